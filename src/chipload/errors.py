@@ -1,0 +1,30 @@
+"""What can go wrong: one root error, refused input, and findings of a reader."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+class ChiploadError(Exception):
+    """Root of every error that chipload raises on purpose."""
+
+
+class InputError(ChiploadError):
+    """Refused input; the message names the thing, its value, the limit and the remedy."""
+
+
+class Cancelled(ChiploadError):
+    """A long call was stopped by its ``progress`` callback."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a reader or a planner noticed and did not hide.
+
+    ``code`` is short and stable (``dxf-joined``), ``line`` the line in the source (0: none), ``text`` says what
+    and where in a sentence.
+    """
+
+    code: str
+    line: int
+    text: str
