@@ -1,0 +1,1 @@
+"""Contours finished at constant engagement: the walls, the passes, and what they cost."""

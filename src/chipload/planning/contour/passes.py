@@ -1,0 +1,110 @@
+"""The passes of a contour: centre path, the stock each one meets, and the ways in and out.
+
+Notation: planning frame, material on the right; R cutter radius, s radial depth of the finish pass, s1 that of the
+semi-finish pass; W the walls, O the finish centre path.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from chipload.engagement.contact import StockBoundary
+from chipload.errors import InputError
+from chipload.geometry.contour import Contour
+from chipload.geometry.distance import distance
+from chipload.geometry.offset import offset
+from chipload.planning.contour.backward import pass_before
+from chipload.planning.contour.wall import Walls
+from chipload.planning.result import Event
+
+
+@dataclass(frozen=True, eq=False)
+class Pass:
+    """One pass round one wall.
+
+    ``path`` the centre path that makes the wall, ``lead_in`` and ``lead_out`` its ways in and out (None where there is
+    no room), ``stock`` what it meets, ``stopped`` why it ends before it should.
+    """
+
+    name: str
+    path: Contour
+    lead_in: Contour | None
+    lead_out: Contour | None
+    stock: StockBoundary
+    stopped: Event | None = None
+
+
+def surface(paths: Sequence[Contour], radius: float) -> tuple[Contour, ...]:
+    """What a pass leaves standing on its right: the parallel of its centre paths at R."""
+    return offset(paths, -radius)
+
+
+def semifinish_paths(
+    finish: Sequence[Contour], walls: Walls, radius: float, depth: float, engagement: float | None
+) -> tuple[Contour, ...]:
+    """Centre paths of the semi-finish pass: parallel to the walls at R + ``depth``, or, with an ``engagement``,
+    the backward method's O*.
+
+    Raises
+    ------
+    InputError
+        The pass vanishes somewhere, so that the finish pass would meet more than it should.
+    """
+    if engagement is None:
+        paths = offset(walls.extended, radius + depth)
+    else:
+        paths = tuple(c for path in finish for c in pass_before(path, radius, engagement))
+    if len(paths) != len(finish):
+        raise InputError(
+            f"operation.radial_depth_mm = {depth:g}: the semi-finish pass falls into {len(paths)} pieces where the "
+            f"finish pass has {len(finish)}: the passage is too narrow, take a smaller cutter or depth"
+        )
+    return paths
+
+
+def boundary(contours: Sequence[Contour]) -> StockBoundary:
+    """Stock on the right of ``contours`` as the kernel wants it, on the left."""
+    return StockBoundary(np.vstack([c.reversed().segments for c in contours]))
+
+
+def start_at_widest(path: Contour) -> Contour:
+    """A closed path started in the middle of its longest segment; an open one as it is."""
+    if not path.closed:
+        return path
+    k = int(np.argmax(path.lengths))
+    return path.started_at(0.5 * (path.knots[k] + path.knots[k + 1]))
+
+
+def with_leads(name: str, path: Contour, stock: StockBoundary, walls: Walls, radius: float, lead: float) -> Pass:
+    """A pass with its ways in and out.
+
+    Closed: a quarter circle of radius ``lead`` tangent to the path on the free side, halved until it is R clear of all
+    walls. Open: the path is that over the extended chain; its run-on and run-off along the end tangents are the leads.
+    """
+    if not path.closed:
+        spare = walls.run_on - lead
+        total = path.length
+        return Pass(
+            name,
+            path.part(walls.run_on, total - walls.run_on),
+            path.part(spare, walls.run_on),
+            path.part(total - walls.run_on, total - spare),
+            stock,
+        )
+    p, t, _ = path.at([0.0])
+    o, t = p[0], t[0]
+    n = np.array([-t[1], t[0]])
+    wall = np.vstack([w.segments for w in walls.extended])
+    while lead > 1e-3 * radius:
+        c = o + lead * n
+        way_in = Contour(np.array([[*(c - lead * t), *o, *c, 0.5 * math.pi]]))
+        way_out = Contour(np.array([[*o, *(c + lead * t), *c, 0.5 * math.pi]]))
+        probe = np.vstack([w.at(np.linspace(0.0, w.length, 64))[0] for w in (way_in, way_out)])
+        if distance(wall, probe).min() >= radius - 1e-7:
+            return Pass(name, path, way_in, way_out, stock)
+        lead *= 0.5
+    return Pass(name, path, None, None, stock)

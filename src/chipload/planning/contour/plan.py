@@ -1,0 +1,317 @@
+"""A contour semi-finished and finished by several strategies, side by side.
+
+Notation: R cutter radius, s radial depth of the finish pass, a* = arccos(1 - s/R) its engagement angle along a line,
+f0 the programmed feed; planning frame as in :mod:`.wall`.
+
+Reference: [Uddin2007]; `forward` [Stori2000].
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material
+from chipload.cutting.wall import Milling
+from chipload.engagement.contact import engagement
+from chipload.errors import InputError
+from chipload.geometry.contour import Contour
+from chipload.geometry.distance import distance
+from chipload.geometry.offset import offset
+from chipload.machine.machine import Machine
+from chipload.planning.contour.ease import eased
+from chipload.planning.contour.forward import forward_pass
+from chipload.planning.contour.moves import Moves, pass_moves
+from chipload.planning.contour.passes import Pass, boundary, semifinish_paths, start_at_widest, surface, with_leads
+from chipload.planning.contour.sampled import mirrored_pass, sampled, stations
+from chipload.planning.contour.wall import Walls, centre_paths, mirrored, walls_of
+from chipload.planning.cost import Cut, check_limits, cost, stacked
+from chipload.planning.result import Columns, Event, OperationResult, StrategyResult
+from chipload.program.program import Program
+from chipload.progress import Progress, silent
+
+#: strategies that a contour compares
+STRATEGIES = ("plain", "backward", "feed")
+
+
+@dataclass(frozen=True)
+class Finishing:
+    """What the engineer asks of a contour; mm, mm/s, rad/s.
+
+    Parameters
+    ----------
+    side : `inside`, `outside`, `left`, `right`: where the cutter runs
+    milling : `down` or `up`
+    strategies : among `plain`, `backward`, `feed`; or `forward` alone
+    use : the strategy whose program is released
+    joint : `sharp` or `clothoid`
+    radial_depth : s of the finish pass
+    axial_depth : depth of cut
+    semifinish_depth : radial depth that the semi-finish pass takes on a straight wall
+    passes : semi-finish passes before the finish pass, or passes of `forward`
+    feed : f0 of the centre [mm/s]
+    spindle_speed : [rad/s]
+    tolerance : how far eased joints may leave the drawn contour, and what a cutter may leave in a corner
+    step : of the history, and of the forward method
+    lead : radius of the quarter circles in and out, length of run-on and run-off of open chains
+    top, clearance : z of the stock's top, height of rapids above it
+    """
+
+    side: str
+    milling: Milling
+    strategies: tuple[str, ...]
+    use: str
+    joint: str
+    radial_depth: float
+    axial_depth: float
+    semifinish_depth: float
+    passes: int
+    feed: float
+    spindle_speed: float
+    tolerance: float
+    step: float
+    lead: float
+    top: float
+    clearance: float
+
+    def engagement(self, radius: float) -> float:
+        """a* [rad] for a cutter of radius R.
+
+        Raises
+        ------
+        InputError
+            s is 2 R or more: the cutter would leave a wall behind it.
+        """
+        if not 0.0 < self.radial_depth < 2.0 * radius:
+            raise InputError(
+                f"operation.radial_depth_mm = {self.radial_depth:g}: must be above 0 and below the cutter's "
+                f"diameter_mm = {2.0 * radius:g}: take several passes"
+            )
+        return math.acos(1.0 - self.radial_depth / radius)
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """What all strategies of one operation share."""
+
+    setting: Finishing
+    cut: Cut
+    machine: Machine
+    limits: Mapping[str, float]
+    walls: Walls
+    finish: tuple[Contour, ...]
+    deviation: float
+    events: tuple[Event, ...]
+
+    @property
+    def radius(self) -> float:
+        return self.cut.cutter.radius
+
+    @property
+    def flip(self) -> bool:
+        return self.setting.milling == "up"
+
+
+def plan_contour(
+    contours: Sequence[Contour],
+    setting: Finishing,
+    cutter: Cutter,
+    material: Material,
+    machine: Machine,
+    limits: Mapping[str, float],
+    progress: Progress = silent,
+) -> OperationResult:
+    """Plan the strategies of ``setting`` on drawn ``contours``; ``limits`` as in :data:`chipload.planning.cost.LIMITS`.
+
+    Raises
+    ------
+    InputError
+        The contour, the cutter and the depths do not go together; the message says where and what would.
+    """
+    radius = cutter.radius
+    a = setting.engagement(radius)
+    cut = Cut(cutter, material, setting.axial_depth, setting.spindle_speed, setting.milling)
+    walls = walls_of(contours, setting.side, setting.milling, setting.lead + 3.0 * radius)
+    if setting.strategies == ("forward",):
+        job = _Job(setting, cut, machine, limits, walls, (), 0.0, ())
+        return OperationResult("forward", "forward", {"forward": _strategy(job, "forward", _forward_passes(job, a))})
+    finish = tuple(start_at_widest(p) for p in centre_paths(walls, radius, setting.tolerance))
+    deviation, events = 0.0, []
+    if setting.joint == "clothoid":
+        easings = [eased(p, radius, a, setting.tolerance) for p in finish]
+        finish = tuple(start_at_widest(e.path) for e in easings)
+        deviation = max(e.deviation_mm for e in easings)
+        events = [x for e in easings for x in e.events]
+    job = _Job(setting, cut, machine, limits, walls, finish, deviation, tuple(events))
+    results = {}
+    for k, name in enumerate(setting.strategies):
+        progress(k / len(setting.strategies), f"contour, {name}")
+        results[name] = _strategy(job, name, _passes(job, a if name == "backward" else None))
+    progress(1.0, "contour")
+    return OperationResult("contour", setting.use, results)
+
+
+def _passes(job: _Job, a: float | None) -> list[Pass]:
+    """Semi-finish passes and the finish pass, outermost first; ``a``: by the backward method, else parallel."""
+    setting, radius = job.setting, job.radius
+    paths = [job.finish]
+    for _ in range(setting.passes):
+        before = semifinish_paths(paths[0], job.walls, radius, setting.radial_depth, a)
+        paths.insert(0, tuple(start_at_widest(p) for p in before))
+    rough = setting.passes * setting.radial_depth + setting.semifinish_depth
+    stock = boundary(offset(job.finish, rough - radius)) if rough != radius else boundary(job.finish)
+    out = []
+    for k, group in enumerate(paths):
+        name = "finish" if k == len(paths) - 1 else "semifinish"
+        out += [with_leads(name, path, stock, job.walls, radius, setting.lead) for path in group]
+        if name != "finish":
+            stock = boundary(surface(group, radius))
+    return out
+
+
+def _forward_passes(job: _Job, a: float) -> list[Pass]:
+    """Passes into the material from the drawn contours, each on the surface of the one before."""
+    setting, radius = job.setting, job.radius
+    out = []
+    for old in job.walls.extended:
+        for _ in range(setting.passes):
+            run = forward_pass(old, radius, a, setting.step)
+            path = Contour.polyline(run.centre)
+            out.append(Pass("finish", path, None, None, boundary([old]), run.event))
+            if run.event is not None:
+                break
+            made = run.made[:-1] if old.closed else run.made
+            old = Contour.polyline(made, closed=old.closed)
+    return out
+
+
+def _strategy(job: _Job, name: str, planar: list[Pass]) -> StrategyResult:
+    """Sample, cost and program the passes of one strategy."""
+    setting = job.setting
+    runs = [mirrored_pass(p, job.flip) for p in planar]
+    z = setting.top - setting.axial_depth
+    histories: list[Columns] = []
+    programs: list[Program] = []
+    for run in runs:
+        steps = sampled(run, job.radius, setting.step)
+        moves = pass_moves(run, steps, setting, job.machine, name == "feed" and run.name == "finish")
+        makes_wall = (steps.zone == run.name) | (steps.zone == "closing")
+        histories.append(
+            cost(job.cut, steps.zone, steps.s, moves.time, steps.centre, steps.heading, z, steps.engagement,
+                 moves.speed, makes_wall)
+        )  # fmt: skip
+        programs.append(moves.program(run, setting, job.machine, job.cut.cutter.number))
+    history = stacked(histories)
+    on_wall = np.asarray(history["pass"] == "finish")
+    events = (*job.events, *_events(job, runs, history, name))
+    drawn = {
+        "wall": tuple(_back(w, job.flip) for w in job.walls.walls),
+        "semifinish path": tuple(r.path for r in runs if r.name == "semifinish"),
+        "finish path": tuple(r.path for r in runs if r.name == "finish"),
+        "stock": tuple(
+            Contour(c.segments) for r in runs if r.name == "finish" for c in _chains(r.stock.segments)
+        ),
+    }
+    return StrategyResult(
+        name,
+        Program.join(programs),
+        history,
+        _summary(job, name, history, on_wall),
+        events,
+        check_limits(job.limits, history, on_wall),
+        drawn,
+    )
+
+
+def _back(contour: Contour, flip: bool) -> Contour:
+    return mirrored(contour).reversed() if flip else contour
+
+
+def _chains(seg: np.ndarray) -> list[Contour]:  # type: ignore[type-arg]
+    """Contours of a boundary's rows, cut where one does not follow the other."""
+    cut = np.flatnonzero(np.hypot(*(seg[1:, 0:2] - seg[:-1, 2:4]).T) > 1e-6) + 1
+    return [Contour(part) for part in np.split(seg, cut)]
+
+
+def _summary(job: _Job, name: str, history: Columns, on_wall: np.ndarray) -> dict[str, object]:  # type: ignore[type-arg]
+    def span(column: str) -> dict[str, float]:
+        values = history[column][on_wall]
+        return {"min": float(values.min()), "max": float(values.max())}
+
+    wanted = math.degrees(job.setting.engagement(job.radius))
+    finish = np.isin(history["pass"], ["finish", "closing"])
+    error = history["error_signed_um"][on_wall]
+    return {
+        "engagement_deg": {**span("engagement_deg"), "wanted": wanted},
+        "force_xy_n": span("force_xy_n"),
+        "force_mean_xy_n": {
+            "min": float(np.hypot(history["force_mean_x_n"], history["force_mean_y_n"])[on_wall].min()),
+            "max": float(np.hypot(history["force_mean_x_n"], history["force_mean_y_n"])[on_wall].max()),
+        },
+        "torque_nm": span("torque_nm"),
+        "error_um": {
+            "max": float(history["error_um"][on_wall].max()),
+            "signed_min": float(error.min()),
+            "signed_max": float(error.max()),
+        },
+        "feed_mm_min": span("feed_mm_min"),
+        "time_s": float(history["t_s"][-1]),
+        "finish_time_s": float(_elapsed(history, finish)),
+        "path_mm": float(history["s_mm"][-1]),
+        "deviation_mm": job.deviation,
+    }
+
+
+def _elapsed(history: Columns, where: np.ndarray) -> float:  # type: ignore[type-arg]
+    """Time spent in the steps that end in a row ``where`` [s]."""
+    return float(np.diff(history["t_s"], prepend=0.0)[where].sum())
+
+
+def _events(job: _Job, runs: list[Pass], history: Columns, name: str) -> list[Event]:
+    """What the passes could not keep: no room for leads, stock too thin for the method, broken boundaries."""
+    out = [r.stopped for r in runs if r.stopped is not None]
+    for r in runs:
+        if r.lead_in is None and name != "forward":
+            x, y = r.path.start
+            out.append(Event("lead-none", x, y, f"{r.name}: no room to lead in: the cutter enters on the wall"))
+    broken = history["arcs"] < 0
+    if broken.any():
+        k = int(np.flatnonzero(broken)[0])
+        out.append(
+            Event(
+                "engagement-unknown",
+                float(history["x_mm"][k]),
+                float(history["y_mm"][k]),
+                f"the stock's boundary is broken here: engagement unknown in {int(broken.sum())} steps",
+                failure=True,
+            )
+        )
+    return out + (_thin_stock(job, runs) if name == "backward" else [])
+
+
+def _thin_stock(job: _Job, runs: list[Pass]) -> list[Event]:
+    """Where the reshaped surface lies outside the stock that roughing left, so that the finish pass meets less."""
+    rough = job.setting.passes * job.setting.radial_depth + job.setting.semifinish_depth
+    wall = np.vstack([_back(w, job.flip).segments for w in job.walls.extended])
+    for r in runs:
+        if r.name != "finish":
+            continue
+        points = np.vstack([c.at(stations(c, job.setting.step))[0] for c in _chains(r.stock.segments)])
+        depth = distance(wall, points)
+        k = int(depth.argmax())
+        if depth[k] > rough + 1e-6:
+            return [
+                Event(
+                    "stock-thin",
+                    float(points[k, 0]),
+                    float(points[k, 1]),
+                    f"constant engagement asks for {depth[k]:.4g} mm of stock on the wall here, roughing leaves "
+                    f"{rough:.4g} mm: raise semifinish_depth_mm to {depth[k] - rough + job.setting.semifinish_depth:.4g}",
+                    failure=True,
+                )
+            ]
+    return []
