@@ -1,0 +1,1 @@
+"""What a cut costs: material coefficients, force, torque, power, and the wall it leaves."""

@@ -1,0 +1,1 @@
+"""What gives way under the force: the cutter as a beam."""

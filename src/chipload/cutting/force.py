@@ -1,0 +1,219 @@
+"""Force, torque and power of what the teeth cut: the one force model of chipload.
+
+Notation: T unit feed direction, n = Rot(+90 deg) T, both in the work plane; the axis points from the tip to the
+holder. phi immersion, h chip thickness, z height and bites as in :mod:`chipload.cutting.bites`; theta rotation of
+tooth 0 at the tip, counted as phi; the edge at height z lags by z tan(helix) / R. Ft, Fr, Fa and their coefficients as
+in :mod:`chipload.cutting.material`.
+
+Every force is the force ON THE CUTTER; the one on the work is its opposite. With a clockwise spindle (M3, seen from
+above) the rim at phi lies in the direction u = cos(phi) n + sin(phi) T and moves along t = cos(phi) T - sin(phi) n. The
+tangential force opposes the motion of the tooth, the radial one pushes it towards the cutter's axis, and the axial one
+pulls a right-hand helix with right-hand cut out of the holder:
+
+    dF = (-dFt t - dFr u, -dFa along the axis),  dFt = (Ktc h + Kte) dz, likewise r and a.
+
+With a counter-clockwise spindle (M4, left-hand cutter) n is mirrored and the rest stands.
+
+Between the bounds of a bite h is a sinusoid, and the integral over z is a closed form: no slices. Torque is Ft R.
+
+Reference: [Altintas2012] ch. 2, analytic forces of a helical end mill; sign of the axial force [Engin2001].
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting import _kernels
+from chipload.cutting.bites import Bites, bites_of_arcs
+from chipload.cutting.material import Material
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+Spindle = Literal["cw", "ccw"]
+
+#: distance of samples over the revolution [rad]; the greatest is refined between them
+SAMPLE_STEP = math.radians(1.0)
+
+
+def edge_lag(cutter: Cutter) -> float:
+    """tan(helix) / R [rad/mm]: how far the edge lags behind its tip for each mm of height."""
+    return math.tan(cutter.helix) / cutter.radius
+
+
+def forces_over_turn(bites: Bites, cutter: Cutter, material: Material, theta: ArrayLike) -> tuple[Floats, Floats]:
+    """Force on the cutter and torque at given rotations.
+
+    Parameters
+    ----------
+    bites : of n steps
+    cutter, material : helix, teeth, radius; coefficients
+    theta : (m,) float [rad], rotation of tooth 0 at the tip
+
+    Returns
+    -------
+    force : (n, m, 3) float [N] along T, n (mirrored where the spindle is counter-clockwise) and the axis
+    torque : (n, m) float [N mm]
+
+    Examples
+    --------
+    One straight tooth straight ahead: Ft = (Ktc f_z + Kte) depth = (1000 * 0.1 + 10) * 2 pushes it towards +n.
+
+    >>> mill = Cutter(10.0, 1, 0.0, 20.0, 30.0, 6e5)
+    >>> plain = Material("plain", 1000.0, 300.0, 0.0, 10.0, 5.0, 0.0, source="made up for this example")
+    >>> bites = bites_of_arcs([0.0], [math.pi], 0.1, mill, 2.0)
+    >>> force, torque = forces_over_turn(bites, mill, plain, [math.pi / 2])
+    >>> force[0, 0].round(9).tolist(), torque.round(9).tolist()
+    ([-70.0, 220.0, 0.0], [[1100.0]])
+    """
+    angles = np.ascontiguousarray(theta, dtype=np.float64)
+    out = np.zeros((len(bites), len(angles), 4))
+    _kernels.turn_of(
+        bites.start,
+        bites.rows,
+        bites.tooth,
+        angles,
+        cutter.flutes,
+        edge_lag(cutter),
+        cutter.radius,
+        np.array(material.coefficients),
+        out,
+    )
+    return out[..., :3], out[..., 3]
+
+
+def mean_forces(bites: Bites, cutter: Cutter, material: Material) -> tuple[Floats, Floats]:
+    """Force on the cutter and torque averaged over a revolution, in closed form; the helix does not enter.
+
+    Returns
+    -------
+    force : (n, 3) float [N] along T, n (mirrored where the spindle is counter-clockwise) and the axis
+    torque : (n,) float [N mm]
+
+    Reference: [Altintas2012] ch. 2, average forces.
+    """
+    out = np.zeros((len(bites), 4))
+    coefficients = np.array(material.coefficients)
+    _kernels.means(bites.start, bites.rows, bites.tooth, cutter.flutes, cutter.radius, coefficients, out)
+    return out[:, :3], out[:, 3]
+
+
+def greatest_forces(
+    bites: Bites, cutter: Cutter, material: Material, sample_step: float = SAMPLE_STEP
+) -> Mapping[str, Floats]:
+    """Where the load is greatest over a revolution.
+
+    The rotations where a bite begins or ends are found exactly; between them the load is smooth, is sampled at most
+    ``sample_step`` apart and refined by golden section. Jumps (zero helix) count with their one-sided limits.
+
+    Returns
+    -------
+    mapping of (n,) float columns: ``force_t``, ``force_n`` [N] at the greatest in-plane resultant and its rotation
+    ``theta`` [rad]; ``torque`` [N mm] the greatest; ``force_axis`` [N] the axial force of greatest size, signed.
+    """
+    if not 0.0 < sample_step <= math.radians(15.0):
+        raise InputError(f"sample_step = {math.degrees(sample_step):g} deg: must be above 0 and at most 15")
+    out = np.zeros((len(bites), 5))
+    _kernels.greatest(
+        bites.start,
+        bites.rows,
+        bites.tooth,
+        cutter.flutes,
+        edge_lag(cutter),
+        cutter.radius,
+        np.array(material.coefficients),
+        sample_step,
+        out,
+    )
+    names = ("force_t", "force_n", "theta", "torque", "force_axis")
+    return dict(zip(names, out.T, strict=True))
+
+
+def forces_along(
+    phi_in: ArrayLike,
+    phi_out: ArrayLike,
+    feed_per_tooth: ArrayLike,
+    T: ArrayLike,
+    cutter: Cutter,
+    material: Material,
+    axial_depth: float,
+    *,
+    spindle_speed: ArrayLike,
+    spindle: Spindle = "cw",
+    count: ArrayLike | None = None,
+    sample_step: float = SAMPLE_STEP,
+) -> dict[str, NDArray[Any]]:
+    """Force, torque and power of every step of a pass.
+
+    Parameters
+    ----------
+    phi_in, phi_out : (n,) or (n, k) float [rad], engaged arcs counted clockwise from n, within 0 .. pi;
+        ``Engagement.phi[..., 0]`` and ``[..., 1]``
+    feed_per_tooth : () or (n,) float [mm], of the cutter's centre
+    T : (n, 2) float, unit feed direction
+    cutter : straight flank
+    material : coefficients
+    axial_depth : [mm], at most the flute length
+    spindle_speed : () or (n,) float [rad/s], for the power
+    spindle : ``cw`` (M3) or ``ccw`` (M4, a left-hand cutter)
+    count : (n,) int, arcs that hold; None: all k
+    sample_step : [rad], of the search over the revolution
+
+    Returns
+    -------
+    columns, (n,) float each
+        ``force_x_n``, ``force_y_n`` on the cutter in the work frame where the in-plane resultant over the revolution is
+        greatest, ``force_xy_n`` that resultant; ``force_mean_x_n``, ``force_mean_y_n``, ``force_mean_z_n`` over the
+        revolution; ``force_z_n`` the axial force of greatest size, below 0 where the cutter is pulled out of its
+        holder; ``torque_nm`` the greatest, ``torque_mean_nm``; ``power_w`` the mean; ``chip_max_mm`` the thickest
+        chip. Where nothing is cut all are 0.
+
+    Raises
+    ------
+    InputError
+        As :func:`chipload.cutting.bites.bites_of_arcs`; T is not (n, 2) of unit vectors; a speed below 0.
+
+    Examples
+    --------
+    A full slot with two teeth: their mean cutting force across the feed is N depth Ktc f_z / 4.
+
+    >>> mill = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5)
+    >>> plain = Material("plain", 1000.0, 0.0, 0.0, 0.0, 0.0, 0.0, source="made up for this example")
+    >>> slot = forces_along([0.0], [math.pi], 0.1, [[1.0, 0.0]], mill, plain, 2.0, spindle_speed=100.0)
+    >>> float(slot["force_mean_y_n"][0].round(9))
+    100.0
+    """
+    if spindle not in ("cw", "ccw"):
+        raise InputError(f"spindle = {spindle!r}: must be cw or ccw")
+    heading = np.asarray(T, dtype=np.float64)
+    bites = bites_of_arcs(phi_in, phi_out, feed_per_tooth, cutter, axial_depth, count=count, clockwise=spindle == "cw")
+    n = len(bites)
+    if heading.shape != (n, 2) or not np.all(np.abs(np.hypot(heading[:, 0], heading[:, 1]) - 1.0) < 1e-6):
+        raise InputError(f"T of shape {heading.shape}: need ({n}, 2) unit vectors, one a step")
+    speed = np.broadcast_to(np.asarray(spindle_speed, dtype=np.float64), (n,))
+    if not ((speed >= 0.0) & np.isfinite(speed)).all():
+        raise InputError("spindle_speed: must be finite and at least 0 rad/s")
+    side = 1.0 if spindle == "cw" else -1.0
+    left = side * np.column_stack([-heading[:, 1], heading[:, 0]])
+    peak = greatest_forces(bites, cutter, material, sample_step)
+    mean, torque_mean = mean_forces(bites, cutter, material)
+    plane = peak["force_t"][:, None] * heading + peak["force_n"][:, None] * left
+    mean_plane = mean[:, :1] * heading + mean[:, 1:2] * left
+    return {
+        "force_x_n": plane[:, 0],
+        "force_y_n": plane[:, 1],
+        "force_xy_n": np.hypot(peak["force_t"], peak["force_n"]),
+        "force_mean_x_n": mean_plane[:, 0],
+        "force_mean_y_n": mean_plane[:, 1],
+        "force_mean_z_n": mean[:, 2],
+        "force_z_n": peak["force_axis"],
+        "torque_nm": peak["torque"] / 1000.0,
+        "torque_mean_nm": torque_mean / 1000.0,
+        "power_w": torque_mean * speed / 1000.0,
+        "chip_max_mm": bites.chip_max(),
+    }
