@@ -1,0 +1,1 @@
+"""What the cutter touches: contact arcs of the rim."""

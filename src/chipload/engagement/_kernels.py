@@ -18,7 +18,8 @@ MAX_CROSSINGS = 256
 @njit(cache=True, nogil=True)
 def rim_crossings(ox, oy, r, seg, candidates, n, angle, sign):  # type: ignore[no-untyped-def]
     """Where the rim crosses the segments ``seg[candidates[:n]]``: fills ``angle`` in [0, 2 pi) and ``sign`` (+1 the
-    rim, run counter-clockwise, enters material there, -1 it leaves), unsorted. Returns the count, -1 if too many."""
+    rim, run counter-clockwise, enters material there, -1 it leaves), unsorted. Returns the count, -1 if too many.
+    """
     count = 0
     for j in range(n):
         i = candidates[j]
@@ -216,7 +217,7 @@ def boxes(seg, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def engage(centres, headings, r, seg, box, first, last, angle, count, phi):  # type: ignore[no-untyped-def]
-    """Fill ``angle``, ``count`` and ``phi`` of the queries first..last; candidates are kept while the centre stays near."""
+    """Fill ``angle``, ``count``, ``phi`` of the queries first..last; candidates are kept while the centre stays near."""
     n = len(seg)
     candidates = np.empty(n, dtype=np.int64)
     everything = np.arange(n)
@@ -237,12 +238,7 @@ def engage(centres, headings, r, seg, box, first, last, angle, count, phi):  # t
             kept = 0
             far = r * 1.001 + reach
             for i in range(n):
-                if (
-                    box[i, 0] <= ox + far
-                    and box[i, 2] >= ox - far
-                    and box[i, 1] <= oy + far
-                    and box[i, 3] >= oy - far
-                ):
+                if box[i, 0] <= ox + far and box[i, 2] >= ox - far and box[i, 1] <= oy + far and box[i, 3] >= oy - far:
                     candidates[kept] = i
                     kept += 1
         arcs = rim_arcs(ox, oy, r, seg, candidates, kept, enter, leave)

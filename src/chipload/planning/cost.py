@@ -18,7 +18,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_along
 from chipload.cutting.material import Material
 from chipload.cutting.wall import Milling, wall_error_along
-from chipload.engagement.contact import Engagement
+from chipload.engagement.contact import PIECES, Engagement
 from chipload.planning.result import Columns, LimitCheck, worst
 from chipload.units import mm_min_from_mm_s
 
@@ -69,9 +69,18 @@ def cost(
     makes_wall : (n,) bool, where the wall error is asked for; 0 elsewhere
     """
     f_z = cut.feed_per_tooth(speed)
+    count = np.clip(met.count, 0, PIECES)
     phi_in, phi_out = met.phi[:, :, 0], met.phi[:, :, 1]
     load = forces_along(
-        phi_in, phi_out, f_z, heading, cut.cutter, cut.material, cut.axial_depth, spindle_speed=cut.spindle_speed
+        phi_in,
+        phi_out,
+        f_z,
+        heading,
+        cut.cutter,
+        cut.material,
+        cut.axial_depth,
+        spindle_speed=cut.spindle_speed,
+        count=count,
     )
     error = np.zeros(len(s))
     signed = np.zeros(len(s))
@@ -84,6 +93,7 @@ def cost(
             cut.material,
             cut.axial_depth,
             milling=cut.milling,
+            count=count[makes_wall],
         )
         error[makes_wall], signed[makes_wall] = wall["error_um"], wall["error_signed_um"]
     return {
@@ -113,7 +123,7 @@ def stacked(parts: Iterable[Columns]) -> Columns:
 
 
 def check_limits(limits: Mapping[str, float], history: Columns, wall_pass: NDArray[np.bool_]) -> tuple[LimitCheck, ...]:
-    """Every stated limit against the worst row: engagement and wall error where the wall is made, the others anywhere."""
+    """Every stated limit against its worst row: engagement and wall error on the wall, the others anywhere."""
     out = []
     for name, limit in limits.items():
         column, on_wall = LIMITS[name]

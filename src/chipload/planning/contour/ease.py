@@ -52,9 +52,9 @@ def clothoid_length(radius: float, engagement: float, rho: float, sign: float) -
 
 
 def corner(theta: float, rho: float, length: float) -> Floats:
-    """Chords (2 ARCS + 1, 3) of an eased corner in the frame of its first line: start x, y and curvature of each arc.
+    """Curvature [1/mm] and length [mm] of the 2 ARCS + 1 arcs of an eased corner: clothoid in, arc, clothoid out.
 
-    Rows are the clothoid in, the arc, the clothoid out; turns by ``theta`` (sign: to the left positive) in all.
+    They turn by ``theta`` in all, positive to the left.
     """
     sign = math.copysign(1.0, theta)
     step = length / ARCS
@@ -99,9 +99,9 @@ def eased(path: Contour, radius: float, engagement: float, tolerance_mm: float) 
             continue
         before, after = (k - 1) % n, (k + 1) % n
         inner = path.closed or 0 < k < n - 1
-        where = path.at(0.5 * (path.knots[k] + path.knots[k + 1]))[0][0]
+        x, y = path.at(0.5 * (path.knots[k] + path.knots[k + 1]))[0][0].tolist()
         if not inner or seg[before, 6] != 0.0 or seg[after, 6] != 0.0 or n < 3:
-            events.append(Event("joint-kept", *where, "arc not between two lines: its joints stay sharp"))
+            events.append(Event("joint-kept", x, y, "arc not between two lines: its joints stay sharp"))
             continue
         theta, rho = float(seg[k, 6]), float(path.radii[k])
         wanted = clothoid_length(radius, engagement, rho, math.copysign(1.0, theta))
@@ -111,7 +111,8 @@ def eased(path: Contour, radius: float, engagement: float, tolerance_mm: float) 
             events.append(
                 Event(
                     "joint-kept",
-                    *where,
+                    x,
+                    y,
                     f"no easing of the {rho:.4g} mm arc stays within tolerance_mm = {tolerance_mm:g}: joint kept sharp",
                 )
             )
@@ -121,7 +122,8 @@ def eased(path: Contour, radius: float, engagement: float, tolerance_mm: float) 
             events.append(
                 Event(
                     "joint-short",
-                    *where,
+                    x,
+                    y,
                     f"clothoid shortened to {share:.0%} of what constant engagement needs, to stay within "
                     f"tolerance_mm = {tolerance_mm:g}",
                 )
@@ -148,7 +150,7 @@ def eased(path: Contour, radius: float, engagement: float, tolerance_mm: float) 
 def _fit(
     theta: float, rho: float, radius: float, engagement: float, wanted: float, room: float, tolerance: float
 ) -> tuple[Floats, float, float, float] | None:
-    """The eased corner that leaves the drawn arc least: its arcs, the set-back along the lines, deviation, share of L."""
+    """The eased corner that leaves the drawn arc least: arcs, set-back along the lines, deviation, share of L."""
     sign = math.copysign(1.0, theta)
     half = 0.5 * abs(theta)
     if half >= 0.5 * math.pi - 1e-9 or not math.isfinite(wanted):

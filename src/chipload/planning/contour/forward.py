@@ -6,8 +6,9 @@ feed, O(i) = Q(i) + R Rot(+90 deg) T(i) the cutter's centre, L = |P(i) - Q(i)| =
 1. d = P(i+1) - Q(i), q = d . T(i), lambda = q - sqrt(q^2 - |d|^2 + L^2), Q(i+1) = Q(i) + lambda T(i)
 2. T(i+1) = Rot(-a*/2) (P(i+1) - Q(i+1)) / L
 
-First order in the step. It is sure for convex stock (material that bulges towards the cutter); elsewhere it can fail and then says where:
-the centre stops or turns back, no Q(i+1) at distance L exists, or the corner is sharper than 90 deg - a*/2.
+First order in the step. It is sure for convex stock (material that bulges towards the cutter); elsewhere it can fail
+and then says where: the centre stops or turns back, no Q(i+1) at distance L exists, or the corner is sharper than
+90 deg - a*/2.
 
 Reference: [Stori2000], as given (repaired) in [Uddin2007].
 """
@@ -20,23 +21,42 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.engagement.contact import StockBoundary, engagement
 from chipload.geometry.contour import Contour
 from chipload.planning.result import Event
 
 Floats = NDArray[np.float64]
 
+#: ends of a pass round a closed contour nearer than this [mm] are made one
+SEAM_MM = 1e-3
+
 
 @dataclass(frozen=True, eq=False)
 class ForwardPass:
     """Rows along the pass: ``centre`` (n, 2) [mm], ``heading`` (n, 2), ``made`` (n, 2) the new surface Q [mm]; ``old``
-    the old surface as run; ``event`` says why it stopped before the end of the old surface, None if it did not."""
+    the old surface as run; ``event`` says why it stopped before the end of the old surface, None if it did not.
+    """
 
     centre: Floats
     heading: Floats
     made: Floats
     old: Contour
     event: Event | None
+
+    def path(self) -> Contour:
+        """The centre path as arcs that turn from one heading to the next, closed where the pass came round."""
+        return self._smooth(self.centre)
+
+    def surface(self) -> Contour:
+        """The new surface, likewise."""
+        return self._smooth(self.made)
+
+    def _smooth(self, points: Floats) -> Contour:
+        t = self.heading
+        turn = np.arctan2(t[:-1, 0] * t[1:, 1] - t[:-1, 1] * t[1:, 0], (t[:-1] * t[1:]).sum(axis=1))
+        points = points.copy()
+        if self.event is None and self.old.closed and np.hypot(*(points[-1] - points[0])) < SEAM_MM:
+            points[-1] = points[0]
+        return Contour.from_bulges(points, np.append(np.tan(0.25 * turn), 0.0))
 
 
 def steady_start(old: Contour, radius: float, a: float) -> tuple[Floats, Floats]:
@@ -79,7 +99,9 @@ def forward_pass(old: Contour, radius: float, a: float, step: float) -> ForwardP
     q, t = steady_start(old, radius, a)
     reach = 2.0 * radius * math.sin(0.5 * a)
     c, sn = math.cos(0.5 * a), math.sin(0.5 * a)
-    centres, headings, made = [], [], []
+    centres: list[Floats] = []
+    headings: list[Floats] = []
+    made: list[Floats] = []
     event: Event | None = None
     for i in range(n + 1):
         o = q + radius * np.array([-t[1], t[0]])
@@ -100,7 +122,9 @@ def forward_pass(old: Contour, radius: float, a: float, step: float) -> ForwardP
         move = along - math.sqrt(disc)
         if move < 0.0:
             limit = 90.0 - math.degrees(a) / 2.0
-            event = _stop("forward-corner", o, f"convex corner sharper than {limit:.4g} deg: the new surface turns back")
+            event = _stop(
+                "forward-corner", o, f"convex corner sharper than {limit:.4g} deg: the new surface turns back"
+            )
             break
         q = q + move * t
         w = (surface[i + 1] - q) / reach

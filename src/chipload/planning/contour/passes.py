@@ -14,7 +14,7 @@ import numpy as np
 
 from chipload.engagement.contact import StockBoundary
 from chipload.errors import InputError
-from chipload.geometry.contour import Contour
+from chipload.geometry.contour import Contour, Region
 from chipload.geometry.distance import distance
 from chipload.geometry.offset import offset
 from chipload.planning.contour.backward import pass_before
@@ -64,6 +64,35 @@ def semifinish_paths(
             f"finish pass has {len(finish)}: the passage is too narrow, take a smaller cutter or depth"
         )
     return paths
+
+
+def rough_stock(walls: Walls, rough: Sequence[Contour], behind: float) -> Region:
+    """The stock on the walls before the first pass, as a closed region: from the rough surface to ``behind`` mm inside
+    the part, or to half of it, a quarter ... where the parallel of an open wall breaks there.
+
+    Raises
+    ------
+    InputError
+        The walls are too crowded for even a 32nd of it.
+    """
+    depth = behind
+    while depth > behind / 50.0:
+        inner = offset(walls.extended, -depth)
+        if all(c.closed for c in walls.extended):
+            return Region.of([*rough, *inner])
+        if len(inner) == len(rough) == 1:
+            return Region.of([_closed_between(rough[0], inner[0])])
+        depth *= 0.5
+    x, y = walls.walls[0].start
+    raise InputError(f"part: the walls near ({x:.4g}, {y:.4g}) leave no room for stock behind them")
+
+
+def _closed_between(a: Contour, b: Contour) -> Contour:
+    """Two open chains that run the same way, joined at their ends."""
+    ends = np.zeros((2, 7))
+    ends[0, :4] = *a.end, *b.end
+    ends[1, :4] = *b.start, *a.start
+    return Contour(np.vstack([a.segments, ends[:1], b.reversed().segments, ends[1:]]))
 
 
 def boundary(contours: Sequence[Contour]) -> StockBoundary:

@@ -10,25 +10,33 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.cutting.wall import Milling
-from chipload.engagement.contact import engagement
 from chipload.errors import InputError
-from chipload.geometry.contour import Contour
+from chipload.geometry.contour import Contour, Region
 from chipload.geometry.distance import distance
 from chipload.geometry.offset import offset
 from chipload.machine.machine import Machine
 from chipload.planning.contour.ease import eased
 from chipload.planning.contour.forward import forward_pass
-from chipload.planning.contour.moves import Moves, pass_moves
-from chipload.planning.contour.passes import Pass, boundary, semifinish_paths, start_at_widest, surface, with_leads
+from chipload.planning.contour.moves import pass_program, speeds
+from chipload.planning.contour.passes import (
+    Pass,
+    boundary,
+    rough_stock,
+    semifinish_paths,
+    start_at_widest,
+    surface,
+    with_leads,
+)
 from chipload.planning.contour.sampled import mirrored_pass, sampled, stations
-from chipload.planning.contour.wall import Walls, centre_paths, mirrored, walls_of
+from chipload.planning.contour.wall import Walls, centre_paths, mirrored, run_on, walls_of
 from chipload.planning.cost import Cut, check_limits, cost, stacked
 from chipload.planning.result import Columns, Event, OperationResult, StrategyResult
 from chipload.program.program import Program
@@ -155,6 +163,19 @@ def plan_contour(
     return OperationResult("contour", setting.use, results)
 
 
+def _rough(job: _Job) -> tuple[Contour, ...]:
+    """The surface that roughing left: parallel to the walls at all that the passes take."""
+    away = job.setting.passes * job.setting.radial_depth + job.setting.semifinish_depth - job.radius
+    return offset(job.finish, away) if away != 0.0 else job.finish
+
+
+def _stock(job: _Job) -> Region:
+    """What the first motion meets, in the work frame."""
+    rough = _rough(job) if job.finish else job.walls.extended
+    behind = 0.5 * job.radius + (0.0 if job.finish else job.setting.passes * job.setting.radial_depth)
+    return Region(tuple(_back(c, job.flip) for c in rough_stock(job.walls, rough, behind).contours))
+
+
 def _passes(job: _Job, a: float | None) -> list[Pass]:
     """Semi-finish passes and the finish pass, outermost first; ``a``: by the backward method, else parallel."""
     setting, radius = job.setting, job.radius
@@ -162,8 +183,7 @@ def _passes(job: _Job, a: float | None) -> list[Pass]:
     for _ in range(setting.passes):
         before = semifinish_paths(paths[0], job.walls, radius, setting.radial_depth, a)
         paths.insert(0, tuple(start_at_widest(p) for p in before))
-    rough = setting.passes * setting.radial_depth + setting.semifinish_depth
-    stock = boundary(offset(job.finish, rough - radius)) if rough != radius else boundary(job.finish)
+    stock = boundary(_rough(job))
     out = []
     for k, group in enumerate(paths):
         name = "finish" if k == len(paths) - 1 else "semifinish"
@@ -177,15 +197,19 @@ def _forward_passes(job: _Job, a: float) -> list[Pass]:
     """Passes into the material from the drawn contours, each on the surface of the one before."""
     setting, radius = job.setting, job.radius
     out = []
-    for old in job.walls.extended:
+    for wall in job.walls.extended:
+        old = start_at_widest(wall)
         for _ in range(setting.passes):
             run = forward_pass(old, radius, a, setting.step)
-            path = Contour.polyline(run.centre)
-            out.append(Pass("finish", path, None, None, boundary([old]), run.event))
+            stock = boundary([old])
+            old = run.surface()
+            path = run.path()
             if run.event is not None:
+                out.append(Pass("forward", path, None, None, stock, run.event))
                 break
-            made = run.made[:-1] if old.closed else run.made
-            old = Contour.polyline(made, closed=old.closed)
+            out.append(
+                with_leads("forward", path, stock, Walls((old,), (old,), job.walls.run_on), radius, setting.lead)
+            )
     return out
 
 
@@ -193,28 +217,29 @@ def _strategy(job: _Job, name: str, planar: list[Pass]) -> StrategyResult:
     """Sample, cost and program the passes of one strategy."""
     setting = job.setting
     runs = [mirrored_pass(p, job.flip) for p in planar]
-    z = setting.top - setting.axial_depth
+    z, safe_z = setting.top - setting.axial_depth, setting.top + setting.clearance
+    wanted = setting.engagement(job.radius)
     histories: list[Columns] = []
     programs: list[Program] = []
     for run in runs:
         steps = sampled(run, job.radius, setting.step)
-        moves = pass_moves(run, steps, setting, job.machine, name == "feed" and run.name == "finish")
+        speed = speeds(steps, setting.feed, job.machine, wanted if name == "feed" and run.name == "finish" else None)
         makes_wall = (steps.zone == run.name) | (steps.zone == "closing")
         histories.append(
-            cost(job.cut, steps.zone, steps.s, moves.time, steps.centre, steps.heading, z, steps.engagement,
-                 moves.speed, makes_wall)
+            cost(job.cut, steps.zone, steps.s, speed.time, steps.centre, steps.heading, z, steps.engagement,
+                 speed.reached, makes_wall)
         )  # fmt: skip
-        programs.append(moves.program(run, setting, job.machine, job.cut.cutter.number))
+        programs.append(
+            pass_program(run, steps, speed.programmed, z, safe_z, setting.spindle_speed, job.cut.cutter.number)
+        )
     history = stacked(histories)
-    on_wall = np.asarray(history["pass"] == "finish")
+    on_wall = np.isin(history["pass"], ["finish", "forward"])
     events = (*job.events, *_events(job, runs, history, name))
     drawn = {
         "wall": tuple(_back(w, job.flip) for w in job.walls.walls),
         "semifinish path": tuple(r.path for r in runs if r.name == "semifinish"),
-        "finish path": tuple(r.path for r in runs if r.name == "finish"),
-        "stock": tuple(
-            Contour(c.segments) for r in runs if r.name == "finish" for c in _chains(r.stock.segments)
-        ),
+        "finish path": tuple(r.path for r in runs if r.name != "semifinish"),
+        "stock": tuple(Contour(c.segments) for r in runs if r.name != "semifinish" for c in _chains(r.stock.segments)),
     }
     return StrategyResult(
         name,
@@ -224,6 +249,7 @@ def _strategy(job: _Job, name: str, planar: list[Pass]) -> StrategyResult:
         events,
         check_limits(job.limits, history, on_wall),
         drawn,
+        _stock(job),
     )
 
 
@@ -231,19 +257,19 @@ def _back(contour: Contour, flip: bool) -> Contour:
     return mirrored(contour).reversed() if flip else contour
 
 
-def _chains(seg: np.ndarray) -> list[Contour]:  # type: ignore[type-arg]
+def _chains(seg: NDArray[np.float64]) -> list[Contour]:
     """Contours of a boundary's rows, cut where one does not follow the other."""
     cut = np.flatnonzero(np.hypot(*(seg[1:, 0:2] - seg[:-1, 2:4]).T) > 1e-6) + 1
     return [Contour(part) for part in np.split(seg, cut)]
 
 
-def _summary(job: _Job, name: str, history: Columns, on_wall: np.ndarray) -> dict[str, object]:  # type: ignore[type-arg]
+def _summary(job: _Job, name: str, history: Columns, on_wall: NDArray[np.bool_]) -> dict[str, object]:
     def span(column: str) -> dict[str, float]:
         values = history[column][on_wall]
         return {"min": float(values.min()), "max": float(values.max())}
 
     wanted = math.degrees(job.setting.engagement(job.radius))
-    finish = np.isin(history["pass"], ["finish", "closing"])
+    finish = np.isin(history["pass"], ["finish", "forward", "closing"])
     error = history["error_signed_um"][on_wall]
     return {
         "engagement_deg": {**span("engagement_deg"), "wanted": wanted},
@@ -266,7 +292,7 @@ def _summary(job: _Job, name: str, history: Columns, on_wall: np.ndarray) -> dic
     }
 
 
-def _elapsed(history: Columns, where: np.ndarray) -> float:  # type: ignore[type-arg]
+def _elapsed(history: Columns, where: NDArray[np.bool_]) -> float:
     """Time spent in the steps that end in a row ``where`` [s]."""
     return float(np.diff(history["t_s"], prepend=0.0)[where].sum())
 
@@ -275,7 +301,7 @@ def _events(job: _Job, runs: list[Pass], history: Columns, name: str) -> list[Ev
     """What the passes could not keep: no room for leads, stock too thin for the method, broken boundaries."""
     out = [r.stopped for r in runs if r.stopped is not None]
     for r in runs:
-        if r.lead_in is None and name != "forward":
+        if r.lead_in is None and r.stopped is None:
             x, y = r.path.start
             out.append(Event("lead-none", x, y, f"{r.name}: no room to lead in: the cutter enters on the wall"))
     broken = history["arcs"] < 0
@@ -296,7 +322,7 @@ def _events(job: _Job, runs: list[Pass], history: Columns, name: str) -> list[Ev
 def _thin_stock(job: _Job, runs: list[Pass]) -> list[Event]:
     """Where the reshaped surface lies outside the stock that roughing left, so that the finish pass meets less."""
     rough = job.setting.passes * job.setting.radial_depth + job.setting.semifinish_depth
-    wall = np.vstack([_back(w, job.flip).segments for w in job.walls.extended])
+    wall = np.vstack([_back(run_on(w, job.walls.run_on), job.flip).segments for w in job.walls.extended])
     for r in runs:
         if r.name != "finish":
             continue
@@ -310,7 +336,7 @@ def _thin_stock(job: _Job, runs: list[Pass]) -> list[Event]:
                     float(points[k, 0]),
                     float(points[k, 1]),
                     f"constant engagement asks for {depth[k]:.4g} mm of stock on the wall here, roughing leaves "
-                    f"{rough:.4g} mm: raise semifinish_depth_mm to {depth[k] - rough + job.setting.semifinish_depth:.4g}",
+                    f"{rough:.4g} mm: raise semifinish_depth_mm by {depth[k] - rough:.4g}",
                     failure=True,
                 )
             ]

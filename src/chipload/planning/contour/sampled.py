@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,7 @@ HALVINGS = 40
 class Sampled:
     """Rows along one pass: ``zone`` (n,) is `lead`, the pass's name, or `closing`."""
 
-    zone: NDArray[np.object_]
+    zone: NDArray[Any]
     s: Floats
     centre: Floats
     heading: Floats
@@ -41,7 +42,7 @@ def sampled(run: Pass, radius: float, step: float) -> Sampled:
     The exact engagement is taken against the stock before the pass; the last piece of a closed pass, where the rim
     meets what the pass itself has cut at its beginning, is `closing`.
     """
-    zones: list[NDArray[np.object_]] = []
+    zones: list[NDArray[Any]] = []
     columns: list[tuple[Floats, Floats, Floats, Floats]] = []
     travelled = 0.0
     for zone, part in (("lead", run.lead_in), (run.name, run.path), ("lead", run.lead_out)):
@@ -53,23 +54,25 @@ def sampled(run: Pass, radius: float, step: float) -> Sampled:
         zones.append(np.full(len(s), zone, dtype=object))
         travelled += part.length
     s, o, t, kappa = (np.concatenate(c) for c in zip(*columns, strict=True))
-    zone = np.concatenate(zones)
+    named = np.concatenate(zones)
     met = engagement(run.stock, o, t, radius)
     if run.path.closed:
-        zone, met = _closing(run, radius, zone, s, o, t, met)
-    return Sampled(zone, s, o, t, kappa, met)
+        named, met = _closing(run, radius, named, s, o, t, met)
+    return Sampled(named, s, o, t, kappa, met)
 
 
 def stations(path: Contour, step: float) -> Floats:
     """Lengths along ``path`` no more than ``step`` apart that contain its joints."""
     counts = np.maximum(np.ceil(path.lengths / step), 1).astype(int)
-    parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(path.knots[:-1], path.knots[1:], counts, strict=True)]
+    parts = [
+        np.linspace(a, b, n, endpoint=False) for a, b, n in zip(path.knots[:-1], path.knots[1:], counts, strict=True)
+    ]
     return np.concatenate([*parts, [path.length]])
 
 
 def _closing(
-    run: Pass, radius: float, zone: NDArray[np.object_], s: Floats, o: Floats, t: Floats, met: Engagement
-) -> tuple[NDArray[np.object_], Engagement]:
+    run: Pass, radius: float, zone: NDArray[Any], s: Floats, o: Floats, t: Floats, met: Engagement
+) -> tuple[NDArray[Any], Engagement]:
     """Take what the beginning of a closed pass has cut away from the engagement of its end.
 
     The engaged piece loses the part that lies within R of the lead-in and of the first 2R of the path; its new end is

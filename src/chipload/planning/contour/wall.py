@@ -39,7 +39,7 @@ def mirrored(contour: Contour) -> Contour:
     return Contour(seg)
 
 
-def walls_of(contours: Sequence[Contour], side: str, milling: str, run_on: float) -> Walls:
+def walls_of(contours: Sequence[Contour], side: str, milling: str, length: float) -> Walls:
     """Drawn chains turned so that the material lies on the right of travel, in the planning frame.
 
     Parameters
@@ -47,7 +47,7 @@ def walls_of(contours: Sequence[Contour], side: str, milling: str, run_on: float
     side : where the cutter runs. `inside`, `outside`: of closed contours (nested by even-odd), or on the side of an
         open chain's closing chord and away from it; `left`, `right`: of open chains as drawn
     milling : `down` or `up`
-    run_on : length that open chains are run on at both ends [mm]
+    length : by which open chains are run on at both ends [mm]
 
     Raises
     ------
@@ -73,7 +73,7 @@ def walls_of(contours: Sequence[Contour], side: str, milling: str, run_on: float
             turned = [c.reversed() for c in turned]
     if milling == "up":
         turned = [mirrored(c.reversed()) for c in turned]
-    return Walls(tuple(turned), tuple(_run_on(c, run_on) for c in turned), run_on)
+    return Walls(tuple(turned), tuple(run_on(c, length) for c in turned), length)
 
 
 def _open_inside(chain: Contour) -> Contour:
@@ -89,13 +89,12 @@ def _open_inside(chain: Contour) -> Contour:
     return chain if area > 0.0 else chain.reversed()
 
 
-def _run_on(chain: Contour, run_on: float) -> Contour:
+def run_on(chain: Contour, length: float) -> Contour:
+    """An open chain run on along its end tangents by ``length`` mm at both ends; a closed contour as it is."""
     if chain.closed:
         return chain
     p, t, _ = chain.at([0.0, chain.length])
-    ends = np.array(
-        [[*(p[0] - run_on * t[0]), *p[0], 0.0, 0.0, 0.0], [*p[1], *(p[1] + run_on * t[1]), 0.0, 0.0, 0.0]]
-    )
+    ends = np.array([[*(p[0] - length * t[0]), *p[0], 0.0, 0.0, 0.0], [*p[1], *(p[1] + length * t[1]), 0.0, 0.0, 0.0]])
     return Contour(np.vstack([ends[:1], chain.segments, ends[1:]]))
 
 

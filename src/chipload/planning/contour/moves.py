@@ -1,0 +1,94 @@
+"""How fast a pass runs, and its program.
+
+Notation: f0 programmed feed, v speed that the machine reaches, a_line engagement angle on a straight wall, a the one at
+the step. The schedule of the `feed` strategy is f = f0 sin(a_line) / sin(a) (90 deg where a is more: the thickest chip
+is f_z sin(a)), never above f0. v keeps the machine's acceleration along the path and across it, v^2 |kappa| <= a_max,
+and passes a kink as its junction rule allows.
+
+Reference: [Uddin2007], strategy 3.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.machine.feed import curvature_speed, junction_speed, limited_speed
+from chipload.machine.machine import Machine
+from chipload.planning.contour.passes import Pass
+from chipload.planning.contour.sampled import Sampled
+from chipload.program.build import follow, plunge, rapid, retract
+from chipload.program.program import Program
+
+Floats = NDArray[np.float64]
+
+#: the schedule is written in steps of this share of f0
+FEED_SHARE = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Speeds:
+    """``programmed`` (n,) what the program says, ``reached`` (n,) what the machine does [mm/s], ``time`` (n,) [s]."""
+
+    programmed: Floats
+    reached: Floats
+    time: Floats
+
+
+def speeds(steps: Sampled, feed: float, machine: Machine, wanted: float | None) -> Speeds:
+    """Programmed and reached speed of every step; ``wanted`` a_line [rad]: the feed schedule, None: f0 throughout.
+
+    The pass begins and ends at rest.
+    """
+    programmed = np.full(len(steps.s), feed)
+    if wanted is not None:
+        wanted = min(wanted, 0.5 * math.pi)
+        a = np.clip(steps.engagement.angle, wanted, 0.5 * math.pi)
+        share = np.floor(math.sin(wanted) / np.sin(a) / FEED_SHARE + 1e-9) * FEED_SHARE
+        programmed = feed * np.maximum(share, FEED_SHARE)
+    acceleration = machine.acceleration_xy
+    limit = np.minimum(programmed, curvature_speed(steps.curvature, acceleration))
+    limit = np.minimum(limit, junction_speed(_kinks(steps), acceleration))
+    reached, time = limited_speed(steps.s, limit, acceleration)
+    return Speeds(programmed, reached, time)
+
+
+def _kinks(steps: Sampled) -> Floats:
+    """(n,) change of direction [rad] at each step that the curvature of the path does not account for."""
+    t, ds = steps.heading, np.diff(steps.s)
+    turn = np.arctan2(t[:-1, 0] * t[1:, 1] - t[:-1, 1] * t[1:, 0], (t[:-1] * t[1:]).sum(axis=1))
+    rest = np.abs(turn - steps.curvature[:-1] * ds)
+    return np.concatenate([[0.0], np.where(rest > 1e-6, rest, 0.0)])
+
+
+def pass_program(
+    run: Pass, steps: Sampled, programmed: Floats, z: float, safe_z: float, spindle: float, tool: int
+) -> Program:
+    """Rapid over the start, down in the clear, lead-in, path, lead-out, up.
+
+    Parameters
+    ----------
+    programmed : (n,) feed at each step [mm/s]; the path is cut where it changes
+    z, safe_z : height of the tip in the cut, and of rapids [mm]
+    """
+    parts = [p for p in (run.lead_in, run.path, run.lead_out) if p is not None]
+    x, y = parts[0].start
+    feed = float(programmed[0])
+    moves = [
+        rapid(np.array([[x, y, safe_z]]), spindle, tool, "link"),
+        plunge(np.array([x, y, z]), feed, spindle, tool, "entry"),
+    ]
+    begin = 0.0
+    for part in parts:
+        label = run.name if part is run.path else "lead"
+        inside = (steps.s >= begin - 1e-9) & (steps.s <= begin + part.length + 1e-9)
+        s, f = steps.s[inside] - begin, programmed[inside]
+        change = np.concatenate([[0], np.flatnonzero(np.diff(f)) + 1])
+        moves.append(follow(part, z, (np.clip(s[change], 0.0, part.length), f[change]), spindle, tool, label))
+        begin += part.length
+    x, y = parts[-1].end
+    moves.append(retract(np.array([x, y, safe_z]), spindle, tool, "link"))
+    return Program.join(moves)
