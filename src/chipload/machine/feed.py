@@ -1,0 +1,134 @@
+"""How fast a machine goes along a path that wants a speed at every place.
+
+Notation: s [mm] length along the path, v [mm/s] speed, a [mm/s^2] acceleration, kappa [1/mm] curvature, theta [rad] the
+angle that the path turns by at a corner, delta [mm] how far the corner may be rounded off.
+
+Between two samples the acceleration is constant, so v^2 is linear in s: v1^2 = v0^2 + 2 a (s1 - s0), and the time
+is dt = 2 (s1 - s0) / (v0 + v1). The fastest speed is then the greatest v^2 below wanted^2 whose slope is at most 2 a:
+one pass forwards, one backwards.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.errors import InputError
+from chipload.machine._kernels import two_passes
+
+Floats = NDArray[np.float64]
+
+#: a joint that turns by less [rad] is passed without slowing: at 100 mm/s a jump of 0.1 mm/s across the path
+TANGENT = 1e-3
+
+
+def limited_speed(
+    s: ArrayLike, wanted: ArrayLike, acceleration: ArrayLike, start_speed: float = 0.0, end_speed: float = 0.0
+) -> tuple[Floats, Floats]:
+    """Fastest speed along a path that never exceeds ``wanted`` and whose acceleration stays within the limit.
+
+    v_i^2 = min over j of (wanted_j^2 + 2 a |s_i - s_j|), in two passes, O(n).
+
+    Parameters
+    ----------
+    s : (n,) float [mm]
+        Length along the path, never falling. Two equal values are a jump of ``wanted`` at one place: the lesser counts.
+    wanted : (n,) float [mm/s]
+        Greatest speed at each sample, >= 0 and finite or inf. 0 inside the path is a stop.
+    acceleration : float or (n - 1,) float [mm/s^2]
+        Greatest |dv/dt|, > 0, or that of each piece between samples.
+    start_speed, end_speed : float [mm/s]
+        Speed at the ends, >= 0; lowered where ``wanted`` or the acceleration does not allow it.
+
+    Returns
+    -------
+    v : (n,) float [mm/s], t : (n,) float [s] from 0; inf from where the path cannot be left (v = 0 at both ends of
+    a piece that has length).
+
+    Raises
+    ------
+    InputError
+        A shape, a sign or a value is wrong.
+
+    Examples
+    --------
+    From rest to rest over 10 mm at 10 mm/s with 100 mm/s^2: 1 s + 0.1 s.
+
+    >>> v, t = limited_speed([0.0, 5.0, 10.0], [10.0, 10.0, 10.0], 100.0)
+    >>> v.tolist()
+    [0.0, 10.0, 0.0]
+    >>> s = np.linspace(0.0, 10.0, 2001)
+    >>> round(float(limited_speed(s, np.full(2001, 10.0), 100.0)[1][-1]), 6)
+    1.1
+    """
+    s, wanted = np.asarray(s, dtype=np.float64), np.asarray(wanted, dtype=np.float64)
+    n = len(s) if s.ndim == 1 else 0
+    if n == 0 or wanted.shape != (n,):
+        raise InputError(f"limited_speed: s {s.shape} and wanted {wanted.shape}: must be (n,) and (n,), n >= 1")
+    a = np.broadcast_to(np.asarray(acceleration, dtype=np.float64), (n - 1,))
+    step = np.diff(s)
+    if not np.isfinite(s).all() or (step < 0.0).any():
+        raise InputError("limited_speed: s must be finite and never fall")
+    if not (wanted >= 0.0).all() or start_speed < 0.0 or end_speed < 0.0:
+        raise InputError("limited_speed: a speed is negative or not a number")
+    if not ((a > 0.0) & np.isfinite(a)).all():
+        raise InputError("limited_speed: acceleration must be finite and above 0 mm/s^2")
+    w = wanted**2
+    w[0] = min(w[0], start_speed**2)
+    w[-1] = min(w[-1], end_speed**2)
+    two_passes(step, np.ascontiguousarray(a), w)
+    v: Floats = np.sqrt(w)
+    total = v[:-1] + v[1:]
+    moving = step > 0.0
+    with np.errstate(divide="ignore"):
+        dt = np.where(moving, 2.0 * step / np.where(moving, total, 1.0), 0.0)
+    return v, np.concatenate([[0.0], np.cumsum(dt)])
+
+
+def curvature_speed(kappa: ArrayLike, acceleration: float) -> Floats:
+    """Speed at which a curve needs the whole acceleration: sqrt(a / |kappa|) [mm/s], inf on a line.
+
+    >>> curvature_speed([0.1, 0.0], 1000.0).tolist()
+    [100.0, inf]
+    """
+    kappa = np.abs(np.asarray(kappa, dtype=np.float64))
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.sqrt(acceleration / kappa))
+
+
+def corner_speed(theta: ArrayLike, acceleration: ArrayLike, tolerance: float) -> Floats:
+    """Speed through a corner that turns by theta [rad], rounded off by at most ``tolerance`` [mm].
+
+    The arc that touches both sides and leaves the corner by delta has the radius
+    delta cos(theta/2) / (1 - cos(theta/2)), and v = sqrt(a radius). Below ``TANGENT`` there is no corner: inf. A full
+    reversal, or a tolerance of 0, is a stop.
+
+    >>> round(float(corner_speed(np.pi / 2, 3000.0, 0.005)), 4)
+    6.0177
+    """
+    theta = np.abs(np.asarray(theta, dtype=np.float64))
+    half = np.clip(np.cos(0.5 * theta), 0.0, 1.0)
+    smooth = theta < TANGENT
+    flare = np.where(smooth, 1.0, 2.0 * np.sin(0.25 * theta) ** 2)
+    speed = np.sqrt(np.asarray(acceleration) * tolerance * half / flare)
+    return np.where(smooth, np.inf, np.where(theta >= math.pi - 1e-9, 0.0, speed))
+
+
+def move_time(length: ArrayLike, speed: ArrayLike, acceleration: ArrayLike, v0: ArrayLike, v1: ArrayLike) -> Floats:
+    """Time [s] of a straight trapezoid: from v0 up to at most ``speed``, on, and down to v1, at constant acceleration.
+
+    The peak is min(speed, sqrt(a L + (v0^2 + v1^2)/2)). v0 and v1 must be reachable: |v1^2 - v0^2| <= 2 a L.
+
+    >>> float(move_time(10.0, 10.0, 100.0, 0.0, 0.0)), float(move_time(1.0, 100.0, 100.0, 0.0, 0.0))
+    (1.1, 0.2)
+    """
+    length, a = np.asarray(length, dtype=np.float64), np.asarray(acceleration, dtype=np.float64)
+    v0, v1 = np.asarray(v0, dtype=np.float64), np.asarray(v1, dtype=np.float64)
+    peak = np.minimum(speed, np.sqrt(a * length + 0.5 * (v0**2 + v1**2)))
+    peak = np.maximum(peak, np.maximum(v0, v1))
+    still = peak == 0.0
+    level = length - (2.0 * peak**2 - v0**2 - v1**2) / (2.0 * a)
+    ramps = (2.0 * peak - v0 - v1) / a
+    return np.asarray(np.where(still, 0.0, ramps + np.maximum(level, 0.0) / np.where(still, 1.0, peak)))
