@@ -1,0 +1,1 @@
+"""The machine: its limits and how fast it can follow a path."""

@@ -18,6 +18,8 @@ Ints = NDArray[np.int64]
 
 #: values of ``Program.motion``
 RAPID, LINE, ARC_CW, ARC_CCW, DWELL = 0, 1, 2, 3, 4
+#: the two radii of an arc may differ by as much [mm]
+ARC_SKEW_MM = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +52,8 @@ class Program:
     Raises
     ------
     InputError
-        Columns differ in length, a value is not finite, a cutting motion has no feed, an axis is not a unit vector.
+        Columns differ in length, a value is not finite, a cutting motion has no feed, an axis is not a unit
+        vector, the radii of an arc at its start and at its end differ by more than ``ARC_SKEW_MM``.
     """
 
     motion: Ints
@@ -81,6 +84,16 @@ class Program:
         if (self.feed[cuts] <= 0.0).any():
             k = int(np.flatnonzero(cuts & (self.feed <= 0.0))[0])
             raise InputError(f"program row {k}: a cutting motion without a feed: set its feed")
+        arc = (self.motion[1:] == ARC_CW) | (self.motion[1:] == ARC_CCW)
+        r0 = np.hypot(*(self.p_work[:-1, 0:2] - self.centre[1:]).T)
+        r1 = np.hypot(*(self.p_work[1:, 0:2] - self.centre[1:]).T)
+        skew = np.where(arc, np.abs(r1 - r0), 0.0)
+        if len(skew) and skew.max() > ARC_SKEW_MM:
+            k = int(skew.argmax())
+            raise InputError(
+                f"program row {k + 1}: an arc starts {r0[k]:.6g} mm from its centre and ends {r1[k]:.6g} mm from it: "
+                f"must agree within {ARC_SKEW_MM:g} mm"
+            )
         if n and np.abs(np.linalg.norm(self.axis, axis=1) - 1.0).max() > 1e-9:
             raise InputError("program.axis: must be unit vectors")
 

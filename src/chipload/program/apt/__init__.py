@@ -1,0 +1,1 @@
+"""APT cutter location data at the edge of a Program."""

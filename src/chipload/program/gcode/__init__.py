@@ -1,0 +1,1 @@
+"""RS-274 at the edge of a Program."""

@@ -1,0 +1,74 @@
+"""What a program asks of a machine that the machine does not give, row by row.
+
+Notation: a row's line is that of its source where it has one; rows are counted from 0.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import Finding
+from chipload.machine.machine import AXES, Machine
+from chipload.program.motions import bounds, is_arc
+from chipload.program.program import DWELL, LINE, RAPID, Program
+from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
+
+
+def check_program(program: Program, machine: Machine) -> tuple[Finding, ...]:
+    """Axis limits (arcs with their bulge), greatest feed, range of the spindle, spindle at rest in a cut, tilted axis.
+
+    One finding a code and axis: the worst row and its value, how many rows, the first of them. Codes: `machine-limit`,
+    `machine-feed`, `machine-spindle`, `machine-spindle-off`, `machine-axis`, `program-start`.
+
+    Examples
+    --------
+    >>> from chipload.machine.machine import machine_named
+    >>> from chipload.program.build import rapid
+    >>> check_program(rapid([[0, 0, 5], [401, 0, 5]], 0.0, 1, "link"), machine_named("vmc"))[0].text
+    'row 1: X = 401 mm: machine vmc goes from -400 to 400 mm'
+    """
+    found: list[Finding] = []
+
+    def report(code: str, bad: NDArray[np.bool_], excess: NDArray[np.float64], text: str, values: object) -> None:
+        at = np.flatnonzero(bad)
+        if len(at) == 0:
+            return
+        worst = int(at[np.argmax(excess[at])])
+        shown = text.format(np.asarray(values)[worst])
+        more = f" ({len(at)} rows, the first is {at[0]})" if len(at) > 1 else ""
+        found.append(Finding(code, int(program.line[worst]), f"row {worst}: {shown}{more}"))
+
+    low, high = bounds(program)
+    slack = 1e-9
+    for i, axis in enumerate(AXES):
+        least, most = machine.limits[i]
+        over = np.maximum(least - low[:, i], high[:, i] - most)
+        value = np.where(least - low[:, i] > high[:, i] - most, low[:, i], high[:, i])
+        text = f"{axis.upper()} = {{:g}} mm: machine {machine.name} goes from {least:g} to {most:g} mm"
+        report("machine-limit", over > slack, over, text, value)
+    cuts = (program.motion == LINE) | is_arc(program)
+    feed = np.where(cuts, program.feed, 0.0)
+    top = f"feed {{:g}} mm/min: machine {machine.name} reaches {mm_min_from_mm_s(machine.feed_max):g} mm/min"
+    report("machine-feed", feed > machine.feed_max * (1.0 + 1e-12), feed, top, mm_min_from_mm_s(1.0) * feed)
+    speed = np.abs(program.spindle)
+    turning = speed > 0.0
+    over = np.maximum(speed / machine.spindle_max, machine.spindle_min / np.where(turning, speed, math.inf))
+    text = (
+        f"spindle {{:g}} rpm: machine {machine.name} turns from {rpm_from_rad_s(machine.spindle_min):g} "
+        f"to {rpm_from_rad_s(machine.spindle_max):g} rpm"
+    )
+    report("machine-spindle", turning & (over > 1.0 + 1e-12), over, text, rpm_from_rad_s(1.0) * speed)
+    none = np.zeros(len(program))
+    report("machine-spindle-off", cuts & ~turning, none, "feeds with the spindle at rest: set its speed", none)
+    tilt = np.degrees(np.arccos(np.clip(program.axis[:, 2], -1.0, 1.0)))
+    tilted = (np.hypot(program.axis[:, 0], program.axis[:, 1]) > 1e-9) | (program.axis[:, 2] < 0.0)
+    text = f"axis tilted by {{:g}} deg: machine {machine.name} has three axes"
+    report("machine-axis", tilted & (program.motion != DWELL), tilt, text, tilt)
+    first = "starts with a cutting motion: must start with a rapid to where it begins"
+    start = np.zeros(len(program), dtype=np.bool_)
+    start[:1] = program.motion[:1] != RAPID
+    report("program-start", start, none, first, none)
+    return tuple(found)
