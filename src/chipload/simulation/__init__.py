@@ -1,0 +1,1 @@
+"""What a Program does, found without knowing how it was planned."""

@@ -1,0 +1,357 @@
+"""Proves or refutes a plan in the plane by the trail of the cutter's centre alone.
+
+Notation: R cutter radius. Compared are the planned engagement against that of the rim with the uncut stock, the
+finished wall against the path (gouge, excess), and rapids below the stock's top against what still stands there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import Cancelled, InputError
+from chipload.geometry.contour import Contour, Region
+from chipload.program.program import ARC_CCW, ARC_CW, LINE, RAPID, Program
+from chipload.progress import Progress, silent
+from chipload.simulation import _kernels
+from chipload.simulation.trail import LEVEL_MM, Trail, flat_motions, motion_rows, rim_engagement
+from chipload.simulation.walls import Worst, excess, gouge
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+#: a row of the history lies on the program's path within this [mm]
+MATCH_MM = 1e-6
+#: stock that a rapid passes through counts when it is thicker than this [mm]
+RAPID_MM = 1e-6
+#: rows between two calls of ``progress``
+CHUNK = 4096
+#: spacing on the rim [deg] at first, and where a row disagrees
+COARSE_DEG, FINE_DEG = 1.0, 1.0 / 16.0
+
+Place = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Verification:
+    """The verdict on a plan.
+
+    ``verdict``: `proved`, every comparison was made and holds; `failed`, at least one does not, ``reasons`` say which
+    and where; `unproven`, none failed but something could not be compared, ``reasons`` say what.
+    ``engagement_difference_deg`` the greatest |planned - found| and its centre; ``gouge_mm`` and ``excess_mm`` the
+    greatest and their places on the wall; ``rapids`` the centres [mm] of rapids that meet stock;
+    ``compared`` rows of the history held against the trail; ``samples`` points and moments looked at;
+    ``text`` one line that says what was compared.
+    """
+
+    verdict: Literal["proved", "failed", "unproven"]
+    engagement_difference_deg: float
+    engagement_at: Place
+    gouge_mm: float
+    gouge_at: Place
+    excess_mm: float
+    excess_at: Place
+    rapids: tuple[Place, ...]
+    compared: int
+    samples: int
+    reasons: tuple[str, ...]
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Level:
+    """One height of the program: its trail, and what lies above it up to ``top``."""
+
+    z: float
+    top: float
+    trail: Trail
+
+
+def verify_contour(
+    program: Program,
+    radius: float,
+    history: Mapping[str, NDArray[Any]],
+    *,
+    stock: Region | None,
+    stock_top_mm: float,
+    wall: Sequence[Contour],
+    material: str,
+    engagement_tolerance_deg: float,
+    gouge_tolerance_mm: float,
+    excess_tolerance_mm: float,
+    passes: Sequence[str] | None = None,
+    step_mm: float = 0.05,
+    workers: int = 1,
+    progress: Progress = silent,
+) -> Verification:
+    """Hold a planned program against the trail of its own motions.
+
+    Parameters
+    ----------
+    program : motions in the XY plane, at one or more heights; rapids included
+    radius : R [mm]
+    history : columns `x_mm`, `y_mm`, `z_mm`, `engagement_deg`, `pass`, a row a step, in the order of the program
+    stock : the stock before row 0 of the program, in the plane; None: solid everywhere
+    stock_top_mm : motions wholly at or above this height cut nothing
+    wall : the finished part's wall, empty where there is none to compare with
+    material : the part is `left` or `right` of the wall's travel
+    engagement_tolerance_deg, gouge_tolerance_mm, excess_tolerance_mm : what is still proved
+    passes : values of `pass` whose engagement is compared; None: all
+    step_mm : spacing on path and wall for gouge, excess and rapids [mm]
+    workers : threads; the answer does not depend on it
+    progress : called with the share done; if it raises Cancelled the verdict so far is given, `unproven` at best
+
+    Raises
+    ------
+    InputError
+        A column is missing, columns differ in length, a tolerance is not above 0.
+
+    Notes
+    -----
+    A row is found on the path by its place: the first place within ``MATCH_MM`` at or after that of the row before
+    it. At a joint of two motions, where the heading may jump, it is held against both headings and the nearer counts.
+    Rows on motions that rise or fall below the stock's top (ramps, plunges) are not compared: that leaves the plan
+    unproven, unless ``passes`` leaves them out. Rows above the stock's top must show no engagement.
+    """
+    columns = _columns(history)
+    for name, value in (
+        ("engagement_tolerance_deg", engagement_tolerance_deg),
+        ("gouge_tolerance_mm", gouge_tolerance_mm),
+        ("excess_tolerance_mm", excess_tolerance_mm),
+    ):
+        if not value > 0.0:
+            raise InputError(f"verify: {name} = {value:g}: must be above 0")
+    if stock is not None and not stock.contours:
+        raise InputError("verify: the stock has no contour: pass None for material everywhere")
+    failed: list[str] = []
+    open_: list[str] = []
+    difference, cleft, remains = Worst(0.0, (0.0, 0.0), 0), Worst(0.0, (0.0, 0.0), 0), Worst(0.0, (0.0, 0.0), 0)
+    hits: list[Place] = []
+    compared = samples = 0
+    try:
+        levels = _levels(program, radius, stock, stock_top_mm)
+        if not levels:
+            open_.append("the program has no level cutting motion below the stock's top")
+        progress(0.05, "trail")
+        for level in levels:
+            found, asked = _rapids(program, level, step_mm)
+            hits += found
+            samples += asked
+        if hits:
+            x, y = hits[0]
+            failed.append(f"rapid through stock at ({x:.4f}, {y:.4f}), {len(hits)} motions in all")
+        progress(0.15, "rapids")
+        if wall:
+            for level in levels:
+                cleft = max(cleft, gouge(level.trail, wall, material, step_mm), key=lambda v: v.value_mm)
+                remains = max(remains, excess(level.trail, wall, step_mm), key=lambda v: v.value_mm)
+                samples += cleft.samples + remains.samples
+            if cleft.value_mm > gouge_tolerance_mm:
+                failed.append(_exceeds("gouge", cleft, "mm", gouge_tolerance_mm))
+            if remains.value_mm > excess_tolerance_mm:
+                failed.append(_exceeds("excess", remains, "mm", excess_tolerance_mm))
+        progress(0.3, "wall")
+        rows = _compare(
+            program, levels, columns, passes, stock_top_mm, engagement_tolerance_deg, workers, progress, failed, open_
+        )
+        difference, compared = rows
+        samples += compared
+        if difference.value_mm > engagement_tolerance_deg:
+            failed.append(_exceeds("engagement differs by", difference, "deg", engagement_tolerance_deg))
+    except Cancelled:
+        open_.append("stopped before the end")
+    verdict: Literal["proved", "failed", "unproven"] = "failed" if failed else "unproven" if open_ else "proved"
+    against = (
+        f"gouge {cleft.value_mm * 1e3:.3g} um, excess {remains.value_mm * 1e3:.3g} um" if wall else "no wall given"
+    )
+    text = (
+        f"{verdict}: {compared} of {len(columns['x_mm'])} rows against the trail of {len(program)} motions, engagement "
+        f"within {difference.value_mm:.3g} deg; {against}; {len(hits)} rapids through stock"
+    )
+    return Verification(
+        verdict,
+        difference.value_mm,
+        difference.at,
+        cleft.value_mm,
+        cleft.at,
+        remains.value_mm,
+        remains.at,
+        tuple(hits),
+        compared,
+        samples,
+        (*failed, *open_),
+        text,
+    )
+
+
+def _exceeds(what: str, worst: Worst, unit: str, limit: float) -> str:
+    x, y = worst.at
+    return f"{what} {worst.value_mm:.6g} {unit} at ({x:.4f}, {y:.4f}): limit {limit:g} {unit}"
+
+
+def _columns(history: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    out: dict[str, NDArray[Any]] = {}
+    for name in ("x_mm", "y_mm", "z_mm", "engagement_deg", "pass"):
+        if name not in history:
+            raise InputError(f"history: column {name} is missing")
+        out[name] = np.asarray(history[name], dtype=object if name == "pass" else np.float64)
+        if len(out[name]) != len(out["x_mm"]):
+            raise InputError(f"history.{name}: {len(out[name])} rows: must be {len(out['x_mm'])} as in x_mm")
+        if name != "pass" and not np.isfinite(out[name]).all():
+            raise InputError(f"history.{name}: a value is not a finite number")
+    return out
+
+
+def _heights(program: Program) -> tuple[Floats, Floats]:
+    """Heights (n,) at which the motions begin and end; row 0 begins where it ends."""
+    z1 = program.p_work[:, 2]
+    return np.concatenate([z1[:1], z1[:-1]]), z1
+
+
+def _levels(program: Program, radius: float, stock: Region | None, top: float) -> list[_Level]:
+    """The heights of level cutting motions below the stock's top, the lowest last."""
+    z0, z1 = _heights(program)
+    cuts = np.isin(program.motion, (LINE, ARC_CW, ARC_CCW)) & (np.abs(z1 - z0) <= LEVEL_MM) & (z1 < top - LEVEL_MM)
+    heights: list[float] = []
+    for z in np.sort(z1[cuts])[::-1]:
+        if not heights or heights[-1] - z > LEVEL_MM:
+            heights.append(float(z))
+    tops = [top, *heights[:-1]]
+    return [_Level(z, t, Trail.of_program(program, radius, stock, z)) for z, t in zip(heights, tops, strict=True)]
+
+
+def _rapids(program: Program, level: _Level, step: float) -> tuple[list[Place], int]:
+    """Centres at which rapids meet uncut stock of this level, one a motion, and the number of moments asked.
+
+    The part of a rapid below the level's top sweeps its front half rim, ``RAPID_MM`` smaller than the cutter, through
+    what stood before it; one that comes from above is also asked over its whole disc, in 8 rings of 64 points.
+    """
+    z0, z1 = _heights(program)
+    below = np.minimum(z0, z1) < level.top - LEVEL_MM
+    at = np.flatnonzero((program.motion == RAPID) & below)
+    at = at[at > 0]
+    hits: list[Place] = []
+    asked = 0
+    if not len(at):
+        return hits, asked
+    trail, path = level.trail, Trail(flat_motions(program), level.trail.radius)
+    reach = trail.radius - RAPID_MM
+    front = np.linspace(0.0, np.pi, 181)
+    around = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+    ring = np.column_stack([np.cos(around), np.sin(around)])
+    disc = np.vstack([[[0.0, 0.0]], *(ring * reach * j / 8.0 for j in range(1, 9))])
+    for k in at:
+        z, rise = level.top, z1[k] - z0[k]
+        first = 0.0 if z0[k] <= z else float((z - z0[k]) / rise)
+        last = 1.0 if z1[k] <= z else float((z - z0[k]) / rise)
+        n = max(1, int(np.ceil(path.lengths[k] * (last - first) / step)))
+        share = np.linspace(first, last, n + 1)
+        o, t = path.places(np.full(n + 1, k), share)
+        left = np.column_stack([-t[:, 1], t[:, 0]])
+        points = o[:, None] + reach * (np.sin(front)[:, None] * t[:, None] + np.cos(front)[:, None] * left[:, None])
+        points = points.reshape(-1, 2)
+        owner = np.repeat(np.arange(n + 1), len(front))
+        if first > 0.0 or not t.any():
+            points = np.vstack([o[0] + disc, points])
+            owner = np.concatenate([np.zeros(len(disc), dtype=np.int64), owner])
+        asked += len(points)
+        still = trail.uncut(points, np.full(len(points), k - 1), np.ones(len(points)))
+        if still.any():
+            x, y = o[owner[int(still.argmax())]]
+            hits.append((float(x), float(y)))
+    return hits, asked
+
+
+def _compare(
+    program: Program,
+    levels: Sequence[_Level],
+    columns: Mapping[str, NDArray[Any]],
+    passes: Sequence[str] | None,
+    top: float,
+    tolerance: float,
+    workers: int,
+    progress: Progress,
+    failed: list[str],
+    open_: list[str],
+) -> tuple[Worst, int]:
+    """Greatest difference of the engagement [deg] with its centre, and the number of rows compared."""
+    x, y, z = columns["x_mm"], columns["y_mm"], columns["z_mm"]
+    points = np.ascontiguousarray(np.column_stack([x, y]))
+    m = len(points)
+    mot = motion_rows(flat_motions(program))
+    z0, z1 = _heights(program)
+    k, w = np.zeros(m, dtype=np.int64), np.zeros(m)
+    found = int(_kernels.locate(points, np.ascontiguousarray(z), mot, z0, z1, MATCH_MM, LEVEL_MM, k, w))
+    if found < m:
+        failed.append(f"history row {found} at ({x[found]:.4f}, {y[found]:.4f}, {z[found]:.4f}) is not on the path")
+    wanted = np.ones(m, dtype=np.bool_) if passes is None else np.isin(columns["pass"].astype(str), list(passes))
+    wanted[found:] = False
+    length = Trail(flat_motions(program), 1.0).lengths
+    joint_k, joint_w = _other_side(k, w, length)
+    done = np.zeros(m, dtype=np.bool_)
+    air = wanted & (z >= top - LEVEL_MM)
+    done |= air
+    gap = np.where(air, np.abs(columns["engagement_deg"]), 0.0)
+    total, finished = max(int((wanted & ~air).sum()), 1), 0
+    for level in levels:
+        flat = np.abs(z - level.z) <= LEVEL_MM
+        still = (np.abs(z1[k] - z0[k]) > LEVEL_MM) | (length[k] == 0.0)
+        one = wanted & flat & ~air & ~still
+        # a row at the end of a plunge is the beginning of the motion after it
+        two = wanted & flat & ~air & (joint_k >= 0)
+        two &= (np.abs(z1[joint_k] - z0[joint_k]) <= LEVEL_MM) & (length[joint_k] > 0.0)
+        for rows in np.array_split(np.flatnonzero(one | two), max(1, int((one | two).sum()) // CHUNK)):
+            best = np.full(len(rows), np.inf)
+            for mine, kk, ww in ((one, k, w), (two, joint_k, joint_w)):
+                use = np.flatnonzero(mine[rows])
+                at = rows[use]
+                planned = columns["engagement_deg"][at]
+                off = np.abs(_degrees(level.trail, kk[at], ww[at], COARSE_DEG, workers) - planned)
+                again = np.flatnonzero(off > tolerance)
+                if len(again):
+                    j = at[again]
+                    off[again] = np.abs(_degrees(level.trail, kk[j], ww[j], FINE_DEG, workers) - planned[again])
+                best[use] = np.minimum(best[use], off)
+            gap[rows] = best
+            done[rows] = True
+            finished += len(rows)
+            progress(0.3 + 0.7 * finished / total, "engagement")
+    left_out = int((wanted & ~done).sum())
+    if left_out:
+        first = int(np.flatnonzero(wanted & ~done)[0])
+        open_.append(
+            f"{left_out} rows on rising or falling motions, the first at ({x[first]:.4f}, {y[first]:.4f}), not compared"
+        )
+    if not done.any():
+        open_.append("no row of the history was compared")
+        return Worst(0.0, (0.0, 0.0), 0), 0
+    i = int(np.argmax(np.where(done, gap, -1.0)))
+    return Worst(float(gap[i]), (float(x[i]), float(y[i])), int(done.sum())), int(done.sum())
+
+
+def _degrees(trail: Trail, k: Ints, w: Floats, step_deg: float, workers: int) -> Floats:
+    return np.degrees(rim_engagement(trail, k, w, step_deg=step_deg, workers=workers).angle)
+
+
+def _other_side(k: Ints, w: Floats, length: Floats) -> tuple[Ints, Floats]:
+    """For a moment at a joint, the moment on the other side of it: the beginning of the next motion that has a
+    length, or the end of the one before; -1 where there is none.
+    """
+    n = len(length)
+    moves = np.flatnonzero(length > 0.0)
+    other, share = np.full(len(k), -1, dtype=np.int64), np.zeros(len(k))
+    if not len(moves):
+        return other, share
+    after = np.append(moves, -1)[np.searchsorted(moves, np.arange(n), side="right")]
+    before = np.concatenate([[-1], moves])[np.searchsorted(moves, np.arange(n), side="left")]
+    at_end = ((1.0 - w) * length[k] <= MATCH_MM) & (after[k] >= 0)
+    at_start = ~at_end & (w * length[k] <= MATCH_MM) & (before[k] >= 0)
+    other[at_end] = after[k[at_end]]
+    other[at_start] = before[k[at_start]]
+    share[at_start] = 1.0
+    return other, share
