@@ -217,7 +217,7 @@ def boxes(seg, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def engage(centres, headings, r, seg, box, first, last, angle, count, phi):  # type: ignore[no-untyped-def]
-    """Fill ``angle``, ``count``, ``phi`` of the queries first..last; candidates are kept while the centre stays near."""
+    """Fill ``angle``, ``count``, ``phi`` of queries first..last; candidates are kept while the centre stays near."""
     n = len(seg)
     candidates = np.empty(n, dtype=np.int64)
     everything = np.arange(n)

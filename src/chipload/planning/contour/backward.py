@@ -6,9 +6,9 @@ P* = O + R (sin a* T - cos a* n) is where the surface left by the pass before mu
 the material is the centre path of that pass.
 
 Reference: [Uddin2007].
-Differs from source: where P* turns away from the material (a line that runs into a concave corner) a cutter of radius R
-cannot reach the kink; O* is trimmed there and leaves a fillet R (1/cos(delta/2) - 1), so the engagement overshoots. The
-source calls it computational error; it is geometry, is reported, and vanishes with eased joints (:mod:`.ease`).
+Differs from source: where P* turns away from the material by delta (a line that runs into a concave corner) a cutter of
+radius R cannot reach the kink; O* is trimmed there and leaves a fillet, so the engagement overshoots. The source calls
+it computational error; it is geometry, is reported, and vanishes with eased joints (:mod:`.ease`).
 """
 
 from __future__ import annotations
@@ -16,10 +16,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour
 from chipload.geometry.offset import offset
+
+Floats = NDArray[np.float64]
 
 #: a change of direction smaller than this [rad] is no kink
 KINK_RAD = 1e-9
@@ -68,7 +71,7 @@ def leading_curve(path: Contour, radius: float, engagement: float) -> Contour:
     return Contour(np.array(rows))
 
 
-def _lead(o: np.ndarray, t: np.ndarray, radius: float, a: float) -> np.ndarray:  # type: ignore[type-arg]
+def _lead(o: Floats, t: Floats, radius: float, a: float) -> Floats:
     n = np.column_stack([-t[:, 1], t[:, 0]])
     return np.asarray(o + radius * (math.sin(a) * t - math.cos(a) * n))
 
@@ -90,10 +93,17 @@ def pass_before(path: Contour, radius: float, engagement: float) -> tuple[Contou
     return before
 
 
-def joint_fillet(radius: float, delta: float) -> float:
-    """Stock that a cutter of radius R leaves in a concave kink of angle delta: R (1/cos(delta/2) - 1) [mm].
+def concave_kinks(lead: Contour) -> tuple[Floats, Floats]:
+    """Points (k, 2) [mm] where P* turns away from the material at once, and by how much (k,) [rad].
 
-    >>> round(1000 * joint_fillet(5.0, math.radians(7.17848)), 2)
-    9.83
+    A cutter of radius R does not reach them: between straight sides it leaves R (1/cos(delta/2) - 1), beside a concave
+    arc more.
     """
-    return radius * (1.0 / math.cos(0.5 * delta) - 1.0)
+    after = lead.at(lead.knots[:-1])[1]
+    before = -lead.reversed().at(lead.reversed().knots[:-1])[1][::-1]
+    before = np.roll(before, 1, axis=0)
+    turn = np.arctan2(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], (before * after).sum(axis=1))
+    if not lead.closed:
+        turn[0] = 0.0
+    kink = turn > KINK_RAD
+    return lead.segments[kink, 0:2], turn[kink]

@@ -3,7 +3,7 @@
 Notation: f0 programmed feed, v speed that the machine reaches, a_line engagement angle on a straight wall, a the one at
 the step. The schedule of the `feed` strategy is f = f0 sin(a_line) / sin(a) (90 deg where a is more: the thickest chip
 is f_z sin(a)), never above f0. v keeps the machine's acceleration along the path and across it, v^2 |kappa| <= a_max,
-and passes a kink as its junction rule allows.
+and passes a kink as the machine's corner tolerance allows.
 
 Reference: [Uddin2007], strategy 3.
 """
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.machine.feed import curvature_speed, junction_speed, limited_speed
+from chipload.machine.feed import corner_speed, curvature_speed, limited_speed
 from chipload.machine.machine import Machine
 from chipload.planning.contour.passes import Pass
 from chipload.planning.contour.sampled import Sampled
@@ -51,7 +51,7 @@ def speeds(steps: Sampled, feed: float, machine: Machine, wanted: float | None) 
         programmed = feed * np.maximum(share, FEED_SHARE)
     acceleration = machine.acceleration_xy
     limit = np.minimum(programmed, curvature_speed(steps.curvature, acceleration))
-    limit = np.minimum(limit, junction_speed(_kinks(steps), acceleration))
+    limit = np.minimum(limit, corner_speed(_kinks(steps), acceleration, machine.corner_tolerance))
     reached, time = limited_speed(steps.s, limit, acceleration)
     return Speeds(programmed, reached, time)
 

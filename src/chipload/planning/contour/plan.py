@@ -23,6 +23,7 @@ from chipload.geometry.contour import Contour, Region
 from chipload.geometry.distance import distance
 from chipload.geometry.offset import offset
 from chipload.machine.machine import Machine
+from chipload.planning.contour.backward import concave_kinks, leading_curve
 from chipload.planning.contour.ease import eased
 from chipload.planning.contour.forward import forward_pass
 from chipload.planning.contour.moves import pass_program, speeds
@@ -44,6 +45,8 @@ from chipload.progress import Progress, silent
 
 #: strategies that a contour compares
 STRATEGIES = ("plain", "backward", "feed")
+#: stock that the cutter leaves in a joint is reported from this on [mm]
+OVERSHOOT_MM = 1e-4
 
 
 @dataclass(frozen=True)
@@ -316,7 +319,32 @@ def _events(job: _Job, runs: list[Pass], history: Columns, name: str) -> list[Ev
                 failure=True,
             )
         )
-    return out + (_thin_stock(job, runs) if name == "backward" else [])
+    return out + (_thin_stock(job, runs) + _overshoots(job, runs) if name == "backward" else [])
+
+
+def _overshoots(job: _Job, runs: list[Pass]) -> list[Event]:
+    """Joints of the finish path where the cutter cannot make the surface that constant engagement asks for."""
+    out = []
+    wanted = job.setting.engagement(job.radius)
+    surface = np.vstack([r.stock.segments for r in runs if r.name == "finish"])
+    for path in job.finish:
+        lead = leading_curve(path, job.radius, wanted)
+        points, turn = concave_kinks(lead)
+        if job.flip:
+            points = points * [1.0, -1.0]
+        left = distance(surface, points)
+        for (x, y), gap, delta in zip(points.tolist(), left, np.degrees(turn), strict=True):
+            if gap > OVERSHOOT_MM:
+                out.append(
+                    Event(
+                        "joint-overshoot",
+                        x,
+                        y,
+                        f"the stock would need a kink of {delta:.3f} deg here; the cutter leaves {1e3 * gap:.2f} um in "
+                        "it, and the engagement overshoots: joint = clothoid removes it",
+                    )
+                )
+    return out
 
 
 def _thin_stock(job: _Job, runs: list[Pass]) -> list[Event]:

@@ -1,0 +1,218 @@
+"""The corner of [Uddin2007]: R 5, s 0.1, inside corner of 8 mm.
+
+Angles, ratios and places; the cutting conditions are lost, so no newtons.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from chipload.geometry.offset import offset
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import material_named
+from chipload.geometry.contour import Contour
+from chipload.machine.machine import machine_named
+from chipload.planning.contour.backward import concave_kinks, leading_curve
+from chipload.planning.contour.ease import clothoid_length, eased
+from chipload.planning.contour.forward import forward_pass
+from chipload.planning.contour.plan import Finishing, plan_contour
+
+R, S = 5.0, 0.1
+A = math.acos(1.0 - S / R)
+QUARTER = math.tan(math.pi / 8)
+CORNER = Contour.from_bulges([(0, 0), (20, 0), (28, 8), (28, 28)], [0, QUARTER, 0, 0])
+SETTING = Finishing(
+    side="inside",
+    milling="down",
+    strategies=("plain", "backward", "feed"),
+    use="backward",
+    joint="sharp",
+    radial_depth=S,
+    axial_depth=5.0,
+    semifinish_depth=0.5,
+    passes=1,
+    feed=10.0,
+    spindle_speed=314.0,
+    tolerance=0.05,
+    step=0.05,
+    lead=5.0,
+    top=0.0,
+    clearance=5.0,
+)
+
+
+def plan(contours=(CORNER,), **changes):
+    cutter = Cutter(10.0, 4, math.radians(30), 22.0, 35.0, 580e3)
+    return plan_contour(
+        list(contours), replace(SETTING, **changes), cutter, material_named("al7075-t6"), machine_named("vmc"), {}
+    ).strategies
+
+
+@pytest.fixture(scope="module")
+def sharp():
+    return plan()
+
+
+def finish(result, column):
+    return result.history[column][result.history["pass"] == "finish"]
+
+
+def test_wanted_angle_and_allowance():
+    assert math.degrees(A) == pytest.approx(11.478, abs=1e-3)
+    lead = leading_curve(Contour.circle((0, 0), 3.0), R, A)
+    assert 8.0 - lead.radii[0] == pytest.approx(0.0375883, abs=5e-8)
+    before = offset([lead], R)[0]
+    assert before.radii[0] == pytest.approx(2.962412, abs=5e-7)
+
+
+def test_kink_of_the_leading_curve(sharp):
+    """delta = 7.17848 deg where the line runs into the corner.
+
+    The fillet of 5 mm between the line and the arc of 7.9624 mm, not the 9.83 um of two straight sides: its centre is
+    5.1 mm above the wall and 2.9624 mm from the corner's centre.
+    """
+    points, turn = concave_kinks(leading_curve(offset([CORNER], R)[0], R, A))
+    assert math.degrees(turn[0]) == pytest.approx(7.17848, abs=1e-5)
+    assert points[0] == pytest.approx((20.0 + R * math.sin(A), 0.1), abs=1e-9)
+    inner = math.hypot(3.0 + R * math.cos(A), R * math.sin(A)) - R
+    centre = 20.0 + math.sqrt(inner**2 - 2.9**2)
+    gap = math.hypot(points[0, 0] - centre, 5.0) - 5.0
+    (event,) = [e for e in sharp["backward"].events if e.code == "joint-overshoot"]
+    assert float(event.text.split("leaves ")[1].split(" um")[0]) == pytest.approx(1e3 * gap, abs=0.006)
+
+
+def test_plain_rises_in_the_corner(sharp):
+    a = finish(sharp["plain"], "engagement_deg")
+    assert a.min() == pytest.approx(11.478, abs=1e-3)
+    assert a.max() == pytest.approx(18.737, abs=1e-3)
+
+
+def test_plain_rises_before_the_tangent_point(sharp):
+    """The rise starts R sin(a_line) = 0.995 mm before the tangent point, because P runs ahead of O."""
+    h = sharp["plain"].history
+    run = (h["pass"] == "finish") & (h["x_mm"] <= 20.0) & (np.abs(h["y_mm"] - 5.0) < 1e-9)
+    x, a = h["x_mm"][run], h["engagement_deg"][run]
+    for d, wanted in ((0.9, 11.5133), (0.7, 11.8641), (0.5, 12.7340), (0.25, 14.9054), (0.0, 18.7375)):
+        assert np.interp(20.0 - d, x, a) == pytest.approx(wanted, abs=1e-3)
+    assert x[a > math.degrees(A) + 1e-6].min() == pytest.approx(20.0 - R * math.sin(A), abs=0.051)
+
+
+def test_backward_sharp_stays_in_the_papers_band(sharp):
+    a = finish(sharp["backward"], "engagement_deg")
+    assert a.min() >= 11.47
+    assert 12.85 <= a.max() <= 12.92
+
+
+@pytest.mark.parametrize("column", ["force_xy_n", "torque_nm", "error_um"])
+def test_range_less_by_75_to_84_percent(sharp, column):
+    before, after = (np.ptp(finish(sharp[name], column)) for name in ("plain", "backward"))
+    assert 0.75 <= 1.0 - after / before <= 0.84
+
+
+def test_greatest_error_at_the_corners_entry(sharp):
+    """The paper saw its greatest error at the entry; so far as the path is reshaped that is where the joint is."""
+    h = sharp["backward"].history
+    rows = h["pass"] == "finish"
+    k = np.flatnonzero(rows)[np.argmax(h["error_um"][rows])]
+    assert (h["x_mm"][k], h["y_mm"][k]) == pytest.approx((20.0, 5.0), abs=0.1)
+
+
+def test_clothoid_makes_it_constant():
+    eased_plan = plan(joint="clothoid")
+    a = finish(eased_plan["backward"], "engagement_deg")
+    assert np.abs(a - math.degrees(A)).max() < 0.01
+    assert 0.0 < eased_plan["backward"].summary["deviation_mm"] <= SETTING.tolerance
+
+
+def test_clothoid_length():
+    assert clothoid_length(R, A, 3.0, 1.0) == pytest.approx(1.02 * 1.66, abs=5e-3)
+
+
+def test_tight_tolerance_shortens_the_clothoid_and_says_so():
+    path = offset([CORNER], R)[0]
+    e = eased(path, R, A, 0.005)
+    assert [x.code for x in e.events] == ["joint-short"]
+    assert 0.0 < e.deviation_mm <= 0.005
+
+
+def test_deviation_is_the_distance_of_the_walls():
+    """The eased path against the drawn one, by a polygon of fine chords."""
+    import shapely
+
+    path = offset([CORNER], R)[0]
+    e = eased(path, R, A, 0.05)
+    drawn = shapely.linestrings(path.flatten(1e-6))
+    points = shapely.points(e.path.at(np.linspace(0.0, e.path.length, 2000))[0])
+    assert shapely.distance(drawn, points).max() == pytest.approx(e.deviation_mm, abs=1e-4)
+
+
+def test_up_milling_is_the_mirror():
+    """A corner symmetric about its bisector: the same angles, entered from the other end."""
+    up = plan(milling="up", strategies=("plain",))["plain"]
+    a = finish(up, "engagement_deg")
+    assert (a.min(), a.max()) == pytest.approx((11.478341, 18.737542), abs=1e-5)
+    assert finish(up, "x_mm")[0] == pytest.approx(23.0, abs=1e-9)
+
+
+def test_feed_schedule_needs_an_agile_machine(sharp):
+    """f0 sin(a_line)/sin(a), in steps of 1 %: the feed in the corner, and no faster than f0 anywhere."""
+    f = finish(sharp["feed"], "feed_mm_min")
+    wanted = 600.0 * math.floor(100.0 * math.sin(A) / math.sin(math.radians(18.7375))) / 100.0
+    assert f.min() == pytest.approx(wanted, abs=1e-6)
+    assert f.max() <= 600.0 + 1e-9
+    assert sharp["feed"].summary["time_s"] > sharp["plain"].summary["time_s"]
+
+
+def test_boss_asks_for_more_stock():
+    """Outside a convex corner the allowance grows to r_P - r_c: thin roughing is reported with what is missing."""
+    boss = Contour.from_bulges(
+        [(3, 0), (37, 0), (40, 3), (40, 27), (37, 30), (3, 30), (0, 27), (0, 3)], [0, QUARTER] * 4, closed=True
+    )
+    wanted = math.hypot(8.0 - R * math.cos(A), R * math.sin(A)) - 3.0
+    (event,) = [
+        e
+        for e in plan([boss], side="outside", strategies=("backward",), semifinish_depth=0.01)["backward"].events
+        if e.failure
+    ]
+    assert event.code == "stock-thin"
+    assert f"asks for {wanted:.4g} mm" in event.text
+
+
+def test_stori_wright():
+    """Old surface 7.9 mm: r_Q 7.9370913, kappa_O 0.3404729; first order in the step."""
+    errors = []
+    for step in (0.02, 0.01, 0.005):
+        run = forward_pass(Contour.circle((0, 0), 7.9), R, A, step)
+        assert run.event is None
+        errors.append(np.hypot(*run.made[-1]) - 7.9370913)
+        kappa = 1.0 / np.hypot(*run.centre[len(run.centre) // 2])
+        assert kappa == pytest.approx(0.3404729, abs=0.01 * step)
+    assert errors[0] / errors[1] == pytest.approx(2.0, abs=0.02)
+    assert errors[1] / errors[2] == pytest.approx(2.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("old", "step", "code"),
+    [
+        (Contour.circle((0, 0), 4.9), 0.02, "forward-stops"),
+        (Contour.polyline([(0, 0), (10, 0), (10.5, -20)]), 0.02, "forward-corner"),
+        (Contour.polyline([(0, 0), (10, 0), (10, 20)]), 2.0, "forward-no-point"),
+    ],
+)
+def test_stori_wright_fails_with_the_place(old, step, code):
+    run = forward_pass(old, R, A, step)
+    assert run.event is not None
+    assert run.event.code == code
+    assert run.event.failure
+    assert np.hypot(run.event.x - run.centre[-1, 0], run.event.y - run.centre[-1, 1]) < 5.0 * step
+
+
+def test_forward_laps_keep_the_angle():
+    boss = Contour.from_bulges(
+        [(8, 0), (40, 0), (48, 8), (48, 30), (40, 38), (8, 38), (0, 30), (0, 8)], [0, QUARTER] * 4, closed=True
+    )
+    run = plan([boss], side="outside", strategies=("forward",), use="forward", passes=2, step=0.02)["forward"]
+    a = run.history["engagement_deg"][run.history["pass"] == "forward"]
+    assert np.abs(a - math.degrees(A)).max() < 0.1
