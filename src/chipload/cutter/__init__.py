@@ -1,0 +1,1 @@
+"""Cutters: their shape, and the files that describe them."""

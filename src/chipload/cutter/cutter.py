@@ -1,14 +1,22 @@
 """A cutter: the seven numbers of APT, its teeth, and how far it stands out of the holder.
 
-Notation (APT): d diameter, r corner radius, e radial and f axial distance of the corner circle's centre from the tip,
-alpha [rad] angle of the bottom with the plane normal to the axis, beta [rad] angle of the flank with the axis,
-h height of the cutting part. A flat end mill has r = e = ... = 0 but e = d/2; a ball has r = d/2, e = 0, f = r.
+Notation (APT): d diameter where bottom and flank lines meet, r corner radius, e radial and f axial distance of the
+corner circle's centre from the tip, alpha [rad] angle of the bottom with the plane normal to the axis, beta [rad] angle
+of the flank with the axis (wider upwards), h height of the cutting part. rho [mm] distance from the axis, z [mm] height
+above the tip. A flat end mill has r = 0, e = d/2, f = 0; a ball has r = d/2, e = 0, f = r.
+
+Bottom line z = rho tan(alpha), flank line rho = d/2 + (z - d/2 tan(alpha)) tan(beta); the corner circle touches both:
+e (1 - tan(alpha) tan(beta)) = d/2 (1 - tan(alpha) tan(beta)) + r tan(beta) / cos(alpha) - r / cos(beta),
+f = e tan(alpha) + r / cos(alpha).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
 
@@ -25,10 +33,11 @@ class Cutter:
     flute_length : length that cuts [mm]
     overhang : length out of the holder [mm], >= flute_length
     modulus : Young's modulus of the cutter [MPa]
-    corner_radius : r [mm], 0 <= r <= d / 2
-    corner_e, corner_f : APT e and f [mm]; None: those of a bull nose, e = d/2 - r, f = r
-    bottom : alpha [rad]
-    taper : beta [rad]
+    corner_radius : r [mm], r >= 0 and e >= 0: without taper and bottom angle r <= d / 2
+    corner_e, corner_f : APT e and f [mm]; None: where the corner touches bottom and flank, as e = d/2 - r, f = r of a
+        bull nose. A given one must agree with that within 1e-3 mm
+    bottom : alpha [rad], 0 <= alpha, alpha + beta < 90 deg
+    taper : beta [rad], 0 <= beta
     runout : (offset [mm], direction [rad] from tooth 0): the axis of the teeth beside that of the spindle
     shank_diameter : [mm]; None: as the diameter
     number : tool number, >= 1
@@ -61,8 +70,10 @@ class Cutter:
             if not ok:
                 raise InputError(f"cutter.{key} = {value:g}: {limit}")
 
+        optional = (self.corner_e, self.corner_f, self.shank_diameter)
         numbers = (self.diameter, self.helix, self.flute_length, self.overhang, self.modulus, self.corner_radius)
-        if not all(math.isfinite(x) for x in numbers):
+        more = (self.bottom, self.taper, *self.runout, *(x for x in optional if x is not None))
+        if not all(math.isfinite(x) for x in (*numbers, *more)):
             raise InputError("cutter: a number is not finite")
         need(self.diameter > 0.0, "diameter_mm", self.diameter, "must be above 0")
         need(self.flutes >= 1, "flutes", self.flutes, "must be at least 1")
@@ -82,15 +93,109 @@ class Cutter:
             self.modulus / 1000.0,
             "must be from 10 to 1000 (steel 210, carbide 580)",
         )
+        right = 0.5 * math.pi - 1e-9
+        need(0.0 <= self.bottom < right, "bottom_deg", math.degrees(self.bottom), "must be from 0 to below 90")
         need(
-            0.0 <= self.corner_radius <= self.diameter / 2.0,
-            "corner_radius_mm",
-            self.corner_radius,
-            f"must be at most diameter_mm / 2 = {self.diameter / 2.0:g}",
+            self.taper >= 0.0 and self.taper + self.bottom < right,
+            "taper_deg",
+            math.degrees(self.taper),
+            f"must be from 0 to below 90 - bottom_deg = {90.0 - math.degrees(self.bottom):g}",
         )
+        largest = self._largest_corner
+        limit = f"must be at most diameter_mm / 2 = {self.radius:g}"
+        if self.bottom > 0.0 or self.taper > 0.0:
+            limit = f"must be at most {largest:.6g}, where the corner's centre is on the axis"
+        slack = 1e-9 * self.diameter
+        need(self.corner_radius >= 0.0, "corner_radius_mm", self.corner_radius, "must be at least 0")
+        need(self.corner_radius <= largest + slack, "corner_radius_mm", self.corner_radius, limit)
+        for key, given, touching in zip(("e", "f"), (self.corner_e, self.corner_f), self.apt[2:4], strict=True):
+            need(
+                given is None or abs(given - touching) <= 1e-3,
+                f"corner_{key}_mm",
+                given or 0.0,
+                f"must be {touching:.6g}, where the corner touches bottom and flank; leave it out",
+            )
         need(self.runout[0] >= 0.0, "runout_mm", self.runout[0], "must be at least 0")
+        shank = self.shank_diameter
+        need(shank is None or shank > 0.0, "shank_diameter_mm", shank or 0.0, "must be above 0")
+        need(self.number >= 1, "number", self.number, "must be at least 1")
 
     @property
     def radius(self) -> float:
         """R = d / 2 [mm]."""
         return 0.5 * self.diameter
+
+    @property
+    def _largest_corner(self) -> float:
+        """Corner radius at which e = 0 [mm]."""
+        ta, tb = math.tan(self.bottom), math.tan(self.taper)
+        return self.radius * (1.0 - ta * tb) / (1.0 / math.cos(self.taper) - tb / math.cos(self.bottom))
+
+    @property
+    def apt(self) -> tuple[float, float, float, float, float, float, float]:
+        """(d, r, e, f, alpha, beta, h) [mm, rad].
+
+        >>> bull = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5, corner_radius=1.0)
+        >>> bull.apt
+        (10.0, 1.0, 4.0, 1.0, 0.0, 0.0, 20.0)
+        """
+        r, ta, tb = self.corner_radius, math.tan(self.bottom), math.tan(self.taper)
+        pull = r / math.cos(self.taper) - r * tb / math.cos(self.bottom)
+        e = max(self.radius - pull / (1.0 - ta * tb), 0.0)
+        f = e * ta + r / math.cos(self.bottom)
+        return (self.diameter, r, e, f, self.bottom, self.taper, self.flute_length)
+
+    def radius_at(self, z: ArrayLike) -> NDArray[np.float64]:
+        """Radius rho of the envelope at the heights z above the tip; at z = 0 that of the flat bottom.
+
+        Bottom line up to z = f - r cos(alpha), corner circle e + sqrt(r^2 - (f - z)^2) up to z = f - r sin(beta), flank
+        line above, on beyond the flutes.
+
+        Parameters
+        ----------
+        z : (n,) float [mm], z >= 0
+
+        Returns
+        -------
+        (n,) float [mm]
+
+        Raises
+        ------
+        InputError
+            A height is below the tip or not a number.
+
+        Examples
+        --------
+        >>> ball = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=5.0)
+        >>> ball.radius_at([0.0, 2.0, 5.0, 9.0]).tolist()
+        [0.0, 4.0, 5.0, 5.0]
+        """
+        z = np.asarray(z, dtype=np.float64)
+        if not (z >= 0.0).all():
+            raise InputError("cutter: radius_at: a height is below the tip: must be at least 0 mm")
+        _, r, e, f, alpha, beta, _ = self.apt
+        low, high = f - r * math.cos(alpha), f - r * math.sin(beta)
+        bottom = z / math.tan(alpha) if alpha > 0.0 else np.full(z.shape, e)
+        circle = e + np.sqrt(np.clip(r * r - (f - z) ** 2, 0.0, None))
+        flank = e + r * math.cos(beta) + (z - high) * math.tan(beta)
+        return np.asarray(np.where(z < low, bottom, np.where(z < high, circle, flank)))
+
+    def profile(self, chord_mm: float) -> NDArray[np.float64]:
+        """(m, 2) (rho, z) [mm] of the envelope from the tip to h, its corner by chords within ``chord_mm``.
+
+        >>> Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5).profile(0.01).tolist()
+        [[0.0, 0.0], [5.0, 0.0], [5.0, 20.0]]
+        """
+        _, r, e, f, alpha, beta, h = self.apt
+        points = [(0.0, 0.0)]
+        if r > 0.0:
+            turn = 0.5 * math.pi - alpha - beta
+            n = max(1, math.ceil(turn / (2.0 * math.acos(1.0 - min(chord_mm / r, 1.0)))))
+            angles = [alpha + turn * i / n for i in range(n + 1)]
+            points += [(e + r * math.sin(a), f - r * math.cos(a)) for a in angles]
+        else:
+            points.append((e, f))
+        points.append((float(self.radius_at(h)), h))
+        p: NDArray[np.float64] = np.array(points)
+        keep = np.hypot(*np.diff(p, axis=0).T) > 1e-9
+        return np.vstack([p[:1], p[1:][keep]])

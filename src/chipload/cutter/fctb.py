@@ -1,0 +1,100 @@
+"""FreeCAD tool bits (`.fctb`): JSON with lengths as texts such as `6,0 mm`, `1/4 in` or `0.25 "`.
+
+Read are end mills, ball ends and bull noses (torus); a shape that does not mill with its flank is refused.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+from chipload.errors import InputError
+
+#: shape file -> what it is
+SHAPES = {"endmill": "flat", "ballend": "ball", "torus": "bull", "bullnose": "bull"}
+_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3, "in": 25.4, "inch": 25.4, '"': 25.4}
+_LENGTH = re.compile(r"^([0-9]+(?:[.,][0-9]+)?)(?:\s*/\s*([0-9]+))?\s*([^\s0-9]+)$")
+_MIXED = re.compile(r"^([0-9]+)[\s+-]+([0-9]+)\s*/\s*([0-9]+)\s*([^\s0-9]+)$")
+_LARGEST_FILE = 1_000_000
+
+
+def read_fctb(path: str | Path) -> dict[str, Any]:
+    """What the file says, under the keys of a job's ``[[cutter]]``; what it does not say is not there.
+
+    Diameter, flutes, cutting edge height, shank diameter, corner radius by shape, the add-on's stick-out as overhang,
+    the name. Not in such a file: number, helix, modulus.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, is not such a file, the shape is another one, a length has no unit.
+    """
+    path = Path(path)
+    label = f"cutter.file {path}"
+    try:
+        if path.stat().st_size > _LARGEST_FILE:
+            raise InputError(f"{label}: more than {_LARGEST_FILE} bytes: not a tool bit")
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as err:
+        raise InputError(f"{label}: cannot be read: {err.strerror}") from None
+    except (ValueError, RecursionError):
+        raise InputError(f"{label}: not a FreeCAD tool bit: must be JSON") from None
+    if not isinstance(data, dict) or not isinstance(data.get("parameter"), dict) or "shape" not in data:
+        raise InputError(f"{label}: not a FreeCAD tool bit: must have shape and parameter")
+    shape = str(data["shape"]).lower().rsplit("/", 1)[-1].removesuffix(".fcstd")
+    kind = SHAPES.get(shape)
+    if kind is None:
+        raise InputError(f"{label}: shape {shape}: must be one of {', '.join(SHAPES)}")
+    parameter = data["parameter"]
+    attribute = data.get("attribute") if isinstance(data.get("attribute"), dict) else {}
+    out: dict[str, Any] = {}
+    if isinstance(data.get("name"), str):
+        out["name"] = data["name"]
+    for source, name, key in (
+        (parameter, "Diameter", "diameter_mm"),
+        (parameter, "CuttingEdgeHeight", "flute_length_mm"),
+        (parameter, "ShankDiameter", "shank_diameter_mm"),
+        (attribute, "btl-stickout", "overhang_mm"),
+    ):
+        if name in source:
+            out[key] = _length(f"{label}: {name}", source[name])
+    if "Flutes" in parameter:
+        out["flutes"] = _count(f"{label}: Flutes", parameter["Flutes"])
+    if kind == "ball" and "diameter_mm" in out:
+        out["corner_radius_mm"] = 0.5 * out["diameter_mm"]
+    if kind == "bull":
+        for name in ("TorusRadius", "CornerRadius", "FlatRadius"):
+            if name in parameter:
+                length = _length(f"{label}: {name}", parameter[name])
+                break
+        else:
+            raise InputError(f"{label}: shape {shape} without TorusRadius, CornerRadius or FlatRadius: give one")
+        if name == "FlatRadius":
+            if "diameter_mm" not in out:
+                raise InputError(f"{label}: FlatRadius without Diameter: give it")
+            length = 0.5 * out["diameter_mm"] - length
+        out["corner_radius_mm"] = length
+    return out
+
+
+def _length(label: str, text: object) -> float:
+    """A length with its unit in mm."""
+    plain = str(text).strip().replace("\N{NO-BREAK SPACE}", " ")
+    value, unit = None, ""
+    if hit := _MIXED.match(plain):
+        value, unit = int(hit[1]) + int(hit[2]) / max(int(hit[3]), 1), hit[4]
+    elif hit := _LENGTH.match(plain):
+        value, unit = float(hit[1].replace(",", ".")) / max(int(hit[2] or 1), 1), hit[3]
+    if value is None or unit.lower() not in _MM:
+        raise InputError(f"{label} = {text!r}: must be a length with its unit, as 6,0 mm or 1/4 in")
+    return value * _MM[unit.lower()]
+
+
+def _count(label: str, value: object) -> int:
+    """A whole number, as a number or as a text."""
+    text = str(value).strip()
+    if isinstance(value, bool) or not re.fullmatch(r"[0-9]{1,3}", text):
+        raise InputError(f"{label} = {value!r}: must be a whole number")
+    return int(text)

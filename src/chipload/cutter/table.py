@@ -1,0 +1,150 @@
+"""The `[[cutter]]` table of a job: the cutter's numbers, or the file that has them.
+
+A number stands in the job or in the file; the job's stands where both have it. One that stands in neither is named and
+refused, never guessed.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutter.fctb import read_fctb
+from chipload.cutter.tooltable import read_tool_table
+from chipload.errors import InputError
+
+#: keys that a cutter cannot be without
+NEEDED = ("number", "diameter_mm", "flutes", "helix_deg", "flute_length_mm", "overhang_mm", "modulus_gpa")
+
+
+class CutterTable(BaseModel):
+    """Keys of one ``[[cutter]]``; :meth:`cutter` makes the cutter.
+
+    ``file`` is a FreeCAD tool bit (`.fctb`) or a LinuxCNC tool table (`.tbl`, with ``tool`` the number in it and
+    ``file_unit`` the unit of its lengths, which the file does not say).
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+
+    number: int | None = Field(None, ge=1)
+    name: str | None = None
+    diameter_mm: float | None = None
+    flutes: int | None = None
+    helix_deg: float | None = None
+    flute_length_mm: float | None = None
+    overhang_mm: float | None = None
+    modulus_gpa: float | None = None
+    corner_radius_mm: float | None = None
+    corner_e_mm: float | None = None
+    corner_f_mm: float | None = None
+    bottom_deg: float | None = None
+    taper_deg: float | None = None
+    runout_mm: float | None = None
+    runout_deg: float | None = None
+    shank_diameter_mm: float | None = None
+    file: str | None = None
+    tool: int | None = None
+    file_unit: Literal["mm", "inch"] | None = None
+
+    def cutter(self, folder: str | Path = ".") -> Cutter:
+        """The cutter; ``file`` is relative to ``folder``.
+
+        Raises
+        ------
+        InputError
+            A key is missing, a number out of range, the file cannot be read or is of another kind.
+        """
+        given = self.model_dump(exclude_none=True)
+        values = {**self._from_file(Path(folder)), **given}
+        for key in NEEDED:
+            if key not in values:
+                where = f": {self.file} does not say it" if self.file else ""
+                raise InputError(f"cutter.{key} is missing{where}: must be given, a cutter is never guessed")
+        if ("runout_mm" in values) != ("runout_deg" in values):
+            lacks, has = ("runout_deg", "runout_mm") if "runout_mm" in values else ("runout_mm", "runout_deg")
+            raise InputError(f"cutter.{lacks} is missing: give it with {has} or leave both out")
+        return Cutter(
+            diameter=values["diameter_mm"],
+            flutes=values["flutes"],
+            helix=math.radians(values["helix_deg"]),
+            flute_length=values["flute_length_mm"],
+            overhang=values["overhang_mm"],
+            modulus=values["modulus_gpa"] * 1000.0,
+            corner_radius=values.get("corner_radius_mm", 0.0),
+            corner_e=values.get("corner_e_mm"),
+            corner_f=values.get("corner_f_mm"),
+            bottom=math.radians(values.get("bottom_deg", 0.0)),
+            taper=math.radians(values.get("taper_deg", 0.0)),
+            runout=(values.get("runout_mm", 0.0), math.radians(values.get("runout_deg", 0.0))),
+            shank_diameter=values.get("shank_diameter_mm"),
+            number=values["number"],
+            name=values.get("name", ""),
+        )
+
+    def _from_file(self, folder: Path) -> dict[str, Any]:
+        """What ``file`` says, under the keys of the job."""
+        if self.file is None:
+            for key in ("tool", "file_unit"):
+                if getattr(self, key) is not None:
+                    raise InputError(f"cutter.{key} is given without cutter.file: give the tool table or leave it out")
+            return {}
+        path = folder / self.file
+        kind = path.suffix.lower()
+        if kind == ".fctb":
+            for key in ("tool", "file_unit"):
+                if getattr(self, key) is not None:
+                    raise InputError(f"cutter.{key} is for a tool table (.tbl): leave it out with {self.file}")
+            return dict(read_fctb(path))
+        if kind == ".tbl":
+            if self.tool is None:
+                raise InputError(f"cutter.tool is missing: {self.file} holds many: say which")
+            if self.file_unit is None:
+                raise InputError(f"cutter.file_unit is missing: {self.file} does not say its unit: give mm or inch")
+            return dict(read_tool_table(path, self.tool, self.file_unit))
+        raise InputError(f"cutter.file = {self.file}: must end in .fctb (FreeCAD) or .tbl (LinuxCNC)")
+
+
+def cutter_from_table(table: Mapping[str, Any], folder: str | Path = ".") -> Cutter:
+    """The cutter of a ``[[cutter]]`` table.
+
+    Raises
+    ------
+    InputError
+        As :meth:`CutterTable.cutter`; a key is unknown or its value of the wrong kind.
+
+    Examples
+    --------
+    >>> mill = {"number": 1, "diameter_mm": 10.0, "flutes": 4, "helix_deg": 30.0, "flute_length_mm": 22.0}
+    >>> cutter_from_table({**mill, "overhang_mm": 35.0, "modulus_gpa": 580.0}).radius
+    5.0
+    """
+    try:
+        checked = CutterTable.model_validate(dict(table))
+    except ValidationError as err:
+        raise InputError(_first(err, table)) from None
+    return checked.cutter(folder)
+
+
+def _first(err: ValidationError, table: Mapping[str, Any]) -> str:
+    """The first thing that is wrong with a table, in our words."""
+    row = err.errors()[0]
+    key = ".".join(str(x) for x in row["loc"])
+    if row["type"] == "extra_forbidden":
+        near = difflib.get_close_matches(key, CutterTable.model_fields, 1, 0.0)[0]
+        return f"cutter.{key}: unknown key: the nearest known one is {near}"
+    wanted = {
+        "float_type": "must be a number",
+        "finite_number": "must be a finite number",
+        "int_type": "must be a whole number",
+        "string_type": "must be a text",
+        "literal_error": "must be mm or inch",
+        "greater_than_equal": "must be at least 1",
+    }
+    value = table[str(row["loc"][0])]
+    return f"cutter.{key} = {value!r}: {wanted.get(row['type'], row['msg'])}"

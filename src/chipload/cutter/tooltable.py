@@ -1,0 +1,63 @@
+"""LinuxCNC tool tables (`.tbl`): a line a tool, `T1 P1 Z+0.511 D10.0 ;10 mm end mill`.
+
+Lengths are in the machine's unit, which the file does not say: it is asked for.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+from chipload.errors import InputError
+from chipload.units import MM_PER
+
+_WORD = re.compile(r"([A-Za-z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?=\s|[A-Za-z]|$)")
+_LARGEST_FILE = 1_000_000
+
+
+def read_tool_table(path: str | Path, tool: int, unit: str) -> dict[str, Any]:
+    """Number, diameter and name of one tool, under the keys of a job's ``[[cutter]]``; what is not there is left out.
+
+    Parameters
+    ----------
+    tool : its T word
+    unit : `mm` or `inch`, of the lengths in the file
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, a line is not a tool, the tool is not there or there twice.
+    """
+    path = Path(path)
+    label = f"cutter.file {path}"
+    try:
+        if path.stat().st_size > _LARGEST_FILE:
+            raise InputError(f"{label}: more than {_LARGEST_FILE} bytes: not a tool table")
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError as err:
+        raise InputError(f"{label}: cannot be read: {err.strerror}") from None
+    found: dict[int, tuple[int, dict[str, float], str]] = {}
+    known: list[int] = []
+    for k, line in enumerate(text.splitlines(), 1):
+        body, _, comment = line.partition(";")
+        if not body.strip():
+            continue
+        words = {letter.upper(): float(number) for letter, number in _WORD.findall(body)}
+        if "T" not in words or _WORD.sub("", body).strip():
+            raise InputError(f"{label} line {k}: not a tool: must be words as T1 P1 D10")
+        number = int(words["T"])
+        if number == tool and tool in found:
+            raise InputError(f"{label}: tool {tool} stands twice, in lines {found[tool][0]} and {k}: keep one")
+        found[number] = (k, words, comment.strip())
+        known.append(number)
+    if tool not in found:
+        listed = ", ".join(str(n) for n in sorted(set(known))) or "none"
+        raise InputError(f"{label}: tool {tool} is not there: must be one of {listed}")
+    _, words, comment = found[tool]
+    out: dict[str, Any] = {"number": tool}
+    if comment:
+        out["name"] = comment
+    if "D" in words:
+        out["diameter_mm"] = words["D"] * MM_PER[unit]
+    return out

@@ -1,0 +1,122 @@
+"""A program as APT cutter location data.
+
+Notation: GOTO/x,y,z[,i,j,k] the tip and, under MULTAX, the axis; CUTTER/d,r,e,f,alpha,beta,h in mm and degrees.
+An arc is a CIRCLE/x,y,z,0,0,s record before its end, as CAM systems write it: centre at the height of the start, s = +1
+counter-clockwise seen from +Z, -1 clockwise, and the GOTO to its end; a full turn is two of them. A helical arc has no
+such record: it is written as two or more GOTO whose chords leave it by at most ``chord_mm``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from chipload.cutter.cutter import Cutter
+from chipload.errors import InputError
+from chipload.program.motions import is_arc, radii, starts, sweeps
+from chipload.program.program import DWELL, RAPID, Program
+from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
+
+
+def write_apt(
+    program: Program,
+    cutters: Mapping[int, Cutter],
+    *,
+    title: str,
+    verified: bool,
+    chord_mm: float = 1e-3,
+) -> str:
+    """CL data of a program.
+
+    Parameters
+    ----------
+    cutters : cutter of each tool number
+    title : of the part, in PARTNO
+    verified : whether an independent simulation has found the program good
+    chord_mm : greatest distance of a helical arc from its chords [mm], > 0
+
+    Raises
+    ------
+    InputError
+        A tool number has no cutter.
+    """
+    said = "VERIFIED BY INDEPENDENT SIMULATION" if verified else "NOT VERIFIED"
+    out = [f"PARTNO/{_text(title)}", f"PPRINT/CHIPLOAD: {said}", "UNITS/MM"]
+    tilted = bool((np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > 1e-12).any())
+    if tilted:
+        out.append("MULTAX/ON")
+    p0, sweep, r = starts(program), sweeps(program), radii(program)
+    arc = is_arc(program) & (sweep != 0.0)
+    tool: int | None = None
+    spindle, feed, label = 0.0, "", -1
+    for k in range(len(program)):
+        if program.tool[k] != tool:
+            tool = int(program.tool[k])
+            if tool not in cutters:
+                raise InputError(f"program row {k}: tool {tool} has no cutter: give its [[cutter]]")
+            out += [cutter_statement(cutters[tool]), f"LOADTL/{tool}"]
+        if program.spindle[k] != spindle:
+            spindle = float(program.spindle[k])
+            sense = "CLW" if spindle > 0.0 else "CCLW"
+            out.append(f"SPINDL/{_number(abs(rpm_from_rad_s(spindle)), 3)},RPM,{sense}" if spindle else "SPINDL/OFF")
+        if program.label[k] != label:
+            label = int(program.label[k])
+            out.append(f"PPRINT/{_text(program.labels[label])}")
+        if program.motion[k] == DWELL:
+            out.append(f"DELAY/{_number(program.feed[k])}")
+            continue
+        if program.motion[k] == RAPID:
+            out.append("RAPID")
+        else:
+            text = _number(mm_min_from_mm_s(program.feed[k]))
+            if text != feed:
+                out.append(f"FEDRAT/{text},MMPM")
+                feed = text
+        end = program.p_work[k]
+        axis = f",{_numbers(program.axis[k], 9)}" if tilted else ""
+        level = abs(end[2] - p0[k, 2]) <= 1e-9
+        if not arc[k]:
+            out.append(f"GOTO/{_numbers(end)}{axis}")
+            continue
+        cx, cy = program.centre[k]
+        if level:
+            pieces = 2 if abs(sweep[k]) > 1.5 * math.pi else 1
+        else:
+            pieces = max(2, math.ceil(abs(sweep[k]) / (2.0 * math.acos(1.0 - min(chord_mm / r[k], 1.0)))))
+        a0 = math.atan2(p0[k, 1] - cy, p0[k, 0] - cx)
+        for i in range(1, pieces + 1):
+            a, u = a0 + sweep[k] * i / pieces, i / pieces
+            z = p0[k, 2] + (end[2] - p0[k, 2]) * u
+            to = end if i == pieces else (cx + r[k] * math.cos(a), cy + r[k] * math.sin(a), z)
+            if level:
+                out.append(f"CIRCLE/{_numbers((cx, cy, p0[k, 2]))},0,0,{'1' if sweep[k] > 0.0 else '-1'}")
+            out.append(f"GOTO/{_numbers(to)}{axis}")
+    out += ["SPINDL/OFF", "FINI"]
+    return "\n".join(out) + "\n"
+
+
+def cutter_statement(cutter: Cutter) -> str:
+    """CUTTER/d,r,e,f,alpha,beta,h in mm and degrees.
+
+    >>> cutter_statement(Cutter(14.0, 2, 0.0, 30.0, 73.0, 6e5, corner_radius=7.0))
+    'CUTTER/14,7,0,7,0,0,30'
+    """
+    d, r, e, f, alpha, beta, h = cutter.apt
+    return f"CUTTER/{_numbers((d, r, e, f, math.degrees(alpha), math.degrees(beta), h))}"
+
+
+def _number(value: float, decimals: int = 6) -> str:
+    text = f"{value:.{max(decimals, 1)}f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
+def _numbers(values: object, decimals: int = 6) -> str:
+    return ",".join(_number(float(x), decimals) for x in np.asarray(values, dtype=np.float64))
+
+
+def _text(text: str) -> str:
+    """Printable ASCII on one line; $ would go on to the next."""
+    plain = " ".join(text.encode("ascii", "replace").decode("ascii").split()).replace("$", "S")
+    return "".join(c for c in plain if c.isprintable())[:66]
