@@ -1,0 +1,475 @@
+"""Parallel curves of contours and regions that stay lines and arcs.
+
+Notation: d [mm] the signed distance, positive to the LEFT of travel; theta [rad] the angle by which a contour turns at
+a vertex; a **raw** segment is the parallel of one input segment before trimming: a line moved by d n, an arc of the
+same centre and the radius ``r - d`` (left turn) or ``r + d``; where d exceeds the radius it is gone. A vertex that turns
+away from the offset side opens the parallel there; an arc of radius ``|d|`` about the vertex links it.
+
+Every point of the parallel that is worth keeping lies at ``|d|`` from its foot and nowhere nearer to anything. So the raw
+segments are cut wherever they cross, touch or overlap, a piece is kept if its quarter points are no nearer than
+``|d| - tol`` to all input, and the kept pieces are chained by their ends. Measured beside OCP: docs/design/offsets.md.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from chipload.errors import ChiploadError, InputError
+from chipload.geometry import _kernels
+from chipload.geometry.contour import Contour, Floats, Region
+from chipload.geometry.distance import boxes
+
+Ints = NDArray[np.int64]
+
+#: an arc whose parallel has a smaller radius [mm] than this becomes a point
+POINT_MM = 1e-9
+#: what is forgiven [mm]: (clearance, ends that are one point); the next pair is tried where the kept pieces do not close
+LADDER = ((1e-9, 1e-8), (1e-8, 5e-8), (1e-7, 4e-7))
+#: curves that miss each other by less [mm] touch
+TOUCH_MM = 1e-10
+
+
+def offset(contours: Sequence[Contour], distance_mm: float) -> tuple[Contour, ...]:
+    """Trimmed parallel curves of all contours together, in their sense of travel.
+
+    Parameters
+    ----------
+    contours : closed contours and open chains
+    distance_mm : d [mm], positive to the left of travel; 0 returns the contours
+
+    Returns
+    -------
+    Contours whose every point lies ``|d|`` from the nearest input point (to 1e-9 mm), closed or open, in the order of
+    the input; none where nothing is left. The parallel of an open chain ends square to its ends, without caps, and is
+    trimmed against both sides of everything. Where two parallels coincide (a slot of width exactly 2 d) those that run
+    opposite ways are both dropped, of those that run the same way one is kept.
+
+    Raises
+    ------
+    InputError
+        ``distance_mm`` is not finite.
+    ChiploadError
+        The pieces do not close up within the widest tolerance.
+
+    Examples
+    --------
+    >>> (inner,) = offset([Contour.circle((0.0, 0.0), 5.0)], 2.0)
+    >>> round(inner.radii[0], 12)
+    3.0
+    """
+    return _offset(contours, distance_mm, both_sides=len(contours) > 1 or not all(c.closed for c in contours))
+
+
+def offset_region(region: Region, distance_mm: float) -> Region:
+    """The points of a region that are ``distance_mm`` from its boundary: positive insets, negative grows.
+
+    Grown by ``-d`` every point within d of the region is added. The result has the inside on the left; parts of no
+    width are not in it. Raises as :func:`offset`.
+
+    Examples
+    --------
+    >>> square = Region.of([Contour.polyline([[0, 0], [4, 0], [4, 4], [0, 4]], closed=True)])
+    >>> offset_region(square, 1.0).area
+    4.0
+    """
+    return Region(_offset(region.contours, distance_mm, both_sides=False))
+
+
+def _offset(contours: Sequence[Contour], d: float, both_sides: bool) -> tuple[Contour, ...]:
+    if not np.isfinite(d):
+        raise InputError(f"offset: distance_mm = {d}: must be a finite number")
+    if d == 0.0 or not contours:
+        return tuple(contours)
+    raw = _raw(contours, d, both_sides)
+    given = np.vstack([c.segments for c in contours])
+    if len(raw.segments) == 0:
+        return ()
+    for tol, snap in LADDER:
+        done, lost = _trimmed(raw, given, d, tol, snap)
+        if lost is None:
+            return done
+    raise ChiploadError(
+        f"offset: the parallel at {d:.6g} mm does not close at ({lost[0]:.6g}, {lost[1]:.6g}): "
+        "segments there are shorter than the tolerance"
+    )
+
+
+# -- raw parallels ------------------------------------------------------------------------------------------------
+@dataclass(frozen=True, eq=False)
+class _Raw:
+    """Raw segments (n, 7); ``smooth`` (n,) the one that follows tangentially or -1; ``knife`` (n,) those that cut
+    others but belong to no result; ``ends`` (n, 2) whether the start, the end is that of an open chain."""
+
+    segments: Floats
+    smooth: Ints
+    knife: NDArray[np.bool_]
+    ends: NDArray[np.bool_]
+
+
+def _raw(contours: Sequence[Contour], d: float, both_sides: bool) -> _Raw:
+    parts = [(_parallel(c, d), False, not c.closed) for c in contours]
+    if both_sides:
+        parts += [(_parallel(c, -d), True, False) for c in contours]
+        for c in contours:
+            if not c.closed:
+                for x, y in (c.start, c.end):
+                    parts.append(((Contour.circle((x, y), abs(d)).segments, np.array([-1])), True, False))
+    rows, smooth, knife, ends = [], [], [], []
+    total = 0
+    for (seg, link), cuts, is_open in parts:
+        n = len(seg)
+        rows.append(seg)
+        smooth.append(np.where(link >= 0, link + total, -1))
+        knife.append(np.full(n, cuts))
+        end = np.zeros((n, 2), dtype=np.bool_)
+        if is_open and n:
+            end[0, 0] = end[-1, 1] = True
+        ends.append(end)
+        total += n
+    return _Raw(np.vstack(rows), np.concatenate(smooth), np.concatenate(knife), np.vstack(ends))
+
+
+def _parallel(contour: Contour, d: float) -> tuple[Floats, Ints]:
+    """Raw segments (n, 7) of one contour with their joining arcs, and the next smooth one (n,) of each."""
+    seg = contour.segments
+    count = len(seg)
+    p0, p1, sweep = seg[:, 0:2], seg[:, 2:4], seg[:, 6]
+    arc = sweep != 0.0
+    sense = np.sign(sweep)
+    centre = _true_centres(seg)
+    r = np.where(arc, np.hypot(*(p0 - centre).T), 1.0)
+    t0 = np.where(arc[:, None], sense[:, None] * _left(p0 - centre), p1 - p0)
+    t1 = np.where(arc[:, None], sense[:, None] * _left(p1 - centre), p1 - p0)
+    t0, t1 = t0 / np.hypot(*t0.T)[:, None], t1 / np.hypot(*t1.T)[:, None]
+    radius = np.where(arc, r - sense * d, np.inf)
+    ratio = (np.where(np.abs(radius) <= POINT_MM, 0.0, np.where(arc, radius, 1.0)) / r)[:, None]
+    a = np.where(arc[:, None], centre + ratio * (p0 - centre), p0 + d * _left(t0))
+    b = np.where(arc[:, None], centre + ratio * (p1 - centre), p1 + d * _left(t1))
+    alive = radius > POINT_MM
+    length = np.where(arc, np.abs(sweep) * np.abs(np.where(arc, radius, 1.0)), contour.lengths)
+    bend = np.where(arc & alive, 1.0 / np.where(alive, radius, 1.0), 0.0)
+
+    joints = range(count if contour.closed else count - 1)
+    links: dict[int, tuple[Floats, bool]] = {}
+    seamless: set[int] = set()
+    for i in joints:
+        j = (i + 1) % count
+        theta = float(np.arctan2(t1[i, 0] * t0[j, 1] - t1[i, 1] * t0[j, 0], t1[i] @ t0[j]))
+        gap = float(np.hypot(*(a[j] - b[i])))
+        both = bool(alive[i] and alive[j])
+        # what moving both ends along the curve to the middle of the gap costs across it
+        bow = abs(d) * theta**2 / 4.0 + gap**2 / 8.0 * (bend[i] + bend[j])
+        if gap <= LADDER[0][1] or (both and bow < 2e-10 and 4.0 * gap < min(length[i], length[j])):
+            b[i] = a[j] = 0.5 * (b[i] + a[j])
+            if both and abs(theta) < 1e-4:
+                seamless.add(i)
+        elif d * theta < 0.0 or abs(theta) > np.pi - 1e-9:
+            turn = -np.sign(d) * abs(theta)
+            links[i] = (np.concatenate([b[i], a[j], 0.5 * (p1[i] + p0[j]), [turn]]), True)
+        elif both and abs(theta) < 0.1:
+            x = _corner(b[i], a[j], (t1[i], t0[j]), (centre[i], centre[j]), (radius[i], radius[j]))
+            reach = max(float(np.hypot(*(x - b[i]))), float(np.hypot(*(x - a[j]))))
+            if reach < min(2.0 * gap, 0.25 * min(length[i], length[j])):
+                b[i] = a[j] = x
+
+    rows: list[Floats] = []
+    follow: list[int] = []
+    for i in range(count):
+        if alive[i]:
+            rows.append(np.concatenate([a[i], b[i], centre[i] if arc[i] else (0.0, 0.0), [sweep[i]]]))
+            follow.append(len(rows) if i in links or i in seamless else -1)
+        if i in links:
+            rows.append(links[i][0])
+            follow.append(len(rows) if alive[(i + 1) % count] else -1)
+    if not rows:
+        return np.zeros((0, 7)), np.zeros(0, dtype=np.int64)
+    out = np.array(rows)
+    smooth = np.array(follow, dtype=np.int64)
+    smooth[smooth == len(out)] = 0 if contour.closed else -1
+    out[:, 6] = _swept(out, out[:, 0:2], out[:, 2:4], out[:, 6])
+    # a segment drawn shorter than a point between its snapped ends goes; its neighbours then meet
+    keep = (np.hypot(*(out[:, 2:4] - out[:, 0:2]).T) > POINT_MM) | (np.abs(out[:, 6]) > np.pi)
+    place = np.cumsum(keep) - 1
+    smooth = np.where((smooth >= 0) & keep[smooth], place[smooth], -1)
+    return out[keep], smooth[keep]
+
+
+def _corner(
+    p: Floats, q: Floats, tangents: tuple[Floats, Floats], centres: tuple[Floats, Floats], radii: tuple[float, float]
+) -> Floats:
+    """Where two raw segments cross near p (on the first) and q (on the second), by Newton's method."""
+    x = 0.5 * (p + q)
+    for _ in range(8):
+        f = np.empty(2)
+        jac = np.empty((2, 2))
+        for k, on in enumerate((p, q)):
+            if np.isfinite(radii[k]):
+                v = x - centres[k]
+                dist = float(np.hypot(*v))
+                f[k], jac[k] = dist - radii[k], v / dist
+            else:
+                jac[k] = _left(tangents[k])
+                f[k] = jac[k] @ (x - on)
+        det = jac[0, 0] * jac[1, 1] - jac[0, 1] * jac[1, 0]
+        if det == 0.0:
+            return np.full(2, np.inf)
+        step = np.array([jac[1, 1] * f[0] - jac[0, 1] * f[1], jac[0, 0] * f[1] - jac[1, 0] * f[0]]) / det
+        x = x - step
+    return x
+
+
+def _true_centres(seg: Floats) -> Floats:
+    """(n, 2) centres moved along the chord so that both ends of an arc have one radius."""
+    chord = seg[:, 2:4] - seg[:, 0:2]
+    length = np.hypot(*chord.T)
+    fit = (seg[:, 6] != 0.0) & (length > 1e-6)
+    u = chord / np.where(fit, length, 1.0)[:, None]
+    slip = np.sum((seg[:, 4:6] - 0.5 * (seg[:, 0:2] + seg[:, 2:4])) * u, axis=1)
+    out: Floats = seg[:, 4:6] - np.where(fit, slip, 0.0)[:, None] * u
+    return out
+
+
+def _left(v: Floats) -> Floats:
+    """Rot(+90 deg) of vectors (..., 2)."""
+    return np.stack([-v[..., 1], v[..., 0]], axis=-1)
+
+
+def _swept(seg: Floats, p: Floats, q: Floats, near: Floats) -> Floats:
+    """(n,) sweep from p to q about the centres of the segments, of the whole turns that come nearest to ``near``."""
+    u, v = p - seg[:, 4:6], q - seg[:, 4:6]
+    turn = np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], np.sum(u * v, axis=1))
+    turn += 2.0 * np.pi * np.round((near - turn) / (2.0 * np.pi))
+    return np.where(near == 0.0, 0.0, turn)
+
+
+# -- trimming -----------------------------------------------------------------------------------------------------
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """Pieces of raw segments: raw segment (m,), parameters (m, 2) in 0..1, nodes (m, 2); places of the nodes (k, 2)."""
+
+    raw: Ints
+    span: Floats
+    node: Ints
+    place: Floats
+
+    def __getitem__(self, pick: NDArray[np.bool_] | Ints) -> _Pieces:
+        return _Pieces(self.raw[pick], self.span[pick], self.node[pick], self.place)
+
+
+def _trimmed(raw: _Raw, given: Floats, d: float, tol: float, snap: float) -> tuple[tuple[Contour, ...], Floats | None]:
+    """The parallel, and a place where a sound piece was left over (none: all is well)."""
+    pieces, loose = _split(raw, tol, snap)
+    pieces = pieces[~raw.knife[pieces.raw]]
+    fixed = boxes(given)
+
+    def too_near(some: _Pieces, limit: float) -> NDArray[np.bool_]:
+        out = np.empty(len(some.raw), dtype=np.bool_)
+        _kernels.nearer(given, fixed, _samples(raw, some), limit, out)
+        return out
+
+    pieces = pieces[~too_near(pieces, abs(d) - tol)]
+    pieces = pieces[_single(raw, pieces, 10.0 * snap)]
+    alive = _rooted(pieces, loose)
+    left = pieces[~alive]
+    pieces = pieces[alive]
+    if len(left.raw):
+        seg = raw.segments[left.raw]
+        long = _lengths(seg) * (left.span[:, 1] - left.span[:, 0]) > 100.0 * snap
+        sound = long & ~too_near(left, abs(d) - 1e-3 * tol)
+        if sound.any():
+            return (), left.place[left.node[int(sound.argmax()), 0]]
+    return _chained(raw, pieces, d, tol), None
+
+
+def _split(raw: _Raw, tol: float, snap: float) -> tuple[_Pieces, NDArray[np.bool_]]:
+    """All pieces between crossings, and which nodes (k,) may end an open chain."""
+    seg = raw.segments
+    n = len(seg)
+    box = boxes(seg)
+    order = np.argsort(box[:, 0], kind="stable")
+    room = 16 * n + 64
+    while True:
+        who, where = np.empty((room, 2), dtype=np.int64), np.empty((room, 2))
+        count = _kernels.crossings(seg, box, order, raw.smooth, tol, TOUCH_MM, who, where)
+        if count <= room:
+            break
+        room = count
+    who, where = who[:count], where[:count]
+    at = _parameter(seg[who[:, 0]], where)
+    points = np.vstack([seg[:, 0:2], seg[:, 2:4], where])
+    owner = np.concatenate([np.arange(n), np.arange(n), who[:, 0]])
+    t = np.concatenate([np.zeros(n), np.ones(n), np.clip(at, 0.0, 1.0)])
+
+    pairs = cKDTree(points).query_pairs(snap, output_type="ndarray")
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
+    label = connected_components(graph, directed=False)[1].astype(np.int64)
+    first = np.full(label.max() + 1, len(points))
+    np.minimum.at(first, label, np.arange(len(points)))
+    place = points[first]
+    free = np.concatenate([raw.ends[:, 0], raw.ends[:, 1], raw.knife[who[:, 1]]])
+    loose = np.zeros(len(place), dtype=np.bool_)
+    loose[label[free]] = True
+
+    rank = np.lexsort((t, owner))
+    a, b = rank[:-1], rank[1:]
+    whole = (np.abs(seg[owner[a], 6]) > np.pi) & (t[b] - t[a] > 0.5)
+    real = (owner[a] == owner[b]) & ((label[a] != label[b]) | whole)
+    a, b = a[real], b[real]
+    # what fell out between two pieces was a point: the next begins where the one before it ended
+    span = np.column_stack([t[a], t[b]])
+    return _Pieces(owner[a], span, np.column_stack([label[a], label[b]]), place), loose
+
+
+def _parameter(seg: Floats, p: Floats) -> Floats:
+    """(m,) share of the way along each segment (m, 7) of a point (m, 2) on it; may leave 0..1 by a rounding."""
+    chord = seg[:, 2:4] - seg[:, 0:2]
+    arc = seg[:, 6] != 0.0
+    line = np.sum((p - seg[:, 0:2]) * chord, axis=1) / np.where(arc, 1.0, np.sum(chord**2, axis=1))
+    u, v = seg[:, 0:2] - seg[:, 4:6], p - seg[:, 4:6]
+    full = np.where(arc, np.abs(seg[:, 6]), 1.0)
+    turn = np.sign(seg[:, 6]) * np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], np.sum(u * v, axis=1))
+    turn = np.where(turn < 0.0, turn + 2.0 * np.pi, turn)
+    turn = np.where(turn > 0.5 * full + np.pi, turn - 2.0 * np.pi, turn)
+    return np.where(arc, turn / full, line)
+
+
+def _on(seg: Floats, t: Floats) -> Floats:
+    """(m, 2) points of segments (m, 7) at the shares t (m,)."""
+    v = seg[:, 0:2] - seg[:, 4:6]
+    c, s = np.cos(t * seg[:, 6])[:, None], np.sin(t * seg[:, 6])[:, None]
+    out: Floats = np.where(
+        seg[:, 6:7] == 0.0, seg[:, 0:2] + t[:, None] * (seg[:, 2:4] - seg[:, 0:2]), seg[:, 4:6] + c * v + s * _left(v)
+    )
+    return out
+
+
+def _lengths(seg: Floats) -> Floats:
+    """(m,) lengths of segments (m, 7)."""
+    r = np.hypot(seg[:, 0] - seg[:, 4], seg[:, 1] - seg[:, 5])
+    return np.where(seg[:, 6] == 0.0, np.hypot(*(seg[:, 2:4] - seg[:, 0:2]).T), r * np.abs(seg[:, 6]))
+
+
+def _samples(raw: _Raw, pieces: _Pieces) -> Floats:
+    """(m, 3, 2) middle and quarter points of the pieces."""
+    seg, (t0, t1) = raw.segments[pieces.raw], pieces.span.T
+    return np.stack([_on(seg, t0 + w * (t1 - t0)) for w in (0.5, 0.25, 0.75)], axis=1)
+
+
+def _single(raw: _Raw, pieces: _Pieces, same: float) -> NDArray[np.bool_]:
+    """(m,) which pieces stay where some coincide: of those that run one way the first, of opposite ones none."""
+    middle = _samples(raw, pieces)[:, 0]
+    groups: dict[tuple[int, int], list[int]] = defaultdict(list)
+    for k, (a, b) in enumerate(pieces.node):
+        groups[(a, b) if a < b else (b, a)].append(k)
+    keep = np.ones(len(pieces.raw), dtype=np.bool_)
+    for members in groups.values():
+        while len(members) > 1:
+            k, *rest = members
+            twins = [m for m in rest if np.hypot(*(middle[m] - middle[k])) <= same]
+            members = [m for m in rest if m not in twins]
+            ring = pieces.node[k, 0] == pieces.node[k, 1]
+            ahead = [
+                m for m in twins
+                if (raw.segments[pieces.raw[m], 6] * raw.segments[pieces.raw[k], 6] > 0.0 if ring
+                    else pieces.node[m, 0] == pieces.node[k, 0])
+            ]  # fmt: skip
+            keep[twins] = False
+            if len(ahead) < len(twins):
+                keep[k] = False
+    return keep
+
+
+def _rooted(pieces: _Pieces, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(m,) pieces that are left when dead ends have been taken away, one after another."""
+    alive = np.ones(len(pieces.raw), dtype=np.bool_)
+    if not len(alive):
+        return alive
+    size = len(pieces.place)
+    while True:
+        starts = np.bincount(pieces.node[alive, 0], minlength=size)
+        ends = np.bincount(pieces.node[alive, 1], minlength=size)
+        dead = alive & (
+            ((ends[pieces.node[:, 0]] == 0) & ~loose[pieces.node[:, 0]])
+            | ((starts[pieces.node[:, 1]] == 0) & ~loose[pieces.node[:, 1]])
+        )
+        if not dead.any():
+            return alive
+        alive &= ~dead
+
+
+# -- chaining -----------------------------------------------------------------------------------------------------
+def _chained(raw: _Raw, pieces: _Pieces, d: float, tol: float) -> tuple[Contour, ...]:
+    """Contours from pieces; at a node of many the sharpest turn to the offset side is taken."""
+    seg = raw.segments[pieces.raw]
+    heading, bend = [], []
+    for t in pieces.span.T:
+        v = _on(seg, t) - seg[:, 4:6]
+        arc = seg[:, 6:7] != 0.0
+        along = np.where(arc, np.sign(seg[:, 6:7]) * _left(v), seg[:, 2:4] - seg[:, 0:2])
+        heading.append(np.arctan2(along[:, 1], along[:, 0]))
+        bend.append(np.where(arc[:, 0], np.sign(seg[:, 6]) / np.hypot(*v.T), 0.0))
+    leaving: dict[int, list[int]] = defaultdict(list)
+    arriving = np.bincount(pieces.node[:, 1], minlength=len(pieces.place)) if len(seg) else np.zeros(0)
+    for k, node in enumerate(pieces.node[:, 0]):
+        leaving[node].append(k)
+    side = np.sign(d)
+
+    def sharpness(k: int, m: int) -> tuple[float, float]:
+        turn = (heading[0][m] - heading[1][k] + np.pi) % (2.0 * np.pi) - np.pi
+        if abs(turn) > np.pi - 1e-6:
+            turn = side * np.pi
+        return float(np.round(side * turn, 6)), float(side * bend[0][m])
+
+    used = np.zeros(len(seg), dtype=np.bool_)
+    out: list[tuple[int, Contour]] = []
+    free = [k for k, node in enumerate(pieces.node[:, 0]) if arriving[node] < len(leaving[node])]
+    for first in [*free, *range(len(seg))]:
+        if used[first]:
+            continue
+        chain = [first]
+        used[first] = True
+        while True:
+            node = pieces.node[chain[-1], 1]
+            ways = [m for m in leaving[node] if not used[m]]
+            if node == pieces.node[first, 0]:
+                ways.append(first)
+            if not ways:
+                break
+            best = ways[0] if len(ways) == 1 else max(ways, key=lambda m: sharpness(chain[-1], m))
+            if best == first:
+                break
+            used[best] = True
+            chain.append(best)
+        made = _contour(raw, pieces, chain)
+        closed = pieces.node[chain[-1], 1] == pieces.node[first, 0]
+        if closed and abs(made.area) <= tol * made.length:
+            continue
+        out.append((int(pieces.raw[first]), made))
+    return tuple(c for _, c in sorted(out, key=lambda item: item[0]))
+
+
+def _contour(raw: _Raw, pieces: _Pieces, chain: list[int]) -> Contour:
+    """One contour; pieces of a raw segment that follow one another become one segment again."""
+    runs: list[list[int]] = []
+    for k in chain:
+        if runs and pieces.raw[k] == pieces.raw[runs[-1][-1]] and pieces.node[k, 0] == pieces.node[runs[-1][-1], 1]:
+            before = pieces.span[runs[-1][-1], 1]
+            if 0.0 <= pieces.span[k, 0] - before < 1e-3:
+                runs[-1].append(k)
+                continue
+        runs.append([k])
+    a = np.array([run[0] for run in runs])
+    b = np.array([run[-1] for run in runs])
+    rows = raw.segments[pieces.raw[a]].copy()
+    p, q = pieces.place[pieces.node[a, 0]], pieces.place[pieces.node[b, 1]]
+    rows[:, 6] = _swept(rows, p, q, rows[:, 6] * (pieces.span[b, 1] - pieces.span[a, 0]))
+    rows[:, 0:2], rows[:, 2:4] = p, q
+    return Contour(rows)
