@@ -209,3 +209,24 @@ def test_refused():
     del rows["pass"]
     with pytest.raises(InputError, match="column pass is missing"):
         verify(plan(), rows)
+
+
+def test_a_row_at_a_kink_is_held_against_both_headings():
+    """Two slots at right angles: leaving the corner the rim is engaged over 90 deg, arriving over 180."""
+    p = program([(RAPID, 0, 0, SAFE, 0, 0), (LINE, 0, 0, Z, 0, 0), (LINE, 30, 0, Z, 0, 0), (LINE, 30, 30, Z, 0, 0)])
+
+    def row(angle):
+        return {
+            "x_mm": np.array([20.0, 30.0, 30.0]),
+            "y_mm": np.array([0.0, 0.0, 20.0]),
+            "z_mm": np.full(3, Z),
+            "engagement_deg": np.array([180.0, angle, 180.0]),
+            "pass": np.full(3, "front", dtype=object),
+        }
+
+    def check(angle):
+        return verify(p, row(angle), stock=None, wall=[], engagement_tolerance_deg=0.01)
+
+    assert check(180.0).verdict == "proved"
+    assert check(90.0).verdict == "proved"
+    assert check(135.0).engagement_difference_deg == pytest.approx(45.0, abs=0.01)
