@@ -84,7 +84,7 @@ def _holds(seg: Any, px: float, py: float, tol: float) -> bool:
         dx, dy = seg[2] - seg[0], seg[3] - seg[1]
         length = math.hypot(dx, dy)
         u = ((px - seg[0]) * dx + (py - seg[1]) * dy) / length
-        return -tol <= u <= length + tol
+        return bool(-tol <= u <= length + tol)
     sense = 1.0 if seg[6] > 0.0 else -1.0
     ax, ay = seg[0] - seg[4], seg[1] - seg[5]
     qx, qy = px - seg[4], py - seg[5]
@@ -92,7 +92,7 @@ def _holds(seg: Any, px: float, py: float, tol: float) -> bool:
     if turn < 0.0:
         turn += 2.0 * math.pi
     slack = tol / math.hypot(ax, ay)
-    return turn <= abs(seg[6]) + slack or turn >= 2.0 * math.pi - slack
+    return bool(turn <= abs(seg[6]) + slack or turn >= 2.0 * math.pi - slack)
 
 
 @njit(cache=True, nogil=True)

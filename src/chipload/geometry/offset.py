@@ -1,12 +1,13 @@
 """Parallel curves of contours and regions that stay lines and arcs.
 
-Notation: d [mm] the signed distance, positive to the LEFT of travel; theta [rad] the angle by which a contour turns at
-a vertex; a **raw** segment is the parallel of one input segment before trimming: a line moved by d n, an arc of the
-same centre and the radius ``r - d`` (left turn) or ``r + d``; where d exceeds the radius it is gone. A vertex that turns
-away from the offset side opens the parallel there; an arc of radius ``|d|`` about the vertex links it.
+Notation: d [mm] the signed distance, positive to the LEFT of travel; theta [rad] the angle by which a contour turns
+at a vertex; kappa [1/mm] the curvature, positive to the left; a **raw** segment is the parallel of one input segment
+before trimming: a line moved by d n, an arc of the same centre and the radius ``r - d`` (left turn) or ``r + d``;
+where d exceeds the radius it is gone. A vertex that turns away from the offset side opens the parallel there; an arc of
+radius ``|d|`` about the vertex links it.
 
-Every point of the parallel that is worth keeping lies at ``|d|`` from its foot and nowhere nearer to anything. So the raw
-segments are cut wherever they cross, touch or overlap, a piece is kept if its quarter points are no nearer than
+Every point of the parallel that is worth keeping lies at ``|d|`` from its foot and nowhere nearer to anything. So the
+raw segments are cut wherever they cross, touch or overlap, a piece is kept if its quarter points are no nearer than
 ``|d| - tol`` to all input, and the kept pieces are chained by their ends. Measured beside OCP: docs/design/offsets.md.
 """
 
@@ -31,7 +32,7 @@ Ints = NDArray[np.int64]
 
 #: an arc whose parallel has a smaller radius [mm] than this becomes a point
 POINT_MM = 1e-9
-#: what is forgiven [mm]: (clearance, ends that are one point); the next pair is tried where the kept pieces do not close
+#: what is forgiven [mm]: (clearance, ends that are one point); the next pair where the kept pieces do not close
 LADDER = ((1e-9, 1e-8), (1e-8, 5e-8), (1e-7, 4e-7))
 #: curves that miss each other by less [mm] touch
 TOUCH_MM = 1e-10
@@ -57,7 +58,7 @@ def offset(contours: Sequence[Contour], distance_mm: float) -> tuple[Contour, ..
     InputError
         ``distance_mm`` is not finite.
     ChiploadError
-        The pieces do not close up within the widest tolerance.
+        The pieces do not close up within the widest tolerance, or an input contour crosses itself.
 
     Examples
     --------
@@ -92,13 +93,15 @@ def _offset(contours: Sequence[Contour], d: float, both_sides: bool) -> tuple[Co
     given = np.vstack([c.segments for c in contours])
     if len(raw.segments) == 0:
         return ()
+    lost = np.zeros(2)
     for tol, snap in LADDER:
-        done, lost = _trimmed(raw, given, d, tol, snap)
-        if lost is None:
+        done, place = _trimmed(raw, given, d, tol, snap)
+        if place is None:
             return done
+        lost = place
     raise ChiploadError(
         f"offset: the parallel at {d:.6g} mm does not close at ({lost[0]:.6g}, {lost[1]:.6g}): "
-        "segments there are shorter than the tolerance"
+        "the contour crosses itself, or has segments shorter than the tolerance"
     )
 
 
@@ -106,7 +109,8 @@ def _offset(contours: Sequence[Contour], d: float, both_sides: bool) -> tuple[Co
 @dataclass(frozen=True, eq=False)
 class _Raw:
     """Raw segments (n, 7); ``smooth`` (n,) the one that follows tangentially or -1; ``knife`` (n,) those that cut
-    others but belong to no result; ``ends`` (n, 2) whether the start, the end is that of an open chain."""
+    others but belong to no result; ``ends`` (n, 2) whether the start, the end is that of an open chain.
+    """
 
     segments: Floats
     smooth: Ints
@@ -146,6 +150,7 @@ def _parallel(contour: Contour, d: float) -> tuple[Floats, Ints]:
     sense = np.sign(sweep)
     centre = _true_centres(seg)
     r = np.where(arc, np.hypot(*(p0 - centre).T), 1.0)
+    kappa = sense / r
     t0 = np.where(arc[:, None], sense[:, None] * _left(p0 - centre), p1 - p0)
     t1 = np.where(arc[:, None], sense[:, None] * _left(p1 - centre), p1 - p0)
     t0, t1 = t0 / np.hypot(*t0.T)[:, None], t1 / np.hypot(*t1.T)[:, None]
@@ -165,13 +170,17 @@ def _parallel(contour: Contour, d: float) -> tuple[Floats, Ints]:
         theta = float(np.arctan2(t1[i, 0] * t0[j, 1] - t1[i, 1] * t0[j, 0], t1[i] @ t0[j]))
         gap = float(np.hypot(*(a[j] - b[i])))
         both = bool(alive[i] and alive[j])
+        # at a cusp the curvatures say to which side the contour turns back; a retraced way is linked on both
+        cusp = abs(theta) > np.pi - 1e-9
+        if cusp and kappa[i] + kappa[j] != 0.0:
+            theta = -np.copysign(np.pi, kappa[i] + kappa[j])
         # what moving both ends along the curve to the middle of the gap costs across it
         bow = abs(d) * theta**2 / 4.0 + gap**2 / 8.0 * (bend[i] + bend[j])
         if gap <= LADDER[0][1] or (both and bow < 2e-10 and 4.0 * gap < min(length[i], length[j])):
             b[i] = a[j] = 0.5 * (b[i] + a[j])
             if both and abs(theta) < 1e-4:
                 seamless.add(i)
-        elif d * theta < 0.0 or abs(theta) > np.pi - 1e-9:
+        elif d * theta < 0.0 or (cusp and kappa[i] + kappa[j] == 0.0):
             turn = -np.sign(d) * abs(theta)
             links[i] = (np.concatenate([b[i], a[j], 0.5 * (p1[i] + p0[j]), [turn]]), True)
         elif both and abs(theta) < 0.1:
@@ -247,7 +256,8 @@ def _swept(seg: Floats, p: Floats, q: Floats, near: Floats) -> Floats:
     u, v = p - seg[:, 4:6], q - seg[:, 4:6]
     turn = np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], np.sum(u * v, axis=1))
     turn += 2.0 * np.pi * np.round((near - turn) / (2.0 * np.pi))
-    return np.where(near == 0.0, 0.0, turn)
+    out: Floats = np.where(near == 0.0, 0.0, turn)
+    return out
 
 
 # -- trimming -----------------------------------------------------------------------------------------------------
