@@ -104,6 +104,20 @@ def within(mot, i, last, px, py, reach):  # type: ignore[no-untyped-def]
     d = math.sqrt(vx * vx + vy * vy)
     if abs(d - mot[i, 7]) >= reach:
         return False
+    ex = px - mot[i, 0]
+    ey = py - mot[i, 1]
+    if ex * ex + ey * ey < reach * reach:
+        return True
+    sweep = mot[i, 6]
+    if last == 1.0 and abs(sweep) < 3.0:  # the wedge by cross products, without an angle
+        ex = px - mot[i, 2]
+        ey = py - mot[i, 3]
+        if ex * ex + ey * ey < reach * reach:
+            return True
+        turn = 1.0 if sweep > 0.0 else -1.0
+        past = (mot[i, 0] - mot[i, 4]) * vy - (mot[i, 1] - mot[i, 5]) * vx
+        left = vx * (mot[i, 3] - mot[i, 5]) - vy * (mot[i, 2] - mot[i, 4])
+        return turn * past >= 0.0 and turn * left >= 0.0
     return nearest(mot, i, 0.0, last, px, py)[0] < reach
 
 
