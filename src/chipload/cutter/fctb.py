@@ -48,7 +48,8 @@ def read_fctb(path: str | Path) -> dict[str, Any]:
     if kind is None:
         raise InputError(f"{label}: shape {shape}: must be one of {', '.join(SHAPES)}")
     parameter = data["parameter"]
-    attribute = data.get("attribute") if isinstance(data.get("attribute"), dict) else {}
+    more = data.get("attribute")
+    attribute: dict[str, Any] = more if isinstance(more, dict) else {}
     out: dict[str, Any] = {}
     if isinstance(data.get("name"), str):
         out["name"] = data["name"]

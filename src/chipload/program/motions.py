@@ -7,12 +7,13 @@ arc turns through in the XY plane, positive counter-clockwise, 0 for all else; e
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipload.geometry.contour import JOIN_MM
-from chipload.program.program import ARC_CCW, ARC_CW, DWELL, Program
+from chipload.program.program import ARC_CCW, ARC_CW, DWELL, LINE, Program
 
 Floats = NDArray[np.float64]
 
@@ -96,3 +97,32 @@ def bounds(program: Program) -> tuple[Floats, Floats]:
         high[:, 0] = np.where(hit, np.maximum(high[:, 0], x), high[:, 0])
         high[:, 1] = np.where(hit, np.maximum(high[:, 1], y), high[:, 1])
     return low, high
+
+
+def straightened(program: Program, turn: Floats) -> Program:
+    """The program with some arcs as chords between points on them.
+
+    Parameters
+    ----------
+    turn : (n,) float [rad]
+        Greatest angle of a chord of each row; inf where the row stays as it is. A chord leaves its arc by at most
+        r (1 - cos(turn / 2)).
+    """
+    sweep = sweeps(program)
+    chosen = is_arc(program) & np.isfinite(turn) & (sweep != 0.0)
+    if not chosen.any():
+        return program
+    count = np.ones(len(program), dtype=np.int64)
+    count[chosen] = np.ceil(np.abs(sweep[chosen]) / turn[chosen] - 1e-9).astype(np.int64).clip(1)
+    row = np.repeat(np.arange(len(program)), count)
+    u = ((np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + 1) / count[row])[:, None]
+    p0, p1 = starts(program)[row], program.p_work[row]
+    v = p0[:, 0:2] - program.centre[row]
+    angle = (sweep[row] * u[:, 0])[:, None]
+    around = program.centre[row] + np.cos(angle) * v + np.sin(angle) * np.column_stack([-v[:, 1], v[:, 0]])
+    inner = (chosen[row] & (u[:, 0] < 1.0))[:, None]
+    points = np.where(inner, np.column_stack([around, (p0 + (p1 - p0) * u)[:, 2]]), p1)
+    columns = {f.name: getattr(program, f.name)[row] for f in fields(Program) if f.name != "labels"}
+    columns["motion"] = np.where(chosen[row], LINE, program.motion[row])
+    columns["centre"] = np.where(chosen[row][:, None], 0.0, program.centre[row])
+    return Program(**{**columns, "p_work": points}, labels=program.labels)

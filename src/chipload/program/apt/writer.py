@@ -1,9 +1,9 @@
 """A program as APT cutter location data.
 
 Notation: GOTO/x,y,z[,i,j,k] the tip and, under MULTAX, the axis; CUTTER/d,r,e,f,alpha,beta,h in mm and degrees.
-An arc is a CIRCLE/x,y,z,0,0,s record before its end, as CAM systems write it: centre at the height of the start, s = +1
+An arc is a CIRCLE/x,y,z,0,0,s record before its end, as CAM systems write it: centre at the height of the arc, s = +1
 counter-clockwise seen from +Z, -1 clockwise, and the GOTO to its end; a full turn is two of them. A helical arc has no
-such record: it is written as two or more GOTO whose chords leave it by at most ``chord_mm``.
+such record: it is written as GOTO whose chords leave it by at most ``chord_mm``.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
-from chipload.program.motions import is_arc, radii, starts, sweeps
+from chipload.program.motions import is_arc, radii, starts, straightened, sweeps
 from chipload.program.program import DWELL, RAPID, Program
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
 
@@ -47,7 +47,11 @@ def write_apt(
     tilted = bool((np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > 1e-12).any())
     if tilted:
         out.append("MULTAX/ON")
-    p0, sweep, r = starts(program), sweeps(program), radii(program)
+    helical = np.abs(program.p_work[:, 2] - starts(program)[:, 2]) > 1e-9
+    r = radii(program)
+    turn = 2.0 * np.arccos(1.0 - np.minimum(chord_mm / np.where(r > 0.0, r, math.inf), 1.0))
+    program = straightened(program, np.where(helical & (r > 0.0), turn, math.inf))
+    p0, sweep = starts(program), sweeps(program)
     arc = is_arc(program) & (sweep != 0.0)
     tool: int | None = None
     spindle, feed, label = 0.0, "", -1
@@ -76,23 +80,17 @@ def write_apt(
                 feed = text
         end = program.p_work[k]
         axis = f",{_numbers(program.axis[k], 9)}" if tilted else ""
-        level = abs(end[2] - p0[k, 2]) <= 1e-9
         if not arc[k]:
             out.append(f"GOTO/{_numbers(end)}{axis}")
             continue
-        cx, cy = program.centre[k]
-        if level:
-            pieces = 2 if abs(sweep[k]) > 1.5 * math.pi else 1
-        else:
-            pieces = max(2, math.ceil(abs(sweep[k]) / (2.0 * math.acos(1.0 - min(chord_mm / r[k], 1.0)))))
-        a0 = math.atan2(p0[k, 1] - cy, p0[k, 0] - cx)
-        for i in range(1, pieces + 1):
-            a, u = a0 + sweep[k] * i / pieces, i / pieces
-            z = p0[k, 2] + (end[2] - p0[k, 2]) * u
-            to = end if i == pieces else (cx + r[k] * math.cos(a), cy + r[k] * math.sin(a), z)
-            if level:
-                out.append(f"CIRCLE/{_numbers((cx, cy, p0[k, 2]))},0,0,{'1' if sweep[k] > 0.0 else '-1'}")
-            out.append(f"GOTO/{_numbers(to)}{axis}")
+        centre = _numbers((*program.centre[k], end[2]))
+        sense = "1" if sweep[k] > 0.0 else "-1"
+        if abs(sweep[k]) > 1.5 * math.pi:
+            a = 0.5 * sweep[k]
+            v = p0[k, 0:2] - program.centre[k]
+            half = program.centre[k] + math.cos(a) * v + math.sin(a) * np.array([-v[1], v[0]])
+            out += [f"CIRCLE/{centre},0,0,{sense}", f"GOTO/{_numbers((*half, end[2]))}{axis}"]
+        out += [f"CIRCLE/{centre},0,0,{sense}", f"GOTO/{_numbers(end)}{axis}"]
     out += ["SPINDL/OFF", "FINI"]
     return "\n".join(out) + "\n"
 

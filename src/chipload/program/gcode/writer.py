@@ -3,8 +3,9 @@
 Notation: q [mm] the position as written, rounded to the machine's decimals; one unit is the last of them. An arc is
 written by its end q and by I, J from its rounded start to its centre; of the nine (I, J) about the true one that is
 taken whose two radii agree best, so that a controller that compares them (LinuxCNC: 0.0127 mm and 0.1 %) accepts the
-arc. A motion that rounds to nothing is left out. An arc that rounds to a chord within half a unit of it is a line: it cannot
-become a full turn.
+arc. A motion that rounds to nothing is left out. An arc that rounds to a chord within half a unit of it is a line: it
+cannot become a full turn. LinuxCNC refuses arcs with a radius below 0.00127 mm: they are written as chords of 45 deg,
+which leave them by at most 0.0001 mm.
 
 First comes whether the program was verified. The same program gives the same bytes.
 """
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 
 from chipload.errors import InputError
 from chipload.machine.machine import Machine
-from chipload.program.motions import is_arc, sweeps
+from chipload.program.motions import is_arc, radii, straightened, sweeps
 from chipload.program.program import ARC_CCW, DWELL, RAPID, Program
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
 
@@ -31,6 +32,8 @@ NOT_VERIFIED = "NOT VERIFIED: no simulation has checked this program"
 #: comments that LinuxCNC would act upon
 _ACTIVE = re.compile(r"^\s*(abort|axis|debug|log|logappend|logclose|logopen|msg|print|probeclose|probeopen|py)\b", re.I)
 _LONGEST_COMMENT = 120
+#: arcs of a smaller radius [mm] are written as chords
+LEAST_RADIUS = 0.0013
 
 
 def write_gcode(
@@ -65,6 +68,8 @@ def write_gcode(
     said = VERIFIED if verified else NOT_VERIFIED
     head = [f"O{number:04d} {_comment(said, fanuc)}" if fanuc else _comment(said, fanuc)]
     head += [_comment(text, fanuc) for text in (title, *comments)]
+    small = radii(program) < LEAST_RADIUS
+    program = straightened(program, np.where(small, 0.25 * math.pi, math.inf))
     blocks = [*_modes(machine), *_blocks(program, machine)]
     blocks += ["M5", "M30" if fanuc else "M2"]
     if line_step > 0:
