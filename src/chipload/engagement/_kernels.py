@@ -152,10 +152,12 @@ def front_part(tx, ty, enter, leave, n, phi_in, phi_out):  # type: ignore[no-unt
 
 @njit(cache=True, nogil=True)
 def side_of(px, py, seg, candidates, n):  # type: ignore[no-untyped-def]
-    """+1 where (px, py) is in material (left of the nearest segment), -1 where it is not."""
+    """+1 where (px, py) is in material (left of the nearest segment), -1 where it is not.
+
+    Where the nearest point is a joint the two sides are added: the sign of the bisector is the true one.
+    """
     best = math.inf
     lean = 0.0
-    side = -1
     for j in range(n):
         i = candidates[j]
         sweep = seg[i, 6]
@@ -189,11 +191,12 @@ def side_of(px, py, seg, candidates, n):  # type: ignore[no-untyped-def]
             dy = turn * qx
         d = math.hypot(wx, wy)
         cross = (dx * wy - dy * wx) / math.hypot(dx, dy)
-        if d < best * (1.0 - 1e-12) - 1e-15 or (d <= best * (1.0 + 1e-12) + 1e-15 and abs(cross) > lean):
-            best = min(d, best)
-            lean = abs(cross)
-            side = 1 if cross > 0.0 else -1
-    return side
+        if d < best * (1.0 - 1e-12) - 1e-15:
+            best = d
+            lean = cross
+        elif d <= best * (1.0 + 1e-12) + 1e-15:
+            lean += cross
+    return 1 if lean > 0.0 else -1
 
 
 @njit(cache=True, nogil=True)

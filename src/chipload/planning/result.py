@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.geometry.contour import Contour, Region
+from chipload.geometry.contour import Contour
 from chipload.program.program import Program
 
 #: columns by name, all of one length: float64, or str (object) for names
@@ -67,8 +67,8 @@ class StrategyResult:
     summary : JSON values, as `engagement_deg: {min, max}`; merged into summary.json
     events : in the order of the path
     limits : the job's limits against this strategy
-    drawn : contours to show by name: `wall`, `stock`, `semifinish path`, `finish path`, `leftover` ...
-    stock : what the first motion meets, for the check and for pictures; None: solid everywhere
+    drawn : contours by name. The check needs `wall` (the part on the right of travel) and `stock before` (closed, what
+        the first motion meets); `stock`, `semifinish path`, `finish path`, `leftover` ... are shown
     """
 
     name: str
@@ -78,7 +78,6 @@ class StrategyResult:
     events: tuple[Event, ...] = ()
     limits: tuple[LimitCheck, ...] = ()
     drawn: Mapping[str, tuple[Contour, ...]] = field(default_factory=dict)
-    stock: Region | None = None
 
     @property
     def holds(self) -> bool:

@@ -239,6 +239,7 @@ def _strategy(job: _Job, name: str, planar: list[Pass]) -> StrategyResult:
     on_wall = np.isin(history["pass"], ["finish", "forward"])
     events = (*job.events, *_events(job, runs, history, name))
     drawn = {
+        "stock before": _stock(job).contours,
         "wall": tuple(_back(w, job.flip) for w in job.walls.walls),
         "semifinish path": tuple(r.path for r in runs if r.name == "semifinish"),
         "finish path": tuple(r.path for r in runs if r.name != "semifinish"),
@@ -252,7 +253,6 @@ def _strategy(job: _Job, name: str, planar: list[Pass]) -> StrategyResult:
         events,
         check_limits(job.limits, history, on_wall),
         drawn,
-        _stock(job),
     )
 
 
