@@ -82,7 +82,7 @@ def test_threads_give_the_same():
     assert (one.phi == two.phi).all()
 
 
-def sampled_rim(region, o, t, radius, n=20001):
+def sampled_rim(region, o, t, radius, n=7201):
     """Engaged share of the front half by asking point after point."""
     phi = (np.arange(n) + 0.5) * math.pi / n
     normal = np.array([-t[1], t[0]])
@@ -99,7 +99,7 @@ def sampled_rim(region, o, t, radius, n=20001):
     st.floats(0.7, 8),
 )
 def test_star_of_lines_and_arcs(corners, x, y, heading, radius):
-    """Any star of lines and arcs against a sampled rim (0.009 deg a sample)."""
+    """Any star of lines and arcs against a sampled rim (0.025 deg a sample)."""
     n = len(corners)
     points = [(r * math.cos(math.tau * k / n), r * math.sin(math.tau * k / n)) for k, (r, _) in enumerate(corners)]
     star = Contour.from_bulges(points, [b if abs(b) > 0.05 else 0.0 for _, b in corners], closed=True)
@@ -108,13 +108,13 @@ def test_star_of_lines_and_arcs(corners, x, y, heading, radius):
     met = engagement(StockBoundary(star.segments), [[x, y]], [t], radius)
     crossed = _crosses_itself(star)
     if not crossed and met.count[0] <= PIECES:
-        assert np.degrees(met.angle[0]) == pytest.approx(sampled_rim(region, (x, y), t, radius), abs=0.05)
+        assert np.degrees(met.angle[0]) == pytest.approx(sampled_rim(region, (x, y), t, radius), abs=0.06)
 
 
 def _crosses_itself(contour):
     import shapely
 
-    return not shapely.polygons(contour.flatten(1e-3)).is_valid
+    return not shapely.polygons(contour.flatten(1e-7)).is_valid
 
 
 def test_bad_input():

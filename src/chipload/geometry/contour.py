@@ -191,9 +191,7 @@ class Contour:
         w = np.column_stack([cos * v[:, 0] - sin * v[:, 1], sin * v[:, 0] + cos * v[:, 1]])
         p = np.where(arc[:, None], centre + w, p0 + u * chord)
         unit = np.where(arc, np.sign(sweep) / np.where(arc, r, 1.0), 0.0)
-        tangent = np.where(
-            arc[:, None], np.column_stack([-w[:, 1], w[:, 0]]) * unit[:, None], chord / length[:, None]
-        )
+        tangent = np.where(arc[:, None], np.column_stack([-w[:, 1], w[:, 0]]) * unit[:, None], chord / length[:, None])
         return p, tangent, unit
 
     def reversed(self) -> Contour:

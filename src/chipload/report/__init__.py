@@ -1,0 +1,1 @@
+"""What a person reads: the result folder, its report, its scene. The only room that draws."""
