@@ -63,7 +63,7 @@ def offset(contours: Sequence[Contour], distance_mm: float) -> tuple[Contour, ..
     Examples
     --------
     >>> (inner,) = offset([Contour.circle((0.0, 0.0), 5.0)], 2.0)
-    >>> round(inner.radii[0], 12)
+    >>> round(float(inner.radii[0]), 12)
     3.0
     """
     return _offset(contours, distance_mm, both_sides=len(contours) > 1 or not all(c.closed for c in contours))
@@ -148,7 +148,7 @@ def _parallel(contour: Contour, d: float) -> tuple[Floats, Ints]:
     p0, p1, sweep = seg[:, 0:2], seg[:, 2:4], seg[:, 6]
     arc = sweep != 0.0
     sense = np.sign(sweep)
-    centre = _true_centres(seg)
+    centre = true_centres(seg)
     r = np.where(arc, np.hypot(*(p0 - centre).T), 1.0)
     kappa = sense / r
     t0 = np.where(arc[:, None], sense[:, None] * _left(p0 - centre), p1 - p0)
@@ -203,7 +203,7 @@ def _parallel(contour: Contour, d: float) -> tuple[Floats, Ints]:
     out = np.array(rows)
     smooth = np.array(follow, dtype=np.int64)
     smooth[smooth == len(out)] = 0 if contour.closed else -1
-    out[:, 6] = _swept(out, out[:, 0:2], out[:, 2:4], out[:, 6])
+    out[:, 6] = swept(out, out[:, 0:2], out[:, 2:4], out[:, 6])
     # a segment drawn shorter than a point between its snapped ends goes; its neighbours then meet
     keep = (np.hypot(*(out[:, 2:4] - out[:, 0:2]).T) > POINT_MM) | (np.abs(out[:, 6]) > np.pi)
     place = np.cumsum(keep) - 1
@@ -235,7 +235,7 @@ def _corner(
     return x
 
 
-def _true_centres(seg: Floats) -> Floats:
+def true_centres(seg: Floats) -> Floats:
     """(n, 2) centres moved along the chord so that both ends of an arc have one radius."""
     chord = seg[:, 2:4] - seg[:, 0:2]
     length = np.hypot(*chord.T)
@@ -251,7 +251,7 @@ def _left(v: Floats) -> Floats:
     return np.stack([-v[..., 1], v[..., 0]], axis=-1)
 
 
-def _swept(seg: Floats, p: Floats, q: Floats, near: Floats) -> Floats:
+def swept(seg: Floats, p: Floats, q: Floats, near: Floats) -> Floats:
     """(n,) sweep from p to q about the centres of the segments, of the whole turns that come nearest to ``near``."""
     u, v = p - seg[:, 4:6], q - seg[:, 4:6]
     turn = np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], np.sum(u * v, axis=1))
@@ -348,7 +348,8 @@ def _parameter(seg: Floats, p: Floats) -> Floats:
     turn = np.sign(seg[:, 6]) * np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], np.sum(u * v, axis=1))
     turn = np.where(turn < 0.0, turn + 2.0 * np.pi, turn)
     turn = np.where(turn > 0.5 * full + np.pi, turn - 2.0 * np.pi, turn)
-    return np.where(arc, turn / full, line)
+    out: Floats = np.where(arc, turn / full, line)
+    return out
 
 
 def _on(seg: Floats, t: Floats) -> Floats:
@@ -480,6 +481,6 @@ def _contour(raw: _Raw, pieces: _Pieces, chain: list[int]) -> Contour:
     b = np.array([run[-1] for run in runs])
     rows = raw.segments[pieces.raw[a]].copy()
     p, q = pieces.place[pieces.node[a, 0]], pieces.place[pieces.node[b, 1]]
-    rows[:, 6] = _swept(rows, p, q, rows[:, 6] * (pieces.span[b, 1] - pieces.span[a, 0]))
+    rows[:, 6] = swept(rows, p, q, rows[:, 6] * (pieces.span[b, 1] - pieces.span[a, 0]))
     rows[:, 0:2], rows[:, 2:4] = p, q
     return Contour(rows)

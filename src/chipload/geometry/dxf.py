@@ -1,0 +1,334 @@
+"""A DXF drawing becomes contours of lines and arcs in mm.
+
+Notation: OCS the frame of a flat entity, WCS that of the drawing; an entity with the extrusion (0, 0, -1) is seen from
+below: its x is mirrored and its arcs turn the other way. Bulge = tan(sweep / 4). Splines and ellipses become biarcs.
+
+Reference: Autodesk, DXF Reference, group codes of the ENTITIES section.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chipload.errors import Finding, InputError
+from chipload.geometry.biarc import arcs_along
+from chipload.geometry.chains import Drawing, chained
+from chipload.geometry.contour import JOIN_MM, Contour, Floats
+from chipload.units import MM_PER
+
+#: $INSUNITS of the header
+INSUNITS = {1: "inch", 2: "foot", 4: "mm", 5: "cm", 6: "m", 13: "um"}
+#: entities that are drawn lines, all others are dropped and reported
+DRAWN = ("LINE", "ARC", "CIRCLE", "LWPOLYLINE", "POLYLINE", "SPLINE", "ELLIPSE")
+#: an entity is flat if its z stays within this [units of the drawing]
+FLAT = 1e-6
+_ENTITY = re.compile(
+    rb"\n[ \t]*0[ \t]*\r?\n[ \t]*(?:LINE|ARC|CIRCLE|LWPOLYLINE|POLYLINE|VERTEX|SPLINE|ELLIPSE|INSERT|POINT|TEXT|MTEXT|"
+    rb"3DFACE|SOLID|HATCH)[ \t]*\r?(?=\n)"
+)
+_POINT = re.compile(rb"\n[ \t]*10[ \t]*\r?(?=\n)")
+
+
+def read_dxf(
+    path: str | Path,
+    *,
+    units: str | None = None,
+    units_if_unsaid: str | None = None,
+    layers: Sequence[str] | None = None,
+    join_mm: float = 0.01,
+    tolerance_mm: float = 0.001,
+    max_entities: int = 200_000,
+) -> Drawing:
+    """Contours of the model space of a DXF file, each layer joined by itself.
+
+    Parameters
+    ----------
+    path : the file, text or binary DXF
+    units : unit of the numbers (``mm``, ``inch`` ...), whatever the header says; a disagreement is a finding
+    units_if_unsaid : unit where the header names none
+    layers : names of the layers to read, case ignored; all by default
+    join_mm : widest gap [mm] that is closed
+    tolerance_mm : how far [mm] arcs may leave a spline or an ellipse
+    max_entities : most entities that are read
+
+    Returns
+    -------
+    Drawing in mm. Blocks are exploded; text, dimensions, points and the like are dropped with a finding.
+
+    Raises
+    ------
+    InputError
+        The file is missing, is no DXF, is too large, has no such layer, no geometry, no unit, an entity that is not
+        parallel to the XY plane, or a number that is not finite.
+    """
+    file = Path(path)
+    if not (np.isfinite(tolerance_mm) and tolerance_mm > 0.0):
+        raise InputError(f"part.tolerance_mm = {tolerance_mm:g}: must be a finite number above 0")
+    for key, value in (("part.units", units), ("part.units_if_unsaid", units_if_unsaid)):
+        if value is not None and value not in MM_PER:
+            raise InputError(f"{key} = {value!r}: must be one of {', '.join(MM_PER)}")
+    _scan(file, max_entities)
+    findings: list[Finding] = []
+    doc = _load(file, findings)
+    unit = _unit(doc, file, units, units_if_unsaid, findings)
+
+    skipped: Counter[str] = Counter()
+    parts: dict[str, list[Floats]] = {}
+    known = {layer.dxf.name for layer in doc.layers}
+    wanted = None if layers is None else {name.casefold() for name in layers}
+    drawn = _Reader(file, MM_PER[unit], tolerance_mm)
+    for count, (entity, layer) in enumerate(_entities(doc.modelspace(), None)):
+        if count >= max_entities:
+            raise InputError(_too_many(file, f"more than {max_entities}", max_entities))
+        known.add(layer)
+        if wanted is not None and layer.casefold() not in wanted:
+            continue
+        rows = drawn.rows(entity, layer, findings)
+        if rows is None:
+            skipped[f"{entity.dxftype()} on layer {layer!r}"] += 1
+        else:
+            parts.setdefault(layer, []).append(rows)
+    names = ", ".join(sorted(known)) or "none"
+    if layers is not None:
+        for name in layers:
+            if name.casefold() not in {k.casefold() for k in known}:
+                raise InputError(f"part.layers: no layer {name!r} in {file.name}; layers there are: {names}")
+    findings += [Finding("dxf-skipped", 0, f"{n} {what} dropped: not a line") for what, n in sorted(skipped.items())]
+
+    contours: list[Contour] = []
+    owner: list[str] = []
+    for layer, rows_of in parts.items():
+        made, seen = chained(rows_of, join_mm, f"layer {layer!r}: ")
+        contours += made
+        owner += [layer] * len(made)
+        findings += seen
+    if not contours:
+        on = "" if layers is None else f" on {', '.join(layers)}"
+        raise InputError(f"part.file = {file.name}: no lines or arcs{on}; layers there are: {names}")
+    return Drawing(tuple(contours), tuple(owner), unit, tuple(findings))
+
+
+def _too_many(file: Path, count: str, most: int, what: str = "entities") -> str:
+    return f"part.file = {file.name}: {count} {what}: must be at most {most}; keep only the part in the drawing"
+
+
+def _scan(file: Path, max_entities: int) -> None:
+    """Refuse by the bytes alone what is missing, is no DXF or is too large."""
+    if not file.is_file():
+        raise InputError(f"part.file = {file}: no such file")
+    entities = points = 0
+    started = False
+    tail = b""
+    try:
+        with file.open("rb") as stream:
+            while block := stream.read(1 << 22):
+                data = tail + block
+                if not started:
+                    if data[:18] == b"AutoCAD Binary DXF":
+                        return
+                    if b"SECTION" not in data or b"\0" in data[:4096]:
+                        raise InputError(f"part.file = {file.name}: not a DXF drawing")
+                    started = True
+                # what lies across two blocks is counted with the later one
+                cut = data.rfind(b"\n", 0, max(len(data) - 64, 0)) if len(block) == 1 << 22 else len(data)
+                cut = len(data) if cut < 0 else cut
+                entities += sum(1 for m in _ENTITY.finditer(data) if m.start() < cut)
+                points += sum(1 for m in _POINT.finditer(data) if m.start() < cut)
+                tail = data[cut:]
+    except OSError as err:
+        raise InputError(f"part.file = {file}: cannot be read: {err.strerror}") from err
+    if not started:
+        raise InputError(f"part.file = {file.name}: the file is empty")
+    if entities > max_entities:
+        raise InputError(_too_many(file, str(entities), max_entities))
+    if points > 5 * max_entities:
+        raise InputError(_too_many(file, str(points), 5 * max_entities, "points"))
+
+
+def _load(file: Path, findings: list[Finding]) -> Any:
+    """The ezdxf document, recovered if it is damaged."""
+    import ezdxf
+    from ezdxf import recover
+
+    logging.getLogger("ezdxf").addHandler(logging.NullHandler())
+    # what a damaged file can make the parser raise is not limited to its own errors
+    try:
+        return ezdxf.readfile(file)
+    except Exception as err:
+        first = _line(err)
+    try:
+        doc, auditor = recover.readfile(file)
+    except Exception as err:
+        raise InputError(f"part.file = {file.name}: not a DXF drawing that can be read: {_line(err)}") from err
+    repairs = len(auditor.errors) + len(auditor.fixes)
+    findings.append(Finding("dxf-recovered", 0, f"the file is damaged ({first}); read with {repairs} repairs"))
+    return doc
+
+
+def _line(err: Exception) -> str:
+    text = " ".join(str(err).split()) or type(err).__name__
+    return text[:120].rstrip(".")
+
+
+def _unit(doc: Any, file: Path, units: str | None, if_unsaid: str | None, findings: list[Finding]) -> str:
+    code = int(doc.header.get("$INSUNITS", 0) or 0)
+    said = INSUNITS.get(code)
+    if units is not None:
+        if said is not None and said != units:
+            findings.append(Finding("dxf-units", 0, f"the header says {said}; read as {units}, as part.units says"))
+        return units
+    if said is not None:
+        return said
+    if code != 0:
+        raise InputError(f"part.file = {file.name}: $INSUNITS = {code} is not read: state part.units")
+    if if_unsaid is None:
+        raise InputError(f"part.file = {file.name}: the header names no unit: state part.units_if_unsaid or part.units")
+    findings.append(Finding("dxf-units", 0, f"the header names no unit: read as {if_unsaid}"))
+    return if_unsaid
+
+
+def _entities(space: Any, inside: str | None, depth: int = 0) -> Iterator[tuple[Any, str]]:
+    """Entities with their layer; what a block has on layer 0 lies on the layer of its reference."""
+    for entity in space:
+        layer = str(entity.dxf.get("layer", "0"))
+        layer = inside if inside is not None and layer == "0" else layer
+        if entity.dxftype() == "INSERT" and depth < 16:
+            for reference in entity.multi_insert() if entity.mcount > 1 else (entity,):
+                yield from _entities(reference.virtual_entities(), layer, depth + 1)
+        else:
+            yield entity, layer
+
+
+class _Reader:
+    """Entities to rows of segments in mm."""
+
+    def __init__(self, file: Path, mm: float, tolerance_mm: float) -> None:
+        self.file, self.mm, self.tolerance_mm = file, mm, tolerance_mm
+
+    def rows(self, entity: Any, layer: str, findings: list[Finding]) -> Floats | None:
+        """(n, 7) segments [mm] of an entity; None if it is not a line."""
+        kind = entity.dxftype()
+        if kind not in DRAWN or (kind == "POLYLINE" and not (entity.is_2d_polyline or entity.is_3d_polyline)):
+            return None
+        what = f"part.file = {self.file.name}: {kind} on layer {layer!r}"
+        try:
+            made = getattr(self, "_" + kind.lower())(entity, what)
+        except InputError:
+            raise
+        except (ArithmeticError, ValueError, IndexError, TypeError, AttributeError) as err:
+            findings.append(Finding("dxf-skipped", 0, f"{kind} on layer {layer!r} is damaged, dropped: {_line(err)}"))
+            return np.zeros((1, 7))
+        rows = np.zeros((1, 7)) if made is None else np.array(made, dtype=np.float64).reshape(-1, 7)
+        if not np.isfinite(rows).all():
+            raise InputError(f"{what} has a coordinate that is not a finite number")
+        return rows
+
+    def _flat(self, points: Sequence[Any], what: str) -> Floats:
+        """(n, 2) points of the drawing in mm, all at one height."""
+        p = np.array([tuple(q) for q in points], dtype=np.float64).reshape(-1, 3)
+        if not np.isfinite(p).all():
+            raise InputError(f"{what} has a coordinate that is not a finite number")
+        if len(p) and np.ptp(p[:, 2]) > max(FLAT, 1e-9 * np.abs(p).max()):
+            x, y = p[0, :2] * self.mm
+            raise InputError(f"{what} at ({x:.6g}, {y:.6g}) is not parallel to the XY plane: a flat drawing is needed")
+        return p[:, :2] * self.mm
+
+    def _side(self, entity: Any, what: str) -> float:
+        """+1 seen from above, -1 from below."""
+        e = np.array(tuple(entity.dxf.extrusion), dtype=np.float64)
+        if not np.isfinite(e).all() or np.hypot(e[0], e[1]) > 1e-6 * abs(e[2]):
+            raise InputError(f"{what} is not parallel to the XY plane (extrusion {e.tolist()}): a flat drawing is needed")
+        return 1.0 if e[2] > 0.0 else -1.0
+
+    def _line(self, entity: Any, what: str) -> Any:
+        p, q = self._flat([entity.dxf.start, entity.dxf.end], what)
+        return [*p, *q, 0.0, 0.0, 0.0]
+
+    def _circle(self, entity: Any, what: str) -> Any:
+        side = self._side(entity, what)
+        x, y = self._flat([entity.dxf.center], what)[0] * (side, 1.0)
+        r = abs(float(entity.dxf.radius)) * self.mm
+        return [x + r, y, x + r, y, x, y, 2.0 * np.pi] if r != 0.0 else None
+
+    def _arc(self, entity: Any, what: str) -> Any:
+        side = self._side(entity, what)
+        x, y = self._flat([entity.dxf.center], what)[0]
+        r = abs(float(entity.dxf.radius)) * self.mm
+        a, b = np.radians([float(entity.dxf.start_angle), float(entity.dxf.end_angle)])
+        sweep = (b - a) % (2.0 * np.pi)
+        sweep = 2.0 * np.pi if sweep <= 1e-12 else sweep
+        p, q = (x + r * np.cos(a), y + r * np.sin(a)), (x + r * np.cos(b), y + r * np.sin(b))
+        if sweep >= 2.0 * np.pi - 1e-12:
+            q = p
+        return [side * p[0], p[1], side * q[0], q[1], side * x, y, side * sweep] if r != 0.0 else None
+
+    def _lwpolyline(self, entity: Any, what: str) -> Any:
+        v = np.array(entity.get_points("xyb"), dtype=np.float64).reshape(-1, 3)
+        return self._bulged(v, bool(entity.closed), self._side(entity, what), what)
+
+    def _polyline(self, entity: Any, what: str) -> Any:
+        # the frame of a spline fit (16) is not drawn
+        vertices = [v for v in entity.vertices if not v.dxf.flags & 16]
+        p = self._flat([v.dxf.location for v in vertices], what) / self.mm
+        flat = bool(entity.is_2d_polyline)
+        b = [float(v.dxf.get("bulge", 0.0)) if flat else 0.0 for v in vertices]
+        side = self._side(entity, what) if flat else 1.0
+        return self._bulged(np.column_stack([p, b]), bool(entity.is_closed), side, what)
+
+    def _bulged(self, v: Floats, closed: bool, side: float, what: str) -> Any:
+        if not np.isfinite(v).all():
+            raise InputError(f"{what} has a coordinate that is not a finite number")
+        p = v[:, :2] * (side * self.mm, self.mm)
+        ends = np.roll(p, -1, axis=0) if closed else np.vstack([p[1:], p[-1:]])
+        if len(p) < 2 or np.hypot(*(ends - p).T).max() <= JOIN_MM:
+            return None
+        return Contour.from_bulges(p, side * v[:, 2], closed).segments
+
+    def _ellipse(self, entity: Any, what: str) -> Any:
+        self._side(entity, what)
+        tool = entity.construction_tool()
+        c, major, minor = (self._flat([x, (0, 0, x[2])], what)[0] for x in (tool.center, tool.major_axis, tool.minor_axis))
+        if max(np.hypot(*major), np.hypot(*minor)) <= JOIN_MM:
+            return None
+        a, b = float(tool.start_param), float(tool.end_param)
+        b = a + 2.0 * np.pi if (b - a) % (2.0 * np.pi) <= 1e-12 else a + (b - a) % (2.0 * np.pi)
+
+        def curve(t: float) -> tuple[Floats, Floats]:
+            cos, sin = np.cos(t), np.sin(t)
+            return c + cos * major + sin * minor, cos * minor - sin * major
+
+        made = arcs_along(curve, np.linspace(a, b, max(3, 1 + int(np.ceil((b - a) / (np.pi / 4))))), self.tolerance_mm)
+        return None if made is None else self._ring(made.segments, b - a >= 2.0 * np.pi - 1e-12)
+
+    def _spline(self, entity: Any, what: str) -> Any:
+        tool = entity.construction_tool()
+        self._flat(tool.control_points, what)
+
+        def curve(t: float) -> tuple[Floats, Floats]:
+            p, d = tool.derivatives([t], 1).__next__()
+            return np.array([p.x, p.y]) * self.mm, np.array([d.x, d.y]) * self.mm
+
+        knots = np.unique(np.asarray(tool.knots(), dtype=np.float64))
+        order = tool.order
+        lo, hi = tool.knots()[order - 1], tool.knots()[-order]
+        spans = knots[(knots >= lo) & (knots <= hi)]
+        made = arcs_along(curve, spans, self.tolerance_mm)
+        if made is None:
+            return None
+        ends = np.hypot(*(curve(lo)[0] - curve(hi)[0]))
+        return self._ring(made.segments, bool(ends <= 1e-6))
+
+    @staticmethod
+    def _ring(seg: Floats, closed: bool) -> Floats:
+        """Rows whose last end is the first start, where the curve is closed."""
+        out = seg.copy()
+        if closed:
+            out[-1, 2:4] = out[0, 0:2]
+        return out
