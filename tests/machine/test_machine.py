@@ -1,0 +1,81 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from importlib import resources
+
+import pytest
+
+from chipload.errors import InputError
+from chipload.machine.machine import machine_named, machine_names, read_machine
+
+VMC = (resources.files("chipload") / "data" / "machines" / "vmc.toml").read_text()
+
+
+def test_units_are_converted(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(VMC.replace('name = "vmc"', 'name = "mine"'))
+    mine = read_machine(path)
+    assert mine.name == "mine"
+    assert mine.limits == ((-400.0, 400.0), (-250.0, 250.0), (-250.0, 250.0))
+    assert (mine.rapid, mine.feed_max) == (400.0, 200.0)
+    assert mine.acceleration == (3000.0, 3000.0, 2500.0)
+    assert mine.spindle_max == pytest.approx(500.0 * math.pi)
+    assert (mine.power_w, mine.torque) == (11000.0, 70000.0)
+    assert replace(mine, name="vmc") == machine_named("vmc")
+
+
+def test_shipped_ones_are_read():
+    assert [machine_named(n).name for n in machine_names()] == list(machine_names())
+    assert (machine_named("vmc-fanuc").dialect, machine_named("vmc-fanuc").decimals) == ("fanuc", 4)
+
+
+GUESS = "must be given, a machine's limits are never guessed"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("rapid_mm_min = 24000.0", "", f"rapid_mm_min is missing: {GUESS}"),
+        ("max_rpm = 15000.0", "", f"spindle.max_rpm is missing: {GUESS}"),
+        ("[axis.y]", "[axis.b]", "unknown key axis.b: the nearest known one is axis.z"),
+        ("rapid_mm_min", "rapid_m_min", "unknown key rapid_m_min: the nearest known one is rapid_mm_min"),
+        ("max_rpm", "max_rmp", "unknown key spindle.max_rmp: the nearest known one is spindle.max_rpm"),
+        ("24000.0", "-1", "machine.rapid_mm_min = -1: must be above 0"),
+        ("24000.0", "nan", "machine.rapid_mm_min = nan: must be above 0"),
+        ("24000.0", '"fast"', "rapid_mm_min = 'fast': must be a number"),
+        ("24000.0", "true", "rapid_mm_min = True: must be a number"),
+        ("decimals = 6", "decimals = 6.0", "decimals = 6.0: must be a whole number"),
+        ("decimals = 6", "decimals = 2", "machine.decimals = 2: must be from 3 to 6"),
+        ('"linuxcnc"', '"heidenhain"', "machine.dialect = 'heidenhain': must be linuxcnc or fanuc"),
+        ("max_mm = 400.0", "max_mm = -400.0", "machine.axis.x.max_mm = -400: must be above min_mm = -400"),
+        ("min_rpm = 60.0", "min_rpm = 2e4", "machine.spindle.min_rpm = 20000: must be from 0 to max_rpm = 15000"),
+        ("2500.0", "0", "machine.axis.z.acceleration_mm_s2 = 0: must be above 0"),
+        ("torque_nm = 70.0", "torque_nm = -70.0", "machine.spindle.torque_nm = -70: must be above 0"),
+        (
+            "corner_tolerance_mm = 0.005",
+            "corner_tolerance_mm = 5",
+            "machine.corner_tolerance_mm = 5: must be from 0 to 1 mm",
+        ),
+    ],
+)
+def test_refused(tmp_path, old, new, message):
+    path = tmp_path / "mine.toml"
+    assert old in VMC
+    path.write_text(VMC.replace(old, new, 1))
+    with pytest.raises(InputError) as err:
+        read_machine(path)
+    assert str(err.value) == f"machine {path}: {message}"
+
+
+def test_not_a_machine(tmp_path):
+    with pytest.raises(InputError) as err:
+        machine_named("vcm")
+    assert str(err.value) == "machine vcm: not known: the nearest is vmc (known: vmc, vmc-fanuc), or give a file"
+    with pytest.raises(InputError) as err:
+        read_machine(tmp_path)
+    assert str(err.value) == f"machine {tmp_path}: cannot be read: Is a directory"
+    bad = tmp_path / "bad.toml"
+    bad.write_bytes(b"\x00\xff")
+    with pytest.raises(InputError, match="not a TOML file"):
+        read_machine(bad)

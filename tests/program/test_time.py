@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chipload.geometry.contour import Contour
+from chipload.machine.feed import corner_speed, curvature_speed, limited_speed
+from chipload.machine.machine import machine_named
+from chipload.program.build import dwell, follow, helix, plunge, rapid
+from chipload.program.check import check_program
+from chipload.program.program import Program
+from chipload.program.time import program_time
+
+VMC = machine_named("vmc")
+
+
+def cut(points, feed=40.0, spindle=800.0):
+    return Program.join([rapid(points[0], spindle, 1, "link"), plunge(points[1:], feed, spindle, 1, "cut")])
+
+
+def test_collinear_rows_are_one_move():
+    one = program_time(cut([[0, 0, 0], [90, 0, 0]]), VMC).sum()
+    many = program_time(cut([[x, 0, 0] for x in np.linspace(0, 90, 18)]), VMC).sum()
+    assert many == pytest.approx(one, rel=1e-12)
+    assert one == pytest.approx(90 / 40 + 40 / 3000, rel=1e-12)
+
+
+def test_square_corner():
+    """Down to the corner's speed and up again: twice a trapezoid with one end at v_c."""
+    vc = float(corner_speed(math.pi / 2, 3000.0, VMC.corner_tolerance))
+    side = 50 / 40 + (40**2 / (2 * 3000) + (40 - vc) ** 2 / (2 * 3000)) / 40
+    np.testing.assert_allclose(program_time(cut([[0, 0, 0], [50, 0, 0], [50, 50, 0]]), VMC), [0, side, side])
+    stop = program_time(cut([[0, 0, 0], [50, 0, 0], [50, 50, 0]]), replace(VMC, corner_tolerance=0.0))
+    np.testing.assert_allclose(stop[1:], 50 / 40 + 40 / 3000)
+
+
+def test_tangent_contour_against_fine_samples():
+    """Lines and arcs that touch: the same as a forward-backward pass over 2e5 samples of the curve."""
+    slot = Contour.from_bulges([[0, 0], [30, 0], [30, 2], [0, 2]], [0.0, 1.0, 0.0, 1.0], closed=True)
+    feed = 120.0  # the arcs of 1 mm allow sqrt(3000) = 54.8
+    part = follow(slot, 0.0, feed, 800.0, 1, "cut")
+    rows = program_time(Program.join([rapid([0, 0, 0], 800.0, 1, "link"), part]), VMC)
+    s = np.linspace(0, slot.length, 200001)
+    wanted = np.minimum(feed, curvature_speed(slot.at(s)[2], 3000.0))
+    assert rows.sum() == pytest.approx(limited_speed(s, wanted, 3000.0)[1][-1], rel=1e-5)
+
+
+def test_helix_dwell_and_rapid():
+    entry = helix((20.0, 0.0), (0.0, 0.0), (10.0, 0.0), 5.0, 10.0, 800.0, 1, "entry", level=False)
+    parts = [rapid([[20, 0, 60], [20, 0, 10]], 800.0, 1, "link"), entry, dwell([20, 0, 0], 0.75, 800.0, 1, "x")]
+    t = program_time(Program.join(parts), VMC)
+    assert t[1] == pytest.approx(2 * math.sqrt(50 / 2500))  # never reaches 400 mm/s
+    slope = math.atan2(10.0, 80 * math.pi)
+    a = min(3000.0 / math.cos(slope), 2500.0 / math.sin(slope))
+    assert t[2:6].sum() == pytest.approx(math.hypot(80 * math.pi, 10.0) / 10.0 + 10.0 / a)
+    assert t[6] == 0.75
+
+
+def test_diagonal_uses_both_axes():
+    t = program_time(cut([[0, 0, 0], [30, 30, 0]], feed=50.0), VMC)
+    assert t[1] == pytest.approx(30 * math.sqrt(2) / 50 + 50 / (3000 * math.sqrt(2)))
+
+
+def test_what_the_machine_cannot_do():
+    slot = Contour.circle((392.0, 0.0), 10.0)
+    parts = [rapid([402, 0, 300], 800.0, 1, "link"), follow(slot, -1.0, 300.0, 1.0, 1, "cut")]
+    parts += [plunge([0, 0, 0], 5.0, 0.0, 1, "cut")]
+    found = check_program(Program.join(parts), VMC)
+    assert [(f.code, f.text) for f in found] == [
+        ("machine-limit", "row 0: X = 402 mm: machine vmc goes from -400 to 400 mm (4 rows, the first is 0)"),
+        ("machine-limit", "row 0: Z = 300 mm: machine vmc goes from -250 to 250 mm (2 rows, the first is 0)"),
+        ("machine-feed", "row 1: feed 18000 mm/min: machine vmc reaches 12000 mm/min (2 rows, the first is 1)"),
+        (
+            "machine-spindle",
+            "row 1: spindle 9.5493 rpm: machine vmc turns from 60 to 15000 rpm (2 rows, the first is 1)",
+        ),
+        ("machine-spindle-off", "row 3: feeds with the spindle at rest: set its speed"),
+    ]
+    assert check_program(cut([[0, 0, 0], [9, 0, 0]]), VMC) == ()
+    # an arc whose ends are inside and whose bulge is not
+    bulge = Contour.from_bulges([[395.0, -10.0], [395.0, 10.0]], [1.0])
+    inside = Program.join([rapid([395, -10, 0], 800.0, 1, "link"), follow(bulge, 0.0, 5.0, 800.0, 1, "cut")])
+    assert check_program(inside, VMC)[0].text == "row 1: X = 405 mm: machine vmc goes from -400 to 400 mm"
+    assert check_program(plunge([0, 0, 0], 5.0, 100.0, 1, "cut"), VMC)[0].code == "program-start"
