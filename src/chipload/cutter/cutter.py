@@ -175,7 +175,7 @@ class Cutter:
             raise InputError("cutter: radius_at: a height is below the tip: must be at least 0 mm")
         _, r, e, f, alpha, beta, _ = self.apt
         low, high = f - r * math.cos(alpha), f - r * math.sin(beta)
-        bottom = z / math.tan(alpha) if alpha > 0.0 else np.full(z.shape, e)
+        bottom = np.where(z < low, z, 0.0) / math.tan(alpha) if alpha > 0.0 else e
         circle = e + np.sqrt(np.clip(r * r - (f - z) ** 2, 0.0, None))
         flank = e + r * math.cos(beta) + (z - high) * math.tan(beta)
         return np.asarray(np.where(z < low, bottom, np.where(z < high, circle, flank)))
