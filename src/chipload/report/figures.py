@@ -1,0 +1,270 @@
+"""The figures of the report as plotly values: what the pass feels along its length, where, and in space.
+
+Strategies keep one colour each in every figure. Long columns are thinned so that every extreme stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+from plotly.subplots import make_subplots
+
+from chipload.geometry.contour import Contour
+from chipload.planning.result import StrategyResult
+from chipload.report.outcome import Operation, exceeds
+from chipload.report.shape import CHORD_MM, cap, merged, pieces, ribbon, thinned
+
+Floats = NDArray[np.float64]
+
+COLOURS = {
+    "plain": "#8a8f98",
+    "backward": "#0b7a75",
+    "feed": "#c9821a",
+    "forward": "#3457a6",
+    "front": "#3457a6",
+}
+DASHES = {"plain": "dot", "feed": "dash"}
+LIMIT, WALL, STOCK, INK, GRID = "#b3261e", "#1f2933", "#a8793a", "#1f2933", "#e6e8eb"
+#: blue where little is engaged, red where most is
+SCALE = [[0.0, "#3154a5"], [0.25, "#2696a0"], [0.5, "#78b446"], [0.75, "#f0b428"], [1.0, "#c82d28"]]
+FONT = {"family": "system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif", "size": 12, "color": INK}
+#: points of one line, of one plan view and of one path in space
+LINE_POINTS, PLAN_POINTS, SPACE_POINTS = 6000, 12_000, 8000
+
+#: column, axis title; a limit of the column's name is drawn with it
+ROWS = (
+    ("engagement_deg", "engagement [deg]"),
+    ("force_xy_n", "force in the plane [N]"),
+    ("error_um", "wall error [um]"),
+    ("feed_mm_min", "feed [mm/min]"),
+)
+#: a limit farther above the values than this is named but would flatten them if it were drawn
+FAR = 1.8
+
+
+def shown_rows(strategy: StrategyResult) -> NDArray[np.bool_]:
+    """Rows that the figures along the pass show: the finish pass, or all cutting where there is none."""
+    names = np.asarray(strategy.history["pass"]).astype(str)
+    finish: NDArray[np.bool_] = np.isin(names, ["finish", "closing"])
+    return finish if finish.any() else np.isin(names, ["front", "semifinish"])
+
+
+def along(operation: Operation) -> go.Figure:
+    """Engagement, force, wall error and feed along the finish pass, all strategies overlaid."""
+    figure = make_subplots(rows=len(ROWS), cols=1, shared_xaxes=True, vertical_spacing=0.035)
+    highest = np.zeros(len(ROWS))
+    for name, strategy in operation.result.strategies.items():
+        where = np.flatnonzero(shown_rows(strategy))
+        s, apart = _abscissa(strategy.history, where)
+        for row, (column, title) in enumerate(ROWS, start=1):
+            values = np.asarray(strategy.history[column], dtype=np.float64)[where]
+            x, y = _gapped(s, values, apart)
+            keep = thinned(y, LINE_POINTS)
+            highest[row - 1] = max(highest[row - 1], float(values.max(initial=0.0)))
+            figure.add_trace(
+                go.Scatter(
+                    x=x[keep].astype(np.float32),
+                    y=y[keep].astype(np.float32),
+                    name=name,
+                    legendgroup=name,
+                    showlegend=row == 1,
+                    mode="lines",
+                    line={"color": COLOURS[name], "width": 1.8, "dash": DASHES.get(name, "solid")},
+                    hovertemplate=f"{name}: %{{y:.4g}}<extra>{title}</extra>",
+                ),
+                row=row,
+                col=1,
+            )
+    limits = {c.name: c.limit for s in operation.result.strategies.values() for c in s.limits}
+    for row, ((column, title), top) in enumerate(zip(ROWS, highest, strict=True), start=1):
+        limit = limits.get(column)
+        near = limit is not None and limit <= FAR * top
+        reach = 1.12 * max(top, limit if near and limit is not None else 0.0)
+        figure.update_yaxes(title_text=title, range=[0.0, reach or 1.0], row=row, col=1)
+        if limit is None:
+            continue
+        said = {"text": f"limit {limit:g}" + ("" if near else ", far above"), "font": {"color": LIMIT, "size": 11}}
+        if near:
+            line = {"color": LIMIT, "width": 1.2, "dash": "dash"}
+            figure.add_hline(y=limit, line=line, annotation=said, annotation_position="top left", row=row, col=1)
+        else:
+            at = {"x": 0.0, "y": reach, "xref": "x domain", "xanchor": "left", "yanchor": "top", "showarrow": False}
+            figure.add_annotation(**said, **at, row=row, col=1)
+    figure.update_xaxes(title_text="length along the pass [mm]", row=len(ROWS), col=1)
+    figure.update_layout(hovermode="x unified", legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0})
+    return _styled(figure, 800, {"l": 64, "r": 16, "t": 30, "b": 44})
+
+
+def plan(operation: Operation) -> go.Figure:
+    """Wall, stock and paths from above; the finish pass coloured by engagement, events marked."""
+    figure = go.Figure()
+    used = operation.result.strategies[operation.result.use]
+    scale = _scale(operation)
+    _chains(figure, used.drawn.get("stock", ()), "stock before the finish pass", STOCK, 1.4, "dot")
+    _chains(figure, used.drawn.get("leftover", ()), "left over", LIMIT, 1.5, "solid")
+    _chains(figure, used.drawn.get("wall", ()), "wall", WALL, 2.6, "solid")
+    for name, strategy in operation.result.strategies.items():
+        visible: Any = True if name == operation.result.use else "legendonly"
+        h = strategy.history
+        names = np.asarray(h["pass"]).astype(str)
+        before = np.flatnonzero(names == "semifinish")
+        if len(before):
+            keep = before[:: max(1, len(before) // LINE_POINTS)]
+            x, y = _lifted(h, keep)
+            figure.add_trace(
+                go.Scatter(
+                    x=x, y=y, mode="lines", legendgroup=name, showlegend=False, visible=visible,
+                    line={"color": COLOURS[name], "width": 1.1, "dash": "dash"}, hoverinfo="skip",
+                )
+            )  # fmt: skip
+        rows = np.flatnonzero(shown_rows(strategy))
+        keep = rows[thinned(np.asarray(h["engagement_deg"])[rows], PLAN_POINTS)]
+        figure.add_trace(
+            go.Scattergl(
+                x=h["x_mm"][keep].astype(np.float32),
+                y=h["y_mm"][keep].astype(np.float32),
+                mode="markers",
+                name=name,
+                legendgroup=name,
+                visible=visible,
+                marker={**_shade(h["engagement_deg"][keep], scale, name == operation.result.use), "size": 4.5},
+                customdata=np.column_stack([h["engagement_deg"][keep], h["force_xy_n"][keep]]).astype(np.float32),
+                hovertemplate="(%{x:.3f}, %{y:.3f})<br>%{customdata[0]:.3f} deg, %{customdata[1]:.1f} N<extra></extra>",
+            )
+        )
+        _marks(figure, name, strategy, visible)
+    figure.update_yaxes(scaleanchor="x", scaleratio=1.0, title_text="y [mm]")
+    figure.update_xaxes(title_text="x [mm]")
+    figure.update_layout(legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0})
+    return _styled(figure, 640, {"l": 64, "r": 16, "t": 60, "b": 44})
+
+
+def space(operation: Operation) -> go.Figure:
+    """Wall and stock raised from the plane, the paths in space coloured by engagement."""
+    figure = go.Figure()
+    used = operation.result.strategies[operation.result.use]
+    low, high = operation.top - operation.depth, operation.top
+    wall = used.drawn.get("wall", ())
+    closed = [c for c in wall if c.closed]
+    floor = [cap(closed, low)] if closed else []
+    for name, parts, colour, opacity in (
+        ("floor", floor, "#c3cad3", 0.55),
+        ("wall", [ribbon(c, low, high) for c in wall], "#8b97a6", 0.9),
+        ("stock", [ribbon(c, low, high) for c in used.drawn.get("stock", ())], "#d6aa6e", 0.35),
+    ):
+        vertices, faces = merged(parts)
+        if len(faces):
+            x, y, z = vertices.astype(np.float32).T
+            i, j, k = faces.astype(np.int32).T
+            figure.add_trace(
+                go.Mesh3d(
+                    x=x, y=y, z=z, i=i, j=j, k=k, name=name, color=colour, opacity=opacity, flatshading=True,
+                    hoverinfo="skip", showlegend=True,
+                    lighting={"ambient": 0.75, "diffuse": 0.5, "specular": 0.05, "roughness": 1.0},
+                )
+            )  # fmt: skip
+    scale = _scale(operation)
+    for name, strategy in operation.result.strategies.items():
+        h = strategy.history
+        keep = thinned(np.asarray(h["engagement_deg"], dtype=np.float64), SPACE_POINTS)
+        piece = pieces(h)[keep]
+        apart = np.flatnonzero(piece[1:] != piece[:-1]) + 1
+        columns = (np.asarray(h[c], dtype=np.float64)[keep] for c in ("x_mm", "y_mm", "z_mm"))
+        x, y, z = (np.insert(c, apart, np.nan).astype(np.float32) for c in columns)
+        shade = np.insert(np.asarray(h["engagement_deg"])[keep], apart, 0.0)
+        line = _shade(shade, scale, name == operation.result.use)
+        figure.add_trace(
+            go.Scatter3d(
+                x=x, y=y, z=z, mode="lines", name=f"{name}: path", line={**line, "width": 5},
+                visible=True if name == operation.result.use else "legendonly",
+                hovertemplate="(%{x:.3f}, %{y:.3f}, %{z:.3f})<extra></extra>",
+            )
+        )  # fmt: skip
+    axis = {"showbackground": False, "gridcolor": GRID, "zerolinecolor": GRID, "color": "#5f6b7a"}
+    figure.update_layout(
+        scene={
+            "aspectmode": "data",
+            "xaxis": {**axis, "title": "x [mm]"},
+            "yaxis": {**axis, "title": "y [mm]"},
+            "zaxis": {**axis, "title": "z [mm]", "nticks": 4},
+            "camera": {"eye": {"x": 0.85, "y": -1.65, "z": 1.4}, "center": {"x": 0.0, "y": 0.0, "z": -0.1}},
+        },
+        legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0},
+    )
+    return _styled(figure, 620, {"l": 0, "r": 0, "t": 40, "b": 0})
+
+
+# -- parts ------------------------------------------------------------------------------------------------------
+def _styled(figure: go.Figure, height: int, margin: Mapping[str, int]) -> go.Figure:
+    figure.update_layout(
+        template="none", height=height, margin=dict(margin), font=FONT, paper_bgcolor="white", plot_bgcolor="white"
+    )
+    figure.update_xaxes(gridcolor=GRID, zeroline=False, linecolor="#9aa3ad", ticks="outside", tickcolor="#9aa3ad")
+    figure.update_yaxes(gridcolor=GRID, zeroline=False, linecolor="#9aa3ad", ticks="outside", tickcolor="#9aa3ad")
+    return figure
+
+
+def _abscissa(history: Mapping[str, NDArray[Any]], where: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
+    """Length from the beginning of what is shown, links left out, and the rows before which a gap lies."""
+    s = np.asarray(history["s_mm"], dtype=np.float64)[where]
+    apart = np.flatnonzero(np.diff(where) > 1) + 1
+    step = np.diff(s, prepend=s[:1])
+    step[apart] = 0.0
+    return np.cumsum(step), apart
+
+
+def _gapped(x: Floats, y: Floats, apart: NDArray[np.int64]) -> tuple[Floats, Floats]:
+    return np.insert(x, apart, x[apart]), np.insert(y, apart, np.nan)
+
+
+def _lifted(history: Mapping[str, NDArray[Any]], rows: NDArray[np.int64]) -> tuple[Floats, Floats]:
+    """Places of rows, x and y, with a gap where rows between them belong to something else."""
+    piece = pieces(history)[rows]
+    apart = np.flatnonzero(piece[1:] != piece[:-1]) + 1
+    x, y = (np.asarray(history[c], dtype=np.float64)[rows] for c in ("x_mm", "y_mm"))
+    return np.insert(x, apart, np.nan).astype(np.float32), np.insert(y, apart, np.nan).astype(np.float32)
+
+
+def _scale(operation: Operation) -> tuple[float, float]:
+    """Least and greatest engagement of what is shown, over all strategies: one colour scale for all."""
+    seen = np.concatenate([s.history["engagement_deg"][shown_rows(s)] for s in operation.result.strategies.values()])
+    cut = seen[seen > 0.0]
+    return (float(cut.min()), float(cut.max())) if len(cut) else (0.0, 1.0)
+
+
+def _shade(engagement: Floats, scale: tuple[float, float], bar: bool) -> dict[str, Any]:
+    out: dict[str, Any] = {"color": engagement.astype(np.float32), "colorscale": SCALE}
+    out |= {"cmin": scale[0], "cmax": scale[1], "showscale": bar}
+    if bar:
+        title = {"text": "engagement [deg]", "side": "right"}
+        out["colorbar"] = {"title": title, "thickness": 12, "len": 0.8, "outlinewidth": 0}
+    return out
+
+
+def _chains(figure: go.Figure, contours: Sequence[Contour], name: str, colour: str, width: float, dash: str) -> None:
+    if not contours:
+        return
+    parts = [np.vstack([c.flatten(CHORD_MM), [[np.nan, np.nan]]]) for c in contours]
+    x, y = np.vstack(parts).astype(np.float32).T
+    line = {"color": colour, "width": width, "dash": dash}
+    figure.add_trace(go.Scatter(x=x, y=y, mode="lines", name=name, line=line, hoverinfo="skip"))
+
+
+def _marks(figure: go.Figure, name: str, strategy: StrategyResult, visible: Any) -> None:
+    """Events, and the worst places of limits that do not hold."""
+    marks = [(e.x, e.y, e.text, e.failure) for e in strategy.events]
+    marks += [(*c.at, exceeds(c), True) for c in strategy.limits if not c.holds]
+    for failed, symbol, colour in ((False, "diamond-open", INK), (True, "x", LIMIT)):
+        some = [m for m in marks if m[3] == failed]
+        if some:
+            figure.add_trace(
+                go.Scatter(
+                    x=[m[0] for m in some], y=[m[1] for m in some], text=[m[2] for m in some], mode="markers",
+                    legendgroup=name, showlegend=False, visible=visible, hovertemplate="%{text}<extra></extra>",
+                    marker={"symbol": symbol, "size": 11, "color": colour, "line": {"width": 2, "color": colour}},
+                )
+            )  # fmt: skip

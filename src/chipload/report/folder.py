@@ -1,0 +1,135 @@
+"""A result folder appears whole or not at all.
+
+Everything is written into a new folder beside the target and then renamed. A result of ours that is already there is
+replaced at that moment; anything else that is there is left alone and refused.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from chipload.errors import InputError
+from chipload.progress import Progress, silent
+from chipload.report.history import history_bytes
+from chipload.report.outcome import Outcome
+from chipload.report.page import page_bytes
+from chipload.report.programs import program_files
+from chipload.report.scene import scene_bytes
+from chipload.report.summary import summary_bytes
+
+SUMMARY = "summary.json"
+#: file and who makes it
+PARTS: tuple[tuple[str, Callable[[Outcome], bytes]], ...] = (
+    (SUMMARY, summary_bytes),
+    ("history.parquet", history_bytes),
+    ("scene.glb", scene_bytes),
+    ("report.html", page_bytes),
+)
+
+
+def check_target(out: str | Path) -> Path:
+    """The absolute target folder, if a result may be put there; asked before the work begins.
+
+    Raises
+    ------
+    InputError
+        It is a file, a folder with something else in it, or lies where nothing can be written.
+    """
+    target = Path(out).absolute()
+    if target.is_symlink() or (target.exists() and not target.is_dir()):
+        raise InputError(f"--out {out}: is not a folder: name a folder that is new, empty or holds an older result")
+    try:
+        if target.exists() and any(target.iterdir()) and not _ours(target):
+            raise InputError(
+                f"--out {out}: holds files that are no result of chipload: name a folder that is new, empty or "
+                "holds an older result"
+            )
+        above = next(p for p in target.parents if p.exists())
+        with tempfile.TemporaryDirectory(prefix=".chipload-", dir=above):
+            pass
+    except OSError as err:
+        raise InputError(f"--out {out}: cannot be written: {err.strerror}: name another folder") from None
+    return target
+
+
+def write_result(outcome: Outcome, out: str | Path, progress: Progress = silent) -> Path:
+    """Write the whole result folder and return it.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written or the disk is full; nothing is left behind, an older result stays.
+    """
+    target = check_target(out)
+    made = [p for p in target.parents if not p.exists()]
+    fresh: Path | None = None
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        fresh = Path(tempfile.mkdtemp(prefix=".chipload-", dir=target.parent))
+        for k, (name, make) in enumerate(PARTS):
+            progress(k / (len(PARTS) + 1), name)
+            _write(fresh / name, make(outcome))
+        progress(len(PARTS) / (len(PARTS) + 1), "programs")
+        for name, data in program_files(outcome).items():
+            _write(fresh / name, data)
+        fresh.chmod(0o777 & ~_umask())
+        _swap(fresh, target)
+        progress(1.0, "written")
+    except OSError as err:
+        raise InputError(f"--out {out}: cannot be written: {err.strerror}: nothing was left there") from None
+    finally:
+        if fresh is not None:
+            shutil.rmtree(fresh, ignore_errors=True)
+        if not target.exists():
+            for folder in made:
+                with contextlib.suppress(OSError):
+                    folder.rmdir()
+    return target
+
+
+def _ours(folder: Path) -> bool:
+    """Whether a folder holds a result of chipload and nothing that it would not write."""
+    try:
+        holds = json.loads((folder / SUMMARY).read_bytes())
+        known = {name for name, _ in PARTS}
+        return (
+            isinstance(holds, dict)
+            and "holds" in holds
+            and all(p.name in known or p.suffix in (".ngc", ".nc", ".apt") for p in folder.iterdir())
+        )
+    except (OSError, ValueError):
+        return False
+
+
+def _write(path: Path, data: bytes) -> None:
+    with path.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _swap(fresh: Path, target: Path) -> None:
+    """Put ``fresh`` in the place of ``target``; what was there goes only when the new one stands."""
+    if not target.exists():
+        fresh.rename(target)
+        return
+    old = Path(tempfile.mkdtemp(prefix=".chipload-", dir=target.parent))
+    target.rename(old)
+    try:
+        fresh.rename(target)
+    except BaseException:
+        old.rename(target)
+        raise
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0o022)
+    os.umask(mask)
+    return mask

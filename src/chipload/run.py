@@ -1,0 +1,222 @@
+"""A job from beginning to end: its files are read, each operation planned, each program checked by the simulation.
+
+Nothing is written here: the outcome is a value, and the report room writes it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material, material_named, read_material
+from chipload.errors import InputError
+from chipload.geometry.contour import Contour, Region
+from chipload.geometry.dxf import read_dxf
+from chipload.job import Job, OperationTable
+from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.planning.contour.plan import Finishing, plan_contour
+from chipload.planning.result import OperationResult, StrategyResult
+from chipload.program.check import check_program
+from chipload.progress import Progress, silent
+from chipload.report.outcome import Operation, Outcome, Proof
+from chipload.simulation.verify import verify_contour
+from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
+
+#: what the simulation may find and still call a program proved
+ENGAGEMENT_DEG, GOUGE_MM = 0.05, 1e-4
+#: libraries whose version may change a number
+LIBRARIES = ("chipload", "numpy", "scipy", "numba", "shapely", "ezdxf", "cadquery-ocp-novtk")
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """What a job names, read: contours [mm], machine, material, and what the readers noticed."""
+
+    contours: tuple[Contour, ...]
+    machine: Machine
+    material: Material
+    findings: tuple[str, ...]
+
+
+def read_inputs(job: Job) -> Inputs:
+    """Read every file that the job names.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read or holds nothing that can be used.
+    """
+    machine = machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
+    material = material_named(job.material) if isinstance(job.material, str) else read_material(job.material)
+    contours, findings = _read_part(job)
+    for k, op in enumerate(job.operations):
+        speed = rad_s_from_rpm(op.speed_rpm)
+        if not machine.spindle_min * (1.0 - 1e-9) <= speed <= machine.spindle_max * (1.0 + 1e-9):
+            low, high = (x / rad_s_from_rpm(1.0) for x in (machine.spindle_min, machine.spindle_max))
+            raise InputError(
+                f"{job.path.name}: operation.{k}.speed_rpm = {op.speed_rpm:g}: machine {machine.name} turns from "
+                f"{low:g} to {high:g} rpm: state a speed between them"
+            )
+    return Inputs(contours, machine, material, findings)
+
+
+def run_job(job: Job, progress: Progress = silent) -> Outcome:
+    """Plan and check every operation of a job.
+
+    Raises
+    ------
+    InputError
+        A file, or the contours, the cutter and the depths together, cannot be used.
+    """
+    progress(0.0, "reading")
+    inputs = read_inputs(job)
+    operations = []
+    for k, op in enumerate(job.operations):
+        share = 1.0 / len(job.operations)
+
+        def part(done: float, what: str, start: float = k * share, share: float = share) -> None:
+            progress(start + share * done, what)
+
+        operations.append(_operation(job, inputs, op, part))
+    progress(1.0, "done")
+    return Outcome(
+        title=job.path.parent.name if job.path.stem == "job" else job.path.stem,
+        operations=tuple(operations),
+        machine=inputs.machine,
+        unchecked=job.unchecked,
+        findings=(*job.findings, *inputs.findings),
+        provenance=_provenance(job, inputs),
+    )
+
+
+def _operation(job: Job, inputs: Inputs, op: OperationTable, progress: Progress) -> Operation:
+    cutter = job.cutters[op.cutter]
+    result = _plan(job, inputs, op, cutter, lambda done, what: progress(0.5 * done, what))
+    proofs, beyond = {}, {}
+    for k, (name, strategy) in enumerate(result.strategies.items()):
+        start = 0.5 + 0.5 * k / len(result.strategies)
+
+        def part(done: float, what: str, start: float = start) -> None:
+            progress(start + 0.5 * done / len(result.strategies), f"simulation: {what}")
+
+        proofs[name] = prove(strategy, op, cutter, job.table.stock.top_mm, part)
+        beyond[name] = tuple(f.text for f in check_program(strategy.program, inputs.machine))
+    settings = {k: v for k, v in op.model_dump().items() if v is not None}
+    return Operation(result, settings, cutter, job.table.stock.top_mm, op.axial_depth_mm, proofs, beyond)
+
+
+def _plan(job: Job, inputs: Inputs, op: OperationTable, cutter: Cutter, progress: Progress) -> OperationResult:
+    """Call the planner of the operation's kind."""
+    if op.kind == "front":
+        raise InputError("operation.kind = front: not there yet")
+    forward = op.kind == "forward"
+    strategies: tuple[str, ...] = ("forward",) if forward else tuple(op.strategies or ())
+    setting = Finishing(
+        side=str(op.side),
+        milling=op.milling,
+        strategies=strategies,
+        use=op.use if op.use is not None and not forward else strategies[0],
+        joint=op.joint or "sharp",
+        radial_depth=op.radial_depth_mm,
+        axial_depth=op.axial_depth_mm,
+        semifinish_depth=op.semifinish_depth_mm or 0.0,
+        passes=op.passes or 1,
+        feed=mm_s_from_mm_min(op.feed_mm_min),
+        spindle_speed=rad_s_from_rpm(op.speed_rpm),
+        tolerance=op.tolerance_mm or 0.0,
+        step=op.step_mm,
+        lead=op.lead_mm or 0.0,
+        top=job.table.stock.top_mm,
+        clearance=op.clearance_mm,
+    )
+    return plan_contour(
+        inputs.contours, setting, cutter, inputs.material, inputs.machine, limits=job.limits, progress=progress
+    )
+
+
+def prove(strategy: StrategyResult, op: OperationTable, cutter: Cutter, top: float, progress: Progress) -> Proof:
+    """Let the simulation, which knows no planner, hold the program of one strategy against its history.
+
+    The planner says in ``drawn`` what the program starts from (`stock before`, closed contours) and the `wall`, whose
+    travel has the part on its right.
+    """
+    before = strategy.drawn.get("stock before", ())
+    if not before:
+        return Proof("unproven", "unproven: the planner does not say what stock the program starts from")
+    # eased joints may leave the drawn wall to either side, a cutter may leave stock in a corner
+    leave = op.tolerance_mm or 0.0
+    told = verify_contour(
+        strategy.program,
+        cutter.radius,
+        strategy.history,
+        stock=Region(tuple(before)),
+        stock_top_mm=top,
+        wall=strategy.drawn.get("wall", ()),
+        material="right",
+        engagement_tolerance_deg=ENGAGEMENT_DEG,
+        gouge_tolerance_mm=max(GOUGE_MM, leave if op.joint == "clothoid" else 0.0),
+        excess_tolerance_mm=max(GOUGE_MM, leave + (op.allowance_mm or 0.0)),
+        progress=progress,
+    )
+    return Proof(
+        told.verdict,
+        "; ".join((told.text, *told.reasons)),
+        {
+            "engagement_difference_deg": told.engagement_difference_deg,
+            "engagement_at_mm": list(told.engagement_at),
+            "gouge_mm": told.gouge_mm,
+            "gouge_at_mm": list(told.gouge_at),
+            "excess_mm": told.excess_mm,
+            "excess_at_mm": list(told.excess_at),
+            "rapids_through_stock": [list(p) for p in told.rapids],
+            "rows_compared": told.compared,
+        },
+    )
+
+
+# -- reading ----------------------------------------------------------------------------------------------------
+def _read_part(job: Job) -> tuple[tuple[Contour, ...], tuple[str, ...]]:
+    """Contours of the drawing or of the planar face, and what its reader noticed."""
+    part = job.table.part
+    ending = job.part_file.suffix.lower()
+    if ending == ".dxf":
+        drawing = read_dxf(
+            job.part_file,
+            units=part.units,
+            units_if_unsaid=part.units_if_unsaid,
+            layers=part.layers or None,
+            join_mm=part.join_mm,
+            tolerance_mm=part.tolerance_mm,
+        )
+    else:
+        raise InputError(f"part.file = {part.file}: must end in .dxf, .step or .stp")
+    return drawing.contours, tuple(f"part: {f.text}" for f in drawing.findings)
+
+
+def _provenance(job: Job, inputs: Inputs) -> dict[str, Any]:
+    """Hashes of the inputs, versions, the source of the coefficients; no time of day, no place on this computer."""
+    files: dict[str, Path] = {"job": job.path, "part": job.part_file}
+    files |= {k: v for k, v in (("machine", job.machine), ("material", job.material)) if isinstance(v, Path)}
+    files |= {f"cutter {k}": job.path.parent / c.file for k, c in enumerate(job.table.cutter) if c.file is not None}
+    hashes: Mapping[str, str] = {
+        name: f"{path.name} sha256 {hashlib.sha256(path.read_bytes()).hexdigest()}" for name, path in files.items()
+    }
+    material = inputs.material
+    return {
+        "inputs": hashes,
+        "overrides": list(job.overrides),
+        "machine": inputs.machine.name,
+        "material": {
+            "name": material.name,
+            "workpiece": material.workpiece,
+            "source": material.source,
+            "conditions": material.conditions,
+        },
+        "versions": {name: version(name) for name in LIBRARIES} | {"python": platform.python_version()},
+    }

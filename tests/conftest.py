@@ -1,0 +1,100 @@
+"""Results made by formula, so that the report is tested without a planner."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chipload.cutter.cutter import Cutter
+from chipload.geometry.contour import Contour
+from chipload.machine.machine import machine_named
+from chipload.planning.result import Event, LimitCheck, OperationResult, StrategyResult
+from chipload.program.build import follow, plunge, rapid, retract
+from chipload.program.program import Program
+from chipload.report.outcome import Operation, Outcome, Proof
+
+EXAMPLES = Path(__file__).parents[1] / "src" / "chipload" / "examples"
+WALL = Contour.from_bulges([[0, 28], [0, 8], [8, 0], [28, 0]], [0, math.tan(math.pi / 8), 0, 0])
+CENTRES = Contour.from_bulges([[5, 28], [5, 8], [8, 5], [28, 5]], [0, math.tan(math.pi / 8), 0, 0])
+BEFORE = Contour.from_bulges([[0.1, 28], [0.1, 8], [8, 0.1], [28, 0.1]], [0, math.tan(math.pi / 8), 0, 0])
+
+
+def made_strategy(name: str, rows: int = 900) -> StrategyResult:
+    """A strategy on the corner whose engagement rises in the corner if it is `plain`; the numbers are not physics."""
+    s = np.linspace(0.0, CENTRES.length, rows)
+    p, T, kappa = CENTRES.at(s)
+    a = 11.478 + (7.26 * (kappa > 0) if name != "backward" else 1.2 * np.exp(-(((s - 20.0) / 0.5) ** 2)))
+    feed = np.full(rows, 600.0) * (np.sin(np.radians(11.478)) / np.sin(np.radians(a)) if name == "feed" else 1.0)
+    force = 4.0 * a * feed / 600.0
+    two = 2 * rows
+    history = {
+        "pass": np.array(["semifinish"] * rows + ["finish"] * rows, dtype=object),
+        "s_mm": np.concatenate([s, CENTRES.length + s]),
+        "t_s": np.linspace(0.0, 9.0, two),
+        "x_mm": np.concatenate([p[:, 0] + 0.1, p[:, 0]]),
+        "y_mm": np.concatenate([p[:, 1] + 0.1, p[:, 1]]),
+        "z_mm": np.full(two, -5.0),
+        "engagement_deg": np.concatenate([np.full(rows, 25.0), a]),
+        "feed_mm_min": np.concatenate([np.full(rows, 600.0), feed]),
+        "force_x_n": np.concatenate([np.full(rows, 90.0), force * T[:, 1]]),
+        "force_y_n": np.concatenate([np.full(rows, 30.0), -force * T[:, 0]]),
+        "force_xy_n": np.concatenate([np.full(rows, 95.0), force]),
+        "torque_nm": np.concatenate([np.full(rows, 0.4), force / 300.0]),
+        "error_um": np.concatenate([np.zeros(rows), force / 8.0]),
+    }
+    start = np.array([*CENTRES.start, 5.0])
+    parts = [rapid(start, 314.159, 1, "finish"), plunge([*CENTRES.start, -5.0], 10.0, 314.159, 1, "finish")]
+    parts += [follow(CENTRES, -5.0, 10.0, 314.159, 1, "finish"), retract([*CENTRES.end, 5.0], 314.159, 1, "finish")]
+    k = rows + int(a.argmax())
+    at = (float(history["x_mm"][k]), float(history["y_mm"][k]))
+    span = {
+        c: {"min": float(v.min()), "max": float(v.max())} for c, v in (("engagement_deg", a), ("force_xy_n", force))
+    }
+    return StrategyResult(
+        name,
+        Program.join(parts),
+        history,
+        {**span, "torque_nm": span["force_xy_n"], "error_um": {"max": float(force.max() / 8.0)}, "time_s": 9.0},
+        (Event("lead-none", 5.0, 28.0, "no room to lead in"),),
+        (
+            LimitCheck("engagement_deg", 13.0, float(a.max()), at),
+            LimitCheck("force_xy_n", 200.0, float(force.max()), at),
+        ),
+        {"wall": (WALL,), "stock": (BEFORE,), "finish path": (CENTRES,)},
+    )
+
+
+def made_outcome(use: str = "backward", status: str = "proved", rows: int = 900) -> Outcome:
+    """A whole run of one operation with three strategies."""
+    names = ("plain", "backward", "feed")
+    result = OperationResult("contour", use, {n: made_strategy(n, rows) for n in names}, ("made by formula",))
+    cutter = Cutter(10.0, 4, math.radians(30.0), 22.0, 35.0, 5.8e5)
+    proofs = {n: Proof(status, f"{status}: 1800 rows compared", {"gouge_mm": 0.0}) for n in names}
+    operation = Operation(result, {"kind": "contour", "use": use, "feed_mm_min": 600.0}, cutter, 0.0, 5.0, proofs)
+    return Outcome(
+        "corner",
+        (operation,),
+        machine_named("vmc"),
+        ("torque_nm",),
+        ("operation.0.x: a finding",),
+        {"inputs": {"job": "x"}},
+    )
+
+
+@pytest.fixture
+def outcome() -> Callable[..., Outcome]:
+    """A maker of outcomes."""
+    return made_outcome
+
+
+@pytest.fixture
+def job_dir(tmp_path: Path) -> Path:
+    """A copy of the contour example."""
+    target = tmp_path / "job"
+    shutil.copytree(EXAMPLES / "contour", target)
+    return target
