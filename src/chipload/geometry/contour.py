@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 
 #: two ends nearer than this [mm] are one point
 JOIN_MM = 1e-7
+#: an arc flatter than this [mm] is a line
+FLAT_MM = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +76,8 @@ class Contour:
     @staticmethod
     def from_bulges(points: ArrayLike, bulges: ArrayLike, closed: bool = False) -> Contour:
         """Vertices (m, 2) [mm] and bulges (m,) as in a DXF polyline: bulge = tan(sweep / 4) of the segment that
-        leaves the vertex. Vertices nearer than ``JOIN_MM`` are one."""
+        leaves the vertex. Vertices nearer than ``JOIN_MM`` are one; an arc that rises less than ``FLAT_MM`` above its
+        chord is a line, for its centre would be too far away to be told exactly."""
         p = np.asarray(points, dtype=np.float64).reshape(-1, 2)
         b = np.asarray(bulges, dtype=np.float64)
         q = np.roll(p, -1, axis=0)
@@ -83,7 +86,7 @@ class Contour:
         keep = np.hypot(*(q - p).T) > JOIN_MM
         p, q, b = p[keep], q[keep], b[keep]
         sweep = 4.0 * np.arctan(b)
-        arc = np.abs(sweep) > 1e-12
+        arc = 0.5 * np.abs(b) * np.hypot(*(q - p).T) > FLAT_MM
         bb = np.where(arc, b, 1.0)
         chord = q - p
         left = np.column_stack([-chord[:, 1], chord[:, 0]])

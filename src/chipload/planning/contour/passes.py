@@ -112,16 +112,17 @@ def with_leads(name: str, path: Contour, stock: StockBoundary, walls: Walls, rad
     """A pass with its ways in and out.
 
     Closed: a quarter circle of radius ``lead`` tangent to the path on the free side, halved until it is R clear of all
-    walls. Open: the path is that over the extended chain; its run-on and run-off along the end tangents are the leads.
+    walls. Open: the path is that over the extended chain; its run-on and run-off along the end tangents are the leads,
+    those of a semi-finish pass 2 R longer, so that the finish pass never meets where they end.
     """
     if not path.closed:
-        spare = walls.run_on - lead
+        end = walls.run_on - lead - (2.0 * radius if name == "semifinish" else 0.0)
         total = path.length
         return Pass(
             name,
             path.part(walls.run_on, total - walls.run_on),
-            path.part(spare, walls.run_on),
-            path.part(total - walls.run_on, total - spare),
+            path.part(end, walls.run_on),
+            path.part(total - walls.run_on, total - end),
             stock,
         )
     p, t, _ = path.at([0.0])

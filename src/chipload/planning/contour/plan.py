@@ -240,7 +240,7 @@ def _strategy(job: _Job, name: str, planar: list[Pass]) -> StrategyResult:
     events = (*job.events, *_events(job, runs, history, name))
     drawn = {
         "stock before": _stock(job).contours,
-        "wall": tuple(_back(w, job.flip) for w in job.walls.walls),
+        "wall" if job.finish else "old surface": tuple(_back(w, job.flip) for w in job.walls.walls),
         "semifinish path": tuple(r.path for r in runs if r.name == "semifinish"),
         "finish path": tuple(r.path for r in runs if r.name != "semifinish"),
         "stock": tuple(Contour(c.segments) for r in runs if r.name != "semifinish" for c in _chains(r.stock.segments)),
