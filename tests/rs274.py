@@ -43,8 +43,8 @@ class Refused(Exception):
     """rs274 did not accept the program; the text is its own."""
 
 
-def run_rs274(text: str, tools: tuple[int, ...] = tuple(range(1, 100))) -> list[Motion]:
-    """The canonical motions of a program, in mm, arcs in the XY plane; :class:`Refused` where rs274 finds an error."""
+def canonical(text: str, tools: tuple[int, ...] = tuple(range(1, 100))) -> list[tuple[str, list[str]]]:
+    """(name, words) of every canonical command; :class:`Refused` where rs274 finds an error."""
     with tempfile.TemporaryDirectory() as folder:
         program, table = Path(folder) / "program.ngc", Path(folder) / "tool.tbl"
         program.write_text(text)
@@ -53,15 +53,17 @@ def run_rs274(text: str, tools: tuple[int, ...] = tuple(range(1, 100))) -> list[
         done = subprocess.run(call, capture_output=True, text=True, cwd=folder, timeout=120)
     if done.returncode != 0:
         raise Refused(done.stderr)
+    calls = [_CALL.match(line) for line in done.stdout.splitlines()]
+    return [(hit[1], [x.strip() for x in hit[2].split(",")]) for hit in calls if hit is not None]
+
+
+def run_rs274(text: str, tools: tuple[int, ...] = tuple(range(1, 100))) -> list[Motion]:
+    """The canonical motions of a program, in mm, arcs in the XY plane; :class:`Refused` where rs274 finds an error."""
     motions: list[Motion] = []
     feed = speed = sense = seconds = 0.0
     tool, fresh = 0, True
     unit = 1.0
-    for line in done.stdout.splitlines():
-        hit = _CALL.match(line)
-        if hit is None:
-            continue
-        name, words = hit[1], [x.strip() for x in hit[2].split(",")]
+    for name, words in canonical(text, tools):
         kind, end, centre, turns = "", (0.0, 0.0, 0.0), (0.0, 0.0), 0
         if name == "USE_LENGTH_UNITS":
             unit = {"CANON_UNITS_MM": 1.0, "CANON_UNITS_INCHES": 25.4}[words[0]]

@@ -63,7 +63,7 @@ def test_lengths(tmp_path, text, mm):
         ("ballend", {}, 3.0),
         ("torus", {"TorusRadius": "1,0 mm"}, 1.0),
         ("bullnose", {"CornerRadius": "0.5 mm"}, 0.5),
-        ("bullnose", {"FlatRadius": "1.5 mm"}, 1.5),
+        ("bullnose", {"FlatRadius": "2 mm"}, 1.0),
     ],
 )
 def test_shapes(tmp_path, shape, more, corner):

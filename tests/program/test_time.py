@@ -59,6 +59,28 @@ def test_helix_dwell_and_rapid():
     assert t[6] == 0.75
 
 
+def test_a_dwell_is_a_stop():
+    legs = [plunge([x, 0, 0], 40.0, 800.0, 1, "cut") for x in (45, 90)]
+    parts = [rapid([0, 0, 0], 800.0, 1, "link"), legs[0], dwell([45, 0, 0], 0.5, 800.0, 1, "x"), legs[1]]
+    leg = 45 / 40 + 40 / 3000
+    np.testing.assert_allclose(program_time(Program.join(parts), VMC), [0, leg, 0.5, leg])
+    # so is a change of speed of the spindle, and the joint of a rapid and a feed
+    parts = [rapid([0, 0, 0], 800.0, 1, "link"), legs[0], plunge([90, 0, 0], 40.0, 700.0, 1, "cut")]
+    np.testing.assert_allclose(program_time(Program.join(parts), VMC), [0, leg, leg])
+    parts = [rapid([[0, 0, 0], [45, 0, 0]], 800.0, 1, "link"), legs[1]]
+    np.testing.assert_allclose(program_time(Program.join(parts), VMC), [0, 2 * (45 / 3000) ** 0.5, leg])
+
+
+def test_steep_helix_keeps_both_limits():
+    """On a helix v^2 cos^2 / r stays within a_xy: 1 mm radius, 20 mm a turn."""
+    entry = helix((1.0, 0.0), (0.0, 0.0), (100.0, 0.0), 20.0, 190.0, 800.0, 1, "entry", level=False)
+    t = program_time(Program.join([rapid([1, 0, 100], 800.0, 1, "link"), entry]), VMC)
+    slope = math.atan2(20.0, 2 * math.pi)
+    v = math.sqrt(3000.0) / math.cos(slope)
+    a = min(3000.0 / math.cos(slope), 2500.0 / math.sin(slope))
+    assert t.sum() == pytest.approx(5 * math.hypot(20.0, 2 * math.pi) / v + v / a, rel=1e-12)
+
+
 def test_diagonal_uses_both_axes():
     t = program_time(cut([[0, 0, 0], [30, 30, 0]], feed=50.0), VMC)
     assert t[1] == pytest.approx(30 * math.sqrt(2) / 50 + 50 / (3000 * math.sqrt(2)))

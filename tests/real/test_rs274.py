@@ -14,7 +14,7 @@ from chipload.machine.machine import machine_named
 from chipload.program.build import dwell, follow, helix, plunge, rapid, rows
 from chipload.program.gcode.writer import write_gcode
 from chipload.program.program import ARC_CCW, ARC_CW, LINE, RAPID, Program
-from rs274 import MISSING, Refused, compare, rs274_installed, run_rs274
+from rs274 import MISSING, Refused, canonical, compare, rs274_installed, run_rs274
 
 pytestmark = pytest.mark.skipif(not rs274_installed(), reason=MISSING)
 LINUXCNC, FANUC = machine_named("vmc"), machine_named("vmc-fanuc")
@@ -178,4 +178,7 @@ def test_comments_do_nothing(text):
     program = rows([RAPID, LINE], [[0, 0, 0], [5, 0, 0]], (0, 0), [0, 5.0], 100.0, 1, text)
     out = write_gcode(program, LINUXCNC, title=text, verified=True, comments=(text, "x" * 500))
     assert compare(run_rs274(out), program) == 0
+    plain = written(rows([RAPID, LINE], [[0, 0, 0], [5, 0, 0]], (0, 0), [0, 5.0], 100.0, 1, "cut"))
+    acts = [name for name, _ in canonical(out) if name != "COMMENT"]
+    assert acts == [name for name, _ in canonical(plain) if name != "COMMENT"]
     assert out.splitlines()[0] == "(chipload: verified by independent simulation)"

@@ -9,7 +9,7 @@ such record: it is written as GOTO whose chords leave it by at most ``chord_mm``
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -110,8 +110,8 @@ def _number(value: float, decimals: int = 6) -> str:
     return "0" if text == "-0" else text
 
 
-def _numbers(values: object, decimals: int = 6) -> str:
-    return ",".join(_number(float(x), decimals) for x in np.asarray(values, dtype=np.float64))
+def _numbers(values: Iterable[float], decimals: int = 6) -> str:
+    return ",".join(_number(x, decimals) for x in values)
 
 
 def _text(text: str) -> str:
