@@ -18,6 +18,7 @@ from chipload.cutting.material import Material, material_named, read_material
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.geometry.dxf import read_dxf
+from chipload.geometry.step import read_step_face
 from chipload.job import Job, OperationTable
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.contour.plan import Finishing, plan_contour
@@ -193,6 +194,10 @@ def _read_part(job: Job) -> tuple[tuple[Contour, ...], tuple[str, ...]]:
             layers=part.layers or None,
             join_mm=part.join_mm,
             tolerance_mm=part.tolerance_mm,
+        )
+    elif ending in (".step", ".stp"):
+        drawing = read_step_face(
+            job.part_file, z_mm=part.face_z_mm, join_mm=part.join_mm, tolerance_mm=part.tolerance_mm
         )
     else:
         raise InputError(f"part.file = {part.file}: must end in .dxf, .step or .stp")

@@ -88,7 +88,8 @@ def _triangles(flat: object, z: float) -> tuple[Floats, Ints]:
     if len(parts) == 0:
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
     ring = np.array([shapely.get_coordinates(t)[:3] for t in parts])
-    turn = np.cross(ring[:, 1] - ring[:, 0], ring[:, 2] - ring[:, 0])
+    (ux, uy), (vx, vy) = (ring[:, 1] - ring[:, 0]).T, (ring[:, 2] - ring[:, 0]).T
+    turn = ux * vy - uy * vx
     ring[turn < 0.0] = ring[turn < 0.0][:, ::-1]
     points, index = np.unique(ring.reshape(-1, 2), axis=0, return_inverse=True)
     return np.column_stack([points, np.full(len(points), z)]), index.reshape(-1, 3).astype(np.int64)

@@ -1,0 +1,153 @@
+"""Jobs that are refused, each with its whole message."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from chipload.errors import InputError
+from chipload.job import load_job
+
+FEED = " (feed of the cutter's centre)"
+BY_SET = {
+    "operation.0.feed_mm_min=-4": f"operation.0.feed_mm_min = -4: must be above 0{FEED}",
+    "operation.0.feed_mm_min=nan": f"operation.0.feed_mm_min = nan: must be a finite number{FEED}",
+    "operation.0.feed_mm_min=-inf": f"operation.0.feed_mm_min = -inf: must be a finite number{FEED}",
+    "operation.0.feed_mm_min=fast": f"operation.0.feed_mm_min = 'fast': must be a number{FEED}",
+    "operation.0.feed_mm_min=true": f"operation.0.feed_mm_min = True: must be a number{FEED}",
+    "operation.0.feed_mm_min=1e6": f"operation.0.feed_mm_min = 1e+06: must be at most 100000{FEED}",
+    "cutter.0.diameter_mm=nan": "cutter.0.diameter_mm = nan: must be a finite number",
+    "cutter.0.diameter_mm=-3": "cutter.0.diameter_mm = -3: must be above 0",
+    "cutter.0.flutes=2.5": "cutter.0.flutes = 2.5: must be a whole number",
+    "cutter.0.corner_radius_mm=8": "cutter.0.corner_radius_mm = 8: must be at most diameter_mm / 2 = 5",
+    "stock.top_mm=inf": "stock.top_mm = inf: must be a finite number (z of the top of the stock)",
+    "operation.0.side=up": "operation.0.side = 'up': must be one of 'inside', 'outside', 'left', 'right'",
+    "operation.0.kind=pocket": "operation.0.kind = 'pocket': must be one of 'contour', 'forward', 'front'",
+    "operation.0.radial_depth_mm=10": "operation.0.radial_depth_mm = 10: must be below the cutter's diameter_mm = 10: "
+    "take several passes or a larger cutter",
+    "operation.0.axial_depth_mm=23": "operation.0.axial_depth_mm = 23: must be at most the cutter's "
+    "flute_length_mm = 22: take several depths or a longer cutter",
+    "operation.0.cutter=7": "operation.0.cutter = 7: no [[cutter]] has this number: state one of 1",
+    "operation.0.strategies=[]": "operation.0.strategies = []: must name at least one of plain, backward, feed",
+    'operation.0.strategies=["feed", "feed"]': "operation.0.strategies = ['feed', 'feed']: a strategy is listed twice: "
+    "list each once",
+    'operation.0.strategies=["feed"]': "operation.0.use = 'backward': must be one of operation.0.strategies = feed",
+    "operation.0.strategies=feed": "operation.0.strategies = 'feed': must be a list, as ['feed']",
+    "operation=[]": "operation: has no entry: state at least one [[operation]]",
+    "stock=3": "stock = 3: must be a table, [stock]",
+    "part.file=": "part.file = '': must not be empty",
+    "part.units=inches": "part.units = 'inches': must be one of 'um', 'mm', 'cm', 'm', 'inch', 'foot'",
+    "limits.engagement_deg=0": "limits.engagement_deg = 0: must be above 0",
+    "operation.0.feed_mm_min=1" + "0" * 400: "a number is too large: write it below 1e300",
+}
+
+#: a wrong `--set` says so itself
+WRONG_SET = {
+    "cutter.0.diametr_mm=12": "cutter.0.diametr_mm: unknown key; did you mean diameter_mm?",
+    "cutter.0.diameter_inch=0.5": "cutter.0.diameter_inch: unknown key; did you mean diameter_mm?",
+    "operation.0.feed_mm_s=10": "operation.0.feed_mm_s: unknown key; did you mean feed_mm_min?",
+    "operation.0.speed_hz=50": "operation.0.speed_hz: unknown key; did you mean speed_rpm?",
+    "cuter.0.diameter_mm=12": "cuter: unknown key; did you mean cutter?",
+    "cutter.1.diameter_mm=12": "cutter.1: cutter has 1 entry: count from 0 to 0",
+    "cutter.first.diameter_mm=12": "cutter.first: cutter has 1 entry: count from 0 to 0",
+    "part.file.name=a": "part.file is a value, it holds no key name",
+    "nothing": "must be key.path=value, as cutter.0.diameter_mm=12",
+    ".a=1": "must be key.path=value, as cutter.0.diameter_mm=12",
+}
+
+#: lines of the example, what they become, what is said
+IN_FILE = [
+    ("diameter_mm = 10.0", "diametr_mm = 10.0", "cutter.0.diametr_mm: unknown key; did you mean diameter_mm?"),
+    ("feed_mm_min = 600.0", "", f"operation.0.feed_mm_min: missing: state it{FEED}"),
+    ("feed_mm_min = 600.0", "feed_mm_s = 10.0", "operation.0.feed_mm_s: unknown key; did you mean feed_mm_min?"),
+    ("top_mm = 0.0", "", "stock.top_mm: missing: state it (z of the top of the stock)"),
+    ("[stock]", "[stok]", "stok: unknown key; did you mean stock?"),
+    ('use = "backward"', "", "operation.0.use: missing: state which of plain, backward, feed is released"),
+    ("lead_mm = 3.0", "", "operation.0.lead_mm: missing: state it (kind = contour needs it)"),
+    ('name = "vmc"', "", "machine: none is stated: state either machine.name or machine.file"),
+    ('name = "vmc"', 'name = "vmc"\nfile = "a.toml"', "machine: both are stated: state either machine.name or "
+     "machine.file"),
+    ("number = 1", "", "cutter.0.number is missing: must be given, a cutter is never guessed"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "message"), BY_SET.items(), ids=[k[:40] for k in BY_SET])
+def test_a_wrong_value_is_named(job_dir: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        load_job(job_dir / "job.toml", [text])
+    assert str(caught.value) == f"job.toml: {message}"
+
+
+@pytest.mark.parametrize(("text", "message"), WRONG_SET.items(), ids=list(WRONG_SET))
+def test_a_wrong_set_is_named(job_dir: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        load_job(job_dir / "job.toml", [text])
+    assert str(caught.value) == f"--set {text}: {message}"
+
+
+@pytest.mark.parametrize(("line", "instead", "message"), IN_FILE, ids=[x[2][:40] for x in IN_FILE])
+def test_a_wrong_line_is_named(job_dir: Path, line: str, instead: str, message: str) -> None:
+    path = job_dir / "job.toml"
+    text = path.read_text()
+    assert line in text
+    path.write_text(text.replace(line, instead, 1))
+    with pytest.raises(InputError) as caught:
+        load_job(path)
+    assert str(caught.value) == f"job.toml: {message}"
+
+
+def test_two_faults_say_the_first_and_count(job_dir: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        load_job(job_dir / "job.toml", ["operation.0.feed_mm_min=-4", "operation.0.side=up"])
+    assert str(caught.value) == f"job.toml: operation.0.feed_mm_min = -4: must be above 0{FEED} (and 1 more)"
+
+
+def test_a_job_without_limits_is_refused(job_dir: Path) -> None:
+    path = job_dir / "job.toml"
+    path.write_text(path.read_text().split("[limits]")[0])
+    with pytest.raises(InputError) as caught:
+        load_job(path)
+    assert str(caught.value) == (
+        "job.toml: limits: none is stated, so nothing would be checked: state at least one of engagement_deg, "
+        "force_xy_n, torque_nm, error_um"
+    )
+
+
+def test_two_cutters_of_one_number_are_refused(job_dir: Path) -> None:
+    path = job_dir / "job.toml"
+    text = path.read_text()
+    block = text[text.index("[[cutter]]") : text.index("[[operation]]")]
+    path.write_text(text.replace("[[operation]]", block + "[[operation]]"))
+    with pytest.raises(InputError) as caught:
+        load_job(path)
+    assert str(caught.value) == "job.toml: cutter.1.number = 1: is taken by another cutter: give each its own"
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"[part\n", "not a TOML file: Expected ']' at the end of a table declaration (at line 1, column 6)"),
+        (b"\xff\xfe\x00", "not a TOML file: 'utf-8' codec can't decode byte 0xff in position 0: invalid start byte"),
+        (b"", "part: missing: state it (and 5 more)"),
+    ],
+)
+def test_what_is_no_job_is_refused(tmp_path: Path, data: bytes, message: str) -> None:
+    path = tmp_path / "job.toml"
+    path.write_bytes(data)
+    with pytest.raises(InputError) as caught:
+        load_job(path)
+    assert str(caught.value) == f"job.toml: {message}"
+
+
+def test_a_job_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        load_job(tmp_path / "job.toml")
+    assert str(caught.value) == f"{tmp_path / 'job.toml'}: cannot be read: No such file or directory"
+
+
+def test_deep_nesting_is_refused_and_not_a_fault(tmp_path: Path) -> None:
+    path = tmp_path / "job.toml"
+    path.write_text("a = " + "[" * 20_000)
+    with pytest.raises(InputError):
+        load_job(path)

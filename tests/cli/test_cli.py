@@ -1,0 +1,209 @@
+"""The command line: what it says, where, and with which exit code."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from chipload import examples, run
+from chipload.cli import app
+from chipload.job import Job
+from chipload.progress import Progress
+from chipload.report.outcome import Outcome
+
+Maker = Callable[..., Outcome]
+CHIPLOAD = [sys.executable, "-c", "from chipload.cli import main; main()"]
+
+
+def call(*words: object) -> tuple[int, str, str]:
+    done = CliRunner().invoke(app, [str(w) for w in words])
+    return done.exit_code, done.stdout, done.stderr
+
+
+@pytest.fixture
+def planned(monkeypatch: pytest.MonkeyPatch, outcome: Maker) -> Callable[[Outcome | BaseException], None]:
+    """Let `run` find an outcome, or an accident, in place of the planner."""
+
+    def put(made: Outcome | BaseException) -> None:
+        def stand_in(job: Job, progress: Progress) -> Outcome:
+            progress(0.5, "half")
+            if isinstance(made, BaseException):
+                raise made
+            return made
+
+        monkeypatch.setattr(run, "run_job", stand_in)
+
+    put(outcome())
+    return put
+
+
+def test_a_job_that_holds_ends_with_0(job_dir: Path, tmp_path: Path, planned: object) -> None:
+    code, out, err = call("run", job_dir / "job.toml", "--out", tmp_path / "r")
+    assert (code, err) == (0, "")
+    assert out.splitlines()[0].startswith("Every stated limit holds")
+    assert out.splitlines()[1] == f"report: {tmp_path / 'r' / 'report.html'}"
+
+
+@pytest.mark.parametrize(("use", "status"), [("plain", "proved"), ("backward", "unproven"), ("backward", "failed")])
+def test_a_job_that_does_not_hold_ends_with_3_and_its_result(
+    job_dir: Path, tmp_path: Path, planned: Callable[[Outcome], None], outcome: Maker, use: str, status: str
+) -> None:
+    planned(outcome(use, status))
+    code, out, err = call("run", job_dir / "job.toml", "--out", tmp_path / "r")
+    assert (code, err) == (3, "")
+    assert out.startswith("Does not hold: operation 0")
+    assert json.loads((tmp_path / "r" / "summary.json").read_bytes())["holds"] is False
+
+
+def test_wrong_input_ends_with_2_and_one_line(job_dir: Path, tmp_path: Path) -> None:
+    job = job_dir / "job.toml"
+    code, out, err = call("run", job, "--out", tmp_path / "r", "--set", "operation.0.feed_mm_min=-4")
+    assert (code, out) == (2, "")
+    assert err == "chipload: job.toml: operation.0.feed_mm_min = -4: must be above 0 (feed of the cutter's centre)\n"
+    assert [p.name for p in tmp_path.iterdir()] == ["job"]
+
+
+def test_a_folder_that_is_refused_is_said_before_the_work(job_dir: Path, planned: Callable[..., None]) -> None:
+    planned(AssertionError("the planner was called"))
+    code, _, err = call("run", job_dir / "job.toml", "--out", job_dir)
+    assert code == 2
+    assert "holds files that are no result of chipload" in err
+
+
+def test_a_fault_of_ours_ends_with_1_and_says_how_to_report(
+    job_dir: Path, tmp_path: Path, planned: Callable[..., None]
+) -> None:
+    planned(ZeroDivisionError("division by zero"))
+    words = ("run", job_dir / "job.toml", "--out", tmp_path / "r")
+    code, _, err = call(*words)
+    assert code == 1
+    assert err == (
+        "chipload: a fault of chipload: ZeroDivisionError: division by zero. Please report it with the job file and "
+        "the output of the same command with --debug\n"
+    )
+    assert "Traceback" in call(*words, "--debug")[2]
+    assert not (tmp_path / "r").exists()
+
+
+def test_a_stop_ends_with_130(job_dir: Path, tmp_path: Path, planned: Callable[..., None]) -> None:
+    planned(KeyboardInterrupt())
+    code, out, err = call("run", job_dir / "job.toml", "--out", tmp_path / "r")
+    assert (code, out, err) == (130, "", "chipload: stopped: nothing was written\n")
+
+
+@pytest.mark.parametrize("words", [("run",), ("run", "job.toml"), ("nonsense",), ("check", "--sett", "a=1"), ()])
+def test_wrong_usage_ends_with_2(words: tuple[str, ...]) -> None:
+    assert call(*words)[0] == 2
+
+
+def test_check_reads_and_plans_nothing(job_dir: Path) -> None:
+    code, out, err = call("check", job_dir / "job.toml", "--set", "operation.0.kind=front")
+    assert (code, err) == (0, "")
+    assert out.splitlines()[:3] == [
+        "job.toml: right: 0 closed and 1 open contours, machine vmc, material al7075-carbide",
+        "operation 0: front, cutter 1 of 10 mm",
+        "finding: operation.0.side: not used by kind = front",
+    ]
+    assert sorted(p.name for p in job_dir.iterdir()) == ["README.md", "corner.dxf", "job.toml"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("part.file=none.dxf", "none.dxf: no such file"),
+        ("part.file=README.md", "part.file = README.md: must end in .dxf, .step or .stp"),
+        ("machine.name=vmx", "machine vmx: not known: the nearest is vmc"),
+        ("material.name=al7075", "material al7075: not known: the nearest is al7075-"),
+        ("material.file=no.toml", "no.toml: cannot be read: No such file or directory"),
+        ("operation.0.speed_rpm=20000", "operation.0.speed_rpm = 20000: machine vmc turns from 60 to 15000 rpm: state"),
+    ],
+)
+def test_check_reads_every_file(job_dir: Path, text: str, said: str) -> None:
+    code, out, err = call("check", job_dir / "job.toml", "--set", text)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1
+
+
+def test_examples_are_listed_with_a_line_each() -> None:
+    code, out, _ = call("example")
+    assert code == 0
+    assert [line.split()[0] for line in out.splitlines()] == ["contour", "pocket"]
+
+
+@pytest.mark.parametrize("name", list(examples.example_titles()))
+def test_an_example_that_was_copied_out_is_right(name: str, tmp_path: Path) -> None:
+    code, out, _ = call("example", name, tmp_path / "mine")
+    assert code == 0
+    assert f"chipload run {tmp_path / 'mine' / 'job.toml'}" in out
+    assert call("check", tmp_path / "mine" / "job.toml")[0] == 0
+
+
+def test_an_example_overwrites_nothing(tmp_path: Path) -> None:
+    (tmp_path / "a").write_text("")
+    code, _, err = call("example", "contour", tmp_path)
+    assert (code, err) == (2, f"chipload: {tmp_path}: is not empty: name a folder that is new or empty\n")
+
+
+def test_an_unknown_example_names_the_nearest(tmp_path: Path) -> None:
+    code, _, err = call("example", "contur", tmp_path / "a")
+    assert code == 2
+    assert err == "chipload: example contur: not known; did you mean contour? (known: contour, pocket)\n"
+
+
+def test_version() -> None:
+    assert call("--version")[:2] == (0, "chipload 0.1.0\n")
+
+
+def test_help_comes_without_the_heavy_imports() -> None:
+    heavy = "numpy", "numba", "scipy", "plotly", "trimesh", "pyarrow", "pydantic", "ezdxf", "OCP", "rich"
+    code = "import sys; from chipload import cli; print([m for m in sys.argv[1:] if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code, *heavy], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stopped_run_leaves_no_half_file(job_dir: Path, tmp_path: Path, number: signal.Signals) -> None:
+    """The run is stopped when its temporary folder has appeared."""
+    slow = (
+        "import time\n"
+        "from chipload.cli import main\n"
+        "from chipload.report import folder\n"
+        "write = folder._write\n"
+        "folder._write = lambda path, data: (write(path, data), time.sleep(60))\n"
+        "from chipload import run\n"
+        "from importlib.util import module_from_spec, spec_from_file_location\n"
+        f"spec = spec_from_file_location('made', {str(Path(__file__).parents[1] / 'conftest.py')!r})\n"
+        "made = module_from_spec(spec)\n"
+        "spec.loader.exec_module(made)\n"
+        "run.run_job = lambda job, progress: made.made_outcome()\n"
+        "main()\n"
+    )
+    words = [sys.executable, "-c", slow, "run", str(job_dir / "job.toml"), "--out", str(tmp_path / "r")]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        for _ in range(600):
+            if any(p.name.startswith(".chipload-") and list(p.iterdir()) for p in tmp_path.iterdir()):
+                break
+            time.sleep(0.1)
+        os.kill(process.pid, number)
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (130, "", "chipload: stopped: nothing was written\n")
+    assert [p.name for p in tmp_path.iterdir()] == ["job"]
+
+
+def test_the_installed_command_ends_with_the_same_codes(job_dir: Path) -> None:
+    job = str(job_dir / "job.toml")
+    done = subprocess.run([*CHIPLOAD, "check", job], capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    done = subprocess.run([*CHIPLOAD, "check", job, "--set", "x=1"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1

@@ -1,0 +1,72 @@
+"""What a job says, and what `--set` does to it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from chipload.job import MAY, NEEDS, OperationTable, load_job
+
+
+def test_the_example_is_read_whole(job_dir: Path) -> None:
+    job = load_job(job_dir / "job.toml")
+    assert job.part_file == job_dir / "corner.dxf"
+    assert (job.machine, job.material) == ("vmc", "al7075-carbide")
+    assert job.cutters[1].diameter == 10.0
+    assert job.cutters[1].helix == pytest.approx(math.radians(30.0))
+    assert job.operations[0].strategies == ("plain", "backward", "feed")
+    assert job.limits["engagement_deg"] == 13.0
+    assert job.findings == ()
+
+
+def test_paths_are_relative_to_the_job_and_not_to_here(job_dir: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(job_dir.parent)
+    job = load_job("job/job.toml", ["part.file=sub/a.dxf", "machine.file=own.toml"])
+    assert job.part_file == job_dir / "sub" / "a.dxf"
+    assert job.machine == job_dir / "own.toml"
+
+
+def test_an_absolute_path_stays(job_dir: Path) -> None:
+    assert load_job(job_dir / "job.toml", ["part.file=/elsewhere/a.dxf"]).part_file == Path("/elsewhere/a.dxf")
+
+
+@pytest.mark.parametrize(
+    ("text", "read"),
+    [
+        ("cutter.0.diameter_mm=12", lambda j: j.cutters[1].diameter == 12.0),
+        ("operation.0.joint=clothoid", lambda j: j.operations[0].joint == "clothoid"),
+        ('operation.0.joint="clothoid"', lambda j: j.operations[0].joint == "clothoid"),
+        ("operation.0.feed_mm_min = 450.5", lambda j: j.operations[0].feed_mm_min == 450.5),
+        ('part.layers=["WALL"]', lambda j: j.table.part.layers == ("WALL",)),
+        ("limits.torque_nm=3", lambda j: j.limits["torque_nm"] == 3.0),
+        ("cutter.0.corner_radius_mm=1", lambda j: j.cutters[1].corner_radius == 1.0),
+    ],
+)
+def test_set_reaches_every_key(job_dir: Path, text: str, read: object) -> None:
+    job = load_job(job_dir / "job.toml", [text])
+    assert read(job)  # type: ignore[operator]
+    assert job.overrides == (text,)
+
+
+def test_the_later_set_wins(job_dir: Path) -> None:
+    job = load_job(job_dir / "job.toml", ["operation.0.step_mm=0.1", "operation.0.step_mm=0.2"])
+    assert job.operations[0].step_mm == 0.2
+
+
+def test_another_kind_names_the_keys_that_it_does_not_use(job_dir: Path) -> None:
+    job = load_job(job_dir / "job.toml", ["operation.0.kind=front"])
+    unused = ("side", "strategies", "use", "joint", "semifinish_depth_mm", "tolerance_mm", "lead_mm")
+    assert job.findings == tuple(f"operation.0.{key}: not used by kind = front" for key in unused)
+
+
+def test_a_limit_that_is_not_stated_is_listed_as_unchecked(job_dir: Path) -> None:
+    path = job_dir / "job.toml"
+    path.write_text("\n".join(x for x in path.read_text().splitlines() if not x.startswith(("torque", "error"))))
+    assert load_job(path).unchecked == ("torque_nm", "error_um")
+
+
+def test_every_key_of_a_kind_exists() -> None:
+    for table in (NEEDS, MAY):
+        assert {key for keys in table.values() for key in keys} <= set(OperationTable.model_fields)
