@@ -109,32 +109,44 @@ def start_at_widest(path: Contour) -> Contour:
 
 
 def with_leads(name: str, path: Contour, stock: StockBoundary, walls: Walls, radius: float, lead: float) -> Pass:
-    """A pass with its ways in and out.
+    """A pass with its ways in and out: quarter circles tangent to the path on the free side.
 
-    Closed: a quarter circle of radius ``lead`` tangent to the path on the free side, halved until it is R clear of all
-    walls. Open: the path is that over the extended chain; its run-on and run-off along the end tangents are the leads,
-    those of a semi-finish pass 2 R longer, so that the finish pass never meets where they end.
+    The path of an open chain is that over the extended one; between its quarter circles and the chain it runs on
+    along the end tangents by ``lead`` mm, a semi-finish pass by 2 R more, so that the finish pass never meets where
+    it ends.
     """
-    if not path.closed:
-        end = walls.run_on - lead - (2.0 * radius if name == "semifinish" else 0.0)
-        total = path.length
+    if path.closed:
         return Pass(
-            name,
-            path.part(walls.run_on, total - walls.run_on),
-            path.part(end, walls.run_on),
-            path.part(total - walls.run_on, total - end),
-            stock,
+            name, path, _quarter(path, walls, radius, lead, 0.0), _quarter(path, walls, radius, lead, None), stock
         )
-    p, t, _ = path.at([0.0])
+    total = path.length
+    end = walls.run_on - lead - (2.0 * radius if name == "semifinish" else 0.0)
+    path, begins, ends = (path.part(*x) for x in ((walls.run_on, total - walls.run_on), (end, walls.run_on),
+                                                  (total - walls.run_on, total - end)))  # fmt: skip
+    way_in, way_out = _quarter(begins, walls, radius, lead, 0.0), _quarter(ends, walls, radius, lead, None)
+    return Pass(
+        name,
+        path,
+        begins if way_in is None else Contour.join([way_in, begins]),
+        ends if way_out is None else Contour.join([ends, way_out]),
+        stock,
+    )
+
+
+def _quarter(path: Contour, walls: Walls, radius: float, lead: float, at: float | None) -> Contour | None:
+    """A quarter circle into the start of ``path`` (``at`` = 0) or out of its end (None), on its left.
+
+    Its radius ``lead`` is halved until it is R clear of all walls; None where there is no room.
+    """
+    p, t, _ = path.at([path.length if at is None else at])
     o, t = p[0], t[0]
     n = np.array([-t[1], t[0]])
     wall = np.vstack([w.segments for w in walls.extended])
     while lead > 1e-3 * radius:
         c = o + lead * n
-        way_in = Contour(np.array([[*(c - lead * t), *o, *c, 0.5 * math.pi]]))
-        way_out = Contour(np.array([[*o, *(c + lead * t), *c, 0.5 * math.pi]]))
-        probe = np.vstack([w.at(np.linspace(0.0, w.length, 64))[0] for w in (way_in, way_out)])
-        if distance(wall, probe).min() >= radius - 1e-7:
-            return Pass(name, path, way_in, way_out, stock)
+        ends = (*(c - lead * t), *o) if at is not None else (*o, *(c + lead * t))
+        way = Contour(np.array([[*ends, *c, 0.5 * math.pi]]))
+        if distance(wall, way.at(np.linspace(0.0, way.length, 64))[0]).min() >= radius - 1e-7:
+            return way
         lead *= 0.5
-    return Pass(name, path, None, None, stock)
+    return None
