@@ -1,14 +1,15 @@
 """Smooth curves as chains of arcs and lines within a tolerance.
 
-Notation: c(t) the curve, c'(t) its derivative, p and q the ends of a span, T0 and T1 the unit tangents there. A **biarc**
-is two arcs that leave p along T0, reach q along T1 and share a tangent where they meet; of the many the one with equal
-tangent lengths is taken: with v = q - p and s = T0 + T1, ``l^2 (2 - 2 T0.T1) + 2 l v.s = v.v``. A span whose biarc leaves
-the curve by more than the tolerance is halved.
+Notation: c(t) the curve, c'(t) its derivative, p and q the ends of a span, T0 and T1 the unit tangents there. A
+**biarc** is two arcs that leave p along T0, reach q along T1 and share a tangent where they meet; of the many the one
+with equal tangent lengths l is taken: with v = q - p and s = T0 + T1, ``l^2 (2 - 2 T0.T1) + 2 l v.s = v.v``. A span
+whose biarc leaves the curve by more than the tolerance is halved.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -43,7 +44,7 @@ def arcs_along(curve: Curve, spans: ArrayLike, tolerance_mm: float) -> Contour |
     """
     t = np.asarray(spans, dtype=np.float64)
     rows: list[Floats] = []
-    todo = [(float(a), float(b), 0) for a, b in zip(t[:-1], t[1:], strict=True)][::-1]
+    todo = [(float(a), float(b), 0) for a, b in pairwise(t)][::-1]
     while todo:
         a, b, depth = todo.pop()
         (p, dp), (q, dq) = curve(a), curve(b)

@@ -1,6 +1,6 @@
 """Loose lines and arcs joined to contours.
 
-Notation: a **part** is a contour as the file has it, often a single segment; each has two **ends**, numbered 2 k (start)
+Notation: a **part** is a contour as the file has it, often a single segment; it has two **ends**, numbered 2 k (start)
 and 2 k + 1. Ends are joined in pairs, the nearest first: those that coincide, then those within ever wider gaps up to
 ``join_mm``. Where three or more ends come together it is not for us to say how the drawing goes on: nothing is joined
 there, and it is reported.
@@ -37,13 +37,15 @@ class Drawing:
     findings: tuple[Finding, ...]
 
 
-def chained(parts: Sequence[Floats], join_mm: float, where: str = "") -> tuple[tuple[Contour, ...], tuple[Finding, ...]]:
+def chained(
+    parts: Sequence[Floats], join_mm: float, where: str = ""
+) -> tuple[tuple[Contour, ...], tuple[Finding, ...]]:
     """Contours from parts (each (n, 7) float [mm, rad], a chain), closed or open, in the order of the file.
 
     The first part of a contour keeps its direction, a closed contour begins with it. Joined ends meet half-way; an arc
-    keeps its plane of symmetry. Findings: ``chain-empty`` a part without length, dropped; ``chain-double`` a part drawn
-    twice, dropped once; ``chain-joined`` a gap that was closed, with its place; ``chain-branch`` three or more ends at a
-    place, left open. ``where`` begins each text. O(n log n).
+    slides its centre along its chord. Findings: ``chain-empty`` a part without length, dropped; ``chain-double`` drawn
+    twice, dropped once; ``chain-joined`` a gap that was closed, with its place; ``chain-branch`` three or more ends at
+    one place, left open. ``where`` begins each text. O(n log n).
 
     Raises
     ------

@@ -88,13 +88,15 @@ def read_dxf(
         if count >= max_entities:
             raise InputError(_too_many(file, f"more than {max_entities}", max_entities))
         known.add(layer)
+        if entity is None:
+            continue
         if wanted is not None and layer.casefold() not in wanted:
             continue
         rows = drawn.rows(entity, layer, findings)
-        if rows is None:
-            skipped[f"{entity.dxftype()} on layer {layer!r}"] += 1
-        else:
+        if rows is not None and len(rows):
             parts.setdefault(layer, []).append(rows)
+        elif rows is None:
+            skipped[f"{entity.dxftype()} on layer {layer!r}"] += 1
     names = ", ".join(sorted(known)) or "none"
     if layers is not None:
         for name in layers:
@@ -111,12 +113,14 @@ def read_dxf(
         findings += seen
     if not contours:
         on = "" if layers is None else f" on {', '.join(layers)}"
-        raise InputError(f"part.file = {file.name}: no lines or arcs{on}; layers there are: {names}")
+        sheets = [layout.name for layout in doc.layouts if layout.name != "Model" and len(layout) > 1]
+        also = f"; the sheets {', '.join(sheets)} are not read, only the model space" if sheets else ""
+        raise InputError(f"part.file = {file.name}: no lines or arcs{on}; layers there are: {names}{also}")
     return Drawing(tuple(contours), tuple(owner), unit, tuple(findings))
 
 
 def _too_many(file: Path, count: str, most: int, what: str = "entities") -> str:
-    return f"part.file = {file.name}: {count} {what}: must be at most {most}; keep only the part in the drawing"
+    return f"part.file = {file.name}: {count} {what}: must be at most {most}; keep only the part there"
 
 
 def _scan(file: Path, max_entities: int) -> None:
@@ -195,12 +199,16 @@ def _unit(doc: Any, file: Path, units: str | None, if_unsaid: str | None, findin
 
 
 def _entities(space: Any, inside: str | None, depth: int = 0) -> Iterator[tuple[Any, str]]:
-    """Entities with their layer; what a block has on layer 0 lies on the layer of its reference."""
+    """Entities with their layer, None for a reference to a block, so that references are counted too.
+
+    What a block has on layer 0 lies on the layer of its reference.
+    """
     for entity in space:
         layer = str(entity.dxf.get("layer", "0"))
         layer = inside if inside is not None and layer == "0" else layer
         if entity.dxftype() == "INSERT" and depth < 16:
             for reference in entity.multi_insert() if entity.mcount > 1 else (entity,):
+                yield None, layer
                 yield from _entities(reference.virtual_entities(), layer, depth + 1)
         else:
             yield entity, layer
@@ -213,7 +221,7 @@ class _Reader:
         self.file, self.mm, self.tolerance_mm = file, mm, tolerance_mm
 
     def rows(self, entity: Any, layer: str, findings: list[Finding]) -> Floats | None:
-        """(n, 7) segments [mm] of an entity; None if it is not a line."""
+        """(n, 7) segments [mm] of an entity, none if it has no length; None if it is not a line."""
         kind = entity.dxftype()
         if kind not in DRAWN or (kind == "POLYLINE" and not (entity.is_2d_polyline or entity.is_3d_polyline)):
             return None
@@ -224,8 +232,11 @@ class _Reader:
             raise
         except (ArithmeticError, ValueError, IndexError, TypeError, AttributeError) as err:
             findings.append(Finding("dxf-skipped", 0, f"{kind} on layer {layer!r} is damaged, dropped: {_line(err)}"))
-            return np.zeros((1, 7))
-        rows = np.zeros((1, 7)) if made is None else np.array(made, dtype=np.float64).reshape(-1, 7)
+            return np.zeros((0, 7))
+        if made is None:
+            findings.append(Finding("dxf-empty", 0, f"{kind} on layer {layer!r} has no length, dropped"))
+            return np.zeros((0, 7))
+        rows = np.array(made, dtype=np.float64).reshape(-1, 7)
         if not np.isfinite(rows).all():
             raise InputError(f"{what} has a coordinate that is not a finite number")
         return rows
@@ -244,7 +255,9 @@ class _Reader:
         """+1 seen from above, -1 from below."""
         e = np.array(tuple(entity.dxf.extrusion), dtype=np.float64)
         if not np.isfinite(e).all() or np.hypot(e[0], e[1]) > 1e-6 * abs(e[2]):
-            raise InputError(f"{what} is not parallel to the XY plane (extrusion {e.tolist()}): a flat drawing is needed")
+            raise InputError(
+                f"{what} is not parallel to the XY plane (extrusion {e.tolist()}): a flat drawing is needed"
+            )
         return 1.0 if e[2] > 0.0 else -1.0
 
     def _line(self, entity: Any, what: str) -> Any:
@@ -294,7 +307,9 @@ class _Reader:
     def _ellipse(self, entity: Any, what: str) -> Any:
         self._side(entity, what)
         tool = entity.construction_tool()
-        c, major, minor = (self._flat([x, (0, 0, x[2])], what)[0] for x in (tool.center, tool.major_axis, tool.minor_axis))
+        c, major, minor = (
+            self._flat([x, (0, 0, x[2])], what)[0] for x in (tool.center, tool.major_axis, tool.minor_axis)
+        )
         if max(np.hypot(*major), np.hypot(*minor)) <= JOIN_MM:
             return None
         a, b = float(tool.start_param), float(tool.end_param)

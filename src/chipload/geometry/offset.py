@@ -66,14 +66,14 @@ def offset(contours: Sequence[Contour], distance_mm: float) -> tuple[Contour, ..
     >>> round(float(inner.radii[0]), 12)
     3.0
     """
-    return _offset(contours, distance_mm, both_sides=len(contours) > 1 or not all(c.closed for c in contours))
+    return _offset(contours, distance_mm, both_sides=True)
 
 
 def offset_region(region: Region, distance_mm: float) -> Region:
     """The points of a region that are ``distance_mm`` from its boundary: positive insets, negative grows.
 
-    Grown by ``-d`` every point within d of the region is added. The result has the inside on the left; parts of no
-    width are not in it. Raises as :func:`offset`.
+    Grown by ``-d`` every point within d of the region is added. The contours must not cross. The result has
+    the inside on the left; parts of no width are not in it. Raises as :func:`offset`.
 
     Examples
     --------

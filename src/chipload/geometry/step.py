@@ -1,0 +1,148 @@
+"""A planar horizontal face of a STEP part becomes contours of lines and arcs in mm.
+
+Notation: z [mm] the height of a face whose normal is along Z. Lines and circles stay what they are, other edges become
+biarcs. The CAD kernel converts the file's unit to mm; it is imported when a file is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chipload.errors import Finding, InputError
+from chipload.geometry.biarc import arcs_along
+from chipload.geometry.chains import Drawing, chained
+from chipload.geometry.contour import Contour, Floats
+
+#: a plane is horizontal if its normal leaves Z by less [rad], and two heights are one within the same [mm]
+LEVEL = 1e-6
+
+
+def read_step_face(
+    path: str | Path, *, z_mm: float | None = None, join_mm: float = 0.001, tolerance_mm: float = 0.001
+) -> Drawing:
+    """Contours of the horizontal planar faces at one height of a STEP part.
+
+    Parameters
+    ----------
+    path : the STEP file
+    z_mm : height [mm] of the face, to 0.001 mm; the topmost horizontal face by default
+    join_mm : widest gap [mm] between edges that is closed
+    tolerance_mm : how far [mm] arcs may leave an edge that is neither line nor circle
+
+    Returns
+    -------
+    Drawing in mm; the layer of each contour is its height, as in ``z=12.5``.
+
+    Raises
+    ------
+    InputError
+        The file is missing or no STEP file, or has no horizontal planar face (at ``z_mm``); the heights are named.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise InputError(f"part.file = {file}: no such file")
+    if z_mm is not None and not np.isfinite(z_mm):
+        raise InputError(f"part.z_mm = {z_mm:g}: must be a finite number")
+    with file.open("rb") as stream:
+        if b"ISO-10303-21" not in stream.read(4096):
+            raise InputError(f"part.file = {file.name}: not a STEP file")
+    faces = list(_level_faces(_shape(file)))
+    if not faces:
+        raise InputError(f"part.file = {file.name}: no horizontal planar face in the part: turn it, or state a DXF")
+    heights = sorted({round(z, 3) + 0.0 for z, _ in faces})
+    level = max(z for z, _ in faces) if z_mm is None else z_mm
+    chosen = [face for z, face in faces if abs(z - level) <= 1e-3]
+    if not chosen:
+        named = ", ".join(f"{z:g}" for z in heights)
+        raise InputError(f"part.z_mm = {level:g}: no horizontal planar face there; faces are at {named} mm")
+    findings: list[Finding] = []
+    contours: list[Contour] = []
+    for face in chosen:
+        made, seen = chained(list(_edges(face, tolerance_mm)), join_mm, f"face at z = {level:g}: ")
+        contours += made
+        findings += seen
+    if z_mm is None and len(heights) > 1:
+        named = ", ".join(f"{z:g}" for z in heights)
+        findings.append(Finding("step-topmost", 0, f"the topmost face, z = {level:g}, of those at {named} mm is read"))
+    return Drawing(tuple(contours), (f"z={level:g}",) * len(contours), "mm", tuple(findings))
+
+
+def _shape(file: Path) -> Any:
+    """The part as one shape, in mm."""
+    import OCP.IFSelect
+    from OCP.Message import Message, Message_Fail
+    from OCP.STEPControl import STEPControl_Reader
+
+    for printer in Message.DefaultMessenger_s().Printers():
+        printer.SetTraceLevel(Message_Fail)
+    reader = STEPControl_Reader()
+    if reader.ReadFile(str(file)) != OCP.IFSelect.IFSelect_RetDone or reader.TransferRoots() == 0:
+        raise InputError(f"part.file = {file.name}: the CAD kernel cannot read this STEP file")
+    return reader.OneShape()
+
+
+def _level_faces(shape: Any) -> Iterator[tuple[float, Any]]:
+    """Height [mm] and face of every horizontal plane."""
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.GeomAbs import GeomAbs_Plane
+    from OCP.TopAbs import TopAbs_FACE
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopoDS import TopoDS
+
+    explorer = TopExp_Explorer(shape, TopAbs_FACE)
+    while explorer.More():
+        face = TopoDS.Face(explorer.Current())
+        surface = BRepAdaptor_Surface(face)
+        if surface.GetType() == GeomAbs_Plane:
+            axis = surface.Plane().Axis().Direction()
+            if np.hypot(axis.X(), axis.Y()) < LEVEL:
+                yield float(surface.Plane().Location().Z()), face
+        explorer.Next()
+
+
+def _edges(face: Any, tolerance_mm: float) -> Iterator[Floats]:
+    """(n, 7) segments [mm] of each edge of a face, in the sense of its wire."""
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepAdaptor import BRepAdaptor_Curve
+    from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line
+    from OCP.gp import gp_Pnt, gp_Vec
+    from OCP.TopAbs import TopAbs_EDGE, TopAbs_REVERSED
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopoDS import TopoDS
+
+    explorer = TopExp_Explorer(face, TopAbs_EDGE)
+    while explorer.More():
+        edge = TopoDS.Edge(explorer.Current())
+        explorer.Next()
+        if BRep_Tool.Degenerated_s(edge):
+            continue
+        curve = BRepAdaptor_Curve(edge)
+        a, b = float(curve.FirstParameter()), float(curve.LastParameter())
+        p, q = curve.Value(a), curve.Value(b)
+        if curve.GetType() == GeomAbs_Line:
+            rows = np.array([[p.X(), p.Y(), q.X(), q.Y(), 0.0, 0.0, 0.0]])
+        elif curve.GetType() == GeomAbs_Circle:
+            circle = curve.Circle()
+            centre, side = circle.Location(), np.sign(circle.Axis().Direction().Z())
+            rows = np.array([[p.X(), p.Y(), q.X(), q.Y(), centre.X(), centre.Y(), side * (b - a)]])
+        else:
+
+            def along(t: float, on: Any = curve) -> tuple[Floats, Floats]:
+                point, slope = gp_Pnt(), gp_Vec()
+                on.D1(t, point, slope)
+                return np.array([point.X(), point.Y()]), np.array([slope.X(), slope.Y()])
+
+            made = arcs_along(along, np.linspace(a, b, 5), tolerance_mm)
+            if made is None:
+                continue
+            rows = np.array(made.segments)
+            if np.hypot(p.X() - q.X(), p.Y() - q.Y()) < LEVEL:
+                rows[-1, 2:4] = rows[0, 0:2]
+        if edge.Orientation() == TopAbs_REVERSED:
+            rows = rows[::-1]
+            rows = np.column_stack([rows[:, 2:4], rows[:, 0:2], rows[:, 4:6], -rows[:, 6]])
+        yield rows
