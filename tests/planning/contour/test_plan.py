@@ -1,0 +1,138 @@
+"""Passes, leads and programs of a planned contour; the check by the simulation, which knows no planner."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import material_named
+from chipload.geometry.contour import Contour, Region
+from chipload.machine.machine import machine_named
+from chipload.planning.contour.plan import Finishing, plan_contour
+from chipload.program.gcode.writer import write_gcode
+from chipload.simulation.verify import verify_contour
+from rs274 import MISSING, compare, rs274_installed, run_rs274
+
+QUARTER = math.tan(math.pi / 8)
+CORNER = Contour.from_bulges([(0, 0), (20, 0), (28, 8), (28, 28)], [0, QUARTER, 0, 0])
+POCKET = Contour.from_bulges(
+    [(8, 0), (40, 0), (48, 8), (48, 30), (40, 38), (8, 38), (0, 30), (0, 8)], [0, QUARTER] * 4, closed=True
+)
+ISLAND = Contour.circle((24, 19), 4.0)
+MACHINE = machine_named("vmc")
+MILL = Cutter(10.0, 4, math.radians(30), 22.0, 35.0, 580e3)
+BASE = Finishing(
+    side="inside",
+    milling="down",
+    strategies=("plain", "backward", "feed"),
+    use="backward",
+    joint="sharp",
+    radial_depth=0.1,
+    axial_depth=5.0,
+    semifinish_depth=0.5,
+    passes=1,
+    feed=10.0,
+    spindle_speed=314.0,
+    tolerance=0.05,
+    step=0.1,
+    lead=3.0,
+    top=0.0,
+    clearance=5.0,
+)
+
+
+def plan(contours, cutter=MILL, limits=None, **changes):
+    return plan_contour(
+        contours, replace(BASE, **changes), cutter, material_named("al7075-t6"), MACHINE, limits or {}
+    ).strategies
+
+
+def proof(result, radius, slack=1e-4):
+    return verify_contour(
+        result.program,
+        radius,
+        result.history,
+        stock=Region(tuple(result.drawn["stock before"])),
+        stock_top_mm=0.0,
+        wall=result.drawn["wall"],
+        material="right",
+        engagement_tolerance_deg=0.01,
+        gouge_tolerance_mm=slack,
+        excess_tolerance_mm=slack,
+    )
+
+
+CASES = {
+    "corner": ([CORNER], MILL, {}),
+    "corner, up": ([CORNER], MILL, {"milling": "up"}),
+    "corner from its right": ([CORNER.reversed()], MILL, {"side": "right"}),
+    "pocket": ([POCKET], MILL, {}),
+    "pocket, up, eased": ([POCKET], MILL, {"milling": "up", "joint": "clothoid"}),
+    "boss": ([POCKET], MILL, {"side": "outside", "semifinish_depth": 1.0}),
+    "pocket with an island, two passes": (
+        [POCKET, ISLAND],
+        replace(MILL, diameter=6.0),
+        {"passes": 2, "semifinish_depth": 1.2},
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_simulation_agrees(case):
+    contours, cutter, changes = CASES[case]
+    slack = BASE.tolerance if changes.get("joint") == "clothoid" else 1e-4
+    for name, result in plan(contours, cutter, **changes).items():
+        told = proof(result, cutter.radius, slack)
+        assert told.verdict == "proved", (name, told.reasons)
+        assert told.compared == len(result.history["s_mm"])
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.skipif(not rs274_installed(), reason=MISSING)
+def test_rs274_reads_the_same_path(case):
+    contours, cutter, changes = CASES[case]
+    for name, result in plan(contours, cutter, **changes).items():
+        compare(run_rs274(write_gcode(result.program, MACHINE, title=name, verified=True)), result.program)
+
+
+def test_right_of_the_reversed_chain_is_left_of_the_chain():
+    one = plan([CORNER], side="left", strategies=("plain",))["plain"]
+    two = plan([CORNER.reversed()], side="right", strategies=("plain",))["plain"]
+    np.testing.assert_allclose(one.history["x_mm"], two.history["x_mm"], atol=1e-9)
+
+
+def test_closing_piece_meets_what_the_lead_in_left():
+    """The last R sin(a) of a closed pass loses its engagement; it is told apart, and ends at nothing."""
+    history = plan([POCKET], strategies=("plain",))["plain"].history
+    closing = history["pass"] == "closing"
+    a = history["engagement_deg"]
+    assert a[closing].min() == pytest.approx(0.0, abs=0.01)
+    assert a[history["pass"] == "finish"].min() == pytest.approx(11.478341, abs=1e-4)
+
+
+def test_limits_and_their_places():
+    results = plan([CORNER], limits={"engagement_deg": 13.0, "force_xy_n": 1.0})
+    plain = {x.name: x for x in results["plain"].limits}
+    assert not plain["engagement_deg"].holds
+    assert plain["engagement_deg"].worst == pytest.approx(18.7375, abs=1e-3)
+    x, y = plain["engagement_deg"].at
+    assert 20.0 <= x <= 23.0
+    assert 5.0 <= y <= 8.0
+    assert {x.name: x.holds for x in results["backward"].limits} == {"engagement_deg": True, "force_xy_n": False}
+
+
+def test_same_input_same_history():
+    one, two = (plan([POCKET], strategies=("backward",))["backward"].history for _ in range(2))
+    for name in one:
+        assert (one[name] == two[name]).all(), name
+
+
+def test_no_entry_in_material():
+    """Every plunge goes down where nothing is left to cut: the engagement of the row that begins a pass is 0."""
+    for contours in ([CORNER], [POCKET]):
+        for result in plan(contours).values():
+            begins = np.flatnonzero(np.diff(result.history["s_mm"], prepend=-1.0) != 0.0)
+            starts = [k for k in begins if k == 0 or result.history["feed_mm_min"][k] == 0.0]
+            assert result.history["engagement_deg"][starts].max() == 0.0
