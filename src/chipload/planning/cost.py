@@ -44,11 +44,7 @@ class Cut:
     milling: Milling
 
     def feed_per_tooth(self, speed: Floats) -> Floats:
-        """f_z [mm] at the speed [mm/s] of the centre.
-
-        >>> float(round(math.tau * 10.0 / (4 * 100.0), 6))
-        0.157080
-        """
+        """f_z = 2 pi v / (N omega) [mm] at the speed v [mm/s] of the centre."""
         return math.tau * speed / (self.cutter.flutes * self.spindle_speed)
 
 

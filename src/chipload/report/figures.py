@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
+from plotly.colors import sample_colorscale
 from plotly.subplots import make_subplots
 
 from chipload.geometry.contour import Contour
@@ -29,8 +30,10 @@ COLOURS = {
 }
 DASHES = {"plain": "dot", "feed": "dash"}
 LIMIT, WALL, STOCK, INK, GRID = "#b3261e", "#1f2933", "#a8793a", "#1f2933", "#e6e8eb"
-#: blue where little is engaged, red where most is
-SCALE = [[0.0, "#3154a5"], [0.25, "#2696a0"], [0.5, "#78b446"], [0.75, "#f0b428"], [1.0, "#c82d28"]]
+#: dark where little is engaged, bright where most is
+SCALE = [[0.0, "#30245c"], [0.25, "#35608d"], [0.5, "#22a884"], [0.75, "#9bd93c"], [1.0, "#fbb61a"]]
+#: shades that the lines of a plan view come in
+SHADES = 16
 FONT = {"family": "system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif", "size": 12, "color": INK}
 #: points of one line, of one plan view and of one path in space
 LINE_POINTS, PLAN_POINTS, SPACE_POINTS = 6000, 12_000, 8000
@@ -55,12 +58,13 @@ def shown_rows(strategy: StrategyResult) -> NDArray[np.bool_]:
 
 def along(operation: Operation) -> go.Figure:
     """Engagement, force, wall error and feed along the finish pass, all strategies overlaid."""
-    figure = make_subplots(rows=len(ROWS), cols=1, shared_xaxes=True, vertical_spacing=0.035)
-    highest = np.zeros(len(ROWS))
+    shown = [r for r in ROWS if any(s.history[r[0]][shown_rows(s)].any() for s in operation.result.strategies.values())]
+    figure = make_subplots(rows=len(shown), cols=1, shared_xaxes=True, vertical_spacing=0.035)
+    highest = np.zeros(len(shown))
     for name, strategy in operation.result.strategies.items():
         where = np.flatnonzero(shown_rows(strategy))
         s, apart = _abscissa(strategy.history, where)
-        for row, (column, title) in enumerate(ROWS, start=1):
+        for row, (column, title) in enumerate(shown, start=1):
             values = np.asarray(strategy.history[column], dtype=np.float64)[where]
             x, y = _gapped(s, values, apart)
             keep = thinned(y, LINE_POINTS)
@@ -80,7 +84,7 @@ def along(operation: Operation) -> go.Figure:
                 col=1,
             )
     limits = {c.name: c.limit for s in operation.result.strategies.values() for c in s.limits}
-    for row, ((column, title), top) in enumerate(zip(ROWS, highest, strict=True), start=1):
+    for row, ((column, title), top) in enumerate(zip(shown, highest, strict=True), start=1):
         limit = limits.get(column)
         near = limit is not None and limit <= FAR * top
         reach = 1.12 * max(top, limit if near and limit is not None else 0.0)
@@ -94,9 +98,9 @@ def along(operation: Operation) -> go.Figure:
         else:
             at = {"x": 0.0, "y": reach, "xref": "x domain", "xanchor": "left", "yanchor": "top", "showarrow": False}
             figure.add_annotation(**said, **at, row=row, col=1)
-    figure.update_xaxes(title_text="length along the pass [mm]", row=len(ROWS), col=1)
+    figure.update_xaxes(title_text="length along the pass [mm]", row=len(shown), col=1)
     figure.update_layout(hovermode="x unified", legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0})
-    return _styled(figure, 800, {"l": 64, "r": 16, "t": 30, "b": 44})
+    return _styled(figure, 110 + 172 * len(shown), {"l": 64, "r": 16, "t": 30, "b": 44})
 
 
 def plan(operation: Operation) -> go.Figure:
@@ -121,22 +125,10 @@ def plan(operation: Operation) -> go.Figure:
                     line={"color": COLOURS[name], "width": 1.1, "dash": "dash"}, hoverinfo="skip",
                 )
             )  # fmt: skip
-        rows = np.flatnonzero(shown_rows(strategy))
-        keep = rows[thinned(np.asarray(h["engagement_deg"])[rows], PLAN_POINTS)]
-        figure.add_trace(
-            go.Scattergl(
-                x=h["x_mm"][keep].astype(np.float32),
-                y=h["y_mm"][keep].astype(np.float32),
-                mode="markers",
-                name=name,
-                legendgroup=name,
-                visible=visible,
-                marker={**_shade(h["engagement_deg"][keep], scale, name == operation.result.use), "size": 4.5},
-                customdata=np.column_stack([h["engagement_deg"][keep], h["force_xy_n"][keep]]).astype(np.float32),
-                hovertemplate="(%{x:.3f}, %{y:.3f})<br>%{customdata[0]:.3f} deg, %{customdata[1]:.1f} N<extra></extra>",
-            )
-        )
+        _shaded_lines(figure, name, strategy, scale, visible)
         _marks(figure, name, strategy, visible)
+    bar = {**_shade(np.array(scale), scale, True), "size": 0.1, "opacity": 0.0}
+    figure.add_trace(go.Scatter(x=[None], y=[None], mode="markers", marker=bar, showlegend=False, hoverinfo="skip"))
     figure.update_yaxes(scaleanchor="x", scaleratio=1.0, title_text="y [mm]")
     figure.update_xaxes(title_text="x [mm]")
     figure.update_layout(legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0})
@@ -252,6 +244,41 @@ def _chains(figure: go.Figure, contours: Sequence[Contour], name: str, colour: s
     x, y = np.vstack(parts).astype(np.float32).T
     line = {"color": colour, "width": width, "dash": dash}
     figure.add_trace(go.Scatter(x=x, y=y, mode="lines", name=name, line=line, hoverinfo="skip"))
+
+
+def _shaded_lines(
+    figure: go.Figure, name: str, strategy: StrategyResult, scale: tuple[float, float], visible: Any
+) -> None:
+    """The pass as lines in :data:`SHADES` colours of engagement, one trace a colour."""
+    h = strategy.history
+    rows = np.flatnonzero(shown_rows(strategy))
+    engagement = np.asarray(h["engagement_deg"], dtype=np.float64)
+    even = rows[:: max(1, len(rows) // PLAN_POINTS)]
+    keep = np.union1d(even, rows[thinned(engagement[rows], PLAN_POINTS // 2)])
+    piece = pieces(h)[keep]
+    joined = np.flatnonzero(piece[1:] == piece[:-1])
+    a = engagement[keep[joined + 1]]
+    share = np.clip((a - scale[0]) / (scale[1] - scale[0]), 0.0, 1.0) if scale[1] > scale[0] else np.zeros(len(a))
+    shade = np.minimum((share * SHADES).astype(np.int64), SHADES - 1)
+    x, y = (np.asarray(h[c], dtype=np.float64) for c in ("x_mm", "y_mm"))
+    colours = sample_colorscale(SCALE, np.linspace(0.0, 1.0, SHADES).tolist())
+    first = True
+    for k in np.unique(shade).tolist():
+        ends = joined[shade == k]
+        runs = np.split(ends, np.flatnonzero(np.diff(ends) != 1) + 1)
+        flat = np.concatenate([np.append(keep[run[0] : run[-1] + 2], -1) for run in runs])
+        gap = flat == -1
+        at = np.where(gap, 0, flat)
+        hover = np.column_stack([engagement[at], np.asarray(h["force_xy_n"])[at]]).astype(np.float32)
+        figure.add_trace(
+            go.Scatter(
+                x=np.where(gap, np.nan, x[at]).astype(np.float32), y=np.where(gap, np.nan, y[at]).astype(np.float32),
+                mode="lines", name=name, legendgroup=name, showlegend=first, visible=visible, customdata=hover,
+                line={"color": colours[k], "width": 3.0},
+                hovertemplate="(%{x:.3f}, %{y:.3f})<br>%{customdata[0]:.3f} deg, %{customdata[1]:.1f} N<extra></extra>",
+            )
+        )  # fmt: skip
+        first = False
 
 
 def _marks(figure: go.Figure, name: str, strategy: StrategyResult, visible: Any) -> None:

@@ -22,13 +22,13 @@ ROWS = 40_000
 
 
 def engagement_colours(engagement: Floats, highest: float) -> NDArray[np.uint8]:
-    """(n, 4) colours from blue (none) over green to red (``highest``), in :data:`SHADES` steps.
+    """(n, 4) colours from dark (none) to bright (``highest``), in :data:`SHADES` steps.
 
     >>> engagement_colours(np.array([0.0, 90.0]), 90.0)[:, 0].tolist() == [
     ...     engagement_colours(np.array([0.0]), 90.0)[0, 0], engagement_colours(np.array([90.0]), 90.0)[0, 0]]
     True
     """
-    stops = np.array([[49, 84, 165], [38, 150, 160], [120, 180, 70], [240, 180, 40], [200, 45, 40]], dtype=np.float64)
+    stops = np.array([[48, 36, 92], [53, 96, 141], [34, 168, 132], [155, 217, 60], [251, 182, 26]], dtype=np.float64)
     share = np.clip(np.asarray(engagement) / highest, 0.0, 1.0) if highest > 0.0 else np.zeros(len(engagement))
     share = np.round(share * (SHADES - 1)) / (SHADES - 1)
     rgb = [np.interp(share, np.linspace(0.0, 1.0, len(stops)), stops[:, k]) for k in range(3)]
