@@ -142,6 +142,16 @@ def test_the_page_says_the_verdict_before_all_else(outcome: Maker) -> None:
     assert "operation.0.x: a finding" in body
 
 
+def test_a_pass_that_never_cut_is_still_shown(outcome: Maker) -> None:
+    made = outcome()
+    op = made.operations[0]
+    air = {n: replace(s, history={k: v if v.dtype == object else 0.0 * v for k, v in s.history.items()})
+           for n, s in op.result.strategies.items()}  # fmt: skip
+    made = replace(made, operations=(replace(op, result=replace(op.result, strategies=air)),))
+    assert b"Along the finish pass" in page_bytes(made)
+    assert scene_bytes(made)
+
+
 def test_names_from_outside_cannot_become_markup(outcome: Maker) -> None:
     evil = "</script><script>alert(1)</script>"
     html = page_bytes(replace(outcome(), title=evil, findings=(evil,))).decode()

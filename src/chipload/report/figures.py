@@ -29,7 +29,7 @@ COLOURS = {
     "front": "#3457a6",
 }
 DASHES = {"plain": "dot", "feed": "dash"}
-LIMIT, WALL, STOCK, INK, GRID = "#b3261e", "#1f2933", "#a8793a", "#1f2933", "#e6e8eb"
+LIMIT, WALL, STOCK, INK, GRID = "#b3261e", "#7b8794", "#a8793a", "#1f2933", "#e6e8eb"
 #: dark where little is engaged, bright where most is
 SCALE = [[0.0, "#30245c"], [0.25, "#35608d"], [0.5, "#22a884"], [0.75, "#9bd93c"], [1.0, "#fbb61a"]]
 #: shades that the lines of a plan view come in
@@ -53,12 +53,14 @@ def shown_rows(strategy: StrategyResult) -> NDArray[np.bool_]:
     """Rows that the figures along the pass show: the finish pass, or all cutting where there is none."""
     names = np.asarray(strategy.history["pass"]).astype(str)
     finish: NDArray[np.bool_] = np.isin(names, ["finish", "closing"])
-    return finish if finish.any() else np.isin(names, ["front", "semifinish"])
+    cut: NDArray[np.bool_] = np.isin(names, ["front", "semifinish"])
+    return next((some for some in (finish, cut) if some.any()), np.ones(len(names), dtype=np.bool_))
 
 
 def along(operation: Operation) -> go.Figure:
     """Engagement, force, wall error and feed along the finish pass, all strategies overlaid."""
     shown = [r for r in ROWS if any(s.history[r[0]][shown_rows(s)].any() for s in operation.result.strategies.values())]
+    shown = shown or [ROWS[0]]
     figure = make_subplots(rows=len(shown), cols=1, shared_xaxes=True, vertical_spacing=0.035)
     highest = np.zeros(len(shown))
     for name, strategy in operation.result.strategies.items():
@@ -110,7 +112,7 @@ def plan(operation: Operation) -> go.Figure:
     scale = _scale(operation)
     _chains(figure, used.drawn.get("stock", ()), "stock before the finish pass", STOCK, 1.4, "dot")
     _chains(figure, used.drawn.get("leftover", ()), "left over", LIMIT, 1.5, "solid")
-    _chains(figure, used.drawn.get("wall", ()), "wall", WALL, 2.6, "solid")
+    _chains(figure, used.drawn.get("wall", ()), "wall", WALL, 3.4, "solid")
     for name, strategy in operation.result.strategies.items():
         visible: Any = True if name == operation.result.use else "legendonly"
         h = strategy.history
