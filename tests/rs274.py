@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 import shutil
 import subprocess
@@ -50,7 +51,9 @@ def canonical(text: str, tools: tuple[int, ...] = tuple(range(1, 100))) -> list[
         program.write_text(text)
         table.write_text("".join(f"T{n} P{n} D1\n" for n in tools))
         call = ["rs274", "-g", "-t", str(table), "-v", str(Path(folder) / "rs274.var"), str(program)]
-        done = subprocess.run(call, capture_output=True, text=True, cwd=folder, timeout=120)
+        # its tool table is a memory map under HOME: a home of its own lets several run side by side
+        home = {**os.environ, "HOME": folder}
+        done = subprocess.run(call, capture_output=True, text=True, cwd=folder, timeout=120, env=home)
     if done.returncode != 0:
         raise Refused(done.stderr)
     calls = [_CALL.match(line) for line in done.stdout.splitlines()]
