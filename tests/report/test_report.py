@@ -16,6 +16,7 @@ import pytest
 import trimesh
 
 from chipload.geometry.contour import Contour
+from chipload.planning.result import Event
 from chipload.report.folder import write_result
 from chipload.report.history import history_bytes
 from chipload.report.outcome import Outcome, verdict
@@ -154,7 +155,12 @@ def test_a_pass_that_never_cut_is_still_shown(outcome: Maker) -> None:
 
 def test_names_from_outside_cannot_become_markup(outcome: Maker) -> None:
     evil = "</script><script>alert(1)</script>"
-    html = page_bytes(replace(outcome(), title=evil, findings=(evil,))).decode()
+    made = outcome()
+    op = made.operations[0]
+    event = Event("x", 1.0, 1.0, evil)
+    strategies = {n: replace(s, events=(event,)) for n, s in op.result.strategies.items()}
+    op = replace(op, result=replace(op.result, strategies=strategies))
+    html = page_bytes(replace(made, title=evil, findings=(evil,), operations=(op,))).decode()
     assert evil not in html
 
 

@@ -201,6 +201,12 @@ def _rest(outcome: Outcome) -> list[str]:
         for name, proof in op.proofs.items()
         if proof.status == "unproven"
     ]
+    unchecked += [
+        f"operation {k}, {name}: engagement of {proof.numbers['rows_not_compared']} steps down into the stock"
+        for k, op in enumerate(outcome.operations)
+        for name, proof in op.proofs.items()
+        if proof.numbers.get("rows_not_compared")
+    ]
     out.append(_items(unchecked) if unchecked else "<p>Every limit that chipload knows is stated and was checked.</p>")
     return [*out, "<h2>Where the numbers come from</h2>", _definitions(outcome.provenance)]
 
