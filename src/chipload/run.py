@@ -24,6 +24,7 @@ from chipload.geometry.step import read_step_face
 from chipload.job import Job, OperationTable
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.contour.plan import Finishing, plan_contour
+from chipload.planning.front.plan import Clearing, plan_front
 from chipload.planning.result import OperationResult, StrategyResult
 from chipload.program.check import check_program
 from chipload.progress import Progress, silent
@@ -32,7 +33,7 @@ from chipload.simulation.verify import verify_contour
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 #: what the simulation may find and still call a program proved
-ENGAGEMENT_DEG, GOUGE_MM = 0.05, 1e-4
+ENGAGEMENT_DEG, GOUGE_MM, CHORDS_MM = 0.05, 1e-4, 1e-3
 #: passes that descend, whose engagement the simulation in the plane cannot compare; their path it does follow
 NOT_LEVEL = ("entry",)
 #: libraries whose version may change a number
@@ -119,7 +120,20 @@ def _operation(job: Job, inputs: Inputs, op: OperationTable, progress: Progress)
 def _plan(job: Job, inputs: Inputs, op: OperationTable, cutter: Cutter, progress: Progress) -> OperationResult:
     """Call the planner of the operation's kind."""
     if op.kind == "front":
-        raise InputError("operation.kind = front: not there yet")
+        clearing = Clearing(
+            milling=op.milling,
+            radial_depth=op.radial_depth_mm,
+            axial_depth=op.axial_depth_mm,
+            feed=mm_s_from_mm_min(op.feed_mm_min),
+            spindle_speed=rad_s_from_rpm(op.speed_rpm),
+            top=job.table.stock.top_mm,
+            clearance=op.clearance_mm,
+            step=op.step_mm,
+            allowance=op.allowance_mm or 0.0,
+        )
+        return plan_front(
+            inputs.contours, clearing, cutter, inputs.material, inputs.machine, limits=job.limits, progress=progress
+        )
     forward = op.kind == "forward"
     strategies: tuple[str, ...] = ("forward",) if forward else tuple(op.strategies or ())
     setting = Finishing(
@@ -148,27 +162,31 @@ def _plan(job: Job, inputs: Inputs, op: OperationTable, cutter: Cutter, progress
 def prove(strategy: StrategyResult, op: OperationTable, cutter: Cutter, top: float, progress: Progress) -> Proof:
     """Let the simulation, which knows no planner, hold the program of one strategy against its history.
 
-    The planner says in ``drawn`` what the program starts from (`stock before`, closed contours) and the `wall`, whose
-    travel has the part on its right.
+    The planner says in ``drawn`` what the program starts from (`stock before`, closed contours; a front starts in the
+    solid) and the `wall`, whose travel has the part on its right.
     """
     before = strategy.drawn.get("stock before", ())
-    if not before:
+    if not before and op.kind != "front":
         return Proof("unproven", "unproven: the planner does not say what stock the program starts from")
-    # eased joints may leave the drawn wall to either side, a cutter may leave stock in a corner
+    # eased joints may leave the drawn wall to either side, a cutter may leave stock in a corner; the path of a front is
+    # made of chords, and what it leaves over is judged by its area, which the planner reports
     leave = op.tolerance_mm or 0.0
+    gouge = leave if op.joint == "clothoid" else 0.0
+    if op.kind == "front":
+        leave, gouge = op.radial_depth_mm, CHORDS_MM
     names = np.asarray(strategy.history["pass"]).astype(str)
     left_out = int(np.isin(names, NOT_LEVEL).sum())
     told = verify_contour(
         strategy.program,
         cutter.radius,
         strategy.history,
-        stock=Region(tuple(before)),
+        stock=Region(tuple(before)) if before else None,
         stock_top_mm=top,
         wall=strategy.drawn.get("wall", ()),
         material="right",
         engagement_tolerance_deg=ENGAGEMENT_DEG,
-        gouge_tolerance_mm=max(GOUGE_MM, leave if op.joint == "clothoid" else 0.0),
-        excess_tolerance_mm=max(GOUGE_MM, leave + (op.allowance_mm or 0.0)),
+        gouge_tolerance_mm=max(GOUGE_MM, gouge),
+        excess_tolerance_mm=max(GOUGE_MM, leave),
         passes=sorted(set(names.tolist()) - set(NOT_LEVEL)),
         progress=progress,
     )
