@@ -188,6 +188,7 @@ def prove(strategy: StrategyResult, op: OperationTable, cutter: Cutter, top: flo
         gouge_tolerance_mm=max(GOUGE_MM, gouge),
         excess_tolerance_mm=max(GOUGE_MM, leave),
         passes=sorted(set(names.tolist()) - set(NOT_LEVEL)),
+        workers=2,
         progress=progress,
     )
     return Proof(

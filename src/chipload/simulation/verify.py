@@ -27,6 +27,8 @@ Bools = NDArray[np.bool_]
 
 #: a row of the history lies on the program's path within this [mm]
 MATCH_MM = 1e-6
+#: where a rim lies on the edge that an earlier disc left there is no one engagement: the one this far [mm] before counts
+BEFORE_MM = 1e-5
 #: stock that a rapid passes through counts when it is thicker than this [mm]
 RAPID_MM = 1e-6
 #: rows between two calls of ``progress``
@@ -317,6 +319,12 @@ def _compare(
                     j = at[again]
                     off[again] = np.abs(_degrees(level.trail, kk[j], ww[j], FINE_DEG, workers) - planned[again])
                 best[use] = np.minimum(best[use], off)
+            stuck = np.flatnonzero((best > tolerance) & one[rows])
+            if len(stuck):
+                at = rows[stuck]
+                just_before = np.maximum(w[at] - BEFORE_MM / length[k[at]], 0.0)
+                found_there = _degrees(level.trail, k[at], just_before, FINE_DEG, workers)
+                best[stuck] = np.minimum(best[stuck], np.abs(found_there - columns["engagement_deg"][at]))
             gap[rows] = best
             done[rows] = True
             finished += len(rows)
