@@ -6,6 +6,7 @@ Notation: R cutter radius, s radial depth, a* = arccos(1 - s/R) the engagement t
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -240,7 +241,7 @@ def _program(path: FrontPath, centre: Floats, setting: Clearing, tool: int) -> P
 def _stretches(names: list[str]) -> list[tuple[int, int, str]]:
     """(first, last + 1, name) of equal neighbours."""
     cut = [0, *(k for k in range(1, len(names)) if names[k] != names[k - 1]), len(names)]
-    return [(a, b, names[a]) for a, b in zip(cut[:-1], cut[1:], strict=True) if b > a]
+    return [(a, b, names[a]) for a, b in itertools.pairwise(cut) if b > a]
 
 
 def _chains(path: FrontPath, centre: Floats) -> tuple[Contour, ...]:

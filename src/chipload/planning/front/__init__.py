@@ -1,0 +1,1 @@
+"""Pockets cleared at constant engagement by a front."""

@@ -1,0 +1,305 @@
+"""The compiled stepping loop of the front: one pass, step after step, in the stock and inside the inset region.
+
+Notation: O centre of the cutter, th its heading [rad], phi the turn of the next step, positive to the left. Material lies
+on the RIGHT. E engagement [rad], a* its limit, l step length, R radius. ``reach`` is the centre region: O may be anywhere
+in it. It is a polygon: ``edges`` (n, 4), ``rows`` and ``row_edges`` the edges that meet each row of cells,
+``flag`` 0 outside, 1 inside, 2 where an edge passes, on the cells of the stock's grid.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from chipload.stock._kernels import ARCS, axis_distance, remove, uncut
+
+RUNNING, LOST, BLOCKED = 0, 1, 2
+#: columns of a step: x, y, greatest E along it, E at its end, arcs at its end, mm^2 taken
+COLUMNS = 6
+
+
+@njit(cache=True, nogil=True)
+def allowed(x, y, grid, flag, edges, rows, row_edges):
+    """Whether O = (x, y) is in the centre region: cell flag, else the crossings of the ray to +x."""
+    h = grid[2]
+    nx, ny = int(grid[3]), int(grid[4])
+    i, j = int(math.floor((x - grid[0]) / h)), int(math.floor((y - grid[1]) / h))
+    if i < 0 or j < 0 or i >= nx or j >= ny:
+        return False
+    f = flag[j * nx + i]
+    if f != 2:
+        return f == 1
+    return crossings(x, y, j, edges, rows, row_edges)
+
+
+@njit(cache=True, nogil=True)
+def crossings(x, y, j, edges, rows, row_edges):
+    """Even-odd rule on the edges of row j."""
+    inside = False
+    for k in range(rows[j], rows[j + 1]):
+        e = row_edges[k]
+        y0, y1 = edges[e, 1], edges[e, 3]
+        if (y0 > y) != (y1 > y):
+            xc = edges[e, 0] + (y - y0) / (y1 - y0) * (edges[e, 2] - edges[e, 0])
+            if xc > x:
+                inside = not inside
+    return inside
+
+
+@njit(cache=True, nogil=True)
+def mark(grid, edges, rows, row_edges, flag):
+    """Fill ``flag``: 2 in cells an edge may touch, else whether the centre is inside."""
+    x0, y0, h = grid[0], grid[1], grid[2]
+    nx, ny = int(grid[3]), int(grid[4])
+    for e in range(len(edges)):
+        dx, dy = edges[e, 2] - edges[e, 0], edges[e, 3] - edges[e, 1]
+        n = 1 + int(math.sqrt(dx * dx + dy * dy) / (0.5 * h))
+        for k in range(n + 1):
+            i = int(math.floor((edges[e, 0] + dx * k / n - x0) / h))
+            j = int(math.floor((edges[e, 1] + dy * k / n - y0) / h))
+            for b in range(max(0, j - 1), min(ny, j + 2)):
+                for a in range(max(0, i - 1), min(nx, i + 2)):
+                    flag[b * nx + a] = 2
+    for j in range(ny):
+        y = y0 + (j + 0.5) * h
+        known = -1
+        for i in range(nx):
+            if flag[j * nx + i] == 2:
+                known = -1
+                continue
+            if known < 0:
+                known = 1 if crossings(x0 + (i + 0.5) * h, y, j, edges, rows, row_edges) else 0
+            flag[j * nx + i] = known
+
+
+@njit(cache=True, nogil=True)
+def angle_at(x, y, tx, ty, r, R, grid, head, link, axis, arcs):
+    """E at O with heading T."""
+    n = uncut(x, y, tx, ty, r, R, False, grid, head, link, axis, arcs)
+    total = 0.0
+    for k in range(n):
+        total += arcs[k, 1] - arcs[k, 0]
+    return total
+
+
+@njit(cache=True, nogil=True)
+def worst_of_step(ox, oy, th, phi, l, full, r, R, grid, head, link, axis, arcs):
+    """Greatest E of the step that turns by phi: its end and, turning to the right, l = R tan(phi / 2), where the
+    wedge opened by the turn is wholly under the rim; ``full`` looks at more places between."""
+    tx, ty = math.cos(th + phi), math.sin(th + phi)
+    e = angle_at(ox + l * tx, oy + l * ty, tx, ty, r, R, grid, head, link, axis, arcs)
+    if phi < 0.0:
+        t = R * math.tan(-0.5 * phi)
+        if t < l:
+            e = max(e, angle_at(ox + t * tx, oy + t * ty, tx, ty, r, R, grid, head, link, axis, arcs))
+    if full:
+        for k in range(5):
+            t = l * (0.02 if k == 0 else 0.2 * k)
+            e = max(e, angle_at(ox + t * tx, oy + t * ty, tx, ty, r, R, grid, head, link, axis, arcs))
+    return e
+
+
+@njit(cache=True, nogil=True)
+def step_allowed(ox, oy, th, phi, l, slack, grid, flag, edges, rows, row_edges):
+    """Whether the step stays in the centre region: end, and middle within ``slack``."""
+    tx, ty = math.cos(th + phi), math.sin(th + phi)
+    if not allowed(ox + l * tx, oy + l * ty, grid, flag, edges, rows, row_edges):
+        return False
+    if allowed(ox + 0.5 * l * tx, oy + 0.5 * l * ty, grid, flag, edges, rows, row_edges):
+        return True
+    mx, my = ox + 0.5 * l * tx - slack * ty, oy + 0.5 * l * ty + slack * tx
+    return allowed(mx, my, grid, flag, edges, rows, row_edges)
+
+
+@njit(cache=True, nogil=True)
+def turn(ox, oy, th, guess, l, limit, right, left, full, slack, r, R, grid, head, link, axis, arcs, flag, edges, rows,
+         row_edges):  # fmt: skip
+    """(found, phi): the turn farthest to the right, in [-right, left], that is allowed and keeps E <= limit."""
+    # the wall on the right
+    lo = -right
+    if not step_allowed(ox, oy, th, lo, l, slack, grid, flag, edges, rows, row_edges):
+        bad = lo
+        good = lo
+        width = 0.04
+        found = False
+        while good < left:
+            good = min(left, good + width)
+            if step_allowed(ox, oy, th, good, l, slack, grid, flag, edges, rows, row_edges):
+                found = True
+                break
+            bad = good
+        if not found:
+            return False, 0.0
+        for _ in range(44):
+            mid = 0.5 * (bad + good)
+            if step_allowed(ox, oy, th, mid, l, slack, grid, flag, edges, rows, row_edges):
+                good = mid
+            else:
+                bad = mid
+        lo = good
+    wall = lo > -right
+    e_lo = worst_of_step(ox, oy, th, lo, l, full, r, R, grid, head, link, axis, arcs)
+    if e_lo <= limit:
+        if wall or e_lo <= 0.0:
+            return True, lo
+        # nothing holds the cutter: turn no farther to the right than brings more material
+        best = lo
+        most = e_lo
+        up = max(guess, lo)
+        for k in range(1, 6):
+            phi = lo + (up + 0.05 - lo) * k / 5.0
+            e = worst_of_step(ox, oy, th, phi, l, full, r, R, grid, head, link, axis, arcs)
+            if e <= limit and e >= most - 0.004:
+                if step_allowed(ox, oy, th, phi, l, slack, grid, flag, edges, rows, row_edges):
+                    best = phi
+                    most = max(most, e)
+        return True, best
+    # walk to the left until the engagement is within the limit
+    bad, f_bad = lo, e_lo - limit
+    phi = max(guess, lo)
+    width = 0.02
+    f_good = 0.0
+    good = lo
+    found = False
+    while True:
+        e = worst_of_step(ox, oy, th, phi, l, full, r, R, grid, head, link, axis, arcs)
+        if e <= limit and step_allowed(ox, oy, th, phi, l, slack, grid, flag, edges, rows, row_edges):
+            good, f_good = phi, e - limit
+            found = True
+            break
+        if e > limit:
+            bad, f_bad = phi, e - limit
+        if phi >= left:
+            break
+        phi = min(left, phi + width)
+        width *= 1.6
+    if not found:
+        return False, 0.0
+    # from the good side nearer to the bad one
+    for k in range(14):
+        if f_good > -2e-4 or good - bad < 2e-5:
+            break
+        if k % 3 == 2:
+            mid = 0.5 * (good + bad)
+        else:
+            w = min(0.95, max(0.05, (f_good + 1e-4) / (f_good - f_bad)))
+            mid = good + w * (bad - good)
+        e = worst_of_step(ox, oy, th, mid, l, full, r, R, grid, head, link, axis, arcs)
+        if e <= limit and step_allowed(ox, oy, th, mid, l, slack, grid, flag, edges, rows, row_edges):
+            good, f_good = mid, e - limit
+        else:
+            bad, f_bad = mid, max(e - limit, 1e-6)
+    return True, good
+
+
+@njit(cache=True, nogil=True)
+def run_pass(state, step, limit, right, left, lost, R, touch, out, room, capsule, used, grid, head, count, link, axis,
+             flag, edges, rows, row_edges):  # fmt: skip
+    """Steps until the pass ends or ``out`` is full.
+
+    ``state`` = x, y, heading, last turn, length on which less than a hundredth of R (1 - cos a*) was cut; ``right``, ``left``: greatest turn of a whole step;
+    ``lost``: length without material that ends the pass. Returns (steps, reason, capsules, chain entries).
+    """
+    arcs = np.empty((ARCS, 2))
+    r = R * (1.0 - touch)
+    slack = 1e-4 * R
+    x, y, th, guess, idle = state[0], state[1], state[2], state[3], state[4]
+    n = 0
+    reason = RUNNING
+    while n < len(out) and capsule < len(axis) and used + room < len(link):
+        found = False
+        l = step
+        phi = 0.0
+        for _ in range(5):
+            share = l / step
+            ok, phi = turn(x, y, th, guess * share, l, limit, right * share, left, False, slack, r, R, grid, head,
+                           link, axis, arcs, flag, edges, rows, row_edges)  # fmt: skip
+            if ok:
+                e = worst_of_step(x, y, th, phi, l, True, r, R, grid, head, link, axis, arcs)
+                if e > limit + 1e-5:
+                    ok, phi = turn(x, y, th, phi, l, limit, right * share, left, True, slack, r, R, grid, head,
+                                   link, axis, arcs, flag, edges, rows, row_edges)  # fmt: skip
+                if ok:
+                    found = True
+                    break
+            l *= 0.5
+        if not found:
+            reason = BLOCKED
+            break
+        th += phi
+        guess = phi * step / l
+        tx, ty = math.cos(th), math.sin(th)
+        e = worst_of_step(x, y, th, 0.0, l, True, r, R, grid, head, link, axis, arcs)
+        if phi < 0.0:
+            t = R * math.tan(-0.5 * phi)
+            if t < l:
+                e = max(e, angle_at(x + t * tx, y + t * ty, tx, ty, r, R, grid, head, link, axis, arcs))
+        k = uncut(x + 0.5 * l * tx, y + 0.5 * l * ty, tx, ty, r, R, False, grid, head, link, axis, arcs)
+        area = 0.0
+        for v in range(k):
+            area += R * l * (math.sin(arcs[v, 1]) - math.sin(arcs[v, 0]))
+        nx, ny = x + l * tx, y + l * ty
+        k = uncut(nx, ny, tx, ty, r, R, False, grid, head, link, axis, arcs)
+        end = 0.0
+        for v in range(k):
+            end += arcs[v, 1] - arcs[v, 0]
+        if e > 0.0:
+            axis[capsule, 0], axis[capsule, 1], axis[capsule, 2], axis[capsule, 3] = x, y, nx, ny
+            used = remove(capsule, R, grid, head, count, link, used, axis)
+            capsule += 1
+        x, y = nx, ny
+        out[n, 0], out[n, 1], out[n, 2], out[n, 3], out[n, 4], out[n, 5] = x, y, e, end, k, area
+        n += 1
+        if area > 0.01 * R * (1.0 - math.cos(limit)) * l:
+            idle = 0.0
+        else:
+            idle += l
+            if idle > lost:
+                reason = LOST
+                break
+    state[0], state[1], state[2], state[3], state[4] = x, y, th, guess, idle
+    return n, reason, capsule, used
+
+
+@njit(cache=True, nogil=True)
+def line_clear(x0, y0, x1, y1, step, R, touch, grid, head, link, axis, flag, edges, rows, row_edges):
+    """Whether a straight link between two freed centres meets no material, nor leaves the centre region.
+
+    Discs are tested a spacing d apart, each larger by d^2 / (8 R), so that together they cover the capsule; d is fine
+    near the ends, where the cutter may touch what it came from.
+    """
+    arcs = np.empty((ARCS, 2))
+    dx, dy = x1 - x0, y1 - y0
+    length = math.sqrt(dx * dx + dy * dy)
+    if length <= 1e-9:
+        return True
+    tx, ty = dx / length, dy / length
+    t = 0.0
+    while t < length:
+        near = min(t, length - t)
+        d = max(step / 64.0, min(step, 0.25 * near))
+        t += d
+        if t >= length:
+            break
+        x, y = x0 + t * tx, y0 + t * ty
+        if not allowed(x, y, grid, flag, edges, rows, row_edges):
+            return False
+        r = R * (1.0 - touch) + d * d / (8.0 * R)
+        if uncut(x, y, tx, ty, r, R, False, grid, head, link, axis, arcs) > 0:
+            return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def open_sides(points, normals, eps, least, R, touch, grid, head, link, axis, flag, edges, rows, row_edges, out):
+    """Whether material can be cut beside each point: O moved by eps along its normal is allowed and meets some."""
+    arcs = np.empty((ARCS, 2))
+    r = R * (1.0 - touch)
+    for k in range(len(points)):
+        nx, ny = normals[k, 0], normals[k, 1]
+        x, y = points[k, 0] + eps * nx, points[k, 1] + eps * ny
+        out[k] = False
+        if allowed(x, y, grid, flag, edges, rows, row_edges):
+            out[k] = angle_at(x, y, nx, ny, r, R, grid, head, link, axis, arcs) > least

@@ -1,0 +1,56 @@
+"""What is left of the reachable region after a path: area, contours and places, by another method than the stock.
+
+Notation: R [mm] cutter radius. The swept area is the union of the path's buffers (shapely); its arcs are polygons whose
+corners lie on the circle, so that it is less than the truth by at most 2e-5 R.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from chipload.geometry.contour import Contour, Region
+
+Floats = NDArray[np.float64]
+
+#: corners of a buffer in a quarter turn
+CORNERS = 128
+#: path points in one buffer
+CHUNK = 64
+#: pieces narrower than this part of R are the polygons' own and count only in the area
+NARROW = 2e-3
+#: most pieces that are reported one by one
+MOST = 20
+
+
+def swept(points: Floats, breaks: NDArray[np.bool_], radius: float) -> shapely.Geometry:
+    """Union of the discs of ``radius`` [mm] along the polyline ``points`` (n, 2); a true break has no leg to its row."""
+    out = []
+    at = np.flatnonzero(breaks)
+    for a, b in zip(at, np.append(at[1:], len(points)), strict=True):
+        for k in range(a, b, CHUNK):
+            p = points[k : min(k + CHUNK + 1, b)]
+            line = shapely.linestrings(p) if len(p) > 1 else shapely.points(p[0])
+            out.append(shapely.buffer(line, radius, quad_segs=CORNERS))
+    return shapely.union_all(out)
+
+
+def leftover(
+    reachable: Region, points: Floats, breaks: NDArray[np.bool_], radius: float
+) -> tuple[float, tuple[Contour, ...], list[tuple[float, tuple[float, float]]]]:
+    """Area [mm^2] left, contours of the pieces that are no mere film, and (area, place) of each, greatest first."""
+    rest = shapely.difference(reachable.flatten(1e-5 * radius), swept(points, breaks, radius))
+    pieces = []
+    for g in shapely.get_parts(rest):
+        if g.area > 0.0 and not shapely.is_empty(shapely.buffer(g, -0.5 * NARROW * radius)):
+            pieces.append(g)
+    pieces.sort(key=lambda g: -g.area)
+    contours, places = [], []
+    for g in pieces:
+        for ring in (g.exterior, *g.interiors):
+            contours.append(Contour.polyline(np.asarray(ring.coords)[:-1], closed=True))
+    for g in pieces[:MOST]:
+        p = g.representative_point()
+        places.append((float(g.area), (float(p.x), float(p.y))))
+    return float(rest.area), tuple(contours), places

@@ -1,0 +1,249 @@
+"""Compiled loops of the planar stock: what a rim meets, and what a capsule takes away.
+
+Notation: R [mm] cutter radius; a **capsule** is the disc of radius R swept along an axis from A to B. The plane is
+cut into square cells; ``head[cell]`` is FULL (no capsule reaches it), EMPTY (it is wholly cleared) or the first entry of
+a chain ``link[:, 0]`` (next entry or -1), ``link[:, 1]`` (capsule). ``grid`` is
+``[x0, y0, h, nx, ny, reach, piece]``: origin, cell side, cells each way, the radius of the disc about a cell's
+centre that its status speaks for, and the angle [rad] of the pieces that a rim is looked at in.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+FULL, EMPTY = -1, -2
+#: most separate arcs that a rim is given back in
+ARCS = 24
+
+
+@njit(cache=True, nogil=True, inline="always")
+def axis_distance(px, py, ax, ay, bx, by):
+    """Distance of P from the straight axis AB."""
+    ex, ey = bx - ax, by - ay
+    wx, wy = px - ax, py - ay
+    ll = ex * ex + ey * ey
+    t = 0.0
+    if ll > 0.0:
+        t = (wx * ex + wy * ey) / ll
+        t = min(1.0, max(0.0, t))
+    dx, dy = wx - t * ex, wy - t * ey
+    return math.sqrt(dx * dx + dy * dy)
+
+
+@njit(cache=True, nogil=True)
+def covered(ax, ay, bx, by, r, R):
+    """Arc (lo, hi) of the circle of radius r about the origin that lies in the capsule of radius R about AB.
+
+    One arc always: every disc of the capsule that meets the circle covers an arc about its own direction. Its ends are
+    those of the end discs, or where the circle crosses a side of the capsule. lo > hi where there is none.
+    """
+    ex, ey = bx - ax, by - ay
+    length = math.sqrt(ex * ex + ey * ey)
+    reach = r + R
+    if length < 1e-12:
+        d = math.sqrt(ax * ax + ay * ay)
+        if d >= reach:
+            return 1.0, 0.0
+        if d <= R - r:
+            return -math.pi, math.pi
+        th = math.atan2(ay, ax)
+        half = math.acos(min(1.0, max(-1.0, (d * d + r * r - R * R) / (2.0 * d * r))))
+        return th - half, th + half
+    ex, ey = ex / length, ey / length
+    p = ex * -ay - ey * -ax
+    if p < 0.0:
+        ax, ay, bx, by = bx, by, ax, ay
+        ex, ey, p = -ex, -ey, -p
+    if p >= reach:
+        return 1.0, 0.0
+    xo = -(ax * ex + ay * ey)
+    w = math.sqrt(reach * reach - p * p)
+    xa, xb = max(-xo, -w), min(length - xo, w)
+    if xa >= xb:
+        return 1.0, 0.0
+    turn = math.atan2(ey, ex)
+    da, db = math.sqrt(xa * xa + p * p), math.sqrt(xb * xb + p * p)
+    if da <= R - r or db <= R - r:
+        return -math.pi, math.pi
+    s1 = (R - p) / r
+    if s1 >= 1.0:
+        s1, c1, al = 1.0, 0.0, 0.5 * math.pi
+    else:
+        s1 = max(-1.0, s1)
+        al = math.asin(s1)
+        c1 = r * math.sqrt(max(0.0, 1.0 - s1 * s1))
+    ta = math.atan2(-p, xa) if p > 0.0 else (0.0 if xa > 0.0 else -math.pi)
+    tb = math.atan2(-p, xb) if p > 0.0 else (0.0 if xb > 0.0 else -math.pi)
+    ha = math.acos(min(1.0, max(-1.0, (da * da + r * r - R * R) / (2.0 * da * r))))
+    hb = math.acos(min(1.0, max(-1.0, (db * db + r * r - R * R) / (2.0 * db * r))))
+    if c1 > xb:
+        hi = tb + hb
+    elif c1 < xa:
+        hi = ta + ha
+    else:
+        hi = al
+    if -c1 < xa:
+        lo = ta - ha
+    elif -c1 > xb:
+        lo = tb - hb
+    else:
+        lo = -math.pi - al
+    return lo + turn, hi + turn
+
+
+@njit(cache=True, nogil=True)
+def uncut(ox, oy, tx, ty, r, R, whole, grid, head, link, axis, out):
+    """Uncut arcs of the circle of radius r about O; ``out[k] = lo, hi`` from T, counter-clockwise; returns the count.
+
+    The front half ``[-pi/2, pi/2]``, or the ``whole`` circle ``[-pi/2, 3 pi/2]``.
+    """
+    x0, y0, h, piece = grid[0], grid[1], grid[2], grid[6]
+    nx, ny = int(grid[3]), int(grid[4])
+    m = int(round(math.pi / piece))
+    if whole:
+        m *= 2
+    half = 0.5 * r * piece
+    ulo = np.empty(16)
+    uhi = np.empty(16)
+    vlo = np.empty(34)
+    vhi = np.empty(34)
+    count = 0
+    ca, sa = math.cos(piece), math.sin(piece)
+    c, s = math.cos(-0.5 * math.pi + 0.5 * piece), math.sin(-0.5 * math.pi + 0.5 * piece)
+    for k in range(m):
+        mx, my = ox + r * (c * tx - s * ty), oy + r * (c * ty + s * tx)
+        a0 = -0.5 * math.pi + k * piece
+        a1 = a0 + piece
+        c, s = c * ca - s * sa, s * ca + c * sa
+        i, j = int((mx - x0) / h), int((my - y0) / h)
+        at = FULL
+        if 0 <= i < nx and 0 <= j < ny:
+            at = head[j * nx + i]
+        if at == EMPTY:
+            continue
+        n = 1
+        ulo[0], uhi[0] = a0, a1
+        while at >= 0:
+            q = link[at, 1]
+            at = link[at, 0]
+            d = axis_distance(mx, my, axis[q, 0], axis[q, 1], axis[q, 2], axis[q, 3])
+            if d >= R + half:
+                continue
+            if d <= R - half:
+                n = 0
+                break
+            pax, pay = axis[q, 0] - ox, axis[q, 1] - oy
+            pbx, pby = axis[q, 2] - ox, axis[q, 3] - oy
+            lo, hi = covered(
+                pax * tx + pay * ty, pay * tx - pax * ty, pbx * tx + pby * ty, pby * tx - pbx * ty, r, R
+            )
+            if lo > hi:
+                continue
+            # of the turns of the covered arc those that can reach into [a0, a1]
+            turns = math.ceil((a0 - hi) / (2.0 * math.pi)) * 2.0 * math.pi
+            lo += turns
+            hi += turns
+            while lo < a1 and n > 0:
+                kept = 0
+                for v in range(n):
+                    if lo > ulo[v]:
+                        vlo[kept], vhi[kept] = ulo[v], min(lo, uhi[v])
+                        kept += 1
+                    if hi < uhi[v]:
+                        vlo[kept], vhi[kept] = max(hi, ulo[v]), uhi[v]
+                        kept += 1
+                n = min(kept, 16)
+                for v in range(n):
+                    ulo[v], uhi[v] = vlo[v], vhi[v]
+                lo += 2.0 * math.pi
+                hi += 2.0 * math.pi
+            if n == 0:
+                break
+        for v in range(n):
+            if count and ulo[v] - out[count - 1, 1] <= 1e-12:
+                out[count - 1, 1] = uhi[v]
+            elif count < ARCS:
+                out[count, 0], out[count, 1] = ulo[v], uhi[v]
+                count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def settle(cell, grid, head, link, axis, R):
+    """Whether the capsules of a cell cover it together: the cell is quartered until each part lies in one of them."""
+    x0, y0, h, reach = grid[0], grid[1], grid[2], grid[5]
+    nx = int(grid[3])
+    cx, cy = x0 + (cell % nx + 0.5) * h, y0 + (cell // nx + 0.5) * h
+    parts = 6
+    side = 2.0 * reach / parts
+    hd = side * math.sqrt(0.5)
+    for a in range(parts):
+        for b in range(parts):
+            px, py = cx - reach + (a + 0.5) * side, cy - reach + (b + 0.5) * side
+            if (px - cx) ** 2 + (py - cy) ** 2 >= (reach + hd) ** 2:
+                continue
+            at = head[cell]
+            found = False
+            while at >= 0:
+                q = link[at, 1]
+                at = link[at, 0]
+                if axis_distance(px, py, axis[q, 0], axis[q, 1], axis[q, 2], axis[q, 3]) <= R - hd:
+                    found = True
+                    break
+            if not found:
+                return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def remove(q, R, grid, head, count, link, used, axis):
+    """Enter capsule q in the cells that it reaches; returns the number of chain entries used."""
+    x0, y0, h, reach = grid[0], grid[1], grid[2], grid[5]
+    nx, ny = int(grid[3]), int(grid[4])
+    ax, ay, bx, by = axis[q, 0], axis[q, 1], axis[q, 2], axis[q, 3]
+    i0 = max(0, int(math.floor((min(ax, bx) - R - reach - x0) / h)))
+    i1 = min(nx - 1, int(math.floor((max(ax, bx) + R + reach - x0) / h)))
+    j0 = max(0, int(math.floor((min(ay, by) - R - reach - y0) / h)))
+    j1 = min(ny - 1, int(math.floor((max(ay, by) + R + reach - y0) / h)))
+    for j in range(j0, j1 + 1):
+        for i in range(i0, i1 + 1):
+            cell = j * nx + i
+            if head[cell] == EMPTY:
+                continue
+            d = axis_distance(x0 + (i + 0.5) * h, y0 + (j + 0.5) * h, ax, ay, bx, by)
+            if d <= R - reach:
+                head[cell] = EMPTY
+            elif d < R + reach:
+                link[used, 0] = head[cell]
+                link[used, 1] = q
+                head[cell] = used
+                used += 1
+                count[cell] += 1
+                if count[cell] >= 12 and count[cell] % 12 == 0 and settle(cell, grid, head, link, axis, R):
+                    head[cell] = EMPTY
+    return used
+
+
+@njit(cache=True, nogil=True)
+def disc_free(ox, oy, R, grid, head, link, axis, scratch):
+    """Whether the disc of radius R about O holds no material, rim and inside; may say no where the answer is close."""
+    if uncut(ox, oy, 1.0, 0.0, R, R, True, grid, head, link, axis, scratch) > 0:
+        return False
+    x0, y0, h = grid[0], grid[1], grid[2]
+    nx = int(grid[3])
+    i0, i1 = int(math.floor((ox - R - x0) / h)), int(math.floor((ox + R - x0) / h))
+    j0, j1 = int(math.floor((oy - R - y0) / h)), int(math.floor((oy + R - y0) / h))
+    for j in range(j0, j1 + 1):
+        for i in range(i0, i1 + 1):
+            dx, dy = x0 + (i + 0.5) * h - ox, y0 + (j + 0.5) * h - oy
+            if math.sqrt(dx * dx + dy * dy) > R - 0.75 * h:
+                continue
+            cell = j * nx + i
+            if head[cell] == FULL:
+                return False
+            if head[cell] >= 0 and not settle(cell, grid, head, link, axis, R):
+                return False
+    return True

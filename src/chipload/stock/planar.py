@@ -1,0 +1,130 @@
+"""Stock in the plane that loses capsules: what the cutter's rim still meets, exactly.
+
+Notation: R [mm] cutter radius; a **capsule** is the disc of radius R swept along a straight step from A to B. What is
+cleared is the union of the capsules. The rim of a cutter at O is covered by each capsule over ONE arc, in closed form;
+what no capsule covers is uncut. A grid of cells keeps, for each place, only the capsules that end there: a cell wholly
+cleared keeps none. No boundary is built, so no tangency can break one: an error of 1e-12 mm in a touch stays one.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.errors import InputError
+from chipload.stock import _kernels
+
+Floats = NDArray[np.float64]
+
+#: pieces that half a rim is looked at in
+PIECES = 48
+#: cells along a cutter radius
+CELLS = 8
+#: most cells of a grid
+CELL_LIMIT = 8_000_000
+#: relative step of the rim inside the disc: touches less deep than this part of R are none
+TOUCH = 1e-9
+
+
+class PlanarStock:
+    """Solid plane within ``bounds`` from which capsules of radius R are taken.
+
+    Parameters
+    ----------
+    bounds : (xmin, ymin, xmax, ymax) [mm]
+        Where the rim of the cutter comes.
+    radius : R [mm], > 0
+
+    Examples
+    --------
+    >>> stock = PlanarStock((-5.0, -5.0, 5.0, 5.0), 1.0)
+    >>> stock.remove([[-4.0, 0.0, 0.0, 0.0]])
+    >>> arcs = stock.arcs((0.5, 0.0), (1.0, 0.0))
+    >>> float(round(np.degrees(arcs[0, 1] - arcs[0, 0]), 9))  # a slot: the disc at the end covers nothing ahead
+    180.0
+    >>> arcs = stock.arcs((-1.0, 1.0), (1.0, 0.0))  # half the cutter beside the slot
+    >>> float(round(np.degrees(arcs[0, 1] - arcs[0, 0]), 9))
+    90.0
+    """
+
+    def __init__(self, bounds: tuple[float, float, float, float], radius: float) -> None:
+        if not 0.0 < radius < math.inf:
+            raise InputError(f"radius = {radius:g} mm: must be above 0")
+        self.radius = radius
+        x0, y0, x1, y1 = bounds
+        margin = 0.5 * radius
+        wide, high = x1 - x0 + 2.0 * margin, y1 - y0 + 2.0 * margin
+        h = max(radius / CELLS, math.sqrt(wide * high / CELL_LIMIT))
+        if h > 0.5 * radius:
+            raise InputError(f"radius = {radius:g} mm: too small for a stock of {wide:.4g} x {high:.4g} mm")
+        nx, ny = math.ceil(wide / h), math.ceil(high / h)
+        piece = math.pi / PIECES
+        reach = h * math.sqrt(0.5) + 0.5 * radius * piece
+        self.grid: Floats = np.array([x0 - margin, y0 - margin, h, nx, ny, reach, piece])
+        self.head = np.full(nx * ny, _kernels.FULL, dtype=np.int64)
+        self.count = np.zeros(nx * ny, dtype=np.int64)
+        self.link = np.zeros((1 << 16, 2), dtype=np.int64)
+        self.used = 0
+        self.axis: Floats = np.zeros((1 << 12, 4))
+        self.capsules = 0
+        self._arcs: Floats = np.zeros((_kernels.ARCS, 2))
+
+    def reserve(self, capsules: int) -> None:
+        """Make room for so many more capsules."""
+        if self.capsules + capsules > len(self.axis):
+            self.axis = np.vstack([self.axis, np.zeros((max(capsules, len(self.axis)), 4))])
+        need = self.used + capsules * self.links_each
+        if need > len(self.link):
+            self.link = np.vstack([self.link, np.zeros((max(need - len(self.link), len(self.link)), 2), dtype=np.int64)])
+
+    @property
+    def links_each(self) -> int:
+        """Most cells that one capsule not longer than R / 2 can enter."""
+        h = float(self.grid[2])
+        side = (2.5 * self.radius + 2.0 * float(self.grid[5])) / h + 2.0
+        return math.ceil(side * ((2.0 * self.radius + 2.0 * float(self.grid[5])) / h + 2.0))
+
+    def remove(self, axes: ArrayLike) -> None:
+        """Take away the capsules about ``axes`` (n, 4) [mm], rows ``ax, ay, bx, by``."""
+        rows = np.asarray(axes, dtype=np.float64).reshape(-1, 4)
+        for row in rows:
+            parts = max(1, math.ceil(math.hypot(row[2] - row[0], row[3] - row[1]) / (0.5 * self.radius)))
+            u = np.linspace(0.0, 1.0, parts + 1)[:, None]
+            p = row[0:2] * (1.0 - u) + row[2:4] * u
+            self.reserve(parts)
+            for a, b in zip(p[:-1], p[1:], strict=True):
+                self.axis[self.capsules] = (*a, *b)
+                self.used = _kernels.remove(
+                    self.capsules, self.radius, self.grid, self.head, self.count, self.link, self.used, self.axis
+                )
+                self.capsules += 1
+
+    def arcs(self, centre: ArrayLike, heading: ArrayLike, whole: bool = False) -> Floats:
+        """(k, 2) uncut arcs [rad] of the rim about ``centre``, counter-clockwise from the unit ``heading``.
+
+        Those of the front half, -pi/2 to pi/2; or of the ``whole`` rim, -pi/2 to 3 pi/2.
+        """
+        (ox, oy), (tx, ty) = np.asarray(centre, dtype=np.float64), np.asarray(heading, dtype=np.float64)
+        r = self.radius * (1.0 - TOUCH)
+        n = _kernels.uncut(
+            ox, oy, tx, ty, r, self.radius, whole, self.grid, self.head, self.link, self.axis, self._arcs
+        )
+        return self._arcs[:n].copy()
+
+    def engagement(self, centre: ArrayLike, heading: ArrayLike) -> float:
+        """Engagement angle [rad]: all that is uncut on the front half of the rim."""
+        a = self.arcs(centre, heading)
+        return float((a[:, 1] - a[:, 0]).sum())
+
+    def free(self, centre: ArrayLike) -> bool:
+        """Whether the disc of the cutter holds no material; where that is close, no."""
+        x, y = np.asarray(centre, dtype=np.float64)
+        return bool(
+            _kernels.disc_free(
+                x, y, self.radius * (1.0 - TOUCH), self.grid, self.head, self.link, self.axis, self._arcs
+            )
+        )
+
+
