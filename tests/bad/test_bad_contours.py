@@ -43,9 +43,7 @@ def rounded(r):
 def refused(contours, diameter=10.0, **changes):
     cutter = Cutter(diameter, 4, math.radians(30), 22.0, 35.0, 580e3)
     with pytest.raises(InputError) as err:
-        plan_contour(
-            contours, replace(BASE, **changes), cutter, material_named("al7075-t6"), machine_named("vmc"), {}
-        )
+        plan_contour(contours, replace(BASE, **changes), cutter, material_named("al7075-t6"), machine_named("vmc"), {})
     return str(err.value)
 
 

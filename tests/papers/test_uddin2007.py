@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from chipload.geometry.offset import offset
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import material_named
 from chipload.geometry.contour import Contour
+from chipload.geometry.offset import offset
 from chipload.machine.machine import machine_named
 from chipload.planning.contour.backward import concave_kinks, leading_curve
 from chipload.planning.contour.ease import clothoid_length, eased

@@ -30,7 +30,7 @@ PIECE = 0.6
 
 
 @njit(cache=True, nogil=True)
-def runout_bites(ends, feed, radii, depth, sizes, rows, tooth, fill):  # type: ignore[no-untyped-def]
+def runout_bites(ends, feed, radii, depth, sizes, rows, tooth, fill):
     """Bites of every arc for teeth of unlike radii: the lower envelope of N lines in s = sin(phi), where positive.
     First call (fill False) counts into ``sizes``, the second fills ``rows`` and ``tooth``.
     """
@@ -91,7 +91,7 @@ def runout_bites(ends, feed, radii, depth, sizes, rows, tooth, fill):  # type: i
 
 
 @njit(cache=True, nogil=True)
-def load(theta, rows, tooth, lo, hi, teeth, lag, radius, c):  # type: ignore[no-untyped-def]
+def load(theta, rows, tooth, lo, hi, teeth, lag, radius, c):
     """Force on the cutter along T, n and the axis [N] and torque [N mm] at one rotation, in closed form."""
     ft = 0.0
     fn = 0.0
@@ -144,7 +144,7 @@ def load(theta, rows, tooth, lo, hi, teeth, lag, radius, c):  # type: ignore[no-
 
 
 @njit(cache=True, nogil=True)
-def turn_of(start, rows, tooth, theta, teeth, lag, radius, c, out):  # type: ignore[no-untyped-def]
+def turn_of(start, rows, tooth, theta, teeth, lag, radius, c, out):
     """Loads of every step at every rotation: out (n, m, 4)."""
     for i in range(len(start) - 1):
         for k in range(len(theta)):
@@ -156,7 +156,7 @@ def turn_of(start, rows, tooth, theta, teeth, lag, radius, c, out):  # type: ign
 
 
 @njit(cache=True, nogil=True)
-def means(start, rows, tooth, teeth, radius, c, out):  # type: ignore[no-untyped-def]
+def means(start, rows, tooth, teeth, radius, c, out):
     """Loads averaged over a revolution, in closed form (they do not depend on the helix): out (n, 4)."""
     for i in range(len(start) - 1):
         for r in range(start[i], start[i + 1]):
@@ -178,7 +178,7 @@ def means(start, rows, tooth, teeth, radius, c, out):  # type: ignore[no-untyped
 
 
 @njit(cache=True, nogil=True)
-def size(what, theta, rows, tooth, lo, hi, teeth, lag, radius, c):  # type: ignore[no-untyped-def]
+def size(what, theta, rows, tooth, lo, hi, teeth, lag, radius, c):
     """What is made greatest: 0 in-plane resultant squared, 1 torque, 2 size of the axial force."""
     ft, fn, fa, mt = load(theta, rows, tooth, lo, hi, teeth, lag, radius, c)
     if what == 0:
@@ -189,7 +189,7 @@ def size(what, theta, rows, tooth, lo, hi, teeth, lag, radius, c):  # type: igno
 
 
 @njit(cache=True, nogil=True)
-def breaks_of(rows, tooth, lo, hi, teeth, lag, period, out):  # type: ignore[no-untyped-def]
+def breaks_of(rows, tooth, lo, hi, teeth, lag, period, out):
     """Rotations in [0, period) where a bite begins or ends at either end of its height: fills out, returns count."""
     count = 0
     for r in range(lo, hi):
@@ -205,7 +205,7 @@ def breaks_of(rows, tooth, lo, hi, teeth, lag, period, out):  # type: ignore[no-
 
 
 @njit(cache=True, nogil=True)
-def greatest(start, rows, tooth, teeth, lag, radius, c, step, out):  # type: ignore[no-untyped-def]
+def greatest(start, rows, tooth, teeth, lag, radius, c, step, out):
     """Loads where they are greatest over a revolution: out (n, 5) = T and n force and rotation at the greatest in-plane
     resultant, greatest torque, axial force of greatest size.
 
@@ -284,7 +284,7 @@ def greatest(start, rows, tooth, teeth, lag, radius, c, step, out):  # type: ign
 
 
 @njit(cache=True, nogil=True)
-def push(theta, z, rows, tooth, lo, hi, teeth, lag, c, length, fluted, flex_fluted, flex_shank, work):  # type: ignore[no-untyped-def]
+def push(theta, z, rows, tooth, lo, hi, teeth, lag, c, length, fluted, flex_fluted, flex_shank, work):
     """Displacement along n of the cutter at height z, away from the work, under the load at rotation theta [mm]: the
     load of each height with the beam's compliance from there to z, five-point Gauss on smooth pieces.
     """
@@ -332,7 +332,7 @@ def push(theta, z, rows, tooth, lo, hi, teeth, lag, c, length, fluted, flex_flut
 
 
 @njit(cache=True, nogil=True)
-def wall_at(z, gen, last, lag, teeth, radii, rows, tooth, lo, hi, c, beam, work):  # type: ignore[no-untyped-def]
+def wall_at(z, gen, last, lag, teeth, radii, rows, tooth, lo, hi, c, beam, work):
     """Error of the wall at height z [mm], positive where material is left. ``gen`` the immersion that makes the wall (0
     or pi), ``last`` whether it is the teeth of greatest radius alone that make it.
     """
@@ -350,7 +350,7 @@ def wall_at(z, gen, last, lag, teeth, radii, rows, tooth, lo, hi, c, beam, work)
 
 
 @njit(cache=True, nogil=True)
-def wall_profiles(start, rows, tooth, gen, lag, teeth, radii, c, z, beam, work, made, out):  # type: ignore[no-untyped-def]
+def wall_profiles(start, rows, tooth, gen, lag, teeth, radii, c, z, beam, work, made, out):
     """Wall error of every step at the heights z (p,): out (n, p); steps that make no wall stay 0."""
     last = np.max(radii) > np.min(radii)
     for i in range(len(start) - 1):
@@ -362,7 +362,7 @@ def wall_profiles(start, rows, tooth, gen, lag, teeth, radii, c, z, beam, work, 
 
 
 @njit(cache=True, nogil=True)
-def wall_worst(start, rows, tooth, gen, lag, teeth, radii, c, heights, depth, beam, work, made, out):  # type: ignore[no-untyped-def]
+def wall_worst(start, rows, tooth, gen, lag, teeth, radii, c, heights, depth, beam, work, made, out):
     """Wall error of greatest size of every step, and its height: out (n, 2). Sampled at ``heights`` equal heights and
     at those where a bite begins or ends as the generating edge passes; then refined by golden section.
     """

@@ -16,7 +16,7 @@ MAX_CROSSINGS = 256
 
 
 @njit(cache=True, nogil=True)
-def rim_crossings(ox, oy, r, seg, candidates, n, angle, sign):  # type: ignore[no-untyped-def]
+def rim_crossings(ox, oy, r, seg, candidates, n, angle, sign):
     """Where the rim crosses the segments ``seg[candidates[:n]]``: fills ``angle`` in [0, 2 pi) and ``sign`` (+1 the
     rim, run counter-clockwise, enters material there, -1 it leaves), unsorted. Returns the count, -1 if too many.
     """
@@ -80,7 +80,7 @@ def rim_crossings(ox, oy, r, seg, candidates, n, angle, sign):  # type: ignore[n
 
 
 @njit(cache=True, nogil=True)
-def rim_arcs(ox, oy, r, seg, candidates, n, enter, leave):  # type: ignore[no-untyped-def]
+def rim_arcs(ox, oy, r, seg, candidates, n, enter, leave):
     """The arcs of the whole rim that lie in material: from ``enter[k]`` counter-clockwise to ``leave[k] > enter[k]``.
 
     Returns their number; -1 where nothing is crossed (the rim is wholly in or wholly out), -2 where the crossings do
@@ -126,7 +126,7 @@ def rim_arcs(ox, oy, r, seg, candidates, n, enter, leave):  # type: ignore[no-un
 
 
 @njit(cache=True, nogil=True)
-def front_part(tx, ty, enter, leave, n, phi_in, phi_out):  # type: ignore[no-untyped-def]
+def front_part(tx, ty, enter, leave, n, phi_in, phi_out):
     """The rim arcs in material, cut to the front half, as immersion angles.
 
     Immersion phi is counted from the left normal n = Rot(+90 deg) T clockwise (the sense of a spindle that turns
@@ -151,7 +151,7 @@ def front_part(tx, ty, enter, leave, n, phi_in, phi_out):  # type: ignore[no-unt
 
 
 @njit(cache=True, nogil=True)
-def side_of(px, py, seg, candidates, n):  # type: ignore[no-untyped-def]
+def side_of(px, py, seg, candidates, n):
     """+1 where (px, py) is in material (left of the nearest segment), -1 where it is not.
 
     Where the nearest point is a joint the two sides are added: the sign of the bisector is the true one.
@@ -200,7 +200,7 @@ def side_of(px, py, seg, candidates, n):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def boxes(seg, out):  # type: ignore[no-untyped-def]
+def boxes(seg, out):
     """Bounding boxes (xmin, ymin, xmax, ymax) of the segments; an arc's is that of its chord grown by its bulge."""
     for i in range(len(seg)):
         x0 = seg[i, 0]
@@ -219,7 +219,7 @@ def boxes(seg, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def engage(centres, headings, r, seg, box, first, last, angle, count, phi):  # type: ignore[no-untyped-def]
+def engage(centres, headings, r, seg, box, first, last, angle, count, phi):
     """Fill ``angle``, ``count``, ``phi`` of queries first..last; candidates are kept while the centre stays near."""
     n = len(seg)
     candidates = np.empty(n, dtype=np.int64)

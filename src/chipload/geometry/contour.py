@@ -77,7 +77,8 @@ class Contour:
     def from_bulges(points: ArrayLike, bulges: ArrayLike, closed: bool = False) -> Contour:
         """Vertices (m, 2) [mm] and bulges (m,) as in a DXF polyline: bulge = tan(sweep / 4) of the segment that
         leaves the vertex. Vertices nearer than ``JOIN_MM`` are one; an arc that rises less than ``FLAT_MM`` above its
-        chord is a line, for its centre would be too far away to be told exactly."""
+        chord is a line, for its centre would be too far away to be told exactly.
+        """
         p = np.asarray(points, dtype=np.float64).reshape(-1, 2)
         b = np.asarray(bulges, dtype=np.float64)
         q = np.roll(p, -1, axis=0)

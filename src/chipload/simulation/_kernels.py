@@ -19,7 +19,7 @@ TAU = 2.0 * math.pi
 
 
 @njit(cache=True, nogil=True)
-def place(mot, k, w):  # type: ignore[no-untyped-def]
+def place(mot, k, w):
     """Centre and unit heading at the moment (k, w); heading 0, 0 where the motion has no length."""
     sweep = mot[k, 6]
     if sweep == 0.0:
@@ -42,7 +42,7 @@ def place(mot, k, w):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def places(mot, k, w, centre, heading):  # type: ignore[no-untyped-def]
+def places(mot, k, w, centre, heading):
     """Fill ``centre`` (m, 2) and ``heading`` (m, 2) at the moments (k, w)."""
     for q in range(len(k)):
         x, y, tx, ty = place(mot, k[q], w[q])
@@ -53,7 +53,7 @@ def places(mot, k, w, centre, heading):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def nearest(mot, i, first, last, px, py):  # type: ignore[no-untyped-def]
+def nearest(mot, i, first, last, px, py):
     """Distance from (px, py) to the shares first..last of motion i, and the share of the nearest point."""
     sweep = mot[i, 6]
     if sweep == 0.0:
@@ -84,7 +84,7 @@ def nearest(mot, i, first, last, px, py):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def within(mot, i, last, px, py, reach):  # type: ignore[no-untyped-def]
+def within(mot, i, last, px, py, reach):
     """Whether (px, py) is nearer than ``reach`` to the first share ``last`` of motion i."""
     if mot[i, 6] == 0.0:
         dx = mot[i, 2] - mot[i, 0]
@@ -122,7 +122,7 @@ def within(mot, i, last, px, py, reach):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def fill_grid(mot, active, radius, slack, gx, gy, h, nx, ny, cover, count, start, items, fill):  # type: ignore[no-untyped-def]
+def fill_grid(mot, active, radius, slack, gx, gy, h, nx, ny, cover, count, start, items, fill):
     """Two passes. First (``fill`` False): ``cover`` (initially n) and the ``count`` of motions a cell. Then, with
     ``start`` their running sum and ``count`` zeroed: the lists.
     """
@@ -176,7 +176,7 @@ def fill_grid(mot, active, radius, slack, gx, gy, h, nx, ny, cover, count, start
 
 
 @njit(cache=True, nogil=True)
-def in_stock(px, py, rows):  # type: ignore[no-untyped-def]
+def in_stock(px, py, rows):
     """Whether (px, py) lies in the initial stock: winding number > 0 by the crossings of the ray to +x."""
     y0, dy, n, start, items, piece = rows
     if n == 0:
@@ -200,7 +200,7 @@ def in_stock(px, py, rows):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def uncut(px, py, k, w, reach, mot, grid, rows, hint):  # type: ignore[no-untyped-def]
+def uncut(px, py, k, w, reach, mot, grid, rows, hint):
     """Whether (px, py) is stock that no centre before the moment (k, w) has come within ``reach`` of.
 
     ``hint[0]`` is the motion that cut the point asked last; it is tried first.
@@ -226,7 +226,7 @@ def uncut(px, py, k, w, reach, mot, grid, rows, hint):  # type: ignore[no-untype
 
 
 @njit(cache=True, nogil=True)
-def uncut_many(points, k, w, reach, mot, grid, rows, out):  # type: ignore[no-untyped-def]
+def uncut_many(points, k, w, reach, mot, grid, rows, out):
     """:func:`uncut` for every point (m, 2) at its moment."""
     hint = np.full(1, -1, dtype=np.int64)
     for q in range(len(points)):
@@ -234,9 +234,7 @@ def uncut_many(points, k, w, reach, mot, grid, rows, out):  # type: ignore[no-un
 
 
 @njit(cache=True, nogil=True)
-def rim(  # type: ignore[no-untyped-def]
-    k, w, centre, heading, radius, reach, sample, precision, mot, grid, rows, first, last, angle, count, phi
-):
+def rim(k, w, centre, heading, radius, reach, sample, precision, mot, grid, rows, first, last, angle, count, phi):
     """Fill ``angle``, ``count`` and ``phi`` of the queries first..last.
 
     The rim at ``radius`` about ``centre`` is asked at the immersions ``sample`` (rising from 0 to pi); each change is
@@ -292,7 +290,7 @@ def rim(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def trail_distance(points, radius, slack, mot, active, grid, out):  # type: ignore[no-untyped-def]
+def trail_distance(points, radius, slack, mot, active, grid, out):
     """Distance from each point (m, 2) to the whole trail: exact where it is above ``radius + slack``, else at most
     ``slack`` above the least.
     """
@@ -322,7 +320,7 @@ def trail_distance(points, radius, slack, mot, active, grid, out):  # type: igno
 
 
 @njit(cache=True, nogil=True)
-def signed_distance(points, wall, loose, side, out):  # type: ignore[no-untyped-def]
+def signed_distance(points, wall, loose, side, out):
     """Distance from each point (m, 2) to the wall's motions (n, 9), negative on the side of its material.
 
     ``side`` +1 where the material lies on the left of travel, -1 on the right; ``loose[i]`` has bit 1 where the start
@@ -364,7 +362,7 @@ def signed_distance(points, wall, loose, side, out):  # type: ignore[no-untyped-
 
 
 @njit(cache=True, nogil=True)
-def locate(points, z, mot, z0, z1, tolerance, z_tolerance, k, w):  # type: ignore[no-untyped-def]
+def locate(points, z, mot, z0, z1, tolerance, z_tolerance, k, w):
     """Moments of the points (m, 2) at the heights z, each sought forward from the one before it.
 
     Returns the number found: m, or the index of the first point that lies nowhere on what is left of the path.

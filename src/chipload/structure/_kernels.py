@@ -6,7 +6,7 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def stepped(za, zb, length, fluted, flex_fluted, flex_shank):  # type: ignore[no-untyped-def]
+def stepped(za, zb, length, fluted, flex_fluted, flex_shank):
     """Deflection at height zb under a unit force at za; see :func:`chipload.structure.beam.compliance`."""
     top = max(za, zb)
     d = top - min(za, zb)
