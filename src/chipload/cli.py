@@ -27,7 +27,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="Plans and proves CNC milling of the parts that are hard to mill.",
-    epilog="Exit codes: 0 every limit holds; 2 wrong input, nothing written; 3 a limit does not hold; 1 a fault of ours.",
+    epilog="Exit codes: 0 every limit holds; 2 wrong input, nothing written; 3 a limit does not hold; 1 our fault.",
 )
 
 JobFile = Annotated[Path, typer.Argument(metavar="JOB", help="the job file (TOML)")]

@@ -151,7 +151,7 @@ class Contour:
         """Signed area [mm^2] by Green's theorem, positive counter-clockwise; closed contours only."""
         if not self.closed:
             raise InputError("contour: an open chain has no area; close it first")
-        x0, y0, x1, y1, xc, yc, sweep = self.segments.T
+        x0, y0, x1, y1, _, _, sweep = self.segments.T
         return float(0.5 * np.sum(x0 * y1 - x1 * y0) + 0.5 * np.sum(self.radii**2 * (sweep - np.sin(sweep))))
 
     @cached_property

@@ -27,7 +27,7 @@ Bools = NDArray[np.bool_]
 
 #: a row of the history lies on the program's path within this [mm]
 MATCH_MM = 1e-6
-#: where a rim lies on the edge that an earlier disc left there is no one engagement: the one this far [mm] before counts
+#: where a rim lies on the edge of an earlier disc there is no one engagement: that this far [mm] before counts too
 BEFORE_MM = 1e-5
 #: stock that a rapid passes through counts when it is thicker than this [mm]
 RAPID_MM = 1e-6
