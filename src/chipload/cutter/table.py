@@ -6,7 +6,6 @@ refused, never guessed.
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,6 +17,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.fctb import read_fctb
 from chipload.cutter.tooltable import read_tool_table
 from chipload.errors import InputError
+from chipload.tables import nearest
 
 #: keys that a cutter cannot be without
 NEEDED = ("number", "diameter_mm", "flutes", "helix_deg", "flute_length_mm", "overhang_mm", "modulus_gpa")
@@ -136,7 +136,7 @@ def _first(err: ValidationError, table: Mapping[str, Any]) -> str:
     row = err.errors()[0]
     key = ".".join(str(x) for x in row["loc"])
     if row["type"] == "extra_forbidden":
-        near = difflib.get_close_matches(key, CutterTable.model_fields, 1, 0.0)[0]
+        near = nearest(key, list(CutterTable.model_fields))
         return f"cutter.{key}: unknown key: the nearest known one is {near}"
     wanted = {
         "float_type": "must be a number",

@@ -6,16 +6,13 @@ Notation: per mm of depth a tooth meets Ft = Ktc h + Kte (tangential), Fr = Krc 
 
 from __future__ import annotations
 
-import difflib
 import math
-import tomllib
 from dataclasses import dataclass
-from importlib import resources
-from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
 from chipload.errors import InputError
+from chipload.tables import nearest, read_table, shipped_names, shipped_table
 
 #: key in the file -> field, lowest and highest value that is believed
 _NUMBERS = {
@@ -96,15 +93,11 @@ def _number(label: str, key: str, value: Any) -> float:
     return float(value)
 
 
-def _from_toml(label: str, data: bytes) -> Material:
-    """A material from the bytes of a TOML file; ``label`` names it in messages."""
-    try:
-        table = tomllib.loads(data.decode("utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as err:
-        raise InputError(f"{label}: not a TOML file: {err}") from None
+def _from_table(label: str, table: dict[str, Any]) -> Material:
+    """A material from the values of its file; ``label`` names it in messages."""
     for key in table:
         if key not in _KEYS:
-            near = difflib.get_close_matches(key, _KEYS, 1, 0.0)[0]
+            near = nearest(key, list(_KEYS))
             raise InputError(f"{label}: unknown key {key}: the nearest known one is {near}")
     for key in ("name", *_NUMBERS):
         if key not in table:
@@ -141,17 +134,7 @@ def read_material(path: str | Path) -> Material:
     InputError
         The file cannot be read, a key is unknown or missing, a number out of range, the source missing.
     """
-    path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as err:
-        raise InputError(f"material {path}: cannot be read: {err.strerror}") from None
-    return _from_toml(f"material {path}", data)
-
-
-def _shipped() -> dict[str, Traversable]:
-    folder = resources.files("chipload") / "data" / "materials"
-    return {x.name.removesuffix(".toml"): x for x in folder.iterdir() if x.name.endswith(".toml")}
+    return _from_table(*read_table("material", path))
 
 
 def material_names() -> tuple[str, ...]:
@@ -160,7 +143,7 @@ def material_names() -> tuple[str, ...]:
     >>> material_names()
     ('al6082-t6', 'al7075-carbide', 'al7075-hss', 'al7075-t6')
     """
-    return tuple(sorted(_shipped()))
+    return shipped_names("material")
 
 
 def material_named(name: str) -> Material:
@@ -176,9 +159,4 @@ def material_named(name: str) -> Material:
     >>> material_named("al7075-t6").Ktc
     767.01
     """
-    shipped = _shipped()
-    if name not in shipped:
-        near = difflib.get_close_matches(name, sorted(shipped), 1, 0.0)[0]
-        known = ", ".join(sorted(shipped))
-        raise InputError(f"material {name}: not known: the nearest is {near} (known: {known}), or give a file")
-    return _from_toml(f"material {name}", shipped[name].read_bytes())
+    return _from_table(*shipped_table("material", name))

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 import shutil
 from importlib import resources
 from pathlib import Path
 
 from chipload.errors import InputError
+from chipload.tables import nearest
 
 
 def example_titles() -> dict[str, str]:
@@ -26,7 +26,7 @@ def copy_example(name: str, folder: str | Path) -> Path:
     """
     known = list(example_titles())
     if name not in known:
-        near = difflib.get_close_matches(name, known, 1, 0.0)[0]
+        near = nearest(name, list(known))
         raise InputError(f"example {name}: not known; did you mean {near}? (known: {', '.join(known)})")
     target = Path(folder)
     try:

@@ -5,16 +5,13 @@ Read from TOML with the unit in every key; a number that is missing is named, ne
 
 from __future__ import annotations
 
-import difflib
 import math
-import tomllib
 from dataclasses import dataclass
-from importlib import resources
-from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
 from chipload.errors import InputError
+from chipload.tables import nearest, read_table, shipped_names, shipped_table
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 AXES = ("x", "y", "z")
@@ -111,7 +108,7 @@ def _table(label: str, data: dict[str, Any], where: str) -> dict[str, Any]:
     prefix = f"{where}." if where else ""
     for key in data:
         if key not in known:
-            near = difflib.get_close_matches(key, known, 1, 0.0)[0]
+            near = nearest(key, list(known))
             raise InputError(f"{label}: unknown key {prefix}{key}: the nearest known one is {prefix}{near}")
     for key in (*keys, *_TABLES.get(where, ())):
         if not key.endswith("?") and key not in data:
@@ -132,12 +129,8 @@ def _table(label: str, data: dict[str, Any], where: str) -> dict[str, Any]:
     return data
 
 
-def _from_toml(label: str, data: bytes) -> Machine:
-    """A machine from the bytes of a TOML file; ``label`` names it in messages."""
-    try:
-        table = tomllib.loads(data.decode("utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as err:
-        raise InputError(f"{label}: not a TOML file: {err}") from None
+def _from_table(label: str, table: dict[str, Any]) -> Machine:
+    """A machine from the values of its file; ``label`` names it in messages."""
     top = _table(label, table, "")
     axes = _table(label, top["axis"], "axis")
     rows = [_table(label, axes[a], f"axis.{a}") for a in AXES]
@@ -175,17 +168,7 @@ def read_machine(path: str | Path) -> Machine:
     InputError
         The file cannot be read, a key is unknown or missing, a value is out of range.
     """
-    path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as err:
-        raise InputError(f"machine {path}: cannot be read: {err.strerror}") from None
-    return _from_toml(f"machine {path}", data)
-
-
-def _shipped() -> dict[str, Traversable]:
-    folder = resources.files("chipload") / "data" / "machines"
-    return {x.name.removesuffix(".toml"): x for x in folder.iterdir() if x.name.endswith(".toml")}
+    return _from_table(*read_table("machine", path))
 
 
 def machine_names() -> tuple[str, ...]:
@@ -194,7 +177,7 @@ def machine_names() -> tuple[str, ...]:
     >>> machine_names()
     ('vmc', 'vmc-fanuc')
     """
-    return tuple(sorted(_shipped()))
+    return shipped_names("machine")
 
 
 def machine_named(name: str) -> Machine:
@@ -210,9 +193,4 @@ def machine_named(name: str) -> Machine:
     >>> machine_named("vmc").acceleration_xy
     3000.0
     """
-    shipped = _shipped()
-    if name not in shipped:
-        near = difflib.get_close_matches(name, sorted(shipped), 1, 0.0)[0]
-        known = ", ".join(sorted(shipped))
-        raise InputError(f"machine {name}: not known: the nearest is {near} (known: {known}), or give a file")
-    return _from_toml(f"machine {name}", shipped[name].read_bytes())
+    return _from_table(*shipped_table("machine", name))

@@ -17,6 +17,10 @@ from numba import njit
 FULL, EMPTY = -1, -2
 #: most separate arcs that a rim is given back in
 ARCS = 24
+#: capsules that enter a cell before it is pruned for the first time, at least
+MORE = 12
+#: parts that a cell is pruned in, each way
+PARTS = 8
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -172,35 +176,79 @@ def uncut(ox, oy, tx, ty, r, R, whole, grid, head, link, axis, out):
 
 
 @njit(cache=True, nogil=True)
-def settle(cell, grid, head, link, axis, R):
-    """Whether the capsules of a cell cover it together: the cell is quartered until each part lies in one of them."""
+def prune(cell, grid, head, link, axis, R):
+    """Keep of a cell's chain what its cleared part needs; returns how many stay, 0 where the cell is cleared.
+
+    The square about what the cell speaks for is cut into parts. A part inside one capsule needs that one only; in any
+    other part every capsule that reaches it stays. Nothing is forgotten of the union.
+    """
     x0, y0, h, reach = grid[0], grid[1], grid[2], grid[5]
     nx = int(grid[3])
     cx, cy = x0 + (cell % nx + 0.5) * h, y0 + (cell // nx + 0.5) * h
-    parts = 6
-    side = 2.0 * reach / parts
+    n = 0
+    at = head[cell]
+    while at >= 0:
+        n += 1
+        at = link[at, 0]
+    keep = np.zeros(n, dtype=np.bool_)
+    side = 2.0 * reach / PARTS
     hd = side * math.sqrt(0.5)
-    for a in range(parts):
-        for b in range(parts):
+    whole = True
+    for a in range(PARTS):
+        for b in range(PARTS):
             px, py = cx - reach + (a + 0.5) * side, cy - reach + (b + 0.5) * side
             if (px - cx) ** 2 + (py - cy) ** 2 >= (reach + hd) ** 2:
                 continue
             at = head[cell]
-            found = False
+            k = 0
+            found = -1
             while at >= 0:
                 q = link[at, 1]
-                at = link[at, 0]
                 if axis_distance(px, py, axis[q, 0], axis[q, 1], axis[q, 2], axis[q, 3]) <= R - hd:
-                    found = True
-                    break
-            if not found:
-                return False
-    return True
+                    found = k
+                    if keep[k]:
+                        break
+                at = link[at, 0]
+                k += 1
+            if found >= 0:
+                keep[found] = True
+                continue
+            whole = False
+            at = head[cell]
+            k = 0
+            while at >= 0:
+                q = link[at, 1]
+                if not keep[k] and axis_distance(px, py, axis[q, 0], axis[q, 1], axis[q, 2], axis[q, 3]) < R + hd:
+                    keep[k] = True
+                at = link[at, 0]
+                k += 1
+    if whole:
+        head[cell] = EMPTY
+        return 0
+    at = head[cell]
+    last = -1
+    k = 0
+    kept = 0
+    while at >= 0:
+        if keep[k]:
+            if last < 0:
+                head[cell] = at
+            else:
+                link[last, 0] = at
+            last = at
+            kept += 1
+        at = link[at, 0]
+        k += 1
+    link[last, 0] = -1
+    return kept
 
 
 @njit(cache=True, nogil=True)
 def remove(q, R, grid, head, count, link, used, axis):
-    """Enter capsule q in the cells that it reaches; returns the number of chain entries used."""
+    """Enter capsule q in the cells that it reaches; ``count`` is how many more a cell takes before it is pruned.
+
+    Returns the number of chain entries used.
+    """
     x0, y0, h, reach = grid[0], grid[1], grid[2], grid[5]
     nx, ny = int(grid[3]), int(grid[4])
     ax, ay, bx, by = axis[q, 0], axis[q, 1], axis[q, 2], axis[q, 3]
@@ -221,29 +269,7 @@ def remove(q, R, grid, head, count, link, used, axis):
                 link[used, 1] = q
                 head[cell] = used
                 used += 1
-                count[cell] += 1
-                if count[cell] >= 12 and count[cell] % 12 == 0 and settle(cell, grid, head, link, axis, R):
-                    head[cell] = EMPTY
+                count[cell] -= 1
+                if count[cell] <= 0:
+                    count[cell] = max(MORE, prune(cell, grid, head, link, axis, R))
     return used
-
-
-@njit(cache=True, nogil=True)
-def disc_free(ox, oy, R, grid, head, link, axis, scratch):
-    """Whether the disc of radius R about O holds no material, rim and inside; may say no where the answer is close."""
-    if uncut(ox, oy, 1.0, 0.0, R, R, True, grid, head, link, axis, scratch) > 0:
-        return False
-    x0, y0, h = grid[0], grid[1], grid[2]
-    nx = int(grid[3])
-    i0, i1 = int(math.floor((ox - R - x0) / h)), int(math.floor((ox + R - x0) / h))
-    j0, j1 = int(math.floor((oy - R - y0) / h)), int(math.floor((oy + R - y0) / h))
-    for j in range(j0, j1 + 1):
-        for i in range(i0, i1 + 1):
-            dx, dy = x0 + (i + 0.5) * h - ox, y0 + (j + 0.5) * h - oy
-            if math.sqrt(dx * dx + dy * dy) > R - 0.75 * h:
-                continue
-            cell = j * nx + i
-            if head[cell] == FULL:
-                return False
-            if head[cell] >= 0 and not settle(cell, grid, head, link, axis, R):
-                return False
-    return True

@@ -64,7 +64,7 @@ class PlanarStock:
         reach = h * math.sqrt(0.5) + 0.5 * radius * piece
         self.grid: Floats = np.array([x0 - margin, y0 - margin, h, nx, ny, reach, piece])
         self.head = np.full(nx * ny, _kernels.FULL, dtype=np.int64)
-        self.count = np.zeros(nx * ny, dtype=np.int64)
+        self.count = np.full(nx * ny, _kernels.MORE, dtype=np.int64)
         self.link = np.zeros((1 << 16, 2), dtype=np.int64)
         self.used = 0
         self.axis: Floats = np.zeros((1 << 12, 4))
@@ -117,14 +117,3 @@ class PlanarStock:
         """Engagement angle [rad]: all that is uncut on the front half of the rim."""
         a = self.arcs(centre, heading)
         return float((a[:, 1] - a[:, 0]).sum())
-
-    def free(self, centre: ArrayLike) -> bool:
-        """Whether the disc of the cutter holds no material; where that is close, no."""
-        x, y = np.asarray(centre, dtype=np.float64)
-        return bool(
-            _kernels.disc_free(
-                x, y, self.radius * (1.0 - TOUCH), self.grid, self.head, self.link, self.axis, self._arcs
-            )
-        )
-
-
