@@ -1,8 +1,8 @@
 """Compiled loops of the planar stock: what a rim meets, and what a capsule takes away.
 
 Notation: R [mm] cutter radius; a **capsule** is the disc of radius R swept along an axis from A to B. The plane is
-cut into square cells; ``head[cell]`` is FULL (no capsule reaches it), EMPTY (it is wholly cleared) or the first entry of
-a chain ``link[:, 0]`` (next entry or -1), ``link[:, 1]`` (capsule). ``grid`` is
+cut into square cells; ``head[cell]`` is FULL (no capsule reaches it), EMPTY (it is wholly cleared) or the first entry
+of a chain ``link[:, 0]`` (next entry or -1), ``link[:, 1]`` (capsule). ``grid`` is
 ``[x0, y0, h, nx, ny, reach, piece]``: origin, cell side, cells each way, the radius of the disc about a cell's
 centre that its status speaks for, and the angle [rad] of the pieces that a rim is looked at in.
 """
@@ -106,7 +106,7 @@ def uncut(ox, oy, tx, ty, r, R, whole, grid, head, link, axis, out):
     """
     x0, y0, h, piece = grid[0], grid[1], grid[2], grid[6]
     nx, ny = int(grid[3]), int(grid[4])
-    m = int(round(math.pi / piece))
+    m = round(math.pi / piece)
     if whole:
         m *= 2
     half = 0.5 * r * piece
@@ -141,9 +141,7 @@ def uncut(ox, oy, tx, ty, r, R, whole, grid, head, link, axis, out):
                 break
             pax, pay = axis[q, 0] - ox, axis[q, 1] - oy
             pbx, pby = axis[q, 2] - ox, axis[q, 3] - oy
-            lo, hi = covered(
-                pax * tx + pay * ty, pay * tx - pax * ty, pbx * tx + pby * ty, pby * tx - pbx * ty, r, R
-            )
+            lo, hi = covered(pax * tx + pay * ty, pay * tx - pax * ty, pbx * tx + pby * ty, pby * tx - pbx * ty, r, R)
             if lo > hi:
                 continue
             # of the turns of the covered arc those that can reach into [a0, a1]
@@ -252,10 +250,10 @@ def remove(q, R, grid, head, count, link, used, axis):
     x0, y0, h, reach = grid[0], grid[1], grid[2], grid[5]
     nx, ny = int(grid[3]), int(grid[4])
     ax, ay, bx, by = axis[q, 0], axis[q, 1], axis[q, 2], axis[q, 3]
-    i0 = max(0, int(math.floor((min(ax, bx) - R - reach - x0) / h)))
-    i1 = min(nx - 1, int(math.floor((max(ax, bx) + R + reach - x0) / h)))
-    j0 = max(0, int(math.floor((min(ay, by) - R - reach - y0) / h)))
-    j1 = min(ny - 1, int(math.floor((max(ay, by) + R + reach - y0) / h)))
+    i0 = max(0, math.floor((min(ax, bx) - R - reach - x0) / h))
+    i1 = min(nx - 1, math.floor((max(ax, bx) + R + reach - x0) / h))
+    j0 = max(0, math.floor((min(ay, by) - R - reach - y0) / h))
+    j1 = min(ny - 1, math.floor((max(ay, by) + R + reach - y0) / h))
     for j in range(j0, j1 + 1):
         for i in range(i0, i1 + 1):
             cell = j * nx + i

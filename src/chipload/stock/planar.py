@@ -8,6 +8,7 @@ cleared keeps none. No boundary is built, so no tangency can break one: an error
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -77,7 +78,9 @@ class PlanarStock:
             self.axis = np.vstack([self.axis, np.zeros((max(capsules, len(self.axis)), 4))])
         need = self.used + capsules * self.links_each
         if need > len(self.link):
-            self.link = np.vstack([self.link, np.zeros((max(need - len(self.link), len(self.link)), 2), dtype=np.int64)])
+            self.link = np.vstack(
+                [self.link, np.zeros((max(need - len(self.link), len(self.link)), 2), dtype=np.int64)]
+            )
 
     @property
     def links_each(self) -> int:
@@ -94,7 +97,7 @@ class PlanarStock:
             u = np.linspace(0.0, 1.0, parts + 1)[:, None]
             p = row[0:2] * (1.0 - u) + row[2:4] * u
             self.reserve(parts)
-            for a, b in zip(p[:-1], p[1:], strict=True):
+            for a, b in itertools.pairwise(p):
                 self.axis[self.capsules] = (*a, *b)
                 self.used = _kernels.remove(
                     self.capsules, self.radius, self.grid, self.head, self.count, self.link, self.used, self.axis

@@ -1,8 +1,8 @@
 """The compiled stepping loop of the front: one pass, step after step, in the stock and inside the inset region.
 
-Notation: O centre of the cutter, th its heading [rad], phi the turn of the next step, positive to the left. Material lies
-on the RIGHT. E engagement [rad], a* its limit, l step length, R radius. ``reach`` is the centre region: O may be anywhere
-in it. It is a polygon: ``edges`` (n, 4), ``rows`` and ``row_edges`` the edges that meet each row of cells,
+Notation: O centre of the cutter, th its heading [rad], phi the turn of the next step, positive to the left. Material
+lies on the RIGHT. E engagement [rad], a* its limit, l step length, R radius. ``reach`` is the centre region: O may be
+anywhere in it. It is a polygon: ``edges`` (n, 4), ``rows`` and ``row_edges`` the edges that meet each row of cells,
 ``flag`` 0 outside, 1 inside, 2 where an edge passes, on the cells of the stock's grid.
 """
 
@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-from chipload.stock._kernels import ARCS, axis_distance, remove, uncut
+from chipload.stock._kernels import ARCS, remove, uncut
 
 RUNNING, LOST, BLOCKED = 0, 1, 2
 #: columns of a step: x, y, greatest E along it, E at its end, arcs at its end, mm^2 taken
@@ -25,7 +25,7 @@ def allowed(x, y, grid, flag, edges, rows, row_edges):
     """Whether O = (x, y) is in the centre region: cell flag, else the crossings of the ray to +x."""
     h = grid[2]
     nx, ny = int(grid[3]), int(grid[4])
-    i, j = int(math.floor((x - grid[0]) / h)), int(math.floor((y - grid[1]) / h))
+    i, j = math.floor((x - grid[0]) / h), math.floor((y - grid[1]) / h)
     if i < 0 or j < 0 or i >= nx or j >= ny:
         return False
     f = flag[j * nx + i]
@@ -57,8 +57,8 @@ def mark(grid, edges, rows, row_edges, flag):
         dx, dy = edges[e, 2] - edges[e, 0], edges[e, 3] - edges[e, 1]
         n = 1 + int(math.sqrt(dx * dx + dy * dy) / (0.5 * h))
         for k in range(n + 1):
-            i = int(math.floor((edges[e, 0] + dx * k / n - x0) / h))
-            j = int(math.floor((edges[e, 1] + dy * k / n - y0) / h))
+            i = math.floor((edges[e, 0] + dx * k / n - x0) / h)
+            j = math.floor((edges[e, 1] + dy * k / n - y0) / h)
             for b in range(max(0, j - 1), min(ny, j + 2)):
                 for a in range(max(0, i - 1), min(nx, i + 2)):
                     flag[b * nx + a] = 2
@@ -87,7 +87,8 @@ def angle_at(x, y, tx, ty, r, R, grid, head, link, axis, arcs):
 @njit(cache=True, nogil=True)
 def worst_of_step(ox, oy, th, phi, l, full, r, R, grid, head, link, axis, arcs):
     """Greatest E of the step that turns by phi: its end and, turning to the right, l = R tan(phi / 2), where the
-    wedge opened by the turn is wholly under the rim; ``full`` looks at more places between."""
+    wedge opened by the turn is wholly under the rim; ``full`` looks at more places between.
+    """
     tx, ty = math.cos(th + phi), math.sin(th + phi)
     e = angle_at(ox + l * tx, oy + l * ty, tx, ty, r, R, grid, head, link, axis, arcs)
     if phi < 0.0:
@@ -151,10 +152,10 @@ def turn(ox, oy, th, guess, l, limit, right, left, full, slack, r, R, grid, head
         for k in range(1, 6):
             phi = lo + (up + 0.05 - lo) * k / 5.0
             e = worst_of_step(ox, oy, th, phi, l, full, r, R, grid, head, link, axis, arcs)
-            if e <= limit and e >= most - 0.004:
-                if step_allowed(ox, oy, th, phi, l, slack, grid, flag, edges, rows, row_edges):
-                    best = phi
-                    most = max(most, e)
+            fits = most - 0.004 <= e <= limit
+            if fits and step_allowed(ox, oy, th, phi, l, slack, grid, flag, edges, rows, row_edges):
+                best = phi
+                most = max(most, e)
         return True, best
     # walk to the left until the engagement is within the limit
     bad, f_bad = lo, e_lo - limit
@@ -199,7 +200,8 @@ def run_pass(state, step, limit, right, left, lost, R, touch, out, room, capsule
              flag, edges, rows, row_edges):  # fmt: skip
     """Steps until the pass ends or ``out`` is full.
 
-    ``state`` = x, y, heading, last turn, length on which less than a hundredth of R (1 - cos a*) was cut; ``right``, ``left``: greatest turn of a whole step;
+    ``state`` = x, y, heading, last turn, length on which less than a hundredth of R (1 - cos a*) was cut; ``right``,
+    ``left``: greatest turn of a whole step;
     ``lost``: length without material that ends the pass. Returns (steps, reason, capsules, chain entries).
     """
     arcs = np.empty((ARCS, 2))

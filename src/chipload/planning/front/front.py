@@ -1,9 +1,9 @@
 """A whole pocket cleared at constant engagement: passes of a front that never meets more than a*.
 
-Notation: O centre of the cutter, T its heading, R radius; material lies on the RIGHT of travel (down milling; up milling
-is the mirror image of it). a* the engagement wanted, 1 - cos a* = s / R. A **pass** turns at every step as far towards the
-material as the exact engagement allows; it slides along the wall where that holds it. Where it ends the cutter
-goes on from the nearest place of the cleared edge that still has material beside it.
+Notation: O centre of the cutter, T its heading, R radius; material lies on the RIGHT of travel (down milling; up
+milling is the mirror image of it). a* the engagement wanted, 1 - cos a* = s / R. A **pass** turns at every step as far
+towards the material as the exact engagement allows; it slides along the wall where that holds it. Where it ends the
+cutter goes on from the nearest place of the cleared edge that still has material beside it.
 
 Reference: [Uddin2007] for the law da/ds = sin b / (R sin(a - b)) - kappa.
 Differs from source: the law only says where the root search begins; what is kept is the engagement itself, along the
@@ -44,6 +44,8 @@ TURN_RIGHT = 0.4
 TURN_LEFT = math.radians(100.0)
 #: length / R without material that ends a pass
 IDLE = 1.5
+#: so many passes within 2 R that take less than this part of R^2 each are given up
+SLOW_PASSES, SLOW_AREA = 100, 0.02
 #: steps between two calls of ``progress``
 CHUNK = 4000
 #: depth / R that is looked into for material beside the path, round after round
@@ -163,6 +165,7 @@ class _Run:
         self.at = np.zeros(2)
         self.area = 0.0
         self.ends: Counter[str] = Counter()
+        self.lately: list[tuple[float, float, float]] = []
         self.steps = 0
         self.most = 100_000 + int(20.0 * self.reachable.area / (step * radius * (1.0 - math.cos(limit))))
 
@@ -203,6 +206,20 @@ class _Run:
                     break
                 if not self._pass_from(k):
                     self.starts.drop(k)
+                elif len(self.lately) >= SLOW_PASSES:
+                    self._leave_if_slow()
+
+    def _leave_if_slow(self) -> None:
+        """Leave a channel hardly wider than the cutter, where pass after pass takes next to nothing."""
+        took = np.array(self.lately)
+        self.lately.clear()
+        low, high = took[:, 1:].min(axis=0), took[:, 1:].max(axis=0)
+        if took[:, 0].sum() > SLOW_AREA * SLOW_PASSES * self.radius**2 or (high - low).max() > 2.0 * self.radius:
+            return
+        x, y = 0.5 * (low + high)
+        self.starts.abandon(np.array([x, y]), 2.0 * self.radius)
+        text = f"{SLOW_PASSES} passes took {took[:, 0].sum():.3g} mm2 here, hardly wider than the cutter: left"
+        self.events.append(Event("front-narrow", float(x), float(y), text))
 
     def _linked(self, p: Floats) -> bool:
         return self._clear_line(self.at, p)
@@ -211,9 +228,19 @@ class _Run:
         s = self.stock
         return bool(
             _kernels.line_clear(
-                p[0], p[1], q[0], q[1], self.step, self.radius, TOUCH, s.grid, s.head, s.link, s.axis,
+                p[0],
+                p[1],
+                q[0],
+                q[1],
+                self.step,
+                self.radius,
+                TOUCH,
+                s.grid,
+                s.head,
+                s.link,
+                s.axis,
                 *self.reach.arguments(),
-            )  # fmt: skip
+            )
         )
 
     def _pass_from(self, k: int) -> bool:
@@ -228,9 +255,12 @@ class _Run:
             self.passes += 1
             self.add(rows[:, 0:2], CUT, rows[:, 3], rows[:, 2], rows[:, 4])
             self.area += float(rows[:, 5].sum())
+            self.lately.append((float(rows[:, 5].sum()), *rows[:, 0:2].mean(axis=0).tolist()))
             self.ends[reason] += 1
             if reason == "front-blocked":
-                text = f"pass {self.passes} stops: no turn keeps the engagement within {math.degrees(self.limit):.4g} deg"
+                text = (
+                    f"pass {self.passes} stops: no turn keeps the engagement within {math.degrees(self.limit):.4g} deg"
+                )
                 self.events.append(Event(reason, float(at[0]), float(at[1]), text))
             self.starts.add(rows[:, 0:2], headings)
             self.progress(min(0.99, self.area / self.reachable.area), f"front, pass {self.passes}")

@@ -25,7 +25,7 @@ MOST = 20
 
 
 def swept(points: Floats, breaks: NDArray[np.bool_], radius: float) -> shapely.Geometry:
-    """Union of the discs of ``radius`` [mm] along the polyline ``points`` (n, 2); a true break has no leg to its row."""
+    """Union of the discs of ``radius`` [mm] along the polyline ``points`` (n, 2); no leg leads to a true break."""
     out = []
     at = np.flatnonzero(breaks)
     for a, b in zip(at, np.append(at[1:], len(points)), strict=True):
@@ -41,15 +41,12 @@ def leftover(
 ) -> tuple[float, tuple[Contour, ...], list[tuple[float, tuple[float, float]]]]:
     """Area [mm^2] left, contours of the pieces that are no mere film, and (area, place) of each, greatest first."""
     rest = shapely.difference(reachable.flatten(1e-5 * radius), swept(points, breaks, radius))
-    pieces = []
-    for g in shapely.get_parts(rest):
-        if g.area > 0.0 and not shapely.is_empty(shapely.buffer(g, -0.5 * NARROW * radius)):
-            pieces.append(g)
+    solid = [g for g in shapely.get_parts(rest) if g.area > 0.0]
+    pieces = [g for g in solid if not shapely.is_empty(shapely.buffer(g, -0.5 * NARROW * radius))]
     pieces.sort(key=lambda g: -g.area)
-    contours, places = [], []
-    for g in pieces:
-        for ring in (g.exterior, *g.interiors):
-            contours.append(Contour.polyline(np.asarray(ring.coords)[:-1], closed=True))
+    rings = [ring for g in pieces for ring in (g.exterior, *g.interiors)]
+    contours = [Contour.polyline(np.asarray(ring.coords)[:-1], closed=True) for ring in rings]
+    places = []
     for g in pieces[:MOST]:
         p = g.representative_point()
         places.append((float(g.area), (float(p.x), float(p.y))))

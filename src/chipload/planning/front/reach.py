@@ -45,7 +45,8 @@ def centre_region(region: Region, distance: float) -> Region:
 
 def inner_points(contour: Contour, chord: float) -> Floats:
     """(m, 2) vertices [mm] of a polygon inside a closed contour of the centre region: chords where the arc bends
-    around the inside, tangents where the inside bends around the arc; at most ``chord`` [mm] off."""
+    around the inside, tangents where the inside bends around the arc; at most ``chord`` [mm] off.
+    """
     out = []
     for (x0, y0, _, _, xc, yc, sweep), r in zip(contour.segments, contour.radii, strict=True):
         out.append([x0, y0])

@@ -40,6 +40,7 @@ class Starts:
         self.first: NDArray[np.bool_] = np.zeros(0, dtype=bool)
         self.alive: NDArray[np.bool_] = np.zeros(0, dtype=bool)
         self.open: NDArray[np.bool_] = np.zeros(0, dtype=bool)
+        self.fresh: NDArray[np.bool_] = np.zeros(0, dtype=bool)  # not looked at since the stock near it changed
 
     def add(self, points: Floats, headings: Floats) -> None:
         """Places of a pass: right side in its order, left side in the other, and ahead of where it ended."""
@@ -55,27 +56,34 @@ class Starts:
         self.rank = np.concatenate([self.rank, np.repeat([0, 2, 3], [n, n, 3])])
         self.first = np.concatenate([self.first, first])
         self.alive = np.concatenate([self.alive, np.ones(len(p), dtype=bool)])
-        self.open = np.zeros(len(self.p), dtype=bool)
+        self.open = np.concatenate([self.open, np.zeros(len(p), dtype=bool)])
+        self.fresh = np.concatenate([self.fresh, np.ones(len(p), dtype=bool)])
+        reach = 2.2 * self.radius  # a rim that far away meets nothing that this pass took
+        near = (self.p >= points.min(axis=0) - reach) & (self.p <= points.max(axis=0) + reach)
+        self.fresh |= near.all(axis=1)
 
     def revive(self) -> None:
         """Let every place be looked at again."""
-        self.alive[:] = True
+        self.alive[:] = self.fresh[:] = True
 
     def look(self, stock: PlanarStock, reach: Reach, depth: float) -> None:
-        """Find the open places: material within ``depth`` x R beside them that the cutter may go to."""
-        k = np.flatnonzero(self.alive)
+        """Find the open places: material within ``depth`` x R beside them that the cutter may go to.
+
+        Only those near the last pass are asked again: elsewhere the stock is as it was.
+        """
+        k = np.flatnonzero(self.alive & self.fresh)
         out = np.zeros(len(k), dtype=bool)
         _kernels.open_sides(
             self.p[k], self.normal[k], depth * self.radius, LEAST, self.radius, TOUCH,
             stock.grid, stock.head, stock.link, stock.axis, *reach.arguments(), out,
         )  # fmt: skip
-        self.open[:] = False
-        self.open[k] = out
-        self.alive[k] = out
+        self.open[k] = self.alive[k] = out
+        self.fresh[:] = False
 
     def nearest(self, at: Floats, linked: Callable[[Floats], bool]) -> int | None:
         """The start to go to: of the long runs on the right side, else of the short ones, else of the left side, else
-        ahead of a pass's end, the nearest that a straight link reaches, else the nearest."""
+        ahead of a pass's end, the nearest that a straight link reaches, else the nearest.
+        """
         before = np.concatenate([[False], self.open[:-1]])
         k = np.flatnonzero(self.open & (self.first | ~before))
         if len(k) == 0:
@@ -100,6 +108,11 @@ class Starts:
             if i > k and (self.first[i] or not self.open[i]):
                 break
             self.alive[i] = self.open[i] = False
+
+    def abandon(self, centre: Floats, far: float) -> None:
+        """Places within ``far`` of a centre are not tried again until :meth:`revive`."""
+        near = np.hypot(*(self.p - centre).T) <= far
+        self.alive[near] = self.open[near] = False
 
     def ways(self, k: int) -> Iterator[tuple[float, float, float]]:
         """(x, y, heading) to begin with for the start k: a little before it on its own path, then at it."""
