@@ -1,7 +1,5 @@
 """The trail alone reproduces the closed forms of engagement."""
 
-import time
-
 import numpy as np
 import pytest
 
@@ -135,24 +133,6 @@ def test_workers_do_not_matter():
     one, two = (rim_engagement(trail, np.full(101, 3), w, workers=n) for n in (1, 2))
     assert (one.angle == two.angle).all()
     assert (one.phi == two.phi).all()
-
-
-def test_speed():
-    n = 50_000
-    a = np.linspace(0, 80 * np.pi, n + 1)
-    p = (0.5 + 0.8 * a / (2 * np.pi))[:, None] * np.column_stack([np.cos(a), np.sin(a)])
-    trail = Trail(np.column_stack([p[:-1], p[1:], np.zeros((n, 3))]), R)
-    rim_engagement(trail, [0], [0.5])
-    k = np.arange(0, n, 2)
-    rate = []
-    for _ in range(3):  # the machine may be shared
-        begun = time.perf_counter()
-        rim = rim_engagement(trail, k, np.full(len(k), 0.5), workers=2)
-        rate.append(len(k) / (time.perf_counter() - begun))
-        if rate[-1] > 2e4:
-            break
-    assert rim.count[-1] == 1
-    assert max(rate) > 2e4
 
 
 def test_open_chain_bounds_a_half_plane():
