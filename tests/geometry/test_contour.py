@@ -106,3 +106,11 @@ def test_a_gap_is_refused_with_its_place():
 def test_an_open_chain_has_no_area():
     with pytest.raises(InputError, match=r"^contour: an open chain has no area; close it first$"):
         _ = Contour.polyline([[0, 0], [1, 0]]).area
+
+
+def test_short_segments_are_dropped_and_their_neighbours_meet():
+    near = 0.9e-7
+    points = [(0, 0), (10, 0), (10 + near, 0), (10 + near, near), (10, 10), (0, 10), (0, near)]
+    for closed in (True, False):
+        c = Contour.from_bulges(points, np.zeros(len(points)), closed)
+        assert (c.segments[1:, 0:2] == c.segments[:-1, 2:4]).all()

@@ -86,6 +86,9 @@ class Contour:
             p, q, b = p[:-1], q[:-1], b[: len(p) - 1]
         keep = np.hypot(*(q - p).T) > JOIN_MM
         p, q, b = p[keep], q[keep], b[keep]
+        q[:-1] = p[1:]  # where a short one was dropped its neighbours meet
+        if closed and len(q):
+            q[-1] = p[0]
         sweep = 4.0 * np.arctan(b)
         arc = 0.5 * np.abs(b) * np.hypot(*(q - p).T) > FLAT_MM
         bb = np.where(arc, b, 1.0)

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.planning.front import _kernels
-from chipload.planning.front.leftover import leftover
+from chipload.planning.front.leftover import leftover, widest_left
 from chipload.planning.front.reach import CHORD, Reach, centre_region, reach_of, widest_places
 from chipload.planning.front.starts import Starts
 from chipload.planning.result import Event
@@ -44,6 +44,8 @@ TURN_RIGHT = 0.4
 TURN_LEFT = math.radians(100.0)
 #: length / R without material that ends a pass
 IDLE = 1.5
+#: entries at most besides the first of each part, and the room / R that one needs
+ENTRIES, LEAST_ROOM = 50, 0.02
 #: so many passes within 2 R that take less than this part of R^2 each are given up
 SLOW_PASSES, SLOW_AREA = 100, 0.02
 #: steps between two calls of ``progress``
@@ -145,6 +147,7 @@ def clear_region(
     for x, y, room in widest_places(centres, CHORD * radius):
         run.enter(x, y, room)
         run.clear()
+    run.enter_elsewhere()
     return run.result()
 
 
@@ -194,6 +197,19 @@ class _Run:
         )
         heading = np.arctan2(*(ring[1:] - ring[:-1]).T[::-1])
         self.starts.add(ring[1:], heading)
+
+    def enter_elsewhere(self) -> None:
+        """Bores into what no pass came to, the widest place first, as long as that clears anything."""
+        for _ in range(ENTRIES):
+            rows = np.vstack(self.rows)
+            x, y, room = widest_left(self.reachable, self.centres, rows[:, 0:2], rows[:, 2] >= LIFT, self.radius)
+            if room < LEAST_ROOM * self.radius:
+                break
+            before = self.area
+            self.enter(x, y, room)
+            self.clear()
+            if self.area - before < 1e-3 * self.radius**2:
+                break
 
     def clear(self) -> None:
         """Passes until nothing more is found beside the path, or there are far more steps than there should be."""

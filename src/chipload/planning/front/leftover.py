@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from chipload.geometry.contour import Contour, Region
 
 Floats = NDArray[np.float64]
+Place = tuple[float, float, float]
 
 #: corners of a buffer in a quarter turn
 CORNERS = 128
@@ -22,6 +23,8 @@ CHUNK = 64
 NARROW = 2e-3
 #: most pieces that are reported one by one
 MOST = 20
+#: side / R of a square of material beyond which another entry is worth it
+WORTH = 0.5
 
 
 def swept(points: Floats, breaks: NDArray[np.bool_], radius: float) -> shapely.Geometry:
@@ -51,3 +54,20 @@ def leftover(
         p = g.representative_point()
         places.append((float(g.area), (float(p.x), float(p.y))))
     return float(rest.area), tuple(contours), places
+
+
+def widest_left(reachable: Region, centres: Region, points: Floats, breaks: NDArray[np.bool_], radius: float) -> Place:
+    """(x, y, room) [mm]: the middle of the widest place of what is left where the cutter's centre may go, and its
+    distance from where it may not; room 0 where there is none.
+    """
+    rest = shapely.difference(reachable.flatten(1e-4 * radius), swept(points, breaks, radius))
+    allowed = centres.flatten(1e-4 * radius)
+    best = (0.0, 0.0, 0.0)
+    for piece in shapely.get_parts(shapely.intersection(rest, allowed)):
+        if piece.area > (WORTH * radius) ** 2:
+            line = shapely.maximum_inscribed_circle(piece, tolerance=1e-3 * radius)
+            x, y = shapely.get_coordinates(line)[0]
+            width, room = shapely.length(line), shapely.distance(shapely.points(x, y), allowed.boundary)
+            if width > best[2]:
+                best = (float(x), float(y), float(min(room, 10.0 * radius)))
+    return best

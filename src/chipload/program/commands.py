@@ -1,0 +1,181 @@
+"""Commands: what a text tells the axes of a machine to do, motion after motion, in columns.
+
+Every reader of NC text ends here and every writer of it starts here; :mod:`chipload.program.axes` leads to and from a
+:class:`~chipload.program.program.Program`, which knows the workpiece and no axes. Positions are as LinuxCNC's canonical
+commands give them: in the coordinates that are active, so that offsets, the offset of G92, the rotation and the tool's
+length are kept beside them, in ``frames``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: the axes of ``Commands.position``, in its columns: X Y Z U V W in mm, A B C in rad
+LETTERS = "XYZABCUVW"
+#: values of ``Commands.motion``; PROBE is a straight feed that a touch may end earlier
+RAPID, LINE, ARC, DWELL, PROBE = 0, 1, 2, 3, 4
+#: values of ``Commands.plane``: the coordinates that an arc turns in, and the one that it may rise along
+XY, ZX, YZ = 0, 1, 2
+#: columns of ``position`` by plane: first, second, along
+PLANE_AXES = ((0, 1, 2), (2, 0, 1), (1, 2, 0))
+
+
+def _zeros() -> Floats:
+    return np.zeros(9)
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """How the coordinates of a text lie in those of the machine.
+
+    ``machine = rotate_xy(position + shift, rotation) + offset + tool``, with the rotation about Z.
+
+    Parameters
+    ----------
+    number : of the work offset: 1 for G54 to 9 for G59.3; 0 for the machine's own coordinates
+    offset : (9,) float [mm, rad], origin of the work offset
+    rotation : of the work offset [rad]
+    shift : (9,) float [mm, rad], of G92 and G52
+    tool : (9,) float [mm, rad], length offset of the tool
+    """
+
+    number: int = 1
+    offset: Floats = field(default_factory=_zeros)
+    rotation: float = 0.0
+    shift: Floats = field(default_factory=_zeros)
+    tool: Floats = field(default_factory=_zeros)
+
+    def __post_init__(self) -> None:
+        for name in ("offset", "shift", "tool"):
+            value = np.array(getattr(self, name), dtype=np.float64)
+            if value.shape != (9,) or not np.isfinite(value).all():
+                raise InputError(f"frame.{name}: must be nine finite numbers, one for each of {' '.join(LETTERS)}")
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    def to_machine(self, position: Floats) -> Floats:
+        """(n, 9) of the machine, less nothing: of its own axes, from (n, 9) in this frame."""
+        p = position + self.shift
+        c, s = math.cos(self.rotation), math.sin(self.rotation)
+        x, y = c * p[:, 0] - s * p[:, 1], s * p[:, 0] + c * p[:, 1]
+        p[:, 0], p[:, 1] = x, y
+        return p + self.offset + self.tool
+
+    def from_machine(self, axes: Floats) -> Floats:
+        """(n, 9) in this frame from (n, 9) of the machine's axes."""
+        p = axes - self.offset - self.tool
+        c, s = math.cos(self.rotation), math.sin(self.rotation)
+        x, y = c * p[:, 0] + s * p[:, 1], -s * p[:, 0] + c * p[:, 1]
+        p[:, 0], p[:, 1] = x, y
+        return p - self.shift
+
+
+@dataclass(frozen=True, eq=False)
+class Commands:
+    """Motions in columns; row k goes from the position of row k - 1 to its own. Row 0 comes from where the machine is.
+
+    Parameters
+    ----------
+    motion : (n,) int
+        RAPID, LINE, ARC, DWELL or PROBE.
+    position : (n, 9) float [mm, rad]
+        End of the motion, X Y Z A B C U V W in the coordinates of its frame.
+    plane : (n,) int
+        XY (G17), ZX (G18) or YZ (G19); matters for arcs alone.
+    centre : (n, 2) float [mm]
+        Centre of an arc, in the first and second coordinate of its plane; 0, 0 elsewhere.
+    turns : (n,) int
+        Of an arc: +1 counter-clockwise seen from the positive side of the plane, +2 with a whole turn before, ...;
+        negative clockwise; 0 elsewhere.
+    feed : (n,) float [mm/s]
+        Of LINE, ARC and PROBE along X Y Z, or U V W where those stand, or [rad/s] where only A B C move; 0 for RAPID;
+        of a DWELL the time [s].
+    spindle : (n,) float [rad/s]
+        Positive clockwise (M3), 0 stopped.
+    tool : (n,) int
+        Number of the tool in the spindle, 0 none.
+    tcp : (n,) bool
+        Whether X Y Z are the tip in the workpiece that the rotary axes carry (G43.4, TRAORI, M128).
+    frame : (n,) int
+        Index into ``frames``.
+    line : (n,) int
+        Line of the text, from 1; 0 where there is none.
+    label : (n,) int
+        Index into ``labels``.
+    frames : tuple of Frame
+    labels : tuple of str
+
+    Raises
+    ------
+    InputError
+        Columns differ in length, a value is not finite, an index or a code is unknown.
+    """
+
+    motion: Ints
+    position: Floats
+    plane: Ints
+    centre: Floats
+    turns: Ints
+    feed: Floats
+    spindle: Floats
+    tool: Ints
+    tcp: NDArray[np.bool_]
+    frame: Ints
+    line: Ints
+    label: Ints
+    frames: tuple[Frame, ...]
+    labels: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        n = len(self.motion)
+        kinds = {"position": np.float64, "centre": np.float64, "feed": np.float64, "spindle": np.float64, "tcp": bool}
+        shapes = {"position": (n, 9), "centre": (n, 2)}
+        for f in fields(self):
+            if f.name in ("frames", "labels"):
+                continue
+            column = np.array(getattr(self, f.name), dtype=kinds.get(f.name, np.int64))
+            if column.shape != shapes.get(f.name, (n,)):
+                raise InputError(f"commands.{f.name}: shape {column.shape}: must be {shapes.get(f.name, (n,))}")
+            if not np.isfinite(column).all():
+                raise InputError(f"commands.{f.name}: a value is not a finite number")
+            column.setflags(write=False)
+            object.__setattr__(self, f.name, column)
+        most = {"motion": PROBE, "plane": YZ, "frame": len(self.frames) - 1, "label": len(self.labels) - 1}
+        for name, top in most.items():
+            column = getattr(self, name)
+            if n and (column.min() < 0 or column.max() > top):
+                raise InputError(f"commands.{name} = {column.min()}..{column.max()}: must be from 0 to {top}")
+
+    def __len__(self) -> int:
+        return len(self.motion)
+
+    def machine(self) -> Floats:
+        """(n, 9) positions of the machine's own axes [mm, rad], offsets and the tool's length put in."""
+        out = np.zeros((len(self), 9))
+        for k, frame in enumerate(self.frames):
+            rows = self.frame == k
+            if rows.any():
+                out[rows] = frame.to_machine(self.position[rows])
+        return out
+
+
+def commands_from_rows(rows: Sequence[tuple], frames: Sequence[Frame], labels: Sequence[str]) -> Commands:  # type: ignore[type-arg]
+    """Commands from rows ``(motion, (9 numbers), plane, (2 numbers), turns, feed, spindle, tool, tcp, frame, line,
+    label)``, in the order of the columns.
+    """
+    columns = list(zip(*rows, strict=True)) if rows else [[] for _ in range(12)]
+    names = [f.name for f in fields(Commands)][:12]
+    values = dict(zip(names, columns, strict=True))
+    values["position"] = np.array(values["position"], dtype=np.float64).reshape(-1, 9)
+    values["centre"] = np.array(values["centre"], dtype=np.float64).reshape(-1, 2)
+    return Commands(**values, frames=tuple(frames), labels=tuple(labels))
