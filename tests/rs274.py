@@ -123,7 +123,7 @@ def compare(motions: list[Motion], program, *, mm: float = 1e-4, unit: float = 1
             assert np.abs(np.array(got.end)[:2] - end[:2]).max() <= mm, where
             queue.pop(0)
             got = queue[0] if queue else None
-        radius = math.hypot(*(end[:2] - program.centre[k]))
+        radius = math.hypot(*(end[:2] - program.centre[k, :2]))
         plane = math.hypot(*(end[:2] - before[:2]))
         flat = kind == "arc" and (plane**2 / (8.0 * max(radius, unit)) <= unit or plane <= 3.0 * unit)
         match = got is not None and np.abs(np.array(got.end) - end).max() <= mm
@@ -137,7 +137,7 @@ def compare(motions: list[Motion], program, *, mm: float = 1e-4, unit: float = 1
             continue
         queue.pop(0)
         if got.kind == "arc":
-            assert np.abs(np.array(got.centre) - program.centre[k]).max() <= mm, f"{where}: got {got}"
+            assert np.abs(np.array(got.centre) - program.centre[k, :2]).max() <= mm, f"{where}: got {got}"
             assert got.turns == (1 if program.motion[k] == 3 else -1), f"{where}: got {got}"
         if kind == "dwell":
             assert abs(got.seconds - program.feed[k]) <= 1e-4, where

@@ -15,21 +15,21 @@ from chipload.simulation.trail import Trail, rim_engagement
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[3] / "shared" / "data")) / "cad" / "dxf_hsm_nibbler"
 #: drawing -> cutter radius [mm]; the radial depth is a fifth of it
 POCKETS = {
-    "arcs": 6.0,
+    "arcs": 4.0,
     "circle": 3.0,
     "circle_point": 8.0,
-    "curve": 10.0,
-    "diverging_lines": 10.0,
+    "curve": 6.0,
+    "diverging_lines": 6.0,
     "gear": 3.0,
-    "hextest": 5.0,
-    "octagon": 6.0,
-    "square1": 6.0,
-    "square2": 6.0,
-    "square_circle": 6.0,
-    "squiffey": 12.0,
-    "squiffey2": 12.0,
-    "taper": 10.0,
-    "thrash": 12.0,
+    "hextest": 4.0,
+    "missing_arc": 4.0,
+    "octagon": 5.0,
+    "square1": 3.0,
+    "square2": 3.0,
+    "square_circle": 4.0,
+    "squiffey": 8.0,
+    "squiffey2": 8.0,
+    "taper": 5.0,
 }
 
 

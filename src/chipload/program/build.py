@@ -34,7 +34,8 @@ def rows(
 
     Parameters
     ----------
-    motion : (n,) int; points : (n, 3) float [mm]; centre : (n, 2) or (2,) float [mm]; feed : (n,) or float [mm/s]
+    motion : (n,) int; points : (n, 3) float [mm]; feed : (n,) or float [mm/s]
+    centre : (n, 2) or (2,) float [mm], of arcs in the XY plane
     spindle : [rad/s], negative for counter-clockwise (M4)
     """
     p = np.asarray(points, dtype=np.float64).reshape(-1, 3)
@@ -43,7 +44,9 @@ def rows(
         motion=np.broadcast_to(np.asarray(motion, dtype=np.int64), (n,)),
         p_work=p,
         axis=np.tile([0.0, 0.0, 1.0], (n, 1)),
-        centre=np.broadcast_to(np.asarray(centre, dtype=np.float64), (n, 2)),
+        centre=np.column_stack([np.broadcast_to(np.asarray(centre, dtype=np.float64), (n, 2)), np.zeros(n)]),
+        normal=np.tile([0.0, 0.0, 1.0], (n, 1)),
+        turns=np.zeros(n, dtype=np.int64),
         feed=np.broadcast_to(np.asarray(feed, dtype=np.float64), (n,)),
         spindle=np.full(n, float(spindle)),
         tool=np.full(n, tool),

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Row = tuple[Any, ...]
 
 #: the axes of ``Commands.position``, in its columns: X Y Z U V W in mm, A B C in rad
 LETTERS = "XYZABCUVW"
@@ -169,13 +171,13 @@ class Commands:
         return out
 
 
-def commands_from_rows(rows: Sequence[tuple], frames: Sequence[Frame], labels: Sequence[str]) -> Commands:  # type: ignore[type-arg]
+def commands_from_rows(rows: Sequence[Row], frames: Sequence[Frame], labels: Sequence[str]) -> Commands:
     """Commands from rows ``(motion, (9 numbers), plane, (2 numbers), turns, feed, spindle, tool, tcp, frame, line,
     label)``, in the order of the columns.
     """
-    columns = list(zip(*rows, strict=True)) if rows else [[] for _ in range(12)]
+    columns = list(zip(*rows, strict=True)) if rows else [()] * 12
     names = [f.name for f in fields(Commands)][:12]
-    values = dict(zip(names, columns, strict=True))
+    values: dict[str, Any] = dict(zip(names, columns, strict=True))
     values["position"] = np.array(values["position"], dtype=np.float64).reshape(-1, 9)
     values["centre"] = np.array(values["centre"], dtype=np.float64).reshape(-1, 2)
     return Commands(**values, frames=tuple(frames), labels=tuple(labels))

@@ -1,7 +1,8 @@
 """What the rows of a program are in space: sweep, length, ends' directions, bounds.
 
-Notation: row k goes from the end of row k - 1 to its own end; row 0 has no length. ``sweep`` [rad] is the angle that an
-arc turns through in the XY plane, positive counter-clockwise, 0 for all else; equal ends are a full turn.
+Notation: row k goes from the end of row k - 1 to its own end; row 0 has no length. An arc turns about the axis through
+its ``centre`` along its unit ``normal`` n; e1, e2 span its plane, e1 x e2 = n. ``sweep`` [rad] is the angle that it
+turns through, positive counter-clockwise about n, 0 for all else; ends over one another are a full turn.
 """
 
 from __future__ import annotations
@@ -28,20 +29,47 @@ def starts(program: Program) -> Floats:
     return np.vstack([program.p_work[:1], program.p_work[:-1]])
 
 
+def bases(normal: Floats) -> tuple[Floats, Floats]:
+    """(n, 3), (n, 3) unit vectors e1, e2 with e1 x e2 = ``normal`` (n, 3).
+
+    X, Y for +Z; Z, X for +Y; Y, Z for +X: the order in which controllers name the coordinates of G17, G18 and G19.
+    """
+    along = np.argmax(np.abs(normal), axis=1)
+    e1 = np.eye(3)[(along + 1) % 3]
+    e1 = e1 - (e1 * normal).sum(axis=1)[:, None] * normal
+    e1 /= np.linalg.norm(e1, axis=1)[:, None]
+    return e1, np.cross(normal, e1) + 0.0
+
+
+def arms(program: Program) -> tuple[Floats, Floats]:
+    """(n, 2), (n, 2) start and end of each arc from its axis, along e1 and e2 [mm]; 0 for all else."""
+    e1, e2 = bases(program.normal)
+    arc = is_arc(program)[:, None]
+    v0, v1 = (p - program.centre for p in (starts(program), program.p_work))
+    first = np.column_stack([(v0 * e1).sum(axis=1), (v0 * e2).sum(axis=1)])
+    last = np.column_stack([(v1 * e1).sum(axis=1), (v1 * e2).sum(axis=1)])
+    return np.where(arc, first, 0.0), np.where(arc, last, 0.0)
+
+
+def rises(program: Program) -> Floats:
+    """(n,) how far each arc moves along its normal [mm], 0 for all else."""
+    d = program.p_work - starts(program)
+    return np.where(is_arc(program), (d * program.normal).sum(axis=1), 0.0)
+
+
 def sweeps(program: Program) -> Floats:
-    """(n,) signed sweep [rad]; an arc whose ends are one point within ``JOIN_MM`` turns fully.
+    """(n,) signed sweep [rad]; an arc whose ends lie over one another within ``JOIN_MM`` turns fully.
 
     >>> from chipload.program.build import plunge, rapid, rows
     >>> half = rows([3], [[-1.0, 0.0, 0.0]], (0.0, 0.0), 5.0, 0.0, 1, "cut")
     >>> float(sweeps(Program.join([rapid([1.0, 0.0, 0.0], 0.0, 1, "link"), half]))[1]) / math.pi
     1.0
     """
-    p0, p1 = starts(program)[:, 0:2], program.p_work[:, 0:2]
-    v0, v1 = p0 - program.centre, p1 - program.centre
+    v0, v1 = arms(program)
     turn = np.arctan2(v0[:, 0] * v1[:, 1] - v0[:, 1] * v1[:, 0], (v0 * v1).sum(axis=1))
     sense = np.where(program.motion == ARC_CCW, 1.0, -1.0)
     sweep = (sense * turn) % math.tau
-    sweep = np.where(np.hypot(*(p1 - p0).T) <= JOIN_MM, math.tau, sweep)
+    sweep = np.where(np.hypot(*(v1 - v0).T) <= JOIN_MM, math.tau, sweep) + math.tau * program.turns
     sweep = np.where(is_arc(program), sense * sweep, 0.0)
     sweep[:1] = 0.0
     return sweep
@@ -49,29 +77,27 @@ def sweeps(program: Program) -> Floats:
 
 def radii(program: Program) -> Floats:
     """(n,) radius of each arc at its end [mm], 0 for all else."""
-    v = program.p_work[:, 0:2] - program.centre
-    return np.where(is_arc(program), np.hypot(v[:, 0], v[:, 1]), 0.0)
+    v = arms(program)[1]
+    return np.hypot(v[:, 0], v[:, 1])
 
 
 def lengths(program: Program) -> Floats:
-    """(n,) length of each row [mm]: chord, arc, or helix sqrt((r sweep)^2 + dz^2)."""
-    d = program.p_work - starts(program)
-    around = np.where(is_arc(program), radii(program) * np.abs(sweeps(program)), np.hypot(d[:, 0], d[:, 1]))
-    return np.where(program.motion == DWELL, 0.0, np.hypot(around, d[:, 2]))
+    """(n,) length of each row [mm]: chord, arc, or helix sqrt((r sweep)^2 + rise^2)."""
+    chord = np.linalg.norm(program.p_work - starts(program), axis=1)
+    bent = np.hypot(radii(program) * sweeps(program), rises(program))
+    return np.where(program.motion == DWELL, 0.0, np.where(is_arc(program), bent, chord))
 
 
 def directions(program: Program) -> tuple[Floats, Floats]:
     """(n, 3), (n, 3) unit directions of travel at the start and the end of each row; 0 where it has no length."""
-    p0, p1 = starts(program), program.p_work
-    d = p1 - p0
+    d = program.p_work - starts(program)
     first, last = d.copy(), d.copy()
-    arc = is_arc(program)
-    sense = np.where(program.motion == ARC_CCW, 1.0, -1.0)
-    turn = np.abs(sweeps(program))
-    for out, p in ((first, p0), (last, p1)):
-        v = p[:, 0:2] - program.centre
-        out[arc, 0] = (-sense * turn * v[:, 1])[arc]
-        out[arc, 1] = (sense * turn * v[:, 0])[arc]
+    arc, sweep = is_arc(program), sweeps(program)
+    e1, e2 = bases(program.normal)
+    along = rises(program)[:, None] * program.normal
+    for out, v in zip((first, last), arms(program), strict=True):
+        around = sweep[:, None] * (v[:, :1] * e2 - v[:, 1:] * e1) + along
+        out[arc] = around[arc]
         size = np.linalg.norm(out, axis=1)
         out /= np.where(size > 0.0, size, 1.0)[:, None]
     still = lengths(program) == 0.0
@@ -80,22 +106,32 @@ def directions(program: Program) -> tuple[Floats, Floats]:
 
 
 def bounds(program: Program) -> tuple[Floats, Floats]:
-    """(n, 3), (n, 3) least and greatest coordinates [mm] that each row reaches, the bulge of arcs included."""
+    """(n, 3), (n, 3) least and greatest coordinates [mm] that each row reaches, the bulge of arcs included.
+
+    Exact but for helical arcs whose normal is no axis of coordinates: those may be given too much, never too little.
+    """
     p0, p1 = starts(program), program.p_work
     low, high = np.minimum(p0, p1), np.maximum(p0, p1)
-    sweep, r = sweeps(program), radii(program)
-    v0 = p0[:, 0:2] - program.centre
+    sweep, r, rise = sweeps(program), radii(program), rises(program)
+    turning = sweep != 0.0
+    if not turning.any():
+        return low, high
+    e1, e2 = bases(program.normal)
+    v0 = arms(program)[0]
     a0 = np.arctan2(v0[:, 1], v0[:, 0])
-    sense = np.sign(sweep)
-    for quarter in range(4):
-        along = (sense * (quarter * 0.5 * math.pi - a0)) % math.tau
-        hit = (sweep != 0.0) & (along <= np.abs(sweep))
-        x = program.centre[:, 0] + r * round(math.cos(quarter * 0.5 * math.pi))
-        y = program.centre[:, 1] + r * round(math.sin(quarter * 0.5 * math.pi))
-        low[:, 0] = np.where(hit, np.minimum(low[:, 0], x), low[:, 0])
-        low[:, 1] = np.where(hit, np.minimum(low[:, 1], y), low[:, 1])
-        high[:, 0] = np.where(hit, np.maximum(high[:, 0], x), high[:, 0])
-        high[:, 1] = np.where(hit, np.maximum(high[:, 1], y), high[:, 1])
+    foot = p0 - v0[:, :1] * e1 - v0[:, 1:] * e2
+    for i in range(3):
+        reach = r * np.hypot(e1[:, i], e2[:, i])
+        top = np.arctan2(e2[:, i], e1[:, i])
+        climb = rise * program.normal[:, i]
+        for sign, turn in ((1.0, 0.0), (-1.0, math.pi)):
+            along = (np.sign(sweep) * (top + turn - a0)) % math.tau
+            hit = turning & ((along <= np.abs(sweep)) | (np.abs(climb) > 1e-9)) & (reach > 1e-12)
+            value = foot[:, i] + sign * (reach + np.maximum(0.0, sign * climb))
+            if sign > 0.0:
+                high[:, i] = np.where(hit, np.maximum(high[:, i], value), high[:, i])
+            else:
+                low[:, i] = np.where(hit, np.minimum(low[:, i], value), low[:, i])
     return low, high
 
 
@@ -116,13 +152,17 @@ def straightened(program: Program, turn: Floats) -> Program:
     count[chosen] = np.ceil(np.abs(sweep[chosen]) / turn[chosen] - 1e-9).astype(np.int64).clip(1)
     row = np.repeat(np.arange(len(program)), count)
     u = ((np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + 1) / count[row])[:, None]
-    p0, p1 = starts(program)[row], program.p_work[row]
-    v = p0[:, 0:2] - program.centre[row]
+    p0, v = starts(program)[row], arms(program)[0][row]
+    e1, e2 = (e[row] for e in bases(program.normal))
     angle = (sweep[row] * u[:, 0])[:, None]
-    around = program.centre[row] + np.cos(angle) * v + np.sin(angle) * np.column_stack([-v[:, 1], v[:, 0]])
+    c, s = np.cos(angle), np.sin(angle)
+    foot = p0 - v[:, :1] * e1 - v[:, 1:] * e2 + (rises(program)[row] * u[:, 0])[:, None] * program.normal[row]
+    around = foot + (c * v[:, :1] - s * v[:, 1:]) * e1 + (s * v[:, :1] + c * v[:, 1:]) * e2
     inner = (chosen[row] & (u[:, 0] < 1.0))[:, None]
-    points = np.where(inner, np.column_stack([around, (p0 + (p1 - p0) * u)[:, 2]]), p1)
+    points = np.where(inner, around, program.p_work[row])
     columns = {f.name: getattr(program, f.name)[row] for f in fields(Program) if f.name != "labels"}
     columns["motion"] = np.where(chosen[row], LINE, program.motion[row])
     columns["centre"] = np.where(chosen[row][:, None], 0.0, program.centre[row])
+    columns["normal"] = np.where(chosen[row][:, None], (0.0, 0.0, 1.0), program.normal[row])
+    columns["turns"] = np.where(chosen[row], 0, program.turns[row])
     return Program(**{**columns, "p_work": points}, labels=program.labels)

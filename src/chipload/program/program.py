@@ -20,6 +20,13 @@ Ints = NDArray[np.int64]
 RAPID, LINE, ARC_CW, ARC_CCW, DWELL = 0, 1, 2, 3, 4
 #: the two radii of an arc may differ by as much [mm]
 ARC_SKEW_MM = 1e-3
+_VECTORS = ("p_work", "axis", "centre", "normal")
+
+
+def _from_axis(p: Floats, centre: Floats, normal: Floats) -> Floats:
+    """(n,) distance of points from the lines through ``centre`` along ``normal`` [mm]."""
+    v = p - centre
+    return np.asarray(np.linalg.norm(v - (v * normal).sum(axis=1)[:, None] * normal, axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,13 +36,18 @@ class Program:
     Parameters
     ----------
     motion : (n,) int
-        RAPID, LINE, ARC_CW, ARC_CCW (in the XY plane seen from +Z, helical where z changes) or DWELL.
+        RAPID, LINE, ARC_CW, ARC_CCW (clockwise, counter-clockwise about ``normal``, helical where it moves along it)
+        or DWELL.
     p_work : (n, 3) float [mm]
         End of the motion.
     axis : (n, 3) float
         Unit vector from the tip to the spindle at the end of the motion.
-    centre : (n, 2) float [mm]
-        Centre of an arc; 0, 0 elsewhere. Start equal to end is a full turn.
+    centre : (n, 3) float [mm]
+        A point of the axis that an arc turns about; 0, 0, 0 elsewhere. Start over end is a full turn.
+    normal : (n, 3) float
+        Unit vector along that axis, (0, 0, 1) for an arc in the XY plane and for all that is no arc.
+    turns : (n,) int
+        Whole turns of an arc before the one that it ends in, >= 0.
     feed : (n,) float [mm/s]
         Feed of LINE and ARC, > 0; 0 for RAPID; for DWELL the time [s].
     spindle : (n,) float [rad/s]
@@ -60,6 +72,8 @@ class Program:
     p_work: Floats
     axis: Floats
     centre: Floats
+    normal: Floats
+    turns: Ints
     feed: Floats
     spindle: Floats
     tool: Ints
@@ -72,10 +86,13 @@ class Program:
         for f in fields(self):
             if f.name == "labels":
                 continue
-            kind = np.float64 if f.name in ("p_work", "axis", "centre", "feed", "spindle") else np.int64
+            kind = np.float64 if f.name in (*_VECTORS, "feed", "spindle") else np.int64
             column = np.array(getattr(self, f.name), dtype=kind)
-            if len(column) != n:
-                raise InputError(f"program.{f.name}: {len(column)} rows: must be {n} as in program.motion")
+            shape = (n, 3) if f.name in _VECTORS else (n,)
+            if column.shape != shape:
+                raise InputError(
+                    f"program.{f.name}: shape {column.shape}: must be {shape} as program.motion has {n} rows"
+                )
             if not np.isfinite(column).all():
                 raise InputError(f"program.{f.name}: a value is not a finite number")
             column.setflags(write=False)
@@ -84,9 +101,13 @@ class Program:
         if (self.feed[cuts] <= 0.0).any():
             k = int(np.flatnonzero(cuts & (self.feed <= 0.0))[0])
             raise InputError(f"program row {k}: a cutting motion without a feed: set its feed")
+        for name in ("axis", "normal"):
+            if n and np.abs(np.linalg.norm(getattr(self, name), axis=1) - 1.0).max() > 1e-9:
+                raise InputError(f"program.{name}: must be unit vectors")
+        if n and self.turns.min() < 0:
+            raise InputError(f"program.turns = {self.turns.min()}: must be at least 0")
         arc = (self.motion[1:] == ARC_CW) | (self.motion[1:] == ARC_CCW)
-        r0 = np.hypot(*(self.p_work[:-1, 0:2] - self.centre[1:]).T)
-        r1 = np.hypot(*(self.p_work[1:, 0:2] - self.centre[1:]).T)
+        r0, r1 = (_from_axis(p, self.centre[1:], self.normal[1:]) for p in (self.p_work[:-1], self.p_work[1:]))
         skew = np.where(arc, np.abs(r1 - r0), 0.0)
         if len(skew) and skew.max() > ARC_SKEW_MM:
             k = int(skew.argmax())
@@ -94,8 +115,6 @@ class Program:
                 f"program row {k + 1}: an arc starts {r0[k]:.6g} mm from its centre and ends {r1[k]:.6g} mm from it: "
                 f"must agree within {ARC_SKEW_MM:g} mm"
             )
-        if n and np.abs(np.linalg.norm(self.axis, axis=1) - 1.0).max() > 1e-9:
-            raise InputError("program.axis: must be unit vectors")
 
     def __len__(self) -> int:
         return len(self.motion)

@@ -3,11 +3,12 @@
 Notation: L [mm] length of a row, v [mm/s] its feed or the rapid rate, a [mm/s^2], u unit direction of travel, theta
 [rad] the angle between the end of a row and the start of the next, delta [mm] the machine's corner tolerance.
 
-The rule: a row runs at min(v, sqrt(a_xy r)) on an arc of radius r, with the acceleration along the path that its axes
-can give together, a = min over axes of a_i / |u_i| (a_xy and a_z for arcs). Rows pass into one another at
-`corner_speed(theta, a, delta)`: a tangent joint without slowing, a corner as fast as an arc that rounds it off by delta
-allows. Between a rapid and a feed, at a dwell, a change of tool or of spindle, and at both ends, the machine stands.
-Acceleration is constant in pieces (no jerk limit); a change of tool and the spindle's run-up take no time.
+The rule: a row runs at min(v, sqrt(a_n r)) on an arc of radius r, with the acceleration along the path that its axes
+can give together, a = min over axes of a_i / |u_i|, |u_i| the greatest anywhere on an arc; a_n = min of a_i / the share
+of axis i in the arc's plane. Rows pass into one another at `corner_speed(theta, a, delta)`: a tangent joint without
+slowing, a corner as fast as an arc that rounds it off by delta allows. Between a rapid and a feed, at a dwell, a change
+of tool or of spindle, and at both ends, the machine stands. Acceleration is constant in pieces (no jerk limit); changing
+the tool and the spindle's run-up take no time.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from chipload.machine.feed import corner_speed, limited_speed, move_time
 from chipload.machine.machine import Machine
-from chipload.program.motions import directions, is_arc, lengths, radii, sweeps
+from chipload.program.motions import bases, directions, is_arc, lengths, radii, sweeps
 from chipload.program.program import DWELL, RAPID, Program
 
 Floats = NDArray[np.float64]
@@ -49,17 +50,20 @@ def program_time(program: Program, machine: Machine) -> Floats:
     first, last = directions(program)
     arc = is_arc(program)
     speed = np.where(program.motion == RAPID, machine.rapid, np.minimum(program.feed, machine.feed_max))
-    ax, ay, az = machine.acceleration
-    limit = np.where(arc[:, None], [machine.acceleration_xy, machine.acceleration_xy, az], [ax, ay, az])
+    e1, e2 = bases(program.normal)
+    climb = np.abs((first * program.normal).sum(axis=1))
+    level = np.sqrt(np.maximum(0.0, 1.0 - climb**2))
+    swing = np.hypot(e1, e2)
     along = np.abs(first)
-    along[arc, 0] = np.hypot(first[arc, 0], first[arc, 1])
-    along[arc, 1] = 0.0
+    along[arc] = (level[:, None] * swing + climb[:, None] * np.abs(program.normal))[arc]
+    limit = np.array(machine.acceleration)
     with np.errstate(divide="ignore"):
         a = (limit / along).min(axis=1)
-    level = np.where(arc, along[:, 0], 1.0)
+        inward = (limit / swing).min(axis=1)
     r = np.where(arc, radii(program), np.inf)
     turning = arc & (sweeps(program) != 0.0)
-    speed = np.where(turning, np.minimum(speed, np.sqrt(machine.acceleration_xy * r) / level), speed)
+    with np.errstate(divide="ignore"):
+        speed = np.where(turning, np.minimum(speed, np.sqrt(inward * r) / level), speed)
     # joints between rows that have a length
     here, there = row[:-1], row[1:]
     cos = (last[here] * first[there]).sum(axis=1)

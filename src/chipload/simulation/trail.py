@@ -264,14 +264,25 @@ def motion_rows(segments: Floats) -> Floats:
 
 
 def flat_motions(program: Program) -> Floats:
-    """(n, 7) the motions of a program in the plane; row 0 and dwells have no length."""
+    """(n, 7) the motions of a program in the plane; row 0 and dwells have no length.
+
+    Raises
+    ------
+    InputError
+        An arc lies in another plane than XY.
+    """
     p = program.p_work[:, 0:2]
     before = np.concatenate([p[:1], p[:-1]])
     arc = (program.motion == ARC_CW) | (program.motion == ARC_CCW)
-    v0, v1 = before - program.centre, p - program.centre
+    upright = np.abs(program.normal[:, 2]) > 1.0 - 1e-12
+    if (arc & ~upright).any():
+        k = int(np.flatnonzero(arc & ~upright)[0])
+        raise InputError(f"trail: the arc of row {k} is not in the XY plane: write it as chords first")
+    centre = program.centre[:, 0:2]
+    v0, v1 = before - centre, p - centre
     a0, a1 = np.arctan2(v0[:, 1], v0[:, 0]), np.arctan2(v1[:, 1], v1[:, 0])
-    turn = np.where(program.motion == ARC_CCW, 1.0, -1.0)
+    turn = np.where(program.motion == ARC_CCW, 1.0, -1.0) * np.where(program.normal[:, 2] < 0.0, -1.0, 1.0)
     sweep = (turn * (a1 - a0)) % (2.0 * np.pi)
     full = np.hypot(*(p - before).T) <= 1e-7
-    sweep = np.where(full, 2.0 * np.pi, sweep) * turn
-    return np.column_stack([before, p, np.where(arc[:, None], program.centre, 0.0), np.where(arc, sweep, 0.0)])
+    sweep = (np.where(full, 2.0 * np.pi, sweep) + 2.0 * np.pi * program.turns) * turn
+    return np.column_stack([before, p, np.where(arc[:, None], centre, 0.0), np.where(arc, sweep, 0.0)])

@@ -83,12 +83,12 @@ def write_apt(
         if not arc[k]:
             out.append(f"GOTO/{_numbers(end)}{axis}")
             continue
-        centre = _numbers((*program.centre[k], end[2]))
+        centre = _numbers((*program.centre[k, 0:2], end[2]))
         sense = "1" if sweep[k] > 0.0 else "-1"
         if abs(sweep[k]) > 1.5 * math.pi:
             a = 0.5 * sweep[k]
-            v = p0[k, 0:2] - program.centre[k]
-            half = program.centre[k] + math.cos(a) * v + math.sin(a) * np.array([-v[1], v[0]])
+            v = p0[k, 0:2] - program.centre[k, 0:2]
+            half = program.centre[k, 0:2] + math.cos(a) * v + math.sin(a) * np.array([-v[1], v[0]])
             out += [f"CIRCLE/{centre},0,0,{sense}", f"GOTO/{_numbers((*half, end[2]))}{axis}"]
         out += [f"CIRCLE/{centre},0,0,{sense}", f"GOTO/{_numbers(end)}{axis}"]
     out += ["SPINDL/OFF", "FINI"]

@@ -120,12 +120,13 @@ def _written(program: Program, decimals: int) -> tuple[Floats, NDArray[np.bool_]
         q[k, 0:2] = q[k - 1, 0:2]
     q0 = np.vstack([q[:1], q[:-1]])
     chord = q[:, 0:2] - q0[:, 0:2]
-    base = np.round((program.centre - q0[:, 0:2]) / unit)
+    from_start = program.centre[:, 0:2] - q0[:, 0:2]
+    base = np.round(from_start / unit)
     near = np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1)], dtype=np.float64)
     ij = (base[:, None, :] + near) * unit
     away = np.hypot(ij[..., 0] - chord[:, None, 0], ij[..., 1] - chord[:, None, 1])
     skew = np.abs(np.hypot(ij[..., 0], ij[..., 1]) - away)
-    moved = np.linalg.norm(ij - (program.centre - q0[:, 0:2])[:, None, :], axis=2)
+    moved = np.linalg.norm(ij - from_start[:, None, :], axis=2)
     best = np.argmin(skew + 0.1 * moved, axis=1)
     ij = np.round(ij[np.arange(len(q)), best], decimals) + 0.0
     r = np.hypot(ij[:, 0], ij[:, 1])
