@@ -53,11 +53,12 @@ def run(
 
     def work() -> int:
         from chipload.job import load_job
+
+        read = load_job(job, sets or ())
         from chipload.report.folder import check_target, write_result
         from chipload.report.outcome import verdict
         from chipload.run import run_job
 
-        read = load_job(job, sets or ())
         check_target(out)
         with _bar() as progress:
             outcome = run_job(read, lambda done, what: progress(0.8 * done, what))
@@ -76,9 +77,10 @@ def check(job: JobFile, sets: Sets = None, debug: Debug = False) -> None:
 
     def work() -> int:
         from chipload.job import load_job
-        from chipload.run import read_inputs
 
         read = load_job(job, sets or ())
+        from chipload.run import read_inputs
+
         inputs = read_inputs(read)
         closed = sum(c.closed for c in inputs.contours)
         typer.echo(

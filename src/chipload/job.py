@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 import tomllib
 import types
 import typing
@@ -418,11 +419,16 @@ def _override(raw: dict[str, Any], text: str) -> None:
 def _value(text: str) -> Any:
     """A TOML value, or the text itself where it is none.
 
-    >>> _value("12"), _value("nan") != _value("nan"), _value("part.dxf"), _value('["a", "b"]')
-    (12, True, 'part.dxf', ['a', 'b'])
+    A number may be written without a digit before or after its point, which TOML itself does not allow.
+
+    >>> _value("12"), _value(".5"), _value("nan") != _value("nan"), _value("part.dxf"), _value('["a", "b"]')
+    (12, 0.5, True, 'part.dxf', ['a', 'b'])
     """
+    text = text.strip()
+    if re.fullmatch(r"[+-]?(\.\d+|\d+\.)([eE][+-]?\d+)?", text):
+        return float(text)
     try:
-        table = tomllib.loads(f"value = {text.strip()}")
+        table = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
-        return text.strip()
-    return table["value"] if len(table) == 1 else text.strip()
+        return text
+    return table["value"] if len(table) == 1 else text

@@ -7,8 +7,8 @@ The rule: a row runs at min(v, sqrt(a_n r)) on an arc of radius r, with the acce
 can give together, a = min over axes of a_i / |u_i|, |u_i| the greatest anywhere on an arc; a_n = min of a_i / the share
 of axis i in the arc's plane. Rows pass into one another at `corner_speed(theta, a, delta)`: a tangent joint without
 slowing, a corner as fast as an arc that rounds it off by delta allows. Between a rapid and a feed, at a dwell, a change
-of tool or of spindle, and at both ends, the machine stands. Acceleration is constant in pieces (no jerk limit); changing
-the tool and the spindle's run-up take no time.
+of tool or of spindle, and at both ends, the machine stands. Acceleration is constant in pieces (no jerk limit), and to
+change the tool or to run up the spindle takes no time.
 """
 
 from __future__ import annotations

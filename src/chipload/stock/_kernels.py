@@ -19,8 +19,8 @@ FULL, EMPTY = -1, -2
 ARCS = 24
 #: capsules that enter a cell before it is pruned for the first time, at least
 MORE = 12
-#: parts that a cell is pruned in, each way
-PARTS = 8
+#: parts that a cell is pruned in, each way, and those of a part that no one capsule holds
+PARTS, FINER = 8, 4
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -35,6 +35,14 @@ def axis_distance(px, py, ax, ay, bx, by):
         t = min(1.0, max(0.0, t))
     dx, dy = wx - t * ex, wy - t * ey
     return math.sqrt(dx * dx + dy * dy)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def half_width(d, r, R):
+    """Half the angle of the circle of radius r that lies in a disc of radius R, d away; at d = 0 all or nothing."""
+    if d <= 0.0:
+        return 0.0 if r > R else math.pi
+    return math.acos(min(1.0, max(-1.0, (d * d + r * r - R * R) / (2.0 * d * r))))
 
 
 @njit(cache=True, nogil=True)
@@ -54,7 +62,7 @@ def covered(ax, ay, bx, by, r, R):
         if d <= R - r:
             return -math.pi, math.pi
         th = math.atan2(ay, ax)
-        half = math.acos(min(1.0, max(-1.0, (d * d + r * r - R * R) / (2.0 * d * r))))
+        half = half_width(d, r, R)
         return th - half, th + half
     ex, ey = ex / length, ey / length
     p = ex * -ay - ey * -ax
@@ -81,8 +89,8 @@ def covered(ax, ay, bx, by, r, R):
         c1 = r * math.sqrt(max(0.0, 1.0 - s1 * s1))
     ta = math.atan2(-p, xa) if p > 0.0 else (0.0 if xa > 0.0 else -math.pi)
     tb = math.atan2(-p, xb) if p > 0.0 else (0.0 if xb > 0.0 else -math.pi)
-    ha = math.acos(min(1.0, max(-1.0, (da * da + r * r - R * R) / (2.0 * da * r))))
-    hb = math.acos(min(1.0, max(-1.0, (db * db + r * r - R * R) / (2.0 * db * r))))
+    ha = half_width(da, r, R)
+    hb = half_width(db, r, R)
     if c1 > xb:
         hi = tb + hb
     elif c1 < xa:
@@ -174,17 +182,62 @@ def uncut(ox, oy, tx, ty, r, R, whole, grid, head, link, axis, out):
 
 
 @njit(cache=True, nogil=True)
+def keep_one(px, py, hd, at, link, axis, R, keep):
+    """Mark a capsule of the chain that holds the whole square part (centre P, half diagonal hd); whether one does."""
+    k = 0
+    found = -1
+    while at >= 0:
+        q = link[at, 1]
+        if axis_distance(px, py, axis[q, 0], axis[q, 1], axis[q, 2], axis[q, 3]) <= R - hd:
+            found = k
+            if keep[k]:
+                break
+        at = link[at, 0]
+        k += 1
+    if found >= 0:
+        keep[found] = True
+    return found >= 0
+
+
+@njit(cache=True, nogil=True)
+def keep_all(px, py, hd, at, link, axis, R, keep):
+    """Mark every capsule of the chain that reaches the square part."""
+    k = 0
+    while at >= 0:
+        q = link[at, 1]
+        if not keep[k] and axis_distance(px, py, axis[q, 0], axis[q, 1], axis[q, 2], axis[q, 3]) < R + hd:
+            keep[k] = True
+        at = link[at, 0]
+        k += 1
+
+
+@njit(cache=True, nogil=True)
+def keep_fine(px, py, hd, at, link, axis, R, keep):
+    """Mark what the square part needs, cut into FINER x FINER; whether it is cleared."""
+    whole = True
+    side = 2.0 * hd * math.sqrt(0.5) / FINER
+    for a in range(FINER):
+        for b in range(FINER):
+            x, y = px + (a - 0.5 * (FINER - 1)) * side, py + (b - 0.5 * (FINER - 1)) * side
+            if not keep_one(x, y, hd / FINER, at, link, axis, R, keep):
+                keep_all(x, y, hd / FINER, at, link, axis, R, keep)
+                whole = False
+    return whole
+
+
+@njit(cache=True, nogil=True)
 def prune(cell, grid, head, link, axis, R):
     """Keep of a cell's chain what its cleared part needs; returns how many stay, 0 where the cell is cleared.
 
     The square about what the cell speaks for is cut into parts. A part inside one capsule needs that one only; in any
-    other part every capsule that reaches it stays. Nothing is forgotten of the union.
+    other part every capsule that reaches it stays. Nothing is forgotten of the union. O(capsules x parts).
     """
     x0, y0, h, reach = grid[0], grid[1], grid[2], grid[5]
     nx = int(grid[3])
     cx, cy = x0 + (cell % nx + 0.5) * h, y0 + (cell // nx + 0.5) * h
+    first = head[cell]
     n = 0
-    at = head[cell]
+    at = first
     while at >= 0:
         n += 1
         at = link[at, 0]
@@ -197,33 +250,12 @@ def prune(cell, grid, head, link, axis, R):
             px, py = cx - reach + (a + 0.5) * side, cy - reach + (b + 0.5) * side
             if (px - cx) ** 2 + (py - cy) ** 2 >= (reach + hd) ** 2:
                 continue
-            at = head[cell]
-            k = 0
-            found = -1
-            while at >= 0:
-                q = link[at, 1]
-                if axis_distance(px, py, axis[q, 0], axis[q, 1], axis[q, 2], axis[q, 3]) <= R - hd:
-                    found = k
-                    if keep[k]:
-                        break
-                at = link[at, 0]
-                k += 1
-            if found >= 0:
-                keep[found] = True
-                continue
-            whole = False
-            at = head[cell]
-            k = 0
-            while at >= 0:
-                q = link[at, 1]
-                if not keep[k] and axis_distance(px, py, axis[q, 0], axis[q, 1], axis[q, 2], axis[q, 3]) < R + hd:
-                    keep[k] = True
-                at = link[at, 0]
-                k += 1
+            if not keep_one(px, py, hd, first, link, axis, R, keep):
+                whole = keep_fine(px, py, hd, first, link, axis, R, keep) and whole
     if whole:
         head[cell] = EMPTY
         return 0
-    at = head[cell]
+    at = first
     last = -1
     k = 0
     kept = 0

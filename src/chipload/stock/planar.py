@@ -55,6 +55,8 @@ class PlanarStock:
             raise InputError(f"radius = {radius:g} mm: must be above 0")
         self.radius = radius
         x0, y0, x1, y1 = bounds
+        if not (math.isfinite(x0 + y0 + x1 + y1) and x1 > x0 and y1 > y0):
+            raise InputError(f"stock: {x1 - x0:.4g} x {y1 - y0:.4g} mm: both sides must be above 0 and finite")
         margin = 0.5 * radius
         wide, high = x1 - x0 + 2.0 * margin, y1 - y0 + 2.0 * margin
         h = max(radius / CELLS, math.sqrt(wide * high / CELL_LIMIT))

@@ -16,6 +16,8 @@ from numba import njit
 from chipload.stock._kernels import ARCS, remove, uncut
 
 RUNNING, LOST, BLOCKED = 0, 1, 2
+#: a turn to the left [rad] that is tried again with half the step
+SHARP = 0.2
 #: columns of a step: x, y, greatest E along it, E at its end, arcs at its end, mm^2 taken
 COLUMNS = 6
 
@@ -230,6 +232,15 @@ def run_pass(state, step, limit, right, left, lost, R, touch, out, room, capsule
         if not found:
             reason = BLOCKED
             break
+        # a shorter step may reach into the corner that a whole one has to cut
+        while phi > SHARP and l > step / 32.0:
+            share = 0.5 * l / step
+            ok, less = turn(x, y, th, 0.0, 0.5 * l, limit, right * share, left, True, slack, r, R, grid, head, link,
+                            axis, arcs, flag, edges, rows, row_edges)  # fmt: skip
+            if not ok or less > phi - SHARP:
+                break
+            l *= 0.5
+            phi = less
         th += phi
         guess = phi * step / l
         tx, ty = math.cos(th), math.sin(th)

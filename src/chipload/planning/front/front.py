@@ -47,7 +47,7 @@ IDLE = 1.5
 #: entries at most besides the first of each part, and the room / R that one needs
 ENTRIES, LEAST_ROOM = 50, 0.02
 #: so many passes within 2 R that take less than this part of R^2 each are given up
-SLOW_PASSES, SLOW_AREA = 100, 0.02
+SLOW_PASSES, SLOW_AREA = 30, 0.02
 #: steps between two calls of ``progress``
 CHUNK = 4000
 #: depth / R that is looked into for material beside the path, round after round
@@ -263,8 +263,8 @@ class _Run:
         """One pass from the start k; whether it took enough for the start to be tried again."""
         for x, y, heading in self.starts.ways(k):
             rows, headings, reason, at = self._steps(x, y, heading)
-            cuts = np.flatnonzero(rows[:, 5] > 1e-4 * self.radius * self.step)
-            if len(cuts) == 0 or rows[:, 5].sum() < 1e-5 * self.radius**2:
+            cuts = np.flatnonzero(rows[:, 2] > 0.0)  # all that changed the stock
+            if len(cuts) == 0:
                 continue
             rows, headings = rows[: cuts[-1] + 1], headings[: cuts[-1] + 1]
             self._go(np.array([x, y]))

@@ -1,0 +1,339 @@
+"""From the axes of a machine to the workpiece and back: Commands to Program, Program to Commands.
+
+Notation: a **known** work offset is one that the text or its parameters set; where it is all zero the work's zero is
+where the machine's file puts it. L [mm] tool length, kept in a frame as what it adds to the axes. Rows on which no
+rotary axis moves are mapped rigidly: arcs stay arcs. Where one moves, the tip of a machine without tool centre point
+control leaves the straight line: the row is cut into pieces, here and on the way back.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import Finding, InputError
+from chipload.machine.follow import follow
+from chipload.machine.kinematics import forward, with_tip
+from chipload.machine.linearise import linearise, traced
+from chipload.machine.machine import Machine
+from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, PROBE, RAPID, XY, Commands, Frame, chorded, extents
+from chipload.program.motions import is_arc, lengths, radii, straightened, sweeps
+from chipload.program.program import ARC_CCW, ARC_CW, Program
+from chipload.program.program import DWELL as WORK_DWELL
+from chipload.program.program import LINE as WORK_LINE
+from chipload.program.program import RAPID as WORK_RAPID
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: how far the tip may leave its path where a row is cut into pieces [mm], and the tool's axis [rad]
+TOLERANCE_MM, ANGLE_TOLERANCE = 1e-3, math.radians(0.05)
+#: arcs of a smaller radius [mm] are written as chords: controllers refuse them
+LEAST_RADIUS = 0.0013
+_ROTARY = slice(3, 6)
+_STILL = 1e-12  # [rad] a rotary axis that moves less stands
+
+
+def work_frame(commands: Commands) -> Frame:
+    """The work offset that the motions are in: the first that is not the machine's own."""
+    used = [commands.frames[k] for k in dict.fromkeys(commands.frame.tolist())]
+    return next((f for f in used if f.number > 0), Frame())
+
+
+def to_work(
+    commands: Commands, machine: Machine, *, tolerance: float = TOLERANCE_MM
+) -> tuple[Program, tuple[Finding, ...]]:
+    """What the commands do to the workpiece: tip and tool's axis in the work frame; O(n).
+
+    Parameters
+    ----------
+    commands : motions of the machine's axes, or of the tip where ``tcp``
+    machine : whose chain leads from the axes to the tip
+    tolerance : greatest distance [mm] of the tip's path from the pieces of a row on which a rotary axis moves
+
+    Raises
+    ------
+    InputError
+        An axis moves that the machine has not; the work offset is turned and the machine has rotary axes.
+    """
+    findings = _strangers(commands, machine)
+    base = work_frame(commands)
+    known = bool(base.offset.any())
+    zero, shift = _work_zero(machine, base, known)
+    moved = np.abs(np.diff(commands.machine()[:, _ROTARY], axis=0, prepend=commands.machine()[:1, _ROTARY])).max(axis=1)
+    turning = moved > _STILL
+    turning[:1] = False
+    commands = chorded(commands, turning, tolerance)
+    axes = commands.machine() + shift
+    moved = np.abs(np.diff(axes[:, _ROTARY], axis=0, prepend=axes[:1, _ROTARY])).max(axis=1)
+    lengths_mm = np.array([_tool_length(machine, f) for f in commands.frames])[commands.frame]
+    if not machine.chain.rotary:
+        tip = _flat(commands, base)
+        direction = np.tile([0.0, 0.0, 1.0], (len(tip), 1))
+    else:
+        if any(f.rotation for f in commands.frames):
+            raise InputError("commands: the work offset is turned (G10 L2 R): must not be on a machine with rotary axes")
+        tip, direction = forward(machine, axes, lengths_mm, zero)
+        tip = np.where(commands.tcp[:, None], _flat(commands, base), tip)
+    columns = {
+        "motion": np.array([WORK_RAPID, WORK_LINE, ARC_CW, WORK_DWELL, WORK_LINE])[commands.motion],
+        "p_work": tip,
+        "axis": direction / np.linalg.norm(direction, axis=1)[:, None],
+        "spindle": commands.spindle,
+        "tool": commands.tool,
+        "line": commands.line,
+        "label": commands.label,
+        **_arcs_to_work(commands, machine, axes, lengths_mm, zero, base),
+    }
+    columns["motion"] = np.where(commands.motion == ARC, np.where(commands.turns > 0, ARC_CCW, ARC_CW), columns["motion"])
+    columns["feed"] = commands.feed
+    program = Program(**columns, labels=commands.labels)
+    program = _timed(program, commands, moved > _STILL)
+    cut = (moved > _STILL) & ~commands.tcp & (commands.motion != DWELL)
+    cut[:1] = False
+    if cut.any():
+        program = _traced(program, machine, axes, lengths_mm, zero, cut, tolerance)
+    return program, findings
+
+
+def to_axes(
+    program: Program,
+    machine: Machine,
+    *,
+    tool_lengths: Mapping[int, float] | None = None,
+    tcp: bool = False,
+    start: Floats | None = None,
+    tolerance: float = TOLERANCE_MM,
+) -> tuple[Commands, tuple[Finding, ...]]:
+    """What the machine's axes have to do for a program; O(n) and the search of :func:`~chipload.machine.follow.follow`.
+
+    Parameters
+    ----------
+    tool_lengths : L [mm] of each tool; one that is not named has 0: positions are of the spindle's nose
+    tcp : whether the controller is told the tip and keeps it there while rotary axes move
+    start : (9,) float, where the axes stand before row 0
+    tolerance : greatest distance of the tip from its line [mm] where a rotary axis moves
+
+    Raises
+    ------
+    InputError
+        The axis is tilted and the machine has no rotary axis; an index table would move in a cut.
+    """
+    small = (radii(program) < LEAST_RADIUS) & is_arc(program)
+    program = straightened(program, np.where(small, 0.25 * math.pi, math.inf))
+    program = _single_turns(program)
+    if not machine.chain.rotary:
+        tilted = np.flatnonzero((np.abs(program.axis[:, :2]).max(axis=1) > 1e-9) | (program.axis[:, 2] < 0.0))
+        if len(tilted):
+            raise InputError(f"program row {tilted[0]}: the axis is tilted: {machine.name} is written with three axes")
+        program = _plane_arcs(program, program.normal, tolerance)
+        return _commands(program, np.pad(program.p_work, ((0, 0), (0, 6))), (Frame(),), np.zeros(len(program))), ()
+    return _rotary_commands(program, machine, tool_lengths or {}, tcp, start, tolerance)
+
+
+# -- to the workpiece -------------------------------------------------------------------------------------------
+def _strangers(commands: Commands, machine: Machine) -> tuple[Finding, ...]:
+    """Axes that move and that the machine has not are refused; rows that are probes are said."""
+    letters = machine.chain.letters
+    for k, letter in enumerate("XYZABCUVW"):
+        if letter not in letters and len(commands) and np.ptp(commands.position[:, k]) > 0.0:
+            row = int(np.flatnonzero(np.diff(commands.position[:, k]))[0]) + 1
+            raise InputError(
+                f"line {commands.line[row]}: {letter} moves: machine {machine.name} has the axes {letters}"
+            )
+    probes = np.flatnonzero(commands.motion == PROBE)
+    text = "{} probing moves are taken to their ends"
+    return (Finding("program-probe", int(commands.line[probes[0]]), text.format(len(probes))),) if len(probes) else ()
+
+
+def _home(machine: Machine, length: float) -> Floats:
+    """(9,) the axes that bring the tip of a tool to the work's zero, rotary axes at zero."""
+    return with_tip(machine, np.zeros((1, 9)), np.zeros((1, 3)), length)[0]
+
+
+def _tool_length(machine: Machine, frame: Frame) -> float:
+    """L [mm] of a frame whose tool adds to the axes what a tool of that length does."""
+    unit = _home(machine, 1.0)[:3] - _home(machine, 0.0)[:3]
+    return float(frame.tool[:3] @ unit / (unit @ unit))
+
+
+def _work_zero(machine: Machine, base: Frame, known: bool) -> tuple[Floats, Floats]:
+    """(3,) the work's zero in the machine's frame [mm]; (9,) what to add to the axes where the offset is not known."""
+    if known:
+        zero = np.array(base.offset)
+        tip, _ = forward(machine, zero[None, :] * _linear(), 0.0, np.zeros(3))
+        return tip[0] @ machine.chain.R_machine_work.T, np.zeros(9)
+    return np.array(machine.chain.work_zero), _home(machine, 0.0)
+
+
+def _linear() -> Floats:
+    mask = np.ones(9)
+    mask[_ROTARY] = 0.0
+    return mask
+
+
+def _flat(commands: Commands, base: Frame) -> Floats:
+    """(n, 3) X Y Z in the work frame, as if no rotary axis were turned."""
+    own = replace(base, shift=np.zeros(9), tool=np.zeros(9))
+    out = np.zeros((len(commands), 3))
+    for k, frame in enumerate(commands.frames):
+        rows = commands.frame == k
+        if rows.any():
+            bare = replace(frame, tool=np.zeros(9))
+            out[rows] = own.from_machine(bare.to_machine(commands.position[rows]))[:, :3]
+    return out
+
+
+def _arcs_to_work(
+    commands: Commands, machine: Machine, axes: Floats, tool: Floats, zero: Floats, base: Frame
+) -> dict[str, Floats | Ints]:
+    """Centre, normal and whole turns of the arcs."""
+    n = len(commands)
+    centre, normal = np.zeros((n, 3)), np.tile([0.0, 0.0, 1.0], (n, 1))
+    arcs = np.flatnonzero(commands.motion == ARC)
+    if len(arcs):
+        first = np.array(PLANE_AXES)[commands.plane[arcs]]
+        at = np.array(commands.position[arcs])
+        at[np.arange(len(arcs)), first[:, 0]] = commands.centre[arcs, 0]
+        at[np.arange(len(arcs)), first[:, 1]] = commands.centre[arcs, 1]
+        up = np.array(at)
+        up[np.arange(len(arcs)), first[:, 2]] += 1.0
+        ends = []
+        for points in (at, up):
+            moved = replace_rows(commands, arcs, points)
+            flat = _flat(moved, base)
+            if machine.chain.rotary:
+                whole = moved.machine() + (axes[arcs] - commands.machine()[arcs])
+                tip, _ = forward(machine, whole, tool[arcs], zero)
+                flat = np.where(moved.tcp[:, None], flat, tip)
+            ends.append(flat)
+        centre[arcs] = ends[0]
+        n1 = ends[1] - ends[0]
+        normal[arcs] = n1 / np.linalg.norm(n1, axis=1)[:, None]
+    turns = np.where(commands.motion == ARC, np.abs(commands.turns) - 1, 0)
+    return {"centre": centre, "normal": normal, "turns": turns}
+
+
+def replace_rows(commands: Commands, rows: Ints, position: Floats) -> Commands:
+    """Some rows of the commands at other positions."""
+    columns = {f.name: getattr(commands, f.name)[rows] for f in fields(Commands) if f.name not in ("frames", "labels")}
+    return Commands(**{**columns, "position": position}, frames=commands.frames, labels=commands.labels)
+
+
+def _timed(program: Program, commands: Commands, turning: NDArray[np.bool_]) -> Program:
+    """The feed of the tip: rows that turn a rotary axis take the time that the controller gives them."""
+    cuts = turning & np.isin(commands.motion, (LINE, PROBE, ARC)) & ~commands.tcp
+    if not cuts.any():
+        return program
+    time = extents(commands) / np.where(commands.feed > 0.0, commands.feed, 1.0)
+    length = lengths(program)
+    own = np.where(length > 1e-9, length / np.where(time > 0.0, time, 1.0), commands.feed)
+    return replace(program, feed=np.where(cuts & (time > 0.0), own, program.feed))
+
+
+def _traced(
+    program: Program,
+    machine: Machine,
+    axes: Floats,
+    tool: Floats,
+    zero: Floats,
+    cut: NDArray[np.bool_],
+    tolerance: float,
+) -> Program:
+    """The program with its turning rows in pieces along which the tip goes straight within the tolerance."""
+    parts: list[dict[str, NDArray[np.generic]]] = []
+    names = [f.name for f in fields(Program) if f.name != "labels"]
+    begin = 0
+    for length in _runs(tool):
+        stop = begin + length
+        here = max(begin - 1, 0)
+        pieces = traced(machine, axes[here:stop], tolerance, float(tool[begin]), zero)
+        row = pieces.row + here
+        keep = (row >= begin) & (cut[row] | (pieces.part == 1.0))
+        row, part = row[keep], pieces.part[keep]
+        columns = {name: np.array(getattr(program, name)[row]) for name in names}
+        inner = part < 1.0
+        columns["p_work"][inner] = pieces.tip[keep][inner]
+        columns["axis"][inner] = pieces.axis[keep][inner]
+        total = np.zeros(stop)
+        before = np.vstack([program.p_work[here][None, :], columns["p_work"][:-1]])
+        np.add.at(total, row, np.linalg.norm(columns["p_work"] - before, axis=1))
+        chord = lengths(program)
+        stretched = np.isin(row, np.flatnonzero(cut)) & (columns["motion"] == WORK_LINE) & (chord[row] > 1e-9)
+        columns["feed"][stretched] *= (total[row] / np.where(chord[row] > 0.0, chord[row], 1.0))[stretched]
+        parts.append(columns)
+        begin = stop
+    joined = {name: np.concatenate([p[name] for p in parts]) for name in names}
+    return Program(**joined, labels=program.labels)
+
+
+def _runs(values: Floats) -> list[int]:
+    """Lengths of the runs of equal values."""
+    ends = np.flatnonzero(np.append(np.diff(values) != 0.0, True)) + 1
+    return [int(x) for x in np.diff(ends, prepend=0)]
+
+
+# -- to the axes ------------------------------------------------------------------------------------------------
+def _single_turns(program: Program) -> Program:
+    """Arcs of more than a turn as several rows of at most one turn each."""
+    if not program.turns.any():
+        return program
+    sweep = np.abs(sweeps(program))
+    step = np.where(program.turns > 0, sweep / np.ceil(sweep / math.tau - 1e-9), math.inf)
+    chords = straightened(program, step)
+    row = np.concatenate([[0], np.cumsum(np.ones(len(program), dtype=np.int64))])[:-1]
+    count = np.where(program.turns > 0, np.ceil(sweep / math.tau - 1e-9), 1).astype(np.int64)
+    row = np.repeat(row, count)
+    back = {name: getattr(program, name)[row] for name in ("motion", "centre", "normal")}
+    return replace(chords, **back, turns=np.zeros(len(row), dtype=np.int64))
+
+
+def _plane_arcs(program: Program, normal: Floats, tolerance: float) -> Program:
+    """Arcs about no axis of coordinates (``normal`` (n, 3), as the controller sees it) as chords."""
+    odd = is_arc(program) & (np.abs(normal).max(axis=1) < 1.0 - 1e-9)
+    r = radii(program)
+    turn = 2.0 * np.arccos(1.0 - np.minimum(tolerance / np.where(r > 0.0, r, math.inf), 1.0))
+    return straightened(program, np.where(odd, turn, math.inf))
+
+
+def _commands(program: Program, position: Floats, frames: tuple[Frame, ...], frame: Floats) -> Commands:
+    """Commands whose X Y Z are those of the program."""
+    along = np.argmax(np.abs(program.normal), axis=1)
+    plane = np.array([2, 1, 0])[along]
+    arc = is_arc(program)
+    first = np.array(PLANE_AXES)[plane]
+    centre = np.take_along_axis(program.centre, first[:, :2], axis=1)
+    sense = np.where(program.motion == ARC_CCW, 1, -1) * np.sign(program.normal[np.arange(len(along)), along])
+    motion = np.array([RAPID, LINE, ARC, ARC, DWELL])[program.motion]
+    return Commands(
+        motion=motion,
+        position=position,
+        plane=np.where(arc, plane, XY),
+        centre=np.where(arc[:, None], centre, 0.0),
+        turns=np.where(arc, sense * (1 + program.turns), 0),
+        feed=program.feed,
+        spindle=program.spindle,
+        tool=program.tool,
+        tcp=np.zeros(len(program), dtype=bool),
+        frame=frame,
+        line=program.line,
+        label=program.label,
+        frames=frames,
+        labels=program.labels,
+    )
+
+
+def _rotary_commands(
+    program: Program,
+    machine: Machine,
+    tool_lengths: Mapping[int, float],
+    tcp: bool,
+    start: Floats | None,
+    tolerance: float,
+) -> tuple[Commands, tuple[Finding, ...]]:
+    """Commands of a machine with rotary axes."""
+    raise NotImplementedError
