@@ -2,9 +2,9 @@
 
 Notation: q [mm or rad] the axis's own coordinate, d its unit direction, c [mm] a point that a rotary axis turns about.
 
-The sign, once for all machines (ISO 841): a growing q moves the tool along d, or turns it right-handed about d, **as the
-workpiece sees it**. A table axis carries the workpiece and so goes the other way itself. A rotary table whose letter
-follows the standard has d = (0, 0, 1) for C; where the table itself turns right-handed about +Z for a growing C
+The sign, once for all machines (ISO 841): a growing q moves the tool along d, or turns it right-handed about d, **as
+the workpiece sees it**. A table axis carries the workpiece and so goes the other way itself. A rotary table whose
+letter follows the standard has d = (0, 0, 1) for C; where the table itself turns right-handed about +Z for a growing C
 (LinuxCNC's `xyzac-trt-kins` and `xyzbc-trt-kins`, whose documentation says so), d = (0, 0, -1).
 
 Directions and points hold with every axis at zero, in the machine's frame.

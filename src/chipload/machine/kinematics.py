@@ -147,18 +147,43 @@ def inverse(
     out = np.repeat(q[:, None, :], angles.shape[1], axis=1)
     for k, one in enumerate(turning):
         out[:, :, one.column] = angles[:, :, k]
-    target = p @ R.T + _zero(chain, work_zero)
     for branch in range(out.shape[1]):
-        at = out[:, branch]
-        point, columns = _pushed(chain, at, tool_length, "XYZ")
-        flat = np.abs(np.linalg.det(columns)) < _FLAT
-        if flat.any():
-            raise InputError(
-                f"inverse: row {int(np.flatnonzero(flat)[0])}: the directions of X, Y and Z lie in a plane: "
-                "must reach every point, hold another angle"
-            )
-        at[:, :3] = np.linalg.solve(columns, (target - point)[..., None])[..., 0]
+        out[:, branch] = with_tip(machine, out[:, branch], p, tool_length, work_zero)
     return Solutions(out, miss, pole, turning)
+
+
+def with_tip(
+    machine: Machine, axes: ArrayLike, tip: ArrayLike, tool_length: ArrayLike = 0.0, work_zero: ArrayLike | None = None
+) -> Floats:
+    """Axis positions with X, Y, Z such that the tip is at ``tip``, the other axes as they are; O(n m).
+
+    What a controller does under G43.4, where a text gives the tip and the angles.
+
+    Parameters
+    ----------
+    axes : (n, 9) float [mm, rad], of which X Y Z are not looked at
+    tip : (n, 3) float [mm], in the work frame
+    tool_length, work_zero : as in ``forward``
+
+    Returns
+    -------
+    (n, 9) float [mm, rad]
+
+    Raises
+    ------
+    InputError
+        At some row X, Y, Z do not reach every point: their directions lie in a plane.
+    """
+    chain = machine.chain
+    out = np.array(_columns("axes", axes))
+    point, columns = _pushed(chain, out, tool_length, "XYZ")
+    flat = np.abs(np.linalg.det(columns)) < _FLAT
+    if flat.any():
+        row = int(np.flatnonzero(flat)[0])
+        raise InputError(f"row {row}: directions of X, Y, Z lie in a plane: must reach every point: hold another angle")
+    target = np.asarray(tip, dtype=np.float64) @ chain.R_machine_work.T + _zero(chain, work_zero)
+    out[:, :3] = np.linalg.solve(columns, (target - point)[..., None])[..., 0]
+    return out
 
 
 def _orientation(

@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 
 def rotated(d: Floats, q: Floats, v: Floats) -> Floats:
-    """v turned right-handed by q about the unit direction d: v cos q + (d x v) sin q + d (d.v)(1 - cos q).
+    """Direction v turned right-handed by q about the unit d: v cos q + (d x v) sin q + d (d.v)(1 - cos q).
 
     Parameters
     ----------
