@@ -1,8 +1,8 @@
 """Axis positions along a path: which of the solutions, and how many whole turns, at every row.
 
-Notation: free axes are the rotary ones that are solved for, m <= 2 of them; a state at a row is one of the k solutions of
-:func:`~chipload.machine.kinematics.inverse` with whole turns added to each free angle. D [rad] rotary motion of a step,
-the greatest |change| of a free angle. The path through the states with the least sum of D is found by dynamic
+Notation: free axes are the rotary ones that are solved for, m <= 2 of them; a state at a row is one of the k solutions
+of :func:`~chipload.machine.kinematics.inverse` with whole turns added to each free angle. D [rad] rotary motion of a
+step, the greatest |change| of a free angle. The path through the states with the least sum of D is found by dynamic
 programming; a row outside a limit costs more than every motion, so that limits are broken where there is no other way
 alone. An axis whose range is more than ``FEW`` turns has too many states: its turns are left out of the search and
 added afterwards, so that it goes the short way, and turns back (greedily as late as possible: the fewest times) where
