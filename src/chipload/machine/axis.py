@@ -79,7 +79,7 @@ class Axis:
         length = math.sqrt(sum(x * x for x in self.direction))
         if not 1e-6 < length < 1e6:
             raise InputError(f"{key}direction = {self.direction}: must have a length above 0")
-        object.__setattr__(self, "direction", tuple(x / length for x in self.direction))
+        object.__setattr__(self, "direction", tuple(x / length + 0.0 for x in self.direction))
         object.__setattr__(self, "pivot", tuple(float(x) for x in self.pivot))
         need(self.low < math.inf, f"min_{mm}", self.low, "must be a finite number")
         need(self.low < self.high, f"max_{mm}", self.high, f"must be above min_{mm} = {shown(self.low):g}")

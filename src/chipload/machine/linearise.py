@@ -240,7 +240,7 @@ def _excess(
     tolerance: float,
     angle_tolerance: float,
 ) -> Floats:
-    """Distance (k,) of pieces from their line and great circle, in tolerances; inf where an axis goes over a quarter turn."""
+    """Distance (k,) of pieces from line and great circle, in tolerances; inf where an axis goes over a quarter turn."""
     tips, directions, _ = _between(machine, axes, tool_length, work_zero)
     chord = np.diff(x, axis=0)
     square = (chord**2).sum(axis=1)
