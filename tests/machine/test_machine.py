@@ -71,7 +71,10 @@ def test_refused(tmp_path, old, new, message):
 def test_not_a_machine(tmp_path):
     with pytest.raises(InputError) as err:
         machine_named("vcm")
-    assert str(err.value) == "machine vcm: not known: the nearest is vmc (known: vmc, vmc-fanuc), or give a file"
+    assert (
+        str(err.value)
+        == f"machine vcm: not known: the nearest is vmc (known: {', '.join(machine_names())}), or give a file"
+    )
     with pytest.raises(InputError) as err:
         read_machine(tmp_path)
     assert str(err.value) == f"machine {tmp_path}: cannot be read: Is a directory"

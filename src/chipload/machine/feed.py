@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
 from chipload.machine._kernels import two_passes
+from chipload.machine.machine import Machine
 
 Floats = NDArray[np.float64]
 
@@ -132,3 +133,57 @@ def move_time(length: ArrayLike, speed: ArrayLike, acceleration: ArrayLike, v0: 
     level = length - (2.0 * peak**2 - v0**2 - v1**2) / (2.0 * a)
     ramps = (2.0 * peak - v0 - v1) / a
     return np.asarray(np.where(still, 0.0, ramps + np.maximum(level, 0.0) / np.where(still, 1.0, peak)))
+
+
+def row_time_limited(machine: Machine, axes: ArrayLike, time: ArrayLike = 0.0) -> Floats:
+    """Least time of each move between rows of axis positions, every axis at its rate at most; O(n m).
+
+    t = max(time, max over axes of |q1 - q0| / rate); accelerations are not looked at.
+
+    Parameters
+    ----------
+    axes : (n, 9) float [mm, rad], columns X Y Z A B C U V W
+    time : float or (n - 1,) float [s], >= 0
+        That the programmed feed asks for: length of the tip's path over the feed.
+
+    Returns
+    -------
+    (n - 1,) float [s]
+
+    Raises
+    ------
+    InputError
+        A shape or a value is wrong.
+
+    Examples
+    --------
+    A at 30 deg/s by 45 degrees while X at 20 mm/s goes 10 mm: 1.5 s, or the 2 s that the feed asks for.
+
+    >>> from chipload.machine.machine import machine_named
+    >>> axes = np.zeros((2, 9))
+    >>> axes[1, 0], axes[1, 3] = 10.0, np.radians(45.0)
+    >>> row_time_limited(machine_named("xyzac-trunnion"), axes).round(9).tolist()
+    [1.5]
+    >>> row_time_limited(machine_named("xyzac-trunnion"), axes, 2.0).tolist()
+    [2.0]
+    """
+    q = np.asarray(axes, dtype=np.float64)
+    asked = np.asarray(time, dtype=np.float64)
+    if q.ndim != 2 or q.shape[1] != 9 or len(q) == 0 or not np.isfinite(q).all():
+        raise InputError(f"row_time_limited: axes {q.shape}: must be (n, 9) finite numbers, n >= 1")
+    if asked.shape not in ((), (len(q) - 1,)) or not (asked >= 0.0).all():
+        raise InputError(f"row_time_limited: time {asked.shape}: must be one number or (n - 1,), >= 0")
+    out = np.array(np.broadcast_to(asked, (len(q) - 1,)))
+    for axis in machine.chain.axes:
+        out = np.maximum(out, np.abs(np.diff(q[:, axis.column])) / axis.rate)
+    return out
+
+
+def inverse_time_feed(time: ArrayLike) -> Floats:
+    """What G93 takes for F: how many times a minute the move would fit [1/min], inf where it takes no time.
+
+    >>> inverse_time_feed([2.0, 0.0]).tolist()
+    [30.0, inf]
+    """
+    with np.errstate(divide="ignore"):
+        return np.asarray(60.0 / np.asarray(time, dtype=np.float64))

@@ -1,0 +1,259 @@
+"""Axis positions along a path: which of the solutions, and how many whole turns, at every row.
+
+Notation: free axes are the rotary ones that are solved for, m <= 2 of them; a state at a row is one of the k solutions
+of :func:`~chipload.machine.kinematics.inverse` with whole turns added to each free angle. D [rad] rotary motion of a
+step, the greatest |change| of a free angle. The path through the states with the least sum of D is found by dynamic
+programming; a row outside a limit costs more than every motion, so that limits are broken where there is no other way
+alone. An axis whose range is more than ``FEW`` turns has too many states: its turns are left out of the search and
+added afterwards, so that it goes the short way, and turns back (greedily as late as possible: the fewest times) where
+it meets its limit.
+
+At a pole the angle of the first free axis is arbitrary: it stays as it was.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.errors import Finding, InputError
+from chipload.machine.axis import Axis
+from chipload.machine.kinematics import Solutions, inverse
+from chipload.machine.limits import SLACK, beyond, limit_findings, written
+from chipload.machine.machine import Machine
+from chipload.machine.orientation import angle_between, wrapped
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: turns of an axis's range up to which the search looks at every one of them
+FEW = 4
+#: a tool's axis out of reach by less [rad] is in reach
+REACH = 1e-6
+#: a free angle that goes this many times as far as the tool's axis turns, and further than SWING [rad], is reported
+GAIN, SWING = 10.0, math.radians(30.0)
+
+_OUTSIDE = 1e6  # [rad] what a row outside a limit costs
+_TIE = 1e-6  # weight of the sum of all free motions, beside the greatest
+_CHUNK = 1 << 18  # steps that are held at once
+_AHEAD = 4096  # rows that the choice of a wide axis's turns looks ahead
+_TURNS = 1000  # whole turns that it goes back by, at most
+
+
+def follow(
+    machine: Machine,
+    tip: ArrayLike,
+    axis: ArrayLike,
+    start: ArrayLike | None = None,
+    tool_length: ArrayLike = 0.0,
+    work_zero: ArrayLike | None = None,
+    free: str | None = None,
+    pole_tolerance: float = 1e-9,
+    line: ArrayLike | None = None,
+) -> tuple[Floats, tuple[Finding, ...]]:
+    """Axis positions for every row of a path: the least rotary motion within the limits; O(n S^2) for S states a row.
+
+    Parameters
+    ----------
+    tip : (n, 3) float [mm], axis : (n, 3) float
+        In the work frame, as in ``inverse``.
+    start : (9,) float [mm, rad]
+        Where the axes stand before row 0; axes that are not solved for stay there. None: these at 0, the others free.
+    tool_length, work_zero, free, pole_tolerance : as in ``inverse``
+    line : (n,) int, line of each row in its source; None: 0
+
+    Returns
+    -------
+    axes : (n, 9) float [mm, rad]
+    findings
+        ``machine-limit``, ``machine-index``, ``machine-reach`` (a tool's axis out of reach: the nearest is taken),
+        ``machine-rewind`` (whole turns back), ``machine-singular`` (rows at a pole; a swing past one).
+
+    Examples
+    --------
+    An axis that goes twice round the cone of 45 degrees: C turns twice, A stays.
+
+    >>> from chipload.machine.machine import machine_named
+    >>> t = np.linspace(0.0, 4.0 * np.pi, 9)
+    >>> cone = np.column_stack([np.sin(t), np.cos(t), np.ones(9)])
+    >>> axes, findings = follow(machine_named("xyzac-trunnion"), np.zeros((9, 3)), cone)
+    >>> np.degrees(axes[[0, 8], 5]).round(6).tolist(), np.degrees(axes[[0, 8], 3]).round(6).tolist()
+    ([0.0, 720.0], [45.0, 45.0])
+    >>> findings
+    ()
+    """
+    begin = None if start is None else np.array(start, dtype=np.float64)
+    if begin is not None and (begin.shape != (9,) or not np.isfinite(begin).all()):
+        raise InputError("start: must be nine finite numbers")
+    found = inverse(machine, tip, axis, tool_length, work_zero, begin, free, pole_tolerance)
+    n = len(found.axes)
+    lines = np.zeros(n, dtype=np.int64) if line is None else np.asarray(line, dtype=np.int64)
+    singular = found.pole <= pole_tolerance
+    if n == 0:
+        return np.zeros((0, 9)), ()
+    axes = np.array(found.axes[:, 0])
+    if found.free:
+        angles, wide = _angles(found, singular, begin)
+        values, branch = _shortest(machine, found, angles, wide, begin)
+        for k, one in enumerate(found.free):
+            if wide[k]:
+                values[:, k] = _wound(one, values[:, k], None if begin is None else float(begin[one.column]))
+        axes = np.take_along_axis(found.axes, branch[:, None, None], axis=1)[:, 0]
+        axes[:, [one.column for one in found.free]] = values
+    directions = np.asarray(axis, dtype=np.float64)
+    findings = [*_reach(found, lines), *_singular(found, singular, axes, directions, lines)]
+    return axes, (*findings, *_rewinds(found.free, axes, lines), *limit_findings(machine, axes, lines))
+
+
+def _angles(found: Solutions, singular: NDArray[np.bool_], begin: Floats | None) -> tuple[Floats, list[bool]]:
+    """Free angles (n, k, m) with those at a pole kept from the row before, and which axes are wide."""
+    angles = found.axes[:, :, [one.column for one in found.free]]
+    if singular.any():
+        known = np.flatnonzero(~singular)
+        last = np.maximum.accumulate(np.where(singular, -1, np.arange(len(singular))))
+        if begin is None and len(known):
+            last[last < 0] = known[0]
+        fill = singular & (last >= 0)
+        angles[fill, :, 0] = angles[last[fill], :, 0]
+    wide = [not one.high - one.low <= FEW * math.tau + SLACK for one in found.free]
+    return angles, wide
+
+
+def _shortest(
+    machine: Machine, found: Solutions, angles: Floats, wide: list[bool], begin: Floats | None
+) -> tuple[Floats, Ints]:
+    """Values (n, m) of the free angles, those of wide axes less whole turns, and the solution (n,) that they are of."""
+    n, k, m = angles.shape
+    states = angles[:, :, None, :]  # (n, k, turns, m)
+    for i, one in enumerate(found.free):
+        if wide[i]:
+            continue
+        middle = 0.5 * (one.low + one.high)
+        some = math.floor((0.5 * (one.high - one.low) + math.pi) / math.tau + SLACK)
+        turns = np.arange(-some, some + 1) * math.tau
+        near = middle + wrapped(states[..., i] - middle)
+        wound = np.repeat(states, len(turns), axis=2)
+        wound[..., i] = (near[..., None] + turns).reshape(n, k, -1)
+        states = wound
+    each = states.shape[2]
+    states = states.reshape(n, k * each, m)
+    penalty = np.zeros(states.shape[:2])
+    for i, one in enumerate(found.free):
+        if not wide[i]:
+            penalty += beyond(one, states[..., i])
+    others = [one for one in machine.chain.axes if one not in found.free]
+    for one in others:
+        penalty += np.repeat(beyond(one, found.axes[:, :, one.column]), each, axis=1)
+    penalty = np.where(penalty > SLACK, _OUTSIDE + penalty, 0.0)
+    loose = np.array(wide)
+    count = k * each
+
+    def moved(a: Floats, b: Floats) -> Floats:
+        change = np.abs(np.where(loose, wrapped(b - a), b - a))
+        return np.asarray(change.max(axis=-1) + _TIE * change.sum(axis=-1))
+
+    if begin is None:
+        cost = penalty[0] + _TIE * moved(np.zeros(m), states[0])
+    else:
+        cost = penalty[0] + moved(begin[[one.column for one in found.free]], states[0])
+    came = np.zeros((n, count), dtype=np.int64)
+    rows = max(1, _CHUNK // (count * count * m))
+    for low in range(1, n, rows):
+        high = min(low + rows, n)
+        steps = moved(states[low - 1 : high - 1, :, None], states[low:high, None, :])
+        for i in range(low, high):
+            total = cost[:, None] + steps[i - low]
+            came[i] = total.argmin(axis=0)
+            cost = total[came[i], np.arange(count)] + penalty[i]
+        cost = cost - cost.min()
+    chosen = np.empty(n, dtype=np.int64)
+    chosen[-1] = int(cost.argmin())
+    for i in range(n - 1, 0, -1):
+        chosen[i - 1] = came[i, chosen[i]]
+    return states[np.arange(n), chosen], chosen // each
+
+
+def _wound(axis: Axis, q: Floats, begin: float | None) -> Floats:
+    """Angles (n,) of a wide axis with whole turns added: the short way from row to row, back where a limit is met."""
+    first = 0.0 if begin is None else begin
+    path = first + np.cumsum(wrapped(np.diff(q, prepend=first)))
+    path = q + math.tau * np.round((path - q) / math.tau)  # no rounding is summed up
+    out = path.copy()
+    i, turn = 0, 0
+    while i < len(path):
+        seen = path[i : i + _AHEAD]
+        most, least = np.maximum.accumulate(seen), np.minimum.accumulate(seen)
+
+        def rows(t: int, most: Floats = most, least: Floats = least) -> int:
+            """Rows from i on within the limits with t turns added."""
+            over = np.searchsorted(most, axis.high + SLACK - math.tau * t, "right")
+            under = np.searchsorted(-least, math.tau * t + SLACK - axis.low, "right")
+            return int(min(over, under))
+
+        ahead = rows(turn)
+        if ahead == 0 or (i == 0 and ahead < len(seen)):
+            low, high = turn - _TURNS, turn + _TURNS
+            if math.isfinite(axis.low):
+                low = max(low, math.ceil((axis.low - SLACK - path[i]) / math.tau))
+            if math.isfinite(axis.high):
+                high = min(high, math.floor((axis.high + SLACK - path[i]) / math.tau))
+            turn = max(range(low, high + 1), key=lambda t: (rows(t), -abs(t)), default=turn)
+            ahead = max(rows(turn), 1)
+        out[i : i + ahead] += math.tau * turn
+        i += ahead
+    return out
+
+
+def _text(rows: NDArray[np.intp], worst: int, text: str) -> str:
+    more = f" ({len(rows)} rows, the first is {rows[0]})" if len(rows) > 1 else ""
+    return f"row {worst}: {text}{more}"
+
+
+def _reach(found: Solutions, lines: Ints) -> list[Finding]:
+    rows = np.flatnonzero(found.miss > REACH)
+    if len(rows) == 0:
+        return []
+    worst = int(rows[np.argmax(found.miss[rows])])
+    names = " and ".join(one.letter for one in found.free)
+    means = f"{names} reach" if found.free else "there is no rotary axis to reach"
+    text = f"the tool's axis is out of reach by {math.degrees(found.miss[worst]):.6g} deg: {means} no nearer one"
+    return [Finding("machine-reach", int(lines[worst]), _text(rows, worst, text))]
+
+
+def _singular(
+    found: Solutions, singular: NDArray[np.bool_], axes: Floats, directions: Floats, lines: Ints
+) -> list[Finding]:
+    """Rows at a pole, and steps in which a free axis swings far while the tool's axis hardly turns."""
+    out = []
+    rows = np.flatnonzero(singular)
+    if len(rows):
+        letter = found.free[0].letter
+        text = f"the tool's axis lies along that of {letter}: {letter} is free and stays as it was"
+        out.append(Finding("machine-singular", int(lines[rows[0]]), _text(rows, int(rows[0]), text)))
+    turned = angle_between(directions[1:], directions[:-1])
+    for one in found.free:
+        swing = np.abs(np.diff(axes[:, one.column]))
+        rows = np.flatnonzero((swing > SWING) & (swing > GAIN * turned)) + 1
+        if len(rows):
+            worst = int(rows[np.argmax(swing[rows - 1])])
+            text = (
+                f"{one.letter} swings by {math.degrees(swing[worst - 1]):.6g} deg while the tool's axis turns by "
+                f"{math.degrees(turned[worst - 1]):.6g} deg: retract before it, or go round the pole"
+            )
+            out.append(Finding("machine-singular", int(lines[worst]), _text(rows, worst, text)))
+    return out
+
+
+def _rewinds(free: tuple[Axis, ...], axes: Floats, lines: Ints) -> list[Finding]:
+    """Steps that are whole turns longer than the shortest way."""
+    out = []
+    for one in free:
+        change = np.diff(axes[:, one.column])
+        turns = np.round((change - wrapped(change)) / math.tau).astype(np.int64)
+        for row in (np.flatnonzero((turns != 0) & (np.abs(change) > math.pi + SLACK)) + 1).tolist():
+            a, b = (written(one, float(axes[row - k, one.column])) for k in (1, 0))
+            text = f"row {row}: {one.letter} goes back from {a} to {b}: retract before it"
+            out.append(Finding("machine-rewind", int(lines[row]), text))
+    return out

@@ -1,0 +1,81 @@
+"""Rows of axis positions that a machine cannot take up, or not without stopping.
+
+Notation: q axis positions, columns X Y Z A B C U V W [mm, rad].
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.errors import Finding
+from chipload.machine.axis import Axis
+from chipload.machine.machine import Machine
+
+Floats = NDArray[np.float64]
+
+#: beyond a limit by less is within it [mm or rad]
+SLACK = 1e-9
+
+
+def beyond(axis: Axis, q: Floats) -> Floats:
+    """How far positions [mm or rad] of an axis lie outside its limits; 0 inside.
+
+    >>> beyond(Axis("X", True, (1.0, 0.0, 0.0), low=-1.0, high=1.0), np.array([0.5, 3.0])).tolist()
+    [0.0, 2.0]
+    """
+    return np.asarray(np.maximum(np.maximum(axis.low - q, q - axis.high), 0.0))
+
+
+def written(axis: Axis, q: float) -> str:
+    """A position of an axis as people read it: in mm or deg.
+
+    >>> written(Axis("C", False, (0.0, 0.0, 1.0)), math.pi)
+    '180 deg'
+    """
+    return f"{math.degrees(q) + 0.0:g} deg" if axis.rotary else f"{q + 0.0:g} mm"
+
+
+def limit_findings(machine: Machine, axes: ArrayLike, line: ArrayLike | None = None) -> tuple[Finding, ...]:
+    """Axis limits and index steps, one finding an axis and code: the worst row, how many, the first; O(n m).
+
+    Codes: ``machine-limit``; ``machine-index``, an indexed axis that stands off its step.
+
+    Parameters
+    ----------
+    axes : (n, 9) float [mm, rad]
+    line : (n,) int, line of each row in its source; None: 0
+
+    Examples
+    --------
+    >>> from chipload.machine.machine import machine_named
+    >>> axes = np.zeros((2, 9))
+    >>> axes[1, 3] = np.radians(60.0)
+    >>> limit_findings(machine_named("xyzac-trunnion"), axes)[0].text
+    'row 1: A = 60 deg: machine xyzac-trunnion goes from -100 deg to 50 deg'
+    """
+    q = np.asarray(axes, dtype=np.float64)
+    lines = np.zeros(len(q), dtype=np.int64) if line is None else np.asarray(line)
+    found = []
+    for axis in machine.chain.axes:
+        values = q[:, axis.column]
+        checks = [
+            (
+                "machine-limit",
+                beyond(axis, values),
+                f"goes from {written(axis, axis.low)} to {written(axis, axis.high)}",
+            )
+        ]
+        if axis.step is not None:
+            off = np.abs(values - axis.step * np.round(values / axis.step))
+            checks.append(("machine-index", off, f"stands at multiples of {written(axis, axis.step)}"))
+        for code, excess, text in checks:
+            rows = np.flatnonzero(excess > SLACK)
+            if len(rows):
+                worst = int(rows[np.argmax(excess[rows])])
+                more = f" ({len(rows)} rows, the first is {rows[0]})" if len(rows) > 1 else ""
+                what = f"{axis.letter} = {written(axis, float(values[worst]))}: machine {machine.name} {text}"
+                found.append(Finding(code, int(lines[worst]), f"row {worst}: {what}{more}"))
+    return tuple(found)

@@ -1,0 +1,271 @@
+"""Moves cut into pieces, so that what is straight for the workpiece and what is straight for the axes agree.
+
+Notation: x(t) [mm] tip and a(t) unit axis of the tool in the work frame, q(t) axis positions; h length of a piece as a
+part of its move, e [mm or rad] greatest distance of a piece from what it stands for.
+
+A machine moves its axes in straight proportion from row to row, the tip then leaves the straight line. The law: e is
+h^2/8 times the second derivative of the tip, to the leading order, so a piece that is off by e is cut into
+ceil(sqrt(e / tolerance)) parts. The law only estimates: every piece is measured at ``PLACES`` places between its ends,
+with the rest of the tolerance left for what lies between them, and cut again until it holds.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.errors import Finding, InputError
+from chipload.machine.axis import LETTERS
+from chipload.machine.follow import follow
+from chipload.machine.kinematics import forward
+from chipload.machine.machine import Machine
+from chipload.machine.orientation import angle_between
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: places inside a piece where it is measured
+PLACES = 7
+#: of a parabola's height its samples at eighths miss 1/64 at most; the rest is for its skew
+_MARGIN = 1.05
+_PARTS = 256  # parts that a piece is cut into in one round, at most
+_MORE = 1.1  # more parts than the law asks for, so that one round is mostly enough
+_JUMP = 4  # parts of a piece in which a rotary axis goes more than a quarter turn
+_SHORTEST = 2.0**-16  # of a move: shorter pieces are not cut
+_TURN = math.pi / 4.0  # [rad] no rotary axis of a traced piece goes further
+_CHUNK = 1 << 15  # pieces that are measured at once
+_ROTARY = [LETTERS.index(letter) for letter in "ABC"]
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Moves cut into pieces.
+
+    Parameters
+    ----------
+    tip : (m, 3) float [mm], axis : (m, 3) float
+        In the work frame; the first is that of row 0.
+    axes : (m, 9) float [mm, rad]
+    row : (m,) int
+        Row of the path whose move a piece belongs to; never falls.
+    part : (m,) float
+        How far along that move the piece ends, in (0, 1]; 1 at the path's own rows.
+    """
+
+    tip: Floats
+    axis: Floats
+    axes: Floats
+    row: Ints
+    part: Floats
+
+
+def linearise(
+    machine: Machine,
+    tip: ArrayLike,
+    axis: ArrayLike,
+    tolerance: float,
+    angle_tolerance: float,
+    start: ArrayLike | None = None,
+    tool_length: float = 0.0,
+    work_zero: ArrayLike | None = None,
+    free: str | None = None,
+    pole_tolerance: float = 1e-9,
+    max_rows: int = 1_000_000,
+) -> tuple[Pieces, tuple[Finding, ...]]:
+    """Pieces between which the axes may go straight: the tip on its line, the tool's axis on its great circle.
+
+    Between the rows given the tip goes straight and the axis along the great circle. O(m) for m pieces, times the
+    rounds: two or three at h^2, eight where nothing helps.
+
+    Parameters
+    ----------
+    tip : (n, 3) float [mm], axis : (n, 3) float
+    tolerance : float [mm], > 0
+        Greatest distance of the tip from the straight line.
+    angle_tolerance : float [rad], > 0
+        Greatest angle of the tool's axis to the plane of the great circle.
+    start, work_zero, free, pole_tolerance : as in ``follow``
+    tool_length : float [mm]
+    max_rows : pieces that may be made
+
+    Returns
+    -------
+    Pieces, and the findings of ``follow`` on their rows, besides ``machine-linear``: a move on which the rotary axes
+    jump, so that no cutting helps.
+
+    Raises
+    ------
+    InputError
+        A tolerance is not above 0, the axis turns by 180 degrees in a move, more than ``max_rows`` pieces are needed.
+
+    Examples
+    --------
+    >>> from chipload.machine.machine import machine_named
+    >>> tips, axes = [[0.0, 0.0, 0.0], [50.0, 0.0, 0.0]], [[0.0, 0.0, 1.0], [0.0, 1.0, 1.0]]
+    >>> coarse, _ = linearise(machine_named("xyzac-trunnion"), tips, axes, 0.1, 0.01)
+    >>> fine, _ = linearise(machine_named("xyzac-trunnion"), tips, axes, 0.001, 0.01)
+    >>> 8.0 < (len(fine.row) - 1) / (len(coarse.row) - 1) < 12.0
+    True
+    """
+    if not (0.0 < tolerance < math.inf and 0.0 < angle_tolerance < math.inf):
+        raise InputError(f"linearise: tolerance {tolerance:g}, angle_tolerance {angle_tolerance:g}: must be above 0")
+    p, a = np.asarray(tip, dtype=np.float64), np.asarray(axis, dtype=np.float64)
+    if p.ndim != 2 or p.shape[1] != 3 or a.shape != p.shape or len(p) == 0:
+        raise InputError(f"linearise: tip {p.shape} and axis {a.shape}: must be (n, 3) and (n, 3), n >= 1")
+    a = a / np.linalg.norm(a, axis=1)[:, None]
+    turn = angle_between(a[1:], a[:-1])
+    if (turn > math.pi - 1e-6).any():
+        worst = int(turn.argmax()) + 1
+        raise InputError(
+            f"linearise: row {worst}: the axis turns by 180 deg: must be less, no great circle is the shortest"
+        )
+    row: Ints = np.arange(len(p), dtype=np.int64)
+    part: Floats = np.ones(len(p))
+    while True:
+        x, d = _along(p, a, row, part)
+        axes, findings = follow(machine, x, d, start, tool_length, work_zero, free, pole_tolerance, None)
+        e = np.zeros(len(row) - 1)
+        for k in range(0, len(e), _CHUNK):
+            some = slice(k, k + _CHUNK + 1)
+            e[k : k + _CHUNK] = _excess(
+                machine, axes[some], x[some], d[some], tool_length, work_zero, tolerance, angle_tolerance
+            )
+        short = np.where(row[1:] == row[:-1], part[1:] - part[:-1], part[1:]) <= _SHORTEST
+        parts = np.where(np.isinf(e), _JUMP, np.minimum(np.ceil(np.sqrt(e) * _MORE), _PARTS))
+        parts = np.where(short | (e <= 1.0), 1, parts).astype(np.int64)
+        if (parts == 1).all():
+            break
+        row, part = _cut(row, part, parts, max_rows)
+    jumps = sorted(set(row[1:][short & (e > 1.0)].tolist()))
+    text = "row {}: the rotary axes jump: no piece is short enough for the tolerance: retract before it"
+    found = tuple(Finding("machine-linear", 0, text.format(k)) for k in jumps)
+    return Pieces(x, d, axes, row, part), (*findings, *found)
+
+
+def traced(
+    machine: Machine,
+    axes: ArrayLike,
+    tolerance: float,
+    tool_length: float = 0.0,
+    work_zero: ArrayLike | None = None,
+    max_rows: int = 1_000_000,
+) -> Pieces:
+    """The path in the work frame when every axis goes in straight proportion from row to row.
+
+    The straight lines between the tips of the pieces leave the path by at most ``tolerance`` (each place against the
+    same share of its chord); no rotary axis turns by more than 45 degrees in a piece. O(m).
+
+    Parameters
+    ----------
+    axes : (n, 9) float [mm, rad]
+    tolerance : float [mm], > 0
+    tool_length, work_zero, max_rows : as in ``linearise``
+
+    Examples
+    --------
+    A quarter turn of a table with the tip 50 mm off its axis: an arc 0.01 mm deep is 2 acos(1 - 0.01/50) = 2.29
+    degrees, so 39.3 of them.
+
+    >>> from chipload.machine.machine import machine_named
+    >>> axes = np.zeros((2, 9))
+    >>> axes[:, 0], axes[1, 5] = 50.0, np.pi / 2
+    >>> path = traced(machine_named("cradle-ac"), axes, 0.01)
+    >>> len(path.row) - 1, np.linalg.norm(path.tip[::11, :2], axis=1).round(9).tolist()
+    (44, [50.0, 50.0, 50.0, 50.0, 50.0])
+    """
+    if not 0.0 < tolerance < math.inf:
+        raise InputError(f"traced: tolerance {tolerance:g}: must be above 0")
+    q = np.asarray(axes, dtype=np.float64)
+    if q.ndim != 2 or q.shape[1] != 9 or len(q) == 0 or not np.isfinite(q).all():
+        raise InputError(f"traced: axes {q.shape}: must be (n, 9) finite numbers, n >= 1")
+    row: Ints = np.arange(len(q), dtype=np.int64)
+    part: Floats = np.ones(len(q))
+    turns = np.abs(np.diff(q[:, _ROTARY], axis=0)).max(axis=1, initial=0.0)
+    if turns.sum() / _TURN > max_rows:
+        raise InputError(f"traced: more than {max_rows} pieces: raise the tolerance or max_rows")
+    parts = np.maximum(np.ceil(turns / _TURN), 1.0).astype(np.int64)
+    while True:
+        row, part = _cut(row, part, parts, max_rows)
+        at = _share(q, row, part)
+        x, d = forward(machine, at, tool_length, work_zero)
+        e = np.zeros(len(row) - 1)
+        for k in range(0, len(e), _CHUNK):
+            some = slice(k, k + _CHUNK + 1)
+            tips, _, share = _between(machine, at[some], tool_length, work_zero)
+            chord = x[some][:-1, None] + share[:, None] * np.diff(x[some], axis=0)[:, None]
+            e[k : k + _CHUNK] = _MARGIN * np.linalg.norm(tips - chord, axis=2).max(axis=1) / tolerance
+        parts = np.where(e > 1.0, np.minimum(np.ceil(np.sqrt(e) * _MORE), _PARTS), 1.0).astype(np.int64)
+        if (parts == 1).all():
+            return Pieces(x, d, at, row, part)
+
+
+def _share(values: Floats, row: Ints, part: Floats) -> Floats:
+    """Rows of ``values`` (n, c) in straight proportion along their moves; its own rows to the last bit."""
+    end, begin = values[row], values[np.maximum(row - 1, 0)]
+    return np.asarray(np.where(part[:, None] == 1.0, end, begin + part[:, None] * (end - begin)))
+
+
+def _along(p: Floats, a: Floats, row: Ints, part: Floats) -> tuple[Floats, Floats]:
+    """Tips along straight lines, axes along great circles."""
+    end, begin = a[row], a[np.maximum(row - 1, 0)]
+    turn = angle_between(begin, end)[:, None]
+    u = part[:, None]
+    small = turn < 1e-12
+    over = np.where(small, 1.0, np.sin(turn))
+    d = np.where(small, end, (np.sin((1.0 - u) * turn) * begin + np.sin(u * turn) * end) / over)
+    return _share(p, row, part), np.where(u == 1.0, end, d)
+
+
+def _between(
+    machine: Machine, axes: Floats, tool_length: float, work_zero: ArrayLike | None
+) -> tuple[Floats, Floats, Floats]:
+    """Tips and axes (k, PLACES, 3) at places inside the k pieces whose axes go straight, and the places' shares."""
+    share = np.arange(1, PLACES + 1) / (PLACES + 1.0)
+    q = axes[:-1, None] + share[:, None] * np.diff(axes, axis=0)[:, None]
+    tips, directions = forward(machine, q.reshape(-1, 9), tool_length, work_zero)
+    shape = (len(axes) - 1, PLACES, 3)
+    return tips.reshape(shape), directions.reshape(shape), share
+
+
+def _excess(
+    machine: Machine,
+    axes: Floats,
+    x: Floats,
+    d: Floats,
+    tool_length: float,
+    work_zero: ArrayLike | None,
+    tolerance: float,
+    angle_tolerance: float,
+) -> Floats:
+    """Distance (k,) of pieces from line and great circle, in tolerances; inf where an axis goes over a quarter turn."""
+    tips, directions, _ = _between(machine, axes, tool_length, work_zero)
+    chord = np.diff(x, axis=0)
+    square = (chord**2).sum(axis=1)
+    off = tips - x[:-1, None]
+    along = np.clip(np.einsum("kps,ks->kp", off, chord) / np.where(square > 0.0, square, 1.0)[:, None], 0.0, 1.0)
+    line = np.linalg.norm(off - along[..., None] * chord[:, None], axis=2).max(axis=1) / tolerance
+    normal = np.cross(d[:-1], d[1:])
+    size = np.linalg.norm(normal, axis=1)
+    still = size < 1e-9
+    out = np.abs(np.einsum("kps,ks->kp", directions, normal / np.where(still, 1.0, size)[:, None]))
+    leaves = np.where(still[:, None], angle_between(directions, d[:-1, None]), np.arcsin(np.clip(out, 0.0, 1.0)))
+    e = _MARGIN * np.maximum(line, leaves.max(axis=1) / angle_tolerance)
+    half = np.abs(np.diff(axes[:, _ROTARY], axis=0)).max(axis=1) > 0.5 * math.pi
+    return np.asarray(np.where(half, math.inf, e))
+
+
+def _cut(row: Ints, part: Floats, parts: Ints, max_rows: int) -> tuple[Ints, Floats]:
+    """Every piece cut into so many equal parts."""
+    total = int(parts.sum()) + 1
+    if total > max_rows:
+        raise InputError(f"{total} pieces are more than max_rows = {max_rows}: raise the tolerance or max_rows")
+    begin = np.where(row[1:] == row[:-1], part[:-1], 0.0)
+    last = np.cumsum(parts)
+    k = np.arange(1, total) - np.repeat(last - parts, parts)
+    share = k / np.repeat(parts, parts)
+    b, e = np.repeat(begin, parts), np.repeat(part[1:], parts)
+    cut = np.where(share == 1.0, e, b + share * (e - b))
+    return np.concatenate([row[:1], np.repeat(row[1:], parts)]), np.concatenate([part[:1], cut])
