@@ -7,6 +7,7 @@ Read from TOML with the unit in every key; a number that is missing is named, ne
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,6 +38,7 @@ class Machine:
     power_w : power of the spindle [W]; None: not known
     torque : torque of the spindle [N mm]; None: not known
     note : where its numbers come from and which are assumed
+    tcp_words : blocks that begin and end tool centre point control, ``{tool}`` for the tool's number; None: it has none
 
     Raises
     ------
@@ -56,6 +58,7 @@ class Machine:
     power_w: float | None = None
     torque: float | None = None
     note: str = ""
+    tcp_words: tuple[str, str] | None = None
 
     def __post_init__(self) -> None:
         def need(ok: bool, key: str, value: object, limit: str) -> None:
@@ -118,17 +121,29 @@ def _from_table(label: str, table: Row) -> Machine:
             power_w=float(spindle["power_w"]) if "power_w" in spindle else None,
             torque=float(spindle["torque_nm"]) * 1e3 if "torque_nm" in spindle else None,
             note=top.get("note", ""),
+            tcp_words=_tcp_words(top),
         )
     except InputError as err:
         text = str(err)
         raise InputError(text if text.startswith(label) else f"{label}: {text}") from None
 
 
+def _tcp_words(top: Row) -> tuple[str, str] | None:
+    if "tcp_on" not in top and "tcp_off" not in top:
+        return None
+    words = str(top.get("tcp_on", "")), str(top.get("tcp_off", ""))
+    for key, word in zip(("tcp_on", "tcp_off"), words, strict=True):
+        if not re.fullmatch(r"[A-Z0-9.{}a-z ]+", word):
+            raise InputError(f"machine.{key} = {word!r}: must be words of the controller, as G43.4 H{{tool}} and G49")
+    return words
+
+
 def read_machine(path: str | Path) -> Machine:
     """Read a machine from a TOML file.
 
     Keys: ``name``, ``dialect``, ``decimals``, ``rapid_mm_min``, ``feed_max_mm_min``, ``corner_tolerance_mm``, optional
-    ``note``, and ``chain``, the letters of the axes from the workpiece to the tool (XYZ if left out).
+    ``note``, ``tcp_on`` and ``tcp_off`` (the words of tool centre point control), and ``chain``, the letters of the
+    axes from the workpiece to the tool (XYZ if left out).
 
     In ``[axis.x]`` and the other linear ones: ``min_mm``, ``max_mm``, ``acceleration_mm_s2``, optional
     ``rate_mm_min`` (else the rapid rate), ``direction`` (else the letter's own), ``side`` (`table` or `head`, else

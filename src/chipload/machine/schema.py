@@ -24,6 +24,8 @@ _MACHINE = {
     "corner_tolerance_mm": _NUMBER,
     "chain?": _TEXT,
     "note?": _TEXT,
+    "tcp_on?": _TEXT,
+    "tcp_off?": _TEXT,
 }
 _SPINDLE = {
     "min_rpm": _NUMBER,

@@ -1,9 +1,9 @@
 """Commands: what a text tells the axes of a machine to do, motion after motion, in columns.
 
-Every reader of NC text ends here and every writer of it starts here; :mod:`chipload.program.axes` leads to and from a
-:class:`~chipload.program.program.Program`, which knows the workpiece and no axes. Positions are as LinuxCNC's canonical
-commands give them: in the coordinates that are active, so that offsets, the offset of G92, the rotation and the tool's
-length are kept beside them, in ``frames``.
+Every reader of NC text ends here and every writer of it starts here; :mod:`~chipload.program.to_work` leads to a
+:class:`~chipload.program.program.Program`, which knows the workpiece and no axes, ``to_axes`` back. Positions are as
+LinuxCNC's canonical commands give them: in the coordinates that are active, so that offsets, the offset of G92, the
+rotation and the tool's length are kept beside them, in ``frames``.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ LETTERS = "XYZABCUVW"
 RAPID, LINE, ARC, DWELL, PROBE = 0, 1, 2, 3, 4
 #: values of ``Commands.plane``: the coordinates that an arc turns in, and the one that it may rise along
 XY, ZX, YZ = 0, 1, 2
+#: ends of an arc that are nearer than this [mm] are one point: a full turn
+FULL_TURN_MM = 1e-7
 #: columns of ``position`` by plane: first, second, along
 PLANE_AXES = ((0, 1, 2), (2, 0, 1), (1, 2, 0))
 
@@ -169,6 +171,73 @@ class Commands:
             if rows.any():
                 out[rows] = frame.to_machine(self.position[rows])
         return out
+
+
+def starts(commands: Commands) -> Floats:
+    """(n, 9) where each row starts, in the coordinates of its own frame; row 0 starts at its own end."""
+    own = np.vstack([commands.position[:1], commands.position[:-1]])
+    changed = np.flatnonzero(np.diff(commands.frame, prepend=commands.frame[:1]))
+    if len(changed):
+        before = commands.machine()[changed - 1]
+        for k, row in enumerate(changed):
+            own[row] = commands.frames[commands.frame[row]].from_machine(before[k : k + 1])[0]
+    return own
+
+
+def arc_sweeps(commands: Commands) -> Floats:
+    """(n,) signed sweep of each arc in its plane [rad], 0 for all else; ends over one another are a full turn."""
+    arc = commands.motion == ARC
+    pair = np.array(PLANE_AXES)[commands.plane][:, :2]
+    v0 = np.take_along_axis(starts(commands), pair, axis=1) - commands.centre
+    v1 = np.take_along_axis(commands.position, pair, axis=1) - commands.centre
+    sense = np.where(commands.turns > 0, 1.0, -1.0)
+    turn = np.arctan2(v0[:, 0] * v1[:, 1] - v0[:, 1] * v1[:, 0], (v0 * v1).sum(axis=1))
+    sweep = (sense * turn) % math.tau
+    sweep = np.where(np.hypot(*(v1 - v0).T) <= FULL_TURN_MM, math.tau, sweep)
+    return np.where(arc, sense * (sweep + math.tau * (np.abs(commands.turns) - 1)), 0.0)
+
+
+def extents(commands: Commands) -> Floats:
+    """(n,) what a feed is counted along: the path of X Y Z [mm], else of U V W [mm], else of A B C [rad]."""
+    d = commands.position - starts(commands)
+    sizes = [np.linalg.norm(d[:, k : k + 3], axis=1) for k in (0, 6, 3)]
+    pair = np.array(PLANE_AXES)[commands.plane]
+    end = np.take_along_axis(commands.position, pair[:, :2], axis=1)
+    r = np.hypot(*(end - commands.centre).T)
+    rise = np.take_along_axis(d, pair[:, 2:], axis=1)[:, 0]
+    sizes[0] = np.where(commands.motion == ARC, np.hypot(r * arc_sweeps(commands), rise), sizes[0])
+    return np.asarray(np.where(sizes[0] > 0.0, sizes[0], np.where(sizes[1] > 0.0, sizes[1], sizes[2])))
+
+
+def chorded(commands: Commands, chosen: NDArray[np.bool_], tolerance: float) -> Commands:
+    """The commands with the ``chosen`` (n,) arcs as chords that leave them by at most ``tolerance`` [mm]."""
+    chosen = chosen & (commands.motion == ARC)
+    if not chosen.any():
+        return commands
+    sweep = arc_sweeps(commands)
+    pair = np.array(PLANE_AXES)[commands.plane][:, :2]
+    begin = starts(commands)
+    v0 = np.take_along_axis(begin, pair, axis=1) - commands.centre
+    r = np.hypot(*v0.T)
+    step = 2.0 * np.arccos(1.0 - np.minimum(tolerance / np.where(r > 0.0, r, math.inf), 0.5))
+    count = np.where(chosen, np.ceil(np.abs(sweep) / np.where(step > 0.0, step, 1.0)), 1.0).astype(np.int64).clip(1)
+    row = np.repeat(np.arange(len(commands)), count)
+    part = (np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + 1) / count[row]
+    inner = chosen[row] & (part < 1.0)
+    position = np.where(
+        inner[:, None], begin[row] + part[:, None] * (commands.position - begin)[row], commands.position[row]
+    )
+    a = sweep[row] * part
+    c, s = np.cos(a), np.sin(a)
+    turned = commands.centre[row] + np.column_stack([c * v0[row, 0] - s * v0[row, 1], s * v0[row, 0] + c * v0[row, 1]])
+    which = np.flatnonzero(inner)
+    position[which[:, None], pair[row][which]] = turned[which]
+    columns = {f.name: getattr(commands, f.name)[row] for f in fields(Commands) if f.name not in ("frames", "labels")}
+    columns["position"] = position
+    columns["motion"] = np.where(chosen[row], LINE, commands.motion[row])
+    columns["centre"] = np.where(chosen[row][:, None], 0.0, commands.centre[row])
+    columns["turns"] = np.where(chosen[row], 0, commands.turns[row])
+    return Commands(**columns, frames=commands.frames, labels=commands.labels)
 
 
 def commands_from_rows(rows: Sequence[Row], frames: Sequence[Frame], labels: Sequence[str]) -> Commands:

@@ -88,6 +88,14 @@ def lengths(program: Program) -> Floats:
     return np.where(program.motion == DWELL, 0.0, np.where(is_arc(program), bent, chord))
 
 
+def spans(program: Program) -> Floats:
+    """(n,) what a feed is counted along: length [mm] or, where the tip stands, how far the tool's axis turns [rad]."""
+    length = lengths(program)
+    before = np.vstack([program.axis[:1], program.axis[:-1]])
+    turn = 2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(program.axis - before, axis=1), 1.0))
+    return np.where((length <= JOIN_MM) & (program.motion != DWELL), turn, length)
+
+
 def directions(program: Program) -> tuple[Floats, Floats]:
     """(n, 3), (n, 3) unit directions of travel at the start and the end of each row; 0 where it has no length."""
     d = program.p_work - starts(program)

@@ -49,7 +49,7 @@ class Program:
     turns : (n,) int
         Whole turns of an arc before the one that it ends in, >= 0.
     feed : (n,) float [mm/s]
-        Feed of LINE and ARC, > 0; 0 for RAPID; for DWELL the time [s].
+        Feed of LINE and ARC, > 0, [rad/s] of the tool's axis where the tip stands; 0 for RAPID; for DWELL the time [s].
     spindle : (n,) float [rad/s]
         Spindle speed, positive clockwise seen from the spindle (M3), 0 stopped.
     tool : (n,) int

@@ -1,27 +1,24 @@
-"""From the axes of a machine to the workpiece and back: Commands to Program, Program to Commands.
+"""From the axes of a machine to the workpiece: Commands to Program.
 
 Notation: a **known** work offset is one that the text or its parameters set; where it is all zero the work's zero is
 where the machine's file puts it. L [mm] tool length, kept in a frame as what it adds to the axes. Rows on which no
 rotary axis moves are mapped rigidly: arcs stay arcs. Where one moves, the tip of a machine without tool centre point
-control leaves the straight line: the row is cut into pieces, here and on the way back.
+control leaves the straight line: the row is cut into pieces.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, InputError
-from chipload.machine.follow import follow
 from chipload.machine.kinematics import forward, with_tip
-from chipload.machine.linearise import linearise, traced
+from chipload.machine.linearise import traced
 from chipload.machine.machine import Machine
-from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, PROBE, RAPID, XY, Commands, Frame, chorded, extents
-from chipload.program.motions import is_arc, lengths, radii, straightened, sweeps
+from chipload.program.commands import ARC, DWELL, LETTERS, LINE, PLANE_AXES, PROBE, Commands, Frame, chorded, extents
+from chipload.program.motions import lengths, spans
 from chipload.program.program import ARC_CCW, ARC_CW, Program
 from chipload.program.program import DWELL as WORK_DWELL
 from chipload.program.program import LINE as WORK_LINE
@@ -30,10 +27,8 @@ from chipload.program.program import RAPID as WORK_RAPID
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: how far the tip may leave its path where a row is cut into pieces [mm], and the tool's axis [rad]
-TOLERANCE_MM, ANGLE_TOLERANCE = 1e-3, math.radians(0.05)
-#: arcs of a smaller radius [mm] are written as chords: controllers refuse them
-LEAST_RADIUS = 0.0013
+#: how far the tip may leave its path where a row is cut into pieces [mm]
+TOLERANCE_MM = 1e-3
 _ROTARY = slice(3, 6)
 _STILL = 1e-12  # [rad] a rotary axis that moves less stands
 
@@ -64,20 +59,19 @@ def to_work(
     base = work_frame(commands)
     known = bool(base.offset.any())
     zero, shift = _work_zero(machine, base, known)
-    moved = np.abs(np.diff(commands.machine()[:, _ROTARY], axis=0, prepend=commands.machine()[:1, _ROTARY])).max(axis=1)
-    turning = moved > _STILL
-    turning[:1] = False
-    commands = chorded(commands, turning, tolerance)
+    commands = chorded(commands, _turning(commands), tolerance)
+    turning = _turning(commands)
     axes = commands.machine() + shift
-    moved = np.abs(np.diff(axes[:, _ROTARY], axis=0, prepend=axes[:1, _ROTARY])).max(axis=1)
-    lengths_mm = np.array([_tool_length(machine, f) for f in commands.frames])[commands.frame]
+    tool = np.array([tool_length(machine, f) for f in commands.frames])[commands.frame]
     if not machine.chain.rotary:
         tip = _flat(commands, base)
         direction = np.tile([0.0, 0.0, 1.0], (len(tip), 1))
     else:
         if any(f.rotation for f in commands.frames):
-            raise InputError("commands: the work offset is turned (G10 L2 R): must not be on a machine with rotary axes")
-        tip, direction = forward(machine, axes, lengths_mm, zero)
+            raise InputError(
+                "commands: the work offset is turned (G10 L2 R): must not be on a machine with rotary axes"
+            )
+        tip, direction = forward(machine, axes, tool, zero)
         tip = np.where(commands.tcp[:, None], _flat(commands, base), tip)
     columns = {
         "motion": np.array([WORK_RAPID, WORK_LINE, ARC_CW, WORK_DWELL, WORK_LINE])[commands.motion],
@@ -87,59 +81,22 @@ def to_work(
         "tool": commands.tool,
         "line": commands.line,
         "label": commands.label,
-        **_arcs_to_work(commands, machine, axes, lengths_mm, zero, base),
+        **_arcs_to_work(commands, machine, axes, tool, zero, base),
     }
-    columns["motion"] = np.where(commands.motion == ARC, np.where(commands.turns > 0, ARC_CCW, ARC_CW), columns["motion"])
-    columns["feed"] = commands.feed
-    program = Program(**columns, labels=commands.labels)
-    program = _timed(program, commands, moved > _STILL)
-    cut = (moved > _STILL) & ~commands.tcp & (commands.motion != DWELL)
-    cut[:1] = False
+    arcs = np.where(commands.turns > 0, ARC_CCW, ARC_CW)
+    columns["motion"] = np.where(commands.motion == ARC, arcs, columns["motion"])
+    program = Program(**columns, feed=commands.feed, labels=commands.labels)
+    cut = turning & ~commands.tcp & (commands.motion != DWELL)
+    program = _timed(program, commands, cut)
     if cut.any():
-        program = _traced(program, machine, axes, lengths_mm, zero, cut, tolerance)
+        program = _traced(program, machine, axes, tool, zero, cut, tolerance)
     return program, findings
 
 
-def to_axes(
-    program: Program,
-    machine: Machine,
-    *,
-    tool_lengths: Mapping[int, float] | None = None,
-    tcp: bool = False,
-    start: Floats | None = None,
-    tolerance: float = TOLERANCE_MM,
-) -> tuple[Commands, tuple[Finding, ...]]:
-    """What the machine's axes have to do for a program; O(n) and the search of :func:`~chipload.machine.follow.follow`.
-
-    Parameters
-    ----------
-    tool_lengths : L [mm] of each tool; one that is not named has 0: positions are of the spindle's nose
-    tcp : whether the controller is told the tip and keeps it there while rotary axes move
-    start : (9,) float, where the axes stand before row 0
-    tolerance : greatest distance of the tip from its line [mm] where a rotary axis moves
-
-    Raises
-    ------
-    InputError
-        The axis is tilted and the machine has no rotary axis; an index table would move in a cut.
-    """
-    small = (radii(program) < LEAST_RADIUS) & is_arc(program)
-    program = straightened(program, np.where(small, 0.25 * math.pi, math.inf))
-    program = _single_turns(program)
-    if not machine.chain.rotary:
-        tilted = np.flatnonzero((np.abs(program.axis[:, :2]).max(axis=1) > 1e-9) | (program.axis[:, 2] < 0.0))
-        if len(tilted):
-            raise InputError(f"program row {tilted[0]}: the axis is tilted: {machine.name} is written with three axes")
-        program = _plane_arcs(program, program.normal, tolerance)
-        return _commands(program, np.pad(program.p_work, ((0, 0), (0, 6))), (Frame(),), np.zeros(len(program))), ()
-    return _rotary_commands(program, machine, tool_lengths or {}, tcp, start, tolerance)
-
-
-# -- to the workpiece -------------------------------------------------------------------------------------------
 def _strangers(commands: Commands, machine: Machine) -> tuple[Finding, ...]:
     """Axes that move and that the machine has not are refused; rows that are probes are said."""
     letters = machine.chain.letters
-    for k, letter in enumerate("XYZABCUVW"):
+    for k, letter in enumerate(LETTERS):
         if letter not in letters and len(commands) and np.ptp(commands.position[:, k]) > 0.0:
             row = int(np.flatnonzero(np.diff(commands.position[:, k]))[0]) + 1
             raise InputError(
@@ -150,14 +107,22 @@ def _strangers(commands: Commands, machine: Machine) -> tuple[Finding, ...]:
     return (Finding("program-probe", int(commands.line[probes[0]]), text.format(len(probes))),) if len(probes) else ()
 
 
-def _home(machine: Machine, length: float) -> Floats:
+def _turning(commands: Commands) -> NDArray[np.bool_]:
+    """(n,) whether a rotary axis moves on each row."""
+    rotary = commands.machine()[:, _ROTARY]
+    out = np.abs(np.diff(rotary, axis=0, prepend=rotary[:1])).max(axis=1) > _STILL
+    return np.asarray(out)
+
+
+def home(machine: Machine, length: float) -> Floats:
     """(9,) the axes that bring the tip of a tool to the work's zero, rotary axes at zero."""
-    return with_tip(machine, np.zeros((1, 9)), np.zeros((1, 3)), length)[0]
+    out: Floats = with_tip(machine, np.zeros((1, 9)), np.zeros((1, 3)), length)[0]
+    return out
 
 
-def _tool_length(machine: Machine, frame: Frame) -> float:
+def tool_length(machine: Machine, frame: Frame) -> float:
     """L [mm] of a frame whose tool adds to the axes what a tool of that length does."""
-    unit = _home(machine, 1.0)[:3] - _home(machine, 0.0)[:3]
+    unit = home(machine, 1.0)[:3] - home(machine, 0.0)[:3]
     return float(frame.tool[:3] @ unit / (unit @ unit))
 
 
@@ -167,7 +132,7 @@ def _work_zero(machine: Machine, base: Frame, known: bool) -> tuple[Floats, Floa
         zero = np.array(base.offset)
         tip, _ = forward(machine, zero[None, :] * _linear(), 0.0, np.zeros(3))
         return tip[0] @ machine.chain.R_machine_work.T, np.zeros(9)
-    return np.array(machine.chain.work_zero), _home(machine, 0.0)
+    return np.array(machine.chain.work_zero), home(machine, 0.0)
 
 
 def _linear() -> Floats:
@@ -204,7 +169,7 @@ def _arcs_to_work(
         up[np.arange(len(arcs)), first[:, 2]] += 1.0
         ends = []
         for points in (at, up):
-            moved = replace_rows(commands, arcs, points)
+            moved = _at_rows(commands, arcs, points)
             flat = _flat(moved, base)
             if machine.chain.rotary:
                 whole = moved.machine() + (axes[arcs] - commands.machine()[arcs])
@@ -218,7 +183,7 @@ def _arcs_to_work(
     return {"centre": centre, "normal": normal, "turns": turns}
 
 
-def replace_rows(commands: Commands, rows: Ints, position: Floats) -> Commands:
+def _at_rows(commands: Commands, rows: Ints, position: Floats) -> Commands:
     """Some rows of the commands at other positions."""
     columns = {f.name: getattr(commands, f.name)[rows] for f in fields(Commands) if f.name not in ("frames", "labels")}
     return Commands(**{**columns, "position": position}, frames=commands.frames, labels=commands.labels)
@@ -226,13 +191,12 @@ def replace_rows(commands: Commands, rows: Ints, position: Floats) -> Commands:
 
 def _timed(program: Program, commands: Commands, turning: NDArray[np.bool_]) -> Program:
     """The feed of the tip: rows that turn a rotary axis take the time that the controller gives them."""
-    cuts = turning & np.isin(commands.motion, (LINE, PROBE, ARC)) & ~commands.tcp
+    cuts = turning & np.isin(commands.motion, (LINE, PROBE, ARC))
     if not cuts.any():
         return program
     time = extents(commands) / np.where(commands.feed > 0.0, commands.feed, 1.0)
-    length = lengths(program)
-    own = np.where(length > 1e-9, length / np.where(time > 0.0, time, 1.0), commands.feed)
-    return replace(program, feed=np.where(cuts & (time > 0.0), own, program.feed))
+    own = spans(program) / np.where(time > 0.0, time, 1.0)
+    return replace(program, feed=np.where(cuts & (own > 0.0), own, program.feed))
 
 
 def _traced(
@@ -244,23 +208,25 @@ def _traced(
     cut: NDArray[np.bool_],
     tolerance: float,
 ) -> Program:
-    """The program with its turning rows in pieces along which the tip goes straight within the tolerance."""
+    """The program with its turning rows in pieces along which the tip goes straight within the tolerance.
+
+    A row that begins with another tool length comes from nowhere that is known: it stays one.
+    """
     parts: list[dict[str, NDArray[np.generic]]] = []
     names = [f.name for f in fields(Program) if f.name != "labels"]
     begin = 0
-    for length in _runs(tool):
-        stop = begin + length
-        here = max(begin - 1, 0)
-        pieces = traced(machine, axes[here:stop], tolerance, float(tool[begin]), zero)
-        row = pieces.row + here
-        keep = (row >= begin) & (cut[row] | (pieces.part == 1.0))
+    for count in _runs(tool):
+        stop = begin + count
+        pieces = traced(machine, axes[begin:stop], tolerance, float(tool[begin]), zero)
+        row = pieces.row + begin
+        keep = cut[row] | (pieces.part == 1.0)
         row, part = row[keep], pieces.part[keep]
         columns = {name: np.array(getattr(program, name)[row]) for name in names}
         inner = part < 1.0
         columns["p_work"][inner] = pieces.tip[keep][inner]
         columns["axis"][inner] = pieces.axis[keep][inner]
         total = np.zeros(stop)
-        before = np.vstack([program.p_work[here][None, :], columns["p_work"][:-1]])
+        before = np.vstack([columns["p_work"][:1], columns["p_work"][:-1]])
         np.add.at(total, row, np.linalg.norm(columns["p_work"] - before, axis=1))
         chord = lengths(program)
         stretched = np.isin(row, np.flatnonzero(cut)) & (columns["motion"] == WORK_LINE) & (chord[row] > 1e-9)
@@ -275,65 +241,3 @@ def _runs(values: Floats) -> list[int]:
     """Lengths of the runs of equal values."""
     ends = np.flatnonzero(np.append(np.diff(values) != 0.0, True)) + 1
     return [int(x) for x in np.diff(ends, prepend=0)]
-
-
-# -- to the axes ------------------------------------------------------------------------------------------------
-def _single_turns(program: Program) -> Program:
-    """Arcs of more than a turn as several rows of at most one turn each."""
-    if not program.turns.any():
-        return program
-    sweep = np.abs(sweeps(program))
-    step = np.where(program.turns > 0, sweep / np.ceil(sweep / math.tau - 1e-9), math.inf)
-    chords = straightened(program, step)
-    row = np.concatenate([[0], np.cumsum(np.ones(len(program), dtype=np.int64))])[:-1]
-    count = np.where(program.turns > 0, np.ceil(sweep / math.tau - 1e-9), 1).astype(np.int64)
-    row = np.repeat(row, count)
-    back = {name: getattr(program, name)[row] for name in ("motion", "centre", "normal")}
-    return replace(chords, **back, turns=np.zeros(len(row), dtype=np.int64))
-
-
-def _plane_arcs(program: Program, normal: Floats, tolerance: float) -> Program:
-    """Arcs about no axis of coordinates (``normal`` (n, 3), as the controller sees it) as chords."""
-    odd = is_arc(program) & (np.abs(normal).max(axis=1) < 1.0 - 1e-9)
-    r = radii(program)
-    turn = 2.0 * np.arccos(1.0 - np.minimum(tolerance / np.where(r > 0.0, r, math.inf), 1.0))
-    return straightened(program, np.where(odd, turn, math.inf))
-
-
-def _commands(program: Program, position: Floats, frames: tuple[Frame, ...], frame: Floats) -> Commands:
-    """Commands whose X Y Z are those of the program."""
-    along = np.argmax(np.abs(program.normal), axis=1)
-    plane = np.array([2, 1, 0])[along]
-    arc = is_arc(program)
-    first = np.array(PLANE_AXES)[plane]
-    centre = np.take_along_axis(program.centre, first[:, :2], axis=1)
-    sense = np.where(program.motion == ARC_CCW, 1, -1) * np.sign(program.normal[np.arange(len(along)), along])
-    motion = np.array([RAPID, LINE, ARC, ARC, DWELL])[program.motion]
-    return Commands(
-        motion=motion,
-        position=position,
-        plane=np.where(arc, plane, XY),
-        centre=np.where(arc[:, None], centre, 0.0),
-        turns=np.where(arc, sense * (1 + program.turns), 0),
-        feed=program.feed,
-        spindle=program.spindle,
-        tool=program.tool,
-        tcp=np.zeros(len(program), dtype=bool),
-        frame=frame,
-        line=program.line,
-        label=program.label,
-        frames=frames,
-        labels=program.labels,
-    )
-
-
-def _rotary_commands(
-    program: Program,
-    machine: Machine,
-    tool_lengths: Mapping[int, float],
-    tcp: bool,
-    start: Floats | None,
-    tolerance: float,
-) -> tuple[Commands, tuple[Finding, ...]]:
-    """Commands of a machine with rotary axes."""
-    raise NotImplementedError
