@@ -14,6 +14,7 @@ At a pole the angle of the first free axis is arbitrary: it stays as it was.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -192,6 +193,10 @@ def _wound(axis: Axis, q: Floats, begin: float | None) -> Floats:
             under = np.searchsorted(-least, math.tau * t + SLACK - axis.low, "right")
             return int(min(over, under))
 
+        def choice(t: int, turn: int = turn, lasts: Callable[[int], int] = rows) -> tuple[int, int]:
+            """The longest way on, then the fewest turns back."""
+            return lasts(t), -abs(t - turn)
+
         ahead = rows(turn)
         if ahead == 0 or (i == 0 and ahead < len(seen)):
             low, high = turn - _TURNS, turn + _TURNS
@@ -199,7 +204,7 @@ def _wound(axis: Axis, q: Floats, begin: float | None) -> Floats:
                 low = max(low, math.ceil((axis.low - SLACK - path[i]) / math.tau))
             if math.isfinite(axis.high):
                 high = min(high, math.floor((axis.high + SLACK - path[i]) / math.tau))
-            turn = max(range(low, high + 1), key=lambda t: (rows(t), -abs(t)), default=turn)
+            turn = max(range(low, high + 1), key=choice, default=turn)
             ahead = max(rows(turn), 1)
         out[i : i + ahead] += math.tau * turn
         i += ahead
@@ -217,8 +222,9 @@ def _reach(found: Solutions, lines: Ints) -> list[Finding]:
         return []
     worst = int(rows[np.argmax(found.miss[rows])])
     names = " and ".join(one.letter for one in found.free)
-    means = f"{names} reach" if found.free else "there is no rotary axis to reach"
-    text = f"the tool's axis is out of reach by {math.degrees(found.miss[worst]):.6g} deg: {means} no nearer one"
+    verb = "reaches" if len(found.free) == 1 else "reach"
+    means = f"{names} {verb} no nearer one" if found.free else "there is no rotary axis to reach it"
+    text = f"the tool's axis is out of reach by {math.degrees(found.miss[worst]):.6g} deg: {means}"
     return [Finding("machine-reach", int(lines[worst]), _text(rows, worst, text))]
 
 
