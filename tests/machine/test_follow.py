@@ -125,7 +125,9 @@ def test_linear_limits_are_found():
 
 def test_through_the_pole():
     """Straight through it the tilt changes sign and C stays; at it C stays too."""
-    axes, findings = follow(limited(), np.zeros((5, 3)), tilted([30.0] * 5, [20.0, 10.0, 0.0, -10.0, -20.0]))
+    tip, axis = np.full((5, 3), 7.0), tilted([30.0] * 5, [20.0, 10.0, 0.0, -10.0, -20.0])
+    axes, findings = follow(limited(), tip, axis)
+    np.testing.assert_allclose(forward(TRUNNION, axes)[0], tip, atol=1e-12)
     np.testing.assert_allclose(np.degrees(axes[:, 5]), [30] * 5, atol=1e-7)
     np.testing.assert_allclose(np.degrees(axes[:, 3]), [20, 10, 0, -10, -20], atol=1e-9)
     assert [f.text for f in findings] == ["row 2: the tool's axis lies along that of C: C is free and stays as it was"]
