@@ -14,13 +14,15 @@ At a pole the angle of the first free axis is arbitrary: it stays as it was.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import Finding, InputError
 from chipload.machine.axis import Axis
-from chipload.machine.kinematics import Solutions, inverse
+from chipload.machine.kinematics import Solutions, inverse, with_tip
 from chipload.machine.limits import SLACK, beyond, limit_findings, written
 from chipload.machine.machine import Machine
 from chipload.machine.orientation import angle_between, wrapped
@@ -95,8 +97,9 @@ def follow(
         return np.zeros((0, 9)), ()
     axes = np.array(found.axes[:, 0])
     if found.free:
-        angles, wide = _angles(found, singular, begin)
-        values, branch = _shortest(machine, found, angles, wide, begin)
+        found = _kept(machine, found, singular, begin, tip, tool_length, work_zero)
+        wide = [not one.high - one.low <= FEW * math.tau + SLACK for one in found.free]
+        values, branch = _shortest(machine, found, wide, begin)
         for k, one in enumerate(found.free):
             if wide[k]:
                 values[:, k] = _wound(one, values[:, k], None if begin is None else float(begin[one.column]))
@@ -107,24 +110,36 @@ def follow(
     return axes, (*findings, *_rewinds(found.free, axes, lines), *limit_findings(machine, axes, lines))
 
 
-def _angles(found: Solutions, singular: NDArray[np.bool_], begin: Floats | None) -> tuple[Floats, list[bool]]:
-    """Free angles (n, k, m) with those at a pole kept from the row before, and which axes are wide."""
-    angles = found.axes[:, :, [one.column for one in found.free]]
-    if singular.any():
-        known = np.flatnonzero(~singular)
-        last = np.maximum.accumulate(np.where(singular, -1, np.arange(len(singular))))
-        if begin is None and len(known):
-            last[last < 0] = known[0]
-        fill = singular & (last >= 0)
-        angles[fill, :, 0] = angles[last[fill], :, 0]
-    wide = [not one.high - one.low <= FEW * math.tau + SLACK for one in found.free]
-    return angles, wide
+def _kept(
+    machine: Machine,
+    found: Solutions,
+    singular: NDArray[np.bool_],
+    begin: Floats | None,
+    tip: ArrayLike,
+    tool_length: ArrayLike,
+    work_zero: ArrayLike | None,
+) -> Solutions:
+    """The solutions with the first free angle at a pole as it was in the row before, and X Y Z after it."""
+    known = np.flatnonzero(~singular)
+    last = np.maximum.accumulate(np.where(singular, -1, np.arange(len(singular))))
+    if begin is None and len(known):
+        last[last < 0] = known[0]
+    rows = np.flatnonzero(singular & (last >= 0))
+    if len(rows) == 0:
+        return found
+    axes = found.axes.copy()
+    column = found.free[0].column
+    axes[rows, :, column] = axes[last[rows], :, column]
+    length = np.broadcast_to(np.asarray(tool_length, dtype=np.float64), (len(axes),))[rows]
+    points = np.asarray(tip, dtype=np.float64)[rows]
+    for branch in range(axes.shape[1]):
+        axes[rows, branch] = with_tip(machine, axes[rows, branch], points, length, work_zero)
+    return replace(found, axes=axes)
 
 
-def _shortest(
-    machine: Machine, found: Solutions, angles: Floats, wide: list[bool], begin: Floats | None
-) -> tuple[Floats, Ints]:
+def _shortest(machine: Machine, found: Solutions, wide: list[bool], begin: Floats | None) -> tuple[Floats, Ints]:
     """Values (n, m) of the free angles, those of wide axes less whole turns, and the solution (n,) that they are of."""
+    angles = found.axes[:, :, [one.column for one in found.free]]
     n, k, m = angles.shape
     states = angles[:, :, None, :]  # (n, k, turns, m)
     for i, one in enumerate(found.free):
@@ -192,6 +207,10 @@ def _wound(axis: Axis, q: Floats, begin: float | None) -> Floats:
             under = np.searchsorted(-least, math.tau * t + SLACK - axis.low, "right")
             return int(min(over, under))
 
+        def choice(t: int, turn: int = turn, lasts: Callable[[int], int] = rows) -> tuple[int, int]:
+            """The longest way on, then the fewest turns back."""
+            return lasts(t), -abs(t - turn)
+
         ahead = rows(turn)
         if ahead == 0 or (i == 0 and ahead < len(seen)):
             low, high = turn - _TURNS, turn + _TURNS
@@ -199,7 +218,7 @@ def _wound(axis: Axis, q: Floats, begin: float | None) -> Floats:
                 low = max(low, math.ceil((axis.low - SLACK - path[i]) / math.tau))
             if math.isfinite(axis.high):
                 high = min(high, math.floor((axis.high + SLACK - path[i]) / math.tau))
-            turn = max(range(low, high + 1), key=lambda t: (rows(t), -abs(t)), default=turn)
+            turn = max(range(low, high + 1), key=choice, default=turn)
             ahead = max(rows(turn), 1)
         out[i : i + ahead] += math.tau * turn
         i += ahead
@@ -217,8 +236,9 @@ def _reach(found: Solutions, lines: Ints) -> list[Finding]:
         return []
     worst = int(rows[np.argmax(found.miss[rows])])
     names = " and ".join(one.letter for one in found.free)
-    means = f"{names} reach" if found.free else "there is no rotary axis to reach"
-    text = f"the tool's axis is out of reach by {math.degrees(found.miss[worst]):.6g} deg: {means} no nearer one"
+    verb = "reaches" if len(found.free) == 1 else "reach"
+    means = f"{names} {verb} no nearer one" if found.free else "there is no rotary axis to reach it"
+    text = f"the tool's axis is out of reach by {math.degrees(found.miss[worst]):.6g} deg: {means}"
     return [Finding("machine-reach", int(lines[worst]), _text(rows, worst, text))]
 
 

@@ -33,8 +33,8 @@ PLACES = 7
 _MARGIN = 1.05
 _PARTS = 256  # parts that a piece is cut into in one round, at most
 _MORE = 1.1  # more parts than the law asks for, so that one round is mostly enough
-_JUMP = 4  # parts of a piece in which a rotary axis goes more than a quarter turn
-_SHORTEST = 2.0**-16  # of a move: shorter pieces are not cut
+_JUMP, _JUMPS = 16, 3  # parts of a piece in which a rotary axis goes over a quarter turn; rounds in which it is cut
+_ROUNDS = 12  # in all
 _TURN = math.pi / 4.0  # [rad] no rotary axis of a traced piece goes further
 _CHUNK = 1 << 15  # pieces that are measured at once
 _ROTARY = [LETTERS.index(letter) for letter in "ABC"]
@@ -78,7 +78,7 @@ def linearise(
     """Pieces between which the axes may go straight: the tip on its line, the tool's axis on its great circle.
 
     Between the rows given the tip goes straight and the axis along the great circle. O(m) for m pieces, times the
-    rounds: two or three at h^2, eight where nothing helps.
+    rounds, of which two or three are enough at h^2.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def linearise(
         )
     row: Ints = np.arange(len(p), dtype=np.int64)
     part: Floats = np.ones(len(p))
-    while True:
+    for count in range(_ROUNDS):
         x, d = _along(p, a, row, part)
         axes, findings = follow(machine, x, d, start, tool_length, work_zero, free, pole_tolerance, None)
         e = np.zeros(len(row) - 1)
@@ -133,13 +133,12 @@ def linearise(
             e[k : k + _CHUNK] = _excess(
                 machine, axes[some], x[some], d[some], tool_length, work_zero, tolerance, angle_tolerance
             )
-        short = np.where(row[1:] == row[:-1], part[1:] - part[:-1], part[1:]) <= _SHORTEST
-        parts = np.where(np.isinf(e), _JUMP, np.minimum(np.ceil(np.sqrt(e) * _MORE), _PARTS))
-        parts = np.where(short | (e <= 1.0), 1, parts).astype(np.int64)
-        if (parts == 1).all():
+        parts = np.where(np.isinf(e), _JUMP if count < _JUMPS else 1, np.minimum(np.ceil(np.sqrt(e) * _MORE), _PARTS))
+        parts = np.where(e > 1.0, parts, 1.0).astype(np.int64)
+        if (parts == 1).all() or count == _ROUNDS - 1:
             break
         row, part = _cut(row, part, parts, max_rows)
-    jumps = sorted(set(row[1:][short & (e > 1.0)].tolist()))
+    jumps = sorted(set(row[1:][e > 1.0].tolist()))
     text = "row {}: the rotary axes jump: no piece is short enough for the tolerance: retract before it"
     found = tuple(Finding("machine-linear", 0, text.format(k)) for k in jumps)
     return Pieces(x, d, axes, row, part), (*findings, *found)
