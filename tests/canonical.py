@@ -27,8 +27,8 @@ class Refused(Exception):
 
 @dataclass(frozen=True)
 class Canon:
-    """One motion: ``kind`` traverse, feed, arc, dwell, probe or nurbs; X Y Z A B C in mm and deg, feed in mm/s or deg/s,
-    spindle in rpm; offsets as (6,) in mm and deg; ``unit`` mm of the printed digits."""
+    """One motion: ``kind`` traverse, feed, arc, dwell, probe or nurbs; X Y Z A B C in mm and deg, feed in mm/s or
+    deg/s, spindle in rpm; offsets as (6,) in mm and deg; ``unit`` mm of the printed digits."""
 
     kind: str
     end: tuple[float, ...]
@@ -57,7 +57,9 @@ def run_canonical(text: str, *, table: str = "", files: dict[str, str] | None = 
             (folder / other).write_text(body)
         call = ["rs274", "-g", "-t", "tool.tbl", "-v", "rs274.var", "program.ngc"]
         home = {**os.environ, "HOME": name}
-        done = subprocess.run(call, capture_output=True, text=True, cwd=folder, timeout=timeout, env=home, errors="replace")
+        done = subprocess.run(
+            call, capture_output=True, text=True, cwd=folder, timeout=timeout, env=home, errors="replace"
+        )
     if done.returncode != 0:
         raise Refused(done.stderr.replace("executing", "").strip())
     return done.stdout
@@ -175,7 +177,9 @@ def compare_commands(motions: list[Canon], commands, *, spindle: bool = True, to
             feed = commands.feed[row]
             turning = abs(feed - motion.feed) > abs(math.degrees(feed) - motion.feed)
             feed = math.degrees(feed) if turning else feed
-            assert abs(feed - motion.feed) <= 1e-6 + HALF * motion.unit / 60.0 * 1.5 + 1e-9 * feed, f"{where}: feed {feed}"
+            assert abs(feed - motion.feed) <= 1e-6 + HALF * motion.unit / 60.0 * 1.5 + 1e-9 * feed, (
+                f"{where}: feed {feed}"
+            )
         else:
             assert commands.feed[row] == 0.0, where
         if spindle:
@@ -192,5 +196,7 @@ def compare_commands(motions: list[Canon], commands, *, spindle: bool = True, to
         assert frame.number == motion.number, where
         assert abs(math.degrees(frame.rotation) - motion.rotation) <= HALF, where
         row += 1
-    assert row == len(commands), f"{len(commands) - row} rows that rs274 does not know, the first on line {commands.line[row]}"
+    assert row == len(commands), (
+        f"{len(commands) - row} rows that rs274 does not know, the first on line {commands.line[row]}"
+    )
     return len(motions)

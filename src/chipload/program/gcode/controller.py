@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import cast
 
 from chipload.errors import InputError
-from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, PROBE, RAPID, XY, YZ, ZX
+from chipload.program.commands import ARC, DWELL, PLANE_AXES, RAPID, XY, YZ, ZX
 from chipload.program.gcode import arcs
 from chipload.program.gcode.compensation import Compensation, Move
 from chipload.program.gcode.expression import integer_of
@@ -21,6 +21,8 @@ from chipload.program.gcode.track import Context, Findings, Track
 from chipload.units import MM_PER
 
 PLANES = {170: XY, 180: ZX, 190: YZ, 171: XY, 181: ZX, 191: YZ}
+#: from the centre of a turning tool's nose to its tip, in radii along X and Z, by orientation
+TIPS = ((0, 0), (-1, 1), (-1, -1), (1, -1), (1, 1), (0, 1), (-1, 0), (0, -1), (1, 0), (0, 0))
 #: positions beyond this are refused [mm, deg]
 FARTHEST = 1e9
 #: a feed by G93 is at least this [units/min], as LinuxCNC does
@@ -67,9 +69,10 @@ class Controller:
         self._beside: Compensation | None = None
         self._framed: Datum | None = None
         self._frame = 0
-        self.known_offsets = {1} | {n for n in range(1, 10) if any(5201 + 20 * n + k in self.parameters.numbered for k in range(10))}
+        self.known_offsets = {1} | {
+            n for n in range(1, 10) if any(5201 + 20 * n + k in self.parameters.numbered for k in range(10))
+        }
         self._start(start)
-        self._live()
 
     def _noted(self, code: str, text: str) -> None:
         self.findings.once(code, self.line, text)
@@ -138,8 +141,8 @@ class Controller:
         if self.state.compensation != 400:
             raise InputError(f"{what}: not while cutter compensation is on: write G40 before")
 
-    def compensate(self, code: int, d: float | None = None) -> None:
-        """G40, or G41, G42 with the tool D, or G41.1, G42.1 with the diameter D."""
+    def compensate(self, code: int, d: float | None = None, orientation: float | None = None) -> None:
+        """G40, or G41, G42 with the tool D, or G41.1, G42.1 with the diameter D and the orientation L."""
         state = self.state
         if code == 400:
             if self._beside is not None:
@@ -154,13 +157,22 @@ class Controller:
         if code % 10:
             if d is None:
                 raise InputError(f"{name}: D is missing: the diameter")
-            radius = 0.5 * d * state.scale
+            if orientation is not None and state.plane != 180:
+                raise InputError(f"{name}: L goes with a turning tool in the plane of G18")
+            radius, turned = 0.5 * d * state.scale, integer_of(orientation or 0.0, f"{name}: L")
         else:
             number = state.tool if d is None else integer_of(d, f"{name}: D")
             if number < 0:
                 raise InputError(f"{name}: D{number}: must be the number of a tool")
-            radius = 0.5 * self.find_tool(number, "D").diameter
-        self._beside = Compensation(1 if code < 420 else -1, radius, PLANES[state.plane], state.at)
+            tool = self.find_tool(number, "D")
+            radius, turned = 0.5 * tool.diameter, tool.orientation
+            if turned and state.plane != 180:
+                raise InputError(f"{name}: tool {number} has an orientation for turning: it goes with G18")
+        if not 0 <= turned <= 9:
+            raise InputError(f"{name}: orientation {turned}: must be from 0 to 9")
+        x, z = TIPS[turned]
+        shift = radius * z, radius * x
+        self._beside = Compensation(1 if code < 420 else -1, radius, PLANES[state.plane], state.at, shift)
         state.compensation = code
 
     def _emit(self, moves: list[Move]) -> None:
@@ -269,81 +281,3 @@ class Controller:
             self._emit(self._beside.pause((context, self.line)))
         else:
             self.track.rows.append((DWELL, *self.state.at, context, self.line))
-
-    # -- what parameters mirror ------------------------------------------------------------------------------------
-
-    def _live(self) -> None:
-        live, state = self.parameters.live, self.state
-
-        def coordinate(k: int) -> float:
-            return state.at[k] / (state.scale if k in LINEAR else 1.0)
-
-        def absolute(k: int) -> float:
-            return state.datum.to_machine(state.at)[k] / (state.scale if k in LINEAR else 1.0)
-
-        def loaded() -> Tool:
-            return (self.tools or {}).get(state.tool, Tool(state.tool))
-
-        def length(k: int) -> float:
-            value = loaded().offset[k]
-            return value / self.machine_scale if k in LINEAR else math.degrees(value)
-
-        for k, axis in enumerate(AXES):
-            live[5420 + k] = lambda k=k: coordinate(k)  # type: ignore[misc]
-            live[f"_{axis}"] = live[5420 + k]
-            live[f"_abs_{axis}"] = lambda k=k: absolute(k)  # type: ignore[misc]
-            live[5401 + k] = lambda k=k: length(k)  # type: ignore[misc]
-        live[5220] = lambda: float(state.datum.number)
-        live[5400] = lambda: float(state.tool)
-        live[5410] = lambda: loaded().diameter / self.machine_scale
-        live[5411] = lambda: math.degrees(loaded().front)
-        live[5412] = lambda: math.degrees(loaded().back)
-        live[5413] = lambda: float(loaded().orientation)
-        flags = {
-            "_metric": lambda: state.scale == 1.0,
-            "_imperial": lambda: state.scale != 1.0,
-            "_absolute": lambda: state.absolute,
-            "_incremental": lambda: not state.absolute,
-            "_inverse_time": lambda: state.feed_mode == 930,
-            "_units_per_minute": lambda: state.feed_mode == 940,
-            "_units_per_rev": lambda: state.feed_mode == 950,
-            "_tool_offset": lambda: state.datum.length != ZERO,
-            "_retract_r_plane": lambda: not state.old_level,
-            "_retract_old_z": lambda: state.old_level,
-            "_spindle_rpm_mode": lambda: not state.surface,
-            "_spindle_css_mode": lambda: state.surface,
-            "_ijk_absolute_mode": lambda: state.absolute_centre,
-            "_lathe_diameter_mode": lambda: state.diameter,
-            "_lathe_radius_mode": lambda: not state.diameter,
-            "_spindle_on": lambda: state.sense != 0,
-            "_spindle_cw": lambda: state.sense == 1,
-            "_mist": lambda: state.mist,
-            "_flood": lambda: state.flood,
-            "_speed_override": lambda: True,
-            "_feed_override": lambda: True,
-            "_adaptive_feed": lambda: False,
-            "_feed_hold": lambda: True,
-            "_task": lambda: False,
-            "_vmajor": lambda: 2.9,
-            "_vminor": lambda: 0,
-            "_line": lambda: self.line,
-            "_motion_mode": lambda: state.motion,
-            "_plane": lambda: state.plane,
-            "_ccomp": lambda: state.compensation,
-            "_coord_system": lambda: 530 + 10 * state.datum.number if state.datum.number < 7 else 584 + state.datum.number,
-            "_feed": lambda: state.feed / state.scale,
-            "_rpm": lambda: state.speed,
-            "_current_tool": lambda: state.tool,
-            "_current_pocket": lambda: loaded().pocket,
-            "_selected_tool": lambda: state.selected,
-            "_selected_pocket": lambda: (self.tools or {}).get(state.selected, Tool(0)).pocket,
-            "_value": lambda: self.returned[0],
-            "_value_returned": lambda: self.returned[1],
-            "_call_level": lambda: self.level,
-            "_remap_level": lambda: 0,
-        }
-        for name, flag in flags.items():
-            live[name] = lambda flag=flag: float(flag())  # type: ignore[misc]
-
-
-__all__ = ["ARC", "DWELL", "LINE", "PROBE", "RAPID", "Controller"]

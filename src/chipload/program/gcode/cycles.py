@@ -1,9 +1,9 @@
 """Canned cycles G73, G74, G81 to G89: the motions over one hole.
 
-Notation: (a, b) the hole in the plane, c along its normal; R where feeding begins, ``bottom`` where it ends, ``clear``
-where the cycle leaves the hole (R with G99, with G98 the higher of R and the level at which the series began);
-Q depth of a peck, P time at the bottom. A step is ``(kind, a, b, c, value)``: RAPID, LINE or DWELL (value: time [s]),
-or SPIN (value: the sense of the spindle, 0 stopped) or STOP (the program waits for its operator).
+Notation: (a, b) the hole in the plane [mm], c along its normal [units of the text]; R where feeding begins, ``bottom``
+where it ends, ``clear`` where the cycle leaves the hole (R with G99, with G98 the higher of R and the level at which
+the series began); Q depth of a peck, P time at the bottom. A step is ``(kind, a, b, c, value)``: RAPID, LINE or DWELL
+(value: time [s]), or SPIN (value: sense of the spindle, 0 stopped) or STOP (the program waits for its operator).
 
 Reference: LinuxCNC 2.9, "Canned Cycles Motion".
 """
@@ -22,8 +22,8 @@ CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 870, 880, 890})
 #: cycles that need a P word, a Q word
 NEED_P = frozenset({820, 860, 880, 890})
 NEED_Q = frozenset({730, 830})
-#: a peck leaves again, or comes back to, as much above [mm, or 0.01 inch]
-RETURN = {False: 0.254, True: 0.254}
+#: a peck goes back by this, or comes back to this above the bottom so far [mm]
+RETURN = 0.254
 #: pecks of one hole
 MOST_PECKS = 100_000
 
@@ -32,7 +32,10 @@ Step = tuple[int, float, float, float, float]
 
 @dataclass(frozen=True)
 class Hole:
-    """Numbers of one hole [mm, s]; ``sense`` of the spindle: 1, -1 or 0; ``shift`` (I, J) and ``k`` of G87."""
+    """Numbers of one hole [units of the text, s]; ``sense`` of the spindle: 1, -1 or 0.
+
+    ``shift`` [mm] and ``middle`` of G87; ``back`` is RETURN in units of the text.
+    """
 
     r: float
     bottom: float
@@ -41,8 +44,8 @@ class Hole:
     dwell: float | None = None
     sense: int = 0
     shift: tuple[float, float] = (0.0, 0.0)
-    k: float = 0.0
-    back: float = 0.254
+    middle: float = 0.0
+    back: float = RETURN
 
 
 def cycle_steps(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
@@ -67,7 +70,10 @@ def cycle_steps(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
         return
     if code in NEED_P:
         yield DWELL, a, b, bottom, hole.dwell or 0.0
-    if code in (850, 890):
+    if code == 890:
+        yield LINE, a, b, clear, 0.0
+        return
+    if code == 850:
         yield LINE, a, b, r, 0.0
     elif code in (860, 880):
         yield SPIN, a, b, bottom, 0
@@ -109,7 +115,7 @@ def _back_bore(a: float, b: float, hole: Hole) -> Iterator[Step]:
     yield RAPID, aside, beside, hole.bottom, 0.0
     yield RAPID, a, b, hole.bottom, 0.0
     yield SPIN, a, b, hole.bottom, hole.sense
-    yield LINE, a, b, hole.k, 0.0
+    yield LINE, a, b, hole.middle, 0.0
     yield LINE, a, b, hole.bottom, 0.0
     yield SPIN, a, b, hole.bottom, 0
     yield RAPID, aside, beside, hole.bottom, 0.0

@@ -128,7 +128,7 @@ def _apply(operator: str, a: float, b: float) -> float:
         if a == 0.0 and b < 0.0:
             raise InputError(f"0 ** {b:g}: has no value")
         try:
-            return a**b
+            return float(a**b)
         except OverflowError:
             raise InputError(f"{a:g} ** {b:g}: is beyond {LARGEST:g}") from None
     if operator in ("/", "mod") and b == 0.0:

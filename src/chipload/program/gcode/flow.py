@@ -1,7 +1,7 @@
 """The order in which blocks are carried out: O-words, subroutines, files that are called, and the end.
 
-Notation: ``line`` counts from 0 in its source. A call keeps where it came from. Blocks are counted, calls and loops with
-them, so that every text ends.
+Notation: ``line`` counts from 0 in its source. A call keeps where it came from. Blocks are counted, with those of calls
+and loops, so that every text ends.
 
 Reference: LinuxCNC 2.9, "O Codes".
 """

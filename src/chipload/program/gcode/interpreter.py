@@ -15,20 +15,23 @@ import re
 from dataclasses import replace
 
 from chipload.errors import InputError
-from chipload.program.gcode import offsets
+from chipload.program.gcode import offsets, targets
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.expression import integer_of
-from chipload.program.gcode.modal import USER_M, axes_given, check_codes, motion_of, shown, unused
+from chipload.program.gcode.mirror import mirror
+from chipload.program.gcode.modal import USER_M, check_codes, motion_of, shown, unused
 from chipload.program.gcode.motion import Motion
 from chipload.program.gcode.state import State
 from chipload.program.gcode.words import Block
 
 _MESSAGE = re.compile(r"\s*(msg|debug|print)\s*,(.*)", re.IGNORECASE | re.DOTALL)
-_OTHER = re.compile(r"\s*(log|logopen|logappend|logclose|probeopen|probeclose|py|abort)\b(.*)", re.IGNORECASE | re.DOTALL)
+_OTHER = re.compile(
+    r"\s*(log|logopen|logappend|logclose|probeopen|probeclose|py|abort)\b(.*)", re.IGNORECASE | re.DOTALL
+)
 _READ = re.compile(r"#(?:([0-9]{1,6})|<([^<>]*)>)")
 _FORMAT = re.compile(r"%(?:d|f|\.[0-9]f)")
 #: characters of a comment that are kept
-LONGEST = 200
+LONGEST = 1000
 #: states saved by M70 and M73
 MOST_SAVED = 100
 #: words of a tool number
@@ -51,6 +54,7 @@ class Interpreter:
 
     def __init__(self, controller: Controller):
         self.c = controller
+        mirror(controller)
         self.motion = Motion(controller)
         #: state saved by M70 or M73, one for each level of call; True: M73
         self.saved: dict[int, tuple[bool, State]] = {}
@@ -59,7 +63,7 @@ class Interpreter:
         """Carry out one block; whether the program ends."""
         c, state = self.c, self.c.state
         codes = check_codes(block)
-        lasting = 52 if self.motion.spline is not None else state.motion
+        lasting = 52 if self.motion.splines.spline is not None else state.motion
         motion = motion_of(block, codes, lasting)
         if motion < 0 and lasting == 52 and "p" in block.words and "motion" not in codes:
             motion = 52
@@ -77,7 +81,7 @@ class Interpreter:
         self._tool(block)
         self._machine(block)
         self._modes(block, codes)
-        axes = self.motion.axes(block)
+        axes = targets.axes(c, block)
         once = codes.get("once", -1)
         self._once(block, once, axes)
         if motion >= 0:
@@ -92,7 +96,8 @@ class Interpreter:
         message = _MESSAGE.match(text)
         if message is not None:
             said = message[2] if message[1].lower() == "msg" else self._filled(message[2])
-            c.note("nc-message", said.strip()[:LONGEST])
+            code = "nc-print" if message[1].lower() == "print" else "nc-message"
+            c.note(code, said.strip()[:LONGEST])
             return
         other = _OTHER.match(text)
         if other is not None:
@@ -121,7 +126,9 @@ class Interpreter:
                 number = parameters.read(key)
             except InputError:
                 return "######"
-            return str(round(number)) if form == "%d" else f"{number:.{form[2] if form != '%f' else 6}f}"
+            digits = 0 if form == "%d" else int(form[2]) if form != "%f" else 6
+            # no -0
+            return f"{round(number, digits) + 0.0:.{digits}f}"
 
         return re.sub(f"{_READ.pattern}|{_FORMAT.pattern}", value, text[: 4 * LONGEST])
 
@@ -151,7 +158,10 @@ class Interpreter:
                 c.changed()
                 units = codes.get("units")
                 if units is not None and (units == 200) != (state.scale != 1.0):
-                    c.note("nc-feed-before-units", f"F{words['f']:g}: is taken before {shown(units)}, in the units before it")
+                    c.note(
+                        "nc-feed-before-units",
+                        f"F{words['f']:g}: is taken before {shown(units)}, in the units before it",
+                    )
         if "s" in words:
             if words["s"] < 0.0:
                 raise InputError(f"S{words['s']:g}: a spindle speed must be 0 or more")
@@ -226,10 +236,10 @@ class Interpreter:
         c, level = self.c, self.c.level
         if m in (70, 73):
             self.saved[level] = (m == 73, replace(c.state))
-        elif level not in self.saved:
-            raise InputError(f"M{m}: nothing is saved: write M70 or M73 first")
         elif m == 71:
-            del self.saved[level]
+            self.saved.pop(level, None)
+        elif level not in self.saved:
+            raise InputError("M72: nothing is saved: write M70 or M73 first")
         else:
             self.restore(self.saved[level][1])
 
@@ -270,7 +280,7 @@ class Interpreter:
         if "lathe" in codes:
             state.diameter = codes["lathe"] == 70
         if "compensation" in codes:
-            c.compensate(codes["compensation"], words.get("d"))
+            c.compensate(codes["compensation"], words.get("d"), words.get("l"))
         if "length" in codes:
             code = codes["length"]
             if code == 434:
@@ -278,7 +288,7 @@ class Interpreter:
                 c.once("nc-tip", "G43.4: tip control is no code of LinuxCNC's own; taken as Fanuc's")
                 code = 430
                 c.changed()
-            offsets.length_offset(c, block, code, self.motion.axes(block))
+            offsets.length_offset(c, block, code, targets.axes(c, block))
         if "offset" in codes:
             offsets.select(c, codes["offset"])
         if "path" in codes:
@@ -298,7 +308,7 @@ class Interpreter:
         if once == 100:
             offsets.set_data(c, block, axes)
         elif once in (280, 300):
-            offsets.go_home(c, once, axes, self.motion.end(block))
+            offsets.go_home(c, once, axes, targets.end(c, block))
         elif once in (281, 301):
             offsets.keep_point(c, once)
         elif once in (520, 920, 921, 922, 923):
@@ -316,9 +326,6 @@ class Interpreter:
 
     def finish(self) -> None:
         """The program ends: what waits is carried out."""
-        if self.motion.spline is not None:
+        if self.motion.splines.spline is not None:
             raise InputError("the program ends and G5.2 is open: close it by G5.3")
         self.c.compensate(400)
-
-
-__all__ = ["Interpreter", "axes_given"]

@@ -17,8 +17,7 @@ from chipload.program.commands import RAPID
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.modal import shown
-from chipload.program.gcode.state import ZERO, Datum, Nine, nine, put
-from chipload.program.gcode.tools import Tool
+from chipload.program.gcode.state import ZERO, Nine, nine, put
 from chipload.program.gcode.words import Block
 
 Axes = Mapping[int, float]
@@ -28,7 +27,7 @@ def select(c: Controller, code: int) -> None:
     """G54 to G59.3."""
     number = (code - 530) // 10 if code < 591 else 6 + code % 10
     datum = c.state.datum
-    if number == datum.number and not (c.parameters.numbered.get(5220) == 0.0):
+    if number == datum.number:
         if number not in c.known_offsets:
             _unset(c, code, number)
         return
@@ -40,8 +39,8 @@ def select(c: Controller, code: int) -> None:
 
 
 def _unset(c: Controller, code: int, number: int) -> None:
-    text = f"{shown(code)}: its origin is not known here and counts as the machine's: give parameters #{5201 + 20 * number} on"
-    c.once("nc-offset-unset", text)
+    said = "its origin is not known here and counts as the machine's"
+    c.once("nc-offset-unset", f"{shown(code)}: {said}: give parameters #{5201 + 20 * number} on")
 
 
 def set_data(c: Controller, block: Block, axes: Axes) -> None:
@@ -191,6 +190,3 @@ def go_home(c: Controller, code: int, axes: Axes, end: Nine) -> None:
 def keep_point(c: Controller, code: int) -> None:
     """G28.1 and G30.1."""
     c.store(5161 if code == 281 else 5181, c.state.datum.to_machine(c.state.at))
-
-
-__all__ = ["Datum", "Tool", "go_home", "keep_point", "length_offset", "select", "set_data", "shift"]

@@ -84,6 +84,11 @@ class Parameters:
             raise InputError(f"parameter #<{key}>: more than {MOST_NAMES} names")
         space[key] = value
 
+    def declare(self, key: int | str) -> None:
+        """A name that a block assigns is 0 for the rest of that block where it was not set before."""
+        if isinstance(key, str) and not self.exists(key):
+            self.assign(key, 0.0)
+
     def enter(self, arguments: list[float]) -> None:
         """Begin a subroutine: its own names and #1 to #30, the arguments first."""
         kept = {n: self.numbered[n] for n in range(1, LOCAL + 1) if n in self.numbered}

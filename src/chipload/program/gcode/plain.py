@@ -18,9 +18,8 @@ _NUMBER = r"([-+]?(?:[0-9]{1,6}\.?[0-9]{0,12}|\.[0-9]{1,12}))"
 
 
 _AXES = "".join(rf"(?:[{x}{x.lower()}][ \t]*{_NUMBER}[ \t]*)?" for x in "XYZABCIJK")
-_match = re.compile(
-    rf"[ \t]*(?:[Nn][0-9]{{1,9}}[ \t]*)?(?:[Gg]0?([0123])(?![ \t]*[0-9.])[ \t]*)?{_AXES}(?:[Ff][ \t]*{_NUMBER}[ \t]*)?\r?\Z"
-).match
+_HEAD = r"[ \t]*(?:[Nn][0-9]{1,9}[ \t]*)?(?:[Gg]0?([0123])(?![ \t]*[0-9.])[ \t]*)?"
+_match = re.compile(rf"{_HEAD}{_AXES}(?:[Ff][ \t]*{_NUMBER}[ \t]*)?\r?\Z").match
 _CODE = {"0": 0, "1": 10, "2": 20, "3": 30}
 
 
@@ -33,7 +32,7 @@ def run_plain(c: Controller, motion: Motion, lines: list[str], line: int) -> tup
         and not state.absolute_centre
         and not state.diameter
         and state.compensation == 400
-        and motion.spline is None
+        and motion.splines.spline is None
         and state.motion in (0, 10, 20, 30, 800)
     ):
         return line, 0
@@ -65,7 +64,7 @@ def run_plain(c: Controller, motion: Motion, lines: list[str], line: int) -> tup
             break
         if sf is not None:
             value = float(sf)
-            if new and value * scale <= 0.0:
+            if value < 0.0 or (new and value * scale == 0.0):
                 break
             state.feed, state.feed_turning = value * scale, value
             c.changed()
@@ -112,6 +111,6 @@ def run_plain(c: Controller, motion: Motion, lines: list[str], line: int) -> tup
     if line != first:
         state.at = (x, y, z, a, b, cc, u, v, w)
         state.motion = code
-        motion.series = None
-        motion.tangent = (0.0, 0.0)
+        motion.drilling.series = None
+        motion.splines.tangent = (0.0, 0.0)
     return line, line - first

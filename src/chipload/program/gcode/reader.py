@@ -43,7 +43,7 @@ def read_gcode(
     lenient: bool = False,
     progress: Progress = silent,
 ) -> tuple[Commands, tuple[Finding, ...]]:
-    """The motions that a text asks for, and what was noticed.
+    r"""The motions that a text asks for, and what was noticed.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def read_gcode(
     InputError
         The controller would refuse the text, or a bound is passed; the message gives the line.
 
-    >>> commands, findings = read_gcode("G21 G90\\nG0 X1 Y2\\nG1 Z-3 F60\\nM2")
+    >>> commands, findings = read_gcode("G21 G90\nG0 X1 Y2\nG1 Z-3 F60\nM2")
     >>> commands.position[-1, :3].tolist(), float(commands.feed[-1])
     ([1.0, 2.0, -3.0], 1.0)
     """

@@ -1,7 +1,7 @@
 """The lines of one file, and where its O-words lead.
 
-Notation: an O-word is ``o<label> keyword rest``: ``o100 if [#1 GT 2]``. A label belongs to the subroutine that it stands
-in; ``key`` is (subroutine, label). Lines are counted from 0.
+Notation: an O-word is ``o<label> keyword rest``: ``o100 if [#1 GT 2]``. A label belongs to the subroutine that it
+stands in; ``key`` is (subroutine, label). Lines are counted from 0.
 """
 
 from __future__ import annotations

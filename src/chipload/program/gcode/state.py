@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chipload.program.commands import Frame
+from chipload.program.commands import Floats, Frame
 
 Nine = tuple[float, float, float, float, float, float, float, float, float]
 ZERO: Nine = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -78,7 +78,7 @@ def rotated(x: float, y: float, degrees: float) -> tuple[float, float]:
     return c * x - s * y, s * x + c * y
 
 
-def _rad(values: Nine) -> np.ndarray:  # type: ignore[type-arg]
+def _rad(values: Nine) -> Floats:
     out = np.array(values, dtype=np.float64)
     out[3:6] = np.radians(out[3:6])
     return out
@@ -125,5 +125,3 @@ class State:
     flood: bool = False
     mist: bool = False
     compensation: int = 400
-    #: radius and angle that @ and ^ remember belong to the position, not here
-    cycle: tuple[float, float, float | None, float | None] | None = None

@@ -128,6 +128,7 @@ def read_block(text: str, comments: list[str], parameters: Parameters) -> Block:
             if text[at : at + 1] != "=":
                 raise InputError(f"#{_shown(key)}: = is missing after it")
             value, at = read_value(text, at + 1, parameters)
+            parameters.declare(key)
             block.sets.append((key, value))
         elif letter in LETTERS:
             if letter in words:
