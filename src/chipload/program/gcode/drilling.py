@@ -17,7 +17,7 @@ from chipload.program.gcode.controller import PLANES, Controller
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.modal import shown
 from chipload.program.gcode.state import put
-from chipload.program.gcode.targets import axes, rate
+from chipload.program.gcode.targets import axes, polar, rate
 from chipload.program.gcode.words import Block
 
 #: heights that differ by less are one [units of the text]
