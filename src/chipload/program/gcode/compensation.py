@@ -65,6 +65,8 @@ class Compensation:
     plane : XY (G17) or ZX (G18)
     start : (9,) programmed position where compensation begins [mm, rad]
     shift : (2,) from the tool's centre to the point that is commanded, in the plane's axes [mm]
+    slack : by how much an arc may turn more than programmed before it is refused [rad]; LinuxCNC's is 0.0254 in a text
+        in mm, 0.001 in one in inches
 
     Raises
     ------
@@ -73,7 +75,7 @@ class Compensation:
     """
 
     def __init__(
-        self, side: int, radius: float, plane: int, start: Sequence[float], shift: tuple[float, float] = (0.0, 0.0)
+        self, side: int, radius: float, plane: int, start: Sequence[float], shift: tuple[float, float] = (0.0, 0.0), slack: float = 0.0254,
     ) -> None:
         if plane == YZ:
             raise InputError("radius compensation: not in the plane YZ (G19): select G17 or G18")
@@ -81,6 +83,7 @@ class Compensation:
         self._radius = abs(radius)
         self._first, self._second, self._along = PLANE_AXES[plane]
         self._shift = complex(*shift)
+        self._slack = slack
         self._programmed = self._centre = tuple(start)
         self._held: list[Move] = []
         self._front: _Offset | None = None
@@ -99,12 +102,15 @@ class Compensation:
     def line(self, motion: int, end: Sequence[float], payload: object) -> list[Move]:
         """Motions that are final once a straight motion, RAPID or LINE, to ``end`` (9) is known."""
         a, b, r = self._flat(self._programmed), self._flat(end), self._radius
+        if r == 0.0:
+            return self._pass(Move(motion, tuple(end), (0.0, 0.0), 0, payload))
         length = abs(b - a)
         if self._front is None:
             if length <= r:
                 raise self._short(length)
             u = (b - a) / length
-            return self._append(_Offset(motion, a, u, b + self._side * 1j * r * u, entry=True), end, payload)
+            normal = self._side * 1j * r * u
+            return self._append(_Offset(motion, a + normal, u, b + normal, entry=True), end, payload)
         if a == b:
             self._programmed, self._centre = tuple(end), self._with(end, self._flat(self._centre))
             self._held.append(Move(motion, self._centre, (0.0, 0.0), 0, payload))
@@ -116,6 +122,8 @@ class Compensation:
     def arc(self, end: Sequence[float], centre: tuple[float, float], turns: int, payload: object) -> list[Move]:
         """Motions that are final once an arc to ``end`` (9) about ``centre`` (2), in the plane's axes, is known."""
         a, b, o, r = self._flat(self._programmed), self._flat(end), complex(*centre), self._radius
+        if r == 0.0:
+            return self._pass(Move(ARC, tuple(end), centre, turns, payload))
         inside = self._side * turns > 0
         size = abs(b - o)
         if inside and size <= r:
@@ -157,14 +165,17 @@ class Compensation:
         away = -self._side * cmath.phase((new.m - corner) / (c - corner))
         if away < -0.5 * math.pi:
             away += 2.0 * math.pi
-        if away < -SMOOTH or away > math.pi + SMOOTH:
+        # an arc with the tool outside curves away, so that a reversal there is a corner towards the tool
+        round_ = new if new.turns else front
+        limit = math.pi + (-SMOOTH if self._side * round_.turns < 0 else SMOOTH)
+        if away < -SMOOTH or away > limit:
             at = self._crossing(front, new, corner)
             self._trim(at)
-            self._check()
             return self._append(new, end, payload)
         if away <= SMOOTH:
             return self._append(new, end, payload)
-        self._check()
+        if not new.turns:
+            self._check()
         around = self._with(end, new.m, along=self._centre[self._along])
         rapid = new.motion == RAPID
         centre = (0.0, 0.0) if rapid else (corner.real, corner.imag)
@@ -178,17 +189,24 @@ class Compensation:
         if not front.turns and not new.turns:
             return new.m + new.u * self._radius * math.tan(0.5 * abs(cmath.phase(new.u / front.u)))
         if front.turns and new.turns:
-            return self._circles(front, new, corner)
+            return self._circles(front, new)
         round_, straight = (front, new) if front.turns else (new, front)
         size = abs((front.e if front.turns else new.m) - round_.o)
-        foot = straight.m + straight.u * ((round_.o - straight.m) * straight.u.conjugate()).real
+        m = straight.m
+        if front.entry and front.turns and corner != front.o:
+            # its contour is thought r beside it on the side that its turns tell, even where it enters from the other
+            out = (corner - front.o) / abs(corner - front.o)
+            m += out * (size + self._side * math.copysign(self._radius, front.turns)) - (corner - front.o)
+        foot = m + straight.u * ((round_.o - m) * straight.u.conjugate()).real
         under = size**2 - abs(foot - round_.o) ** 2
         if under < 0.0:
             raise self._gouge("a corner between an arc and a line", "use a smaller tool")
-        sense = ((corner - round_.o) * straight.u.conjugate()).real
+        # an arc with the tool inside is left through its disc, one with the tool outside away from it
+        leaving = self._side * round_.turns > 0
+        sense = -1.0 if leaving == bool(front.turns) else 1.0
         return foot + straight.u * math.copysign(math.sqrt(under), sense)
 
-    def _circles(self, front: _Offset, new: _Offset, corner: complex) -> complex:
+    def _circles(self, front: _Offset, new: _Offset) -> complex:
         apart = new.o - front.o
         d = abs(apart)
         r0, r1 = abs(front.e - front.o), abs(new.m - new.o)
@@ -199,13 +217,14 @@ class Compensation:
         under = r0**2 - x**2
         if under < 0.0:
             raise self._gouge("a corner between two arcs", "use a smaller tool")
-        sense = ((corner - front.o) / u).imag
+        sense = math.copysign(1.0, self._side * front.turns * new.turns)
         return front.o + u * complex(x, math.copysign(math.sqrt(under), sense))
 
     def _trim(self, at: complex) -> None:
         """Let the front and what follows it end ``at``."""
         self._held = [move._replace(end=self._with(move.end, at)) for move in self._held]
         self._centre = self._with(self._centre, at)
+        self._check()
 
     def _check(self) -> None:
         """Refuse a front that its corners turned back."""
@@ -213,10 +232,15 @@ class Compensation:
         if front is None or front.entry:
             return
         if front.turns:
-            if _sweep(front, self._from, at) > _sweep(front, front.m, front.e) + 1e-9:
+            if _sweep(front, self._from, at) > _sweep(front, front.m, front.e) + self._slack:
                 raise self._gouge("an arc between two corners", "use a smaller tool or a longer arc")
         elif ((at - self._from) * front.u.conjugate()).real < 0.0:
             raise self._gouge("a line between two corners", "use a smaller tool or a longer line")
+
+    def _pass(self, move: Move) -> list[Move]:
+        """With a radius of 0 the contour is the path."""
+        self._programmed = self._centre = move.end
+        return [self._out(move)]
 
     def _append(self, new: _Offset, end: Sequence[float], payload: object) -> list[Move]:
         """Hold ``new``; what was held before is final."""
@@ -257,4 +281,4 @@ class Compensation:
 def _sweep(arc: _Offset, start: complex, end: complex) -> float:
     """Angle from ``start`` to ``end`` in the direction of an arc, above 0 to a whole turn [rad]."""
     angle = math.copysign(1.0, arc.turns) * cmath.phase((end - arc.o) / (start - arc.o))
-    return angle if angle > 0.0 else angle + 2.0 * math.pi
+    return angle if angle > 1e-9 else angle + 2.0 * math.pi
