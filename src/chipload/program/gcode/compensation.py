@@ -1,0 +1,284 @@
+"""Cutter radius compensation: the path of the tool's centre beside a programmed contour (G41 and G42).
+
+Notation: positions in the plane are complex numbers, first axis + i second axis. ``r`` is the tool's radius, ``s`` the
+side (+1 left, -1 right), ``a -> b`` a programmed motion, ``m`` the offset of its start and ``e`` that of its end: r away,
+square to the contour, on the tool's side. ``c`` is where the tool's centre stands.
+
+At a corner that turns away from the tool the centre goes round the corner on an arc of radius r; at one that turns towards
+it both motions end where their offsets cross. So the end of a motion is known only with the next motion in the plane:
+one motion, and what follows it without moving in the plane, is held back.
+
+The rules are those of LinuxCNC ("Tool Compensation" in its manual): the first motion leads to the offset of its own end,
+a change of direction below 0.05 rad is no corner, and what the tool does not fit into is refused.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from chipload.errors import InputError
+from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, RAPID, YZ
+
+#: a change of direction below this is no corner [rad]
+SMOOTH = 0.05
+
+
+class Move(NamedTuple):
+    """One motion of the tool's centre.
+
+    ``motion`` RAPID, LINE, ARC or DWELL; ``end`` (9) [mm, rad]; ``centre`` (2) [mm] and ``turns`` of an arc as in
+    :class:`~chipload.program.commands.Commands`; ``payload`` of the programmed motion that it belongs to.
+    """
+
+    motion: int
+    end: tuple[float, ...]
+    centre: tuple[float, float]
+    turns: int
+    payload: object
+
+
+class _Offset(NamedTuple):
+    """The offset of one motion in the plane: from ``m`` along ``u`` to ``e``; ``turns`` not 0: about ``o``.
+
+    ``entry``: it leads to the contour from anywhere, so that its end may be moved either way.
+    """
+
+    motion: int
+    m: complex
+    u: complex
+    e: complex
+    o: complex = 0j
+    turns: int = 0
+    entry: bool = False
+
+
+class Compensation:
+    """The tool's centre beside the contour, from G41 or G42 to G40.
+
+    Parameters
+    ----------
+    side : +1 tool left of the contour (G41), -1 right (G42)
+    radius : of the tool [mm]; a negative one stands on the other side
+    plane : XY (G17) or ZX (G18)
+    start : (9,) programmed position where compensation begins [mm, rad]
+    shift : (2,) from the tool's centre to the point that is commanded, in the plane's axes [mm]
+    slack : by how much an arc may turn more than programmed before it is refused [rad]; LinuxCNC's is 0.0254 in a text
+        in mm, 0.001 in one in inches
+
+    Raises
+    ------
+    InputError
+        Plane YZ; later, a motion beside which the tool does not fit.
+    """
+
+    def __init__(
+        self, side: int, radius: float, plane: int, start: Sequence[float], shift: tuple[float, float] = (0.0, 0.0), slack: float = 0.0254,
+    ) -> None:
+        if plane == YZ:
+            raise InputError("radius compensation: not in the plane YZ (G19): select G17 or G18")
+        self._side = side if radius >= 0.0 else -side
+        self._radius = abs(radius)
+        self._first, self._second, self._along = PLANE_AXES[plane]
+        self._shift = complex(*shift)
+        self._slack = slack
+        self._programmed = self._centre = tuple(start)
+        self._held: list[Move] = []
+        self._front: _Offset | None = None
+        self._from = 0j
+
+    @property
+    def position(self) -> tuple[float, ...]:
+        """(9,) programmed end of the last motion [mm, rad]."""
+        return self._programmed
+
+    @property
+    def end(self) -> tuple[float, ...]:
+        """(9,) end of the last motion beside the contour, as long as no corner shortens it [mm, rad]."""
+        return self._centre if self._front is None else self._with(self._centre, self._flat(self._centre) + self._shift)
+
+    def line(self, motion: int, end: Sequence[float], payload: object) -> list[Move]:
+        """Motions that are final once a straight motion, RAPID or LINE, to ``end`` (9) is known."""
+        a, b, r = self._flat(self._programmed), self._flat(end), self._radius
+        if r == 0.0:
+            return self._pass(Move(motion, tuple(end), (0.0, 0.0), 0, payload))
+        length = abs(b - a)
+        if self._front is None:
+            if length <= r:
+                raise self._short(length)
+            u = (b - a) / length
+            normal = self._side * 1j * r * u
+            return self._append(_Offset(motion, a + normal, u, b + normal, entry=True), end, payload)
+        if a == b:
+            self._programmed, self._centre = tuple(end), self._with(end, self._flat(self._centre))
+            self._held.append(Move(motion, self._centre, (0.0, 0.0), 0, payload))
+            return []
+        u = (b - a) / length
+        normal = self._side * 1j * r * u
+        return self._corner(_Offset(motion, a + normal, u, b + normal), a, end, payload)
+
+    def arc(self, end: Sequence[float], centre: tuple[float, float], turns: int, payload: object) -> list[Move]:
+        """Motions that are final once an arc to ``end`` (9) about ``centre`` (2), in the plane's axes, is known."""
+        a, b, o, r = self._flat(self._programmed), self._flat(end), complex(*centre), self._radius
+        if r == 0.0:
+            return self._pass(Move(ARC, tuple(end), centre, turns, payload))
+        inside = self._side * turns > 0
+        size = abs(b - o)
+        if inside and size <= r:
+            raise self._gouge(f"an arc of radius {size:.6g} mm, from inside,", "use a smaller tool")
+        outward = (b - o) / size
+        e = b + (-r if inside else r) * outward
+        if self._front is None:
+            if abs(b - a) <= r:
+                raise self._short(abs(b - a))
+            # its centre is on the normal at its end, as far from the start as from the offset of the end
+            chord = a - e
+            o = e + outward * abs(chord) ** 2 / (2.0 * (chord * outward.conjugate()).real)
+            return self._append(_Offset(ARC, a, 0j, e, o, turns, entry=True), end, payload)
+        radial = (a - o) / abs(a - o)
+        m = a + (-r if inside else r) * radial
+        return self._corner(_Offset(ARC, m, math.copysign(1.0, turns) * 1j * radial, e, o, turns), a, end, payload)
+
+    def pause(self, payload: object) -> list[Move]:
+        """Motions that are final; a pause (DWELL) keeps its place among them."""
+        self._held.append(Move(DWELL, self._centre, (0.0, 0.0), 0, payload))
+        return self._release() if self._front is None else []
+
+    def finish(self) -> list[Move]:
+        """The motions that were held back (G40)."""
+        self._check()
+        return self._release()
+
+    def _release(self) -> list[Move]:
+        done, self._held = [self._out(move) for move in self._held], []
+        return done
+
+    def _corner(self, new: _Offset, corner: complex, end: Sequence[float], payload: object) -> list[Move]:
+        """Join ``new`` to the front; what is final."""
+        front, r, c = self._front, self._radius, self._flat(self._centre)
+        assert front is not None
+        if r == 0.0:
+            return self._append(new, end, payload)
+        # from the direction to the tool's centre to its direction beside the new motion, > 0 away from the tool
+        away = -self._side * cmath.phase((new.m - corner) / (c - corner))
+        if away < -0.5 * math.pi:
+            away += 2.0 * math.pi
+        # an arc with the tool outside curves away, so that a reversal there is a corner towards the tool
+        round_ = new if new.turns else front
+        limit = math.pi + (-SMOOTH if self._side * round_.turns < 0 else SMOOTH)
+        if away < -SMOOTH or away > limit:
+            at = self._crossing(front, new, corner)
+            self._trim(at)
+            return self._append(new, end, payload)
+        if away <= SMOOTH:
+            return self._append(new, end, payload)
+        if not new.turns:
+            self._check()
+        around = self._with(end, new.m, along=self._centre[self._along])
+        rapid = new.motion == RAPID
+        centre = (0.0, 0.0) if rapid else (corner.real, corner.imag)
+        move = Move(RAPID if rapid else ARC, around, centre, 0 if rapid else -self._side, payload)
+        done = [*self._release(), self._out(move)]
+        self._centre = around
+        return [*done, *self._append(new, end, payload)]
+
+    def _crossing(self, front: _Offset, new: _Offset, corner: complex) -> complex:
+        """Where two offsets cross beside a corner that turns towards the tool."""
+        if not front.turns and not new.turns:
+            return new.m + new.u * self._radius * math.tan(0.5 * abs(cmath.phase(new.u / front.u)))
+        if front.turns and new.turns:
+            return self._circles(front, new)
+        round_, straight = (front, new) if front.turns else (new, front)
+        size = abs((front.e if front.turns else new.m) - round_.o)
+        m = straight.m
+        if front.entry and front.turns and corner != front.o:
+            # its contour is thought r beside it on the side that its turns tell, even where it enters from the other
+            out = (corner - front.o) / abs(corner - front.o)
+            m += out * (size + self._side * math.copysign(self._radius, front.turns)) - (corner - front.o)
+        foot = m + straight.u * ((round_.o - m) * straight.u.conjugate()).real
+        under = size**2 - abs(foot - round_.o) ** 2
+        if under < 0.0:
+            raise self._gouge("a corner between an arc and a line", "use a smaller tool")
+        # an arc with the tool inside is left through its disc, one with the tool outside away from it
+        leaving = self._side * round_.turns > 0
+        sense = -1.0 if leaving == bool(front.turns) else 1.0
+        return foot + straight.u * math.copysign(math.sqrt(under), sense)
+
+    def _circles(self, front: _Offset, new: _Offset) -> complex:
+        apart = new.o - front.o
+        d = abs(apart)
+        r0, r1 = abs(front.e - front.o), abs(new.m - new.o)
+        if d == 0.0:
+            raise self._gouge("a corner between two arcs with one centre", "join them")
+        u = apart / d
+        x = (d**2 + r0**2 - r1**2) / (2.0 * d)
+        under = r0**2 - x**2
+        if under < 0.0:
+            raise self._gouge("a corner between two arcs", "use a smaller tool")
+        sense = math.copysign(1.0, self._side * front.turns * new.turns)
+        return front.o + u * complex(x, math.copysign(math.sqrt(under), sense))
+
+    def _trim(self, at: complex) -> None:
+        """Let the front and what follows it end ``at``."""
+        self._held = [move._replace(end=self._with(move.end, at)) for move in self._held]
+        self._centre = self._with(self._centre, at)
+        self._check()
+
+    def _check(self) -> None:
+        """Refuse a front that its corners turned back."""
+        front, at = self._front, self._flat(self._centre)
+        if front is None or front.entry:
+            return
+        if front.turns:
+            if _sweep(front, self._from, at) > _sweep(front, front.m, front.e) + self._slack:
+                raise self._gouge("an arc between two corners", "use a smaller tool or a longer arc")
+        elif ((at - self._from) * front.u.conjugate()).real < 0.0:
+            raise self._gouge("a line between two corners", "use a smaller tool or a longer line")
+
+    def _pass(self, move: Move) -> list[Move]:
+        """With a radius of 0 the contour is the path."""
+        self._programmed = self._centre = move.end
+        return [self._out(move)]
+
+    def _append(self, new: _Offset, end: Sequence[float], payload: object) -> list[Move]:
+        """Hold ``new``; what was held before is final."""
+        done = self._release()
+        self._front, self._from = new, self._flat(self._centre)
+        self._programmed, self._centre = tuple(end), self._with(end, new.e)
+        self._held = [Move(new.motion, self._centre, (new.o.real, new.o.imag), new.turns, payload)]
+        return done
+
+    def _flat(self, position: Sequence[float]) -> complex:
+        return complex(position[self._first], position[self._second])
+
+    def _with(self, position: Sequence[float], at: complex, along: float | None = None) -> tuple[float, ...]:
+        out = list(position)
+        out[self._first], out[self._second] = at.real, at.imag
+        if along is not None:
+            out[self._along] = along
+        return tuple(out)
+
+    def _out(self, move: Move) -> Move:
+        """Shifted from the tool's centre to the point that is commanded."""
+        end = self._with(move.end, self._flat(move.end) + self._shift)
+        centre = complex(*move.centre) + (self._shift if move.turns else 0j)
+        return move._replace(end=end, centre=(centre.real, centre.imag))
+
+    def _short(self, length: float) -> InputError:
+        return InputError(
+            f"radius compensation: its first motion is {length:.6g} mm long: must be longer than the tool's radius "
+            f"{self._radius:.6g} mm: start farther away or use a smaller tool"
+        )
+
+    def _gouge(self, what: str, remedy: str) -> InputError:
+        return InputError(
+            f"radius compensation: {what} would cause gouging with a tool of radius {self._radius:.6g} mm: {remedy}"
+        )
+
+
+def _sweep(arc: _Offset, start: complex, end: complex) -> float:
+    """Angle from ``start`` to ``end`` in the direction of an arc, above 0 to a whole turn [rad]."""
+    angle = math.copysign(1.0, arc.turns) * cmath.phase((end - arc.o) / (start - arc.o))
+    return angle if angle > 1e-9 else angle + 2.0 * math.pi

@@ -1,0 +1,283 @@
+"""A controller that makes rows: its state, its parameters, its tools and what it has noticed.
+
+Notation: positions are nine numbers X Y Z A B C U V W [mm, deg]; F is a speed per minute, S in rpm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import cast
+
+from chipload.errors import InputError
+from chipload.program.commands import ARC, DWELL, PLANE_AXES, RAPID, XY, YZ, ZX
+from chipload.program.gcode import arcs
+from chipload.program.gcode.compensation import Compensation, Move
+from chipload.program.gcode.expression import integer_of
+from chipload.program.gcode.parameters import Parameters
+from chipload.program.gcode.state import AXES, LINEAR, ZERO, Datum, Nine, State, nine
+from chipload.program.gcode.tools import Tool, ToolTable
+from chipload.program.gcode.track import Context, Findings, Track
+from chipload.units import MM_PER
+
+PLANES = {170: XY, 180: ZX, 190: YZ, 171: XY, 181: ZX, 191: YZ}
+#: from the centre of a turning tool's nose to its tip, in radii along X and Z, by orientation
+TIPS = ((0, 0), (-1, 1), (-1, -1), (1, -1), (1, 1), (0, 1), (-1, 0), (0, -1), (1, 0), (0, 0))
+#: positions beyond this are refused [mm, deg]
+FARTHEST = 1e9
+#: a feed by G93 is at least this [units/min], as LinuxCNC does
+LEAST_INVERSE = 0.1
+
+
+class Controller:
+    """State and outlets of one reading.
+
+    Parameters
+    ----------
+    tools : entries by number, None where no table is known
+    parameters : what numbered parameters hold before the program starts
+    units, machine_units : mm in a unit of the text at its start, and of the machine (of parameters and offsets)
+    start : (9,) position of the axes at the start [mm, deg]
+    most_rows : rows that the text may make
+    strict : a tool that is not in the table is refused
+    """
+
+    def __init__(
+        self,
+        *,
+        tools: ToolTable | None = None,
+        parameters: Mapping[int, float] | None = None,
+        units: str = "mm",
+        machine_units: str = "mm",
+        start: Nine = ZERO,
+        most_rows: int = 10_000_000,
+        strict: bool = True,
+    ):
+        self.state = State(scale=MM_PER[units])
+        self.machine_scale = MM_PER[machine_units]
+        self.tools: dict[int, Tool] | None = None if tools is None else dict(tools.tools)
+        self.strict = strict
+        self.findings = Findings()
+        self.track = Track(most_rows)
+        self.parameters = Parameters(parameters, self._noted)
+        self.line = 0
+        self.label = 0
+        self.returned = (0.0, 0.0)
+        self.named_tools: dict[str, int] = {}
+        self.level = 0
+        self._contexts: dict[int, int] = {}
+        self._beside: Compensation | None = None
+        self._framed: Datum | None = None
+        self._frame = 0
+        self.known_offsets = {1} | {
+            n for n in range(1, 10) if any(5201 + 20 * n + k in self.parameters.numbered for k in range(10))
+        }
+        self._start(start)
+
+    def _noted(self, code: str, text: str) -> None:
+        self.findings.once(code, self.line, text)
+
+    def note(self, code: str, text: str) -> None:
+        """A finding on the line that is read."""
+        self.findings.add(code, self.line, text)
+
+    def once(self, code: str, text: str) -> None:
+        """A finding that is made a single time."""
+        self.findings.once(code, self.line, text)
+
+    # -- offsets ---------------------------------------------------------------------------------------------------
+
+    def stored(self, first: int) -> Nine:
+        """Nine parameters from number ``first`` on [mm, deg]."""
+        get, scale = self.parameters.numbered.get, self.machine_scale
+        return nine([get(first + k, 0.0) * (scale if k in LINEAR else 1.0) for k in range(9)])
+
+    def store(self, first: int, values: Nine) -> None:
+        """Keep nine numbers in parameters from number ``first`` on."""
+        for k, value in enumerate(values):
+            self.parameters.numbered[first + k] = value / (self.machine_scale if k in LINEAR else 1.0)
+
+    def work_offset(self, number: int) -> tuple[Nine, float]:
+        """Origin and rotation of a work offset."""
+        return self.stored(5201 + 20 * number), self.parameters.numbered.get(5210 + 20 * number, 0.0)
+
+    def _start(self, start: Nine) -> None:
+        number = int(self.parameters.numbered.get(5220, 1.0))
+        number = number if 1 <= number <= 9 else 1
+        offset, rotation = self.work_offset(number)
+        shift = self.stored(5211) if self.parameters.numbered.get(5210, 0.0) else ZERO
+        self.state.datum = Datum(number, offset, rotation, shift, ZERO)
+        self.state.at = self.state.datum.from_machine(start)
+
+    def rebase(self, datum: Datum) -> None:
+        """Other coordinates, the machine where it is."""
+        state = self.state
+        if datum != state.datum:
+            state.at = datum.from_machine(state.datum.to_machine(state.at))
+            state.datum = datum
+            self.changed()
+
+    # -- tools -----------------------------------------------------------------------------------------------------
+
+    def find_tool(self, number: int, what: str) -> Tool:
+        """Entry of the table; an empty one where there is none and the text may go on."""
+        if number == 0:
+            return (self.tools or {}).get(0, Tool(0))
+        tool = (self.tools or {}).get(number)
+        if tool is not None:
+            return tool
+        if number < 0:
+            raise InputError(f"{what}{number}: must be 0 or more")
+        if self.tools is not None and self.strict:
+            raise InputError(f"{what}{number}: tool {number} is not in the tool table: add it there")
+        where = "is not in the tool table" if self.tools is not None else "is used and no tool table is given"
+        self.once("nc-tool-unknown", f"tool {number} {where}: its length and diameter count as 0")
+        return Tool(number)
+
+    # -- compensation ----------------------------------------------------------------------------------------------
+
+    def not_compensated(self, what: str) -> None:
+        """Refuse what cutter compensation excludes."""
+        if self.state.compensation != 400:
+            raise InputError(f"{what}: not while cutter compensation is on: write G40 before")
+
+    def compensate(self, code: int, d: float | None = None, orientation: float | None = None) -> None:
+        """G40, or G41, G42 with the tool D, or G41.1, G42.1 with the diameter D and the orientation L."""
+        state = self.state
+        if code == 400:
+            if self._beside is not None:
+                self._emit(self._beside.finish())
+                self._beside = None
+            state.compensation = 400
+            return
+        name = f"G{code / 10:g}"
+        self.not_compensated(name)
+        if PLANES[state.plane] == YZ or state.plane % 10:
+            raise InputError(f"{name}: compensation lies in the planes of G17 and G18")
+        if code % 10:
+            if d is None:
+                raise InputError(f"{name}: D is missing: the diameter")
+            if orientation is not None and state.plane != 180:
+                raise InputError(f"{name}: L goes with a turning tool in the plane of G18")
+            radius, turned = 0.5 * d * state.scale, integer_of(orientation or 0.0, f"{name}: L")
+        else:
+            number = state.tool if d is None else integer_of(d, f"{name}: D")
+            if number < 0:
+                raise InputError(f"{name}: D{number}: must be the number of a tool")
+            tool = self.find_tool(number, "D")
+            radius, turned = 0.5 * tool.diameter, tool.orientation
+            if turned and state.plane != 180:
+                raise InputError(f"{name}: tool {number} has an orientation for turning: it goes with G18")
+        if not 0 <= turned <= 9:
+            raise InputError(f"{name}: orientation {turned}: must be from 0 to 9")
+        x, z = TIPS[turned]
+        shift = radius * z, radius * x
+        self._beside = Compensation(1 if code < 420 else -1, radius, PLANES[state.plane], state.at, shift)
+        state.compensation = code
+
+    def _emit(self, moves: list[Move]) -> None:
+        """Rows of motions beside the contour."""
+        for move in moves:
+            context, line = cast(tuple[int, int], move.payload)
+            row = (move.motion, *nine(list(move.end)), context, line)
+            if move.motion == ARC:
+                self.track.arc(row, *move.centre, move.turns)
+            else:
+                self.track.rows.append(row)
+
+    # -- rows ------------------------------------------------------------------------------------------------------
+
+    def changed(self) -> None:
+        """Something that rows carry has changed."""
+        self._contexts.clear()
+
+    def context(self, kind: int) -> int:
+        """Context of a row: 0 rapid, 1 feed of lengths, 2 feed of angles."""
+        number = self._contexts.get(kind)
+        if number is None:
+            number = self._contexts[kind] = self.track.context(self.carried(self._feed(kind)))
+        return number
+
+    def carried(self, feed: float) -> Context:
+        """What a row of this feed [mm/s, rad/s, s] carries."""
+        state = self.state
+        spindle = 0.0 if state.surface else state.sense * state.speed * math.tau / 60.0
+        if state.datum is not self._framed:
+            self._framed, self._frame = state.datum, self.track.frame(state.datum)
+        frame = self._frame
+        return feed, spindle, state.tool, state.tcp, frame, PLANES[state.plane], self.label
+
+    def _feed(self, kind: int) -> float:
+        if kind == 0:
+            return 0.0
+        state = self.state
+        per_minute = state.feed if kind == 1 else math.radians(state.feed_turning)
+        if state.feed_mode == 950:
+            per_minute *= abs(state.speed)
+        return per_minute / 60.0
+
+    def kind_of(self, end: Nine) -> int:
+        """Whether a motion from here feeds lengths (1) or angles alone (2)."""
+        x, y, z, a, b, c, u, v, w = self.state.at
+        if (end[0], end[1], end[2], end[6], end[7], end[8]) != (x, y, z, u, v, w):
+            return 1
+        return 2 if (end[3], end[4], end[5]) != (a, b, c) else 1
+
+    def straight_context(self, motion: int, end: Nine, rate: float | None) -> int:
+        """Context of a straight motion; ``rate``: G93, 1/min."""
+        if motion == RAPID:
+            return self.context(0)
+        kind = self.kind_of(end)
+        if rate is None:
+            return self.context(kind)
+        a, b = self.state.at, end
+        span = math.dist(a[:3], b[:3]) or math.dist(a[6:], b[6:]) or math.dist(a[3:6], b[3:6])
+        return self._inverse(kind, span, rate)
+
+    def _inverse(self, kind: int, span: float, rate: float) -> int:
+        unit = self.state.scale if kind == 1 else 1.0
+        feed = max(span * rate, LEAST_INVERSE * unit) / 60.0
+        return self.track.context(self.carried(feed if kind == 1 else math.radians(feed)))
+
+    def straight(self, motion: int, end: Nine, rate: float | None = None) -> None:
+        """RAPID, LINE or PROBE to ``end``."""
+        self.check(end)
+        context = self.straight_context(motion, end, rate)
+        if self._beside is not None:
+            self._emit(self._beside.line(motion, end, (context, self.line)))
+        else:
+            self.track.rows.append((motion, *end, context, self.line))
+        self.state.at = end
+
+    def check(self, end: Nine) -> None:
+        """Refuse a position that no machine has."""
+        for k, value in enumerate(end):
+            if not -FARTHEST <= value <= FARTHEST:
+                raise InputError(f"{AXES[k].upper()}{value:g} mm or deg: must be within {FARTHEST:g}")
+
+    def arc_context(self, end: Nine, centre: tuple[float, float], turns: int, rate: float | None) -> int:
+        """Context of an arc."""
+        if rate is None:
+            return self.context(1)
+        first, second, along = PLANE_AXES[PLANES[self.state.plane]]
+        at = self.state.at
+        span = arcs.length(at[first], at[second], end[first], end[second], *centre, turns, end[along] - at[along])
+        return self._inverse(1, span, rate)
+
+    def arc(self, end: Nine, centre: tuple[float, float], turns: int, rate: float | None = None) -> None:
+        """ARC to ``end`` in the active plane."""
+        self.check(end)
+        context = self.arc_context(end, centre, turns, rate)
+        if self._beside is not None:
+            self._emit(self._beside.arc(end, centre, turns, (context, self.line)))
+        else:
+            self.track.arc((ARC, *end, context, self.line), *centre, turns)
+        self.state.at = end
+
+    def dwell(self, seconds: float) -> None:
+        """DWELL where the machine is."""
+        context = self.track.context(self.carried(seconds))
+        if self._beside is not None:
+            self._emit(self._beside.pause((context, self.line)))
+        else:
+            self.track.rows.append((DWELL, *self.state.at, context, self.line))

@@ -1,0 +1,124 @@
+"""Canned cycles G73, G74, G81 to G89: the motions over one hole.
+
+Notation: (a, b) the hole in the plane [mm], c along its normal [units of the text]; R where feeding begins, ``bottom``
+where it ends, ``clear`` where the cycle leaves the hole (R with G99, with G98 the higher of R and the level at which
+the series began); Q depth of a peck, P time at the bottom. A step is ``(kind, a, b, c, value)``: RAPID, LINE or DWELL
+(value: time [s]), or SPIN (value: sense of the spindle, 0 stopped) or STOP (the program waits for its operator).
+
+Reference: LinuxCNC 2.9, "Canned Cycles Motion".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from chipload.errors import InputError
+from chipload.program.commands import DWELL, LINE, RAPID
+
+SPIN, STOP = -1, -2
+#: G codes in tenths
+CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 870, 880, 890})
+#: cycles that need a P word, a Q word
+NEED_P = frozenset({820, 860, 880, 890})
+NEED_Q = frozenset({730, 830})
+#: a peck goes back by this, or comes back to this above the bottom so far [mm]
+RETURN = 0.254
+#: pecks of one hole
+MOST_PECKS = 100_000
+
+Step = tuple[int, float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Hole:
+    """Numbers of one hole [units of the text, s]; ``sense`` of the spindle: 1, -1 or 0.
+
+    ``shift`` [mm] and ``middle`` of G87; ``back`` is RETURN in units of the text.
+    """
+
+    r: float
+    bottom: float
+    clear: float
+    peck: float = 0.0
+    dwell: float | None = None
+    sense: int = 0
+    shift: tuple[float, float] = (0.0, 0.0)
+    middle: float = 0.0
+    back: float = RETURN
+
+
+def cycle_steps(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
+    """The steps from above R, over (a, b), to ``clear``."""
+    r, bottom, clear = hole.r, hole.bottom, hole.clear
+    if code == 870:
+        yield from _back_bore(a, b, hole)
+        return
+    if code in NEED_Q:
+        yield from _pecks(code, a, b, hole)
+    else:
+        if code in (740, 840):
+            _tapping(code, hole.sense)
+        elif code in (860, 880) and hole.sense == 0:
+            raise InputError(f"G{code // 10}: the spindle does not turn: start it by M3 or M4")
+        yield LINE, a, b, bottom, 0.0
+    if code in (740, 840):
+        yield SPIN, a, b, bottom, -hole.sense
+        yield DWELL, a, b, bottom, hole.dwell or 0.0
+        yield LINE, a, b, clear, 0.0
+        yield SPIN, a, b, clear, hole.sense
+        return
+    if code in NEED_P:
+        yield DWELL, a, b, bottom, hole.dwell or 0.0
+    if code == 890:
+        yield LINE, a, b, clear, 0.0
+        return
+    if code == 850:
+        yield LINE, a, b, r, 0.0
+    elif code in (860, 880):
+        yield SPIN, a, b, bottom, 0
+        if code == 880:
+            yield STOP, a, b, bottom, 0.0
+    yield RAPID, a, b, clear, 0.0
+    if code in (860, 880):
+        yield SPIN, a, b, clear, hole.sense
+
+
+def _tapping(code: int, sense: int) -> None:
+    right = 1 if code == 840 else -1
+    if sense != right:
+        said = {0: "does not turn", 1: "turns clockwise", -1: "turns counter-clockwise"}[sense]
+        raise InputError(f"G{code // 10}: the spindle {said}: start it by M{3 if right > 0 else 4}")
+
+
+def _pecks(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
+    if hole.peck <= 0.0:
+        raise InputError(f"Q{hole.peck:g}: the depth of a peck must be above 0")
+    if (hole.r - hole.bottom) / hole.peck > MOST_PECKS:
+        raise InputError(f"Q{hole.peck:g}: makes more than {MOST_PECKS} pecks: raise it")
+    depth = hole.r - hole.peck
+    while depth > hole.bottom:
+        yield LINE, a, b, depth, 0.0
+        if code == 830:
+            yield RAPID, a, b, hole.r, 0.0
+        yield RAPID, a, b, depth + hole.back, 0.0
+        depth -= hole.peck
+    yield LINE, a, b, hole.bottom, 0.0
+
+
+def _back_bore(a: float, b: float, hole: Hole) -> Iterator[Step]:
+    if hole.sense == 0:
+        raise InputError("G87: the spindle does not turn: start it by M3 or M4")
+    aside, beside = a + hole.shift[0], b + hole.shift[1]
+    yield RAPID, aside, beside, hole.r, 0.0
+    yield SPIN, aside, beside, hole.r, 0
+    yield RAPID, aside, beside, hole.bottom, 0.0
+    yield RAPID, a, b, hole.bottom, 0.0
+    yield SPIN, a, b, hole.bottom, hole.sense
+    yield LINE, a, b, hole.middle, 0.0
+    yield LINE, a, b, hole.bottom, 0.0
+    yield SPIN, a, b, hole.bottom, 0
+    yield RAPID, aside, beside, hole.bottom, 0.0
+    yield RAPID, aside, beside, hole.clear, 0.0
+    yield RAPID, a, b, hole.clear, 0.0
+    yield SPIN, a, b, hole.clear, hole.sense

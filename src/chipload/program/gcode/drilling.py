@@ -1,0 +1,160 @@
+"""Canned cycles block by block: what lasts in a series of holes, and the way from hole to hole.
+
+Notation: a series begins with the first cycle after another motion; ``level`` is where it began along the normal of the
+plane. Heights are in units of the text: pecks add up as they do there.
+
+Reference: LinuxCNC 2.9, "Canned Cycles"; the way between holes is that which its interpreter was observed to take.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from chipload.errors import InputError
+from chipload.program.commands import DWELL, LINE, PLANE_AXES, RAPID
+from chipload.program.gcode import cycles
+from chipload.program.gcode.controller import PLANES, Controller
+from chipload.program.gcode.expression import integer_of
+from chipload.program.gcode.modal import shown
+from chipload.program.gcode.state import put
+from chipload.program.gcode.targets import axes, polar, rate
+from chipload.program.gcode.words import Block
+
+#: heights that differ by less are one [units of the text]
+SAME = 1e-9
+MOST_REPEATS = 100_000
+
+
+@dataclass(frozen=True)
+class Series:
+    """What a canned cycle keeps from block to block [units of the text]; ``level`` where the series began."""
+
+    code: int
+    level: float
+    r: float
+    bottom: float
+    peck: float | None = None
+    dwell: float | None = None
+    i: float | None = None
+    j: float | None = None
+    k: float | None = None
+
+
+class Drilling:
+    """The canned cycles of one controller."""
+
+    def __init__(self, controller: Controller):
+        self.c = controller
+        self.series: Series | None = None
+
+    def move(self, block: Block, code: int) -> None:
+        """Carry out the cycle ``code`` over the holes of a block."""
+        c, state, words = self.c, self.c.state, block.words
+        c.not_compensated(shown(code))
+        for axis in "abcuvw":
+            if axis in words:
+                raise InputError(f"{axis.upper()}: stands in no canned cycle")
+        if state.plane % 10:
+            raise InputError(f"{shown(code)}: cycles lie in the planes of G17, G18 and G19")
+        if state.feed_mode == 930:
+            raise InputError(f"{shown(code)}: a cycle has no inverse time: write G94 and F")
+        if state.feed_mode == 950 and state.speed == 0.0 and state.feed != 0.0:
+            self.c.once("nc-feed-unknown", f"{shown(code)}: feed per revolution (G95) and no spindle speed")
+        else:
+            rate(self.c, block, shown(code))
+        first, second, along = PLANE_AXES[PLANES[state.plane]]
+        scale, old = state.scale, self.series
+        series = self._sticky(block, code, old, "xyz"[along], state.at[along] / scale)
+        repeats = integer_of(words.get("l", 1.0), "L")
+        if not 1 <= repeats <= MOST_REPEATS:
+            raise InputError(f"L{repeats}: repeats of a cycle must be from 1 to {MOST_REPEATS}")
+        r, bottom, level = series.r, series.bottom, series.level
+        if not state.absolute:
+            r += level
+            bottom += r
+        if r < bottom:
+            raise InputError(f"R{r:g}: lies below the bottom of the hole, {bottom:g}: raise R")
+        clear = max(level, r) if state.old_level else r
+        hole = self._hole(series, code, along, first, second, r, bottom, clear)
+        self.series = series
+        given = axes(self.c, block)
+
+        def go(motion: int, a: float, b: float, height: float) -> None:
+            c.straight(motion, put(state.at, {first: a, second: b, along: height * scale}))
+
+        height = state.at[along] / scale
+        if level < r:
+            go(RAPID, state.at[first], state.at[second], r)
+            height = r
+        height = max(height, clear)
+        a, b = state.at[first], state.at[second]
+        pole = "@" in words or "^" in words
+        for _ in range(repeats):
+            if pole:
+                to = put(state.at, polar(self.c, block, given))
+                a, b = to[first], to[second]
+            elif state.absolute:
+                a, b = given.get(first, a), given.get(second, b)
+            else:
+                a, b = a + given.get(first, 0.0), b + given.get(second, 0.0)
+            go(RAPID, a, b, height)
+            if abs(height - r) > SAME:
+                go(RAPID, a, b, r)
+            for kind, p, q, h, value in cycles.cycle_steps(code, a, b, hole):
+                if kind in (RAPID, LINE):
+                    go(kind, p, q, h)
+                elif kind == DWELL:
+                    c.dwell(value)
+                elif kind == cycles.SPIN:
+                    state.sense = int(value)
+                    c.changed()
+                else:
+                    c.note("nc-stop", f"{shown(code)}: the program waits for its operator, who retracts by hand")
+            height = clear
+            c.track.spill()
+
+    def _sticky(self, block: Block, code: int, old: Series | None, normal: str, here: float) -> Series:
+        words = block.words
+        if self.c.state.diameter and normal == "x":
+            raise InputError(f"{shown(code)}: no cycle along X with diameters (G7)")
+        if old is None or old.code != code:
+            if "r" not in words:
+                raise InputError(f"{shown(code)}: R is missing: where feeding begins")
+            if normal not in words:
+                raise InputError(f"{shown(code)}: {normal.upper()} is missing: the bottom of the hole")
+            new = Series(code, here if old is None else old.level, words["r"], words[normal])
+        else:
+            new = replace(old, r=words.get("r", old.r), bottom=words.get(normal, old.bottom))
+        new = replace(
+            new,
+            peck=words.get("q", new.peck),
+            dwell=words.get("p", new.dwell),
+            i=words.get("i", new.i),
+            j=words.get("j", new.j),
+            k=words.get("k", new.k),
+        )
+        if code in cycles.NEED_P and new.dwell is None:
+            raise InputError(f"{shown(code)}: P is missing: the time at the bottom")
+        if code in cycles.NEED_Q and new.peck is None:
+            raise InputError(f"{shown(code)}: Q is missing: the depth of a peck")
+        return new
+
+    def _hole(
+        self, series: Series, code: int, along: int, first: int, second: int, r: float, bottom: float, clear: float
+    ) -> cycles.Hole:
+        scale = self.c.state.scale
+        shift, middle = (0.0, 0.0), 0.0
+        if code == 870:
+            offsets = (series.i, series.j, series.k)
+            for letter, value in zip("IJK", offsets, strict=True):
+                if value is None:
+                    raise InputError(f"G87: {letter} is missing")
+            i, j, k = (value or 0.0 for value in offsets)
+            shift = (scale * (i, j, k)[first], scale * (i, j, k)[second])
+            middle = (i, j, k)[along] + (0.0 if self.c.state.absolute else bottom)
+        dwell = series.dwell
+        if dwell is not None and dwell < 0.0:
+            raise InputError(f"P{dwell:g}: the time at the bottom must be 0 or more")
+        return cycles.Hole(
+            r, bottom, clear, series.peck or 0.0, dwell, self.c.state.sense, shift, middle, cycles.RETURN / scale
+        )

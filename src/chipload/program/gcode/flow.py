@@ -1,0 +1,404 @@
+"""The order in which blocks are carried out: O-words, subroutines, files that are called, and the end.
+
+Notation: ``line`` counts from 0 in its source. A call keeps where it came from. Blocks are counted, with those of calls
+and loops, so that every text ends.
+
+Reference: LinuxCNC 2.9, "O Codes".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from chipload.errors import InputError
+from chipload.program.gcode.dialect import Dialect
+from chipload.program.gcode.expression import integer_of, read_value
+from chipload.program.gcode.interpreter import Interpreter
+from chipload.program.gcode.parameters import LOCAL
+from chipload.program.gcode.plain import run_plain
+from chipload.program.gcode.source import KEYWORDS, OWord, Source, read_source
+from chipload.program.gcode.words import bare
+
+#: calls within calls
+DEEPEST_CALL = 10
+#: largest file that is called [bytes]
+LARGEST_FILE = 50_000_000
+#: files that a text may call
+MOST_FILES = 1000
+#: repeats of a loop or a call that are taken at all
+MOST_REPEATS = 1_000_000_000
+#: longest line
+LONGEST_LINE = 255
+
+
+@dataclass
+class _Call:
+    source: Source
+    back: int
+    label: str
+    loops: dict[int, int]
+    local: bool
+    left: int
+    first: int
+
+
+class Flow:
+    """Runs a text on an interpreter.
+
+    Parameters
+    ----------
+    source : the main text
+    folder : the one folder that called files may lie in; None: no files
+    most_blocks : blocks that may be carried out
+    progress : called with the part of the main text that is done
+    """
+
+    def __init__(
+        self,
+        interpreter: Interpreter,
+        source: Source,
+        dialect: Dialect,
+        folder: Path | None,
+        most_blocks: int,
+        progress: Callable[[float, str], None],
+    ):
+        self.i = interpreter
+        self.c = interpreter.c
+        self.main = source
+        self.source = source
+        self.dialect = dialect
+        self.folder = folder
+        self.most_blocks = most_blocks
+        self.progress = progress
+        self.blocks = 0
+        self.line = 0
+        self._calls: list[_Call] = []
+        self._loops: dict[int, int] = {}
+        self._files: dict[str, Source | None] = {}
+        self._opened = False
+
+    def run(self) -> None:
+        """Carry out blocks until the program ends."""
+        try:
+            self._opened = self._percent()
+            report = 0
+            while self._step():
+                if self.blocks - report >= 4096 or self.blocks < report:
+                    report = self.blocks
+                    self.c.track.spill()
+                    self.progress(min(1.0, self.line / max(1, len(self.main.lines))), "reading")
+        except InputError as error:
+            raise InputError(f"{self.source.name}: line {self.line + 1}: {error}") from None
+
+    def _percent(self) -> bool:
+        for line, text in enumerate(self.main.lines):
+            text = text.strip()
+            if text:
+                if text == "%":
+                    self.line = line + 1
+                    return True
+                return False
+        return False
+
+    def _step(self) -> bool:
+        """Carry out the next blocks; whether there are more."""
+        lines = self.source.lines
+        if self.line >= len(lines):
+            return self._end()
+        if self.dialect.plain:
+            self.line, done = run_plain(self.c, self.i.motion, lines, self.line)
+            self.blocks += done
+            if self.line >= len(lines):
+                return self._end()
+        self.blocks += 1
+        if self.blocks > self.most_blocks:
+            raise InputError(f"more than {self.most_blocks} blocks: a loop does not end, or most_blocks must be raised")
+        raw = lines[self.line]
+        self.c.line = self.line + 1
+        word = self.source.words.get(self.line)
+        if word is not None:
+            self._check_length(raw)
+            for text in bare(raw)[1]:
+                self.i.comment(text)
+            return self._o_word(word)
+        stripped = raw.strip()
+        if not stripped:
+            self.line += 1
+            return True
+        if stripped == "%":
+            if self._opened or not self.dialect.strict:
+                self.i.finish()
+                return False
+            raise InputError("%: ends a text that begins with %, and this one does not: remove it")
+        self._check_length(raw)
+        return self._block(raw)
+
+    def _check_length(self, raw: str) -> None:
+        if self.dialect.strict and len(raw.rstrip("\r")) > LONGEST_LINE:
+            raise InputError(f"{len(raw)} characters: a line has at most {LONGEST_LINE}")
+
+    def _block(self, raw: str) -> bool:
+        block = self.dialect.read(raw, self.c)
+        if block is None:
+            self.line += 1
+            return True
+        for key, value in block.sets:
+            self.c.parameters.assign(key, value)
+        ends = self.i.execute(block)
+        self.line += 1
+        if ends:
+            return False
+        if 98 in block.m:
+            self._call_number(block.words)
+        elif 99 in block.m:
+            return self._return_number()
+        return True
+
+    def _end(self) -> bool:
+        """The lines are used up."""
+        self.line = len(self.source.lines) - 1
+        if self._calls:
+            raise InputError(f"the text ends within o{self._calls[-1].label}: endsub or M99 is missing")
+        if self.dialect.strict:
+            raise InputError("the text ends without M2, M30 or %: write M2 as its last block")
+        self.c.note("nc-no-end", "the text ends without M2 or M30")
+        self.i.finish()
+        return False
+
+    # -- values ----------------------------------------------------------------------------------------------------
+
+    def _bracket(self, text: str, word: OWord) -> tuple[float, str]:
+        if not text.startswith("["):
+            raise InputError(f"o{word.label} {word.keyword}: [ is missing after it")
+        value, end = read_value(text, 0, self.c.parameters)
+        return value, text[end:]
+
+    def _condition(self, word: OWord) -> float:
+        value, rest = self._bracket(word.rest, word)
+        if rest:
+            raise InputError(f"{rest[:12]!r}: nothing may follow an O-word but a comment")
+        return value
+
+    def _nothing(self, word: OWord) -> None:
+        if word.rest:
+            raise InputError(f"{word.rest[:12]!r}: nothing may follow an O-word but a comment")
+
+    # -- O-words ---------------------------------------------------------------------------------------------------
+
+    def _o_word(self, word: OWord | str) -> bool:
+        if isinstance(word, str):
+            raise InputError(word)
+        if word.keyword == "dynamic":
+            word = self._calculated(word)
+        source, line, key = self.source, self.line, word.key
+        match word.keyword:
+            case "":
+                self.line += 1
+            case "sub":
+                end = source.after(line, key, ("endsub",))
+                for other in range(line + 1, end):
+                    if other in source.words and source.keyword(other) == "sub":
+                        raise InputError(f"o{word.label} sub: another sub begins on line {other + 1} before its endsub")
+                self.line = end + 1
+            case "call":
+                self._call(word)
+            case "return" | "endsub":
+                self._return(word)
+            case "if":
+                self._choose(word, line)
+            case "else" | "elseif":
+                source.before(line, key, ("if",))
+                self.line = source.after(line, key, ("endif",)) + 1
+            case "endif":
+                source.before(line, key, ("if",))
+                self._nothing(word)
+                self.line += 1
+            case "do":
+                self._nothing(word)
+                self.line += 1
+            case "while":
+                self._while(word)
+            case "endwhile":
+                self.line = source.before(line, key, ("while",))
+            case "repeat":
+                self._repeat(word)
+            case "endrepeat":
+                head = source.before(line, key, ("repeat",))
+                if head not in self._loops:
+                    raise InputError(f"o{word.label} endrepeat: repeat on line {head + 1} was not carried out")
+                self._loops[head] -= 1
+                self.line = head + 1 if self._loops[head] > 0 else line + 1
+            case _:
+                self._leave_loop(word)
+        return True
+
+    def _calculated(self, word: OWord) -> OWord:
+        value, at = read_value(word.rest, 0, self.c.parameters)
+        label = str(integer_of(value, "O"))
+        for keyword in KEYWORDS:
+            if word.rest.startswith(keyword, at):
+                if keyword != "call":
+                    raise InputError(f"o[...] {keyword}: a calculated label goes with call only")
+                return OWord(label, keyword, word.rest[at + len(keyword) :].replace("(", ""), (word.key[0], label))
+        raise InputError(f"o{label}: no keyword of an O-word follows the label")
+
+    def _choose(self, word: OWord, line: int) -> None:
+        taken = self._condition(word) != 0.0
+        while not taken:
+            line = self.source.after(line, word.key, ("elseif", "else", "endif"))
+            other = self.source.words[line]
+            assert isinstance(other, OWord)
+            if other.keyword != "elseif":
+                break
+            self.line = line
+            taken = self._condition(other) != 0.0
+        self.line = line + 1
+
+    def _is_tail(self, line: int, key: tuple[str, str]) -> int:
+        """Line of the ``do`` that a ``while`` closes, -1 where it opens a loop."""
+        for other in reversed(self.source.places[key]):
+            if other < line:
+                keyword = self.source.keyword(other)
+                if keyword == "do":
+                    return other
+                if keyword in ("while", "endwhile"):
+                    return -1
+        return -1
+
+    def _while(self, word: OWord) -> None:
+        line = self.line
+        head = self._is_tail(line, word.key)
+        if head >= 0:
+            self.line = head + 1 if self._condition(word) != 0.0 else line + 1
+        elif self._condition(word) != 0.0:
+            self.line += 1
+        else:
+            self.line = self.source.after(line, word.key, ("endwhile",)) + 1
+
+    def _repeat(self, word: OWord) -> None:
+        count = self._condition(word)
+        if count > MOST_REPEATS:
+            raise InputError(f"repeat [{count:g}]: must be at most {MOST_REPEATS}")
+        if round(count) <= 0:
+            self.line = self.source.after(self.line, word.key, ("endrepeat",)) + 1
+            return
+        self._loops[self.line] = round(count)
+        self.line += 1
+
+    def _leave_loop(self, word: OWord) -> None:
+        """``break`` and ``continue``."""
+        self._nothing(word)
+        source, line, key = self.source, self.line, word.key
+        head = source.before(line, key, ("while", "do", "repeat"))
+        if source.keyword(head) == "repeat":
+            raise InputError(f"o{word.label} {word.keyword}: belongs to while and do; line {head + 1} is a repeat")
+        opens = source.keyword(head) == "do" or self._is_tail(head, key) < 0
+        if not opens:
+            raise InputError(f"o{word.label} {word.keyword}: while or do is missing before it")
+        tail = source.after(line, key, ("while",) if source.keyword(head) == "do" else ("endwhile",))
+        if word.keyword == "break":
+            self.line = tail + 1
+        else:
+            self.line = tail if source.keyword(head) == "do" else head
+
+    # -- calls -----------------------------------------------------------------------------------------------------
+
+    def _find(self, label: str) -> tuple[Source, int]:
+        for source in (self.source, self.main):
+            if label in source.subs:
+                return source, source.subs[label]
+        source_or_none = self._file(label)
+        if source_or_none is not None and label in source_or_none.subs:
+            return source_or_none, source_or_none.subs[label]
+        where = "this text" if self.folder is None else f"this text and {label}.ngc beside it"
+        raise InputError(f"o{label} call: there is no o{label} sub in {where}")
+
+    def _file(self, label: str) -> Source | None:
+        if self.folder is None or not label.replace("_", "").replace("-", "").isalnum():
+            return None
+        if label not in self._files:
+            if len(self._files) >= MOST_FILES:
+                raise InputError(f"more than {MOST_FILES} files are called")
+            root = self.folder.resolve()
+            path = (root / f"{label}.ngc").resolve()
+            found = path.parent == root and path.is_file()
+            if found and path.stat().st_size > LARGEST_FILE:
+                raise InputError(f"{path.name}: is larger than {LARGEST_FILE} bytes")
+            text = path.read_bytes().decode("utf-8", "replace").replace("\r\n", "\n") if found else ""
+            self._files[label] = read_source(text, path.name) if found else None
+        return self._files[label]
+
+    def _enter(self, source: Source, line: int, label: str, local: bool, times: int) -> None:
+        if len(self._calls) >= DEEPEST_CALL:
+            raise InputError(f"o{label}: calls are nested deeper than {DEEPEST_CALL}")
+        self._calls.append(_Call(self.source, self.line, label, self._loops, local, times, line + 1))
+        self._loops = {}
+        self.c.level += 1
+        self.source, self.line = source, line + 1
+
+    def _call(self, word: OWord) -> None:
+        arguments: list[float] = []
+        rest = word.rest
+        while rest:
+            if not rest.startswith("["):
+                raise InputError(f"{rest[:12]!r}: arguments of a call stand in [ ]")
+            value, rest = self._bracket(rest, word)
+            arguments.append(value)
+        if len(arguments) > LOCAL:
+            raise InputError(f"o{word.label} call: {len(arguments)} arguments: at most {LOCAL}")
+        source, line = self._find(word.label)
+        self.line += 1
+        try:
+            self._enter(source, line, word.label, True, 1)
+        except InputError:
+            self.line -= 1
+            raise
+        self.c.parameters.enter(arguments)
+
+    def _return(self, word: OWord) -> None:
+        if not self._calls or not self._calls[-1].local:
+            raise InputError(f"o{word.label} {word.keyword}: no subroutine was called")
+        value = (self._condition(word), 1.0) if word.rest else (0.0, 0.0)
+        self.c.parameters.leave()
+        self.c.returned = value
+        self._leave()
+
+    def _leave(self) -> None:
+        call = self._calls.pop()
+        level = self.c.level
+        self.c.level -= 1
+        self.source, self.line, self._loops = call.source, call.back, call.loops
+        self.i.left(level)
+
+    def _call_number(self, words: dict[str, float]) -> None:
+        """M98: a subroutine that begins with its O number and ends with M99."""
+        self.line -= 1
+        label, times = self.dialect.call(words)
+        place = self.source.numbers.get(label)
+        source = self.source
+        if place is None and label in self.main.numbers:
+            place, source = self.main.numbers[label], self.main
+        if place is None:
+            raise InputError(f"M98 P{label}: there is no block O{label} in this text")
+        self.line += 1
+        if times > 0:
+            self._enter(source, place, label, False, times)
+
+    def _return_number(self) -> bool:
+        """M99."""
+        if not self._calls:
+            self.c.note("nc-endless", "M99 in the main program starts it again without end: it is read once")
+            self.i.finish()
+            return False
+        call = self._calls[-1]
+        if call.local:
+            raise InputError("M99: ends a subroutine that M98 calls; this one ends with endsub")
+        call.left -= 1
+        if call.left > 0:
+            self.line = call.first
+            self._loops = {}
+        else:
+            self._leave()
+        return True

@@ -1,0 +1,89 @@
+"""Splines of G5, G5.1 and G5.2 as points on the curve.
+
+Notation: control points p_i [mm] with weights w_i, i = 0 to n; order L, degree L - 1; knots are uniform and clamped: L
+zeros, 1, 2, ... , L times n - L + 2. The curve is
+
+    c(u) = sum N_i(u) w_i p_i / sum N_i(u) w_i
+
+Points are such that the curve leaves the chord between neighbours by at most the tolerance, measured at a quarter, half
+and three quarters of each.
+
+Reference: [Piegl1997] chapters 3 and 4.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+
+#: the curve leaves the chords by at most this [mm]
+CHORD_TOLERANCE = 1e-3
+#: largest order, most control points, most points on one curve
+HIGHEST_ORDER = 20
+MOST_CONTROL_POINTS = 10_000
+MOST_POINTS = 1_000_000
+
+
+def spline_points(points: Floats, weights: Floats, order: int, tolerance: float = CHORD_TOLERANCE) -> Floats:
+    """(m, 2) points on a spline after its first.
+
+    Parameters
+    ----------
+    points : (n + 1, 2) float [mm], control points; the curve starts at the first and ends at the last
+    weights : (n + 1,) float > 0
+    order : L above, 2 to n + 1
+    tolerance : the curve leaves the chords by at most this [mm]
+    """
+    n = len(points) - 1
+    if not 2 <= order <= min(n + 1, HIGHEST_ORDER):
+        raise InputError(
+            f"spline of order {order} with {n + 1} control points: L must be from 2 to that number, at most "
+            f"{HIGHEST_ORDER}"
+        )
+    inner = n - order + 2
+    knots = np.concatenate([np.zeros(order), np.arange(1.0, inner), np.full(order, float(inner))])
+    spread = float(np.ptp(weights.min() / weights)) if len(weights) else 0.0
+    assert spread >= 0.0
+    curve = BSpline(knots, np.column_stack([points * weights[:, None], weights]), order - 1)
+
+    def at(u: Floats) -> Floats:
+        h = curve(np.minimum(u, inner))
+        return np.asarray(h[:, :2] / h[:, 2:3])
+
+    u = np.arange(inner + 1.0)
+    # a smooth piece between knots may be S-shaped: never judge it by its middle alone
+    u = np.interp(np.arange(4 * inner + 1) / 4.0, np.arange(inner + 1.0), u)
+    while True:
+        ends = at(u)
+        a, b = ends[:-1], ends[1:]
+        step = np.diff(u)
+        away = np.zeros(len(step))
+        for part in (0.25, 0.5, 0.75):
+            p = at(u[:-1] + part * step)
+            d, e = b - a, p - a
+            size = np.einsum("ij,ij->i", d, d)
+            t = np.clip(np.einsum("ij,ij->i", e, d) / np.where(size > 0.0, size, 1.0), 0.0, 1.0)
+            away = np.maximum(away, np.linalg.norm(e - t[:, None] * d, axis=1))
+        coarse = np.flatnonzero((away > tolerance) & (step > 1e-12 * inner))
+        if len(coarse) == 0:
+            break
+        if len(u) + len(coarse) > MOST_POINTS:
+            raise InputError(f"spline of more than {MOST_POINTS} chords of {tolerance:g} mm tolerance: split it")
+        u = np.sort(np.concatenate([u, u[coarse] + 0.5 * step[coarse]]))
+    ends[-1] = points[-1]
+    return ends[1:]
+
+
+def cubic(start: tuple[float, float], i: float, j: float, p: float, q: float, end: tuple[float, float]) -> Floats:
+    """(4, 2) control points of G5: (i, j) from the start, (p, q) from the end."""
+    return np.array([start, (start[0] + i, start[1] + j), (end[0] + p, end[1] + q), end])
+
+
+def quadratic(start: tuple[float, float], i: float, j: float, end: tuple[float, float]) -> Floats:
+    """(3, 2) control points of G5.1: (i, j) from the start."""
+    return np.array([start, (start[0] + i, start[1] + j), end])

@@ -1,0 +1,192 @@
+"""What moves the coordinates: G10, G28, G30, G43, G49, G52, G54 to G59.3 and G92, and going to stored points.
+
+Notation: M position of the machine's axes; p in the coordinates of the text; the datum leads from one to the other.
+Axes are by index. The table of tools and the parameters keep what the program sets.
+
+Reference: LinuxCNC 2.9, "Coordinate Systems", "G10", "G28", "G43", "G92".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+from chipload.errors import InputError
+from chipload.program.commands import RAPID
+from chipload.program.gcode.controller import Controller
+from chipload.program.gcode.expression import integer_of
+from chipload.program.gcode.modal import shown
+from chipload.program.gcode.state import ZERO, Nine, nine, put
+from chipload.program.gcode.words import Block
+
+Axes = Mapping[int, float]
+
+
+def select(c: Controller, code: int) -> None:
+    """G54 to G59.3."""
+    number = (code - 530) // 10 if code < 591 else 6 + code % 10
+    datum = c.state.datum
+    if number == datum.number:
+        if number not in c.known_offsets:
+            _unset(c, code, number)
+        return
+    c.not_compensated(shown(code))
+    if number not in c.known_offsets:
+        _unset(c, code, number)
+    offset, rotation = c.work_offset(number)
+    c.rebase(replace(datum, number=number, offset=offset, rotation=rotation))
+
+
+def _unset(c: Controller, code: int, number: int) -> None:
+    said = "its origin is not known here and counts as the machine's"
+    c.once("nc-offset-unset", f"{shown(code)}: {said}: give parameters #{5201 + 20 * number} on")
+
+
+def set_data(c: Controller, block: Block, axes: Axes) -> None:
+    """G10."""
+    words = block.words
+    kind = integer_of(words.get("l", -1.0), "L")
+    if kind in (2, 20):
+        _set_work_offset(c, block, axes, kind)
+    elif kind in (1, 10, 11):
+        _set_tool(c, block, axes, kind)
+    elif kind != 0:
+        raise InputError("G10: L is missing or none of 0, 1, 2, 10, 11, 20")
+
+
+def _number(block: Block, most: int, what: str) -> int:
+    number = int(block.words["p"]) if "p" in block.words else -1
+    if not 0 <= number <= most:
+        raise InputError(f"{what}: P must be from 0 to {most}")
+    return number
+
+
+def _set_work_offset(c: Controller, block: Block, axes: Axes, kind: int) -> None:
+    words, state = block.words, c.state
+    if "i" in words or "j" in words:
+        raise InputError(f"G10 L{kind}: takes no I and J")
+    number = _number(block, 9, f"G10 L{kind}") or state.datum.number
+    active = number == state.datum.number
+    if active:
+        c.not_compensated("G10 of the active work offset")
+    offset, rotation = (state.datum.offset, state.datum.rotation) if active else c.work_offset(number)
+    if kind == 20:
+        if "r" in words:
+            raise InputError("G10 L20: takes no R")
+        datum = replace(state.datum, number=number, offset=offset, rotation=rotation)
+        machine = state.datum.to_machine(state.at)
+        wanted = replace(datum, offset=ZERO).to_machine(put(datum.from_machine(machine), dict(axes)))
+        moved = nine([m - w for m, w in zip(machine, wanted, strict=True)])
+        # the rotation carries X into Y; the other axes keep theirs
+        turned = {0, 1} if rotation and not {0, 1}.isdisjoint(axes) else set()
+        offset = put(offset, {k: moved[k] for k in turned | axes.keys()})
+    else:
+        offset = put(offset, dict(axes))
+        rotation = words.get("r", rotation)
+    c.known_offsets.add(number)
+    c.store(5201 + 20 * number, offset)
+    c.parameters.numbered[5210 + 20 * number] = rotation
+    if active:
+        c.rebase(replace(state.datum, offset=offset, rotation=rotation))
+
+
+def _set_tool(c: Controller, block: Block, axes: Axes, kind: int) -> None:
+    words, state = block.words, c.state
+    if "p" not in words:
+        raise InputError(f"G10 L{kind}: P is missing: the number of the tool")
+    number = integer_of(words["p"], "P")
+    tool = c.find_tool(number, "P")
+    offset = nine([math.degrees(x) if 3 <= k < 6 else x for k, x in enumerate(tool.offset)])
+    if kind == 1:
+        offset = put(offset, dict(axes))
+    else:
+        machine = state.datum.to_machine(state.at)
+        datum = replace(state.datum, length=offset)
+        if kind == 11:
+            origin, rotation = c.work_offset(9)
+            datum = replace(datum, offset=origin, rotation=rotation, shift=ZERO)
+        wanted = replace(datum, length=ZERO).to_machine(put(datum.from_machine(machine), dict(axes)))
+        offset = nine([m - w for m, w in zip(machine, wanted, strict=True)])
+    changed = replace(tool, offset=tuple(math.radians(x) if 3 <= k < 6 else x for k, x in enumerate(offset)))
+    if "r" in words:
+        changed = replace(changed, diameter=2.0 * words["r"] * state.scale)
+    if "i" in words:
+        changed = replace(changed, front=math.radians(words["i"]))
+    if "j" in words:
+        changed = replace(changed, back=math.radians(words["j"]))
+    if "q" in words:
+        orientation = integer_of(words["q"], "Q")
+        if not 0 <= orientation <= 9:
+            raise InputError(f"Q{orientation}: the orientation of a tool must be from 0 to 9")
+        changed = replace(changed, orientation=orientation)
+    if c.tools is None:
+        c.tools = {}
+        c.strict = False
+    c.tools[number] = changed
+
+
+def length_offset(c: Controller, block: Block, code: int, axes: Axes) -> None:
+    """G43, G43.1, G43.2 and G49."""
+    state = c.state
+    c.not_compensated(shown(code))
+    old = state.datum.length
+    if code == 490:
+        new = ZERO
+        if state.tcp:
+            state.tcp = False
+            c.changed()
+    elif code == 431:
+        new = put(old, dict(axes))
+    else:
+        if code == 432 and "h" not in block.words:
+            raise InputError("G43.2: H is missing: the tool whose offset is added")
+        number = integer_of(block.words.get("h", 0.0), "H")
+        if number == 0 and code == 430:
+            number = state.tool
+        tool = c.find_tool(number, "H")
+        length = nine([math.degrees(x) if 3 <= k < 6 else x for k, x in enumerate(tool.offset)])
+        new = nine([a + b for a, b in zip(old, length, strict=True)]) if code == 432 else length
+    c.rebase(replace(state.datum, length=new))
+
+
+def shift(c: Controller, code: int, axes: Axes) -> None:
+    """G52, G92 and G92.1 to G92.3."""
+    state, numbered = c.state, c.parameters.numbered
+    c.not_compensated(shown(code))
+    datum = state.datum
+    if code in (520, 920):
+        if not axes:
+            raise InputError(f"{shown(code)}: needs at least one axis")
+        if code == 520:
+            new = put(datum.shift, dict(axes))
+        else:
+            new = put(datum.shift, {k: state.at[k] + datum.shift[k] - value for k, value in axes.items()})
+        numbered[5210] = 1.0
+        c.store(5211, new)
+    elif code == 923:
+        new = c.stored(5211)
+        numbered[5210] = 1.0
+    else:
+        new = ZERO
+        numbered[5210] = 0.0
+        if code == 921:
+            c.store(5211, ZERO)
+    c.rebase(replace(datum, shift=new))
+
+
+def go_home(c: Controller, code: int, axes: Axes, end: Nine) -> None:
+    """G28 and G30: by way of ``end`` to the stored point, those axes alone that the block gives."""
+    state = c.state
+    c.not_compensated(shown(code))
+    first = 5161 if code == 280 else 5181
+    if not any(first + k in c.parameters.numbered for k in range(9)):
+        c.once("nc-point-unset", f"{shown(code)}: parameters #{first} on are not set: it goes to the machine's origin")
+    c.straight(RAPID, end)
+    home = state.datum.from_machine(c.stored(first))
+    c.straight(RAPID, put(end, {k: home[k] for k in (axes or range(9))}))
+
+
+def keep_point(c: Controller, code: int) -> None:
+    """G28.1 and G30.1."""
+    c.store(5161 if code == 281 else 5181, c.state.datum.to_machine(c.state.at))

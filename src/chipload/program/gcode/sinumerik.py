@@ -1,0 +1,272 @@
+"""Sinumerik's dialect where it differs from LinuxCNC's in what matters.
+
+Notation: ``X=10``, ``X=IC(5)`` and ``I=AC(3)`` give values; ``CR=`` the radius of an arc, ``TURN=`` its whole turns;
+``R1=..`` sets a parameter, kept as #1. TRAORI begins and TRAFOOF ends tip control. G70 and G700 are inches, G71 and
+G710 mm.
+
+Refused: frames (TRANS, ROT, CYCLE800 ...), cycles, tool vectors (A3 B3 C3), jumps and loops, calls. Noted and left out:
+what does not concern the path.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+
+from chipload.errors import InputError
+from chipload.program.gcode.controller import Controller
+from chipload.program.gcode.dialect import Dialect, lenient
+from chipload.program.gcode.expression import integer_of, read_value
+from chipload.program.gcode.state import AXES, LINEAR, ZERO
+from chipload.program.gcode.words import LONGEST, Block
+
+_TOKEN = re.compile(
+    r"""\s*(?:
+      (?P<name>[A-Z_$][A-Z0-9_$]*?)\s*(?:\[[^\]]*\])?\s*=\s*(?P<value>"[^"]*"|(?:[^\s=()"]|\([^()]*(?:\([^()]*\)[^()]*)*\))+)
+     |(?P<call>[A-Z_][A-Z0-9_]+)\s*\((?P<arguments>(?:"[^"]*"|[^()"]|\([^()]*\))*)\)
+     |(?P<letter>[A-Z])\s*(?P<number>[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?![A-Z_])
+     |(?P<word>[A-Z_][A-Z0-9_]*)(?P<colon>:?)
+    )""",
+    re.VERBOSE,
+)
+_WAY = re.compile(r"(AC|IC|DC|ACP|ACN)\((.*)\)\Z", re.DOTALL)
+_R = re.compile(r"R([0-9]+)(?![0-9A-Z_])")
+_NAMED = re.compile(r"[A-Z]+")
+
+FRAMES = frozenset(
+    """
+    AMIRROR AROT AROTS ASCALE ATRANS CROT CTRANS MIRROR ROT ROTS SCALE TOFRAME TOROT TRANS
+    """.split()  # noqa: SIM905
+)
+JUMPS = frozenset(
+    """
+    CALL CASE DEF DEFINE ELSE ENDFOR ENDIF ENDLOOP ENDWHILE EXTCALL FOR GOTO GOTOB GOTOC GOTOF IF LOOP MCALL
+    REPEAT REPEATB UNTIL WHILE
+    """.split()  # noqa: SIM905
+)
+CURVES = frozenset(
+    """
+    AP ASPLINE BSPLINE CIP CSPLINE CT INVCCW INVCW OMA POLY RP TCARR TRAANG TRACYL TRANSMIT
+    """.split()  # noqa: SIM905
+)
+IDLE = frozenset(
+    """
+    ADIS ADISPOS BRISK CFC CFIN CFTCP COARSEA COMPCAD COMPCURV COMPOF COMPON COMPSURF CUT2D CUT2DF CUT3DC
+    CUT3DF CUT3DFF CYCLE832 DIAM90 DIAMOF DISPLOF DRIVE EXTERN FFWOF FFWON FINEA FLIN FNORM FRC FRCM GFRAME0
+    GROUP_ADDEND GROUP_BEGIN GROUP_END KONT LIMS NORM ORIAXES ORIEULER ORIMACHAX ORIMKS ORIRESET ORIRPY
+    ORIRPY2 ORISOF ORISON ORIVECT ORIWKS OVR OVRRAP PROC RTLIOF RTLION SAVE SBLOF SBLON SD SOFT SPATH SPOS
+    SPOSA STOPRE UPATH UPL WALIMOF WALIMON WORKPIECE
+    """.split()  # noqa: SIM905
+)
+#: codes of G as LinuxCNC has them, in tenths
+SAME = {60: 610, 64: 640, 641: 640, 642: 640, 643: 640, 644: 640, 645: 640, 70: 200, 700: 200, 71: 210, 710: 210,
+        153: 530, 53: 530, 9: 0}  # fmt: skip
+PLAIN = frozenset({0, 1, 2, 3, 4, 17, 18, 19, 40, 41, 42, 54, 55, 56, 57, 90, 91, 93, 94, 95, 96, 97})
+NO_MEANING = frozenset({9, 25, 26, 450, 451, 460, 461, 462, 601, 602, 603, 621, 810, 820, 930, 931, 94})
+_WORDS = frozenset("XYZABCUVWIJKFSTDH")
+
+
+@dataclass(frozen=True)
+class Sinumerik(Dialect):
+    """See above."""
+
+    def begin(self, c: Controller, text: str) -> None:
+        """Nothing differs at power on."""
+
+    def read(self, raw: str, c: Controller) -> Block | None:
+        """The block of a line, in LinuxCNC's words."""
+        body, _, comment = _without_comment(raw)
+        body = body.strip().upper()
+        block = Block(comments=[comment] if comment else [])
+        if body.startswith("%") or (body.startswith("$") and "=" not in body):
+            return None
+        body = re.sub(r"^/[0-9]?\s*", "", body)
+        if len(body) > 4 * LONGEST:
+            raise InputError(f"{len(body)} characters: a block has at most {4 * LONGEST}")
+        at = 0
+        values: list[tuple[str, str, float]] = []
+        while at < len(body):
+            found = _TOKEN.match(body, at)
+            if found is None:
+                if not body[at:].strip():
+                    break
+                raise InputError(f"{body[at : at + 16].strip()!r}: begins no word")
+            at = found.end()
+            if found["letter"]:
+                _letter(block, c, found["letter"], float(found["number"]), values)
+            elif found["name"]:
+                _named(block, c, found["name"], found["value"], values)
+            elif found["call"]:
+                _called(block, c, found["call"], found["arguments"])
+            elif not found["colon"]:
+                _keyword(block, c, found["word"])
+        self._resolve(block, c, values)
+        return lenient(block, c)
+
+    def _resolve(self, block: Block, c: Controller, values: list[tuple[str, str, float]]) -> None:
+        """AC and IC, in the way that the block gives values."""
+        state, words = c.state, block.words
+        absolute = 910 not in block.g and (state.absolute or 900 in block.g)
+        scale = 25.4 if 200 in block.g else 1.0 if 210 in block.g else state.scale
+        if 40 in block.g:
+            if "f" in words:
+                words["p"] = words.pop("f")
+            elif "s" in words:
+                raise InputError("G4 S: a dwell by turns of the spindle is not read: give F in seconds")
+        for letter, way, value in values:
+            k = AXES.find(letter) if letter in AXES else "ijk".find(letter)
+            here = state.at[k] / (scale if k in LINEAR else 1.0)
+            if letter in "ijk":
+                words[letter] = value - here if way != "IC" else value
+            elif way == "IC":
+                words[letter] = here + value if absolute else value
+            else:
+                if way != "AC":
+                    c.once("nc-ignored", f"{way}: the direction of a rotary axis is left to the machine")
+                words[letter] = value if absolute else value - here
+        if 6 in block.m and c.tools is not None and not {430, 490} & set(block.g):
+            block.g.append(430)
+            words.setdefault("h", 0.0)
+        for letter in "dh":
+            if letter in words and not {410, 420, 430} & set(block.g):
+                del words[letter]
+                c.once("nc-ignored", f"{letter.upper()}: edges of tools and auxiliary functions are left out")
+
+
+def _without_comment(raw: str) -> tuple[str, str, str]:
+    quoted = False
+    for k, character in enumerate(raw):
+        if character == '"':
+            quoted = not quoted
+        elif character == ";" and not quoted:
+            return raw[:k], ";", raw[k + 1 :].strip()
+    return raw, "", ""
+
+
+def _value(text: str, c: Controller) -> float:
+    """Value of an expression with R parameters and ( )."""
+    plain = _R.sub(r"#\1", "".join(text.split()))
+    if _NAMED.sub("", plain) != plain:
+        for name in _NAMED.findall(plain):
+            if name not in ("SIN", "COS", "TAN", "ASIN", "ACOS", "SQRT", "ABS", "EXP", "LN"):
+                raise InputError(f"{name}: is not read in a value: write the number")
+    plain = plain.replace("(", "[").replace(")", "]").lower()
+    value, end = read_value(f"[{plain}]", 0, c.parameters)
+    if end != len(plain) + 2:
+        raise InputError(f"{text!r}: cannot be read as a value")
+    return value
+
+
+def _letter(block: Block, c: Controller, letter: str, value: float, values: list[tuple[str, str, float]]) -> None:
+    if letter == "G":
+        _code(block, c, integer_of(value, "code G"))
+    elif letter == "M":
+        m = integer_of(value, "code M")
+        if m == 17:
+            c.note("nc-ignored", "M17: ends a subroutine: the text ends here")
+            m = 30
+        block.m.append(m)
+    elif letter == "N":
+        block.number = int(min(value, 1e12))
+    elif letter == "L":
+        raise InputError(f"L{value:g}: calls a subroutine: not read; write its blocks out")
+    elif letter in _WORDS:
+        _put(block, letter.lower(), value)
+    else:
+        c.note("nc-unknown-word", f"{letter}{value:g}: is not known")
+
+
+def _put(block: Block, letter: str, value: float) -> None:
+    if letter in block.words:
+        raise InputError(f"{letter.upper()}: stands twice in one block")
+    block.words[letter] = value
+
+
+def _code(block: Block, c: Controller, code: int) -> None:
+    if code in SAME and code != 9:
+        block.g.append(SAME[code])
+    elif code in PLAIN:
+        block.g.append(10 * code)
+    elif code == 500 or 505 <= code <= 599:
+        c.once("nc-offset-unset", f"G{code}: its origin is not known here and counts as the machine's")
+        c.rebase(replace(c.state.datum, number=0 if code == 500 else code - 500, offset=ZERO, rotation=0.0))
+    elif code in NO_MEANING:
+        c.once("nc-ignored", f"G{code}: does not concern the path")
+    elif code in (33, 34, 35, 63, 331, 332, 58, 59, 74, 75, 110, 111, 112, *range(140, 149), 247, 248, 347, 348):
+        raise InputError(f"G{code}: is not read: write the moves out")
+    else:
+        # the dialect's reader makes a finding of it
+        block.g.append(9990 - code % 100 if code > 998 else 10 * code + 9)
+
+
+def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple[str, str, float]]) -> None:
+    if name in ("A3", "B3", "C3", "A2", "B2", "C2", "A4", "B4", "C4", "A5", "B5", "C5", "LEAD", "TILT"):
+        raise InputError(f"{name}: tool directions as vectors or angles to the surface are not read: post with axes")
+    if name == "T" and text.startswith('"'):
+        number = c.named_tools.setdefault(text, 9001 + len(c.named_tools))
+        c.once("nc-tool-unknown", f"tool {text}: is not known here; it counts as T{number} without length")
+        _put(block, "t", float(number))
+        return
+    if name in CURVES:
+        raise InputError(f"{name}: is not read: write the moves out")
+    if text.startswith('"') or name.startswith("$") or name in IDLE:
+        c.once("nc-ignored", f"{name}: does not concern the path and is left out")
+        return
+    if re.fullmatch(r"R[0-9]{1,4}", name):
+        block.sets.append((int(name[1:]), _value(text, c)))
+        return
+    if name == "CR":
+        _put(block, "r", _value(text, c))
+    elif name == "TURN":
+        _put(block, "p", _value(text, c) + 1.0)
+    elif name in ("G", "M"):
+        _letter(block, c, name, _value(text, c), values)
+    elif len(name) == 1 and name in _WORDS:
+        way = _WAY.match(text)
+        value = _value(way[2] if way is not None else text, c)
+        if way is not None and name in "XYZABCUVWIJK":
+            values.append((name.lower(), way[1], value))
+        else:
+            _put(block, name.lower(), value)
+    elif re.fullmatch(r"[SM][0-9]", name):
+        c.note("nc-unknown-word", f"{name}={text}: further spindles are left out")
+    else:
+        c.note("nc-unknown-word", f"{name}={text[:40]}: is not known")
+
+
+def _called(block: Block, c: Controller, name: str, arguments: str) -> None:
+    if name == "MSG":
+        c.note("nc-message", arguments.strip().strip('"')[:200])
+    elif name == "TRAORI":
+        _keyword(block, c, name)
+    elif name == "CYCLE800" and not arguments.strip():
+        c.once("nc-ignored", "CYCLE800(): resets a swivel that is not on")
+    elif name in FRAMES or name == "CYCLE800":
+        raise InputError(f"{name}: turned or shifted frames are not read: post in the coordinates of the work offset")
+    elif name in JUMPS:
+        _keyword(block, c, name)
+    elif name in IDLE:
+        c.once("nc-ignored", f"{name}: does not concern the path and is left out")
+    else:
+        raise InputError(f"{name}(...): cycles and calls are not read: write the moves out")
+
+
+def _keyword(block: Block, c: Controller, word: str) -> None:
+    if word in ("TRAORI", "TRAFOOF"):
+        c.state.tcp = word == "TRAORI"
+        c.changed()
+    elif word == "SUPA":
+        block.g.append(530)
+    elif word == "RET":
+        c.note("nc-ignored", "RET: ends a subroutine: the text ends here")
+        block.m.append(30)
+    elif word in FRAMES:
+        raise InputError(f"{word}: turned or shifted frames are not read: post in the coordinates of the work offset")
+    elif word in JUMPS:
+        raise InputError(f"{word}: jumps, loops and calls are not read: write out what they do")
+    elif word in CURVES or word.startswith(("CYCLE", "POCKET", "SLOT", "HOLES")):
+        raise InputError(f"{word}: is not read: write the moves out")
+    elif word in IDLE:
+        c.once("nc-ignored", f"{word}: does not concern the path and is left out")
+    else:
+        c.note("nc-unknown-word", f"{word[:40]}: is not known")

@@ -1,0 +1,127 @@
+"""What a controller remembers between blocks: modes, numbers, and how coordinates lie in the machine.
+
+Notation: positions are nine numbers X Y Z A B C U V W in mm and degrees. ``machine = rotate_xy(position + shift,
+rotation) + offset + length``: ``shift`` of G92 and G52, ``rotation`` and ``offset`` of the work offset, ``length`` of
+the tool.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from chipload.program.commands import Floats, Frame
+
+Nine = tuple[float, float, float, float, float, float, float, float, float]
+ZERO: Nine = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+AXES = "xyzabcuvw"
+#: axes that are lengths, by index
+LINEAR = (0, 1, 2, 6, 7, 8)
+#: motion modes, in tenths of G: none
+NO_MOTION = 800
+
+
+def nine(values: list[float]) -> Nine:
+    """Nine numbers of a list."""
+    x, y, z, a, b, c, u, v, w = values
+    return x, y, z, a, b, c, u, v, w
+
+
+def put(position: Nine, values: dict[int, float]) -> Nine:
+    """A position with some of its axes replaced."""
+    out = list(position)
+    for k, value in values.items():
+        out[k] = value
+    return nine(out)
+
+
+@dataclass(frozen=True, slots=True)
+class Datum:
+    """How the coordinates of the text lie in the machine; ``number`` of the work offset, rotation in degrees."""
+
+    number: int = 1
+    offset: Nine = ZERO
+    rotation: float = 0.0
+    shift: Nine = ZERO
+    length: Nine = ZERO
+
+    def to_machine(self, p: Nine) -> Nine:
+        """Position of the machine's axes."""
+        q = [a + b for a, b in zip(p, self.shift, strict=True)]
+        if self.rotation:
+            q[0], q[1] = rotated(q[0], q[1], self.rotation)
+        return nine([a + b + c for a, b, c in zip(q, self.offset, self.length, strict=True)])
+
+    def from_machine(self, m: Nine) -> Nine:
+        """Position in these coordinates."""
+        q = [a - b - c for a, b, c in zip(m, self.offset, self.length, strict=True)]
+        if self.rotation:
+            q[0], q[1] = rotated(q[0], q[1], -self.rotation)
+        return nine([a - b for a, b in zip(q, self.shift, strict=True)])
+
+    def frame(self) -> Frame:
+        """The same in rad, as Commands keep it."""
+        return Frame(
+            number=self.number,
+            offset=_rad(self.offset),
+            rotation=math.radians(self.rotation),
+            shift=_rad(self.shift),
+            tool=_rad(self.length),
+        )
+
+
+def rotated(x: float, y: float, degrees: float) -> tuple[float, float]:
+    """(x, y) turned about the origin."""
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    return c * x - s * y, s * x + c * y
+
+
+def _rad(values: Nine) -> Floats:
+    out = np.array(values, dtype=np.float64)
+    out[3:6] = np.radians(out[3:6])
+    return out
+
+
+@dataclass(slots=True)
+class State:
+    """Modes of a controller; codes in tenths of G.
+
+    Parameters
+    ----------
+    scale : mm in a unit of the text
+    at : programmed position
+    motion, plane, feed_mode, path : active codes
+    absolute, absolute_centre : G90, G90.1
+    old_level : G98
+    diameter : G7
+    feed, feed_turning : F as a speed of lengths [mm/min] and of angles [deg/min]; of G95 per revolution
+    speed, sense : S [rpm] and the sense of rotation, 1 clockwise
+    surface : S is a speed of the cutting edge (G96)
+    tool, selected : in the spindle, and named by T
+    tcp : X Y Z are the tip in the workpiece
+    """
+
+    scale: float = 1.0
+    at: Nine = ZERO
+    datum: Datum = Datum()
+    motion: int = NO_MOTION
+    plane: int = 170
+    feed_mode: int = 940
+    path: int = 640
+    absolute: bool = True
+    absolute_centre: bool = False
+    old_level: bool = False
+    diameter: bool = False
+    feed: float = 0.0
+    feed_turning: float = 0.0
+    speed: float = 0.0
+    sense: int = 0
+    surface: bool = False
+    tool: int = 0
+    selected: int = 0
+    tcp: bool = False
+    flood: bool = False
+    mist: bool = False
+    compensation: int = 400

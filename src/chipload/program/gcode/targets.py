@@ -1,0 +1,75 @@
+"""Where the words of a block lead, and how fast.
+
+Notation: a word is in units of the text; targets are in mm and degrees. ``@`` is a distance from the origin in X and Y,
+``^`` an angle about it.
+
+Reference: LinuxCNC 2.9, "Polar Coordinates" and "G90, G91", "G93, G94, G95".
+"""
+
+from __future__ import annotations
+
+import math
+
+from chipload.errors import InputError
+from chipload.program.gcode.controller import Controller
+from chipload.program.gcode.state import AXES, LINEAR, Nine, put
+from chipload.program.gcode.words import Block
+
+
+def axes(c: Controller, block: Block) -> dict[int, float]:
+    """Axes that the block gives, by index [mm, deg]."""
+    words, state = block.words, c.state
+    out = {}
+    for k, axis in enumerate(AXES):
+        if axis in words:
+            out[k] = words[axis] * (state.scale if k in LINEAR else 1.0)
+    if state.diameter and 0 in out:
+        out[0] *= 0.5
+    return out
+
+
+def end(c: Controller, block: Block) -> Nine:
+    """Where the words of the block lead."""
+    state = c.state
+    given, at = axes(c, block), state.at
+    if "@" in block.words or "^" in block.words:
+        given |= polar(c, block, given)
+    elif not state.absolute:
+        given = {k: at[k] + value for k, value in given.items()}
+    return put(at, given)
+
+
+def polar(c: Controller, block: Block, given: dict[int, float]) -> dict[int, float]:
+    """X and Y of a pole; ``given``: the axes that the block gives besides."""
+    if 0 in given or 1 in given:
+        raise InputError("@ and ^: stand for X and Y and go with neither")
+    state, words = c.state, block.words
+    x, y = state.at[0], state.at[1]
+    r, angle = math.hypot(x, y), math.degrees(math.atan2(y, x))
+    if "^" not in words and r == 0.0:
+        raise InputError("@ without ^ from the origin: give the angle")
+    if state.absolute:
+        r, angle = words.get("@", r / state.scale) * state.scale, words.get("^", angle)
+    else:
+        r, angle = r + words.get("@", 0.0) * state.scale, angle + words.get("^", 0.0)
+    out = {0: r * math.cos(math.radians(angle)), 1: r * math.sin(math.radians(angle))}
+    if not state.absolute:
+        out |= {k: state.at[k] + value for k, value in given.items()}
+    return out
+
+
+def rate(c: Controller, block: Block, what: str) -> float | None:
+    """Of G93 [1/min]; None in other modes, where a feed has to be set."""
+    state = c.state
+    if state.feed_mode == 930:
+        if "f" not in block.words:
+            raise InputError(f"{what}: each feed by inverse time (G93) needs its own F")
+        return block.words["f"]
+    if state.feed == 0.0:
+        raise InputError(f"{what}: the feed is 0 or was never set: give F")
+    if state.feed_mode == 950:
+        if state.surface:
+            c.once("nc-feed-unknown", "feed per revolution (G95) with G96: the spindle speed is not known here")
+        elif state.speed == 0.0:
+            raise InputError(f"{what}: feed per revolution (G95) and no spindle speed: give S")
+    return None

@@ -1,0 +1,145 @@
+"""The rows of Commands while a text is read, and what was noticed.
+
+Notation: a row is ``(motion, x, y, z, a, b, c, u, v, w, context, line)`` in mm and degrees; a context is ``(feed,
+spindle, tool, tcp, frame, plane, label)``, kept once and named by its number. Rows wait in a list and go to columns in
+pieces, so that a long text does not hold a tuple for each.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import Finding, InputError
+from chipload.program.commands import ARC, Commands, Frame
+from chipload.program.gcode.state import Datum
+
+#: rows that wait
+PIECE = 1 << 15
+#: findings that are kept; one more says how many are not
+MOST_FINDINGS = 2000
+#: frames and labels that a text may make
+MOST_FRAMES = 100_000
+
+Row = tuple[int, float, float, float, float, float, float, float, float, float, int, int]
+Context = tuple[float, float, int, bool, int, int, int]
+
+
+class Findings:
+    """Findings, each text once for a code and line."""
+
+    def __init__(self) -> None:
+        self._kept: dict[tuple[str, int, str], None] = {}
+        self._once: set[tuple[str, str]] = set()
+        self._left = 0
+
+    def add(self, code: str, line: int, text: str) -> None:
+        """Keep a finding."""
+        key = (code, line, text)
+        if key in self._kept:
+            return
+        if len(self._kept) < MOST_FINDINGS:
+            self._kept[key] = None
+        else:
+            self._left += 1
+
+    def once(self, code: str, line: int, text: str) -> None:
+        """Keep a finding whose text has not been seen on any line."""
+        if (code, text) not in self._once and len(self._once) <= MOST_FINDINGS:
+            self._once.add((code, text))
+            self.add(code, line, text)
+
+    def all(self) -> tuple[Finding, ...]:
+        """The findings in the order in which they were made."""
+        kept = [Finding(*key) for key in self._kept]
+        if self._left:
+            kept.append(Finding("nc-more-findings", 0, f"{self._left} more findings are not listed"))
+        return tuple(kept)
+
+
+class Track:
+    """Rows in the order in which they are made.
+
+    Parameters
+    ----------
+    most : a text may make as many rows
+    """
+
+    def __init__(self, most: int) -> None:
+        self.rows: list[Row] = []
+        self.most = most
+        self.count = 0
+        self._pieces: list[NDArray[np.float64]] = []
+        self._arcs: list[tuple[int, float, float, int]] = []
+        self._contexts: dict[Context, int] = {}
+        self._frames: dict[Datum, int] = {}
+        self._labels: dict[str, int] = {"": 0}
+
+    def context(self, context: Context) -> int:
+        """Number of a context."""
+        return self._contexts.setdefault(context, len(self._contexts))
+
+    def frame(self, datum: Datum) -> int:
+        """Number of the frame of a datum."""
+        number = self._frames.setdefault(datum, len(self._frames))
+        if number >= MOST_FRAMES:
+            raise InputError(f"the offsets change more than {MOST_FRAMES} times")
+        return number
+
+    def label(self, text: str) -> int:
+        """Number of a label; past the most, the last."""
+        if text not in self._labels and len(self._labels) >= MOST_FRAMES:
+            return len(self._labels) - 1
+        return self._labels.setdefault(text, len(self._labels))
+
+    def arc(self, row: Row, first: float, second: float, turns: int) -> None:
+        """Add an arc about (first, second) in its plane."""
+        self._arcs.append((self.count + len(self.rows), first, second, turns))
+        self.rows.append(row)
+
+    def spill(self) -> None:
+        """Move rows to columns when many wait."""
+        if len(self.rows) >= PIECE:
+            self._spill()
+
+    def _spill(self) -> None:
+        if self.rows:
+            self._pieces.append(np.array(self.rows, dtype=np.float64))
+            self.count += len(self.rows)
+            self.rows.clear()
+        if self.count > self.most:
+            raise InputError(f"more than {self.most} motions: split the program")
+
+    def commands(self) -> Commands:
+        """All rows as Commands."""
+        self._spill()
+        table = np.concatenate(self._pieces) if self._pieces else np.zeros((0, 12))
+        self._pieces.clear()
+        n = len(table)
+        which = table[:, 10].astype(np.int64)
+        columns = list(zip(*self._contexts, strict=True)) if self._contexts else [(0,)] * 7
+        centre, turns = np.zeros((n, 2)), np.zeros(n, dtype=np.int64)
+        if self._arcs:
+            arcs = np.array(self._arcs, dtype=np.float64)
+            rows = arcs[:, 0].astype(np.int64)
+            centre[rows], turns[rows] = arcs[:, 1:3], arcs[:, 3].astype(np.int64)
+        position = table[:, 1:10].copy()
+        position[:, 3:6] = np.radians(position[:, 3:6])
+        motion = table[:, 0].astype(np.int64)
+        assert not (turns[motion != ARC] != 0).any()
+        return Commands(
+            motion=motion,
+            position=position,
+            plane=np.array(columns[5], dtype=np.int64)[which],
+            centre=centre,
+            turns=turns,
+            feed=np.array(columns[0], dtype=np.float64)[which],
+            spindle=np.array(columns[1], dtype=np.float64)[which],
+            tool=np.array(columns[2], dtype=np.int64)[which],
+            tcp=np.array(columns[3], dtype=np.bool_)[which],
+            frame=np.array(columns[4], dtype=np.int64)[which],
+            line=table[:, 11].astype(np.int64),
+            label=np.array(columns[6], dtype=np.int64)[which],
+            frames=tuple(datum.frame() for datum in self._frames) or (Frame(),),
+            labels=tuple(self._labels),
+        )
