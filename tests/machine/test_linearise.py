@@ -65,9 +65,12 @@ def test_a_move_without_rotation_is_left_alone():
     assert findings == ()
 
 
-def test_past_the_pole_many_pieces_hold():
-    """0.5 deg beside the pole: C goes round by half a turn; the tip still keeps its line."""
+@pytest.mark.parametrize("low", [-120.0, 0.0])
+def test_past_the_pole_many_pieces_hold(low):
+    """0.5 deg beside the pole, A from +10 to -10 or C half a turn round: the tip still keeps its line."""
     machine = machine_named("cradle-ac")
+    axes = tuple(replace(a, low=math.radians(low)) if a.letter == "A" else a for a in machine.chain.axes)
+    machine = replace(machine, chain=replace(machine.chain, axes=axes))
     tip = np.array([[0.0, 0.0, 0.0], [20.0, 0.0, 0.0]])
     a = math.radians(10.0)
     axis = np.array([[math.radians(0.5), -math.sin(a), math.cos(a)], [math.radians(0.5), math.sin(a), math.cos(a)]])
