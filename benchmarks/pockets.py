@@ -1,0 +1,235 @@
+"""The front and FreeCAD's Adaptive on real pockets: engagement, length, time and share of the area, side by side.
+
+    python benchmarks/pockets.py [names ...] [--data FOLDER] [--json FILE] [--spacing 0.3] [--no-freecad]
+
+Radial depth R / 5, so that the engagement wanted is acos(0.8) = 36.87 deg. Both paths are asked by the same checker,
+which knows neither planner: the trail of the centre, and the rim point by point, every ``spacing`` R of the cutting
+moves. Bores are taken out first and are no cutting moves. FreeCAD runs in its own process (``freecadcmd``); without it
+its columns are empty. Times are wall clock, of planning alone: time is the ratio of the front's to Adaptive's.
+"""
+
+import argparse
+import json
+import math
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from chipload.geometry.contour import Contour, Region
+from chipload.geometry.dxf import read_dxf
+from chipload.planning.front.front import CUT, ENTRY, LIFT, clear_region
+from chipload.planning.front.leftover import leftover
+from chipload.planning.front.reach import centre_region
+from chipload.simulation.trail import Trail, rim_engagement
+
+#: drawing -> radius of the cutter [mm]
+POCKETS = {
+    "arcs": 4.0,
+    "circle": 3.0,
+    "circle_point": 8.0,
+    "curve": 6.0,
+    "diverging_lines": 6.0,
+    "gear": 3.0,
+    "hextest": 4.0,
+    "octagon": 5.0,
+    "square1": 3.0,
+    "square2": 3.0,
+    "square_circle": 4.0,
+    "squiffey": 8.0,
+    "squiffey2": 8.0,
+    "taper": 5.0,
+    "thrash": 12.0,
+}
+#: radial depth / R
+DEPTH = 0.2
+#: kinds of a path here: a bore, cutting, along cleared space, raised
+BORE, CUTTING, LINKING, RAISED = 0, 1, 2, 3
+#: a rim that goes this much beyond what was wanted counts as over it [deg]
+OVER_DEG = 1.0
+
+#: what freecadcmd runs: reads job.json, writes path.json beside it
+FREECAD = """
+import json, os, time
+import area
+folder = os.environ["CHIPLOAD_ADAPTIVE"]
+with open(os.path.join(folder, "job.json")) as f:
+    job = json.load(f)
+a = area.Adaptive2d()
+a.toolDiameter = 2.0 * job["radius"]
+a.helixRampDiameter = job["helix"]
+a.stepOverFactor = job["step_over"]
+a.tolerance = job["tolerance"]
+a.stockToLeave = 0.0
+a.forceInsideOut = False
+a.finishingProfile = True
+a.opType = area.AdaptiveOperationType.ClearingInside
+begun = time.perf_counter()
+regions = a.Execute(job["stock"], job["outlines"], lambda paths: False)
+seconds = time.perf_counter() - begun
+names = {int(getattr(area.AdaptiveMotionType, n)): n for n in ("Cutting", "LinkClear", "LinkNotClear",
+                                                               "LinkClearAtPrevPass")}
+out = {"seconds": seconds, "regions": [
+    {"centre": list(r.HelixCenterPoint), "start": list(r.StartPoint),
+     "paths": [[names[int(kind)], [list(p) for p in points]] for kind, points in r.AdaptivePaths]} for r in regions]}
+with open(os.path.join(folder, "path.json"), "w") as f:
+    json.dump(out, f)
+"""
+
+
+def front_path(region, radius):
+    """Rows (n, 3) x, y, kind of the front's path, and its seconds."""
+    begun = time.perf_counter()
+    path = clear_region(region, radius, math.acos(1.0 - DEPTH))
+    seconds = time.perf_counter() - begun
+    kind = np.select([path.kind == ENTRY, path.kind == CUT, path.kind == LIFT], [BORE, CUTTING, RAISED], LINKING)
+    return np.column_stack([path.x, path.y, kind]), seconds
+
+
+def adaptive_path(region, radius, program, tolerance, timeout):
+    """The same of FreeCAD; None where it failed."""
+    xmin, ymin, xmax, ymax = region.bounds
+    m = 2.0 * radius
+    box = [[xmin - m, ymin - m], [xmax + m, ymin - m], [xmax + m, ymax + m], [xmin - m, ymax + m]]
+    job = {
+        "radius": radius,
+        "helix": 1.8 * radius,
+        "step_over": 0.5 * DEPTH,
+        "tolerance": tolerance,
+        "stock": [[*box, box[0]]],
+        "outlines": [closed(c, 1e-3 * radius) for c in region.contours],
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        script = Path(folder) / "adaptive.py"
+        script.write_text(FREECAD)
+        (Path(folder) / "job.json").write_text(json.dumps(job))
+        env = {**os.environ, "CHIPLOAD_ADAPTIVE": folder, "HOME": folder}
+        try:
+            subprocess.run(
+                [program, str(script)], env=env, cwd=folder, timeout=timeout, check=False, stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            )  # fmt: skip
+            found = json.loads((Path(folder) / "path.json").read_text())
+        except (subprocess.TimeoutExpired, OSError, ValueError):
+            return None
+    kinds = {"Cutting": CUTTING, "LinkClear": LINKING, "LinkClearAtPrevPass": LINKING, "LinkNotClear": RAISED}
+    rows = []
+    for part in found["regions"]:
+        (cx, cy), (sx, sy) = part["centre"], part["start"]
+        a0, r = math.atan2(sy - cy, sx - cx), math.hypot(sx - cx, sy - cy)
+        a = a0 + np.linspace(0.0, 2.0 * math.pi, 181)
+        ring = np.column_stack([cx + r * np.cos(a), cy + r * np.sin(a), np.full(len(a), BORE)])
+        ring[0, 2] = RAISED
+        rows.append(ring)
+        for name, points in part["paths"]:
+            rows.append(np.column_stack([np.array(points).reshape(-1, 2), np.full(len(points), kinds[name])]))
+    return np.vstack(rows), found["seconds"]
+
+
+def closed(contour, chord):
+    """The corners of a closed contour, chords at most ``chord`` [mm] off, the first one again at the end."""
+    p = np.asarray(contour.flatten(chord)).tolist()
+    return p if p[0] == p[-1] else [*p, p[0]]
+
+
+def measured(rows, seconds, reachable, radius, spacing, workers):
+    """What a path costs and gives, asked of the trail and of a union of its buffers."""
+    points, kind = rows[:, 0:2], rows[1:, 2]
+    steps = np.column_stack([points[:-1], points[1:], np.zeros((len(points) - 1, 3))])
+    leg = np.hypot(*(points[1:] - points[:-1]).T)
+    trail = Trail(steps, radius, None, kind < RAISED)
+    cut = np.flatnonzero((kind == CUTTING) & (leg > 1e-9))
+    along = np.cumsum(leg[cut])
+    asked = np.arange(0.5, along[-1] / (spacing * radius)) * spacing * radius
+    which = np.minimum(np.searchsorted(along, asked), len(cut) - 1)
+    share = np.clip(1.0 - (along[which] - asked) / leg[cut[which]], 0.0, 1.0)
+    angle = np.degrees(rim_engagement(trail, cut[which], share, workers=workers).angle)
+    left, _, _ = leftover(reachable, points, rows[:, 2] >= RAISED, radius)
+    wanted = math.degrees(math.acos(1.0 - DEPTH))
+    return {
+        "seconds": seconds,
+        "samples": len(angle),
+        "engagement_max_deg": float(angle.max()),
+        "engagement_95_deg": float(np.percentile(angle, 95.0)),
+        "engagement_median_deg": float(np.median(angle)),
+        "over_share": float((angle > wanted + OVER_DEG).mean()),
+        "cut_mm": float(leg[kind == CUTTING].sum()),
+        "path_mm": float(leg[kind < RAISED].sum()),
+        "lifts": int(((kind == RAISED) & (leg > 1e-9)).sum()),
+        "reached": 1.0 - left / reachable.area,
+    }
+
+
+def table(results, wanted):
+    """Markdown: a row a pocket."""
+    out = [
+        f"engagement wanted {wanted:.2f} deg; columns front / adaptive",
+        "",
+        "| pocket | R [mm] | greatest [deg] | 95 % [deg] | over by 1 deg [%] | path [m] | lifts | reached [%] | time |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    columns = [
+        ("engagement_max_deg", 1.0, ".1f"),
+        ("engagement_95_deg", 1.0, ".1f"),
+        ("over_share", 100.0, ".1f"),
+        ("path_mm", 1e-3, ".2f"),
+        ("lifts", 1, "d"),
+        ("reached", 100.0, ".2f"),
+    ]
+    for name, r in results.items():
+        both = [r["front"], r.get("adaptive")]
+        cells = [" / ".join(format(x[key] * k, how) if x else "-" for x in both) for key, k, how in columns]
+        ratio = f"{both[0]['seconds'] / both[1]['seconds']:.1f}" if both[1] else f"{both[0]['seconds']:.1f} s"
+        out.append(f"| {name} | {r['radius_mm']:g} | " + " | ".join(cells) + f" | {ratio} |")
+    return "\n".join(out)
+
+
+def main() -> None:
+    here = Path(__file__).resolve().parents[2] / "shared" / "data"
+    data = Path(os.environ.get("CHIPLOAD_DATA", here)) / "cad" / "dxf_hsm_nibbler"
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", help=f"of {', '.join(POCKETS)}; all where none is given")
+    parser.add_argument("--data", type=Path, default=data, help="folder with the drawings")
+    parser.add_argument("--json", type=Path, help="write the results here too")
+    parser.add_argument("--spacing", type=float, default=0.3, help="between two places that are asked, / R")
+    parser.add_argument("--workers", type=int, default=2, help="threads of the checker")
+    parser.add_argument("--no-freecad", action="store_true", help="the front alone")
+    parser.add_argument("--tolerance", type=float, default=0.1, help="of Adaptive, 0.1 being its own default")
+    parser.add_argument("--timeout", type=float, default=120.0, help="of one run of FreeCAD [s]")
+    asked = parser.parse_args()
+    unknown = [name for name in asked.names if name not in POCKETS]
+    if unknown:
+        parser.error(f"{', '.join(unknown)}: must be of {', '.join(POCKETS)}")
+    if not asked.data.is_dir():
+        parser.error(f"{asked.data}: no such folder: give --data")
+    program = None if asked.no_freecad else shutil.which("freecadcmd") or shutil.which("FreeCADCmd")
+    if program is None:
+        print("without FreeCAD (freecadcmd): the columns of Adaptive are empty", file=sys.stderr)
+    clear_region(Region.of([Contour.polyline([[0, 0], [9, 0], [9, 9], [0, 9]], closed=True)]), 2.0, 0.6)  # compile
+    results = {}
+    for name in asked.names or POCKETS:
+        radius = POCKETS[name]
+        drawing = read_dxf(asked.data / f"{name}.dxf", units_if_unsaid="mm")
+        region = Region.of([c for c in drawing.contours if c.closed])
+        reachable = centre_region(centre_region(region, radius), -radius)
+        results[name] = {"radius_mm": radius}
+        found = {"front": front_path(region, radius)}
+        if program is not None:
+            found["adaptive"] = adaptive_path(region, radius, program, asked.tolerance, asked.timeout)
+        for who, path in found.items():
+            if path is not None:
+                results[name][who] = measured(*path, reachable, radius, asked.spacing, asked.workers)
+        print(f"{name}: {json.dumps(results[name])}", file=sys.stderr, flush=True)
+    wanted = math.degrees(math.acos(1.0 - DEPTH))
+    print(table(results, wanted))
+    if asked.json:
+        asked.json.write_text(json.dumps({"wanted_deg": wanted, "pockets": results}, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
