@@ -10,16 +10,21 @@ import os
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from chipload.errors import Cancelled, InputError
+from chipload.errors import Cancelled, Finding, InputError
+
+if TYPE_CHECKING:
+    from chipload.machine.machine import Machine
 
 FAULT, WRONG, EXCEEDED, STOPPED = 1, 2, 3, 130
+#: findings of a machine that break nothing
+HARMLESS = ("machine-singular", "machine-rewind")
 
 app = typer.Typer(
     add_completion=False,
@@ -39,6 +44,15 @@ Sets = Annotated[
         help="override a key, as cutter.0.diameter_mm=12; repeatable; files are relative to the job's folder",
     ),
 ]
+MachineName = Annotated[
+    str | None, typer.Option("--machine", metavar="MACHINE", help="a shipped machine, or a file (.toml, LinuxCNC .ini)")
+]
+Tools = Annotated[Path | None, typer.Option("--tools", metavar="FILE", help="LinuxCNC tool table (.tbl)")]
+DialectName = Annotated[
+    str | None,
+    typer.Option("--dialect", help="linuxcnc, fanuc, sinumerik, heidenhain or apt; else by the file's ending"),
+]
+FeedIfUnsaid = Annotated[float | None, typer.Option("--feed-mm-min", help="feed of CL data that state none")]
 Debug = Annotated[bool, typer.Option("--debug", help="show the traceback of a fault")]
 
 
@@ -49,21 +63,33 @@ def run(
     sets: Sets = None,
     debug: Debug = False,
 ) -> None:
-    """Plan a job, prove its programs, write the result folder."""
+    """Plan a job and prove its programs, or read the program that it names; write the result folder."""
 
     def work() -> int:
         from chipload.job import load_job
 
         read = load_job(job, sets or ())
+        from chipload.job import ProgramJob
+        from chipload.report import outcome as planned
+        from chipload.report import reading
         from chipload.report.folder import check_target, write_result
-        from chipload.report.outcome import verdict
-        from chipload.run import run_job
+        from chipload.run import run_job, run_program
 
         check_target(out)
         with _bar() as progress:
-            outcome = run_job(read, lambda done, what: progress(0.8 * done, what))
-            target = write_result(outcome, out, lambda done, what: progress(0.8 + 0.2 * done, what))
-        holds, says = verdict(outcome)
+
+            def first(done: float, what: str) -> None:
+                progress(0.8 * done, what)
+
+            def then(done: float, what: str) -> None:
+                progress(0.8 + 0.2 * done, what)
+
+            if isinstance(read, ProgramJob):
+                done = run_program(read, first)
+                target, (holds, says) = write_result(done, out, then), reading.verdict(done)
+            else:
+                outcome = run_job(read, first)
+                target, (holds, says) = write_result(outcome, out, then), planned.verdict(outcome)
         typer.echo(says)
         typer.echo(f"report: {target / 'report.html'}")
         return 0 if holds else EXCEEDED
@@ -72,28 +98,75 @@ def run(
 
 
 @app.command()
-def check(job: JobFile, sets: Sets = None, debug: Debug = False) -> None:
-    """Read a job and every file that it names; plan nothing, write nothing."""
+def check(
+    file: Annotated[Path, typer.Argument(metavar="JOB|PROGRAM", help="a job (TOML) or a program (NC text, CL data)")],
+    machine: MachineName = None,
+    tools: Tools = None,
+    dialect: DialectName = None,
+    feed_mm_min: FeedIfUnsaid = None,
+    sets: Sets = None,
+    debug: Debug = False,
+) -> None:
+    """Read a job and every file that it names, or a program as its controller does; write nothing."""
 
     def work() -> int:
-        from chipload.job import load_job
+        if file.suffix.lower() != ".toml":
+            if sets:
+                raise InputError("--set: belongs to a job: leave it out for a program")
+            return _check_program(file, machine, tools, dialect, feed_mm_min)
+        for option, value in (
+            ("machine", machine),
+            ("tools", tools),
+            ("dialect", dialect),
+            ("feed-mm-min", feed_mm_min),
+        ):
+            if value is not None:
+                raise InputError(f"--{option}: belongs to a program: in a job state it in the file")
+        return _check_job(file, sets or ())
 
-        read = load_job(job, sets or ())
-        from chipload.run import read_inputs
+    _guarded(work, debug)
 
-        inputs = read_inputs(read)
-        closed = sum(c.closed for c in inputs.contours)
-        typer.echo(
-            f"{job.name}: right: {closed} closed and {len(inputs.contours) - closed} open contours, "
-            f"machine {inputs.machine.name}, material {inputs.material.name}"
-        )
-        for k, op in enumerate(read.operations):
-            typer.echo(f"operation {k}: {op.kind}, cutter {op.cutter} of {read.cutters[op.cutter].diameter:g} mm")
-        for text in (*read.findings, *inputs.findings):
-            typer.echo(f"finding: {text}")
-        if read.unchecked:
-            typer.echo(f"not checked, no limit stated: {', '.join(read.unchecked)}")
-        return 0
+
+@app.command()
+def convert(
+    source: Annotated[Path, typer.Argument(metavar="PROGRAM", help="NC text or CL data")],
+    target: Annotated[
+        Path, typer.Argument(metavar="FILE", help="what is written; its ending says what: .ngc, .nc, .apt")
+    ],
+    machine: MachineName = None,
+    from_machine: Annotated[
+        str | None, typer.Option("--from", metavar="MACHINE", help="the machine of the source, if another")
+    ] = None,
+    tools: Tools = None,
+    dialect: DialectName = None,
+    feed_mm_min: FeedIfUnsaid = None,
+    tcp: Annotated[bool, typer.Option("--tcp", help="tell the controller the tip while rotary axes move")] = False,
+    debug: Debug = False,
+) -> None:
+    """Write a program for a machine, or as CL data; it is not verified, and its first line says so."""
+
+    def work() -> int:
+        from chipload.files import write_whole
+        from chipload.program.convert import convert_program
+        from chipload.program.read import read_program, read_tools
+
+        there = _machine(machine)
+        here = _machine(from_machine) if from_machine is not None else there
+        table = read_tools(tools) if tools is not None else None
+        lengths = table.lengths() if table is not None else {}
+        with _bar() as progress:
+            reading = read_program(
+                source, here, dialect=dialect, tools=table, feed=_mm_s(feed_mm_min), progress=progress
+            )  # fmt: skip
+            text, findings = convert_program(
+                reading.program, reading.noticed, there, target.suffix, title=source.name, cutters={},
+                tool_lengths=lengths, tcp=tcp,
+            )  # fmt: skip
+            write_whole(target, text.encode("ascii"))
+        for f in (*reading.noticed, *findings):
+            typer.echo(_said(f))
+        typer.echo(f"written: {target}: {len(text.splitlines())} lines for machine {there.name}, not verified")
+        return EXCEEDED if any(f.code.startswith("machine-") and f.code not in HARMLESS for f in findings) else 0
 
     _guarded(work, debug)
 
@@ -141,6 +214,93 @@ def main() -> NoReturn:
 def _stop(_number: int, _frame: object) -> NoReturn:
     """A polite kill stops as Ctrl-C does."""
     raise KeyboardInterrupt
+
+
+def _check_job(job: Path, sets: Sequence[str]) -> int:
+    """Check a job: say what it is and what was noticed."""
+    from chipload.job import load_job
+
+    read = load_job(job, sets)
+    from chipload.job import ProgramJob
+    from chipload.run import read_inputs, run_program
+
+    if isinstance(read, ProgramJob):
+        from chipload.report.reading import verdict
+
+        done = run_program(read)
+        for f in (*done.reading.noticed, *done.reading.broken):
+            typer.echo(_said(f))
+        typer.echo(f"{job.name}: {verdict(done)[1]}")
+        return EXCEEDED if done.reading.broken else 0
+    inputs = read_inputs(read)
+    closed = sum(c.closed for c in inputs.contours)
+    typer.echo(
+        f"{job.name}: right: {closed} closed and {len(inputs.contours) - closed} open contours, "
+        f"machine {inputs.machine.name}, material {inputs.material.name}"
+    )
+    for k, op in enumerate(read.operations):
+        typer.echo(f"operation {k}: {op.kind}, cutter {op.cutter} of {read.cutters[op.cutter].diameter:g} mm")
+    for text in (*read.findings, *inputs.findings):
+        typer.echo(f"finding: {text}")
+    if read.unchecked:
+        typer.echo(f"not checked, no limit stated: {', '.join(read.unchecked)}")
+    return 0
+
+
+def _check_program(
+    path: Path, machine: str | None, tools: Path | None, dialect: str | None, feed_mm_min: float | None
+) -> int:
+    """Check a program: findings by line, then what it is."""
+    from chipload.program.motions import lengths
+    from chipload.program.read import line_times, read_program, read_tools
+
+    on = _machine(machine)
+    with _bar() as progress:
+        reading = read_program(
+            path, on, dialect=dialect, tools=read_tools(tools) if tools is not None else None, feed=_mm_s(feed_mm_min),
+            progress=progress,
+        )  # fmt: skip
+    broken = set(map(id, reading.broken))
+    for f in sorted((*reading.noticed, *reading.broken), key=lambda f: f.line):
+        typer.echo(f"{_said(f)}{' [does not hold]' if id(f) in broken else ''}")
+    low, high = reading.program.p_work.min(axis=0), reading.program.p_work.max(axis=0)
+    box = ", ".join(f"{x} {a:g} to {b:g}" for x, a, b in zip("XYZ", low, high, strict=True))
+    _, seconds = line_times(reading, on)
+    typer.echo(
+        f"{path.name}: {len(reading.commands)} motions on machine {on.name}, {lengths(reading.program).sum():.6g} mm, "
+        f"{seconds.sum() / 60.0:.4g} min; {box} mm"
+    )
+    typer.echo(f"{len(reading.broken)} findings do not hold" if reading.broken else "the machine's limits hold")
+    return EXCEEDED if reading.broken else 0
+
+
+def _said(finding: Finding) -> str:
+    return (
+        f"line {finding.line}: {finding.text} ({finding.code})" if finding.line else f"{finding.text} ({finding.code})"
+    )
+
+
+def _machine(name: str | None) -> Machine:
+    """A shipped machine by name, or a file: TOML of ours or LinuxCNC's .ini."""
+    from chipload.machine.ini import read_ini
+    from chipload.machine.machine import machine_named, machine_names, read_machine
+
+    if name is None:
+        raise InputError(f"--machine: missing: name a file (.toml, .ini) or one of {', '.join(machine_names())}")
+    if name.lower().endswith(".ini"):
+        machine, findings = read_ini(Path(name))
+        for f in findings:
+            typer.echo(f"{name}: {_said(f)}")
+        return machine
+    return read_machine(name) if name.lower().endswith(".toml") else machine_named(name)
+
+
+def _mm_s(mm_min: float | None) -> float | None:
+    if mm_min is None:
+        return None
+    if not 0.0 < mm_min < 1e9:
+        raise InputError(f"--feed-mm-min = {mm_min:g}: must be above 0")
+    return mm_min / 60.0
 
 
 def _guarded(work: Callable[[], int], debug: bool) -> NoReturn:

@@ -111,8 +111,24 @@ class LimitsTable(Table):
     error_um: Positive | None = None
 
 
+class ProgramTable(Table):
+    """A program that exists: NC text or CL data."""
+
+    file: Text
+    dialect: Literal["linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"] | None = None
+    tools: Text | None = Field(None, description="LinuxCNC tool table")
+    feed_mm_min: Positive | None = Field(None, le=1e5, description="feed of CL data that state none")
+
+
+class ProgramJobTable(Table):
+    """The whole file of a job that runs a program instead of a plan."""
+
+    program: ProgramTable
+    machine: SourceTable
+
+
 class JobTable(Table):
-    """The whole file."""
+    """The whole file of a job that is planned."""
 
     part: PartTable
     stock: StockTable
@@ -174,8 +190,30 @@ class Job:
         return tuple(k for k, v in self.table.limits.model_dump().items() if v is None)
 
 
-def load_job(path: str | Path, overrides: Sequence[str] = ()) -> Job:
-    """Read a job file and apply ``key.path=value`` overrides.
+@dataclass(frozen=True)
+class ProgramJob:
+    """A job that runs a program; paths are absolute.
+
+    Parameters
+    ----------
+    path : the job file
+    table : its values
+    program_file : NC text or CL data
+    tools_file : tool table; None: none
+    machine : a shipped name or a file
+    overrides : the `--set` texts that were applied
+    """
+
+    path: Path
+    table: ProgramJobTable
+    program_file: Path
+    tools_file: Path | None
+    machine: str | Path
+    overrides: tuple[str, ...]
+
+
+def load_job(path: str | Path, overrides: Sequence[str] = ()) -> Job | ProgramJob:
+    """Read a job file and apply ``key.path=value`` overrides; one with a ``[program]`` runs that.
 
     Raises
     ------
@@ -193,6 +231,8 @@ def load_job(path: str | Path, overrides: Sequence[str] = ()) -> Job:
     for text in overrides:
         _override(raw, text)
     try:
+        if "program" in raw:
+            return _program_job(path, ProgramJobTable.model_validate(raw), overrides)
         table = JobTable.model_validate(raw)
     except ValidationError as err:
         raise InputError(f"{label}: {_first(err)}") from None
@@ -212,6 +252,14 @@ def load_job(path: str | Path, overrides: Sequence[str] = ()) -> Job:
         _source("material", table.material, path.parent, label),
         _unused(table),
         tuple(overrides),
+    )
+
+
+def _program_job(path: Path, table: ProgramJobTable, overrides: Sequence[str]) -> ProgramJob:
+    folder, tools = path.parent, table.program.tools
+    machine = _source("machine", table.machine, folder, path.name)
+    return ProgramJob(
+        path, table, folder / table.program.file, None if tools is None else folder / tools, machine, tuple(overrides)
     )
 
 
@@ -293,6 +341,10 @@ def _first(err: ValidationError) -> str:
     # a list whose entry is refused is also called too short: the entry says more
     errors = [e for e in found if not any(o["loc"][: len(e["loc"])] == e["loc"] and o is not e for o in found)]
     unknown = [e for e in errors if e["type"] == "extra_forbidden"]
+    if err.title == ProgramJobTable.__name__:
+        planned = [e["loc"][0] for e in unknown if len(e["loc"]) == 1 and e["loc"][0] in JobTable.model_fields]
+        if planned:
+            return f"{planned[0]}: not used where a [program] is run: leave it out"
     others = [e for e in errors if e["type"] != "extra_forbidden"]
     meant = {(*e["loc"][:-1], _nearest(str(e["loc"][-1]), _keys(e["loc"][:-1]))) for e in unknown}
     rest = unknown + [e for e in others if not (e["type"] == "missing" and e["loc"] in meant)]
@@ -350,7 +402,8 @@ def _meaning(loc: tuple[int | str, ...]) -> str:
 
 def _model_at(loc: Iterable[int | str]) -> type[BaseModel] | None:
     """The model of the table at a place in the file."""
-    model: type[BaseModel] | None = JobTable
+    loc = tuple(loc)
+    model: type[BaseModel] | None = ProgramJobTable if loc[:1] == ("program",) else JobTable
     for key in loc:
         if isinstance(key, int):
             continue

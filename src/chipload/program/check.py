@@ -20,6 +20,9 @@ from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
 def check_program(program: Program, machine: Machine) -> tuple[Finding, ...]:
     """Axis limits (arcs with their bulge), greatest feed, range of the spindle, spindle at rest in a cut, tilted axis.
 
+    Limits and tilt of a machine without rotary axes; with them :func:`~chipload.machine.limits.limit_findings` says
+    what the axes do.
+
     One finding a code and axis: the worst row and its value, how many rows, the first of them. Codes: `machine-limit`,
     `machine-feed`, `machine-spindle`, `machine-spindle-off`, `machine-axis`, `program-start`.
 
@@ -43,7 +46,7 @@ def check_program(program: Program, machine: Machine) -> tuple[Finding, ...]:
 
     low, high = bounds(program)
     slack = 1e-9
-    for i, axis in enumerate(AXES):
+    for i, axis in enumerate(AXES if not machine.chain.rotary else ()):
         least, most = machine.limits[i]
         over = np.maximum(least - low[:, i], high[:, i] - most)
         value = np.where(least - low[:, i] > high[:, i] - most, low[:, i], high[:, i])
@@ -66,7 +69,7 @@ def check_program(program: Program, machine: Machine) -> tuple[Finding, ...]:
     tilt = np.degrees(np.arccos(np.clip(program.axis[:, 2], -1.0, 1.0)))
     tilted = (np.hypot(program.axis[:, 0], program.axis[:, 1]) > 1e-9) | (program.axis[:, 2] < 0.0)
     text = f"axis tilted by {{:g}} deg: machine {machine.name} has three axes"
-    report("machine-axis", tilted & (program.motion != DWELL), tilt, text, tilt)
+    report("machine-axis", tilted & (program.motion != DWELL) & (not machine.chain.rotary), tilt, text, tilt)
     first = "starts with a cutting motion: must start with a rapid to where it begins"
     start = np.zeros(len(program), dtype=np.bool_)
     start[:1] = program.motion[:1] != RAPID

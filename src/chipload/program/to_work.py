@@ -39,6 +39,22 @@ def work_frame(commands: Commands) -> Frame:
     return next((f for f in used if f.number > 0), Frame())
 
 
+def axes_of(commands: Commands, machine: Machine) -> Floats:
+    """(n, 9) where the machine's own axes stand at the end of each row [mm, rad]; O(n).
+
+    Where the work offset is not known, the work's zero is where the machine's file puts it.
+    """
+    base = work_frame(commands)
+    zero, shift = _work_zero(machine, base, bool(base.offset.any()))
+    axes = commands.machine() + shift
+    if not (machine.chain.rotary and commands.tcp.any()):
+        return axes
+    tool = np.array([tool_length(machine, f) for f in commands.frames])[commands.frame]
+    rows = commands.tcp
+    axes[rows] = with_tip(machine, axes[rows], _flat(commands, base)[rows], tool[rows], zero)
+    return axes
+
+
 def to_work(
     commands: Commands, machine: Machine, *, tolerance: float = TOLERANCE_MM
 ) -> tuple[Program, tuple[Finding, ...]]:

@@ -12,25 +12,25 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from chipload.errors import InputError
 from chipload.progress import Progress, silent
+from chipload.report import reading
 from chipload.report.history import history_bytes
 from chipload.report.outcome import Outcome
 from chipload.report.page import page_bytes
 from chipload.report.programs import program_files
+from chipload.report.reading import Read
 from chipload.report.scene import scene_bytes
 from chipload.report.summary import summary_bytes
 
 SUMMARY = "summary.json"
-#: file and who makes it
-PARTS: tuple[tuple[str, Callable[[Outcome], bytes]], ...] = (
-    (SUMMARY, summary_bytes),
-    ("history.parquet", history_bytes),
-    ("scene.glb", scene_bytes),
-    ("report.html", page_bytes),
-)
+#: files and who makes them
+Makers = list[tuple[str, Callable[[], bytes]]]
+#: files that every result has
+NAMES = (SUMMARY, "history.parquet", "scene.glb", "report.html")
 
 
 def check_target(out: str | Path) -> Path:
@@ -58,7 +58,7 @@ def check_target(out: str | Path) -> Path:
     return target
 
 
-def write_result(outcome: Outcome, out: str | Path, progress: Progress = silent) -> Path:
+def write_result(outcome: Outcome | Read, out: str | Path, progress: Progress = silent) -> Path:
     """Write the whole result folder and return it.
 
     Raises
@@ -72,11 +72,12 @@ def write_result(outcome: Outcome, out: str | Path, progress: Progress = silent)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         fresh = Path(tempfile.mkdtemp(prefix=".chipload-", dir=target.parent))
-        for k, (name, make) in enumerate(PARTS):
-            progress(k / (len(PARTS) + 1), name)
-            _write(fresh / name, make(outcome))
-        progress(len(PARTS) / (len(PARTS) + 1), "programs")
-        for name, data in program_files(outcome).items():
+        makers, programs = _makers(outcome)
+        for k, (name, make) in enumerate(makers):
+            progress(k / (len(makers) + 1), name)
+            _write(fresh / name, make())
+        progress(len(makers) / (len(makers) + 1), "programs")
+        for name, data in programs().items():
             _write(fresh / name, data)
         fresh.chmod(0o777 & ~_umask())
         _swap(fresh, target)
@@ -93,15 +94,27 @@ def write_result(outcome: Outcome, out: str | Path, progress: Progress = silent)
     return target
 
 
+def _makers(
+    outcome: Outcome | Read,
+) -> tuple[Makers, Callable[[], dict[str, bytes]]]:
+    """Who makes each file, and the programs."""
+    if isinstance(outcome, Read):
+        parts = (reading.summary_bytes, reading.history_bytes, reading.scene_bytes, reading.page_bytes)
+        makers: Makers = [(name, partial(make, outcome)) for name, make in zip(NAMES, parts, strict=True)]
+        return makers, partial(reading.program_files, outcome)
+    planned = (summary_bytes, history_bytes, scene_bytes, page_bytes)
+    makers = [(name, partial(make, outcome)) for name, make in zip(NAMES, planned, strict=True)]
+    return makers, partial(program_files, outcome)
+
+
 def _ours(folder: Path) -> bool:
     """Whether a folder holds a result of chipload and nothing that it would not write."""
     try:
         holds = json.loads((folder / SUMMARY).read_bytes())
-        known = {name for name, _ in PARTS}
         return (
             isinstance(holds, dict)
             and "holds" in holds
-            and all(p.name in known or p.suffix in (".ngc", ".nc", ".apt") for p in folder.iterdir())
+            and all(p.name in NAMES or p.suffix in (".ngc", ".nc", ".apt") for p in folder.iterdir())
         )
     except (OSError, ValueError):
         return False

@@ -53,6 +53,10 @@ class ToolTable:
 
     tools: Mapping[int, Tool] = field(default_factory=dict)
 
+    def lengths(self) -> dict[int, float]:
+        """Length [mm] of each tool: its offset along Z."""
+        return {number: tool.offset[2] for number, tool in self.tools.items()}
+
 
 def read_tool_table(text: str, *, name: str = "tool table", units: str = "mm") -> tuple[ToolTable, tuple[Finding, ...]]:
     """A table from the text of a ``.tbl`` file.

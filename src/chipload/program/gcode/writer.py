@@ -68,6 +68,7 @@ def write_commands(
     comments: Sequence[str] = (),
     number: int = 1,
     line_step: int = 0,
+    words: Sequence[tuple[int, str]] = (),
 ) -> str:
     """The text of commands for the controller of ``machine``.
 
@@ -79,6 +80,8 @@ def write_commands(
     comments : lines for the reader at the machine
     number : O number of a Fanuc-like program, 1 to 9999
     line_step : step of N words; 0 writes none
+    words : (line, block) in rising lines: blocks that stand before the first motion of that line of the source, or
+        of a later one; those that are no comment are written as they are
 
     Raises
     ------
@@ -92,7 +95,7 @@ def write_commands(
     said = VERIFIED if verified else NOT_VERIFIED
     head = [f"O{number:04d} {_comment(said, fanuc)}" if fanuc else _comment(said, fanuc)]
     head += [_comment(text, fanuc) for text in (title, *comments)]
-    blocks = [*_modes(machine), *_blocks(commands, machine)]
+    blocks = [*_modes(machine), *_blocks(commands, machine, words)]
     blocks += ["M5", "M30" if fanuc else "M2"]
     if line_step > 0:
         blocks = [x if x.startswith("(") else f"N{line_step * (k + 1)} {x}" for k, x in enumerate(blocks)]
@@ -172,7 +175,7 @@ def _written(commands: Commands, decimals: int) -> _Written:
     return _Written(q, arc & ~flat & (r > 0.0), ij)
 
 
-def _blocks(commands: Commands, machine: Machine) -> Iterator[str]:
+def _blocks(commands: Commands, machine: Machine, kept: Sequence[tuple[int, str]]) -> Iterator[str]:
     """The blocks of the motions, modal words left out where nothing changes."""
     fanuc = machine.dialect == "fanuc"
     d = machine.decimals
@@ -189,7 +192,11 @@ def _blocks(commands: Commands, machine: Machine) -> Iterator[str]:
     mode, feed, label, plane, inverse = "", "", -1, XY, False
     tool: int | None = None
     number, spindle, tcp = 1, 0.0, False
+    lines = commands.line.tolist()
+    waiting = list(reversed(kept))
     for k in range(len(motion)):
+        while waiting and lines[k] and waiting[-1][0] <= lines[k]:
+            yield _kept(waiting.pop()[1], fanuc)
         fresh = tools[k] != tool
         if labels[k] != label:
             label = labels[k]
@@ -260,10 +267,16 @@ def _blocks(commands: Commands, machine: Machine) -> Iterator[str]:
                 words.append(f"F{text}")
                 feed = text
         yield " ".join(words)
+    for _, text in reversed(waiting):
+        yield _kept(text, fanuc)
     if inverse:
         yield "G94"
     if tcp:
         yield _tcp(machine, False, 0, len(motion))
+
+
+def _kept(text: str, fanuc: bool) -> str:
+    return _comment(text[1:-1], fanuc) if text.startswith("(") else text
 
 
 def _inverse_minutes(commands: Commands) -> list[float]:

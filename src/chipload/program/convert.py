@@ -1,0 +1,74 @@
+"""A program written for another machine, or as CL data.
+
+What the motions do not say goes along by its line: coolant and stops as words, all else as comments, so that nothing is
+lost without a trace.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from chipload.cutter.cutter import Cutter
+from chipload.errors import Finding, InputError
+from chipload.machine.machine import Machine
+from chipload.program.apt.writer import write_apt
+from chipload.program.gcode.writer import write_commands
+from chipload.program.program import Program
+from chipload.program.to_axes import to_axes
+
+#: endings of CL data and of NC text that can be written
+CL_DATA, NC_TEXT = (".apt", ".cls"), (".ngc", ".nc", ".tap", ".cnc", ".gcode")
+#: findings whose words go along
+CARRIED = ("nc-coolant", "nc-stop", "nc-output", "nc-user-code", "nc-unknown-word", "apt-unknown", "heidenhain-unknown")
+_WORDS = {"nc-coolant", "nc-stop"}
+
+
+def carried(findings: tuple[Finding, ...]) -> tuple[tuple[int, str], ...]:
+    """(line, block) of what the motions do not say: `M8`, `M0`, else a comment.
+
+    >>> carried((Finding("nc-coolant", 6, "M8: coolant"), Finding("nc-output", 9, "M62: an output")))
+    ((6, 'M8'), (9, '(line 9 has M62: an output)'))
+    """
+    out = []
+    for f in sorted((f for f in findings if f.code in CARRIED), key=lambda f: f.line):
+        word = re.match(r"M(0|1|7|8|9)\b", f.text) if f.code in _WORDS else None
+        out.append((f.line, word[0] if word else f"(line {f.line} has {f.text})"))
+    return tuple(out)
+
+
+def convert_program(
+    program: Program,
+    noticed: tuple[Finding, ...],
+    machine: Machine,
+    ending: str,
+    *,
+    title: str,
+    cutters: Mapping[int, Cutter] | None = None,
+    tool_lengths: Mapping[int, float] | None = None,
+    tcp: bool = False,
+) -> tuple[str, tuple[Finding, ...]]:
+    """The text of a program for a machine, and what the machine does not give.
+
+    Parameters
+    ----------
+    noticed : by the reader: what goes along
+    ending : of the file: ``.ngc`` and others for NC text, ``.apt`` for CL data
+    cutters : by number; CL data state those that are known
+    tool_lengths : [mm] by number, on a machine with rotary axes
+    tcp : whether the controller is told the tip while rotary axes move
+
+    Raises
+    ------
+    InputError
+        The ending is not known, or the machine cannot do what the program asks.
+    """
+    ending = ending.lower()
+    if ending in CL_DATA:
+        return write_apt(program, cutters or {}, title=title, verified=False), ()
+    if ending not in NC_TEXT:
+        known = " ".join((*NC_TEXT, *CL_DATA))
+        raise InputError(f"the ending {ending or 'none'} cannot be written: must be one of {known}")
+    commands, findings = to_axes(program, machine, tool_lengths=tool_lengths, tcp=tcp)
+    text = write_commands(commands, machine, title=title, verified=False, words=carried(noticed))
+    return text, findings

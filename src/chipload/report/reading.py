@@ -1,0 +1,289 @@
+"""The result of running a program that exists: what it does on the machine, by line; it is read, not yet simulated.
+
+So its verdict is never better than `unproven`: the machine's limits may hold, what the cutter meets is not known.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+import pyarrow as pa
+import pyarrow.parquet as pq
+import trimesh
+from numpy.typing import NDArray
+
+from chipload.errors import Finding
+from chipload.machine.machine import Machine
+from chipload.program.apt.writer import write_apt
+from chipload.program.motions import is_arc, lengths, radii, spans, straightened
+from chipload.program.program import DWELL, RAPID, Program
+from chipload.program.read import Reading
+from chipload.program.time import program_time
+from chipload.report.figures import FONT, GRID, LIMIT, SCALE, SPACE_POINTS, STOCK
+from chipload.report.sheet import definitions, figure, framed, heading, table
+from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
+
+Floats = NDArray[np.float64]
+
+MOTIONS = ("rapid", "line", "arc clockwise", "arc counter-clockwise", "dwell")
+#: chords of arcs in pictures leave them by at most this [mm]
+CHORD_MM = 0.01
+#: findings and lines that the page lists
+LISTED, SLOWEST = 300, 12
+
+
+@dataclass(frozen=True, eq=False)
+class Read:
+    """A program that was read for a machine.
+
+    Parameters
+    ----------
+    title : name of the job
+    name : of the program's file
+    reading : what it does
+    lines, seconds : (m,) lines of the source that move, and their times [s]
+    machine : that it was read for
+    provenance : JSON values: hashes of the inputs, versions
+    """
+
+    title: str
+    name: str
+    reading: Reading
+    lines: NDArray[np.int64]
+    seconds: Floats
+    machine: Machine
+    provenance: Mapping[str, Any]
+
+
+def verdict(read: Read) -> tuple[bool, str]:
+    """Whether everything holds, which an unproven program never does, and one sentence that says it."""
+    bad = read.reading.broken
+    if bad:
+        more = f"; and {len(bad) - 1} more" if len(bad) > 1 else ""
+        return False, f"Does not hold: {_said(bad[0])}{more}."
+    return False, f"Unproven: the limits of machine {read.machine.name} hold; what the cutter meets was not simulated."
+
+
+def _said(finding: Finding) -> str:
+    return f"line {finding.line}: {finding.text}" if finding.line else finding.text
+
+
+def numbers(read: Read) -> dict[str, Any]:
+    """What the program is, in numbers."""
+    program = read.reading.program
+    length, rapid = lengths(program), program.motion == RAPID
+    cuts = ~rapid & (program.motion != DWELL)
+    low, high = program.p_work.min(axis=0), program.p_work.max(axis=0)
+    feeds = mm_min_from_mm_s(1.0) * program.feed[cuts & (length > 0.0)]
+    return {
+        "file": read.name,
+        "motions": len(read.reading.commands),
+        "path_mm": float(length.sum()),
+        "cutting_mm": float(length[cuts].sum()),
+        "rapid_mm": float(length[rapid].sum()),
+        "time_s": float(read.seconds.sum()),
+        "box_mm": {"low": low.tolist(), "high": high.tolist()},
+        "feed_mm_min": {"min": float(feeds.min()), "max": float(feeds.max())} if len(feeds) else None,
+        "tools": sorted({int(t) for t in program.tool}),
+        "tilted": bool((np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > 1e-9).any()),
+    }
+
+
+def summary_bytes(read: Read) -> bytes:
+    """summary.json."""
+    holds, says = verdict(read)
+
+    def rows(findings: tuple[Finding, ...]) -> list[dict[str, Any]]:
+        return [{"code": f.code, "line": f.line, "text": f.text} for f in findings]
+
+    values = {
+        "holds": holds,
+        "says": says,
+        "job": read.title,
+        "program": numbers(read) | {"status": "failed" if read.reading.broken else "unproven"},
+        "machine": read.machine.name,
+        "broken": rows(read.reading.broken),
+        "findings": rows(read.reading.noticed),
+        "provenance": dict(read.provenance),
+    }
+    return (json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def history(read: Read) -> dict[str, Any]:
+    """A row a motion of the tip, columns by name."""
+    program = read.reading.program
+    names = np.array([label or "program" for label in program.labels], dtype=object)
+    axis = {f"axis_{x}": program.axis[:, k] for k, x in enumerate("xyz")}
+    return {
+        "pass": names[program.label],
+        "line": program.line,
+        "motion": np.array(MOTIONS, dtype=object)[program.motion],
+        **{f"{x}_mm": program.p_work[:, k] for k, x in enumerate("xyz")},
+        **axis,
+        "s_mm": np.cumsum(lengths(program)),
+        "t_s": np.cumsum(program_time(program, read.machine)),
+        "feed_mm_min": np.where(program.motion == DWELL, 0.0, mm_min_from_mm_s(1.0) * program.feed),
+        "spindle_rpm": rpm_from_rad_s(1.0) * program.spindle,
+        "tool": program.tool,
+    }
+
+
+def history_bytes(read: Read) -> bytes:
+    """history.parquet."""
+    columns = history(read)
+    n = len(columns["pass"])
+    data = {"operation": pa.array(np.zeros(n, dtype=np.int32)), "strategy": pa.array(["program"] * n)}
+    data |= {k: pa.array(v.tolist() if v.dtype == object else np.ascontiguousarray(v)) for k, v in columns.items()}
+    sink = io.BytesIO()
+    pq.write_table(pa.table(data), sink, compression="zstd")
+    return sink.getvalue()
+
+
+def scene_bytes(read: Read) -> bytes:
+    """scene.glb: rapids and cutting motions as lines; lengths are mm, Z is up."""
+    points, rapid = _drawn(read.reading.program)
+    scene = trimesh.Scene()
+    for name, chosen, colour in (("rapids", rapid, (179, 38, 30, 255)), ("path", ~rapid, (34, 120, 132, 255))):
+        entities = [
+            trimesh.path.entities.Line(np.arange(a - 1, b), color=np.array(colour, dtype=np.uint8))
+            for a, b in _runs(chosen)
+        ]
+        if entities:
+            path = trimesh.path.Path3D(entities=entities, vertices=points, process=False)
+            scene.add_geometry(path, node_name=name, geom_name=name)
+    glb: bytes = scene.export(file_type="glb", extension_webp=False)
+    return glb
+
+
+def program_files(read: Read) -> dict[str, bytes]:
+    """CL data of the program."""
+    text = write_apt(read.reading.program, {}, title=f"{read.title}, {read.name}", verified=False)
+    return {"0-program.apt": text.encode("ascii")}
+
+
+def page_bytes(read: Read) -> bytes:
+    """report.html."""
+    holds, says = verdict(read)
+    bad = read.reading.broken
+    word = "Does not hold" if bad else "Unproven"
+    figures: dict[str, go.Figure] = {}
+    what = numbers(read)
+    minutes = what["time_s"] / 60.0
+    low, high = what["box_mm"]["low"], what["box_mm"]["high"]
+    box = ", ".join(f"{x} {a:.4g} to {b:.4g}" for x, a, b in zip("XYZ", low, high, strict=True))
+    body = [*heading(read.title, holds, word, says.removeprefix(f"{word}: ").capitalize())]
+    body += _findings("What does not hold", bad)
+    body += [
+        f"<h2>{escape(read.name)} on {escape(read.machine.name)}</h2>",
+        f"<p>{what['motions']} motions, {what['cutting_mm']:.5g} mm at feed and {what['rapid_mm']:.5g} mm of rapids, "
+        f"{minutes:.4g} min; {box} mm; tools {escape(', '.join(map(str, what['tools'])))}.</p>",
+        "<h3>In space</h3>",
+        '<p class="note">The path of the tip in the work frame, coloured by feed; rapids in red.</p>',
+        figure("space", space(read.reading.program), figures),
+        "<h3>Feed along the time</h3>",
+        figure("feed", feed_figure(read), figures),
+        "<h3>Lines that take longest</h3>",
+        _slowest(read),
+        *_findings("What the reader noticed", read.reading.noticed),
+        "<h2>What was not checked</h2>",
+        "<p>Removal, engagement, force, collision: the program was only held against the limits of the machine.</p>",
+        "<h2>Where the numbers come from</h2>",
+        definitions(read.provenance),
+    ]
+    return framed(read.title, word.lower(), body, figures)
+
+
+def space(program: Program) -> go.Figure:
+    """The path of the tip, coloured by feed."""
+    points, rapid = _drawn(program)
+    feeds = _drawn_feeds(program)
+    step = -(-len(points) // SPACE_POINTS)
+    keep = np.unique(np.concatenate([np.arange(0, len(points), step), [len(points) - 1]]))
+    p, fast, feed = points[keep].astype(np.float32), rapid[keep], feeds[keep].astype(np.float32)
+    out = go.Figure()
+    lines = {"color": feed, "colorscale": SCALE, "width": 3}
+    lines |= {"colorbar": {"title": {"text": "feed [mm/min]", "side": "right"}, "thickness": 12}, "showscale": True}
+    cut = np.where(fast[:, None], np.nan, p)
+    for k in np.flatnonzero(~fast[1:] & fast[:-1]):
+        cut[k] = p[k]
+    out.add_trace(go.Scatter3d(x=cut[:, 0], y=cut[:, 1], z=cut[:, 2], mode="lines", line=lines, name="feed"))
+    away = np.where(fast[:, None], p, np.nan)
+    for k in np.flatnonzero(fast[1:] & ~fast[:-1]):
+        away[k] = p[k]
+    red = {"color": LIMIT, "width": 1}
+    out.add_trace(go.Scatter3d(x=away[:, 0], y=away[:, 1], z=away[:, 2], mode="lines", line=red, name="rapid"))
+    axes = {f"{x}axis": {"title": f"{x.upper()} [mm]", "gridcolor": GRID} for x in "xyz"}
+    scene = {"aspectmode": "data", **axes}
+    out.update_layout(
+        template="none", height=520, font=FONT, scene=scene, margin={"l": 0, "r": 0, "t": 10, "b": 0}, showlegend=True
+    )
+    return out
+
+
+def feed_figure(read: Read) -> go.Figure:
+    """Programmed feed against time, motion after motion."""
+    columns = history(read)
+    t, feed = np.asarray(columns["t_s"]) / 60.0, np.asarray(columns["feed_mm_min"])
+    step = -(-len(t) // SPACE_POINTS)
+    out = go.Figure(
+        go.Scatter(
+            x=t[::step].astype(np.float32), y=feed[::step].astype(np.float32), mode="lines", line_shape="vh",
+            line={"color": STOCK, "width": 1.2},
+            customdata=columns["line"][::step], hovertemplate="line %{customdata}: %{y:.5g} mm/min<extra></extra>",
+        )
+    )  # fmt: skip
+    out.update_layout(template="none", height=260, font=FONT, margin={"l": 70, "r": 20, "t": 10, "b": 50})
+    out.update_xaxes(title="time [min]", gridcolor=GRID)
+    out.update_yaxes(title="feed [mm/min]", gridcolor=GRID, rangemode="tozero")
+    return out
+
+
+# -- parts ------------------------------------------------------------------------------------------------------
+def _drawn(program: Program) -> tuple[Floats, NDArray[np.bool_]]:
+    """Points with arcs as chords, and whether a rapid leads to each."""
+    chords = _chords(program)
+    return np.asarray(chords.p_work), np.asarray(chords.motion == RAPID)
+
+
+def _drawn_feeds(program: Program) -> Floats:
+    chords = _chords(program)
+    moving = (chords.motion != RAPID) & (chords.motion != DWELL) & (spans(chords) > 0.0)
+    return np.where(moving, mm_min_from_mm_s(1.0) * chords.feed, 0.0)
+
+
+def _chords(program: Program) -> Program:
+    r = radii(program)
+    turn = 2.0 * np.arccos(1.0 - np.minimum(CHORD_MM / np.where(r > 0.0, r, np.inf), 1.0))
+    return straightened(program, np.where(is_arc(program) & (r > 0.0), np.maximum(turn, 0.02), np.inf))
+
+
+def _runs(chosen: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """(first, past the last) of each run of chosen rows that has a row before it."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
+    return [(max(int(a), 1), int(b)) for a, b in edges.reshape(-1, 2) if b > 1]
+
+
+def _slowest(read: Read) -> str:
+    order = np.argsort(-read.seconds, kind="stable")[:SLOWEST]
+    whole = max(float(read.seconds.sum()), 1e-300)
+    rows = [
+        [str(int(read.lines[k])), f"{read.seconds[k]:.4g}", f"{100.0 * read.seconds[k] / whole:.3g}"]
+        for k in order
+        if read.seconds[k] > 0.0
+    ]
+    return table(["line", "time [s]", "of all [%]"], rows, numbers=(1, 2))
+
+
+def _findings(title: str, findings: tuple[Finding, ...]) -> list[str]:
+    if not findings:
+        return []
+    rows = [[str(f.line or ""), escape(f.text), escape(f.code)] for f in findings[:LISTED]]
+    more = [f'<p class="note">{len(findings) - LISTED} more in summary.json.</p>'] if len(findings) > LISTED else []
+    return [f"<h3>{title}</h3>", table(["line", "what", "code"], rows), *more]

@@ -1,0 +1,128 @@
+"""The sheet that pages are made of: style, frame, tables, figures; one file that opens without a network and prints."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import Any
+
+import plotly.graph_objects as go
+from plotly.offline import get_plotlyjs
+
+_STYLE = """
+:root { --ink: #1f2933; --soft: #5f6b7a; --line: #d9dde2; --good: #0b6b4f; --bad: #b3261e; --paper: #ffffff; }
+* { box-sizing: border-box; }
+body { margin: 0; background: #f4f5f7; color: var(--ink);
+  font: 14px/1.5 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; }
+main { max-width: 1180px; margin: 0 auto; padding: 24px 32px 48px; background: var(--paper); }
+h1 { font-size: 15px; font-weight: 600; color: var(--soft); margin: 0 0 12px; }
+h2 { font-size: 18px; margin: 36px 0 8px; padding-top: 14px; border-top: 1px solid var(--line); }
+h3 { font-size: 14px; margin: 22px 0 4px; }
+p { margin: 4px 0 8px; max-width: 92ch; }
+.verdict { border-left: 6px solid; padding: 12px 18px; font-size: 17px; line-height: 1.45; margin: 0 0 16px; }
+.verdict b { display: block; font-size: 21px; }
+.good { color: var(--good); border-color: var(--good); background: #eef7f3; }
+.bad { color: var(--bad); border-color: var(--bad); background: #fcf1f0; }
+.verdict span { color: var(--ink); }
+.note { color: var(--soft); font-size: 13px; }
+td code { white-space: nowrap; }
+table { border-collapse: collapse; width: 100%; margin: 6px 0 12px; font-variant-numeric: tabular-nums; }
+th, td { text-align: left; padding: 5px 10px; border-bottom: 1px solid var(--line); vertical-align: top; }
+thead th { font-weight: 600; color: var(--soft); font-size: 12.5px; border-bottom: 1.5px solid #aab2bb; }
+td.n, th.n { text-align: right; white-space: nowrap; }
+td:first-child { white-space: nowrap; }
+tr.used td { background: #f1f7f6; }
+.ok { color: var(--good); } .no { color: var(--bad); font-weight: 600; }
+.dot { display: inline-block; width: 10px; height: 10px; border-radius: 5px; margin-right: 7px; }
+ul { margin: 4px 0 10px; padding-left: 20px; } li { margin: 2px 0; }
+dl { display: grid; grid-template-columns: max-content 1fr; gap: 2px 18px; margin: 6px 0; }
+dt { color: var(--soft); } dd { margin: 0; overflow-wrap: anywhere; }
+code { font: 12.5px ui-monospace, "DejaVu Sans Mono", monospace; }
+.figure { width: 100%; margin: 4px 0 6px; }
+@media print { body { background: white; } main { max-width: none; padding: 0; } .figure, table { break-inside: avoid; }
+  h2, h3 { break-after: avoid; } }
+"""
+#: runs in the page: each figure is drawn when it comes near the window, and all of them before printing
+_DRAW = """
+const figures = JSON.parse(document.getElementById("figures").textContent);
+const config = {displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"]};
+function draw(id) {
+  const figure = figures[id];
+  if (!figure) return;
+  delete figures[id];
+  Plotly.newPlot(id, figure.data, figure.layout, config);
+}
+const seen = new IntersectionObserver(list => list.forEach(e => { if (e.isIntersecting) draw(e.target.id); }),
+  {rootMargin: "800px"});
+Object.keys(figures).forEach(id => seen.observe(document.getElementById(id)));
+addEventListener("beforeprint", () => Object.keys(figures).forEach(draw));
+"""
+
+
+def framed(title: str, word: str, body: Sequence[str], figures: Mapping[str, go.Figure]) -> bytes:
+    """The whole file: ``title: word`` in the window's bar, the body, the figures that are drawn when they are seen."""
+    # "<" cannot end the element when written as an escape of JSON
+    data = json.dumps({k: json.loads(f.to_json()) for k, f in figures.items()}, separators=(",", ":"))
+    data = data.replace("<", "\\u003c")
+    html = (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(title)}: {word}</title>"
+        f"<style>{_STYLE}</style></head>\n<body><main>\n{chr(10).join(body)}\n</main>\n"
+        f"<script>{get_plotlyjs()}</script>\n"
+        f'<script id="figures" type="application/json">{data}</script>\n<script>{_DRAW}</script>\n</body></html>\n'
+    )
+    return html.encode()
+
+
+def heading(title: str, holds: bool, word: str, says: str) -> list[str]:
+    """The first lines of a page: what it is about, and the verdict."""
+    return [
+        f"<h1>chipload &middot; {escape(title)}</h1>",
+        f'<div class="verdict {"good" if holds else "bad"}"><b>{word}</b><span>{escape(says)}</span></div>',
+    ]
+
+
+def figure(name: str, drawn: go.Figure, figures: dict[str, go.Figure]) -> str:
+    """The place of a figure, which is put among ``figures``."""
+    figures[name] = drawn
+    return f'<div class="figure" id="{name}" style="height:{drawn.layout.height}px"></div>'
+
+
+def table(
+    head: Iterable[str], rows: Iterable[Iterable[str]], numbers: tuple[int, ...] = (), used: Iterable[bool] = ()
+) -> str:
+    """A table of HTML cells; columns ``numbers`` stand at the right, rows ``used`` are tinted."""
+
+    def cells(tag: str, row: Iterable[str]) -> str:
+        return "".join(f"<{tag}{' class=n' if i in numbers else ''}>{x}</{tag}>" for i, x in enumerate(row))
+
+    rows = list(rows)
+    marks = list(used) or [False] * len(rows)
+    lines = [f"<tr{' class=used' if m else ''}>{cells('td', r)}</tr>" for r, m in zip(rows, marks, strict=True)]
+    return f"<table><thead><tr>{cells('th', head)}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+
+
+def items(texts: Iterable[str]) -> str:
+    """A list of plain texts."""
+    return f"<ul>{''.join(f'<li>{escape(t)}</li>' for t in texts)}</ul>"
+
+
+def definitions(values: Mapping[str, Any], prefix: str = "") -> str:
+    """Names and plain values, nested ones one after the other."""
+    rows = "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in _flat(values, prefix))
+    return f"<dl>{rows}</dl>"
+
+
+def _flat(values: Mapping[str, Any], prefix: str) -> Iterable[tuple[str, str]]:
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key} ")
+        else:
+            yield prefix + str(key), said(value)
+
+
+def said(value: Any) -> str:
+    """A value as text, a list with commas."""
+    return ", ".join(str(v) for v in value) if isinstance(value, (list, tuple)) else str(value)
