@@ -1,15 +1,16 @@
 """Cutter radius compensation: the path of the tool's centre beside a programmed contour (G41 and G42).
 
 Notation: positions in the plane are complex numbers, first axis + i second axis. ``r`` is the tool's radius, ``s`` the
-side (+1 left, -1 right), ``a -> b`` a programmed motion, ``m`` the offset of its start and ``e`` that of its end: r away,
-square to the contour, on the tool's side. ``c`` is where the tool's centre stands.
+side (+1 left, -1 right), ``a -> b`` a programmed motion, ``m`` the offset of its start and ``e`` that of its end: r
+away, square to the contour, on the tool's side. ``c`` is where the tool's centre stands.
 
-At a corner that turns away from the tool the centre goes round the corner on an arc of radius r; at one that turns towards
-it both motions end where their offsets cross. So the end of a motion is known only with the next motion in the plane:
-one motion, and what follows it without moving in the plane, is held back.
+At a corner that turns away from the tool the centre goes round the corner on an arc of radius r; at one that turns
+towards it both motions end where their offsets cross. So the end of a motion is known only with the next motion in the
+plane: one motion, and what follows it without moving in the plane, is held back.
 
-The rules are those of LinuxCNC ("Tool Compensation" in its manual): the first motion leads to the offset of its own end,
-a change of direction below 0.05 rad is no corner, and what the tool does not fit into is refused.
+The rules are those of LinuxCNC ("Tool Compensation" in its manual): the first motion leads to the offset of its own
+end, a change of direction below 0.05 rad is no corner, and what the tool does not fit into is refused. As there, a
+line that its corners turned back is not noticed where an arc follows it round a corner, or nothing but a smooth one.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from chipload.errors import InputError
-from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, RAPID, YZ
+from chipload.program.commands import ARC, DWELL, PLANE_AXES, RAPID, YZ
 
 #: a change of direction below this is no corner [rad]
 SMOOTH = 0.05
@@ -75,7 +76,14 @@ class Compensation:
     """
 
     def __init__(
-        self, side: int, radius: float, plane: int, start: Sequence[float], shift: tuple[float, float] = (0.0, 0.0), slack: float = 0.0254,
+        self,
+        side: int,
+        radius: float,
+        plane: int,
+        start: Sequence[float],
+        *,
+        shift: tuple[float, float] = (0.0, 0.0),
+        slack: float = 0.0254,
     ) -> None:
         if plane == YZ:
             raise InputError("radius compensation: not in the plane YZ (G19): select G17 or G18")
@@ -125,17 +133,20 @@ class Compensation:
         if r == 0.0:
             return self._pass(Move(ARC, tuple(end), centre, turns, payload))
         inside = self._side * turns > 0
-        size = abs(b - o)
-        if inside and size <= r:
-            raise self._gouge(f"an arc of radius {size:.6g} mm, from inside,", "use a smaller tool")
-        outward = (b - o) / size
+        size = min(abs(a - o), abs(b - o))
+        if size <= (r if inside else 0.0):
+            raise self._gouge(f"an arc of radius {size:.6g} mm", "use a smaller tool")
+        outward = (b - o) / abs(b - o)
         e = b + (-r if inside else r) * outward
         if self._front is None:
             if abs(b - a) <= r:
                 raise self._short(abs(b - a))
             # its centre is on the normal at its end, as far from the start as from the offset of the end
             chord = a - e
-            o = e + outward * abs(chord) ** 2 / (2.0 * (chord * outward.conjugate()).real)
+            slope = 2.0 * (chord * outward.conjugate()).real
+            if slope == 0.0:
+                raise self._gouge("a first arc that starts beside its end", "start it farther away")
+            o = e + outward * abs(chord) ** 2 / slope
             return self._append(_Offset(ARC, a, 0j, e, o, turns, entry=True), end, payload)
         radial = (a - o) / abs(a - o)
         m = a + (-r if inside else r) * radial
@@ -152,15 +163,14 @@ class Compensation:
         return self._release()
 
     def _release(self) -> list[Move]:
+        """What was held back, as commanded."""
         done, self._held = [self._out(move) for move in self._held], []
         return done
 
     def _corner(self, new: _Offset, corner: complex, end: Sequence[float], payload: object) -> list[Move]:
         """Join ``new`` to the front; what is final."""
-        front, r, c = self._front, self._radius, self._flat(self._centre)
+        front, c = self._front, self._flat(self._centre)
         assert front is not None
-        if r == 0.0:
-            return self._append(new, end, payload)
         # from the direction to the tool's centre to its direction beside the new motion, > 0 away from the tool
         away = -self._side * cmath.phase((new.m - corner) / (c - corner))
         if away < -0.5 * math.pi:
@@ -176,6 +186,7 @@ class Compensation:
             return self._append(new, end, payload)
         if not new.turns:
             self._check()
+        # the other axes go round the corner with the new motion, the one along the tool waits
         around = self._with(end, new.m, along=self._centre[self._along])
         rapid = new.motion == RAPID
         centre = (0.0, 0.0) if rapid else (corner.real, corner.imag)
@@ -207,6 +218,7 @@ class Compensation:
         return foot + straight.u * math.copysign(math.sqrt(under), sense)
 
     def _circles(self, front: _Offset, new: _Offset) -> complex:
+        """Where two offset arcs cross so that the path turns towards the tool."""
         apart = new.o - front.o
         d = abs(apart)
         r0, r1 = abs(front.e - front.o), abs(new.m - new.o)
@@ -280,5 +292,6 @@ class Compensation:
 
 def _sweep(arc: _Offset, start: complex, end: complex) -> float:
     """Angle from ``start`` to ``end`` in the direction of an arc, above 0 to a whole turn [rad]."""
-    angle = math.copysign(1.0, arc.turns) * cmath.phase((end - arc.o) / (start - arc.o))
-    return angle if angle > 1e-9 else angle + 2.0 * math.pi
+    angle = math.copysign(1.0, arc.turns) * (cmath.phase(end - arc.o) - cmath.phase(start - arc.o))
+    angle %= 2.0 * math.pi
+    return angle if angle > 1e-9 else 2.0 * math.pi
