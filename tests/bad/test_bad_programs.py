@@ -55,8 +55,8 @@ BAD = [
     (
         "F10\nG3 X5 I1",
         2,
-        "arc that starts 1 mm from its centre and ends 4 mm from it: must agree within 0.02828 mm or 0.1 %: correct its "
-        "centre or its end",
+        "arc that starts 1 mm from its centre and ends 4 mm from it: must agree within 0.02828 mm or 0.1 %: "
+        "correct its centre or its end",
     ),
     ("F10\nG81 X1 Z-1", 2, "G81: R is missing: where feeding begins"),
     ("F10\nG81 X1 R1", 2, "G81: Z is missing: the bottom of the hole"),

@@ -20,7 +20,10 @@ def codes(findings):
 
 
 def test_a_fanuc_program():
-    text = "%\nO1234 (PART)\nG21 G17 G90 G94 G40 G49 G80\nT1 M6\nG54 G0 X0. Y0. S1000 M3\nG43 H1 Z5. M8\nG98 G81 X1. Y1. Z-3. R2. F60.\n"
+    text = (
+        "%\nO1234 (PART)\nG21 G17 G90 G94 G40 G49 G80\nT1 M6\nG54 G0 X0. Y0. S1000 M3\n"
+        "G43 H1 Z5. M8\nG98 G81 X1. Y1. Z-3. R2. F60.\n"
+    )
     text += "X2.\nG80\nG04 X2.\nG04 P500\nM98 P20007\nG49\nM30\nO0007\nG91 G0 X1.\nG90\nM99\n%"
     commands, findings = fanuc(text)
     assert commands.feed[commands.motion == DWELL].tolist() == [2.0, 0.5]
@@ -78,8 +81,12 @@ def test_fanuc_refuses(block, message):
 
 
 def test_a_sinumerik_program():
-    text = '%_N_PART_MPF\n;$PATH=/_N_MPF_DIR\nN10 G71 G17 G90 G54 ; plane\nN20 T="MILL" M6\nN30 TRAORI\nMSG("first")\nS600 M3\n'
-    text += "R1=40\nG0 X=10 Y=IC(5) A30\nG1 X20 F=R1+20\nTRAFOOF\nR2=5*(1+1)\nG1 Y=R2\nG2 X10 Y10 CR=5\nG3 X=20 Y=10 I=AC(15) J=AC(10)\n"
+    text = '%_N_PART_MPF\n;$PATH=/_N_MPF_DIR\nN10 G71 G17 G90 G54 ; plane\nN20 T="MILL" M6\nN30 TRAORI\nMSG("first")\n'
+    text += "S600 M3\n"
+    text += (
+        "R1=40\nG0 X=10 Y=IC(5) A30\nG1 X20 F=R1+20\nTRAFOOF\nR2=5*(1+1)\nG1 Y=R2\n"
+        "G2 X10 Y10 CR=5\nG3 X=20 Y=10 I=AC(15) J=AC(10)\n"
+    )
     text += "G4 F2\nG91 G1 X=AC(0)\nSUPA G90 G0 Z0\nFFWON\nM30"
     commands, findings = sinumerik(text)
     assert commands.tcp.tolist() == [True, True] + [False] * 6

@@ -13,7 +13,8 @@ def xs(text, **options):
 
 def test_if_elseif_else():
     text = "\n".join(
-        f"#1={n}\nO1 if [#1 eq 0]\nG0 X10\nO1 elseif [#1 eq 1]\nG0 X11\nO1 elseif [#1 le 2]\nG0 X12\nO1 else\nG0 X13\nO1 endif"
+        f"#1={n}\nO1 if [#1 eq 0]\nG0 X10\nO1 elseif [#1 eq 1]\nG0 X11\nO1 elseif [#1 le 2]\n"
+        f"G0 X12\nO1 else\nG0 X13\nO1 endif"
         for n in range(4)
     )
     assert xs(text) == [10.0, 11.0, 12.0, 13.0]
@@ -46,7 +47,10 @@ def test_a_subroutine_has_its_own_parameters_and_returns_a_value():
 
 
 def test_recursion_with_labels_of_its_own():
-    text = "O<f> sub\nO1 if [#1 gt 1]\n#2=[#1-1]\nO<f> call [#2]\n#3=[#<_value>*#1]\nO1 else\n#3=1\nO1 endif\nO<f> endsub [#3]\n"
+    text = (
+        "O<f> sub\nO1 if [#1 gt 1]\n#2=[#1-1]\nO<f> call [#2]\n#3=[#<_value>*#1]\nO1 else\n"
+        "#3=1\nO1 endif\nO<f> endsub [#3]\n"
+    )
     assert xs(text + "O<f> call [6]\nG0 X#<_value>") == [720.0]
 
 

@@ -1,6 +1,7 @@
 """Arcs, splines, cycles, offsets and tools against hand-computed positions."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -18,7 +19,8 @@ def read(text, **options):
 
 def test_arcs_of_all_planes_and_forms():
     commands = read(
-        "F60\nG3 X1 Y1 R-1\nG2 X1 Y1 I2 P3 Z4\nG18 G3 X3 Z4 I1\nG19 G2 Y3 Z4 J1\nG17 G90.1 G3 X5 Y3 I4 J3\nG91.1 G91 G2 X2 I1"
+        "F60\nG3 X1 Y1 R-1\nG2 X1 Y1 I2 P3 Z4\nG18 G3 X3 Z4 I1\nG19 G2 Y3 Z4 J1\n"
+        "G17 G90.1 G3 X5 Y3 I4 J3\nG91.1 G91 G2 X2 I1"
     )
     assert (commands.motion == ARC).all()
     assert commands.plane.tolist() == [0, 0, ZX, YZ, 0, 0]
@@ -53,7 +55,7 @@ def test_a_whole_turn_by_radius_is_refused_and_by_centre_is_one():
 def _bezier(points, t):
     points = [np.asarray(p, dtype=float) for p in points]
     while len(points) > 1:
-        points = [(1.0 - t) * a + t * b for a, b in zip(points[:-1], points[1:], strict=True)]
+        points = [(1.0 - t) * a + t * b for a, b in pairwise(points)]
     return points[0]
 
 

@@ -27,8 +27,33 @@ def _text(source):
         elif kind < 0.8:
             lines.append(f"G1{axes} F{source.choice([0, 5, 50.5])}")
         else:
-            lines.append(source.choice(["G17", "G18", "G90", "G91", "G93", "G94", "F30", "G20", "G21", "", "(note)", "S5 M3", "G80",
-                                        "G81 X1 Z-9 R9", "G90.1", "G91.1", "T1 M6", "G55", "G7", "G8", "G1 X1 F7"]))  # fmt: skip
+            lines.append(
+                source.choice(
+                    [
+                        "G17",
+                        "G18",
+                        "G90",
+                        "G91",
+                        "G93",
+                        "G94",
+                        "F30",
+                        "G20",
+                        "G21",
+                        "",
+                        "(note)",
+                        "S5 M3",
+                        "G80",
+                        "G81 X1 Z-9 R9",
+                        "G90.1",
+                        "G91.1",
+                        "T1 M6",
+                        "G55",
+                        "G7",
+                        "G8",
+                        "G1 X1 F7",
+                    ]
+                )
+            )
     return "\n".join(lines) + "\nM2\n"
 
 
