@@ -43,7 +43,7 @@ def centre_from_radius(
 ) -> tuple[float, float]:
     """Centre of an arc of a radius [mm], negative for more than half a turn; ``left``: counter-clockwise.
 
-    >>> centre_from_radius(0.0, 0.0, 1.0, 1.0, -1.0, True, False)
+    >>> centre_from_radius(0.0, 0.0, 2.0, 0.0, 1.0, True, False)
     (1.0, 0.0)
     """
     chord = math.hypot(a1 - a0, b1 - b0)

@@ -23,6 +23,8 @@ from chipload.units import MM_PER
 PLANES = {170: XY, 180: ZX, 190: YZ, 171: XY, 181: ZX, 191: YZ}
 #: from the centre of a turning tool's nose to its tip, in radii along X and Z, by orientation
 TIPS = ((0, 0), (-1, 1), (-1, -1), (1, -1), (1, 1), (0, 1), (-1, 0), (0, -1), (1, 0), (0, 0))
+#: an arc beside its contour may turn more than programmed by this [rad], in a text in mm and in one in inches
+ARC_SLACK = {False: 0.0254, True: 0.001}
 #: positions beyond this are refused [mm, deg]
 FARTHEST = 1e9
 #: a feed by G93 is at least this [units/min], as LinuxCNC does
@@ -171,8 +173,14 @@ class Controller:
         if not 0 <= turned <= 9:
             raise InputError(f"{name}: orientation {turned}: must be from 0 to 9")
         x, z = TIPS[turned]
-        shift = radius * z, radius * x
-        self._beside = Compensation(1 if code < 420 else -1, radius, PLANES[state.plane], state.at, shift)
+        self._beside = Compensation(
+            1 if code < 420 else -1,
+            radius,
+            PLANES[state.plane],
+            state.at,
+            shift=(radius * z, radius * x),
+            slack=ARC_SLACK[state.scale != 1.0],
+        )
         state.compensation = code
 
     def _emit(self, moves: list[Move]) -> None:

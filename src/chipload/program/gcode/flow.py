@@ -258,14 +258,11 @@ class Flow:
 
     def _is_tail(self, line: int, key: tuple[str, str]) -> int:
         """Line of the ``do`` that a ``while`` closes, -1 where it opens a loop."""
-        for other in reversed(self.source.places[key]):
-            if other < line:
-                keyword = self.source.keyword(other)
-                if keyword == "do":
-                    return other
-                if keyword in ("while", "endwhile"):
-                    return -1
-        return -1
+        try:
+            other = self.source.before(line, key, ("do", "while", "endwhile"))
+        except InputError:
+            return -1
+        return other if self.source.keyword(other) == "do" else -1
 
     def _while(self, word: OWord) -> None:
         line = self.line

@@ -228,7 +228,7 @@ class Interpreter:
             elif m in USER_M:
                 c.once("nc-user-code", f"M{m}: is the machine builder's own: what it does is not known here")
             elif m in (428, 429, 430):
-                state.tcp = m == 428
+                state.tcp, state.tcp_by_length = m == 428, False
                 c.changed()
                 c.once("nc-tip", f"M{m}: taken as LinuxCNC's {'tip control on' if state.tcp else 'tip control off'}")
 
@@ -282,13 +282,7 @@ class Interpreter:
         if "compensation" in codes:
             c.compensate(codes["compensation"], words.get("d"), words.get("l"))
         if "length" in codes:
-            code = codes["length"]
-            if code == 434:
-                state.tcp = True
-                c.once("nc-tip", "G43.4: tip control is no code of LinuxCNC's own; taken as Fanuc's")
-                code = 430
-                c.changed()
-            offsets.length_offset(c, block, code, targets.axes(c, block))
+            offsets.length_offset(c, block, codes["length"], targets.axes(c, block))
         if "offset" in codes:
             offsets.select(c, codes["offset"])
         if "path" in codes:

@@ -57,7 +57,7 @@ _NOT_ALONE = frozenset({382, 383, 384, 385, 50, 51, 52, 760, 330, 331})
 USES: dict[str, tuple[frozenset[int], frozenset[int], frozenset[int]]] = {
     "d": (frozenset(), frozenset({410, 411, 420, 421, 960}), frozenset()),
     "e": (frozenset({760}), frozenset(), frozenset({66, 67, 68})),
-    "h": (frozenset({760}), frozenset({430, 432}), frozenset()),
+    "h": (frozenset({760}), frozenset({430, 432, 434}), frozenset()),
     "i": (frozenset({20, 30, 50, 51, 331, 760, 870}), frozenset({100}), frozenset()),
     "j": (frozenset({20, 30, 50, 51, 760, 870}), frozenset({100}), frozenset()),
     "k": (frozenset({20, 30, 330, 331, 760, 870}), frozenset(), frozenset()),

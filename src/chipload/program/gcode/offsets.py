@@ -127,15 +127,20 @@ def _set_tool(c: Controller, block: Block, axes: Axes, kind: int) -> None:
 
 
 def length_offset(c: Controller, block: Block, code: int, axes: Axes) -> None:
-    """G43, G43.1, G43.2 and G49."""
+    """G43, G43.1, G43.2, G43.4 and G49."""
     state = c.state
     c.not_compensated(shown(code))
     old = state.datum.length
+    if code == 434:
+        state.tcp = state.tcp_by_length = True
+        c.once("nc-tip", "G43.4: tip control by a length is taken as Fanuc's")
+        c.changed()
+        code = 430
+    elif state.tcp_by_length:
+        state.tcp = state.tcp_by_length = False
+        c.changed()
     if code == 490:
         new = ZERO
-        if state.tcp:
-            state.tcp = False
-            c.changed()
     elif code == 431:
         new = put(old, dict(axes))
     else:

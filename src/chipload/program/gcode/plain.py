@@ -12,8 +12,9 @@ from chipload.program.commands import ARC, LINE, RAPID
 from chipload.program.gcode.arcs import check_centre
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.motion import Motion
-from chipload.program.gcode.track import PIECE
 
+#: blocks in one go
+PIECE = 8192
 _NUMBER = r"([-+]?(?:[0-9]{1,6}\.?[0-9]{0,12}|\.[0-9]{1,12}))"
 
 
@@ -28,7 +29,7 @@ def run_plain(c: Controller, motion: Motion, lines: list[str], line: int) -> tup
     state = c.state
     if not (
         state.absolute
-        and state.feed_mode == 940
+        and state.feed_mode in (930, 940)
         and not state.absolute_centre
         and not state.diameter
         and state.compensation == 400
@@ -40,10 +41,11 @@ def run_plain(c: Controller, motion: Motion, lines: list[str], line: int) -> tup
     scale, inch, flat = state.scale, state.scale != 1.0, state.plane == 170
     x, y, z, a, b, cc, u, v, w = state.at
     code = state.motion
-    first, count, limit = line, len(lines), PIECE
-    append, arc, rows = c.track.rows.append, c.track.arc, c.track.rows
+    first, count = line, min(len(lines), line + PIECE)
+    append, arc = c.track.rows.append, c.track.arc
+    inverse = state.feed_mode == 930
     rapid = feed = -1
-    while line < count and len(rows) < limit:
+    while line < count:
         found = match(lines[line])
         if found is None:
             break
@@ -62,7 +64,12 @@ def run_plain(c: Controller, motion: Motion, lines: list[str], line: int) -> tup
                 break
         elif si is not None or sj is not None or sk is not None:
             break
-        if sf is not None:
+        if inverse and new:
+            if sf is None or new != 10:
+                break
+        elif sf is not None:
+            if inverse:
+                break
             value = float(sf)
             if value < 0.0 or (new and value * scale == 0.0):
                 break
@@ -71,6 +78,7 @@ def run_plain(c: Controller, motion: Motion, lines: list[str], line: int) -> tup
             rapid = feed = -1
         elif new and state.feed == 0.0:
             break
+        here = x, y, z, a, b, cc, u, v, w
         x0, y0, z0 = x, y, z
         if sx is not None:
             x = float(sx) * scale
@@ -80,15 +88,14 @@ def run_plain(c: Controller, motion: Motion, lines: list[str], line: int) -> tup
             z = float(sz) * scale
         line += 1
         if sa is not None or sb is not None or sc is not None:
-            a0, b0, c0 = a, b, cc
             if sa is not None:
                 a = float(sa)
             if sb is not None:
                 b = float(sb)
             if sc is not None:
                 cc = float(sc)
-            turning = x == x0 and y == y0 and z == z0 and (a != a0 or b != b0 or cc != c0)
-            if turning and new == 10:
+            turning = x == x0 and y == y0 and z == z0 and (a, b, cc) != here[3:6]
+            if turning and new == 10 and not inverse:
                 append((LINE, x, y, z, a, b, cc, u, v, w, c.context(2), line))
                 code = new
                 continue
@@ -96,6 +103,9 @@ def run_plain(c: Controller, motion: Motion, lines: list[str], line: int) -> tup
             if rapid < 0:
                 rapid = c.context(0)
             append((RAPID, x, y, z, a, b, cc, u, v, w, rapid, line))
+        elif inverse:
+            state.at, end = here, (x, y, z, a, b, cc, u, v, w)
+            append((LINE, *end, c.straight_context(LINE, end, float(sf)), line))
         else:
             if feed < 0:
                 feed = c.context(1)

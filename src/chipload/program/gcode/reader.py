@@ -26,6 +26,8 @@ from chipload.progress import Progress, silent
 
 #: largest program [bytes]
 LARGEST_FILE = 500_000_000
+#: motions of one program
+MOST_ROWS = 20_000_000
 
 
 def read_gcode(
@@ -88,7 +90,7 @@ def read_gcode(
         units=units,
         machine_units=machine_units or units,
         start=nine(at),
-        most_rows=2 * most_blocks + 1_000_000,
+        most_rows=min(2 * most_blocks + 100_000, MOST_ROWS),
         strict=dialect == "linuxcnc" and not lenient,
     )
     text = text.replace("\r\n", "\n").replace("\r", "\n")

@@ -7,6 +7,7 @@ stands in; ``key`` is (subroutine, label). Lines are counted from 0.
 from __future__ import annotations
 
 import re
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass, field
 
 from chipload.errors import InputError
@@ -61,16 +62,18 @@ class Source:
 
     def after(self, line: int, key: tuple[str, str], keywords: tuple[str, ...]) -> int:
         """The next line of a key with one of some keywords."""
-        for other in self.places[key]:
-            if other > line and self.keyword(other) in keywords:
-                return other
+        places = self.places.get(key, [])
+        for k in range(bisect_right(places, line), len(places)):
+            if self.keyword(places[k]) in keywords:
+                return places[k]
         raise InputError(f"o{key[1]}: {' or '.join(keywords)} is missing after line {line + 1}")
 
     def before(self, line: int, key: tuple[str, str], keywords: tuple[str, ...]) -> int:
         """The line of a key with one of some keywords before a line."""
-        for other in reversed(self.places[key]):
-            if other < line and self.keyword(other) in keywords:
-                return other
+        places = self.places.get(key, [])
+        for k in range(bisect_left(places, line) - 1, -1, -1):
+            if self.keyword(places[k]) in keywords:
+                return places[k]
         raise InputError(f"o{key[1]} {self.keyword(line)}: {' or '.join(keywords)} is missing before it")
 
 

@@ -100,7 +100,7 @@ class State:
     speed, sense : S [rpm] and the sense of rotation, 1 clockwise
     surface : S is a speed of the cutting edge (G96)
     tool, selected : in the spindle, and named by T
-    tcp : X Y Z are the tip in the workpiece
+    tcp, tcp_by_length : X Y Z are the tip in the workpiece; G43.4 made it so, and another length ends it
     """
 
     scale: float = 1.0
@@ -122,6 +122,7 @@ class State:
     tool: int = 0
     selected: int = 0
     tcp: bool = False
+    tcp_by_length: bool = False
     flood: bool = False
     mist: bool = False
     compensation: int = 400
