@@ -270,7 +270,8 @@ def _check_program(
         f"{path.name}: {len(reading.commands)} motions on machine {on.name}, {lengths(reading.program).sum():.6g} mm, "
         f"{seconds.sum() / 60.0:.4g} min; {box} mm"
     )
-    typer.echo(f"{len(reading.broken)} findings do not hold" if reading.broken else "the machine's limits hold")
+    count = len(reading.broken)
+    typer.echo(f"{count} {'finding does' if count == 1 else 'findings do'} not hold" if count else "the limits hold")
     return EXCEEDED if reading.broken else 0
 
 

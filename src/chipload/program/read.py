@@ -19,7 +19,7 @@ from chipload.machine.limits import limit_findings
 from chipload.machine.machine import Machine
 from chipload.program.apt.reader import read_apt_file
 from chipload.program.check import check_program
-from chipload.program.commands import DWELL, Commands
+from chipload.program.commands import Commands
 from chipload.program.gcode.reader import read_gcode_file
 from chipload.program.gcode.tools import ToolTable, read_tool_table
 from chipload.program.heidenhain.reader import read_heidenhain_file
@@ -124,7 +124,7 @@ def line_times(reading: Reading, machine: Machine) -> tuple[Ints, Floats]:
     seconds = np.zeros(len(lines))
     np.add.at(seconds, np.searchsorted(lines, program.line), program_time(program, machine))
     if machine.chain.rotary:
-        least = np.where(commands.motion == DWELL, 0.0, row_time_limited(machine, reading.axes))
+        least = np.concatenate([[0.0], row_time_limited(machine, reading.axes)])[: len(commands)]
         by_axes = np.zeros(len(lines))
         np.add.at(by_axes, np.searchsorted(lines, commands.line), least)
         seconds = np.maximum(seconds, by_axes)
