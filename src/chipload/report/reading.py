@@ -128,11 +128,23 @@ def history(read: Read) -> dict[str, Any]:
         **{f"{x}_mm": program.p_work[:, k] for k, x in enumerate("xyz")},
         **axis,
         "s_mm": np.cumsum(lengths(program)),
-        "t_s": np.cumsum(program_time(program, read.machine)),
+        "t_s": np.cumsum(row_times(read)),
         "feed_mm_min": np.where(program.motion == DWELL, 0.0, mm_min_from_mm_s(1.0) * program.feed),
         "spindle_rpm": rpm_from_rad_s(1.0) * program.spindle,
         "tool": program.tool,
     }
+
+
+def row_times(read: Read) -> Floats:
+    """(n,) time of each row of the tip [s]; the rows of a line share what its axes need beyond the path's own time."""
+    program = read.reading.program
+    own, at = program_time(program, read.machine), np.searchsorted(read.lines, program.line)
+    whole, count = np.zeros(len(read.lines)), np.zeros(len(read.lines))
+    np.add.at(whole, at, own)
+    np.add.at(count, at, 1.0)
+    more = (read.seconds - whole)[at]
+    share = np.where(whole[at] > 0.0, own / np.where(whole[at] > 0.0, whole[at], 1.0), 1.0 / count[at])
+    return np.asarray(own + more * share)
 
 
 def history_bytes(read: Read) -> bytes:
@@ -219,10 +231,17 @@ def space(program: Program) -> go.Figure:
         away[k] = p[k]
     red = {"color": LIMIT, "width": 1}
     out.add_trace(go.Scatter3d(x=away[:, 0], y=away[:, 1], z=away[:, 2], mode="lines", line=red, name="rapid"))
+    camera = {"eye": {"x": 1.35, "y": -1.35, "z": 1.1}}
     axes = {f"{x}axis": {"title": f"{x.upper()} [mm]", "gridcolor": GRID} for x in "xyz"}
-    scene = {"aspectmode": "data", **axes}
+    scene = {"aspectmode": "data", "camera": camera, **axes}
     out.update_layout(
-        template="none", height=520, font=FONT, scene=scene, margin={"l": 0, "r": 0, "t": 10, "b": 0}, showlegend=True
+        template="none",
+        height=520,
+        font=FONT,
+        scene=scene,
+        margin={"l": 0, "r": 0, "t": 10, "b": 0},
+        showlegend=True,
+        legend={"x": 0.0, "y": 1.0},
     )
     return out
 
