@@ -1,0 +1,148 @@
+"""In which coordinates the points of CL data are: CSYS, TRNTYP, ROTABL, TLAXIS.
+
+Notation: p_work in the one work frame, p in the coordinates of the text; R (3, 3), t (3,) with p_work = R (p - t), a
+direction a_work = R a. CSYS/a11,a12,a13,t1,a21,a22,a23,t2,a31,a32,a33,t3 describes a coordinate system whose axes, in
+the work frame, are the columns of (a_ij) = A, and p = A' p_work + t are the coordinates in it.
+
+TRNTYP says what the points are given in. Under TRNTYP/WORLD, which CAM systems write for indexed tables, that is the
+work frame: R = 1, t = 0, and CSYS gives the axis of the tool alone, its third axis. Under TRNTYP/LOCAL it is the system
+of CSYS: R = A.
+
+ROTABL/angle,AAXIS,TABLE,CCLW says that the table has turned the work: the points are in axes that stand still, with the
+tool along +Z, R = rotation by the angle about X (BAXIS: Y, CAXIS: Z), counter-clockwise for CCLW. The angle is in rad or
+in degrees; TLAXIS, the axis of the tool in the work frame, tells which: R z must be that axis.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import InputError
+from chipload.program.apt.records import Record
+
+Floats = NDArray[np.float64]
+
+#: how far the axes of a CSYS may be from unit vectors at right angles
+SKEW = 1e-3
+#: how far R z of ROTABL may be from TLAXIS
+SAME_AXIS = 1e-4
+
+_ABOUT = {"AAXIS": 0, "BAXIS": 1, "CAXIS": 2}
+_Z = (0.0, 0.0, 1.0)
+
+
+def _one() -> Floats:
+    return np.eye(3)
+
+
+def _nought() -> Floats:
+    return np.zeros(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """What CSYS, TRNTYP, ROTABL and TLAXIS say so far.
+
+    Parameters
+    ----------
+    A : (3, 3) float, t : (3,) float [mm], of CSYS
+    given : ``work`` or ``csys``, what points under a CSYS are in; None: not said
+    turned : angles as ROTABL gives them, about X, Y, Z
+    tlaxis : of TLAXIS, a unit vector; None: not said
+    line : of the CSYS
+    """
+
+    A: Floats = field(default_factory=_one)
+    t: Floats = field(default_factory=_nought)
+    given: str | None = None
+    turned: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tlaxis: tuple[float, float, float] | None = None
+    line: int = 0
+
+    def resolved(self) -> tuple[Floats, Floats, Floats]:
+        """R (3, 3), t (3,) [mm] and the tool's axis (3,) in the work frame where a point gives none.
+
+        Raises
+        ------
+        InputError
+            It is not said what the points are in, or ROTABL and TLAXIS do not agree.
+        """
+        if any(self.turned):
+            R = self._turned()
+            return R, np.zeros(3), R @ _Z
+        plain = np.abs(self.A - np.eye(3)).max() < 1e-12 and not self.t.any()
+        if not plain and self.given is None:
+            raise InputError(
+                f"line {self.line}: CSYS without TRNTYP does not say what points are given in: say whether it is the "
+                "work frame or the coordinates of CSYS"
+            )
+        R, t = (self.A, self.t) if self.given == "csys" else (np.eye(3), np.zeros(3))
+        return R, t, self.A @ _Z if self.tlaxis is None else R @ self.tlaxis
+
+    def _turned(self) -> Floats:
+        about = [k for k in range(3) if abs(self.turned[k]) > 1e-9]
+        if self.tlaxis is None or len(about) > 1:
+            raise InputError(
+                f"line {self.line}: ROTABL: must turn one axis and come with TLAXIS, the tool's axis in the work frame"
+            )
+        for scale in (1.0, math.pi / 180.0):
+            R = _rotation(about[0], self.turned[about[0]] * scale) if about else np.eye(3)
+            if np.abs(R @ _Z - self.tlaxis).max() <= SAME_AXIS:
+                return R
+        raise InputError(
+            f"line {self.line}: ROTABL: an angle of {max(self.turned, key=abs):g}, in rad or in degrees, does not bring "
+            f"the tool to TLAXIS {self.tlaxis}: must agree"
+        )
+
+    def csys(self, record: Record, mm: float) -> Coordinates:
+        """After a CSYS record of 12 numbers; ``mm`` in one unit of the text."""
+        m = np.array(record.numbers(12)).reshape(3, 4)
+        A = m[:, :3]
+        if np.abs(A.T @ A - np.eye(3)).max() > SKEW or np.linalg.det(A) < 0.0:
+            raise record.error("its axes must be unit vectors at right angles, right-handed")
+        u, _, v = np.linalg.svd(A)
+        near = u @ v
+        exact = A if np.abs(A - near).max() < 1e-12 else near
+        return replace(self, A=exact, t=m[:, 3] * mm, line=record.line)
+
+    def trntyp(self, record: Record) -> Coordinates:
+        """After a TRNTYP record."""
+        given = {"WORLD": "work", "LOCAL": "csys"}.get(record.args[0] if record.args else "")
+        if given is None or any(record.number(k) for k in range(1, len(record.args))):
+            raise record.error("must be TRNTYP/WORLD or TRNTYP/LOCAL, its numbers 0")
+        return replace(self, given=given)
+
+    def rotabl(self, record: Record) -> Coordinates:
+        """After a ROTABL record; angles are those that the table has then, not added up."""
+        about = [_ABOUT[word] for word in record.args if word in _ABOUT]
+        words = {"TABLE", "CLW", "CCLW", "ATANGL", *_ABOUT}
+        angles = [record.number(k) for k, word in enumerate(record.args) if word not in words]
+        if len(about) != 1 or len(angles) != 1:
+            raise record.error("must name one axis, AAXIS, BAXIS or CAXIS, and one angle")
+        sign = -1.0 if "CLW" in record.args else 1.0
+        turned = tuple(sign * angles[0] if k == about[0] else was for k, was in enumerate(self.turned))
+        return replace(self, turned=turned, line=record.line)
+
+    def tool_axis(self, record: Record) -> Coordinates:
+        """After a TLAXIS record."""
+        return replace(self, tlaxis=unit(record, record.numbers(3))[0])
+
+
+def unit(record: Record, a: tuple[float, ...]) -> tuple[tuple[float, float, float], float]:
+    """A direction as a unit vector, and the length that it had."""
+    length = math.hypot(*a)
+    if length < 1e-6:
+        raise record.error(f"direction {a}: must have a length above 0")
+    return (a[0] / length + 0.0, a[1] / length + 0.0, a[2] / length + 0.0), length
+
+
+def _rotation(about: int, angle: float) -> Floats:
+    c, s = math.cos(angle), math.sin(angle)
+    R = np.eye(3)
+    i, j = (about + 1) % 3, (about + 2) % 3
+    R[i, i], R[i, j], R[j, i], R[j, j] = c, -s, s, c
+    return R

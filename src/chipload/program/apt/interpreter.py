@@ -1,0 +1,318 @@
+"""What the records of CL data do, one after the other.
+
+Notation: ``mm`` in one unit of the text; p, a a point and the tool's axis as the text gives them, w, b the same in the
+work frame. Between records stand the units, the coordinates, a pending RAPID or CIRCLE, and the cycle that cuts holes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import Finding, InputError
+from chipload.program.apt.cycles import FEEDS, Cycle, read_cycle
+from chipload.program.apt.frames import Coordinates, unit
+from chipload.program.apt.records import NOTE, Record
+from chipload.program.apt.track import DEGREES, MINUTE, Point, Track
+from chipload.program.program import DWELL, LINE, RAPID, Program
+from chipload.units import MM_PER, rad_s_from_rpm
+
+Floats = NDArray[np.float64]
+
+#: how far the length of a tool's axis may be from 1 without a finding
+UNIT_AXIS = 1e-3
+#: largest tool number
+LARGEST_TOOL = 99_999_999
+#: how far the radius that a CIRCLE gives may be from its arc [mm] without a finding
+RADIUS_MM = 1e-2
+
+#: records that move the tool or the coordinates in a way that is not read
+REFUSED = frozenset(
+    "TRACUT COPY INDEX TRANS ORIGIN CALL MACRO TERMAC LOOPST LOOPND JUMPTO IF MOVARC ARC GOHOME RETRCT THREAD POCKET "
+    "INDIRV INDIRP TLLFT TLRGT TLON GOLFT GORGT GOFWD GOBACK GOUP GODOWN GO PSIS CLEARP PROBE MIRROR TMARK".split()
+)
+#: records that a Program does not hold
+UNUSED = frozenset(
+    "COOLNT STOP OPSTOP SELECT SELCTL OPSKIP SEQNO MACHIN CUTCOM INTOL OUTTOL TOLER PREFUN AUXFUN CLAMP MODE DISPLY "
+    "TPRINT REMARK LETTER OPFEATEND REWIND".split()
+)
+_SILENT = frozenset({"PARTNO"})
+
+
+class Interpreter:
+    """Modal state between records; ``ended`` is the record that ends the text, once it is read."""
+
+    def __init__(self, track: Track, mm: float, coordinates: Coordinates) -> None:
+        self.track, self.mm, self.ended = track, mm, ""
+        self._units_said = False
+        self._in = coordinates
+        self._resolved: tuple[Floats, Floats, Floats] | None = None
+        self._axis: Point | None = None  # of the text, None: that of the coordinates
+        self._programmed: Point | None = None  # the last point of the text, in the work frame
+        self._rapid = False
+        self._circle: tuple[Point, Point, float | None, Record] | None = None
+        self._cycle: Cycle | None = None
+        self._drilling = False
+        self._sense = -1.0 if track.spindle < 0.0 else 1.0
+        self._speed = abs(track.spindle)
+        self._counts: tuple[str, float | None] = (MINUTE, None)
+        self._do: dict[str, Callable[[Record], None]] = {
+            "GOTO": self._goto,
+            "FROM": self._from,
+            "GODLTA": self._godlta,
+            "CIRCLE": self._circle_record,
+            "RAPID": self._rapid_record,
+            "CYCLE": self._cycle_record,
+            "DELAY": self._delay,
+            "DWELL": self._delay,
+            "FEDRAT": self._fedrat,
+            "SPINDL": self._spindl,
+            "UNITS": self._units,
+            "UNIT": self._units,
+            "LOAD": self._load,
+            "LOADTL": self._load,
+            "TOOLNO": self._load,
+            "TURRET": self._load,
+            "MULTAX": self._multax,
+            "CSYS": self._coordinates,
+            "TRNTYP": self._coordinates,
+            "ROTABL": self._coordinates,
+            "TLAXIS": self._coordinates,
+            "CUTTER": self._cutter,
+            "PPRINT": self._label,
+            "INSERT": self._label,
+            "OPFEATSTART": self._label,
+        }
+
+    def read(self, record: Record) -> None:
+        """One record."""
+        word, track = record.word, self.track
+        if word in self._do:
+            self._do[word](record)
+        elif word in ("FINI", "END"):
+            self.ended = word
+        elif word in REFUSED or (word == "MSYS" and track.at is not None):
+            raise record.error("moves the tool or the coordinates in a way that is not read: write plain GOTO instead")
+        elif word == "CUTCOM" and record.args != ("OFF",):
+            track.note_once("apt-cutcom", record.line, f"{record}: points are taken as of the tool's own tip")
+        elif word in UNUSED:
+            track.note("apt-unused", record.line, str(record))
+        elif word not in _SILENT:
+            track.note("apt-comment" if word == NOTE else "apt-unknown", record.line, str(record))
+
+    def done(self) -> tuple[Program, tuple[Finding, ...]]:
+        """The program."""
+        if self._circle is not None:
+            self.track.note("apt-circle", self._circle[3].line, "CIRCLE without a GOTO after it is left out")
+        if not self.ended:
+            self.track.note("apt-end", 0, "the text does not end with FINI: it may have been cut off")
+        return self.track.program()
+
+    # ------------------------------------------------------------------------------------------------ motions
+
+    def _goto(self, record: Record) -> None:
+        p, b = self._point(record)
+        if self._drilling:
+            self._hole(p, b, record)
+        elif self._circle is not None:
+            self._arc(p, b, record)
+        elif self._rapid:
+            self.track.rapid(p, b, record.line)
+        else:
+            self.track.straight(p, b, record.line)
+        self._rapid, self._programmed = False, p
+
+    def _from(self, record: Record) -> None:
+        p, b = self._point(record)
+        if self.track.at is not None and (self.track.at, self.track.axis) != (p, b):
+            self.track.note("apt-from", record.line, f"{record}: a rapid leads there")
+        self.track.rapid(p, b, record.line)
+        self._programmed = p
+
+    def _godlta(self, record: Record) -> None:
+        d = record.numbers(1, 3)
+        if self._programmed is None or self._drilling or self._circle is not None:
+            raise record.error("must come after a point, and not in a cycle or after CIRCLE")
+        R, _, _ = self._frame()
+        b = self.track.axis
+        step = np.multiply(d[0], b) if len(d) == 1 else R @ d
+        p = _tuple(self._programmed + step * self.mm)
+        (self.track.rapid if self._rapid else self.track.straight)(p, b, record.line)
+        self._rapid, self._programmed = False, p
+
+    def _point(self, record: Record) -> tuple[Point, Point]:
+        """The point and the axis of a GOTO in the work frame."""
+        v = record.numbers(3, 6)
+        if not self._units_said:
+            unit_name = next(key for key, mm in MM_PER.items() if mm == self.mm)
+            self.track.note_once("apt-units", record.line, f"no UNITS before it: lengths are read as {unit_name}")
+        R, t, natural = self._frame()
+        if len(v) == 6:
+            a, length = unit(record, v[3:])
+            if abs(length - 1.0) > UNIT_AXIS:
+                self.track.note(
+                    "apt-axis", record.line, f"the axis has the length {length:.6g}: must be 1; it is scaled"
+                )
+            self._axis = a
+        b = natural if self._axis is None else R @ self._axis
+        return _tuple(R @ (np.multiply(v[:3], self.mm) - t)), _tuple(b / np.linalg.norm(b))
+
+    def _frame(self) -> tuple[Floats, Floats, Floats]:
+        if self._resolved is None:
+            self._resolved = self._in.resolved()
+        return self._resolved
+
+    def _rapid_record(self, record: Record) -> None:
+        self._rapid = True
+
+    def _circle_record(self, record: Record) -> None:
+        v = [record.number(k) for k in range(6)]
+        words = [word for word in record.args[6:] if word in ("CLOCKWISE", "COUNTERCLOCKWISE")]
+        n, _ = unit(record, tuple(v[3:6]))
+        if words == ["CLOCKWISE"]:
+            n = (-n[0] + 0.0, -n[1] + 0.0, -n[2] + 0.0)
+        r = record.number(6) * self.mm if len(record.args) > 6 and record.args[6] not in words else None
+        if len(record.args) - len(words) > 7:
+            self.track.note_once("apt-circle", record.line, f"{record}: only its first seven numbers are read")
+        if self._circle is not None:
+            self.track.note("apt-circle", self._circle[3].line, "CIRCLE without a GOTO after it is left out")
+        self._circle = ((v[0], v[1], v[2]), n, r, record)
+
+    def _arc(self, p: Point, b: Point, record: Record) -> None:
+        assert self._circle is not None
+        c, n, r, circle = self._circle
+        self._circle = None
+        if self._rapid:
+            self.track.note("apt-arc", record.line, "RAPID before an arc: it is cut at the feed in force")
+        R, t, _ = self._frame()
+        centre, normal = _tuple(R @ (np.multiply(c, self.mm) - t)), _tuple(R @ n)
+        self.track.arc(p, b, centre, normal, record.line)
+        off = np.subtract(p, centre)
+        own = float(np.linalg.norm(off - (off @ normal) * np.array(normal)))
+        if r is not None and abs(own - r) > RADIUS_MM:
+            self.track.note("apt-arc", circle.line, f"{circle}: the GOTO after it gives the radius {own:.6g} mm")
+
+    # ------------------------------------------------------------------------------------------------ holes
+
+    def _cycle_record(self, record: Record) -> None:
+        word = record.args[0] if record.args else ""
+        if word in ("OFF", "NOMORE"):
+            self._drilling = False
+        elif word == "ON":
+            self._drilling = self._cycle is not None
+        elif word not in ("INIT", "CLEAR"):
+            self._cycle, self._drilling = read_cycle(record, self.mm), True
+
+    def _hole(self, p: Point, b: Point, record: Record) -> None:
+        """A hole at p against the axis b."""
+        cycle, track, line = self._cycle, self.track, record.line
+        assert cycle is not None
+        if self._circle is not None:
+            raise record.error("CIRCLE before a hole: must not be")
+        at, up = np.array(p), np.array(b)
+        stated, turning = track.stated, track.spindle
+        if cycle.kind == "TAP" and turning == 0.0:
+            raise record.error("a tap and the spindle stands: SPINDL must come before it")
+        if track.at is not None:
+            height = float(np.subtract(track.at, at) @ up)
+            if height < cycle.rtrcto - 1e-9 and track.axis == b:
+                track.rapid(_tuple(track.at + (cycle.rtrcto - height) * up), b, line)
+            height = max(height, cycle.rtrcto)
+        else:
+            height = cycle.rtrcto
+        track.rapid(_tuple(at + height * up), b, line)
+        if cycle.feed is not None:
+            track.stated = cycle.feed
+        for kind, h, value in cycle.steps():
+            w = _tuple(at + h * up)
+            if kind == DWELL:
+                track.dwell(value, line)
+            elif kind == LINE:
+                track.straight(w, b, line)
+            elif kind == RAPID and w != track.at:
+                track.rapid(w, b, line)
+            elif kind != RAPID:
+                track.spindle = value * turning
+        track.stated = stated
+
+    def _delay(self, record: Record) -> None:
+        turns = record.args[1:] == ("REV",)
+        value = record.number(0)
+        if value < 0.0 or (len(record.args) > 1 and not turns):
+            raise record.error("must be a time in s, at least 0, or a number of turns and REV")
+        if turns and self.track.spindle == 0.0:
+            raise record.error("turns of the spindle, which stands: SPINDL must come before it")
+        self.track.dwell(value * math.tau / abs(self.track.spindle) if turns else value, record.line)
+
+    # ------------------------------------------------------------------------------------------------ what holds
+
+    def _fedrat(self, record: Record) -> None:
+        values = [k for k, word in enumerate(record.args) if word not in FEEDS and word != "DPM"]
+        words = [word for word in record.args if word in FEEDS or word == "DPM"]
+        if len(values) != 1 or len(words) > 1:
+            raise record.error(f"must have one number and at most one of {', '.join((*FEEDS, 'DPM'))}")
+        if words:
+            self._counts = (DEGREES, 1.0) if words == ["DPM"] else FEEDS[words[0]]
+        counts, scale = self._counts
+        self.track.stated = (record.number(values[0]) * (self.mm if scale is None else scale), counts)
+
+    def _spindl(self, record: Record) -> None:
+        words = [word for word in record.args if word in ("RPM", "CLW", "CCLW", "ON", "OFF")]
+        values = [k for k, word in enumerate(record.args) if word not in words]
+        if len(values) > 1 or not record.args:
+            raise record.error("must have one number and RPM, CLW or CCLW, or be ON or OFF")
+        if "CLW" in words or "CCLW" in words:
+            self._sense = -1.0 if "CCLW" in words else 1.0
+        if values:
+            self._speed = rad_s_from_rpm(record.number(values[0]))
+            if self._speed < 0.0:
+                raise record.error("must be at least 0: CCLW turns it the other way")
+        self.track.spindle = 0.0 if "OFF" in words else self._sense * self._speed + 0.0
+
+    def _units(self, record: Record) -> None:
+        said = {"MM": "mm", "INCH": "inch", "INCHES": "inch", "CM": "cm"}.get(",".join(record.args))
+        if said is None:
+            raise record.error("must be MM, CM or INCHES")
+        self.mm, self._units_said = MM_PER[said], True
+
+    def _load(self, record: Record) -> None:
+        k = 1 if record.args[:1] == ("TOOL",) else 0
+        value = record.number(k)
+        if not (0.0 <= value <= LARGEST_TOOL and value == int(value)):
+            raise record.error(f"must be a whole number from 0 to {LARGEST_TOOL}")
+        self.track.tool = int(value)
+
+    def _multax(self, record: Record) -> None:
+        if record.args not in ((), ("ON",), ("OFF",)):
+            raise record.error("must be ON or OFF")
+        self._axis = None if record.args == ("OFF",) else self._axis
+
+    def _coordinates(self, record: Record) -> None:
+        self._resolved = self._axis = None
+        if record.word == "CSYS":
+            self._in = self._in.csys(record, self.mm)
+        elif record.word == "TRNTYP":
+            self._in = self._in.trntyp(record)
+        elif record.word == "ROTABL":
+            self._in = self._in.rotabl(record)
+        else:
+            self._in = self._in.tool_axis(record)
+
+    def _cutter(self, record: Record) -> None:
+        if not 1 <= len(record.numbers()) <= 7:
+            raise record.error("must have at most 7 numbers")
+
+    def _label(self, record: Record) -> None:
+        text = record.args[0]
+        if record.word == "INSERT":
+            self.track.note("apt-unused", record.line, str(record))
+            if text.startswith(("STOP", "Stock Size")):
+                return
+        self.track.label = text
+
+
+def _tuple(v: Floats) -> Point:
+    return (float(v[0]), float(v[1]), float(v[2]))

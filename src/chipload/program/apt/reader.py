@@ -1,0 +1,88 @@
+"""CL data to a Program.
+
+Notation: a record is WORD/arg,arg,... GOTO/x,y,z[,i,j,k] moves the tip straight, after CIRCLE/x,y,z,i,j,k[,r] on an arc
+counter-clockwise about (i, j, k) through (x, y, z); ends over one another are a full turn. RAPID holds for one motion,
+FEDRAT, SPINDL and the axis of the tool until they are said anew; a FEDRAT without a unit counts as the one before, the
+first as lengths of the text in a minute. SPINDL without CLW or CCLW turns as before, first CLW. A GOTO of three numbers
+keeps the axis; MULTAX/OFF, CSYS and TLAXIS set it as :mod:`~chipload.program.apt.frames` says, which tells in what
+coordinates points are. :mod:`~chipload.program.apt.cycles` tells how holes are cut. PPRINT, INSERT and OPFEATSTART name
+what the rows after them belong to.
+
+CUTCOM changes nothing: points are of the tool's own tip. What a Program cannot hold is a finding with its line:
+``apt-unused`` (coolant, stops, inserted text), ``apt-unknown`` (a record that is not known). A record that would move
+the tool or change what coordinates mean, and is not read, is refused.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Literal
+
+from chipload.errors import Finding, InputError
+from chipload.program.apt.frames import Coordinates
+from chipload.program.apt.interpreter import Interpreter
+from chipload.program.apt.records import LONGEST_TEXT, records
+from chipload.program.apt.track import Track
+from chipload.program.program import Program
+from chipload.units import MM_PER
+
+
+def read_apt(
+    text: str,
+    *,
+    name: str = "program",
+    units: Literal["mm", "inch"] = "mm",
+    feed: float | None = None,
+    spindle: float = 0.0,
+    tool: int = 0,
+    csys: Literal["work", "csys"] | None = None,
+) -> tuple[Program, tuple[Finding, ...]]:
+    r"""The motions of CL data in the work frame, and what was noticed.
+
+    Parameters
+    ----------
+    text : of the CL data
+    name : for messages, and of the rows before any PPRINT
+    units : of lengths before the text says UNITS
+    feed : [mm/s] of cuts before the text says FEDRAT; None: such a cut is refused
+    spindle, tool : [rad/s] and number before the text says SPINDL and LOAD
+    csys : what points under a CSYS are given in before the text says TRNTYP; None: such a point is refused
+
+    Raises
+    ------
+    InputError
+        A record is malformed, moves the tool in a way that is not read, or leaves a feed, a unit or coordinates open;
+        the message gives the line.
+
+    >>> text = "UNITS/MM\nRAPID\nGOTO/0,0,5\nFEDRAT/600,MMPM\nGOTO/0,0,0\nCIRCLE/5,0,0,0,0,-1\nGOTO/10,0,0\nFINI"
+    >>> program, findings = read_apt(text)
+    >>> program.motion.tolist(), program.p_work[-1].tolist(), float(program.feed[-1]), findings
+    ([0, 1, 2], [10.0, 0.0, 0.0], 10.0, ())
+    """
+    if units not in ("mm", "inch"):
+        raise InputError(f"units = {units!r}: must be mm or inch")
+    if csys not in (None, "work", "csys"):
+        raise InputError(f"csys = {csys!r}: must be work or csys")
+    if feed is not None and not 0.0 < feed < math.inf:
+        raise InputError(f"feed = {feed:g} mm/s: must be above 0")
+    reader = Interpreter(Track(name, feed, spindle, tool, name), MM_PER[units], Coordinates(given=csys))
+    for record in records(text):
+        if reader.ended:
+            reader.track.note(
+                "apt-after-end", record.line, f"{record} and all after it is left out: behind {reader.ended}"
+            )
+            break
+        reader.read(record)
+    return reader.done()
+
+
+def read_apt_file(path: Path, **options: object) -> tuple[Program, tuple[Finding, ...]]:
+    """As :func:`read_apt`, of a file; its name is that of the program."""
+    try:
+        if path.stat().st_size > LONGEST_TEXT:
+            raise InputError(f"{path.name}: larger than {LONGEST_TEXT} bytes: split it")
+        text = path.read_bytes().decode("utf-8", "replace")
+    except OSError as err:
+        raise InputError(f"{path.name}: {err.strerror}: must be a readable file") from None
+    return read_apt(text, **{"name": path.stem, **options})  # type: ignore[arg-type]
