@@ -3,8 +3,9 @@
 Notation: R [mm] cutter radius; a **capsule** is the disc of radius R swept along an axis from A to B. The plane is
 cut into square cells; ``head[cell]`` is FULL (no capsule reaches it), EMPTY (it is wholly cleared) or the first entry
 of a chain ``link[:, 0]`` (next entry or -1), ``link[:, 1]`` (capsule). ``grid`` is
-``[x0, y0, h, nx, ny, reach, piece]``: origin, cell side, cells each way, the radius of the disc about a cell's
-centre that its status speaks for, and the angle [rad] of the pieces that a rim is looked at in.
+``[x0, y0, h, nx, ny, reach, piece, room]``: origin, cell side, cells each way, the radius of the disc about a cell's
+centre that its status speaks for, the angle [rad] of the pieces that a rim is looked at in, and the most entries that
+one capsule makes. Entries never change, so that the heads alone say what the stock is.
 """
 
 from __future__ import annotations
@@ -226,8 +227,8 @@ def keep_fine(px, py, hd, at, link, axis, R, keep):
 
 
 @njit(cache=True, nogil=True)
-def prune(cell, grid, head, link, axis, R):
-    """Keep of a cell's chain what its cleared part needs; returns how many stay, 0 where the cell is cleared.
+def prune(cell, grid, head, link, used, axis, R):
+    """A new chain of a cell with what its cleared part needs; returns the number of chain entries used.
 
     The square about what the cell speaks for is cut into parts. A part inside one capsule needs that one only; in any
     other part every capsule that reaches it stays. Nothing is forgotten of the union. O(capsules x parts).
@@ -241,6 +242,8 @@ def prune(cell, grid, head, link, axis, R):
     while at >= 0:
         n += 1
         at = link[at, 0]
+    if used + n + int(grid[7]) > len(link):
+        return used
     keep = np.zeros(n, dtype=np.bool_)
     side = 2.0 * reach / PARTS
     hd = side * math.sqrt(0.5)
@@ -254,23 +257,19 @@ def prune(cell, grid, head, link, axis, R):
                 whole = keep_fine(px, py, hd, first, link, axis, R, keep) and whole
     if whole:
         head[cell] = EMPTY
-        return 0
+        return used
     at = first
-    last = -1
+    head[cell] = used
     k = 0
-    kept = 0
     while at >= 0:
         if keep[k]:
-            if last < 0:
-                head[cell] = at
-            else:
-                link[last, 0] = at
-            last = at
-            kept += 1
+            link[used, 0] = used + 1
+            link[used, 1] = link[at, 1]
+            used += 1
         at = link[at, 0]
         k += 1
-    link[last, 0] = -1
-    return kept
+    link[used - 1, 0] = -1
+    return used
 
 
 @njit(cache=True, nogil=True)
@@ -301,5 +300,7 @@ def remove(q, R, grid, head, count, link, used, axis):
                 used += 1
                 count[cell] -= 1
                 if count[cell] <= 0:
-                    count[cell] = max(MORE, prune(cell, grid, head, link, axis, R))
+                    before = used
+                    used = prune(cell, grid, head, link, used, axis, R)
+                    count[cell] = max(MORE, used - before)
     return used

@@ -18,6 +18,7 @@ from chipload.errors import InputError
 from chipload.stock import _kernels
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 #: pieces that half a rim is looked at in
 PIECES = 48
@@ -65,7 +66,9 @@ class PlanarStock:
         nx, ny = math.ceil(wide / h), math.ceil(high / h)
         piece = math.pi / PIECES
         reach = h * math.sqrt(0.5) + 0.5 * radius * piece
-        self.grid: Floats = np.array([x0 - margin, y0 - margin, h, nx, ny, reach, piece])
+        side = (2.5 * radius + 2.0 * reach) / h + 2.0
+        room = math.ceil(side * ((2.0 * radius + 2.0 * reach) / h + 2.0))
+        self.grid: Floats = np.array([x0 - margin, y0 - margin, h, nx, ny, reach, piece, room])
         self.head = np.full(nx * ny, _kernels.FULL, dtype=np.int64)
         self.count = np.full(nx * ny, _kernels.MORE, dtype=np.int64)
         self.link = np.zeros((1 << 16, 2), dtype=np.int64)
@@ -78,18 +81,19 @@ class PlanarStock:
         """Make room for so many more capsules."""
         if self.capsules + capsules > len(self.axis):
             self.axis = np.vstack([self.axis, np.zeros((max(capsules, len(self.axis)), 4))])
-        need = self.used + capsules * self.links_each
+        need = self.used + (2 * capsules + 2) * int(self.grid[7])
         if need > len(self.link):
             self.link = np.vstack(
                 [self.link, np.zeros((max(need - len(self.link), len(self.link)), 2), dtype=np.int64)]
             )
 
-    @property
-    def links_each(self) -> int:
-        """Most cells that one capsule not longer than R / 2 can enter."""
-        h = float(self.grid[2])
-        side = (2.5 * self.radius + 2.0 * float(self.grid[5])) / h + 2.0
-        return math.ceil(side * ((2.0 * self.radius + 2.0 * float(self.grid[5])) / h + 2.0))
+    def state(self) -> tuple[Ints, Ints, int, int]:
+        """What :meth:`restore` needs to take back all that is removed from now on."""
+        return self.head.copy(), self.count.copy(), self.capsules, self.used
+
+    def restore(self, state: tuple[Ints, Ints, int, int]) -> None:
+        """The stock as it was: chain entries never change, so that the heads of the cells are enough."""
+        self.head[:], self.count[:], self.capsules, self.used = state
 
     def remove(self, axes: ArrayLike) -> None:
         """Take away the capsules about ``axes`` (n, 4) [mm], rows ``ax, ay, bx, by``."""

@@ -198,7 +198,7 @@ def turn(ox, oy, th, guess, l, limit, right, left, full, slack, r, R, grid, head
 
 
 @njit(cache=True, nogil=True)
-def run_pass(state, step, limit, right, left, lost, R, touch, out, room, capsule, used, grid, head, count, link, axis,
+def run_pass(state, step, limit, right, left, lost, R, touch, out, capsule, used, grid, head, count, link, axis,
              flag, edges, rows, row_edges):  # fmt: skip
     """Steps until the pass ends or ``out`` is full.
 
@@ -212,7 +212,7 @@ def run_pass(state, step, limit, right, left, lost, R, touch, out, room, capsule
     x, y, th, guess, idle = state[0], state[1], state[2], state[3], state[4]
     n = 0
     reason = RUNNING
-    while n < len(out) and capsule < len(axis) and used + room < len(link):
+    while n < len(out) and capsule < len(axis) and used + 2.0 * grid[7] < len(link):
         found = False
         l = step
         phi = 0.0

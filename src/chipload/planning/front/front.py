@@ -262,11 +262,18 @@ class _Run:
     def _pass_from(self, k: int) -> bool:
         """One pass from the start k; whether it took enough for the start to be tried again."""
         for x, y, heading in self.starts.ways(k):
+            before = self.stock.state()
             rows, headings, reason, at = self._steps(x, y, heading)
-            cuts = np.flatnonzero(rows[:, 2] > 0.0)  # all that changed the stock
-            if len(cuts) == 0:
+            cuts = np.flatnonzero(rows[:, 5] > 1e-4 * self.radius * self.step)
+            if len(cuts) == 0 or rows[:, 5].sum() < 1e-5 * self.radius**2:
+                self.stock.restore(before)
                 continue
-            rows, headings = rows[: cuts[-1] + 1], headings[: cuts[-1] + 1]
+            end = cuts[-1] + 1
+            if (rows[end:, 2] > 0.0).any():
+                self.stock.restore(before)
+                places = np.vstack([[[x, y]], rows[:end, 0:2]])
+                self.stock.remove(np.hstack([places[:-1], places[1:]])[rows[:end, 2] > 0.0])
+            rows, headings = rows[:end], headings[:end]
             self._go(np.array([x, y]))
             self.passes += 1
             self.add(rows[:, 0:2], CUT, rows[:, 3], rows[:, 2], rows[:, 4])
@@ -301,7 +308,7 @@ class _Run:
             s.reserve(CHUNK + 8)
             out = np.zeros((CHUNK, _kernels.COLUMNS))
             n, reason, s.capsules, s.used = _kernels.run_pass(
-                state, self.step, self.limit, right, TURN_LEFT, IDLE * R, R, TOUCH, out, s.links_each, s.capsules,
+                state, self.step, self.limit, right, TURN_LEFT, IDLE * R, R, TOUCH, out, s.capsules,
                 s.used, s.grid, s.head, s.count, s.link, s.axis, *self.reach.arguments(),
             )  # fmt: skip
             parts.append(out[:n])
