@@ -4,11 +4,11 @@ Notation: a hole is at a point of the surface, its depth d [mm] counted from the
 rtrcto h [mm] are counted from there along it. A step is ``(kind, height, value)``: RAPID or LINE to a height above the
 surface (a depth is negative), DWELL of a time [s], SPIN to the sense of the spindle, 1 as it was or -1 reversed.
 
-CYCLE/kind,word,number,... with FEDTO or DEPTH d (the sign does not count), RAPTO or CLEAR c, RTRCTO or RETURN h (AUTO or
-none: h = c), a feed MMPM, MMPR, IPM, IPR, PERMIN or PERREV, DWELL in seconds, pecks STEP, or 1STPECK and then SUBPECK.
-Each GOTO until CYCLE/OFF is a hole. The tool rises to h if it is lower, moves over the hole, goes in as told and ends
-at h. A peck of DEEP leaves the hole up to c and comes back to ``RETURN_MM`` above where it was; one of BRKCHP goes up by
-``RETURN_MM``. Where RAPTO comes with CLEAR, it leads from CLEAR on towards the hole.
+CYCLE/kind,word,number,... with FEDTO or DEPTH d (the sign does not count), RAPTO or CLEAR c, RTRCTO or RETURN h (AUTO
+or none: h = c), a feed MMPM, MMPR, IPM, IPR, PERMIN or PERREV, DWELL in seconds, pecks STEP, or 1STPECK and then
+SUBPECK. Each GOTO until CYCLE/OFF is a hole. The tool rises to h if it is lower, moves over the hole, goes in as told
+and ends at h. A peck of DEEP leaves the hole up to c and comes back to ``RETURN_MM`` above where it was; one of BRKCHP
+goes up by ``RETURN_MM``. Where RAPTO comes with CLEAR, it leads from CLEAR on towards the hole.
 """
 
 from __future__ import annotations

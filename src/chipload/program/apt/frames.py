@@ -8,9 +8,9 @@ TRNTYP says what the points are given in. Under TRNTYP/WORLD, which CAM systems 
 work frame: R = 1, t = 0, and CSYS gives the axis of the tool alone, its third axis. Under TRNTYP/LOCAL it is the system
 of CSYS: R = A.
 
-ROTABL/angle,AAXIS,TABLE,CCLW says that the table has turned the work: the points are in axes that stand still, with the
-tool along +Z, R = rotation by the angle about X (BAXIS: Y, CAXIS: Z), counter-clockwise for CCLW. The angle is in rad or
-in degrees; TLAXIS, the axis of the tool in the work frame, tells which: R z must be that axis.
+ROTABL/angle,AAXIS,TABLE,CCLW says that the table has turned the work: the points are in axes that stand still, with
+the tool along +Z, R = rotation by the angle about X (BAXIS: Y, CAXIS: Z), counter-clockwise for CCLW. The angle is in
+rad or in degrees; TLAXIS, the axis of the tool in the work frame, tells which: R z must be that axis.
 """
 
 from __future__ import annotations
@@ -74,14 +74,28 @@ class Coordinates:
         if any(self.turned):
             R = self._turned()
             return R, np.zeros(3), R @ _Z
-        plain = np.abs(self.A - np.eye(3)).max() < 1e-12 and not self.t.any()
-        if not plain and self.given is None:
+        if not self._plain and self.given is None:
             raise InputError(
                 f"line {self.line}: CSYS without TRNTYP does not say what points are given in: say whether it is the "
                 "work frame or the coordinates of CSYS"
             )
         R, t = (self.A, self.t) if self.given == "csys" else (np.eye(3), np.zeros(3))
         return R, t, self.A @ _Z if self.tlaxis is None else R @ self.tlaxis
+
+    @property
+    def note(self) -> str:
+        """How points are read where a CSYS or ROTABL is in force, else empty."""
+        if any(self.turned):
+            return "ROTABL: points are turned back with the table into the work frame"
+        if self._plain:
+            return ""
+        if self.given == "csys":
+            return "CSYS: points are brought from its coordinates into the work frame"
+        return "CSYS: points stand as they are, given in the work frame"
+
+    @property
+    def _plain(self) -> bool:
+        return bool(np.abs(self.A - np.eye(3)).max() < 1e-12) and not self.t.any()
 
     def _turned(self) -> Floats:
         about = [k for k in range(3) if abs(self.turned[k]) > 1e-9]
@@ -94,8 +108,8 @@ class Coordinates:
             if np.abs(R @ _Z - self.tlaxis).max() <= SAME_AXIS:
                 return R
         raise InputError(
-            f"line {self.line}: ROTABL: an angle of {max(self.turned, key=abs):g}, in rad or in degrees, does not bring "
-            f"the tool to TLAXIS {self.tlaxis}: must agree"
+            f"line {self.line}: ROTABL: an angle of {max(self.turned, key=abs):g}, in rad or in degrees, does not "
+            f"bring the tool to TLAXIS {self.tlaxis}: must agree"
         )
 
     def csys(self, record: Record, mm: float) -> Coordinates:
@@ -124,8 +138,9 @@ class Coordinates:
         if len(about) != 1 or len(angles) != 1:
             raise record.error("must name one axis, AAXIS, BAXIS or CAXIS, and one angle")
         sign = -1.0 if "CLW" in record.args else 1.0
-        turned = tuple(sign * angles[0] if k == about[0] else was for k, was in enumerate(self.turned))
-        return replace(self, turned=turned, line=record.line)
+        turned = list(self.turned)
+        turned[about[0]] = sign * angles[0]
+        return replace(self, turned=(turned[0], turned[1], turned[2]), line=record.line)
 
     def tool_axis(self, record: Record) -> Coordinates:
         """After a TLAXIS record."""

@@ -7,12 +7,13 @@ work frame. Between records stand the units, the coordinates, a pending RAPID or
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.errors import Finding, InputError
+from chipload.errors import Finding
 from chipload.program.apt.cycles import FEEDS, Cycle, read_cycle
 from chipload.program.apt.frames import Coordinates, unit
 from chipload.program.apt.records import NOTE, Record
@@ -30,14 +31,14 @@ LARGEST_TOOL = 99_999_999
 RADIUS_MM = 1e-2
 
 #: records that move the tool or the coordinates in a way that is not read
-REFUSED = frozenset(
-    "TRACUT COPY INDEX TRANS ORIGIN CALL MACRO TERMAC LOOPST LOOPND JUMPTO IF MOVARC ARC GOHOME RETRCT THREAD POCKET "
-    "INDIRV INDIRP TLLFT TLRGT TLON GOLFT GORGT GOFWD GOBACK GOUP GODOWN GO PSIS CLEARP PROBE MIRROR TMARK".split()
+REFUSED = re.compile(
+    "TRACUT|COPY|INDEX|TRANS|ORIGIN|CALL|MACRO|TERMAC|LOOPST|LOOPND|JUMPTO|IF|MOVARC|ARC|GOHOME|RETRCT|THREAD|POCKET|"
+    "INDIRV|INDIRP|TLLFT|TLRGT|TLON|GOLFT|GORGT|GOFWD|GOBACK|GOUP|GODOWN|GO|PSIS|CLEARP|PROBE|MIRROR|TMARK"
 )
 #: records that a Program does not hold
-UNUSED = frozenset(
-    "COOLNT STOP OPSTOP SELECT SELCTL OPSKIP SEQNO MACHIN CUTCOM INTOL OUTTOL TOLER PREFUN AUXFUN CLAMP MODE DISPLY "
-    "TPRINT REMARK LETTER OPFEATEND REWIND".split()
+UNUSED = re.compile(
+    "COOLNT|STOP|OPSTOP|SELECT|SELCTL|OPSKIP|SEQNO|MACHIN|CUTCOM|INTOL|OUTTOL|TOLER|PREFUN|AUXFUN|CLAMP|MODE|DISPLY|"
+    "TPRINT|REMARK|LETTER|OPFEATEND|REWIND"
 )
 _SILENT = frozenset({"PARTNO"})
 
@@ -94,11 +95,11 @@ class Interpreter:
             self._do[word](record)
         elif word in ("FINI", "END"):
             self.ended = word
-        elif word in REFUSED or (word == "MSYS" and track.at is not None):
+        elif REFUSED.fullmatch(word) or (word == "MSYS" and track.at is not None):
             raise record.error("moves the tool or the coordinates in a way that is not read: write plain GOTO instead")
         elif word == "CUTCOM" and record.args != ("OFF",):
             track.note_once("apt-cutcom", record.line, f"{record}: points are taken as of the tool's own tip")
-        elif word in UNUSED:
+        elif UNUSED.fullmatch(word):
             track.note("apt-unused", record.line, str(record))
         elif word not in _SILENT:
             track.note("apt-comment" if word == NOTE else "apt-unknown", record.line, str(record))
@@ -150,6 +151,8 @@ class Interpreter:
             unit_name = next(key for key, mm in MM_PER.items() if mm == self.mm)
             self.track.note_once("apt-units", record.line, f"no UNITS before it: lengths are read as {unit_name}")
         R, t, natural = self._frame()
+        if self._in.note:
+            self.track.note_once("apt-coordinates", record.line, self._in.note)
         if len(v) == 6:
             a, length = unit(record, v[3:])
             if abs(length - 1.0) > UNIT_AXIS:

@@ -9,7 +9,8 @@ coordinates points are. :mod:`~chipload.program.apt.cycles` tells how holes are 
 what the rows after them belong to.
 
 CUTCOM changes nothing: points are of the tool's own tip. What a Program cannot hold is a finding with its line:
-``apt-unused`` (coolant, stops, inserted text), ``apt-unknown`` (a record that is not known). A record that would move
+``apt-unused`` (coolant, stops, inserted text), ``apt-unknown`` (a record that is not known), ``apt-comment`` (data of a
+CAM system in a comment). A record that would move
 the tool or change what coordinates mean, and is not read, is refused.
 """
 

@@ -75,14 +75,14 @@ def number(text: str) -> float | None:
 
 
 def records(text: str) -> Iterator[Record]:
-    """The records of a text, in order.
+    r"""The records of a text, in order.
 
     Raises
     ------
     InputError
         The text or a record is too long.
 
-    >>> [str(one) for one in records("GOTO / 1., 2., $\\n 3. $$ top\\nPARTNO a, b\\n$$ nothing\\nrapid")]
+    >>> [str(one) for one in records("GOTO / 1., 2., $\n 3. $$ top\nPARTNO a, b\n$$ nothing\nrapid")]
     ['GOTO/1.,2.,3.', 'PARTNO/a, b', 'RAPID']
     """
     if len(text) > LONGEST_TEXT:

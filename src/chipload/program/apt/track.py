@@ -1,7 +1,8 @@
 """The rows of a Program as CL data is read: what holds until it is said anew, and the motions.
 
-Notation: all in the work frame, mm, s and rad. ``stated`` is the feed as the text gives it, a number and what it counts:
-mm in a minute or in a turn of the spindle, or degrees in a minute (DPM) for the tool's axis where the tip stands.
+Notation: all in the work frame, mm, s and rad. ``stated`` is the feed as the text gives it, a number and what it
+counts: mm in a minute or in a turn of the spindle, or degrees in a minute (DPM) for the tool's axis where the tip
+stands.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """A program as APT cutter location data.
 
 Notation: GOTO/x,y,z[,i,j,k] the tip and, under MULTAX, the axis; CUTTER/d,r,e,f,alpha,beta,h in mm and degrees.
-An arc is a CIRCLE/x,y,z,0,0,s record before its end, as CAM systems write it: centre at the height of the arc, s = +1
-counter-clockwise seen from +Z, -1 clockwise, and the GOTO to its end; a full turn is two of them. A helical arc has no
-such record: it is written as GOTO whose chords leave it by at most ``chord_mm``.
+An arc is a CIRCLE/x,y,z,i,j,k record before the GOTO to its end, as CAM systems write it: the centre at the height of
+the end along the normal, the arc counter-clockwise about (i, j, k). Arcs of more than 3/4 of a turn are several of
+them. A helical arc has no such record: it is written as GOTO whose chords leave it by at most ``chord_mm``. Where the
+tip stands and the axis turns, the feed is in degrees a minute (DPM).
 """
 
 from __future__ import annotations
@@ -15,9 +16,15 @@ import numpy as np
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
-from chipload.program.motions import is_arc, radii, starts, straightened, sweeps
+from chipload.program.build import LONGEST_ARC
+from chipload.program.motions import is_arc, lengths, radii, rises, spans, starts, straightened, sweeps
 from chipload.program.program import DWELL, RAPID, Program
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
+
+#: an arc that moves further along its normal [mm] is helical
+HELIX_MM = 1e-9
+#: an arc whose ends are nearer [mm] than this is a GOTO: rounded, they could be one point, and that a full turn
+SHORT_MM = 5e-6
 
 
 def write_apt(
@@ -47,12 +54,14 @@ def write_apt(
     tilted = bool((np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > 1e-12).any())
     if tilted:
         out.append("MULTAX/ON")
-    helical = np.abs(program.p_work[:, 2] - starts(program)[:, 2]) > 1e-9
+    helical = np.abs(rises(program)) > HELIX_MM
     r = radii(program)
     turn = 2.0 * np.arccos(1.0 - np.minimum(chord_mm / np.where(r > 0.0, r, math.inf), 1.0))
     program = straightened(program, np.where(helical & (r > 0.0), turn, math.inf))
     p0, sweep = starts(program), sweeps(program)
-    arc = is_arc(program) & (sweep != 0.0)
+    short = (np.linalg.norm(program.p_work - p0, axis=1) < SHORT_MM) & (np.abs(sweep) < 1.0)
+    arc = is_arc(program) & (sweep != 0.0) & ~short
+    stands = (spans(program) != lengths(program)) | (lengths(program) == 0.0)
     tool: int | None = None
     spindle, feed, label = 0.0, "", -1
     for k in range(len(program)):
@@ -74,23 +83,28 @@ def write_apt(
         if program.motion[k] == RAPID:
             out.append("RAPID")
         else:
-            text = _number(mm_min_from_mm_s(program.feed[k]))
+            text = f"{_number(mm_min_from_mm_s(program.feed[k]))},MMPM"
+            if stands[k]:
+                text = f"{_number(60.0 * math.degrees(program.feed[k]))},DPM"
             if text != feed:
-                out.append(f"FEDRAT/{text},MMPM")
+                out.append(f"FEDRAT/{text}")
                 feed = text
         end = program.p_work[k]
         axis = f",{_numbers(program.axis[k], 9)}" if tilted else ""
         if not arc[k]:
             out.append(f"GOTO/{_numbers(end)}{axis}")
             continue
-        centre = _numbers((*program.centre[k, 0:2], end[2]))
-        sense = "1" if sweep[k] > 0.0 else "-1"
-        if abs(sweep[k]) > 1.5 * math.pi:
-            a = 0.5 * sweep[k]
-            v = p0[k, 0:2] - program.centre[k, 0:2]
-            half = program.centre[k, 0:2] + math.cos(a) * v + math.sin(a) * np.array([-v[1], v[0]])
-            out += [f"CIRCLE/{centre},0,0,{sense}", f"GOTO/{_numbers((*half, end[2]))}{axis}"]
-        out += [f"CIRCLE/{centre},0,0,{sense}", f"GOTO/{_numbers(end)}{axis}"]
+        n = program.normal[k]
+        centre = program.centre[k] + ((end - program.centre[k]) @ n) * n
+        circle = f"CIRCLE/{_numbers(centre)},{_numbers(math.copysign(1.0, sweep[k]) * n, 9)}"
+        v = p0[k] - program.centre[k]
+        v = v - (v @ n) * n
+        pieces = math.ceil(abs(sweep[k]) / math.pi - 1e-9) if abs(sweep[k]) > LONGEST_ARC else 1
+        for piece in range(1, pieces):
+            a = sweep[k] * piece / pieces
+            between = centre + math.cos(a) * v + math.sin(a) * np.cross(n, v)
+            out += [circle, f"GOTO/{_numbers(between)}{axis}"]
+        out += [circle, f"GOTO/{_numbers(end)}{axis}"]
     out += ["SPINDL/OFF", "FINI"]
     return "\n".join(out) + "\n"
 
