@@ -20,7 +20,7 @@ from chipload.program.to_axes import to_axes
 #: endings of CL data and of NC text that can be written
 CL_DATA, NC_TEXT = (".apt", ".cls"), (".ngc", ".nc", ".tap", ".cnc", ".gcode")
 #: findings whose words go along
-CARRIED = ("nc-coolant", "nc-stop", "nc-output", "nc-user-code", "nc-unknown-word", "apt-unknown", "heidenhain-unknown")
+CARRIED = ("nc-coolant", "nc-stop", "nc-output", "nc-user-code", "nc-unknown-word", "apt-unknown")
 _WORDS = {"nc-coolant", "nc-stop"}
 
 
@@ -54,7 +54,7 @@ def convert_program(
     ----------
     noticed : by the reader: what goes along
     ending : of the file: ``.ngc`` and others for NC text, ``.apt`` for CL data
-    cutters : by number; CL data state those that are known
+    cutters : by number, of CL data; None: not known
     tool_lengths : [mm] by number, on a machine with rotary axes
     tcp : whether the controller is told the tip while rotary axes move
 
@@ -65,7 +65,7 @@ def convert_program(
     """
     ending = ending.lower()
     if ending in CL_DATA:
-        return write_apt(program, cutters or {}, title=title, verified=False), ()
+        return write_apt(program, cutters, title=title, verified=False), ()
     if ending not in NC_TEXT:
         known = " ".join((*NC_TEXT, *CL_DATA))
         raise InputError(f"the ending {ending or 'none'} cannot be written: must be one of {known}")

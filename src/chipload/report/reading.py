@@ -176,7 +176,7 @@ def scene_bytes(read: Read) -> bytes:
 
 def program_files(read: Read) -> dict[str, bytes]:
     """CL data of the program."""
-    text = write_apt(read.reading.program, {}, title=f"{read.title}, {read.name}", verified=False)
+    text = write_apt(read.reading.program, None, title=f"{read.title}, {read.name}", verified=False)
     return {"0-program.apt": text.encode("ascii")}
 
 

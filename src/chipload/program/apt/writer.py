@@ -29,7 +29,7 @@ SHORT_MM = 5e-6
 
 def write_apt(
     program: Program,
-    cutters: Mapping[int, Cutter],
+    cutters: Mapping[int, Cutter] | None,
     *,
     title: str,
     verified: bool,
@@ -39,7 +39,7 @@ def write_apt(
 
     Parameters
     ----------
-    cutters : cutter of each tool number
+    cutters : cutter of each tool number; None: not known, no CUTTER is written
     title : of the part, in PARTNO
     verified : whether an independent simulation has found the program good
     chord_mm : greatest distance of a helical arc from its chords [mm], > 0
@@ -67,9 +67,11 @@ def write_apt(
     for k in range(len(program)):
         if program.tool[k] != tool:
             tool = int(program.tool[k])
-            if tool not in cutters:
+            if cutters is not None and tool not in cutters:
                 raise InputError(f"program row {k}: tool {tool} has no cutter: give its [[cutter]]")
-            out += [cutter_statement(cutters[tool]), f"LOADTL/{tool}"]
+            if cutters is not None:
+                out.append(cutter_statement(cutters[tool]))
+            out.append(f"LOADTL/{tool}")
         if program.spindle[k] != spindle:
             spindle = float(program.spindle[k])
             sense = "CLW" if spindle > 0.0 else "CCLW"

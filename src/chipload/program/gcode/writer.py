@@ -211,9 +211,9 @@ def _blocks(commands: Commands, machine: Machine, kept: Sequence[tuple[int, str]
                 yield _tcp(machine, False, 0, k)
                 tcp = False
             tool = tools[k]
-            if tool > 0:
+            if tools[k] > 0:
                 yield f"T{tool} M6"
-            if tool > 0 and not fanuc:
+            if tools[k] > 0 and not fanuc:
                 yield f"G43 H{tool}"
             at = [""] * 9
         if numbers[commands.frame[k]] != number:
@@ -237,7 +237,7 @@ def _blocks(commands: Commands, machine: Machine, kept: Sequence[tuple[int, str]
             # where the machine stands is not known: over the start first, then down
             mode = "G0"
             yield " ".join([mode, *(f"{LETTERS[c]}{to[c]}" for c in linear)])
-            yield f"G43 H{tool} Z{to[2]}" if fanuc and tool > 0 and not tcp else f"Z{to[2]}"
+            yield f"G43 H{tool} Z{to[2]}" if fanuc and tools[k] > 0 and not tcp else f"Z{to[2]}"
             at = to
             continue
         if written.arc[k]:
