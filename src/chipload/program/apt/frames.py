@@ -10,7 +10,7 @@ of CSYS: R = A.
 
 ROTABL/angle,AAXIS,TABLE,CCLW says that the table has turned the work: the points are in axes that stand still, with
 the tool along +Z, R = rotation by the angle about X (BAXIS: Y, CAXIS: Z), counter-clockwise for CCLW. The angle is in
-rad or in degrees; TLAXIS, the axis of the tool in the work frame, tells which: R z must be that axis.
+rad or in degrees; TLAXIS, the axis of the tool in the work frame, tells which, and has more digits: R z is that axis.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 
 #: how far the axes of a CSYS may be from unit vectors at right angles
 SKEW = 1e-3
-#: how far R z of ROTABL may be from TLAXIS
+#: how far R z of ROTABL may be from TLAXIS [rad]
 SAME_AXIS = 1e-4
 
 _ABOUT = {"AAXIS": 0, "BAXIS": 1, "CAXIS": 2}
@@ -103,14 +103,18 @@ class Coordinates:
             raise InputError(
                 f"line {self.line}: ROTABL: must turn one axis and come with TLAXIS, the tool's axis in the work frame"
             )
-        for scale in (1.0, math.pi / 180.0):
-            R = _rotation(about[0], self.turned[about[0]] * scale) if about else np.eye(3)
-            if np.abs(R @ _Z - self.tlaxis).max() <= SAME_AXIS:
-                return R
-        raise InputError(
-            f"line {self.line}: ROTABL: an angle of {max(self.turned, key=abs):g}, in rad or in degrees, does not "
-            f"bring the tool to TLAXIS {self.tlaxis}: must agree"
-        )
+        if not about:
+            return np.eye(3)
+        k, said = about[0], self.turned[about[0]]
+        u = self.tlaxis
+        own = (math.atan2(-u[1], u[2]), math.atan2(u[0], u[2]), 0.0)[k]
+        near = [abs(math.remainder(said * scale - own, math.tau)) < SAME_AXIS for scale in (1.0, math.pi / 180.0)]
+        if sum(near) != 1 or abs(u[k]) > SAME_AXIS:
+            raise InputError(
+                f"line {self.line}: ROTABL: an angle of {said:g} must, in rad or else in degrees, bring the tool to "
+                f"TLAXIS {u}"
+            )
+        return _rotation(k, own)
 
     def csys(self, record: Record, mm: float) -> Coordinates:
         """After a CSYS record of 12 numbers; ``mm`` in one unit of the text."""

@@ -1,8 +1,9 @@
 """Text of CL data to records.
 
-Notation: WORD/arg,arg,... is a record, a word with arguments. ``$`` at the end of a line goes on on the next, ``$$``
-and what follows is a comment. Blanks around words and numbers do not count, nor do small letters; the text of PARTNO,
-PPRINT and INSERT is kept as it stands. ``$$->`` begins a comment that a CAM system writes for its postprocessors.
+Notation: WORD/arg,arg,... is a record, a word with arguments. At a ``$`` it goes on on the next line; what follows that
+and what follows ``$$`` is a comment. Blanks around words and numbers do not count, nor do small letters; the text of
+PARTNO, PPRINT and INSERT is kept as it stands. ``$$->`` begins a comment that a CAM system writes for its
+postprocessors.
 """
 
 from __future__ import annotations
@@ -99,13 +100,12 @@ def records(text: str) -> Iterator[Record]:
             yield Record(as_text[1].upper(), (as_text[2].strip(),), line)
             continue
         said, comment, _ = whole.partition("$$")
-        said = said.rstrip()
-        more = said.endswith("$")
+        said, more, _ = said.partition("$")
         first = first or line
-        begun += said.rstrip("$ ") if more else said
+        begun += said
         if len(begun) > LONGEST_RECORD:
             raise InputError(f"line {first}: a record of more than {LONGEST_RECORD} characters: must be shorter")
-        if more or (begun.strip() and comment and not said):
+        if more or (begun.strip() and comment and not said.strip()):
             continue
         record = _record(begun, first)
         begun, first = "", 0
