@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 FAULT, WRONG, EXCEEDED, STOPPED = 1, 2, 3, 130
 #: findings of a machine that break nothing
-HARMLESS = ("machine-singular", "machine-rewind")
+HARMLESS = ("machine-singular", "machine-rewind", "machine-offset")
 
 app = typer.Typer(
     add_completion=False,

@@ -38,15 +38,19 @@ def written(axis: Axis, q: float) -> str:
     return f"{math.degrees(q) + 0.0:g} deg" if axis.rotary else f"{q + 0.0:g} mm"
 
 
-def limit_findings(machine: Machine, axes: ArrayLike, line: ArrayLike | None = None) -> tuple[Finding, ...]:
+def limit_findings(
+    machine: Machine, axes: ArrayLike, line: ArrayLike | None = None, placed: bool = True
+) -> tuple[Finding, ...]:
     """Axis limits and index steps, one finding an axis and code: the worst row, how many, the first; O(n m).
 
-    Codes: ``machine-limit``; ``machine-index``, an indexed axis that stands off its step.
+    Codes: ``machine-limit``; ``machine-index``, an indexed axis that stands off its step; ``machine-offset``, a linear
+    axis that is beyond a limit, but would not be with another work offset.
 
     Parameters
     ----------
     axes : (n, 9) float [mm, rad]
     line : (n,) int, line of each row in its source; None: 0
+    placed : whether the work offset is known
 
     Examples
     --------
@@ -61,9 +65,10 @@ def limit_findings(machine: Machine, axes: ArrayLike, line: ArrayLike | None = N
     found = []
     for axis in machine.chain.axes:
         values = q[:, axis.column]
+        fits = not placed and not axis.rotary and np.ptp(values) <= axis.high - axis.low
         checks = [
             (
-                "machine-limit",
+                "machine-offset" if fits else "machine-limit",
                 beyond(axis, values),
                 f"goes from {written(axis, axis.low)} to {written(axis, axis.high)}",
             )

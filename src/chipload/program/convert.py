@@ -22,6 +22,15 @@ CL_DATA, NC_TEXT = (".apt", ".cls"), (".ngc", ".nc", ".tap", ".cnc", ".gcode")
 #: findings whose words go along
 CARRIED = ("nc-coolant", "nc-stop", "nc-output", "nc-user-code", "nc-unknown-word", "apt-unknown")
 _WORDS = {"nc-coolant", "nc-stop"}
+#: records of CL data that are words of a controller
+_RECORDS = {
+    "COOLNT/FLOOD": "M8",
+    "COOLNT/ON": "M8",
+    "COOLNT/MIST": "M7",
+    "COOLNT/OFF": "M9",
+    "STOP": "M0",
+    "OPSTOP": "M1",
+}
 
 
 def carried(findings: tuple[Finding, ...]) -> tuple[tuple[int, str], ...]:
@@ -31,9 +40,12 @@ def carried(findings: tuple[Finding, ...]) -> tuple[tuple[int, str], ...]:
     ((6, 'M8'), (9, '(line 9 has M62: an output)'))
     """
     out = []
-    for f in sorted((f for f in findings if f.code in CARRIED), key=lambda f: f.line):
+    for f in sorted(findings, key=lambda f: f.line):
         word = re.match(r"M(0|1|7|8|9)\b", f.text) if f.code in _WORDS else None
-        out.append((f.line, word[0] if word else f"(line {f.line} has {f.text})"))
+        if f.code == "apt-unused" and f.text in _RECORDS:
+            out.append((f.line, _RECORDS[f.text]))
+        elif f.code in CARRIED:
+            out.append((f.line, word[0] if word else f"(line {f.line} has {f.text})"))
     return tuple(out)
 
 

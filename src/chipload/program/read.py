@@ -24,8 +24,8 @@ from chipload.program.gcode.reader import read_gcode_file
 from chipload.program.gcode.tools import ToolTable, read_tool_table
 from chipload.program.program import Program
 from chipload.program.time import program_time
-from chipload.program.to_axes import to_axes
-from chipload.program.to_work import TOLERANCE_MM, axes_of, to_work
+from chipload.program.to_axes import LIMITS, to_axes
+from chipload.program.to_work import TOLERANCE_MM, axes_of, to_work, work_frame
 from chipload.progress import Progress, silent
 
 Floats = NDArray[np.float64]
@@ -92,7 +92,7 @@ def read_program(
         lengths = tools.lengths() if tools is not None else {}
         program, noticed = read_apt_file(path, feed=feed)
         commands, found = to_axes(program, machine, tool_lengths=lengths, tolerance=tolerance)
-        more = tuple(f for f in found if f.code not in ("machine-limit", "machine-index"))
+        more = tuple(f for f in found if f.code not in LIMITS)
     else:
         commands, noticed = read_gcode_file(path, dialect=kind, tools=tools, progress=progress)
         if len(commands) == 0:
@@ -101,7 +101,9 @@ def read_program(
     axes = axes_of(commands, machine)
     broken = [*check_program(program, machine)]
     if machine.chain.rotary:
-        broken += limit_findings(machine, axes, commands.line)
+        found = limit_findings(machine, axes, commands.line, placed=bool(work_frame(commands).offset.any()))
+        broken += [f for f in found if f.code != "machine-offset"]
+        more += tuple(f for f in found if f.code == "machine-offset")
     problems = ("machine-reach", "machine-linear")
     broken += [f for f in more if f.code in problems]
     noticed += tuple(f for f in more if f.code not in problems)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from chipload.errors import Finding, InputError
 from chipload.machine.follow import follow
 from chipload.machine.kinematics import forward, with_tip
+from chipload.machine.limits import limit_findings
 from chipload.machine.linearise import linearise
 from chipload.machine.machine import Machine
 from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, RAPID, XY, YZ, ZX, Commands, Frame, extents
@@ -33,6 +34,8 @@ ANGLE_TOLERANCE = math.radians(0.05)
 LEAST_RADIUS = 0.0013
 #: an index table that moves less [rad] stands
 INDEX_STANDS = 1e-6
+#: codes of findings that say where the axes are
+LIMITS = ("machine-limit", "machine-index", "machine-offset")
 #: pieces that the rows of one tool may be cut into
 MOST_PIECES = 1_000_000
 _ROTARY = slice(3, 6)
@@ -144,9 +147,11 @@ def _rotary_commands(
         piece, q, found = _piece(_taken(program, np.arange(begin, end)), machine, length, free, tcp, stands, tolerance)
         parts.append(piece)
         axes.append(q)
-        findings += found
+        said = f"tool {program.tool[begin]}: " if len(tools) > 1 else ""
+        findings += [replace(f, text=f"{said}{f.text}") for f in found if f.code not in LIMITS]
         stands = q[-1]
     whole, q = Program.join(parts), np.vstack(axes)
+    findings += limit_findings(machine, q, whole.line, placed=False)
     _index_stands(whole, machine, q)
     frame = np.array([tools.index(t) for t in whole.tool.tolist()])
     if tcp:
