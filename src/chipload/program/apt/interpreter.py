@@ -166,6 +166,8 @@ class Interpreter:
                     "apt-axis", record.line, f"the axis has the length {length:.6g}: must be 1; it is scaled"
                 )
             self._axis = a
+        if self._axis is not None and self._in.in_work:
+            return (v[0] * self.mm, v[1] * self.mm, v[2] * self.mm), self._axis
         b = natural if self._axis is None else R @ self._axis
         return _tuple(R @ (np.multiply(v[:3], self.mm) - t)), _tuple(b / np.linalg.norm(b))
 
