@@ -16,6 +16,7 @@ import pytest
 
 from chipload.machine.kinematics import forward
 from chipload.machine.machine import machine_named
+from chipload.program.apt.cutters import read_cutters
 from chipload.program.apt.points import read_cl_points
 from chipload.program.apt.reader import read_apt_file
 from chipload.program.motions import is_arc, starts
@@ -83,7 +84,8 @@ def test_every_record_is_a_row(path):
     program, findings = read_apt_file(path)
     said, R = points(path), frame(path)
     assert len(said) == len(re.findall(r"^\s*GOTO/", path.read_text(), re.MULTILINE)) > 3
-    assert {f.code for f in findings} <= {"apt-unused", "apt-unknown", "apt-cutcom", "apt-coordinates"}
+    assert {f.code for f in findings} <= {"apt-unused", "apt-unknown", "apt-cutcom", "apt-coordinates", "apt-cutter"}
+    assert ("apt-cutter" in {f.code for f in findings}) == (path.suffix == ".clt")  # it loads no tool
     np.testing.assert_allclose(program.axis, np.tile(R[:, 2], (len(program), 1)), atol=1e-9)
     atol = 1e-9
     arcs = 0
@@ -127,6 +129,18 @@ def test_points_are_of_the_work_and_not_of_csys(name):
         brought = (A.T @ one.p + t, A @ (one.p - t))
         assert ((one.p[:2] > 0.0) & (one.p[:2] < size)).all()
         assert all(((b[:2] < 0.0) | (b[:2] > size)).any() for b in brought)
+
+
+@pytest.mark.parametrize("path", [path for path in FILES if path.suffix == ".apt"], ids=lambda p: p.name)
+def test_cutters(path):
+    shapes, _ = read_cutters(path.read_text())
+    said = re.findall(r"CUTTER/(.*)\s+LOAD/TOOL,(\d+)", path.read_text())
+    assert {int(n) for _, n in said} == set(shapes) == set(read_apt_file(path)[0].tool.tolist())
+    for numbers, n in reversed(said):
+        first = next(x for x, m in said if m == n)
+        if numbers == first:
+            own = np.array([float(x) for x in numbers.split(",")]) * ([1.0] * 4 + [np.pi / 180.0] * 2 + [1.0])
+            np.testing.assert_allclose(shapes[int(n)], own, atol=1e-12)
 
 
 def test_csys_takes_the_instances_of_one_part_to_the_same_points():

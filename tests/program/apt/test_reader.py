@@ -7,10 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
+from chipload.program.apt.cutters import read_cutters
 from chipload.program.apt.points import read_cl_points
 from chipload.program.apt.reader import read_apt, read_apt_file
-from chipload.program.motions import sweeps
+from chipload.program.apt.writer import write_apt
+from chipload.program.motions import lengths, sweeps
 from chipload.program.program import ARC_CCW, ARC_CW, DWELL, LINE, RAPID
 
 HEAD = "UNITS/MM\nSPINDL/600,RPM,CLW\nRAPID\nGOTO/0,0,10\nFEDRAT/60,MMPM\n"
@@ -71,6 +74,32 @@ def test_arcs_turn_about_their_normal():
     assert program.motion[1:].tolist() == [ARC_CCW, ARC_CW, ARC_CCW]
     assert program.normal[1:].tolist() == [[0, 0, 1], [0, 0, 1], [0, 1, 0]]
     np.testing.assert_allclose(sweeps(program)[1:], [0.5 * math.pi, -0.5 * math.pi, 1.5 * math.pi])
+
+
+def test_a_helical_arc_rises_along_its_normal():
+    program, findings = read("CIRCLE/0,5,-3,0,0,1\nGOTO/5,5,20")
+    assert findings == ()
+    assert lengths(program)[1] == pytest.approx(math.hypot(2.5 * math.pi, 10.0))
+
+
+def test_cutters():
+    text = (
+        "CUTTER/10,1,4,1,0,0,22\nLOADTL/3\nGOTO/1,0,0\nLOADTL/4\nUNITS/INCHES\nCUTTER/1,.1\nGOTO/2,0,0\n"
+        "LOADTL/3\nCUTTER/2\nGOTO/3,0,0\nCUTTER/3\nGOTO/4,0,0"
+    )
+    shapes, findings = read_cutters(HEAD + text)
+    assert shapes[3] == (10, 1, 4, 1, 0, 0, 22)
+    np.testing.assert_allclose(shapes[4], [25.4, 2.54, 10.16, 2.54, 0, 0, 0])
+    assert [f.line for f in findings] == [14, 16]
+    _, findings = read(text)
+    assert [(f.code, f.line) for f in findings] == [("apt-cutter", 16)]
+
+
+def test_cutters_that_are_written():
+    mill = Cutter(16.0, 4, 0.5, 22.0, 35.0, 6e5, corner_radius=1.0, bottom=math.radians(10.0), taper=math.radians(5.0))
+    start = read("GOTO/0,0,0")[0]
+    text = write_apt(start, {0: mill}, title="x", verified=False)
+    np.testing.assert_allclose(read_cutters(text)[0][0], mill.apt, atol=1e-6)
 
 
 def test_an_arc_with_ends_that_differ_is_centred_or_refused():

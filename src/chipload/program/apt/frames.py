@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,6 +84,11 @@ class Coordinates:
         return R, t, self.A @ _Z if self.tlaxis is None else R @ self.tlaxis
 
     @property
+    def in_work(self) -> bool:
+        """Whether points are in the work frame as they stand."""
+        return not any(self.turned) and (self._plain or self.given == "work")
+
+    @property
     def note(self) -> str:
         """How points are read where a CSYS or ROTABL is in force, else empty."""
         if any(self.turned):
@@ -93,7 +99,7 @@ class Coordinates:
             return "CSYS: points are brought from its coordinates into the work frame"
         return "CSYS: points stand as they are, given in the work frame"
 
-    @property
+    @cached_property
     def _plain(self) -> bool:
         return bool(np.abs(self.A - np.eye(3)).max() < 1e-12) and not self.t.any()
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding
+from chipload.program.apt.cutters import Shape, length_unit, shape, tool_number
 from chipload.program.apt.cycles import FEEDS, Cycle, read_cycle
 from chipload.program.apt.frames import Coordinates, unit
 from chipload.program.apt.records import NOTE, Record
@@ -25,8 +26,6 @@ Floats = NDArray[np.float64]
 
 #: how far the length of a tool's axis may be from 1 without a finding
 UNIT_AXIS = 1e-3
-#: largest tool number
-LARGEST_TOOL = 99_999_999
 #: how far the radius that a CIRCLE gives may be from its arc [mm] without a finding
 RADIUS_MM = 1e-2
 
@@ -57,6 +56,9 @@ class Interpreter:
         self._circle: tuple[Point, Point, float | None, Record] | None = None
         self._cycle: Cycle | None = None
         self._drilling = False
+        self._shape: Shape | None = None  # of the last CUTTER
+        self._changed: Record | None = None  # the CUTTER that changed it since the last point
+        self._loaded = False  # whether a tool was loaded since then
         self._sense = -1.0 if track.spindle < 0.0 else 1.0
         self._speed = abs(track.spindle)
         self._counts: tuple[str, float | None] = (MINUTE, None)
@@ -147,6 +149,10 @@ class Interpreter:
     def _point(self, record: Record) -> tuple[Point, Point]:
         """The point and the axis of a GOTO in the work frame."""
         v = record.numbers(3, 6)
+        if self._changed is not None and not self._loaded and self.track.at is not None:
+            text = f"{self._changed}: another cutter and no tool is loaded: the tool stays {self.track.tool}"
+            self.track.note("apt-cutter", self._changed.line, text)
+        self._changed, self._loaded = None, False
         if not self._units_said:
             unit_name = next(key for key, mm in MM_PER.items() if mm == self.mm)
             self.track.note_once("apt-units", record.line, f"no UNITS before it: lengths are read as {unit_name}")
@@ -160,6 +166,8 @@ class Interpreter:
                     "apt-axis", record.line, f"the axis has the length {length:.6g}: must be 1; it is scaled"
                 )
             self._axis = a
+        if self._axis is not None and self._in.in_work:
+            return (v[0] * self.mm, v[1] * self.mm, v[2] * self.mm), self._axis
         b = natural if self._axis is None else R @ self._axis
         return _tuple(R @ (np.multiply(v[:3], self.mm) - t)), _tuple(b / np.linalg.norm(b))
 
@@ -276,17 +284,10 @@ class Interpreter:
         self.track.spindle = 0.0 if "OFF" in words else self._sense * self._speed + 0.0
 
     def _units(self, record: Record) -> None:
-        said = {"MM": "mm", "INCH": "inch", "INCHES": "inch", "CM": "cm"}.get(",".join(record.args))
-        if said is None:
-            raise record.error("must be MM, CM or INCHES")
-        self.mm, self._units_said = MM_PER[said], True
+        self.mm, self._units_said = MM_PER[length_unit(record)], True
 
     def _load(self, record: Record) -> None:
-        k = 1 if record.args[:1] == ("TOOL",) else 0
-        value = record.number(k)
-        if not (0.0 <= value <= LARGEST_TOOL and value == int(value)):
-            raise record.error(f"must be a whole number from 0 to {LARGEST_TOOL}")
-        self.track.tool = int(value)
+        self.track.tool, self._loaded = tool_number(record), True
 
     def _multax(self, record: Record) -> None:
         if record.args not in ((), ("ON",), ("OFF",)):
@@ -305,8 +306,9 @@ class Interpreter:
             self._in = self._in.tool_axis(record)
 
     def _cutter(self, record: Record) -> None:
-        if not 1 <= len(record.numbers()) <= 7:
-            raise record.error("must have at most 7 numbers")
+        said = shape(record, self.mm)
+        if said != self._shape:
+            self._shape, self._changed = said, record
 
     def _label(self, record: Record) -> None:
         text = record.args[0]

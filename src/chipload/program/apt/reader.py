@@ -6,7 +6,7 @@ FEDRAT, SPINDL and the axis of the tool until they are said anew; a FEDRAT witho
 first as lengths of the text in a minute. SPINDL without CLW or CCLW turns as before, first CLW. A GOTO of three numbers
 keeps the axis; MULTAX/OFF, CSYS and TLAXIS set it as :mod:`~chipload.program.apt.frames` says, which tells in what
 coordinates points are. :mod:`~chipload.program.apt.cycles` tells how holes are cut. PPRINT, INSERT and OPFEATSTART name
-what the rows after them belong to.
+what the rows after them belong to. Cutters are for :mod:`~chipload.program.apt.cutters`.
 
 CUTCOM changes nothing: points are of the tool's own tip. What a Program cannot hold is a finding with its line:
 ``apt-unused`` (coolant, stops, inserted text), ``apt-unknown`` (a record that is not known), ``apt-comment`` (data of a
