@@ -150,7 +150,7 @@ def straightened(program: Program, turn: Floats) -> Program:
     ----------
     turn : (n,) float [rad]
         Greatest angle of a chord of each row; inf where the row stays as it is. A chord leaves its arc by at most
-        r (1 - cos(turn / 2)).
+        r (1 - cos(turn / 2)). An axis that turns on an arc turns evenly along its chord.
     """
     sweep = sweeps(program)
     chosen = is_arc(program) & np.isfinite(turn) & (sweep != 0.0)
@@ -169,6 +169,8 @@ def straightened(program: Program, turn: Floats) -> Program:
     inner = (chosen[row] & (u[:, 0] < 1.0))[:, None]
     points = np.where(inner, around, program.p_work[row])
     columns = {f.name: getattr(program, f.name)[row] for f in fields(Program) if f.name != "labels"}
+    turned = program.axis[np.maximum(row - 1, 0)] * (1.0 - u) + program.axis[row] * u
+    columns["axis"] = np.where(inner, turned / np.linalg.norm(turned, axis=1)[:, None], columns["axis"])
     columns["motion"] = np.where(chosen[row], LINE, program.motion[row])
     columns["centre"] = np.where(chosen[row][:, None], 0.0, program.centre[row])
     columns["normal"] = np.where(chosen[row][:, None], (0.0, 0.0, 1.0), program.normal[row])

@@ -62,7 +62,8 @@ def to_axes(
     Raises
     ------
     InputError
-        The axis is tilted and the machine has no rotary axis; an index table would move in a cut.
+        The axis is tilted and the machine has no rotary axis, or its rotary axes do not reach it; an index table would
+        move in a cut.
     """
     small = (radii(program) < LEAST_RADIUS) & is_arc(program)
     program = straightened(program, np.where(small, 0.25 * math.pi, math.inf))
@@ -180,6 +181,9 @@ def _piece(
 ) -> tuple[Program, Floats, tuple[Finding, ...]]:
     """Rows of one tool and their axes: arcs that the machine sees askew as chords, turning rows in pieces."""
     q, findings = follow(machine, program.p_work, program.axis, start, length, None, free, line=program.line)
+    missed = next((f for f in findings if f.code == "machine-reach"), None)
+    if missed is not None:
+        raise InputError(f"program {missed.text}: choose a machine that reaches it")
     turns = np.abs(np.diff(q[:, _ROTARY], axis=0, prepend=q[:1, _ROTARY])).max(axis=1) > 1e-9
     normal = program.normal if tcp else _seen(machine, q, program.normal)
     odd = np.where((turns & is_arc(program))[:, None], math.sqrt(1.0 / 3.0), normal)
@@ -201,9 +205,11 @@ def _swung(program: Program, machine: Machine, q: Floats, length: float, toleran
     """Rows in pieces: rotary axes in straight proportion, the tip on its line within the tolerance.
 
     The tool's axis goes the way that the rotary axes take it, which need not be a great circle: that of a pallet is a
-    cone. The error of n pieces falls as 1 / n^2.
+    cone. The error of n pieces falls as 1 / n^2. A row that sets an index table stays one.
     """
     count = np.ones(len(q), dtype=np.int64)
+    tables = [axis.column for axis in machine.chain.rotary if axis.indexed]
+    sets = np.abs(np.diff(q[:, tables], axis=0, prepend=q[:1, tables])).max(axis=1) > INDEX_STANDS
     while True:
         row = np.repeat(np.arange(len(q)), count)
         part = (np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + 1) / count[row]
@@ -223,6 +229,7 @@ def _swung(program: Program, machine: Machine, q: Floats, length: float, toleran
         worst = np.zeros(len(q))
         np.maximum.at(worst, row, np.where(is_arc(program)[row], 0.0, away))
         worst[0] = 0.0
+        worst[sets] = 0.0
         if (worst <= tolerance).all():
             break
         more = np.ceil(count * np.sqrt(np.maximum(worst / tolerance, 1.0)) * 1.1).astype(np.int64)
