@@ -81,3 +81,11 @@ def test_radii_that_differ_in_a_turned_plane():
         InputError, match=r"^program row 1: an arc starts 5 mm from its centre and ends 5\.01 mm from it"
     ):
         Program(**{**columns, "p_work": wrong})
+
+
+def test_an_axis_that_turns_on_an_arc_turns_along_its_chords():
+    program, _ = one_arc(5.0, 0.0, 180.0, 0.0)
+    s, c = math.sin(0.2), math.cos(0.2)
+    columns = {k: getattr(program, k) for k in program.__dataclass_fields__}
+    chords = straightened(Program(**{**columns, "axis": [[0, -s, c], [0, s, c]]}), np.array([np.inf, math.pi / 2]))
+    np.testing.assert_allclose(chords.axis, [[0, -s, c], [0, 0, 1], [0, s, c]], atol=1e-12)
