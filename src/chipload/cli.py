@@ -50,7 +50,7 @@ MachineName = Annotated[
 Tools = Annotated[Path | None, typer.Option("--tools", metavar="FILE", help="LinuxCNC tool table (.tbl)")]
 DialectName = Annotated[
     str | None,
-    typer.Option("--dialect", help="linuxcnc, fanuc, sinumerik or apt; else by the file's ending"),
+    typer.Option("--dialect", help="linuxcnc, fanuc, sinumerik, heidenhain or apt; else by the file's ending"),
 ]
 FeedIfUnsaid = Annotated[float | None, typer.Option("--feed-mm-min", help="feed of CL data that state none")]
 Debug = Annotated[bool, typer.Option("--debug", help="show the traceback of a fault")]

@@ -115,7 +115,7 @@ class ProgramTable(Table):
     """A program that exists: NC text or CL data."""
 
     file: Text
-    dialect: Literal["linuxcnc", "fanuc", "sinumerik", "apt"] | None = None
+    dialect: Literal["linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"] | None = None
     tools: Text | None = Field(None, description="LinuxCNC tool table")
     feed_mm_min: Positive | None = Field(None, le=1e5, description="feed of CL data that state none")
 

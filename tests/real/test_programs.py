@@ -26,7 +26,7 @@ def machine_of(path: Path):
         return machine_named("xyzac-trunnion")
     if "xyzbc" in path.name:
         return machine_named("xyzbc-trunnion")
-    return machine_named("dmu50" if path.suffix in (".apt", ".clt", ".txt") else "vmc")
+    return machine_named("dmu50" if path.suffix in (".apt", ".clt", ".h", ".txt") else "vmc")
 
 
 def on_its_machine(path: Path):

@@ -20,7 +20,7 @@ from chipload.program.to_axes import to_axes
 #: endings of CL data and of NC text that can be written
 CL_DATA, NC_TEXT = (".apt", ".cls"), (".ngc", ".nc", ".tap", ".cnc", ".gcode")
 #: findings whose words go along
-CARRIED = ("nc-coolant", "nc-stop", "nc-output", "nc-user-code", "nc-unknown-word", "apt-unknown")
+CARRIED = ("nc-coolant", "nc-stop", "nc-output", "nc-user-code", "nc-unknown-word", "apt-unknown", "heidenhain-unknown")
 _WORDS = {"nc-coolant", "nc-stop"}
 #: records of CL data that are words of a controller
 _RECORDS = {

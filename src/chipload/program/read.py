@@ -1,6 +1,6 @@
 """Any program file: who reads it, what it does on a machine, what is wrong with it there.
 
-Notation: a **source** is a text of axes (RS-274: Commands) or of the tip (APT: Program). With a machine
+Notation: a **source** is a text of axes (RS-274, conversational: Commands) or of the tip (APT: Program). With a machine
 each leads to the other, so that a :class:`Reading` always has both.
 """
 
@@ -22,6 +22,7 @@ from chipload.program.check import check_program
 from chipload.program.commands import Commands
 from chipload.program.gcode.reader import read_gcode_file
 from chipload.program.gcode.tools import ToolTable, read_tool_table
+from chipload.program.heidenhain.reader import read_heidenhain_file
 from chipload.program.program import Program
 from chipload.program.time import program_time
 from chipload.program.to_axes import LIMITS, to_axes
@@ -30,12 +31,13 @@ from chipload.progress import Progress, silent
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Dialect = Literal["linuxcnc", "fanuc", "sinumerik", "apt"]
+Dialect = Literal["linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"]
 
 #: dialect by the ending of a file; None: that of the machine
 ENDINGS: dict[str, Dialect | None] = {
     **dict.fromkeys((".ngc", ".nc", ".gcode", ".tap", ".cnc", ".txt", ".iso", ".eia", ".ptp"), None),
     **dict.fromkeys((".mpf", ".spf"), "sinumerik"),
+    **dict.fromkeys((".h", ".hnc"), "heidenhain"),
     **dict.fromkeys((".apt", ".cls", ".cl", ".clt", ".cldata"), "apt"),
 }
 #: largest tool table [bytes]
@@ -94,7 +96,10 @@ def read_program(
         commands, found = to_axes(program, machine, tool_lengths=lengths, tolerance=tolerance)
         more = tuple(f for f in found if f.code not in LIMITS)
     else:
-        commands, noticed = read_gcode_file(path, dialect=kind, tools=tools, progress=progress)
+        if kind == "heidenhain":
+            commands, noticed = read_heidenhain_file(path)
+        else:
+            commands, noticed = read_gcode_file(path, dialect=kind, tools=tools, progress=progress)
         if len(commands) == 0:
             raise InputError(f"{path.name}: no motion: nothing to check")
         program, more = to_work(commands, machine, tolerance=tolerance)

@@ -1,0 +1,150 @@
+"""Conversational blocks against what they mean by hand, loops against plain Python."""
+
+import math
+
+import numpy as np
+import pytest
+
+from chipload.errors import InputError
+from chipload.program.commands import ARC, DWELL, LINE, RAPID, arc_sweeps
+from chipload.program.heidenhain.formula import Parameters
+from chipload.program.heidenhain.reader import read_heidenhain
+
+
+def read(*blocks, unit="MM", **options):
+    return read_heidenhain("\n".join([f"BEGIN PGM T {unit}", *blocks, f"END PGM T {unit}"]), **options)
+
+
+def test_lines_are_modal_and_incremental():
+    c, _ = read("1 L X+10 Y-2.5 Z+50 R0 FMAX M3", "2 L Z 5 F300 ; down", "L IX-4 IY + 1", "L X-1")
+    assert c.motion.tolist() == [RAPID, LINE, LINE, LINE]
+    np.testing.assert_allclose(c.position[:, :3], [[10, -2.5, 50], [10, -2.5, 5], [6, -1.5, 5], [-1, -1.5, 5]])
+    assert c.feed.tolist() == [0, 5, 5, 5]
+    assert c.line.tolist() == [2, 3, 4, 5]
+
+
+def test_inch_and_rotary():
+    c, _ = read("L X+1 Y+0 Z+2 A+90 FMAX", "L X+2 F10", unit="INCH")
+    np.testing.assert_allclose(c.position[1, :4], [50.8, 0, 50.8, math.pi / 2])
+    assert c.feed[1] == pytest.approx(254.0 / 60.0)
+
+
+def test_arcs_about_the_pole():
+    """A quarter each way, a whole turn, two turns of a helix."""
+    c, _ = read(
+        "L X+10 Y+0 Z+0 FMAX", "CC X+0 Y+0", "C X+0 Y+10 DR+ F600", "C X+10 Y+0 DR-", "C DR+", "CP IPA-720 IZ-6 DR-"
+    )  # fmt: skip
+    assert c.motion.tolist() == [RAPID, ARC, ARC, ARC, ARC]
+    np.testing.assert_allclose(np.degrees(arc_sweeps(c)[1:]), [90, -90, 360, -720], atol=1e-9)
+    np.testing.assert_allclose(c.centre[1:], 0.0, atol=1e-12)
+    np.testing.assert_allclose(c.position[-1, :3], [10, 0, -6], atol=1e-9)
+
+
+def test_a_rounded_arc_keeps_its_ends():
+    """The pole of a text with three decimals is moved so that both ends are as far from the centre."""
+    c, _ = read("L X+10 Y+0 Z+0 FMAX", "CC X+0.001 Y+0.001", "C X+0 Y+10 DR+ F600")
+    ends = c.position[:, :2] - c.centre[1]
+    assert np.hypot(*ends[0]) == pytest.approx(np.hypot(*ends[1]), abs=1e-12)
+    assert np.hypot(*c.centre[1]) < 2e-3
+
+
+def test_pecking_by_hand():
+    """Surface at 25 - 25 = 0: plunges of 3 to 10, stops of 0.6 above, dwell at the bottom."""
+    c, _ = read(
+        "L X+1 Y+2 Z+25 FMAX M3", "CYCL DEF 1.0 PECKING", "CYCL DEF 1.1 DIST25.000", "CYCL DEF 1.2 DEPTH-7",
+        "CYCL DEF 1.3 PLNGNG3.0", "CYCL DEF 1.4 DWELL0.5", "CYCL DEF 1.5 F240", "L FMAX M99", "L X+9 FMAX",
+    )  # fmt: skip
+    assert c.motion.tolist() == [RAPID, LINE, RAPID, RAPID, LINE, RAPID, RAPID, LINE, DWELL, RAPID, RAPID]
+    np.testing.assert_allclose(c.position[:, 2], [25, -3, 25, -2.4, -6, 25, -5.4, -7, -7, 25, 25])
+    assert c.feed[1] == 4.0
+    assert c.feed[8] == 0.5
+    assert c.position[-1, 0] == 9
+
+
+def test_datum_shift_moves_no_axis():
+    c, _ = read("L X+10 Y+0 Z+5 FMAX", "CYCL DEF 7.0 DATUM SHIFT", "CYCL DEF 7.1 X+4", "CYCL DEF 7.2 IY-1", "L X+0 F60")
+    np.testing.assert_allclose(c.machine()[:, :3], [[10, 0, 5], [4, 0, 5]])
+    np.testing.assert_allclose(c.position[1, :3], [0, 1, 5])
+
+
+def test_tools_and_spindle():
+    c, f = read(
+        "TOOL DEF 5 L+30 R+2", "TOOL CALL 5 Z S3000", "L X+0 Y+0 Z+1 FMAX M13", "TOOL CALL S1500", "L Z+0 F60 M5",
+        "TOOL CALL 6 Z S100", "L Z+9 FMAX",
+    )  # fmt: skip
+    assert c.tool.tolist() == [5, 5, 6]
+    np.testing.assert_allclose(c.spindle * 60 / math.tau, [3000, 1500, 0])
+    assert c.frames[c.frame[0]].tool[2] == 30
+    assert {x.code for x in f} == {"nc-coolant", "heidenhain-tool-unknown"}
+
+
+def test_loops_jumps_and_calls_against_python():
+    c, _ = read(
+        "FN0: Q1 = +0", "Q2 = 3 * ( 2 + SQRT 16 )", "L X+0 Y+0 Z+0 FMAX", "LBL 1", "Q1 = Q1 + 1", "L X+Q1 Y-Q2 F100",
+        "CALL LBL 2", "FN12: IF +Q1 LT +3 GOTO LBL 1", "LBL 3", "L IX+1", "CALL LBL 3 REP 2/2",
+        "FN9: IF 1 EQU 1 GOTO LBL 9",
+        "LBL 2", "L IZ-0.5", "LBL 0", "LBL 9",
+    )  # fmt: skip
+    want, x, z = [(0.0, 0.0, 0.0)], 0.0, 0.0
+    for k in (1, 2, 3):
+        x = float(k)
+        want += [(x, -18.0, z), (x, -18.0, z - 0.5)]
+        z -= 0.5
+    for _ in range(3):
+        x += 1
+        want.append((x, -18.0, z))
+    np.testing.assert_allclose(c.position[:, :3], want)
+
+
+def test_formulas_against_python():
+    q = Parameters({1: 2.5, 7: -4.0})
+    for text, value in {
+        "Q1 * ( Q7 - 1 ) / 3 ^ 2": 2.5 * (-5) / 9,
+        "2 - Q7 ^ 2": 2.0 - 16.0,
+        "SIN 30 + COS ( Q1 * 24 )": 0.5 + 0.5,
+        "ABS Q7 + FRAC 2.25 + SGN Q7": 4 + 0.25 - 1,
+        "2 ^ 3 ^ 2": 2.0**9,
+    }.items():
+        assert q.formula(text) == pytest.approx(value), text
+
+
+def test_what_the_controller_knows_may_be_given():
+    blocks = ["FN18: SYSREAD Q3 = ID270 NR1 IDX3", "L X+0 Y+0 Z+Q3 FMAX"]
+    with pytest.raises(InputError, match=r"line 3: Q3 comes from the controller and is not known here: give it"):
+        read(*blocks)
+    assert read(*blocks, parameters={3: 7.5})[0].position[0, 2] == 7.5
+
+
+@pytest.mark.parametrize(
+    ("block", "text"),
+    [
+        ("L X+1 RL F100", "RL: radius compensation is not read: give the path of the tool's centre"),
+        ("L X+1 QQ2 FMAX", "'QQ2': is not read in a motion"),
+        ("L X+1", "a cut has no feed: give F"),
+        ("L X+1 F AUTO", "F AUTO: the feed of a tool table is not known: give a number"),
+        ("L X+1 F0", "F0: must be above 0 and below 1e+06"),
+        ("L IX+1 F10", "IX: where the axis stands is not known: give X first"),
+        ("C X+1 Y+1 DR+ F10", "an arc begins where the tool stands, which is not known: move there first"),
+        ("CYCL DEF 208 BORE", "CYCL DEF 208: is not read: write its motions"),
+        ("CYCL DEF 19.1 A+10", "CYCL DEF 19: a tilted working plane is not read: state the program in the work frame"),
+        ("CALL LBL 4", "LBL 4 is not there"),
+        ("Q1 = Q2", "Q2 is read before it is set: set it"),
+        ("Q1 = 1 / 0", "formula: division by 0"),
+        ("Q1 = ( 1", "formula: a bracket is not closed"),
+        ("APPR LT X+1 LEN10 F10", "'APPR LT X+1 LEN10 F10': is not read: take it out or write it as L and C blocks"),
+        ("CALL PGM X", "'CALL PGM X': is not read: take it out or write it as L and C blocks"),
+        ("L M99", "a cycle is called where the tool stands, which is not known: move there first"),
+    ],
+)
+def test_refused(block, text):
+    with pytest.raises(InputError) as err:
+        read(block)
+    assert str(err.value) == f"program: line 2: {text}"
+
+
+def test_a_loop_without_end_is_stopped(monkeypatch):
+    monkeypatch.setattr("chipload.program.heidenhain.reader.MOST_BLOCKS", 5000)
+    with pytest.raises(InputError, match="more than 5000 blocks are carried out"):
+        read("LBL 1", "FN9: IF 1 EQU 1 GOTO LBL 1")
+    with pytest.raises(InputError, match="more than 20 calls inside one another"):
+        read("LBL 1", "CALL LBL 1")
