@@ -102,7 +102,7 @@ def run_rs274(text: str, tools: tuple[int, ...] = tuple(range(1, 100))) -> list[
     return motions
 
 
-def compare(motions: list[Motion], program, *, mm: float = 1e-4, unit: float = 1e-6) -> int:
+def assert_same_motions(motions: list[Motion], program, *, mm: float = 1e-4, unit: float = 1e-6) -> int:
     """Assert that canonical motions are a Program's rows; how many rows were left out because they round to nothing.
 
     A row may be left out, or an arc be a line, only where the difference is below the written ``unit``.

@@ -11,7 +11,7 @@ from chipload.geometry.contour import Region
 from chipload.geometry.dxf import read_dxf
 
 
-def refused(path, message, **keys):
+def assert_refused(path, message, **keys):
     with pytest.raises(InputError, match="^" + re.escape(message) + "$"):
         read_dxf(path, **keys)
 
@@ -40,8 +40,8 @@ def line_of(x):
 
 def test_missing_file(tmp_path):
     path = tmp_path / "none.dxf"
-    refused(path, f"part.file = {path}: no such file")
-    refused(tmp_path, f"part.file = {tmp_path}: no such file")
+    assert_refused(path, f"part.file = {path}: no such file")
+    assert_refused(tmp_path, f"part.file = {tmp_path}: no such file")
 
 
 @pytest.mark.parametrize(
@@ -50,13 +50,13 @@ def test_missing_file(tmp_path):
 def test_rubbish(tmp_path, data):
     path = tmp_path / "rubbish.dxf"
     path.write_bytes(data)
-    refused(path, "part.file = rubbish.dxf: not a DXF drawing")
+    assert_refused(path, "part.file = rubbish.dxf: not a DXF drawing")
 
 
 def test_empty_file(tmp_path):
     path = tmp_path / "empty.dxf"
     path.write_bytes(b"")
-    refused(path, "part.file = empty.dxf: the file is empty")
+    assert_refused(path, "part.file = empty.dxf: the file is empty")
 
 
 def test_binary_dxf_with_rubbish_in_it(tmp_path):
@@ -75,7 +75,7 @@ def test_a_million_lines_are_refused_in_seconds(tmp_path):
             stream.write(one * 10_000)
         stream.write("0\nENDSEC\n0\nEOF\n")
     start = time.perf_counter()
-    refused(
+    assert_refused(
         path,
         "part.file = huge.dxf: 1000000 entities: must be at most 200000; keep only the part there",
     )
@@ -92,7 +92,7 @@ def test_too_many_by_blocks_in_blocks(drawn):
                 block.add_blockref(f"b{k - 1}", (0, 0))
         msp.add_blockref("b5", (0, 0))
 
-    refused(
+    assert_refused(
         drawn(add),
         "part.file = part.dxf: more than 500 entities: must be at most 500; keep only the part there",
         max_entities=500,
@@ -101,13 +101,15 @@ def test_too_many_by_blocks_in_blocks(drawn):
 
 def test_no_geometry_names_the_layers(drawn):
     path = drawn(lambda msp: msp.add_text("only text"))
-    refused(path, "part.file = part.dxf: no lines or arcs; layers there are: 0, Defpoints, walls")
+    assert_refused(path, "part.file = part.dxf: no lines or arcs; layers there are: 0, Defpoints, walls")
 
 
 def test_unknown_layer_names_those_there_are(drawn):
     path = drawn(lambda msp: msp.add_circle((0, 0), 1))
-    refused(path, "part.layers: no layer 'wall' in part.dxf; layers there are: 0, Defpoints, walls", layers=["wall"])
-    refused(
+    assert_refused(
+        path, "part.layers: no layer 'wall' in part.dxf; layers there are: 0, Defpoints, walls", layers=["wall"]
+    )
+    assert_refused(
         path, "part.file = part.dxf: no lines or arcs on walls; layers there are: 0, Defpoints, walls", layers=["walls"]
     )
 
@@ -116,31 +118,33 @@ def test_units_must_be_said(drawn):
     def add(msp):
         msp.add_circle((0, 0), 1)
 
-    refused(
+    assert_refused(
         drawn(add, units=0), "part.file = part.dxf: the header names no unit: state part.units_if_unsaid or part.units"
     )
-    refused(drawn(add, units=3), "part.file = part.dxf: $INSUNITS = 3 is not read: state part.units")
-    refused(drawn(add), "part.units = 'mmm': must be one of um, mm, cm, m, inch, foot", units="mmm")
+    assert_refused(drawn(add, units=3), "part.file = part.dxf: $INSUNITS = 3 is not read: state part.units")
+    assert_refused(drawn(add), "part.units = 'mmm': must be one of um, mm, cm, m, inch, foot", units="mmm")
 
 
 @pytest.mark.parametrize("bad", ["nan", "inf", "-inf", "1e999"])
 def test_a_coordinate_that_is_no_number(tmp_path, bad):
     path = tmp_path / "part.dxf"
     path.write_text(entities(*line_of(bad)))
-    refused(path, "part.file = part.dxf: LINE on layer '0' has a coordinate that is not a finite number", units="mm")
+    assert_refused(
+        path, "part.file = part.dxf: LINE on layer '0' has a coordinate that is not a finite number", units="mm"
+    )
 
 
 def test_what_is_not_flat(drawn):
-    refused(
+    assert_refused(
         drawn(lambda msp: msp.add_line((1, 2, 0), (3, 4, 5))),
         "part.file = part.dxf: LINE on layer '0' at (1, 2) is not parallel to the XY plane: a flat drawing is needed",
     )
-    refused(
+    assert_refused(
         drawn(lambda msp: msp.add_arc((0, 0), 1, 0, 90, dxfattribs={"extrusion": (1, 0, 0)})),
         "part.file = part.dxf: ARC on layer '0' is not parallel to the XY plane (extrusion [1.0, 0.0, 0.0]): "
         "a flat drawing is needed",
     )
-    refused(
+    assert_refused(
         drawn(lambda msp: msp.add_polyline3d([(0, 0, 0), (1, 0, 0), (1, 1, 1)])),
         "part.file = part.dxf: POLYLINE on layer '0' at (0, 0) is not parallel to the XY plane: a flat drawing "
         "is needed",
@@ -150,7 +154,7 @@ def test_what_is_not_flat(drawn):
 @pytest.mark.parametrize("bad", [0.0, -1.0, float("nan")])
 def test_a_tolerance_that_is_none(drawn, bad):
     path = drawn(lambda msp: msp.add_circle((0, 0), 1))
-    refused(path, f"part.tolerance_mm = {bad:g}: must be a finite number above 0", tolerance_mm=bad)
+    assert_refused(path, f"part.tolerance_mm = {bad:g}: must be a finite number above 0", tolerance_mm=bad)
 
 
 def test_an_open_chain_where_a_closed_one_is_needed(drawn):

@@ -65,7 +65,7 @@ def some_commands(draw, rotary):
     )  # fmt: skip
 
 
-def same(meant, read, unit):
+def assert_same(meant, read, unit):
     """Rows that round to nothing may be missing; a tool's first row is two."""
     got = iter(range(len(read)))
     place = None
@@ -101,7 +101,7 @@ def same(meant, read, unit):
 @settings(max_examples=150, deadline=None)
 def test_three_axes(meant):
     text = write_commands(meant, VMC, title="t", verified=False)
-    same(meant, read_gcode(text)[0], 1e-6)
+    assert_same(meant, read_gcode(text)[0], 1e-6)
 
 
 @given(some_commands(rotary=False))
@@ -110,11 +110,11 @@ def test_fanuc(meant):
     rpm = np.round(meant.spindle * 60 / math.tau) * math.tau / 60
     meant = replace(meant, spindle=rpm)
     text = write_commands(meant, FANUC, title="t", verified=False)
-    same(meant, read_gcode(text, dialect="fanuc")[0], 1e-4)
+    assert_same(meant, read_gcode(text, dialect="fanuc")[0], 1e-4)
 
 
 @given(some_commands(rotary=True))
 @settings(max_examples=150, deadline=None)
 def test_five_axes(meant):
     text = write_commands(meant, FIVE, title="t", verified=False)
-    same(meant, read_gcode(text)[0], 1e-6)
+    assert_same(meant, read_gcode(text)[0], 1e-6)

@@ -14,7 +14,7 @@ from chipload.machine.machine import machine_named
 from chipload.program.build import dwell, follow, helix, plunge, rapid, rows
 from chipload.program.gcode.writer import write_gcode
 from chipload.program.program import ARC_CCW, ARC_CW, LINE, RAPID, Program
-from rs274 import MISSING, Refused, canonical, compare, rs274_installed, run_rs274
+from rs274 import MISSING, Refused, assert_same_motions, canonical, rs274_installed, run_rs274
 
 pytestmark = pytest.mark.skipif(not rs274_installed(), reason=MISSING)
 LINUXCNC, FANUC = machine_named("vmc"), machine_named("vmc-fanuc")
@@ -62,7 +62,7 @@ def kept(program, decimals=6):
 @pytest.mark.parametrize("seed", range(4))
 def test_random_program_is_understood(seed):
     program = random_program(np.random.default_rng(seed), 1500)
-    left = compare(run_rs274(written(program)), program)
+    left = assert_same_motions(run_rs274(written(program)), program)
     assert left == np.count_nonzero(~kept(program)) <= 2
 
 
@@ -109,7 +109,7 @@ def test_fanuc_text_with_four_decimals():
             "spindle": np.full(len(program), round(800.0 * 60 / math.tau) * math.tau / 60),
         }
     )
-    compare(run_rs274(text), spun, mm=2e-4, unit=1e-4)
+    assert_same_motions(run_rs274(text), spun, mm=2e-4, unit=1e-4)
 
 
 coordinate = st.one_of(
@@ -142,7 +142,7 @@ def test_any_program_is_understood(moves):
             p.append(np.array([x, y, z]))
     feed = [0.0 if m == RAPID else 10.0 for m in motion]
     program = rows(motion, np.array(p), np.array(centres), feed, 500.0, 1, "cut")
-    compare(run_rs274(written(program)), program)
+    assert_same_motions(run_rs274(written(program)), program)
 
 
 def test_contour_helix_dwell_and_change_of_tool():
@@ -160,7 +160,7 @@ def test_contour_helix_dwell_and_change_of_tool():
         rapid([58.0, 10.0, 10.0], 0.0, 12, "link"),
     ]
     program = Program.join(parts)
-    assert compare(run_rs274(written(program)), program) == 0
+    assert assert_same_motions(run_rs274(written(program)), program) == 0
 
 
 def test_the_reader_does_refuse():
@@ -177,7 +177,7 @@ def test_the_reader_does_refuse():
 def test_comments_do_nothing(text):
     program = rows([RAPID, LINE], [[0, 0, 0], [5, 0, 0]], (0, 0), [0, 5.0], 100.0, 1, text)
     out = write_gcode(program, LINUXCNC, title=text, verified=True, comments=(text, "x" * 500))
-    assert compare(run_rs274(out), program) == 0
+    assert assert_same_motions(run_rs274(out), program) == 0
     plain = written(rows([RAPID, LINE], [[0, 0, 0], [5, 0, 0]], (0, 0), [0, 5.0], 100.0, 1, "cut"))
     acts = [name for name, _ in canonical(out) if name != "COMMENT"]
     assert acts == [name for name, _ in canonical(plain) if name != "COMMENT"]

@@ -13,7 +13,7 @@ from chipload.machine.machine import machine_named
 from chipload.planning.contour.plan import Finishing, plan_contour
 from chipload.program.gcode.writer import write_gcode
 from chipload.simulation.verify import verify_contour
-from rs274 import MISSING, compare, rs274_installed, run_rs274
+from rs274 import MISSING, assert_same_motions, rs274_installed, run_rs274
 
 QUARTER = math.tan(math.pi / 8)
 CORNER = Contour.from_bulges([(0, 0), (20, 0), (28, 8), (28, 28)], [0, QUARTER, 0, 0])
@@ -94,7 +94,7 @@ def test_the_simulation_agrees(case):
 def test_rs274_reads_the_same_path(case):
     contours, cutter, changes = CASES[case]
     for name, result in plan(contours, cutter, **changes).items():
-        compare(run_rs274(write_gcode(result.program, MACHINE, title=name, verified=True)), result.program)
+        assert_same_motions(run_rs274(write_gcode(result.program, MACHINE, title=name, verified=True)), result.program)
 
 
 def test_right_of_the_reversed_chain_is_left_of_the_chain():
