@@ -195,8 +195,6 @@ def _blocks(commands: Commands, machine: Machine, kept: Sequence[tuple[int, str]
     lines = commands.line.tolist()
     waiting = list(reversed(kept))
     for k in range(len(motion)):
-        while waiting and lines[k] and waiting[-1][0] <= lines[k]:
-            yield _kept(waiting.pop()[1], fanuc)
         fresh = tools[k] != tool
         if labels[k] != label:
             label = labels[k]
@@ -228,6 +226,8 @@ def _blocks(commands: Commands, machine: Machine, kept: Sequence[tuple[int, str]
             tcp = not tcp
             yield _tcp(machine, tcp, tools[k], k)
             at = [""] * 9
+        while waiting and lines[k] and waiting[-1][0] <= lines[k]:
+            yield _kept(waiting.pop()[1], fanuc)
         if motion[k] == DWELL:
             yield f"G4 P{max(1, round(1000.0 * feeds[k]))}" if fanuc else f"G4 P{_decimal(feeds[k], 6)}"
             continue
