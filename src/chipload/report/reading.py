@@ -231,7 +231,7 @@ def space(program: Program) -> go.Figure:
         away[k] = p[k]
     red = {"color": LIMIT, "width": 1}
     out.add_trace(go.Scatter3d(x=away[:, 0], y=away[:, 1], z=away[:, 2], mode="lines", line=red, name="rapid"))
-    camera = {"eye": {"x": 1.35, "y": -1.35, "z": 1.1}}
+    camera = {"eye": {"x": 1.6, "y": -1.6, "z": 1.2}}
     axes = {f"{x}axis": {"title": f"{x.upper()} [mm]", "gridcolor": GRID} for x in "xyz"}
     scene = {"aspectmode": "data", "camera": camera, **axes}
     out.update_layout(
