@@ -101,7 +101,7 @@ def _plane_arcs(program: Program, normal: Floats, tolerance: float) -> Program:
 def _commands(
     program: Program, position: Floats, centre: Floats, normal: Floats, frames: tuple[Frame, ...], frame: Ints
 ) -> Commands:
-    """Commands of rows at ``position`` (n, 9), their arcs about ``normal`` through ``centre`` (n, 3)."""
+    """Commands of rows at ``position`` (n, 9), arcs of at most a turn about ``normal`` through ``centre``."""
     along = np.argmax(np.abs(normal), axis=1)
     plane = np.array([YZ, ZX, XY])[along]
     arc = is_arc(program)
@@ -112,7 +112,7 @@ def _commands(
         position=position,
         plane=np.where(arc, plane, XY),
         centre=np.where(arc[:, None], np.take_along_axis(centre, pair, axis=1), 0.0),
-        turns=np.where(arc, sense * (1 + program.turns), 0),
+        turns=np.where(arc, sense, 0),
         feed=program.feed,
         spindle=program.spindle,
         tool=program.tool,

@@ -1,0 +1,111 @@
+"""Frames and rows of Commands by hand."""
+
+import math
+
+import numpy as np
+import pytest
+
+from chipload.errors import InputError
+from chipload.machine.machine import machine_named
+from chipload.program.commands import (
+    ARC,
+    LINE,
+    RAPID,
+    YZ,
+    Commands,
+    Frame,
+    chorded,
+    commands_from_rows,
+    extents,
+    starts,
+)
+from chipload.program.gcode.reader import read_gcode
+from chipload.program.gcode.writer import write_commands
+
+SHIFTED = Frame(
+    2, [100.0, 20, 5, 0.1, 0, 0, 1, 0, 0], math.pi / 2, [1.0, 2, 3, 0, 0, 0.5, 0, 0, 0], [0, 0, 50.0, *[0] * 6]
+)
+
+
+def nine(*xyz):
+    return [*xyz, *[0.0] * (9 - len(xyz))]
+
+
+OWN = (Frame(),)
+
+
+def commands(rows, frames=OWN):
+    """Rows (motion, position, frame) with what else they need."""
+    full = [(m, p, 0, (0.0, 0.0), 0, 0.0 if m == RAPID else 5.0, 100.0, 1, False, f, k + 1, 0) for k, (m, p, f) in
+            enumerate(rows)]  # fmt: skip
+    return commands_from_rows(full, frames, ("x",))
+
+
+def test_a_frame_by_hand():
+    """(10, 0, 0) shifted to (11, 2, 3), turned to (-2, 11, 3), then by the offset and the tool's length."""
+    got = SHIFTED.to_machine(np.array([nine(10.0)]))
+    np.testing.assert_allclose(got, [[98, 31, 58, 0.1, 0, 0.5, 1, 0, 0]], atol=1e-12)
+
+
+def test_a_frame_there_and_back():
+    p = np.random.default_rng(0).normal(scale=50, size=(40, 9))
+    np.testing.assert_allclose(SHIFTED.from_machine(SHIFTED.to_machine(p)), p, atol=1e-12)
+    assert (SHIFTED.to_machine(p) != p).any(axis=0).sum() >= 6
+
+
+def test_a_row_starts_where_the_machine_stands():
+    c = commands([(RAPID, nine(98.0, 31, 58, 0.1, 0, 0.5, 1), 0), (LINE, nine(20.0), 1)], (Frame(), SHIFTED))
+    np.testing.assert_allclose(starts(c)[1], nine(10.0), atol=1e-12)
+    assert extents(c)[1] == pytest.approx(10.0)
+
+
+def test_what_a_feed_is_counted_along():
+    c = commands(
+        [(RAPID, nine(), 0), (LINE, [3, 4, 0, 9, 9, 9, 9, 9, 9], 0), (LINE, [3, 4, 0, 9, 9, 12, 9, 9, 11], 0),
+         (LINE, [3, 4, 0, 9, 12, 16, 9, 9, 11], 0)]
+    )  # fmt: skip
+    np.testing.assert_allclose(extents(c), [0, 5, 2, 5])
+
+
+def test_chords_of_an_arc_in_another_plane():
+    """A quarter in YZ about (0, 0) with a rise of 2 along X and A turning by 1: points on the helix."""
+    rows = [
+        (RAPID, nine(0.0, 10, 0), 0, (0, 0), 0, 0, 1, 1, False, 0, 1, 0),
+        (ARC, nine(2.0, 0, 10, 1.0), YZ, (0, 0), 1, 5, 1, 1, False, 0, 2, 0),
+    ]
+    c = chorded(commands_from_rows(rows, (Frame(),), ("x",)), np.array([False, True]), 0.01)
+    u = np.arange(1, len(c)) / (len(c) - 1)
+    a = 0.5 * math.pi * u
+    np.testing.assert_allclose(
+        c.position[1:, :4], np.column_stack([2 * u, 10 * np.cos(a), 10 * np.sin(a), u]), atol=1e-9
+    )
+    assert 10 * (1 - math.cos(0.25 * math.pi / (len(c) - 1))) <= 0.01
+    assert set(c.motion[1:]) == {LINE}
+
+
+def test_a_shift_is_written_into_the_coordinates():
+    """What G92 did is in the numbers, so that the axes go to the same places without it."""
+    frame = Frame(2, nine(), 0.0, nine(1.0, 2, 3))
+    c = commands([(RAPID, nine(10.0, 0, 5), 0), (LINE, nine(20.0, 0, 0), 0)], (frame,))
+    text = write_commands(c, machine_named("vmc"), title="t", verified=False)
+    assert "\nG55\n" in text
+    read, _ = read_gcode(text)
+    np.testing.assert_allclose(read.machine()[-1], c.machine()[-1], atol=1e-9)
+    assert read.frames[read.frame[-1]].number == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"frame": [5]}, "commands.frame = 5..5: must be from 0 to 0"),
+        ({"motion": [9]}, "commands.motion = 9..9: must be from 0 to 4"),
+        ({"position": [[1.0, 2.0]]}, "commands.position: shape (1, 2): must be (1, 9)"),
+        ({"feed": [math.nan]}, "commands.feed: a value is not a finite number"),
+    ],
+)
+def test_refused(change, text):
+    columns = {"motion": [0], "position": [nine()], "plane": [0], "centre": [[0, 0]], "turns": [0], "feed": [0]}
+    columns |= {"spindle": [0], "tool": [0], "tcp": [False], "frame": [0], "line": [0], "label": [0]}
+    with pytest.raises(InputError) as err:
+        Commands(**{**columns, **change}, frames=(Frame(),), labels=("x",))
+    assert str(err.value) == text
