@@ -94,6 +94,20 @@ def test_a_shift_is_written_into_the_coordinates():
     assert read.frames[read.frame[-1]].number == 2
 
 
+@pytest.mark.parametrize("tcp", [True, False])
+def test_the_feed_of_a_turn_alone(tcp):
+    """0.5 rad/s about A: 1718.9 deg/min with tip control, else the time of 0.2 rad: 150 times a minute."""
+    rows = [
+        (RAPID, nine(1.0, 2, 3), 0, (0, 0), 0, 0, 10.0, 1, tcp, 0, 1, 0),
+        (LINE, nine(1.0, 2, 3, 0.2), 0, (0, 0), 0, 0.5, 10.0, 1, tcp, 0, 2, 0),
+    ]
+    c = commands_from_rows(rows, (Frame(),), ("x",))
+    text = write_commands(c, machine_named("xyzac-trunnion"), title="t", verified=False)
+    assert ("F1718.873" if tcp else "G93 A11.459156 F150") in text
+    read, _ = read_gcode(text)
+    assert read.feed[-1] == pytest.approx(0.5, rel=1e-6)
+
+
 @pytest.mark.parametrize(
     ("change", "text"),
     [
