@@ -189,7 +189,10 @@ def test_a_stopped_run_leaves_no_half_file(job_dir: Path, tmp_path: Path, number
         "main()\n"
     )
     words = [sys.executable, "-c", slow, "run", str(job_dir / "job.toml"), "--out", str(tmp_path / "r")]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    pipe = subprocess.PIPE
+    # a shell that runs in the background lets its children ignore Ctrl-C
+    heard = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
+    with subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True, preexec_fn=heard) as process:
         for _ in range(600):
             if any(p.name.startswith(".chipload-") and list(p.iterdir()) for p in tmp_path.iterdir()):
                 break
