@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from chipload.machine.machine import Machine
 
 FAULT, WRONG, EXCEEDED, STOPPED = 1, 2, 3, 130
+#: [mm] where none is stated
+TOLERANCE_MM = 0.001
 #: findings of a machine that break nothing
 HARMLESS = ("machine-singular", "machine-rewind", "machine-offset")
 
@@ -53,6 +55,10 @@ DialectName = Annotated[
     typer.Option("--dialect", help="linuxcnc, fanuc, sinumerik, heidenhain or apt; else by the file's ending"),
 ]
 FeedIfUnsaid = Annotated[float | None, typer.Option("--feed-mm-min", help="feed of CL data that state none")]
+ToleranceMm = Annotated[
+    float,
+    typer.Option("--tolerance-mm", help="how far the tip may leave its path where a move with rotary axes is cut up"),
+]
 Debug = Annotated[bool, typer.Option("--debug", help="show the traceback of a fault")]
 
 
@@ -104,6 +110,7 @@ def check(
     tools: Tools = None,
     dialect: DialectName = None,
     feed_mm_min: FeedIfUnsaid = None,
+    tolerance_mm: ToleranceMm = TOLERANCE_MM,
     sets: Sets = None,
     debug: Debug = False,
 ) -> None:
@@ -113,7 +120,7 @@ def check(
         if file.suffix.lower() != ".toml":
             if sets:
                 raise InputError("--set: belongs to a job: leave it out for a program")
-            return _check_program(file, machine, tools, dialect, feed_mm_min)
+            return _check_program(file, machine, tools, dialect, feed_mm_min, tolerance_mm)
         for option, value in (
             ("machine", machine),
             ("tools", tools),
@@ -140,6 +147,7 @@ def convert(
     tools: Tools = None,
     dialect: DialectName = None,
     feed_mm_min: FeedIfUnsaid = None,
+    tolerance_mm: ToleranceMm = TOLERANCE_MM,
     tcp: Annotated[bool, typer.Option("--tcp", help="tell the controller the tip while rotary axes move")] = False,
     debug: Debug = False,
 ) -> None:
@@ -156,11 +164,12 @@ def convert(
         lengths = table.lengths() if table is not None else {}
         with _bar() as progress:
             reading = read_program(
-                source, here, dialect=dialect, tools=table, feed=_mm_s(feed_mm_min), progress=progress
+                source, here, dialect=dialect, tools=table, feed=_mm_s(feed_mm_min), tolerance=tolerance_mm,
+                progress=progress,
             )  # fmt: skip
             text, findings = convert_program(
                 reading.program, reading.noticed, there, target.suffix, title=source.name,
-                tool_lengths=lengths, tcp=tcp,
+                tool_lengths=lengths, tcp=tcp, tolerance=tolerance_mm,
             )  # fmt: skip
             write_whole(target, text.encode("ascii"))
         for f in (*reading.noticed, *findings):
@@ -248,7 +257,12 @@ def _check_job(job: Path, sets: Sequence[str]) -> int:
 
 
 def _check_program(
-    path: Path, machine: str | None, tools: Path | None, dialect: str | None, feed_mm_min: float | None
+    path: Path,
+    machine: str | None,
+    tools: Path | None,
+    dialect: str | None,
+    feed_mm_min: float | None,
+    tolerance_mm: float,
 ) -> int:
     """Check a program: findings by line, then what it is."""
     from chipload.program.motions import lengths
@@ -258,7 +272,7 @@ def _check_program(
     with _bar() as progress:
         reading = read_program(
             path, on, dialect=dialect, tools=read_tools(tools) if tools is not None else None, feed=_mm_s(feed_mm_min),
-            progress=progress,
+            tolerance=tolerance_mm, progress=progress,
         )  # fmt: skip
     broken = set(map(id, reading.broken))
     for f in sorted((*reading.noticed, *reading.broken), key=lambda f: f.line):

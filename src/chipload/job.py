@@ -118,6 +118,9 @@ class ProgramTable(Table):
     dialect: Literal["linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"] | None = None
     tools: Text | None = Field(None, description="LinuxCNC tool table")
     feed_mm_min: Positive | None = Field(None, le=1e5, description="feed of CL data that state none")
+    tolerance_mm: Positive = Field(
+        0.001, le=1.0, description="how far the tip may leave its path where a move is cut up"
+    )
 
 
 class ProgramJobTable(Table):

@@ -119,6 +119,7 @@ def run_program(job: ProgramJob, progress: Progress = silent) -> Read:
         dialect=table.dialect,
         tools=read_tools(job.tools_file) if job.tools_file is not None else None,
         feed=mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None,
+        tolerance=table.tolerance_mm,
         progress=progress,
     )
     lines, seconds = line_times(reading, machine)

@@ -135,6 +135,26 @@ def test_converted_for_five_axes(files: Path):
         np.testing.assert_allclose(read.program.axis[k], axis, atol=1e-7)
 
 
+def test_a_coarser_tolerance_makes_fewer_pieces(files: Path):
+    """The pieces of a row go with the root of the tolerance."""
+    counts = []
+    for tolerance in ("0.01", "0.0001"):
+        out = files / f"{tolerance}.ngc"
+        words = ("--machine", "xyzbc-trunnion", "--tolerance-mm", tolerance)
+        assert call("convert", files / "p.cls", out, *words)[0] == 0
+        counts.append(sum(line.startswith(("X", "Y", "Z", "B", "G93")) for line in out.read_text().splitlines()))
+    assert 7 <= counts[1] / counts[0] <= 13
+
+
+def test_a_tolerance_of_nothing_is_refused(files: Path):
+    code, _, err = call(
+        "convert", files / "p.cls", files / "x.ngc", "--machine", "xyzbc-trunnion", "--tolerance-mm", "0"
+    )
+    assert code == 2
+    assert "tolerance" in err
+    assert not (files / "x.ngc").exists()
+
+
 def test_a_job_with_a_program(files: Path):
     job = files / "job.toml"
     job.write_text('[program]\nfile = "a.ngc"\ntools = "t.tbl"\n[machine]\nname = "vmc"\n')

@@ -16,6 +16,7 @@ from chipload.program.apt.writer import write_apt
 from chipload.program.gcode.writer import write_commands
 from chipload.program.program import Program
 from chipload.program.to_axes import to_axes
+from chipload.program.to_work import TOLERANCE_MM
 
 #: endings of CL data and of NC text that can be written
 CL_DATA, NC_TEXT = (".apt", ".cls"), (".ngc", ".nc", ".tap", ".cnc", ".gcode")
@@ -59,6 +60,7 @@ def convert_program(
     cutters: Mapping[int, Cutter] | None = None,
     tool_lengths: Mapping[int, float] | None = None,
     tcp: bool = False,
+    tolerance: float = TOLERANCE_MM,
 ) -> tuple[str, tuple[Finding, ...]]:
     """The text of a program for a machine, and what the machine does not give.
 
@@ -69,6 +71,7 @@ def convert_program(
     cutters : by number, of CL data; None: not known
     tool_lengths : [mm] by number, on a machine with rotary axes
     tcp : whether the controller is told the tip while rotary axes move
+    tolerance : how far the tip may leave its path where a move with rotary axes is cut up [mm]
 
     Raises
     ------
@@ -81,6 +84,6 @@ def convert_program(
     if ending not in NC_TEXT:
         known = " ".join((*NC_TEXT, *CL_DATA))
         raise InputError(f"the ending {ending or 'none'} cannot be written: must be one of {known}")
-    commands, findings = to_axes(program, machine, tool_lengths=tool_lengths, tcp=tcp)
+    commands, findings = to_axes(program, machine, tool_lengths=tool_lengths, tcp=tcp, tolerance=tolerance)
     text = write_commands(commands, machine, title=title, verified=False, words=carried(noticed))
     return text, findings
