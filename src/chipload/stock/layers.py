@@ -1,9 +1,9 @@
 """The workpiece as a pile of horizontal layers, each a set of polygons that lose what a cutter covers.
 
 Notation: layer i is the prism between ``bounds[i]`` and ``bounds[i + 1]`` [mm]; its section S_i is taken at its middle,
-``heights[i]``. The plane is cut into rectangular **tiles** (columns x rows); a layer keeps one geometry a tile, so that a
-removal of area C reads only the tiles under C and costs the same after many moves as after none. Volume = sum of
-area(S_i) times thickness; for a smooth body cut at the middles its error is O(dz^2).
+``heights[i]``. The plane is cut into rectangular **tiles** (columns x rows); a layer keeps one geometry a tile, so
+that a removal of area C reads only the tiles under C and costs the same after many moves as after none. Volume = sum
+of area(S_i) times thickness; for a smooth body cut at the middles its error is O(dz^2).
 
 Reference: [Chips2017] (the pile of layers).
 """
@@ -138,7 +138,7 @@ class LayeredStock:
         Returns
         -------
         For each k the pieces that were there and were taken, joined over the tiles; none: an empty list. What is taken
-        and what is left add up to what was there but for rounding. Pieces as thin as rounding are given back like others.
+        and what is left add up to what was there but for rounding. Pieces as thin as rounding come back like others.
 
         Raises
         ------
