@@ -172,18 +172,18 @@ class LayeredStock:
             return
         k, layer, j, i = np.array(which, dtype=np.int64).T
         before, shape = self.tiles[layer, j, i], given[k]
-        met = shapely.intersects(before, shape)
-        k, layer, j, i, before, shape = k[met], layer[met], j[met], i[met], before[met], shape[met]
         taken = shapely.intersection(before, shape)
-        solid = shapely.area(taken) > 0.0
-        k, layer, j, i = k[solid], layer[solid], j[solid], i[solid]
-        self.tiles[layer, j, i] = shapely.difference(before[solid], shape[solid])
-        self.cut[layer] = True
-        taken = taken[solid]
-        starts = np.flatnonzero(np.diff(k, prepend=-1))
-        for s, e in itertools.pairwise([*starts, len(k)]):
-            chip = taken[s] if e == s + 1 else shapely.union_all([MultiPolygon(polygons(t)) for t in taken[s:e]])
-            chips[k[s]] = polygons(chip)
+        parts, pair = shapely.get_parts(taken, return_index=True)
+        solid = (shapely.get_type_id(parts) == POLYGON) & (shapely.area(parts) > 0.0)
+        parts, pair = parts[solid], pair[solid]
+        hit = np.unique(pair)
+        self.tiles[layer[hit], j[hit], i[hit]] = shapely.difference(before[hit], shape[hit])
+        self.cut[layer[hit]] = True
+        for n, part in zip(k[pair].tolist(), parts, strict=True):
+            chips[n].append(part)
+        several, tiles = np.unique(k[hit], return_counts=True)
+        for n in several[tiles > 1].tolist():
+            chips[n] = polygons(shapely.union_all(chips[n]))
 
     def _layer(self, layer: int) -> int:
         if not 0 <= layer < self.layers:
