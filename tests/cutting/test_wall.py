@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting.bites import bites_of_arcs, tooth_radii
 from chipload.cutting.material import material_named
 from chipload.cutting.wall import wall_error_along, wall_profile
+from chipload.engagement.bites import bites_of_arcs, tooth_radii
 from chipload.errors import InputError
 from chipload.structure.beam import compliance
 

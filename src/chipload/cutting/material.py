@@ -41,6 +41,7 @@ class Material:
     workpiece : alloy and temper
     chip : (smallest, greatest) chip thickness they hold for [mm]; None: the source does not say
     spread : relative standard deviation of the coefficients; None: the source does not say
+    size : exponents (m_t, m_r, m_a) of the size effect, from 0 to below 1; 0: none
 
     Raises
     ------
@@ -60,6 +61,7 @@ class Material:
     workpiece: str = ""
     chip: tuple[float, float] | None = None
     spread: float | None = None
+    size: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         for key, (name, low, high) in _NUMBERS.items():
@@ -81,8 +83,13 @@ class Material:
             raise InputError(f"material.spread = {self.spread:g}: must be from 0 to below 1 (0.1 is 10 %)")
 
     @property
+    def law(self) -> tuple[float, ...]:
+        """Coefficients and exponents, (Ktc, Krc, Kac, Kte, Kre, Kae, m_t, m_r, m_a), as the kernels take them."""
+        return (*self.coefficients, *self.size)
+
+    @property
     def coefficients(self) -> tuple[float, float, float, float, float, float]:
-        """(Ktc, Krc, Kac, Kte, Kre, Kae) in MPa and N/mm, the order in which the kernels take them."""
+        """(Ktc, Krc, Kac, Kte, Kre, Kae) in MPa and N/mm."""
         return (self.Ktc, self.Krc, self.Kac, self.Kte, self.Kre, self.Kae)
 
 
