@@ -1,0 +1,339 @@
+"""Force coefficients from measured forces: what a fit is, the average method, and what a fit says of another cut.
+
+Notation: x = (Ktc, Krc, Kac, Kte, Kre, Kae) [MPa, N/mm] as in :mod:`chipload.cutting.material`; force on the cutter
+along T, n and the axis as in :mod:`chipload.cutting.force`; theta [rad] rotation of tooth 0; e, lambda runout; Omega
+[rad/s] spindle speed; k harmonic of the spindle, c_k amplitudes as in :mod:`chipload.cutting.turns`; B_k those of the
+six forces that belong to unit coefficients; w0 [rad/s], zeta resonance of the dynamometer.
+
+Force is linear in x. The mean force over whole turns is B_0 x: a linear regression over the cuts, whose B_0 is the
+closed form of the one force model, for any arc. Every sample over the turn: :mod:`chipload.cutting.fit_turns`.
+
+The dynamometer shows D(w) = 1 / (1 - (w / w0)^2 + 2 i zeta w / w0) times the force, 1 where it is taken as rigid.
+
+Intervals are 95 %, Student's t; here from the scatter about the line. With two feeds no scatter is left, and that from
+turn to turn is taken. What no channel determines is not a number.
+
+Reference: [Altintas2012] ch. 2, mean forces; [Kline1983], runout.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.bites import bites_of_arcs
+from chipload.cutting.force import forces_over_turn, mean_forces
+from chipload.cutting.material import Material
+from chipload.cutting.turns import Cut, Turns, turns_of
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+NAMES = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")
+#: which of x act in the plane, and along the axis
+PLANE, AXIS = (0, 1, 3, 4), (2, 5)
+#: rotations at which the forces of a turn are taken
+TURN = 512
+#: singular value, in parts of the greatest, below which a direction is undetermined
+LOOSE = 1e-6
+
+_PLAIN = Material("unit", 1000.0, 0.0, 0.0, 0.0, 0.0, 0.0, source="a difference of two materials")
+_STEPS = (1000.0, 1000.0, 1000.0, 100.0, 100.0, 100.0)
+_MORE = tuple(replace(_PLAIN, **{name: getattr(_PLAIN, name) + step}) for name, step in zip(NAMES, _STEPS, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Coefficients with what is known of them.
+
+    Parameters
+    ----------
+    method : ``average`` or ``instantaneous``
+    values : (6,) float, x; NaN where not identified
+    covariance : (6, 6) float; NaN where not identified
+    interval : (6, 2) float, 95 %
+    cutter : with the runout that was found, or was given
+    cuts, turns : that were fitted
+    phase : (f,) float [rad], theta_0 of each cut; NaN by the average method
+    zero : (f, 3) float [N] of each cut; 0 where it is not sought
+    resonance : (3, 2) float, w0 [rad/s] and zeta of each channel; NaN: rigid
+    residual : (3,) float [N] standard deviation of what the model leaves, in the band; NaN: not measured
+    r2 : (3,) float, share of the variance that the model explains
+    freedom : observations less parameters
+    harmonics : how many count
+    converged : whether the search ended by itself
+    notes : what the reader must know
+    linear : (6,) float, x with some value where it is not identified; ``parameters`` (p,) and ``spread`` (p, p): runout
+        and x as fitted and their covariance, for the bands
+    """
+
+    method: str
+    values: Floats
+    covariance: Floats
+    interval: Floats
+    cutter: Cutter
+    cuts: tuple[Cut, ...]
+    turns: tuple[Turns, ...]
+    phase: Floats
+    zero: Floats
+    resonance: Floats
+    residual: Floats
+    r2: Floats
+    freedom: int
+    harmonics: int
+    converged: bool
+    notes: tuple[str, ...]
+    linear: Floats
+    parameters: Floats
+    spread: Floats
+
+    @property
+    def identified(self) -> NDArray[np.bool_]:
+        """(6,) which coefficients the measurement determines."""
+        return np.asarray(np.isfinite(self.values))
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """(3,) the channels whose force the identified coefficients give."""
+        plane, axis = self.identified[list(PLANE)].all(), self.identified[list(AXIS)].all()
+        return np.array([plane, plane, axis])
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """What the coefficients say of a cut: (3,) float [N] along T, n and the axis; NaN where they do not say it.
+
+    ``mean``; ``high`` and ``low`` greatest and least over the turn as the dynamometer shows them; ``band_high`` and
+    ``band_low`` of the harmonics that were fitted alone; ``half`` (5, 3) the half widths of their 95 % bands, in this
+    order; ``resultant`` greatest in-plane force.
+    """
+
+    mean: Floats
+    high: Floats
+    low: Floats
+    band_high: Floats
+    band_low: Floats
+    half: Floats
+    resultant: float
+
+
+# -- the model --------------------------------------------------------------------------------------------------
+def unit_forces(cut: Cut, cutter: Cutter, theta: Floats) -> Floats:
+    """Forces on the cutter that belong to unit coefficients, (m, 3, 6) float: force = unit_forces @ x."""
+    bites = bites_of_arcs([cut.arc[0]], [cut.arc[1]], cut.feed_per_tooth(cutter.flutes), cutter, cut.depth)
+    return _columns(lambda material: forces_over_turn(bites, cutter, material, theta)[0][0])
+
+
+def unit_means(cut: Cut, cutter: Cutter) -> Floats:
+    """As :func:`unit_forces`, averaged over the turn in closed form: (3, 6) float."""
+    bites = bites_of_arcs([cut.arc[0]], [cut.arc[1]], cut.feed_per_tooth(cutter.flutes), cutter, cut.depth)
+    return _columns(lambda material: mean_forces(bites, cutter, material)[0][0])
+
+
+def _columns(force: Callable[[Material], Floats]) -> Floats:
+    """The force of each unit coefficient, as a difference of the forces of two materials."""
+    plain = force(_PLAIN)
+    return np.stack([(force(more) - plain) / step for more, step in zip(_MORE, _STEPS, strict=True)], axis=-1)
+
+
+def unit_harmonics(cut: Cut, cutter: Cutter, harmonics: int) -> Complexes:
+    """B_k, (H + 1, 3, 6) complex; the zeroth is the closed form."""
+    theta = np.linspace(0.0, math.tau, TURN, endpoint=False)
+    out = np.fft.rfft(unit_forces(cut, cutter, theta), axis=0)[: harmonics + 1] / TURN
+    out[0] = unit_means(cut, cutter)
+    return np.asarray(out)
+
+
+def dynamometer(resonance: Floats, w: Floats) -> Complexes:
+    """D of each channel at the frequencies w (m,) [rad/s]: (m, 3) complex."""
+    out = np.ones((len(w), 3), dtype=np.complex128)
+    for c in np.flatnonzero(np.isfinite(resonance[:, 0])):
+        r = w / resonance[c, 0]
+        out[:, c] = 1.0 / (1.0 - r * r + 2j * resonance[c, 1] * r)
+    return out
+
+
+def as_real(amplitude: Complexes) -> Floats:
+    """Amplitudes as real numbers whose squares sum to the mean square of the signal: (2 H + 1, ...)."""
+    root = math.sqrt(2.0)
+    return np.concatenate([amplitude[:1].real, root * amplitude[1:].real, root * amplitude[1:].imag])
+
+
+# -- the average method -----------------------------------------------------------------------------------------
+def fit_average(cuts: Sequence[Cut], cutter: Cutter) -> Fit:
+    """Coefficients from mean forces over whole turns.
+
+    Parameters
+    ----------
+    cuts : two feeds or more
+    cutter : with its runout, where it is known: it decides which teeth touch
+
+    Raises
+    ------
+    InputError
+        There is no cut, or the cutter has no straight flank.
+    """
+    turns = _turns(cuts, 1)
+    a = np.stack([unit_means(cut, cutter) for cut in cuts])
+    y = np.stack([t.mean.mean(axis=0) for t in turns])
+    noise = np.stack([t.mean.var(axis=0, ddof=1) / len(t.mean) if len(t.mean) > 1 else np.nan * y[0] for t in turns])
+    feeds = len({round(cut.feed_per_tooth(cutter.flutes), 9) for cut in cuts})
+    notes: list[str] = []
+    if feeds == 2:
+        notes.append("two feeds: whether force is a straight line in feed cannot be seen; intervals count turns only")
+    linear, identified, spread = np.zeros(6), np.zeros(6, dtype=bool), np.zeros((6, 6))
+    residual, r2, freedom = np.full(3, np.nan), np.full(3, np.nan), 10**9
+    for channels, which in (((0, 1), PLANE), ((2,), AXIS)):
+        rows = [(i, c) for i in range(len(cuts)) for c in channels if cuts[i].measured[c]]
+        if not rows:
+            continue
+        i, c = np.array(rows).T
+        block, seen = a[i, c][:, which], y[i, c]
+        x, there, free = solved(block, seen)
+        left = seen - block @ x
+        inverse = np.linalg.pinv(block, rcond=1e-9)
+        count = len(rows) - int(np.linalg.matrix_rank(block, rtol=1e-9))
+        if feeds > 2 and count > 0:
+            covariance = inverse @ inverse.T * float(left @ left) / count
+        else:
+            count = min(len(t.mean) for t in turns) - 1
+            covariance = (inverse * noise[i, c]) @ inverse.T
+        freedom = min(freedom, count)
+        linear[list(which)], identified[list(which)] = x, there & free
+        spread[np.ix_(which, which)] = covariance
+        for channel in set(c.tolist()):
+            mine = c == channel
+            residual[channel] = math.sqrt(float(np.mean(left[mine] ** 2)))
+            total = float(np.sum((seen[mine] - seen[mine].mean()) ** 2))
+            r2[channel] = 1.0 - float(np.sum(left[mine] ** 2)) / total if total > 0.0 else math.nan
+    return concluded(
+        "average", cuts, turns, cutter, linear, identified, np.concatenate([runout_of(cutter), linear]),
+        padded(spread, 2), max(freedom, 0), notes,
+        phase=np.full(len(cuts), np.nan), zero=np.zeros((len(cuts), 3)), resonance=np.full((3, 2), np.nan),
+        residual=residual, r2=r2, harmonics=0, converged=True,
+    )  # fmt: skip
+
+
+def solved(a: Floats, y: Floats) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Least squares with scaled columns; which columns are there at all, and which are determined."""
+    size = np.linalg.norm(a, axis=0)
+    there = size > 0.0
+    scale = np.where(there, size, 1.0)
+    u, s, vt = np.linalg.svd(a / scale, full_matrices=False)
+    sure = s > LOOSE * s[0] if len(s) and s[0] > 0.0 else np.zeros(len(s), dtype=bool)
+    x = vt[sure].T @ ((u.T[sure] @ y) / s[sure]) / scale
+    determined = np.sum(vt[sure] ** 2, axis=0) > 1.0 - 1e-6
+    return x, there, determined
+
+
+# -- what comes out ---------------------------------------------------------------------------------------------
+def _turns(cuts: Sequence[Cut], harmonics: int) -> tuple[Turns, ...]:
+    if not cuts:
+        raise InputError("fit: no cut to fit: name at least one measurement with use = fit")
+    return tuple(turns_of(cut, harmonics) for cut in cuts)
+
+
+def runout_of(cutter: Cutter) -> Floats:
+    """(e cos(lambda), e sin(lambda)) [mm]."""
+    size, direction = cutter.runout
+    return size * np.array([math.cos(direction), math.sin(direction)])
+
+
+def padded(spread: Floats, more: int) -> Floats:
+    """A covariance with ``more`` exact numbers before it."""
+    out = np.zeros((len(spread) + more, len(spread) + more))
+    out[more:, more:] = spread
+    return out
+
+
+def concluded(
+    method: str,
+    cuts: Sequence[Cut],
+    turns: tuple[Turns, ...],
+    cutter: Cutter,
+    linear: Floats,
+    identified: NDArray[np.bool_],
+    parameters: Floats,
+    spread: Floats,
+    freedom: int,
+    notes: list[str],
+    *,
+    phase: Floats,
+    zero: Floats,
+    resonance: Floats,
+    residual: Floats,
+    r2: Floats,
+    harmonics: int,
+    converged: bool,
+) -> Fit:
+    """A fit with its intervals; what is not identified becomes NaN."""
+    if freedom < 1:
+        notes.append("as many coefficients as observations: no interval can be stated")
+    values = np.where(identified, linear, np.nan)
+    covariance = np.where(np.outer(identified, identified), spread[2:, 2:], np.nan)
+    half = _student(freedom) * np.sqrt(np.diagonal(covariance))
+    lost = [name for name, ok in zip(NAMES, identified, strict=True) if not ok]
+    if lost:
+        notes.append(f"not identified by these measurements: {', '.join(lost)}")
+    return Fit(
+        method, values, covariance, np.column_stack([values - half, values + half]), cutter, tuple(cuts), turns, phase,
+        zero, resonance, residual, r2, freedom, harmonics, converged, tuple(notes), linear, parameters, spread,
+    )  # fmt: skip
+
+
+def _student(freedom: int) -> float:
+    """How many standard deviations hold 95 % on both sides."""
+    return float(student.ppf(0.975, freedom)) if freedom > 0 else math.nan
+
+
+def predicted(fit: Fit, cut: Cut, theta: Floats, resonance: Floats | None = None) -> Floats:
+    """Forces that the coefficients give over a turn of a cut, as the dynamometer shows them: (m, 3) float [N] on the
+    cutter at the rotations theta (m,); ``resonance`` None: that of the fit.
+    """
+    return _turned(fit, cut, fit.parameters, theta, None, fit.resonance if resonance is None else resonance)
+
+
+def _turned(fit: Fit, cut: Cut, p: Floats, theta: Floats, harmonics: int | None, resonance: Floats) -> Floats:
+    """As :func:`predicted` for any runout and coefficients p, of the first harmonics or of all."""
+    cutter = replace(fit.cutter, runout=(math.hypot(p[0], p[1]), math.atan2(p[1], p[0])))
+    top = TURN // 2 - 1 if harmonics is None else harmonics
+    if harmonics is None and not np.isfinite(resonance).any():
+        force = unit_forces(cut, cutter, theta) @ p[2:]
+        return np.asarray(np.where(fit.known, force, np.nan))
+    k = np.arange(top + 1, dtype=np.float64)
+    amplitude = (unit_harmonics(cut, cutter, top) @ p[2:]) * dynamometer(resonance, k * cut.speed)
+    wave = np.exp(1j * np.outer(theta, k[1:]))
+    force = amplitude[0].real + 2.0 * (wave @ amplitude[1:]).real
+    return np.asarray(np.where(fit.known, force, np.nan))
+
+
+def predict(fit: Fit, cut: Cut) -> Prediction:
+    """Mean and extremes of a cut that was not fitted, with their bands from the covariance of runout and x."""
+    theta = np.linspace(0.0, math.tau, TURN, endpoint=False)
+
+    def said(p: Floats) -> Floats:
+        whole = _turned(fit, cut, p, theta, None, fit.resonance)
+        band = _turned(fit, cut, p, theta, max(fit.harmonics, 1), fit.resonance)
+        cutter = replace(fit.cutter, runout=(math.hypot(p[0], p[1]), math.atan2(p[1], p[0])))
+        mean = np.where(fit.known, unit_means(cut, cutter) @ p[2:], np.nan)
+        return np.stack([mean, whole.max(axis=0), whole.min(axis=0), band.max(axis=0), band.min(axis=0)])
+
+    p = fit.parameters
+    values = said(p)
+    slopes = np.zeros((*values.shape, len(p)))
+    for j, sd in enumerate(np.sqrt(np.diagonal(fit.spread))):
+        if sd > 0.0:
+            d = np.where(np.arange(len(p)) == j, 0.1 * sd, 0.0)
+            slopes[..., j] = (said(p + d) - said(p - d)) / (0.2 * sd)
+    half = _student(fit.freedom) * np.sqrt(np.einsum("abj,jk,abk->ab", slopes, fit.spread, slopes))
+    whole = predicted(fit, cut, theta)
+    return Prediction(
+        values[0], values[1], values[2], values[3], values[4], half, float(np.hypot(whole[:, 0], whole[:, 1]).max())
+    )

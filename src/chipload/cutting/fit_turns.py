@@ -1,0 +1,305 @@
+"""Force coefficients from every sample over the turn, with the runout and the spindle's phase, which nobody measured.
+
+Notation: as in :mod:`chipload.cutting.fit`; theta_0 [rad] rotation of tooth 0 at the first sample; f cuts, H harmonics.
+
+Over whole turns the harmonics are orthogonal, so that least squares on the samples is least squares on their
+amplitudes:
+
+    c_k = D(k Omega) B_k(e, lambda) x exp(i k theta_0) + zero (k = 0).
+
+x and the zeros are linear and solved inside (variable projection); theta_0 of each cut and the runout outside. Omega is
+found before, where the harmonics hold most. Harmonics up to a stated band count, and each channel of each cut counts
+by its own size. Where the dynamometer rings, w0 and zeta come from all harmonics in turn with the rest; intervals take
+them as known.
+
+Intervals: covariance (J'J)^-1 J' diag(r^2 / (1 - l)^2) J (J'J)^-1 with residuals r and leverages l, which holds too
+where the model fits some harmonics worse than others.
+
+Reference: [Kline1983], runout.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.fit import (
+    LOOSE,
+    Fit,
+    as_real,
+    concluded,
+    dynamometer,
+    padded,
+    runout_of,
+    solved,
+    unit_harmonics,
+)
+from chipload.cutting.turns import Cut, Turns, turns_of
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+#: rotations and directions of the runout that a search starts from
+PHASES, DIRECTIONS = 180, 6
+#: how often coefficients and dynamometer are found in turn
+ROUNDS = 4
+#: sizes of the runout that a search starts from, in parts of the least feed per tooth
+SIZES = (0.2, 0.45, 0.7)
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """Amplitudes, what they weigh, and what is sought. q = theta_0 of each cut, then the runout (u, v) or u or none."""
+
+    cuts: tuple[Cut, ...]
+    turns: tuple[Turns, ...]
+    cutter: Cutter
+    harmonics: int
+    seek_runout: bool
+    seek_zero: bool
+    resonance: Floats
+    kept: dict[tuple[float, ...], list[Complexes]]
+
+    @property
+    def unknowns(self) -> int:
+        """Numbers of the runout: with two teeth only its size acts, with one nothing."""
+        return min(self.cutter.flutes - 1, 2) if self.seek_runout else 0
+
+    def cutter_at(self, runout: Floats) -> Cutter:
+        """The cutter with the runout of the unknowns."""
+        if not len(runout):
+            return self.cutter
+        u, v = float(runout[0]), float(runout[1]) if len(runout) > 1 else 0.0
+        return replace(self.cutter, runout=(math.hypot(u, v), math.atan2(v, u)))
+
+    def units(self, runout: Floats) -> list[Complexes]:
+        """B_k of each cut."""
+        key = tuple(runout.tolist())
+        if key not in self.kept:
+            if len(self.kept) > 16:
+                self.kept.clear()
+            self.kept[key] = [unit_harmonics(cut, self.cutter_at(runout), self.harmonics) for cut in self.cuts]
+        return self.kept[key]
+
+    def rows(self, q: Floats, only: int | None = None) -> tuple[Floats, Floats]:
+        """Weighted design (m, 6 + zeros) and observations (m,), of every cut or of one."""
+        f = len(self.cuts)
+        k = np.arange(self.harmonics + 1, dtype=np.float64)
+        design, seen = [], []
+        for i, (unit, turns) in enumerate(zip(self.units(q[f:]), self.turns, strict=True)):
+            if only is not None and i != only:
+                continue
+            shown = dynamometer(self.resonance, k * turns.speed) * np.exp(1j * k * q[i])[:, None]
+            for c in np.flatnonzero(self.cuts[i].measured):
+                amplitude = turns.amplitude[: self.harmonics + 1, c]
+                weight = 1.0 / math.sqrt(float(np.sum(as_real(amplitude)[1:] ** 2)))
+                block = np.zeros((2 * self.harmonics + 1, 6 + (3 * f if self.seek_zero else 0)))
+                block[:, :6] = as_real(unit[:, c] * shown[:, c, None])
+                if self.seek_zero:
+                    block[0, 6 + 3 * i + c] = 1.0
+                design.append(weight * block)
+                seen.append(weight * as_real(amplitude))
+        return np.concatenate(design), np.concatenate(seen)
+
+    def left(self, q: Floats) -> Floats:
+        """Residuals at the best linear coefficients."""
+        a, y = self.rows(q)
+        return np.asarray(y - a @ solved(a, y)[0])
+
+    def start(self, runout: Floats) -> Floats:
+        """theta_0 of each cut by search, at one runout; the linear coefficients are free in each cut."""
+        f = len(self.cuts)
+        tried = np.arange(PHASES) * (math.tau / PHASES)
+        found = np.zeros(f)
+        for i in range(f):
+            cost = np.empty(PHASES)
+            for p, theta in enumerate(tried):
+                q = np.concatenate([np.zeros(f), runout])
+                q[i] = theta
+                a, y = self.rows(q, i)
+                x = solved(a, y)[0]
+                # half a turn away coefficients of the other sign do as well: such a cut is none
+                cost[p] = np.sum((y - a @ x) ** 2) if x[0] >= 0.0 else math.inf
+            found[i] = tried[int(np.argmin(cost))]
+        return np.concatenate([found, runout])
+
+
+def fit_instantaneous(
+    cuts: Sequence[Cut],
+    cutter: Cutter,
+    *,
+    band: float,
+    runout: bool = True,
+    zero: bool = False,
+    ringing: Sequence[float | None] = (None, None, None),
+) -> Fit:
+    """Coefficients from every sample over the turn.
+
+    Parameters
+    ----------
+    cuts : one or more
+    cutter : its runout stands where none is sought
+    band : highest frequency that counts [rad/s]; best below the first resonance of the dynamometer
+    runout : seek the runout; with two teeth its size alone, with one nothing
+    zero : seek the zero of each channel of each cut: drift of a charge amplifier
+    ringing : of T, n and the axis, about where the dynamometer rings [rad/s]; None: rigid
+
+    Raises
+    ------
+    InputError
+        There is no cut, the band holds no harmonic, or the cutter has no straight flank.
+    """
+    if not cuts:
+        raise InputError("fit: no cut to fit: name at least one measurement with use = fit")
+    slowest = max(cut.speed for cut in cuts)
+    harmonics = math.floor(band / slowest * (1.0 + 1e-9))
+    if harmonics < 1:
+        raise InputError(
+            f"band_hz = {band / math.tau:g}: must be at least the spindle's {slowest / math.tau:g} Hz, better twice "
+            "the tooth-passing frequency"
+        )
+    full = [max(harmonics, math.floor(0.8 * math.pi * cut.rate / cut.speed)) for cut in cuts]
+    turns = tuple(turns_of(cut, h) for cut, h in zip(cuts, full, strict=True))
+    resonance = np.full((3, 2), np.nan)
+    for c, w in enumerate(ringing):
+        if w is not None:
+            resonance[c] = w, 0.05
+    problem = _Problem(tuple(cuts), turns, cutter, harmonics, runout, zero, resonance, {})
+    q, converged = _searched(problem)
+    if any(w is not None for w in ringing):
+        for _ in range(ROUNDS):
+            problem = replace(problem, resonance=_rung(problem, q), kept={})
+            q, converged = _refined(problem, q)
+    return _concluded(problem, q, converged)
+
+
+def _searched(problem: _Problem) -> tuple[Floats, bool]:
+    """The best of several starts."""
+    f, m = len(problem.cuts), problem.unknowns
+    flutes = problem.cutter.flutes
+    starts = [np.zeros(0)]
+    if m:
+        least = min(cut.feed_per_tooth(flutes) for cut in problem.cuts)
+        turn = np.arange(DIRECTIONS) * (math.tau / (flutes * DIRECTIONS)) if m == 2 else np.zeros(1)
+        starts = [s * least * np.array([math.cos(a), math.sin(a)])[:m] for s in SIZES for a in turn]
+    ranked: list[tuple[float, int, Floats]] = []
+    for start in starts:
+        q = problem.start(start)
+        # which tooth is which is known up to one turn of names: cut by cut, try the other teeth
+        for i in range(1, f):
+            turned = [q + np.where(np.arange(len(q)) == i, math.tau * j / flutes, 0.0) for j in range(flutes)]
+            q = min(turned, key=lambda x: float(np.sum(problem.left(x) ** 2)))
+        ranked.append((float(np.sum(problem.left(q) ** 2)), len(ranked), q))
+    ranked.sort()
+    found = [_refined(problem, q) for _, _, q in ranked[:3]]
+    return min(found, key=lambda x: float(np.sum(problem.left(x[0]) ** 2)))
+
+
+def _refined(problem: _Problem, q: Floats) -> tuple[Floats, bool]:
+    """Least squares from one start."""
+    least = min(cut.feed_per_tooth(problem.cutter.flutes) for cut in problem.cuts)
+    scale = np.concatenate([np.full(len(problem.cuts), 0.1), np.full(problem.unknowns, 0.2 * least)])
+    done = least_squares(problem.left, q, x_scale=scale, xtol=1e-10, ftol=1e-12, max_nfev=200)
+    return np.asarray(done.x), bool(done.status > 0)
+
+
+def _rung(problem: _Problem, q: Floats) -> Floats:
+    """w0 and zeta of each channel that rings, from all harmonics, the rest as it is."""
+    f = len(problem.cuts)
+    a, y = problem.rows(q)
+    x = solved(a, y)[0][:6]
+    out = problem.resonance.copy()
+    cutter = problem.cutter_at(q[f:])
+    for c in np.flatnonzero(np.isfinite(out[:, 0])):
+        parts = []
+        for i, (cut, turns) in enumerate(zip(problem.cuts, problem.turns, strict=True)):
+            if cut.measured[c]:
+                k = np.arange(len(turns.amplitude), dtype=np.float64)
+                forced = (unit_harmonics(cut, cutter, len(k) - 1)[:, c] @ x) * np.exp(1j * k * q[i])
+                parts.append((k[1:] * turns.speed, forced[1:], turns.amplitude[1:, c]))
+        left = partial(_ringing_left, parts=parts)
+        low, high = np.log([0.7 * out[c, 0], 0.003]), np.log([1.4 * out[c, 0], 0.5])
+        first = [np.log([g * out[c, 0], 0.05]) for g in (0.9, 1.0, 1.1)]
+        found = [least_squares(left, s, bounds=(low, high)) for s in first]
+        out[c] = np.exp(min(found, key=lambda d: float(d.cost)).x)
+    return out
+
+
+def _ringing_left(p: Floats, parts: list[tuple[Floats, Complexes, Complexes]]) -> Floats:
+    """What one channel leaves at p = (ln w0, ln zeta), each cut by its own size."""
+    one = np.full((3, 2), np.nan)
+    one[0] = np.exp(p)
+    e = [(dynamometer(one, w)[:, 0] * forced - seen) / np.linalg.norm(seen) for w, forced, seen in parts]
+    return np.concatenate([part for z in e for part in (z.real, z.imag)])
+
+
+def _concluded(problem: _Problem, q: Floats, converged: bool) -> Fit:
+    """Values, covariance and quality at the end of the search."""
+    f, m = len(problem.cuts), problem.unknowns
+    a, y = problem.rows(q)
+    x, there, determined = solved(a, y)
+    left = y - a @ x
+    # model rows against every unknown: those outside by differences, x and the zeros exactly
+    steps = np.concatenate([np.full(f, 1e-5), np.full(m, 1e-7)])
+    outer = [
+        ((problem.rows(q + d)[0] - problem.rows(q - d)[0]) @ x) / (2.0 * h)
+        for h, d in zip(steps, np.diag(steps), strict=True)
+    ]
+    jacobian = np.column_stack([*outer, a])
+    size = np.linalg.norm(jacobian, axis=0)
+    scale = np.where(size > 0.0, size, 1.0)
+    u, s, vt = np.linalg.svd(jacobian / scale, full_matrices=False)
+    sure = s > LOOSE * s[0]
+    leverage = np.minimum(np.sum(u[:, sure] ** 2, axis=1), 1.0 - 1e-6)
+    turned = (vt[sure].T / s[sure]) @ (u[:, sure].T * (left / (1.0 - leverage)))
+    covariance = (turned @ turned.T) / np.outer(scale, scale)
+    free = np.sum(vt[sure] ** 2, axis=0) > 1.0 - 1e-6
+    linear = x[:6]
+    identified = (there & determined)[:6] & free[f + m : f + m + 6]
+    residual, r2 = _quality(problem, q, x)
+    runout = problem.cutter_at(q[f:])
+    keep = [*range(f, f + m), *range(f + m, f + m + 6)]
+    spread = covariance[np.ix_(keep, keep)]
+    notes = []
+    if problem.seek_runout and m == 1:
+        notes.append("two teeth: the size of the runout acts along their line alone; its direction is not identified")
+    if m == 1:
+        spread = np.insert(np.insert(spread, 1, 0.0, axis=0), 1, 0.0, axis=1)
+    elif m == 0:
+        spread = padded(spread, 2)
+    zero = x[6:].reshape(f, 3) if problem.seek_zero else np.zeros((f, 3))
+    return concluded(
+        "instantaneous", problem.cuts, problem.turns, runout, linear, identified,
+        np.concatenate([runout_of(runout), linear]), spread, len(y) - int(sure.sum()), notes,
+        phase=np.mod(q[:f], math.tau), zero=zero, resonance=problem.resonance, residual=residual, r2=r2,
+        harmonics=problem.harmonics, converged=converged,
+    )  # fmt: skip
+
+
+def _quality(problem: _Problem, q: Floats, x: Floats) -> tuple[Floats, Floats]:
+    """Standard deviation of what the model leaves in the band [N], and R^2, of each channel."""
+    left, total = np.full((2, 3), np.nan)
+    for c in range(3):
+        mine = [i for i, cut in enumerate(problem.cuts) if cut.measured[c]]
+        if not mine:
+            continue
+        sums = np.zeros(2)
+        for i in mine:
+            k = np.arange(problem.harmonics + 1, dtype=np.float64)
+            turns = problem.turns[i]
+            shown = dynamometer(problem.resonance, k * turns.speed)[:, c] * np.exp(1j * k * q[i])
+            model = (problem.units(q[len(problem.cuts) :])[i][:, c] @ x[:6]) * shown
+            if problem.seek_zero:
+                model[0] += x[6 + 3 * i + c]
+            seen = turns.amplitude[: problem.harmonics + 1, c]
+            sums += np.sum(as_real(seen - model) ** 2), np.sum(as_real(seen)[1:] ** 2)
+        left[c], total[c] = sums / len(mine)
+    return np.sqrt(left), 1.0 - left / total

@@ -1,0 +1,285 @@
+"""Files of measured forces: with a header as DynoWare writes it, or with a line of names alone.
+
+Notation: F force [N], t time [s].
+
+A file is UTF-8 or latin-1 text: lines ``key,value`` (DynoWare's header, may be missing), a line of column names, a line
+of units where the names do not hold them (``fx_n``, ``time_s``), then numbers with a decimal point. Time says where a
+sample is missing; without a time column the header's sampling rate holds, and the first sample is at 0.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from array import array
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import Finding, InputError
+
+Floats = NDArray[np.float64]
+
+#: newtons, seconds in one unit of a column
+FORCE_UNITS = {"n": 1.0, "kn": 1000.0, "mn": 0.001, "lbf": 4.4482216152605}
+TIME_UNITS = {"s": 1.0, "ms": 0.001, "us": 1e-6}
+#: most samples that are kept, lines of a header, characters of a line
+SAMPLES, HEADER, LINE = 5_000_000, 200, 10_000
+#: part of a sampling interval that a time stamp may be off
+JITTER = 0.2
+#: equal extreme samples in a row that are called clipped
+CLIPPED = 4
+#: drift over the window that is called so, in parts of the greatest force
+DRIFT = 0.02
+_RATE = ("sampling rate", "sample rate", "sampling frequency")
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Forces of one file.
+
+    Parameters
+    ----------
+    names : of the force columns, as in the file
+    force : (n, c) float [N], equally spaced in time
+    rate : [Hz]
+    start : time of the first sample kept [s]
+    header : key and value of every line before the names
+    """
+
+    names: tuple[str, ...]
+    force: Floats
+    rate: float
+    start: float
+    header: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        force = np.array(self.force, dtype=np.float64)
+        force.setflags(write=False)
+        object.__setattr__(self, "force", force)
+
+    def column(self, name: str) -> Floats:
+        """The forces of a column, (n,) float [N].
+
+        Raises
+        ------
+        InputError
+            There is no such column.
+        """
+        for k, known in enumerate(self.names):
+            if known.lower() == name.lower():
+                return np.asarray(self.force[:, k])
+        raise InputError(f"channel {name}: not in the file: it has {', '.join(self.names)}")
+
+
+# -- files ------------------------------------------------------------------------------------------------------
+def read_forces(path: str | Path, window: tuple[float, float] | None = None) -> tuple[Measured, tuple[Finding, ...]]:
+    """Read a file of measured forces.
+
+    Parameters
+    ----------
+    path : the file
+    window : (from, to) [s] in the file's own time; what lies outside is not kept. None: all
+
+    Returns
+    -------
+    value : the forces, equally spaced; findings: ``force-window``, ``force-clipped``, ``force-drift``
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, names no columns or units, holds something that is no number, misses samples within the
+        window, or holds more than can be kept; with the line and what to do.
+    """
+    label = f"forces {Path(path).name}"
+    lines = _lines(Path(path), label)
+    header, names, units, at, first = _head(lines, label)
+    time, columns = _columns(names, units, at, label)
+    rate = _rate(header, label)
+    if time is None and rate is None:
+        raise InputError(
+            f"{label}: line {at}: no time column and no sampling rate: add a column time_s or a line Sampling rate [Hz]"
+        )
+    kept = array("d")
+    stamps = array("d")
+    count = -1
+    low, high = window if window is not None else (-math.inf, math.inf)
+    for number, row in _rows(first, lines):
+        if len(row) != len(names):
+            raise InputError(f"{label}: line {number}: {len(row)} values: must be {len(names)}, one a column")
+        count += 1
+        try:
+            values = [float(x) for x in row]
+        except ValueError:
+            raise InputError(
+                f"{label}: line {number}: {','.join(row)[:60]!r}: must be numbers with a decimal point"
+            ) from None
+        if not all(map(math.isfinite, values)):
+            raise InputError(f"{label}: line {number}: a value is not finite: leave the sample out of the window")
+        now = values[time[0]] * time[1] if time is not None else count / (rate or 1.0)
+        if not low - 1e-12 <= now <= high + 1e-12:
+            continue
+        if len(stamps) >= SAMPLES:
+            raise InputError(f"{label}: line {number}: more than {SAMPLES} samples: state a window_s")
+        stamps.append(now)
+        kept.extend(values[k] * scale for k, scale in columns)
+    t = np.frombuffer(stamps, dtype=np.float64)
+    force = np.frombuffer(kept, dtype=np.float64).reshape(-1, len(columns))
+    if len(t) < 3:
+        raise InputError(
+            f"{label}: {len(t)} samples in the window {low:g} to {high:g} s: needs 3 or more: widen window_s"
+        )
+    rate = _spacing(t, rate, label) if time is not None else rate
+    assert rate is not None
+    measured = Measured(tuple(names[k] for k, _ in columns), force, rate, float(t[0]), header)
+    return measured, tuple(_findings(measured, window, float(t[-1])))
+
+
+def _lines(path: Path, label: str) -> Iterator[tuple[int, str]]:
+    """Numbered lines without their ends; latin-1 where the text is not UTF-8."""
+    try:
+        with path.open("rb") as file:
+            number = 0
+            while raw := file.readline(LINE + 1):
+                number += 1
+                if len(raw) > LINE:
+                    raise InputError(f"{label}: line {number}: longer than {LINE} characters: this is no force file")
+                try:
+                    text = raw.decode("utf-8-sig" if number == 1 else "utf-8")
+                except UnicodeDecodeError:
+                    text = raw.decode("latin-1")
+                if "\x00" in text:
+                    raise InputError(f"{label}: line {number}: is not text: export the forces as CSV")
+                yield number, text.rstrip("\r\n")
+    except OSError as err:
+        raise InputError(f"{label}: cannot be read: {err.strerror}") from None
+
+
+def _split(text: str) -> list[str]:
+    mark = next((m for m in (",", ";", "\t") if m in text), ",")
+    return [x.strip() for x in next(csv.reader([text], delimiter=mark), [])]
+
+
+def _rows(first: tuple[int, list[str]] | None, lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, list[str]]]:
+    if first is not None:
+        yield first
+    for number, text in lines:
+        if text.strip():
+            yield number, _split(text)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _head(
+    lines: Iterator[tuple[int, str]], label: str
+) -> tuple[dict[str, str], list[str], list[str] | None, int, tuple[int, list[str]] | None]:
+    """Header, names, units (None: in the names), line of the names, the first line of numbers."""
+    before: list[tuple[int, list[str]]] = []
+    for number, text in lines:
+        if not text.strip():
+            continue
+        row = _split(text)
+        if all(_is_number(x) for x in row):
+            break
+        before.append((number, row))
+        if len(before) > HEADER:
+            raise InputError(f"{label}: line {number}: no numbers in {HEADER} lines: this is no force file")
+    else:
+        raise InputError(f"{label}: holds no numbers: must be names, units and samples")
+    if not before:
+        raise InputError(f"{label}: line {number}: numbers without names: add a line as time_s,fx_n,fy_n,fz_n")
+    units = None
+    if len(before) > 1 and len(before[-1][1]) == len(row) == len(before[-2][1]):
+        known = {*FORCE_UNITS, *TIME_UNITS}
+        if all(x.strip("[]() ").lower() in known for x in before[-1][1]):
+            units = [x.strip("[]() ").lower() for x in before.pop()[1]]
+    at, names = before.pop()
+    if len(names) != len(row):
+        raise InputError(f"{label}: line {at}: {len(names)} names for {len(row)} columns: must be one each")
+    header = {r[0].rstrip(": "): ",".join(r[1:]).strip() for _, r in before if r[0]}
+    return header, names, units, at, (number, row)
+
+
+def _columns(
+    names: list[str], units: list[str] | None, at: int, label: str
+) -> tuple[tuple[int, float] | None, list[tuple[int, float]]]:
+    """Column and scale of the time, and of each force."""
+    time, forces = None, []
+    for k, name in enumerate(names):
+        unit = units[k] if units is not None else name.lower().rsplit("_", 1)[-1]
+        if name.lower().startswith("time") or name.lower() in ("t", "t_s"):
+            if unit not in TIME_UNITS:
+                raise InputError(f"{label}: line {at}: {name}: its unit must be one of {', '.join(TIME_UNITS)}")
+            time = (k, TIME_UNITS[unit])
+        elif unit in FORCE_UNITS:
+            forces.append((k, FORCE_UNITS[unit]))
+        elif name.lower().startswith("f"):
+            raise InputError(
+                f"{label}: line {at}: {name}: has no unit: name it {name.lower()}_n or add a line of units (N, kN, lbf)"
+            )
+    if not forces:
+        raise InputError(
+            f"{label}: line {at}: no column of forces among {', '.join(names)}: name them fx_n, fy_n, fz_n"
+        )
+    return time, forces
+
+
+def _rate(header: Mapping[str, str], label: str) -> float | None:
+    """The header's sampling rate [Hz]."""
+    for key, value in header.items():
+        if key.lower().startswith(_RATE):
+            unit = 1000.0 if "khz" in key.lower() else 1.0
+            if "hz" not in key.lower() or not _is_number(value) or not 0.0 < float(value) < math.inf:
+                raise InputError(f"{label}: {key} = {value}: must be above 0, with its unit: Sampling rate [Hz]")
+            return float(value) * unit
+    return None
+
+
+def _spacing(t: Floats, stated: float | None, label: str) -> float:
+    """The sampling rate of the time stamps; gaps are refused, and a rate that the header states otherwise."""
+    step = float(np.median(np.diff(t)))
+    if not step > 0.0:
+        raise InputError(f"{label}: time does not rise at {t[0]:g} s: must be equally spaced")
+    off = np.abs(np.diff(t) - step) > JITTER * step
+    if off.any():
+        k = int(np.flatnonzero(off)[0])
+        raise InputError(
+            f"{label}: samples are missing ({int(off.sum())} gaps): between {t[k]:.6g} and {t[k + 1]:.6g} s lie "
+            f"{(t[k + 1] - t[k]) / step:.3g} sampling intervals: must be 1: choose a window_s without gaps"
+        )
+    rate = (len(t) - 1) / float(t[-1] - t[0])
+    if stated is not None and abs(rate - stated) > 0.01 * stated:
+        raise InputError(f"{label}: time stamps are {rate:.6g} Hz apart, the header says {stated:g} Hz: correct one")
+    # time stamps are rounded, a stated rate is not
+    return stated if stated is not None else rate
+
+
+def _findings(measured: Measured, window: tuple[float, float] | None, end: float) -> Iterator[Finding]:
+    """A window that the file does not fill, samples that are clipped, channels that drift."""
+    step = 1.0 / measured.rate
+    if window is not None and (measured.start - window[0] > step or window[1] - end > step):
+        text = f"the window {window[0]:g} to {window[1]:g} s is filled from {measured.start:g} to {end:g} s alone"
+        yield Finding("force-window", 0, text)
+    t = np.arange(len(measured.force)) * step
+    for name, f in zip(measured.names, measured.force.T, strict=True):
+        for extreme in (f.max(), f.min()):
+            same = np.concatenate([[0], (f == extreme).astype(int), [0]])
+            runs = np.flatnonzero(np.diff(same) < 0) - np.flatnonzero(np.diff(same) > 0)
+            if f.max() > f.min() and (runs >= CLIPPED).any():
+                text = f"{name} stays at {extreme:g} N for {int(runs.max())} samples: clipped by the amplifier?"
+                yield Finding("force-clipped", 0, text)
+        slope = float(np.polyfit(t - t.mean(), f, 1)[0]) * float(t[-1])
+        largest = float(np.abs(f).max())
+        if abs(slope) > DRIFT * largest:
+            yield Finding(
+                "force-drift", 0, f"{name} drifts by {slope:.3g} N over the window, of {largest:.4g} N at most"
+            )

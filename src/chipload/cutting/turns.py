@@ -1,0 +1,165 @@
+"""Steady cuts that were measured, and what their whole turns hold.
+
+Notation: T unit feed direction, n across it, as in :mod:`chipload.cutting.force`; Omega [rad/s] spindle speed; k
+harmonic of the spindle; c_k complex amplitude: F(t) = c_0 + 2 Re(sum over k of c_k exp(i k Omega t)), t from the first
+sample.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """A steady cut that was measured.
+
+    Parameters
+    ----------
+    name : as messages call it
+    rate : samples a second [Hz], above 0
+    force : (n, 3) float [N], on the cutter along T, n and the axis; a column of NaN was not measured
+    feed : of the cutter's centre [mm/s], above 0
+    speed : of the spindle, nominal [rad/s], above 0
+    arc : (from, to) engaged immersion [rad], within 0 .. pi; a slot is (0, pi)
+    depth : axial depth [mm]
+
+    Raises
+    ------
+    InputError
+        A number is out of range, a column is measured in part, or the window holds less than one turn.
+    """
+
+    name: str
+    rate: float
+    force: Floats
+    feed: float
+    speed: float
+    arc: tuple[float, float]
+    depth: float
+
+    def __post_init__(self) -> None:
+        force = np.array(self.force, dtype=np.float64)
+        for key, value in (("feed_mm_min", self.feed * 60.0), ("rate_hz", self.rate), ("speed", self.speed)):
+            if not 0.0 < value < math.inf:
+                raise InputError(f"{self.name}: {key} = {value:g}: must be above 0")
+        if force.ndim != 2 or force.shape[1] != 3:
+            raise InputError(f"{self.name}: force of shape {force.shape}: must be (n, 3)")
+        lost = np.isnan(force)
+        if (lost.any(axis=0) & ~lost.all(axis=0)).any() or np.isinf(force).any():
+            raise InputError(f"{self.name}: samples are missing within the window: choose a window without gaps")
+        if lost.all():
+            raise InputError(f"{self.name}: no channel is measured: name at least one")
+        turn = self.rate * math.tau / self.speed
+        if len(force) < turn or turn < 4.0:
+            raise InputError(
+                f"{self.name}: {len(force)} samples, {turn:.4g} in a turn: needs a whole turn, and 4 samples in it: "
+                "choose a longer window or a higher rate"
+            )
+        force.setflags(write=False)
+        object.__setattr__(self, "force", force)
+
+    @property
+    def measured(self) -> NDArray[np.bool_]:
+        """(3,) which of T, n and the axis were measured."""
+        return np.asarray(~np.isnan(self.force[0]))
+
+    def feed_per_tooth(self, flutes: int) -> float:
+        """f_z [mm] = feed / (Omega / (2 pi) N).
+
+        >>> cut = Cut("c", 100.0, np.zeros((200, 3)), 10.0, math.tau * 5.0, (0.0, math.pi), 1.0)
+        >>> cut.feed_per_tooth(2)
+        1.0
+        """
+        return self.feed * math.tau / (self.speed * flutes)
+
+
+@dataclass(frozen=True, eq=False)
+class Turns:
+    """What whole turns of a cut hold.
+
+    ``speed`` [rad/s] that was found; ``amplitude`` (H + 1, 3) complex [N], c_k; ``mean``, ``high`` and ``low`` (r, 3)
+    [N] of each turn; ``plane`` (r,) [N] greatest in-plane force of each turn; ``scatter`` (3,) [N] standard deviation
+    of the samples about the harmonics. NaN: not measured.
+    """
+
+    speed: float
+    amplitude: Complexes
+    mean: Floats
+    high: Floats
+    low: Floats
+    plane: Floats
+    scatter: Floats
+
+
+def turns_of(cut: Cut, harmonics: int, search: float = 0.01, seek: int = 8) -> Turns:
+    """Spindle speed, harmonics and extremes of the whole turns of a cut.
+
+    Parameters
+    ----------
+    harmonics : H, at least 1 and below half the samples of a turn
+    search : part of the nominal speed within which the speed is sought; 0: the nominal speed is exact
+    seek : the speed is where the harmonics up to this hold most
+
+    Raises
+    ------
+    InputError
+        There are more harmonics than samples can tell.
+    """
+    given = np.flatnonzero(cut.measured)
+    force = cut.force[:, given] - cut.force[:, given].mean(axis=0)
+    t = np.arange(len(force)) / cut.rate
+    speed = cut.speed
+    most = math.ceil(math.pi * cut.rate / (cut.speed * (1.0 + search))) - 1
+    if not 1 <= harmonics <= most:
+        raise InputError(f"{cut.name}: {harmonics} harmonics: must be from 1 to {most}, below half the sampling rate")
+    if search > 0.0:
+        top = min(seek, most)
+        step = math.tau / (6.0 * t[-1] * top)
+        width = search * cut.speed
+        while True:
+            tried = speed + np.arange(-math.ceil(width / step), math.ceil(width / step) + 1) * step
+            held = np.array([_held(force, t, w, top) for w in tried])
+            k = int(np.argmax(held))
+            speed, width, step = float(tried[k]), step, step / 8.0
+            if step < 1e-9 * cut.speed:
+                break
+    turn = math.tau * cut.rate / speed
+    count = int(len(force) / turn + 1e-9)
+    edges = np.round(np.arange(count + 1) * turn).astype(int)
+    whole = cut.force[: edges[-1], given]
+    basis = np.exp(1j * speed * t[: len(whole), None] * np.arange(1, harmonics + 1))
+    design = np.column_stack([np.ones(len(whole)), 2.0 * basis.real, -2.0 * basis.imag])
+    x = np.linalg.lstsq(design, whole, rcond=None)[0]
+    left = whole - design @ x
+    amplitude = np.full((harmonics + 1, 3), np.nan, dtype=np.complex128)
+    amplitude[0, given] = x[0]
+    amplitude[1:, given] = x[1 : harmonics + 1] + 1j * x[harmonics + 1 :]
+    mean, high, low = (np.full((count, 3), np.nan) for _ in range(3))
+    for i, (a, b) in enumerate(pairwise(edges)):
+        part = whole[a:b]
+        mean[i, given], high[i, given], low[i, given] = part.mean(axis=0), part.max(axis=0), part.min(axis=0)
+    plane = np.array([np.hypot(*cut.force[a:b, :2].T).max() for a, b in pairwise(edges)])
+    scatter = np.full(3, np.nan)
+    scatter[given] = np.sqrt(np.sum(left**2, axis=0) / max(len(whole) - design.shape[1], 1))
+    return Turns(speed, amplitude, mean, high, low, plane, scatter)
+
+
+def _held(force: Floats, t: Floats, w: float, top: int) -> float:
+    """Sum of the squares of the harmonics 1 .. top of the angular frequency w."""
+    one = np.exp(-1j * w * t)
+    total, power = 0.0, np.ones_like(one)
+    for _ in range(top):
+        power = power * one
+        total += float(np.sum(np.abs(power @ force) ** 2))
+    return total
