@@ -8,7 +8,9 @@ sin theta), c halfway between the ends of the section along a, M = I + a a' / (A
 
 Arrays: ``cp``, ``ca`` (n, 3) Chebyshev coefficients of the tip and of the axis, its length aside, on t in 0 .. 1.
 ``K`` cutter: e, r, f, sin, cos, tan of alpha, sin, cos, tan of beta, flank radius at w = 0, H, rho(H).
-``S`` instant: p, A, p', A' (0-11), h 12, c 13-14, w at c 15, from the axis to c 16-18, its square 19, corners 20, t 21.
+``S`` instant: p, A, p', A' (0-11), h 12, c 13-14, w at c 15, from the axis to c 16-18, its square 19, corners 20, t 21;
+where the section is a whole ellipse, 22 is R (else 0) and N . v = g . c + (R a . c / A_z)(m . c), c = (cos theta, sin
+theta), g 23-24, m = M a' 25-26.
 ``C`` (8, 5) corners of the section: theta, x, y, code of the piece before, after (counter-clockwise).
 Rows of edges and vertices: x, y, theta, t, n_x, n_y (outward, across the curve), code.
 """
@@ -25,6 +27,8 @@ BOTTOM, CONE, TORUS, FLANK, TOP = 0, 1, 2, 3, 4
 CORNER = 5  # a root at a corner of the section
 NODES = 32
 MAX_ROOTS = 16
+_COS = np.cos(np.arange(NODES) * (TAU / NODES))
+_SIN = np.sin(np.arange(NODES) * (TAU / NODES))
 
 
 @njit(cache=True, nogil=True)
@@ -183,9 +187,28 @@ def speed(S, K, x, y, code):
 @njit(cache=True, nogil=True)
 def point(S, K, theta, row):
     """The edge at theta into ``row`` (x, y, theta, t, n_x, n_y, code); returns V."""
-    ct, st = math.cos(theta), math.sin(theta)
+    return point_at(S, K, theta, math.cos(theta), math.sin(theta), row)
+
+
+@njit(cache=True, nogil=True)
+def point_at(S, K, theta, ct, st, row):
+    """As ``point``, cosine and sine of theta given."""
+    ac = S[3] * ct + S[4] * st
+    k = ac / (S[5] * (1.0 + S[5]))
+    if S[22] > 0.0:
+        row[0] = S[13] + S[22] * (ct + S[3] * k)
+        row[1] = S[14] + S[22] * (st + S[4] * k)
+        row[2] = theta
+        row[3] = S[21]
+        k = ac / (1.0 + S[5])
+        nx = ct - k * S[3]
+        ny = st - k * S[4]
+        n = math.sqrt(nx * nx + ny * ny)
+        row[4] = nx / n
+        row[5] = ny / n
+        row[6] = FLANK
+        return (S[23] * ct + S[24] * st + S[22] * ac / S[5] * (S[25] * ct + S[26] * st)) / n
     lam, code = ray(S, K, ct, st)
-    k = (S[3] * ct + S[4] * st) / (S[5] * (1.0 + S[5]))
     row[0] = S[13] + lam * (ct + S[3] * k)
     row[1] = S[14] + lam * (st + S[4] * k)
     row[2] = theta
@@ -210,11 +233,47 @@ def _centre(S, x, y):
 
 
 @njit(cache=True, nogil=True)
+def _ellipse(S, R):
+    """Coefficients of N . v on a cylinder that the layer cuts through."""
+    ax, ay, Az = S[3], S[4], S[5]
+    S[22] = R
+    k = (ax * S[9] + ay * S[10]) / (Az * (1.0 + Az))
+    S[25] = S[9] + k * ax
+    S[26] = S[10] + k * ay
+    k = (ax * S[6] + ay * S[7]) / (Az * (1.0 + Az)) - (ax * S[6] + ay * S[7] + Az * S[8]) / Az
+    S[23] = S[6] + k * ax + S[15] * S[25]
+    S[24] = S[7] + k * ay + S[15] * S[26]
+
+
+@njit(cache=True, nogil=True)
+def _newton(S, guess, sign, row):
+    """The grazing point of an ellipse near ``guess`` by Newton's method, theta into ``row[2]``; False if it fails."""
+    theta = guess
+    bx, by = S[22] * S[3] / S[5], S[22] * S[4] / S[5]
+    for _ in range(8):
+        ct, st = math.cos(theta), math.sin(theta)
+        b, m = bx * ct + by * st, S[25] * ct + S[26] * st
+        v = S[23] * ct + S[24] * st + b * m
+        dv = S[24] * ct - S[23] * st + (by * ct - bx * st) * m + b * (S[26] * ct - S[25] * st)
+        if dv * sign <= 0.0:
+            return False
+        step = v / dv
+        theta -= step
+        if abs(theta - guess) > 0.5:
+            return False
+        if abs(step) < 1e-9:
+            row[2] = theta
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
 def instant(cp, ca, K, h, t, S, C):
     """Fill ``S`` and the corners ``C``; False where the layer doesn't cut the open cutter."""
     state(cp, ca, t, S)
     S[12] = h
     S[20] = 0.0
+    S[22] = 0.0
     zl, ul, zh, uh = extent(S, K)
     z = h - S[2]
     if not zl < z < zh:
@@ -224,12 +283,16 @@ def instant(cp, ca, K, h, t, S, C):
     u = ul + (uh - ul) * ((z - zl) / (zh - zl))
     _centre(S, S[0] + u * ex, S[1] + u * ey)
     Az = S[5]
-    up, _ = ray(S, K, ex, ey)
-    down, _ = ray(S, K, -ex, -ey)
+    up, high = ray(S, K, ex, ey)
+    down, low = ray(S, K, -ex, -ey)
     if not up + down > 0.0:
         return False
     u += 0.5 * (up - down) / Az
     _centre(S, S[0] + u * ex, S[1] + u * ey)
+    if high == FLANK and low == FLANK:
+        if K[8] == 0.0:
+            _ellipse(S, K[9])
+        return True
     n = 0
     for which in range(2):
         rho, w = (K[0], K[2]) if which == 0 else (K[11], K[10])
@@ -327,7 +390,7 @@ def roots(S, K, C, vmin, R, sign, grid):
             th[n + 1], vv[n + 1], at[n + 1] = C[k, 0], vr, k
             n += 2
             k += 1
-        grid[i] = point(S, K, angle, row)
+        grid[i] = point_at(S, K, angle, _COS[i], _SIN[i], row)
         if k > 0 and C[k - 1, 0] == angle:
             continue
         th[n], vv[n], at[n] = angle, grid[i], -1
@@ -430,6 +493,9 @@ def deviation(a, b):
 @njit(cache=True, nogil=True)
 def root_near(S, K, C, guess, width, sign, row):
     """The change of V of this sign near ``guess``, into ``row``; False if there is none within a quarter turn."""
+    if S[22] > 0.0 and _newton(S, guess, sign, row):
+        point(S, K, row[2], row)
+        return True
     lo = guess - width
     hi = guess + width
     vlo = point(S, K, lo, row)

@@ -111,7 +111,7 @@ def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], toleranc
     if not 0.0 < tolerance < math.inf:
         raise InputError(f"covered: tolerance = {tolerance:g} mm: must be above 0")
     K = cutter_numbers(cutter)
-    buffer = np.empty((2048, 11))
+    buffer = np.empty((2048, 12))
     out: list[Covered | None] = []
     for height in heights:
         h = float(height)
@@ -133,11 +133,11 @@ def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], toleranc
 def _larger(buffer: Floats) -> Floats:
     if 4 * len(buffer) > _MOST_EDGES:
         raise InputError("covered: the boundary has more than four million edges: make the tolerance larger")
-    return np.empty((4 * len(buffer), 11))
+    return np.empty((4 * len(buffer), 12))
 
 
 def candidates(move: Move, cutter: Cutter, height: float, tolerance: float) -> Floats:
-    """All pieces of the diagram that may bound the covered area, as edges (n, 11) of :mod:`chips.ring`."""
+    """All pieces of the diagram that may bound the covered area, as edges (n, 12) of :mod:`chips.ring`."""
     return _pieces(move, cutter_numbers(cutter), height, tolerance)
 
 
@@ -145,7 +145,7 @@ def _pieces(move: Move, K: Floats, h: float, tolerance: float) -> Floats:
     cp, ca, vmin = move.tip, move.axis, STILL * tolerance
     span = np.empty((_SPANS, 2))
     m = trace.spans(cp, ca, K, h, _KNOTS, span)
-    buffer, jumps = np.empty((8192, 11)), np.empty(16)
+    buffer, jumps = np.empty((8192, 12)), np.empty(16)
     found: list[Floats] = []
     for ta, tb in span[:m]:
         n, jumped = faces.pieces(cp, ca, K, h, tolerance, vmin, ta, tb, _KNOTS, buffer, 0, jumps)
@@ -158,14 +158,14 @@ def _pieces(move: Move, K: Floats, h: float, tolerance: float) -> Floats:
                 whole_section(move, K, h, at, tolerance)
                 for at in (max(t - 2 * faces.LEAST, ta), min(t + 2 * faces.LEAST, tb))
             ]
-    return np.concatenate(found) if found else np.empty((0, 11))
+    return np.concatenate(found) if found else np.empty((0, 12))
 
 
 def whole_section(move: Move, K: Floats, h: float, t: float, tolerance: float) -> Floats:
     """Edges (n, 11) of the section at t, counter-clockwise; none where the layer isn't cut."""
-    S, C, buffer = np.empty(22), np.empty((8, 5)), np.empty((2048, 11))
+    S, C, buffer = np.empty(27), np.empty((8, 5)), np.empty((2048, 12))
     if not instant(move.tip, move.axis, K, h, t, S, C):
-        return np.empty((0, 11))
+        return np.empty((0, 12))
     n = trace.ring(S, K, C, tolerance, trace.FIRST, buffer, 0)
     while n < 0:
         buffer = _larger(buffer)

@@ -1,8 +1,9 @@
 """Closed boundaries whose edges know where they come from.
 
 Notation: an edge from P to Q of length L; its curve stands y(s) = L (m0 (s - 2 s^2 + s^3) + m1 (s^3 - s^2)) to the left
-of the edge, s in 0 .. 1, m0 and m1 the slopes of the curve against the edge at both ends. Rows of edges (11): P, Q,
-theta and t at P, at Q, m0, m1, origin.
+of the edge, s in 0 .. 1, m0 and m1 the slopes of the curve against the edge at both ends. Rows of edges (12): P, Q,
+theta and t at P, at Q, m0, m1, origin, area between
+the curve and the edge, above 0 to the right.
 """
 
 from __future__ import annotations
@@ -67,9 +68,9 @@ class Ring:
 
 
 def bulges(edges: Floats, f0: Floats, f1: Floats) -> Floats:
-    """Areas between edges (n, 11) and their curves, from the fraction f0 to f1 of each, above 0 to the right.
+    """Areas between edges (n, 12) and their curves, from the fraction f0 to f1 of each, above 0 to the right.
 
-    >>> float(bulges(np.array([[0, 0, 6, 0, 0, 0, 0, 0, -0.1, 0.1, 0]]), np.zeros(1), np.ones(1))[0].round(9))
+    >>> float(bulges(np.array([[0, 0, 6, 0, 0, 0, 0, 0, -0.1, 0.1, 0, 0]]), np.zeros(1), np.ones(1))[0].round(9))
     0.6
     """
     L2 = (edges[:, 2] - edges[:, 0]) ** 2 + (edges[:, 3] - edges[:, 1]) ** 2
@@ -82,13 +83,12 @@ def bulges(edges: Floats, f0: Floats, f1: Floats) -> Floats:
 
 
 def ring_of_edges(edges: Floats) -> Ring:
-    """The ring of edges (m, 11) that follow each other."""
-    zero, one = np.zeros(len(edges)), np.ones(len(edges))
-    return Ring(edges[:, :2], edges[:, 10].astype(np.int64), edges[:, 4], edges[:, 5], bulges(edges, zero, one))
+    """The ring of edges (m, 12) that follow each other."""
+    return Ring(edges[:, :2], edges[:, 10].astype(np.int64), edges[:, 4], edges[:, 5], edges[:, 11])
 
 
 def rings_of_polygons(area: shapely.Geometry, edges: Floats) -> tuple[Ring, ...]:
-    """Rings of a polygon or several, each edge traced to the one of ``edges`` (n, 11) that it lies on.
+    """Rings of a polygon or several, each edge traced to the one of ``edges`` (n, 12) that it lies on.
 
     Outer rings counter-clockwise, holes clockwise.
     """

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,13 +26,16 @@ from chipload.errors import InputError
 Floats = NDArray[np.float64]
 
 
+@lru_cache(maxsize=64)
 def cutter_numbers(cutter: Cutter) -> Floats:
     """(12,) e, r, f, sin, cos, tan of alpha, of beta, flank radius at the tip, H, rho(H) [mm]."""
     d, r, e, f, alpha, beta, H = cutter.apt
     foot = 0.5 * d * (1.0 - math.tan(alpha) * math.tan(beta))
     bottom = (math.sin(alpha), math.cos(alpha), math.tan(alpha))
     flank = (math.sin(beta), math.cos(beta), math.tan(beta))
-    return np.array([e, r, f, *bottom, *flank, foot, H, float(cutter.radius_at(H))])
+    out = np.array([e, r, f, *bottom, *flank, foot, H, float(cutter.radius_at(H))])
+    out.setflags(write=False)
+    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +63,7 @@ def section(move: Move, cutter: Cutter, height: float, t: float, theta: ArrayLik
     """
     if not 0.0 <= t <= 1.0:
         raise InputError(f"section: t = {t:g}: must be from 0 to 1")
-    K, S, C = cutter_numbers(cutter), np.empty(22), np.empty((8, 5))
+    K, S, C = cutter_numbers(cutter), np.empty(27), np.empty((8, 5))
     if not _kernels.instant(move.tip, move.axis, K, float(height), float(t), S, C):
         return None
     angles = np.atleast_1d(np.asarray(theta, dtype=np.float64))

@@ -25,7 +25,7 @@ def pieces(cp, ca, K, h, tol, vmin, ta, tb, knots, buf, n, jumps):
         ta += INSET * width
     if tb < 1.0:
         tb -= INSET * width
-    S = np.empty((DEPTH, 22))
+    S = np.empty((DEPTH, 27))
     C = np.empty((DEPTH, 8, 5))
     R = np.empty((DEPTH, MAX_ROOTS, 7))
     sign = np.empty((DEPTH, MAX_ROOTS), np.int64)
@@ -162,7 +162,7 @@ def depth(S, K, x, y, h):
 @njit(cache=True, nogil=True)
 def quickest(cp, ca):
     """Bounds of |p'| and |A'|: the greatest of 65 samples and a tenth."""
-    S = np.empty(22)
+    S = np.empty(27)
     p = a = 0.0
     for i in range(65):
         state(cp, ca, i / 64.0, S)
@@ -178,7 +178,7 @@ def covered_at(cp, ca, K, h, x, y, slack):
     Branch and bound: the depth changes no faster than the cutter's points near (x, y) move.
     """
     vp, va = quickest(cp, ca)
-    S = np.empty(22)
+    S = np.empty(27)
     stack = np.empty((96, 2))
     stack[0] = 0.0, 1.0
     n = 1

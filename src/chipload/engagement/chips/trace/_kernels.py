@@ -1,8 +1,9 @@
 """Compiled loops that follow grazing points through a move and put pieces of boundary together.
 
 Notation: arrays ``cp``, ``ca``, ``K``, ``S``, ``C`` and rows (x, y, theta, t, n_x, n_y, code) as in
-:mod:`chipload.engagement.chips._kernels`. An edge (11): x, y of its start, x, y of its end, theta, t of both, slopes of
-the curve against the edge at both ends, origin. ``sign`` of a root: +1 from inward to outward speed with theta rising.
+:mod:`chipload.engagement.chips._kernels`. An edge (12): x, y of its start, x, y of its end, theta, t of both, slopes of
+the curve against the edge at both ends, origin, area between the curve and the
+edge (above 0 to the right). ``sign`` of a root: +1 from inward to outward speed with theta rising.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ INSET = 1e-10  # of a span of time: where a section that begins as a point is lo
 @njit(cache=True, nogil=True)
 def spans(cp, ca, K, h, n, out):
     """Times during which the layer cuts the cutter, into ``out`` (m, 2); their count. n intervals are looked at."""
-    S = np.empty(22)
+    S = np.empty(27)
     cut = np.empty(4 * n + 8)
     g = np.empty(n + 1)
     for i in range(n + 1):
@@ -114,6 +115,7 @@ def edge(buf, n, a, b, ax, ay, bx, by, origin):
         if abs(ca) < abs(ma) and abs(cb) < abs(mb):
             row[8], row[9] = ca / ma, cb / mb
     row[10] = origin
+    row[11] = (dx * dx + dy * dy) * (row[9] - row[8]) / 12.0
     return n + 1
 
 
@@ -216,7 +218,7 @@ def kind(a, b):
 @njit(cache=True, nogil=True)
 def track(cp, ca, K, h, tol, vmin, first, last, sign, out):
     """The curve V = 0 from row ``first`` to row ``last``, the only one of its sign; rows into ``out``, count, -1."""
-    S = np.empty(22)
+    S = np.empty(27)
     C = np.empty((8, 5))
     R = np.empty((MAX_ROOTS, 7))
     signs = np.empty(MAX_ROOTS, np.int64)
@@ -313,7 +315,7 @@ def loop(cp, ca, K, h, tol, vmin, buf):
         ta += INSET * length
     if tb < 1.0:
         tb -= INSET * length
-    S = np.empty((KNOTS, 22))
+    S = np.empty((KNOTS, 27))
     C = np.empty((KNOTS, 8, 5))
     R = np.empty((KNOTS, MAX_ROOTS, 7))
     sign = np.empty((KNOTS, MAX_ROOTS), np.int64)
@@ -414,7 +416,7 @@ def _settled(grid, dt, tol):
 @njit(cache=True, nogil=True)
 def _meeting(cp, ca, K, h, tol, vmin, t0, t1, down, up):
     """Bring the pair of roots at t1 to where it meets towards t0, within tol / 20; False if it doesn't."""
-    S = np.empty(22)
+    S = np.empty(27)
     C = np.empty((8, 5))
     R = np.empty((MAX_ROOTS, 7))
     sign = np.empty(MAX_ROOTS, np.int64)
