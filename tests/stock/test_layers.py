@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import math
+import struct
 
 import numpy as np
 import pytest
 import shapely
+import trimesh
 
 from chipload.errors import InputError
 from chipload.stock.layers import LayeredStock
@@ -139,3 +142,170 @@ def test_layers_between() -> None:
 def test_refused(call, message: str) -> None:
     with pytest.raises(InputError, match=message):
         call()
+
+
+def worn(seed: int = 3, moves: int = 60) -> LayeredStock:
+    """A block from which discs were taken at random."""
+    rng = np.random.default_rng(seed)
+    stock = block(9.0)
+    for _ in range(moves):
+        stock.remove(int(rng.integers(3)), ellipse(rng, 40.0))
+    return stock
+
+
+@pytest.mark.parametrize("moves", [0, 1, 60, 160])
+def test_the_mesh_is_closed_and_has_the_volume(moves: int) -> None:
+    stock = worn(moves=moves)
+    mesh = stock.mesh()
+    assert mesh.is_watertight
+    assert mesh.is_winding_consistent
+    assert mesh.volume == pytest.approx(stock.volume(), rel=1e-9)
+
+
+def test_the_mesh_is_closed_where_rings_touch_in_a_point() -> None:
+    stock = LayeredStock.block((0.0, 0.0, 0.0), (8.0, 8.0, 1.0), 1.0, 100.0)
+    for x, y in ((1, 1), (2, 2), (3, 3), (3, 1), (0, 4), (4, 0)):
+        stock.remove(0, shapely.box(x, y, x + 1, y + 1))
+    stock.remove(0, shapely.Polygon([(6.0, 5.0), (8.0, 6.0), (6.0, 7.0), (5.0, 6.0)]))
+    mesh = stock.mesh()
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(64.0 - 6.0 - 3.0, rel=1e-12)
+
+
+def test_nothing_left_is_an_empty_mesh() -> None:
+    stock = LayeredStock.block((0.0, 0.0, 0.0), (8.0, 8.0, 1.0), 1.0, 100.0)
+    stock.remove(0, shapely.box(0.0, 0.0, 8.0, 8.0))
+    assert len(stock.mesh().faces) == 0
+    data = stock.to_glb()
+    kind, version, size, text, code = struct.unpack("<4sII I4s", data[:20])
+    assert (kind, version, size, text % 4, code) == (b"glTF", 2, len(data), 0, b"JSON")
+    assert json.loads(data[20:]) == {"asset": {"version": "2.0"}}
+
+
+def test_glb_is_in_metres_with_y_up() -> None:
+    stock = LayeredStock.block((10.0, 20.0, 30.0), (11.0, 22.0, 33.0), 1.0, 100.0)
+    data = stock.to_glb()
+    assert data == stock.to_glb()
+    scene = trimesh.load(trimesh.util.wrap_as_stream(data), file_type="glb")
+    assert scene.bounds == pytest.approx(np.array([[0.010, 0.030, -0.022], [0.011, 0.033, -0.020]]), rel=1e-6)
+    assert scene.to_mesh().volume == pytest.approx(6e-9, rel=1e-6)
+
+
+def sphere() -> trimesh.Trimesh:
+    return trimesh.creation.icosphere(5, 10.0)
+
+
+def test_a_sphere_by_layers_converges_with_the_square() -> None:
+    body = sphere()
+    errors = [LayeredStock.of_mesh(body, 20.0 / n, 7.0).volume() - body.volume for n in (5, 10, 20, 40)]
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert orders == pytest.approx([2.0] * 3, abs=0.1)
+    assert errors[0] == pytest.approx(math.pi * 20.0 * 4.0**2 / 12.0, rel=0.01)  # of the midpoint rule on a true sphere
+
+
+def test_tiles_hold_the_whole_section() -> None:
+    body = sphere()
+    for tile in (3.0, 100.0):
+        stock = LayeredStock.of_mesh(body, [-10.0, -4.0, 0.0, 11.0], tile)
+        for i, h in enumerate((-7.0, -2.0, 5.5)):
+            assert stock.heights[i] == h
+            radius = math.sqrt(100.0 - h * h)
+            assert stock.area(i) == pytest.approx(math.pi * radius**2, rel=2e-3)
+            assert stock.section(i).area == pytest.approx(stock.area(i), rel=1e-12)
+
+
+def test_refined_layers_are_cut_from_the_mesh_again() -> None:
+    body = sphere()
+    stock = LayeredStock.of_mesh(body, 4.0, 7.0)
+    fine = LayeredStock.of_mesh(body, 1.0, 7.0)
+    stock.remove(2, shapely.box(0.0, 0.0, 20.0, 20.0))
+    cut = stock.volumes()[2]
+    stock.refine(-7.0, 1.0, 1.0)
+    assert stock.bounds.tolist() == pytest.approx([*range(-10, 3), 6, 10])
+    assert stock.volumes()[:8] == pytest.approx(fine.volumes()[:8], rel=1e-12)
+    assert stock.volumes()[8:12] == pytest.approx([cut / 4.0] * 4, rel=1e-12)
+    assert stock.cut.tolist() == [False] * 8 + [True] * 4 + [False] * 2
+    assert stock.volumes()[13] == LayeredStock.of_mesh(body, 4.0, 7.0).volumes()[4]
+
+
+def test_levels_become_bounds() -> None:
+    stock = block(9.0)
+    stock.remove(1, shapely.box(0.0, 0.0, 10.0, 10.0))
+    stock.refine_at([2.5, -1.0, 3.0 + 1e-12, 0.25, 2.5, 9.0])
+    assert stock.bounds.tolist() == [0.0, 0.25, 1.0, 2.5, 3.0, 6.0]
+    assert stock.volumes() == pytest.approx([400.0, 1200.0, 2250.0, 750.0, 4800.0], rel=1e-12)
+    stock.refine_at([])
+    stock.refine(0.0, 6.0, 10.0)
+    assert stock.layers == 5
+
+
+def test_restored_is_as_it_was() -> None:
+    stock = worn()
+    state, before = stock.state(), stock.volumes()
+    for _ in range(2):
+        stock.remove(0, shapely.box(0.0, 0.0, 20.0, 40.0))
+        stock.refine(0.0, 6.0, 0.5)
+        assert stock.layers == 12
+        stock.restore(state)
+        assert stock.volumes().tolist() == before.tolist()
+
+
+@pytest.mark.parametrize("meshed", [False, True])
+def test_saved_and_loaded_it_goes_on_the_same(tmp_path, meshed: bool) -> None:
+    rng = np.random.default_rng(2)
+    stock = LayeredStock.of_mesh(sphere(), 3.0, 7.0) if meshed else worn()
+    for _ in range(5):
+        stock.remove(2, ellipse(rng, 10.0))
+    stock.save(tmp_path / "a.npz")
+    stock.save(tmp_path / "b.npz")
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+    again = LayeredStock.load(tmp_path / "a.npz")
+    for _ in range(20):
+        shape = ellipse(rng, 40.0)
+        left, right = stock.remove(1, shape), again.remove(1, shape)
+        assert [shapely.to_wkb(p) for p in left] == [shapely.to_wkb(p) for p in right]
+    for each in (stock, again):
+        each.refine(-20.0, 20.0, 0.7)
+    assert stock.bounds.tolist() == again.bounds.tolist()
+    assert stock.cut.tolist() == again.cut.tolist()
+    assert [shapely.to_wkb(t) for t in stock.tiles.ravel()] == [shapely.to_wkb(t) for t in again.tiles.ravel()]
+
+
+def test_damaged_and_foreign_files_are_refused(tmp_path) -> None:
+    path = tmp_path / "a.npz"
+    worn(moves=5).save(path)
+    whole = path.read_bytes()
+    rng = np.random.default_rng(1)
+    damaged = [whole[:n] for n in (0, 10, len(whole) // 2, len(whole) - 1)]
+    for at in rng.integers(0, len(whole), 150):
+        spoilt = bytearray(whole)
+        spoilt[at] ^= 1 << int(rng.integers(8))
+        damaged.append(bytes(spoilt))
+    refused = 0
+    for data in damaged:
+        path.write_bytes(data)
+        try:
+            LayeredStock.load(path)  # a bit of a date or a name that nobody reads may be spoilt
+        except InputError as error:
+            assert "stock.file = a.npz: " in str(error)  # noqa: PT017
+            refused += 1
+    assert refused > 100
+    np.savez(path, kind=np.zeros(3))
+    with pytest.raises(InputError, match="not a file of the kind 'chipload layered stock 1'"):
+        LayeredStock.load(path)
+    np.savez(path, kind=np.array([{}], dtype=object))
+    with pytest.raises(InputError, match="damaged"):
+        LayeredStock.load(path)
+    np.save(tmp_path / "c.npy", np.zeros(3))
+    with pytest.raises(InputError, match="damaged"):
+        LayeredStock.load(tmp_path / "c.npy")
+    with pytest.raises(InputError, match="no such file"):
+        LayeredStock.load(tmp_path / "none.npz")
+
+
+def test_a_mesh_that_is_open_is_refused() -> None:
+    body = sphere()
+    with pytest.raises(InputError, match="stock: the mesh is not closed: 6 open edges"):
+        LayeredStock.of_mesh(trimesh.Trimesh(body.vertices, np.delete(body.faces, [3, 300], axis=0)), 1.0, 5.0)
+    with pytest.raises(InputError, match="must hold the mesh, -10 to 10 mm"):
+        LayeredStock.of_mesh(body, [-9.0, 10.0], 5.0)

@@ -13,14 +13,19 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import shapely
+import trimesh
 from numpy.typing import ArrayLike, NDArray
 from shapely import MultiPolygon, Polygon
 
 from chipload.errors import InputError
+from chipload.geometry.mesh import require_closed, sections
+from chipload.stock.shapes import read_shapes, write_shapes
+from chipload.stock.solid import glb, prisms
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -28,6 +33,8 @@ Shapes = NDArray[np.object_]
 
 #: most tiles times layers
 TILE_LIMIT = 20_000_000
+#: what a saved stock says of itself
+KIND = "chipload layered stock 1"
 #: type numbers of GEOS
 POLYGON, MULTIPOLYGON = 3, 6
 
@@ -43,6 +50,7 @@ class LayeredStock:
     bounds : (n + 1,) float [mm], ascending
     xs, ys : (columns + 1,), (rows + 1,) float [mm], ascending: borders of the tiles
     tiles : (n, rows, columns) polygons, multipolygons or empty geometries, each within its tile
+    part : closed mesh that layers are cut from again when they are split and nothing was removed from them
 
     Examples
     --------
@@ -53,10 +61,13 @@ class LayeredStock:
     [400.0, 376.0]
     """
 
-    def __init__(self, bounds: Floats, xs: Floats, ys: Floats, tiles: Shapes) -> None:
+    def __init__(
+        self, bounds: Floats, xs: Floats, ys: Floats, tiles: Shapes, part: trimesh.Trimesh | None = None
+    ) -> None:
         self.bounds = bounds
         self.xs, self.ys = xs, ys
         self.tiles = tiles
+        self.part = part
         self.cut: NDArray[np.bool_] = np.zeros(len(tiles), dtype=np.bool_)
 
     @classmethod
@@ -86,6 +97,34 @@ class LayeredStock:
         tiles = np.empty((len(bounds) - 1, *boxes.shape), dtype=object)
         tiles[:] = boxes
         return cls(bounds, xs, ys, tiles)
+
+    @classmethod
+    def of_mesh(cls, mesh: trimesh.Trimesh, bounds_or_layer_mm: ArrayLike, tile_mm: float) -> LayeredStock:
+        """A closed mesh, cut at the middles of the layers; it is kept for :meth:`refine`.
+
+        Parameters
+        ----------
+        bounds_or_layer_mm : thickest layer [mm] (layers are equal), or (n + 1,) bounds that hold the mesh
+        tile_mm : longest side of a tile [mm]; two to four cutter diameters
+
+        Raises
+        ------
+        InputError
+            The mesh is not closed (with the number of open edges), or the bounds do not hold it.
+        """
+        if len(mesh.faces) == 0:
+            raise InputError("stock: the mesh has no triangles")
+        require_closed(mesh, "stock")
+        part = trimesh.Trimesh(np.array(mesh.vertices), np.array(mesh.faces), process=False)
+        (x0, y0, z0), (x1, y1, z1) = part.bounds
+        bounds = _bounds(bounds_or_layer_mm, float(z0), float(z1))
+        if bounds[0] > z0 or bounds[-1] < z1:
+            raise InputError(
+                f"stock.bounds from {bounds[0]:g} to {bounds[-1]:g} mm: must hold the mesh, {z0:g} to {z1:g} mm"
+            )
+        xs, ys = _borders(x0, x1, tile_mm), _borders(y0, y1, tile_mm)
+        boxes = _boxes(xs, ys, len(bounds) - 1)
+        return cls(bounds, xs, ys, _cut_up(part, 0.5 * (bounds[:-1] + bounds[1:]), boxes), part)
 
     @property
     def layers(self) -> int:
@@ -159,6 +198,93 @@ class LayeredStock:
             self._take(turn, rows, given, chips)
         return chips
 
+    def refine(self, z0: float, z1: float, layer_mm: float) -> None:
+        """Split the layers that reach into z0 < z < z1 [mm] into equal ones until none is thicker than ``layer_mm``.
+
+        A layer from which nothing was removed is cut from the mesh again at the new middles; where there is no mesh, or
+        something was removed, the new layers have the polygons of the old one, and the volume stays.
+        """
+        if not layer_mm > 0.0:
+            raise InputError(f"stock.layer_mm = {layer_mm:g}: must be above 0")
+        levels: list[float] = []
+        for i in self.layers_between(z0, z1):
+            parts = math.ceil(self.thickness[i] / layer_mm * (1.0 - 1e-12))
+            levels += np.linspace(self.bounds[i], self.bounds[i + 1], parts + 1)[1:-1].tolist()
+        self._split(np.array(levels))
+
+    def refine_at(self, levels: ArrayLike, within: float = 1e-9) -> None:
+        """Make heights [mm] bounds of layers, as :meth:`refine` does; those ``within`` [mm] of a bound are left out."""
+        fresh: list[float] = []
+        for z in np.sort(np.asarray(levels, dtype=np.float64).ravel()).tolist():
+            if self.bounds[0] < z < self.bounds[-1] and np.abs(np.array([*self.bounds, *fresh]) - z).min() > within:
+                fresh.append(z)
+        self._split(np.array(fresh))
+
+    def _split(self, levels: Floats) -> None:
+        """Add bounds."""
+        if not len(levels):
+            return
+        bounds = np.sort(np.concatenate([self.bounds, levels]))
+        heights = 0.5 * (bounds[:-1] + bounds[1:])
+        parents = np.searchsorted(self.bounds, heights, "right") - 1
+        boxes = _boxes(self.xs, self.ys, len(heights))
+        again = ~self.cut[parents] & (np.bincount(parents)[parents] > 1)
+        self.bounds, self.cut, self.tiles = bounds, self.cut[parents], self.tiles[parents]
+        if self.part is not None:
+            self.tiles[again] = _cut_up(self.part, heights[again], boxes)
+
+    def mesh(self) -> trimesh.Trimesh:
+        """What is left as one closed mesh [mm], the prism of each layer by itself, z up."""
+        return prisms([polygons(self.section(i)) for i in range(self.layers)], self.bounds)
+
+    def to_glb(self) -> bytes:
+        """What is left as binary glTF: in metres, y up, as that format has it."""
+        return glb(self.mesh())
+
+    def state(self) -> tuple[Floats, Shapes, NDArray[np.bool_]]:
+        """What :meth:`restore` needs to take back all that is done from now on."""
+        return self.bounds, self.tiles.copy(), self.cut.copy()
+
+    def restore(self, state: tuple[Floats, Shapes, NDArray[np.bool_]]) -> None:
+        """The stock as it was."""
+        self.bounds, self.tiles, self.cut = state[0], state[1].copy(), state[2].copy()
+
+    def save(self, path: str | Path) -> None:
+        """Write all of it to one ``.npz`` file, whole or not at all."""
+        part = self.part
+        vertices = np.zeros((0, 3)) if part is None else np.asarray(part.vertices, dtype=np.float64)
+        faces = np.zeros((0, 3), dtype=np.int64) if part is None else np.asarray(part.faces, dtype=np.int64)
+        arrays = {"bounds": self.bounds, "xs": self.xs, "ys": self.ys, "cut": self.cut}
+        write_shapes(path, KIND, arrays | {"vertices": vertices, "faces": faces}, self.tiles.ravel())
+
+    @classmethod
+    def load(cls, path: str | Path) -> LayeredStock:
+        """Read what :meth:`save` wrote; the stock goes on as the one that was saved, bit for bit.
+
+        Raises
+        ------
+        InputError
+            The file is missing, damaged, or holds something else.
+        """
+        a, tiles = read_shapes(path, KIND, {"bounds": 1, "xs": 1, "ys": 1, "cut": 1, "vertices": 2, "faces": 2})
+        axes = (a["bounds"], a["xs"], a["ys"])
+        shape = (len(a["bounds"]) - 1, len(a["ys"]) - 1, len(a["xs"]) - 1)
+        vertices, faces = a["vertices"], a["faces"]
+        if (
+            min(shape) < 1
+            or not all(np.isfinite(v).all() and (np.diff(v) > 0.0).all() for v in axes)
+            or len(tiles) != math.prod(shape)
+            or a["cut"].shape != shape[:1]
+            or vertices.shape[1] != 3
+            or faces.shape[1] != 3
+            or (len(faces) > 0 and not (faces.min() >= 0 and faces.max() < len(vertices)))
+        ):
+            raise InputError(f"stock.file = {Path(path).name}: damaged: its parts do not fit each other")
+        part = trimesh.Trimesh(vertices, faces.astype(np.int64), process=False) if len(faces) else None
+        stock = cls(axes[0], axes[1], axes[2], tiles.reshape(shape), part)
+        stock.cut = a["cut"].astype(np.bool_)
+        return stock
+
     def _take(self, turn: Ints, rows: Ints, given: Shapes, chips: list[list[Polygon]]) -> None:
         """Remove the shapes numbered ``turn``, no two of one layer."""
         x0, y0, x1, y1 = shapely.bounds(given[turn]).reshape(-1, 4).T
@@ -195,6 +321,17 @@ def polygons(shape: Any) -> list[Polygon]:
     """The polygons of a geometry that have an area; its lines and points are left out."""
     parts = shapely.get_parts(shape)
     return list(parts[(shapely.get_type_id(parts) == POLYGON) & (shapely.area(parts) > 0.0)])
+
+
+def _cut_up(part: trimesh.Trimesh, heights: Floats, boxes: Shapes) -> Shapes:
+    """(n, rows, columns) tiles of the sections of a mesh."""
+    whole = np.empty((len(heights), 1, 1), dtype=object)
+    whole[:, 0, 0] = sections(part, heights)
+    shapely.prepare(whole)
+    tiles = shapely.intersection(boxes, whole)
+    for at in zip(*np.nonzero(~np.isin(shapely.get_type_id(tiles), (POLYGON, MULTIPOLYGON))), strict=True):
+        tiles[at] = MultiPolygon(polygons(tiles[at]))
+    return np.asarray(tiles)
 
 
 def _turns(rows: Ints) -> list[Ints]:
