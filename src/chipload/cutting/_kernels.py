@@ -21,8 +21,8 @@ GOLDEN = 0.6180339887498949
 REFINEMENTS = 14
 #: half an angle below which its sine over it is 1 [rad]
 FLAT = 1e-8
-#: Gauss-Legendre on [-1, 1], ten points
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)
+#: Gauss-Legendre on [-1, 1], twelve points
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
 @njit(cache=True, nogil=True)
@@ -36,8 +36,8 @@ def thickness_power(h, m):
 @njit(cache=True, nogil=True)
 def powers(first, last, along, offset, across, c, out):
     """Means over the immersion from ``first`` to ``last`` of h^(1 - m) times 1, sin and cos: out (3, 3), a row a
-    direction. Between crest and trough of h the variable is w, phi = zero +- w^4, so that the root of h at its zero,
-    or near it, is smooth in w; ten points of Gauss.
+    direction. Between crest and trough of h the variable is w, phi = zero +- w^3, so that the root of h at its zero,
+    or near it, is smooth in w; twelve points of Gauss, right to 1e-7 of the thickest chip's, or better.
     """
     out[:] = 0.0
     swing = math.hypot(along, across)
@@ -50,12 +50,12 @@ def powers(first, last, along, offset, across, c, out):
         if high > low:
             falling = k % 2 == 0
             zero = crest + k * PI + reach if falling else crest + (k + 1) * PI - reach
-            u = (max(zero - high, 0.0) if falling else max(low - zero, 0.0)) ** 0.25
-            v = (max(zero - low, 0.0) if falling else max(high - zero, 0.0)) ** 0.25
+            u = np.cbrt(max(zero - high, 0.0) if falling else max(low - zero, 0.0))
+            v = np.cbrt(max(zero - low, 0.0) if falling else max(high - zero, 0.0))
             for g in range(len(NODES)):
                 w = 0.5 * (u + v) + 0.5 * (v - u) * NODES[g]
-                weight = 2.0 * (v - u) * w * w * w * WEIGHTS[g]
-                phi = zero - w**4 if falling else zero + w**4
+                weight = 1.5 * (v - u) * w * w * WEIGHTS[g]
+                phi = zero - w**3 if falling else zero + w**3
                 si = math.sin(phi)
                 co = math.cos(phi)
                 h = along * si + across * co + offset
