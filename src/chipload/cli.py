@@ -181,6 +181,35 @@ def convert(
 
 
 @app.command()
+def fit(
+    file: Annotated[Path, typer.Argument(metavar="FIT", help="the fit (TOML): measured cuts, cutter, engagement")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="the result folder; appears whole or not at all")],
+    debug: Debug = False,
+) -> None:
+    """Identify force coefficients from measured forces; write a material, its intervals and what it predicts."""
+
+    def work() -> int:
+        from chipload.cutting.fit_job import load_fit, run_fit
+        from chipload.report.fit import check_fit_target, verdict, write_fit
+
+        job = load_fit(file)
+        check_fit_target(out)
+        with _bar() as progress:
+            done = run_fit(job, progress)
+            target = write_fit(done, out)
+        holds, says = verdict(done)
+        for f in job.findings:
+            typer.echo(_said(f))
+        for text in done.notes:
+            typer.echo(f"note: {text}")
+        typer.echo(says)
+        typer.echo(f"report: {target / 'report.html'}")
+        return 0 if holds else EXCEEDED
+
+    _guarded(work, debug)
+
+
+@app.command()
 def example(
     name: Annotated[str | None, typer.Argument(help="the example; none: list them")] = None,
     folder: Annotated[Path | None, typer.Argument(metavar="DIR", help="where it is copied to")] = None,

@@ -337,3 +337,17 @@ def predict(fit: Fit, cut: Cut) -> Prediction:
     return Prediction(
         values[0], values[1], values[2], values[3], values[4], half, float(np.hypot(whole[:, 0], whole[:, 1]).max())
     )
+
+
+def aligned(fit: Fit, cut: Cut, turns: Turns, parts: int = 720) -> float:
+    """theta_0 of a cut at which its harmonics lie nearest to those that the fit says, of ``parts`` tried [rad]."""
+    k = np.arange(len(turns.amplitude), dtype=np.float64)
+    said = (unit_harmonics(cut, fit.cutter, len(k) - 1) @ fit.linear) * dynamometer(fit.resonance, k * cut.speed)
+    some = cut.measured & fit.known
+    if not some.any():
+        return 0.0
+    size = np.sqrt(np.sum(np.abs(turns.amplitude[1:, some]) ** 2, axis=0))
+    # the phase changes only how amplitudes lie to each other, not their size
+    overlap = np.sum(np.conj(said[1:, some]) * turns.amplitude[1:, some] / size**2, axis=1)
+    tried = np.linspace(0.0, math.tau, parts, endpoint=False)
+    return float(tried[int(np.argmax((np.exp(-1j * np.outer(tried, k[1:])) @ overlap).real))])
