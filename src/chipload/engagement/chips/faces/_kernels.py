@@ -180,8 +180,8 @@ def quickest(cp, ca):
 
 
 @njit(cache=True, nogil=True)
-def covered_at(cp, ca, K, h, x, y, slack):
-    """Whether (x, y) on the layer is inside the cutter at some t, from above 0 to ``slack`` in doubt (no).
+def covered_at(cp, ca, K, h, x, y, over, slack):
+    """Whether (x, y) on the layer is within ``over`` of the cutter at some t; up to ``slack`` more in doubt (no).
 
     Branch and bound: the depth changes no faster than the cutter's points near (x, y) move.
     """
@@ -196,11 +196,11 @@ def covered_at(cp, ca, K, h, x, y, slack):
         t = 0.5 * (a + b)
         state(cp, ca, t, S)
         d = depth(S, K, x, y, h)
-        if d <= 0.0:
+        if d <= over:
             return True
         half = 0.5 * (b - a)
         far = math.sqrt((x - S[0]) ** 2 + (y - S[1]) ** 2 + (h - S[2]) ** 2) + vp * half
-        if d - (vp + far * va) * half > -slack or half < 1e-13:
+        if d - (vp + far * va) * half > over - slack or half < 1e-13:
             continue
         stack[n] = a, t
         stack[n + 1] = t, b
@@ -209,7 +209,7 @@ def covered_at(cp, ca, K, h, x, y, slack):
 
 
 @njit(cache=True, nogil=True)
-def covered_points(cp, ca, K, h, points, slack, out):
-    """``covered_at`` of many points (n, 2), ``slack`` (n,)."""
+def covered_points(cp, ca, K, h, points, over, slack, out):
+    """``covered_at`` of many points (n, 2), ``over`` (n,)."""
     for i in range(points.shape[0]):
-        out[i] = covered_at(cp, ca, K, h, points[i, 0], points[i, 1], slack[i])
+        out[i] = covered_at(cp, ca, K, h, points[i, 0], points[i, 1], over[i], slack)

@@ -31,8 +31,8 @@ from chipload.engagement.chips._kernels import (
 )
 
 FIRST, LAST, GRAZING, CHORD, CHORD_END, FIRST_CHORD, LAST_CHORD = 0, 1, 2, 3, 4, 5, 6
-NOTHING, GENERAL, FULL = -1, -2, -3
-KNOTS = 9
+NOTHING, GENERAL, FULL, UNSETTLED = -1, -2, -3, -4
+KNOTS, MOST_KNOTS = 9, 200
 INSET = 1e-10  # of a span of time: where a section that begins as a point is looked at
 
 
@@ -303,8 +303,9 @@ def _cross(p, q):
 
 
 @njit(cache=True, nogil=True)
-def loop(cp, ca, K, h, tol, vmin, buf):
-    """The covered area where its boundary is one simple loop: count of edges; NOTHING, GENERAL or FULL."""
+def loop(cp, ca, K, h, tol, vmin, knots, buf):
+    """The covered area where its boundary is one simple loop: count of edges; NOTHING, GENERAL, FULL or
+    UNSETTLED, which more ``knots`` in time may mend."""
     span = np.empty((4, 2))
     m = spans(cp, ca, K, h, 16, span)
     if m != 1:
@@ -315,24 +316,24 @@ def loop(cp, ca, K, h, tol, vmin, buf):
         ta += INSET * length
     if tb < 1.0:
         tb -= INSET * length
-    S = np.empty((KNOTS, 27))
-    C = np.empty((KNOTS, 8, 5))
-    R = np.empty((KNOTS, MAX_ROOTS, 7))
-    sign = np.empty((KNOTS, MAX_ROOTS), np.int64)
-    count = np.empty(KNOTS, np.int64)
-    around = np.empty(KNOTS, np.int64)
-    grid = np.empty((KNOTS, NODES))
-    dt = (tb - ta) / (KNOTS - 1)
-    for i in range(KNOTS):
-        t = tb if i == KNOTS - 1 else ta + i * dt
+    S = np.empty((knots, 27))
+    C = np.empty((knots, 8, 5))
+    R = np.empty((knots, MAX_ROOTS, 7))
+    sign = np.empty((knots, MAX_ROOTS), np.int64)
+    count = np.empty(knots, np.int64)
+    around = np.empty(knots, np.int64)
+    grid = np.empty((knots, NODES))
+    dt = (tb - ta) / (knots - 1)
+    for i in range(knots):
+        t = tb if i == knots - 1 else ta + i * dt
         if not instant(cp, ca, K, h, t, S[i], C[i]):
             return GENERAL
         count[i], around[i] = roots(S[i], K, C[i], vmin, R[i], sign[i], grid[i])
         if count[i] < 0 or count[i] > 2:
             return GENERAL
     if not _settled(grid, dt, tol):
-        return GENERAL
-    last = KNOTS - 1
+        return UNSETTLED if knots <= MOST_KNOTS else GENERAL
+    last = knots - 1
     if count.max() == 0:
         for i in range(last):
             if around[i] * around[i + 1] < 0:
@@ -347,7 +348,7 @@ def loop(cp, ca, K, h, tol, vmin, buf):
     i1 = last
     while count[i1] == 0:
         i1 -= 1
-    for i in range(KNOTS):
+    for i in range(knots):
         if i < i0 and around[i] <= 0 or i > i1 and around[i] >= 0 or i0 <= i <= i1 and count[i] != 2:
             return GENERAL
     k = 0 if sign[i0, 0] == -1 else 1
