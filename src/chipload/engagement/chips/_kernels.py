@@ -445,7 +445,7 @@ def roots(S, K, C, vmin, R, sign, grid):
                 after = (i + 1) % n
                 if at[before] < 0 and at[after] < 0:
                     a0, a1, a2, a3 = abs(vv[before]), abs(vv[last]), abs(vv[i]), abs(vv[after])
-                    if a1 < a0 and a2 < a3 and min(a1, a2) < 0.25 * max(a0, a3):
+                    if a1 <= a0 and a2 <= a3 and min(a1, a2) < 0.25 * max(a0, a3):
                         hi = th[i] if th[i] > th[last] else th[i] + TAU
                         lo = th[last]
                         a, b = lo, hi
@@ -470,7 +470,7 @@ def roots(S, K, C, vmin, R, sign, grid):
                                 b = x2
                             else:
                                 a = x1
-                            if min(v1, v2) > 0.5 * min(a1, a2):
+                            if b - a < 1e-8:
                                 break
         here = now
         last = i

@@ -117,10 +117,14 @@ def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], toleranc
         h = float(height)
         if not math.isfinite(h):
             raise InputError(f"covered: height = {h:g} mm: must be finite")
-        n = trace.loop(move.tip, move.axis, K, h, tolerance, STILL * tolerance, buffer)
-        while n == trace.FULL:
-            buffer = _larger(buffer)
-            n = trace.loop(move.tip, move.axis, K, h, tolerance, STILL * tolerance, buffer)
+        knots = trace.KNOTS
+        n = trace.loop(move.tip, move.axis, K, h, tolerance, STILL * tolerance, knots, buffer)
+        while n in (trace.FULL, trace.UNSETTLED):
+            if n == trace.FULL:
+                buffer = _larger(buffer)
+            else:
+                knots = 4 * knots - 3
+            n = trace.loop(move.tip, move.axis, K, h, tolerance, STILL * tolerance, knots, buffer)
         if n == trace.NOTHING:
             out.append(None)
         elif n == trace.GENERAL:
@@ -178,20 +182,15 @@ def _noded(move: Move, K: Floats, h: float, tolerance: float) -> Covered | None:
     edges = _pieces(move, K, h, tolerance)
     if len(edges) == 0:
         return None
-    net = shapely.unary_union(shapely.linestrings(edges[:, :4].reshape(-1, 2, 2)))
-    found = np.array(shapely.get_parts(shapely.polygonize([net])))
+    lines = shapely.line_merge(shapely.multilinestrings(edges[:, :4].reshape(-1, 2, 2)))
+    found = np.array(shapely.get_parts(shapely.polygonize([shapely.node(lines)])))
     if len(found) == 0:
         return None
-    area, around = shapely.area(found), shapely.length(found)
-    thin = area < tolerance * around
-    inner = shapely.point_on_surface(found)
-    slack = np.full(len(found), 0.01 * tolerance)
-    for k in np.flatnonzero(thin):
-        middle = shapely.maximum_inscribed_circle(found[k], tolerance=0.05 * tolerance)
-        inner[k] = shapely.get_point(middle, 0)
+    thin = shapely.area(found) < tolerance * shapely.length(found)
+    points = shapely.get_coordinates(shapely.point_on_surface(found))
     inside = np.empty(len(found), np.bool_)
-    points = shapely.get_coordinates(inner)
-    faces.covered_points(move.tip, move.axis, K, h, points, slack, inside)
+    over = np.where(thin, tolerance, 0.0)  # what is no wider than the error of the polygon is not left open
+    faces.covered_points(move.tip, move.axis, K, h, points, over, 0.01 * tolerance, inside)
     if not inside.any():
         return None
     whole = shapely.unary_union(found[inside])

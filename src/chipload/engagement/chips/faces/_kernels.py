@@ -10,8 +10,8 @@ import math
 import numpy as np
 from numba import njit
 
-from chipload.engagement.chips._kernels import MAX_ROOTS, NODES, deviation, instant, roots, state
-from chipload.engagement.chips.trace._kernels import FIRST, FULL, GRAZING, INSET, LAST, edge, kind, sides
+from chipload.engagement.chips._kernels import MAX_ROOTS, NODES, TAU, deviation, instant, roots, state
+from chipload.engagement.chips.trace._kernels import FIRST, FULL, GRAZING, INSET, LAST, arc, edge, kind, sides
 
 DEPTH = 64
 LEAST = 1e-12  # [t] nearer than this two instants are one
@@ -32,10 +32,12 @@ def pieces(cp, ca, K, h, tol, vmin, ta, tb, knots, buf, n, jumps):
     count = np.empty(DEPTH, np.int64)
     around = np.empty(DEPTH, np.int64)
     grid = np.empty(NODES)
+    most = np.empty(DEPTH)
     found = 0
     if not instant(cp, ca, K, h, ta, S[0], C[0]):
         return n, 0
     count[0], around[0] = roots(S[0], K, C[0], vmin, R[0], sign[0], grid)
+    most[0] = np.abs(grid).max()
     n = sides(S[0], K, C[0], R[0], sign[0], max(count[0], 0), around[0], -1, tol, FIRST, buf, n)
     if n < 0:
         return FULL, 0
@@ -46,9 +48,13 @@ def pieces(cp, ca, K, h, tol, vmin, ta, tb, knots, buf, n, jumps):
             if not instant(cp, ca, K, h, t, S[top], C[top]):
                 return n, found
             count[top], around[top] = roots(S[top], K, C[top], vmin, R[top], sign[top], grid)
+            most[top] = np.abs(grid).max()
             while top > 0:
                 short = S[top, 21] - S[0, 21] < LEAST or top >= DEPTH - 1
-                m = link(R[0], sign[0], count[0], R[top], sign[top], count[top], tol, short, buf, n)
+                quiet = (S[top, 21] - S[0, 21]) * max(most[0], most[top]) <= 0.05 * tol or short
+                m = link(
+                    S[0], C[0], R[0], sign[0], count[0], S[top], C[top], R[top], sign[top], count[top], K, tol, quiet, buf, n
+                )
                 if m == -2:
                     return FULL, 0
                 if m == -1 and not short:
@@ -59,7 +65,8 @@ def pieces(cp, ca, K, h, tol, vmin, ta, tb, knots, buf, n, jumps):
                         found += 1
                 else:
                     n = m
-                S[0], C[0], R[0], sign[0], count[0], around[0] = S[top], C[top], R[top], sign[top], count[top], around[top]
+                S[0], C[0], R[0], sign[0] = S[top], C[top], R[top], sign[top]
+                count[0], around[0], most[0] = count[top], around[top], most[top]
                 top -= 1
             if top == 0:
                 break
@@ -70,58 +77,59 @@ def pieces(cp, ca, K, h, tol, vmin, ta, tb, knots, buf, n, jumps):
 
 
 @njit(cache=True, nogil=True)
-def link(R0, s0, n0, R1, s1, n1, tol, short, buf, n):
-    """Join the roots of two instants, in cyclic order; new count, -1 where they don't fit, -2 where full."""
+def _without(R, sign, n, i, R_out, sign_out):
+    """All roots but i and the next one."""
+    k = 0
+    for m in range(n):
+        if m != i and m != (i + 1) % n:
+            R_out[k] = R[m]
+            sign_out[k] = sign[m]
+            k += 1
+
+
+@njit(cache=True, nogil=True)
+def link(S0, C0, R0, s0, n0, S1, C1, R1, s1, n1, K, tol, quiet, buf, n):
+    """Join the roots of two instants in cyclic order; new count, -1 where they don't fit, -2 where full.
+
+    A pair that is there at one instant only is joined along the section, where the two points are within tol / 5 or
+    ``quiet``: nothing moves by more than that in between.
+    """
     if n0 < 0 or n1 < 0 or abs(n0 - n1) > 2:
         return -1
     if n + n0 + n1 + 2 >= buf.shape[0]:
         return -2
-    if n0 != n1:
-        swap = n1 > n0
-        big, sb, nb = (R1, s1, n1) if swap else (R0, s0, n0)
-        small, ss, ns = (R0, s0, n0) if swap else (R1, s1, n1)
-        best, pair = math.inf, -1
-        for i in range(nb):
-            j = (i + 1) % nb
-            d = math.hypot(big[i, 0] - big[j, 0], big[i, 1] - big[j, 1])
-            if d > 0.2 * tol and not short:
-                continue
-            rest = np.empty((MAX_ROOTS, 7))
-            sr = np.empty(MAX_ROOTS, np.int64)
-            k = 0
-            for m in range(nb):
-                if m != i and m != j:
-                    rest[k] = big[m]
-                    sr[k] = sb[m]
-                    k += 1
-            total, _ = _match(small, ss, rest, sr, ns, tol)
-            if d + total < best:
-                best, pair = d + total, i
-        if pair < 0 or best == math.inf:
+    if n0 == n1:
+        total, shift = _match(R0, s0, R1, s1, n0, tol)
+        if total == math.inf:
             return -1
-        j = (pair + 1) % nb
-        if math.hypot(big[pair, 0] - big[j, 0], big[pair, 1] - big[j, 1]) > tol:
-            return -1
-        rest = np.empty((MAX_ROOTS, 7))
-        sr = np.empty(MAX_ROOTS, np.int64)
-        k = 0
-        for m in range(nb):
-            if m != pair and m != j:
-                rest[k] = big[m]
-                sr[k] = sb[m]
-                k += 1
-        a, b = big[pair], big[j]
-        n = edge(buf, n, a, b, a[4], a[5], b[4], b[5], GRAZING)
-        if swap:
-            return link(small, ss, ns, rest, sr, ns, tol, short, buf, n)
-        return link(rest, sr, ns, small, ss, ns, tol, short, buf, n)
-    total, shift = _match(R0, s0, R1, s1, n0, tol)
-    if total == math.inf:
+        for i in range(n0):
+            a, b = R0[i], R1[(i + shift) % n0]
+            n = edge(buf, n, a, b, a[4], a[5], b[4], b[5], kind(a, b))
+        return n
+    S, C, big, sb, nb = (S1, C1, R1, s1, n1) if n1 > n0 else (S0, C0, R0, s0, n0)
+    small, ss = (R0, s0) if n1 > n0 else (R1, s1)
+    rest = np.empty((MAX_ROOTS, 7))
+    sr = np.empty(MAX_ROOTS, np.int64)
+    best, pair, shift = math.inf, -1, 0
+    for i in range(nb):
+        j = (i + 1) % nb
+        d = math.hypot(big[i, 0] - big[j, 0], big[i, 1] - big[j, 1])
+        if d > 0.2 * tol and not quiet:
+            continue
+        _without(big, sb, nb, i, rest, sr)
+        total, k = _match(small, ss, rest, sr, nb - 2, tol)
+        if d + total < best:
+            best, pair, shift = d + total, i, k
+    if pair < 0:
         return -1
-    for i in range(n0):
-        a, b = R0[i], R1[(i + shift) % n0]
+    _without(big, sb, nb, pair, rest, sr)
+    for i in range(nb - 2):
+        a, b = small[i], rest[(i + shift) % (nb - 2)]
         n = edge(buf, n, a, b, a[4], a[5], b[4], b[5], kind(a, b))
-    return n
+    b = big[(pair + 1) % nb].copy()
+    b[2] = big[pair, 2] + (b[2] - big[pair, 2]) % TAU
+    n = arc(S, K, C, big[pair], b, tol, GRAZING, buf, n)
+    return -2 if n < 0 else n
 
 
 @njit(cache=True, nogil=True)
@@ -172,8 +180,8 @@ def quickest(cp, ca):
 
 
 @njit(cache=True, nogil=True)
-def covered_at(cp, ca, K, h, x, y, slack):
-    """Whether (x, y) on the layer is inside the cutter at some t, from above 0 to ``slack`` in doubt (no).
+def covered_at(cp, ca, K, h, x, y, over, slack):
+    """Whether (x, y) on the layer is within ``over`` of the cutter at some t; up to ``slack`` more in doubt (no).
 
     Branch and bound: the depth changes no faster than the cutter's points near (x, y) move.
     """
@@ -188,11 +196,11 @@ def covered_at(cp, ca, K, h, x, y, slack):
         t = 0.5 * (a + b)
         state(cp, ca, t, S)
         d = depth(S, K, x, y, h)
-        if d <= 0.0:
+        if d <= over:
             return True
         half = 0.5 * (b - a)
         far = math.sqrt((x - S[0]) ** 2 + (y - S[1]) ** 2 + (h - S[2]) ** 2) + vp * half
-        if d - (vp + far * va) * half > -slack or half < 1e-13:
+        if d - (vp + far * va) * half > over - slack or half < 1e-13:
             continue
         stack[n] = a, t
         stack[n + 1] = t, b
@@ -201,7 +209,7 @@ def covered_at(cp, ca, K, h, x, y, slack):
 
 
 @njit(cache=True, nogil=True)
-def covered_points(cp, ca, K, h, points, slack, out):
-    """``covered_at`` of many points (n, 2), ``slack`` (n,)."""
+def covered_points(cp, ca, K, h, points, over, slack, out):
+    """``covered_at`` of many points (n, 2), ``over`` (n,)."""
     for i in range(points.shape[0]):
-        out[i] = covered_at(cp, ca, K, h, points[i, 0], points[i, 1], slack[i])
+        out[i] = covered_at(cp, ca, K, h, points[i, 0], points[i, 1], over[i], slack)

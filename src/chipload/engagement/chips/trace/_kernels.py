@@ -31,8 +31,8 @@ from chipload.engagement.chips._kernels import (
 )
 
 FIRST, LAST, GRAZING, CHORD, CHORD_END, FIRST_CHORD, LAST_CHORD = 0, 1, 2, 3, 4, 5, 6
-NOTHING, GENERAL, FULL = -1, -2, -3
-KNOTS = 9
+NOTHING, GENERAL, FULL, UNSETTLED = -1, -2, -3, -4
+KNOTS, MOST_KNOTS = 9, 200
 INSET = 1e-10  # of a span of time: where a section that begins as a point is looked at
 
 
@@ -303,8 +303,9 @@ def _cross(p, q):
 
 
 @njit(cache=True, nogil=True)
-def loop(cp, ca, K, h, tol, vmin, buf):
-    """The covered area where its boundary is one simple loop: count of edges; NOTHING, GENERAL or FULL."""
+def loop(cp, ca, K, h, tol, vmin, knots, buf):
+    """The covered area where its boundary is one simple loop: count of edges; NOTHING, GENERAL, FULL or
+    UNSETTLED, which more ``knots`` in time may mend."""
     span = np.empty((4, 2))
     m = spans(cp, ca, K, h, 16, span)
     if m != 1:
@@ -315,24 +316,24 @@ def loop(cp, ca, K, h, tol, vmin, buf):
         ta += INSET * length
     if tb < 1.0:
         tb -= INSET * length
-    S = np.empty((KNOTS, 27))
-    C = np.empty((KNOTS, 8, 5))
-    R = np.empty((KNOTS, MAX_ROOTS, 7))
-    sign = np.empty((KNOTS, MAX_ROOTS), np.int64)
-    count = np.empty(KNOTS, np.int64)
-    around = np.empty(KNOTS, np.int64)
-    grid = np.empty((KNOTS, NODES))
-    dt = (tb - ta) / (KNOTS - 1)
-    for i in range(KNOTS):
-        t = tb if i == KNOTS - 1 else ta + i * dt
+    S = np.empty((knots, 27))
+    C = np.empty((knots, 8, 5))
+    R = np.empty((knots, MAX_ROOTS, 7))
+    sign = np.empty((knots, MAX_ROOTS), np.int64)
+    count = np.empty(knots, np.int64)
+    around = np.empty(knots, np.int64)
+    grid = np.empty((knots, NODES))
+    dt = (tb - ta) / (knots - 1)
+    for i in range(knots):
+        t = tb if i == knots - 1 else ta + i * dt
         if not instant(cp, ca, K, h, t, S[i], C[i]):
             return GENERAL
         count[i], around[i] = roots(S[i], K, C[i], vmin, R[i], sign[i], grid[i])
         if count[i] < 0 or count[i] > 2:
             return GENERAL
     if not _settled(grid, dt, tol):
-        return GENERAL
-    last = KNOTS - 1
+        return UNSETTLED if knots <= MOST_KNOTS else GENERAL
+    last = knots - 1
     if count.max() == 0:
         for i in range(last):
             if around[i] * around[i + 1] < 0:
@@ -347,7 +348,7 @@ def loop(cp, ca, K, h, tol, vmin, buf):
     i1 = last
     while count[i1] == 0:
         i1 -= 1
-    for i in range(KNOTS):
+    for i in range(knots):
         if i < i0 and around[i] <= 0 or i > i1 and around[i] >= 0 or i0 <= i <= i1 and count[i] != 2:
             return GENERAL
     k = 0 if sign[i0, 0] == -1 else 1
@@ -362,10 +363,10 @@ def loop(cp, ca, K, h, tol, vmin, buf):
     if i0 == 0:
         up0[2] = down0[2] + (up0[2] - down0[2]) % TAU
         n = arc(S[0], K, C[0], down0, up0, tol, FIRST, buf, n)
-        if n < 0:
-            return FULL
     else:
-        n = edge(buf, n, down0, up0, down0[4], down0[5], up0[4], up0[5], GRAZING)
+        n = between(cp, ca, K, h, down0, up0, tol, buf, n)
+    if n < 0:
+        return FULL
     rows = np.empty((buf.shape[0], 7))
     n = _side(cp, ca, K, h, tol, vmin, up0, up1, 1, rows, buf, n)
     if n < 0:
@@ -373,10 +374,10 @@ def loop(cp, ca, K, h, tol, vmin, buf):
     if i1 == last:
         down1[2] = up1[2] + (down1[2] - up1[2]) % TAU
         n = arc(S[last], K, C[last], up1, down1, tol, LAST, buf, n)
-        if n < 0:
-            return FULL
     else:
-        n = edge(buf, n, up1, down1, up1[4], up1[5], down1[4], down1[5], GRAZING)
+        n = between(cp, ca, K, h, up1, down1, tol, buf, n)
+    if n < 0:
+        return FULL
     n = _side(cp, ca, K, h, tol, vmin, down0, down1, -1, rows, buf, n)
     if n < 0:
         return FULL if n == FULL else GENERAL
@@ -386,6 +387,17 @@ def loop(cp, ca, K, h, tol, vmin, buf):
     for i in range(n):
         area += (buf[i, 0] - buf[0, 0]) * (buf[i, 3] - buf[0, 1]) - (buf[i, 2] - buf[0, 0]) * (buf[i, 1] - buf[0, 1])
     return n if area > 0.0 else GENERAL
+
+
+@njit(cache=True, nogil=True)
+def between(cp, ca, K, h, a, b, tol, buf, n):
+    """Edges of the section between two grazing points that meet: it stands still there."""
+    S = np.empty(27)
+    C = np.empty((8, 5))
+    instant(cp, ca, K, h, a[3], S, C)
+    end = b.copy()
+    end[2] = a[2] + (b[2] - a[2]) % TAU
+    return arc(S, K, C, a, end, tol, GRAZING, buf, n)
 
 
 @njit(cache=True, nogil=True)
@@ -415,20 +427,22 @@ def _settled(grid, dt, tol):
 
 @njit(cache=True, nogil=True)
 def _meeting(cp, ca, K, h, tol, vmin, t0, t1, down, up):
-    """Bring the pair of roots at t1 to where it meets towards t0, within tol / 20; False if it doesn't."""
+    """Bring the pair of roots at t1 to where it meets towards t0, V between them within tol / 20 of way; or False."""
     S = np.empty(27)
     C = np.empty((8, 5))
     R = np.empty((MAX_ROOTS, 7))
     sign = np.empty(MAX_ROOTS, np.int64)
     grid = np.empty(NODES)
+    most = math.inf
     for _ in range(60):
-        if math.hypot(down[0] - up[0], down[1] - up[1]) <= 0.05 * tol:
+        if math.hypot(down[0] - up[0], down[1] - up[1]) <= 0.05 * tol or abs(t1 - t0) * most <= 0.05 * tol:
             return True
         t = 0.5 * (t0 + t1)
         if not instant(cp, ca, K, h, t, S, C):
             return False
         count, _ = roots(S, K, C, vmin, R, sign, grid)
         if count == 2:
+            most = np.abs(grid).max()
             t1 = t
             k = 0 if sign[0] == -1 else 1
             down[:] = R[k]
