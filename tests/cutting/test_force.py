@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting.bites import Bites, bites_of_arcs, tooth_radii
 from chipload.cutting.force import forces_along, forces_over_turn, greatest_forces, mean_forces
 from chipload.cutting.material import Material, material_named
+from chipload.engagement.bites import Bites, bites_of_arcs, tooth_radii
 from chipload.errors import InputError
 
 AL = material_named("al7075-t6")
@@ -225,8 +225,8 @@ def test_slices_of_a_cut_add_up_to_the_cut():
     """The interface of bites: a depth cut into slices is the same cut."""
     whole = bites_of_arcs([2.7], [math.pi], 0.05, MILL, 6.0)
     heights = np.linspace(0.0, 6.0, 8)
-    rows = [[2.7, math.pi, a, b, 0.05, 0.0] for a, b in pairwise(heights)]
-    parts = Bites(np.array([0, 7]), np.array(rows), np.full(7, -1))
+    rows = [[2.7, math.pi, a, b, 0.05, 0.0, 0.0] for a, b in pairwise(heights)]
+    parts = Bites(np.array([0, 7]), np.array(rows), np.full(7, -1), np.zeros(7, dtype=int), whole.slices)
     theta = np.linspace(0.0, 6.0, 30)
     np.testing.assert_allclose(
         forces_over_turn(parts, MILL, AL, theta)[0], forces_over_turn(whole, MILL, AL, theta)[0], atol=1e-10

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting.bites import bites_of_arcs, tooth_radii
 from chipload.cutting.material import material_named
 from chipload.cutting.wall import wall_error_along, wall_profile
+from chipload.engagement.bites import Bites, bites_of_arcs, tooth_radii
 from chipload.errors import InputError
 from chipload.structure.beam import compliance
 
@@ -149,3 +149,28 @@ def test_refuses_heights_outside_the_cutter():
     with pytest.raises(InputError) as err:
         wall_profile(bites, MILL, AL, [40.0], milling="down")
     assert str(err.value) == "z: must be heights from 0 to cutter.overhang_mm = 35"
+
+
+def test_a_bite_counted_along_another_profile_is_the_same_wall():
+    """The flank of a profile whose s begins elsewhere: heights and lags are what counts."""
+    flat = bites_of_arcs([2.6], [math.pi], 0.05, MILL, 6.0)
+    rows = np.array(flat.rows)
+    rows[:, 2:4] += 3.0 - 1.0
+    lead = math.tan(MILL.helix) / 5.0
+    edge = [[0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0], [3.0, 5.0, 1.0, 1.0, 0.0, lead, lead]]
+    other = Bites(flat.start, rows, flat.tooth, np.ones(len(rows), dtype=int), edge)
+    z = np.linspace(0.0, 6.0, 5)
+    np.testing.assert_allclose(
+        wall_profile(other, MILL, AL, z, milling="down"), wall_profile(flat, MILL, AL, z, milling="down"), rtol=1e-12
+    )
+
+
+def test_refuses_what_is_no_straight_flank():
+    flat = bites_of_arcs([2.6], [math.pi], 0.05, MILL, 6.0)
+    edge = [[0.0, 4.0, 0.0, 0.6, 0.8, 0.0, 0.1]]
+    with pytest.raises(InputError) as err:
+        wall_profile(Bites(flat.start, flat.rows, flat.tooth, flat.slice, edge), MILL, AL, [1.0], milling="down")
+    assert str(err.value) == (
+        "bites: row 0: rho = 4 mm, sin(kappa) = 0.6: the wall's error is known for a straight flank only, rho = 5 mm and "
+        "sin(kappa) = 1"
+    )

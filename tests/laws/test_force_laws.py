@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting.bites import bites_of_arcs
 from chipload.cutting.force import forces_along, mean_forces
 from chipload.cutting.material import Material, material_named, material_names
 from chipload.cutting.wall import wall_error_along
+from chipload.engagement.bites import bites_of_arcs
 
 MILL = Cutter(10.0, 4, math.radians(30.0), 25.0, 35.0, 6e5)
 NO_EDGE = Material("no edge", 800.0, 250.0, 150.0, 0.0, 0.0, 0.0, source="made up")

@@ -1,8 +1,9 @@
-"""Compiled loops of force and wall error; arrays and scalars only.
+"""Compiled loops of the force; arrays and scalars only.
 
-Notation as in :mod:`chipload.cutting.bites` and :mod:`chipload.cutting.force`: theta [rad] rotation of tooth 0 at the
-tip, lag [rad/mm] = tan(helix) / R, c = (Ktc, Krc, Kac, Kte, Kre, Kae), a bite row = (phi from, phi to, z from, z to,
-slope, offset). Oracles: slice summation and quadrature in tests/cutting.
+Notation as in :mod:`chipload.engagement.bites` and :mod:`chipload.cutting.force`: theta [rad] rotation of tooth 0 at
+the tip, c = (Ktc, Krc, Kac, Kte, Kre, Kae, m_t, m_r, m_a), a bite row = (phi from, phi to, s from, s to, along, offset,
+across), a slice = (s from, rho, z, sin(kappa), cos(kappa), lag, rate of the lag), ``piece`` the slice of each row.
+Oracles: slice summation and quadrature in tests/cutting.
 """
 
 from __future__ import annotations
@@ -12,87 +13,116 @@ import math
 import numpy as np
 from numba import njit
 
-from chipload.structure._kernels import stepped
-
 PI = math.pi
 TAU = 2.0 * math.pi
 #: angle beside a break, where the smooth piece is sampled [rad]
 BESIDE = 1e-9
 GOLDEN = 0.6180339887498949
 REFINEMENTS = 14
-#: Gauss-Legendre on [-1, 1], five points
-NODES = np.array([-0.906179845938664, -0.5384693101056831, 0.0, 0.5384693101056831, 0.906179845938664])
-WEIGHTS = np.array(
-    [0.23692688505618908, 0.47862867049936647, 0.5688888888888889, 0.47862867049936647, 0.23692688505618908]
-)
-#: longest piece of immersion that five points integrate to rounding [rad]
-PIECE = 0.6
+#: half an angle below which its sine over it is 1 [rad]
+FLAT = 1e-8
+#: Gauss-Legendre on [-1, 1], twelve points
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
 @njit(cache=True, nogil=True)
-def runout_bites(ends, feed, radii, depth, sizes, rows, tooth, fill):
-    """Bites of every arc for teeth of unlike radii: the lower envelope of N lines in s = sin(phi), where positive.
-    First call (fill False) counts into ``sizes``, the second fills ``rows`` and ``tooth``.
+def thickness_power(h, m):
+    """h^(1 - m) for h [mm], the thickness that a law with exponent m counts; 0 where h is not above 0."""
+    if m == 0.0:
+        return h
+    return h ** (1.0 - m) if h > 0.0 else 0.0
+
+
+@njit(cache=True, nogil=True)
+def powers(first, last, along, offset, across, c, out):
+    """Means over the immersion from ``first`` to ``last`` of h^(1 - m) times 1, sin and cos: out (3, 3), a row a
+    direction. Between crest and trough of h the variable is w, phi = zero +- w^3, so that the root of h at its zero,
+    or near it, is smooth in w; twelve points of Gauss, right to 1e-7 of the thickest chip's, or better.
     """
-    teeth = len(radii)
-    at = 0
-    for i in range(len(ends)):
-        before = at
-        for j in range(teeth):
-            line = teeth
-            low = 0.0
-            for m in range(teeth, 0, -1):
-                d = radii[j] - radii[(j - m) % teeth]
-                if m == teeth:
-                    d = 0.0
-                if d <= low:
-                    low = d
-                    line = m
-            s = 0.0
-            while s < 1.0:
-                d = radii[j] - radii[(j - line) % teeth] if line < teeth else 0.0
-                end = 1.0
-                after = line
-                for m in range(1, line):
-                    cross = (radii[j] - radii[(j - m) % teeth] - d) / (feed[i] * (line - m))
-                    if cross < end:
-                        end = cross
-                        after = m
-                slope = line * feed[i]
-                first = max(s, -d / slope)
-                if end > first:
-                    u = math.asin(first)
-                    v = math.asin(end)
-                    parts = 1 if end >= 1.0 else 2
-                    for part in range(parts):
-                        if parts == 1:
-                            p, q = u, PI - u
-                        elif part == 0:
-                            p, q = u, v
-                        else:
-                            p, q = PI - v, PI - u
-                        p = max(p, ends[i, 0])
-                        q = min(q, ends[i, 1])
-                        if q > p:
-                            if fill:
-                                rows[at, 0] = p
-                                rows[at, 1] = q
-                                rows[at, 2] = 0.0
-                                rows[at, 3] = depth
-                                rows[at, 4] = slope
-                                rows[at, 5] = d
-                                tooth[at] = j
-                            at += 1
-                if after == line:
-                    break
-                s = max(s, end)
-                line = after
-        sizes[i] = at - before
+    out[:] = 0.0
+    swing = math.hypot(along, across)
+    crest = math.atan2(along, across)
+    reach = math.acos(-offset / swing) if swing > abs(offset) else PI
+    k = math.floor((first - crest) / PI)
+    low = first
+    while low < last:
+        high = min(last, crest + (k + 1) * PI)
+        if high > low:
+            falling = k % 2 == 0
+            zero = crest + k * PI + reach if falling else crest + (k + 1) * PI - reach
+            u = np.cbrt(max(zero - high, 0.0) if falling else max(low - zero, 0.0))
+            v = np.cbrt(max(zero - low, 0.0) if falling else max(high - zero, 0.0))
+            for g in range(len(NODES)):
+                w = 0.5 * (u + v) + 0.5 * (v - u) * NODES[g]
+                weight = 1.5 * (v - u) * w * w * WEIGHTS[g]
+                phi = zero - w**3 if falling else zero + w**3
+                si = math.sin(phi)
+                co = math.cos(phi)
+                h = along * si + across * co + offset
+                for d in range(3):
+                    value = weight * thickness_power(h, c[6 + d])
+                    out[d, 0] += value
+                    out[d, 1] += value * si
+                    out[d, 2] += value * co
+        low = high
+        k += 1
+    out /= last - first
 
 
 @njit(cache=True, nogil=True)
-def load(theta, rows, tooth, lo, hi, teeth, lag, radius, c):
-    """Force on the cutter along T, n and the axis [N] and torque [N mm] at one rotation, in closed form."""
+def edge(mid, half, along, offset, across, sine, cosine, c):
+    """Mean load of a mm of edge over the immersion mid - half .. mid + half [N/mm]: along T, n and the axis, and the
+    tangential force. The radial force acts along nu, the axial one along cos(kappa) u + sin(kappa) A.
+    """
+    sinc1 = 1.0
+    sinc2 = 1.0
+    if half > FLAT:
+        sh = math.sin(half)
+        sinc1 = sh / half
+        sinc2 = sinc1 * math.cos(half)
+    sm = math.sin(mid)
+    cm = math.cos(mid)
+    si = sm * sinc1
+    co = cm * sinc1
+    if c[6] == 0.0 and c[7] == 0.0 and c[8] == 0.0:
+        sc = sm * cm * sinc2
+        ss = 0.5 * (1.0 - (1.0 - 2.0 * sm * sm) * sinc2)
+        cc = 1.0 - ss
+        kr = sine * c[1] + cosine * c[2]
+        ka = sine * c[2] - cosine * c[1]
+        at = c[0] * offset + c[3]
+        bt = c[0] * along
+        ct = c[0] * across
+        ar = kr * offset + sine * c[4] + cosine * c[5]
+        br = kr * along
+        cr = kr * across
+        t = at * co + bt * sc + ct * cc + ar * si + br * ss + cr * sc
+        n = at * si + bt * ss + ct * sc - ar * co - br * sc - cr * cc
+        a = ka * offset + sine * c[5] - cosine * c[4] + ka * (along * si + across * co)
+        return -t, n, -a, at + bt * si + ct * co
+    j = np.empty((3, 3))
+    if half > FLAT:
+        powers(mid - half, mid + half, along, offset, across, c, j)
+    else:
+        h = along * sm + across * cm + offset
+        for d in range(3):
+            j[d, 0] = thickness_power(h, c[6 + d])
+            j[d, 1] = j[d, 0] * sm
+            j[d, 2] = j[d, 0] * cm
+    for d in range(3):
+        j[d, 0] = c[d] * j[d, 0] + c[3 + d]
+        j[d, 1] = c[d] * j[d, 1] + c[3 + d] * si
+        j[d, 2] = c[d] * j[d, 2] + c[3 + d] * co
+    t = j[0, 2] + sine * j[1, 1] + cosine * j[2, 1]
+    n = j[0, 1] - sine * j[1, 2] - cosine * j[2, 2]
+    return -t, n, cosine * j[1, 0] - sine * j[2, 0], j[0, 0]
+
+
+@njit(cache=True, nogil=True)
+def load(theta, rows, tooth, piece, slices, lo, hi, teeth, c):
+    """Force on the cutter along T, n and the axis [N] and torque [N mm] at one rotation, in closed form where the law
+    is linear.
+    """
     ft = 0.0
     fn = 0.0
     fa = 0.0
@@ -100,55 +130,47 @@ def load(theta, rows, tooth, lo, hi, teeth, lag, radius, c):
     for r in range(lo, hi):
         p = rows[r, 0]
         q = rows[r, 1]
-        za = rows[r, 2]
-        zb = rows[r, 3]
+        sa = rows[r, 2]
+        sb = rows[r, 3]
+        k = piece[r]
+        rate = slices[k, 6]
+        base = slices[k, 5] - rate * slices[k, 0]
+        first = base + rate * sa
+        last = base + rate * sb
         one = tooth[r] >= 0
-        for k in range(1 if one else teeth):
-            j = tooth[r] if one else k
-            turn = (theta - TAU * j / teeth) % TAU
-            while turn - lag * zb <= q:
-                if turn - lag * za >= p:
-                    z1 = za
-                    z2 = zb
-                    if lag > 0.0:
-                        z1 = max(za, (turn - q) / lag)
-                        z2 = min(zb, (turn - p) / lag)
-                    elif turn >= q:
-                        z2 = z1
-                    dz = z2 - z1
-                    if dz > 0.0:
-                        mid = turn - 0.5 * lag * (z1 + z2)
-                        half = 0.5 * lag * dz
-                        sinc1 = 1.0
-                        sinc2 = 1.0
-                        if half > 1e-8:
-                            sh = math.sin(half)
-                            sinc1 = sh / half
-                            sinc2 = sinc1 * math.cos(half)
-                        sm = math.sin(mid)
-                        cm = math.cos(mid)
-                        si = sm * sinc1
-                        co = cm * sinc1
-                        sc = sm * cm * sinc2
-                        ss = 0.5 * (1.0 - (1.0 - 2.0 * sm * sm) * sinc2)
-                        at = c[0] * rows[r, 5] + c[3]
-                        bt = c[0] * rows[r, 4]
-                        ar = c[1] * rows[r, 5] + c[4]
-                        br = c[1] * rows[r, 4]
-                        ft -= dz * (at * co + bt * sc + ar * si + br * ss)
-                        fn += dz * (at * si + bt * ss - ar * co - br * sc)
-                        fa -= dz * (c[2] * rows[r, 5] + c[5] + c[2] * rows[r, 4] * si)
-                        mt += dz * radius * (at + bt * si)
+        for i in range(1 if one else teeth):
+            j = tooth[r] if one else i
+            turn = theta - TAU * j / teeth
+            turn -= TAU * math.floor(turn / TAU)
+            if turn - first < p:
+                turn += TAU * math.ceil((p + first - turn) / TAU)
+            while turn - last <= q:
+                s1 = sa
+                s2 = sb
+                if rate > 0.0:
+                    s1 = max(sa, (turn - base - q) / rate)
+                    s2 = min(sb, (turn - base - p) / rate)
+                elif turn - first >= q:
+                    s2 = s1
+                ds = s2 - s1
+                if ds > 0.0:
+                    mid = turn - base - 0.5 * rate * (s1 + s2)
+                    half = 0.5 * rate * ds
+                    t, n, a, m = edge(mid, half, rows[r, 4], rows[r, 5], rows[r, 6], slices[k, 3], slices[k, 4], c)
+                    ft += ds * t
+                    fn += ds * n
+                    fa += ds * a
+                    mt += ds * slices[k, 1] * m
                 turn += TAU
     return ft, fn, fa, mt
 
 
 @njit(cache=True, nogil=True)
-def turn_of(start, rows, tooth, theta, teeth, lag, radius, c, out):
+def turn_of(start, rows, tooth, piece, slices, theta, teeth, c, out):
     """Loads of every step at every rotation: out (n, m, 4)."""
     for i in range(len(start) - 1):
         for k in range(len(theta)):
-            ft, fn, fa, mt = load(theta[k], rows, tooth, start[i], start[i + 1], teeth, lag, radius, c)
+            ft, fn, fa, mt = load(theta[k], rows, tooth, piece, slices, start[i], start[i + 1], teeth, c)
             out[i, k, 0] = ft
             out[i, k, 1] = fn
             out[i, k, 2] = fa
@@ -156,31 +178,25 @@ def turn_of(start, rows, tooth, theta, teeth, lag, radius, c, out):
 
 
 @njit(cache=True, nogil=True)
-def means(start, rows, tooth, teeth, radius, c, out):
-    """Loads averaged over a revolution, in closed form (they do not depend on the helix): out (n, 4)."""
+def means(start, rows, tooth, piece, slices, teeth, c, out):
+    """Loads averaged over a revolution (they do not depend on the lag): out (n, 4)."""
     for i in range(len(start) - 1):
         for r in range(start[i], start[i + 1]):
-            p = rows[r, 0]
-            q = rows[r, 1]
-            dz = (rows[r, 3] - rows[r, 2]) * (1.0 if tooth[r] >= 0 else teeth) / TAU
-            co = math.sin(q) - math.sin(p)
-            si = math.cos(p) - math.cos(q)
-            sc = 0.5 * (math.sin(q) ** 2 - math.sin(p) ** 2)
-            ss = 0.5 * (q - p) - 0.25 * (math.sin(2.0 * q) - math.sin(2.0 * p))
-            at = c[0] * rows[r, 5] + c[3]
-            bt = c[0] * rows[r, 4]
-            ar = c[1] * rows[r, 5] + c[4]
-            br = c[1] * rows[r, 4]
-            out[i, 0] -= dz * (at * co + bt * sc + ar * si + br * ss)
-            out[i, 1] += dz * (at * si + bt * ss - ar * co - br * sc)
-            out[i, 2] -= dz * ((c[2] * rows[r, 5] + c[5]) * (q - p) + c[2] * rows[r, 4] * si)
-            out[i, 3] += dz * radius * (at * (q - p) + bt * si)
+            k = piece[r]
+            half = 0.5 * (rows[r, 1] - rows[r, 0])
+            mid = rows[r, 0] + half
+            part = (rows[r, 3] - rows[r, 2]) * (1.0 if tooth[r] >= 0 else teeth) * half / PI
+            t, n, a, m = edge(mid, half, rows[r, 4], rows[r, 5], rows[r, 6], slices[k, 3], slices[k, 4], c)
+            out[i, 0] += part * t
+            out[i, 1] += part * n
+            out[i, 2] += part * a
+            out[i, 3] += part * slices[k, 1] * m
 
 
 @njit(cache=True, nogil=True)
-def size(what, theta, rows, tooth, lo, hi, teeth, lag, radius, c):
+def size(what, theta, rows, tooth, piece, slices, lo, hi, teeth, c):
     """What is made greatest: 0 in-plane resultant squared, 1 torque, 2 size of the axial force."""
-    ft, fn, fa, mt = load(theta, rows, tooth, lo, hi, teeth, lag, radius, c)
+    ft, fn, fa, mt = load(theta, rows, tooth, piece, slices, lo, hi, teeth, c)
     if what == 0:
         return ft * ft + fn * fn
     if what == 1:
@@ -189,28 +205,30 @@ def size(what, theta, rows, tooth, lo, hi, teeth, lag, radius, c):
 
 
 @njit(cache=True, nogil=True)
-def breaks_of(rows, tooth, lo, hi, teeth, lag, period, out):
-    """Rotations in [0, period) where a bite begins or ends at either end of its height: fills out, returns count."""
+def breaks_of(rows, tooth, piece, slices, lo, hi, teeth, period, out):
+    """Rotations in [0, period) where a bite begins or ends at either end of its s: fills out, returns count."""
     count = 0
     for r in range(lo, hi):
         one = tooth[r] >= 0
-        for k in range(1 if one or period < TAU else teeth):
-            j = tooth[r] if one else k
+        k = piece[r]
+        for i in range(1 if one or period < TAU else teeth):
+            j = tooth[r] if one else i
             for e in range(4):
                 phi = rows[r, e // 2]
-                z = rows[r, 2 + e % 2]
-                out[count] = (phi + lag * z + TAU * j / teeth) % period
+                lag = slices[k, 5] + slices[k, 6] * (rows[r, 2 + e % 2] - slices[k, 0])
+                out[count] = (phi + lag + TAU * j / teeth) % period
                 count += 1
     return count
 
 
 @njit(cache=True, nogil=True)
-def greatest(start, rows, tooth, teeth, lag, radius, c, step, out):
+def greatest(start, rows, tooth, piece, slices, teeth, c, step, exact, out):
     """Loads where they are greatest over a revolution: out (n, 5) = T and n force and rotation at the greatest in-plane
     resultant, greatest torque, axial force of greatest size.
 
     Between the breaks the loads are smooth: each such piece is sampled at most ``step`` apart, both ends included (as
-    one-sided limits), and the best sample is refined by golden section between its neighbours.
+    one-sided limits), and the best sample is refined by golden section between its neighbours. Steps of more than
+    ``exact`` rows are sampled as if there were no breaks.
     """
     best = np.empty(3)
     where = np.empty(3)
@@ -225,9 +243,11 @@ def greatest(start, rows, tooth, teeth, lag, radius, c, step, out):
         for r in range(lo, hi):
             if tooth[r] >= 0:
                 period = TAU
-        room = np.empty(4 * (hi - lo) * teeth + 1)
-        count = breaks_of(rows, tooth, lo, hi, teeth, lag, period, room)
-        room[:count].sort()
+        count = 1
+        room = np.zeros(4 * (hi - lo) * teeth + 1 if hi - lo <= exact else 2)
+        if hi - lo <= exact:
+            count = breaks_of(rows, tooth, piece, slices, lo, hi, teeth, period, room)
+            room[:count].sort()
         room[count] = room[0] + period
         best[:] = -1.0
         for b in range(count):
@@ -240,7 +260,7 @@ def greatest(start, rows, tooth, teeth, lag, radius, c, step, out):
             h = (last - first) / parts
             for k in range(parts + 1):
                 theta = first + k * h
-                ft, fn, fa, mt = load(theta, rows, tooth, lo, hi, teeth, lag, radius, c)
+                ft, fn, fa, mt = load(theta, rows, tooth, piece, slices, lo, hi, teeth, c)
                 for what in range(3):
                     value = ft * ft + fn * fn if what == 0 else (mt if what == 1 else abs(fa))
                     if value > best[what]:
@@ -253,8 +273,8 @@ def greatest(start, rows, tooth, teeth, lag, radius, c, step, out):
             d = right[what]
             x = d - GOLDEN * (d - a)
             y = a + GOLDEN * (d - a)
-            vx = size(what, x, rows, tooth, lo, hi, teeth, lag, radius, c)
-            vy = size(what, y, rows, tooth, lo, hi, teeth, lag, radius, c)
+            vx = size(what, x, rows, tooth, piece, slices, lo, hi, teeth, c)
+            vy = size(what, y, rows, tooth, piece, slices, lo, hi, teeth, c)
             for _ in range(REFINEMENTS):
                 if vx > vy:
                     if vx > best[what]:
@@ -264,7 +284,7 @@ def greatest(start, rows, tooth, teeth, lag, radius, c, step, out):
                     y = x
                     vy = vx
                     x = d - GOLDEN * (d - a)
-                    vx = size(what, x, rows, tooth, lo, hi, teeth, lag, radius, c)
+                    vx = size(what, x, rows, tooth, piece, slices, lo, hi, teeth, c)
                 else:
                     if vy > best[what]:
                         best[what] = vy
@@ -273,141 +293,11 @@ def greatest(start, rows, tooth, teeth, lag, radius, c, step, out):
                     x = y
                     vx = vy
                     y = a + GOLDEN * (d - a)
-                    vy = size(what, y, rows, tooth, lo, hi, teeth, lag, radius, c)
-        ft, fn, fa, mt = load(where[0], rows, tooth, lo, hi, teeth, lag, radius, c)
+                    vy = size(what, y, rows, tooth, piece, slices, lo, hi, teeth, c)
+        ft, fn, fa, mt = load(where[0], rows, tooth, piece, slices, lo, hi, teeth, c)
         out[i, 0] = ft
         out[i, 1] = fn
         out[i, 2] = where[0] % TAU
         out[i, 3] = best[1]
-        ft, fn, fa, mt = load(where[2], rows, tooth, lo, hi, teeth, lag, radius, c)
+        ft, fn, fa, mt = load(where[2], rows, tooth, piece, slices, lo, hi, teeth, c)
         out[i, 4] = fa
-
-
-@njit(cache=True, nogil=True)
-def push(theta, z, rows, tooth, lo, hi, teeth, lag, c, length, fluted, flex_fluted, flex_shank, work):
-    """Displacement along n of the cutter at height z, away from the work, under the load at rotation theta [mm]: the
-    load of each height with the beam's compliance from there to z, five-point Gauss on smooth pieces.
-    """
-    total = 0.0
-    for r in range(lo, hi):
-        p = rows[r, 0]
-        q = rows[r, 1]
-        za = rows[r, 2]
-        zb = rows[r, 3]
-        one = tooth[r] >= 0
-        for k in range(1 if one else teeth):
-            j = tooth[r] if one else k
-            turn = (theta - TAU * j / teeth) % TAU
-            while turn - lag * zb <= q:
-                if turn - lag * za >= p:
-                    z1 = za
-                    z2 = zb
-                    if lag > 0.0:
-                        z1 = max(za, (turn - q) / lag)
-                        z2 = min(zb, (turn - p) / lag)
-                    elif turn >= q:
-                        z2 = z1
-                    at = c[0] * rows[r, 5] + c[3]
-                    bt = c[0] * rows[r, 4]
-                    ar = c[1] * rows[r, 5] + c[4]
-                    br = c[1] * rows[r, 4]
-                    for side in range(2):
-                        b1 = z1 if side == 0 else max(z1, z)
-                        b2 = min(z2, z) if side == 0 else z2
-                        if b2 <= b1:
-                            continue
-                        parts = math.ceil(lag * (b2 - b1) / PIECE)
-                        parts = max(parts, 1)
-                        h = (b2 - b1) / parts
-                        for part in range(parts):
-                            for g in range(5):
-                                zz = b1 + h * (part + 0.5 + 0.5 * NODES[g])
-                                phi = turn - lag * zz
-                                s = math.sin(phi)
-                                f = (at + bt * s) * s - (ar + br * s) * math.cos(phi)
-                                flex = stepped(zz, z, length, fluted, flex_fluted, flex_shank) + work
-                                total += 0.5 * h * WEIGHTS[g] * f * flex
-                turn += TAU
-    return total
-
-
-@njit(cache=True, nogil=True)
-def wall_at(z, gen, last, lag, teeth, radii, rows, tooth, lo, hi, c, beam, work):
-    """Error of the wall at height z [mm], positive where material is left. ``gen`` the immersion that makes the wall (0
-    or pi), ``last`` whether it is the teeth of greatest radius alone that make it.
-    """
-    sign = 1.0 if gen > 1.0 else -1.0
-    inside = gen - sign * BESIDE
-    top = np.max(radii)
-    least = math.inf
-    for j in range(teeth if last else 1):
-        if radii[j] < top - 1e-12:
-            continue
-        theta = inside + lag * z + TAU * j / teeth
-        e = sign * push(theta, z, rows, tooth, lo, hi, teeth, lag, c, beam[0], beam[1], beam[2], beam[3], work)
-        least = min(least, e - radii[j])
-    return least
-
-
-@njit(cache=True, nogil=True)
-def wall_profiles(start, rows, tooth, gen, lag, teeth, radii, c, z, beam, work, made, out):
-    """Wall error of every step at the heights z (p,): out (n, p); steps that make no wall stay 0."""
-    last = np.max(radii) > np.min(radii)
-    for i in range(len(start) - 1):
-        if made[i]:
-            for k in range(len(z)):
-                out[i, k] = wall_at(
-                    z[k], gen, last, lag, teeth, radii, rows, tooth, start[i], start[i + 1], c, beam, work
-                )
-
-
-@njit(cache=True, nogil=True)
-def wall_worst(start, rows, tooth, gen, lag, teeth, radii, c, heights, depth, beam, work, made, out):
-    """Wall error of greatest size of every step, and its height: out (n, 2). Sampled at ``heights`` equal heights and
-    at those where a bite begins or ends as the generating edge passes; then refined by golden section.
-    """
-    last = np.max(radii) > np.min(radii)
-    pitch = TAU / teeth
-    for i in range(len(start) - 1):
-        if not made[i]:
-            continue
-        lo = start[i]
-        hi = start[i + 1]
-        best = -1.0
-        for k in range(heights):
-            zk = depth * k / (heights - 1)
-            e = wall_at(zk, gen, last, lag, teeth, radii, rows, tooth, lo, hi, c, beam, work)
-            if abs(e) > best:
-                best = abs(e)
-                out[i, 0] = e
-                out[i, 1] = zk
-        room = np.empty(4 * (hi - lo) * teeth)
-        count = breaks_of(rows, tooth, lo, hi, teeth, lag, pitch, room) if lag > 0.0 else 0
-        for b in range(count):
-            zk = ((room[b] - gen) % pitch) / lag
-            while zk < depth:
-                e = wall_at(zk, gen, last, lag, teeth, radii, rows, tooth, lo, hi, c, beam, work)
-                if abs(e) > best:
-                    best = abs(e)
-                    out[i, 0] = e
-                    out[i, 1] = zk
-                zk += pitch / lag
-        a = max(0.0, out[i, 1] - depth / (heights - 1))
-        d = min(depth, out[i, 1] + depth / (heights - 1))
-        for _ in range(REFINEMENTS):
-            x = d - GOLDEN * (d - a)
-            y = a + GOLDEN * (d - a)
-            ex = wall_at(x, gen, last, lag, teeth, radii, rows, tooth, lo, hi, c, beam, work)
-            ey = wall_at(y, gen, last, lag, teeth, radii, rows, tooth, lo, hi, c, beam, work)
-            if abs(ex) > abs(ey):
-                d = y
-                if abs(ex) > best:
-                    best = abs(ex)
-                    out[i, 0] = ex
-                    out[i, 1] = x
-            else:
-                a = x
-                if abs(ey) > best:
-                    best = abs(ey)
-                    out[i, 0] = ey
-                    out[i, 1] = y

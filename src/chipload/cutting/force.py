@@ -1,22 +1,27 @@
 """Force, torque and power of what the teeth cut: the one force model of chipload.
 
-Notation: T unit feed direction, n = Rot(+90 deg) T, both in the work plane; the axis points from the tip to the
-holder. phi immersion, h chip thickness, z height and bites as in :mod:`chipload.cutting.bites`; theta rotation of
-tooth 0 at the tip, counted as phi; the edge at height z lags by z tan(helix) / R. Ft, Fr, Fa and their coefficients as
-in :mod:`chipload.cutting.material`.
+Notation: A the axis from the tip to the holder, T the direction that immersion is counted from less pi/2 (that of the
+feed where the feed is normal to A), n = Rot(+90 deg about A) T; phi immersion, h chip thickness, s length along the
+profile, rho, kappa, u, nu and bites as in :mod:`chipload.engagement.bites`; theta rotation of tooth 0 at the tip,
+counted as phi; the edge at s lags as :mod:`chipload.cutter.slices` says. Ft, Fr, Fa and their coefficients as in
+:mod:`chipload.cutting.material`.
 
 Every force is the force ON THE CUTTER; the one on the work is its opposite. With a clockwise spindle (M3, seen from
 above) the rim at phi lies in the direction u = cos(phi) n + sin(phi) T and moves along t = cos(phi) T - sin(phi) n. The
-tangential force opposes the motion of the tooth, the radial one pushes it towards the cutter's axis, and the axial one
-pulls a right-hand helix with right-hand cut out of the holder:
+tangential force opposes the motion of the tooth, the radial one pushes it into the cutter along nu = sin(kappa) u -
+cos(kappa) A, and the axial one, along the edge e = cos(kappa) u + sin(kappa) A, pulls a right-hand helix with
+right-hand cut out of the holder:
 
-    dF = (-dFt t - dFr u, -dFa along the axis),  dFt = (Ktc h + Kte) dz, likewise r and a.
+    dF = -dFt t - dFr nu - dFa e,  dFt = (Ktc h + Kte) ds, likewise r and a;  torque rho dFt.
 
-With a counter-clockwise spindle (M4, left-hand cutter) n is mirrored and the rest stands.
+On a straight flank nu = u and e = A; on a flat bottom the radial force is the thrust, along A. With a counter-clockwise
+spindle (M4, left-hand cutter) n is mirrored and the rest stands.
 
-Between the bounds of a bite h is a sinusoid, and the integral over z is a closed form: no slices. Torque is Ft R.
+Between the bounds of a bite h is a sinusoid, and the integral over s is a closed form: no slices of a straight flank.
+Where the material has a size effect, h^(1 - m) in place of h, it is a quadrature, right to 1e-7 or better.
 
-Reference: [Altintas2012] ch. 2, analytic forces of a helical end mill; sign of the axial force [Engin2001].
+Reference: [Altintas2012] ch. 2, analytic forces of a helical end mill; [Engin2001] for kappa and the sign of the axial
+force; [Kienzle1952] for the size effect.
 """
 
 from __future__ import annotations
@@ -30,8 +35,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting import _kernels
-from chipload.cutting.bites import Bites, bites_of_arcs
 from chipload.cutting.material import Material
+from chipload.engagement.bites import Bites, bites_of_arcs
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -40,10 +45,16 @@ Spindle = Literal["cw", "ccw"]
 #: distance of samples over the revolution [rad]; the greatest is refined between them
 SAMPLE_STEP = math.radians(1.0)
 
+#: most bites of a step whose ends are looked up one by one in the search of the greatest load
+EXACT_ROWS = 24
 
-def edge_lag(cutter: Cutter) -> float:
-    """tan(helix) / R [rad/mm]: how far the edge lags behind its tip for each mm of height."""
-    return math.tan(cutter.helix) / cutter.radius
+
+def _arrays(bites: Bites, cutter: Cutter) -> tuple[Any, ...]:
+    """Bites as the kernels take them, after a check that the cutter has their teeth."""
+    top = int(bites.tooth.max(initial=-1))
+    if top >= cutter.flutes:
+        raise InputError(f"bites: tooth {top}: must be below cutter.flutes = {cutter.flutes}")
+    return bites.start, bites.rows, bites.tooth, bites.slice, bites.slices
 
 
 def forces_over_turn(bites: Bites, cutter: Cutter, material: Material, theta: ArrayLike) -> tuple[Floats, Floats]:
@@ -52,12 +63,13 @@ def forces_over_turn(bites: Bites, cutter: Cutter, material: Material, theta: Ar
     Parameters
     ----------
     bites : of n steps
-    cutter, material : helix, teeth, radius; coefficients
+    cutter, material : number of teeth; coefficients
     theta : (m,) float [rad], rotation of tooth 0 at the tip
 
     Returns
     -------
-    force : (n, m, 3) float [N] along T, n (mirrored where the spindle is counter-clockwise) and the axis
+    force : (n, m, 3) float [N] along T, n (mirrored where the spindle is counter-clockwise) and the axis; for the frame
+        of the work see :func:`in_work`
     torque : (n, m) float [N mm]
 
     Examples
@@ -73,22 +85,12 @@ def forces_over_turn(bites: Bites, cutter: Cutter, material: Material, theta: Ar
     """
     angles = np.ascontiguousarray(theta, dtype=np.float64)
     out = np.zeros((len(bites), len(angles), 4))
-    _kernels.turn_of(
-        bites.start,
-        bites.rows,
-        bites.tooth,
-        angles,
-        cutter.flutes,
-        edge_lag(cutter),
-        cutter.radius,
-        np.array(material.coefficients),
-        out,
-    )
+    _kernels.turn_of(*_arrays(bites, cutter), angles, cutter.flutes, np.array(material.law), out)
     return out[..., :3], out[..., 3]
 
 
 def mean_forces(bites: Bites, cutter: Cutter, material: Material) -> tuple[Floats, Floats]:
-    """Force on the cutter and torque averaged over a revolution, in closed form; the helix does not enter.
+    """Force on the cutter and torque averaged over a revolution; the lag of the edge does not enter.
 
     Returns
     -------
@@ -98,18 +100,25 @@ def mean_forces(bites: Bites, cutter: Cutter, material: Material) -> tuple[Float
     Reference: [Altintas2012] ch. 2, average forces.
     """
     out = np.zeros((len(bites), 4))
-    coefficients = np.array(material.coefficients)
-    _kernels.means(bites.start, bites.rows, bites.tooth, cutter.flutes, cutter.radius, coefficients, out)
+    _kernels.means(*_arrays(bites, cutter), cutter.flutes, np.array(material.law), out)
     return out[:, :3], out[:, 3]
 
 
 def greatest_forces(
-    bites: Bites, cutter: Cutter, material: Material, sample_step: float = SAMPLE_STEP
+    bites: Bites,
+    cutter: Cutter,
+    material: Material,
+    sample_step: float = SAMPLE_STEP,
+    exact_rows: int | None = EXACT_ROWS,
 ) -> Mapping[str, Floats]:
     """Where the load is greatest over a revolution.
 
     The rotations where a bite begins or ends are found exactly; between them the load is smooth, is sampled at most
     ``sample_step`` apart and refined by golden section. Jumps (zero helix) count with their one-sided limits.
+
+    In a step of more than ``exact_rows`` bites (None: no such limit) the ends are not looked up, for their number
+    times the number of bites grows too fast: the revolution, or the pitch where all teeth are alike, is sampled
+    ``sample_step`` apart and the best sample refined between its neighbours. A peak narrower than that may be missed.
 
     Returns
     -------
@@ -119,19 +128,36 @@ def greatest_forces(
     if not 0.0 < sample_step <= math.radians(15.0):
         raise InputError(f"sample_step = {math.degrees(sample_step):g} deg: must be above 0 and at most 15")
     out = np.zeros((len(bites), 5))
-    _kernels.greatest(
-        bites.start,
-        bites.rows,
-        bites.tooth,
-        cutter.flutes,
-        edge_lag(cutter),
-        cutter.radius,
-        np.array(material.coefficients),
-        sample_step,
-        out,
-    )
+    exact = len(bites.rows) if exact_rows is None else exact_rows
+    _kernels.greatest(*_arrays(bites, cutter), cutter.flutes, np.array(material.law), sample_step, exact, out)
     names = ("force_t", "force_n", "theta", "torque", "force_axis")
     return dict(zip(names, out.T, strict=True))
+
+
+def in_work(force: ArrayLike, frame: ArrayLike) -> Floats:
+    """Forces along T, n and the axis in the frame of the work: F_T T + F_n n + F_A A.
+
+    Parameters
+    ----------
+    force : (n, 3) or (n, m, 3) float [N]
+    frame : (n, 3, 3) float, rows T, n (mirrored where the spindle is counter-clockwise) and A; ``Bites.frame``
+
+    Returns
+    -------
+    float [N], the shape of ``force``.
+
+    Examples
+    --------
+    The feed along y, the axis along z: n is -x.
+
+    >>> in_work([[1.0, 2.0, 3.0]], [[[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]]).tolist()
+    [[-2.0, 1.0, 3.0]]
+    """
+    f, frames = np.asarray(force, dtype=np.float64), np.asarray(frame, dtype=np.float64)
+    if f.ndim not in (2, 3) or f.shape[-1] != 3 or frames.shape != (len(f), 3, 3):
+        raise InputError(f"in_work: force {f.shape}, frame {frames.shape}: need (n, 3) or (n, m, 3), and (n, 3, 3)")
+    out: Floats = (f if f.ndim == 3 else f[:, None, :]) @ frames
+    return out.reshape(f.shape)
 
 
 def forces_along(
@@ -176,7 +202,7 @@ def forces_along(
     Raises
     ------
     InputError
-        As :func:`chipload.cutting.bites.bites_of_arcs`; T is not (n, 2) of unit vectors; a speed below 0.
+        As :func:`chipload.engagement.bites.bites_of_arcs`; T is not (n, 2) of unit vectors; a speed below 0.
 
     Examples
     --------
@@ -200,7 +226,7 @@ def forces_along(
         raise InputError("spindle_speed: must be finite and at least 0 rad/s")
     side = 1.0 if spindle == "cw" else -1.0
     left = side * np.column_stack([-heading[:, 1], heading[:, 0]])
-    peak = greatest_forces(bites, cutter, material, sample_step)
+    peak = greatest_forces(bites, cutter, material, sample_step, exact_rows=None)
     mean, torque_mean = mean_forces(bites, cutter, material)
     plane = peak["force_t"][:, None] * heading + peak["force_n"][:, None] * left
     mean_plane = mean[:, :1] * heading + mean[:, 1:2] * left

@@ -1,7 +1,10 @@
-"""What a material asks of the edge: cutting and edge coefficients, and where they were measured.
+"""What a material asks of the edge: cutting and edge coefficients, where they were measured and how sure they are.
 
 Notation: per mm of depth a tooth meets Ft = Ktc h + Kte (tangential), Fr = Krc h + Kre (radial), Fa = Kac h + Kae
-(axial), h [mm] the chip thickness; Kc [MPa], Ke [N/mm]. Reference: [Altintas2012] ch. 2, [Zhang2021] table 5.
+(axial), h [mm] the chip thickness; Kc [MPa], Ke [N/mm]. With a size effect of exponent m, which each direction has its
+own of, Kc h becomes Kc (h / 1 mm)^(-m) h, Kc that at a thickness of 1 mm: thin chips ask for more.
+
+Reference: [Altintas2012] ch. 2; [Kienzle1952] for the exponent; [Zhang2021] table 5 for the shipped numbers.
 """
 
 from __future__ import annotations
@@ -11,8 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from chipload.errors import InputError
 from chipload.tables import nearest, read_table, shipped_names, shipped_table
+from chipload.units import mm_min_from_mm_s, mm_s_from_mm_min
 
 #: key in the file -> field, lowest and highest value that is believed
 _NUMBERS = {
@@ -23,8 +30,13 @@ _NUMBERS = {
     "kre_n_mm": ("Kre", -1e3, 1e3),
     "kae_n_mm": ("Kae", -1e3, 1e3),
 }
-_TEXTS = ("name", "source", "conditions", "workpiece")
-_KEYS = (*_TEXTS, *_NUMBERS, "chip_min_mm", "chip_max_mm", "spread")
+_TEXTS = ("name", "source", "conditions", "workpiece", "cutter")
+_EXPONENTS = ("exponent_t", "exponent_r", "exponent_a")
+_RANGES = {"chip": ("chip_min_mm", "chip_max_mm"), "speed": ("speed_min_m_min", "speed_max_m_min")}
+_KEYS = (*_TEXTS, *_NUMBERS, *_EXPONENTS, *_RANGES["chip"], *_RANGES["speed"], "spread", "covariance")
+
+#: the six coefficients in their order, as the rows and columns of their covariance
+Covariance = tuple[tuple[float, float, float, float, float, float], ...]
 
 
 @dataclass(frozen=True)
@@ -34,13 +46,19 @@ class Material:
     Parameters
     ----------
     name : as the job calls it
-    Ktc, Krc, Kac : cutting coefficients [MPa], tangential, radial, axial; 10 <= Ktc <= 20000
+    Ktc, Krc, Kac : cutting coefficients [MPa], tangential, radial, axial; 10 <= Ktc <= 20000; with an exponent, those
+        at a chip thickness of 1 mm
     Kte, Kre, Kae : edge coefficients [N/mm]
     source : where the numbers were published or measured; never empty
-    conditions : cutter and lubrication they were measured with
+    conditions : cutter and lubrication they were measured with, or only the latter where ``cutter`` says the former
     workpiece : alloy and temper
     chip : (smallest, greatest) chip thickness they hold for [mm]; None: the source does not say
-    spread : relative standard deviation of the coefficients; None: the source does not say
+    spread : relative standard deviation of the coefficients, each by itself; None: the source does not say
+    exponents : (m_t, m_r, m_a) of the size effect, from 0 to below 1; 0: none, the linear law
+    cutter : what they were measured with: form, diameter, teeth, helix, rake, substrate
+    speed : (lowest, highest) cutting speed they hold for [mm/s]; None: the source does not say
+    covariance : (6, 6), of (Ktc, Krc, Kac, Kte, Kre, Kae) in products of MPa and N/mm, from a fit; instead of
+        ``spread``; None: not known
 
     Raises
     ------
@@ -60,6 +78,10 @@ class Material:
     workpiece: str = ""
     chip: tuple[float, float] | None = None
     spread: float | None = None
+    exponents: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    cutter: str = ""
+    speed: tuple[float, float] | None = None
+    covariance: Covariance | None = None
 
     def __post_init__(self) -> None:
         for key, (name, low, high) in _NUMBERS.items():
@@ -79,10 +101,59 @@ class Material:
             )
         if self.spread is not None and not 0.0 <= self.spread < 1.0:
             raise InputError(f"material.spread = {self.spread:g}: must be from 0 to below 1 (0.1 is 10 %)")
+        for key, value in zip(_EXPONENTS, self.exponents, strict=True):
+            if not 0.0 <= value < 1.0:
+                raise InputError(f"material.{key} = {value:g}: must be from 0 (no size effect) to below 1")
+        if self.speed is not None and not 0.0 <= self.speed[0] < self.speed[1] < math.inf:
+            low, high = (mm_min_from_mm_s(v) / 1000.0 for v in self.speed)
+            raise InputError(
+                f"material.speed_max_m_min = {high:g}: must be above speed_min_m_min = {low:g}, which must be at "
+                "least 0"
+            )
+        if self.covariance is not None:
+            self._check_covariance()
+
+    def _check_covariance(self) -> None:
+        """Refuse what is no covariance; keep it as a tuple of rows."""
+        if self.spread is not None:
+            raise InputError("material.spread and material.covariance: give one of them, they say the same thing")
+        c = np.asarray(self.covariance, dtype=np.float64)
+        if c.shape != (6, 6) or not np.isfinite(c).all():
+            raise InputError(f"material.covariance of shape {c.shape}: must be 6 rows of 6 finite numbers")
+        scale = np.sqrt(np.abs(np.diagonal(c)))
+        scale[scale == 0.0] = 1.0
+        unit = c / np.outer(scale, scale)
+        if not np.allclose(unit, unit.T, rtol=0.0, atol=1e-6) or np.linalg.eigvalsh(unit).min() < -1e-6:
+            raise InputError("material.covariance: must be symmetric and without negative variances")
+        object.__setattr__(self, "covariance", tuple(map(tuple, c.tolist())))
+
+    @property
+    def variances(self) -> NDArray[np.float64]:
+        """Covariance of the six coefficients, (6, 6) float: the fitted one, or from the spread as if each coefficient
+        erred by itself.
+
+        Raises
+        ------
+        InputError
+            Neither is known.
+        """
+        if self.covariance is not None:
+            return np.array(self.covariance)
+        if self.spread is None:
+            raise InputError(
+                f"material {self.name}: neither spread nor covariance is known, so how sure its coefficients are "
+                "cannot be said: give spread, or fit them"
+            )
+        return np.diag((self.spread * np.array(self.coefficients)) ** 2)
+
+    @property
+    def law(self) -> tuple[float, ...]:
+        """Coefficients and exponents, (Ktc, Krc, Kac, Kte, Kre, Kae, m_t, m_r, m_a), as the kernels take them."""
+        return (*self.coefficients, *self.exponents)
 
     @property
     def coefficients(self) -> tuple[float, float, float, float, float, float]:
-        """(Ktc, Krc, Kac, Kte, Kre, Kae) in MPa and N/mm, the order in which the kernels take them."""
+        """(Ktc, Krc, Kac, Kte, Kre, Kae) in MPa and N/mm."""
         return (self.Ktc, self.Krc, self.Kac, self.Kte, self.Kre, self.Kae)
 
 
@@ -91,6 +162,23 @@ def _number(label: str, key: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise InputError(f"{label}: {key} = {value!r}: must be a number")
     return float(value)
+
+
+def _range(label: str, table: dict[str, Any], low: str, high: str) -> tuple[float, float] | None:
+    """Two numbers that are given together or not at all."""
+    if low not in table and high not in table:
+        return None
+    for key in (low, high):
+        if key not in table:
+            raise InputError(f"{label}: {key} is missing: give both {low} and {high} or neither")
+    return _number(label, low, table[low]), _number(label, high, table[high])
+
+
+def _matrix(label: str, value: Any) -> list[list[float]]:
+    """Rows of numbers; their count is checked by the material."""
+    if not isinstance(value, list) or not all(isinstance(row, list) and len(row) == len(value) for row in value):
+        raise InputError(f"{label}: covariance: must be 6 rows of 6 numbers")
+    return [[_number(label, "covariance", x) for x in row] for row in value]
 
 
 def _from_table(label: str, table: dict[str, Any]) -> Material:
@@ -106,19 +194,15 @@ def _from_table(label: str, table: dict[str, Any]) -> Material:
         if not isinstance(table.get(key, ""), str):
             raise InputError(f"{label}: {key} = {table[key]!r}: must be a text")
     numbers: dict[str, Any] = {name: _number(label, key, table[key]) for key, (name, _, _) in _NUMBERS.items()}
-    chip = None
-    if "chip_min_mm" in table or "chip_max_mm" in table:
-        for key in ("chip_min_mm", "chip_max_mm"):
-            if key not in table:
-                raise InputError(f"{label}: {key} is missing: give both chip_min_mm and chip_max_mm or neither")
-        chip = (
-            _number(label, "chip_min_mm", table["chip_min_mm"]),
-            _number(label, "chip_max_mm", table["chip_max_mm"]),
-        )
+    ranges: dict[str, Any] = {name: _range(label, table, *keys) for name, keys in _RANGES.items()}
+    if (speed := ranges["speed"]) is not None:
+        ranges["speed"] = (mm_s_from_mm_min(1000.0 * speed[0]), mm_s_from_mm_min(1000.0 * speed[1]))
     spread = _number(label, "spread", table["spread"]) if "spread" in table else None
+    exponents: Any = tuple(_number(label, key, table.get(key, 0.0)) for key in _EXPONENTS)
+    covariance: Any = _matrix(label, table["covariance"]) if "covariance" in table else None
     texts: dict[str, Any] = {key: table.get(key, "") for key in _TEXTS}
     try:
-        return Material(**numbers, **texts, chip=chip, spread=spread)
+        return Material(**numbers, **texts, **ranges, spread=spread, exponents=exponents, covariance=covariance)
     except InputError as err:
         raise InputError(f"{label}: {err}") from None
 
@@ -127,7 +211,9 @@ def read_material(path: str | Path) -> Material:
     """Read a material from a TOML file.
 
     Keys: ``name``, ``ktc_mpa``, ``krc_mpa``, ``kac_mpa``, ``kte_n_mm``, ``kre_n_mm``, ``kae_n_mm`` (N per mm of
-    depth), ``source``; optional ``workpiece``, ``conditions``, ``chip_min_mm`` with ``chip_max_mm``, ``spread``.
+    depth), ``source``; optional ``workpiece``, ``conditions``, ``cutter``, ``chip_min_mm`` with ``chip_max_mm``,
+    ``speed_min_m_min`` with ``speed_max_m_min``, ``exponent_t``, ``exponent_r``, ``exponent_a``, and ``spread`` or
+    ``covariance`` (6 rows of 6).
 
     Raises
     ------
@@ -135,6 +221,31 @@ def read_material(path: str | Path) -> Material:
         The file cannot be read, a key is unknown or missing, a number out of range, the source missing.
     """
     return _from_table(*read_table("material", path))
+
+
+def beyond(material: Material, chip_mm: float, speed_mm_s: float) -> tuple[str, ...]:
+    """What a cut asks of the coefficients outside the range they were measured in, as texts; none: nothing, or unknown.
+
+    Parameters
+    ----------
+    material : with its ranges
+    chip_mm : thickest chip [mm]; one below the range is no news, every chip ends thin
+    speed_mm_s : cutting speed at the rim [mm/s]
+
+    Examples
+    --------
+    >>> steel = Material("steel", 1800.0, 600.0, 200.0, 30.0, 40.0, 2.0, source="made up", chip=(0.01, 0.1))
+    >>> beyond(steel, 0.15, 2000.0)
+    ('material steel: a chip of 0.15 mm: its coefficients were measured from 0.01 to 0.1 mm',)
+    """
+    out = []
+    if material.chip is not None and chip_mm > material.chip[1]:
+        low, high = material.chip
+        out.append(f"a chip of {chip_mm:g} mm: its coefficients were measured from {low:g} to {high:g} mm")
+    if material.speed is not None and not material.speed[0] <= speed_mm_s <= material.speed[1]:
+        low, high, speed = (mm_min_from_mm_s(v) / 1000.0 for v in (*material.speed, speed_mm_s))
+        out.append(f"a speed of {speed:g} m/min: its coefficients were measured from {low:g} to {high:g} m/min")
+    return tuple(f"material {material.name}: {text}" for text in out)
 
 
 def material_names() -> tuple[str, ...]:

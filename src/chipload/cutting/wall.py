@@ -1,6 +1,6 @@
 """What the bending cutter leaves on the wall, or takes too much of.
 
-Notation: phi immersion, theta rotation, bites as in :mod:`chipload.cutting.bites`; z [mm] height above the tip;
+Notation: phi immersion, theta rotation, bites as in :mod:`chipload.engagement.bites`; z [mm] height above the tip;
 C(z', z) [mm/N] the beam's compliance; e(z) [mm] error of the wall, positive where material is left on it (the cutter
 was pushed away), negative where it is cut away.
 
@@ -14,7 +14,7 @@ own height; c_w a compliance of the work normal to the wall. With zero helix and
 made, so that the edge force alone shows. With runout the wall is made by the tooth of greatest radius, which takes its
 excess r_j - R away: e(z) lessened by it.
 
-The load is that of the rigid model: bending does not thin the chip.
+The load is that of the rigid model: bending does not thin the chip. A straight flank only: another bite is refused.
 
 Reference: [Uddin2007]; [Altintas2012] ch. 2.
 """
@@ -28,10 +28,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting import _kernels
-from chipload.cutting.bites import Bites, bites_of_arcs, tooth_radii
-from chipload.cutting.force import Spindle, edge_lag
+from chipload.cutter.slices import edge_lag
+from chipload.cutting.bending import _kernels
+from chipload.cutting.force import Spindle
 from chipload.cutting.material import Material
+from chipload.engagement.bites import Bites, bites_of_arcs, tooth_radii
 from chipload.errors import InputError
 from chipload.structure.beam import FLUTED_FACTOR, flexibilities
 
@@ -55,6 +56,20 @@ def _makes_wall(bites: Bites, phi_wall: float, reach: float) -> NDArray[np.bool_
     near = np.abs(bites.rows[:, 0 if phi_wall == 0.0 else 1] - phi_wall) <= reach
     np.logical_or.at(made, np.repeat(np.arange(len(bites)), np.diff(bites.start)), near)
     return made
+
+
+def _straight(bites: Bites, cutter: Cutter) -> Floats:
+    """Rows with heights in place of lengths along the profile, (b, 7); other bites than a straight flank's refused."""
+    own = bites.slices[bites.slice]
+    bad = np.flatnonzero(~((np.abs(own[:, 3] - 1.0) <= 1e-12) & (np.abs(own[:, 1] - cutter.radius) <= 1e-9)))
+    if len(bad):
+        raise InputError(
+            f"bites: row {bad[0]}: rho = {own[bad[0], 1]:g} mm, sin(kappa) = {own[bad[0], 3]:g}: the wall's error is "
+            f"known for a straight flank only, rho = {cutter.radius:g} mm and sin(kappa) = 1"
+        )
+    rows = bites.rows.copy()
+    rows[:, 2:4] += (own[:, 2] - own[:, 0])[:, None]
+    return rows
 
 
 def _beam(cutter: Cutter, fluted_factor: float) -> Floats:
@@ -102,13 +117,13 @@ def wall_profile(
     out = np.zeros((len(bites), len(heights)))
     _kernels.wall_profiles(
         bites.start,
-        bites.rows,
+        _straight(bites, cutter),
         bites.tooth,
         phi_wall,
         edge_lag(cutter),
         cutter.flutes,
         tooth_radii(cutter),
-        np.array(material.coefficients),
+        np.array(material.law),
         heights,
         _beam(cutter, fluted_factor),
         work_compliance,
@@ -174,11 +189,13 @@ def wall_error_along(
         bites.start,
         bites.rows,
         bites.tooth,
+        bites.slice,
+        bites.slices,
         phi_wall,
         edge_lag(cutter),
         cutter.flutes,
         tooth_radii(cutter),
-        np.array(material.coefficients),
+        np.array(material.law),
         heights,
         axial_depth,
         _beam(cutter, fluted_factor),

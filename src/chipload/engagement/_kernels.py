@@ -1,7 +1,8 @@
-"""Compiled loops of the engagement of a cutter circle with line-and-arc stock; arrays and scalars only.
+"""Compiled loops of the engagement of a cutter circle with line-and-arc stock, and of runout; arrays and scalars only.
 
 Notation: segments as in :mod:`chipload.geometry.contour`, with the MATERIAL ON THE LEFT of every segment. The rim is
-the circle about (ox, oy) of radius r; rim angles are counter-clockwise from +x [rad].
+the circle about (ox, oy) of radius r; rim angles are counter-clockwise from +x [rad]. Bites
+as in :mod:`chipload.engagement.bites`.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import math
 import numpy as np
 from numba import njit
 
+PI = math.pi
 TAU = 2.0 * math.pi
 MAX_CROSSINGS = 256
 
@@ -264,3 +266,75 @@ def engage(centres, headings, r, seg, box, first, last, angle, count, phi):
                 phi[q, k, 0] = phi_in[k]
                 phi[q, k, 1] = phi_out[k]
         angle[q] = total
+
+
+@njit(cache=True, nogil=True)
+def runout_bites(whole, every, sine, radii, sizes, rows, tooth, fill):
+    """Bites of each tooth for teeth of unlike radii. With g the thickness of a bite of every tooth: the lower envelope
+    of N lines in g, where positive, and then the immersions at which g lies between its corners.
+
+    ``whole`` (b, 7) and ``every`` (b,) the bites and their teeth, ``sine`` (b,) sin(kappa), ``radii`` (N,) [mm]. First
+    call (fill False) counts into ``sizes``, the second fills ``rows`` and ``tooth``.
+    """
+    teeth = len(radii)
+    at = 0
+    for i in range(len(whole)):
+        before = at
+        if every[i] >= 0:
+            if fill:
+                rows[at] = whole[i]
+                tooth[at] = every[i]
+            at += 1
+            sizes[i] = 1
+            continue
+        offset = whole[i, 5]
+        swing = math.hypot(whole[i, 4], whole[i, 6])
+        crest = math.atan2(whole[i, 4], whole[i, 6])
+        top = offset + swing
+        for j in range(teeth):
+            line = teeth
+            low = 0.0
+            for m in range(teeth, 0, -1):
+                d = (radii[j] - radii[(j - m) % teeth]) * sine[i] if m < teeth else 0.0
+                if d <= low:
+                    low = d
+                    line = m
+            g = 0.0
+            while g < top:
+                d = (radii[j] - radii[(j - line) % teeth]) * sine[i] if line < teeth else 0.0
+                end = top
+                after = line
+                for m in range(1, line):
+                    cross = ((radii[j] - radii[(j - m) % teeth]) * sine[i] - d) / (line - m)
+                    if cross < end:
+                        end = cross
+                        after = m
+                first = max(g, -d / line)
+                if end > first:
+                    outer = PI if first <= offset - swing else math.acos((first - offset) / swing)
+                    inner = 0.0
+                    if end < top:
+                        inner = PI if end <= offset - swing else math.acos((end - offset) / swing)
+                    for turn in range(-1, 3):
+                        for part in range(1 if inner == 0.0 else 2):
+                            p = crest - outer if part == 0 else crest + inner
+                            q = crest - inner if part == 0 and inner > 0.0 else crest + outer
+                            p = max(p + TAU * turn, whole[i, 0])
+                            q = min(q + TAU * turn, whole[i, 1])
+                            if q > p:
+                                if fill:
+                                    back = TAU if p > TAU else 0.0
+                                    rows[at, 0] = p - back
+                                    rows[at, 1] = q - back
+                                    rows[at, 2] = whole[i, 2]
+                                    rows[at, 3] = whole[i, 3]
+                                    rows[at, 4] = line * whole[i, 4]
+                                    rows[at, 5] = line * offset + d
+                                    rows[at, 6] = line * whole[i, 6]
+                                    tooth[at] = j
+                                at += 1
+                if after == line:
+                    break
+                g = max(g, end)
+                line = after
+        sizes[i] = at - before

@@ -1,4 +1,4 @@
-"""A planar horizontal face of a STEP part becomes contours of lines and arcs in mm.
+"""A planar horizontal face of a STEP part becomes contours of lines and arcs in mm; the whole part triangles.
 
 Notation: z [mm] the height of a face whose normal is along Z. Lines and circles stay what they are, other edges become
 biarcs. The CAD kernel converts the file's unit to mm; it is imported when a file is read.
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chipload.errors import Finding, InputError
 from chipload.geometry.biarc import arcs_along
@@ -43,13 +44,9 @@ def read_step_face(
         The file is missing or no STEP file, or has no horizontal planar face (at ``z_mm``); the heights are named.
     """
     file = Path(path)
-    if not file.is_file():
-        raise InputError(f"part.file = {file}: no such file")
+    _check(file, "part.file")
     if z_mm is not None and not np.isfinite(z_mm):
         raise InputError(f"part.z_mm = {z_mm:g}: must be a finite number")
-    with file.open("rb") as stream:
-        if b"ISO-10303-21" not in stream.read(4096):
-            raise InputError(f"part.file = {file.name}: not a STEP file")
     faces = list(_level_faces(_shape(file)))
     if not faces:
         raise InputError(f"part.file = {file.name}: no horizontal planar face in the part: turn it, or state a DXF")
@@ -71,7 +68,67 @@ def read_step_face(
     return Drawing(tuple(contours), (f"z={level:g}",) * len(contours), "mm", tuple(findings))
 
 
-def _shape(file: Path) -> Any:
+def step_triangles(
+    path: str | Path, chord_mm: float, angle: float = 0.5, key: str = "part.file"
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Triangles of a STEP part, face by face, seen counter-clockwise from outside.
+
+    Parameters
+    ----------
+    chord_mm : how far [mm] a triangle may leave its surface
+    angle : most turn [rad] of the surface from one vertex to the next
+    key : what the file is called in a message
+
+    Returns
+    -------
+    (n, 3) vertices [mm] and (m, 3) their numbers; vertices on an edge of the part come once with each of its faces.
+
+    Raises
+    ------
+    InputError
+        The file is missing or no STEP file, or has no faces.
+    """
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.TopoDS import TopoDS
+
+    file = Path(path)
+    _check(file, key)
+    shape = _shape(file, key)
+    BRepMesh_IncrementalMesh(shape, chord_mm, False, angle, False)
+    points: list[Floats] = []
+    corners: list[NDArray[np.int64]] = []
+    count = 0
+    explorer = TopExp_Explorer(shape, TopAbs_FACE)
+    while explorer.More():
+        face, place = TopoDS.Face(explorer.Current()), TopLoc_Location()
+        explorer.Next()
+        made = BRep_Tool.Triangulation_s(face, place)
+        if made is None:
+            continue
+        move = place.Transformation()
+        nodes = [made.Node(i).Transformed(move) for i in range(1, made.NbNodes() + 1)]
+        numbers = np.array([made.Triangle(i).Get() for i in range(1, made.NbTriangles() + 1)], dtype=np.int64)
+        points.append(np.array([(p.X(), p.Y(), p.Z()) for p in nodes]))
+        corners.append(count - 1 + (numbers[:, ::-1] if face.Orientation() == TopAbs_REVERSED else numbers))
+        count += len(nodes)
+    if not points:
+        raise InputError(f"{key} = {file.name}: no faces in this STEP file")
+    return np.vstack(points), np.vstack(corners)
+
+
+def _check(file: Path, key: str) -> None:
+    if not file.is_file():
+        raise InputError(f"{key} = {file}: no such file")
+    with file.open("rb") as stream:
+        if b"ISO-10303-21" not in stream.read(4096):
+            raise InputError(f"{key} = {file.name}: not a STEP file")
+
+
+def _shape(file: Path, key: str = "part.file") -> Any:
     """The part as one shape, in mm."""
     import OCP.IFSelect
     from OCP.Message import Message, Message_Fail
@@ -81,7 +138,7 @@ def _shape(file: Path) -> Any:
         printer.SetTraceLevel(Message_Fail)
     reader = STEPControl_Reader()
     if reader.ReadFile(str(file)) != OCP.IFSelect.IFSelect_RetDone or reader.TransferRoots() == 0:
-        raise InputError(f"part.file = {file.name}: the CAD kernel cannot read this STEP file")
+        raise InputError(f"{key} = {file.name}: the CAD kernel cannot read this STEP file")
     return reader.OneShape()
 
 

@@ -1,0 +1,144 @@
+"""The cutting edge in slices along the cutter's profile: where it is, which way it faces, how it lags.
+
+Notation: s [mm] length along the profile, 0 where the bottom line ends, below 0 on the bottom line, rising through the
+corner and the flank to the end of the flutes; rho [mm] distance from the axis, z [mm] height above the tip; R half the
+diameter; kappa [rad] angle of the outward normal nu with the downward axis: nu = sin(kappa) u - cos(kappa) A, u the
+radial direction, A the axis from the tip to the holder. A flat bottom has kappa = 0, a bottom line alpha, a straight
+flank pi/2, a tapered one pi/2 - beta; along the corner kappa rises evenly from alpha to pi/2 - beta and s - s' =
+r (kappa - kappa').
+
+The edge has a constant lead: at height z it lags behind the tip by z tan(helix) / R, also where it is nearer to the
+axis, so that along s the lag grows by sin(kappa) tan(helix) / R. On a flat bottom it does not lag.
+
+A slice takes rho and kappa at its middle: exact on lines, of second order in the slice's length on the corner.
+
+Reference: [Engin2001], generalised cutter and constant lead.
+Differs from source: there a slice is a step of z; here of s, so that a flat bottom has slices too.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Slices:
+    """Pieces of a cutter's profile that follow one another, (k,) float each.
+
+    Parameters
+    ----------
+    s_from, s_to : bounds [mm]
+    rho : radius at the middle [mm]
+    z : height at ``s_from`` [mm]
+    sin_kappa, cos_kappa : at the middle
+    lag : at ``s_from`` [rad]
+    rate : of the lag [rad/mm]
+    """
+
+    s_from: Floats
+    s_to: Floats
+    rho: Floats
+    z: Floats
+    sin_kappa: Floats
+    cos_kappa: Floats
+    lag: Floats
+    rate: Floats
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = np.array(getattr(self, field.name), dtype=np.float64)
+            if value.shape != (len(self),) or not np.isfinite(value).all():
+                raise InputError(f"slices.{field.name} of shape {value.shape}: need ({len(self)},) finite numbers")
+            value.setflags(write=False)
+            object.__setattr__(self, field.name, value)
+
+    def __len__(self) -> int:
+        return len(self.s_from)
+
+    @property
+    def columns(self) -> Floats:
+        """(k, 7) float: s_from, rho, z, sin(kappa), cos(kappa), lag, rate; what a bite and the force need."""
+        return np.column_stack([self.s_from, self.rho, self.z, self.sin_kappa, self.cos_kappa, self.lag, self.rate])
+
+
+def edge_lag(cutter: Cutter) -> float:
+    """tan(helix) / R [rad/mm]: how far the edge lags behind its tip for each mm of height."""
+    return math.tan(cutter.helix) / cutter.radius
+
+
+def slices(cutter: Cutter, *, bottom_pieces: int = 4, corner_pieces: int = 16, flank_mm: float | None = None) -> Slices:
+    """The profile from the axis to the end of the flutes in slices.
+
+    Parameters
+    ----------
+    cutter : any
+    bottom_pieces : slices of the bottom line, where there is one; one at least
+    corner_pieces : slices of the corner of even kappa, where there is one; one at least
+    flank_mm : greatest length of a slice of the flank [mm], above 0; None: the flank is one slice (with a taper its rho
+        is then that of its middle)
+
+    Returns
+    -------
+    Slices
+        From the axis upwards; a part of the profile that has no length has none.
+
+    Examples
+    --------
+    >>> bull = slices(Cutter(10.0, 4, 0.0, 20.0, 30.0, 6e5, corner_radius=1.0), bottom_pieces=1, corner_pieces=1)
+    >>> bull.s_from.round(3).tolist(), bull.s_to.round(3).tolist(), bull.rho.round(3).tolist()
+    ([-4.0, 0.0, 1.571], [0.0, 1.571, 20.571], [2.0, 4.707, 5.0])
+    >>> bull.sin_kappa.round(3).tolist(), bull.z.round(3).tolist()
+    ([0.0, 0.707, 1.0], [0.0, 0.0, 1.0])
+    """
+    for name, number in (("bottom_pieces", bottom_pieces), ("corner_pieces", corner_pieces)):
+        if number < 1:
+            raise InputError(f"slices: {name} = {number}: must be at least 1")
+    if flank_mm is not None and not flank_mm > 0.0:
+        raise InputError(f"slices: flank_mm = {flank_mm:g}: must be above 0, or None for one slice")
+    _, r, e, f, alpha, beta, height = cutter.apt
+    tiny = 1e-9 * cutter.diameter
+    low, high = f - r * math.cos(alpha), f - r * math.sin(beta)
+    end = e + r * math.sin(alpha)
+    parts: list[tuple[Floats, Floats, Floats, Floats, Floats]] = []
+    if end > tiny:
+        rho = np.linspace(0.0, end, bottom_pieces + 1)
+        s = (rho - end) / math.cos(alpha)
+        parts.append(_line(s, rho, rho * math.tan(alpha), alpha))
+    reach = 0.0
+    if r > tiny:
+        kappa = np.linspace(alpha, 0.5 * math.pi - beta, corner_pieces + 1)
+        mid = 0.5 * (kappa[:-1] + kappa[1:])
+        s = r * (kappa - alpha)
+        reach = float(s[-1])
+        parts.append((s, e + r * np.sin(mid), f - r * np.cos(kappa[:-1]), np.sin(mid), np.cos(mid)))
+    else:
+        high = low
+    if height > high + tiny:
+        length = (height - high) / math.cos(beta)
+        number = 1 if flank_mm is None else max(1, math.ceil(length / flank_mm * (1.0 - 1e-12)))
+        along = np.linspace(0.0, length, number + 1)
+        foot = e + r * math.cos(beta) if r > tiny else end
+        parts.append(
+            _line(reach + along, foot + along * math.sin(beta), high + along * math.cos(beta), 0.5 * math.pi - beta)
+        )
+    s_from = np.concatenate([p[0][:-1] for p in parts])
+    s_to = np.concatenate([p[0][1:] for p in parts])
+    rho, z, sin, cos = (np.concatenate([p[i] for p in parts]) for i in range(1, 5))
+    lead = edge_lag(cutter)
+    return Slices(s_from, s_to, rho, z, sin, cos, lead * z, lead * sin)
+
+
+def _line(s: Floats, rho: Floats, z: Floats, kappa: float) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Slices of a straight piece of the profile between nodes: nodes of s, middle rho, lower z, sine, cosine."""
+    one = np.ones(len(s) - 1)
+    cosine = 0.0 if kappa == 0.5 * math.pi else math.cos(kappa)
+    return s, 0.5 * (rho[:-1] + rho[1:]), z[:-1], math.sin(kappa) * one, cosine * one

@@ -1,0 +1,1 @@
+"""The loops of the cutter that bends and of the wall that it leaves."""

@@ -1,0 +1,529 @@
+"""Compiled loops of the covered area: the section at an instant, its grazing points, curves in (theta, t).
+
+Notation: tip p(t), unit axis A = (a, A_z), layer z = h; w height above the tip along the axis, rho distance from it, e_r
+direction from the axis to a point. Surface normal N = sin(g) e_r - cos(g) A, g = 0 on the bottom face, pi on the top;
+normal speed of the cutter's surface N . v = sin(g) e_r . p' - cos(g) A . p' + (w sin(g) + rho cos(g)) e_r . A'; V is
+that over |N_xy|, the speed of the section's edge in the layer. A point of the edge is x(theta) = c + l M (cos theta,
+sin theta), c halfway between the ends of the section along a, M = I + a a' / (A_z (1 + A_z)).
+
+Arrays: ``cp``, ``ca`` (n, 3) Chebyshev coefficients of the tip and of the axis, its length aside, on t in 0 .. 1.
+``K`` cutter: e, r, f, sin, cos, tan of alpha, sin, cos, tan of beta, flank radius at w = 0, H, rho(H).
+``S`` instant: p, A, p', A' (0-11), h 12, c 13-14, w at c 15, from the axis to c 16-18, its square 19, corners 20, t 21;
+where the section is a whole ellipse, 22 is R (else 0) and N . v = g . c + (R a . c / A_z)(m . c), c = (cos theta, sin
+theta), g 23-24, m = M a' 25-26.
+``C`` (8, 5) corners of the section: theta, x, y, code of the piece before, after (counter-clockwise).
+Rows of edges and vertices: x, y, theta, t, n_x, n_y (outward, across the curve), code.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+TAU = 2.0 * math.pi
+BOTTOM, CONE, TORUS, FLANK, TOP = 0, 1, 2, 3, 4
+CORNER = 5  # a root at a corner of the section
+NODES = 32
+MAX_ROOTS = 16
+_COS = np.cos(np.arange(NODES) * (TAU / NODES))
+_SIN = np.sin(np.arange(NODES) * (TAU / NODES))
+
+
+@njit(cache=True, nogil=True)
+def state(cp, ca, t, S):
+    """Tip, axis and their derivatives into ``S[:12]``."""
+    u = 2.0 * t - 1.0
+    for k in range(3):
+        for c in range(2):
+            co = cp if c == 0 else ca
+            b1 = b2 = d1 = d2 = 0.0
+            for j in range(co.shape[0] - 1, 0, -1):
+                b = co[j, k] + 2.0 * u * b1 - b2
+                d = 2.0 * b1 + 2.0 * u * d1 - d2
+                b2 = b1
+                b1 = b
+                d2 = d1
+                d1 = d
+            S[3 * c + k] = co[0, k] + u * b1 - b2
+            S[6 + 3 * c + k] = 2.0 * (b1 + u * d1 - d2)
+    length = math.sqrt(S[3] ** 2 + S[4] ** 2 + S[5] ** 2)
+    for k in range(3):
+        S[3 + k] /= length
+        S[9 + k] /= length
+    along = S[3] * S[9] + S[4] * S[10] + S[5] * S[11]
+    for k in range(3):
+        S[9 + k] -= along * S[3 + k]
+    S[21] = t
+
+
+@njit(cache=True, nogil=True)
+def extent(S, K):
+    """Lowest and highest point above the tip: (z, u) of both, u along a."""
+    Az = S[5]
+    s = math.hypot(S[3], S[4])
+    H, top = K[10], K[11]
+    zh = H * Az + top * s
+    uh = H * s - top * Az
+    w = K[2] - K[1] * Az
+    if s < K[3]:
+        return 0.0, 0.0, zh, uh
+    if s <= K[7] and w <= H:
+        rho = K[0] + K[1] * s
+        return w * Az - rho * s, w * s + rho * Az, zh, uh
+    return H * Az - top * s, H * s + top * Az, zh, uh
+
+
+@njit(cache=True, nogil=True)
+def reach(cp, ca, K, h, t, S):
+    """Above 0 where the layer cuts the open cutter [mm]; fills ``S[:12]``."""
+    state(cp, ca, t, S)
+    zl, _, zh, _ = extent(S, K)
+    return min(h - S[2] - zl, S[2] + zh - h)
+
+
+@njit(cache=True, nogil=True)
+def _exit(A2, B, C):
+    """Least positive root of A2 l^2 + 2 B l + C, C < 0; inf if there is none."""
+    disc = B * B - A2 * C
+    if disc < 0.0:
+        return math.inf
+    root = math.sqrt(disc)
+    if A2 > 0.0 and B < 0.0:
+        return (root - B) / A2
+    den = B + root
+    return -C / den if den > 0.0 else math.inf
+
+
+@njit(cache=True, nogil=True)
+def ray(S, K, ct, st):
+    """Where the ray from c leaves the section: l, code."""
+    Az = S[5]
+    ac = S[3] * ct + S[4] * st
+    dw = ac / Az
+    k = ac / (Az * (1.0 + Az))
+    q1 = S[16] * (ct + S[3] * k) + S[17] * (st + S[4] * k)
+    w0, q0 = S[15], S[19]
+    flank = K[9] + w0 * K[8]
+    lam = _exit(1.0 - (K[8] * dw) ** 2, q1 - K[8] * dw * flank, q0 - flank * flank)
+    code = FLANK
+    if K[5] == 0.0:
+        if dw < 0.0 and -w0 / dw < lam:
+            lam = -w0 / dw
+            code = BOTTOM
+    else:
+        T = K[5] * K[5]
+        other = _exit(T - dw * dw, T * q1 - w0 * dw, T * q0 - w0 * w0)
+        if other < lam:
+            lam = other
+            code = CONE
+    if dw > 0.0 and (K[10] - w0) / dw < lam:
+        lam = (K[10] - w0) / dw
+        code = TOP
+    e, r, f = K[0], K[1], K[2]
+    if r > 0.0:
+        w = w0 + lam * dw
+        rho = math.sqrt(max(q0 + lam * (2.0 * q1 + lam), 0.0))
+        y, x = f - w, rho - e
+        if x * K[4] > y * K[3] and x * K[6] < y * K[7] and x * x + y * y > r * r:
+            code = TORUS
+            if e == 0.0:
+                y0 = w0 - f
+                lam = _exit(1.0 + dw * dw, q1 + dw * y0, q0 + y0 * y0 - r * r)
+            else:
+                for _ in range(40):
+                    x = max(rho - e, 0.0)
+                    y = w0 + lam * dw - f
+                    dist = math.hypot(x, y)
+                    slope = (x * (q1 + lam) / rho if x > 0.0 else 0.0) + y * dw
+                    if slope <= 0.0:
+                        break
+                    step = (dist - r) * dist / slope
+                    lam -= step
+                    if step <= 4e-16 * lam:
+                        break
+                    rho = math.sqrt(max(q0 + lam * (2.0 * q1 + lam), 0.0))
+    return lam, code
+
+
+@njit(cache=True, nogil=True)
+def speed(S, K, x, y, code):
+    """V [mm per t] and the outward normal (n_x, n_y) of the section's edge at a point of piece ``code``."""
+    X, Y, Z = x - S[0], y - S[1], S[12] - S[2]
+    w = X * S[3] + Y * S[4] + Z * S[5]
+    X -= w * S[3]
+    Y -= w * S[4]
+    Z -= w * S[5]
+    rho = math.sqrt(X * X + Y * Y + Z * Z)
+    if rho > 0.0:
+        X /= rho
+        Y /= rho
+        Z /= rho
+    if code == FLANK:
+        sg, cg = K[7], K[6]
+    elif code == BOTTOM:
+        sg, cg = 0.0, 1.0
+    elif code == TOP:
+        sg, cg = 0.0, -1.0
+    elif code == CONE:
+        sg, cg = K[3], K[4]
+    else:
+        sg = max(rho - K[0], 0.0)
+        cg = K[2] - w
+        d = math.hypot(sg, cg)
+        sg /= d
+        cg /= d
+    v = sg * (X * S[6] + Y * S[7] + Z * S[8]) - cg * (S[3] * S[6] + S[4] * S[7] + S[5] * S[8])
+    v += (w * sg + rho * cg) * (X * S[9] + Y * S[10] + Z * S[11])
+    nx = sg * X - cg * S[3]
+    ny = sg * Y - cg * S[4]
+    n = math.hypot(nx, ny)
+    if n == 0.0:
+        return math.inf, 1.0, 0.0
+    return v / n, nx / n, ny / n
+
+
+@njit(cache=True, nogil=True)
+def point(S, K, theta, row):
+    """The edge at theta into ``row`` (x, y, theta, t, n_x, n_y, code); returns V."""
+    return point_at(S, K, theta, math.cos(theta), math.sin(theta), row)
+
+
+@njit(cache=True, nogil=True)
+def point_at(S, K, theta, ct, st, row):
+    """As ``point``, cosine and sine of theta given."""
+    ac = S[3] * ct + S[4] * st
+    k = ac / (S[5] * (1.0 + S[5]))
+    if S[22] > 0.0:
+        row[0] = S[13] + S[22] * (ct + S[3] * k)
+        row[1] = S[14] + S[22] * (st + S[4] * k)
+        row[2] = theta
+        row[3] = S[21]
+        k = ac / (1.0 + S[5])
+        nx = ct - k * S[3]
+        ny = st - k * S[4]
+        n = math.sqrt(nx * nx + ny * ny)
+        row[4] = nx / n
+        row[5] = ny / n
+        row[6] = FLANK
+        return (S[23] * ct + S[24] * st + S[22] * ac / S[5] * (S[25] * ct + S[26] * st)) / n
+    lam, code = ray(S, K, ct, st)
+    row[0] = S[13] + lam * (ct + S[3] * k)
+    row[1] = S[14] + lam * (st + S[4] * k)
+    row[2] = theta
+    row[3] = S[21]
+    v, row[4], row[5] = speed(S, K, row[0], row[1], code)
+    row[6] = code
+    return v
+
+
+@njit(cache=True, nogil=True)
+def _centre(S, x, y):
+    """Put the inner point at (x, y)."""
+    S[13] = x
+    S[14] = y
+    X, Y, Z = x - S[0], y - S[1], S[12] - S[2]
+    w = X * S[3] + Y * S[4] + Z * S[5]
+    S[15] = w
+    S[16] = X - w * S[3]
+    S[17] = Y - w * S[4]
+    S[18] = Z - w * S[5]
+    S[19] = S[16] ** 2 + S[17] ** 2 + S[18] ** 2
+
+
+@njit(cache=True, nogil=True)
+def _ellipse(S, R):
+    """Coefficients of N . v on a cylinder that the layer cuts through."""
+    ax, ay, Az = S[3], S[4], S[5]
+    S[22] = R
+    k = (ax * S[9] + ay * S[10]) / (Az * (1.0 + Az))
+    S[25] = S[9] + k * ax
+    S[26] = S[10] + k * ay
+    k = (ax * S[6] + ay * S[7]) / (Az * (1.0 + Az)) - (ax * S[6] + ay * S[7] + Az * S[8]) / Az
+    S[23] = S[6] + k * ax + S[15] * S[25]
+    S[24] = S[7] + k * ay + S[15] * S[26]
+
+
+@njit(cache=True, nogil=True)
+def _newton(S, guess, sign, row):
+    """The grazing point of an ellipse near ``guess`` by Newton's method, theta into ``row[2]``; False if it fails."""
+    theta = guess
+    bx, by = S[22] * S[3] / S[5], S[22] * S[4] / S[5]
+    for _ in range(8):
+        ct, st = math.cos(theta), math.sin(theta)
+        b, m = bx * ct + by * st, S[25] * ct + S[26] * st
+        v = S[23] * ct + S[24] * st + b * m
+        dv = S[24] * ct - S[23] * st + (by * ct - bx * st) * m + b * (S[26] * ct - S[25] * st)
+        if dv * sign <= 0.0:
+            return False
+        step = v / dv
+        theta -= step
+        if abs(theta - guess) > 0.5:
+            return False
+        if abs(step) < 1e-9:
+            row[2] = theta
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def instant(cp, ca, K, h, t, S, C):
+    """Fill ``S`` and the corners ``C``; False where the layer doesn't cut the open cutter."""
+    state(cp, ca, t, S)
+    S[12] = h
+    S[20] = 0.0
+    S[22] = 0.0
+    zl, ul, zh, uh = extent(S, K)
+    z = h - S[2]
+    if not zl < z < zh:
+        return False
+    s = math.hypot(S[3], S[4])
+    ex, ey = (S[3] / s, S[4] / s) if s > 0.0 else (1.0, 0.0)
+    u = ul + (uh - ul) * ((z - zl) / (zh - zl))
+    _centre(S, S[0] + u * ex, S[1] + u * ey)
+    Az = S[5]
+    up, high = ray(S, K, ex, ey)
+    down, low = ray(S, K, -ex, -ey)
+    if not up + down > 0.0:
+        return False
+    u += 0.5 * (up - down) / Az
+    _centre(S, S[0] + u * ex, S[1] + u * ey)
+    if high == FLANK and low == FLANK:
+        if K[8] == 0.0:
+            _ellipse(S, K[9])
+        return True
+    n = 0
+    for which in range(2):
+        rho, w = (K[0], K[2]) if which == 0 else (K[11], K[10])
+        if (which == 0 and K[1] > 0.0) or s == 0.0:
+            continue
+        low = FLANK if which == 1 else (BOTTOM if K[5] == 0.0 else CONE)
+        if which == 1 and K[1] > 0.0 and K[10] < K[2] - K[1] * K[6]:
+            low = TORUS
+        high = TOP if which == 1 else FLANK
+        cphi = (z - w * Az) / (rho * s)
+        if not -1.0 < cphi < 1.0:
+            continue
+        across = rho * math.sqrt((1.0 - cphi) * (1.0 + cphi))
+        along = w * s - rho * cphi * Az
+        for side in range(2):
+            v = across if side == 0 else -across
+            C[n, 1] = S[0] + along * ex - v * ey
+            C[n, 2] = S[1] + along * ey + v * ex
+            C[n, 0] = math.atan2(v, (along - u) * Az)
+            C[n, 0] = (C[n, 0] + math.atan2(ey, ex)) % TAU
+            C[n, 3] = high if side == 0 else low
+            C[n, 4] = low if side == 0 else high
+            n += 1
+    for i in range(1, n):
+        j = i
+        while j > 0 and C[j, 0] < C[j - 1, 0]:
+            for k in range(5):
+                C[j, k], C[j - 1, k] = C[j - 1, k], C[j, k]
+            j -= 1
+    S[20] = n
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _zero(S, K, lo, vlo, hi, vhi, row):
+    """A zero of V between two angles of one smooth stretch where its signs differ, into ``row``."""
+    side = 0
+    for _ in range(80):
+        x = (lo * vhi - hi * vlo) / (vhi - vlo)
+        if not lo < x < hi:
+            x = 0.5 * (lo + hi)
+        v = point(S, K, x, row)
+        if v == 0.0 or hi - lo < 1e-14:
+            break
+        if (v > 0.0) == (vhi > 0.0):
+            near = hi - x
+            hi, vhi = x, v
+            if side == 1:
+                vlo *= 0.5
+            side = 1
+        else:
+            near = x - lo
+            lo, vlo = x, v
+            if side == -1:
+                vhi *= 0.5
+            side = -1
+        if near < 1e-14:
+            break
+
+
+@njit(cache=True, nogil=True)
+def _corner(S, K, C, i, row):
+    """The corner i into ``row``, across its own velocity; returns V of the pieces before and after it."""
+    x, y = C[i, 1], C[i, 2]
+    vl, lx, ly = speed(S, K, x, y, int(C[i, 3]))
+    vr, rx, ry = speed(S, K, x, y, int(C[i, 4]))
+    nx = lx * abs(vr) + rx * abs(vl)
+    ny = ly * abs(vr) + ry * abs(vl)
+    n = math.hypot(nx, ny)
+    row[0], row[1], row[2], row[3] = x, y, C[i, 0], S[21]
+    row[4], row[5] = (nx / n, ny / n) if n > 0.0 else (lx, ly)
+    row[6] = CORNER
+    return vl, vr
+
+
+@njit(cache=True, nogil=True)
+def roots(S, K, C, vmin, R, sign, grid):
+    """Where V changes sign around the section, in order of theta: rows into ``R``, +1 from inward to outward.
+
+    Speeds under ``vmin`` take the sign before them. Returns (count, sign of V where count is 0; 0: |V| < vmin all
+    round). ``grid`` (NODES,) takes V at even angles.
+    """
+    th = np.empty(NODES + 16)
+    vv = np.empty(NODES + 16)
+    at = np.empty(NODES + 16, np.int64)
+    row = np.empty(7)
+    n = 0
+    nc = int(S[20])
+    k = 0
+    for i in range(NODES):
+        angle = i * (TAU / NODES)
+        while k < nc and C[k, 0] <= angle:
+            vl, vr = _corner(S, K, C, k, row)
+            th[n], vv[n], at[n] = C[k, 0], vl, k
+            th[n + 1], vv[n + 1], at[n + 1] = C[k, 0], vr, k
+            n += 2
+            k += 1
+        grid[i] = point_at(S, K, angle, _COS[i], _SIN[i], row)
+        if k > 0 and C[k - 1, 0] == angle:
+            continue
+        th[n], vv[n], at[n] = angle, grid[i], -1
+        n += 1
+    while k < nc:
+        vl, vr = _corner(S, K, C, k, row)
+        th[n], vv[n], at[n] = C[k, 0], vl, k
+        th[n + 1], vv[n + 1], at[n + 1] = C[k, 0], vr, k
+        n += 2
+        k += 1
+    start = -1
+    for i in range(n):
+        if abs(vv[i]) >= vmin:
+            start = i
+            break
+    if start < 0:
+        return 0, 0
+    count = 0
+    last = start
+    first_sign = 1 if vv[start] > 0.0 else -1
+    here = first_sign
+    for step in range(1, n + 1):
+        i = (start + step) % n
+        if abs(vv[i]) < vmin:
+            continue
+        now = 1 if vv[i] > 0.0 else -1
+        if now != here:
+            if count + 2 > MAX_ROOTS:
+                return -1, 0
+            done = False
+            j = last
+            while j != i:  # the one sign change among nodes that may be near zero
+                m = (j + 1) % n
+                if (vv[j] > 0.0) == (here > 0) and (vv[m] > 0.0) == (now > 0):
+                    if at[j] >= 0 and at[j] == at[m]:
+                        _corner(S, K, C, at[j], R[count])
+                    else:
+                        hi = th[m] if th[m] > th[j] else th[m] + TAU
+                        _zero(S, K, th[j], vv[j], hi, vv[m], R[count])
+                        R[count, 2] %= TAU
+                    done = True
+                    break
+                j = m
+            if not done:
+                return -1, 0
+            sign[count] = now
+            count += 1
+        else:
+            j = (last + 1) % n
+            if j == i and at[i] < 0 and at[last] < 0:  # a pair of roots between even nodes: the least |V| by a parabola
+                before = (last - 1 + n) % n
+                after = (i + 1) % n
+                if at[before] < 0 and at[after] < 0:
+                    a0, a1, a2, a3 = abs(vv[before]), abs(vv[last]), abs(vv[i]), abs(vv[after])
+                    if a1 < a0 and a2 < a3 and min(a1, a2) < 0.25 * max(a0, a3):
+                        hi = th[i] if th[i] > th[last] else th[i] + TAU
+                        lo = th[last]
+                        a, b = lo, hi
+                        for _ in range(40):
+                            x1 = b - 0.6180339887498949 * (b - a)
+                            x2 = a + 0.6180339887498949 * (b - a)
+                            v1 = point(S, K, x1, row) * here
+                            v2 = point(S, K, x2, row) * here
+                            if min(v1, v2) < -vmin:
+                                x, v = (x1, v1) if v1 < v2 else (x2, v2)
+                                if count + 3 > MAX_ROOTS:
+                                    return -1, 0
+                                _zero(S, K, lo, vv[last], x, v * here, R[count])
+                                R[count, 2] %= TAU
+                                sign[count] = -here
+                                _zero(S, K, x, v * here, hi, vv[i], R[count + 1])
+                                R[count + 1, 2] %= TAU
+                                sign[count + 1] = here
+                                count += 2
+                                break
+                            if v1 < v2:
+                                b = x2
+                            else:
+                                a = x1
+                            if min(v1, v2) > 0.5 * min(a1, a2):
+                                break
+        here = now
+        last = i
+    return count, first_sign
+
+
+@njit(cache=True, nogil=True)
+def wrapped(angle):
+    """The angle in -pi .. pi."""
+    return angle - TAU * math.floor(angle / TAU + 0.5)
+
+
+@njit(cache=True, nogil=True)
+def deviation(a, b):
+    """How far a smooth curve can be from its chord, from its tangents at both ends [mm]."""
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    return 0.25 * max(abs(dx * a[4] + dy * a[5]), abs(dx * b[4] + dy * b[5]))
+
+
+@njit(cache=True, nogil=True)
+def root_near(S, K, C, guess, width, sign, row):
+    """The change of V of this sign near ``guess``, into ``row``; False if there is none within a quarter turn."""
+    if S[22] > 0.0 and _newton(S, guess, sign, row):
+        point(S, K, row[2], row)
+        return True
+    lo = guess - width
+    hi = guess + width
+    vlo = point(S, K, lo, row)
+    vhi = point(S, K, hi, row)
+    while sign * vlo >= 0.0:
+        hi, vhi = lo, vlo
+        width *= 2.0
+        lo -= width
+        if lo < guess - 1.6:
+            return False
+        vlo = point(S, K, lo, row)
+    while sign * vhi <= 0.0:
+        lo, vlo = hi, vhi
+        width *= 2.0
+        hi += width
+        if hi > guess + 1.6:
+            return False
+        vhi = point(S, K, hi, row)
+    for i in range(int(S[20])):
+        theta = C[i, 0] + TAU * math.floor((lo - C[i, 0]) / TAU + 1.0)
+        if not lo < theta < hi:
+            continue
+        vl, vr = _corner(S, K, C, i, row)
+        if sign * vl > 0.0:
+            hi, vhi = theta, vl
+        elif sign * vr < 0.0:
+            lo, vlo = theta, vr
+        else:
+            return True
+    _zero(S, K, lo, vlo, hi, vhi, row)
+    return True

@@ -1,0 +1,92 @@
+"""The section of a cutter with a plane layer at an instant, and whether a point lies in it.
+
+Notation: p tip, A = (a, A_z) unit axis, layer z = h. A cutter is a convex solid of revolution: bottom face or cone,
+corner circle, flank, and the plane at the end of the flutes. Its section is convex: x(theta) = c + l(theta) M (cos
+theta, sin theta), M = I + a a' / (A_z (1 + A_z)), c halfway between the ends of the section along a; l is where the ray
+leaves the solid, in closed form but at a corner of radius below d / 2 (Newton, to rounding). For a flank alone c is the
+centre of the ellipse, l = R and theta its own parameter.
+
+F(x) >= 0 outside, < 0 inside: the greatest of the distances to bottom, flank and top and to the corner's torus.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.engagement.chips import _kernels
+from chipload.engagement.chips.move import Move
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+
+
+@lru_cache(maxsize=64)
+def cutter_numbers(cutter: Cutter) -> Floats:
+    """(12,) e, r, f, sin, cos, tan of alpha, of beta, flank radius at the tip, H, rho(H) [mm]."""
+    d, r, e, f, alpha, beta, H = cutter.apt
+    foot = 0.5 * d * (1.0 - math.tan(alpha) * math.tan(beta))
+    bottom = (math.sin(alpha), math.cos(alpha), math.tan(alpha))
+    flank = (math.sin(beta), math.cos(beta), math.tan(beta))
+    out = np.array([e, r, f, *bottom, *flank, foot, H, float(cutter.radius_at(H))])
+    out.setflags(write=False)
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """Points of the edge of a section.
+
+    ``points`` (n, 2) [mm], ``V`` (n,) [mm per unit of t] outward speed of the edge, ``normal`` (n, 2) outward unit,
+    ``piece`` (n,): 0 bottom face, 1 bottom cone, 2 corner, 3 flank, 4 top of the flutes.
+    """
+
+    theta: Floats
+    points: Floats
+    V: Floats
+    normal: Floats
+    piece: NDArray[np.int64]
+
+
+def section(move: Move, cutter: Cutter, height: float, t: float, theta: ArrayLike) -> Section | None:
+    """The edge of the section at t at the angles theta (n,) [rad]; None where the layer doesn't cut the open cutter.
+
+    >>> mill = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
+    >>> move = Move.lerp([0, 0, 0], [0, 0, 1], [20, 0, 0], [0, 0, 1])
+    >>> section(move, mill, 1.0, 0.5, [0.0]).points.tolist(), section(move, mill, -1.0, 0.5, [0.0])
+    ([[15.0, 0.0]], None)
+    """
+    if not 0.0 <= t <= 1.0:
+        raise InputError(f"section: t = {t:g}: must be from 0 to 1")
+    K, S, C = cutter_numbers(cutter), np.empty(27), np.empty((8, 5))
+    if not _kernels.instant(move.tip, move.axis, K, float(height), float(t), S, C):
+        return None
+    angles = np.atleast_1d(np.asarray(theta, dtype=np.float64))
+    rows, V = np.empty((len(angles), 7)), np.empty(len(angles))
+    for i, angle in enumerate(angles):
+        V[i] = _kernels.point(S, K, angle, rows[i])
+    return Section(angles, rows[:, :2], V, rows[:, 4:6], rows[:, 6].astype(np.int64))
+
+
+def depth(move: Move, cutter: Cutter, height: float, t: float, points: ArrayLike) -> Floats:
+    """F (n,) [mm] of points (n, 2) on the layer at t, from the profile rho(w) of the cutter.
+
+    The same in NumPy as the branch and bound uses; rays and roots know nothing of it.
+    """
+    x = np.asarray(points, dtype=np.float64)
+    p, A = (v[0] for v in move.at([t]))
+    X = np.column_stack([x, np.full(len(x), float(height))]) - p
+    w = X @ A
+    rho = np.linalg.norm(X - w[:, None] * A, axis=1)
+    d, r, e, f, alpha, beta, H = cutter.apt
+    foot = 0.5 * d * (1.0 - math.tan(alpha) * math.tan(beta))
+    u, v = rho - e, f - w
+    out = np.maximum(w - H, (rho - foot) * math.cos(beta) - w * math.sin(beta))
+    out = np.maximum(out, rho * math.sin(alpha) - w * math.cos(alpha))
+    corner = (u * math.cos(alpha) > v * math.sin(alpha)) & (u * math.sin(beta) < v * math.cos(beta))
+    return np.where(corner, np.maximum(out, np.hypot(u, v) - r), out) if r > 0.0 else out

@@ -1,0 +1,154 @@
+"""Closed triangle meshes: read from STL and STEP, checked, and cut by horizontal planes.
+
+Notation: a **ring** is a closed chain of points in a plane z = h with the solid on its left: counter-clockwise around
+solid, clockwise around a hole. A vertex on the plane counts as above it, so that a plane never meets a vertex and each
+face that it cuts has one edge that goes down through it, where the chain enters the face, and one that goes up, where
+it leaves: the rings are a matter of counting alone and close whatever the rounding.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import shapely
+import trimesh
+from numpy.typing import NDArray
+from shapely import MultiPolygon, Polygon
+
+from chipload.errors import InputError
+from chipload.geometry.step import step_triangles
+from chipload.units import MM_PER
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def read_mesh(
+    path: str | Path, *, unit: str | None = None, chord_mm: float | None = None, key: str = "stock.file"
+) -> trimesh.Trimesh:
+    """A closed mesh in mm from an STL file or a STEP part.
+
+    Parameters
+    ----------
+    path : .stl, .stp or .step
+    unit : what one unit of an STL file is: um, mm, cm, m, inch or foot; STL does not say it, so it is not guessed. STEP
+        files say it themselves
+    chord_mm : how far [mm] a triangle may leave a surface of a STEP part
+    key : what the file is called in a message
+
+    Raises
+    ------
+    InputError
+        The file is missing, of another kind or damaged, the unit or the chord is not stated, or the mesh is not closed.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise InputError(f"{key} = {file}: no such file")
+    kind = file.suffix.lower()
+    if kind in (".stp", ".step"):
+        if chord_mm is None or not chord_mm > 0.0:
+            raise InputError(f"{key} = {file.name}: state how far a triangle may leave a surface: chord_mm above 0")
+        vertices, faces = step_triangles(file, chord_mm, key=key)
+    elif kind == ".stl":
+        if unit not in MM_PER:
+            raise InputError(f"{key} = {file.name}: STL has no unit: state unit as one of {', '.join(MM_PER)}")
+        try:
+            with file.open("rb") as stream:
+                read = trimesh.load_mesh(stream, file_type="stl", process=False)
+        except (ValueError, IndexError, KeyError, TypeError, UnicodeError):
+            raise InputError(f"{key} = {file.name}: not an STL file, or damaged") from None
+        vertices, faces = np.asarray(read.vertices, dtype=np.float64) * MM_PER[unit], np.asarray(read.faces)
+    else:
+        raise InputError(f"{key} = {file.name}: must be .stl, .stp or .step")
+    if len(faces) == 0 or not np.isfinite(vertices).all():
+        raise InputError(f"{key} = {file.name}: no triangles in it, damaged, or a number is not finite")
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    mesh.update_faces(mesh.nondegenerate_faces())
+    mesh.remove_unreferenced_vertices()
+    require_closed(mesh, f"{key} = {file.name}")
+    if mesh.volume < 0.0:
+        mesh.invert()
+    return mesh
+
+
+def open_edges(mesh: trimesh.Trimesh) -> int:
+    """Number of edges that are not met as often along as against; four faces at an edge may close a mesh."""
+    edges = np.asarray(mesh.edges)
+    along = np.where(edges[:, 0] < edges[:, 1], 1, -1)
+    _, which = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
+    return int(np.count_nonzero(np.bincount(which.ravel(), weights=along)))
+
+
+def require_closed(mesh: trimesh.Trimesh, name: str) -> None:
+    """Refuse a mesh that does not enclose a volume.
+
+    Raises
+    ------
+    InputError
+        With the number of open edges.
+    """
+    count = open_edges(mesh)
+    if count:
+        raise InputError(f"{name}: the mesh is not closed: {count} open edges: mend it in CAD and export it again")
+
+
+def sections(mesh: trimesh.Trimesh, heights: Sequence[float] | Floats) -> list[MultiPolygon]:
+    """Sections of a closed mesh by the planes z = ``heights`` [mm]; where faces lie in the plane, that just below it.
+
+    Overlapping bodies are joined; a ring that crosses itself is mended by counting its crossings even and odd.
+
+    Examples
+    --------
+    >>> box = trimesh.creation.box((4.0, 3.0, 2.0))
+    >>> [section.area for section in sections(box, [0.5, 1.0, 1.5])]
+    [12.0, 12.0, 0.0]
+    """
+    vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
+    return [_filled(_rings(vertices, faces, float(h))) for h in heights]
+
+
+def _rings(vertices: Floats, faces: Ints, h: float) -> list[Floats]:
+    """(k, 2) points of each ring in the plane z = h."""
+    above = (vertices[:, 2] >= h)[faces]
+    cut = above.any(axis=1) & ~above.all(axis=1)
+    f, up = faces[cut], above[cut]
+    rows = np.arange(len(f))
+    after, up_after = np.roll(f, -1, axis=1), np.roll(up, -1, axis=1)
+    enter, leave = np.argmax(up & ~up_after, axis=1), np.argmax(~up & up_after, axis=1)
+    first = np.sort(np.column_stack([f[rows, enter], after[rows, enter]]), axis=1)
+    last = np.sort(np.column_stack([f[rows, leave], after[rows, leave]]), axis=1)
+    # the face that a chain comes to is one that it enters by the edge by which it left; of four faces any two
+    onward_of: Ints = np.empty(len(f), dtype=np.int64)
+    onward_of[np.lexsort(last.T)] = np.lexsort(first.T)
+    a, b = vertices[first[:, 0]], vertices[first[:, 1]]
+    part = ((h - a[:, 2]) / (b[:, 2] - a[:, 2]))[:, None]
+    points = a[:, :2] * (1.0 - part) + b[:, :2] * part
+    rings: list[Floats] = []
+    onward = onward_of.tolist()
+    done = [False] * len(onward)
+    for start in range(len(onward)):
+        ring: list[int] = []
+        at = start
+        while not done[at]:
+            done[at] = True
+            ring.append(at)
+            at = onward[at]
+        if len(ring) > 2:
+            rings.append(points[ring])
+    return rings
+
+
+def _filled(rings: list[Floats]) -> MultiPolygon:
+    """What the rings enclose: from the largest to the smallest, solid is joined and holes are taken away."""
+    areas = [0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)) for x, y in (r.T for r in rings)]
+    order = sorted((i for i, area in enumerate(areas) if area != 0.0), key=lambda i: -abs(areas[i]))
+    whole = Polygon()
+    for solid, group in itertools.groupby(order, key=lambda i: areas[i] > 0.0):
+        joined = shapely.union_all([shapely.make_valid(Polygon(rings[i])) for i in group])
+        whole = shapely.union(whole, joined) if solid else shapely.difference(whole, joined)
+    parts = shapely.get_parts(whole)
+    return MultiPolygon(list(parts[(shapely.get_type_id(parts) == 3) & (shapely.area(parts) > 0.0)]))

@@ -1,0 +1,381 @@
+"""The workpiece as a pile of horizontal layers, each a set of polygons that lose what a cutter covers.
+
+Notation: layer i is the prism between ``bounds[i]`` and ``bounds[i + 1]`` [mm]; its section S_i is taken at its middle,
+``heights[i]``. The plane is cut into rectangular **tiles** (columns x rows); a layer keeps one geometry a tile, so
+that a removal of area C reads only the tiles under C and costs the same after many moves as after none. Volume = sum
+of area(S_i) times thickness; for a smooth body cut at the middles its error is O(dz^2).
+
+Reference: [Chips2017] (the pile of layers).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+import trimesh
+from numpy.typing import ArrayLike, NDArray
+from shapely import MultiPolygon, Polygon
+
+from chipload.errors import InputError
+from chipload.geometry.mesh import require_closed, sections
+from chipload.stock.shapes import read_shapes, write_shapes
+from chipload.stock.solid import glb, prisms
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Shapes = NDArray[np.object_]
+
+#: most tiles times layers
+TILE_LIMIT = 20_000_000
+#: what a saved stock says of itself
+KIND = "chipload layered stock 1"
+#: type numbers of GEOS
+POLYGON, MULTIPOLYGON = 3, 6
+
+
+class LayeredStock:
+    """Solid layers that lose polygons.
+
+    :meth:`remove`, :meth:`remove_many`, :meth:`refine`, :meth:`refine_at` and :meth:`restore` change the stock; all
+    else reads. Splitting layers shifts the numbers of those above. Polygons are values and are never changed.
+
+    Parameters
+    ----------
+    bounds : (n + 1,) float [mm], ascending
+    xs, ys : (columns + 1,), (rows + 1,) float [mm], ascending: borders of the tiles
+    tiles : (n, rows, columns) polygons, multipolygons or empty geometries, each within its tile
+    part : closed mesh that layers are cut from again when they are split and nothing was removed from them
+
+    Examples
+    --------
+    >>> stock = LayeredStock.block((0.0, 0.0, 0.0), (20.0, 10.0, 4.0), 2.0, 5.0)
+    >>> [chip.area for chip in stock.remove(1, shapely.box(4.0, 4.0, 6.0, 30.0))]
+    [12.0]
+    >>> stock.volumes().tolist()
+    [400.0, 376.0]
+    """
+
+    def __init__(
+        self, bounds: Floats, xs: Floats, ys: Floats, tiles: Shapes, part: trimesh.Trimesh | None = None
+    ) -> None:
+        self.bounds = bounds
+        self.xs, self.ys = xs, ys
+        self.tiles = tiles
+        self.part = part
+        self.cut: NDArray[np.bool_] = np.zeros(len(tiles), dtype=np.bool_)
+
+    @classmethod
+    def block(cls, low: ArrayLike, high: ArrayLike, bounds_or_layer_mm: ArrayLike, tile_mm: float) -> LayeredStock:
+        """A cuboid between the corners ``low`` and ``high`` (3,) [mm].
+
+        Parameters
+        ----------
+        bounds_or_layer_mm : thickest layer [mm] (layers are equal), or (n + 1,) bounds from ``low`` to ``high``
+        tile_mm : longest side of a tile [mm]; two to four cutter diameters
+
+        Raises
+        ------
+        InputError
+            A side is not above 0, or bounds do not ascend from the bottom to the top.
+        """
+        a, b = (np.asarray(corner, dtype=np.float64) for corner in (low, high))
+        if a.shape != (3,) or b.shape != (3,) or not np.isfinite([a, b]).all() or not (b > a).all():
+            raise InputError(f"stock: from {a.tolist()} to {b.tolist()} mm: each side must be above 0 and finite")
+        bounds = _bounds(bounds_or_layer_mm, float(a[2]), float(b[2]))
+        if bounds[0] != a[2] or bounds[-1] != b[2]:
+            raise InputError(
+                f"stock.bounds from {bounds[0]:g} to {bounds[-1]:g} mm: must be the block's, {a[2]:g} and {b[2]:g}"
+            )
+        xs, ys = _borders(a[0], b[0], tile_mm), _borders(a[1], b[1], tile_mm)
+        boxes = _boxes(xs, ys, len(bounds) - 1)
+        tiles = np.empty((len(bounds) - 1, *boxes.shape), dtype=object)
+        tiles[:] = boxes
+        return cls(bounds, xs, ys, tiles)
+
+    @classmethod
+    def of_mesh(cls, mesh: trimesh.Trimesh, bounds_or_layer_mm: ArrayLike, tile_mm: float) -> LayeredStock:
+        """A closed mesh, cut at the middles of the layers; it is kept for :meth:`refine`.
+
+        Parameters
+        ----------
+        bounds_or_layer_mm : thickest layer [mm] (layers are equal), or (n + 1,) bounds that hold the mesh
+        tile_mm : longest side of a tile [mm]; two to four cutter diameters
+
+        Raises
+        ------
+        InputError
+            The mesh is not closed (with the number of open edges), or the bounds do not hold it.
+        """
+        if len(mesh.faces) == 0:
+            raise InputError("stock: the mesh has no triangles")
+        require_closed(mesh, "stock")
+        part = trimesh.Trimesh(np.array(mesh.vertices), np.array(mesh.faces), process=False)
+        (x0, y0, z0), (x1, y1, z1) = part.bounds
+        bounds = _bounds(bounds_or_layer_mm, float(z0), float(z1))
+        if bounds[0] > z0 or bounds[-1] < z1:
+            raise InputError(
+                f"stock.bounds from {bounds[0]:g} to {bounds[-1]:g} mm: must hold the mesh, {z0:g} to {z1:g} mm"
+            )
+        xs, ys = _borders(x0, x1, tile_mm), _borders(y0, y1, tile_mm)
+        boxes = _boxes(xs, ys, len(bounds) - 1)
+        return cls(bounds, xs, ys, _cut_up(part, 0.5 * (bounds[:-1] + bounds[1:]), boxes), part)
+
+    @property
+    def layers(self) -> int:
+        """Number of layers n."""
+        return len(self.tiles)
+
+    @property
+    def thickness(self) -> Floats:
+        """(n,) float [mm]."""
+        return np.diff(self.bounds)
+
+    @property
+    def heights(self) -> Floats:
+        """(n,) float [mm]: the middle of each layer, where its section is taken."""
+        return 0.5 * (self.bounds[:-1] + self.bounds[1:])
+
+    def layers_between(self, z0: float, z1: float) -> range:
+        """Layers that reach into the open interval z0 < z < z1 [mm]."""
+        first = int(np.searchsorted(self.bounds, z0, "right")) - 1
+        last = int(np.searchsorted(self.bounds, z1, "left"))
+        return range(max(first, 0), max(min(last, self.layers), first, 0))
+
+    def section(self, layer: int) -> MultiPolygon:
+        """What is left of a layer, its tiles joined."""
+        parts = polygons(shapely.union_all(self.tiles[self._layer(layer)].ravel()))
+        return MultiPolygon(parts)
+
+    def area(self, layer: int) -> float:
+        """Area that is left of a layer [mm^2]."""
+        return math.fsum(shapely.area(self.tiles[self._layer(layer)]).ravel())
+
+    def volumes(self) -> Floats:
+        """(n,) float [mm^3] that is left of each layer."""
+        areas = shapely.area(self.tiles).reshape(self.layers, -1)
+        return np.array([math.fsum(row) for row in areas]) * self.thickness
+
+    def volume(self) -> float:
+        """What is left [mm^3]."""
+        return math.fsum(self.volumes())
+
+    def remove(self, layer: int, polygon: Polygon | MultiPolygon) -> list[Polygon]:
+        """Take a polygon from a layer; what was really taken, see :meth:`remove_many`."""
+        return self.remove_many([layer], [polygon])[0]
+
+    def remove_many(
+        self, layers: Sequence[int] | Ints, shapes: Sequence[Polygon | MultiPolygon] | Shapes
+    ) -> list[list[Polygon]]:
+        """Take polygon k from layer ``layers[k]``, for all k; in turn where a layer comes more than once.
+
+        Returns
+        -------
+        For each k the pieces that were there and were taken, joined over the tiles; none: an empty list. What is taken
+        and what is left add up to what was there but for rounding. Pieces as thin as rounding come back like others.
+
+        Raises
+        ------
+        InputError
+            A layer is not there, or a shape crosses itself or is no polygon; nothing is removed.
+        """
+        rows = np.asarray(layers, dtype=np.int64)
+        given = np.empty(len(shapes), dtype=object)
+        given[:] = list(shapes)
+        if rows.shape != given.shape:
+            raise InputError(f"stock: {len(rows)} layers for {len(given)} polygons: one layer a polygon")
+        for i in rows:
+            self._layer(int(i))
+        if not (np.isin(shapely.get_type_id(given), (POLYGON, MULTIPOLYGON)) & shapely.is_valid(given)).all():
+            raise InputError("stock: a shape to remove is no polygon or crosses itself: mend it first")
+        chips: list[list[Polygon]] = [[] for _ in rows]
+        for turn in _turns(rows):
+            self._take(turn, rows, given, chips)
+        return chips
+
+    def refine(self, z0: float, z1: float, layer_mm: float) -> None:
+        """Split the layers that reach into z0 < z < z1 [mm] into equal ones until none is thicker than ``layer_mm``.
+
+        A layer from which nothing was removed is cut from the mesh again at the new middles; where there is no mesh, or
+        something was removed, the new layers have the polygons of the old one, and the volume stays.
+        """
+        if not layer_mm > 0.0:
+            raise InputError(f"stock.layer_mm = {layer_mm:g}: must be above 0")
+        levels: list[float] = []
+        for i in self.layers_between(z0, z1):
+            parts = math.ceil(self.thickness[i] / layer_mm * (1.0 - 1e-12))
+            levels += np.linspace(self.bounds[i], self.bounds[i + 1], parts + 1)[1:-1].tolist()
+        self._split(np.array(levels))
+
+    def refine_at(self, levels: ArrayLike, within: float = 1e-9) -> None:
+        """Make heights [mm] bounds of layers, as :meth:`refine` does; those ``within`` [mm] of a bound are left out."""
+        fresh: list[float] = []
+        for z in np.sort(np.asarray(levels, dtype=np.float64).ravel()).tolist():
+            if self.bounds[0] < z < self.bounds[-1] and np.abs(np.array([*self.bounds, *fresh]) - z).min() > within:
+                fresh.append(z)
+        self._split(np.array(fresh))
+
+    def _split(self, levels: Floats) -> None:
+        """Add bounds."""
+        if not len(levels):
+            return
+        bounds = np.sort(np.concatenate([self.bounds, levels]))
+        heights = 0.5 * (bounds[:-1] + bounds[1:])
+        parents = np.searchsorted(self.bounds, heights, "right") - 1
+        boxes = _boxes(self.xs, self.ys, len(heights))
+        again = ~self.cut[parents] & (np.bincount(parents)[parents] > 1)
+        self.bounds, self.cut, self.tiles = bounds, self.cut[parents], self.tiles[parents]
+        if self.part is not None:
+            self.tiles[again] = _cut_up(self.part, heights[again], boxes)
+
+    def mesh(self) -> trimesh.Trimesh:
+        """What is left as one closed mesh [mm], the prism of each layer by itself, z up."""
+        return prisms([polygons(self.section(i)) for i in range(self.layers)], self.bounds)
+
+    def to_glb(self) -> bytes:
+        """What is left as binary glTF: in metres, y up, as that format has it."""
+        return glb(self.mesh())
+
+    def state(self) -> tuple[Floats, Shapes, NDArray[np.bool_]]:
+        """What :meth:`restore` needs to take back all that is done from now on."""
+        return self.bounds, self.tiles.copy(), self.cut.copy()
+
+    def restore(self, state: tuple[Floats, Shapes, NDArray[np.bool_]]) -> None:
+        """The stock as it was."""
+        self.bounds, self.tiles, self.cut = state[0], state[1].copy(), state[2].copy()
+
+    def save(self, path: str | Path) -> None:
+        """Write all of it to one ``.npz`` file, whole or not at all."""
+        part = self.part
+        vertices = np.zeros((0, 3)) if part is None else np.asarray(part.vertices, dtype=np.float64)
+        faces = np.zeros((0, 3), dtype=np.int64) if part is None else np.asarray(part.faces, dtype=np.int64)
+        arrays = {"bounds": self.bounds, "xs": self.xs, "ys": self.ys, "cut": self.cut}
+        write_shapes(path, KIND, arrays | {"vertices": vertices, "faces": faces}, self.tiles.ravel())
+
+    @classmethod
+    def load(cls, path: str | Path) -> LayeredStock:
+        """Read what :meth:`save` wrote; the stock goes on as the one that was saved, bit for bit.
+
+        Raises
+        ------
+        InputError
+            The file is missing, damaged, or holds something else.
+        """
+        a, tiles = read_shapes(path, KIND, {"bounds": 1, "xs": 1, "ys": 1, "cut": 1, "vertices": 2, "faces": 2})
+        axes = (a["bounds"], a["xs"], a["ys"])
+        shape = (len(a["bounds"]) - 1, len(a["ys"]) - 1, len(a["xs"]) - 1)
+        vertices, faces = a["vertices"], a["faces"]
+        if (
+            min(shape) < 1
+            or not all(np.isfinite(v).all() and (np.diff(v) > 0.0).all() for v in axes)
+            or len(tiles) != math.prod(shape)
+            or a["cut"].shape != shape[:1]
+            or vertices.shape[1] != 3
+            or faces.shape[1] != 3
+            or (len(faces) > 0 and not (faces.min() >= 0 and faces.max() < len(vertices)))
+        ):
+            raise InputError(f"stock.file = {Path(path).name}: damaged: its parts do not fit each other")
+        part = trimesh.Trimesh(vertices, faces.astype(np.int64), process=False) if len(faces) else None
+        stock = cls(axes[0], axes[1], axes[2], tiles.reshape(shape), part)
+        stock.cut = a["cut"].astype(np.bool_)
+        return stock
+
+    def _take(self, turn: Ints, rows: Ints, given: Shapes, chips: list[list[Polygon]]) -> None:
+        """Remove the shapes numbered ``turn``, no two of one layer."""
+        x0, y0, x1, y1 = shapely.bounds(given[turn]).reshape(-1, 4).T
+        with np.errstate(invalid="ignore"):
+            ia, ib = _span(self.xs, x0, x1)
+            ja, jb = _span(self.ys, y0, y1)
+        which: list[tuple[int, int, int, int]] = []
+        for k, a, b, c, d in zip(turn, ia, ib, ja, jb, strict=True):
+            which += [(k, rows[k], j, i) for j, i in itertools.product(range(c, d), range(a, b))]
+        if not which:
+            return
+        k, layer, j, i = np.array(which, dtype=np.int64).T
+        before, shape = self.tiles[layer, j, i], given[k]
+        taken = shapely.intersection(before, shape)
+        parts, pair = shapely.get_parts(taken, return_index=True)
+        solid = (shapely.get_type_id(parts) == POLYGON) & (shapely.area(parts) > 0.0)
+        parts, pair = parts[solid], pair[solid]
+        hit = np.unique(pair)
+        self.tiles[layer[hit], j[hit], i[hit]] = shapely.difference(before[hit], shape[hit])
+        self.cut[layer[hit]] = True
+        for n, part in zip(k[pair].tolist(), parts, strict=True):
+            chips[n].append(part)
+        several, tiles = np.unique(k[hit], return_counts=True)
+        for n in several[tiles > 1].tolist():
+            chips[n] = polygons(shapely.union_all(chips[n]))
+
+    def _layer(self, layer: int) -> int:
+        if not 0 <= layer < self.layers:
+            raise InputError(f"stock: layer {layer}: must be from 0 to {self.layers - 1}")
+        return layer
+
+
+def polygons(shape: Any) -> list[Polygon]:
+    """The polygons of a geometry that have an area; its lines and points are left out."""
+    parts = shapely.get_parts(shape)
+    return list(parts[(shapely.get_type_id(parts) == POLYGON) & (shapely.area(parts) > 0.0)])
+
+
+def _cut_up(part: trimesh.Trimesh, heights: Floats, boxes: Shapes) -> Shapes:
+    """(n, rows, columns) tiles of the sections of a mesh."""
+    whole = np.empty((len(heights), 1, 1), dtype=object)
+    whole[:, 0, 0] = sections(part, heights)
+    shapely.prepare(whole)
+    tiles = shapely.intersection(boxes, whole)
+    for at in zip(*np.nonzero(~np.isin(shapely.get_type_id(tiles), (POLYGON, MULTIPOLYGON))), strict=True):
+        tiles[at] = MultiPolygon(polygons(tiles[at]))
+    return np.asarray(tiles)
+
+
+def _turns(rows: Ints) -> list[Ints]:
+    """Numbers 0 .. len(rows) - 1 in groups, so that no layer comes twice in a group."""
+    order = np.argsort(rows, kind="stable")
+    ranks = np.empty(len(rows), dtype=np.int64)
+    first = np.flatnonzero(np.diff(rows[order], prepend=-1))
+    ranks[order] = np.arange(len(rows)) - np.repeat(first, np.diff([*first, len(rows)]))
+    return [np.flatnonzero(ranks == turn) for turn in range(int(ranks.max(initial=-1)) + 1)]
+
+
+def _span(borders: Floats, low: Floats, high: Floats) -> tuple[Ints, Ints]:
+    """First and last + 1 of the tiles that the open intervals low .. high reach into; not a number: none."""
+    a = np.clip(np.searchsorted(borders, low, "right") - 1, 0, None)
+    b = np.clip(np.searchsorted(borders, high, "left"), 0, len(borders) - 1)
+    return a, np.where(high > low, b, 0)
+
+
+def _bounds(bounds_or_layer_mm: ArrayLike, low: float, high: float) -> Floats:
+    """(n + 1,) bounds [mm] of the layers: as given, or equal ones no thicker than the number given."""
+    given = np.asarray(bounds_or_layer_mm, dtype=np.float64)
+    if given.ndim == 0:
+        thickest = float(given)
+        if not 0.0 < thickest < math.inf:
+            raise InputError(f"stock.layer_mm = {thickest:g}: must be above 0")
+        given = np.linspace(low, high, max(1, math.ceil((high - low) / thickest * (1.0 - 1e-12))) + 1)
+    if given.ndim != 1 or len(given) < 2 or not np.isfinite(given).all() or not (np.diff(given) > 0.0).all():
+        raise InputError("stock.bounds: must be two or more ascending heights [mm]")
+    return given
+
+
+def _borders(low: float, high: float, tile_mm: float) -> Floats:
+    """Borders [mm] of equal tiles no longer than ``tile_mm``."""
+    if not 0.0 < tile_mm < math.inf:
+        raise InputError(f"stock.tile_mm = {tile_mm:g}: must be above 0; two to four cutter diameters")
+    return np.linspace(low, high, max(1, math.ceil((high - low) / tile_mm * (1.0 - 1e-12))) + 1)
+
+
+def _boxes(xs: Floats, ys: Floats, layers: int) -> Shapes:
+    """(rows, columns) squares of the tiles."""
+    if layers * len(xs) * len(ys) > TILE_LIMIT:
+        raise InputError(
+            f"stock: {layers} layers of {len(xs) - 1} x {len(ys) - 1} tiles: at most {TILE_LIMIT} in all: "
+            "take larger tiles or thicker layers"
+        )
+    boxes: Shapes = shapely.box(xs[None, :-1], ys[:-1, None], xs[None, 1:], ys[1:, None])
+    return boxes

@@ -1,0 +1,85 @@
+"""Arrays and plane geometries in one ``.npz`` file that executes nothing when it is read.
+
+Notation: geometries are well-known binary (WKB, little-endian), one after the other in ``wkb`` as bytes; geometry i is
+``wkb[ends[i - 1]:ends[i]]``. ``kind`` says what the file is. Coordinates come back bit for bit.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+import tokenize
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from chipload.errors import InputError
+from chipload.files import write_whole
+
+#: what a damaged archive, array or its header makes the readers raise
+UNREADABLE = (
+    *(ValueError, TypeError, KeyError, AttributeError, EOFError, OSError, RuntimeError, SyntaxError),
+    *(ArithmeticError, MemoryError, struct.error, tokenize.TokenError, zipfile.BadZipFile, zlib.error),
+)
+
+
+def write_shapes(path: str | Path, kind: str, arrays: dict[str, NDArray[Any]], shapes: NDArray[np.object_]) -> None:
+    """Write named arrays and (n,) geometries, whole or not at all; the same values give the same bytes."""
+    binary = shapely.to_wkb(shapes, byte_order=1)
+    out = io.BytesIO()
+    np.savez_compressed(
+        out,
+        allow_pickle=False,
+        kind=np.frombuffer(kind.encode(), dtype=np.uint8),
+        wkb=np.frombuffer(b"".join(binary), dtype=np.uint8),
+        ends=np.cumsum([len(b) for b in binary], dtype=np.int64),
+        **arrays,
+    )
+    write_whole(path, out.getvalue())
+
+
+def read_shapes(
+    path: str | Path, kind: str, names: dict[str, int]
+) -> tuple[dict[str, NDArray[Any]], NDArray[np.object_]]:
+    """What :func:`write_shapes` wrote: the arrays ``names`` with their numbers of dimensions, and the geometries.
+
+    Raises
+    ------
+    InputError
+        The file is missing, damaged, of another kind, or holds other than numbers, polygons and multipolygons.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise InputError(f"stock.file = {file}: no such file")
+    damaged = InputError(f"stock.file = {file.name}: damaged: save the stock again")
+    try:
+        with np.load(io.BytesIO(file.read_bytes()), allow_pickle=False) as data:
+            if not isinstance(data, np.lib.npyio.NpzFile):
+                raise damaged
+            if "kind" not in data or data["kind"].dtype != np.uint8 or data["kind"].tobytes() != kind.encode():
+                raise InputError(f"stock.file = {file.name}: not a file of the kind '{kind}'")
+            arrays = {key: np.asarray(data[key]) for key in names}
+            wkb, ends = data["wkb"], data["ends"]
+    except UNREADABLE:
+        raise damaged from None
+    numbers = all(arrays[key].ndim == n and arrays[key].dtype.kind in "biuf" for key, n in names.items())
+    if not (numbers and wkb.dtype == np.uint8 and ends.dtype == np.int64 and wkb.ndim == ends.ndim == 1):
+        raise damaged
+    starts = np.concatenate([[0], ends[:-1]]) if len(ends) else ends
+    if (ends < starts).any() or (starts < 0).any() or (int(ends[-1]) if len(ends) else 0) != len(wkb):
+        raise damaged
+    whole = wkb.tobytes()
+    binary = np.empty(len(ends), dtype=object)
+    binary[:] = [whole[a:b] for a, b in zip(starts.tolist(), ends.tolist(), strict=True)]
+    try:
+        shapes: NDArray[np.object_] = shapely.from_wkb(binary)
+    except shapely.errors.ShapelyError:
+        raise damaged from None
+    if not (np.isin(shapely.get_type_id(shapes), (3, 6)).all() and np.isfinite(shapely.get_coordinates(shapes)).all()):
+        raise damaged
+    return arrays, shapes
