@@ -27,10 +27,10 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting.bites import bites_of_arcs
 from chipload.cutting.force import forces_over_turn, mean_forces
 from chipload.cutting.material import Material
 from chipload.cutting.turns import Cut, Turns, turns_of
+from chipload.engagement.bites import bites_of_arcs
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
