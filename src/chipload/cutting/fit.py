@@ -27,10 +27,10 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting.bites import bites_of_arcs
 from chipload.cutting.force import forces_over_turn, mean_forces
 from chipload.cutting.material import Material
 from chipload.cutting.turns import Cut, Turns, turns_of
+from chipload.engagement.bites import bites_of_arcs
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -303,14 +303,16 @@ def predicted(fit: Fit, cut: Cut, theta: Floats, resonance: Floats | None = None
 def _turned(fit: Fit, cut: Cut, p: Floats, theta: Floats, harmonics: int | None, resonance: Floats) -> Floats:
     """As :func:`predicted` for any runout and coefficients p, of the first harmonics or of all."""
     cutter = replace(fit.cutter, runout=(math.hypot(p[0], p[1]), math.atan2(p[1], p[0])))
-    top = TURN // 2 - 1 if harmonics is None else harmonics
-    if harmonics is None and not np.isfinite(resonance).any():
-        force = unit_forces(cut, cutter, theta) @ p[2:]
-        return np.asarray(np.where(fit.known, force, np.nan))
-    k = np.arange(top + 1, dtype=np.float64)
-    amplitude = (unit_harmonics(cut, cutter, top) @ p[2:]) * dynamometer(resonance, k * cut.speed)
-    wave = np.exp(1j * np.outer(theta, k[1:]))
-    force = amplitude[0].real + 2.0 * (wave @ amplitude[1:]).real
+    rings = np.isfinite(resonance[:, 0])
+    force = np.full((len(theta), 3), np.nan)
+    if harmonics is None and not rings.all():
+        force[:] = unit_forces(cut, cutter, theta) @ p[2:]
+    if harmonics is not None or rings.any():
+        k = np.arange(TURN // 2 if harmonics is None else harmonics + 1, dtype=np.float64)
+        amplitude = (unit_harmonics(cut, cutter, len(k) - 1) @ p[2:]) * dynamometer(resonance, k * cut.speed)
+        wave = np.exp(1j * np.outer(theta, k[1:]))
+        summed = amplitude[0].real + 2.0 * (wave @ amplitude[1:]).real
+        force = np.where(rings | (harmonics is not None), summed, force)
     return np.asarray(np.where(fit.known, force, np.nan))
 
 

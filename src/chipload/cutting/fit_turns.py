@@ -48,7 +48,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 #: rotations and directions of the runout that a search starts from
-PHASES, DIRECTIONS = 180, 6
+PHASES, DIRECTIONS = 72, 6
 #: how often coefficients and dynamometer are found in turn
 ROUNDS = 4
 #: sizes of the runout that a search starts from, in parts of the least feed per tooth

@@ -11,7 +11,6 @@ import shutil
 import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
-from html import escape
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -37,7 +36,7 @@ UNITS = ("MPa", "MPa", "MPa", "N/mm", "N/mm", "N/mm")
 COLOURS = ("#0b7a75", "#3457a6", "#c9821a")
 SEEN = "#aab2bb"
 #: points of a cloud of samples, of a line
-CLOUD, LINE = 2500, 360
+CLOUD, LINE = 1200, 360
 #: what a summary of ours says of itself
 KIND = "fit"
 
@@ -255,16 +254,15 @@ def _span(interval: Floats) -> str:
 
 
 def _errors(done: Fitted) -> str:
-    head = ["file", "use", "feed [mm/min]", "channel", "mean, measured", "model", "off [%]"]
+    head = ["feed [mm/min]", "use", "channel", "mean, measured [N]", "model [N]", "off [%]"]
     head += ["peaks, measured [N]", "model [N]", "off [%]"]
     rows = []
     for c in done.comparisons:
         feed = f"{mm_min_from_mm_s(c.cut.feed):g}"
         rows += [
             [
-                escape(c.cut.name),
-                c.use,
                 feed,
+                c.use,
                 CHANNELS[k],
                 f"{c.mean[k]:.4g}",
                 f"{_said(c.said.mean[k])} &plusmn; {_said(c.said.half[0, k], '?')}",
@@ -276,7 +274,7 @@ def _errors(done: Fitted) -> str:
             for k in np.flatnonzero(c.cut.measured)
         ]
     used = [row[1] == "predict" for row in rows]
-    return table(head, rows, numbers=(2, 4, 5, 6, 7, 8, 9), used=used)
+    return table(head, rows, numbers=(3, 4, 5, 6, 7, 8), used=used)
 
 
 def _means(done: Fitted) -> go.Figure:
@@ -285,7 +283,7 @@ def _means(done: Fitted) -> go.Figure:
     cuts = [c.cut for c in done.comparisons]
     flutes = done.fit.cutter.flutes
     largest = max(cuts, key=lambda c: c.feed_per_tooth(flutes))
-    feeds = np.linspace(0.05, 1.1, 12)
+    feeds = np.linspace(0.02, 1.1, 40)
     along = [replace(largest, feed=largest.feed * x) for x in feeds]
     x = np.array([c.feed_per_tooth(flutes) for c in along])
     said = [predict(done.fit, c) for c in along]
@@ -302,7 +300,7 @@ def _means(done: Fitted) -> go.Figure:
                         showlegend=False,
                     )
                 )  # fmt: skip
-            out.add_trace(go.Scatter(x=x, y=mean, name=CHANNELS[k], line={"color": colour, "width": 2}))
+            out.add_trace(go.Scatter(x=x, y=mean, name=CHANNELS[k], mode="lines", line={"color": colour, "width": 2}))
         for use, symbol in (("fit", "circle"), ("predict", "circle-open")):
             mine = [c for c in done.comparisons if c.use == use and c.cut.measured[k]]
             out.add_trace(
@@ -327,6 +325,7 @@ def _turn(done: Fitted, left: bool) -> go.Figure:
         horizontal_spacing=0.03, column_titles=titles,
     )  # fmt: skip
     angles = np.linspace(0.0, math.tau, LINE)
+    reach = np.full((3, 2), [math.inf, -math.inf])
     for col, c in enumerate(cuts, start=1):
         n = len(c.cut.force)
         some = np.unique(np.linspace(0, n - 1, min(n, CLOUD)).astype(int))
@@ -334,9 +333,12 @@ def _turn(done: Fitted, left: bool) -> go.Figure:
         model = predicted(done.fit, c.cut, theta if left else angles)
         for row, k in enumerate(shown, start=1):
             y = c.cut.force[some, k] - model[:, k] if left else c.cut.force[some, k]
+            both = y if left or not np.isfinite(model[:, k]).all() else np.concatenate([y, model[:, k]])
+            if np.isfinite(both).any():
+                reach[k] = min(reach[k, 0], np.nanmin(both)), max(reach[k, 1], np.nanmax(both))
             dots = {"color": COLOURS[k] if left else SEEN, "size": 3}
             out.add_trace(
-                go.Scattergl(
+                go.Scatter(
                     x=np.degrees(theta).astype(np.float32), y=y.astype(np.float32), mode="markers", marker=dots,
                     showlegend=False,
                 ),
@@ -345,12 +347,18 @@ def _turn(done: Fitted, left: bool) -> go.Figure:
             if not left:
                 line = {"color": COLOURS[k], "width": 2.2}
                 out.add_trace(
-                    go.Scatter(x=np.degrees(angles), y=model[:, k], line=line, showlegend=False), row=row, col=col
+                    go.Scatter(x=np.degrees(angles), y=model[:, k], mode="lines", line=line, showlegend=False),
+                    row=row,
+                    col=col,
                 )
             out.add_hline(y=0.0, line={"color": LIMIT if left else INK, "width": 0.7}, row=row, col=col)
             if col == 1:
                 out.update_yaxes(title_text=f"{CHANNELS[k]} [N]", row=row, col=col)
         out.update_xaxes(title_text="rotation of tooth 0 [deg]", row=len(shown), col=col)
+    for row, k in enumerate(shown, start=1):
+        if np.isfinite(reach[k]).all():
+            room = 0.06 * (reach[k, 1] - reach[k, 0])
+            out.update_yaxes(range=[reach[k, 0] - room, reach[k, 1] + room], row=row)
     out.update_xaxes(tickvals=[0, 90, 180, 270, 360], range=[0, 360])
     return _styled(out, 90 + 190 * len(shown))
 
