@@ -265,7 +265,7 @@ def _check_job(job: Path, sets: Sequence[str]) -> int:
     if isinstance(read, ProgramJob):
         from chipload.report.reading import verdict
 
-        done = run_program(read)
+        done = run_program(read, simulate=False)
         for f in (*done.reading.noticed, *done.reading.broken):
             typer.echo(_said(f))
         typer.echo(f"{job.name}: {verdict(done)[1]}")

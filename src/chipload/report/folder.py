@@ -114,7 +114,7 @@ def _ours(folder: Path) -> bool:
         return (
             isinstance(holds, dict)
             and "holds" in holds
-            and all(p.name in NAMES or p.suffix in (".ngc", ".nc", ".apt") for p in folder.iterdir())
+            and all(p.name in NAMES or p.suffix in (".ngc", ".nc", ".apt", ".npz") for p in folder.iterdir())
         )
     except (OSError, ValueError):
         return False

@@ -1,6 +1,7 @@
-"""The result of running a program that exists: what it does on the machine, by line; it is read, not yet simulated.
+"""The result of running a program that exists: what it does on the machine, by line, and to its stock.
 
-So its verdict is never better than `unproven`: the machine's limits may hold, what the cutter meets is not known.
+The verdict over a program that was only read is never better than `unproven`: the machine's limits may hold, what the
+cutter meets is not known.
 """
 
 from __future__ import annotations
@@ -27,7 +28,9 @@ from chipload.program.program import DWELL, RAPID, Program
 from chipload.program.read import Reading
 from chipload.program.time import program_time
 from chipload.report.figures import FONT, GRID, LIMIT, SCALE, SPACE_POINTS, STOCK
-from chipload.report.sheet import definitions, figure, framed, heading, table
+from chipload.report.sheet import definitions, figure, framed, heading, items, table
+from chipload.report.simulated import Simulated, operation, sections
+from chipload.report.simulated import history as steps
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
 
 Floats = NDArray[np.float64]
@@ -51,6 +54,7 @@ class Read:
     lines, seconds : (m,) lines of the source that move, and their times [s]
     machine : that it was read for
     provenance : JSON values: hashes of the inputs, versions
+    simulated : what the program does to its stock; None: it was only read
     """
 
     title: str
@@ -60,6 +64,7 @@ class Read:
     seconds: Floats
     machine: Machine
     provenance: Mapping[str, Any]
+    simulated: Simulated | None = None
 
 
 def verdict(read: Read) -> tuple[bool, str]:
@@ -68,7 +73,21 @@ def verdict(read: Read) -> tuple[bool, str]:
     if bad:
         more = f"; and {len(bad) - 1} more" if len(bad) > 1 else ""
         return False, f"Does not hold: {_said(bad[0])}{more}."
+    if read.simulated is not None:
+        fails = read.simulated.fails
+        if fails:
+            more = f"; and {len(fails) - 1} more" if len(fails) > 1 else ""
+            return False, f"Does not hold: {fails[0]}{more}."
+        held = ", ".join(h.says for h in read.simulated.held)
+        return True, f"Every stated limit holds in the simulation: {held}."
     return False, f"Unproven: the limits of machine {read.machine.name} hold; what the cutter meets was not simulated."
+
+
+def _status(read: Read) -> str:
+    """`failed`, `unproven` or `simulated`."""
+    if not verdict(read)[0] and (read.reading.broken or read.simulated is not None):
+        return "failed"
+    return "unproven" if read.simulated is None else "simulated"
 
 
 def _said(finding: Finding) -> str:
@@ -107,7 +126,8 @@ def summary_bytes(read: Read) -> bytes:
         "holds": holds,
         "says": says,
         "job": read.title,
-        "program": numbers(read) | {"status": "failed" if read.reading.broken else "unproven"},
+        "program": numbers(read) | {"status": _status(read)},
+        "operations": [operation(read.simulated)] if read.simulated is not None else [],
         "machine": read.machine.name,
         "broken": rows(read.reading.broken),
         "findings": rows(read.reading.noticed),
@@ -149,7 +169,7 @@ def row_times(read: Read) -> Floats:
 
 def history_bytes(read: Read) -> bytes:
     """history.parquet."""
-    columns = history(read)
+    columns = history(read) if read.simulated is None else steps(read.simulated)
     n = len(columns["pass"])
     data = {"operation": pa.array(np.zeros(n, dtype=np.int32)), "strategy": pa.array(["program"] * n)}
     data |= {k: pa.array(v.tolist() if v.dtype == object else np.ascontiguousarray(v)) for k, v in columns.items()}
@@ -159,7 +179,7 @@ def history_bytes(read: Read) -> bytes:
 
 
 def scene_bytes(read: Read) -> bytes:
-    """scene.glb: rapids and cutting motions as lines; lengths are mm, Z is up."""
+    """scene.glb: rapids and cutting motions as lines, what is left of the stock; lengths are mm, Z is up."""
     points, rapid = _drawn(read.reading.program)
     scene = trimesh.Scene()
     for name, chosen, colour in (("rapids", rapid, (179, 38, 30, 255)), ("path", ~rapid, (34, 120, 132, 255))):
@@ -170,21 +190,26 @@ def scene_bytes(read: Read) -> bytes:
         if entities:
             path = trimesh.path.Path3D(entities=entities, vertices=points, process=False)
             scene.add_geometry(path, node_name=name, geom_name=name)
+    if read.simulated is not None:
+        stock = read.simulated.stock.mesh()
+        stock.visual.face_colors = (168, 122, 58, 255)
+        scene.add_geometry(stock, node_name="stock", geom_name="stock")
     glb: bytes = scene.export(file_type="glb", extension_webp=False)
     return glb
 
 
 def program_files(read: Read) -> dict[str, bytes]:
-    """CL data of the program."""
+    """CL data of the program, and the stock that it leaves."""
     text = write_apt(read.reading.program, None, title=f"{read.title}, {read.name}", verified=False)
-    return {"0-program.apt": text.encode("ascii")}
+    files = {"0-program.apt": text.encode("ascii")}
+    return files if read.simulated is None else files | {"stock.npz": read.simulated.stock.to_bytes()}
 
 
 def page_bytes(read: Read) -> bytes:
     """report.html."""
     holds, says = verdict(read)
     bad = read.reading.broken
-    word = "Does not hold" if bad else "Unproven"
+    word = "Holds" if holds else "Unproven" if _status(read) == "unproven" else "Does not hold"
     figures: dict[str, go.Figure] = {}
     what = numbers(read)
     minutes = what["time_s"] / 60.0
@@ -192,6 +217,8 @@ def page_bytes(read: Read) -> bytes:
     box = ", ".join(f"{x} {a:.4g} to {b:.4g}" for x, a, b in zip("XYZ", low, high, strict=True))
     body = [*heading(read.title, holds, word, says.removeprefix(f"{word}: ").capitalize())]
     body += _findings("What does not hold", bad)
+    if read.simulated is not None and read.simulated.fails:
+        body += ["<h3>What the simulation found</h3>", items(read.simulated.fails[:LISTED])]
     body += [
         f"<h2>{escape(read.name)} on {escape(read.machine.name)}</h2>",
         f"<p>{what['motions']} motions, {what['cutting_mm']:.5g} mm at feed and {what['rapid_mm']:.5g} mm of rapids, "
@@ -204,8 +231,9 @@ def page_bytes(read: Read) -> bytes:
         "<h3>Lines that take longest</h3>",
         _slowest(read),
         *_findings("What the reader noticed", read.reading.noticed),
+        *(sections(read.simulated, figures) if read.simulated is not None else ()),
         "<h2>What was not checked</h2>",
-        "<p>Removal, engagement, force, collision: the program was only held against the limits of the machine.</p>",
+        f"<p>{_unchecked(read)}</p>",
         "<h2>Where the numbers come from</h2>",
         definitions(read.provenance),
     ]
@@ -298,6 +326,17 @@ def _slowest(read: Read) -> str:
         if read.seconds[k] > 0.0
     ]
     return table(["line", "time [s]", "of all [%]"], rows, numbers=(1, 2))
+
+
+def _unchecked(read: Read) -> str:
+    if read.simulated is None:
+        return "Removal, engagement, force, collision: the program was only held against the limits of the machine."
+    names = ", ".join(read.simulated.unchecked)
+    limits = f" No limit is stated for {escape(names)}." if names else ""
+    return (
+        "Whether the cutter leaves the part right, and whether shank, holder or fixtures collide: neither part nor "
+        f"fixtures are known to this job.{limits}"
+    )
 
 
 def _findings(title: str, findings: tuple[Finding, ...]) -> list[str]:

@@ -23,8 +23,9 @@ from numpy.typing import ArrayLike, NDArray
 from shapely import MultiPolygon, Polygon
 
 from chipload.errors import InputError
+from chipload.files import write_whole
 from chipload.geometry.mesh import require_closed, sections
-from chipload.stock.shapes import read_shapes, write_shapes
+from chipload.stock.shapes import read_shapes, shape_bytes
 from chipload.stock.solid import glb, prisms
 
 Floats = NDArray[np.float64]
@@ -156,6 +157,35 @@ class LayeredStock:
         """Area that is left of a layer [mm^2]."""
         return math.fsum(shapely.area(self.tiles[self._layer(layer)]).ravel())
 
+    def edges(self, layers: range, low: ArrayLike, high: ArrayLike) -> tuple[Floats, Ints, Floats]:
+        """The rings in the tiles of neighbouring layers under a rectangle.
+
+        Parameters
+        ----------
+        low, high : (2,) float [mm], corners of the rectangle
+
+        Returns
+        -------
+        bounds : (l + 1,) float [mm], of the layers
+        start : (l + 1,) int; layer i has the edges start[i] .. start[i + 1] - 1
+        edges : (m, 4) float [mm], rows x0, y0, x1, y1; those that no ray along +x from the rectangle meets are left out
+        """
+        (x0, y0), (x1, y1) = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+        ia, ib = _span(self.xs, np.array([x0]), np.array([x1]))
+        ja, jb = _span(self.ys, np.array([y0]), np.array([y1]))
+        tiles = self.tiles[layers.start : layers.stop, ja[0] : jb[0], ia[0] : ib[0]]
+        width = max(tiles.shape[1] * tiles.shape[2], 1)
+        parts, tile = shapely.get_parts(tiles.ravel(), return_index=True)
+        rings, part = shapely.get_rings(parts, return_index=True)
+        points, ring = shapely.get_coordinates(rings, return_index=True)
+        joined = np.flatnonzero(ring[1:] == ring[:-1])
+        edges = np.hstack([points[joined], points[joined + 1]])
+        kept = (np.maximum(edges[:, 1], edges[:, 3]) >= y0) & (np.minimum(edges[:, 1], edges[:, 3]) <= y1)
+        kept &= np.maximum(edges[:, 0], edges[:, 2]) >= x0
+        layer = tile[part[ring[joined[kept]]]] // width
+        start = np.searchsorted(layer, np.arange(len(layers) + 1)).astype(np.int64)
+        return self.bounds[layers.start : layers.stop + 1], start, np.ascontiguousarray(edges[kept])
+
     def volumes(self) -> Floats:
         """(n,) float [mm^3] that is left of each layer."""
         areas = shapely.area(self.tiles).reshape(self.layers, -1)
@@ -251,11 +281,15 @@ class LayeredStock:
 
     def save(self, path: str | Path) -> None:
         """Write all of it to one ``.npz`` file, whole or not at all."""
+        write_whole(path, self.to_bytes())
+
+    def to_bytes(self) -> bytes:
+        """All of it as the bytes of a ``.npz`` file."""
         part = self.part
         vertices = np.zeros((0, 3)) if part is None else np.asarray(part.vertices, dtype=np.float64)
         faces = np.zeros((0, 3), dtype=np.int64) if part is None else np.asarray(part.faces, dtype=np.int64)
         arrays = {"bounds": self.bounds, "xs": self.xs, "ys": self.ys, "cut": self.cut}
-        write_shapes(path, KIND, arrays | {"vertices": vertices, "faces": faces}, self.tiles.ravel())
+        return shape_bytes(KIND, arrays | {"vertices": vertices, "faces": faces}, self.tiles.ravel())
 
     @classmethod
     def load(cls, path: str | Path) -> LayeredStock:

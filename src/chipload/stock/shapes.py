@@ -19,7 +19,6 @@ import shapely
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.files import write_whole
 
 #: what a damaged archive, array or its header makes the readers raise
 UNREADABLE = (
@@ -28,8 +27,8 @@ UNREADABLE = (
 )
 
 
-def write_shapes(path: str | Path, kind: str, arrays: dict[str, NDArray[Any]], shapes: NDArray[np.object_]) -> None:
-    """Write named arrays and (n,) geometries, whole or not at all; the same values give the same bytes."""
+def shape_bytes(kind: str, arrays: dict[str, NDArray[Any]], shapes: NDArray[np.object_]) -> bytes:
+    """A file of named arrays and (n,) geometries; the same values give the same bytes."""
     binary = shapely.to_wkb(shapes, byte_order=1)
     out = io.BytesIO()
     np.savez_compressed(
@@ -40,13 +39,13 @@ def write_shapes(path: str | Path, kind: str, arrays: dict[str, NDArray[Any]], s
         ends=np.cumsum([len(b) for b in binary], dtype=np.int64),
         **arrays,
     )
-    write_whole(path, out.getvalue())
+    return out.getvalue()
 
 
 def read_shapes(
     path: str | Path, kind: str, names: dict[str, int]
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.object_]]:
-    """What :func:`write_shapes` wrote: the arrays ``names`` with their numbers of dimensions, and the geometries.
+    """What :func:`shape_bytes` made: the arrays ``names`` with their numbers of dimensions, and the geometries.
 
     Raises
     ------

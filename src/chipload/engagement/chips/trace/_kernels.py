@@ -305,7 +305,8 @@ def _cross(p, q):
 @njit(cache=True, nogil=True)
 def loop(cp, ca, K, h, tol, vmin, knots, buf):
     """The covered area where its boundary is one simple loop: count of edges; NOTHING, GENERAL, FULL or
-    UNSETTLED, which more ``knots`` in time may mend."""
+    UNSETTLED, which more ``knots`` in time may mend.
+    """
     span = np.empty((4, 2))
     m = spans(cp, ca, K, h, 16, span)
     if m != 1:
@@ -349,7 +350,7 @@ def loop(cp, ca, K, h, tol, vmin, knots, buf):
     while count[i1] == 0:
         i1 -= 1
     for i in range(knots):
-        if i < i0 and around[i] <= 0 or i > i1 and around[i] >= 0 or i0 <= i <= i1 and count[i] != 2:
+        if (i < i0 and around[i] <= 0) or (i > i1 and around[i] >= 0) or (i0 <= i <= i1 and count[i] != 2):
             return GENERAL
     k = 0 if sign[i0, 0] == -1 else 1
     down0, up0 = R[i0, k].copy(), R[i0, 1 - k].copy()

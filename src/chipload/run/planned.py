@@ -5,11 +5,7 @@ Nothing is written here: the outcome is a value, and the report room writes it.
 
 from __future__ import annotations
 
-import hashlib
-import platform
-from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -21,16 +17,15 @@ from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.geometry.dxf import read_dxf
 from chipload.geometry.step import read_step_face
-from chipload.job import Job, OperationTable, ProgramJob
+from chipload.job import Job, OperationTable
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.contour.plan import Finishing, plan_contour
 from chipload.planning.front.plan import Clearing, plan_front
 from chipload.planning.result import OperationResult, StrategyResult
 from chipload.program.check import check_program
-from chipload.program.read import line_times, read_program, read_tools
 from chipload.progress import Progress, silent
 from chipload.report.outcome import Operation, Outcome, Proof
-from chipload.report.reading import Read
+from chipload.run.provenance import hashes, title_of, versions
 from chipload.simulation.verify import verify_contour
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
@@ -38,8 +33,6 @@ from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 ENGAGEMENT_DEG, GOUGE_MM, CHORDS_MM = 0.05, 1e-4, 1e-3
 #: passes that descend, whose engagement the simulation in the plane cannot compare; their path it does follow
 NOT_LEVEL = ("entry",)
-#: libraries whose version may change a number
-LIBRARIES = ("chipload", "numpy", "scipy", "numba", "shapely", "ezdxf", "cadquery-ocp-novtk")
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,44 +87,13 @@ def run_job(job: Job, progress: Progress = silent) -> Outcome:
         operations.append(_operation(job, inputs, op, part))
     progress(1.0, "done")
     return Outcome(
-        title=_title(job.path),
+        title=title_of(job.path),
         operations=tuple(operations),
         machine=inputs.machine,
         unchecked=job.unchecked,
         findings=(*job.findings, *inputs.findings),
         provenance=_provenance(job, inputs),
     )
-
-
-def run_program(job: ProgramJob, progress: Progress = silent) -> Read:
-    """Read the program of a job for its machine.
-
-    Raises
-    ------
-    InputError
-        A file cannot be read, or the controller would refuse the program.
-    """
-    machine = machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
-    table = job.table.program
-    reading = read_program(
-        job.program_file,
-        machine,
-        dialect=table.dialect,
-        tools=read_tools(job.tools_file) if job.tools_file is not None else None,
-        feed=mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None,
-        tolerance=table.tolerance_mm,
-        progress=progress,
-    )
-    lines, seconds = line_times(reading, machine)
-    files: dict[str, Path] = {"job": job.path, "program": job.program_file}
-    files |= {k: v for k, v in (("machine", job.machine), ("tools", job.tools_file)) if isinstance(v, Path)}
-    provenance = {
-        "inputs": _hashes(files),
-        "overrides": list(job.overrides),
-        "machine": f"{machine.name}: {machine.note}" if machine.note else machine.name,
-        "versions": _versions(),
-    }
-    return Read(_title(job.path), job.program_file.name, reading, lines, seconds, machine, provenance)
 
 
 def _operation(job: Job, inputs: Inputs, op: OperationTable, progress: Progress) -> Operation:
@@ -271,7 +233,7 @@ def _provenance(job: Job, inputs: Inputs) -> dict[str, Any]:
     files |= {f"cutter {k}": job.path.parent / c.file for k, c in enumerate(job.table.cutter) if c.file is not None}
     material = inputs.material
     return {
-        "inputs": _hashes(files),
+        "inputs": hashes(files),
         "overrides": list(job.overrides),
         "machine": inputs.machine.name,
         "material": {
@@ -280,17 +242,5 @@ def _provenance(job: Job, inputs: Inputs) -> dict[str, Any]:
             "source": material.source,
             "conditions": material.conditions,
         },
-        "versions": _versions(),
+        "versions": versions(),
     }
-
-
-def _hashes(files: Mapping[str, Path]) -> dict[str, str]:
-    return {name: f"{path.name} sha256 {hashlib.sha256(path.read_bytes()).hexdigest()}" for name, path in files.items()}
-
-
-def _versions() -> dict[str, str]:
-    return {name: version(name) for name in LIBRARIES} | {"python": platform.python_version()}
-
-
-def _title(path: Path) -> str:
-    return path.parent.name if path.stem == "job" else path.stem

@@ -1,0 +1,135 @@
+"""The bites of a cutter in a layered workpiece: from where to where each slice of each tooth cuts, and how thick.
+
+Notation: p, A tip [mm] and unit axis at an instant, T, n with T x n = A (n mirrored where the spindle turns
+counter-clockwise), phi immersion, u = cos(phi) n + sin(phi) T; a slice of the cutter is a circle of radius rho at the
+height z, its surface has the outward normal nu = sin(kappa) u - cos(kappa) A. V [mm], W [rad] what the tip moves and
+the axis turns while the spindle turns by one tooth.
+
+A point p + z A + rho u moves by V + W x (z A + rho u) in that time, so that the chip is as thick as its normal part:
+
+    h = sin(kappa) u . (V + z W x A) - rho cos(kappa) u . (A x W) - cos(kappa) V . A,
+
+a sinusoid of phi, f_z sin(phi) for a flank that moves across its axis, the feed per tooth on the bottom of a plunge. A
+tooth cuts where h > 0 and the point is in the material that the move before it has left.
+
+The material is known in layers, each by its section at half its height. A face that looks down is held against the
+layer whose middle lies next below it, one that looks sideways against the layer that it is in: the depth is then right
+to the thickness of a layer on slopes, and exactly on an upright flank.
+
+Reference: [Chips2017] for the layers, [Engin2001] for the slices of a general cutter.
+Differs from source: h is to first order in the feed per tooth, the path of a tooth is the circle about the moving axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.cutter.slices import Slices
+from chipload.engagement.immersion import _kernels
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """Edges of the material in layers that lie on one another.
+
+    Parameters
+    ----------
+    bounds : (l + 1,) float [mm], ascending
+    start : (l + 1,) int; layer i has the edges start[i] .. start[i + 1] - 1
+    edges : (m, 4) float [mm], rows x0, y0, x1, y1 of closed rings; edges that no ray along +x from the cutter can
+        meet may be left out
+    """
+
+    bounds: Floats
+    start: Ints
+    edges: Floats
+
+
+def tool_frame(axis: ArrayLike, toward: ArrayLike, clockwise: bool = True) -> Floats:
+    """(3, 3) rows T, n, A: T the direction ``toward`` (3,) across the unit axis (3,), n left of it (right where the
+    spindle turns counter-clockwise); where ``toward`` has no part across the axis T is any direction across it.
+
+    >>> tool_frame([0, 0, 1], [3, 0, 4]).tolist()
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    """
+    A, v = np.asarray(axis, dtype=np.float64), np.asarray(toward, dtype=np.float64)
+    across = v - (v @ A) * A
+    size = float(np.linalg.norm(across))
+    if size <= 1e-12 * float(np.linalg.norm(v)) or size == 0.0:
+        across = np.eye(3)[int(np.argmin(np.abs(A)))]
+        across = across - (across @ A) * A
+        size = float(np.linalg.norm(across))
+    T = across / size
+    n = np.cross(A, T) if clockwise else np.cross(T, A)
+    return np.array([T, n, A]) + 0.0
+
+
+def immersed(
+    tip: ArrayLike,
+    frame: ArrayLike,
+    feed: ArrayLike,
+    turn: ArrayLike,
+    cutter: Slices,
+    section: Section,
+) -> tuple[Floats, Ints]:
+    """Rows of :class:`chipload.engagement.bites.Bites` of one instant, and the slice of each.
+
+    Parameters
+    ----------
+    tip : (3,) float [mm]
+    frame : (3, 3) rows T, n, A, see :func:`tool_frame`; A points up: A_z > 0
+    feed : V, (3,) float [mm] that the tip moves while the spindle turns by one tooth
+    turn : W, (3,) float [rad] that the axis turns in that time
+    cutter : its slices
+    section : the material before the move, around the cutter; without edges nothing is cut
+
+    Returns
+    -------
+    rows : (b, 7) float, owner : (b,) int
+
+    Notes
+    -----
+    O(k m) for k slices and m edges; nothing is sampled: ends of bites are where the circle of a slice meets an edge or
+    the middle between two layers, or where h = 0.
+    """
+    R = np.ascontiguousarray(frame, dtype=np.float64)
+    if R.shape != (3, 3) or not R[2, 2] > 0.0:
+        raise InputError(f"axis z = {R[2, 2]:g}: must be above 0: the spindle stands above the layers")
+    half = 0.5 * (cutter.s_to - cutter.s_from) * cutter.sin_kappa
+    table = np.column_stack(
+        [
+            cutter.s_from,
+            cutter.s_to,
+            cutter.rho,
+            cutter.z + half,
+            cutter.sin_kappa,
+            cutter.cos_kappa,
+            cutter.z,
+            cutter.z + 2.0 * half,
+        ]
+    )
+    room = 4 * len(table) + 16
+    while True:
+        rows, owner = np.empty((room, 7)), np.empty(room, dtype=np.int64)
+        count = _kernels.immersed(
+            np.asarray(tip, dtype=np.float64),
+            R,
+            np.asarray(feed, dtype=np.float64),
+            np.asarray(turn, dtype=np.float64),
+            table,
+            section.bounds,
+            section.start,
+            section.edges,
+            rows,
+            owner,
+        )
+        if count >= 0:
+            return rows[:count], owner[:count]
+        room *= 4

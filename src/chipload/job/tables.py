@@ -1,0 +1,181 @@
+"""The tables of a job file: which keys there are, their units and their ranges.
+
+Every key carries its unit in its name. Nothing that matters is guessed: a feed, a tool, a side or a limit that is not
+stated is asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from chipload.cutter.table import CutterTable
+
+
+def _only_number(value: Any) -> Any:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ValueError("must be a number")
+    if not math.isfinite(value):
+        raise ValueError("must be a finite number")
+    return value
+
+
+def _only_count(value: Any) -> Any:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise ValueError("must be a whole number")
+    return value
+
+
+Number = Annotated[float, BeforeValidator(_only_number), Field(allow_inf_nan=False)]
+Positive = Annotated[Number, Field(gt=0.0)]
+NotNegative = Annotated[Number, Field(ge=0.0)]
+Point = Annotated[tuple[Number, Number, Number], Field()]
+Count = Annotated[int, BeforeValidator(_only_count), Field(ge=1, le=1000)]
+Text = Annotated[str, Field(min_length=1)]
+Unit = Literal["um", "mm", "cm", "m", "inch", "foot"]
+Strategy = Literal["plain", "backward", "feed"]
+
+
+class Table(BaseModel):
+    """A table of the file: unknown keys are refused, values do not change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)
+
+
+class PartTable(Table):
+    """What is to be made: a drawing (DXF) or a model (STEP)."""
+
+    file: Text
+    units: Unit | None = Field(None, description="overrides the units of the drawing")
+    units_if_unsaid: Unit | None = Field(None, description="units of a drawing that names none")
+    layers: tuple[Text, ...] = Field((), description="layers that are read; none: all")
+    join_mm: NotNegative = Field(0.01, le=10.0, description="gaps up to this are closed and reported")
+    tolerance_mm: Positive = Field(0.001, le=1.0, description="how far arcs may leave splines and ellipses")
+    face_z_mm: Number | None = Field(None, description="height of the planar face of a STEP file")
+
+
+class StockTable(Table):
+    """What it is made from."""
+
+    top_mm: Number = Field(description="z of the top of the stock")
+
+
+class SourceTable(Table):
+    """A shipped thing by name, or a file of one's own."""
+
+    name: Text | None = None
+    file: Text | None = None
+
+
+class OperationTable(Table):
+    """One operation; which keys it needs depends on its kind, see :data:`NEEDS`."""
+
+    kind: Literal["contour", "forward", "front"]
+    cutter: Count = Field(description="number of a [[cutter]]")
+    milling: Literal["down", "up"]
+    radial_depth_mm: Positive = Field(description="depth of cut across the wall")
+    axial_depth_mm: Positive = Field(description="depth of cut along the axis")
+    feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's centre")
+    speed_rpm: Positive = Field(le=1e6, description="spindle speed")
+    step_mm: Positive = Field(le=10.0, description="step of the history")
+    clearance_mm: Positive = Field(description="height of rapids above the top of the stock")
+    side: Literal["inside", "outside", "left", "right"] | None = None
+    strategies: tuple[Strategy, ...] | None = None
+    use: Strategy | None = Field(None, description="the strategy whose program is released")
+    joint: Literal["sharp", "clothoid"] | None = None
+    semifinish_depth_mm: Positive | None = Field(None, description="radial depth of the first pass on a straight wall")
+    passes: Count | None = Field(None, description="passes before the finish pass, or passes of forward")
+    tolerance_mm: Positive | None = Field(None, le=1.0, description="how far eased joints may leave the drawing")
+    lead_mm: Positive | None = Field(None, description="radius of the lead-in")
+    allowance_mm: NotNegative | None = Field(None, description="left on the wall")
+
+
+class LimitsTable(Table):
+    """What must not be exceeded; what is not stated is not checked, and the report says so."""
+
+    engagement_deg: Positive | None = Field(None, le=180.0)
+    force_xy_n: Positive | None = None
+    torque_nm: Positive | None = None
+    error_um: Positive | None = None
+
+
+class ProgramTable(Table):
+    """A program that exists: NC text or CL data."""
+
+    file: Text
+    dialect: Literal["linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"] | None = None
+    tools: Text | None = Field(None, description="LinuxCNC tool table")
+    feed_mm_min: Positive | None = Field(None, le=1e5, description="feed of CL data that state none")
+    tolerance_mm: Positive = Field(
+        0.001, le=1.0, description="how far the tip may leave its path where a move is cut up"
+    )
+
+
+class SolidTable(Table):
+    """What a program starts from: a block, a mesh (STL), a model (STEP), or what an earlier run left."""
+
+    low_mm: Point | None = Field(None, description="lower corner of a block")
+    high_mm: Point | None = Field(None, description="upper corner of a block")
+    file: Text | None = Field(None, description=".stl, .step or an earlier result's .npz")
+    units: Unit | None = Field(None, description="unit of an STL file, which does not say it")
+    chord_mm: Positive = Field(0.01, le=1.0, description="how far facets may leave a model's faces")
+    layer_mm: Positive | None = Field(None, description="thickness of the layers; an earlier result has its own")
+
+
+class SimulateTable(Table):
+    """Run the program through the stock: chips, forces, torque, power."""
+
+    kind: Literal["simulate"]
+    step_mm: Positive = Field(le=100.0, description="longest step of the tip")
+    tolerance_mm: Positive = Field(0.001, le=0.1, description="how far chords may leave the edges of chips")
+    interpolation: Literal["slerp", "lerp"] = Field("slerp", description="how the axis turns within a step")
+    corner_slices: Count = Field(12, le=200, description="slices of a corner radius")
+    flank_mm: Positive | None = Field(None, description="length of a slice of the flank; else half the radius")
+
+
+class LoadLimitsTable(Table):
+    """What the simulated loads must not exceed."""
+
+    force_n: Positive | None = None
+    torque_nm: Positive | None = None
+    power_w: Positive | None = None
+    chip_mm: Positive | None = None
+
+
+class ProgramJobTable(Table):
+    """The whole file of a job that runs a program instead of a plan; with an operation it is simulated."""
+
+    program: ProgramTable
+    machine: SourceTable
+    stock: SolidTable | None = None
+    material: SourceTable | None = None
+    cutter: tuple[CutterTable, ...] = ()
+    operation: tuple[SimulateTable, ...] = Field((), max_length=1)
+    limits: LoadLimitsTable = Field(default_factory=LoadLimitsTable.model_construct)
+
+
+class JobTable(Table):
+    """The whole file of a job that is planned."""
+
+    part: PartTable
+    stock: StockTable
+    machine: SourceTable
+    material: SourceTable
+    cutter: tuple[CutterTable, ...] = Field(min_length=1)
+    operation: tuple[OperationTable, ...] = Field(min_length=1)
+    limits: LimitsTable = Field(default_factory=LimitsTable.model_construct)
+
+
+#: keys that every planned operation needs
+ALWAYS = {"kind", "cutter", "milling", "radial_depth_mm", "axial_depth_mm", "feed_mm_min", "speed_rpm", "step_mm"}
+#: keys that each kind needs beside those that all need
+NEEDS: Mapping[str, tuple[str, ...]] = {
+    "contour": ("side", "strategies", "joint", "semifinish_depth_mm", "tolerance_mm", "lead_mm"),
+    "forward": ("side", "lead_mm"),
+    "front": (),
+}
+#: keys that each kind also understands
+MAY: Mapping[str, tuple[str, ...]] = {"contour": ("use", "passes"), "forward": ("passes",), "front": ("allowance_mm",)}

@@ -1,0 +1,231 @@
+"""What running a program through its stock gives: chips, forces, torque and power along it, and its limits.
+
+Notation: means are over the time in which something is cut at a feed; greatest and least values are those of any
+rotation of the spindle in any step. Forces are on the cutter, in the work frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+from plotly.subplots import make_subplots
+
+from chipload.cutting.material import Material
+from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, STOCK
+from chipload.report.shape import thinned
+from chipload.report.sheet import figure, table
+from chipload.simulation.chips import Removal
+from chipload.stock.layers import LayeredStock
+
+Floats = NDArray[np.float64]
+
+#: limit, the column that it holds, and its unit
+LIMITS: Mapping[str, tuple[str, str]] = {
+    "force_n": ("force_n", "N"),
+    "torque_nm": ("torque_nm", "N m"),
+    "power_w": ("power_w", "W"),
+    "chip_mm": ("chip_max_mm", "mm"),
+}
+#: rows of the figure: lines (column, name, colour) and the title of their axis, and the limit
+ROWS = (
+    (
+        (
+            ("force_x_mean_n", "x, mean", "#3457a6"),
+            ("force_y_mean_n", "y, mean", "#0b7a75"),
+            ("force_z_mean_n", "z, mean", "#c9821a"),
+            ("force_n", "greatest size", INK),
+        ),
+        "force [N]",
+        "force_n",
+    ),
+    ((("torque_mean_nm", "mean", "#8a8f98"), ("torque_nm", "greatest", INK)), "torque [N m]", "torque_nm"),
+    ((("power_w", "mean over a turn", INK),), "power [W]", "power_w"),
+    ((("chip_max_mm", "thickest", INK),), "chip [mm]", "chip_mm"),
+    ((("rate", "removed", STOCK),), "removal [mm\u00b3/s]", ""),
+)
+
+
+@dataclass(frozen=True)
+class Held:
+    """A limit against the worst step: where (x, y, z) [mm], at which line of the source."""
+
+    name: str
+    limit: float
+    worst: float
+    line: int
+    at: tuple[float, float, float]
+
+    @property
+    def holds(self) -> bool:
+        """Whether the limit is kept."""
+        return self.worst <= self.limit
+
+    @property
+    def says(self) -> str:
+        """`force 812 N exceeds 500 N in line 12`."""
+        word, unit = self.name.split("_")[0], LIMITS[self.name][1]
+        if self.holds:
+            return f"{word} {self.worst:.4g} of {self.limit:g} {unit}"
+        return f"{word} {self.worst:.4g} {unit} exceeds {self.limit:g} {unit} in line {self.line}"
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """A program that was run through a stock.
+
+    Parameters
+    ----------
+    removal : what every step removed and what it cost
+    stock : as it is afterwards
+    material : whose coefficients were used
+    limits, unchecked : stated limits by name, and names of those that are not stated
+    settings : the keys of the operation
+    """
+
+    removal: Removal
+    stock: LayeredStock
+    material: Material
+    limits: Mapping[str, float]
+    unchecked: tuple[str, ...]
+    settings: Mapping[str, Any]
+
+    @cached_property
+    def held(self) -> tuple[Held, ...]:
+        """Every stated limit."""
+        c, out = self.removal.columns, []
+        for name, limit in self.limits.items():
+            values = c[LIMITS[name][0]]
+            k = int(np.argmax(values))
+            at = (float(c["x_mm"][k]), float(c["y_mm"][k]), float(c["z_mm"][k]))
+            out.append(Held(name, limit, float(values[k]), int(c["line"][k]), at))
+        return tuple(out)
+
+    @cached_property
+    def fails(self) -> tuple[str, ...]:
+        """What does not hold."""
+        found = [h.says for h in self.held if not h.holds]
+        return (*found, *(f"line {f.line}: {f.text}" for f in self.removal.findings))
+
+
+def operation(simulated: Simulated) -> dict[str, Any]:
+    """The operation in summary.json."""
+    removal = simulated.removal
+    c = removal.columns
+    cuts = (c["chip_volume_mm3"] > 0.0) & ~c["rapid"]
+    seconds = np.where(cuts, c["seconds"], 0.0)
+    whole = float(seconds.sum())
+
+    def mean(name: str) -> float:
+        return float((c[name] * seconds).sum() / whole) if whole > 0.0 else 0.0
+
+    force = {
+        x: {
+            "mean": mean(f"force_{x}_mean_n"),
+            "max": float(c[f"force_{x}_max_n"].max(initial=0.0)),
+            "min": float(c[f"force_{x}_min_n"].min(initial=0.0)),
+        }
+        for x in "xyz"
+    }
+    return {
+        "kind": "simulate",
+        "holds": not simulated.fails,
+        "fails": list(simulated.fails),
+        "steps": len(c["line"]),
+        "chip_pieces_max": int(c["chip_pieces"].max(initial=0)),
+        "chip_volume_mm3": float(c["chip_volume_mm3"].sum()),
+        "stock_before_mm3": removal.volume_before,
+        "stock_removed_mm3": removal.volume_before - removal.volume_after,
+        "cutting_s": whole,
+        "air_cut_s": float(c["seconds"][~cuts & ~c["rapid"]].sum()),
+        "force_n": {**force, "max": float(c["force_n"].max(initial=0.0))},
+        "torque_nm": {"mean": mean("torque_mean_nm"), "max": float(c["torque_nm"].max(initial=0.0))},
+        "power_w": {"mean": mean("power_w"), "max": float(c["power_w"].max(initial=0.0))},
+        "chip_mm": {"max": float(c["chip_max_mm"].max(initial=0.0))},
+        "limits": [
+            {"name": h.name, "limit": h.limit, "worst": h.worst, "line": h.line, "at_mm": list(h.at), "holds": h.holds}
+            for h in simulated.held
+        ],
+        "unchecked": list(simulated.unchecked),
+        "settings": dict(simulated.settings),
+    }
+
+
+def history(simulated: Simulated) -> dict[str, NDArray[Any]]:
+    """The columns of history.parquet, a row a step."""
+    columns = dict(simulated.removal.columns)
+    names = np.array([label or "program" for label in simulated.removal.labels], dtype=object)
+    return {"pass": names[columns.pop("label")], **columns}
+
+
+def along(simulated: Simulated) -> go.Figure:
+    """Force, torque, power, chip thickness and removal against time."""
+    columns = dict(simulated.removal.columns)
+    seconds = columns["seconds"]
+    columns["rate"] = np.where(seconds > 0.0, columns["chip_volume_mm3"] / np.where(seconds > 0.0, seconds, 1.0), 0.0)
+    t = columns["t_s"] - 0.5 * seconds
+    out = make_subplots(rows=len(ROWS), cols=1, shared_xaxes=True, vertical_spacing=0.03)
+    for row, (lines, title, limit) in enumerate(ROWS, start=1):
+        for column, name, colour in lines:
+            y = np.asarray(columns[column], dtype=np.float64)
+            keep = thinned(y, LINE_POINTS)
+            out.add_trace(
+                go.Scatter(
+                    x=t[keep].astype(np.float32),
+                    y=y[keep].astype(np.float32),
+                    name=name,
+                    mode="lines",
+                    line={"color": colour, "width": 1.3},
+                    customdata=columns["line"][keep],
+                    hovertemplate=f"{name}: %{{y:.4g}}, line %{{customdata}}<extra>{title}</extra>",
+                    showlegend=row == 1,
+                ),
+                row=row,
+                col=1,
+            )
+        if limit in simulated.limits:
+            said = {"text": f"limit {simulated.limits[limit]:g}", "font": {"color": LIMIT, "size": 11}}
+            line = {"color": LIMIT, "width": 1.2, "dash": "dash"}
+            out.add_hline(
+                y=simulated.limits[limit],
+                line=line,
+                annotation=said,
+                annotation_position="top left",
+                row=row,
+                col=1,
+            )
+        out.update_yaxes(title_text=title, row=row, col=1)
+    out.update_xaxes(gridcolor=GRID, zeroline=False)
+    out.update_yaxes(gridcolor=GRID, zerolinecolor=GRID)
+    out.update_xaxes(title_text="time at the commanded feed [s]", row=len(ROWS), col=1)
+    out.update_layout(
+        template="none",
+        height=900,
+        font=FONT,
+        margin={"l": 74, "r": 16, "t": 30, "b": 46},
+        legend={"orientation": "h", "y": 1.01, "yanchor": "bottom", "x": 0.0},
+    )
+    return out
+
+
+def sections(simulated: Simulated, figures: dict[str, go.Figure]) -> list[str]:
+    """The part of the page that shows chips and forces; figures are put among ``figures``."""
+    what = operation(simulated)
+    force, torque, power = what["force_n"], what["torque_nm"], what["power_w"]
+    rows = [[f"force {x} on the cutter [N]", *(f"{force[x][k]:.4g}" for k in ("mean", "max", "min"))] for x in "xyz"]
+    rows += [["torque [N m]", f"{torque['mean']:.4g}", f"{torque['max']:.4g}", ""]]
+    rows += [["power [W]", f"{power['mean']:.4g}", f"{power['max']:.4g}", ""]]
+    body = [
+        "<h2>Chips, force, torque, power</h2>",
+        f"<p>{what['steps']} steps; {what['chip_volume_mm3']:.6g} mm\u00b3 of chips, stock less by "
+        f"{what['stock_removed_mm3']:.6g} mm\u00b3; {what['cutting_s']:.4g} s in cut, {what['air_cut_s']:.4g} s "
+        f"in air; thickest chip {what['chip_mm']['max']:.4g} mm.</p>",
+        table(["", "mean", "greatest", "least"], rows, numbers=(1, 2, 3)),
+        figure("loads", along(simulated), figures),
+    ]
+    return body

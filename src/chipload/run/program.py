@@ -1,0 +1,129 @@
+"""A job that runs a program: read for its machine, and with an operation run through the stock."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutting.material import Material, material_named, read_material
+from chipload.geometry.mesh import read_mesh
+from chipload.job import ProgramJob
+from chipload.job.tables import SimulateTable
+from chipload.machine.machine import machine_named, read_machine
+from chipload.program.program import RAPID, Program
+from chipload.program.read import line_times, read_program, read_tools
+from chipload.progress import Progress, silent
+from chipload.report.reading import Read
+from chipload.report.simulated import Simulated
+from chipload.run.provenance import hashes, title_of, versions
+from chipload.simulation.chips import Resolution, remove
+from chipload.stock.layers import LayeredStock
+from chipload.units import mm_s_from_mm_min
+
+#: side of a tile of the stock in diameters of the largest cutter
+TILE = 1.5
+
+
+def run_program(job: ProgramJob, progress: Progress = silent, *, simulate: bool = True) -> Read:
+    """Read the program of a job for its machine; simulate it where the job says so.
+
+    Parameters
+    ----------
+    simulate : False: every file is read, nothing is cut
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, the controller would refuse the program, or the stock and the cutters cannot be used.
+    """
+    machine = machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
+    table = job.table.program
+    share = 0.1 if job.simulates else 1.0
+    reading = read_program(
+        job.program_file,
+        machine,
+        dialect=table.dialect,
+        tools=read_tools(job.tools_file) if job.tools_file is not None else None,
+        feed=mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None,
+        tolerance=table.tolerance_mm,
+        progress=lambda done, what: progress(share * done, what),
+    )
+    lines, seconds = line_times(reading, machine)
+    simulated = None
+    if job.simulates:
+        stock, material = _stock(job, reading.program), _material(job)
+        if simulate:
+            simulated = _simulated(
+                job, reading.program, stock, material, lambda done, what: progress(share + (1.0 - share) * done, what)
+            )
+    files: dict[str, Path] = {"job": job.path, "program": job.program_file}
+    named = {"machine": job.machine, "tools": job.tools_file, "material": job.material}
+    if job.table.stock is not None and job.table.stock.file is not None:
+        named["stock"] = job.path.parent / job.table.stock.file
+    files |= {k: v for k, v in named.items() if isinstance(v, Path)}
+    files |= {f"cutter {k}": job.path.parent / c.file for k, c in enumerate(job.table.cutter) if c.file is not None}
+    provenance = {
+        "inputs": hashes(files),
+        "overrides": list(job.overrides),
+        "machine": f"{machine.name}: {machine.note}" if machine.note else machine.name,
+        **({"material": material_provenance(simulated.material)} if simulated is not None else {}),
+        "versions": versions(),
+    }
+    return Read(title_of(job.path), job.program_file.name, reading, lines, seconds, machine, provenance, simulated)
+
+
+def _simulated(
+    job: ProgramJob, program: Program, stock: LayeredStock, material: Material, progress: Progress
+) -> Simulated:
+    """The program, run through the stock of the job."""
+    op: SimulateTable = job.table.operation[0]
+    smallest = min(c.radius for c in job.cutters.values())
+    fine = Resolution(op.step_mm, op.tolerance_mm, op.corner_slices, op.flank_mm or 0.5 * smallest)
+    removal = remove(program, stock, job.cutters, material, fine, interpolation=op.interpolation, progress=progress)
+    settings = {k: v for k, v in op.model_dump().items() if v is not None}
+    return Simulated(removal, stock, material, job.limits, job.unchecked, settings)
+
+
+def _material(job: ProgramJob) -> Material:
+    """The coefficients that the job names."""
+    assert job.material is not None
+    return material_named(job.material) if isinstance(job.material, str) else read_material(job.material)
+
+
+def _stock(job: ProgramJob, program: Program) -> LayeredStock:
+    """The stock that the job names; layers end where an upright cutter stands while it cuts level."""
+    table, folder = job.table.stock, job.path.parent
+    assert table is not None
+    if table.file is not None and table.file.lower().endswith(".npz"):
+        return LayeredStock.load(folder / table.file)
+    assert table.layer_mm is not None
+    tile = TILE * max(c.diameter for c in job.cutters.values())
+    if table.file is None:
+        assert table.low_mm is not None
+        assert table.high_mm is not None
+        stock = LayeredStock.block(table.low_mm, table.high_mm, table.layer_mm, tile)
+    else:
+        mesh = read_mesh(folder / table.file, unit=table.units, chord_mm=table.chord_mm)
+        stock = LayeredStock.of_mesh(mesh, table.layer_mm, tile)
+    stock.refine_at(_levels(program))
+    return stock
+
+
+def _levels(program: Program) -> NDArray[np.float64]:
+    """Heights [mm] at which an upright cutter moves level at a feed."""
+    p = np.asarray(program.p_work)
+    level = (np.abs(np.diff(p[:, 2], prepend=p[:1, 2])) < 1e-9) & (program.motion != RAPID)
+    upright = np.asarray(program.axis)[:, 2] > 1.0 - 1e-12
+    return np.unique(p[level & upright, 2].round(9))
+
+
+def material_provenance(material: Material) -> dict[str, str]:
+    """Where the coefficients of a material were published or measured."""
+    return {
+        "name": material.name,
+        "workpiece": material.workpiece,
+        "source": material.source,
+        "conditions": material.conditions,
+    }

@@ -1,0 +1,27 @@
+"""Where the numbers come from: hashes of the inputs and versions; no time of day, no place on this computer."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+
+#: libraries whose version may change a number
+LIBRARIES = ("chipload", "numpy", "scipy", "numba", "shapely", "embreex", "ezdxf", "cadquery-ocp-novtk")
+
+
+def hashes(files: Mapping[str, Path]) -> dict[str, str]:
+    """Name and hash of each file."""
+    return {name: f"{path.name} sha256 {hashlib.sha256(path.read_bytes()).hexdigest()}" for name, path in files.items()}
+
+
+def versions() -> dict[str, str]:
+    """Versions of the libraries and of Python."""
+    return {name: version(name) for name in LIBRARIES} | {"python": platform.python_version()}
+
+
+def title_of(path: Path) -> str:
+    """What a job is called: its folder where the file is `job.toml`."""
+    return path.parent.name if path.stem == "job" else path.stem

@@ -1,0 +1,134 @@
+"""Programs run through a layered stock, against closed forms, the energy of the cut and the planner's exact arcs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.force import forces_along
+from chipload.cutting.material import Material, material_named
+from chipload.errors import InputError
+from chipload.program.build import plunge, rapid
+from chipload.program.program import Program
+from chipload.simulation.chips import Resolution, remove
+from chipload.stock.layers import LayeredStock
+from simulation.test_steps import five_axis
+
+MILL = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
+BALL = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=5.0)
+BULL = Cutter(12.0, 3, 0.4, 20.0, 30.0, 6e5, corner_radius=2.0)
+FINE = Resolution(step_mm=1.0, tolerance=1e-4, corner_pieces=60, flank_mm=0.25)
+#: cutting without edge forces, and along the tooth's motion alone: its work is Ktc times the volume
+ENERGY = Material("plain", 1000.0, 0.0, 0.0, 0.0, 0.0, 0.0, source="made up for this test")
+
+
+def block(layer_mm: float = 0.5, tile_mm: float = 15.0) -> LayeredStock:
+    return LayeredStock.block((0.0, -20.0, -10.0), (40.0, 20.0, 0.0), layer_mm, tile_mm)
+
+
+def straight(start: list[float], end: list[float], feed: float = 20.0, spindle: float = 300.0) -> Program:
+    return Program.join([rapid(start, spindle, 1, "link"), plunge(end, feed, spindle, 1, "cut")])
+
+
+def test_a_slot_takes_its_volume_and_costs_what_the_closed_form_says() -> None:
+    stock = block()
+    removal = remove(straight([-10, 0, -3], [30, 0, -3]), stock, {1: MILL}, material_named("al7075-t6"), FINE)
+    c = removal.columns
+    slot = 3.0 * (10.0 * 30.0 + 0.5 * math.pi * 25.0)
+    assert c["chip_volume_mm3"].sum() == pytest.approx(slot, rel=1e-4)
+    assert removal.volume_before - removal.volume_after == pytest.approx(c["chip_volume_mm3"].sum(), rel=1e-9)
+    full = c["x_mm"] > 6.5
+    m, a, n = material_named("al7075-t6"), 3.0, 4
+    f = math.tau * 20.0 / (n * 300.0)
+    # [Altintas2012] ch. 2: mean forces of a slot, here on the cutter, x along the feed
+    expected = {
+        "force_x_mean_n": -n * a * (m.Krc * f / 4.0 + m.Kre / math.pi),
+        "force_y_mean_n": n * a * (m.Ktc * f / 4.0 + m.Kte / math.pi),
+        "force_z_mean_n": -n * a * (m.Kac * f / math.pi + m.Kae / 2.0),
+        "torque_mean_nm": n * a * 5.0 / math.tau * (2.0 * m.Ktc * f + math.pi * m.Kte) / 1000.0,
+    }
+    for name, value in expected.items():
+        assert c[name][full] == pytest.approx(value, rel=1e-6), name
+    assert c["power_w"][full] == pytest.approx(expected["torque_mean_nm"] * 300.0, rel=1e-6)
+    assert c["chip_max_mm"][full] == pytest.approx(f, rel=1e-9)
+
+
+@pytest.mark.parametrize("spindle", ["cw", "ccw"])
+def test_a_wall_costs_what_the_exact_arcs_say(spindle: str) -> None:
+    """The planner's provider: closed arcs of a circle at a straight wall; here layers and polygons."""
+    turn = 300.0 if spindle == "cw" else -300.0
+    stock = LayeredStock.block((0.0, -20.0, -4.0), (40.0, 3.0, 0.0), 0.5, 15.0)
+    program = straight([-10, 5.0, -4], [30, 5.0, -4], spindle=turn)
+    c = remove(program, stock, {1: MILL}, material_named("al7075-t6"), FINE).columns
+    a = math.acos(1.0 - 3.0 / 5.0)
+    f = math.tau * 20.0 / (4 * 300.0)
+    load = forces_along(
+        [math.pi - a], [math.pi], f, [[1.0, 0.0]], MILL, material_named("al7075-t6"), 4.0,
+        spindle_speed=300.0, spindle=spindle,
+    )  # fmt: skip
+    row = int(np.flatnonzero(c["x_mm"] > 20.0)[0])
+    for ours, theirs in (
+        ("force_x_mean_n", "force_mean_x_n"),
+        ("force_y_mean_n", "force_mean_y_n"),
+        ("force_z_mean_n", "force_mean_z_n"),
+        ("torque_mean_nm", "torque_mean_nm"),
+        ("power_w", "power_w"),
+        ("chip_max_mm", "chip_max_mm"),
+    ):
+        assert c[ours][row] == pytest.approx(load[theirs][0], rel=1e-6), ours
+    # looked at every 3 degrees there, refined here
+    assert load["torque_nm"][0] * 0.99 <= c["torque_nm"][row] <= load["torque_nm"][0] * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("cutter", [MILL, BULL, BALL], ids=["flat", "bull", "ball"])
+@pytest.mark.parametrize(
+    "path",
+    [
+        ([[-9, 0, -3], [20, 2, -4]], [[0, 0, 1], [0, 0, 1]]),
+        ([[-9, 0, -3], [20, 2, -3]], [[0, 0.3, 1], [0.4, 0.1, 1]]),
+        ([[8, 2, 3], [12, 2, -4]], [[0, 0, 1], [0, 0, 1]]),
+        ([[15, 0, 2], [15, 0, -5]], [[0, 0, 1], [0, 0, 1]]),
+        ([[-9, 3, -4], [20, 0, -2]], [[0.3, 0, 1], [0.3, -0.2, 1]]),
+    ],
+    ids=["slope", "turning", "ramp", "plunge", "lead"],
+)
+def test_the_torque_does_the_work_that_the_volume_asks_for(cutter: Cutter, path: list[list[list[float]]]) -> None:
+    """Oracle: with Ktc alone, torque times angle is Ktc times the volume removed, whatever the engagement."""
+    stock = block(0.1)
+    fine = Resolution(step_mm=0.25, tolerance=1e-4, corner_pieces=60, flank_mm=0.25)
+    # a small feed: the thickness is of first order in the feed per tooth, and so is what a step takes
+    c = remove(five_axis(*path, feed=5.0), stock, {1: cutter}, ENERGY, fine).columns
+    work = 1000.0 * (c["torque_mean_nm"] * 100.0 * c["seconds"]).sum()
+    assert work == pytest.approx(1000.0 * c["chip_volume_mm3"].sum(), rel=0.02)
+
+
+def test_a_rapid_through_material_is_found_and_costs_no_force() -> None:
+    removal = remove(straight([-10, 0, 5], [30, 0, 5]), block(), {1: MILL}, ENERGY, FINE)
+    assert removal.findings == ()
+    assert removal.piece is None
+    program = Program.join([rapid([[-10, 0, -3], [20, 0, -3]], 300.0, 1, "link")])
+    removal = remove(program, block(), {1: MILL}, ENERGY, FINE)
+    assert [f.code for f in removal.findings] == ["rapid-cuts"]
+    assert not removal.columns["force_n"].any()
+    assert removal.columns["chip_volume_mm3"].sum() > 0.0
+
+
+def test_what_is_wrong_with_a_program_is_said() -> None:
+    with pytest.raises(InputError, match=r"tool 1: no \[\[cutter\]\] has this number: state one beside 2"):
+        remove(straight([-10, 0, -3], [30, 0, -3]), block(), {2: MILL}, ENERGY, FINE)
+    with pytest.raises(InputError, match="cuts with the spindle at rest: start it"):
+        remove(straight([-10, 0, -3], [30, 0, -3], spindle=0.0), block(), {1: MILL}, ENERGY, FINE)
+
+
+def test_the_same_in_another_place_and_turned_by_a_quarter() -> None:
+    one = remove(straight([-10, 1, -3], [30, 2, -4]), block(), {1: BALL}, material_named("al7075-t6"), FINE).columns
+    stock = LayeredStock.block((80.0, 100.0, 40.0), (120.0, 140.0, 50.0), 0.5, 15.0)
+    program = straight([99, 90, 47], [98, 130, 46])
+    two = remove(program, stock, {1: BALL}, material_named("al7075-t6"), FINE).columns
+    for a, b, sign in (("force_x", "force_y", 1.0), ("force_y", "force_x", -1.0), ("force_z", "force_z", 1.0)):
+        scale = np.abs(one["force_n"]).max()
+        assert two[f"{b}_mean_n"] == pytest.approx(sign * one[f"{a}_mean_n"], abs=1e-6 * scale)
+    assert two["chip_volume_mm3"] == pytest.approx(one["chip_volume_mm3"], abs=1e-4)
