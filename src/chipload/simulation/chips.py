@@ -1,7 +1,8 @@
 """Run a Program through a layered workpiece: what every step removes, and what that costs.
 
 Notation: a step as in :mod:`chipload.simulation.steps`; t in 0..1 within it. Its chip is, layer by layer, what the
-cutter covers during the step and what is still there; its volume the sum of area times thickness. Forces are those at
+cutter covers during the step and what is still there; its volume the sum of area times thickness. Where the stock's
+edges are made simpler, by half the tolerance, what that takes or gives counts with the step. Forces are those at
 the middle of the step (t = 1/2), on the cutter, in the work frame, over one revolution of the spindle.
 
 What is known at each layer is the section at half its height: see :mod:`chipload.stock.layers` for the error in volume
@@ -176,7 +177,9 @@ def remove(
                 continue
             # a face that looks down is held against the layer below
             material_before = Section(*stock.edges(range(max(layers.start - 1, 0), layers.stop), inner[:2], outer[:2]))
-            taken = stock.remove_many([i for i, _ in met], [a.polygon for _, a in met])
+            tidied = stock.tidied
+            taken = stock.remove_many([i for i, _ in met], [a.polygon for _, a in met], 0.5 * resolution.tolerance)
+            removed[k, 0] = tidied - stock.tidied
             chips = {i: pieces for (i, _), pieces in zip(met, taken, strict=True) if pieces}
             if not chips:
                 continue

@@ -1,8 +1,8 @@
 """A five-axis move: where the tip is and how the axis stands, as polynomials of time.
 
-Notation: t in 0 .. 1; p(t) [mm] tip, A(t) unit axis from the tip to the spindle, B(t) any vector along it; T_k Chebyshev
-polynomial of u = 2 t - 1. p = sum_k P_k T_k(u), B = sum_k B_k T_k(u), A = B / |B|: one form for every interpolation of
-the axis, so that the area that is covered depends on the interpolation and the code does not.
+Notation: t in 0 .. 1; p(t) [mm] tip, A(t) unit axis from the tip to the spindle, B(t) any vector along it; T_k
+Chebyshev polynomial of u = 2 t - 1. p = sum_k P_k T_k(u), B = sum_k B_k T_k(u), A = B / |B|: one form for every
+interpolation of the axis, so that the area that is covered depends on the interpolation and the code does not.
 """
 
 from __future__ import annotations
@@ -69,16 +69,22 @@ class Move:
         """
         u = 2.0 * np.asarray(t, dtype=np.float64) - 1.0
         b = chebyshev.chebval(u, self.axis).T
-        return chebyshev.chebval(u, self.tip).T, b / np.linalg.norm(b, axis=1)[:, None]
+        tip = np.asarray(chebyshev.chebval(u, self.tip).T, dtype=np.float64)
+        return tip, np.asarray(b / np.linalg.norm(b, axis=1)[:, None])
 
     def rates(self, t: ArrayLike) -> tuple[Floats, Floats]:
+<<<<<<< HEAD
         """P' (n, 3) [mm] and A' (n, 3), per unit of t."""
+=======
+        """Rates p' (n, 3) [mm] and A' (n, 3), per unit of t."""
+>>>>>>> covered
         u = 2.0 * np.asarray(t, dtype=np.float64) - 1.0
         b, db = chebyshev.chebval(u, self.axis).T, 2.0 * chebyshev.chebval(u, chebyshev.chebder(self.axis)).T
         length = np.linalg.norm(b, axis=1)[:, None]
         a = b / length
         db = db / length
-        return 2.0 * chebyshev.chebval(u, chebyshev.chebder(self.tip)).T, db - a * (a * db).sum(1)[:, None]
+        rate = 2.0 * np.asarray(chebyshev.chebval(u, chebyshev.chebder(self.tip)).T, dtype=np.float64)
+        return rate, np.asarray(db - a * (a * db).sum(1)[:, None])
 
     @staticmethod
     def lerp(p0: ArrayLike, a0: ArrayLike, p1: ArrayLike, a1: ArrayLike) -> Move:
@@ -147,10 +153,11 @@ class Move:
 
 
 def _nodes(order: int) -> tuple[Floats, Floats, Floats]:
-    u = np.cos(np.pi * (np.arange(order + 1) + 0.5) / (order + 1))
-    back = 2.0 / (order + 1) * chebyshev.chebvander(u, order).T
+    u: Floats = np.cos(np.pi * (np.arange(order + 1) + 0.5) / (order + 1))
+    back = 2.0 / (order + 1) * np.asarray(chebyshev.chebvander(u, order).T, dtype=np.float64)
     back[0] *= 0.5
-    return u, back, np.cos(np.pi * np.arange(order + 2) / (order + 1))
+    between: Floats = np.cos(np.pi * np.arange(order + 2) / (order + 1))
+    return u, back, between
 
 
 _NODES = {order: _nodes(order) for order in _ORDERS}

@@ -46,6 +46,7 @@ class Ring:
     origin : (m,) int, :class:`Origin` of the edge from each point to the next
     theta : (m,) float [rad], NaN on old stock
     t : (m,) float, NaN on old stock
+    end : (m, 2) float, theta [rad] and t at the end of each edge: where pieces cross it is not the next start
     bulge : (m,) float [mm2], area between each edge and its curve, above 0 to the right of the edge
     """
 
@@ -53,6 +54,7 @@ class Ring:
     origin: NDArray[np.int64]
     theta: Floats
     t: Floats
+    end: Floats
     bulge: Floats
 
     @property
@@ -84,7 +86,7 @@ def bulges(edges: Floats, f0: Floats, f1: Floats) -> Floats:
 
 def ring_of_edges(edges: Floats) -> Ring:
     """The ring of edges (m, 12) that follow each other."""
-    return Ring(edges[:, :2], edges[:, 10].astype(np.int64), edges[:, 4], edges[:, 5], edges[:, 11])
+    return Ring(edges[:, :2], edges[:, 10].astype(np.int64), edges[:, 4], edges[:, 5], edges[:, 6:8], edges[:, 11])
 
 
 def rings_of_polygons(area: shapely.Geometry, edges: Floats) -> tuple[Ring, ...]:
@@ -114,5 +116,6 @@ def _traced(p: Floats, edges: Floats, tree: shapely.STRtree) -> Ring:
     L2 = (d**2).sum(1)
     f0 = ((p - e[:, :2]) * d).sum(1) / L2
     f1 = ((q - e[:, :2]) * d).sum(1) / L2
-    theta, t = e[:, 4] + f0 * (e[:, 6] - e[:, 4]), e[:, 5] + f0 * (e[:, 7] - e[:, 5])
-    return Ring(p, e[:, 10].astype(np.int64), theta, t, bulges(e, f0, f1))
+    rise = e[:, 6:8] - e[:, 4:6]
+    start, end = e[:, 4:6] + f0[:, None] * rise, e[:, 4:6] + f1[:, None] * rise
+    return Ring(p, e[:, 10].astype(np.int64), start[:, 0], start[:, 1], end, bulges(e, f0, f1))

@@ -89,4 +89,4 @@ def depth(move: Move, cutter: Cutter, height: float, t: float, points: ArrayLike
     out = np.maximum(w - H, (rho - foot) * math.cos(beta) - w * math.sin(beta))
     out = np.maximum(out, rho * math.sin(alpha) - w * math.cos(alpha))
     corner = (u * math.cos(alpha) > v * math.sin(alpha)) & (u * math.sin(beta) < v * math.cos(beta))
-    return np.where(corner, np.maximum(out, np.hypot(u, v) - r), out) if r > 0.0 else out
+    return np.asarray(np.where(corner, np.maximum(out, np.hypot(u, v) - r), out) if r > 0.0 else out)

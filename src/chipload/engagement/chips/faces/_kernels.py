@@ -10,8 +10,9 @@ import math
 import numpy as np
 from numba import njit
 
-from chipload.engagement.chips._kernels import MAX_ROOTS, NODES, TAU, deviation, instant, roots, state
+from chipload.engagement.chips._kernels import TAU, instant, state
 from chipload.engagement.chips.trace._kernels import FIRST, FULL, GRAZING, INSET, LAST, arc, edge, kind, sides
+from chipload.engagement.chips.zeros._kernels import MAX_ROOTS, NODES, deviation, roots
 
 DEPTH = 64
 LEAST = 1e-12  # [t] nearer than this two instants are one
@@ -52,9 +53,8 @@ def pieces(cp, ca, K, h, tol, vmin, ta, tb, knots, buf, n, jumps):
             while top > 0:
                 short = S[top, 21] - S[0, 21] < LEAST or top >= DEPTH - 1
                 quiet = (S[top, 21] - S[0, 21]) * max(most[0], most[top]) <= 0.05 * tol or short
-                m = link(
-                    S[0], C[0], R[0], sign[0], count[0], S[top], C[top], R[top], sign[top], count[top], K, tol, quiet, buf, n
-                )
+                one, other = (S[0], C[0], R[0], sign[0], count[0]), (S[top], C[top], R[top], sign[top], count[top])
+                m = link(one, other, K, tol, quiet, buf, n)
                 if m == -2:
                     return FULL, 0
                 if m == -1 and not short:
@@ -88,12 +88,14 @@ def _without(R, sign, n, i, R_out, sign_out):
 
 
 @njit(cache=True, nogil=True)
-def link(S0, C0, R0, s0, n0, S1, C1, R1, s1, n1, K, tol, quiet, buf, n):
+def link(one, other, K, tol, quiet, buf, n):
     """Join the roots of two instants in cyclic order; new count, -1 where they don't fit, -2 where full.
 
     A pair that is there at one instant only is joined along the section, where the two points are within tol / 5 or
-    ``quiet``: nothing moves by more than that in between.
+    ``quiet``: nothing moves by more than that in between. An instant: S, C, rows, signs, count.
     """
+    S0, C0, R0, s0, n0 = one
+    S1, C1, R1, s1, n1 = other
     if n0 < 0 or n1 < 0 or abs(n0 - n1) > 2:
         return -1
     if n + n0 + n1 + 2 >= buf.shape[0]:

@@ -13,22 +13,8 @@ import math
 import numpy as np
 from numba import njit
 
-from chipload.engagement.chips._kernels import (
-    BOTTOM,
-    CORNER,
-    MAX_ROOTS,
-    NODES,
-    TAU,
-    TOP,
-    deviation,
-    instant,
-    point,
-    reach,
-    root_near,
-    roots,
-    speed,
-    wrapped,
-)
+from chipload.engagement.chips._kernels import BOTTOM, TAU, TOP, instant, point, reach, speed
+from chipload.engagement.chips.zeros._kernels import CORNER, MAX_ROOTS, NODES, deviation, root_near, roots, wrapped
 
 FIRST, LAST, GRAZING, CHORD, CHORD_END, FIRST_CHORD, LAST_CHORD = 0, 1, 2, 3, 4, 5, 6
 NOTHING, GENERAL, FULL, UNSETTLED = -1, -2, -3, -4
@@ -140,7 +126,7 @@ def arc(S, K, C, a, b, tol, origin, buf, n):
             if theta < goal + 1e-15 and theta > cur[2] + 1e-14:
                 goal = min(theta, end)
                 at = i
-        straight = (code == BOTTOM or code == TOP) and K[1] == 0.0
+        straight = code in (BOTTOM, TOP) and K[1] == 0.0
         if n >= buf.shape[0] - 2:
             return -1
         rest = goal - cur[2]
@@ -161,8 +147,10 @@ def arc(S, K, C, a, b, tol, origin, buf, n):
                 continue
             step = took * (min(3.0, 0.93 * math.sqrt(tol / dev)) if dev > 0.1 * tol else 3.0)
             step = min(step, 0.5)
-        flat = code == BOTTOM or code == TOP
-        n = edge(buf, n, cur, new, cur[4], cur[5], new[4], new[5], origin + FIRST_CHORD - FIRST if flat else origin)
+        of = origin
+        if code in (BOTTOM, TOP):
+            of = CHORD if origin == GRAZING else (FIRST_CHORD if origin == FIRST else LAST_CHORD)
+        n = edge(buf, n, cur, new, cur[4], cur[5], new[4], new[5], of)
         if whole and goal >= end:
             return n
         cur[:] = new
@@ -212,7 +200,7 @@ def kind(a, b):
     code = a[6] if a[3] <= b[3] else b[6]
     if code == CORNER:
         return CHORD_END
-    return CHORD if code == BOTTOM or code == TOP else GRAZING
+    return CHORD if code in (BOTTOM, TOP) else GRAZING
 
 
 @njit(cache=True, nogil=True)

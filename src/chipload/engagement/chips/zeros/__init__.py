@@ -1,0 +1,1 @@
+"""Grazing points of a section."""
