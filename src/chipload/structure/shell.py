@@ -383,14 +383,15 @@ def _polynomials(ends: str, which: int, terms: int) -> Floats:
     """(terms, terms + 2) Legendre coefficients of the functions of u, v or w (``which``) that hold the ends."""
     unit = np.eye(terms + 1)
     if ends == "clamped":
-        made: Floats = legendre.legint(unit[:terms], 2 if which == 2 else 1, lbnd=-1, axis=1)
+        times, made = (2 if which == 2 else 1), unit[:terms]
     elif ends == "diaphragms" and which > 0:
-        made = legendre.legint(unit[1:], 1, lbnd=-1, axis=1)
+        times, made = 1, unit[1:]
     else:
-        made = unit[:terms]
+        times, made = 0, unit[:terms]
     out = np.zeros((terms, terms + 2))
-    columns = min(made.shape[1], terms + 2)
-    out[:, :columns] = made[:, :columns]
+    whole = legendre.legint(made, times, lbnd=-1, axis=1)
+    columns = min(whole.shape[1], terms + 2)
+    out[:, :columns] = whole[:, :columns]
     return out
 
 
