@@ -285,7 +285,7 @@ def run(
     greatest, over = 0.0, 0.0
     end = at[len(at) - 1]
     finished = False
-    reading, held = 0.0, 0.0
+    reading, held, torque = 0.0, 0.0, 0.0
     while t < longest:
         while i + 2 < len(at) and at[i + 1] <= s:
             i += 1
@@ -353,4 +353,8 @@ def run(
             break
         if v == 0.0 and command == 0.0 and status >= OVERLOAD:
             break
+    if rows < len(out):
+        out[rows, 0], out[rows, 1], out[rows, 2], out[rows, 3] = t, s, v, torque
+        out[rows, 4], out[rows, 5], out[rows, 6], out[rows, 7] = reading, sent, status, w
+        rows += 1
     return rows, finished, t, greatest, over

@@ -218,8 +218,8 @@ class Outcome:
     time : [s]
     torque_max : greatest true torque [N mm]
     time_over : with the true torque above the limit [s]
-    t, s, feed, torque, measured, override, speed : (k,) float, a row each step of the controller [s, mm, mm/s, N mm,
-        N mm, -, rad/s]
+    t, s, feed, torque, measured, override, speed : (k,) float, a row each step of the controller and the last
+        [s, mm, mm/s, N mm, N mm, -, rad/s]
     status : (k,) int, of ``STATUS``
     """
 
@@ -279,7 +279,7 @@ def run(
     delay = round(loop.latency / loop.period)
     noise = np.random.default_rng(loop.seed).normal(0.0, spindle.noise, 65_536)
     state = begin(controller, model is not None)
-    rows = math.ceil(loop.longest_s / loop.period / every_row) + 2
+    rows = math.ceil(loop.longest_s / loop.period / every_row) + 3
     out = np.empty((min(rows, 2_000_000), 8))
     fault = fault or Fault()
     filled, finished, time, greatest, over = _kernels.run(
