@@ -1,0 +1,1 @@
+"""What the feed override does while the program runs: spindle, controller, plant."""

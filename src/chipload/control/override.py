@@ -1,0 +1,230 @@
+"""Which feed override is sent, now: a controller's answer within rules that keep the part and the cutter whole.
+
+Notation: T measured torque [N mm], T_ref the torque that is held; o override (feed over programmed feed); q the trim
+that the controller moves; e = (T_ref - T) / T_ref, d its change since the last step; f in [-1, 1] the fuzzy answer to
+e / error_span and d / change_span; dt time since the last step [s].
+
+Without a model q is the override itself. With one (feed-forward) the override is what the model allows along the path,
+(q T_ref - edge) / cut, early enough for what lies ahead; then q is the share of T_ref that the model may plan with and
+e = 1 - q T / T_model, so that q settles where measured and planned torque agree, in light cuts as in heavy ones; a
+torque above T_ref counts at once. The fuzzy answer moves q by q f gain dt.
+
+The rules, in the order in which they act:
+
+1. a stop is final until the controller is begun anew; 2. a reading that is none (not a number, below -light, above
+`torque_most`, the same value `stuck_steps` times) lowers the override to `lost_override` and stops after `lost_s`;
+3. torque above `overload` for `overload_steps` stops; 4. the override rises only on a load that is known: a trusted
+reading, heavier than `light` (or light where the model says so), `settle_steps` readings after a start or a loss;
+5. it falls at `slew_down` and rises at `slew_up`, at most a third of it; 6. it stays from `floor` to `cap`, and `cap`
+is at most 1 unless `above_programmed`; 7. what is sent is rounded down to whole `quantum`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.control import _kernels
+from chipload.control.fuzzy import FuzzyTable
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+
+KINDS = ("fixed", "pi", "mamdani", "product-sum")
+#: names of the numbers that a step returns
+STATUS = ("run", "settling", "air", "unknown", "lost", "overload", "stopped")
+#: falling is at least so many times faster than rising
+FALL_OVER_RISE = 3.0
+
+
+@dataclass(frozen=True)
+class Override:
+    """A controller and its rules.
+
+    Parameters
+    ----------
+    kind : ``fixed`` (start, or the model alone), ``pi``, ``mamdani``, ``product-sum``
+    torque_ref : T_ref [N mm]
+    overload : torque that stops [N mm]
+    torque_most : greatest torque that the spindle can give; more is no reading [N mm]
+    light : below it the estimate is not trusted [N mm]
+    floor, cap : least and greatest override while it runs
+    start : override after a start, from floor to cap
+    air_override : greatest override in the air, without a model
+    lost_override : greatest override without a reading; 0: stop
+    lost_s : after so long without a reading stop [s]
+    above_programmed : the cap may be above 1
+    slew_up, slew_down : greatest change of the override [1/s]
+    gain_up, gain_down : greatest relative change of the trim [1/s]
+    error_span, change_span : e and d at which the sets end
+    pi_gain, pi_rate : dq = pi_gain d + pi_rate e dt; pi_rate [1/s]
+    overload_steps, stuck_steps, air_steps, settle_steps : in steps
+    gap_s : a longer time between steps counts as a start [s]
+    quantum : step of the override that the controller takes; 0: any value
+    trim_least, trim_most : of q with a model
+
+    Raises
+    ------
+    InputError
+        A value is out of its range.
+    """
+
+    kind: Literal["fixed", "pi", "mamdani", "product-sum"]
+    torque_ref: float
+    overload: float
+    torque_most: float
+    light: float
+    floor: float
+    cap: float
+    start: float
+    air_override: float
+    lost_override: float
+    lost_s: float
+    above_programmed: bool = False
+    slew_up: float = 1.0
+    slew_down: float = 5.0
+    gain_up: float = 1.5
+    gain_down: float = 6.0
+    error_span: float = 1.0
+    change_span: float = 0.5
+    pi_gain: float = 0.3
+    pi_rate: float = 1.5
+    overload_steps: int = 3
+    stuck_steps: int = 10
+    air_steps: int = 3
+    settle_steps: int = 5
+    gap_s: float = 0.5
+    quantum: float = 0.01
+    trim_least: float = 0.2
+    trim_most: float = 1.5
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise InputError(f"override.kind = {self.kind!r}: must be one of {', '.join(KINDS)}")
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, float) and not math.isfinite(value):
+                raise InputError(f"override.{field.name} = {value:g}: must be a number")
+        top = math.inf if self.above_programmed else 1.0
+        limits = (
+            ("torque_ref", 0.0, math.inf, False),
+            ("overload", self.torque_ref, math.inf, False),
+            ("torque_most", self.overload, math.inf, False),
+            ("light", 0.0, self.torque_ref, False),
+            ("floor", 0.0, 1.0, False),
+            ("cap", self.floor, top, True),
+            ("start", self.floor, self.cap, True),
+            ("air_override", self.floor, self.cap, True),
+            ("lost_override", 0.0, self.cap, True),
+            ("lost_s", 0.0, math.inf, False),
+            ("slew_up", 0.0, math.inf, False),
+            ("slew_down", FALL_OVER_RISE * self.slew_up, math.inf, True),
+            ("gain_up", 0.0, math.inf, False),
+            ("gain_down", FALL_OVER_RISE * self.gain_up, math.inf, True),
+            ("error_span", 0.0, math.inf, False),
+            ("change_span", 0.0, math.inf, False),
+            ("pi_gain", 0.0, math.inf, True),
+            ("pi_rate", 0.0, math.inf, True),
+            ("overload_steps", 1, math.inf, True),
+            ("stuck_steps", 2, math.inf, True),
+            ("air_steps", 1, math.inf, True),
+            ("settle_steps", 1, math.inf, True),
+            ("gap_s", 0.0, math.inf, False),
+            ("quantum", 0.0, self.floor, True),
+            ("trim_least", 0.0, 1.0, False),
+            ("trim_most", 1.0, math.inf, True),
+        )
+        for name, low, high, inclusive in limits:
+            value = getattr(self, name)
+            if not ((low <= value if inclusive else low < value) and value <= high):
+                bound = f"{'at least' if inclusive else 'above'} {low:g}"
+                upper = "" if high == math.inf else f" and at most {high:g}"
+                why = {
+                    "cap": " (above_programmed = true allows more)" if not self.above_programmed else "",
+                    "slew_down": f" ({FALL_OVER_RISE:g} slew_up: it must fall faster than it rises)",
+                    "gain_down": f" ({FALL_OVER_RISE:g} gain_up: it must fall faster than it rises)",
+                }.get(name, "")
+                raise InputError(f"override.{name} = {value:g}: must be {bound}{upper}{why}")
+
+    @property
+    def numbers(self) -> Floats:
+        """The values in the order in which the kernels take them."""
+        names = (
+            "torque_ref", "cap", "floor", "start", "air_override", "lost_override", "slew_up", "slew_down", "gain_up",
+            "gain_down", "error_span", "change_span", "light", "overload", "overload_steps", "torque_most",
+            "stuck_steps", "air_steps", "settle_steps", "lost_s", "gap_s", "quantum", "pi_gain", "pi_rate",
+            "trim_least", "trim_most",
+        )  # fmt: skip
+        return np.array([KINDS.index(self.kind), *(getattr(self, name) for name in names)], dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a step is told.
+
+    Parameters
+    ----------
+    torque : measured [N mm]; not a number: there is none
+    dt : time since the last step [s]
+    trusted : the estimator believes it (speed in its range, ...)
+    actual : override at which the axes move
+    predicted : what the model expects to be measured now [N mm]
+    model : override that the model allows here with the trim of the state (:func:`trim`); None: there is no model
+    """
+
+    torque: float
+    dt: float
+    trusted: bool = True
+    actual: float = 1.0
+    predicted: float = 0.0
+    model: float | None = None
+
+
+def begin(config: Override, modelled: bool = False) -> Floats:
+    """The state before the first step, and after every stop."""
+    state = np.zeros(_kernels.STATE)
+    state[0] = state[10] = state[11] = config.start
+    state[1] = 1.0 if modelled else config.start
+    return state
+
+
+def trim(state: Floats) -> float:
+    """Trim q of a state: with a model the share of torque_ref that may be planned with."""
+    return float(state[1])
+
+
+def step(config: Override, table: FuzzyTable, state: Floats, reading: Reading) -> tuple[float, str, Floats]:
+    """One step.
+
+    Parameters
+    ----------
+    config, table : the controller; the table is used by the fuzzy kinds only
+    state : from :func:`begin` or the last step
+    reading : what was measured
+
+    Returns
+    -------
+    The override to send, its status (one of ``STATUS``) and the new state.
+    """
+    new = state.copy()
+    sent, status = _kernels.step(
+        config.numbers,
+        table.error,
+        table.change,
+        table.output,
+        table.rules,
+        table.whole_ends,
+        np.empty(len(table.output)),
+        new,
+        float(reading.torque),
+        reading.trusted,
+        float(reading.predicted),
+        -1.0 if reading.model is None else float(reading.model),
+        float(reading.actual),
+        float(reading.dt),
+    )
+    return float(sent), STATUS[status], new

@@ -1,0 +1,330 @@
+"""Torque, feed and spindle along a program under an override: the loop that a controller is tried in.
+
+Notation: s [mm] along the path; F(s) programmed feed [mm/s], o the override, v the feed that the axes reach on the way
+to o F; torque averaged over a revolution T(s) = edge(s) + cut(s) v / F (w_0 / w), so cut is the part that goes with the
+feed per tooth [N mm at the programmed feed]; w spindle speed [rad/s], w_0 the programmed one; J inertia [N mm s^2],
+K_T [N mm/A], I current [A].
+
+    J dw/dt = K_T (I - I_idle(w)) - T,   I_idle = i_0 + i_1 w,
+    I = K_P (w_0 - w) + K_I integral of (w_0 - w), within the drive's current,
+    T_measured = lag of [K_T (I - I_idle) - J dw/dt] + K_T noise, smoothed.
+
+What the controller believes (the model) and what is true (its columns with surprises) are two sets of columns. The axes
+accelerate within their limit; the override acts after its latency. Teeth are below the bandwidth and are not in it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.control import _kernels
+from chipload.control.fuzzy import FuzzyTable
+from chipload.control.override import STATUS, Override, begin
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+
+FAULTS = ("none", "nan", "stuck", "value")
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueProfile:
+    """Torque along a path at the programmed feed.
+
+    Parameters
+    ----------
+    s : (n,) float [mm], not falling
+    feed : (n,) float [mm/s], programmed
+    edge : (n,) float [N mm], part that does not know the feed
+    cut : (n,) float [N mm], part that goes with the feed per tooth
+
+    Raises
+    ------
+    InputError
+        Columns differ in length, s falls, a value is negative or no number, a feed is 0.
+    """
+
+    s: Floats
+    feed: Floats
+    edge: Floats
+    cut: Floats
+
+    def __post_init__(self) -> None:
+        for name in ("s", "feed", "edge", "cut"):
+            column = np.array(getattr(self, name), dtype=np.float64)
+            if column.ndim != 1 or len(column) < 2 or column.shape != np.shape(self.s):
+                raise InputError(f"profile.{name}: must be a column of the length of s, at least 2 rows")
+            bad = ~(np.isfinite(column) & (column >= 0.0 if name != "feed" else column > 0.0))
+            if bad.any() and name != "s":
+                row = int(np.flatnonzero(bad)[0])
+                least = "above 0" if name == "feed" else "at least 0"
+                raise InputError(f"profile.{name}[{row}] = {column[row]:g}: must be a number, {least}")
+            column.setflags(write=False)
+            object.__setattr__(self, name, column)
+        if not (np.diff(self.s) > 0.0).all():
+            row = int(np.flatnonzero(~(np.diff(self.s) > 0.0))[0]) + 1
+            raise InputError(f"profile.s[{row}] = {self.s[row]:g}: must be above {self.s[row - 1]:g} before it")
+
+    def torque(self, override: ArrayLike) -> Floats:
+        """Torque [N mm] in each row at an override (a number or (n,))."""
+        return np.asarray(self.edge + self.cut * np.asarray(override, dtype=np.float64))
+
+    def constant_override(self, torque: float) -> float:
+        """Greatest constant override at which no row exceeds ``torque`` [N mm]; 0: none does."""
+        cutting = self.cut > 0.0
+        if (self.edge > torque).any():
+            return 0.0
+        return float(((torque - self.edge[cutting]) / self.cut[cutting]).min()) if cutting.any() else math.inf
+
+
+@dataclass(frozen=True)
+class Surprise:
+    """Something true that the model does not know, from ``begin`` to ``end`` [mm] along the path.
+
+    Parameters
+    ----------
+    begin, end : [mm]
+    cut, edge : factors of the two parts of the torque (1.3, 1: stock 30 % thicker; 1.2, 2: a worn cutter)
+    ramp : the factor grows and falls over so much path at both ends [mm]; a round cutter enters over about its radius
+    """
+
+    begin: float
+    end: float
+    cut: float
+    edge: float = 1.0
+    ramp: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.begin < self.end:
+            raise InputError(f"surprise.end = {self.end:g} mm: must be above begin = {self.begin:g}")
+        for name in ("cut", "edge"):
+            if not 0.0 <= getattr(self, name) <= 100.0:
+                raise InputError(f"surprise.{name} = {getattr(self, name):g}: must be a factor from 0 to 100")
+        if not 0.0 <= self.ramp < math.inf:
+            raise InputError(f"surprise.ramp = {self.ramp:g} mm: must be at least 0")
+
+
+def surprised(profile: TorqueProfile, surprises: tuple[Surprise, ...], spacing: float | None = None) -> TorqueProfile:
+    """The true columns: the profile with surprises, sampled every ``spacing`` [mm] (None: the rows that are there)."""
+    s = profile.s
+    if spacing is not None:
+        if not spacing > 0.0:
+            raise InputError(f"plant.spacing = {spacing:g} mm: must be above 0")
+        s = np.unique(np.concatenate([s, np.arange(s[0], s[-1], spacing)]))
+    edge, cut, feed = (np.interp(s, profile.s, x) for x in (profile.edge, profile.cut, profile.feed))
+    for x in surprises:
+        inside = np.minimum(s - x.begin, x.end - s)
+        share = (inside >= 0.0).astype(np.float64) if x.ramp == 0.0 else np.clip(inside / x.ramp, 0.0, 1.0)
+        cut = cut * (1.0 + (x.cut - 1.0) * share)
+        edge = edge * (1.0 + (x.edge - 1.0) * share)
+    return TorqueProfile(s, feed, edge, cut)
+
+
+@dataclass(frozen=True)
+class Spindle:
+    """A spindle with its drive and current sensor.
+
+    Parameters
+    ----------
+    speed : w_0 [rad/s]
+    inertia : J [N mm s^2] (1 kg m^2 = 1000)
+    torque_constant : K_T [N mm/A]
+    idle : (i_0 [A], i_1 [A s])
+    stiffness, reset : K_P [A s], K_I [A] of the speed controller
+    most_current : of the drive [A]
+    sensor_lag : time constant [s]
+    smoothing : time constant of the filter behind it [s], about a revolution
+    noise : standard deviation of a reading of the current [A]
+    """
+
+    speed: float
+    inertia: float
+    torque_constant: float
+    idle: tuple[float, float]
+    stiffness: float
+    reset: float
+    most_current: float
+    sensor_lag: float
+    smoothing: float
+    noise: float
+
+    def __post_init__(self) -> None:
+        for name in ("speed", "inertia", "torque_constant", "stiffness", "most_current"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise InputError(f"spindle.{name} = {getattr(self, name):g}: must be above 0")
+        for name in ("reset", "sensor_lag", "smoothing", "noise"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise InputError(f"spindle.{name} = {getattr(self, name):g}: must be at least 0")
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Times of the loop and the limit of the axes.
+
+    Parameters
+    ----------
+    acceleration : of the feed [mm/s^2]
+    period : between two steps of the controller [s]
+    latency : until an override acts [s], rounded to periods
+    substep : of the simulation [s], at most the period
+    longest_s : give up after [s]
+    seed : of the noise
+    """
+
+    acceleration: float
+    period: float = 0.01
+    latency: float = 0.0
+    substep: float = 0.001
+    longest_s: float = 3600.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("acceleration", "period", "substep", "longest_s"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise InputError(f"loop.{name} = {getattr(self, name):g}: must be above 0")
+        if not 0.0 <= self.latency <= 10.0:
+            raise InputError(f"loop.latency = {self.latency:g} s: must be from 0 to 10")
+        if self.substep > self.period:
+            raise InputError(f"loop.substep = {self.substep:g} s: must be at most the period {self.period:g}")
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What happens to the sensor from ``begin`` to ``end`` [s]: ``nan``, ``stuck`` (its last reading) or ``value``."""
+
+    kind: Literal["none", "nan", "stuck", "value"] = "none"
+    begin: float = 0.0
+    end: float = 0.0
+    value: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in FAULTS:
+            raise InputError(f"fault.kind = {self.kind!r}: must be one of {', '.join(FAULTS)}")
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a run gave.
+
+    Parameters
+    ----------
+    finished : the end of the path was reached
+    stopped : status at which it ended (``run`` where it finished)
+    time : [s]
+    torque_max : greatest true torque [N mm]
+    time_over : with the true torque above the limit [s]
+    t, s, feed, torque, measured, override, speed : (k,) float, a row each step of the controller and the last
+        [s, mm, mm/s, N mm, N mm, -, rad/s]
+    status : (k,) int, of ``STATUS``
+    """
+
+    finished: bool
+    stopped: str
+    time: float
+    torque_max: float
+    time_over: float
+    t: Floats
+    s: Floats
+    feed: Floats
+    torque: Floats
+    measured: Floats
+    override: Floats
+    speed: Floats
+    status: NDArray[np.int64]
+
+
+def run(
+    truth: TorqueProfile,
+    model: TorqueProfile | None,
+    controller: Override,
+    table: FuzzyTable,
+    spindle: Spindle,
+    loop: Loop,
+    limit: float,
+    fault: Fault | None = None,
+    every_row: int = 1,
+) -> Outcome:
+    """Run a controller along a path.
+
+    Parameters
+    ----------
+    truth : what the cutter meets
+    model : what the controller believes, at the same programmed feeds; None: it has no feed-forward
+    controller, table : see :mod:`chipload.control.override`
+    spindle, loop : the machine
+    limit : torque for ``time_over`` [N mm]
+    fault : of the sensor
+    every_row : keep every so many steps of the controller
+
+    Raises
+    ------
+    InputError
+        The model covers another path than the truth.
+    """
+    believed = truth
+    if model is not None:
+        if (model.s[0], model.s[-1]) != (truth.s[0], truth.s[-1]):
+            raise InputError(
+                f"plant.model: from s = {model.s[0]:g} to {model.s[-1]:g} mm: must cover the path, "
+                f"{truth.s[0]:g} to {truth.s[-1]:g}"
+            )
+        believed = _on_rows(model, truth.s)
+        truth = _on_rows(truth, believed.s)
+    every = max(round(loop.period / loop.substep), 1)
+    delay = round(loop.latency / loop.period)
+    noise = np.random.default_rng(loop.seed).normal(0.0, spindle.noise, 65_536)
+    state = begin(controller, model is not None)
+    rows = math.ceil(loop.longest_s / loop.period / every_row) + 3
+    out = np.empty((min(rows, 2_000_000), 8))
+    fault = fault or Fault()
+    filled, finished, time, greatest, over = _kernels.run(
+        truth.s, truth.feed, truth.edge, truth.cut, believed.edge, believed.cut, model is not None,
+        controller.numbers, table.error, table.change, table.output, table.rules, table.whole_ends,
+        np.empty(len(table.output)), state, delay * loop.period,
+        np.array([loop.period / every, loop.acceleration, loop.longest_s]),
+        np.array([spindle.inertia, spindle.torque_constant, *spindle.idle, spindle.stiffness, spindle.reset,
+                  spindle.most_current, spindle.speed, spindle.sensor_lag, spindle.smoothing]),
+        np.array([FAULTS.index(fault.kind), fault.begin, fault.end, fault.value], dtype=np.float64),
+        noise, every, delay, limit, every_row, out,
+    )  # fmt: skip
+    t, s, feed, torque, measured, sent, status, speed = np.ascontiguousarray(out[:filled].T)
+    return Outcome(
+        finished=finished,
+        stopped="run" if finished else STATUS[int(status[-1])],
+        time=time,
+        torque_max=greatest,
+        time_over=over,
+        t=t,
+        s=s,
+        feed=feed,
+        torque=torque,
+        measured=measured,
+        override=sent,
+        speed=speed,
+        status=status.astype(np.int64),
+    )
+
+
+def comparison(constant: float, controller: Override) -> dict[str, tuple[Override, bool]]:
+    """The controllers that are compared, with whether each has the model: constant, pi, fuzzy, fuzzy_feedforward.
+
+    ``constant``: override of the constant one. The others are ``controller`` with another kind.
+    """
+    fixed = replace(controller, kind="fixed", start=constant, floor=min(controller.floor, constant), quantum=0.0)
+    return {
+        "constant": (fixed, False),
+        "pi": (replace(controller, kind="pi"), False),
+        "fuzzy": (replace(controller, kind="mamdani"), False),
+        "fuzzy_feedforward": (replace(controller, kind="mamdani"), True),
+    }
+
+
+def _on_rows(profile: TorqueProfile, s: Floats) -> TorqueProfile:
+    """The profile with rows also at ``s``."""
+    rows = np.union1d(profile.s, s)
+    return TorqueProfile(rows, *(np.interp(rows, profile.s, x) for x in (profile.feed, profile.edge, profile.cut)))

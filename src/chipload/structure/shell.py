@@ -1,0 +1,457 @@
+"""How far a thin tube or cone gives way under the cutter, and how hard it is strained: a Fourier-Ritz shell.
+
+Notation: s [mm] along the meridian from 0 to the length; theta round; r = r0 + s sin f the radius of the middle
+surface, f [rad] the half angle of the cone (f > 0: wider away from s = 0); t thickness; u, v, w displacements along s,
+along theta and along the outward normal; E modulus [MPa], m Poisson's ratio; C = E t / (1 - m^2) and
+D = E t^3 / (12 (1 - m^2)). With ' for d/ds and the index th for d/dtheta the strains of the middle surface and the
+changes of curvature are
+
+    es = u',    et = (v_th + u sin f + w cos f) / r,    g = u_th / r + v' - v sin f / r,
+    ks = -w'',  kt = -w_thth / r^2 + cos f v_th / r^2 - sin f w' / r,
+    tw = 2 (-w'_th / r + sin f w_th / r^2 + cos f v' / r - sin f cos f v / r^2).
+
+The energy is minimal over u = sum u_n(s) cos n theta, v = sum v_n(s) sin n theta, w = sum w_n(s) cos n theta, with u_n,
+v_n, w_n integrals of Legendre polynomials that hold the ends. The harmonics do not mix: each is factored once, for all
+loads.
+
+Valid for t / r below about 1/10, small displacements, one thickness. Too stiff, never too soft (Ritz); under a point
+load the deflection converges as 1 / harmonics^2 and 1 / terms^2 (:func:`left_out` says what is missing), the stress
+under it not at all: it needs the area on which the load acts.
+
+Reference: [Leissa1973] ch. 1 (Donnell's and Novozhilov's relations for cones); [Timoshenko1959] ch. 15.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import solve_triangular
+
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+
+ENDS = ("clamped", "diaphragms", "free")
+
+
+@dataclass(frozen=True)
+class Shell:
+    """A thin tube or cone.
+
+    Parameters
+    ----------
+    radius : r0 of the middle surface at s = 0 [mm]
+    length : along the meridian [mm]
+    thickness : of the wall [mm]
+    modulus : E [MPa]
+    poisson : Poisson's ratio, 0 .. below 0.5
+    cone_angle : f [rad], within +-80 deg; 0: a tube
+    ends : ``clamped`` at s = 0 and free at the length; ``diaphragms`` (v = w = 0, u free) at both; ``free`` at both,
+        for loads that are in balance
+
+    Raises
+    ------
+    InputError
+        A value is out of its range, or the cone closes to a point.
+    """
+
+    radius: float
+    length: float
+    thickness: float
+    modulus: float
+    poisson: float
+    cone_angle: float = 0.0
+    ends: Literal["clamped", "diaphragms", "free"] = "clamped"
+
+    def __post_init__(self) -> None:
+        for name, unit in (("radius", "mm"), ("length", "mm"), ("thickness", "mm"), ("modulus", "MPa")):
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise InputError(f"shell.{name} = {value:g}: must be above 0 {unit}")
+        if not 0.0 <= self.poisson < 0.5:
+            raise InputError(f"shell.poisson = {self.poisson:g}: must be from 0 to below 0.5")
+        if not abs(self.cone_angle) <= math.radians(80.0):
+            raise InputError(f"shell.cone_angle_deg = {math.degrees(self.cone_angle):g}: must be from -80 to 80")
+        if self.ends not in ENDS:
+            raise InputError(f"shell.ends = {self.ends!r}: must be one of {', '.join(ENDS)}")
+        narrow = min(self.radius, float(self.radius_at(self.length)))
+        if narrow <= 0.0:
+            raise InputError(
+                f"shell.length = {self.length:g} mm: the cone closes to a point at "
+                f"{-self.radius / math.sin(self.cone_angle):g}; must be shorter"
+            )
+        if self.thickness > narrow:
+            raise InputError(
+                f"shell.thickness = {self.thickness:g} mm: must be at most the least radius {narrow:g}; "
+                "a thin shell is meant (below a tenth of it)"
+            )
+
+    def radius_at(self, s: ArrayLike) -> Floats:
+        """Radius of the middle surface [mm], the shape of ``s`` [mm]."""
+        return np.asarray(self.radius + np.asarray(s, dtype=np.float64) * math.sin(self.cone_angle))
+
+
+@dataclass(frozen=True, eq=False)
+class Ritz:
+    """A shell with the stiffness of each of its harmonics factored.
+
+    Parameters
+    ----------
+    shell : what it was made from
+    harmonics : (h,) int, the n that are in it
+    terms : polynomials for each displacement
+    inverse : (h, 3 m, 3 m) float; inverse[i].T @ inverse[i] is the flexibility of harmonic i [mm/N], m = terms
+    repeat : forces stand ``repeat`` times round, evenly
+    """
+
+    shell: Shell
+    harmonics: NDArray[np.int64]
+    terms: int
+    inverse: Floats
+    repeat: int = 1
+
+
+def ritz(shell: Shell, harmonics: int = 80, terms: int = 40, repeat: int = 1) -> Ritz:
+    """Factor the stiffness of each harmonic of a shell.
+
+    Parameters
+    ----------
+    shell : the wall
+    harmonics : greatest n, at least 2
+    terms : polynomials for each of u, v, w, 4 .. 80
+    repeat : the loads stand so many times round (2: a pair across the diameter); only multiples of it are kept
+
+    Raises
+    ------
+    InputError
+        A number is out of range, or the shell is free and the load stands alone.
+    """
+    if harmonics < 2:
+        raise InputError(f"shell.harmonics = {harmonics}: must be at least 2, with fewer nothing ovalises")
+    if not 4 <= terms <= 80:
+        raise InputError(f"shell.terms = {terms}: must be from 4 to 80")
+    if repeat < 1:
+        raise InputError(f"shell.repeat = {repeat}: must be at least 1")
+    if shell.ends == "free" and repeat < 2:
+        raise InputError("shell.ends = 'free': one force is not in balance: must be repeat = 2 or more")
+    nodes, weights = legendre.leggauss(2 * terms + 8)
+    s = 0.5 * shell.length * (nodes + 1.0)
+    area = 0.5 * shell.length * weights * shell.radius_at(s)
+    law = _law(shell)
+    orders = np.arange(0, harmonics + 1, repeat)
+    inverse = np.empty((len(orders), 3 * terms, 3 * terms))
+    basis = _basis(shell, terms, s)
+    for i, n in enumerate(orders):
+        b = _strains(shell, basis, s, int(n))
+        weight = (math.tau if n == 0 else math.pi) * area
+        flat = (len(s) * 6, 3 * terms)
+        stiffness = b.reshape(flat).T @ (law @ b * weight[:, None, None]).reshape(flat)
+        held = _held(shell, terms, int(n))
+        stiffness[held, :] = stiffness[:, held] = 0.0
+        stiffness[held, held] = 1.0
+        scale = 1.0 / np.sqrt(np.diag(stiffness))
+        lower = np.linalg.cholesky(stiffness * scale[:, None] * scale)
+        inverse[i] = solve_triangular(lower, np.diag(scale), lower=True)
+        inverse[i][:, held] = 0.0
+    for array in (orders, inverse):
+        array.setflags(write=False)
+    return Ritz(shell, orders, terms, inverse, repeat)
+
+
+def compliance(
+    modes: Ritz,
+    s_force: ArrayLike,
+    s_point: ArrayLike | None = None,
+    theta: ArrayLike = 0.0,
+    length: float = 0.0,
+    width: float = 0.0,
+) -> Floats:
+    """Displacement (u, v, w) of one point under unit forces along (s, theta, normal) at another.
+
+    Parameters
+    ----------
+    modes : from :func:`ritz`
+    s_force : float [mm], (k,) or a number, where the force acts, at theta = 0
+    s_point : float [mm], where the displacement is asked; None: at the force
+    theta : float [rad], angle from the force to the point
+    length, width : the force is spread evenly over so much along s and round [mm]; 0: a point. The displacement is that
+        of the middle of the patch, or of s_point.
+
+    Returns
+    -------
+    (k, 3, 3) float [mm/N], row: displacement, column: force. A number for ``s_force`` and all others gives (3, 3).
+
+    Raises
+    ------
+    InputError
+        A point or the patch lies outside the wall.
+
+    Nothing holds a tube between diaphragms along s, and nothing a free one: columns of forces that are not in balance
+    are then for a mean of u (and of v, where free) that is held at 0.
+    """
+    force, point, angle = np.broadcast_arrays(
+        np.asarray(s_force, dtype=np.float64),
+        np.asarray(s_force if s_point is None else s_point, dtype=np.float64),
+        np.asarray(theta, dtype=np.float64),
+    )
+    shape = force.shape
+    loads = _loads(modes, force.ravel(), length)
+    rows = loads if s_point is None and length == 0.0 else _loads(modes, point.ravel(), 0.0)
+    out = np.zeros((force.size, 3, 3))
+    for i, n in enumerate(modes.harmonics):
+        spread = modes.repeat * np.sinc(n * width / (math.tau * modes.shell.radius_at(force.ravel())))
+        left = np.einsum("ij,kjc->kic", modes.inverse[i], rows, optimize=True)
+        right = left if rows is loads else np.einsum("ij,kjc->kic", modes.inverse[i], loads, optimize=True)
+        block = np.einsum("kia,kib->kab", left, right, optimize=True) * spread[:, None, None]
+        c, d = np.cos(n * angle.ravel()), np.sin(n * angle.ravel())
+        # u and w of forces along u and w go with cos; v with sin; a force along v makes the pattern a quarter wave on
+        even = np.stack([c, d, c], axis=1)[:, :, None] * block
+        odd = np.stack([-d, c, -d], axis=1) * block[:, :, 1]
+        out[:, :, 0] += even[:, :, 0]
+        out[:, :, 2] += even[:, :, 2]
+        out[:, :, 1] += odd
+    return out.reshape(*shape, 3, 3)
+
+
+def left_out(modes: Ritz, s: ArrayLike) -> Floats:
+    """What the harmonics and terms that were left out would add to the normal compliance under a point force [mm/N].
+
+    They are short waves, to which the wall is an infinite plate: [s (L - s) / terms^2 + r^2 / n_max^2] / (8 pi D). The
+    first part is exact for many terms; near a free edge the second is too small by a factor of 2 to 3. The two
+    overlap by a little.
+
+    Parameters
+    ----------
+    modes : from :func:`ritz`
+    s : float [mm], any shape
+    """
+    shell = modes.shell
+    at = np.asarray(s, dtype=np.float64)
+    bending = shell.modulus * shell.thickness**3 / (12.0 * (1.0 - shell.poisson**2))
+    along = at * (shell.length - at) / modes.terms**2
+    return np.asarray((along + (shell.radius_at(at) / modes.harmonics[-1]) ** 2) / (8.0 * math.pi * bending))
+
+
+def stress(
+    modes: Ritz,
+    s_force: float,
+    s_point: ArrayLike,
+    theta: ArrayLike,
+    outside: bool = True,
+    length: float = 0.0,
+    width: float = 0.0,
+) -> Floats:
+    """Stress on a face of the wall under a unit normal force (outwards).
+
+    Parameters
+    ----------
+    modes : from :func:`ritz`
+    s_force : where the force acts, at theta = 0 [mm]
+    s_point, theta : where it is asked, float [mm], [rad], shapes that broadcast to (k,)
+    outside : on the outer face; False: on the inner one
+    length, width : area over which the force is spread [mm]; without it the stress under the force has no limit
+
+    Returns
+    -------
+    (k, 3) float [MPa/N], along s, round, shear.
+
+    Raises
+    ------
+    InputError
+        A point or the patch lies outside the wall, or the stress is asked at the place of a point force.
+    """
+    point, angle = np.broadcast_arrays(np.asarray(s_point, dtype=np.float64), np.asarray(theta, dtype=np.float64))
+    shape, at, angle = point.shape, point.ravel(), angle.ravel()
+    _inside(modes.shell, at, 0.0)
+    if (length == 0.0 or width == 0.0) and (np.hypot(at - s_force, modes.shell.radius_at(at) * angle) == 0.0).any():
+        raise InputError(
+            f"shell.stress: s = {s_force:g} mm: under a point force the stress has no limit; give the length and the "
+            "width of the patch on which the cutter acts"
+        )
+    shell = modes.shell
+    load = _loads(modes, np.array([s_force]), length)[0, :, 2]
+    strains = np.zeros((len(at), 6))
+    basis = _basis(shell, modes.terms, at)
+    for i, n in enumerate(modes.harmonics):
+        q = modes.inverse[i].T @ (modes.inverse[i] @ load)
+        q *= modes.repeat * np.sinc(n * width / (math.tau * float(shell.radius_at(s_force))))
+        c, d = np.cos(n * angle), np.sin(n * angle)
+        strains += np.stack([c, c, d, c, c, d], axis=1) * (_strains(shell, basis, at, int(n)) @ q)
+    z = 0.5 * shell.thickness if outside else -0.5 * shell.thickness
+    es, et, g = (strains[:, j] + z * strains[:, 3 + j] for j in range(3))
+    plane = shell.modulus / (1.0 - shell.poisson**2)
+    along = plane * (es + shell.poisson * et)
+    round_ = plane * (et + shell.poisson * es)
+    shear = 0.5 * shell.modulus / (1.0 + shell.poisson) * g
+    return np.stack([along, round_, shear], axis=1).reshape(*shape, 3)
+
+
+def equivalent(stresses: ArrayLike) -> Floats:
+    """Von Mises's stress of (..., 3) stresses along s, round, shear; the shape without the last axis.
+
+    >>> float(equivalent([3.0, 0.0, 0.0])), round(float(equivalent([0.0, 0.0, 1.0])), 6)
+    (3.0, 1.732051)
+    """
+    a, b, shear = np.moveaxis(np.asarray(stresses, dtype=np.float64), -1, 0)
+    return np.asarray(np.sqrt(a * a - a * b + b * b + 3.0 * shear * shear))
+
+
+def greatest_stress(modes: Ritz, s_force: float, length: float, width: float, angles: int = 181) -> tuple[float, float]:
+    """Greatest equivalent stress at the clamp and under the patch, for a unit normal force [MPa/N].
+
+    Both faces are asked, at ``angles`` places round at s = 0 (half the circle, the rest is its mirror image) and at the
+    middle and the ends of the patch. An end with diaphragms or free counts like the clamp.
+    """
+    theta = np.linspace(0.0, math.pi, angles)
+    under = np.array([s_force - 0.5 * length, s_force, s_force + 0.5 * length])
+    clamp, patch = 0.0, 0.0
+    for face in (True, False):
+        clamp = max(clamp, float(equivalent(stress(modes, s_force, 0.0, theta, face, length, width)).max()))
+        patch = max(patch, float(equivalent(stress(modes, s_force, under, 0.0, face, length, width)).max()))
+    return clamp, patch
+
+
+@dataclass(frozen=True, eq=False)
+class Ovalisation:
+    """What each harmonic adds to the deflection under the force, and the shape of the loaded rim.
+
+    Parameters
+    ----------
+    harmonics : (h,) int
+    share : (h,) float [mm/N], normal deflection at the force that harmonic n gives
+    beam : the same of a beam with shear [mm/N]
+    theta : (k,) float [rad]
+    rim : (k,) float [mm/N], normal displacement round at the height of the force
+    """
+
+    harmonics: NDArray[np.int64]
+    share: Floats
+    beam: float
+    theta: Floats
+    rim: Floats
+
+
+def ovalisation(modes: Ritz, s_force: float, points: int = 181) -> Ovalisation:
+    """Harmonics and rim of the wall under a unit normal force at ``s_force`` [mm]; see :class:`Ovalisation`."""
+    load = _loads(modes, np.array([s_force]), 0.0)[0, :, 2]
+    share = modes.repeat * np.sum((modes.inverse @ load) ** 2, axis=1)
+    theta = np.linspace(-math.pi, math.pi, points)
+    rim = np.cos(theta[:, None] * modes.harmonics) @ share
+    return Ovalisation(modes.harmonics, share, beam_compliance(modes.shell, s_force), theta, rim)
+
+
+def beam_compliance(shell: Shell, s_force: float) -> float:
+    """Deflection of a tube as a beam with shear, clamped at s = 0, under a unit lateral force [mm/N].
+
+    s^3 / (3 E I) + s / (k G A), I = pi r^3 t, A = 2 pi r t, k = 2 (1 + m) / (4 + 3 m). For tubes only.
+
+    Reference: [Cowper1966] table 1 (thin-walled round tube).
+
+    Raises
+    ------
+    InputError
+        The shell is a cone.
+    """
+    if shell.cone_angle != 0.0:
+        raise InputError(
+            f"shell.cone_angle_deg = {math.degrees(shell.cone_angle):g}: must be 0, the beam is for tubes only"
+        )
+    area = math.tau * shell.radius * shell.thickness
+    inertia = 0.5 * area * shell.radius**2
+    factor = 2.0 * (1.0 + shell.poisson) / (4.0 + 3.0 * shell.poisson)
+    shear = 0.5 * shell.modulus / (1.0 + shell.poisson)
+    return s_force**3 / (3.0 * shell.modulus * inertia) + s_force / (factor * shear * area)
+
+
+def _law(shell: Shell) -> Floats:
+    """(6, 6) from (es, et, g, ks, kt, tw) to forces and moments per length."""
+    m = shell.poisson
+    plane = np.array([[1.0, m, 0.0], [m, 1.0, 0.0], [0.0, 0.0, 0.5 * (1.0 - m)]])
+    stretch = shell.modulus * shell.thickness / (1.0 - m * m)
+    law = np.zeros((6, 6))
+    law[:3, :3] = stretch * plane
+    law[3:, 3:] = stretch * shell.thickness**2 / 12.0 * plane
+    return law
+
+
+def _polynomials(ends: str, which: int, terms: int) -> Floats:
+    """(terms, terms + 2) Legendre coefficients of the functions of u, v or w (``which``) that hold the ends."""
+    unit = np.eye(terms + 1)
+    if ends == "clamped":
+        times, made = (2 if which == 2 else 1), unit[:terms]
+    elif ends == "diaphragms" and which > 0:
+        times, made = 1, unit[1:]
+    else:
+        times, made = 0, unit[:terms]
+    out = np.zeros((terms, terms + 2))
+    whole = legendre.legint(made, times, lbnd=-1, axis=1)
+    columns = min(whole.shape[1], terms + 2)
+    out[:, :columns] = whole[:, :columns]
+    return out
+
+
+def _functions(shell: Shell, terms: int, which: int, s: Floats, order: int) -> Floats:
+    """(q, terms) values of the derivative of ``order`` at s."""
+    c = _polynomials(shell.ends, which, terms).T
+    if order:
+        c = np.asarray(legendre.legder(c, order, axis=0), dtype=np.float64)
+    x = 2.0 * s / shell.length - 1.0
+    return np.asarray(legendre.legvander(x, len(c) - 1) @ c * (2.0 / shell.length) ** order)
+
+
+def _basis(shell: Shell, terms: int, s: Floats) -> tuple[Floats, ...]:
+    """u, u', v, v', w, w', w'' of every function at s, each (q, terms)."""
+    wanted = ((0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
+    return tuple(_functions(shell, terms, which, s, order) for which, order in wanted)
+
+
+def _strains(shell: Shell, basis: tuple[Floats, ...], s: Floats, n: int) -> Floats:
+    """(q, 6, 3 terms) strains and changes of curvature of harmonic n, without their cos and sin."""
+    r = shell.radius_at(s)[:, None]
+    sf, cf = math.sin(shell.cone_angle), math.cos(shell.cone_angle)
+    u, u1, v, v1, w, w1, w2 = basis
+    b = np.zeros((len(s), 6, 3, u.shape[1]))
+    b[:, 0, 0] = u1
+    b[:, 1, 0], b[:, 1, 1], b[:, 1, 2] = sf * u / r, n * v / r, cf * w / r
+    b[:, 2, 0], b[:, 2, 1] = -n * u / r, v1 - sf * v / r
+    b[:, 3, 2] = -w2
+    b[:, 4, 1], b[:, 4, 2] = cf * n * v / r**2, n * n * w / r**2 - sf * w1 / r
+    b[:, 5, 1] = 2.0 * (cf * v1 / r - sf * cf * v / r**2)
+    b[:, 5, 2] = 2.0 * (n * w1 / r - sf * n * w / r**2)
+    return b.reshape(len(s), 6, -1)
+
+
+def _held(shell: Shell, terms: int, n: int) -> NDArray[np.int64]:
+    """Coefficients that are 0: the rigid motions that nothing holds and no load moves."""
+    if n > 0 or shell.ends == "clamped":
+        return np.empty(0, dtype=np.int64)
+    along = [0] if shell.cone_angle == 0.0 or shell.ends == "free" else []
+    turn = [terms] if shell.ends == "free" else []
+    return np.array(along + turn, dtype=np.int64)
+
+
+def _loads(modes: Ritz, s: Floats, length: float) -> Floats:
+    """(k, 3 terms, 3) work of unit forces along u, v, w at s, spread over ``length``, on each function."""
+    shell, terms = modes.shell, modes.terms
+    _inside(shell, s, length)
+    nodes, weights = legendre.leggauss(terms + 2) if length > 0.0 else (np.zeros(1), np.full(1, 2.0))
+    out = np.zeros((len(s), 3, terms, 3))
+    places = (s[:, None] + 0.5 * length * nodes).ravel()
+    for which in range(3):
+        values = _functions(shell, terms, which, places, 0).reshape(len(s), len(nodes), terms)
+        out[:, which, :, which] = np.einsum("kqm,q->km", values, 0.5 * weights)
+    return out.reshape(len(s), 3 * terms, 3)
+
+
+def _inside(shell: Shell, s: Floats, length: float) -> None:
+    """Refuse places that are not on the wall."""
+    slack = 1e-9 * shell.length
+    bad = ~((s - 0.5 * length >= -slack) & (s + 0.5 * length <= shell.length + slack))
+    if bad.any():
+        patch = f" with a patch of {length:g} mm" if length else ""
+        raise InputError(f"shell: s = {s[bad][0]:g} mm{patch}: must lie on the wall, from 0 to {shell.length:g}")
