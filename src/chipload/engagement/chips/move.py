@@ -73,11 +73,7 @@ class Move:
         return tip, np.asarray(b / np.linalg.norm(b, axis=1)[:, None])
 
     def rates(self, t: ArrayLike) -> tuple[Floats, Floats]:
-<<<<<<< HEAD
-        """P' (n, 3) [mm] and A' (n, 3), per unit of t."""
-=======
         """Rates p' (n, 3) [mm] and A' (n, 3), per unit of t."""
->>>>>>> covered
         u = 2.0 * np.asarray(t, dtype=np.float64) - 1.0
         b, db = chebyshev.chebval(u, self.axis).T, 2.0 * chebyshev.chebval(u, chebyshev.chebder(self.axis)).T
         length = np.linalg.norm(b, axis=1)[:, None]
