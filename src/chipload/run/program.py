@@ -23,7 +23,7 @@ from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min
 
 #: side of a tile of the stock in diameters of the largest cutter
-TILE = 1.5
+TILE = 4.0
 
 
 def run_program(job: ProgramJob, progress: Progress = silent, *, simulate: bool = True) -> Read:

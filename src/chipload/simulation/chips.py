@@ -171,14 +171,13 @@ def remove(
             cutter, move = cutters[int(steps.tool[k])], _move(steps, k, interpolation)
             inner, outer = _box(steps, k, cutter)
             layers = stock.layers_between(inner[2], outer[2])
-            areas = covered_areas(move, cutter, stock.heights[layers.start : layers.stop], resolution.tolerance)
-            met = [(i, a) for i, a in zip(layers, areas, strict=True) if a is not None]
+            met = _covered(steps, k, move, cutter, stock, layers, resolution.tolerance)
             if not met:
                 continue
             # a face that looks down is held against the layer below
             material_before = Section(*stock.edges(range(max(layers.start - 1, 0), layers.stop), inner[:2], outer[:2]))
             tidied = stock.tidied
-            taken = stock.remove_many([i for i, _ in met], [a.polygon for _, a in met], 0.5 * resolution.tolerance)
+            taken = stock.remove_many([i for i, _ in met], [shape for _, shape in met], 0.5 * resolution.tolerance)
             removed[k, 0] = tidied - stock.tidied
             chips = {i: pieces for (i, _), pieces in zip(met, taken, strict=True) if pieces}
             if not chips:
@@ -218,6 +217,32 @@ class _Bite:
 def _move(steps: Steps, k: int, interpolation: Interpolation) -> Move:
     make = Move.slerp if interpolation == "slerp" else Move.lerp
     return make(steps.p0[k], steps.a0[k], steps.p1[k], steps.a1[k])
+
+
+def _covered(
+    steps: Steps, k: int, move: Move, cutter: Cutter, stock: LayeredStock, layers: range, tolerance: float
+) -> list[tuple[int, Polygon | MultiPolygon]]:
+    """What a step covers of each layer that it meets; layers that an upright flank crosses share one polygon."""
+    heights = stock.heights[layers.start : layers.stop]
+    shared = np.zeros(len(heights), dtype=np.bool_)
+    if steps.a0[k, 2] == steps.a1[k, 2] == 1.0 and cutter.taper == 0.0:
+        _, r, _, f, _, _, top = cutter.apt
+        low, high = sorted((steps.p0[k, 2], steps.p1[k, 2]))
+        shared = (heights > high + (f if r > 0.0 else cutter.radius * math.tan(cutter.bottom))) & (heights < low + top)
+    own = np.flatnonzero(~shared)
+    if shared.any():
+        own = np.append(own, np.flatnonzero(shared)[0])
+    shapes = {int(own[n]): a for n, a in enumerate(covered_areas(move, cutter, heights[own], tolerance))}
+    common = shapes[int(own[-1])] if shared.any() else None
+    flank = common.polygon if common is not None else None
+    out = []
+    for n, i in enumerate(layers):
+        area = shapes.get(n)
+        if shared[n]:
+            out.append((i, flank))
+        elif area is not None:
+            out.append((i, area.polygon))
+    return [(i, shape) for i, shape in out if shape is not None]
 
 
 def _box(steps: Steps, k: int, cutter: Cutter) -> tuple[Floats, Floats]:

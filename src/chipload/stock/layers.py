@@ -354,27 +354,46 @@ class LayeredStock:
             return
         k, layer, j, i = np.array(which, dtype=np.int64).T
         before, shape = self.tiles[layer, j, i], given[k]
-        taken = shapely.intersection(before, shape)
+        # layers that were cut alike so far share their tiles, and what is alike is cut once
+        seen: dict[tuple[int, int], int] = {}
+        same = np.array([seen.setdefault((id(b), id(s)), len(seen)) for b, s in zip(before, shape, strict=True)])
+        first = np.unique(same, return_index=True)[1]
+        taken = shapely.intersection(before[first], shape[first])
         parts, pair = shapely.get_parts(taken, return_index=True)
         solid = (shapely.get_type_id(parts) == POLYGON) & (shapely.area(parts) > 0.0)
         parts, pair = parts[solid], pair[solid]
         hit = np.unique(pair)
-        self.tiles[layer[hit], j[hit], i[hit]] = shapely.difference(before[hit], shape[hit])
-        self.cut[layer[hit]] = True
+        left = shapely.difference(before[first[hit]], shape[first[hit]])
+        pieces: list[list[Polygon]] = [[] for _ in first]
+        for n, part in zip(pair.tolist(), parts, strict=True):
+            pieces[n].append(part)
+        after = before[first]
+        after[hit] = left
+        cut = np.isin(same, hit)
+        self.tiles[layer[cut], j[cut], i[cut]] = after[same[cut]]
+        self.cut[layer[cut]] = True
         if tidy > 0.0:
-            self._tidy(layer[hit], j[hit], i[hit], tidy)
-        for n, part in zip(k[pair].tolist(), parts, strict=True):
-            chips[n].append(part)
-        several, tiles = np.unique(k[hit], return_counts=True)
-        for n in several[tiles > 1].tolist():
-            chips[n] = polygons(shapely.union_all(chips[n]))
+            self._tidy(layer[cut], j[cut], i[cut], tidy)
+        groups: dict[int, list[int]] = {}
+        for n, g in zip(k[cut].tolist(), same[cut].tolist(), strict=True):
+            groups.setdefault(n, []).append(g)
+        joined: dict[tuple[int, ...], list[Polygon]] = {}
+        for n, several in groups.items():
+            key = tuple(several)
+            if key not in joined:
+                flat = [p for g in several for p in pieces[g]]
+                joined[key] = flat if len(several) == 1 else polygons(shapely.union_all(flat))
+            chips[n] = list(joined[key])
 
     def _tidy(self, layer: Ints, j: Ints, i: Ints, tidy: float) -> None:
         """Leave vertices out of tiles that have twice as many as when they were last tidied."""
         many = shapely.get_num_coordinates(self.tiles[layer, j, i]) > self.room[layer, j, i]
         layer, j, i = layer[many], j[many], i[many]
         old = self.tiles[layer, j, i]
-        new = shapely.simplify(old, tidy, preserve_topology=True)
+        alike: dict[int, int] = {}
+        same = np.array([alike.setdefault(id(tile), len(alike)) for tile in old], dtype=np.int64)
+        first = np.unique(same, return_index=True)[1]
+        new = shapely.simplify(old[first], tidy, preserve_topology=True)[same]
         self.tiles[layer, j, i] = new
         self.room[layer, j, i] = np.maximum(2 * shapely.get_num_coordinates(new), ROOM)
         self.tidied += float(((shapely.area(new) - shapely.area(old)) * self.thickness[layer]).sum())
