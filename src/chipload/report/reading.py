@@ -215,7 +215,7 @@ def page_bytes(read: Read) -> bytes:
     minutes = what["time_s"] / 60.0
     low, high = what["box_mm"]["low"], what["box_mm"]["high"]
     box = ", ".join(f"{x} {a:.4g} to {b:.4g}" for x, a, b in zip("XYZ", low, high, strict=True))
-    body = [*heading(read.title, holds, word, says.removeprefix(f"{word}: ").capitalize())]
+    body = [*heading(read.title, holds, word, _sentence(says.removeprefix(f"{word}: ")))]
     body += _findings("What does not hold", bad)
     if read.simulated is not None and read.simulated.fails:
         body += ["<h3>What the simulation found</h3>", items(read.simulated.fails[:LISTED])]
@@ -326,6 +326,10 @@ def _slowest(read: Read) -> str:
         if read.seconds[k] > 0.0
     ]
     return table(["line", "time [s]", "of all [%]"], rows, numbers=(1, 2))
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def _unchecked(read: Read) -> str:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from chipload.cutting.material import Material
+from chipload.report.diagram import diagram_figure
 from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, STOCK
 from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table
@@ -228,4 +229,14 @@ def sections(simulated: Simulated, figures: dict[str, go.Figure]) -> list[str]:
         table(["", "mean", "greatest", "least"], rows, numbers=(1, 2, 3)),
         figure("loads", along(simulated), figures),
     ]
+    piece = simulated.removal.piece
+    if piece is not None:
+        title = f"step {piece.step}, layer at z = {piece.height:.4g} mm"
+        drawn = diagram_figure(piece.move, piece.cutter, piece.height, piece.before, title=title)
+        body += [
+            "<h3>A chip</h3>",
+            f'<p class="note">The chip that falls into most pieces ({len(piece.chips)}): how the covered area is built '
+            "(left: around the edge across, time in the step up) and what of it was still there (right).</p>",
+            figure("chip", drawn, figures),
+        ]
     return body

@@ -78,7 +78,7 @@ class Resolution:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """The chip of one step on one layer, kept because it is the one with most pieces, and the greatest of those.
+    """The chip of one step on one layer: the one with most pieces, of those the one whose pieces are most alike.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class Removal:
     ----------
     columns : (n,) each, a row a step, see :func:`remove`
     volume_before, volume_after : of the stock [mm^3]
-    piece : the chip with most pieces; None where nothing was cut
+    piece : the chip with most pieces that are most alike; None where nothing was cut
     findings : rapids that cut, material above the flutes
     labels : of the program, `label` of the columns counts in them
     """
@@ -183,14 +183,15 @@ def remove(
             if not chips:
                 continue
             for i, pieces in chips.items():
-                whole = sum(_whole(p, resolution.tolerance) for p in pieces)
-                size = sum(p.area for p in pieces)
-                removed[k] += (size * stock.thickness[i], 0.0, 1.0)
-                removed[k, 1] = max(removed[k, 1], whole)
-                if (whole, size) > rank:
-                    rank = (whole, size)
+                whole = [p for p in pieces if _whole(p, resolution.tolerance)]
+                removed[k] += (sum(p.area for p in pieces) * stock.thickness[i], 0.0, 1.0)
+                removed[k, 1] = max(removed[k, 1], len(whole))
+                areas = [p.area for p in whole]
+                alike = min(areas) / sum(areas) if areas else 0.0
+                if (len(whole), alike) > rank:
+                    rank = (len(whole), alike)
                     near = stock.section(i).union(MultiPolygon(pieces)).intersection(box(*inner[:2], *outer[:2]))
-                    best = Piece(k, move, cutter, float(stock.heights[i]), near, tuple(pieces))
+                    best = Piece(k, move, cutter, float(stock.heights[i]), near, tuple(whole))
             if not steps.rapid[k]:
                 cuts.append(_bite(steps, k, move, cutter, profiles[int(steps.tool[k])], material_before))
         for number in sorted({int(steps.tool[c.step]) for c in cuts}):

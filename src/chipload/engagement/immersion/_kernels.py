@@ -14,6 +14,8 @@ from numba import njit
 TAU = 2.0 * math.pi
 #: shortest interval of immersion that is kept [rad]
 SHORT = 1e-9
+#: an edge that moves along its own face but for this share of its way does not cut
+ALONG = 1e-9
 #: a slice is level where its heights differ by less than this [mm]
 LEVEL = 1e-9
 
@@ -119,7 +121,9 @@ def immersed(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner)
             along += (sk * w - rho * ck * swing[i]) * T[i]
             across += (sk * w - rho * ck * swing[i]) * n[i]
             offset -= ck * speed[i] * A[i]
-        if math.hypot(along, across) + offset <= 0.0:
+        way = math.sqrt(speed @ speed) + math.sqrt(turn @ turn) * (abs(z) + rho)
+        least = ALONG * way
+        if math.hypot(along, across) + offset <= least:
             continue
         mid[0] = tip[0] + z * A[0]
         mid[1] = tip[1] + z * A[1]
@@ -157,7 +161,7 @@ def immersed(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner)
                 s_to = min(s_to, s_to - (high - bounds[first + 1]) / (sk * A[2]))
                 if s_to <= s_from:
                     continue
-            count = roots(across, along, offset, breaks, 0)
+            count = roots(across, along, offset - least, breaks, 0)
             if not level:
                 for l in range(first, last + 1):
                     count = roots(rise * n[2], rise * T[2], look - bounds[l], breaks, count)
@@ -175,7 +179,7 @@ def immersed(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner)
                 phi = 0.5 * (p + q)
                 co = math.cos(phi)
                 si = math.sin(phi)
-                kept = along * si + across * co + offset > 0.0
+                kept = along * si + across * co + offset > least
                 if kept:
                     l = first
                     if not level:

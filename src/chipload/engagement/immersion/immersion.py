@@ -10,7 +10,8 @@ A point p + z A + rho u moves by V + W x (z A + rho u) in that time, so that the
     h = sin(kappa) u . (V + z W x A) - rho cos(kappa) u . (A x W) - cos(kappa) V . A,
 
 a sinusoid of phi, f_z sin(phi) for a flank that moves across its axis, the feed per tooth on the bottom of a plunge. A
-tooth cuts where h > 0 and the point is in the material that the move before it has left.
+tooth cuts where h > 0 (by more than rounding: 1e-9 of its way) and the point is in the material that the move before it
+has left.
 
 The material is known in layers, each by its section at half its height. A face that looks down is held against the
 layer whose middle lies next below it, one that looks sideways against the layer that it is in: the depth is then right
