@@ -1,10 +1,10 @@
 """Compiled loops of the covered area: the section of a cutter with a layer at an instant.
 
 Notation: tip p(t), unit axis A = (a, A_z), layer z = h; w height above the tip along the axis, rho distance from the
-axis, e_r direction from it to a point. Surface normal N = sin(g) e_r - cos(g) A, g = 0 on the bottom face, pi on
-the top; normal speed of the cutter's surface N . v = sin(g) e_r . p' - cos(g) A . p' + (w sin(g) + rho cos(g)) e_r . A';
-V is that over |N_xy|, the speed of the section's edge in the layer. A point of the edge is x(theta) = c + l M (cos theta,
-sin theta), c halfway between the ends of the section along a, M = I + a a' / (A_z (1 + A_z)).
+axis, e_r direction from it to a point. Surface normal N = sin(g) e_r - cos(g) A, g = 0 on the bottom face, pi on the
+top; normal speed of the cutter's surface N . v = sin(g) e_r . p' - cos(g) A . p' + (w sin(g) + rho cos(g)) e_r . A'.
+V is that over |N_xy|, the speed of the section's edge in the layer. A point of the edge is x(theta) = c + l M (cos
+theta, sin theta), c halfway between the ends of the section along a, M = I + a a' / (A_z (1 + A_z)).
 
 Arrays: ``cp``, ``ca`` (n, 3) Chebyshev coefficients of the tip and of the axis, its length aside, on t in 0 .. 1.
 ``K`` cutter: e, r, f, sin, cos, tan of alpha, sin, cos, tan of beta, flank radius at w = 0, H, rho(H).
