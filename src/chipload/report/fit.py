@@ -20,7 +20,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from chipload.cutting.fit import NAMES, predict, predicted
+from chipload.cutting.fit import NAMES, predicted, predicted_mean
 from chipload.cutting.fit_job import CHANNELS, Comparison, Fitted, material_text
 from chipload.errors import InputError
 from chipload.report import folder
@@ -286,10 +286,9 @@ def _means(done: Fitted) -> go.Figure:
     feeds = np.linspace(0.02, 1.1, 40)
     along = [replace(largest, feed=largest.feed * x) for x in feeds]
     x = np.array([c.feed_per_tooth(flutes) for c in along])
-    said = [predict(done.fit, c) for c in along]
+    said = np.array([predicted_mean(done.fit, c) for c in along])
     for k in np.flatnonzero(np.any([c.measured for c in cuts], axis=0)):
-        mean = np.array([p.mean[k] for p in said])
-        half = np.array([p.half[0, k] for p in said])
+        mean, half = said[:, :, k].T
         colour = COLOURS[k]
         if np.isfinite(mean).all():
             if np.isfinite(half).all():
