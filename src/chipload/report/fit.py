@@ -359,13 +359,13 @@ def _turn(done: Fitted, left: bool) -> go.Figure:
             room = 0.06 * (reach[k, 1] - reach[k, 0])
             out.update_yaxes(range=[reach[k, 0] - room, reach[k, 1] + room], row=row)
     out.update_xaxes(tickvals=[0, 90, 180, 270, 360], range=[0, 360])
-    return _styled(out, 90 + 190 * len(shown))
+    return _styled(out, 114 + 190 * len(shown))
 
 
 def _styled(out: go.Figure, height: int) -> go.Figure:
     out.update_layout(
         height=height, font=FONT, plot_bgcolor="white", paper_bgcolor="white",
-        margin={"l": 64, "r": 16, "t": 34, "b": 48},
+        margin={"l": 64, "r": 16, "t": 58, "b": 48},
     )  # fmt: skip
     out.update_xaxes(gridcolor=GRID, zeroline=False)
     out.update_yaxes(gridcolor=GRID, zeroline=False)
