@@ -163,13 +163,20 @@ def test_one_feed_and_an_arc():
 
 def test_zero_of_the_amplifier():
     """An offset is taken for edge force if it is not sought; sought, the coefficients are right again."""
-    cuts = made((0.03, 0.12), MILL, off=25.0, noise=2.0, turns=40)
-    plain = fit_instantaneous(cuts, MILL, band=12 * SPEED, runout=False)
-    sought = fit_instantaneous(cuts, MILL, band=12 * SPEED, runout=False, zero=True)
+    mill = replace(MILL, flutes=3)
+    cuts = made((0.03, 0.12), mill, off=25.0, noise=2.0, turns=40)
+    plain = fit_instantaneous(cuts, mill, band=12 * SPEED, runout=False)
+    sought = fit_instantaneous(cuts, mill, band=12 * SPEED, runout=False, zero=True)
     assert abs(plain.values[4] - X[4]) > 3.0
     assert abs(sought.values[4] - X[4]) < 1.0
     assert inside(sought).sum() >= 5
     assert np.allclose(sought.zero, 25.0, atol=3.0)
+
+
+def test_four_teeth_in_a_slot_with_a_free_zero():
+    """sin^2 of two teeth a right angle apart is 1: cutting forces are constant over the turn, and so are the zeros."""
+    fit = fit_instantaneous(made((0.03, 0.12), MILL), MILL, band=12 * SPEED, runout=False, zero=True)
+    assert fit.identified.tolist() == [False, False, True, True, True, False]
 
 
 def test_ringing_dynamometer():

@@ -316,17 +316,18 @@ def _turned(fit: Fit, cut: Cut, p: Floats, theta: Floats, harmonics: int | None,
     return np.asarray(np.where(fit.known, force, np.nan))
 
 
-def predict(fit: Fit, cut: Cut) -> Prediction:
-    """Mean and extremes of a cut that was not fitted, with their bands from the covariance of runout and x."""
-    theta = np.linspace(0.0, math.tau, TURN, endpoint=False)
+def predicted_mean(fit: Fit, cut: Cut) -> tuple[Floats, Floats]:
+    """Mean force over the turn and the half width of its band, (3,) float [N] each: as in :func:`predict`, alone."""
+    return _banded(fit, lambda p: _mean(fit, cut, p))
 
-    def said(p: Floats) -> Floats:
-        whole = _turned(fit, cut, p, theta, None, fit.resonance)
-        band = _turned(fit, cut, p, theta, max(fit.harmonics, 1), fit.resonance)
-        cutter = replace(fit.cutter, runout=(math.hypot(p[0], p[1]), math.atan2(p[1], p[0])))
-        mean = np.where(fit.known, unit_means(cut, cutter) @ p[2:], np.nan)
-        return np.stack([mean, whole.max(axis=0), whole.min(axis=0), band.max(axis=0), band.min(axis=0)])
 
+def _mean(fit: Fit, cut: Cut, p: Floats) -> Floats:
+    cutter = replace(fit.cutter, runout=(math.hypot(p[0], p[1]), math.atan2(p[1], p[0])))
+    return np.asarray(np.where(fit.known, unit_means(cut, cutter) @ p[2:], np.nan))
+
+
+def _banded(fit: Fit, said: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
+    """What is said at the fitted parameters, and the half width of its 95 % band, by differences."""
     p = fit.parameters
     values = said(p)
     slopes = np.zeros((*values.shape, len(p)))
@@ -334,7 +335,19 @@ def predict(fit: Fit, cut: Cut) -> Prediction:
         if sd > 0.0:
             d = np.where(np.arange(len(p)) == j, 0.1 * sd, 0.0)
             slopes[..., j] = (said(p + d) - said(p - d)) / (0.2 * sd)
-    half = _student(fit.freedom) * np.sqrt(np.einsum("abj,jk,abk->ab", slopes, fit.spread, slopes))
+    return values, _student(fit.freedom) * np.sqrt(np.einsum("...j,jk,...k->...", slopes, fit.spread, slopes))
+
+
+def predict(fit: Fit, cut: Cut) -> Prediction:
+    """Mean and extremes of a cut that was not fitted, with their bands from the covariance of runout and x."""
+    theta = np.linspace(0.0, math.tau, TURN, endpoint=False)
+
+    def said(p: Floats) -> Floats:
+        whole = _turned(fit, cut, p, theta, None, fit.resonance)
+        band = _turned(fit, cut, p, theta, max(fit.harmonics, 1), fit.resonance)
+        return np.stack([_mean(fit, cut, p), whole.max(axis=0), whole.min(axis=0), band.max(axis=0), band.min(axis=0)])
+
+    values, half = _banded(fit, said)
     whole = predicted(fit, cut, theta)
     return Prediction(
         values[0], values[1], values[2], values[3], values[4], half, float(np.hypot(whole[:, 0], whole[:, 1]).max())

@@ -311,7 +311,7 @@ def run_fit(job: FitJob, progress: Progress = silent) -> Fitted:
     failures = [] if fit.converged else ["the search for runout and phase did not end: widen the windows"]
     failures += _exceeded(table.limits, comparisons)
     notes = list(fit.notes)
-    material, why = _material(job, fit, comparisons, notes)
+    material, why = _material(job, fit, notes)
     progress(1.0, "fitted")
     return Fitted(job, fit, comparisons, material, tuple(failures + why), tuple(notes))
 
@@ -354,9 +354,7 @@ def _exceeded(limits: LimitsTable, comparisons: tuple[Comparison, ...]) -> list[
     return out
 
 
-def _material(
-    job: FitJob, fit: Fit, comparisons: tuple[Comparison, ...], notes: list[str]
-) -> tuple[Material | None, list[str]]:
+def _material(job: FitJob, fit: Fit, notes: list[str]) -> tuple[Material | None, list[str]]:
     """The material, or why there is none."""
     table = job.table
     values = fit.values.copy()
@@ -369,37 +367,25 @@ def _material(
         what = "measure them or state [axial]" if set(lost) <= {"Kac", "Kae"} else "measure more feeds or channels"
         return None, [f"no material is written: {', '.join(lost)} not identified: {what}"]
     chip = max(cut.feed_per_tooth(job.cutter.flutes) for cut in fit.cuts) + 2.0 * fit.cutter.runout[0]
-    spread = _spread(fit, comparisons)
-    if spread is not None:
-        notes.append(
-            f"spread {spread:.3g} is the larger of the relative standard deviation of the tangential force and of the "
-            "error of the worst mean in the plane that was predicted"
-        )
     cutter = job.cutter
-    conditions = table.conditions or (
-        f"{cutter.name or 'end mill'}, D {cutter.diameter:g} mm, {cutter.flutes} teeth, helix "
-        f"{math.degrees(cutter.helix):g} deg, {table.engagement.milling}, {table.engagement.axial_depth_mm:g} mm deep"
-    )
-    numbers = {name: float(f"{v:.6g}") for name, v in zip(NAMES, values, strict=True)}
+    said = f"{cutter.name or 'end mill'}, D {cutter.diameter:g} mm, {cutter.flutes} teeth, helix "
+    said += f"{math.degrees(cutter.helix):g} deg"
+    cuts = f"{table.engagement.milling}, {table.engagement.axial_depth_mm:g} mm deep"
+    numbers: dict[str, Any] = {name: float(f"{v:.6g}") for name, v in zip(NAMES, values, strict=True)}
+    covariance: Any = None
+    if np.isfinite(fit.covariance).all():
+        covariance = tuple(tuple(float(f"{v:.9g}") for v in row) for row in fit.covariance)
+    else:
+        notes.append("how sure the coefficients are is not written: the covariance of all six is not known")
     try:
         made = Material(
-            name=table.name, source=f"{source}; {table.method} fit", conditions=conditions, workpiece=table.workpiece,
-            chip=(0.0, float(f"{chip:.6g}")), spread=spread, **numbers,
+            name=table.name, source=f"{source}; {table.method} fit", workpiece=table.workpiece, cutter=said,
+            conditions="; ".join(x for x in (table.conditions, cuts) if x), chip=(0.0, float(f"{chip:.6g}")),
+            covariance=covariance, **numbers,
         )  # fmt: skip
     except InputError as err:
         return None, [f"no material is written: {err}"]
     return made, []
-
-
-def _spread(fit: Fit, comparisons: tuple[Comparison, ...]) -> float | None:
-    """Relative standard deviation that the material states: of Ft at the mean chip, or of the worst predicted mean."""
-    h = 2.0 / math.pi * float(np.mean([cut.feed_per_tooth(fit.cutter.flutes) for cut in fit.cuts]))
-    g = np.array([h, 1.0])
-    variance = float(g @ fit.covariance[np.ix_([0, 3], [0, 3])] @ g)
-    found = [math.sqrt(variance) / abs(float(g @ fit.values[[0, 3]]))] if variance >= 0.0 else []
-    off = [e / 100.0 for c in comparisons if c.use == "predict" for e in np.abs(c.mean_percent[:2])]
-    worst = max([x for x in (*found, *off) if math.isfinite(x)], default=math.nan)
-    return float(f"{worst:.3g}") if worst < 1.0 else None
 
 
 def material_text(material: Material) -> str:
@@ -412,7 +398,9 @@ def material_text(material: Material) -> str:
     lines += [f"{key} = {float(v)!r}" for key, v in zip(keys, material.coefficients, strict=True)]
     if material.chip is not None:
         lines += [f"chip_min_mm = {material.chip[0]!r}", f"chip_max_mm = {material.chip[1]!r}"]
-    if material.spread is not None:
-        lines.append(f"spread = {material.spread!r}")
-    lines += [f"source = {text(material.source)}", f"conditions = {text(material.conditions)}"]
+    if material.covariance is not None:
+        rows = ",\n".join(f"    [{', '.join(repr(v) for v in row)}]" for row in material.covariance)
+        lines.append(f"covariance = [\n{rows},\n]")
+    lines += [f"source = {text(material.source)}", f"cutter = {text(material.cutter)}"]
+    lines.append(f"conditions = {text(material.conditions)}")
     return "\n".join(lines) + "\n"

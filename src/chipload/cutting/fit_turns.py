@@ -115,20 +115,25 @@ class _Problem:
         return np.asarray(y - a @ solved(a, y)[0])
 
     def start(self, runout: Floats) -> Floats:
-        """theta_0 of each cut by search, at one runout; the linear coefficients are free in each cut."""
-        f = len(self.cuts)
-        tried = np.arange(PHASES) * (math.tau / PHASES)
-        found = np.zeros(f)
-        for i in range(f):
-            cost = np.empty(PHASES)
-            for p, theta in enumerate(tried):
-                q = np.concatenate([np.zeros(f), runout])
-                q[i] = theta
-                a, y = self.rows(q, i)
-                x = solved(a, y)[0]
-                # half a turn away coefficients of the other sign do as well: such a cut is none
-                cost[p] = np.sum((y - a @ x) ** 2) if x[0] >= 0.0 else math.inf
-            found[i] = tried[int(np.argmin(cost))]
+        """theta_0 of each cut by search, at one runout; the linear coefficients are free in each cut.
+
+        Turning the phase turns all columns alike: the normal matrix stays, and only its right side changes.
+        """
+        tried = np.linspace(0.0, math.tau, PHASES, endpoint=False)
+        found = np.zeros(len(self.cuts))
+        k = np.arange(self.harmonics + 1, dtype=np.float64)
+        share = np.where(k == 0.0, 0.0 if self.seek_zero else 1.0, 2.0)
+        for i, (unit, turns) in enumerate(zip(self.units(runout), self.turns, strict=True)):
+            some = np.flatnonzero(self.cuts[i].measured)
+            seen = turns.amplitude[: len(k), some]
+            shown = unit[:, some] * dynamometer(self.resonance, k * turns.speed)[:, some, None]
+            weight = share[:, None] / np.sum(share[1:, None] * np.abs(seen[1:]) ** 2, axis=0)
+            normal = np.einsum("kc,kcp,kcq->pq", weight, np.conj(shown), shown).real
+            right = np.exp(-1j * np.outer(tried, k)) @ np.einsum("kc,kcp,kc->kp", weight, np.conj(shown), seen)
+            x = right.real @ np.linalg.pinv(normal, rcond=LOOSE, hermitian=True)
+            won = np.einsum("tp,tp->t", x, right.real)
+            # half a turn away coefficients of the other sign do as well: such a cut is none
+            found[i] = tried[int(np.argmax(np.where(x[:, 0] >= 0.0, won, -math.inf)))]
         return np.concatenate([found, runout])
 
 

@@ -269,7 +269,10 @@ def _findings(measured: Measured, window: tuple[float, float] | None, end: float
     if window is not None and (measured.start - window[0] > step or window[1] - end > step):
         text = f"the window {window[0]:g} to {window[1]:g} s is filled from {measured.start:g} to {end:g} s alone"
         yield Finding("force-window", 0, text)
-    third = len(measured.force) // 3
+    half = len(measured.force) // 2
+    # a bell: whole and broken turns alike leave its mean
+    bell = np.sin(math.pi * (np.arange(half) + 0.5) / half) ** 2
+    bell /= bell.sum()
     for name, f in zip(measured.names, measured.force.T, strict=True):
         for extreme in (f.max(), f.min()):
             same = np.concatenate([[0], (f == extreme).astype(int), [0]])
@@ -277,7 +280,7 @@ def _findings(measured: Measured, window: tuple[float, float] | None, end: float
             if f.max() > f.min() and (runs >= CLIPPED).any():
                 text = f"{name} stays at {extreme:g} N for {int(runs.max())} samples: clipped by the amplifier?"
                 yield Finding("force-clipped", 0, text)
-        slope = 1.5 * float(f[-third:].mean() - f[:third].mean())
+        slope = 2.0 * float(bell @ f[-half:] - bell @ f[:half])
         largest = float(np.abs(f).max())
         if abs(slope) > DRIFT * largest:
             yield Finding(

@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from chipload.errors import InputError
 
@@ -118,29 +119,20 @@ def turns_of(cut: Cut, harmonics: int, search: float = 0.01, seek: int = 8) -> T
     """
     given = np.flatnonzero(cut.measured)
     force = cut.force[:, given] - cut.force[:, given].mean(axis=0)
-    t = np.arange(len(force)) / cut.rate
     speed = cut.speed
     most = math.ceil(math.pi * cut.rate / (cut.speed * (1.0 + search))) - 1
     if not 1 <= harmonics <= most:
         raise InputError(f"{cut.name}: {harmonics} harmonics: must be from 1 to {most}, below half the sampling rate")
     if search > 0.0:
-        top = min(seek, most)
-        step = math.tau / (6.0 * t[-1] * top)
-        width = search * cut.speed
-        while True:
-            tried = speed + np.arange(-math.ceil(width / step), math.ceil(width / step) + 1) * step
-            held = np.array([_held(force, t, w, top) for w in tried])
-            k = int(np.argmax(held))
-            speed, width, step = float(tried[k]), step, step / 8.0
-            if step < 1e-9 * cut.speed:
-                break
+        speed = _speed(force, cut.rate, cut.speed, search, min(seek, most))
     turn = math.tau * cut.rate / speed
     count = int(len(force) / turn + 1e-9)
     edges = np.round(np.arange(count + 1) * turn).astype(int)
     whole = cut.force[: edges[-1], given]
-    basis = np.exp(1j * speed * t[: len(whole), None] * np.arange(1, harmonics + 1))
+    basis = np.exp(1j * speed / cut.rate * np.outer(np.arange(len(whole)), np.arange(1, harmonics + 1)))
     design = np.column_stack([np.ones(len(whole)), 2.0 * basis.real, -2.0 * basis.imag])
-    x = np.linalg.lstsq(design, whole, rcond=None)[0]
+    # nearly orthogonal columns: the normal equations lose nothing
+    x = np.linalg.solve(design.T @ design, design.T @ whole)
     left = whole - design @ x
     amplitude = np.full((harmonics + 1, 3), np.nan, dtype=np.complex128)
     amplitude[0, given] = x[0]
@@ -155,11 +147,31 @@ def turns_of(cut: Cut, harmonics: int, search: float = 0.01, seek: int = 8) -> T
     return Turns(speed, amplitude, mean, high, low, plane, scatter)
 
 
-def _held(force: Floats, t: Floats, w: float, top: int) -> float:
-    """Sum of the squares of the harmonics 1 .. top of the angular frequency w."""
-    one = np.exp(-1j * w * t)
-    total, power = 0.0, np.ones_like(one)
-    for _ in range(top):
-        power = power * one
-        total += float(np.sum(np.abs(power @ force) ** 2))
-    return total
+def _speed(force: Floats, rate: float, nominal: float, search: float, top: int) -> float:
+    """Where the harmonics 1 .. top hold most: on the bins of a padded transform, then between them."""
+    n = len(force)
+    size = 8 * 2 ** math.ceil(math.log2(n))
+    power = np.sum(np.abs(np.fft.rfft(force, size, axis=0)) ** 2, axis=1)
+    line = math.tau * rate / size
+    step = line / (2.0 * top)
+    reach = math.ceil(search * nominal / step)
+    tried = nominal + np.arange(-reach, reach + 1) * step
+    k = np.arange(1, top + 1)
+    at = np.minimum(np.rint(np.outer(tried, k) / line).astype(int), len(power) - 1)
+    best = float(tried[int(np.argmax(power[at].sum(axis=1)))])
+    t = np.arange(n) / rate
+    heard = force.astype(np.complex128)
+
+    def lost(w: float) -> float:
+        """Less the squares of the harmonics of w."""
+        one = np.exp(-1j * w * t)
+        total, turned = 0.0, one
+        for _ in range(top):
+            total += float(np.sum(np.abs(turned @ heard) ** 2))
+            turned = turned * one
+        return -total
+
+    found = minimize_scalar(
+        lost, bounds=(best - line, best + line), method="bounded", options={"xatol": 1e-8 * nominal}
+    )
+    return float(found.x)

@@ -20,7 +20,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from chipload.cutting.fit import NAMES, predict, predicted
+from chipload.cutting.fit import NAMES, predicted, predicted_mean
 from chipload.cutting.fit_job import CHANNELS, Comparison, Fitted, material_text
 from chipload.errors import InputError
 from chipload.report import folder
@@ -286,10 +286,9 @@ def _means(done: Fitted) -> go.Figure:
     feeds = np.linspace(0.02, 1.1, 40)
     along = [replace(largest, feed=largest.feed * x) for x in feeds]
     x = np.array([c.feed_per_tooth(flutes) for c in along])
-    said = [predict(done.fit, c) for c in along]
+    said = np.array([predicted_mean(done.fit, c) for c in along])
     for k in np.flatnonzero(np.any([c.measured for c in cuts], axis=0)):
-        mean = np.array([p.mean[k] for p in said])
-        half = np.array([p.half[0, k] for p in said])
+        mean, half = said[:, :, k].T
         colour = COLOURS[k]
         if np.isfinite(mean).all():
             if np.isfinite(half).all():
@@ -360,13 +359,13 @@ def _turn(done: Fitted, left: bool) -> go.Figure:
             room = 0.06 * (reach[k, 1] - reach[k, 0])
             out.update_yaxes(range=[reach[k, 0] - room, reach[k, 1] + room], row=row)
     out.update_xaxes(tickvals=[0, 90, 180, 270, 360], range=[0, 360])
-    return _styled(out, 90 + 190 * len(shown))
+    return _styled(out, 114 + 190 * len(shown))
 
 
 def _styled(out: go.Figure, height: int) -> go.Figure:
     out.update_layout(
         height=height, font=FONT, plot_bgcolor="white", paper_bgcolor="white",
-        margin={"l": 64, "r": 16, "t": 34, "b": 48},
+        margin={"l": 64, "r": 16, "t": 58, "b": 48},
     )  # fmt: skip
     out.update_xaxes(gridcolor=GRID, zeroline=False)
     out.update_yaxes(gridcolor=GRID, zeroline=False)
