@@ -22,6 +22,7 @@ from shapely import MultiPolygon, Polygon, box
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import Slices, slices
+from chipload.cutting.band import deviations, mean_basis
 from chipload.cutting.force import forces_over_turn, in_work, mean_forces
 from chipload.cutting.material import Material
 from chipload.engagement.bites import Bites, with_runout
@@ -51,7 +52,12 @@ LOADS = (
     "torque_nm",
     "power_w",
     "chip_max_mm",
+    "force_normal_n",
 )
+#: a bite ends where h = 0 if h is at most this share of its greatest
+GRAZES = 1e-6
+#: a mean normal shorter than this stands for surfaces that face each other
+ONE_SIDE = 0.5
 #: a piece of a chip narrower than so many tolerances is a film left by chords, no piece
 FILM = 4.0
 
@@ -105,6 +111,8 @@ class Removal:
     ----------
     columns : (n,) each, a row a step, see :func:`remove`
     volume_before, volume_after : of the stock [mm^3]
+    mean_band : (4,) standard deviation of the mean force x, y, z [N] and torque [N m] over the time in cut, from that
+        of the coefficients; None: the material does not say how sure they are
     piece : the chip with most pieces that are most alike; None where nothing was cut
     findings : rapids that cut, material above the flutes
     labels : of the program, `label` of the columns counts in them
@@ -113,6 +121,7 @@ class Removal:
     columns: Columns
     volume_before: float
     volume_after: float
+    mean_band: tuple[float, ...] | None
     piece: Piece | None
     findings: tuple[Finding, ...]
     labels: tuple[str, ...]
@@ -143,7 +152,9 @@ def remove(
     ``y_mm``, ``z_mm``, ``axis_x..z``, ``feed_mm_min``, ``chip_volume_mm3``, ``chip_pieces`` (most on one layer),
     ``chip_layers`` (layers that lost something), ``chip_max_mm`` (thickest),
     ``force_{x,y,z}_{mean,max,min}_n`` over the revolution, ``force_n`` (greatest size), ``torque_mean_nm``,
-    ``torque_nm`` (greatest), ``power_w`` (mean)
+    ``torque_nm`` (greatest), ``power_w`` (mean),
+    ``force_normal_n`` (greatest force that presses on the surface that the step leaves, along its normal; 0 where it
+    leaves two that face each other, as in a slot)
 
     Raises
     ------
@@ -162,6 +173,7 @@ def remove(
     before = stock.volume()
     removed = np.zeros((len(steps), 3))
     loads = np.zeros((len(steps), len(LOADS)))
+    basis = np.zeros((4, 6))
     best: Piece | None = None
     rank = (0, 0.0)
     for first in range(0, len(steps), BLOCK):
@@ -196,13 +208,26 @@ def remove(
                 cuts.append(_bite(steps, k, move, cutter, profiles[int(steps.tool[k])], material_before))
         for number in sorted({int(steps.tool[c.step]) for c in cuts}):
             some = [c for c in cuts if steps.tool[c.step] == number]
-            loads[[c.step for c in some]] = _loads(
-                some, cutters[number], profiles[number], material, resolution.rotation, steps
-            )
+            at = [c.step for c in some]
+            bites = _bites(some, cutters[number], profiles[number])
+            loads[at] = _loads(bites, some, cutters[number], material, resolution.rotation, steps.spindle[at])
+            if _sure(material):
+                each = mean_basis(bites, cutters[number], material, bites.frame)
+                basis += np.tensordot(steps.seconds[at], each, 1)
     progress(1.0, "removed")
+    band = None
+    if _sure(material):
+        cut_s = float(steps.seconds[(removed[:, 0] > 0.0) & ~steps.rapid].sum())
+        sd = deviations(basis / cut_s, material) if cut_s > 0.0 else np.zeros(4)
+        band = (*sd[:3].tolist(), float(sd[3]) / 1000.0)
     return Removal(
-        _columns(steps, removed, loads), before, stock.volume(), best, _findings(steps, removed), program.labels
+        _columns(steps, removed, loads), before, stock.volume(), band, best, _findings(steps, removed), program.labels
     )
+
+
+def _sure(material: Material) -> bool:
+    """Whether the material says how sure its coefficients are."""
+    return material.spread is not None or material.covariance is not None
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,33 +297,56 @@ def _bite(steps: Steps, k: int, move: Move, cutter: Cutter, profile: Slices, sec
     return _Bite(k, frame, rows, owner)
 
 
-def _loads(
-    cuts: list[_Bite], cutter: Cutter, profile: Slices, material: Material, rotation: float, steps: Steps
-) -> Floats:
-    """(c, len(LOADS)) loads of some steps of one cutter."""
+def _bites(cuts: list[_Bite], cutter: Cutter, profile: Slices) -> Bites:
+    """The bites of some steps of one cutter, with its runout."""
     start = np.cumsum([0, *(len(c.rows) for c in cuts)])
     rows, owner = np.concatenate([c.rows for c in cuts]), np.concatenate([c.owner for c in cuts])
     frame = np.array([c.frame for c in cuts])
-    bites = Bites(start, rows, np.full(len(rows), -1), owner, profile.columns, frame)
-    bites = with_runout(bites, cutter)
+    return with_runout(Bites(start, rows, np.full(len(rows), -1), owner, profile.columns, frame), cutter)
+
+
+def _loads(
+    bites: Bites, cuts: list[_Bite], cutter: Cutter, material: Material, rotation: float, spindle: Floats
+) -> Floats:
+    """(c, len(LOADS)) loads of steps."""
+    assert bites.frame is not None
     pitch = math.tau if cutter.runout[0] > 0.0 else math.tau / cutter.flutes
-    theta = np.arange(max(math.ceil(pitch / rotation), 8)) * (pitch / max(math.ceil(pitch / rotation), 8))
-    force, torque = forces_over_turn(bites, cutter, material, theta)
+    count = max(math.ceil(pitch / rotation), 8)
+    force, torque = forces_over_turn(bites, cutter, material, np.arange(count) * (pitch / count))
     mean, torque_mean = mean_forces(bites, cutter, material)
-    turned = in_work(force, frame)
-    speed = np.abs(steps.spindle[[c.step for c in cuts]])
+    turned = in_work(force, bites.frame)
+    left = np.array([_left(c, bites.slices) for c in cuts])
     return np.column_stack(
         [
-            in_work(mean, frame),
+            in_work(mean, bites.frame),
             turned.max(axis=1),
             turned.min(axis=1),
             np.linalg.norm(force, axis=2).max(axis=1),
             torque_mean / 1000.0,
             torque.max(axis=1) / 1000.0,
-            torque_mean * speed / 1000.0,
+            torque_mean * np.abs(spindle) / 1000.0,
             bites.chip_max(),
+            -np.einsum("nmi,ni->nm", turned, left).min(axis=1).clip(None, 0.0),
         ]
     )
+
+
+def _left(cut: _Bite, slices: Floats) -> Floats:
+    """Outward normal of the cutter, in the work frame, where it leaves a surface behind: nu averaged over the ends of
+    bites at which h = 0, by their length along the profile; (3,), 0 where no surface or two that face each other are
+    left.
+    """
+    p, q, a, b, along, offset, across = cut.rows.T
+    sk, ck = slices[cut.owner, 3], slices[cut.owner, 4]
+    total, whole = np.zeros(3), 0.0
+    for phi in (p, q):
+        h = along * np.sin(phi) + across * np.cos(phi) + offset
+        made = np.where(np.abs(h) <= GRAZES * (np.hypot(along, across) + np.abs(offset)), b - a, 0.0)
+        nu = np.column_stack([sk * np.sin(phi), sk * np.cos(phi), -ck]) @ cut.frame
+        total += made @ nu
+        whole += float(made.sum())
+    size = float(np.linalg.norm(total))
+    return total / size if size > ONE_SIDE * whole > 0.0 else np.zeros(3)
 
 
 def _whole(piece: Polygon, tolerance: float) -> bool:

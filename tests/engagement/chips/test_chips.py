@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 import shapely
-from engagement.chips.brute import CUTTERS, random_move
 
 from chipload.engagement.chips.chips import chips
 from chipload.engagement.chips.covered import covered
@@ -17,6 +16,7 @@ from chipload.engagement.chips.ring import Origin
 from chipload.engagement.chips.section import depth
 from chipload.errors import InputError
 from chipload.report.diagram import diagram_figure
+from engagement.chips.brute import CUTTERS, random_move
 
 FLAT = CUTTERS["flat"]
 UP = [0.0, 0.0, 1.0]

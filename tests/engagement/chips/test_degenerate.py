@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 import shapely
-from engagement.chips.brute import CUTTERS, sections
 
 from chipload.cutter.cutter import Cutter
 from chipload.engagement.chips.covered import covered
 from chipload.engagement.chips.move import LEAST_AXIS_Z, Move
 from chipload.errors import InputError
 from chipload.machine.machine import machine_named
+from engagement.chips.brute import CUTTERS, sections
 
 FLAT, BALL, BULL = CUTTERS["flat"], CUTTERS["ball"], CUTTERS["bull"]
 UP = [0.0, 0.0, 1.0]
