@@ -14,50 +14,32 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon, box
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutter.slices import Slices, slices
+from chipload.cutter.slices import slices
 from chipload.cutting.band import deviations, mean_basis
-from chipload.cutting.force import forces_over_turn, in_work, mean_forces
 from chipload.cutting.material import Material
-from chipload.engagement.bites import Bites, with_runout
-from chipload.engagement.chips.covered import covered_areas
 from chipload.engagement.chips.move import Move
-from chipload.engagement.immersion.immersion import Section, immersed, tool_frame
+from chipload.engagement.immersion.immersion import Section
 from chipload.errors import Finding, InputError
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
+from chipload.simulation.loads import LOADS, StepBite, bite_of_step, bites_of_steps, loads_of_steps
 from chipload.simulation.steps import Steps, steps_of
+from chipload.simulation.swept import Interpolation, swept_ahead
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
 Columns = Mapping[str, NDArray[Any]]
-Interpolation = Literal["slerp", "lerp"]
 
 #: steps whose forces are calculated at once
 BLOCK = 512
-#: columns of loads, in their order
-LOADS = (
-    *(f"force_{x}_mean_n" for x in "xyz"),
-    *(f"force_{x}_max_n" for x in "xyz"),
-    *(f"force_{x}_min_n" for x in "xyz"),
-    "force_n",
-    "torque_mean_nm",
-    "torque_nm",
-    "power_w",
-    "chip_max_mm",
-    "force_normal_n",
-)
-#: a bite ends where h = 0 if h is at most this share of its greatest
-GRAZES = 1e-6
-#: a mean normal shorter than this stands for surfaces that face each other
-ONE_SIDE = 0.5
 #: a piece of a chip narrower than so many tolerances is a film left by chords, no piece
 FILM = 4.0
 
@@ -178,14 +160,11 @@ def remove(
     rank = (0, 0.0)
     for first in range(0, len(steps), BLOCK):
         progress(first / len(steps), "removing")
-        cuts: list[_Bite] = []
-        for k in range(first, min(first + BLOCK, len(steps))):
-            cutter, move = cutters[int(steps.tool[k])], _move(steps, k, interpolation)
-            inner, outer = _box(steps, k, cutter)
-            layers = stock.layers_between(inner[2], outer[2])
-            met = _covered(steps, k, move, cutter, stock, layers, resolution.tolerance)
-            if not met:
-                continue
+        some = range(first, min(first + BLOCK, len(steps)))
+        cuts: list[StepBite] = []
+        for k, swept in swept_ahead(steps, some, stock, cutters, interpolation, resolution.tolerance):
+            cutter, move, met = cutters[int(steps.tool[k])], swept.move, swept.met
+            inner, outer, layers = swept.low, swept.high, swept.layers
             # a face that looks down is held against the layer below
             material_before = Section(*stock.edges(range(max(layers.start - 1, 0), layers.stop), inner[:2], outer[:2]))
             tidied = stock.tidied
@@ -205,12 +184,12 @@ def remove(
                     near = stock.section(i).union(MultiPolygon(pieces)).intersection(box(*inner[:2], *outer[:2]))
                     best = Piece(k, move, cutter, float(stock.heights[i]), near, tuple(whole))
             if not steps.rapid[k]:
-                cuts.append(_bite(steps, k, move, cutter, profiles[int(steps.tool[k])], material_before))
+                cuts.append(bite_of_step(steps, k, move, cutter, profiles[int(steps.tool[k])], material_before))
         for number in sorted({int(steps.tool[c.step]) for c in cuts}):
-            some = [c for c in cuts if steps.tool[c.step] == number]
-            at = [c.step for c in some]
-            bites = _bites(some, cutters[number], profiles[number])
-            loads[at] = _loads(bites, some, cutters[number], material, resolution.rotation, steps.spindle[at])
+            own = [c for c in cuts if steps.tool[c.step] == number]
+            at = [c.step for c in own]
+            bites = bites_of_steps(own, cutters[number], profiles[number])
+            loads[at] = loads_of_steps(bites, own, cutters[number], material, resolution.rotation, steps.spindle[at])
             if _sure(material):
                 each = mean_basis(bites, cutters[number], material, bites.frame)
                 basis += np.tensordot(steps.seconds[at], each, 1)
@@ -228,125 +207,6 @@ def remove(
 def _sure(material: Material) -> bool:
     """Whether the material says how sure its coefficients are."""
     return material.spread is not None or material.covariance is not None
-
-
-@dataclass(frozen=True, eq=False)
-class _Bite:
-    """Rows of one step."""
-
-    step: int
-    frame: Floats
-    rows: Floats
-    owner: NDArray[np.int64]
-
-
-def _move(steps: Steps, k: int, interpolation: Interpolation) -> Move:
-    make = Move.slerp if interpolation == "slerp" else Move.lerp
-    return make(steps.p0[k], steps.a0[k], steps.p1[k], steps.a1[k])
-
-
-def _covered(
-    steps: Steps, k: int, move: Move, cutter: Cutter, stock: LayeredStock, layers: range, tolerance: float
-) -> list[tuple[int, Polygon | MultiPolygon]]:
-    """What a step covers of each layer that it meets; layers that an upright flank crosses share one polygon."""
-    heights = stock.heights[layers.start : layers.stop]
-    shared = np.zeros(len(heights), dtype=np.bool_)
-    if steps.a0[k, 2] == steps.a1[k, 2] == 1.0 and cutter.taper == 0.0:
-        _, r, _, f, _, _, top = cutter.apt
-        low, high = sorted((steps.p0[k, 2], steps.p1[k, 2]))
-        shared = (heights > high + (f if r > 0.0 else cutter.radius * math.tan(cutter.bottom))) & (heights < low + top)
-    own = np.flatnonzero(~shared)
-    if shared.any():
-        own = np.append(own, np.flatnonzero(shared)[0])
-    shapes = {int(own[n]): a for n, a in enumerate(covered_areas(move, cutter, heights[own], tolerance))}
-    common = shapes[int(own[-1])] if shared.any() else None
-    flank = common.polygon if common is not None else None
-    out = []
-    for n, i in enumerate(layers):
-        area = shapes.get(n)
-        if shared[n]:
-            out.append((i, flank))
-        elif area is not None:
-            out.append((i, area.polygon))
-    return [(i, shape) for i, shape in out if shape is not None]
-
-
-def _box(steps: Steps, k: int, cutter: Cutter) -> tuple[Floats, Floats]:
-    """(3,), (3,) corners of a box that the cutter does not leave during a step, as the axis turns by a few degrees."""
-    top = cutter.flute_length
-    wide = max(cutter.radius, float(cutter.radius_at([top])[0]))
-    ends = np.array([steps.p0[k], steps.p1[k], steps.p0[k] + top * steps.a0[k], steps.p1[k] + top * steps.a1[k]])
-    # the top of the cutter leaves its chord by the sagitta of the turn, and each circle reaches R across the axis
-    axes = np.array([steps.a0[k], steps.a1[k]])
-    turn = float(np.linalg.norm(axes[1] - axes[0]))
-    reach = wide * np.minimum(np.sqrt(np.maximum(1.0 - axes.min(axis=0) ** 2, 1.0 - axes.max(axis=0) ** 2)) + turn, 1.0)
-    reach = reach + top * turn**2
-    return ends.min(axis=0) - reach, ends.max(axis=0) + reach
-
-
-def _bite(steps: Steps, k: int, move: Move, cutter: Cutter, profile: Slices, section: Section) -> _Bite:
-    """What the teeth cut at the middle of a step."""
-    if steps.spindle[k] == 0.0:
-        raise InputError(f"line {steps.line[k]}: cuts with the spindle at rest: start it (M3 S) before the cut")
-    (tip, axis), (speed, swing) = ((v[0] for v in pair) for pair in (move.at([0.5]), move.rates([0.5])))
-    tooth = math.tau / (cutter.flutes * abs(float(steps.spindle[k]))) / float(steps.seconds[k])
-    turn = np.cross(axis, swing)
-    middle = speed + 0.5 * cutter.flute_length * swing
-    frame = tool_frame(axis, speed if np.linalg.norm(speed) > 0.0 else middle, bool(steps.spindle[k] > 0.0))
-    rows, owner = immersed(tip, frame, speed * tooth, turn * tooth, profile, section)
-    return _Bite(k, frame, rows, owner)
-
-
-def _bites(cuts: list[_Bite], cutter: Cutter, profile: Slices) -> Bites:
-    """The bites of some steps of one cutter, with its runout."""
-    start = np.cumsum([0, *(len(c.rows) for c in cuts)])
-    rows, owner = np.concatenate([c.rows for c in cuts]), np.concatenate([c.owner for c in cuts])
-    frame = np.array([c.frame for c in cuts])
-    return with_runout(Bites(start, rows, np.full(len(rows), -1), owner, profile.columns, frame), cutter)
-
-
-def _loads(
-    bites: Bites, cuts: list[_Bite], cutter: Cutter, material: Material, rotation: float, spindle: Floats
-) -> Floats:
-    """(c, len(LOADS)) loads of steps."""
-    assert bites.frame is not None
-    pitch = math.tau if cutter.runout[0] > 0.0 else math.tau / cutter.flutes
-    count = max(math.ceil(pitch / rotation), 8)
-    force, torque = forces_over_turn(bites, cutter, material, np.arange(count) * (pitch / count))
-    mean, torque_mean = mean_forces(bites, cutter, material)
-    turned = in_work(force, bites.frame)
-    left = np.array([_left(c, bites.slices) for c in cuts])
-    return np.column_stack(
-        [
-            in_work(mean, bites.frame),
-            turned.max(axis=1),
-            turned.min(axis=1),
-            np.linalg.norm(force, axis=2).max(axis=1),
-            torque_mean / 1000.0,
-            torque.max(axis=1) / 1000.0,
-            torque_mean * np.abs(spindle) / 1000.0,
-            bites.chip_max(),
-            -np.einsum("nmi,ni->nm", turned, left).min(axis=1).clip(None, 0.0),
-        ]
-    )
-
-
-def _left(cut: _Bite, slices: Floats) -> Floats:
-    """Outward normal of the cutter, in the work frame, where it leaves a surface behind: nu averaged over the ends of
-    bites at which h = 0, by their length along the profile; (3,), 0 where no surface or two that face each other are
-    left.
-    """
-    p, q, a, b, along, offset, across = cut.rows.T
-    sk, ck = slices[cut.owner, 3], slices[cut.owner, 4]
-    total, whole = np.zeros(3), 0.0
-    for phi in (p, q):
-        h = along * np.sin(phi) + across * np.cos(phi) + offset
-        made = np.where(np.abs(h) <= GRAZES * (np.hypot(along, across) + np.abs(offset)), b - a, 0.0)
-        nu = np.column_stack([sk * np.sin(phi), sk * np.cos(phi), -ck]) @ cut.frame
-        total += made @ nu
-        whole += float(made.sum())
-    size = float(np.linalg.norm(total))
-    return total / size if size > ONE_SIDE * whole > 0.0 else np.zeros(3)
 
 
 def _whole(piece: Polygon, tolerance: float) -> bool:
