@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from engagement.chips.brute import CUTTERS, inside, random_move, sections
 
 from chipload.engagement.chips.covered import covered
 from chipload.engagement.chips.grazing import grazing
+from engagement.chips.brute import CUTTERS, inside, random_move, sections
 
 TOLERANCE, MARGIN, MOVES = 1e-3, 1e-2, 200
 WAYS = ("lerp", "slerp", "machine")
