@@ -67,7 +67,7 @@ def test_ramp_of_a_vertical_flat_cutter_starts_where_it_meets_the_layer():
 def test_forward_and_back_covers_what_forward_does():
     move = Move.of(lambda t: (np.column_stack([16 * t * (1 - t), 0 * t, 0 * t]), np.tile(UP, (len(t), 1))))
     c = covered(move, FLAT, 1.0, TOLERANCE)
-    assert c.area == pytest.approx(math.pi * 25.0 + 10.0 * 4.0, rel=1e-8)
+    assert c.area == pytest.approx(math.pi * 25.0 + 10.0 * 4.0, abs=TOLERANCE)  # it turns back within tolerance / 20
 
 
 def test_full_circle_leaves_a_hole():
@@ -130,7 +130,7 @@ def test_chord_appears_in_the_middle_of_the_move():
     c = covered(move, FLAT, 0.0, 1e-4)
     dense = shapely.unary_union(sections(FLAT, move, 0.0, np.linspace(0, 1, 400), 400))
     assert dense.difference(c.polygon.buffer(2e-4)).area < 1e-9
-    assert c.area == pytest.approx(dense.area, rel=1e-3)
+    assert c.area == pytest.approx(dense.area, rel=2e-3)
     assert c.area > dense.area
 
 
@@ -141,7 +141,7 @@ def test_flute_end_crosses_the_layer():
     c = covered(move, FLAT, 0.0, 1e-4)
     dense = shapely.unary_union(sections(FLAT, move, 0.0, np.linspace(0, 1, 400), 400))
     assert dense.difference(c.polygon.buffer(2e-4)).area < 1e-9
-    assert c.area == pytest.approx(dense.area, rel=1e-3)
+    assert c.area == pytest.approx(dense.area, rel=2e-3)
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, math.nan, math.inf])

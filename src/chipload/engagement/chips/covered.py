@@ -41,6 +41,7 @@ STILL = 1e-3
 _KNOTS = 64
 _MOST_EDGES = 4_000_000
 _SPANS = 8
+_GRID = 1e-5  # of the tolerance: nearer than this two points are one when pieces are noded
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +184,8 @@ def _noded(move: Move, K: Floats, h: float, tolerance: float) -> Covered | None:
     if len(edges) == 0:
         return None
     lines = shapely.line_merge(shapely.multilinestrings(edges[:, :4].reshape(-1, 2, 2)))
-    found = np.array(shapely.get_parts(shapely.polygonize([shapely.node(lines)])))
+    net = shapely.unary_union(lines, grid_size=_GRID * tolerance)  # the same curve twice becomes one
+    found = np.array(shapely.get_parts(shapely.polygonize([net])))
     if len(found) == 0:
         return None
     thin = shapely.area(found) < tolerance * shapely.length(found)

@@ -324,9 +324,8 @@ def loop(cp, ca, K, h, tol, vmin, knots, buf):
         return UNSETTLED if knots <= MOST_KNOTS else GENERAL
     last = knots - 1
     if count.max() == 0:
-        for i in range(last):
-            if around[i] * around[i + 1] < 0:
-                return GENERAL
+        if around.max() > 0 and around.min() < 0:
+            return GENERAL
         outward = around.max() > 0
         i = last if outward else 0
         n = ring(S[i], K, C[i], tol, LAST if outward else FIRST, buf, 0)
