@@ -30,7 +30,7 @@ def sections(cutter: Cutter, move: Move, height: float, times, rays: int) -> lis
     e = axis[:, :2] / np.maximum(np.hypot(axis[:, 0], axis[:, 1]), 1e-300)[:, None]
     e[np.hypot(e[:, 0], e[:, 1]) < 0.5] = (1.0, 0.0)
     far = cutter.flute_length + cutter.diameter * 40.0
-    u = np.sort(np.concatenate([np.linspace(-far, far, 60), np.linspace(-4, 4, 600) * cutter.diameter]))
+    u = np.sort(np.concatenate([np.linspace(-far, far, 60), np.linspace(-4, 4, 240) * cutter.diameter]))
     line = tip[:, None, :2] + u[None, :, None] * e[:, None, :]
     member = inside(cutter, tip[:, None], axis[:, None], height, line)
     has = member.any(1)
