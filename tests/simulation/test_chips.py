@@ -98,12 +98,12 @@ def test_a_wall_costs_what_the_exact_arcs_say(spindle: str) -> None:
 )
 def test_the_torque_does_the_work_that_the_volume_asks_for(cutter: Cutter, path: list[list[list[float]]]) -> None:
     """Oracle: with Ktc alone, torque times angle is Ktc times the volume removed, whatever the engagement."""
-    stock = block(0.1)
-    fine = Resolution(step_mm=0.25, tolerance=1e-4, corner_pieces=60, flank_mm=0.25)
+    stock = block(0.2, 60.0)
+    fine = Resolution(step_mm=0.5, tolerance=5e-4, corner_pieces=40, flank_mm=0.5)
     # a small feed: the thickness is of first order in the feed per tooth, and so is what a step takes
     c = remove(five_axis(*path, feed=5.0), stock, {1: cutter}, ENERGY, fine).columns
     work = 1000.0 * (c["torque_mean_nm"] * 100.0 * c["seconds"]).sum()
-    assert work == pytest.approx(1000.0 * c["chip_volume_mm3"].sum(), rel=0.02)
+    assert work == pytest.approx(1000.0 * c["chip_volume_mm3"].sum(), rel=0.03)
 
 
 def test_a_rapid_through_material_is_found_and_costs_no_force() -> None:
@@ -132,7 +132,8 @@ def test_the_same_in_another_place_and_turned_by_a_quarter() -> None:
     for a, b, sign in (("force_x", "force_y", 1.0), ("force_y", "force_x", -1.0), ("force_z", "force_z", 1.0)):
         scale = np.abs(one["force_n"]).max()
         assert two[f"{b}_mean_n"] == pytest.approx(sign * one[f"{a}_mean_n"], abs=1e-6 * scale)
-    assert two["chip_volume_mm3"] == pytest.approx(one["chip_volume_mm3"], abs=1e-4)
+    # edges that are made simpler move by half the tolerance, and not alike in both places
+    assert two["chip_volume_mm3"] == pytest.approx(one["chip_volume_mm3"], abs=1e-3)
 
 
 def test_the_force_on_the_wall_is_the_component_along_its_normal() -> None:

@@ -160,3 +160,11 @@ def test_cutter_of_another_kind_is_the_same_shape():
     move = Move.slerp([0, 0, 0], [0.3, 0, 1], [3, 1, -1], [0, 0.3, 1])
     near = Cutter(10.0, 4, 0.5, 14.0, 40.0, 6e5, corner_radius=5.0 - 1e-9)
     assert covered(move, near, 1.0, 1e-4).area == pytest.approx(covered(move, BALL, 1.0, 1e-4).area, rel=1e-6)
+
+
+def test_a_ball_that_pierces_the_layer_by_a_rounding_error_covers_nothing():
+    ball = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=5.0)
+    move = Move.slerp([15, 0, 0], [0, 0, 1], [15, 0, -0.5], [0, 0, 1])
+    assert covered(move, ball, -0.4999999999999991, 5e-4) is None
+    assert covered(move, ball, 4.4e-16, 5e-4).area == pytest.approx(np.pi * (25.0 - 4.5**2), rel=1e-6)
+    assert covered(move, ball, -0.49, 5e-4).area == pytest.approx(np.pi * (25.0 - 4.99**2), rel=1e-6)

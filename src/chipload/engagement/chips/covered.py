@@ -41,6 +41,8 @@ STILL = 1e-3
 _KNOTS = 64
 _MOST_EDGES = 4_000_000
 _SPANS = 8
+#: a layer that is met for a smaller share of the move is touched in a point
+_TOUCH = 1e-12
 _GRID = 1e-5  # of the tolerance: nearer than this two points are one when pieces are noded
 
 
@@ -153,6 +155,8 @@ def _pieces(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> Fl
     buffer, jumps = np.empty((8192, 12)), np.empty(16)
     found: list[Floats] = []
     for ta, tb in span[:m]:
+        if tb - ta <= _TOUCH:
+            continue
         n, jumped = faces.pieces(cp, ca, K, h, tolerance, vmin, ta, tb, knots, buffer, 0, jumps)
         while n == trace.FULL:
             buffer = _larger(buffer)
@@ -163,7 +167,9 @@ def _pieces(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> Fl
                 whole_section(move, K, h, at, tolerance)
                 for at in (max(t - 2 * faces.LEAST, ta), min(t + 2 * faces.LEAST, tb))
             ]
-    return np.concatenate(found) if found else np.empty((0, 12))
+    edges = np.concatenate(found) if found else np.empty((0, 12))
+    # a section that is a point but for rounding has no direction along its edge, and bounds nothing
+    return edges[np.isfinite(edges[:, :4]).all(axis=1)]
 
 
 def whole_section(move: Move, K: Floats, h: float, t: float, tolerance: float) -> Floats:
