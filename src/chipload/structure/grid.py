@@ -91,7 +91,8 @@ def from_half_grid(points: Array) -> Grid:
         raise InputError("mesh: a point is not finite")
     lattice = np.full(points.shape[:3], -1, dtype=np.int64)
     lattice[is_node] = np.arange(len(nodes))
-    corner = np.stack(np.meshgrid(*[np.arange(1, s, 2) for s in lattice.shape], indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    rows, columns, layers = lattice.shape
+    corner = 2 * np.indices((rows // 2, columns // 2, layers // 2)).reshape(3, -1).T[:, None, :] + 1
     i, j, k = np.moveaxis(corner + NODES.astype(np.int64), -1, 0)
     return Grid(nodes, lattice[i, j, k], lattice)
 

@@ -4,8 +4,8 @@ Notation: m elements, 20 nodes each, (xi, eta, zeta) in [-1, 1]^3 the local plac
 g_i = dN_i/dx [1/mm]; lambda, mu [MPa] Lame's constants; kept (lo, hi) the part of the thickness that is there, as
 fractions 0 .. 1 along zeta. Degrees of freedom of an element are node by node: 3 i + c.
 
-Nodes: 0-3 corners at zeta = -1 counter-clockwise from (-1, -1), 4-7 those at zeta = 1, 8-11 and 12-15 the middles of the
-edges after each corner at zeta = -1 and 1, 16-19 those of the edges along zeta: the order of C3D20 in CalculiX.
+Nodes: 0-3 corners at zeta = -1 counter-clockwise from (-1, -1), 4-7 those at zeta = 1, 8-11 and 12-15 the middles of
+the edges after each corner at zeta = -1 and 1, 16-19 those of the edges along zeta: the order of C3D20 in CalculiX.
 
 The space of the element keeps itself under zeta -> a zeta + b. So an element that has lost a slice of its thickness is
 integrated over what is left with the shape functions it had: for a flat plate this is the thinner element exactly, and
@@ -27,9 +27,11 @@ Array = NDArray[np.float64]
 
 #: local places of the nodes
 NODES: Array = np.array(
-    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]]
-    + [[0, -1, -1], [1, 0, -1], [0, 1, -1], [-1, 0, -1], [0, -1, 1], [1, 0, 1], [0, 1, 1], [-1, 0, 1]]
-    + [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]],
+    [
+        *([-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]),
+        *([0, -1, -1], [1, 0, -1], [0, 1, -1], [-1, 0, -1], [0, -1, 1], [1, 0, 1], [0, 1, 1], [-1, 0, 1]),
+        *([-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]),
+    ],
     dtype=np.float64,
 )
 NODES.setflags(write=False)
@@ -69,7 +71,7 @@ def gauss(points: int = 27) -> tuple[Array, Array]:
         places = np.array([*(s * a * e for e in np.eye(3) for s in (-1.0, 1.0)), *itertools.product((-b, b), repeat=3)])
         return places, np.repeat([320.0 / 361.0, 121.0 / 361.0], [6, 8])
     x, w = np.polynomial.legendre.leggauss(2 if points == 8 else 3)
-    return np.array(list(itertools.product(x, repeat=3))), np.array([a * b * c for a, b, c in itertools.product(w, repeat=3)])
+    return np.array(list(itertools.product(x, repeat=3))), np.einsum("a,b,c->abc", w, w, w).ravel()
 
 
 def shape(local: Array) -> Array:
@@ -129,14 +131,14 @@ def _determinant(J: Array, first: int) -> Array:
     bad = np.flatnonzero(~(det.min(axis=1) > 0.0))
     if len(bad):
         raise InputError(
-            f"element {first + bad[0]}: det(dx/dxi) = {det[bad[0]].min():g} mm^3: must be above 0 everywhere; the element is "
-            "inverted, folded or flat: turn the order of the points or move its nodes"
+            f"element {first + bad[0]}: det(dx/dxi) = {det[bad[0]].min():g} mm^3: must be above 0 everywhere; the "
+            "element is inverted, folded or flat: turn the order of the points or move its nodes"
         )
     return det
 
 
 def gradients(xyz: Array, rule: int = 27, kept: Array | None = None, first: int = 0) -> tuple[Array, Array]:
-    """g (m, points, 20, 3) [1/mm] and weight times det J (m, points) [mm^3] of elements xyz (m, 20, 3) [mm]."""
+    """Gradients g (m, points, 20, 3) [1/mm] and weight times det J (m, points) [mm^3] of elements (m, 20, 3) [mm]."""
     local, weights, alike = _integration(kept, len(xyz), rule)
     if alike:
         dN = shape_gradient(local[0])[None]

@@ -112,10 +112,34 @@ def locate(grid: Grid, side: str, points: ArrayLike, tolerance: float) -> Places
     far = int(np.argmax(best)) if len(x) else 0
     if len(x) and not best[far] <= tolerance:
         raise InputError(
-            f"point {far} ({x[far, 0]:g}, {x[far, 1]:g}, {x[far, 2]:g}) lies {best[far]:g} mm from side {side}: must be "
-            f"within {tolerance:g} mm"
+            f"point {far} ({x[far, 0]:g}, {x[far, 1]:g}, {x[far, 2]:g}) lies {best[far]:g} mm from side {side}: must "
+            f"be within {tolerance:g} mm"
         )
     return Places(element, local)
+
+
+def on_cut(places: Places, kept: Array, side: str) -> Places:
+    """The same places on the faces that a cut left, along the thickness.
+
+    Parameters
+    ----------
+    kept : (m, 2) float, as of :class:`chipload.structure.solid.Solid`
+    side : ``"k+"`` or ``"k-"``, the side from which was cut
+
+    Raises
+    ------
+    InputError
+        Another side, or an element that is gone.
+    """
+    if side not in ("k-", "k+"):
+        raise InputError(f"on_cut: side = {side!r}: must be k- or k+")
+    part = kept[places.element]
+    gone = places.element[part[:, 1] <= part[:, 0]]
+    if len(gone):
+        raise InputError(f"on_cut: element {gone[0]} is gone")
+    local = places.local.copy()
+    local[:, 2] = 2.0 * part[:, 1 if side == "k+" else 0] - 1.0
+    return Places(places.element, local)
 
 
 def points_of(grid: Grid, places: Places) -> Array:

@@ -1,9 +1,9 @@
 """How far the workpiece gives way while it is cut: the factors of the start, corrected by a small dense system.
 
-Notation: f free degrees of freedom; K stiffness at the last factorisation (the base), K' = K + dK the present one. Elements
-that were cut since the base touch the degrees of freedom A, which belong to no other element, and B, which they share with the
-rest; b = |B| is the rank. S = K_BB - K_BA K_AA^-1 K_AB of the cut elements alone, before (S) and after (S'); D = S' - S.
-P_B unit columns; W = K^-1 P_B, G = P_B^T W; F forces, U = K^-1 F; M = (I + D G)^-1 D.
+Notation: f free degrees of freedom; K stiffness at the last factorisation (the base), K' = K + dK the present one.
+Elements that were cut since the base touch the degrees of freedom A, which belong to no other element, and B, which
+they share with the rest; b = |B| is the rank. S = K_BB - K_BA K_AA^-1 K_AB of the cut elements alone, before (S) and
+after (S'); D = S' - S. P_B unit columns; W = K^-1 P_B, G = P_B^T W; F forces, U = K^-1 F; M = (I + D G)^-1 D.
 
 The cut elements are condensed on B, so whatever happened to them (thinned, gone) is a change of rank b. By Woodbury,
 without an inverse of D, forces away from A have
@@ -15,11 +15,11 @@ and a force on the cut elements, f_A and f_B, is carried to B: g = f_B - K'_BA K
     F^T K'^-1 F = f_A^T K'_AA^-1 f_A + g^T (G - G M G) g,
 
 with no solution in the base at all. A column of W costs one solution, and is kept. After that a state costs
-O(b^3 + b^2 q) for q forces, whatever f is. ``prepare`` gets the columns ahead, so that the path of a pass is followed by
-dense algebra alone. When b passes ``limit`` the workpiece is factored again.
+O(b^3 + b^2 q) for q forces, whatever f is. ``prepare`` gets the columns ahead, so that the path of a pass is followed
+by dense algebra alone. When b passes ``limit`` the workpiece is factored again.
 
-Valid while pieces stay held (checked at each cut). A slice thinner than a thousandth of its element loses digits: the shape
-functions of the element are then stretched a thousand times. Let such an element be gone.
+Valid while pieces stay held (checked at each cut). A slice thinner than a thousandth of its element loses digits: the
+shape functions of the element are then stretched a thousand times. Let such an element be gone.
 
 Reference: [Hager1989] for the formula and its history.
 """
@@ -30,17 +30,16 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import lu_factor, lu_solve
 from scipy.sparse import coo_array, csc_array
-from scipy.sparse.linalg import SuperLU
 
 from chipload.errors import InputError
 from chipload.progress import Progress, silent
+from chipload.structure.factors import Factors, factor
 from chipload.structure.grid import Indices
 from chipload.structure.hexa import Array, stiffness
-from chipload.structure.places import Places
-from chipload.structure.solid import Factored, Solid, check_held, element_dofs, factor, factorise, loads
+from chipload.structure.solid import Factored, Solid, check_held, element_dofs, factorise
 
 #: rank at which the workpiece is factored again, over sqrt(f); see benchmarks/structure.py
 LIMIT_FACTOR = 4.0
@@ -74,18 +73,18 @@ class Inside:
     gone : (g,) int, those that are on none
     elements : (e,) int, the elements that were cut since the base
     K_BA : (b, a) sparse, K' between B and A
-    lu : factors of K'_AA; None: A is empty
+    factors : of K'_AA; None: A is empty
     """
 
     A: Indices
     gone: Indices
     elements: Indices
     K_BA: csc_array
-    lu: SuperLU | None
+    factors: Factors | None
 
     def solve(self, force: Array) -> Array:
         """K'_AA^-1 times (a, q)."""
-        return force if self.lu is None else np.asarray(self.lu.solve(np.ascontiguousarray(force)))
+        return force if self.factors is None else self.factors.solve(force)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +176,7 @@ def _with_columns(columns: Columns, base: Factored, wanted: Indices, progress: P
         some = columns.rows[new[at : at + 64]]
         unit = np.zeros((len(base.free), len(some)))
         unit[some, np.arange(len(some))] = 1.0
-        W[at : at + 64] = base.solve(unit)[columns.rows].T
+        W[at : at + 64] = base.solve(unit, columns.rows).T
         progress(min(1.0, (at + 64) / len(new)), "columns of the compliance")
     place = columns.place.copy()
     place[new] = len(columns.known) + np.arange(len(new))
@@ -190,8 +189,8 @@ def cut(state: Removal, elements: ArrayLike, kept: ArrayLike = (0.0, 0.0), progr
     Parameters
     ----------
     elements : (e,) int, in the region
-    kept : (2,) or (e, 2) float, the part lo .. hi of the thickness (along k, 0 .. 1) that stays; thinned by x from the side
-        k+ it is (0, 1 - x); (0, 0): the element is gone
+    kept : (2,) or (e, 2) float, the part lo .. hi of the thickness (along k, 0 .. 1) that stays; thinned by x from
+        the side k+ it is (0, 1 - x); (0, 0): the element is gone
 
     Raises
     ------
@@ -210,7 +209,8 @@ def cut(state: Removal, elements: ArrayLike, kept: ArrayLike = (0.0, 0.0), progr
     if back.any():
         k = int(np.flatnonzero(back)[0])
         raise InputError(
-            f"cut: element {e[k]} keeps {new[k].tolist()} of its thickness, had {now[e[k]].tolist()}: material cannot come back"
+            f"cut: element {e[k]} keeps {new[k].tolist()} of its thickness, had {now[e[k]].tolist()}: material cannot "
+            "come back"
         )
     now[e] = np.where(empty[:, None], 0.0, new)
     solid = replace(state.solid, kept=now)
@@ -241,7 +241,7 @@ def cut(state: Removal, elements: ArrayLike, kept: ArrayLike = (0.0, 0.0), progr
     return replace(state, solid=solid, columns=columns, B=at, M=0.5 * (M + M.T), inside=inside)
 
 
-def _cut_elements(base: Factored, solid: Solid) -> tuple[Indices, Array, csc_array, csc_array]:
+def _cut_elements(base: Factored, solid: Solid) -> tuple[Indices, NDArray[np.bool_], csc_array, csc_array]:
     """Cut elements: their free degrees of freedom, which other elements share, stiffness before and after."""
     assert base.solid.kept is not None
     assert solid.kept is not None
@@ -266,98 +266,3 @@ def _cut_elements(base: Factored, solid: Solid) -> tuple[Indices, Array, csc_arr
     other = np.zeros(len(solid.grid.nodes), dtype=np.bool_)
     other[solid.grid.elements[~differs & (solid.kept[:, 1] > solid.kept[:, 0])]] = True
     return touched, other[base.free[touched] // 3], summed(base.solid.kept[e]), summed(solid.kept[e])
-
-
-@dataclass(frozen=True, eq=False)
-class Watched:
-    """Unit forces with their displacements in the base; good for every state of the same base.
-
-    Attributes
-    ----------
-    base : the factorisation that they belong to
-    F : (f, q) sparse, forces
-    U : (r, q) float, displacements at the rows of the region
-    own : (q,) float, F^T U of each force with itself
-    """
-
-    base: Factored
-    F: csc_array
-    U: Array
-    own: Array
-
-
-def watch(state: Removal, places: Places, normals: ArrayLike, progress: Progress = silent) -> Watched:
-    """Solve unit forces along ``normals`` (p, 3) at places once, for many states: one solution each."""
-    F = loads(state.base, places, np.asarray(normals, dtype=np.float64))
-    U = np.empty((len(state.columns.rows), F.shape[1]))
-    own = np.empty(F.shape[1])
-    for at in range(0, F.shape[1], 64):
-        some = F[:, at : at + 64].toarray()
-        u = state.base.solve(some)
-        U[:, at : at + 64] = u[state.columns.rows]
-        own[at : at + 64] = np.einsum("fq,fq->q", some, u)
-        progress(min(1.0, (at + 64) / F.shape[1]), "forces on the workpiece")
-    return Watched(state.base, F, U, own)
-
-
-def alive(state: Removal, watched: Watched) -> Array:
-    """Which forces still act on material, (q,) bool."""
-    return _alive(state, watched.F)
-
-
-def _alive(state: Removal, F: csc_array) -> Array:
-    return np.asarray(abs(F.tocsr()[state.inside.gone]).sum(axis=0) <= 1e-12)
-
-
-def compliance(state: Removal, watched: Watched) -> Array:
-    """Compliance C_nn (q,) [mm/N] of the watched forces in this state, O(b^2 q).
-
-    Raises
-    ------
-    InputError
-        The forces belong to another factorisation (watch them again), or one acts on material that is gone.
-    """
-    if watched.base is not state.base:
-        raise InputError("compliance: the forces were watched before the workpiece was factored again: watch them again")
-    _refuse_dead(_alive(state, watched.F))
-    U = watched.U[state.B]
-    out = watched.own - np.einsum("bq,bq->q", U, state.M @ U)
-    on_cut = np.asarray(abs(watched.F.tocsr()[state.inside.A]).sum(axis=0) > 0.0)
-    if on_cut.any():
-        out[on_cut] = _on_cut(state, watched.F[:, on_cut])
-    return np.asarray(out)
-
-
-def cut_compliance(state: Removal, places: Places, normals: ArrayLike) -> Array:
-    """Compliance C_nn (p,) [mm/N] at places of elements that were cut since the last factorisation: no solution in the base.
-
-    For new places, e.g. on the cut faces (:func:`chipload.structure.places.on_cut`).
-
-    Raises
-    ------
-    InputError
-        An element was not cut, or a place is on material that is gone.
-    """
-    stray = places.element[~np.isin(places.element, state.inside.elements)]
-    if len(stray):
-        raise InputError(f"cut_compliance: element {stray[0]} was not cut since the last factorisation: watch the place instead")
-    F = loads(state.base, places, np.asarray(normals, dtype=np.float64))
-    _refuse_dead(_alive(state, F))
-    return _on_cut(state, F)
-
-
-def _refuse_dead(living: Array) -> None:
-    dead = np.flatnonzero(~living)
-    if len(dead):
-        raise InputError(f"compliance: force {dead[0]} acts on material that is gone: leave it out (see alive)")
-
-
-def _on_cut(state: Removal, F: csc_array) -> Array:
-    """Forces on the cut elements, by way of B."""
-    rows = F.tocsr()
-    f_A = rows[state.inside.A].toarray()
-    u_A = state.inside.solve(f_A)
-    g = rows[state.columns.rows[state.B]].toarray() - state.inside.K_BA @ u_A
-    G = state.columns.W[np.ix_(state.columns.place[state.B], state.B)]
-    u = G @ g
-    return np.asarray(np.einsum("aq,aq->q", f_A, u_A) + np.einsum("bq,bq->q", g - state.M @ u, u))

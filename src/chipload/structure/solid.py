@@ -3,8 +3,8 @@
 Notation: n nodes, K stiffness [N/mm] over the free degrees of freedom (3 node + c), f force [N], u displacement [mm],
 K u = f. N_p shape functions at a place p; compliance C_p = N_p K^-1 N_p^T (3, 3) [mm/N]; C_nn = normal . C_p normal.
 
-K is symmetric and positive definite, so it is factored without pivots, K = L U with the ordering of K + K^T (minimum
-degree). A plate of 35,000 degrees of freedom takes about 2 s; every right-hand side after that about 10 ms.
+K is symmetric and positive definite, so it is factored without pivots (:mod:`chipload.structure.factors`). A plate of
+35,000 degrees of freedom takes about 2 s; every right-hand side after that about 10 ms.
 
 A force at a point is a limit: on ever finer meshes the displacement under it grows without bound, about 1 / (E h) with
 element size h. For a thin wall that is far below its bending, t^3 / (h a^2) of it or so.
@@ -12,17 +12,16 @@ element size h. For a thin wall that is far below its bending, t^3 / (h a^2) of 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import SuperLU, splu
 
 from chipload.errors import InputError
 from chipload.progress import Progress, silent
+from chipload.structure.factors import Factors, factor
 from chipload.structure.grid import Grid, Indices
 from chipload.structure.hexa import Array, mass, stiffness
 from chipload.structure.places import Places, weights
@@ -59,10 +58,10 @@ class Solid:
     modulus: float
     poisson: float
     density: float
-    fixed: Array | Indices
+    fixed: NDArray[np.bool_] | Indices
     kept: Array | None = None
     rule: int = 27
-    held: Array = field(init=False)
+    held: NDArray[np.bool_] = field(init=False)
 
     def __post_init__(self) -> None:
         lo, hi = MODULUS_RANGE
@@ -159,7 +158,9 @@ def check_held(solid: Solid) -> None:
         raise InputError("workpiece: no element is left")
     elements = solid.grid.elements[e]
     n = len(solid.grid.nodes)
-    incidence = csr_array((np.ones(elements.size), elements.ravel(), np.arange(0, elements.size + 1, 20)), shape=(len(e), n))
+    incidence = csr_array(
+        (np.ones(elements.size), elements.ravel(), np.arange(0, elements.size + 1, 20)), shape=(len(e), n)
+    )
     count, piece = connected_components(incidence @ incidence.T, directed=False)
     for number in range(count):
         mine = np.unique(elements[piece == number])
@@ -181,7 +182,8 @@ def check_held(solid: Solid) -> None:
             names = [RIGID_MOTIONS[c] for c in range(6) if share[c] > 0.1]
             what = "workpiece" if count == 1 else f"the piece of element {int(e[np.argmax(piece == number)])}"
             raise InputError(
-                f"{what}: not held against motion {', '.join(names)}: {loose.shape[1]} rigid motions are free; fix more nodes"
+                f"{what}: not held against motion {', '.join(names)}: {loose.shape[1]} rigid motions are free; "
+                "fix more nodes"
             )
 
 
@@ -194,22 +196,17 @@ class Factored:
     solid : the workpiece
     free : (f,) int, degrees of freedom that are solved for
     stiffness : (f, f) sparse
-    lu : the factors
+    factors : of that
     """
 
     solid: Solid
     free: Indices
     stiffness: csc_array
-    lu: SuperLU
+    factors: Factors
 
-    def solve(self, force: Array) -> Array:
-        """Displacements (f, q) [mm] of the free degrees of freedom under forces (f, q) [N]."""
-        return np.asarray(self.lu.solve(force))
-
-
-def factor(matrix: csc_array) -> SuperLU:
-    """Factors of a symmetric positive definite matrix, without pivots."""
-    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    def solve(self, force: Array, rows: Indices | None = None) -> Array:
+        """Displacements (f, q) [mm] of the free degrees of freedom under forces (f, q) [N], or some rows of them."""
+        return self.factors.solve(force, rows)
 
 
 def factorise(solid: Solid) -> Factored:
@@ -249,7 +246,8 @@ def displacement(factored: Factored, force: ArrayLike) -> Array:
     return out.reshape(f.shape)
 
 
-def _checked_normals(places: Places, normals: ArrayLike) -> Array:
+def checked_normals(places: Places, normals: ArrayLike) -> Array:
+    """Normals as an array, refused unless they are unit vectors, one a place."""
     n = np.asarray(normals, dtype=np.float64)
     if n.shape != (len(places), 3) or not np.isclose(np.linalg.norm(n, axis=1), 1.0, rtol=0.0, atol=1e-6).all():
         raise InputError(f"normals of shape {n.shape}: must be unit vectors of shape ({len(places)}, 3)")
@@ -266,7 +264,7 @@ def compliance(factored: Factored, places: Places, normals: ArrayLike, progress:
     InputError
         The normals are not unit vectors, one a place.
     """
-    n = _checked_normals(places, normals)
+    n = checked_normals(places, normals)
     F = loads(factored, places, n)
     out = np.empty(len(places))
     for at in range(0, len(places), 64):
@@ -289,10 +287,3 @@ def full_compliance(factored: Factored, places: Places, progress: Progress = sil
                 out[part, a, b] = np.einsum("fp,fp->p", some[a], u)
         progress(min(1.0, (at + 64) / len(places)), "compliance")
     return 0.5 * (out + np.swapaxes(out, 1, 2))
-
-
-def strain_energy(factored: Factored, displacement: Array) -> float:
-    """Energy [N mm] of displacements (n, 3) [mm] that are zero where the workpiece is held."""
-    u = displacement.ravel()[factored.free]
-    energy = 0.5 * float(u @ (factored.stiffness @ u))
-    return energy if math.isfinite(energy) else 0.0
