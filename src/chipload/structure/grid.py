@@ -91,8 +91,8 @@ def from_half_grid(points: Array) -> Grid:
         raise InputError("mesh: a point is not finite")
     lattice = np.full(points.shape[:3], -1, dtype=np.int64)
     lattice[is_node] = np.arange(len(nodes))
-    rows, columns, layers = lattice.shape
-    corner = 2 * np.indices((rows // 2, columns // 2, layers // 2)).reshape(3, -1).T[:, None, :] + 1
+    first = np.indices((len(points) // 2, points.shape[1] // 2, points.shape[2] // 2)).reshape(3, -1).T
+    corner = 2 * first[:, None, :] + 1
     i, j, k = np.moveaxis(corner + NODES.astype(np.int64), -1, 0)
     return Grid(nodes, lattice[i, j, k], lattice)
 
@@ -165,7 +165,7 @@ def plate(length: float, height: float, thickness: float, counts: tuple[int, int
     Examples
     --------
     >>> plate(100.0, 60.0, 2.0, (4, 3, 1)).nodes.shape
-    (106, 3)
+    (122, 3)
     """
     size = np.array([length, height, thickness], dtype=np.float64)
     if not ((size > 0.0) & np.isfinite(size)).all() or min(counts) < 1:

@@ -2,8 +2,9 @@
 
 Notation: f [Hz]; H(f) complex receptance [mm/N]; w = 2 pi f; C static compliance [mm/N].
 
-Below the first resonance each mode adds c_k / (1 - (f / f_k)^2), so Re H = C + c_2 f^2 + c_4 f^4 + ...; C is the constant
-of that polynomial, fitted over a band. Accelerometers see little there: take the band where the coherence is good.
+Below the first resonance each mode adds c_k / (1 - (f / f_k)^2), so Re H = C + c_2 f^2 + c_4 f^4 + ...; C is the
+constant of that polynomial, fitted over a band. Accelerometers see little there: take the band where the
+coherence is good.
 """
 
 from __future__ import annotations

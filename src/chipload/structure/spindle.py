@@ -153,12 +153,12 @@ def chain_compliance(bars: tuple[Bar, ...], z_force: ArrayLike, z_point: ArrayLi
             raise InputError(f"chain_compliance: {name} = {z[bad].flat[0]:g} mm: must be from 0 to {length:g}")
     top, c = np.maximum(a, b), np.abs(a - b)
     out: Array = np.zeros(top.shape)
-    z = 0.0
+    end = 0.0
     for bar in bars:
-        low = np.maximum(z - top, 0.0)
-        z += bar.length
-        high = np.maximum(z - top, 0.0)
+        low = np.maximum(end - top, 0.0)
+        end += bar.length
+        high = np.maximum(end - top, 0.0)
         out = out + bar.flexibility * ((high**3 - low**3) / 3.0 + c * (high**2 - low**2) / 2.0)
         j = bar.joint
-        out = out + np.where(z >= top, j.c_ff + j.c_fm * (2.0 * z - a - b) + j.c_mm * (z - a) * (z - b), 0.0)
+        out = out + np.where(end >= top, j.c_ff + j.c_fm * (2.0 * end - a - b) + j.c_mm * (end - a) * (end - b), 0.0)
     return out
