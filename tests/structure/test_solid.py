@@ -110,7 +110,7 @@ def test_curved_wall_by_two_meshes():
             return np.stack([r * np.sin(a), 30.0 * p[:, 1], r * np.cos(a)], axis=1)
 
         grid = from_map(np.linspace(0, 1, 2 * n + 1), np.linspace(0, 1, n + 1) ** 1.5, [0.0, 1.0], place)
-        f = factorise(Solid(grid, E, NU, RHO, grid.side("j-")))
+        f = factorise(Solid(grid, E, NU, RHO, grid.side("j-"), rule=8))
         places = on_side(grid, "k-", [0.2, 0.5, 0.8], [0.9, 0.9, 0.9])
         F = loads(f, places, normals_of(grid, places, "k-")).toarray()
         return F.T @ f.solve(F)
@@ -118,7 +118,7 @@ def test_curved_wall_by_two_meshes():
     coarse, fine = wall(6), wall(10)
     away = ~np.eye(3, dtype=bool)
     np.testing.assert_allclose(coarse[away], fine[away], rtol=0.02)
-    np.testing.assert_allclose(fine, fine[::-1, ::-1], rtol=1e-5)
+    np.testing.assert_allclose(fine, fine[::-1, ::-1], rtol=1e-4)
 
 
 def test_thinned_plate_is_the_thinner_mesh():

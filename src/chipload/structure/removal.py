@@ -98,7 +98,8 @@ class Removal:
     region : (e,) int, elements that may be cut
     columns : what is known of K^-1
     B : (b,) int, rows of ``columns``
-    M : (b, b) float [N/mm]
+    D : (b, b) float [N/mm]
+    lu : factors of I + D G, as :func:`scipy.linalg.lu_factor` gives them
     inside : the cut elements
     limit : greatest rank before the workpiece is factored again
     factorisations : how many there were
@@ -109,10 +110,15 @@ class Removal:
     region: Indices
     columns: Columns
     B: Indices
-    M: Array
+    D: Array
+    lu: tuple[Array, NDArray[np.int32]]
     inside: Inside
     limit: int
     factorisations: int = 1
+
+    def correction(self, U: Array) -> Array:
+        """M U (b, q) [N/mm] of displacements (b, q) of B in the base."""
+        return np.asarray(lu_solve(self.lu, self.D @ U, check_finite=False)) if len(self.B) else U
 
     @property
     def rank(self) -> int:
@@ -149,7 +155,18 @@ def _fresh(base: Factored, region: Indices, limit: int, factorisations: int) -> 
     columns = Columns(rows, np.zeros(0, np.int64), np.full(len(rows), -1), np.zeros((0, len(rows))))
     none = np.zeros(0, dtype=np.int64)
     inside = Inside(none, none, none, csc_array((0, 0)), None)
-    return Removal(base.solid, base, region, columns, none, np.zeros((0, 0)), inside, limit, factorisations)
+    return Removal(
+        base.solid,
+        base,
+        region,
+        columns,
+        none,
+        np.zeros((0, 0)),
+        (np.zeros((0, 0)), np.zeros(0, np.int32)),
+        inside,
+        limit,
+        factorisations,
+    )
 
 
 def _rows(base: Factored, elements: Indices) -> Indices:
@@ -237,8 +254,11 @@ def cut(state: Removal, elements: ArrayLike, kept: ArrayLike = (0.0, 0.0), progr
     at = np.searchsorted(state.columns.rows, touched[B])
     columns = _with_columns(state.columns, state.base, at, progress)
     G = columns.W[np.ix_(columns.place[at], at)]
-    M = lu_solve(lu_factor(np.eye(len(B)) + D @ G), D)
-    return replace(state, solid=solid, columns=columns, B=at, M=0.5 * (M + M.T), inside=inside)
+    D = 0.5 * (D + D.T)
+    within = D @ G
+    within[np.diag_indices(len(B))] += 1.0
+    lu = lu_factor(within, overwrite_a=True, check_finite=False) if len(B) else state.lu
+    return replace(state, solid=solid, columns=columns, B=at, D=D, lu=lu, inside=inside)
 
 
 def _cut_elements(base: Factored, solid: Solid) -> tuple[Indices, NDArray[np.bool_], csc_array, csc_array]:

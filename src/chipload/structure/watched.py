@@ -98,7 +98,7 @@ def compliance(state: Removal, watched: Watched) -> Array:
     d = watched.own.shape[1]
     _refuse_dead(_alive(state, watched.F, d))
     U = watched.U[state.B]
-    V = state.M @ U
+    V = state.correction(U)
     b, p = len(U), len(watched.own)
     out = watched.own - np.einsum("bpi,bpj->pij", U.reshape(b, p, d), V.reshape(b, p, d))
     weight = np.asarray(abs(watched.F.tocsr()[state.inside.A]).sum(axis=0))
@@ -144,4 +144,4 @@ def _on_cut(state: Removal, F: csc_array, d: int) -> Array:
     u_B = G @ g
     shape = (-1, F.shape[1] // d, d)
     own = np.einsum("api,apj->pij", f_A.reshape(shape), u_A.reshape(shape))
-    return np.asarray(own + np.einsum("bpi,bpj->pij", (g - state.M @ u_B).reshape(shape), u_B.reshape(shape)))
+    return np.asarray(own + np.einsum("bpi,bpj->pij", (g - state.correction(u_B)).reshape(shape), u_B.reshape(shape)))
