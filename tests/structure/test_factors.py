@@ -32,3 +32,5 @@ def test_against_dense(columns):
 def test_singular_is_refused():
     with pytest.raises(InputError, match="stiffness: Factor is exactly singular: a part of the workpiece is not held"):
         factor(csc_array(np.diag([1.0, 0.0, 2.0])))
+    with pytest.raises(InputError, match=r"stiffness: smallest pivot 4.4e-16 of its diagonal, must be above 1.0e-11"):
+        factor(csc_array(np.array([[1.0, 1.0], [1.0, 1.0 + 2.0**-51]])))

@@ -171,6 +171,12 @@ def test_refused():
     through = np.concatenate([row(solid.grid, 2, 0), row(solid.grid, 2, 1)])
     with pytest.raises(InputError, match="the piece of element 6: not held against motion along x, along y, along z"):
         cut(free, through)
+    hinge = [*row(solid.grid, 3, 0, slice(7)), *row(solid.grid, 3, 1, slice(7))]
+    hinge += [*row(solid.grid, 4, 0, slice(7, 8)), *row(solid.grid, 4, 1, slice(7, 8))]
+    with pytest.raises(InputError, match="a piece of the workpiece would hang on a hinge of nodes"):
+        cut(free, hinge)
+    with pytest.raises(InputError, match="a piece of the workpiece hangs on a hinge of nodes"):
+        cut(start(solid, limit=0), hinge)
     other = start(solid)
     with pytest.raises(InputError, match="watch the places again"):
         compliance(other, watch(state, places, n))

@@ -80,13 +80,19 @@ class Factors:
         return out
 
 
-def factor(matrix: csc_array) -> Factors:
+#: smallest pivot over the diagonal that is not taken for zero; thin plates of 1:1000 reach 1e-10, hinges 1e-12
+SMALLEST_PIVOT = 1e-11
+
+
+def factor(matrix: csc_array, smallest: float = SMALLEST_PIVOT) -> Factors:
     """Factors of a symmetric positive definite matrix, O(f^1.5) for a plate, O(f^2) for a block.
+
+    ``smallest`` is the pivot, over the diagonal entry that it came from, below which the matrix counts as singular.
 
     Raises
     ------
     InputError
-        The matrix is singular.
+        The matrix is singular: a piece is loose, or hangs on a line of nodes as on a hinge.
 
     Examples
     --------
@@ -95,6 +101,15 @@ def factor(matrix: csc_array) -> Factors:
     """
     options = {"SymmetricMode": True}
     try:
-        return Factors(splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options))
+        lu = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
     except RuntimeError as error:
         raise InputError(f"stiffness: {error}: a part of the workpiece is not held") from None
+    came_from = np.empty(matrix.shape[0])
+    came_from[lu.perm_r] = matrix.diagonal()
+    ratio = float((lu.U.diagonal() / came_from).min())
+    if not ratio > smallest:
+        raise InputError(
+            f"stiffness: smallest pivot {ratio:.1e} of its diagonal, must be above {smallest:.1e}: a piece of the "
+            "workpiece hangs on a hinge of nodes or hardly at all"
+        )
+    return Factors(lu)

@@ -19,7 +19,8 @@ O(b^3 + b^2 q) for q forces, whatever f is. ``prepare`` gets the columns ahead, 
 by dense algebra alone. When b passes ``limit`` the workpiece is factored again.
 
 Valid while pieces stay held (checked at each cut). A slice thinner than a thousandth of its element loses digits: the
-shape functions of the element are then stretched a thousand times. Let such an element be gone.
+shape functions of the element are then stretched a thousand times. Let such an element be gone. Neighbours share their
+nodes whatever is left of them: two that are cut from opposite sides until their slices do not meet still hold together.
 
 Reference: [Hager1989] for the formula and its history.
 """
@@ -42,7 +43,10 @@ from chipload.structure.hexa import Array, stiffness
 from chipload.structure.solid import Factored, Solid, check_held, element_dofs, factorise
 
 #: rank at which the workpiece is factored again, over sqrt(f); see benchmarks/structure.py
-LIMIT_FACTOR = 4.0
+LIMIT_FACTOR = 5.0
+
+#: smallest pivot of I + D G that is not taken for zero: a cut makes nothing a thousand million times softer
+SMALLEST_PIVOT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +137,7 @@ def start(solid: Solid | Factored, region: ArrayLike | None = None, limit: int |
     ----------
     solid : the workpiece, factored already or not
     region : (e,) int, elements that may be cut; None: all. Fewer need less memory: (e 60) a column
-    limit : greatest rank before the workpiece is factored again; None: 4 sqrt(f)
+    limit : greatest rank before the workpiece is factored again; None: 5 sqrt(f)
 
     Raises
     ------
@@ -258,6 +262,12 @@ def cut(state: Removal, elements: ArrayLike, kept: ArrayLike = (0.0, 0.0), progr
     within = D @ G
     within[np.diag_indices(len(B))] += 1.0
     lu = lu_factor(within, overwrite_a=True, check_finite=False) if len(B) else state.lu
+    pivot = float(abs(lu[0].diagonal()).min()) if len(B) else 1.0
+    if not pivot > SMALLEST_PIVOT:
+        raise InputError(
+            f"cut: smallest pivot {pivot:.1e}, must be above {SMALLEST_PIVOT:.1e}: a piece of the workpiece would hang "
+            "on a hinge of nodes or hardly at all"
+        )
     return replace(state, solid=solid, columns=columns, B=at, D=D, lu=lu, inside=inside)
 
 
