@@ -1,18 +1,19 @@
-"""Normal compliance of a wall, layer by layer of its removal: low-rank correction, refactoring, CalculiX.
+"""Normal compliance of a wall while it is cut: low-rank correction, refactoring, CalculiX.
 
-    python benchmarks/structure.py [ROWS [LAYERS]]
+    python benchmarks/structure.py [ROWS]
 
-A wall of 120 x 60 mm, finish 2 mm and stock 1 mm on one side, of titanium, clamped below; ROWS (24) x 2 ROWS x 2 elements.
-From the free edge down the stock is taken off row by row (a layer), LAYERS (6) of them; after each, C_nn at 61 places of the
-finish wall. All three do the same on the same mesh in the same run:
+A wall of 120 x 60 mm, finish 2 mm and stock 1 mm on one side, of titanium, clamped below; ROWS (20) x 2 ROWS x 2
+elements. The stock is taken from the free edge downwards, along the rows, in layers of 1, 4 and 12 elements and of a
+whole row, four layers of each; after each layer C_nn at 61 places of the finish wall. All do the same on the same mesh
+in the same run:
 
-* correction: ``cut`` and ``compliance``; what was solved ahead (columns of the stock of these layers, the 61 forces) is
-  given beside it, once for all layers
-* refactoring: assemble, factor, solve 61 forces, with our own factors
-* CalculiX: one run of ``ccx`` for one force; times 61 where every force is a step of its own. Both are given
+* correction: ``cut`` and ``compliance``; what was solved ahead (columns of the stock of these rows, the 61 forces) is
+  given above the table, once for all layers
+* refactoring: assemble, factor, solve the 61 forces, with our own factors
+* CalculiX: ``ccx`` with the 61 forces, each a step of its own (one and three steps are run, the rest is extrapolated)
 
 Then: how the solution of many right-hand sides compares with that of SuperLU itself, and at which rank a correction
-without columns solved ahead costs as much as factoring again.
+without columns solved ahead takes as long as factoring again.
 """
 
 import shutil
@@ -73,64 +74,68 @@ def by_calculix(solid: Solid, F, steps: int) -> float:
         return timed(lambda: subprocess.run(run, cwd=name, check=True, stdout=subprocess.DEVNULL))[1]
 
 
+def calculix_times(solid: Solid, F) -> tuple[float, float]:
+    """Seconds of one force, and of each further one."""
+    one, three = by_calculix(solid, F, 1), by_calculix(solid, F, 3)
+    return one, (three - one) / 2.0
+
+
+def row(solid: Solid, below: int):
+    """Stock of one row, counted from the free edge."""
+    columns, rows, _ = solid.grid.counts
+    return solid.grid.element(np.arange(columns), np.full(columns, rows - 1 - below), 1)
+
+
 def main() -> None:
-    rows = int(sys.argv[1]) if len(sys.argv) > 1 else 24
-    layers = int(sys.argv[2]) if len(sys.argv) > 2 else 6
-    solid = wall(rows)
+    solid = wall(int(sys.argv[1]) if len(sys.argv) > 1 else 20)
     grid = solid.grid
     places = on_side(grid, "k-", np.linspace(0.0, 1.0, PLACES), np.full(PLACES, 0.9))
     normals = normals_of(grid, places, "k-")
-    every = np.arange(2 * rows)
-    stock = [grid.element(every, np.full(2 * rows, rows - 1 - k), 1) for k in range(layers)]
-    factorise(wall(3)).solve(np.ones((len(factorise(wall(3)).free), 8)), np.arange(3))  # compile
+    small = factorise(wall(3))
+    small.solve(np.ones((len(small.free), 8)), np.arange(3))  # compiles
     base, t_factor = timed(lambda: factorise(solid))
     n = len(base.free)
-    state = start(base, np.concatenate(stock), limit=10**9)
-    watched, t_watch = timed(lambda: watch(state, places, normals))
-    lazy = timed(lambda: cut(state, stock[0]))
-    state, t_ahead = timed(lambda: prepare(state))
+    first = start(base, np.concatenate([row(solid, k) for k in range(4)]), limit=10**9)
+    watched, t_watch = timed(lambda: watch(first, places, normals))
+    lazy, t_lazy = timed(lambda: cut(first, row(solid, 0)))
+    ready, t_ahead = timed(lambda: prepare(first))
     print(f"{n} degrees of freedom; factored once {t_factor:.2f} s; {PLACES} forces {t_watch:.2f} s; ", end="")
-    print(f"{len(state.columns.known)} columns ahead {t_ahead:.2f} s\n")
-    has = shutil.which("ccx") is not None
-    print("| layer | rank | correction [s] | refactoring [s] | ratio | ccx, 1 force [s] | ratio | difference |")
-    print("|---|---|---|---|---|---|---|---|")
-    total = np.zeros(3)
-    for k, elements in enumerate(stock):
-
-        def correction(elements=elements):
-            new = cut(state, elements)
-            return new, corrected(new, watched)
-
-        (state, ours), t_ours = timed(correction)
-        now = replace(solid, kept=state.solid.kept)
-        anew, t_anew = timed(lambda now=now: compliance(factorise(now), places, normals))
-        line = f"| {k + 1} | {state.rank} | {t_ours:.4f} | {t_anew:.2f} | {t_anew / t_ours:.1f} "
-        t_ccx = 0.0
-        if has:
-            F = np.zeros((3 * len(grid.nodes), 1))
-            F[base.free] = loads(base, places, normals)[:, [0]].toarray()
-            t_ccx = by_calculix(now, F, 1)
-            line += f"| {t_ccx:.2f} | {t_ccx / t_ours:.0f} "
-        else:
-            line += "| not here | "
-        print(line + f"| {abs(ours / anew - 1.0).max():.1e} |", flush=True)
-        total += (t_ours, t_anew, t_ccx)
-    print(f"\nall layers: refactoring / correction {total[1] / total[0]:.1f}; ", end="")
-    print(f"with what was solved ahead {(total[1] + t_watch) / (total[0] + t_ahead + t_watch):.1f}")
-    if has:
+    print(f"{len(ready.columns.known)} columns ahead {t_ahead:.2f} s")
+    ccx = 0.0
+    if shutil.which("ccx"):
         F = np.zeros((3 * len(grid.nodes), 3))
         F[base.free] = loads(base, places, normals)[:, [0, 1, 2]].toarray()
-        more = (by_calculix(solid, F, 3) - by_calculix(solid, F[:, :1], 1)) / 2.0
-        per_layer = total[2] / layers + (PLACES - 1) * more
-        print(f"CalculiX, each further force {more:.2f} s; {PLACES} forces {per_layer:.0f} s a layer; ", end="")
-        print(f"ratio to the correction {per_layer * layers / total[0]:.0f}")
+        one, further = calculix_times(solid, F)
+        ccx = one + (PLACES - 1) * further
+        print(f"CalculiX: one force {one:.2f} s, each further {further:.2f} s, {PLACES} forces {ccx:.0f} s")
+    print(
+        "\n| elements a layer | rank | correction [ms] | refactoring [s] | ratio | CalculiX / correction | difference |"
+    )
+    print("|---|---|---|---|---|---|---|")
+    for size in (1, 4, 12, grid.counts[0]):
+        state, ours, anew, ranks, worst = ready, 0.0, 0.0, [], 0.0
+        order = np.concatenate([row(solid, k) for k in range(4)])
+        for k in range(4):
+            elements = order[k * size : (k + 1) * size]
+            state, t_cut = timed(lambda state=state, elements=elements: cut(state, elements))
+            values, t_read = timed(lambda state=state: corrected(state, watched))
+            now = replace(solid, kept=state.solid.kept)
+            expected, t_anew = timed(lambda now=now: compliance(factorise(now), places, normals))
+            ours, anew = ours + (t_cut + t_read) / 4, anew + t_anew / 4
+            ranks.append(state.rank)
+            worst = max(worst, abs(values / expected - 1.0).max())
+        other = f"{ccx / ours:.0f}" if ccx else "not here"
+        print(f"| {size} | {min(ranks)} to {max(ranks)} | {1e3 * ours:.0f} | {anew:.2f} | {anew / ours:.1f} ", end="")
+        print(f"| {other} | {worst:.0e} |", flush=True)
     right = np.random.default_rng(0).standard_normal((n, 64))
     t_theirs = timed(lambda: base.factors.lu.solve(right))[1] / 64.0
     t_ours = timed(lambda: base.solve(right))[1] / 64.0
-    print(f"one right-hand side of 64: ours {1e3 * t_ours:.1f} ms, SuperLU {1e3 * t_theirs:.1f} ms")
-    rank, t_lazy = lazy[0].rank, lazy[1]
-    even = rank * t_anew / t_lazy
-    print(f"nothing solved ahead: rank {rank} in {t_lazy:.2f} s; as long as refactoring at rank {even:.0f} ", end="")
+    print(f"\none right-hand side of 64: ours {1e3 * t_ours:.1f} ms, SuperLU {1e3 * t_theirs:.1f} ms")
+    even = lazy.rank * anew / t_lazy
+    print(
+        f"nothing solved ahead: rank {lazy.rank} in {t_lazy:.2f} s; refactoring takes as long as rank {even:.0f} ",
+        end="",
+    )
     print(f"= {even / np.sqrt(n):.1f} sqrt(n)")
 
 

@@ -18,7 +18,7 @@ E, NU, RHO = 1.14e5, 0.34, 4.43e-9
 
 
 def wall(layers=2):
-    grid = plate(60.0, 40.0, 4.0, (8, 5, layers))
+    grid = plate(60.0, 40.0, 4.0, (6, 5, layers))
     return Solid(grid, E, NU, RHO, grid.side("j-"))
 
 
@@ -35,7 +35,7 @@ def blade():
             -1.0,
         ]
 
-    grid = from_map(np.linspace(0, 1, 7), np.linspace(0, 1, 6), np.linspace(0, 1, 4), place)
+    grid = from_map(np.linspace(0, 1, 6), np.linspace(0, 1, 6), np.linspace(0, 1, 4), place)
     return Solid(grid, E, NU, RHO, grid.side("j-"))
 
 
@@ -66,7 +66,7 @@ def test_thinned_and_gone(x):
     np.testing.assert_allclose(compliance(state, full), exact, rtol=0.0, atol=1e-9 * abs(exact).max())
 
 
-@pytest.mark.parametrize(("make", "limit"), [(wall, 500), (blade, 250)])
+@pytest.mark.parametrize(("make", "limit"), [(wall, 350), (blade, 250)])
 def test_any_order_of_cuts(make, limit):
     """Random thinning, many times: each state to 1e-9; the rank alone says when it is factored again."""
     solid = make()
@@ -75,7 +75,7 @@ def test_any_order_of_cuts(make, limit):
     places, n = seen(solid)
     watched = watch(state, places, n)
     checked, outer = 0, solid.grid.counts[2] - 1
-    for _ in range(12):
+    for _ in range(7):
         elements = rng.choice(row(solid.grid, int(rng.integers(1, 5)), outer), 3, replace=False)
         kept = state.solid.kept[elements] * [1.0, rng.uniform(0.5, 0.95)]
         before = state.factorisations
@@ -86,7 +86,7 @@ def test_any_order_of_cuts(make, limit):
         assert state.rank <= limit
         np.testing.assert_allclose(compliance(state, watched), solved(factorise(state.solid), places, n), rtol=1e-9)
         checked += state.rank > 0
-    assert checked >= 5
+    assert checked >= 3
     assert state.factorisations >= 2
 
 
@@ -165,14 +165,14 @@ def test_refused():
     e = int(row(solid.grid, 4, 1)[0])
     with pytest.raises(InputError, match=rf"cut: element {e} keeps \[0.0, 0.6\] of its thickness, had \[0.0, 0.5\]"):
         cut(thin, e, (0.0, 0.6))
-    with pytest.raises(InputError, match=r"removal.region: an element outside 0 .. 79"):
-        start(solid, [80])
+    with pytest.raises(InputError, match=r"removal.region: an element outside 0 .. 59"):
+        start(solid, [60])
     free = start(solid, limit=10**6)
     through = np.concatenate([row(solid.grid, 2, 0), row(solid.grid, 2, 1)])
     with pytest.raises(InputError, match="the piece of element 6: not held against motion along x, along y, along z"):
         cut(free, through)
-    hinge = [*row(solid.grid, 3, 0, slice(7)), *row(solid.grid, 3, 1, slice(7))]
-    hinge += [*row(solid.grid, 4, 0, slice(7, 8)), *row(solid.grid, 4, 1, slice(7, 8))]
+    hinge = [*row(solid.grid, 3, 0, slice(5)), *row(solid.grid, 3, 1, slice(5))]
+    hinge += [*row(solid.grid, 4, 0, slice(5, 6)), *row(solid.grid, 4, 1, slice(5, 6))]
     with pytest.raises(InputError, match="a piece of the workpiece would hang on a hinge of nodes"):
         cut(free, hinge)
     with pytest.raises(InputError, match="a piece of the workpiece hangs on a hinge of nodes"):
