@@ -52,12 +52,13 @@ class Grid:
 
     def side(self, name: str) -> Indices:
         """Nodes of one side, e.g. ``"j-"``."""
-        axis, end = _side(name)
+        axis, end = side_axis(name)
         found = np.take(self.lattice, end, axis=axis).ravel()
         return np.asarray(found[found >= 0])
 
 
-def _side(name: str) -> tuple[int, int]:
+def side_axis(name: str) -> tuple[int, int]:
+    """Axis (0, 1, 2) of a side and which end of it it is (0 or -1)."""
     if name not in SIDES:
         raise InputError(f"side = {name!r}: must be one of {', '.join(SIDES)}")
     return "ijk".index(name[0]), 0 if name[1] == "-" else -1

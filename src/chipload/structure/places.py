@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from chipload.errors import InputError
-from chipload.structure.grid import Grid, Indices, _side
+from chipload.structure.grid import Grid, Indices, side_axis
 from chipload.structure.hexa import NODES, Array, shape, shape_gradient
 
 
@@ -51,7 +51,7 @@ def on_side(grid: Grid, side: str, u: ArrayLike, v: ArrayLike) -> Places:
     InputError
         A number is outside 0 .. 1, or the side is not known.
     """
-    axis, end = _side(side)
+    axis, end = side_axis(side)
     a, b = np.broadcast_arrays(np.asarray(u, dtype=np.float64).ravel(), np.asarray(v, dtype=np.float64).ravel())
     along = [c for c in range(3) if c != axis]
     index = np.zeros((len(a), 3), dtype=np.int64)
@@ -86,7 +86,7 @@ def locate(grid: Grid, side: str, points: ArrayLike, tolerance: float) -> Places
     longer than the mesh is coarse. O(p log m).
     """
     x = np.atleast_2d(np.asarray(points, dtype=np.float64))
-    axis, end = _side(side)
+    axis, end = side_axis(side)
     numbers = np.take(np.arange(len(grid.elements)).reshape(grid.counts), end, axis=axis).ravel()
     along = [c for c in range(3) if c != axis]
     face = NODES[:, axis] == (-1.0 if end == 0 else 1.0)
@@ -157,7 +157,7 @@ def normals_of(grid: Grid, places: Places, side: str) -> Array:
     >>> normals_of(g, on_side(g, "k-", 0.3, 0.4), "k-").tolist()[0][2]
     -1.0
     """
-    axis, end = _side(side)
+    axis, end = side_axis(side)
     T = np.einsum("pnd,pnc->pdc", shape_gradient(places.local), grid.nodes[grid.elements[places.element]])
     n = np.cross(T[:, (axis + 1) % 3], T[:, (axis + 2) % 3]) * (1.0 if end else -1.0)
     return np.asarray(n / np.linalg.norm(n, axis=1)[:, None])
