@@ -217,6 +217,25 @@ def test_restart_in_the_middle(begin, modelled):
     assert found.override[0] <= RULES.start
 
 
+@pytest.mark.parametrize("before", [0.5, 1.5, 3.0, 5.0])
+def test_restart_just_before_a_step(before):
+    """From standing still, through 100 ms of latency: the axes must not run into the step that the model knows."""
+    wall = profile([(before, 400.0), (50.0, 4000.0)])
+    found = go(replace(RULES, start=0.35), wall, wall, latency=0.1)
+    assert found.finished
+    assert found.torque_max < LIMIT
+
+
+def test_a_step_of_the_programmed_feed():
+    """The programmed feed doubles where the depth does: the look-ahead reckons with the faster feed."""
+    s = np.arange(0.0, 120.01, 0.25)
+    deep = s >= 60.0
+    path = TorqueProfile(s, np.where(s > 40.0, 40.0, 20.0), np.where(deep, 500.0, 50.0), np.where(deep, 3000.0, 600.0))
+    found = go(replace(RULES, kind="product-sum"), path, path, latency=0.1)
+    assert found.finished
+    assert found.torque_max < LIMIT
+
+
 def test_worn_cutter_is_an_edge():
     truth = surprised(TOY, (Surprise(0.0, 280.0, 1.0, 3.0),))
     np.testing.assert_allclose(truth.torque(0.0), 3.0 * TOY.torque(0.0), rtol=1e-12)

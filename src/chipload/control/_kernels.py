@@ -104,24 +104,23 @@ STATE = 12
 
 
 @njit(cache=True, nogil=True)
-def allowed(s, at, edge, cut, torque, latency, speed, slew, cap, first):
+def allowed(s, at, feed, edge, cut, torque, latency, soon, slew, cap, first):
     """Override that a torque allows at ``s`` and that can still be left in time for what lies ahead.
 
-    ``at, edge, cut`` (n,): columns of the model; ``speed`` [mm/s] now; ``slew`` [1/s] how fast the override falls;
-    ``first``: a row at or before s. Returns the override, not below 0, and the row.
+    ``at, feed, edge, cut`` (n,): columns of the model; ``soon``: greatest override before this one acts, above 0;
+    ``slew`` [1/s] how fast the override falls; ``first``: a row at or before s. Returns the override, not below 0, and
+    the row.
     """
     n = len(at)
     while first + 1 < n and at[first + 1] <= s:
         first += 1
     best = cap
     i = first
+    until = 0.0
     while i < n:
-        late = 0.0
         if at[i] > s:
-            if speed <= 0.0 and i > first + 1:
-                break
-            if speed > 0.0:
-                late = max((at[i] - s) / speed - latency, 0.0) * slew
+            until += (at[i] - max(s, at[i - 1])) / (soon * max(feed[i - 1], feed[i]))
+        late = max(until - latency, 0.0) * slew
         if late >= best:
             break
         # the torque between two rows lies between theirs: both ends are asked
@@ -307,8 +306,10 @@ def run(
                 held = reading
             model = -1.0
             if modelled:
+                known = latency_known + every * dt
+                soon = max(v / programmed, min(p[2], state[_O] + p[7] * known))
                 model, first = allowed(
-                    s, at, model_edge, model_cut, p[1] * state[_Q], latency_known + every * dt, v,
+                    s, at, feed, model_edge, model_cut, p[1] * state[_Q], known, soon,
                     min(p[8], acc / programmed), p[2], first,
                 )  # fmt: skip
             sent, status = step(
