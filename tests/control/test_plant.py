@@ -182,7 +182,7 @@ def test_sensor_faults_in_the_loop(kind):
     fault = Fault(kind, 4.0, 1e9, -500.0)
     found = go(RULES, model=TOY, fault=fault)
     assert not found.finished
-    assert found.stopped == "stopped"
+    assert found.ended == "stopped"
     after = found.t > 4.2
     assert np.diff(found.override[after]).max() <= 0.0
     assert found.feed[-1] == 0.0
@@ -199,7 +199,7 @@ def test_a_short_loss_goes_on():
 def test_overload_stops():
     truth = surprised(TOY, (Surprise(120.0, 125.0, 8.0, 8.0),))
     found = go(RULES, truth, TOY)
-    assert (found.finished, found.stopped) == (False, "overload")
+    assert (found.finished, found.ended) == (False, "overload")
     assert found.feed[-1] == 0.0
     assert found.s[-1] < 125.0
 
@@ -226,11 +226,33 @@ def test_restart_just_before_a_step(before):
     assert found.torque_max < LIMIT
 
 
+def test_slow_axes_before_a_step():
+    """While they still speed up, the look-ahead reckons with the override that was sent, not with the feed that is."""
+    wall = profile([(9.0, 400.0), (50.0, 4000.0)])
+    found = go(replace(RULES, start=0.9), wall, wall, latency=0.1, acceleration=60.0)
+    assert found.finished
+    assert found.torque_max < LIMIT
+
+
+def test_the_current_of_the_drive_is_limited():
+    """12 A give (12 - idle) K_T = 2246 N mm at speed: a cut of 2600 stalls the spindle, unless the controller stops."""
+    weak = replace(SPINDLE, most_current=12.0)
+    cut = profile([(40.0, 400.0), (80.0, 2600.0)])
+    heedless = replace(fixed(1.0), overload=17e3)
+    assert run(cut, None, heedless, TABLE, SPINDLE, LOOP, LIMIT).finished
+    assert run(cut, None, heedless, TABLE, weak, LOOP, LIMIT).ended == "stalled"
+    careful = run(cut, None, replace(fixed(1.0), overload=2500.0), TABLE, weak, LOOP, LIMIT)
+    assert careful.ended == "overload"
+    assert careful.speed[-1] > 0.5 * SPINDLE.speed
+    assert go(fixed(0.05), cut).finished
+    assert run(cut, None, fixed(0.05), TABLE, SPINDLE, replace(LOOP, longest_s=1.0), LIMIT).ended == "time"
+
+
 def test_a_step_of_the_programmed_feed():
     """The programmed feed doubles where the depth does: the look-ahead reckons with the faster feed."""
     s = np.arange(0.0, 120.01, 0.25)
     deep = s >= 60.0
-    path = TorqueProfile(s, np.where(s > 40.0, 40.0, 20.0), np.where(deep, 500.0, 50.0), np.where(deep, 3000.0, 600.0))
+    path = TorqueProfile(s, np.where(s > 56.0, 40.0, 20.0), np.where(deep, 500.0, 50.0), np.where(deep, 3000.0, 600.0))
     found = go(replace(RULES, kind="product-sum"), path, path, latency=0.1)
     assert found.finished
     assert found.torque_max < LIMIT

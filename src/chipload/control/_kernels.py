@@ -98,6 +98,8 @@ def product_sum(error, change, output, rules, e, d):
 RUN, SETTLING, AIR, UNKNOWN, LOST, OVERLOAD, GIVEN_UP = range(7)
 # which answer moves the trim
 FIXED, PI, MAMDANI, PRODUCT_SUM = range(4)
+# how a run ends; the names are in chipload.control.plant
+FINISHED, STOPPED, TIMED_OUT, STALLED = range(4)
 # places of the state
 _O, _Q, _E, _READ, _SAME, _LIGHT, _OVER, _LOST_S, _GOOD, _LATCH, _WANTED, _OUT = range(12)
 STATE = 12
@@ -229,10 +231,9 @@ def step(p, error, change, output, rules, whole_ends, strength, state, torque, t
     elif modelled:
         wanted = model
     else:
+        if status == AIR:
+            state[_Q] = min(state[_Q], air_most)
         wanted = state[_Q]
-    if status == AIR and not modelled:
-        wanted = min(wanted, air_most)
-        state[_Q] = min(state[_Q], max(air_most, floor))
     wanted = min(max(wanted, floor), cap)
     state[_WANTED] = wanted
     rise = up * dt if may_rise or kind == FIXED else 0.0
@@ -266,12 +267,12 @@ def run(
 ):  # fmt: skip
     """Controller, axes and spindle along a path; see :func:`chipload.control.plant.run`.
 
-    ``drive`` (dt, acceleration, longest time); ``spindle`` (J, K_T, idle 0, idle 1, K_P, K_I, most current, speed,
-    sensor lag, filter lag); ``fault`` (kind 0..3, from, to, value); ``noise`` (m,) [A], used in turn; ``delay`` in
-    steps of control. ``out`` (rows, 8): t, s, feed, torque, measured, override, status, speed. Returns rows filled,
-    finished, time, greatest torque, time over the limit.
+    ``drive`` (dt, acceleration, longest time, share of the speed at which the spindle stalls); ``spindle`` (J, K_T, idle
+    0, idle 1, K_P, K_I, most current, speed, sensor lag, filter lag); ``fault`` (kind 0..3, from, to, value); ``noise``
+    (m,) [A], used in turn; ``delay`` in steps of control. ``out`` (rows, 8): t, s, feed, torque, measured, override,
+    status, speed. Returns rows filled, how it ended, time, greatest torque, time over the limit.
     """
-    dt, acc, longest = drive[0], drive[1], drive[2]
+    dt, acc, longest, stall = drive[0], drive[1], drive[2], drive[3]
     inertia, kt, idle0, idle1 = spindle[0], spindle[1], spindle[2], spindle[3]
     prop, integ, most, aim_speed, lag, smooth = spindle[4], spindle[5], spindle[6], spindle[7], spindle[8], spindle[9]
     queue = np.full(int(delay) + 1, state[_OUT])
@@ -283,7 +284,7 @@ def run(
     sent, command = state[_OUT], state[_OUT]
     greatest, over = 0.0, 0.0
     end = at[len(at) - 1]
-    finished = False
+    ended = TIMED_OUT
     reading, held, torque = 0.0, 0.0, 0.0
     while t < longest:
         while i + 2 < len(at) and at[i + 1] <= s:
@@ -350,12 +351,16 @@ def run(
         t += dt
         k += 1
         if s >= end:
-            finished = True
+            ended = FINISHED
             break
         if v == 0.0 and command == 0.0 and status >= OVERLOAD:
+            ended = STOPPED
+            break
+        if w <= stall * aim_speed:
+            ended = STALLED
             break
     if rows < len(out):
         out[rows, 0], out[rows, 1], out[rows, 2], out[rows, 3] = t, s, v, torque
         out[rows, 4], out[rows, 5], out[rows, 6], out[rows, 7] = reading, sent, status, w
         rows += 1
-    return rows, finished, t, greatest, over
+    return rows, ended, t, greatest, over
