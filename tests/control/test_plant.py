@@ -61,7 +61,7 @@ def profile(levels, feed=20.0, spacing=0.25, edge=0.15):
     return TorqueProfile(s, np.full(len(s), feed), edge * depth, (1.0 - edge) * depth)
 
 
-#: light and heavy steps, air at both ends: 30 s at the constant feed that respects the limit
+#: light and heavy steps, air at both ends: 33 s at the constant feed that respects the limit
 TOY = profile([(5.0, 0.0), (80.0, 1900.0), (30.0, 3900.0), (60.0, 1400.0), (60.0, 3000.0), (40.0, 2100.0), (5.0, 0.0)])
 
 
@@ -155,12 +155,16 @@ def test_surprises(latency):
     assert ahead.time < 0.8 * constant.time
     assert ahead.torque_max < 1.05 * LIMIT
     blind = go(RULES, truth, None, latency=latency)
-    assert blind.torque_max > ahead.torque_max
+    assert blind.torque_max > 1.5 * LIMIT
+    alone = go(replace(RULES, kind="fixed"), truth, TOY, latency=latency)
+    assert alone.torque_max > 1.15 * LIMIT
 
 
 def test_latency_costs():
-    peaks = [go(replace(RULES, kind="mamdani"), latency=x).torque_max for x in (0.0, 0.1, 0.3)]
-    assert peaks[0] < peaks[1] < peaks[2]
+    """Stock that grows by half over 8 mm, without a model: the peak is the higher, the later the override acts."""
+    truth = surprised(profile([(150.0, 2600.0)]), (Surprise(90.0, 140.0, 1.5, 1.5, ramp=8.0),))
+    peaks = np.array([go(RULES, truth, latency=x).torque_max for x in (0.0, 0.1, 0.3)])
+    assert np.diff(peaks).min() > 0.02 * LIMIT
 
 
 def test_the_model_looks_ahead_as_far_as_it_must():
@@ -218,18 +222,19 @@ def test_restart_in_the_middle(begin, modelled):
 
 
 @pytest.mark.parametrize("before", [0.5, 1.5, 3.0, 5.0])
-def test_restart_just_before_a_step(before):
+@pytest.mark.parametrize("start", [0.35, 0.9])
+def test_restart_just_before_a_step(before, start):
     """From standing still, through 100 ms of latency: the axes must not run into the step that the model knows."""
     wall = profile([(before, 400.0), (50.0, 4000.0)])
-    found = go(replace(RULES, start=0.35), wall, wall, latency=0.1)
+    found = go(replace(RULES, start=start), wall, wall, latency=0.1)
     assert found.finished
     assert found.torque_max < LIMIT
 
 
 def test_slow_axes_before_a_step():
     """While they still speed up, the look-ahead reckons with the override that was sent, not with the feed that is."""
-    wall = profile([(9.0, 400.0), (50.0, 4000.0)])
-    found = go(replace(RULES, start=0.9), wall, wall, latency=0.1, acceleration=60.0)
+    wall = profile([(2.0, 400.0), (50.0, 4000.0)])
+    found = go(replace(RULES, start=0.9), wall, wall, latency=0.1, acceleration=40.0)
     assert found.finished
     assert found.torque_max < LIMIT
 

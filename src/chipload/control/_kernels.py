@@ -236,6 +236,8 @@ def step(p, error, change, output, rules, whole_ends, strength, state, torque, t
         wanted = state[_Q]
     wanted = min(max(wanted, floor), cap)
     state[_WANTED] = wanted
+    if fresh:
+        state[_O] = min(state[_O], wanted)
     rise = up * dt if may_rise or kind == FIXED else 0.0
     state[_O] = min(max(wanted, state[_O] - down * dt), state[_O] + rise)
     return _put_out(state, max(state[_O], floor), quantum), status
@@ -267,21 +269,22 @@ def run(
 ):  # fmt: skip
     """Controller, axes and spindle along a path; see :func:`chipload.control.plant.run`.
 
-    ``drive`` (dt, acceleration, longest time, share of the speed at which the spindle stalls); ``spindle`` (J, K_T, idle
-    0, idle 1, K_P, K_I, most current, speed, sensor lag, filter lag); ``fault`` (kind 0..3, from, to, value); ``noise``
-    (m,) [A], used in turn; ``delay`` in steps of control. ``out`` (rows, 8): t, s, feed, torque, measured, override,
-    status, speed. Returns rows filled, how it ended, time, greatest torque, time over the limit.
+    ``drive`` (dt, acceleration, longest time, share of the speed at which the spindle stalls); ``spindle`` (J, K_T,
+    idle 0, idle 1, K_P, K_I, most current, speed, lags of sensor and filter); ``fault`` (kind, from, to, value);
+    ``noise`` (m,) [A], used in turn; ``delay`` in steps of control. ``out`` (rows, 8): t, s, feed, torque, measured,
+    override, status, speed. Returns rows filled, how it ended, time, greatest torque, time over the limit.
     """
     dt, acc, longest, stall = drive[0], drive[1], drive[2], drive[3]
     inertia, kt, idle0, idle1 = spindle[0], spindle[1], spindle[2], spindle[3]
     prop, integ, most, aim_speed, lag, smooth = spindle[4], spindle[5], spindle[6], spindle[7], spindle[8], spindle[9]
-    queue = np.full(int(delay) + 1, state[_OUT])
+    # until the first override acts the axes stand
+    queue = np.zeros(int(delay) + 1)
     t, s, v, w = 0.0, at[0], 0.0, aim_speed
     i, first = 0, 0
     summed = idle0 + idle1 * w
     sensed, rate, expected, filtered = summed, 0.0, 0.0, 0.0
     rows, k, status, head = 0, 0, RUN, 0
-    sent, command = state[_OUT], state[_OUT]
+    sent, command = 0.0, 0.0
     greatest, over = 0.0, 0.0
     end = at[len(at) - 1]
     ended = TIMED_OUT
