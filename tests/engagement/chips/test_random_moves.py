@@ -1,8 +1,8 @@
 """200 random five-axis moves against unions of sections that are found by membership alone.
 
-Resolution of the oracle: 71 sections of 80 rays, so its area is low by up to 2 % (scallops between sections, at tracks
-of corners a saw) and never high. What the polygon has too much is found by points 0.01 mm inside its edge, looked up
-at 3001 times.
+Resolution of the oracle: 71 sections of 80 rays. Its area is never high; it is low by 0.1 % in the median, by up to 6 %
+where sections are slender (rays cut their ends) or a corner's track is a saw of few teeth. What the polygon has too
+much is found by points 0.01 mm inside its edge instead, looked up at 3001 times.
 """
 
 from __future__ import annotations
@@ -46,8 +46,9 @@ def test_every_dense_section_is_covered_and_little_else(cases):
         assert abs(c.area - polygon.area) <= TOLERANCE * polygon.length
         short.append((polygon.area - union.area) / polygon.area)
     assert len(short) > 150
-    assert np.median(short) < 2.5e-3
-    assert np.quantile(short, 0.9) < 0.02
+    assert np.median(short) < 2e-3
+    assert np.quantile(short, 0.9) < 0.01
+    assert max(short) < 0.06
 
 
 def test_points_just_inside_are_covered_at_some_time(cases):
