@@ -184,21 +184,28 @@ def climb(
 ) -> tuple[float, float, int]:  # fmt: skip
     """Golden section for the largest limit in lo..hi: (rho, B, limiting point)."""
     g = 0.5 * (math.sqrt(5.0) - 1.0)
-    x0, x1 = hi - g * (hi - lo), lo + g * (hi - lo)
-    f0, i0 = largest_at(points, own, nodes, spans, leaves, cc, cone, tool, x0, cap, -1, hints, hinted)
-    f1, i1 = largest_at(points, own, nodes, spans, leaves, cc, cone, tool, x1, cap, -1, hints, hinted)
-    while hi - lo > least and max(f0, f1) < cap:
-        if f0 < f1:
-            lo, x0, f0, i0 = x0, x1, f1, i1
-            x1 = lo + g * (hi - lo)
-            f1, i1 = largest_at(points, own, nodes, spans, leaves, cc, cone, tool, x1, cap, -1, hints, hinted)
+    x = np.array([hi - g * (hi - lo), lo + g * (hi - lo)])
+    f, who = np.full(2, -math.inf), np.full(2, -1)
+    step, side = 0, 0
+    while True:
+        f[side], who[side] = largest_at(
+            points, own, nodes, spans, leaves, cc, cone, tool, x[side], cap, -1, hints, hinted
+        )
+        step += 1
+        if step == 1:
+            side = 1
+            continue
+        if hi - lo <= least or max(f[0], f[1]) >= cap:
+            break
+        side = 1 if f[0] < f[1] else 0
+        if side == 1:
+            lo, x[0], f[0], who[0] = x[0], x[1], f[1], who[1]
+            x[1] = lo + g * (hi - lo)
         else:
-            hi, x1, f1, i1 = x1, x0, f0, i0
-            x0 = hi - g * (hi - lo)
-            f0, i0 = largest_at(points, own, nodes, spans, leaves, cc, cone, tool, x0, cap, -1, hints, hinted)
-    if f0 < f1:
-        return f1, x1, i1
-    return f0, x0, i0
+            hi, x[1], f[1], who[1] = x[1], x[0], f[0], who[0]
+            x[0] = hi - g * (hi - lo)
+    k = 1 if f[0] < f[1] else 0
+    return f[k], x[k], who[k]
 
 
 @njit(cache=True, nogil=True)
@@ -214,8 +221,9 @@ def scan(
         cells = max(math.ceil((parts[k, 1] - parts[k, 0]) / step), 1)
         w = (parts[k, 1] - parts[k, 0]) / cells
         hints[0], hints[1] = -1, -1
-        for j in range(cells):
-            B = parts[k, 0] + (j + 0.5) * w
+        # both ends too: n = 0, the flank along the surface, is often the best
+        for j in range(-1, cells + 1):
+            B = min(max(parts[k, 0] + (j + 0.5) * w, parts[k, 0]), parts[k, 1])
             rho, i = largest_at(points, own, nodes, spans, leaves, cc, cone, tool, B, cap, -1, hints, 2)
             if rho > best:
                 best, where, width = rho, B, w
@@ -321,11 +329,14 @@ def search(
                 bound[c, t], rounds[c, t] = -math.inf, 0
                 continue
             if (every or j == 0) and best[c, t] < cap:
+                k = 0
+                while where[c, t] > parts[t, k, 1]:
+                    k += 1
                 rho, B, i = climb(
-                    points, own, nodes, spans, leaves, cc, cones[t], tool, where[c, t] - width[t],
-                    where[c, t] + width[t], cap, least, blockers[t], number[t],
+                    points, own, nodes, spans, leaves, cc, cones[t], tool, max(where[c, t] - width[t], parts[t, k, 0]),
+                    min(where[c, t] + width[t], parts[t, k, 1]), cap, least, blockers[t], number[t],
                 )  # fmt: skip
-                if rho > best[c, t] and inside(B, parts[t], count[t]):
+                if rho > best[c, t]:
                     best[c, t], where[c, t] = rho, B
                     number[t] = remember(blockers[t], number[t], i)
             start = floor if every else max(floor, high + eps)
@@ -335,12 +346,3 @@ def search(
             )  # fmt: skip
             high = max(high, best[c, t])
             proof[c, t, : number[t]] = blockers[t, : number[t]]
-
-
-@njit(cache=True, nogil=True)
-def inside(B: float, parts: Any, count: int) -> bool:
-    """Whether B lies in one of the parts."""
-    for k in range(count):
-        if parts[k, 0] <= B <= parts[k, 1]:
-            return True
-    return False

@@ -22,7 +22,7 @@ for _i in range(17):
 
 
 @njit(cache=True, nogil=True)
-def at(f: Any, c: float, s: float) -> float:
+def at(f: Any, c: float, s: float) -> Any:
     """``f0 + f1 cos B + f2 sin B``."""
     return f[0] + f[1] * c + f[2] * s
 
@@ -137,7 +137,7 @@ def _corner(trig: Any, yN: float, yy: float, rho: float, r: float, cm: float, sm
 
 
 @njit(cache=True, nogil=True)
-def osculating(a: float, b: float, s2: float, rho: float, r: float, K: Any) -> float:
+def osculating(a: float, b: float, s2: float, rho: float, r: float, K: Any) -> Any:
     """Above 0 where the curvature at the contact admits rho: ``s^3 det(I - r K) - rho (Q - r s^2 det K)``."""
     det = K[0] * K[2] - K[1] * K[1]
     free = 1.0 - r * (K[0] + K[2]) + r * r * det
@@ -185,7 +185,7 @@ def _signs(c: Any, m: int) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _value(B: float, kind: int, trig: Any, yN: float, yy: float, rho: float, r: float, P: float, K: Any) -> float:
+def _value(B: float, kind: int, trig: Any, yN: float, yy: float, rho: float, r: float, P: float, K: Any) -> Any:
     """The limit itself, not squared, at B; ``kind`` 0: corner, 1: cylinder, 2: curvature at the contact."""
     c, s = math.cos(B), math.sin(B)
     a, b = at(trig[2], c, s), at(trig[3], c, s)
@@ -219,7 +219,7 @@ def _breaks(
             f0 = _value(B0, kind, trig, yN, yy, rho, r, P, K)
             f1 = _value(B1, kind, trig, yN, yy, rho, r, P, K)
             if f0 * f1 < 0.0:
-                while B1 - B0 > least:
+                while least < B1 - B0:
                     mid = 0.5 * (B0 + B1)
                     f = _value(mid, kind, trig, yN, yy, rho, r, P, K)
                     if (f < 0.0) == (f0 < 0.0):
@@ -231,7 +231,7 @@ def _breaks(
                     found += 1
             # else the root is one of the square only
             continue
-        if B1 - B0 < least or top > 61:
+        if least > B1 - B0 or top > 61:
             if found + 1 < len(out):
                 out[found], out[found + 1] = B0, B1
                 found += 2
@@ -261,7 +261,7 @@ def levels(f: Any, level: float, lo: float, hi: float, out: Any, found: int) -> 
     for k in range(2):
         B = phi + w if k == 0 else phi - w
         B += 2.0 * math.pi * math.ceil((lo - B) / (2.0 * math.pi))
-        while B < hi:
+        while hi > B:
             if lo < B:
                 out[found] = B
                 found += 1
