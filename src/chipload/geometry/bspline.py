@@ -43,7 +43,9 @@ class Patch:
             value.flags.writeable = False
             object.__setattr__(self, name, value)
         if self.control.ndim != 3 or self.control.shape[2] != 3 or self.side not in (1, -1):
-            raise InputError(f"patch: control points {self.control.shape}, side {self.side}: must be (n, m, 3), 1 or -1")
+            raise InputError(
+                f"patch: control points {self.control.shape}, side {self.side}: must be (n, m, 3), 1 or -1"
+            )
 
     @property
     def degrees(self) -> tuple[int, int]:
@@ -114,7 +116,7 @@ class Patch:
 
 
 def basis(knots: Floats, degree: int, x: Floats, derivative: int = 0) -> tuple[NDArray[np.int64], Floats]:
-    """First index (k,) of the basis functions that are not 0 at x (k,), and their values or derivatives (k, degree + 1).
+    """First index (k,) of the basis functions that are not 0 at x (k,); their values or derivatives (k, degree + 1).
 
     >>> first, N = basis(np.array([0.0, 0.0, 1.0, 1.0]), 1, np.array([0.25]))
     >>> N.tolist()

@@ -87,8 +87,8 @@ class Revolved:
         c, w = np.cos(theta), np.sin(theta)
         A = np.stack([t[:, 0] * c, t[:, 0] * w, t[:, 1]], axis=-1)
         B = np.stack([-w * np.ones(len(A)), c * np.ones(len(A)), np.zeros(len(A))], axis=-1)
-        out: Floats = along[:, None, None] * A[:, :, None] * A[:, None, :]
-        return out + around[:, None, None] * B[:, :, None] * B[:, None, :]
+        out: Floats = np.einsum("k,ki,kj->kij", along, A, A) + np.einsum("k,ki,kj->kij", around, B, B)
+        return out
 
     def nearest(self, r: ArrayLike, z: ArrayLike, count: int = 2001) -> Floats:
         """Parameter s (k,) of the nearest of ``count`` points of the curve to each (r, z)."""

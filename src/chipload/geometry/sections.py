@@ -1,12 +1,12 @@
 """Blade sections: files of points, checked, and lofted to the two sides of a blade.
 
-Notation: a section is a closed profile (n, 3) float [mm] in the part's frame, z the axis of rotation; sections go from hub to
-shroud. A blade has the side that faces a growing theta (`plus`) and the one that faces a falling one (`minus`).
+Notation: a section is a closed profile (n, 3) float [mm] in the part's frame, z the axis of rotation; sections go from
+hub to shroud. A blade has the side that faces a growing theta (`plus`) and the one that faces a falling one (`minus`).
 u in 0..1 runs along a section from its leading to its trailing edge, v from the first section to the last.
 
 Formats: a table of three columns whose first line names them, `X R*THETA R`, `X R THETA_DEG` or `X Y Z`, a section a
-file (NASA's HECC); TurboGrid `.curve` and `.crv`, x y z, sections divided by lines that begin with #. X of the first two
-is along the axis. Files say no unit: it is asked for.
+file (NASA's HECC); TurboGrid `.curve` and `.crv`, x y z, sections divided by lines that begin with #. X of the first
+two is along the axis. Files say no unit: it is asked for.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from pathlib import Path
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
+from scipy.interpolate import BSpline, make_interp_spline
+from scipy.optimize import minimize_scalar
 
 from chipload.errors import InputError
 from chipload.geometry.bspline import Patch, through
@@ -26,8 +27,11 @@ from chipload.units import MM_PER
 
 Floats = NDArray[np.float64]
 
+_Half = tuple[BSpline, float, float]
+
 _LARGEST_FILE = 20_000_000
 _LEAST_POINTS = 12
+_EDGE = 0.03  # of its length: a profile that begins so near an end begins at that edge
 _OUTER = 0.02  # the outer diameter may differ from the stated one by this share
 
 
@@ -52,7 +56,7 @@ def read_sections(
     ----------
     unit : of the files, a key of ``units.MM_PER``
     over : the part is turned over about x, so that a flow along +x comes down the z axis
-    columns : of files whose first line does not name them, as section 7 of HECC's main blade; must agree with the others
+    columns : of files whose first line does not name them, as section 7 of HECC's main blade; the others must agree
 
     Returns
     -------
@@ -106,11 +110,15 @@ def checked(sections: tuple[Floats, ...], outer_diameter: float | None = None) -
     back = (step[1:] * step[:-1]).sum(axis=1) <= 0.0
     if back.any():
         k = int(back.argmax()) + 2
-        raise InputError(f"section {k}: out of order: lies not between sections {k - 1} and {k + 1}: sort hub to shroud")
+        raise InputError(
+            f"section {k}: out of order: lies not between sections {k - 1} and {k + 1}: sort hub to shroud"
+        )
     if outer_diameter is not None:
         found = 2.0 * max(float(np.hypot(p[:, 0], p[:, 1]).max()) for p in sections)
         if abs(found / outer_diameter - 1.0) > _OUTER:
-            likely = [a for a in MM_PER for b in MM_PER if abs(found / MM_PER[b] * MM_PER[a] / outer_diameter - 1) < _OUTER]
+            likely = [
+                a for a in MM_PER for b in MM_PER if abs(found / MM_PER[b] * MM_PER[a] / outer_diameter - 1) < _OUTER
+            ]
             hint = f": the unit is more likely {likely[0]}" if likely else ": check the unit"
             raise InputError(f"sections: outer diameter {found:.6g} mm: must be {outer_diameter:g} as stated{hint}")
     return sections
@@ -119,8 +127,9 @@ def checked(sections: tuple[Floats, ...], outer_diameter: float | None = None) -
 def loft(sections: tuple[Floats, ...], count: int = 61) -> Blade:
     """Both sides of a blade through its sections.
 
-    Each section is cut at its two points that are farthest apart (leading edge: the one of greater z), each half is
-    interpolated over its chord length and read at ``count`` places, closer at the edges; the patch goes through those.
+    Each section is interpolated over its chord length and cut where it is longest (leading edge: the end of greater z;
+    one that begins at an edge is cut at that beginning); each half is read at ``count`` places, closer at the edges, and
+    the patch goes through those.
     """
     u = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
     u[0], u[-1] = 0.0, 1.0
@@ -140,21 +149,41 @@ def _side(grid: Floats, u: Floats, v: Floats, sign: float) -> Patch:
     patch = through(np.swapaxes(grid, 0, 1), u, v)
     at = patch.at(0.5, 0.5)[0]
     towards = sign * np.array([-at[1], at[0], 0.0])
-    return patch if patch.normal(0.5, 0.5)[0] @ towards > 0.0 else Patch(patch.knots_u, patch.knots_v, patch.control, -1)
+    return (
+        patch if patch.normal(0.5, 0.5)[0] @ towards > 0.0 else Patch(patch.knots_u, patch.knots_v, patch.control, -1)
+    )
 
 
-def _halves(p: Floats) -> tuple[Floats, Floats]:
-    """Two open profiles from the leading to the trailing edge."""
+def _halves(p: Floats) -> tuple[_Half, _Half]:
+    """Both ways round from the leading to the trailing edge: (curve, from, to)."""
     ring = p[:-1] if np.allclose(p[0], p[-1], rtol=0.0, atol=1e-9 * np.abs(p).max()) else p
     apart = ((ring[:, None] - ring[None]) ** 2).sum(axis=2)
     i, j = sorted(int(x) for x in np.unravel_index(apart.argmax(), apart.shape))
-    one, other = ring[i : j + 1], np.concatenate([ring[j:], ring[: i + 1]])[::-1]
-    return (one, other) if ring[i, 2] >= ring[j, 2] else (one[::-1], other[::-1])
+    length = np.sqrt(apart.max())
+    # a profile that begins at an edge is cut there, in every section at the same place
+    begins = min(apart[0, i], apart[0, j]) < (_EDGE * length) ** 2
+    if not begins:
+        ring, i, j = np.roll(ring, -i, axis=0), 0, j - i
+    elif apart[0, j] < apart[0, i]:
+        j = i
+    ring = np.concatenate([ring, ring[:1]])
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
+    curve = make_interp_spline(s, ring, k=3)
+    last = len(s) - 2
+    found = minimize_scalar(
+        lambda x: -float(((curve(x) - ring[0]) ** 2).sum()), bounds=(s[max(j - 1, 1)], s[min(j + 1, last)]), method="bounded",
+        options={"xatol": 1e-9 * s[-1]},
+    )  # fmt: skip
+    split, end = float(found.x), float(s[-1])
+    if curve(split)[2] >= ring[0, 2]:
+        return (curve, split, 0.0), (curve, split, end)
+    return (curve, 0.0, split), (curve, end, split)
 
 
-def _read(half: Floats, u: Floats) -> Floats:
-    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(half, axis=0), axis=1))])
-    out: Floats = make_interp_spline(s / s[-1], half, k=3)(u)
+def _read(half: _Half, u: Floats) -> Floats:
+    """Points (n, 3) at the shares u of the length of a half."""
+    curve, first, last = half
+    out: Floats = curve(first + u * (last - first))
     return out
 
 
