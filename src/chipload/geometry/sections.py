@@ -116,10 +116,11 @@ def checked(sections: tuple[Floats, ...], outer_diameter: float | None = None) -
     if outer_diameter is not None:
         found = 2.0 * max(float(np.hypot(p[:, 0], p[:, 1]).max()) for p in sections)
         if abs(found / outer_diameter - 1.0) > _OUTER:
-            likely = [
-                a for a in MM_PER for b in MM_PER if abs(found / MM_PER[b] * MM_PER[a] / outer_diameter - 1) < _OUTER
+            factor = outer_diameter / found
+            pairs = [
+                f"{a} read as {b}" for a in MM_PER for b in MM_PER if abs(MM_PER[a] / MM_PER[b] / factor - 1.0) < _OUTER
             ]
-            hint = f": the unit is more likely {likely[0]}" if likely else ": check the unit"
+            hint = f": smaller by {factor:.4g}, as {' or '.join(pairs)}" if pairs else ": check the unit"
             raise InputError(f"sections: outer diameter {found:.6g} mm: must be {outer_diameter:g} as stated{hint}")
     return sections
 
@@ -128,8 +129,8 @@ def loft(sections: tuple[Floats, ...], count: int = 61) -> Blade:
     """Both sides of a blade through its sections.
 
     Each section is interpolated over its chord length and cut where it is longest (leading edge: the end of greater z;
-    one that begins at an edge is cut at that beginning); each half is read at ``count`` places, closer at the edges, and
-    the patch goes through those.
+    one that begins at an edge is cut at that beginning); each half is read at ``count`` places, closer at the edges,
+    and the patch goes through those.
     """
     u = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
     u[0], u[-1] = 0.0, 1.0
@@ -171,7 +172,8 @@ def _halves(p: Floats) -> tuple[_Half, _Half]:
     curve = make_interp_spline(s, ring, k=3)
     last = len(s) - 2
     found = minimize_scalar(
-        lambda x: -float(((curve(x) - ring[0]) ** 2).sum()), bounds=(s[max(j - 1, 1)], s[min(j + 1, last)]), method="bounded",
+        lambda x: -float(((curve(x) - ring[0]) ** 2).sum()), method="bounded",
+        bounds=(s[max(j - 1, 1)], s[min(j + 1, last)]),
         options={"xatol": 1e-9 * s[-1]},
     )  # fmt: skip
     split, end = float(found.x), float(s[-1])

@@ -53,14 +53,13 @@ def channel(seed=0, points=20):
 def admitted(s, c, table, pallets, r):
     """Least limit of contact point c at each B by the formulas, point by point; -inf where n < 0."""
     keep = ~((s.check_surface == s.surface[c]) & (((s.check - s.contact[c]) ** 2).sum(axis=1) < s.near**2))
-    out = []
-    for T in axis_at(table, pallets):
-        if s.normal[c] @ T < -1e-12:
-            out.append(-np.inf)
-            continue
-        at_points = rho_limits(s.check[keep], s.contact[c], s.normal[c], T, r).min()
-        out.append(min(at_points, contact_limit(s.normal[c], T, r, s.curvature[c])))
-    return np.array(out)
+    check = s.check[keep]
+    out = np.full(len(pallets), -np.inf)
+    for k, T in enumerate(axis_at(table, pallets)):
+        if s.normal[c] @ T >= -1e-12:
+            at_points = rho_limits(check, s.contact[c], s.normal[c], T, r).min(initial=np.inf)
+            out[k] = min(at_points, contact_limit(s.normal[c], T, r, s.curvature[c]))
+    return out
 
 
 @pytest.mark.parametrize(("width", "r"), [(24.185, 2.0), (24.185, 0.0), (8.0, 4.0)])
@@ -119,12 +118,12 @@ def test_bore_parallel_to_the_axis():
 
 
 def test_certificate_agrees_with_7200_samples():
-    s = channel(points=8)
+    s = channel(points=3)
     tables = np.radians([25.0, 60.0, 90.0])
     found = limits(s, tables, 2.0, 40.0, sampling=Sampling(eps=1e-3))
     assert found.certified.all()
     B = np.linspace(0, 2 * np.pi, 7200, endpoint=False)
-    for c in range(8):
+    for c in range(3):
         for t in range(3):
             sampled = admitted(s, c, tables[t], B, 2.0).max()
             assert sampled <= found.bound[c, t]
