@@ -246,61 +246,90 @@ def remember(blockers: Any, number: int, i: int) -> int:
 
 
 @njit(cache=True, nogil=True)
+def known_limit(points: Any, cc: Any, cone: Any, tool: Any, B: float, blockers: Any, number: int) -> tuple[float, int]:
+    """As :func:`largest_at`, over the ``blockers`` alone."""
+    Tx, Ty, Tz = cone[0] * math.cos(B), cone[0] * math.sin(B), cone[1]
+    n = cc[3] * Tx + cc[4] * Ty + cc[5] * Tz
+    a = cc[6] * Tx + cc[7] * Ty + cc[8] * Tz
+    b = cc[9] * Tx + cc[10] * Ty + cc[11] * Tz
+    s2 = a * a + b * b
+    if s2 == 0.0:
+        return math.inf, -1
+    r, s = tool[0], math.sqrt(s2)
+    best, which = contact_limit(a, b, s2, r, cc[12], cc[13], cc[14]), -2
+    for k in range(number):
+        i = blockers[k]
+        if i < 0:
+            continue
+        x, y, z = (points[i, 0] - cc[0] - r * cc[3], points[i, 1] - cc[1] - r * cc[4], points[i, 2] - cc[2] - r * cc[5])
+        h = x * Tx + y * Ty + z * Tz
+        yV = (x * cc[3] + y * cc[4] + z * cc[5] - n * h) / s
+        limit = point_limit(h, yV, x * x + y * y + z * z, r, tool[1])
+        if limit < best:
+            best, which = limit, i
+    return best, which
+
+
+@njit(cache=True, nogil=True)
 def cover(
     points: Any, own: Any, nodes: Any, spans: Any, leaves: int, cc: Any, cone: Any, tool: Any, parts: Any, count: int,
     floor: float, cap: float, eps: float, least: float, best: float, where: float, blockers: Any, number: int,
-) -> tuple[float, float, float, int, int]:  # fmt: skip
+    used: Any,
+) -> tuple[float, float, float, int, bool]:  # fmt: skip
     """Raises ``best`` until the arcs of few points forbid every B to a larger one.
 
-    (largest rho, its B, proved bound, number of blockers, rounds; rounds = -1: not proved).
+    Takes a gap, finds the point that limits its middle, takes that point's arcs out of the gap; what is forbidden to a
+    cutter stays forbidden to a larger one. (largest rho, its B, proved bound, number of points ``used``, proved.)
     """
     stages = np.array([[0.0, 0.0], [tool[1], 0.0]]) if tool[1] < math.inf else np.array([[0.0, 0.0]])
-    arcs, free = np.empty((8 * len(blockers), 2)), np.empty((256, 2))
+    arcs, free, one = np.empty((32, 2)), np.empty((33, 2)), np.empty((1, 2))
+    stack = np.empty((256, 2))
+    stack[:count] = parts[:count]
     target = max(best + eps, floor)
-    done, filled = 0, 0
-    for rounds in range(1000):
+    taken, top = 0, count
+    for _ in range(4000):
         if best >= cap:
-            return cap, where, cap, number, rounds
-        for j in range(done, number):
-            for k in range(count):
-                filled = point_arcs(
-                    points, blockers[j], cc, cone, target, tool[0], stages, parts[k, 0], parts[k, 1], least, arcs,
-                    filled,
-                )  # fmt: skip
-        done = number
-        left = gaps(parts, count, arcs, filled, least, free)
-        if left == 0:
-            return best, where, target, number, rounds
-        if number == len(blockers):
-            break
-        before = number
-        for g in range(left):
-            B = 0.5 * (free[g, 0] + free[g, 1])
+            return cap, where, cap, taken, True
+        if top == 0:
+            return best, where, target, taken, True
+        top -= 1
+        lo, hi = stack[top, 0], stack[top, 1]
+        B = 0.5 * (lo + hi)
+        rho, i = known_limit(points, cc, cone, tool, B, blockers, number)
+        if rho >= target:
             rho, i = largest_at(points, own, nodes, spans, leaves, cc, cone, tool, B, cap, -1, blockers, number)
             number = remember(blockers, number, i)
             if rho >= target:
                 high, C, i = climb(
-                    points, own, nodes, spans, leaves, cc, cone, tool, free[g, 0], free[g, 1], cap, least, blockers,
-                    number,
-                )  # fmt: skip
+                    points, own, nodes, spans, leaves, cc, cone, tool, lo, hi, cap, 1e-3 * eps, blockers, number
+                )
                 number = remember(blockers, number, i)
                 if high > rho:
                     rho, B = high, C
                 best, where, target = rho, B, rho + eps
-                done, filled = 0, 0
-                break
+                top += 1
+                continue
             if rho > best:
                 best, where = rho, B
-        if number == before and done > 0:
+        filled = point_arcs(points, i, cc, cone, target, tool[0], stages, lo, hi, least, arcs, 0)
+        one[0, 0], one[0, 1] = lo, hi
+        left = gaps(one, 1, arcs, filled, least, free)
+        if left + top > len(stack) or filled == 0:
             break
-    return best, where, target, number, -1
+        size = taken
+        taken = remember(used, taken, i)
+        if taken == size and size == len(used) and used[size - 1] != i:
+            break
+        for g in range(left):
+            stack[top], top = free[g], top + 1
+    return best, where, target, taken, False
 
 
 @njit(cache=True, nogil=True)
 def search(
     points: Any, own: Any, nodes: Any, spans: Any, leaves: int, ccs: Any, cones: Any, tool: Any, limits: Any,
     floor: float, cap: float, eps: float, least: float, step: float, every: bool, first: int, last: int, best: Any,
-    where: Any, bound: Any, rounds: Any, proof: Any,
+    where: Any, bound: Any, proved: Any, proof: Any,
 ) -> None:  # fmt: skip
     """Fills rows ``first``..``last`` of the tables (contact point, table angle).
 
@@ -310,7 +339,7 @@ def search(
     tables, size = len(cones), proof.shape[2]
     parts, count = np.empty((tables, 3 * len(limits), 2)), np.zeros(tables, dtype=np.int64)
     blockers, number = np.empty((tables, size), dtype=np.int64), np.zeros(tables, dtype=np.int64)
-    width = np.zeros(tables)
+    width, used = np.zeros(tables), np.empty(size, dtype=np.int64)
     for c in range(first, last):
         cc = ccs[c]
         for t in range(tables):
@@ -326,7 +355,7 @@ def search(
         for j in range(tables):
             t = order[j]
             if count[t] == 0:
-                bound[c, t], rounds[c, t] = -math.inf, 0
+                bound[c, t], proved[c, t] = -math.inf, True
                 continue
             if (every or j == 0) and best[c, t] < cap:
                 k = 0
@@ -334,15 +363,15 @@ def search(
                     k += 1
                 rho, B, i = climb(
                     points, own, nodes, spans, leaves, cc, cones[t], tool, max(where[c, t] - width[t], parts[t, k, 0]),
-                    min(where[c, t] + width[t], parts[t, k, 1]), cap, least, blockers[t], number[t],
+                    min(where[c, t] + width[t], parts[t, k, 1]), cap, 1e-3 * eps, blockers[t], number[t],
                 )  # fmt: skip
                 if rho > best[c, t]:
                     best[c, t], where[c, t] = rho, B
                     number[t] = remember(blockers[t], number[t], i)
             start = floor if every else max(floor, high + eps)
-            best[c, t], where[c, t], bound[c, t], number[t], rounds[c, t] = cover(
+            best[c, t], where[c, t], bound[c, t], taken, proved[c, t] = cover(
                 points, own, nodes, spans, leaves, cc, cones[t], tool, parts[t], count[t], start, cap, eps, least,
-                best[c, t], where[c, t], blockers[t], number[t],
+                best[c, t], where[c, t], blockers[t], number[t], used,
             )  # fmt: skip
             high = max(high, best[c, t])
-            proof[c, t, : number[t]] = blockers[t, : number[t]]
+            proof[c, t, :taken] = used[:taken]

@@ -43,7 +43,7 @@ class Sampling:
     """
 
     eps: float = 1e-3
-    step: float = math.radians(6.0)
+    step: float = math.radians(15.0)
     least: float = 1e-9
     blockers: int = 128
 
@@ -134,11 +134,11 @@ def limits(
         raise InputError(f"corner_radius {corner_radius:g}, floor {floor:g}, cap {cap:g}: must be 0 <= floor <= cap")
     c, t = len(scene.contact), len(alpha)
     rho, bound, pallet = np.full((c, t), -np.inf), np.full((c, t), -np.inf), np.zeros((c, t))
-    rounds = np.zeros((c, t), dtype=np.int64)
+    proved = np.ones((c, t), dtype=np.bool_)
     proof = np.full((c, t, how.blockers), -1, dtype=np.int64)
     round_enough = corner_radius * scene.curvature_max < 1.0
     rows = np.ascontiguousarray(scene.rows[round_enough])
-    part = tuple(np.ascontiguousarray(x[round_enough]) for x in (rho, pallet, bound, rounds, proof))
+    part = tuple(np.ascontiguousarray(x[round_enough]) for x in (rho, pallet, bound, proved, proof))
     tree = scene.tree
     points, own = scene.check[tree.order], scene.check_surface[tree.order]
     cones = np.column_stack([np.sin(alpha), np.cos(alpha)])
@@ -151,9 +151,9 @@ def limits(
         )  # fmt: skip
 
     in_blocks(block, len(rows), workers, progress, f"largest cutters, corner radius {corner_radius:g} mm")
-    for whole, some in zip((rho, pallet, bound, rounds, proof), part, strict=True):
+    for whole, some in zip((rho, pallet, bound, proved, proof), part, strict=True):
         whole[round_enough] = some
     blockers = np.where(proof >= 0, tree.order[np.maximum(proof, 0)] if len(points) else proof, proof)
     blockers[~round_enough, :, 0] = CURVATURE
     used = max(int((blockers != -1).sum(axis=2).max()), 1)
-    return Limits(corner_radius, alpha, rho, bound, pallet, rounds >= 0, blockers[:, :, :used], cap, floor)
+    return Limits(corner_radius, alpha, rho, bound, pallet, proved, blockers[:, :, :used], cap, floor)
