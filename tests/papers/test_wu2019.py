@@ -1,4 +1,4 @@
-"""The search of [Wu2019] on an impeller with its dimensions; its blade surface is lost, so no diameter of it is claimed.
+"""The search of [Wu2019] on an impeller with its dimensions; its blade surface is lost: no diameter of it is claimed.
 
 The oracle is the gouge test of the source, check point by check point, over a grid of the pallet angle.
 """
@@ -83,12 +83,16 @@ def test_never_smaller_than_the_sampled_search(found):
             T = axis_at(TABLES[j], GRID)
             n = T @ s.normal[k]
             T = T[(n >= 0.0) & (n < 1.0 - 1e-9)]
-            sampled = max(
-                min(
-                    rho_limits(s.check[keep], s.contact[k], s.normal[k], one, 2.0).min(),
-                    contact_limit(s.normal[k], one, 2.0, s.curvature[k]),
+            sampled = (
+                max(
+                    min(
+                        rho_limits(s.check[keep], s.contact[k], s.normal[k], one, 2.0).min(),
+                        contact_limit(s.normal[k], one, 2.0, s.curvature[k]),
+                    )
+                    for one in T
                 )
-                for one in T
+                if len(T)
+                else -np.inf
             )
             assert min(sampled, family.cap) <= family.bound[k, j] or family.rho[k, j] == family.cap
 
