@@ -147,6 +147,7 @@ def operation(simulated: Simulated) -> dict[str, Any]:
         "steps": len(c["line"]),
         "chip_pieces_max": int(c["chip_pieces"].max(initial=0)),
         "chip_volume_mm3": float(c["chip_volume_mm3"].sum()),
+        "films_mm3": float(c["chip_volume_mm3"][c["chip_pieces"] == 0].sum()),
         "stock_before_mm3": removal.volume_before,
         "stock_removed_mm3": removal.volume_before - removal.volume_after,
         "cutting_s": whole,
@@ -243,7 +244,8 @@ def sections(simulated: Simulated, figures: dict[str, go.Figure]) -> list[str]:
         "<h2>Chips, force, torque, power</h2>",
         f"<p>{what['steps']} steps; {what['chip_volume_mm3']:.6g} mm\u00b3 of chips, stock less by "
         f"{what['stock_removed_mm3']:.6g} mm\u00b3; {what['cutting_s']:.4g} s in cut, {what['air_cut_s']:.4g} s "
-        f"in air; thickest chip {what['chip_mm']['max']:.4g} mm.</p>",
+        f"in air; thickest chip {what['chip_mm']['max']:.4g} mm; in films too thin to be told from the tolerance "
+        f"{what['films_mm3']:.2g} mm\u00b3.</p>",
         table(["", "mean", "greatest", "least"], rows, numbers=(1, 2, 3)),
         f'<p class="note">{SURE if sure else UNSURE}</p>',
         figure("loads", along(simulated), figures),

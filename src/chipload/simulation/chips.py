@@ -132,7 +132,8 @@ def remove(
     Removal
         With the columns ``line``, ``tool``, ``label``, ``rapid``, ``s_mm``, ``t_s``, ``seconds``, ``x_mm``,
     ``y_mm``, ``z_mm``, ``axis_x..z``, ``feed_mm_min``, ``chip_volume_mm3``, ``chip_pieces`` (most on one layer),
-    ``chip_layers`` (layers that lost something), ``chip_max_mm`` (thickest),
+    ``chip_layers`` (layers that lost something; where all of it is films, narrower than a few tolerances, there are no
+    pieces and no loads), ``chip_max_mm`` (thickest),
     ``force_{x,y,z}_{mean,max,min}_n`` over the revolution, ``force_n`` (greatest size), ``torque_mean_nm``,
     ``torque_nm`` (greatest), ``power_w`` (mean),
     ``force_normal_n`` (greatest force that presses on the surface that the step leaves, along its normal; 0 where it
@@ -183,7 +184,8 @@ def remove(
                     rank = (len(whole), alike)
                     near = stock.section(i).union(MultiPolygon(pieces)).intersection(box(*inner[:2], *outer[:2]))
                     best = Piece(k, move, cutter, float(stock.heights[i]), near, tuple(whole))
-            if not steps.rapid[k]:
+            # what is thinner than the tolerance can tell is no cut
+            if removed[k, 1] > 0.0 and not steps.rapid[k]:
                 cuts.append(bite_of_step(steps, k, move, cutter, profiles[int(steps.tool[k])], material_before))
         for number in sorted({int(steps.tool[c.step]) for c in cuts}):
             own = [c for c in cuts if steps.tool[c.step] == number]
