@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named, read_material
 from chipload.geometry.mesh import read_mesh
 from chipload.job import ProgramJob
@@ -24,6 +27,8 @@ from chipload.units import mm_s_from_mm_min
 
 #: side of a tile of the stock in diameters of the largest cutter
 TILE = 4.0
+#: layers where no cutter comes are so many times as thick
+COARSE = 4.0
 
 
 def run_program(job: ProgramJob, progress: Progress = silent, *, simulate: bool = True) -> Read:
@@ -93,7 +98,9 @@ def _material(job: ProgramJob) -> Material:
 
 
 def _stock(job: ProgramJob, program: Program) -> LayeredStock:
-    """The stock that the job names; layers end where an upright cutter stands while it cuts level."""
+    """The stock that the job names: its layers as thin as stated where the cutters come, and some times as thick
+    elsewhere; they end where an upright cutter stands while it cuts level.
+    """
     table, folder = job.table.stock, job.path.parent
     assert table is not None
     if table.file is not None and table.file.lower().endswith(".npz"):
@@ -103,12 +110,25 @@ def _stock(job: ProgramJob, program: Program) -> LayeredStock:
     if table.file is None:
         assert table.low_mm is not None
         assert table.high_mm is not None
-        stock = LayeredStock.block(table.low_mm, table.high_mm, table.layer_mm, tile)
+        stock = LayeredStock.block(table.low_mm, table.high_mm, COARSE * table.layer_mm, tile)
     else:
         mesh = read_mesh(folder / table.file, unit=table.units, chord_mm=table.chord_mm)
-        stock = LayeredStock.of_mesh(mesh, table.layer_mm, tile)
+        stock = LayeredStock.of_mesh(mesh, COARSE * table.layer_mm, tile)
+    top = float(stock.bounds[-1])
+    stock.refine(min(_lowest(program, job.cutters), top), top, table.layer_mm)
     stock.refine_at(_levels(program))
     return stock
+
+
+def _lowest(program: Program, cutters: Mapping[int, Cutter]) -> float:
+    """A height [mm] that no cutter comes below at a feed."""
+    feeds = np.flatnonzero(program.motion != RAPID)
+    if len(feeds) == 0:
+        return math.inf
+    rows = np.unique(np.concatenate([feeds, np.maximum(feeds - 1, 0)]))
+    widest = max(max(c.radius, float(c.radius_at([c.flute_length])[0])) for c in cutters.values())
+    lean = np.sqrt(np.clip(1.0 - np.asarray(program.axis)[rows, 2] ** 2, 0.0, None))
+    return float((np.asarray(program.p_work)[rows, 2] - widest * lean).min())
 
 
 def _levels(program: Program) -> NDArray[np.float64]:
