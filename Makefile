@@ -27,7 +27,7 @@ test: setup
 
 # 0: every limit holds; 3: done, but a limit does not hold, which the verdict says; anything else is a fault
 demo: setup
-	@for name in contour pocket; do \
+	@for name in contour pocket chips; do \
 	  code=0; $(BIN)/chipload run examples/$$name/job.toml --out result/$$name || code=$$?; \
 	  if [ $$code -ne 0 ] && [ $$code -ne 3 ]; then exit $$code; fi; \
 	done

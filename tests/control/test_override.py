@@ -202,6 +202,24 @@ def test_a_dead_sensor_while_the_model_says_that_it_cuts():
     assert there[-1] == pytest.approx(0.9)
 
 
+def test_material_where_the_model_says_air():
+    """300 N mm where none are expected: a load that nobody knows; nothing rises, and too much of it lowers the trim."""
+    state = begin(RULES, modelled=True)
+    sent, statuses, _ = follow(RULES, [300.0 + k / 1e3 for k in range(200)], state, model=0.9, predicted=0.0)
+    assert set(statuses[5:]) == {"unknown"}
+    assert sent.max() <= 0.4
+    _, _, after = follow(RULES, [1300.0 + k / 1e3 for k in range(50)], state, model=0.9, predicted=0.0)
+    assert trim(after) < 0.95
+
+
+def test_torque_above_the_one_that_is_held_counts_whatever_the_model_says():
+    """1200 where 3000 were planned, but 1000 are allowed: the trim falls."""
+    state = begin(RULES, modelled=True)
+    state[1] = 0.5
+    _, _, after = follow(RULES, [1200.0 + k / 1e3 for k in range(50)], state, model=0.4, predicted=3000.0)
+    assert trim(after) < 0.45
+
+
 def test_overload():
     _, _, state = follow(RULES, [cut(1500.0)] * 500)
     sent, statuses, state = follow(RULES, [2100.0, 2200.0, 500.0, 2100.0, 2200.0, 2300.0, 300.0, 300.0], state)

@@ -167,6 +167,47 @@ def test_few_instants_already_hold_the_floor_of_a_tilted_mill() -> None:
     assert 4800.0 - stock.volume() == pytest.approx(removed, rel=1.5e-3)
 
 
+@pytest.mark.parametrize(
+    ("name", "direction"),
+    [("flat", "z"), ("flat", "x"), ("ball", "y"), ("bull", "z"), ("bull", "y"), ("taper", "x"), ("drill", "z")],
+)
+def test_few_instants_take_what_many_moments_cover(name: str, direction: str) -> None:
+    """Each ray loses what it has in common with 2000 cutters, though only five are asked for at first."""
+    cutter, k = SHAPES[name], "xyz".index(direction)
+    t = np.linspace(0.0, 1.0, 5)[:, None]
+    tips = np.array([8.0, 11.0, 4.0]) * (1.0 - t) + np.array([21.0, 17.0, 3.0]) * t
+    turns = np.column_stack([0.3 - 0.2 * t, 0.1 + 0.3 * t, np.ones(5)])
+    turns /= np.linalg.norm(turns, axis=1)[:, None]
+    stock = TriDexel.block((0.0, 0.0, 0.0), (30.0, 30.0, 30.0), 1.3, direction)
+    stock.remove_poses(tips, turns, cutter.apt, tol=1e-7)
+    shape = _shape(cutter.apt)
+    moments = []
+    for m in np.linspace(0.0, 4.0, 2001):
+        i = min(int(m), 3)
+        axis = turns[i] + (m - i) * (turns[i + 1] - turns[i])
+        moments.append((tips[i] + (m - i) * (tips[i + 1] - tips[i]), axis / np.linalg.norm(axis)))
+    (rays,) = stock.rays
+    more = []
+    for n, (u, v) in enumerate(zip(*rays.places(), strict=True)):
+        spans = np.array([_kernels.pierce(k, u, v, tip, axis, shape) for tip, axis in moments[::40]])
+        met = spans[:, 0] <= spans[:, 1]
+        if met.sum() < 14 or np.count_nonzero(np.diff(met)) > 2:
+            continue  # less than a fourth of the move, or two passages: five instants may miss one
+        spans = np.array([_kernels.pierce(k, u, v, tip, axis, shape) for tip, axis in moments])
+        spans = np.clip(spans[spans[:, 0] <= spans[:, 1]], 0.0, 30.0)
+        lo, hi = spans[:, 0].min(), spans[:, 1].max()
+        left = rays.ends[n, : rays.count[n]]
+        taken = (
+            left[0, 1] if len(left) and left[0, 0] == 0.0 else 0.0,
+            left[-1, 0] if len(left) and left[-1, 1] == 30.0 else 30.0,
+        )
+        assert taken[0] <= lo + 2e-4
+        assert taken[1] >= hi - 2e-4
+        more += [lo - taken[0], taken[1] - hi]
+    assert len(more) > 60
+    assert np.quantile(more, 0.9) < 0.003
+
+
 def test_a_quarter_turn_permutes_the_directions() -> None:
     rng = np.random.default_rng(9)
     one = TriDexel.block((0.0, 0.0, 0.0), (20.0, 16.0, 10.0), 0.5)

@@ -98,30 +98,31 @@ def product_sum(error, change, output, rules, e, d):
 RUN, SETTLING, AIR, UNKNOWN, LOST, OVERLOAD, GIVEN_UP = range(7)
 # which answer moves the trim
 FIXED, PI, MAMDANI, PRODUCT_SUM = range(4)
+# how a run ends; the names are in chipload.control.plant
+FINISHED, STOPPED, TIMED_OUT, STALLED = range(4)
 # places of the state
 _O, _Q, _E, _READ, _SAME, _LIGHT, _OVER, _LOST_S, _GOOD, _LATCH, _WANTED, _OUT = range(12)
 STATE = 12
 
 
 @njit(cache=True, nogil=True)
-def allowed(s, at, edge, cut, torque, latency, speed, slew, cap, first):
+def allowed(s, at, feed, edge, cut, torque, latency, soon, slew, cap, first):
     """Override that a torque allows at ``s`` and that can still be left in time for what lies ahead.
 
-    ``at, edge, cut`` (n,): columns of the model; ``speed`` [mm/s] now; ``slew`` [1/s] how fast the override falls;
-    ``first``: a row at or before s. Returns the override, not below 0, and the row.
+    ``at, feed, edge, cut`` (n,): columns of the model; ``soon``: greatest override before this one acts, above 0;
+    ``slew`` [1/s] how fast the override falls; ``first``: a row at or before s. Returns the override, not below 0, and
+    the row.
     """
     n = len(at)
     while first + 1 < n and at[first + 1] <= s:
         first += 1
     best = cap
     i = first
+    until = 0.0
     while i < n:
-        late = 0.0
         if at[i] > s:
-            if speed <= 0.0 and i > first + 1:
-                break
-            if speed > 0.0:
-                late = max((at[i] - s) / speed - latency, 0.0) * slew
+            until += (at[i] - max(s, at[i - 1])) / (soon * max(feed[i - 1], feed[i]))
+        late = max(until - latency, 0.0) * slew
         if late >= best:
             break
         # the torque between two rows lies between theirs: both ends are asked
@@ -230,12 +231,13 @@ def step(p, error, change, output, rules, whole_ends, strength, state, torque, t
     elif modelled:
         wanted = model
     else:
+        if status == AIR:
+            state[_Q] = min(state[_Q], air_most)
         wanted = state[_Q]
-    if status == AIR and not modelled:
-        wanted = min(wanted, air_most)
-        state[_Q] = min(state[_Q], max(air_most, floor))
     wanted = min(max(wanted, floor), cap)
     state[_WANTED] = wanted
+    if fresh:
+        state[_O] = min(state[_O], wanted)
     rise = up * dt if may_rise or kind == FIXED else 0.0
     state[_O] = min(max(wanted, state[_O] - down * dt), state[_O] + rise)
     return _put_out(state, max(state[_O], floor), quantum), status
@@ -267,24 +269,25 @@ def run(
 ):  # fmt: skip
     """Controller, axes and spindle along a path; see :func:`chipload.control.plant.run`.
 
-    ``drive`` (dt, acceleration, longest time); ``spindle`` (J, K_T, idle 0, idle 1, K_P, K_I, most current, speed,
-    sensor lag, filter lag); ``fault`` (kind 0..3, from, to, value); ``noise`` (m,) [A], used in turn; ``delay`` in
-    steps of control. ``out`` (rows, 8): t, s, feed, torque, measured, override, status, speed. Returns rows filled,
-    finished, time, greatest torque, time over the limit.
+    ``drive`` (dt, acceleration, longest time, share of the speed at which the spindle stalls); ``spindle`` (J, K_T,
+    idle 0, idle 1, K_P, K_I, most current, speed, lags of sensor and filter); ``fault`` (kind, from, to, value);
+    ``noise`` (m,) [A], used in turn; ``delay`` in steps of control. ``out`` (rows, 8): t, s, feed, torque, measured,
+    override, status, speed. Returns rows filled, how it ended, time, greatest torque, time over the limit.
     """
-    dt, acc, longest = drive[0], drive[1], drive[2]
+    dt, acc, longest, stall = drive[0], drive[1], drive[2], drive[3]
     inertia, kt, idle0, idle1 = spindle[0], spindle[1], spindle[2], spindle[3]
     prop, integ, most, aim_speed, lag, smooth = spindle[4], spindle[5], spindle[6], spindle[7], spindle[8], spindle[9]
-    queue = np.full(int(delay) + 1, state[_OUT])
+    # until the first override acts the axes stand
+    queue = np.zeros(int(delay) + 1)
     t, s, v, w = 0.0, at[0], 0.0, aim_speed
     i, first = 0, 0
     summed = idle0 + idle1 * w
     sensed, rate, expected, filtered = summed, 0.0, 0.0, 0.0
     rows, k, status, head = 0, 0, RUN, 0
-    sent, command = state[_OUT], state[_OUT]
+    sent, command = 0.0, 0.0
     greatest, over = 0.0, 0.0
     end = at[len(at) - 1]
-    finished = False
+    ended = TIMED_OUT
     reading, held, torque = 0.0, 0.0, 0.0
     while t < longest:
         while i + 2 < len(at) and at[i + 1] <= s:
@@ -307,8 +310,10 @@ def run(
                 held = reading
             model = -1.0
             if modelled:
+                known = latency_known + every * dt
+                soon = max(v / programmed, min(p[2], state[_O] + p[7] * known))
                 model, first = allowed(
-                    s, at, model_edge, model_cut, p[1] * state[_Q], latency_known + every * dt, v,
+                    s, at, feed, model_edge, model_cut, p[1] * state[_Q], known, soon,
                     min(p[8], acc / programmed), p[2], first,
                 )  # fmt: skip
             sent, status = step(
@@ -349,12 +354,16 @@ def run(
         t += dt
         k += 1
         if s >= end:
-            finished = True
+            ended = FINISHED
             break
         if v == 0.0 and command == 0.0 and status >= OVERLOAD:
+            ended = STOPPED
+            break
+        if w <= stall * aim_speed:
+            ended = STALLED
             break
     if rows < len(out):
         out[rows, 0], out[rows, 1], out[rows, 2], out[rows, 3] = t, s, v, torque
         out[rows, 4], out[rows, 5], out[rows, 6], out[rows, 7] = reading, sent, status, w
         rows += 1
-    return rows, finished, t, greatest, over
+    return rows, ended, t, greatest, over

@@ -54,7 +54,7 @@ class Override:
     light : below it the estimate is not trusted [N mm]
     floor, cap : least and greatest override while it runs
     start : override after a start, from floor to cap
-    air_override : greatest override in the air, without a model
+    air_override : greatest override in the air, without a model (``fixed`` keeps its own)
     lost_override : greatest override without a reading; 0: stop
     lost_s : after so long without a reading stop [s]
     above_programmed : the cap may be above 1

@@ -30,6 +30,10 @@ from chipload.errors import InputError
 Floats = NDArray[np.float64]
 
 FAULTS = ("none", "nan", "stuck", "value")
+#: how a run ends
+ENDS = ("finished", "stopped", "time", "stalled")
+#: share of its speed below which the spindle counts as stalled
+STALL = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +218,7 @@ class Outcome:
     Parameters
     ----------
     finished : the end of the path was reached
-    stopped : status at which it ended (``run`` where it finished)
+    ended : ``finished``; ``overload`` or ``stopped`` by the controller; ``time``: longest_s; ``stalled``: the spindle
     time : [s]
     torque_max : greatest true torque [N mm]
     time_over : with the true torque above the limit [s]
@@ -224,7 +228,7 @@ class Outcome:
     """
 
     finished: bool
-    stopped: str
+    ended: str
     time: float
     torque_max: float
     time_over: float
@@ -282,11 +286,11 @@ def run(
     rows = math.ceil(loop.longest_s / loop.period / every_row) + 3
     out = np.empty((min(rows, 2_000_000), 8))
     fault = fault or Fault()
-    filled, finished, time, greatest, over = _kernels.run(
+    filled, ended, time, greatest, over = _kernels.run(
         truth.s, truth.feed, truth.edge, truth.cut, believed.edge, believed.cut, model is not None,
         controller.numbers, table.error, table.change, table.output, table.rules, table.whole_ends,
         np.empty(len(table.output)), state, delay * loop.period,
-        np.array([loop.period / every, loop.acceleration, loop.longest_s]),
+        np.array([loop.period / every, loop.acceleration, loop.longest_s, STALL]),
         np.array([spindle.inertia, spindle.torque_constant, *spindle.idle, spindle.stiffness, spindle.reset,
                   spindle.most_current, spindle.speed, spindle.sensor_lag, spindle.smoothing]),
         np.array([FAULTS.index(fault.kind), fault.begin, fault.end, fault.value], dtype=np.float64),
@@ -294,8 +298,8 @@ def run(
     )  # fmt: skip
     t, s, feed, torque, measured, sent, status, speed = np.ascontiguousarray(out[:filled].T)
     return Outcome(
-        finished=finished,
-        stopped="run" if finished else STATUS[int(status[-1])],
+        finished=ENDS[ended] == "finished",
+        ended=STATUS[int(status[-1])] if ENDS[ended] == "stopped" else ENDS[ended],
         time=time,
         torque_max=greatest,
         time_over=over,

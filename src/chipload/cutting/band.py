@@ -54,13 +54,24 @@ def mean_band(
     >>> force[0].round(9).tolist()
     [0.0, 10.0, 0.0]
     """
-    basis = np.zeros((len(bites), 1, 4, 6))
+    deviation = deviations(mean_basis(bites, cutter, material, frame), material)
+    return deviation[:, :3], deviation[:, 3]
+
+
+def mean_basis(bites: Bites, cutter: Cutter, material: Material, frame: ArrayLike | None = None) -> Floats:
+    """B of the mean loads, (n, 4, 6): force and torque for 1 of each coefficient; for the band of a sum add B first."""
+    basis = np.zeros((len(bites), 4, 6))
     for k, law in enumerate(_unit_laws(material)):
         out = np.zeros((len(bites), 4))
         _kernels.means(bites.start, bites.rows, bites.tooth, bites.slice, bites.slices, cutter.flutes, law, out)
-        basis[:, 0, :, k] = out
-    force, torque = _deviation(basis, material, frame)
-    return force[:, 0], torque[:, 0]
+        basis[:, :, k] = out
+    return basis if frame is None else _turned(basis, frame)
+
+
+def deviations(basis: Floats, material: Material) -> Floats:
+    """Roots of the diagonal of B C B' for B (..., 4, 6): standard deviations (..., 4)."""
+    variance = np.einsum("...ik,kl,...il->...i", basis, material.variances, basis)
+    return np.asarray(np.sqrt(np.clip(variance, 0.0, None)))
 
 
 def band_over_turn(
@@ -85,7 +96,8 @@ def band_over_turn(
         rows = (bites.start, bites.rows, bites.tooth, bites.slice, bites.slices)
         _kernels.turn_of(*rows, angles, cutter.flutes, law, out)
         basis[..., k] = out
-    return _deviation(basis, material, frame)
+    deviation = deviations(basis if frame is None else _turned(basis, frame), material)
+    return deviation[..., :3], deviation[..., 3]
 
 
 def _unit_laws(material: Material) -> Floats:
@@ -93,11 +105,8 @@ def _unit_laws(material: Material) -> Floats:
     return np.column_stack([np.eye(6), np.broadcast_to(material.exponents, (6, 3))])
 
 
-def _deviation(basis: Floats, material: Material, frame: ArrayLike | None) -> tuple[Floats, Floats]:
-    """Roots of the diagonal of B C B' for B (n, m, 4, 6), the force turned into ``frame``."""
-    if frame is not None:
-        for k in range(6):
-            basis[:, :, :3, k] = in_work(basis[:, :, :3, k], frame)
-    variance = np.einsum("nmik,kl,nmil->nmi", basis, material.variances, basis)
-    deviation = np.sqrt(np.clip(variance, 0.0, None))
-    return deviation[..., :3], deviation[..., 3]
+def _turned(basis: Floats, frame: ArrayLike) -> Floats:
+    """B with its forces turned into ``frame``."""
+    for k in range(6):
+        basis[..., :3, k] = in_work(basis[..., :3, k], frame)
+    return basis

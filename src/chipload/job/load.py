@@ -62,12 +62,12 @@ class Job:
     @property
     def limits(self) -> dict[str, float]:
         """The limits that are stated, by name."""
-        return {k: v for k, v in self.table.limits.model_dump().items() if v is not None}
+        return self.table.limits.stated
 
     @property
     def unchecked(self) -> tuple[str, ...]:
         """Names of the limits that are not stated, so that nothing holds the job against them."""
-        return tuple(k for k, v in self.table.limits.model_dump().items() if v is None)
+        return self.table.limits.unstated
 
 
 @dataclass(frozen=True)
@@ -103,12 +103,12 @@ class ProgramJob:
     @property
     def limits(self) -> dict[str, float]:
         """The limits that are stated, by name."""
-        return {k: v for k, v in self.table.limits.model_dump().items() if v is not None}
+        return self.table.limits.stated
 
     @property
     def unchecked(self) -> tuple[str, ...]:
         """Names of the limits that are not stated."""
-        return tuple(k for k, v in self.table.limits.model_dump().items() if v is None)
+        return self.table.limits.unstated
 
 
 def load_job(path: str | Path, overrides: Sequence[str] = ()) -> Job | ProgramJob:
@@ -200,7 +200,7 @@ def _check_simulation(table: ProgramJobTable) -> None:
         if saved == (stock.layer_mm is not None):
             need = "leave it out: the layers of an earlier result stay" if saved else "missing: state it"
             raise InputError(f"stock.layer_mm: {need}")
-    if all(v is None for v in table.limits.model_dump().values()):
+    if not table.limits.stated:
         names = ", ".join(LoadLimitsTable.model_fields)
         raise InputError(f"limits: none is stated, so nothing would be checked: state at least one of {names}")
 
@@ -249,7 +249,7 @@ def _check(table: JobTable, cutters: Mapping[int, Cutter]) -> None:
                 f"{at}.axial_depth_mm = {op.axial_depth_mm:g}: must be at most the cutter's flute_length_mm = "
                 f"{cutter.flute_length:g}: take several depths or a longer cutter"
             )
-    if all(v is None for v in table.limits.model_dump().values()):
+    if not table.limits.stated:
         names = ", ".join(LimitsTable.model_fields)
         raise InputError(f"limits: none is stated, so nothing would be checked: state at least one of {names}")
 

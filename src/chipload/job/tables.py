@@ -93,8 +93,22 @@ class OperationTable(Table):
     allowance_mm: NotNegative | None = Field(None, description="left on the wall")
 
 
-class LimitsTable(Table):
-    """What must not be exceeded; what is not stated is not checked, and the report says so."""
+class Limits(Table):
+    """Limits by name; what is not stated is not checked, and the report says so."""
+
+    @property
+    def stated(self) -> dict[str, float]:
+        """The limits that are stated, by name."""
+        return {k: v for k, v in self.model_dump().items() if v is not None}
+
+    @property
+    def unstated(self) -> tuple[str, ...]:
+        """Names of the others, so that nothing holds the job against them."""
+        return tuple(k for k, v in self.model_dump().items() if v is None)
+
+
+class LimitsTable(Limits):
+    """What a planned program must not exceed."""
 
     engagement_deg: Positive | None = Field(None, le=180.0)
     force_xy_n: Positive | None = None
@@ -136,7 +150,7 @@ class SimulateTable(Table):
     flank_mm: Positive | None = Field(None, description="length of a slice of the flank; else half the radius")
 
 
-class LoadLimitsTable(Table):
+class LoadLimitsTable(Limits):
     """What the simulated loads must not exceed."""
 
     force_n: Positive | None = None

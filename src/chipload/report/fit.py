@@ -4,11 +4,8 @@ says: over a turn, what is left, and means against feed.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
-import shutil
-import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
 from importlib.metadata import version
@@ -22,7 +19,6 @@ from plotly.subplots import make_subplots
 
 from chipload.cutting.fit import NAMES, predicted, predicted_mean
 from chipload.cutting.fit_job import CHANNELS, Comparison, Fitted, material_text
-from chipload.errors import InputError
 from chipload.report import folder
 from chipload.report.figures import FONT, GRID, INK, LIMIT
 from chipload.report.sheet import definitions, figure, framed, heading, items, table
@@ -63,13 +59,7 @@ def check_fit_target(out: str | Path) -> Path:
     InputError
         It holds something else than a fit, or nothing can be written there.
     """
-    target = Path(out).absolute()
-    if target.is_dir() and not target.is_symlink() and any(target.iterdir()) and not _ours(target):
-        raise InputError(
-            f"--out {out}: holds files that are no fit of chipload: name a folder that is new, empty or holds an "
-            "older fit"
-        )
-    return target if target.is_dir() and _ours(target) else folder.check_target(out)
+    return folder.check_target(out, _ours, "fit")
 
 
 def write_fit(done: Fitted, out: str | Path) -> Path:
@@ -80,35 +70,11 @@ def write_fit(done: Fitted, out: str | Path) -> Path:
     InputError
         The folder cannot be written; nothing is left behind.
     """
-    target = check_fit_target(out)
-    fresh: Path | None = None
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        fresh = Path(tempfile.mkdtemp(prefix=".chipload-", dir=target.parent))
-        files = {SUMMARY: summary_bytes(done), PAGE: page_bytes(done)}
-        if done.material is not None:
-            files[MATERIAL] = material_text(done.material).encode()
-        for name, data in files.items():
-            (fresh / name).write_bytes(data)
-        fresh.chmod(0o755)
-        if target.exists():
-            older = Path(tempfile.mkdtemp(prefix=".chipload-", dir=target.parent))
-            target.rename(older)
-            try:
-                fresh.rename(target)
-            except BaseException:
-                older.rename(target)
-                raise
-            shutil.rmtree(older, ignore_errors=True)
-        else:
-            fresh.rename(target)
-    except OSError as err:
-        raise InputError(f"--out {out}: cannot be written: {err.strerror}: nothing was left there") from None
-    finally:
-        if fresh is not None:
-            with contextlib.suppress(OSError):
-                shutil.rmtree(fresh)
-    return target
+    files = {SUMMARY: lambda: summary_bytes(done), PAGE: lambda: page_bytes(done)}
+    material = done.material
+    if material is not None:
+        files[MATERIAL] = lambda: material_text(material).encode()
+    return folder.write_files(list(files.items()), out, ours=_ours, what="fit")
 
 
 def _ours(target: Path) -> bool:

@@ -33,8 +33,12 @@ Makers = list[tuple[str, Callable[[], bytes]]]
 NAMES = (SUMMARY, "history.parquet", "scene.glb", "report.html")
 
 
-def check_target(out: str | Path) -> Path:
+def check_target(out: str | Path, ours: Callable[[Path], bool] | None = None, what: str = "result") -> Path:
     """The absolute target folder, if a result may be put there; asked before the work begins.
+
+    Parameters
+    ----------
+    ours : whether a folder that holds something is an older ``what`` that may be replaced; None: a result of a run
 
     Raises
     ------
@@ -45,10 +49,10 @@ def check_target(out: str | Path) -> Path:
     if target.is_symlink() or (target.exists() and not target.is_dir()):
         raise InputError(f"--out {out}: is not a folder: name a folder that is new, empty or holds an older result")
     try:
-        if target.exists() and any(target.iterdir()) and not _ours(target):
+        if target.exists() and any(target.iterdir()) and not (ours or _ours)(target):
             raise InputError(
-                f"--out {out}: holds files that are no result of chipload: name a folder that is new, empty or "
-                "holds an older result"
+                f"--out {out}: holds files that are no {what} of chipload: name a folder that is new, empty or "
+                f"holds an older {what}"
             )
         above = next(p for p in target.parents if p.exists())
         with tempfile.TemporaryDirectory(prefix=".chipload-", dir=above):
@@ -66,18 +70,43 @@ def write_result(outcome: Outcome | Read, out: str | Path, progress: Progress = 
     InputError
         The folder cannot be written or the disk is full; nothing is left behind, an older result stays.
     """
-    target = check_target(out)
+    makers, programs = _makers(outcome)
+    return write_files(makers, out, programs, progress=progress)
+
+
+def write_files(
+    makers: Makers,
+    out: str | Path,
+    more: Callable[[], dict[str, bytes]] | None = None,
+    *,
+    ours: Callable[[Path], bool] | None = None,
+    what: str = "result",
+    progress: Progress = silent,
+) -> Path:
+    """Write a folder of files, whole or not at all, and return it.
+
+    Parameters
+    ----------
+    makers : names and who makes their content
+    more : further files, made last
+    ours, what : as in :func:`check_target`
+
+    Raises
+    ------
+    InputError
+        As :func:`write_result`.
+    """
+    target = check_target(out, ours, what)
     made = [p for p in target.parents if not p.exists()]
     fresh: Path | None = None
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         fresh = Path(tempfile.mkdtemp(prefix=".chipload-", dir=target.parent))
-        makers, programs = _makers(outcome)
         for k, (name, make) in enumerate(makers):
             progress(k / (len(makers) + 1), name)
             _write(fresh / name, make())
         progress(len(makers) / (len(makers) + 1), "programs")
-        for name, data in programs().items():
+        for name, data in (more() if more is not None else {}).items():
             _write(fresh / name, data)
         fresh.chmod(0o777 & ~_umask())
         _swap(fresh, target)

@@ -33,6 +33,8 @@ LIMITS: Mapping[str, tuple[str, str]] = {
     "power_w": ("power_w", "W"),
     "chip_mm": ("chip_max_mm", "mm"),
 }
+SURE = "\u00b1 is twice the standard deviation that the spread of the material's coefficients gives."
+UNSURE = "How sure these are cannot be said: the material states neither a spread nor a covariance of its coefficients."
 #: rows of the figure: lines (column, name, colour) and the title of their axis, and the limit
 ROWS = (
     (
@@ -125,7 +127,7 @@ def operation(simulated: Simulated) -> dict[str, Any]:
     def mean(name: str) -> float:
         return float((c[name] * seconds).sum() / whole) if whole > 0.0 else 0.0
 
-    force = {
+    force: dict[str, dict[str, float | None]] = {
         x: {
             "mean": mean(f"force_{x}_mean_n"),
             "max": float(c[f"force_{x}_max_n"].max(initial=0.0)),
@@ -133,6 +135,11 @@ def operation(simulated: Simulated) -> dict[str, Any]:
         }
         for x in "xyz"
     }
+    band = removal.mean_band
+    for x, sd in zip("xyz", band[:3] if band is not None else (None,) * 3, strict=True):
+        force[x]["mean_sd"] = sd
+    normal = float(c["force_normal_n"].max(initial=0.0))
+    torque = {"mean": mean("torque_mean_nm"), "max": float(c["torque_nm"].max(initial=0.0))}
     return {
         "kind": "simulate",
         "holds": not simulated.fails,
@@ -140,12 +147,13 @@ def operation(simulated: Simulated) -> dict[str, Any]:
         "steps": len(c["line"]),
         "chip_pieces_max": int(c["chip_pieces"].max(initial=0)),
         "chip_volume_mm3": float(c["chip_volume_mm3"].sum()),
+        "films_mm3": float(c["chip_volume_mm3"][c["chip_pieces"] == 0].sum()),
         "stock_before_mm3": removal.volume_before,
         "stock_removed_mm3": removal.volume_before - removal.volume_after,
         "cutting_s": whole,
         "air_cut_s": float(c["seconds"][~cuts & ~c["rapid"]].sum()),
-        "force_n": {**force, "max": float(c["force_n"].max(initial=0.0))},
-        "torque_nm": {"mean": mean("torque_mean_nm"), "max": float(c["torque_nm"].max(initial=0.0))},
+        "force_n": {**force, "max": float(c["force_n"].max(initial=0.0)), "normal_max": normal},
+        "torque_nm": torque | {"mean_sd": band[3] if band is not None else None},
         "power_w": {"mean": mean("power_w"), "max": float(c["power_w"].max(initial=0.0))},
         "chip_mm": {"max": float(c["chip_max_mm"].max(initial=0.0))},
         "limits": [
@@ -214,19 +222,32 @@ def along(simulated: Simulated) -> go.Figure:
     return out
 
 
+def _mean(values: Mapping[str, Any]) -> str:
+    """A mean, with twice its standard deviation where that is known."""
+    sd = values["mean_sd"]
+    return f"{values['mean']:.4g}" if sd is None else f"{values['mean']:.4g} \u00b1 {2.0 * sd:.2g}"
+
+
 def sections(simulated: Simulated, figures: dict[str, go.Figure]) -> list[str]:
     """The part of the page that shows chips and forces; figures are put among ``figures``."""
     what = operation(simulated)
     force, torque, power = what["force_n"], what["torque_nm"], what["power_w"]
-    rows = [[f"force {x} on the cutter [N]", *(f"{force[x][k]:.4g}" for k in ("mean", "max", "min"))] for x in "xyz"]
-    rows += [["torque [N m]", f"{torque['mean']:.4g}", f"{torque['max']:.4g}", ""]]
+    sure = torque["mean_sd"] is not None
+    rows = [
+        [f"force {x} on the cutter [N]", _mean(force[x]), f"{force[x]['max']:.4g}", f"{force[x]['min']:.4g}"]
+        for x in "xyz"
+    ]
+    rows += [["force on the surface that is left, along its normal [N]", "", f"{force['normal_max']:.4g}", ""]]
+    rows += [["torque [N m]", _mean(torque), f"{torque['max']:.4g}", ""]]
     rows += [["power [W]", f"{power['mean']:.4g}", f"{power['max']:.4g}", ""]]
     body = [
         "<h2>Chips, force, torque, power</h2>",
         f"<p>{what['steps']} steps; {what['chip_volume_mm3']:.6g} mm\u00b3 of chips, stock less by "
         f"{what['stock_removed_mm3']:.6g} mm\u00b3; {what['cutting_s']:.4g} s in cut, {what['air_cut_s']:.4g} s "
-        f"in air; thickest chip {what['chip_mm']['max']:.4g} mm.</p>",
+        f"in air; thickest chip {what['chip_mm']['max']:.4g} mm; in films too thin to be told from the tolerance "
+        f"{what['films_mm3']:.2g} mm\u00b3.</p>",
         table(["", "mean", "greatest", "least"], rows, numbers=(1, 2, 3)),
+        f'<p class="note">{SURE if sure else UNSURE}</p>',
         figure("loads", along(simulated), figures),
     ]
     piece = simulated.removal.piece

@@ -14,44 +14,32 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon, box
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutter.slices import Slices, slices
-from chipload.cutting.force import forces_over_turn, in_work, mean_forces
+from chipload.cutter.slices import slices
+from chipload.cutting.band import deviations, mean_basis
 from chipload.cutting.material import Material
-from chipload.engagement.bites import Bites, with_runout
-from chipload.engagement.chips.covered import covered_areas
 from chipload.engagement.chips.move import Move
-from chipload.engagement.immersion.immersion import Section, immersed, tool_frame
+from chipload.engagement.immersion.immersion import Section
 from chipload.errors import Finding, InputError
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
+from chipload.simulation.loads import LOADS, StepBite, bite_of_step, bites_of_steps, loads_of_steps
 from chipload.simulation.steps import Steps, steps_of
+from chipload.simulation.swept import Interpolation, swept_ahead
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
 Columns = Mapping[str, NDArray[Any]]
-Interpolation = Literal["slerp", "lerp"]
 
 #: steps whose forces are calculated at once
 BLOCK = 512
-#: columns of loads, in their order
-LOADS = (
-    *(f"force_{x}_mean_n" for x in "xyz"),
-    *(f"force_{x}_max_n" for x in "xyz"),
-    *(f"force_{x}_min_n" for x in "xyz"),
-    "force_n",
-    "torque_mean_nm",
-    "torque_nm",
-    "power_w",
-    "chip_max_mm",
-)
 #: a piece of a chip narrower than so many tolerances is a film left by chords, no piece
 FILM = 4.0
 
@@ -105,6 +93,8 @@ class Removal:
     ----------
     columns : (n,) each, a row a step, see :func:`remove`
     volume_before, volume_after : of the stock [mm^3]
+    mean_band : (4,) standard deviation of the mean force x, y, z [N] and torque [N m] over the time in cut, from that
+        of the coefficients; None: the material does not say how sure they are
     piece : the chip with most pieces that are most alike; None where nothing was cut
     findings : rapids that cut, material above the flutes
     labels : of the program, `label` of the columns counts in them
@@ -113,6 +103,7 @@ class Removal:
     columns: Columns
     volume_before: float
     volume_after: float
+    mean_band: tuple[float, ...] | None
     piece: Piece | None
     findings: tuple[Finding, ...]
     labels: tuple[str, ...]
@@ -141,9 +132,12 @@ def remove(
     Removal
         With the columns ``line``, ``tool``, ``label``, ``rapid``, ``s_mm``, ``t_s``, ``seconds``, ``x_mm``,
     ``y_mm``, ``z_mm``, ``axis_x..z``, ``feed_mm_min``, ``chip_volume_mm3``, ``chip_pieces`` (most on one layer),
-    ``chip_layers`` (layers that lost something), ``chip_max_mm`` (thickest),
+    ``chip_layers`` (layers that lost something; where all of it is films, narrower than a few tolerances, there are no
+    pieces and no loads), ``chip_max_mm`` (thickest),
     ``force_{x,y,z}_{mean,max,min}_n`` over the revolution, ``force_n`` (greatest size), ``torque_mean_nm``,
-    ``torque_nm`` (greatest), ``power_w`` (mean)
+    ``torque_nm`` (greatest), ``power_w`` (mean),
+    ``force_normal_n`` (greatest force that presses on the surface that the step leaves, along its normal; 0 where it
+    leaves two that face each other, as in a slot)
 
     Raises
     ------
@@ -162,18 +156,16 @@ def remove(
     before = stock.volume()
     removed = np.zeros((len(steps), 3))
     loads = np.zeros((len(steps), len(LOADS)))
+    basis = np.zeros((4, 6))
     best: Piece | None = None
     rank = (0, 0.0)
     for first in range(0, len(steps), BLOCK):
         progress(first / len(steps), "removing")
-        cuts: list[_Bite] = []
-        for k in range(first, min(first + BLOCK, len(steps))):
-            cutter, move = cutters[int(steps.tool[k])], _move(steps, k, interpolation)
-            inner, outer = _box(steps, k, cutter)
-            layers = stock.layers_between(inner[2], outer[2])
-            met = _covered(steps, k, move, cutter, stock, layers, resolution.tolerance)
-            if not met:
-                continue
+        some = range(first, min(first + BLOCK, len(steps)))
+        cuts: list[StepBite] = []
+        for k, swept in swept_ahead(steps, some, stock, cutters, interpolation, resolution.tolerance):
+            cutter, move, met = cutters[int(steps.tool[k])], swept.move, swept.met
+            inner, outer, layers = swept.low, swept.high, swept.layers
             # a face that looks down is held against the layer below
             material_before = Section(*stock.edges(range(max(layers.start - 1, 0), layers.stop), inner[:2], outer[:2]))
             tidied = stock.tidied
@@ -192,113 +184,31 @@ def remove(
                     rank = (len(whole), alike)
                     near = stock.section(i).union(MultiPolygon(pieces)).intersection(box(*inner[:2], *outer[:2]))
                     best = Piece(k, move, cutter, float(stock.heights[i]), near, tuple(whole))
-            if not steps.rapid[k]:
-                cuts.append(_bite(steps, k, move, cutter, profiles[int(steps.tool[k])], material_before))
+            # what is thinner than the tolerance can tell is no cut
+            if removed[k, 1] > 0.0 and not steps.rapid[k]:
+                cuts.append(bite_of_step(steps, k, move, cutter, profiles[int(steps.tool[k])], material_before))
         for number in sorted({int(steps.tool[c.step]) for c in cuts}):
-            some = [c for c in cuts if steps.tool[c.step] == number]
-            loads[[c.step for c in some]] = _loads(
-                some, cutters[number], profiles[number], material, resolution.rotation, steps
-            )
+            own = [c for c in cuts if steps.tool[c.step] == number]
+            at = [c.step for c in own]
+            bites = bites_of_steps(own, cutters[number], profiles[number])
+            loads[at] = loads_of_steps(bites, own, cutters[number], material, resolution.rotation, steps.spindle[at])
+            if _sure(material):
+                each = mean_basis(bites, cutters[number], material, bites.frame)
+                basis += np.tensordot(steps.seconds[at], each, 1)
     progress(1.0, "removed")
+    band = None
+    if _sure(material):
+        cut_s = float(steps.seconds[(removed[:, 0] > 0.0) & ~steps.rapid].sum())
+        sd = deviations(basis / cut_s, material) if cut_s > 0.0 else np.zeros(4)
+        band = (*sd[:3].tolist(), float(sd[3]) / 1000.0)
     return Removal(
-        _columns(steps, removed, loads), before, stock.volume(), best, _findings(steps, removed), program.labels
+        _columns(steps, removed, loads), before, stock.volume(), band, best, _findings(steps, removed), program.labels
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Bite:
-    """Rows of one step."""
-
-    step: int
-    frame: Floats
-    rows: Floats
-    owner: NDArray[np.int64]
-
-
-def _move(steps: Steps, k: int, interpolation: Interpolation) -> Move:
-    make = Move.slerp if interpolation == "slerp" else Move.lerp
-    return make(steps.p0[k], steps.a0[k], steps.p1[k], steps.a1[k])
-
-
-def _covered(
-    steps: Steps, k: int, move: Move, cutter: Cutter, stock: LayeredStock, layers: range, tolerance: float
-) -> list[tuple[int, Polygon | MultiPolygon]]:
-    """What a step covers of each layer that it meets; layers that an upright flank crosses share one polygon."""
-    heights = stock.heights[layers.start : layers.stop]
-    shared = np.zeros(len(heights), dtype=np.bool_)
-    if steps.a0[k, 2] == steps.a1[k, 2] == 1.0 and cutter.taper == 0.0:
-        _, r, _, f, _, _, top = cutter.apt
-        low, high = sorted((steps.p0[k, 2], steps.p1[k, 2]))
-        shared = (heights > high + (f if r > 0.0 else cutter.radius * math.tan(cutter.bottom))) & (heights < low + top)
-    own = np.flatnonzero(~shared)
-    if shared.any():
-        own = np.append(own, np.flatnonzero(shared)[0])
-    shapes = {int(own[n]): a for n, a in enumerate(covered_areas(move, cutter, heights[own], tolerance))}
-    common = shapes[int(own[-1])] if shared.any() else None
-    flank = common.polygon if common is not None else None
-    out = []
-    for n, i in enumerate(layers):
-        area = shapes.get(n)
-        if shared[n]:
-            out.append((i, flank))
-        elif area is not None:
-            out.append((i, area.polygon))
-    return [(i, shape) for i, shape in out if shape is not None]
-
-
-def _box(steps: Steps, k: int, cutter: Cutter) -> tuple[Floats, Floats]:
-    """(3,), (3,) corners of a box that the cutter does not leave during a step, as the axis turns by a few degrees."""
-    top = cutter.flute_length
-    wide = max(cutter.radius, float(cutter.radius_at([top])[0]))
-    ends = np.array([steps.p0[k], steps.p1[k], steps.p0[k] + top * steps.a0[k], steps.p1[k] + top * steps.a1[k]])
-    # the top of the cutter leaves its chord by the sagitta of the turn, and each circle reaches R across the axis
-    axes = np.array([steps.a0[k], steps.a1[k]])
-    turn = float(np.linalg.norm(axes[1] - axes[0]))
-    reach = wide * np.minimum(np.sqrt(np.maximum(1.0 - axes.min(axis=0) ** 2, 1.0 - axes.max(axis=0) ** 2)) + turn, 1.0)
-    reach = reach + top * turn**2
-    return ends.min(axis=0) - reach, ends.max(axis=0) + reach
-
-
-def _bite(steps: Steps, k: int, move: Move, cutter: Cutter, profile: Slices, section: Section) -> _Bite:
-    """What the teeth cut at the middle of a step."""
-    if steps.spindle[k] == 0.0:
-        raise InputError(f"line {steps.line[k]}: cuts with the spindle at rest: start it (M3 S) before the cut")
-    (tip, axis), (speed, swing) = ((v[0] for v in pair) for pair in (move.at([0.5]), move.rates([0.5])))
-    tooth = math.tau / (cutter.flutes * abs(float(steps.spindle[k]))) / float(steps.seconds[k])
-    turn = np.cross(axis, swing)
-    middle = speed + 0.5 * cutter.flute_length * swing
-    frame = tool_frame(axis, speed if np.linalg.norm(speed) > 0.0 else middle, bool(steps.spindle[k] > 0.0))
-    rows, owner = immersed(tip, frame, speed * tooth, turn * tooth, profile, section)
-    return _Bite(k, frame, rows, owner)
-
-
-def _loads(
-    cuts: list[_Bite], cutter: Cutter, profile: Slices, material: Material, rotation: float, steps: Steps
-) -> Floats:
-    """(c, len(LOADS)) loads of some steps of one cutter."""
-    start = np.cumsum([0, *(len(c.rows) for c in cuts)])
-    rows, owner = np.concatenate([c.rows for c in cuts]), np.concatenate([c.owner for c in cuts])
-    frame = np.array([c.frame for c in cuts])
-    bites = Bites(start, rows, np.full(len(rows), -1), owner, profile.columns, frame)
-    bites = with_runout(bites, cutter)
-    pitch = math.tau if cutter.runout[0] > 0.0 else math.tau / cutter.flutes
-    theta = np.arange(max(math.ceil(pitch / rotation), 8)) * (pitch / max(math.ceil(pitch / rotation), 8))
-    force, torque = forces_over_turn(bites, cutter, material, theta)
-    mean, torque_mean = mean_forces(bites, cutter, material)
-    turned = in_work(force, frame)
-    speed = np.abs(steps.spindle[[c.step for c in cuts]])
-    return np.column_stack(
-        [
-            in_work(mean, frame),
-            turned.max(axis=1),
-            turned.min(axis=1),
-            np.linalg.norm(force, axis=2).max(axis=1),
-            torque_mean / 1000.0,
-            torque.max(axis=1) / 1000.0,
-            torque_mean * speed / 1000.0,
-            bites.chip_max(),
-        ]
-    )
+def _sure(material: Material) -> bool:
+    """Whether the material says how sure its coefficients are."""
+    return material.spread is not None or material.covariance is not None
 
 
 def _whole(piece: Polygon, tolerance: float) -> bool:

@@ -215,9 +215,9 @@ class LayeredStock:
 
         Parameters
         ----------
-        tidy : edges that are cut again and again along the same wall come out as many short ones; where those of a tile
-            have doubled, vertices are left out that move its edge by at most this [mm]. What the stock gains by it (mm^3,
-            signed) is added to ``tidied``; 0: nothing is left out
+        tidy : edges cut again and again along the same wall come out as many short ones; where those of a tile
+            have doubled, vertices are left out that move its edge by at most this [mm]. What the stock gains by it
+            (mm^3, signed) is added to ``tidied``; 0: nothing is left out
 
         Returns
         -------

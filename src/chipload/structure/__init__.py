@@ -1,1 +1,1 @@
-"""What gives way under the force: the cutter as a beam."""
+"""What gives way under the force: the workpiece while it is cut, the cutter as a beam, holder and spindle."""

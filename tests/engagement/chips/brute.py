@@ -24,19 +24,30 @@ def inside(cutter: Cutter, tip, axis, height, xy) -> np.ndarray:
     return ok & (rho < cutter.radius_at(np.where(ok, w, 0.0)))
 
 
+def _outside(cutter: Cutter, tip, axis, height, xy) -> np.ndarray:
+    """Above 0 outside, below inside: the greatest of the ways past bottom, top and profile."""
+    X = np.concatenate([xy, np.broadcast_to(height, (*xy.shape[:-1], 1))], axis=-1) - tip
+    w = (X * axis).sum(-1)
+    rho = np.linalg.norm(X - w[..., None] * axis, axis=-1)
+    H = cutter.flute_length
+    return np.maximum(np.maximum(-w, w - H), rho - cutter.radius_at(np.clip(w, 0.0, H)))
+
+
 def sections(cutter: Cutter, move: Move, height: float, times, rays: int) -> list[shapely.Polygon]:
     """Polygons of the sections at some times: each ray from an inner point halved 40 times."""
     tip, axis = move.at(times)
     e = axis[:, :2] / np.maximum(np.hypot(axis[:, 0], axis[:, 1]), 1e-300)[:, None]
     e[np.hypot(e[:, 0], e[:, 1]) < 0.5] = (1.0, 0.0)
     far = cutter.flute_length + cutter.diameter * 40.0
-    u = np.sort(np.concatenate([np.linspace(-far, far, 60), np.linspace(-4, 4, 600) * cutter.diameter]))
-    line = tip[:, None, :2] + u[None, :, None] * e[:, None, :]
-    member = inside(cutter, tip[:, None], axis[:, None], height, line)
-    has = member.any(1)
-    middle = (member * u).sum(1)[has] / member.sum(1)[has]
+    middle, width = np.zeros(len(tip)), far
+    for _ in range(7):  # where the line along the axis is deepest in the cutter: thin sections are found too
+        u = middle[:, None] + np.linspace(-width, width, 121)
+        outside = _outside(cutter, tip[:, None], axis[:, None], height, tip[:, None, :2] + u[..., None] * e[:, None])
+        middle = u[np.arange(len(u)), outside.argmin(1)]
+        width /= 30.0
+    has = outside.min(1) < 0.0
     tip, axis, e = tip[has], axis[has], e[has]
-    c = tip[:, :2] + middle[:, None] * e
+    c = tip[:, :2] + middle[has, None] * e
     phi = np.arange(rays) * (math.tau / rays)
     d = np.stack([np.cos(phi), np.sin(phi)], axis=-1)
     lo, hi = np.zeros((len(c), rays)), np.full((len(c), rays), far)

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 import shapely
-from engagement.chips.brute import CUTTERS, random_move
 
 from chipload.engagement.chips.chips import chips
 from chipload.engagement.chips.covered import covered
@@ -17,6 +16,7 @@ from chipload.engagement.chips.ring import Origin
 from chipload.engagement.chips.section import depth
 from chipload.errors import InputError
 from chipload.report.diagram import diagram_figure
+from engagement.chips.brute import CUTTERS, random_move
 
 FLAT = CUTTERS["flat"]
 UP = [0.0, 0.0, 1.0]
@@ -36,7 +36,7 @@ def test_chip_of_a_slot_after_the_first_section():
     middle = 0.5 * (ring.points + np.roll(ring.points, -1, axis=0))
     side = np.abs(np.abs(middle[:, 1]) - 5.0) < 1e-4
     front = np.hypot(middle[:, 0] - 6.0, middle[:, 1]) > 5.0 - 1e-5
-    assert (ring.origin[side & (middle[:, 0] > 0.01) & (middle[:, 0] < 5.9)] == Origin.GRAZING).all()
+    assert (ring.origin[side & (middle[:, 0] > 0.03) & (middle[:, 0] < 5.9)] == Origin.GRAZING).all()
     assert (ring.origin[front & (middle[:, 0] > 6.1)] == Origin.LAST).all()
     assert (ring.origin[(middle[:, 0] < 5.0) & (np.abs(middle[:, 1]) < 4.9)] == Origin.STOCK).all()
 
@@ -104,7 +104,7 @@ def test_figure_shows_pieces_in_the_same_colours_on_both():
     figure = diagram_figure(move, FLAT, 1.0, shapely.box(-2, -8, 12, 4), title="a step")
     by_name = {}
     for trace in figure.data:
-        if trace.line.width == 3:
+        if trace.type == "scatter" and trace.line.width == 3:
             by_name.setdefault(trace.name, []).append((trace.xaxis, trace.line.color))
     both = [name for name, found in by_name.items() if len(found) == 2]
     assert {"first section, leaving edge", "last section, advancing edge", "grazing points"} <= set(both)

@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 import shapely
-from engagement.chips.brute import CUTTERS, random_move
 
 from chipload.cutter.cutter import Cutter
 from chipload.engagement.chips.chips import chips
 from chipload.engagement.chips.covered import covered, covered_areas
 from chipload.engagement.chips.move import Move
 from chipload.engagement.chips.ring import Origin
+from engagement.chips.brute import CUTTERS, random_move
 
 R, TILT, TURN, TOLERANCE = 5.0, 0.5, 0.9, 1e-5
 MILL = Cutter(2.0 * R, 4, 0.5, 60.0, 80.0, 6e5)

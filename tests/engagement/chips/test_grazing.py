@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from engagement.chips.brute import CUTTERS, inside, random_move
 
 from chipload.cutter.cutter import Cutter
 from chipload.engagement.chips.grazing import ellipse_grazing, grazing
+from chipload.engagement.chips.move import Move
 from chipload.engagement.chips.section import depth, section
+from engagement.chips.brute import CUTTERS, inside, random_move
 
 LONG = Cutter(10.0, 4, 0.5, 400.0, 500.0, 6e5)
 ANGLES = np.linspace(0.0, 2.0 * math.pi, 37)[:-1] + 0.01
@@ -20,7 +21,10 @@ def test_quartic_and_sampled_signs_agree_on_ellipses():
     rng = np.random.default_rng(3)
     counts = {2: 0, 4: 0}
     for _ in range(300):
-        move, height, t = random_move(rng, "slerp", 2.0), 150.0 * rng.uniform(0.1, 1.0), rng.uniform()
+        (a0, a1), t = (np.append(rng.uniform(-0.7, 0.7, 2), 1.0) for _ in range(2)), rng.uniform()
+        a0, a1 = a0 / np.linalg.norm(a0), a1 / np.linalg.norm(a1)
+        q = rng.uniform(-1.0, 1.0, 3) * rng.choice([0.2, 3.0])  # the axis turns about a point near the layer
+        move, height = Move.slerp(-150.0 * a0, a0, q - 150.0 * a1, a1), rng.uniform(-1.0, 1.0)
         (p, a), (dp, da) = move.at([t]), move.rates([t])
         theta, sign = ellipse_grazing(5.0, height, p[0], a[0], dp[0], da[0], 1e-7)
         g = grazing(move, LONG, height, t, 1e-12)

@@ -60,7 +60,7 @@ def test_axis_into_the_layer_is_refused_between_the_ends_too():
     machine = machine_named("cradle-ac")
     q0, q1 = np.zeros(9), np.zeros(9)
     q0[3], q1[3] = -0.3, 1.7
-    with pytest.raises(InputError, match="must be at least 0.01"):
+    with pytest.raises(InputError, match=r"must be at least 0\.01"):
         Move.machine_linear(machine, q0, q1)
 
 

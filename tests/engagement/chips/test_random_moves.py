@@ -1,8 +1,8 @@
 """200 random five-axis moves against unions of sections that are found by membership alone.
 
-Resolution of the oracle: 81 sections of 96 rays, so its area is low by up to 2 % (scallops between sections, at tracks
-of corners a saw) and never high. What the polygon has too much is found by points 0.01 mm inside its edge, looked up
-at 3001 times.
+Resolution of the oracle: 71 sections of 80 rays. Its area is never high; it is low by 0.1 % in the median, by up to 6 %
+where sections are slender (rays cut their ends) or a corner's track is a saw of few teeth. What the polygon has too
+much is found by points 0.01 mm inside its edge instead, looked up at 3001 times.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from engagement.chips.brute import CUTTERS, inside, random_move, sections
 
 from chipload.engagement.chips.covered import covered
 from chipload.engagement.chips.grazing import grazing
+from engagement.chips.brute import CUTTERS, inside, random_move, sections
 
 TOLERANCE, MARGIN, MOVES = 1e-3, 1e-2, 200
 WAYS = ("lerp", "slerp", "machine")
@@ -35,7 +35,7 @@ def cases():
 def test_every_dense_section_is_covered_and_little_else(cases):
     short = []
     for cutter, move, height, c in cases:
-        found = sections(cutter, move, height, np.linspace(0.0, 1.0, 81), 96)
+        found = sections(cutter, move, height, np.linspace(0.0, 1.0, 71), 80)
         if c is None:
             assert not found
             continue
@@ -46,8 +46,9 @@ def test_every_dense_section_is_covered_and_little_else(cases):
         assert abs(c.area - polygon.area) <= TOLERANCE * polygon.length
         short.append((polygon.area - union.area) / polygon.area)
     assert len(short) > 150
-    assert np.median(short) < 2.5e-3
-    assert np.quantile(short, 0.9) < 0.02
+    assert np.median(short) < 2e-3
+    assert np.quantile(short, 0.9) < 0.01
+    assert max(short) < 0.06
 
 
 def test_points_just_inside_are_covered_at_some_time(cases):

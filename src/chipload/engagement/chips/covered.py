@@ -41,6 +41,9 @@ STILL = 1e-3
 _KNOTS = 64
 _MOST_EDGES = 4_000_000
 _SPANS = 8
+#: a layer that is met for a smaller share of the move is touched in a point
+_TOUCH = 1e-12
+_GRID = 1e-5  # of the tolerance: nearer than this two points are one when pieces are noded
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +131,7 @@ def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], toleranc
         if n == trace.NOTHING:
             out.append(None)
         elif n == trace.GENERAL:
-            out.append(_noded(move, K, h, tolerance))
+            out.append(_noded(move, K, h, tolerance, max(_KNOTS, 2 * knots)))
         else:
             out.append(Covered((ring_of_edges(buffer[:n].copy()),), h, tolerance, True))
     return out
@@ -142,27 +145,31 @@ def _larger(buffer: Floats) -> Floats:
 
 def candidates(move: Move, cutter: Cutter, height: float, tolerance: float) -> Floats:
     """All pieces of the diagram that may bound the covered area, as edges (n, 12) of :mod:`chips.ring`."""
-    return _pieces(move, cutter_numbers(cutter), height, tolerance)
+    return _pieces(move, cutter_numbers(cutter), float(height), tolerance, _KNOTS)
 
 
-def _pieces(move: Move, K: Floats, h: float, tolerance: float) -> Floats:
+def _pieces(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> Floats:
     cp, ca, vmin = move.tip, move.axis, STILL * tolerance
     span = np.empty((_SPANS, 2))
-    m = trace.spans(cp, ca, K, h, _KNOTS, span)
+    m = trace.spans(cp, ca, K, h, knots, span)
     buffer, jumps = np.empty((8192, 12)), np.empty(16)
     found: list[Floats] = []
     for ta, tb in span[:m]:
-        n, jumped = faces.pieces(cp, ca, K, h, tolerance, vmin, ta, tb, _KNOTS, buffer, 0, jumps)
+        if tb - ta <= _TOUCH:
+            continue
+        n, jumped = faces.pieces(cp, ca, K, h, tolerance, vmin, ta, tb, knots, buffer, 0, jumps)
         while n == trace.FULL:
             buffer = _larger(buffer)
-            n, jumped = faces.pieces(cp, ca, K, h, tolerance, vmin, ta, tb, _KNOTS, buffer, 0, jumps)
+            n, jumped = faces.pieces(cp, ca, K, h, tolerance, vmin, ta, tb, knots, buffer, 0, jumps)
         found.append(buffer[:n].copy())
         for t in jumps[:jumped]:
             found += [
                 whole_section(move, K, h, at, tolerance)
                 for at in (max(t - 2 * faces.LEAST, ta), min(t + 2 * faces.LEAST, tb))
             ]
-    return np.concatenate(found) if found else np.empty((0, 12))
+    edges = np.concatenate(found) if found else np.empty((0, 12))
+    # a section that is a point but for rounding has no direction along its edge, and bounds nothing
+    return edges[np.isfinite(edges[:, :4]).all(axis=1)]
 
 
 def whole_section(move: Move, K: Floats, h: float, t: float, tolerance: float) -> Floats:
@@ -177,13 +184,14 @@ def whole_section(move: Move, K: Floats, h: float, t: float, tolerance: float) -
     return buffer[:n].copy()
 
 
-def _noded(move: Move, K: Floats, h: float, tolerance: float) -> Covered | None:
+def _noded(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> Covered | None:
     """The general case: faces between all pieces, those kept that some section covers."""
-    edges = _pieces(move, K, h, tolerance)
+    edges = _pieces(move, K, h, tolerance, knots)
     if len(edges) == 0:
         return None
     lines = shapely.line_merge(shapely.multilinestrings(edges[:, :4].reshape(-1, 2, 2)))
-    found = np.array(shapely.get_parts(shapely.polygonize([shapely.node(lines)])))
+    net = shapely.unary_union(lines, grid_size=_GRID * tolerance)  # the same curve twice becomes one
+    found = np.array(shapely.get_parts(shapely.polygonize([net])))
     if len(found) == 0:
         return None
     thin = shapely.area(found) < tolerance * shapely.length(found)

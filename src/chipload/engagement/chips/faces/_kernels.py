@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from chipload.engagement.chips._kernels import TAU, instant, state
-from chipload.engagement.chips.trace._kernels import FIRST, FULL, GRAZING, INSET, LAST, arc, edge, kind, sides
+from chipload.engagement.chips.trace._kernels import FIRST, FULL, GRAZING, INSET, LAST, arc, edge, kind, ring, sides
 from chipload.engagement.chips.zeros._kernels import MAX_ROOTS, NODES, deviation, roots
 
 DEPTH = 64
@@ -53,7 +53,8 @@ def pieces(cp, ca, K, h, tol, vmin, ta, tb, knots, buf, n, jumps):
             while top > 0:
                 short = S[top, 21] - S[0, 21] < LEAST or top >= DEPTH - 1
                 quiet = (S[top, 21] - S[0, 21]) * max(most[0], most[top]) <= 0.05 * tol or short
-                one, other = (S[0], C[0], R[0], sign[0], count[0]), (S[top], C[top], R[top], sign[top], count[top])
+                one = (S[0], C[0], R[0], sign[0], count[0], around[0])
+                other = (S[top], C[top], R[top], sign[top], count[top], around[top])
                 m = link(one, other, K, tol, quiet, buf, n)
                 if m == -2:
                     return FULL, 0
@@ -92,14 +93,20 @@ def link(one, other, K, tol, quiet, buf, n):
     """Join the roots of two instants in cyclic order; new count, -1 where they don't fit, -2 where full.
 
     A pair that is there at one instant only is joined along the section, where the two points are within tol / 5 or
-    ``quiet``: nothing moves by more than that in between. An instant: S, C, rows, signs, count.
+    ``quiet``: nothing moves by more than that in between. An instant: S, C, rows, signs,
+    count, sign where there are none.
     """
-    S0, C0, R0, s0, n0 = one
-    S1, C1, R1, s1, n1 = other
+    S0, C0, R0, s0, n0, around0 = one
+    S1, C1, R1, s1, n1, around1 = other
     if n0 < 0 or n1 < 0 or abs(n0 - n1) > 2:
         return -1
     if n + n0 + n1 + 2 >= buf.shape[0]:
         return -2
+    if n0 == 0 and n1 == 0 and around0 != around1:
+        if not quiet:
+            return -1
+        n = ring(S0, K, C0, tol, GRAZING, buf, n)
+        return -2 if n < 0 else n
     if n0 == n1:
         total, shift = _match(R0, s0, R1, s1, n0, tol)
         if total == math.inf:
@@ -109,14 +116,22 @@ def link(one, other, K, tol, quiet, buf, n):
             n = edge(buf, n, a, b, a[4], a[5], b[4], b[5], kind(a, b))
         return n
     S, C, big, sb, nb = (S1, C1, R1, s1, n1) if n1 > n0 else (S0, C0, R0, s0, n0)
-    small, ss = (R0, s0) if n1 > n0 else (R1, s1)
+    small, ss, around = (R0, s0, around0) if n1 > n0 else (R1, s1, around1)
+    if nb == 2 and around == 0:
+        if not quiet:
+            return -1
+        for wanted in (-1, 1):
+            n = sides(S, K, C, big, sb, nb, 0, wanted, tol, GRAZING, buf, n)
+            if n < 0:
+                return -2
+        return n
     rest = np.empty((MAX_ROOTS, 7))
     sr = np.empty(MAX_ROOTS, np.int64)
     best, pair, shift = math.inf, -1, 0
     for i in range(nb):
         j = (i + 1) % nb
         d = math.hypot(big[i, 0] - big[j, 0], big[i, 1] - big[j, 1])
-        if d > 0.2 * tol and not quiet:
+        if (d > 0.2 * tol and not quiet) or (nb == 2 and sb[i] == around):
             continue
         _without(big, sb, nb, i, rest, sr)
         total, k = _match(small, ss, rest, sr, nb - 2, tol)

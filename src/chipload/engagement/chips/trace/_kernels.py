@@ -18,7 +18,7 @@ from chipload.engagement.chips.zeros._kernels import CORNER, MAX_ROOTS, NODES, d
 
 FIRST, LAST, GRAZING, CHORD, CHORD_END, FIRST_CHORD, LAST_CHORD = 0, 1, 2, 3, 4, 5, 6
 NOTHING, GENERAL, FULL, UNSETTLED = -1, -2, -3, -4
-KNOTS, MOST_KNOTS = 9, 200
+KNOTS, MOST_KNOTS = 9, 100
 INSET = 1e-10  # of a span of time: where a section that begins as a point is looked at
 
 
@@ -324,9 +324,8 @@ def loop(cp, ca, K, h, tol, vmin, knots, buf):
         return UNSETTLED if knots <= MOST_KNOTS else GENERAL
     last = knots - 1
     if count.max() == 0:
-        for i in range(last):
-            if around[i] * around[i + 1] < 0:
-                return GENERAL
+        if around.max() > 0 and around.min() < 0:
+            return GENERAL
         outward = around.max() > 0
         i = last if outward else 0
         n = ring(S[i], K, C[i], tol, LAST if outward else FIRST, buf, 0)

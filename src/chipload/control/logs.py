@@ -1,0 +1,183 @@
+"""What a log of a cut says: columns of a CSV, by name and unit.
+
+Notation: t time [s], w spindle speed [rad/s], I spindle current [A], T torque [N mm], f feed [mm/s].
+
+The table of columns (TOML, or a dict of the same form) names for each quantity its column and unit, and the time of a
+row where the log has no column of time:
+
+    sample_s = 0.1
+    [speed]
+    column = "S1_ActualVelocity"
+    unit = "rev/s"
+
+Quantities are ``time``, ``speed``, ``current``, ``torque``, ``feed`` and ``label`` (a text, without a unit). Currents
+that were written in steps of a converter have the unit ``count``; what is made of them is in counts too.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import Finding, InputError
+from chipload.tables import nearest, read_table
+
+Floats = NDArray[np.float64]
+
+#: of a file that is read [bytes]
+MOST_BYTES = 1 << 28
+#: quantity -> unit -> factor to the unit inside
+UNITS: dict[str, dict[str, float]] = {
+    "time": {"s": 1.0, "ms": 1e-3},
+    "speed": {"rad/s": 1.0, "rpm": math.tau / 60.0, "rev/s": math.tau},
+    "current": {"A": 1.0, "mA": 1e-3, "count": 1.0},
+    "torque": {"N mm": 1.0, "N m": 1e3},
+    "feed": {"mm/s": 1.0, "mm/min": 1.0 / 60.0},
+}
+_QUANTITIES = (*UNITS, "label")
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """Columns of a log; what it does not hold is None.
+
+    Parameters
+    ----------
+    time : (n,) float [s], rising
+    current : (n,) float [A] (or counts)
+    speed : (n,) float [rad/s]
+    torque : (n,) float [N mm]
+    feed : (n,) float [mm/s]
+    label : (n,) text
+    """
+
+    time: Floats
+    current: Floats
+    speed: Floats | None = None
+    torque: Floats | None = None
+    feed: Floats | None = None
+    label: NDArray[np.str_] | None = None
+
+
+def read_log(path: str | Path, columns: dict[str, Any] | str | Path) -> tuple[Log, list[Finding]]:
+    """Read a log.
+
+    Parameters
+    ----------
+    path : CSV with a head of names, separated by commas
+    columns : the table of columns, or the path of its TOML file
+
+    Returns
+    -------
+    The log and findings: rows that are left out because a number is missing (``log-row``), or because the time does not
+    rise (``log-time``), each kind once, with the first line and how many.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read or is too large, a column is not there, a unit is not known, no row is left.
+    """
+    label = f"log {path}"
+    wanted, sample = _wanted(columns)
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+    except OSError as err:
+        raise InputError(f"{label}: cannot be read: {err.strerror}") from None
+    if len(data) > MOST_BYTES:
+        raise InputError(f"{label}: larger than {MOST_BYTES} bytes: cut it into parts")
+    rows = csv.reader(io.StringIO(data.decode("utf-8-sig", "replace"), newline=""))
+    try:
+        names = [name.strip() for name in next(rows, [])]
+        places = {}
+        for quantity, (name, _) in wanted.items():
+            if name not in names:
+                near = f": the nearest is {nearest(name, names)}" if names else ": the file is empty"
+                raise InputError(f"{label}: no column {name} for {quantity}{near}")
+            places[quantity] = names.index(name)
+        kept, bad, number = _kept(rows, places)
+    except csv.Error as err:
+        raise InputError(f"{label}: not a CSV file: {err}") from None
+    findings = []
+    if bad:
+        findings.append(Finding("log-row", bad[0], f"{len(bad)} rows are left out: a number is missing"))
+    if not kept:
+        raise InputError(f"{label}: no row with all of {', '.join(n for n, _ in wanted.values())}")
+    made: dict[str, Any] = {"time": np.array(number, dtype=np.float64) * (sample or 0.0)}
+    for k, quantity in enumerate(places):
+        values = [row[k] for row in kept]
+        if quantity == "label":
+            made["label"] = np.array(values, dtype=np.str_)
+        else:
+            made[quantity] = np.array(values, dtype=np.float64) * UNITS[quantity][wanted[quantity][1]]
+    rising = np.concatenate([[True], made["time"][1:] > np.maximum.accumulate(made["time"])[:-1]])
+    if not rising.all():
+        first = int(np.flatnonzero(~rising)[0])
+        findings.append(
+            Finding("log-time", number[first] + 2, f"{int((~rising).sum())} rows are left out: time does not rise")
+        )
+        made = {key: column[rising] for key, column in made.items()}
+    return Log(**made), findings
+
+
+def _kept(rows: Any, places: dict[str, int]) -> tuple[list[list[float | str]], list[int], list[int]]:
+    """Values of whole rows, lines of the others, and the number of each whole row."""
+    kept: list[list[float | str]] = []
+    bad, number = [], []
+    for k, row in enumerate(rows):
+        if not row:
+            continue
+        values: list[float | str] = []
+        for quantity, place in places.items():
+            text = row[place].strip() if place < len(row) else ""
+            if quantity == "label":
+                values.append(text)
+                continue
+            try:
+                value = float(text)
+            except ValueError:
+                break
+            if not math.isfinite(value):
+                break
+            values.append(value)
+        if len(values) == len(places):
+            kept.append(values)
+            number.append(k)
+        else:
+            bad.append(k + 2)
+    return kept, bad, number
+
+
+def _wanted(columns: dict[str, Any] | str | Path) -> tuple[dict[str, tuple[str, str]], float | None]:
+    """Quantity -> (column, unit), and the time of a row."""
+    label, table = ("log columns", columns) if isinstance(columns, dict) else read_table("log columns", columns)
+    out = {}
+    sample = None
+    for key, value in table.items():
+        if key == "sample_s":
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
+                raise InputError(f"{label}: sample_s = {value!r}: must be a number above 0")
+            sample = float(value)
+            continue
+        if key not in _QUANTITIES:
+            raise InputError(
+                f"{label}: unknown quantity {key}: the nearest known one is {nearest(key, [*_QUANTITIES])}"
+            )
+        if not isinstance(value, dict) or not isinstance(value.get("column"), str):
+            raise InputError(f"{label}: {key}: must be a table with column and unit")
+        unit = value.get("unit", "")
+        if key != "label" and unit not in UNITS[key]:
+            raise InputError(f"{label}: {key}.unit = {unit!r}: must be one of {', '.join(UNITS[key])}")
+        out[key] = (value["column"], unit)
+    if "current" not in out:
+        raise InputError(f"{label}: current is missing: the column of the spindle current must be named")
+    if ("time" in out) == (sample is not None):
+        raise InputError(f"{label}: must give either time or sample_s")
+    return out, sample

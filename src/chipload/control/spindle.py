@@ -1,0 +1,291 @@
+"""What torque the spindle's current means, how surely, and where it means nothing.
+
+Notation: w spindle speed [rad/s], I current [A], T torque of cutting [N mm], J inertia [N mm s^2], K_T [N mm/A],
+I_idle(w) = i_0 + i_1 w + ... [A] the current of the free spindle:
+
+    J dw/dt = K_T (I - I_idle(w)) - T,   so   I = I_idle(w) + T / K_T + (J / K_T) dw/dt,
+
+which is linear in i_k, 1 / K_T and J / K_T: they come from cuts of known torque by least squares. A current sensor of
+first order lags by tau [s]; speed and torque pass the same lag before they are compared with it. Residuals of a log
+follow each other; their first autocorrelation rho widens the intervals by sqrt((1 + rho) / (1 - rho)).
+
+Not to be trusted: torques below ``light`` (friction, slip and noise: the share of the error is above what was asked),
+speeds outside those that were identified. Bandwidth: revolutions, not teeth.
+
+Reference: [Altintas1992] (cutting force from the current of drives).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.signal import lfilter
+from scipy.stats import t as student
+
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SpindleMap:
+    """An identified spindle.
+
+    Parameters
+    ----------
+    torque_constant, inertia : K_T [N mm/A], J [N mm s^2]
+    idle : (p,) float, coefficients of I_idle in powers of w [A, A s, ...]
+    half_width : (p + 2,) float, half of the interval of K_T, J and the coefficients, at ``level``
+    level : of confidence, 0 .. 1
+    speeds : (least, greatest) w that it was identified at [rad/s]
+    light : torque below which a single estimate is not to be trusted [N mm]
+    biased : the same after any averaging: below it the mean itself is wrong [N mm]
+    residual : standard deviation of a current around the map [A]
+    sensor_lag : tau [s]
+    """
+
+    torque_constant: float
+    inertia: float
+    idle: Floats
+    half_width: Floats
+    level: float
+    speeds: tuple[float, float]
+    light: float
+    biased: float
+    residual: float
+    sensor_lag: float
+
+    def idle_current(self, speed: ArrayLike) -> Floats:
+        """I_idle(w) [A], the shape of ``speed`` [rad/s]."""
+        return np.asarray(np.polynomial.polynomial.polyval(np.asarray(speed, dtype=np.float64), self.idle))
+
+
+def first_order(values: ArrayLike, time: Floats, lag: float) -> Floats:
+    """What a sensor of first order makes of a series, from rest at its first value.
+
+    Parameters
+    ----------
+    values : (n,) float, taken to be straight between two times
+    time : (n,) float [s], rising
+    lag : tau [s]; 0: nothing is done
+    """
+    x = np.asarray(values, dtype=np.float64)
+    if lag == 0.0:
+        return x.copy()
+    step = np.diff(time)
+    if len(x) > 2 and np.ptp(step) <= 1e-9 * step[0]:
+        a = float(step[0]) / lag
+        decay = math.exp(-a)
+        ramp = (1.0 - decay) / a
+        after, _ = lfilter([1.0 - ramp, ramp - decay], [1.0, -decay], x, zi=[x[0] * ramp])
+        return np.asarray(after)
+    out = np.empty_like(x)
+    out[0] = y = x[0]
+    for k in range(1, len(x)):
+        a = (time[k] - time[k - 1]) / lag
+        decay = math.exp(-a)
+        ramp = (1.0 - decay) / a
+        y = decay * y + (ramp - decay) * x[k - 1] + (1.0 - ramp) * x[k]
+        out[k] = y
+    return out
+
+
+def lagged_rate(speed: Floats, time: Floats, lag: float) -> Floats:
+    """dw/dt as a sensor of first order shows it, (w - lagged w) / tau; without a lag by central differences."""
+    if lag == 0.0:
+        return np.asarray(np.gradient(speed, time))
+    return (speed - first_order(speed, time, lag)) / lag
+
+
+def identify(
+    time: Floats,
+    speed: Floats,
+    current: Floats,
+    torque: Floats,
+    sensor_lag: float,
+    idle_terms: int = 2,
+    level: float = 0.95,
+    share: float = 0.2,
+) -> SpindleMap:
+    """Identify a spindle from logged cuts of known torque (0 in the air).
+
+    Parameters
+    ----------
+    time, speed, current, torque : (n,) float [s], [rad/s], [A], [N mm]
+    sensor_lag : tau [s]
+    idle_terms : coefficients of I_idle, 1 .. 4
+    level : of the intervals
+    share : an estimate counts as trusted where its error is below this share of the torque
+
+    Raises
+    ------
+    InputError
+        Columns differ in length, are too short, or do not tell the parameters apart (one speed, one torque, no ramp).
+    """
+    n = len(time)
+    for name, column in (("speed", speed), ("current", current), ("torque", torque)):
+        if column.shape != (n,) or not np.isfinite(column).all():
+            raise InputError(f"spindle.{name}: must be a column of {n} numbers like time")
+    if not 1 <= idle_terms <= 4:
+        raise InputError(f"spindle.idle_terms = {idle_terms}: must be from 1 to 4")
+    if n < 10 * (idle_terms + 2):
+        raise InputError(f"spindle.time: {n} rows: must be at least {10 * (idle_terms + 2)} to identify")
+    scale_w = float(np.abs(speed).max())
+    scale_t = float(np.abs(torque).max())
+    rate = lagged_rate(speed, time, sensor_lag)
+    scale_r = float(np.abs(rate).max())
+    for name, scale, cure in (
+        ("speed", scale_w, "the spindle must turn"),
+        ("torque", scale_t, "at least one cut of known torque is needed"),
+        ("speed", float(np.ptp(speed)), "the speed must change somewhere (a run-up), or J cannot be found"),
+    ):
+        if scale == 0.0:
+            raise InputError(f"spindle.{name}: {cure}")
+    lagged = [first_order(torque / scale_t, time, sensor_lag), rate / scale_r]
+    powers = [first_order((speed / scale_w) ** k, time, sensor_lag) for k in range(idle_terms)]
+    # the sensor's state before the first row is not known
+    settled = time - time[0] >= 5.0 * sensor_lag
+    design = np.stack([*lagged, *powers], axis=1)[settled]
+    found, _, rank, _ = np.linalg.lstsq(design, current[settled], rcond=1e-10)
+    if rank < design.shape[1]:
+        raise InputError(
+            "spindle: torque, acceleration and idle current cannot be told apart: cuts at two speeds and two torques "
+            "are needed, or fewer idle_terms"
+        )
+    left = current[settled] - design @ found
+    freedom = len(left) - design.shape[1]
+    variance = float(left @ left) / freedom
+    power = float(left @ left)
+    rho = min(max(float(left[1:] @ left[:-1]) / power, 0.0), 0.99) if power > 0.0 else 0.0
+    covariance = variance * (1.0 + rho) / (1.0 - rho) * np.linalg.inv(design.T @ design)
+    per_torque, per_rate = found[0] / scale_t, found[1] / scale_r
+    if per_torque <= 0.0:
+        raise InputError("spindle.torque: a greater torque takes less current: the columns do not belong together")
+    constant = 1.0 / per_torque
+    inertia = per_rate * constant
+    # delta method: K_T = 1/a, J = b/a
+    jacobian = np.zeros((idle_terms + 2, idle_terms + 2))
+    jacobian[0, 0] = -(constant**2) / scale_t
+    jacobian[1, 0], jacobian[1, 1] = -inertia * constant / scale_t, constant / scale_r
+    for k in range(idle_terms):
+        jacobian[2 + k, 2 + k] = scale_w**-k
+    spread = np.sqrt(np.diag(jacobian @ covariance @ jacobian.T))
+    light, biased = _light(lagged[0][settled] * scale_t, constant * left, share)
+    return SpindleMap(
+        torque_constant=constant,
+        inertia=inertia,
+        idle=found[2:] / scale_w ** np.arange(idle_terms),
+        half_width=float(student.ppf(0.5 + 0.5 * level, freedom)) * spread,
+        level=level,
+        speeds=(float(speed.min()), float(speed.max())),
+        light=light,
+        biased=biased,
+        residual=math.sqrt(variance),
+        sensor_lag=sensor_lag,
+    )
+
+
+def idle_map(
+    speed: Floats, current: Floats, torque_constant: float, sensor_lag: float, idle_terms: int = 1, light: float = 0.0
+) -> SpindleMap:
+    """A map from a spindle that runs free: idle current only; K_T is taken as given (1: the torque is in amperes).
+
+    ``light`` is raised to twice the spread of a reading, below which nothing can be told from the air.
+    """
+    if len(speed) < 10 * idle_terms or len(speed) != len(current):
+        raise InputError(f"spindle.speed: {len(speed)} rows in the air: must be at least {10 * idle_terms}")
+    scale = float(np.abs(speed).max()) or 1.0
+    design = (speed[:, None] / scale) ** np.arange(idle_terms)
+    found, _, rank, _ = np.linalg.lstsq(design, current, rcond=1e-10)
+    if rank < idle_terms:
+        raise InputError("spindle.speed: one speed only: must be idle_terms = 1")
+    left = current - design @ found
+    freedom = len(speed) - idle_terms
+    variance = float(left @ left) / freedom
+    spread = np.sqrt(variance * np.diag(np.linalg.inv(design.T @ design))) / scale ** np.arange(idle_terms)
+    return SpindleMap(
+        torque_constant=torque_constant,
+        inertia=0.0,
+        idle=found / scale ** np.arange(idle_terms),
+        half_width=np.concatenate([np.zeros(2), float(student.ppf(0.975, freedom)) * spread]),
+        level=0.95,
+        speeds=(float(speed.min()), float(speed.max())),
+        light=max(light, 2.0 * torque_constant * math.sqrt(variance)),
+        biased=light,
+        residual=math.sqrt(variance),
+        sensor_lag=sensor_lag,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Torque from a log.
+
+    Parameters
+    ----------
+    torque : (n,) float [N mm], lagging by the sensor's lag
+    half_width : (n,) float [N mm], half of the interval of K_T and of the idle map, at the level of the map
+    light, off_speed : (n,) bool, why a row is not to be trusted: too little torque, a speed that was not identified
+    """
+
+    torque: Floats
+    half_width: Floats
+    light: NDArray[np.bool_]
+    off_speed: NDArray[np.bool_]
+
+    @property
+    def trusted(self) -> NDArray[np.bool_]:
+        """(n,) bool: neither light nor off speed."""
+        return ~(self.light | self.off_speed)
+
+
+def estimate(spindle: SpindleMap, time: Floats, speed: Floats, current: Floats, average: int = 1) -> Estimate:
+    """Torque of cutting from speed and current.
+
+    Parameters
+    ----------
+    spindle : from :func:`identify` or :func:`idle_map`
+    time, speed, current : (n,) float [s], [rad/s], [A]
+    average : rows that are averaged (centred), odd; ``light`` falls with its root, down to ``biased``
+
+    Returns
+    -------
+    See :class:`Estimate`.
+    """
+    if average < 1 or average % 2 == 0:
+        raise InputError(f"spindle.average = {average}: must be odd and at least 1")
+    seen = first_order(speed, time, spindle.sensor_lag)
+    torque = spindle.torque_constant * (current - spindle.idle_current(seen))
+    if spindle.inertia:
+        torque -= spindle.inertia * lagged_rate(speed, time, spindle.sensor_lag)
+    idle_width = np.abs(seen[:, None] ** np.arange(len(spindle.idle))) @ spindle.half_width[2:]
+    width = np.hypot(spindle.half_width[0] / spindle.torque_constant * torque, spindle.torque_constant * idle_width)
+    if average > 1:
+        kernel = np.ones(average)
+        weight = np.convolve(np.ones_like(torque), kernel, "same")
+        torque = np.convolve(torque, kernel, "same") / weight
+        width = np.convolve(width, kernel, "same") / weight
+    slack = 0.02 * max(abs(spindle.speeds[0]), abs(spindle.speeds[1]))
+    off = (seen < spindle.speeds[0] - slack) | (seen > spindle.speeds[1] + slack)
+    return Estimate(torque, width, torque < max(spindle.light / math.sqrt(average), spindle.biased), off)
+
+
+def _light(torque: Floats, error: Floats, share: float, bins: int = 12) -> tuple[float, float]:
+    """Torques above which the root mean square of the error, and its mean, stay below ``share`` of a band of torque."""
+    cutting = torque > 0.0
+    edges = np.linspace(0.0, float(torque.max()), bins + 1)
+    light, biased = 0.0, 0.0
+    for low, high in itertools.pairwise(edges):
+        band = cutting & (torque > low) & (torque <= high)
+        if band.sum() < 5:
+            continue
+        believed = share * float(torque[band].mean())
+        if math.sqrt(float(np.mean(error[band] ** 2))) > believed:
+            light = float(high)
+        if abs(float(error[band].mean())) > believed:
+            biased = float(high)
+    return light, biased

@@ -1,0 +1,165 @@
+"""Surfaces through a grid of points: tensor products of B-splines, with normals and curvatures.
+
+Notation: S(u, v) = sum of N_i(u) M_j(v) P_ij with basis functions N, M of degrees p, q over knots in 0..1, P_ij control
+points [mm]. E, F, G and L, M, N first and second fundamental form; K curvature tensor in space (3, 3) [1/mm],
+K = J I^-1 II I^-1 J^T with J = (S_u, S_v): K applied to a unit tangent twice is the normal curvature, above 0 where the
+surface bends towards its normal.
+
+Reference: [Piegl1997] ch. 2, 9.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import make_interp_spline
+
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """A B-spline surface over the unit square.
+
+    Parameters
+    ----------
+    knots_u, knots_v : (n + p + 1,), (m + q + 1,) float, ascending, the ends p + 1 and q + 1 times
+    control : P (n, m, 3) float [mm]
+    side : 1 or -1, the normal is ``side`` S_u x S_v
+    """
+
+    knots_u: Floats
+    knots_v: Floats
+    control: Floats
+    side: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("knots_u", "knots_v", "control"):
+            value = np.array(getattr(self, name), dtype=np.float64)
+            value.flags.writeable = False
+            object.__setattr__(self, name, value)
+        if self.control.ndim != 3 or self.control.shape[2] != 3 or self.side not in (1, -1):
+            raise InputError(
+                f"patch: control points {self.control.shape}, side {self.side}: must be (n, m, 3), 1 or -1"
+            )
+
+    @property
+    def degrees(self) -> tuple[int, int]:
+        """(p, q)."""
+        n, m = self.control.shape[:2]
+        return len(self.knots_u) - n - 1, len(self.knots_v) - m - 1
+
+    def at(self, u: ArrayLike, v: ArrayLike, du: int = 0, dv: int = 0) -> Floats:
+        """Points, or derivatives of order ``du``, ``dv`` in 0..2.
+
+        Parameters
+        ----------
+        u, v : (k,) float in 0..1
+
+        Returns
+        -------
+        (k, 3) float [mm]
+        """
+        a, b = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(v, dtype=np.float64))
+        p, q = self.degrees
+        i, N = basis(self.knots_u, p, a.ravel(), du)
+        j, M = basis(self.knots_v, q, b.ravel(), dv)
+        rows = self.control[i[:, None, None] + np.arange(p + 1)[:, None], j[:, None, None] + np.arange(q + 1)]
+        out: Floats = np.einsum("ki,kj,kijd->kd", N, M, rows)
+        return out
+
+    def normal(self, u: ArrayLike, v: ArrayLike) -> Floats:
+        """Unit normals (k, 3).
+
+        Raises
+        ------
+        InputError
+            S_u and S_v are parallel or 0 there.
+        """
+        cross = np.cross(self.at(u, v, 1, 0), self.at(u, v, 0, 1))
+        length = np.linalg.norm(cross, axis=1)
+        if (length == 0.0).any():
+            raise InputError("patch: no normal where S_u and S_v are parallel: leave that edge out")
+        out: Floats = self.side * cross / length[:, None]
+        return out
+
+    def curvature(self, u: ArrayLike, v: ArrayLike) -> Floats:
+        """K (k, 3, 3) [1/mm] towards :meth:`normal`."""
+        N = self.normal(u, v)
+        J = np.stack([self.at(u, v, 1, 0), self.at(u, v, 0, 1)], axis=-1)
+        second = [np.einsum("kd,kd->k", self.at(u, v, *d), N) for d in ((2, 0), (1, 1), (0, 2))]
+        II = np.stack([np.stack(second[:2], axis=-1), np.stack(second[1:], axis=-1)], axis=-2)
+        A = np.linalg.solve(np.swapaxes(J, 1, 2) @ J, np.swapaxes(J, 1, 2))
+        out: Floats = np.swapaxes(A, 1, 2) @ II @ A
+        return out
+
+    def principal(self, u: ArrayLike, v: ArrayLike) -> Floats:
+        """Principal curvatures (k, 2) [1/mm], ascending."""
+        K, N = self.curvature(u, v), self.normal(u, v)
+        # in the plane across N: the third eigenvalue of K is 0 along N
+        other = np.eye(3)[np.abs(N).argmin(axis=1)]
+        a = np.cross(N, other)
+        a /= np.linalg.norm(a, axis=1)[:, None]
+        b = np.cross(N, a)
+        k11, k12, k22 = (np.einsum("ki,kij,kj->k", x, K, y) for x, y in ((a, a), (a, b), (b, b)))
+        mean, spread = 0.5 * (k11 + k22), np.hypot(0.5 * (k11 - k22), k12)
+        return np.stack([mean - spread, mean + spread], axis=-1)
+
+    def turned(self, angle: float) -> Patch:
+        """The patch turned about z by an angle [rad]."""
+        c, s = np.cos(angle), np.sin(angle)
+        return replace(self, control=self.control @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
+
+
+def basis(knots: Floats, degree: int, x: Floats, derivative: int = 0) -> tuple[NDArray[np.int64], Floats]:
+    """First index (k,) of the basis functions that are not 0 at x (k,); their values or derivatives (k, degree + 1).
+
+    >>> first, N = basis(np.array([0.0, 0.0, 1.0, 1.0]), 1, np.array([0.25]))
+    >>> N.tolist()
+    [[0.75, 0.25]]
+    """
+    if (x < knots[degree]).any() or (x > knots[-degree - 1]).any():
+        raise InputError(f"patch: parameter out of {knots[degree]:g}..{knots[-degree - 1]:g}")
+    count = len(knots) - degree - 1
+    span = np.clip(np.searchsorted(knots, x, side="right") - 1, degree, count - 1)
+    values = np.ones((len(x), 1))
+    for d in range(1, degree + 1):
+        low, high = knots[span[:, None] + np.arange(1 - d, 1)], knots[span[:, None] + np.arange(1, d + 1)]
+        grown = np.zeros((len(x), d + 1))
+        if d > degree - derivative:
+            part = d * values / (high - low)
+            grown[:, :-1] -= part
+        else:
+            part = values / (high - low)
+            grown[:, :-1] += part * (high - x[:, None])
+            part = part * (x[:, None] - low)
+        grown[:, 1:] += part
+        values = grown
+    return span - degree, values if derivative <= degree else np.zeros_like(values)
+
+
+def through(points: ArrayLike, u: ArrayLike, v: ArrayLike, degrees: tuple[int, int] = (3, 3), side: int = 1) -> Patch:
+    """The patch through a grid of points (n, m, 3) [mm] at the parameters u (n,), v (m,), each from 0 to 1.
+
+    A degree is lowered to the number of points less one.
+
+    Raises
+    ------
+    InputError
+        The parameters do not ascend from 0 to 1, or there are fewer than two of either.
+    """
+    grid = np.asarray(points, dtype=np.float64)
+    a, b = np.asarray(u, dtype=np.float64), np.asarray(v, dtype=np.float64)
+    for name, x, size in (("u", a, grid.shape[0]), ("v", b, grid.shape[1])):
+        ok = len(x) == size and size >= 2 and x[0] == 0.0 and x[-1] == 1.0 and (np.diff(x) > 0.0).all()
+        if not ok:
+            raise InputError(f"patch.{name}: must ascend from 0 to 1, one for each of {size} points, at least two")
+    p, q = min(degrees[0], len(a) - 1), min(degrees[1], len(b) - 1)
+    first = make_interp_spline(a, grid, k=p, axis=0)
+    second = make_interp_spline(b, first.c, k=q, axis=1)
+    # of the coefficients the axis of v comes first
+    return Patch(first.t, second.t, np.swapaxes(second.c, 0, 1), side)

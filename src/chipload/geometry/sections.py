@@ -1,0 +1,261 @@
+"""Blade sections: files of points, checked, and lofted to the two sides of a blade.
+
+Notation: a section is a closed profile (n, 3) float [mm] in the part's frame, z the axis of rotation; sections go from
+hub to shroud. A blade has the side that faces a growing theta (`plus`) and the one that faces a falling one (`minus`).
+u in 0..1 runs along a section from its leading to its trailing edge, v from the first section to the last.
+
+Formats: a table of three columns whose first line names them, `X R*THETA R`, `X R THETA_DEG` or `X Y Z`, a section a
+file (NASA's HECC); TurboGrid `.curve` and `.crv`, x y z, sections divided by lines that begin with #. X of the first
+two is along the axis. Files say no unit: it is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline, make_interp_spline
+from scipy.optimize import minimize_scalar
+
+from chipload.errors import InputError
+from chipload.geometry.bspline import Patch, through
+from chipload.units import MM_PER
+
+Floats = NDArray[np.float64]
+
+_Half = tuple[BSpline, float, float]
+
+_LARGEST_FILE = 20_000_000
+_LEAST_POINTS = 12
+_EDGE = 0.03  # of its length: a profile that begins so near an end begins at that edge
+_OUTER = 0.02  # the outer diameter may differ from the stated one by this share
+
+
+@dataclass(frozen=True, eq=False)
+class Blade:
+    """The two sides of a blade, normals out of the metal."""
+
+    plus: Patch
+    minus: Patch
+
+    def turned(self, angle: float) -> Blade:
+        """The blade turned about z by an angle [rad]."""
+        return Blade(self.plus.turned(angle), self.minus.turned(angle))
+
+
+def read_sections(
+    paths: Sequence[str | Path], unit: str, over: bool = False, columns: str | None = None
+) -> tuple[Floats, ...]:
+    """Sections of one blade, from files in the order hub to shroud; one TurboGrid file may hold all.
+
+    Parameters
+    ----------
+    unit : of the files, a key of ``units.MM_PER``
+    over : the part is turned over about x, so that a flow along +x comes down the z axis
+    columns : of files whose first line does not name them, as section 7 of HECC's main blade; the others must agree
+
+    Returns
+    -------
+    sections (n, 3) float [mm], z along the axis
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, a line is not three numbers, the columns or the unit are not known.
+    """
+    out: list[Floats] = []
+    for path in paths:
+        out += _sections_of(Path(path), _scale(unit), columns)
+    return tuple(p * np.array([1.0, -1.0, -1.0]) if over else p for p in out)
+
+
+def read_meridian(path: str | Path, unit: str, over: bool = False) -> Floats:
+    """(n, 2) float [mm] r and z of a hub or shroud: two columns `x r`, or TurboGrid's x y z with z along the axis."""
+    scale = _scale(unit)
+    rows = [row for block in _blocks(Path(path)) for row in block[1]]
+    p = np.array(rows) * scale
+    if p.shape[1] == 3:
+        p = np.stack([p[:, 2], np.hypot(p[:, 0], p[:, 1])], axis=-1)
+    return np.stack([p[:, 1], -p[:, 0] if over else p[:, 0]], axis=-1)
+
+
+def checked(sections: tuple[Floats, ...], outer_diameter: float | None = None) -> tuple[Floats, ...]:
+    """The sections, if a blade can be lofted through them.
+
+    Parameters
+    ----------
+    outer_diameter : of the blade [mm], as the drawing states it; finds a wrong unit. None: not checked
+
+    Raises
+    ------
+    InputError
+        There are fewer than two, one has too few points or crosses itself, they are out of order, or the diameter is
+        another.
+    """
+    if len(sections) < 2:
+        raise InputError(f"sections: {len(sections)}: must be at least 2, from hub to shroud")
+    for k, p in enumerate(sections, 1):
+        if len(p) < _LEAST_POINTS:
+            raise InputError(f"section {k}: {len(p)} points: must be at least {_LEAST_POINTS}")
+        if not np.isfinite(p).all():
+            raise InputError(f"section {k}: a number is not finite")
+        if _crossing(p):
+            raise InputError(f"section {k}: crosses itself: its points must go once round the profile")
+    centre = np.array([p.mean(axis=0) for p in sections])
+    step = np.diff(centre, axis=0)
+    back = (step[1:] * step[:-1]).sum(axis=1) <= 0.0
+    if back.any():
+        k = int(back.argmax()) + 2
+        raise InputError(
+            f"section {k}: out of order: lies not between sections {k - 1} and {k + 1}: sort hub to shroud"
+        )
+    if outer_diameter is not None:
+        found = 2.0 * max(float(np.hypot(p[:, 0], p[:, 1]).max()) for p in sections)
+        if abs(found / outer_diameter - 1.0) > _OUTER:
+            factor = outer_diameter / found
+            pairs = [
+                f"{a} read as {b}" for a in MM_PER for b in MM_PER if abs(MM_PER[a] / MM_PER[b] / factor - 1.0) < _OUTER
+            ]
+            hint = f": smaller by {factor:.4g}, as {' or '.join(pairs)}" if pairs else ": check the unit"
+            raise InputError(f"sections: outer diameter {found:.6g} mm: must be {outer_diameter:g} as stated{hint}")
+    return sections
+
+
+def loft(sections: tuple[Floats, ...], count: int = 61) -> Blade:
+    """Both sides of a blade through its sections.
+
+    Each section is interpolated over its chord length and cut where it is longest (leading edge: the end of greater z;
+    one that begins at an edge is cut at that beginning); each half is read at ``count`` places, closer at the edges,
+    and the patch goes through those.
+    """
+    u = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
+    u[0], u[-1] = 0.0, 1.0
+    halves = [_halves(p) for p in sections]
+    sides = [np.array([_read(half[k], u) for half in halves]) for k in range(2)]
+    theta = [np.unwrap(np.arctan2(s[..., 1], s[..., 0]), axis=1) for s in sides]
+    ahead = np.angle(np.exp(1j * (theta[0] - theta[1]))).mean() > 0.0
+    plus, minus = sides if ahead else sides[::-1]
+    middle = 0.5 * (plus + minus)
+    step = np.linalg.norm(np.diff(middle, axis=0), axis=2).mean(axis=1)
+    v = np.concatenate([[0.0], np.cumsum(step)]) / step.sum()
+    v[-1] = 1.0
+    return Blade(_side(plus, u, v, 1.0), _side(minus, u, v, -1.0))
+
+
+def _side(grid: Floats, u: Floats, v: Floats, sign: float) -> Patch:
+    patch = through(np.swapaxes(grid, 0, 1), u, v)
+    at = patch.at(0.5, 0.5)[0]
+    towards = sign * np.array([-at[1], at[0], 0.0])
+    return (
+        patch if patch.normal(0.5, 0.5)[0] @ towards > 0.0 else Patch(patch.knots_u, patch.knots_v, patch.control, -1)
+    )
+
+
+def _halves(p: Floats) -> tuple[_Half, _Half]:
+    """Both ways round from the leading to the trailing edge: (curve, from, to)."""
+    ring = p[:-1] if np.allclose(p[0], p[-1], rtol=0.0, atol=1e-9 * np.abs(p).max()) else p
+    apart = ((ring[:, None] - ring[None]) ** 2).sum(axis=2)
+    i, j = sorted(int(x) for x in np.unravel_index(apart.argmax(), apart.shape))
+    length = np.sqrt(apart.max())
+    # a profile that begins at an edge is cut there, in every section at the same place
+    begins = min(apart[0, i], apart[0, j]) < (_EDGE * length) ** 2
+    if not begins:
+        ring, i, j = np.roll(ring, -i, axis=0), 0, j - i
+    elif apart[0, j] < apart[0, i]:
+        j = i
+    ring = np.concatenate([ring, ring[:1]])
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
+    curve = make_interp_spline(s, ring, k=3)
+    last = len(s) - 2
+    found = minimize_scalar(
+        lambda x: -float(((curve(x) - ring[0]) ** 2).sum()), method="bounded",
+        bounds=(s[max(j - 1, 1)], s[min(j + 1, last)]),
+        options={"xatol": 1e-9 * s[-1]},
+    )  # fmt: skip
+    split, end = float(found.x), float(s[-1])
+    if curve(split)[2] >= ring[0, 2]:
+        return (curve, split, 0.0), (curve, split, end)
+    return (curve, 0.0, split), (curve, end, split)
+
+
+def _read(half: _Half, u: Floats) -> Floats:
+    """Points (n, 3) at the shares u of the length of a half."""
+    curve, first, last = half
+    out: Floats = curve(first + u * (last - first))
+    return out
+
+
+def _crossing(p: Floats) -> bool:
+    """Whether the profile crosses itself as seen in every one of three ways: a twisted one may seem to in some."""
+    ring = p[:-1] if np.array_equal(p[0], p[-1]) else p
+    _, _, axes = np.linalg.svd(ring - ring.mean(axis=0), full_matrices=False)
+    r, theta = np.hypot(ring[:, 0], ring[:, 1]), np.unwrap(np.arctan2(ring[:, 1], ring[:, 0]))
+    views = [ring @ axes[:2].T, *(np.stack([r + k * ring[:, 2], r * theta], axis=-1) for k in (1.0, -1.0))]
+    return not any(shapely.LinearRing(view).is_simple for view in views)
+
+
+def _scale(unit: str) -> float:
+    if unit not in MM_PER:
+        raise InputError(f"unit = {unit!r}: must be one of {', '.join(MM_PER)}")
+    return MM_PER[unit]
+
+
+def _sections_of(path: Path, scale: float, columns: str | None) -> list[Floats]:
+    out = []
+    stated = "X Y Z" if path.suffix.lower() in (".curve", ".crv") else columns
+    for names, rows in _blocks(path):
+        p = np.array(rows)
+        if p.shape[1] != 3:
+            raise InputError(f"{path}: {p.shape[1]} columns: must be 3")
+        found = " ".join(names) or stated
+        if found is None:
+            raise InputError(f"{path}: no line names the columns: say which they are, as X R*THETA R")
+        if columns is not None and found != columns:
+            raise InputError(f"{path}: columns {found}: must be {columns} as stated")
+        if found == "X Y Z":
+            out.append(p * scale)
+            continue
+        if found == "X R*THETA R":
+            x, r, theta = p[:, 0], p[:, 2], p[:, 1] / p[:, 2]
+        elif found == "X R THETA_DEG":
+            x, r, theta = p[:, 0], p[:, 1], np.radians(p[:, 2])
+        else:
+            raise InputError(f"{path}: columns {found}: must be X R*THETA R, X R THETA_DEG or X Y Z")
+        out.append(scale * np.stack([r * np.cos(theta), r * np.sin(theta), x], axis=-1))
+    return out
+
+
+def _blocks(path: Path) -> list[tuple[list[str], list[list[float]]]]:
+    """(names of the columns, rows) of each block of a file."""
+    try:
+        if path.stat().st_size > _LARGEST_FILE:
+            raise InputError(f"{path}: more than {_LARGEST_FILE} bytes: not a table of points")
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError as err:
+        raise InputError(f"{path}: cannot be read: {err.strerror}") from None
+    blocks: list[tuple[list[str], list[list[float]]]] = [([], [])]
+    for k, line in enumerate(text.splitlines(), 1):
+        words = line.replace(",", " ").split()
+        if not words:
+            continue
+        if line.lstrip().startswith("#"):
+            blocks.append((blocks[-1][0], []))
+            continue
+        try:
+            row = [float(w) for w in words]
+        except ValueError:
+            if any(block[1] for block in blocks):
+                raise InputError(f"{path} line {k}: not numbers: {line.strip()[:40]!r}") from None
+            blocks[-1] = ([w.upper() for w in words], [])
+            continue
+        if len(row) not in (2, 3) or (blocks[-1][1] and len(row) != len(blocks[-1][1][0])):
+            raise InputError(f"{path} line {k}: {len(row)} numbers: must be as many in every line, 2 or 3")
+        blocks[-1][1].append(row)
+    blocks = [b for b in blocks if b[1]]
+    if not blocks:
+        raise InputError(f"{path}: no numbers: must be a table of points")
+    return blocks

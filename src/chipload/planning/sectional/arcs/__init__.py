@@ -1,0 +1,1 @@
+"""Pallet angles that one check point forbids to one cutter, exactly."""

@@ -1,0 +1,31 @@
+"""A long loop over contact points, on threads, block by block, the same result with any number of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+from chipload.progress import Progress
+
+#: contact points between two reports of progress
+BLOCK = 32
+
+
+def in_blocks(block: Callable[[int], None], total: int, workers: int, progress: Progress, what: str) -> None:
+    """Runs ``block(first)`` for the first of every :data:`BLOCK` in 0..``total``, and tells how far it is.
+
+    Raises
+    ------
+    Cancelled
+        By ``progress``; blocks that have not begun are dropped.
+    """
+    with ThreadPoolExecutor(workers) as pool:
+        waiting = [pool.submit(block, first) for first in range(0, total, BLOCK)]
+        try:
+            for k, one in enumerate(waiting, 1):
+                one.result()
+                progress(k / len(waiting), what)
+        except BaseException:
+            for one in waiting:
+                one.cancel()
+            raise

@@ -1,0 +1,144 @@
+"""An impeller: blades and splitters round a hub, and the points of one channel.
+
+Notation: z axis of rotation, inlet above; theta angle about it, pitch = 2 pi / blades. Sides of a blade as in
+``geometry/sections.py``: `plus` faces a growing theta. The channel of `plus` of a blade is bounded by `minus` of the
+next body round, a splitter where there is one. u along the blade from the leading edge, v from hub to shroud, both
+0..1.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.errors import InputError
+from chipload.geometry.bspline import Patch
+from chipload.geometry.revolve import Revolved
+from chipload.geometry.sections import Blade
+from chipload.planning.sectional.scene import Scene
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Impeller:
+    """An impeller.
+
+    Parameters
+    ----------
+    blade, splitter : one of each, splitter None: there are none
+    hub, shroud : of revolution, normals into the channel
+    blades : how many of each, evenly round
+    """
+
+    blade: Blade
+    splitter: Blade | None
+    hub: Revolved
+    shroud: Revolved
+    blades: int
+
+    def __post_init__(self) -> None:
+        if self.blades < 2:
+            raise InputError(f"impeller.blades = {self.blades}: must be at least 2")
+
+    @property
+    def pitch(self) -> float:
+        """Angle between two blades [rad]."""
+        return 2.0 * math.pi / self.blades
+
+    @property
+    def bodies(self) -> tuple[Blade, ...]:
+        """Blade and splitter, the splitter turned into the channel on the `plus` side of the blade."""
+        if self.splitter is None:
+            return (self.blade,)
+        ahead = (_angle(self.splitter) - _angle(self.blade)) % self.pitch
+        turn = _angle(self.blade) + ahead - _angle(self.splitter)
+        return self.blade, self.splitter.turned(turn)
+
+    def body(self, index: int) -> Blade:
+        """Bodies counted round, 0 the blade, on and on in both directions."""
+        bodies = self.bodies
+        return bodies[index % len(bodies)].turned(self.pitch * (index // len(bodies)))
+
+    def scene(
+        self,
+        body: int,
+        side: str,
+        contact: tuple[ArrayLike, ArrayLike],
+        check: tuple[int, int],
+        near: float,
+        around: int = 1,
+        hub_points: tuple[int, int] = (40, 25),
+        hub_range: tuple[float, float] = (0.0, 1.0),
+    ) -> Scene:
+        """Contact points of one side, check points of its channel and of the bodies round it.
+
+        Parameters
+        ----------
+        body : 0 blade, 1 splitter
+        side : `plus` or `minus`
+        contact : u (a,), v (b,) of the contact points, which are a x b, v the faster
+        check : how many along u and v on each side of a body
+        near : as :class:`Scene`
+        around : how many bodies beyond the channel's two on either side; 0: the channel alone, as in the source
+        hub_points, hub_range : how many along the hub and round each channel; from where to where along the hub
+
+        Returns
+        -------
+        Scene with the surfaces 0: the side milled, 1: the side that faces it, 2: the hub, 3 on: other sides.
+        """
+        if side not in ("plus", "minus") or not 0 <= body < len(self.bodies):
+            raise InputError(f"body {body}, side {side!r}: must be 0..{len(self.bodies) - 1}, plus or minus")
+        u, v = (np.asarray(x, dtype=np.float64) for x in contact)
+        if (np.concatenate([u, v]) < 0.0).any() or (np.concatenate([u, v]) > 1.0).any():
+            raise InputError("contact: u and v must be from 0 to 1")
+        U, V = (x.ravel() for x in np.meshgrid(u, v, indexing="ij"))
+        a, b = (x.ravel() for x in np.meshgrid(np.linspace(0, 1, check[0]), np.linspace(0, 1, check[1]), indexing="ij"))
+        step = 1 if side == "plus" else -1
+        own, facing = _side(self.body(body), step), _side(self.body(body + step), -step)
+        first, last = -around, 1 + around
+        floors = []
+        for k in range(first, last):
+            near_wall, far_wall = self.body(body + step * k), self.body(body + step * (k + 1))
+            floors.append(self._floor(_side(near_wall, step), _side(far_wall, -step), hub_points, hub_range))
+        parts = [own.at(a, b), facing.at(a, b), np.concatenate(floors)]
+        if around:
+            parts += [_side(self.body(body), -step).at(a, b), _side(self.body(body + step), step).at(a, b)]
+            others = [*range(first, 0), *range(2, last + 1)]
+            parts += [_side(self.body(body + step * k), w).at(a, b) for k in others for w in (1, -1)]
+        surface = np.repeat(np.arange(len(parts)), [len(p) for p in parts])
+        return Scene(
+            own.at(U, V), own.normal(U, V), own.curvature(U, V), np.zeros(len(U), dtype=np.int64),
+            np.concatenate(parts), surface, near,
+        )  # fmt: skip
+
+    def _floor(self, own: Patch, facing: Patch, count: tuple[int, int], along: tuple[float, float]) -> Floats:
+        """Points of the hub of one channel, from body to body."""
+        s = np.linspace(*along, count[0])
+        low, high = (_theta_along(p, self.hub, s) for p in (own, facing))
+        gap = np.angle(np.exp(1j * (high - low)))
+        theta = low[:, None] + gap[:, None] * np.linspace(0.0, 1.0, count[1])
+        return self.hub.at(np.repeat(s, count[1]), theta.ravel())
+
+
+def _side(blade: Blade, sign: int) -> Patch:
+    return blade.plus if sign > 0 else blade.minus
+
+
+def _angle(blade: Blade) -> float:
+    """Mean theta [rad] of a blade at its trailing edge, half way up."""
+    p = blade.plus.at(1.0, 0.5)[0]
+    return math.atan2(p[1], p[0])
+
+
+def _theta_along(patch: Patch, hub: Revolved, s: Floats) -> Floats:
+    """Theta (k,) of a side's foot at places along the hub; beyond its edges as at the edge."""
+    foot = patch.at(np.linspace(0.0, 1.0, 201), 0.0)
+    at = hub.nearest(np.hypot(foot[:, 0], foot[:, 1]), foot[:, 2])
+    theta = np.unwrap(np.arctan2(foot[:, 1], foot[:, 0]))
+    order = np.argsort(at, kind="stable")
+    out: Floats = np.interp(s, at[order], theta[order])
+    return out

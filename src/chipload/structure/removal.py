@@ -1,0 +1,298 @@
+"""How far the workpiece gives way while it is cut: the factors of the start, corrected by a small dense system.
+
+Notation: f free degrees of freedom; K stiffness at the last factorisation (the base), K' = K + dK the present one.
+Elements that were cut since the base touch the degrees of freedom A, which belong to no other element, and B, which
+they share with the rest; b = |B| is the rank. S = K_BB - K_BA K_AA^-1 K_AB of the cut elements alone, before (S) and
+after (S'); D = S' - S. P_B unit columns; W = K^-1 P_B, G = P_B^T W; F forces, U = K^-1 F; M = (I + D G)^-1 D.
+
+The cut elements are condensed on B, so whatever happened to them (thinned, gone) is a change of rank b. By Woodbury,
+without an inverse of D, forces away from A have
+
+    F^T K'^-1 F = F^T U - U_B^T M U_B,
+
+and a force on the cut elements, f_A and f_B, is carried to B: g = f_B - K'_BA K'_AA^-1 f_A,
+
+    F^T K'^-1 F = f_A^T K'_AA^-1 f_A + g^T (G - G M G) g,
+
+with no solution in the base at all. A column of W costs one solution, and is kept. After that a state costs
+O(b^3 + b^2 q) for q forces, whatever f is. ``prepare`` gets the columns ahead, so that the path of a pass is followed
+by dense algebra alone. When b passes ``limit`` the workpiece is factored again.
+
+Valid while pieces stay held (checked at each cut). A slice thinner than a thousandth of its element loses digits: the
+shape functions of the element are then stretched a thousand times. Let such an element be gone. Neighbours share their
+nodes whatever is left of them: two that are cut from opposite sides until their slices do not meet still hold together.
+
+Reference: [Hager1989] for the formula and its history.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import lu_factor, lu_solve
+from scipy.sparse import coo_array, csc_array
+
+from chipload.errors import InputError
+from chipload.progress import Progress, silent
+from chipload.structure.factors import Factors, factor
+from chipload.structure.grid import Indices
+from chipload.structure.hexa import Array, stiffness
+from chipload.structure.solid import Factored, Solid, check_held, element_dofs, factorise
+
+#: rank at which the workpiece is factored again, over sqrt(f); see benchmarks/structure.py
+LIMIT_FACTOR = 5.0
+
+#: smallest pivot of I + D G that is not taken for zero: a cut makes nothing a thousand million times softer
+SMALLEST_PIVOT = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Columns of K^-1 that were solved, at the rows of interest.
+
+    Attributes
+    ----------
+    rows : (r,) int, free degrees of freedom of the region, increasing
+    known : (c,) int, which degree of freedom each column belongs to, as a number in ``rows``
+    place : (r,) int, the column of each row; -1: not known
+    W : (c, r) float, one column of K^-1 a row
+    """
+
+    rows: Indices
+    known: Indices
+    place: Indices
+    W: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Inside:
+    """The cut elements in themselves.
+
+    Attributes
+    ----------
+    A : (a,) int, free degrees of freedom of the base that only cut elements have and that still are on material
+    gone : (g,) int, those that are on none
+    elements : (e,) int, the elements that were cut since the base
+    K_BA : (b, a) sparse, K' between B and A
+    factors : of K'_AA; None: A is empty
+    """
+
+    A: Indices
+    gone: Indices
+    elements: Indices
+    K_BA: csc_array
+    factors: Factors | None
+
+    def solve(self, force: Array) -> Array:
+        """K'_AA^-1 times (a, q)."""
+        return force if self.factors is None else self.factors.solve(force)
+
+
+@dataclass(frozen=True, eq=False)
+class Removal:
+    """A workpiece in one state of its removal.
+
+    Attributes
+    ----------
+    solid : the workpiece as it is now
+    base : its last factorisation
+    region : (e,) int, elements that may be cut
+    columns : what is known of K^-1
+    B : (b,) int, rows of ``columns``
+    D : (b, b) float [N/mm]
+    lu : factors of I + D G, as :func:`scipy.linalg.lu_factor` gives them
+    inside : the cut elements
+    limit : greatest rank before the workpiece is factored again
+    factorisations : how many there were
+    """
+
+    solid: Solid
+    base: Factored
+    region: Indices
+    columns: Columns
+    B: Indices
+    D: Array
+    lu: tuple[Array, NDArray[np.int32]]
+    inside: Inside
+    limit: int
+    factorisations: int = 1
+
+    def correction(self, U: Array) -> Array:
+        """M U (b, q) [N/mm] of displacements (b, q) of B in the base."""
+        return np.asarray(lu_solve(self.lu, self.D @ U, check_finite=False)) if len(self.B) else U
+
+    @property
+    def rank(self) -> int:
+        """Size b of the correction."""
+        return len(self.B)
+
+
+def start(solid: Solid | Factored, region: ArrayLike | None = None, limit: int | None = None) -> Removal:
+    """Begin with a workpiece as it stands.
+
+    Parameters
+    ----------
+    solid : the workpiece, factored already or not
+    region : (e,) int, elements that may be cut; None: all. Fewer need less memory: (e 60) a column
+    limit : greatest rank before the workpiece is factored again; None: 5 sqrt(f)
+
+    Raises
+    ------
+    InputError
+        The workpiece is not held, or an element of ``region`` does not exist.
+    """
+    base = solid if isinstance(solid, Factored) else factorise(solid)
+    m = len(base.solid.grid.elements)
+    chosen = np.arange(m) if region is None else np.unique(np.asarray(region, dtype=np.int64))
+    if len(chosen) and not (chosen[0] >= 0 and chosen[-1] < m):
+        raise InputError(f"removal.region: an element outside 0 .. {m - 1}")
+    if limit is None:
+        limit = math.ceil(LIMIT_FACTOR * math.sqrt(len(base.free)))
+    return _fresh(base, chosen, limit, 1)
+
+
+def _fresh(base: Factored, region: Indices, limit: int, factorisations: int) -> Removal:
+    rows = _rows(base, region)
+    columns = Columns(rows, np.zeros(0, np.int64), np.full(len(rows), -1), np.zeros((0, len(rows))))
+    none = np.zeros(0, dtype=np.int64)
+    inside = Inside(none, none, none, csc_array((0, 0)), None)
+    return Removal(
+        base.solid,
+        base,
+        region,
+        columns,
+        none,
+        np.zeros((0, 0)),
+        (np.zeros((0, 0)), np.zeros(0, np.int32)),
+        inside,
+        limit,
+        factorisations,
+    )
+
+
+def _rows(base: Factored, elements: Indices) -> Indices:
+    """Free degrees of freedom, as numbers among the free ones, of elements."""
+    number = np.full(3 * len(base.solid.grid.nodes), -1, dtype=np.int64)
+    number[base.free] = np.arange(len(base.free))
+    found = np.unique(number[element_dofs(base.solid.grid.elements[elements])])
+    return found[found >= 0]
+
+
+def prepare(state: Removal, elements: ArrayLike | None = None, progress: Progress = silent) -> Removal:
+    """Solve the columns of elements ahead of their cutting; None: of the whole region."""
+    chosen = state.region if elements is None else np.asarray(elements, dtype=np.int64)
+    wanted = np.searchsorted(state.columns.rows, _rows(state.base, chosen))
+    return replace(state, columns=_with_columns(state.columns, state.base, wanted, progress))
+
+
+def _with_columns(columns: Columns, base: Factored, wanted: Indices, progress: Progress = silent) -> Columns:
+    new = wanted[columns.place[wanted] < 0]
+    if not len(new):
+        return columns
+    W = np.empty((len(new), len(columns.rows)))
+    for at in range(0, len(new), 64):
+        some = columns.rows[new[at : at + 64]]
+        unit = np.zeros((len(base.free), len(some)))
+        unit[some, np.arange(len(some))] = 1.0
+        W[at : at + 64] = base.solve(unit, columns.rows).T
+        progress(min(1.0, (at + 64) / len(new)), "columns of the compliance")
+    place = columns.place.copy()
+    place[new] = len(columns.known) + np.arange(len(new))
+    return Columns(columns.rows, np.concatenate([columns.known, new]), place, np.concatenate([columns.W, W]))
+
+
+def cut(state: Removal, elements: ArrayLike, kept: ArrayLike = (0.0, 0.0), progress: Progress = silent) -> Removal:
+    """Take material from elements.
+
+    Parameters
+    ----------
+    elements : (e,) int, in the region
+    kept : (2,) or (e, 2) float, the part lo .. hi of the thickness (along k, 0 .. 1) that stays; thinned by x from
+        the side k+ it is (0, 1 - x); (0, 0): the element is gone
+
+    Raises
+    ------
+    InputError
+        An element is not in the region, material would come back, or a piece would be loose.
+    """
+    e = np.atleast_1d(np.asarray(elements, dtype=np.int64))
+    stray = e[~np.isin(e, state.region)]
+    if len(stray):
+        raise InputError(f"cut: element {stray[0]} is not in the region of this removal")
+    assert state.solid.kept is not None
+    now = state.solid.kept.copy()
+    new = np.broadcast_to(np.asarray(kept, dtype=np.float64), (len(e), 2))
+    empty = new[:, 0] >= new[:, 1]
+    back = ~empty & ((new[:, 0] < now[e, 0]) | (new[:, 1] > now[e, 1]))
+    if back.any():
+        k = int(np.flatnonzero(back)[0])
+        raise InputError(
+            f"cut: element {e[k]} keeps {new[k].tolist()} of its thickness, had {now[e[k]].tolist()}: material cannot "
+            "come back"
+        )
+    now[e] = np.where(empty[:, None], 0.0, new)
+    solid = replace(state.solid, kept=now)
+    check_held(solid)
+    touched, rest, before, after = _cut_elements(state.base, solid)
+    B, A = np.flatnonzero(rest), np.flatnonzero(~rest)
+    if len(B) > state.limit or len(A) > 0.5 * len(state.base.free):
+        return _fresh(factorise(solid), state.region, state.limit, state.factorisations + 1)
+    gone = after.diagonal()[A] == 0.0
+    live = A[~gone]
+    D = after[B][:, B].toarray() - before[B][:, B].toarray()
+    if len(A):
+        D += before[B][:, A] @ factor(before[A][:, A].tocsc()).solve(before[A][:, B].toarray())
+    K_BA = after[B][:, live].tocsc()
+    inside = Inside(
+        touched[live],
+        touched[A[gone]],
+        np.flatnonzero((now != state.base.solid.kept).any(axis=1)),
+        K_BA,
+        factor(after[live][:, live].tocsc()) if len(live) else None,
+    )
+    if len(live):
+        D -= K_BA @ inside.solve(K_BA.T.toarray())
+    at = np.searchsorted(state.columns.rows, touched[B])
+    columns = _with_columns(state.columns, state.base, at, progress)
+    G = columns.W[np.ix_(columns.place[at], at)]
+    D = 0.5 * (D + D.T)
+    within = D @ G
+    within[np.diag_indices(len(B))] += 1.0
+    lu = lu_factor(within, overwrite_a=True, check_finite=False) if len(B) else state.lu
+    pivot = float(abs(lu[0].diagonal()).min()) if len(B) else 1.0
+    if not pivot > SMALLEST_PIVOT:
+        raise InputError(
+            f"cut: smallest pivot {pivot:.1e}, must be above {SMALLEST_PIVOT:.1e}: a piece of the workpiece would hang "
+            "on a hinge of nodes or hardly at all"
+        )
+    return replace(state, solid=solid, columns=columns, B=at, D=D, lu=lu, inside=inside)
+
+
+def _cut_elements(base: Factored, solid: Solid) -> tuple[Indices, NDArray[np.bool_], csc_array, csc_array]:
+    """Cut elements: their free degrees of freedom, which other elements share, stiffness before and after."""
+    assert base.solid.kept is not None
+    assert solid.kept is not None
+    differs = (base.solid.kept != solid.kept).any(axis=1)
+    e = np.flatnonzero(differs)
+    elements = solid.grid.elements[e]
+    touched = _rows(base, e)
+    number = np.full(3 * len(solid.grid.nodes), -1, dtype=np.int64)
+    number[base.free[touched]] = np.arange(len(touched))
+    dofs = number[element_dofs(elements)]
+    rows, columns = np.repeat(dofs, 60, axis=1).ravel(), np.tile(dofs, (1, 60)).ravel()
+    free = (rows >= 0) & (columns >= 0)
+    xyz = solid.grid.nodes[elements]
+
+    def summed(kept: Array) -> csc_array:
+        K = np.zeros((len(e), 60, 60))
+        part = kept[:, 1] > kept[:, 0]
+        K[part] = stiffness(xyz[part], solid.modulus, solid.poisson, solid.rule, kept[part])
+        size = (len(touched), len(touched))
+        return coo_array((K.ravel()[free], (rows[free], columns[free])), shape=size).tocsc()
+
+    other = np.zeros(len(solid.grid.nodes), dtype=np.bool_)
+    other[solid.grid.elements[~differs & (solid.kept[:, 1] > solid.kept[:, 0])]] = True
+    return touched, other[base.free[touched] // 3], summed(base.solid.kept[e]), summed(solid.kept[e])

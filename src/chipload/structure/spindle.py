@@ -1,0 +1,164 @@
+"""How far the tip gives way when holder and spindle bend too: a chain of bars and joints.
+
+Notation: z [mm] height above the tip; E I [N mm^2] of each bar, from the tip upwards; a joint at height z_j gives way
+by c_ff [mm/N] under a force, c_mm [rad/(N mm)] under a moment, c_fm [1/N] each under the other.
+
+The chain is held at its end and statically determinate, so the joints add to the bending (unit load method):
+
+    C(a, b) = integral from max(a, b) of (z - a)(z - b) / (E I) dz
+              + sum over joints above both of c_ff + c_fm (z_j - a + z_j - b) + c_mm (z_j - a)(z_j - b).
+
+Shear is left out, as in :mod:`chipload.structure.beam`, with which a clamped cutter agrees to the last digits.
+
+Reference: [Altintas2012] ch. 2 and 4; [Schmitz2009] ch. 9 for the joint between cutter and holder.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from chipload.cutter.cutter import Cutter
+from chipload.errors import InputError
+from chipload.structure.beam import FLUTED_FACTOR, flexibilities
+from chipload.structure.hexa import Array
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What gives way between two bars: c_ff [mm/N], c_mm [rad/(N mm)], c_fm [1/N]; all 0: rigid.
+
+    Raises
+    ------
+    InputError
+        The compliances are not those of something passive (c_ff, c_mm >= 0, c_fm^2 <= c_ff c_mm).
+    """
+
+    c_ff: float = 0.0
+    c_mm: float = 0.0
+    c_fm: float = 0.0
+
+    def __post_init__(self) -> None:
+        ok = self.c_ff >= 0.0 and self.c_mm >= 0.0 and self.c_fm**2 <= self.c_ff * self.c_mm * (1.0 + 1e-12)
+        if not (ok and all(math.isfinite(c) for c in (self.c_ff, self.c_mm, self.c_fm))):
+            raise InputError(
+                f"joint: c_ff = {self.c_ff:g}, c_mm = {self.c_mm:g}, c_fm = {self.c_fm:g}: c_ff and c_mm must be at "
+                "least 0, c_fm^2 at most c_ff c_mm"
+            )
+
+
+RIGID = Joint()
+
+
+def springs(translation: float = math.inf, rotation: float = math.inf) -> Joint:
+    """Joint of two springs, [N/mm] and [N mm/rad]; infinite: rigid.
+
+    Examples
+    --------
+    >>> springs(2e4, 5e7)
+    Joint(c_ff=5e-05, c_mm=2e-08, c_fm=0.0)
+    """
+    for name, k in (("translation", translation), ("rotation", rotation)):
+        if not k > 0.0:
+            raise InputError(f"joint.{name} = {k:g}: a stiffness must be above 0; inf for a rigid one")
+    return Joint(1.0 / translation, 1.0 / rotation)
+
+
+def bearings(front: float, rear: float, span: float, bending: float = math.inf) -> Joint:
+    """Spindle on two bearings, as a joint at the front one.
+
+    Parameters
+    ----------
+    front, rear : stiffness of the bearings [N/mm]
+    span : distance between them [mm]
+    bending : E I of the spindle between them [N mm^2]
+
+    Examples
+    --------
+    >>> round(bearings(1e5, 1e5, 100.0).c_mm * 1e9, 9)
+    2.0
+    """
+    for name, k in (("front", front), ("rear", rear), ("span", span), ("bending", bending)):
+        if not k > 0.0:
+            raise InputError(f"bearings.{name} = {k:g}: must be above 0")
+    return Joint(1.0 / front, (1.0 / front + 1.0 / rear) / span**2 + span / (3.0 * bending), 1.0 / (front * span))
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A bar of one section: length [mm], 1 / (E I) [1/(N mm^2)], and the joint at its upper end."""
+
+    length: float
+    flexibility: float
+    joint: Joint = RIGID
+
+    def __post_init__(self) -> None:
+        if not (self.length >= 0.0 and self.flexibility >= 0.0 and math.isfinite(self.length)):
+            raise InputError(f"bar: length_mm = {self.length:g}, 1/(E I) = {self.flexibility:g}: must be at least 0")
+
+
+def tube(length: float, outer: float, modulus: float, inner: float = 0.0, joint: Joint = RIGID) -> Bar:
+    """Bar of a round section, diameters [mm], modulus [MPa]: 1 / (E I) = 64 / (pi E (D^4 - d^4)).
+
+    Examples
+    --------
+    >>> round(1.0 / tube(30.0, 10.0, 6e5).flexibility / 6e5, 3)
+    490.874
+    """
+    if not (outer > inner >= 0.0 and modulus > 0.0):
+        raise InputError(
+            f"tube: outer_mm = {outer:g}, inner_mm = {inner:g}, modulus = {modulus:g} MPa: must be outer > inner >= 0, "
+            "modulus > 0"
+        )
+    return Bar(length, 64.0 / (math.pi * modulus * (outer**4 - inner**4)), joint)
+
+
+def cutter_bars(cutter: Cutter, joint: Joint = RIGID, fluted_factor: float = FLUTED_FACTOR) -> tuple[Bar, ...]:
+    """Fluted part and shank of a cutter, with the joint by which the holder grips it."""
+    fluted, shank = flexibilities(cutter, fluted_factor)
+    return Bar(cutter.flute_length, fluted), Bar(cutter.overhang - cutter.flute_length, shank, joint)
+
+
+def chain_compliance(bars: tuple[Bar, ...], z_force: ArrayLike, z_point: ArrayLike) -> Array:
+    """Lateral deflection at one height under a unit lateral force at another, [mm/N].
+
+    O(bars) a pair.
+
+    Parameters
+    ----------
+    bars : from the tip upwards; what the last joint is fastened to does not move
+    z_force, z_point : float [mm], any shapes that broadcast, 0 .. length of the chain
+
+    Raises
+    ------
+    InputError
+        A height lies outside the chain.
+
+    Examples
+    --------
+    A rigid bar of 50 mm on a joint of 20 kN/mm and 50 kN m/rad:
+
+    >>> round(float(chain_compliance((Bar(50.0, 0.0, springs(2e4, 5e7)),), 0.0, 0.0)) * 1e6, 6)
+    100.0
+    """
+    a = np.asarray(z_force, dtype=np.float64)
+    b = np.asarray(z_point, dtype=np.float64)
+    length = sum(bar.length for bar in bars)
+    for name, z in (("z_force", a), ("z_point", b)):
+        bad = ~((z >= 0.0) & (z <= length))
+        if bad.any():
+            raise InputError(f"chain_compliance: {name} = {z[bad].flat[0]:g} mm: must be from 0 to {length:g}")
+    top, c = np.maximum(a, b), np.abs(a - b)
+    out: Array = np.zeros(top.shape)
+    end = 0.0
+    for bar in bars:
+        low = np.maximum(end - top, 0.0)
+        end += bar.length
+        high = np.maximum(end - top, 0.0)
+        out = out + bar.flexibility * ((high**3 - low**3) / 3.0 + c * (high**2 - low**2) / 2.0)
+        j = bar.joint
+        out = out + np.where(end >= top, j.c_ff + j.c_fm * (2.0 * end - a - b) + j.c_mm * (end - a) * (end - b), 0.0)
+    return out

@@ -1,0 +1,88 @@
+"""Logs: columns, units, rows that are left out, what is refused."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from chipload.control.logs import read_log
+from chipload.errors import InputError
+
+TEXT = "t,n,I,what\n0,60,1.5,air\n10,120,2.5,cut\n20,bad,3,cut\n30,60,,cut\n\n15,60,2,cut\n40,180,4,\n"
+COLUMNS = {
+    "time": {"column": "t", "unit": "ms"},
+    "speed": {"column": "n", "unit": "rpm"},
+    "current": {"column": "I", "unit": "mA"},
+    "label": {"column": "what"},
+}
+
+
+@pytest.fixture
+def path(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(TEXT)
+    return path
+
+
+def test_columns_and_units(path):
+    log, findings = read_log(path, COLUMNS)
+    assert log.time.tolist() == [0.0, 0.01, 0.015, 0.04]
+    assert log.speed.tolist() == pytest.approx([2 * math.pi, 4 * math.pi, 2 * math.pi, 6 * math.pi])
+    assert log.current.tolist() == [0.0015, 0.0025, 0.002, 0.004]
+    assert log.label.tolist() == ["air", "cut", "cut", ""]
+    assert log.torque is None
+    assert [(f.code, f.line) for f in findings] == [("log-row", 4)]
+
+
+def test_time_that_does_not_rise(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("t,I\n0,1\n2,1\n1,5\n2,6\n3,1\n")
+    log, findings = read_log(path, {"time": {"column": "t", "unit": "s"}, "current": {"column": "I", "unit": "A"}})
+    assert log.time.tolist() == [0.0, 2.0, 3.0]
+    assert log.current.tolist() == [1.0, 1.0, 1.0]
+    assert [(f.code, f.line) for f in findings] == [("log-time", 4)]
+
+
+def test_a_time_of_a_row_and_a_file_of_columns(path, tmp_path):
+    table = tmp_path / "columns.toml"
+    table.write_text('sample_s = 0.1\n[current]\ncolumn = "I"\nunit = "A"\n')
+    log, _ = read_log(path, table)
+    assert log.time.tolist() == pytest.approx([0.0, 0.1, 0.2, 0.5, 0.6]) or len(log.time) == 5
+    assert log.current.tolist() == [1.5, 2.5, 3.0, 2.0, 4.0]
+
+
+@pytest.mark.parametrize(
+    ("columns", "text"),
+    [
+        ({}, "log columns: current is missing: the column of the spindle current must be named"),
+        ({"current": {"column": "I", "unit": "A"}}, "log columns: must give either time or sample_s"),
+        ({**COLUMNS, "sample_s": 0.1}, "log columns: must give either time or sample_s"),
+        ({"curent": {}}, "log columns: unknown quantity curent: the nearest known one is current"),
+        ({"current": "I"}, "log columns: current: must be a table with column and unit"),
+        (
+            {"current": {"column": "I", "unit": "V"}},
+            "log columns: current.unit = 'V': must be one of A, mA, count",
+        ),
+        ({"sample_s": -1}, "log columns: sample_s = -1: must be a number above 0"),
+        (
+            {"sample_s": 1, "current": {"column": "Ix", "unit": "A"}},
+            "log {}: no column Ix for current: the nearest is I",
+        ),
+    ],
+)
+def test_refused(path, columns, text):
+    with pytest.raises(InputError) as err:
+        read_log(path, columns)
+    assert str(err.value) == text.format(path)
+
+
+def test_files_that_are_none(tmp_path):
+    one = {"sample_s": 1, "current": {"column": "I", "unit": "A"}}
+    with pytest.raises(InputError, match="cannot be read"):
+        read_log(tmp_path / "none.csv", one)
+    for text in ("", "I\n", "I\nx\n", "\0\0"):
+        path = tmp_path / "bad.csv"
+        path.write_text(text)
+        with pytest.raises(InputError):
+            read_log(path, one)

@@ -1,0 +1,72 @@
+"""Interpolating B-spline surfaces, against scipy and closed forms."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import NdBSpline
+
+from chipload.errors import InputError
+from chipload.geometry.bspline import through
+
+U, V = np.sort(np.r_[0.0, np.random.default_rng(1).uniform(size=11), 1.0]), np.linspace(0.0, 1.0, 9) ** 1.3
+
+
+def wavy():
+    u, v = np.meshgrid(U, V, indexing="ij")
+    return np.stack([30 * u + np.sin(3 * v), 20 * v + u * u, 4 * np.sin(4 * u) * np.cos(3 * v)], axis=-1)
+
+
+@pytest.mark.parametrize("degrees", [(3, 3), (5, 2), (1, 3)])
+def test_against_scipy(degrees):
+    patch = through(wavy(), U, V, degrees)
+    other = NdBSpline((patch.knots_u, patch.knots_v), patch.control, patch.degrees)
+    rng = np.random.default_rng(2)
+    u, v = np.r_[0, 1, 0, 1, rng.uniform(size=200)], np.r_[0, 0, 1, 1, rng.uniform(size=200)]
+    xi = np.stack([u, v], axis=-1)
+    for du, dv in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)):
+        expected = other(xi, nu=(du, dv))
+        np.testing.assert_allclose(patch.at(u, v, du, dv), expected, rtol=1e-9, atol=1e-9)
+
+
+def test_goes_through_its_points():
+    u, v = np.meshgrid(U, V, indexing="ij")
+    at = through(wavy(), U, V).at(u.ravel(), v.ravel())
+    np.testing.assert_allclose(at, wavy().reshape(-1, 3), atol=1e-11)
+
+
+def torus(a, b):
+    """R 20, r 5: normal outwards, curvatures -1/5 and -cos(b) / (20 + 5 cos b)."""
+    ring = 20.0 + 5.0 * np.cos(b)
+    return np.stack([ring * np.cos(a), ring * np.sin(a), 5.0 * np.sin(b)], axis=-1)
+
+
+def test_normal_and_curvature_of_a_torus():
+    x = np.linspace(0.0, 1.0, 60)
+    a, b = np.meshgrid(1.0 * x, 1.0 * x, indexing="ij")
+    patch = through(torus(a, b), x, x, (5, 5))
+    u, v = (c.ravel() for c in np.meshgrid(np.linspace(0.1, 0.9, 7), np.linspace(0.1, 0.9, 7)))
+    ring = np.stack([np.cos(u), np.sin(u), np.zeros_like(u)], axis=-1)
+    normal = ring * np.cos(v)[:, None] + np.array([0, 0, 1.0]) * np.sin(v)[:, None]
+    np.testing.assert_allclose(patch.normal(u, v), normal, atol=1e-8)
+    expected = np.stack([np.full(len(u), -0.2), -np.cos(v) / (20 + 5 * np.cos(v))], axis=-1)
+    np.testing.assert_allclose(patch.principal(u, v), np.sort(expected, axis=1), atol=1e-6)
+    around = np.stack([-np.sin(u), np.cos(u), np.zeros_like(u)], axis=-1)
+    K = patch.curvature(u, v)
+    np.testing.assert_allclose(np.einsum("ki,kij,kj->k", around, K, around), expected[:, 1], atol=1e-6)
+    np.testing.assert_allclose(K @ normal[:, :, None], 0.0, atol=1e-7)
+
+
+def test_turned():
+    patch = through(wavy(), U, V)
+    p, q = patch.at(0.3, 0.6)[0], patch.turned(0.7).at(0.3, 0.6)[0]
+    assert np.hypot(*p[:2]) == pytest.approx(np.hypot(*q[:2]))
+    assert np.arctan2(q[1], q[0]) - np.arctan2(p[1], p[0]) == pytest.approx(0.7)
+
+
+def test_refused():
+    with pytest.raises(InputError, match=r"patch.u: must ascend from 0 to 1, one for each of 13 points"):
+        through(wavy(), U * 2, V)
+    with pytest.raises(InputError, match=r"patch: parameter out of 0\.\.1"):
+        through(wavy(), U, V).at(1.1, 0.0)
+    flat = np.zeros((4, 4, 3))
+    with pytest.raises(InputError, match="no normal where S_u and S_v are parallel"):
+        through(flat, np.linspace(0, 1, 4), np.linspace(0, 1, 4)).normal(0.5, 0.5)
