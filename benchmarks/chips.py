@@ -4,8 +4,8 @@
 
 Notation: a covered area is what one move covers of one layer. Its relative error is held against the boundary at a
 tolerance of 1e-6 mm. Every method gets the coarsest resolution of its ladder whose mean error over all moves is at
-most 1e-4; where it has two resolutions, the fastest pair of a grid that reaches it. The moves: 1 to 6 mm long, the axis
-leaning by up to 25 degrees and turning by up to 6.
+most 1e-4; where it has two resolutions, the fastest pair of a grid that reaches it. The axis leans by up to 25 degrees.
+Short moves are 1 to 6 mm long and turn by up to 6 degrees, long ones 10 to 30 mm and by 10 to 30 degrees.
 
 * dense union: polygons of the section (ellipses of a flank, circles of a ball, in closed form) at even instants,
   joined by shapely;
@@ -43,6 +43,9 @@ FLAT = Cutter(10.0, 4, 0.5, 60.0, 80.0, 6e5)
 BALL = Cutter(10.0, 2, 0.5, 25.0, 40.0, 6e5, corner_radius=5.0)
 ERROR = 1e-4
 TIMES = 3
+#: resolutions that are tried
+INSTANTS, SIDES = (8, 12, 16, 24, 32, 48, 64, 96, 128, 192), (64, 128, 192, 256, 320, 384)
+PITCHES, MISSES = (0.1, 0.07, 0.05, 0.035, 0.025, 0.015), (3e-2, 1e-2, 3e-3, 1e-3, 3e-4)
 
 
 def clock(work, times: int = TIMES) -> float:
@@ -55,17 +58,19 @@ def clock(work, times: int = TIMES) -> float:
     return best
 
 
-def some_moves(n: int) -> list[tuple[Cutter, Move, float]]:
+def some_moves(n: int, kind: str = "short") -> list[tuple[Cutter, Move, float]]:
     """Moves with a layer that meets only the flank of a flat end mill, or only the ball."""
     rng = np.random.default_rng(2017)
     out = []
+    lengths, turns = ((1.0, 6.0), (0.5, 6.0)) if kind == "short" else ((10.0, 30.0), (10.0, 30.0))
     for k in range(n):
         lean, way = rng.uniform(0.05, 0.43), rng.uniform(0.0, math.tau)
         a = np.array([math.sin(lean) * math.cos(way), math.sin(lean) * math.sin(way), math.cos(lean)])
-        b = a + math.radians(rng.uniform(0.5, 6.0)) * np.append(rng.normal(size=2) / 1.5, 0.0)
-        a, b = (v / np.linalg.norm(v) for v in (a, b))
+        toward = np.cross(a, np.append(rng.normal(size=2), 0.0))
+        turn = math.radians(rng.uniform(*turns))
+        b = math.cos(turn) * a + math.sin(turn) * toward / np.linalg.norm(toward)
         p = np.zeros(3)
-        q = rng.uniform(1.0, 6.0) * np.array([math.cos(k), math.sin(k), 0.1 * rng.normal()])
+        q = rng.uniform(*lengths) * np.array([math.cos(k), math.sin(k), rng.uniform(-0.03, 0.03)])
         if k % 2:
             out.append((FLAT, Move.slerp(p, a, q, b), float(rng.uniform(9.0, 30.0))))
         else:
@@ -101,12 +106,13 @@ def rays(cutter: Cutter, move: Move, height: float, box: tuple[float, ...], pitc
     return (before - stock.volume()) / (2.0 * thin)
 
 
-def rates() -> None:
-    moves = some_moves(60)
+def rates(kind: str) -> None:
+    """Areas a second by each method, all at the same error."""
+    moves = some_moves(60, kind)
     fine = [covered_areas(m, c, [h], 1e-6)[0] for c, m, h in moves]
     exact = np.array([a.area for a in fine])
-    boxes = [tuple(np.array(a.polygon.bounds) + (-0.01, -0.01, 0.01, 0.01)) for a in fine]
-    print(f"{len(moves)} moves, {sum(a.simple for a in fine)} of one loop; mean |error| at most {ERROR:g}")
+    boxes = [tuple(np.add(a.polygon.bounds, (-0.01, -0.01, 0.01, 0.01))) for a in fine]
+    print(f"{len(moves)} {kind} moves, {sum(a.simple for a in fine)} of one loop; mean |error| at most {ERROR:g}")
 
     def error(found: list[float]) -> float:
         return float(np.abs(np.array(found) / exact - 1.0).mean())
@@ -126,8 +132,8 @@ def rates() -> None:
     ladders = {
         "boundary, area in curves": (boundary, [(t,) for t in (0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)]),
         "boundary, polygon": (polygons, [(t,) for t in (0.01, 0.005, 0.002, 0.001, 0.0005, 0.0002)]),
-        "dense union": (union, list(itertools.product((8, 12, 16, 24, 32, 48, 64, 96), (48, 64, 96, 128, 192, 256, 384)))),
-        "dexels": (dexels, list(itertools.product((0.4, 0.2, 0.1, 0.05, 0.025), (3e-2, 1e-2, 3e-3, 1e-3, 3e-4)))),
+        "dense union": (union, list(itertools.product(INSTANTS, SIDES))),
+        "dexels": (dexels, list(itertools.product(PITCHES, MISSES))),
     }
     found = {}
     for name, (method, ladder) in ladders.items():
@@ -244,7 +250,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="folder for chips.html")
     args = parser.parse_args()
     finishing(400)
-    rates()
+    rates("short")
+    rates("long")
     at: list[tuple[float, float]] = []
     wall, own, removal = finishing(args.points, at=at)
     c = removal.columns
