@@ -124,6 +124,14 @@ def test_what_is_wrong_with_a_program_is_said() -> None:
         remove(straight([-10, 0, -3], [30, 0, -3], spindle=0.0), block(), {1: MILL}, ENERGY, FINE)
 
 
+def test_an_axis_that_lies_is_refused_at_the_stock_and_nowhere_else() -> None:
+    lying = [[1, 0, 0], [1, 0, 0]]
+    with pytest.raises(InputError, match=r"line 1: move: the axis has A_z = 0 somewhere"):
+        remove(five_axis([[-10, 0, -3], [30, 0, -3]], lying), block(), {1: MILL}, ENERGY, FINE)
+    away = remove(five_axis([[-10, 0, 30], [30, 0, 30]], lying), block(), {1: MILL}, ENERGY, FINE)
+    assert not away.columns["chip_volume_mm3"].any()
+
+
 def test_the_same_in_another_place_and_turned_by_a_quarter() -> None:
     one = remove(straight([-10, 1, -3], [30, 2, -4]), block(), {1: BALL}, material_named("al7075-t6"), FINE).columns
     stock = LayeredStock.block((80.0, 100.0, 40.0), (120.0, 140.0, 50.0), 0.5, 15.0)

@@ -96,7 +96,7 @@ class Removal:
     mean_band : (4,) standard deviation of the mean force x, y, z [N] and torque [N m] over the time in cut, from that
         of the coefficients; None: the material does not say how sure they are
     piece : the chip with most pieces that are most alike; None where nothing was cut
-    findings : rapids that cut, material above the flutes
+    findings : rapids that cut
     labels : of the program, `label` of the columns counts in them
     """
 
@@ -142,7 +142,7 @@ def remove(
     Raises
     ------
     InputError
-        A tool has no cutter, an axis lies or looks down, a cut is made with the spindle at rest.
+        A tool has no cutter, an axis lies or looks down at the stock, a cut is made with the spindle at rest.
 
     Notes
     -----
@@ -164,29 +164,26 @@ def remove(
         some = range(first, min(first + BLOCK, len(steps)))
         cuts: list[StepBite] = []
         for k, swept in swept_ahead(steps, some, stock, cutters, interpolation, resolution.tolerance):
-            cutter, move, met = cutters[int(steps.tool[k])], swept.move, swept.met
-            inner, outer, layers = swept.low, swept.high, swept.layers
+            cutter, met, low, high = cutters[int(steps.tool[k])], swept.met, swept.low, swept.high
             # a face that looks down is held against the layer below
-            material_before = Section(*stock.edges(range(max(layers.start - 1, 0), layers.stop), inner[:2], outer[:2]))
+            layers = range(max(swept.layers.start - 1, 0), swept.layers.stop)
+            there = Section(*stock.edges(layers, low[:2], high[:2]))
             tidied = stock.tidied
             taken = stock.remove_many([i for i, _ in met], [shape for _, shape in met], 0.5 * resolution.tolerance)
             removed[k, 0] = tidied - stock.tidied
-            chips = {i: pieces for (i, _), pieces in zip(met, taken, strict=True) if pieces}
-            if not chips:
-                continue
-            for i, pieces in chips.items():
+            for (i, _), pieces in zip(met, taken, strict=True):
+                if not pieces:
+                    continue
                 whole = [p for p in pieces if _whole(p, resolution.tolerance)]
                 removed[k] += (sum(p.area for p in pieces) * stock.thickness[i], 0.0, 1.0)
                 removed[k, 1] = max(removed[k, 1], len(whole))
-                areas = [p.area for p in whole]
-                alike = min(areas) / sum(areas) if areas else 0.0
-                if (len(whole), alike) > rank:
-                    rank = (len(whole), alike)
-                    near = stock.section(i).union(MultiPolygon(pieces)).intersection(box(*inner[:2], *outer[:2]))
-                    best = Piece(k, move, cutter, float(stock.heights[i]), near, tuple(whole))
+                if _rank(whole) > rank:
+                    rank = _rank(whole)
+                    near = stock.section(i).union(MultiPolygon(pieces)).intersection(box(*low[:2], *high[:2]))
+                    best = Piece(k, swept.move, cutter, float(stock.heights[i]), near, tuple(whole))
             # what is thinner than the tolerance can tell is no cut
             if removed[k, 1] > 0.0 and not steps.rapid[k]:
-                cuts.append(bite_of_step(steps, k, move, cutter, profiles[int(steps.tool[k])], material_before))
+                cuts.append(bite_of_step(steps, k, swept.move, cutter, profiles[int(steps.tool[k])], there))
         for number in sorted({int(steps.tool[c.step]) for c in cuts}):
             own = [c for c in cuts if steps.tool[c.step] == number]
             at = [c.step for c in own]
@@ -209,6 +206,12 @@ def remove(
 def _sure(material: Material) -> bool:
     """Whether the material says how sure its coefficients are."""
     return material.spread is not None or material.covariance is not None
+
+
+def _rank(whole: list[Polygon]) -> tuple[int, float]:
+    """By how many pieces a chip stands out, and by how alike they are."""
+    areas = [p.area for p in whole]
+    return len(areas), min(areas) / sum(areas) if areas else 0.0
 
 
 def _whole(piece: Polygon, tolerance: float) -> bool:

@@ -18,6 +18,7 @@ from shapely import MultiPolygon, Polygon
 from chipload.cutter.cutter import Cutter
 from chipload.engagement.chips.covered import covered_areas
 from chipload.engagement.chips.move import Move
+from chipload.errors import InputError
 from chipload.simulation.steps import Steps
 from chipload.stock.layers import LayeredStock
 
@@ -44,17 +45,30 @@ def swept_ahead(
     interpolation: Interpolation,
     tolerance: float,
 ) -> Iterator[tuple[int, Swept]]:
-    """Those of ``some`` steps that meet a layer, in their order; found in a thread that runs ahead of the caller."""
+    """Those of ``some`` steps that meet a layer, in their order; found in a thread that runs ahead of the caller.
 
-    def swept(k: int) -> Swept:
-        cutter, move = cutters[int(steps.tool[k])], _move(steps, k, interpolation)
+    Raises
+    ------
+    InputError
+        Beside or in the stock the axis lies, or looks down.
+    """
+
+    def swept(k: int) -> Swept | None:
+        cutter = cutters[int(steps.tool[k])]
         low, high = _box(steps, k, cutter)
         layers = stock.layers_between(low[2], high[2])
+        beside = high[0] < stock.xs[0] or low[0] > stock.xs[-1] or high[1] < stock.ys[0] or low[1] > stock.ys[-1]
+        if beside or not layers:
+            return None
+        try:
+            move = _move(steps, k, interpolation)
+        except InputError as err:
+            raise InputError(f"line {steps.line[k]}: {err}") from None
         return Swept(move, low, high, layers, _covered(steps, k, move, cutter, stock, layers, tolerance))
 
     with ThreadPoolExecutor(1) as pool:
         for k, found in zip(some, pool.map(swept, some), strict=True):
-            if found.met:
+            if found is not None and found.met:
                 yield k, found
 
 
