@@ -11,8 +11,8 @@ Short moves are 1 to 6 mm long and turn by up to 6 degrees, long ones 10 to 30 m
   joined by shapely;
 * dexels: rays along x in the layer's plane, which is the best that dexels do for one area.
 
-Times are processor seconds of this process, so that other work on the computer matters less; the 10,000 points are also
-timed by the clock. ``--out`` writes ``chips.html`` with the figure of the costs.
+Times are processor seconds of all threads of this process, so that other work on the computer matters less; the 10,000
+points are also timed by the clock. ``--out`` writes ``chips.html`` with the figure of the costs.
 """
 
 from __future__ import annotations
@@ -156,10 +156,11 @@ def rates(kind: str) -> None:
             print(f"  {mine} / {other}: {found[mine] / found[other]:.1f}")
 
 
-def slope(x: np.ndarray, y: np.ndarray) -> float:
-    """Exponent of a power law through the upper half of the points."""
-    some = slice(len(x) // 2 - 1, None)
-    return float(np.polyfit(np.log(x[some]), np.log(y[some]), 1)[0])
+def line(x: np.ndarray, y: np.ndarray) -> str:
+    """The straight line a + b x through the points and how much of their scatter it holds."""
+    b, a = np.polyfit(x, y, 1)
+    rest = ((y - a - b * x) ** 2).sum() / ((y - y.mean()) ** 2).sum()
+    return f"{a:.3g} s + {1e3 * b:.3g} ms each, R2 = {1.0 - rest:.4f}"
 
 
 def wavy(points: int) -> Program:
@@ -237,7 +238,7 @@ def figure(cost: dict[str, tuple[np.ndarray, np.ndarray]]):
 
     fig = go.Figure()
     for name, (x, y) in cost.items():
-        fig.add_trace(go.Scatter(x=x, y=y, mode="lines+markers", name=f"{name}: slope {slope(x, y):.2f}"))
+        fig.add_trace(go.Scatter(x=x, y=y, mode="lines+markers", name=f"{name}: {line(x, y)}"))
     fig.update_xaxes(type="log", title="number")
     fig.update_yaxes(type="log", title="processor time [s]")
     fig.update_layout(title="Cost of chips")
@@ -257,20 +258,20 @@ def main() -> None:
     c = removal.columns
     n = len(c["x_mm"])
     print(f"{args.points} five-axis points, {n} steps, {c['chip_layers'].mean():.1f} layers cut a step, with forces:")
-    print(f"  {wall:.1f} s by the clock, {own:.1f} s of one processor, {1e3 * own / n:.2f} ms a step")
+    print(f"  {wall:.1f} s by the clock, {own:.1f} s of processors, {1e3 * own / n:.2f} ms a step")
     print(f"  removed {c['chip_volume_mm3'].sum():.1f} mm3; greatest force {c['force_n'].max():.1f} N")
     print("cost:")
     cost = costs(at, n)
     for name, (x, y) in cost.items():
         rows = "  ".join(f"{a:.0f}: {b:.3g}" for a, b in zip(x, y, strict=True))
-        print(f"  {name}: slope {slope(x, y):.2f}\n    {rows}")
+        print(f"  {name}: {line(x, y)}\n    {rows}")
     profile = cProfile.Profile()
     profile.enable()
     finishing(1000)
     profile.disable()
     text = io.StringIO()
     pstats.Stats(profile, stream=text).sort_stats("tottime").print_stats(14)
-    print("profile of 1000 points (own time):")
+    print("profile of 1000 points, own time in the thread that removes; at a lock it waits for the one that covers:")
     for row in text.getvalue().splitlines():
         parts = row.split(None, 5)
         if len(parts) == 6 and parts[1].replace(".", "").isdigit():

@@ -43,8 +43,8 @@ def test_a_rigid_motion_leaves_volumes_and_turns_forces(cutter: Cutter, seed: in
     a, b = one.columns, two.columns
     force, turned = (np.column_stack([c[name] for name in FORCES]) for c in (a, b))
     np.testing.assert_allclose(b["chip_volume_mm3"], a["chip_volume_mm3"], atol=1e-4 * a["chip_volume_mm3"].max())
-    assert b["chip_volume_mm3"].sum() == pytest.approx(a["chip_volume_mm3"].sum(), rel=1e-5)
-    np.testing.assert_allclose(turned, force @ turn.T, atol=1e-3 * np.abs(force).max())
+    assert b["chip_volume_mm3"].sum() == pytest.approx(a["chip_volume_mm3"].sum(), rel=5e-5)
+    np.testing.assert_allclose(turned, force @ turn.T, atol=3e-4 * np.abs(force).max())
     np.testing.assert_allclose(b["torque_mean_nm"], a["torque_mean_nm"], atol=1e-3 * a["torque_mean_nm"].max())
 
 
