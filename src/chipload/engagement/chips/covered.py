@@ -131,7 +131,7 @@ def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], toleranc
         if n == trace.NOTHING:
             out.append(None)
         elif n == trace.GENERAL:
-            out.append(_noded(move, K, h, tolerance, max(_KNOTS, 2 * knots)))
+            out.append(_noded(move, K, h, tolerance, max(_KNOTS, 4 * knots)))
         else:
             out.append(Covered((ring_of_edges(buffer[:n].copy()),), h, tolerance, True))
     return out

@@ -18,7 +18,7 @@ from chipload.engagement.chips.zeros._kernels import CORNER, MAX_ROOTS, NODES, d
 
 FIRST, LAST, GRAZING, CHORD, CHORD_END, FIRST_CHORD, LAST_CHORD = 0, 1, 2, 3, 4, 5, 6
 NOTHING, GENERAL, FULL, UNSETTLED = -1, -2, -3, -4
-KNOTS, MOST_KNOTS = 9, 100
+KNOTS, MOST_KNOTS = 5, 60
 INSET = 1e-10  # of a span of time: where a section that begins as a point is looked at
 
 
