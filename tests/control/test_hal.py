@@ -194,6 +194,38 @@ def test_off_the_path_it_is_air():
     assert (found.column("away_mm") > 0.5).all()
 
 
+def test_a_restart_in_the_middle():
+    """The place is found anew, wherever it is; the override begins at most at its start and rises at its slew."""
+    first = Simulated(PATH)
+    first.s = 120.0
+    found = control(JOB, first, clock=lambda: first.t, sleep=lambda _: None)
+    assert found.column("s_mm")[0] == pytest.approx(120.0, abs=1e-6)
+    assert found.ended == "path"
+    sent = found.column("override")
+    assert sent[: RULES.settle_steps - 1].max() <= RULES.start
+    assert np.diff(sent).max() <= RULES.slew_up * PERIOD + RULES.quantum + 1e-12
+    assert found.column("torque_nmm").max() <= 1.08 * RULES.torque_ref
+
+
+def test_a_machine_that_goes_back():
+    """Taken away from the path and put down before a step: what lies ahead is asked anew."""
+
+    class Back(Simulated):
+        def exchange(self, feed, beat, torque, status, s):
+            seen = super().exchange(feed, beat, torque, status, s)
+            if self.t == pytest.approx(6.0):
+                self.s = 2.0
+            return seen._replace(z=seen.z + 5.0) if 6.0 < self.t < 6.2 else seen
+
+    machine = Back(PATH)
+    found = control(JOB, machine, clock=lambda: machine.t, sleep=lambda _: None)
+    assert found.ended == "path"
+    again = np.flatnonzero(found.column("t_s") > 6.2)[0]
+    assert found.column("s_mm")[again] < 10.0
+    heavy = (found.column("s_mm") > 42.0) & (found.column("s_mm") < 50.0) & (np.arange(len(found.rows)) > again)
+    assert found.column("torque_nmm")[heavy].max() <= 1.05 * RULES.torque_ref
+
+
 def test_a_torque_from_a_pin():
     """NaN on the pin is a lost sensor: slower, then stopped; a torque above the limit slows; an overload stops."""
     pin = replace(JOB, source="pin")

@@ -62,7 +62,7 @@ class HalJob:
     period : between steps [s]
     latency : until an override acts [s], beside the period
     modelled : the model of the path is used (feed-forward)
-    window : the machine is looked for so far from its last place [mm]
+    window : the machine is looked for so far from its last place [mm], on the whole path while it is off it
     away : farther from the path it is not on it [mm]
     """
 
@@ -174,7 +174,7 @@ def control(
     noise = np.random.default_rng(seed).normal(0.0, spindle.noise, 65_536)
     state, wheel = begin(config, job.modelled), turning(spindle)
     s, row, greatest, beat = float(path.model.s[0]), 0, 0.0, False
-    sent, status, ended = 0.0, 0, "stopped"
+    sent, status, ended, on = 0.0, 0, "stopped", False
     last: tuple[Seen, Load, Load] | None = None
     rows: list[tuple[float, ...]] = []
     due = clock()
@@ -184,9 +184,10 @@ def control(
         if seen is None:
             ended = "gone"
             break
-        found, away = locate(path, (seen.x, seen.y, seen.z), s, job.window)
+        found, away = locate(path, (seen.x, seen.y, seen.z), s, job.window if on else math.inf)
         on = away <= job.away
         s = found if on else s
+        row = row if model[0][row] <= s else 0
         programmed = float(np.interp(s, path.model.s, path.model.feed))
         actual = seen.velocity / programmed if on else 0.0
         true, believed = (_load(p, s, actual) for p in (path.truth, path.model))

@@ -12,15 +12,16 @@ import sys
 import time
 from pathlib import Path
 
-import hal
-import linuxcnc
-
 PERIOD_S = 0.02
 BEAT_S = 60.0
 
 
 def main() -> int:
     """Run the program once."""
+    # modules of LinuxCNC's own Python
+    import hal  # type: ignore[import-not-found]
+    import linuxcnc  # type: ignore[import-not-found]
+
     component = hal.component("drive")
     component.ready()
     command, status = linuxcnc.command(), linuxcnc.stat()

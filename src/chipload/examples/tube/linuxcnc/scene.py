@@ -98,7 +98,7 @@ def scene(folder: Path) -> ToolPath:
 
 def _at_ends(torque: np.ndarray) -> np.ndarray:
     padded = np.vstack([torque[:1], torque, torque[-1:]])
-    return 0.5 * (padded[1:] + padded[:-1])
+    return np.asarray(0.5 * (padded[1:] + padded[:-1]))
 
 
 if __name__ == "__main__":
