@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import subprocess
 import sys
 from dataclasses import replace
 
@@ -90,6 +91,13 @@ def test_a_place_on_a_helix():
         found, away = locate(two, p, s - 1.0, 5.0)
         assert found == pytest.approx(s, abs=1e-9)
         assert away < 1e-9
+    # the same points twice: the round is known by the window alone
+    again = tool_path(np.vstack([PATH.points, PATH.points[::-1][1:]]), np.full(2 * len(PATH.points) - 1, FEED),
+                      np.zeros((2 * len(PATH.points) - 1, 2)))  # fmt: skip
+    whole = float(PATH.model.s[-1])
+    p = [np.interp(100.0, PATH.model.s, x) for x in PATH.points.T]
+    assert locate(again, p, 98.0, 5.0)[0] == pytest.approx(100.0, abs=1e-9)
+    assert locate(again, p, 2.0 * whole - 103.0, 5.0)[0] == pytest.approx(2.0 * whole - 100.0, abs=1e-9)
     # in the middle of a chord: nearest place by brute force
     p = np.array([20.0, 13.0, -0.1])
     fine = np.linspace(0.0, 40.0, 400_001)
@@ -160,6 +168,8 @@ def test_what_the_model_allows():
     assert most == pytest.approx(0.5 + 5.0 * 0.02)
     assert row == 1
     assert allowed(rules, state, columns, 10.0, 1.0, 0.03, 500.0)[0] == 1.0
+    with pytest.raises(InputError, match="latency = 0 s: must be above 0 while nothing moves"):
+        allowed(rules, np.zeros_like(state), columns, 10.0, 0.0, 0.0, 500.0)
 
 
 def test_the_loop_is_the_simulated_one():
@@ -319,6 +329,22 @@ def test_a_wrong_job(tmp_path, old, new, says):
     file.write_text(TEXT.replace(old, new))
     with pytest.raises(InputError, match=says.replace("(", r"\(")):
         load_hal(file)
+
+
+def test_the_command(tmp_path):
+    """A wrong job: one line, exit code 2, nothing written; the same without LinuxCNC's Python."""
+    (tmp_path / "path.csv").write_text(write_path(PATH))
+    file, out = tmp_path / "hal.toml", tmp_path / "out.csv"
+    file.write_text(TEXT.replace("cap = 1", "cap = 2"))
+    call = [sys.executable, "-c", "from chipload.cli import main; main()", "hal", str(file), "--out", str(out)]
+    done = subprocess.run(call, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stderr.startswith("chipload: override.cap = 2: must be at least")
+    file.write_text(TEXT)
+    done = subprocess.run([*call, "--python", sys.executable], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "start LinuxCNC first, with its own Python" in done.stderr
+    assert not out.exists()
 
 
 def test_an_interpreter_without_hal():

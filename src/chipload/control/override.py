@@ -222,10 +222,17 @@ def allowed(
     Returns
     -------
     The override, and the row at or before s.
+
+    Raises
+    ------
+    InputError
+        At rest, with an override of 0 and no latency: the time until what lies ahead is not known.
     """
     at, feed, edge, cut = profile
     programmed = float(np.interp(s, at, feed))
     soon = max(actual, min(config.cap, float(state[0]) + config.slew_up * latency))
+    if not soon > 0.0:
+        raise InputError(f"override.allowed: latency = {latency:g} s: must be above 0 while nothing moves")
     most, row = _kernels.allowed(
         s, at, feed, edge, cut, config.torque_ref * trim(state), latency, soon,
         min(config.slew_down, acceleration / programmed), config.cap, first,
