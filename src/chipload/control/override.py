@@ -197,6 +197,49 @@ def trim(state: Floats) -> float:
     return float(state[1])
 
 
+def allowed(
+    config: Override,
+    state: Floats,
+    profile: tuple[Floats, Floats, Floats, Floats],
+    s: float,
+    actual: float,
+    latency: float,
+    acceleration: float,
+    first: int = 0,
+) -> tuple[float, int]:
+    """Override that the model allows, for ``Reading.model``: early enough for what lies ahead, no earlier.
+
+    Parameters
+    ----------
+    config, state : the controller
+    profile : s [mm], programmed feed [mm/s], edge and cut part of the torque [N mm], (n,) float each
+    s : place along the path [mm]
+    actual : override at which the axes move
+    latency : until an override acts [s], the period included
+    acceleration : of the axes [mm/s^2]
+    first : a row at or before s, from the last call; 0: the first
+
+    Returns
+    -------
+    The override, and the row at or before s.
+
+    Raises
+    ------
+    InputError
+        At rest, with an override of 0 and no latency: the time until what lies ahead is not known.
+    """
+    at, feed, edge, cut = profile
+    programmed = float(np.interp(s, at, feed))
+    soon = max(actual, min(config.cap, float(state[0]) + config.slew_up * latency))
+    if not soon > 0.0:
+        raise InputError(f"override.allowed: latency = {latency:g} s: must be above 0 while nothing moves")
+    most, row = _kernels.allowed(
+        s, at, feed, edge, cut, config.torque_ref * trim(state), latency, soon,
+        min(config.slew_down, acceleration / programmed), config.cap, first,
+    )  # fmt: skip
+    return float(most), int(row)
+
+
 def step(config: Override, table: FuzzyTable, state: Floats, reading: Reading) -> tuple[float, str, Floats]:
     """One step.
 

@@ -1,0 +1,1 @@
+"""The side of the machine: its path, its spindle, its pins."""

@@ -1,0 +1,67 @@
+"""The pins of the component in HAL: a program of its own, for the Python that LinuxCNC's modules belong to.
+
+It uses the standard library and `hal` only, and is passive: each line on its input is one exchange, and when its input
+ends, it leaves HAL. The first line is JSON: {"name": component, "pins": [[name, type, direction], ...], "signals":
+{pin: signal}}, types `float`, `bit`, `s32`, directions `in`, `out`; signals are made where there are none. Each later
+line holds the values of the out pins in their order; the answer is the time [s] and the values of the in pins.
+A value that is no number is not set: the line is answered with `error`, and the beat that it carried does not arrive.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import sys
+import time
+from typing import Any
+
+
+def serve(component: Any, out_pins: list[str], in_pins: list[str]) -> None:
+    """Exchange lines until the input ends."""
+    for line in sys.stdin:
+        words = line.split()
+        try:
+            values = [float(x) for x in words]
+        except ValueError:
+            values = []
+        if len(values) != len(out_pins) or not all(map(math.isfinite, values)):
+            print("error", flush=True)
+            continue
+        for name, value in zip(out_pins, values, strict=True):
+            kind = type(component[name])
+            component[name] = kind(value)
+        print(time.monotonic(), *(float(component[name]) for name in in_pins), flush=True)
+
+
+def main() -> None:
+    """Make the component, connect it, serve."""
+    import hal  # type: ignore[import-not-found]  # of the system, see docs/design/linuxcnc.md
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    asked = json.loads(sys.stdin.readline())
+    types = {"float": hal.HAL_FLOAT, "bit": hal.HAL_BIT, "s32": hal.HAL_S32}
+    ways = {"in": hal.HAL_IN, "out": hal.HAL_OUT}
+    component = hal.component(asked["name"])
+    try:
+        for name, kind, way in asked["pins"]:
+            component.newpin(name, types[kind], ways[way])
+        component.ready()
+        there = {x["NAME"] for x in hal.get_info_signals()}
+        for name, sig in asked["signals"].items():
+            if sig not in there:
+                kind = next(k for n, k, _ in asked["pins"] if n == name)
+                hal.new_sig(sig, types[kind])
+            hal.connect(f"{asked['name']}.{name}", sig)
+        print("ready", flush=True)
+        pins = asked["pins"]
+        serve(component, [n for n, _, w in pins if w == "out"], [n for n, _, w in pins if w == "in"])
+    except BrokenPipeError:
+        pass
+    finally:
+        component.exit()
+
+
+if __name__ == "__main__":
+    main()
