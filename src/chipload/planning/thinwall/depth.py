@@ -5,8 +5,8 @@ model on the bites of :mod:`chipload.planning.thinwall.engaged`: its greatest si
 threshold; f_z [mm] feed per tooth.
 
 F_n(d) is looked at from d_min to d_max; the depth is the greatest d up to which F_n <= F_th everywhere, found to
-``tolerance`` by bracketing and false position (Illinois), from below. A place where F_n(d_min) > F_th is infeasible. If the edge alone,
-f_z -> 0, stays below F_th there, a smaller feed makes it feasible; else a smaller cutter may.
+``tolerance`` by bracketing and false position (Illinois), from below. A place where F_n(d_min) > F_th is infeasible. If
+the edge alone, f_z -> 0, stays below F_th there, a smaller feed makes it feasible; else a smaller cutter may.
 
 Reference: [Yan2018] for the idea; the closed form of a ball upright in a slot, radial terms, is the test.
 """
@@ -97,14 +97,21 @@ class Depths:
 
 
 def normal_force(
-    posture: Posture, material: Material, depths: ArrayLike, *, measure: Measure, nodes: int = 8, step_deg: float = 1.0
+    posture: Posture,
+    material: Material,
+    depths: ArrayLike,
+    *,
+    measure: Measure,
+    nodes: int | None = None,
+    step_deg: float = 1.0,
 ) -> Floats:
     """F_n of depths (n,) [mm], (n,) float [N].
 
     Parameters
     ----------
     measure : ``greatest`` size over the revolution, sampled ``step_deg`` apart, or the size of the ``mean``
-    nodes : as of :func:`chipload.planning.thinwall.engaged.bites_of_depths`
+    nodes : as of :func:`chipload.planning.thinwall.engaged.bites_of_depths`; None: 8 of a mean (1e-4 of a ball's),
+        16 of the greatest (1 to 4 %: bites come and go at once, which makes it rather too great)
 
     Examples
     --------
@@ -127,7 +134,7 @@ def normal_force(
     turn = math.tau / (1 if cutter.runout[0] > 0.0 else cutter.flutes)
     theta = np.linspace(0.0, turn, max(8, math.ceil(math.degrees(turn) / step_deg)), endpoint=False)
     for at in range(0, len(d), BLOCK):
-        bites = bites_of_depths(posture, d[at : at + BLOCK], nodes)
+        bites = bites_of_depths(posture, d[at : at + BLOCK], nodes or (8 if measure == "mean" else 16))
         if measure == "mean":
             out[at : at + BLOCK] = np.abs(mean_forces(bites, cutter, material)[0] @ N)
         else:
@@ -212,10 +219,11 @@ def _below(
         d = np.where(last[o] >= 0, d - 0.4 * tolerance, d + 0.4 * tolerance)
         d = np.where((d > low[o]) & (d < high[o]) & (turn % 3 != 2), d, 0.5 * (low[o] + high[o]))
         F = force(d)
-        under = F <= target[o]
+        excess = F - target[o]
+        under = excess <= 0.0
         u, v = o[under], o[~under]
-        low[u], a[u], true_low[u] = d[under], (F - target[o])[under], F[under]
-        high[v], b[v] = d[~under], (F - target[o])[~under]
+        low[u], a[u], true_low[u] = d[under], excess[under], F[under]
+        high[v], b[v] = d[~under], excess[~under]
         b[u] = np.where(last[u] == -1, 0.5 * b[u], b[u])
         a[v] = np.where(last[v] == 1, 0.5 * a[v], a[v])
         last[u], last[v] = -1, 1

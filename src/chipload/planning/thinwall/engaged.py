@@ -13,8 +13,7 @@ before has left. The first two are sinusoids of phi; the roots of the third are 
 
 Over kappa the ends of bites run into one another like square roots, where a circle just touches z = d. Nodes are those
 of Gauss in t, kappa = m - w cos(t), which makes that smooth; the length of a bite along the profile is its weight.
-Accuracy over a slot 1e-9, beside a row 1e-3 of the force with 24 nodes (docs/design/thinwall.md). The stock is plane: right
-where d is small against the radii of curvature of the surface.
+Accuracy: docs/design/thinwall.md. The stock is plane: right where d is small against the surface's radii of curvature.
 
 Reference: [Engin2001] for kappa and s. Differs from source: depth and step-over normal to the surface.
 """
@@ -22,6 +21,7 @@ Reference: [Engin2001] for kappa and s. Differs from source: depth and step-over
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -108,7 +108,7 @@ class Posture:
 
     @property
     def deepest(self) -> float:
-        """r (1 - sin(beta)) [mm]: deeper, the flank cuts too.
+        """Depth r (1 - sin(beta)) [mm]: beyond it the flank cuts too.
 
         >>> ball = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5, corner_radius=5.0)
         >>> round(Posture(ball, 0.05, None, lead=math.radians(30.0)).deepest, 9)
@@ -162,10 +162,9 @@ def _breaks(posture: Posture, d: Floats) -> Floats:
     found = [low, high, whole, np.abs(psi - b), np.full(len(d), abs(posture.lead))]
 
     def kappa(*nu: Floats) -> Floats:
-        return np.arccos(np.clip(-(nu[0] * A[0] + nu[1] * A[1] + nu[2] * A[2]), -1.0, 1.0))
+        return np.asarray(np.arccos(np.clip(-(nu[0] * A[0] + nu[1] * A[1] + nu[2] * A[2]), -1.0, 1.0)))
 
-    for side in (-1.0, 1.0):
-        found.append(kappa(0.0 * d, side * np.sin(psi), -np.cos(psi)))
+    found += [kappa(0.0 * d, side * np.sin(psi), -np.cos(psi)) for side in (-1.0, 1.0)]
     if step is not None:
         slope = np.zeros(len(d))
         if e == 0.0:
@@ -242,7 +241,7 @@ def bites_of_depths(posture: Posture, depths: ArrayLike, nodes: int = 8) -> Bite
             f"depth_mm = {d[wrong[0]]:g}: must be above 0 and at most {posture.deepest:.6g}, where the flank begins to "
             "cut: lean the cutter less or take a greater corner radius"
         )
-    r, e, f = posture.cutter.apt[1:4]
+    r, _, f = posture.cutter.apt[1:4]
     T, n, A = posture.frame
     kappa, rho, weight = _profile(posture, d, nodes)
     sine, cosine = np.sin(kappa), np.cos(kappa)
@@ -252,13 +251,13 @@ def bites_of_depths(posture: Posture, depths: ArrayLike, nodes: int = 8) -> Bite
     y0, z0 = (posture.centre[i] + above * A[i] for i in (1, 2))
 
     def height(phi: Floats) -> Floats:
-        return z0[..., None] + rho[..., None] * (np.cos(phi) * n[2] + np.sin(phi) * T[2])
+        return np.asarray(z0[..., None] + rho[..., None] * (np.cos(phi) * n[2] + np.sin(phi) * T[2]))
 
     def beside(phi: Floats) -> Floats:
         """Above 0 where the row before has left nothing."""
         assert posture.step is not None
         y = y0[..., None] + rho[..., None] * (np.cos(phi) * n[1] + np.sin(phi) * T[1])
-        return height(phi) - np.minimum(posture.outline(y + posture.step), 1e6)
+        return np.asarray(height(phi) - np.minimum(posture.outline(y + posture.step), 1e6))
 
     breaks = [_roots(0.0 * along, along, offset), _roots(rho * n[2], rho * T[2], z0 - d[:, None])]
     if posture.step is not None:
@@ -311,7 +310,7 @@ def _roots(a: Floats, b: Floats, c: Floats) -> Floats:
     return np.where(some[..., None], out, np.inf)
 
 
-def _crossings(function, shape: tuple[int, ...]) -> Floats:  # type: ignore[no-untyped-def]
+def _crossings(function: Callable[[Floats], Floats], shape: tuple[int, ...]) -> Floats:
     """Zeros of a function of phi (..., m) -> (..., m), at most six; infinite beyond those that there are."""
     phi = np.linspace(0.0, math.tau, LOOKS + 1)
     sign = function(np.broadcast_to(phi, (*shape, LOOKS + 1))) > 0.0

@@ -8,8 +8,8 @@ is the greatest function at or below d whose slope is at most L in any direction
 is least, and break the threshold there. |p - q| is the straight distance, at most that along the surface: d~ is never
 too deep.
 
-Places are gathered in boxes of about sqrt(n); for those of one box the others are taken in the order of min d + L (distance of
-the boxes), until that passes the greatest d~ left in it. Exact; O(n sqrt(n)) where d needs little lowering.
+Places are gathered in boxes of about sqrt(n); for those of one box the others are taken in the order of min d +
+L (distance of the boxes), until that passes the greatest d~ left in it. Exact; O(n^1.5) where d needs little lowering.
 
 Reference: [Yan2018] for the offset function; the envelope is the infimal convolution with a cone.
 """
