@@ -11,8 +11,9 @@ from numpy.testing import assert_allclose
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
-from chipload.planning.thinwall.depth import Limits, law_of, normal_force
+from chipload.planning.thinwall.depth import Limits, normal_force
 from chipload.planning.thinwall.engaged import Posture
+from chipload.planning.thinwall.law import law_of
 from chipload.planning.thinwall.passes import constant, least_first_depth, variable
 from chipload.planning.thinwall.paths import Going, gouges, pass_programs, rows_of, seconds
 from chipload.planning.thinwall.wall import SIDES, Wall

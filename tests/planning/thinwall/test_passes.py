@@ -7,7 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chipload.errors import InputError
-from chipload.planning.thinwall.depth import Law, Limits
+from chipload.planning.thinwall.depth import Limits
+from chipload.planning.thinwall.law import Law
 from chipload.planning.thinwall.passes import constant, least_first_depth, variable
 from chipload.planning.thinwall.threshold import modelled
 from chipload.planning.thinwall.wall import SIDES, Surface, Wall

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.planning.thinwall.depth import Law
 from chipload.planning.thinwall.envelope import lower_envelope
+from chipload.planning.thinwall.law import Law
 from chipload.planning.thinwall.threshold import Threshold
 from chipload.planning.thinwall.wall import Surface
 from chipload.progress import Progress, silent
