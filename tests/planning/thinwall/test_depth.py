@@ -23,15 +23,16 @@ RADIAL = Material("radial", 1500.0, 600.0, 0.0, 20.0, 15.0, 0.0, source="made up
 FULL = Material("full", 1500.0, 600.0, 250.0, 20.0, 15.0, 5.0, source="made up")
 
 
-def summed(posture: Posture, material: Material, d: float, n: int = 900) -> float:
+def summed(posture: Posture, material: Material, d: float, n: int = 1000) -> float:
     """Mean normal force of a ball: every piece of its sphere that faces forward in uncut stock, over one revolution."""
     R, c, b = posture.cutter.radius, math.cos(posture.lead), posture.step
     A = np.array([math.sin(posture.lead), math.sin(posture.tilt) * c, math.cos(posture.tilt) * c])
     X = np.cross(A, [0.0, 1.0, 0.0])
     X /= np.linalg.norm(X)
     Y = np.cross(A, X)
-    k = (np.arange(n) + 0.5) * 0.5 * math.pi / n
-    total, weight = 0.0, 0.5 * math.pi / n / n
+    reach = math.acos(A[2]) + math.acos(1.0 - d / R)
+    k = (np.arange(n) + 0.5) * reach / n
+    total, weight = 0.0, reach / n / n
     for phi in (np.arange(n) + 0.5) * math.tau / n:
         u = math.cos(phi) * X + math.sin(phi) * Y
         t = -math.sin(phi) * X + math.cos(phi) * Y
@@ -139,3 +140,12 @@ def test_refused():
         Limits(0.0, 1.0)
     with pytest.raises(InputError, match="threshold: a place has none above 0"):
         largest_depths(Posture(BALL, 0.05, None), RADIAL, [0.0], Limits(0.1, 1.0), measure="mean")
+
+
+@pytest.mark.parametrize(("Krc", "Kre", "power"), [(600.0, 0.0, 1.0), (0.0, 15.0, 2.0)])
+def test_depth_grows_as_a_power_of_the_threshold(Krc, Kre, power):
+    """Shallow slot: the chip's force grows as d, the edge's as sqrt(d)."""
+    material = Material("one", 1500.0, Krc, 0.0, 20.0, Kre, 0.0, source="made up")
+    F = np.array([2.0, 2.2]) * (0.1 if Kre == 0.0 else 1.0)
+    found = largest_depths(Posture(BALL, 0.05, None), material, F, Limits(1e-5, 1.0, 1e-10), measure="mean")
+    assert np.diff(np.log(found.depth))[0] / math.log(1.1) == pytest.approx(power, rel=2e-3)
