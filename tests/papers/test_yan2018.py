@@ -1,7 +1,7 @@
 """What [Yan2018] claims, on a plain wall: variable depths take less time than a constant one at no more deflection.
 
-Only the abstract of the paper is open, so that there is no number to meet; the ratio is printed by the failing
-assertion alone and stands in docs/design/thinwall.md."""
+The paper's own numbers are not at hand; what is found here stands in docs/design/thinwall.md.
+"""
 
 import math
 

@@ -118,7 +118,7 @@ class Posture:
 
     @property
     def centre(self) -> Floats:
-        """C, (3,) float [mm]: where the cutter touches z = 0, seen from the middle of its corner circle's centres."""
+        """C, (3,) float [mm], seen from the point where the cutter touches z = 0."""
         r, e = self.cutter.apt[1:3]
         s = math.sin(self.beta)
         up = np.array([0.0, 0.0, 1.0])
