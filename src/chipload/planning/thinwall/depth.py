@@ -1,0 +1,270 @@
+"""Largest depth of cut whose force normal to the surface stays at or below a threshold.
+
+Notation: d [mm] depth of cut; F_n [N] force along the surface normal over a revolution of the spindle, by the one force
+model on the bites of :mod:`chipload.planning.thinwall.engaged`: its greatest size, or the size of its mean; F_th [N]
+threshold; f_z [mm] feed per tooth.
+
+F_n(d) is looked at from d_min to d_max; the depth is the greatest d up to which F_n <= F_th everywhere, found to
+``tolerance`` by bracketing and false position (Illinois), from below. A place where F_n(d_min) > F_th is infeasible. If
+the edge alone, f_z -> 0, stays below F_th there, a smaller feed makes it feasible; else a smaller cutter may.
+
+Reference: [Yan2018] for the idea; the closed form of a ball upright in a slot, radial terms, is the test.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.cutting.force import forces_over_turn, mean_forces
+from chipload.cutting.material import Material
+from chipload.engagement.bites import with_runout
+from chipload.errors import InputError
+from chipload.planning.thinwall.engaged import Posture, bites_of_depths
+from chipload.progress import Progress, silent
+
+Floats = NDArray[np.float64]
+Measure = Literal["greatest", "mean"]
+
+#: what limits a depth: values of ``Depths.status``
+THRESHOLD, DEEPEST, INFEASIBLE = 0, 1, 2
+#: depths at which the force is looked at before it is solved for
+LOOKS = 49
+#: share of the feed that stands for the edge alone
+NO_FEED = 1e-6
+#: depths whose bites are held at once
+BLOCK = 256
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Smallest and greatest depth [mm], and how near the solution must come [mm]."""
+
+    smallest: float
+    greatest: float
+    tolerance: float = 1e-7
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.smallest < self.greatest < math.inf:
+            raise InputError(
+                f"depth_min_mm = {self.smallest:g}: must be above 0 and below depth_max_mm = {self.greatest:g}"
+            )
+        if not self.tolerance > 0.0:
+            raise InputError(f"depth tolerance_mm = {self.tolerance:g}: must be above 0")
+
+
+@dataclass(frozen=True)
+class Infeasible:
+    """A place that bears not even the smallest depth.
+
+    Attributes
+    ----------
+    place : its number
+    threshold, force, edge_force : [N], the last two at the smallest depth; the edge alone
+    feed_per_tooth : [mm] that would make it feasible; None: none would
+    diameter : [mm] of a cutter of the same shape that would; None: not asked (a feed does), or none would
+    """
+
+    place: int
+    threshold: float
+    force: float
+    edge_force: float
+    feed_per_tooth: float | None
+    diameter: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Depths:
+    """Depth of cut at places.
+
+    Attributes
+    ----------
+    depth : (p,) float [mm]; 0 where infeasible
+    force : (p,) float [N], F_n there; that of the smallest depth where infeasible
+    status : (p,) int, THRESHOLD, DEEPEST or INFEASIBLE
+    infeasible : those places, with what would help
+    """
+
+    depth: Floats
+    force: Floats
+    status: NDArray[np.int64]
+    infeasible: tuple[Infeasible, ...]
+
+
+def normal_force(
+    posture: Posture,
+    material: Material,
+    depths: ArrayLike,
+    *,
+    measure: Measure,
+    nodes: int | None = None,
+    step_deg: float = 1.0,
+) -> Floats:
+    """F_n of depths (n,) [mm], (n,) float [N].
+
+    Parameters
+    ----------
+    measure : ``greatest`` size over the revolution, sampled ``step_deg`` apart, or the size of the ``mean``
+    nodes : as of :func:`chipload.planning.thinwall.engaged.bites_of_depths`; None: 8 of a mean (1e-4 of a ball's),
+        16 of the greatest (1 to 4 %: bites come and go at once, which makes it rather too great)
+
+    Examples
+    --------
+    Ball of 5 mm upright in a slot: N Krc f_z (2 d - d^2 / R) / (2 pi) at d = 0.5: 4 * 600 * 0.05 * 0.95 / (2 pi).
+
+    >>> from chipload.cutter.cutter import Cutter
+    >>> ball = Cutter(10.0, 4, 0.0, 20.0, 30.0, 6e5, corner_radius=5.0)
+    >>> plain = Material("plain", 1500.0, 600.0, 0.0, 0.0, 0.0, 0.0, source="made up for this example")
+    >>> normal_force(Posture(ball, 0.05, None), plain, [0.5], measure="mean").round(4).tolist()
+    [18.1437]
+    >>> round(4 * 600 * 0.05 * 0.95 / math.tau, 4)
+    18.1437
+    """
+    if measure not in ("greatest", "mean"):
+        raise InputError(f"measure = {measure!r}: must be greatest or mean")
+    d = np.atleast_1d(np.asarray(depths, dtype=np.float64))
+    out = np.empty(len(d))
+    N = posture.frame[:, 2]
+    cutter = posture.cutter
+    turn = math.tau / (1 if cutter.runout[0] > 0.0 else cutter.flutes)
+    theta = np.linspace(0.0, turn, max(8, math.ceil(math.degrees(turn) / step_deg)), endpoint=False)
+    for at in range(0, len(d), BLOCK):
+        bites = bites_of_depths(posture, d[at : at + BLOCK], nodes or (8 if measure == "mean" else 16))
+        if measure == "mean":
+            out[at : at + BLOCK] = np.abs(mean_forces(bites, cutter, material)[0] @ N)
+        else:
+            force = forces_over_turn(with_runout(bites, cutter), cutter, material, theta)[0]
+            out[at : at + BLOCK] = np.abs(force @ N).max(axis=1)
+    return out
+
+
+def largest_depths(
+    posture: Posture,
+    material: Material,
+    thresholds: ArrayLike,
+    limits: Limits,
+    *,
+    measure: Measure,
+    progress: Progress = silent,
+) -> Depths:
+    """Largest depth at places with thresholds (p,) [N].
+
+    Raises
+    ------
+    InputError
+        A threshold is not above 0, or the greatest depth is beyond the corner of the cutter.
+    """
+    F_th = np.atleast_1d(np.asarray(thresholds, dtype=np.float64))
+    if not ((F_th > 0.0) & np.isfinite(F_th)).all():
+        raise InputError("threshold: a place has none above 0 N")
+    if limits.greatest > posture.deepest:
+        raise InputError(
+            f"depth_max_mm = {limits.greatest:g}: must be at most {posture.deepest:.6g}, where the flank begins to cut"
+        )
+
+    def force(d: Floats) -> Floats:
+        return normal_force(posture, material, d, measure=measure)
+
+    looks = np.geomspace(limits.smallest, limits.greatest, LOOKS)
+    F = force(looks)
+    rising = np.maximum.accumulate(F)
+    value, back = np.unique(F_th, return_inverse=True)
+    above = np.searchsorted(rising, value, side="right")  # first look whose force is above the threshold
+    depth = np.where(above == LOOKS, limits.greatest, 0.0)
+    found = np.where(above == LOOKS, F[-1], F[0])
+    solve = np.flatnonzero((above > 0) & (above < LOOKS))
+    if len(solve):
+        k = above[solve]
+        depth[solve], found[solve] = _below(
+            force, value[solve], looks[k - 1], looks[k], F[k - 1], F[k], limits.tolerance, progress
+        )
+    status = np.where(above == LOOKS, DEEPEST, np.where(above == 0, INFEASIBLE, THRESHOLD))
+    helped: dict[int, tuple[float, float | None, float | None]] = {
+        int(i): _helps(posture, material, float(value[i]), limits.smallest, measure) for i in np.flatnonzero(above == 0)
+    }
+    infeasible = tuple(
+        Infeasible(int(i), float(F_th[i]), float(F[0]), *helped[int(back[i])])
+        for i in np.flatnonzero(status[back] == INFEASIBLE)
+    )
+    return Depths(depth[back], found[back], status[back], infeasible)
+
+
+def _below(
+    force: Callable[[Floats], Floats],
+    target: Floats,
+    low: Floats,
+    high: Floats,
+    F_low: Floats,
+    F_high: Floats,
+    tolerance: float,
+    progress: Progress,
+) -> tuple[Floats, Floats]:
+    """Depth within ``tolerance`` below the crossing, and the force there; Illinois, many at once."""
+    low, high, true_low = low.copy(), high.copy(), F_low.copy()
+    a, b = F_low - target, F_high - target
+    last = np.zeros(len(low), dtype=np.int64)
+    for turn in range(200):
+        open_ = np.flatnonzero(high - low > tolerance)
+        if not len(open_):
+            break
+        progress(min(turn / 12.0, 1.0), "depths")
+        o = open_
+        d = (low[o] * b[o] - high[o] * a[o]) / (b[o] - a[o])
+        # towards the end look on either side of the root, so that the bracket shuts from both sides
+        d = np.where(last[o] >= 0, d - 0.4 * tolerance, d + 0.4 * tolerance)
+        d = np.where((d > low[o]) & (d < high[o]) & (turn % 3 != 2), d, 0.5 * (low[o] + high[o]))
+        F = force(d)
+        excess = F - target[o]
+        under = excess <= 0.0
+        u, v = o[under], o[~under]
+        low[u], a[u], true_low[u] = d[under], excess[under], F[under]
+        high[v], b[v] = d[~under], excess[~under]
+        b[u] = np.where(last[u] == -1, 0.5 * b[u], b[u])
+        a[v] = np.where(last[v] == 1, 0.5 * a[v], a[v])
+        last[u], last[v] = -1, 1
+    return low, true_low
+
+
+def _helps(
+    posture: Posture, material: Material, threshold: float, depth: float, measure: Measure
+) -> tuple[float, float | None, float | None]:
+    """Force of the edge alone, feed per tooth and diameter that bring the force of ``depth`` to the threshold."""
+
+    def at_feed(feed: float) -> float:
+        return float(normal_force(replace(posture, feed_per_tooth=feed), material, [depth], measure=measure)[0])
+
+    least = NO_FEED * posture.feed_per_tooth
+    edge = at_feed(least)
+    if edge <= threshold:
+        return edge, _bisect(at_feed, threshold, least, posture.feed_per_tooth), None
+
+    def at_diameter(diameter: float) -> float:
+        return float(normal_force(_scaled(posture, diameter), material, [depth], measure=measure)[0])
+
+    ratio = max(depth / posture.deepest, abs(posture.step or 0.0) / posture.cutter.diameter)
+    smallest = 1.001 * ratio * posture.cutter.diameter
+    if smallest >= posture.cutter.diameter or at_diameter(smallest) > threshold:
+        return edge, None, None
+    return edge, None, _bisect(at_diameter, threshold, smallest, posture.cutter.diameter)
+
+
+def _scaled(posture: Posture, diameter: float) -> Posture:
+    cutter = posture.cutter
+    corner = cutter.corner_radius * diameter / cutter.diameter
+    other = replace(cutter, diameter=diameter, corner_radius=corner, corner_e=None, corner_f=None, shank_diameter=None)
+    return replace(posture, cutter=other)
+
+
+def _bisect(function: Callable[[float], float], target: float, low: float, high: float) -> float:
+    """Largest value found with function <= target, which holds at ``low`` and does not at ``high``."""
+    for _ in range(40):
+        if high - low <= 1e-6 * high:
+            break
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if function(middle) <= target else (low, middle)
+    return low

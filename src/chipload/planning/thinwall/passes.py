@@ -1,0 +1,196 @@
+"""Passes over a thin wall: variable depths that it bears, from the finish surface outwards, and constant ones.
+
+Notation: D_k [mm] stock that is left on a side before its pass k, D_0 = 0 the finish surface; d [mm] depth that a place
+bears; d~ its lower Lipschitz envelope of slope L; a allowance. Passes are numbered from the finish outwards, the order
+of planning; they are cut the other way round, the sides alternately: ... A_2 B_2 A_1 B_1.
+
+    D_k = min(D_(k-1) + d~_k, a)      until D_k = a everywhere.
+
+The depth of pass k is that which the wall bears with D_(k-1) left on its side everywhere, as if the whole pass were cut
+already: the softest state in which the pass is cut. The other side still has what its own later passes take.
+
+Constant depths: the least d of the first passes, in the fewest equal passes; unlimited: what the cutter takes.
+
+Reference: [Yan2018]. Differs from source: thresholds of each pass by the stiffness in its own state.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import InputError
+from chipload.planning.thinwall.envelope import lower_envelope
+from chipload.planning.thinwall.law import Law
+from chipload.planning.thinwall.threshold import Threshold
+from chipload.planning.thinwall.wall import Surface
+from chipload.progress import Progress, silent
+
+Floats = NDArray[np.float64]
+#: what the places of a side bear, ``(left on each side, side) -> threshold``
+Bears = Callable[[Sequence[Floats], int], Threshold]
+
+#: depths below this are no cut [mm]
+NOTHING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Pass:
+    """One pass over one side.
+
+    Attributes
+    ----------
+    side : number of the side
+    low, high : (n, m) float [mm], stock after and before it
+    threshold : what the places bear in the state after it
+    force : (n, m) float [N], F_n of its depth; 0 where nothing is cut
+    exceeds : (n, m) bool, where that is above the threshold
+    """
+
+    side: int
+    low: Floats
+    high: Floats
+    threshold: Threshold
+    force: Floats
+    exceeds: NDArray[np.bool_]
+
+    @property
+    def depth(self) -> Floats:
+        """Depth of cut, (n, m) float [mm]."""
+        return np.asarray(self.high - self.low)
+
+    @property
+    def deflection(self) -> Floats | None:
+        """Deflection F_n C_nn, (n, m) float [mm]; None where the compliance is not known."""
+        C = self.threshold.compliance
+        return None if C is None else self.force * C.reshape(self.force.shape)
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Passes in the order in which they are cut.
+
+    Attributes
+    ----------
+    name : ``variable``, ``constant`` or ``unconstrained``
+    passes : in order
+    infeasible : (side, i, j) of places that bear not even the smallest depth in some pass
+    """
+
+    name: str
+    passes: tuple[Pass, ...]
+    infeasible: tuple[tuple[int, int, int], ...] = ()
+
+    @property
+    def holds(self) -> bool:
+        """Whether no place exceeds its threshold."""
+        return not any(p.exceeds.any() for p in self.passes)
+
+    @property
+    def force_max(self) -> float:
+        """Greatest F_n [N]."""
+        return max(float(p.force.max()) for p in self.passes)
+
+    @property
+    def deflection_max(self) -> float | None:
+        """Greatest predicted deflection [mm]; None where the compliance is not known."""
+        known = [p.deflection for p in self.passes]
+        return max((float(x.max()) for x in known if x is not None), default=None)
+
+
+def _made(side: int, low: Floats, high: Floats, threshold: Threshold, law: Law) -> Pass:
+    depth = high - low
+    force = np.where(depth > NOTHING, law.force(np.maximum(depth, NOTHING)), 0.0)
+    return Pass(side, low, high, threshold, force, force > threshold.force.reshape(low.shape) * (1.0 + 1e-9))
+
+
+def variable(
+    surfaces: Sequence[Surface],
+    bears: Bears,
+    law: Law,
+    slope: float,
+    *,
+    most: int = 200,
+    progress: Progress = silent,
+) -> Plan:
+    """Variable depths on the sides alternately.
+
+    Parameters
+    ----------
+    surfaces : one or two sides, A first
+    bears : threshold of a side in a state; the stock left is that of all sides, in their order
+    law : depth of a threshold
+    slope : L > 0 of the offset function
+    most : passes on a side before it is given up
+
+    Raises
+    ------
+    InputError
+        The allowance is not covered in ``most`` passes.
+    """
+    count = len(surfaces)
+    D = [np.zeros(s.points.shape[:2]) for s in surfaces]
+    done: list[Pass] = []
+    infeasible: set[tuple[int, int, int]] = set()
+    for _ in range(most):
+        if all((D[s] >= surfaces[s].allowance - NOTHING).all() for s in range(count)):
+            return Plan("variable", tuple(reversed(done)), tuple(sorted(infeasible)))
+        for side in reversed(range(count)):
+            a = surfaces[side].allowance
+            if (D[side] >= a - NOTHING).all():
+                continue
+            threshold = bears(D, side)
+            F = threshold.force.reshape(D[side].shape)
+            open_ = D[side] < a - NOTHING
+            depth = law.depth(F)
+            weak = (depth == 0.0) & open_
+            infeasible |= {(side, int(i), int(j)) for i, j in np.argwhere(weak)}
+            depth = lower_envelope(surfaces[side].points, np.maximum(depth, law.limits.smallest), slope)
+            high = np.minimum(D[side] + depth, a)
+            done.append(_made(side, D[side], high, threshold, law))
+            D[side] = high
+            progress(
+                min(float(np.mean([(d / s.allowance).mean() for d, s in zip(D, surfaces, strict=True)])), 1.0), "passes"
+            )
+    worst = min(float(d.min()) for d in D)
+    raise InputError(
+        f"passes: {most} on each side cover {worst:.3g} mm only: allow more deflection, less feed or a smaller "
+        "step-over"
+    )
+
+
+def least_first_depth(surfaces: Sequence[Surface], bears: Bears, law: Law) -> float:
+    """Least depth [mm] that all places of all sides bear in the last passes; 0: one bears none."""
+    D = [np.zeros(s.points.shape[:2]) for s in surfaces]
+    return min(float(law.depth(bears(D, side).force).min()) for side in range(len(surfaces)))
+
+
+def constant(surfaces: Sequence[Surface], bears: Bears, law: Law, depth: float, name: str = "constant") -> Plan:
+    """Equal passes of at most ``depth``, the fewest, on the sides alternately.
+
+    Raises
+    ------
+    InputError
+        The depth is not above 0.
+    """
+    if not depth > 0.0:
+        raise InputError(
+            f"passes: constant depth_mm = {depth:g}: must be above 0; a place of the wall bears no cut at all: allow "
+            "more deflection, less feed or a smaller step-over"
+        )
+    number = [math.ceil(s.allowance / depth - 1e-9) for s in surfaces]
+    D = [np.zeros(s.points.shape[:2]) for s in surfaces]
+    done = []
+    for k in range(max(number)):
+        for side in reversed(range(len(surfaces))):
+            if k >= number[side]:
+                continue
+            a = surfaces[side].allowance
+            high = np.full_like(D[side], a * (k + 1) / number[side])
+            done.append(_made(side, D[side], high, bears(D, side), law))
+            D[side] = high
+    return Plan(name, tuple(reversed(done)))

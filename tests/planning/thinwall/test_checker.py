@@ -1,0 +1,52 @@
+"""The depth's force against the simulation: two rows through a layered block, the second one beside the first."""
+
+import math
+
+import numpy as np
+import pytest
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material
+from chipload.planning.thinwall.depth import Limits, largest_depths, normal_force
+from chipload.planning.thinwall.engaged import Posture
+from chipload.planning.thinwall.paths import Going, program_of, rows_of
+from chipload.planning.thinwall.wall import Surface
+from chipload.simulation.chips import Resolution, remove
+from chipload.stock.layers import LayeredStock
+
+STEEL = Material("steel", 1900.0, 600.0, 300.0, 24.0, 20.0, 5.0, source="made up, of the usual size")
+BALL = Cutter(8.0, 2, math.radians(30.0), 20.0, 30.0, 6e5, corner_radius=4.0)
+BULL = Cutter(8.0, 4, math.radians(30.0), 20.0, 30.0, 6e5, corner_radius=2.0)
+
+
+def simulated(posture: Posture, d: float, layers: int, feed: float, spindle: float) -> tuple[float, float]:
+    """Size of the mean and greatest size of the normal force [N] in the middle of the second row."""
+    x, y = np.meshgrid(np.linspace(0.0, 10.0, 6), [0.0, 0.5], indexing="ij")
+    points = np.stack([x, y, 0.0 * x], axis=-1)
+    surface = Surface(points, np.broadcast_to([0.0, 0.0, 1.0], points.shape), d)
+    none = np.zeros(x.shape)
+    program = program_of(rows_of(surface, none, none + d, posture), Going(posture, feed, 100.0, spindle, 8.0), "rows")
+    bounds = np.concatenate([[-1.0], np.linspace(-0.008, 0.0, 3)[:-1], np.linspace(0.0, d, layers + 1)])
+    stock = LayeredStock.block((-10.0, -12.0, -1.0), (20.0, 12.0, d), bounds, 16.0)
+    c = remove(program, stock, {1: posture.cutter}, STEEL, Resolution(1.0, 0.002, 96, 0.5)).columns
+    k = int(np.flatnonzero(~c["rapid"] & (np.abs(c["x_mm"] - 5.5) < 2.0) & (c["chip_volume_mm3"] > 0.0))[-1])
+    return abs(float(c["force_z_mean_n"][k])), float(max(c["force_z_max_n"][k], -c["force_z_min_n"][k]))
+
+
+@pytest.mark.parametrize(
+    ("cutter", "lead", "tilt", "step", "threshold"),
+    [(BALL, 15.0, 0.0, -0.5, 20.0), (BULL, 8.0, 5.0, 0.5, 14.0)],
+)
+def test_simulated_row(cutter, lead, tilt, step, threshold):
+    """The mean within 1 % of what 30 and 60 layers tend to (their error halves); the greatest within 4 %: bites count
+    as whole slices there."""
+    feed, spindle = 10.0, 628.0
+    tooth = feed * math.tau / (spindle * cutter.flutes)
+    posture = Posture(cutter, tooth, step, math.radians(lead), math.radians(tilt))
+    found = largest_depths(posture, STEEL, [threshold], Limits(0.02, 0.8, 1e-5), measure="greatest")
+    d = float(found.depth[0])
+    assert 0.1 < d < 0.7
+    coarse, fine = (simulated(posture, d, n, feed, spindle) for n in (30, 60))
+    mean = float(normal_force(posture, STEEL, [d], measure="mean")[0])
+    assert 2.0 * fine[0] - coarse[0] == pytest.approx(mean, rel=0.01)
+    assert fine[1] == pytest.approx(threshold, rel=0.04)
