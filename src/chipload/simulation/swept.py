@@ -45,7 +45,7 @@ def swept_ahead(
     interpolation: Interpolation,
     tolerance: float,
 ) -> Iterator[tuple[int, Swept]]:
-    """Those of ``some`` steps that meet a layer, in their order; found in a thread that runs ahead of the caller.
+    """Those of ``some`` steps that meet a layer, in their order; found in threads that run ahead of the caller.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def swept_ahead(
             raise InputError(f"line {steps.line[k]}: {err}") from None
         return Swept(move, low, high, layers, _covered(steps, k, move, cutter, stock, layers, tolerance))
 
-    with ThreadPoolExecutor(1) as pool:
+    with ThreadPoolExecutor(2) as pool:
         for k, found in zip(some, pool.map(swept, some), strict=True):
             if found is not None and found.met:
                 yield k, found
