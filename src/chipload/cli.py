@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from chipload.errors import Cancelled, Finding, InputError
+from chipload.errors import Cancelled, InputError
 
 if TYPE_CHECKING:
     from chipload.machine.machine import Machine
@@ -75,27 +75,14 @@ def run(
         from chipload.job import load_job
 
         read = load_job(job, sets or ())
-        from chipload.job import ProgramJob
-        from chipload.report import outcome as planned
-        from chipload.report import reading
-        from chipload.report.folder import check_target, write_result
-        from chipload.run import run_job, run_program
+        from chipload.report.folder import check_target, verdict, write_result
+        from chipload.run import run as run_any
 
         check_target(out)
         with _bar() as progress:
-
-            def first(done: float, what: str) -> None:
-                progress(0.8 * done, what)
-
-            def then(done: float, what: str) -> None:
-                progress(0.8 + 0.2 * done, what)
-
-            if isinstance(read, ProgramJob):
-                done = run_program(read, first)
-                target, (holds, says) = write_result(done, out, then), reading.verdict(done)
-            else:
-                outcome = run_job(read, first)
-                target, (holds, says) = write_result(outcome, out, then), planned.verdict(outcome)
+            done = run_any(read, lambda part, what: progress(0.8 * part, what))
+            target = write_result(done, out, lambda part, what: progress(0.8 + 0.2 * part, what))
+        holds, says = verdict(done)
         typer.echo(says)
         typer.echo(f"report: {target / 'report.html'}")
         return 0 if holds else EXCEEDED
@@ -173,7 +160,7 @@ def convert(
             )  # fmt: skip
             write_whole(target, text.encode("ascii"))
         for f in (*reading.noticed, *findings):
-            typer.echo(_said(f))
+            typer.echo(str(f))
         typer.echo(f"written: {target}: {len(text.splitlines())} lines for machine {there.name}, not verified")
         return EXCEEDED if any(f.code.startswith("machine-") and f.code not in HARMLESS for f in findings) else 0
 
@@ -199,7 +186,7 @@ def fit(
             target = write_fit(done, out)
         holds, says = verdict(done)
         for f in job.findings:
-            typer.echo(_said(f))
+            typer.echo(str(f))
         for text in done.notes:
             typer.echo(f"note: {text}")
         typer.echo(says)
@@ -293,30 +280,12 @@ def _check_job(job: Path, sets: Sequence[str]) -> int:
     from chipload.job import load_job
 
     read = load_job(job, sets)
-    from chipload.job import ProgramJob
-    from chipload.run import read_inputs, run_program
+    from chipload.run import look
 
-    if isinstance(read, ProgramJob):
-        from chipload.report.reading import verdict
-
-        done = run_program(read, simulate=False)
-        for f in (*done.reading.noticed, *done.reading.broken):
-            typer.echo(_said(f))
-        typer.echo(f"{job.name}: {verdict(done)[1]}")
-        return EXCEEDED if done.reading.broken else 0
-    inputs = read_inputs(read)
-    closed = sum(c.closed for c in inputs.contours)
-    typer.echo(
-        f"{job.name}: right: {closed} closed and {len(inputs.contours) - closed} open contours, "
-        f"machine {inputs.machine.name}, material {inputs.material.name}"
-    )
-    for k, op in enumerate(read.operations):
-        typer.echo(f"operation {k}: {op.kind}, cutter {op.cutter} of {read.cutters[op.cutter].diameter:g} mm")
-    for text in (*read.findings, *inputs.findings):
-        typer.echo(f"finding: {text}")
-    if read.unchecked:
-        typer.echo(f"not checked, no limit stated: {', '.join(read.unchecked)}")
-    return 0
+    lines, holds = look(read)
+    for text in lines:
+        typer.echo(text)
+    return 0 if holds else EXCEEDED
 
 
 def _check_program(
@@ -339,7 +308,7 @@ def _check_program(
         )  # fmt: skip
     broken = set(map(id, reading.broken))
     for f in sorted((*reading.noticed, *reading.broken), key=lambda f: f.line):
-        typer.echo(f"{_said(f)}{' [does not hold]' if id(f) in broken else ''}")
+        typer.echo(f"{f}{' [does not hold]' if id(f) in broken else ''}")
     low, high = reading.program.p_work.min(axis=0), reading.program.p_work.max(axis=0)
     box = ", ".join(f"{x} {a:g} to {b:g}" for x, a, b in zip("XYZ", low, high, strict=True))
     _, seconds = line_times(reading, on)
@@ -352,12 +321,6 @@ def _check_program(
     return EXCEEDED if reading.broken else 0
 
 
-def _said(finding: Finding) -> str:
-    return (
-        f"line {finding.line}: {finding.text} ({finding.code})" if finding.line else f"{finding.text} ({finding.code})"
-    )
-
-
 def _machine(name: str | None) -> Machine:
     """A shipped machine by name, or a file: TOML of ours or LinuxCNC's .ini."""
     from chipload.machine.ini import read_ini
@@ -368,7 +331,7 @@ def _machine(name: str | None) -> Machine:
     if name.lower().endswith(".ini"):
         machine, findings = read_ini(Path(name))
         for f in findings:
-            typer.echo(f"{name}: {_said(f)}")
+            typer.echo(f"{name}: {f}")
         return machine
     return read_machine(name) if name.lower().endswith(".toml") else machine_named(name)
 

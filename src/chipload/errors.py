@@ -28,3 +28,11 @@ class Finding:
     code: str
     line: int
     text: str
+
+    def __str__(self) -> str:
+        """The text with its line and its code.
+
+        >>> str(Finding("dxf-joined", 12, "a gap of 0.002 mm was closed"))
+        'line 12: a gap of 0.002 mm was closed (dxf-joined)'
+        """
+        return f"line {self.line}: {self.text} ({self.code})" if self.line else f"{self.text} ({self.code})"

@@ -40,7 +40,7 @@ def planned(monkeypatch: pytest.MonkeyPatch, outcome: Maker) -> Callable[[Outcom
                 raise made
             return made
 
-        monkeypatch.setattr(run, "run_job", stand_in)
+        monkeypatch.setattr(run, "run", stand_in)
 
     put(outcome())
     return put
@@ -187,7 +187,7 @@ def test_a_stopped_run_leaves_no_half_file(job_dir: Path, tmp_path: Path, number
         f"spec = spec_from_file_location('made', {str(Path(__file__).parents[1] / 'conftest.py')!r})\n"
         "made = module_from_spec(spec)\n"
         "spec.loader.exec_module(made)\n"
-        "run.run_job = lambda job, progress: made.made_outcome()\n"
+        "run.run = lambda job, progress: made.made_outcome()\n"
         "main()\n"
     )
     words = [sys.executable, "-c", slow, "run", str(job_dir / "job.toml"), "--out", str(tmp_path / "r")]

@@ -1,6 +1,8 @@
 """The job file, from its text to checked values."""
 
-from chipload.job.load import Job, ProgramJob, load_job
+from chipload.job.load import AnyJob, load_job
+from chipload.job.planned import Job
+from chipload.job.program import ProgramJob
 from chipload.job.tables import MAY, NEEDS, JobTable, OperationTable, ProgramJobTable
 
-__all__ = ["MAY", "NEEDS", "Job", "JobTable", "OperationTable", "ProgramJob", "ProgramJobTable", "load_job"]
+__all__ = ["MAY", "NEEDS", "AnyJob", "Job", "JobTable", "OperationTable", "ProgramJob", "ProgramJobTable", "load_job"]

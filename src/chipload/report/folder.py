@@ -14,12 +14,14 @@ import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from chipload.errors import InputError
 from chipload.progress import Progress, silent
 from chipload.report import reading
 from chipload.report.history import history_bytes
 from chipload.report.outcome import Outcome
+from chipload.report.outcome import verdict as planned_verdict
 from chipload.report.page import page_bytes
 from chipload.report.programs import program_files
 from chipload.report.reading import Read
@@ -31,6 +33,30 @@ SUMMARY = "summary.json"
 Makers = list[tuple[str, Callable[[], bytes]]]
 #: files that every result has
 NAMES = (SUMMARY, "history.parquet", "scene.glb", "report.html")
+
+
+class Kind(NamedTuple):
+    """How an outcome is shown: the files of :data:`NAMES`, its programs and other files, and its verdict."""
+
+    files: tuple[Callable[[Any], bytes], ...]
+    programs: Callable[[Any], dict[str, bytes]]
+    verdict: Callable[[Any], tuple[bool, str]]
+
+
+#: kinds of outcomes
+KINDS: dict[type, Kind] = {
+    Outcome: Kind((summary_bytes, history_bytes, scene_bytes, page_bytes), program_files, planned_verdict),
+    Read: Kind(
+        (reading.summary_bytes, reading.history_bytes, reading.scene_bytes, reading.page_bytes),
+        reading.program_files,
+        reading.verdict,
+    ),
+}
+
+
+def verdict(outcome: Outcome | Read) -> tuple[bool, str]:
+    """Whether everything holds, and one sentence that says it."""
+    return KINDS[type(outcome)].verdict(outcome)
 
 
 def check_target(out: str | Path, ours: Callable[[Path], bool] | None = None, what: str = "result") -> Path:
@@ -70,8 +96,9 @@ def write_result(outcome: Outcome | Read, out: str | Path, progress: Progress = 
     InputError
         The folder cannot be written or the disk is full; nothing is left behind, an older result stays.
     """
-    makers, programs = _makers(outcome)
-    return write_files(makers, out, programs, progress=progress)
+    made = KINDS[type(outcome)]
+    makers: Makers = [(name, partial(make, outcome)) for name, make in zip(NAMES, made.files, strict=True)]
+    return write_files(makers, out, partial(made.programs, outcome), progress=progress)
 
 
 def write_files(
@@ -121,19 +148,6 @@ def write_files(
                 with contextlib.suppress(OSError):
                     folder.rmdir()
     return target
-
-
-def _makers(
-    outcome: Outcome | Read,
-) -> tuple[Makers, Callable[[], dict[str, bytes]]]:
-    """Who makes each file, and the programs."""
-    if isinstance(outcome, Read):
-        parts = (reading.summary_bytes, reading.history_bytes, reading.scene_bytes, reading.page_bytes)
-        makers: Makers = [(name, partial(make, outcome)) for name, make in zip(NAMES, parts, strict=True)]
-        return makers, partial(reading.program_files, outcome)
-    planned = (summary_bytes, history_bytes, scene_bytes, page_bytes)
-    makers = [(name, partial(make, outcome)) for name, make in zip(NAMES, planned, strict=True)]
-    return makers, partial(program_files, outcome)
 
 
 def _ours(folder: Path) -> bool:

@@ -1,6 +1,46 @@
-"""From a job to its outcome."""
+"""From a job to its outcome: each kind of job has its file here."""
 
-from chipload.run.planned import Inputs, prove, read_inputs, run_job
-from chipload.run.program import run_program
+from collections.abc import Callable, Mapping
+from typing import Any
 
-__all__ = ["Inputs", "prove", "read_inputs", "run_job", "run_program"]
+from chipload.job import AnyJob, Job, ProgramJob
+from chipload.progress import Progress, silent
+from chipload.report.outcome import Outcome
+from chipload.report.reading import Read
+from chipload.run.planned import Inputs, look_at_job, prove, read_inputs, run_job
+from chipload.run.program import look_at_program, run_program
+
+#: an outcome of any kind
+AnyOutcome = Outcome | Read
+#: kinds of jobs: what runs them, and what reads all that they name and says what it found and whether that holds
+KINDS: Mapping[type[AnyJob], tuple[Callable[[Any, Progress], AnyOutcome], Callable[[Any], tuple[list[str], bool]]]] = {
+    Job: (run_job, look_at_job),
+    ProgramJob: (run_program, look_at_program),
+}
+
+
+def run(job: AnyJob, progress: Progress = silent) -> AnyOutcome:
+    """Run a job of any kind; nothing is written.
+
+    Raises
+    ------
+    InputError
+        A file that it names cannot be used, or its values together.
+    Cancelled
+        By ``progress``.
+    """
+    return KINDS[type(job)][0](job, progress)
+
+
+def look(job: AnyJob) -> tuple[list[str], bool]:
+    """Read all that a job names: a line for each thing found, and whether they hold.
+
+    Raises
+    ------
+    InputError
+        As :func:`run`.
+    """
+    return KINDS[type(job)][1](job)
+
+
+__all__ = ["AnyOutcome", "Inputs", "look", "prove", "read_inputs", "run", "run_job", "run_program"]

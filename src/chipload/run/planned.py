@@ -96,6 +96,22 @@ def run_job(job: Job, progress: Progress = silent) -> Outcome:
     )
 
 
+def look_at_job(job: Job) -> tuple[list[str], bool]:
+    """What the files of a job hold."""
+    inputs = read_inputs(job)
+    closed = sum(c.closed for c in inputs.contours)
+    lines = [
+        f"{job.path.name}: right: {closed} closed and {len(inputs.contours) - closed} open contours, "
+        f"machine {inputs.machine.name}, material {inputs.material.name}"
+    ]
+    for k, op in enumerate(job.operations):
+        lines.append(f"operation {k}: {op.kind}, cutter {op.cutter} of {job.cutters[op.cutter].diameter:g} mm")
+    lines += [f"finding: {text}" for text in (*job.findings, *inputs.findings)]
+    if job.unchecked:
+        lines.append(f"not checked, no limit stated: {', '.join(job.unchecked)}")
+    return lines, True
+
+
 def _operation(job: Job, inputs: Inputs, op: OperationTable, progress: Progress) -> Operation:
     cutter = job.cutters[op.cutter]
     result = _plan(job, inputs, op, cutter, lambda done, what: progress(0.5 * done, what))

@@ -18,7 +18,7 @@ from chipload.machine.machine import machine_named, read_machine
 from chipload.program.program import RAPID, Program
 from chipload.program.read import line_times, read_program, read_tools
 from chipload.progress import Progress, silent
-from chipload.report.reading import Read
+from chipload.report.reading import Read, verdict
 from chipload.report.simulated import Simulated
 from chipload.run.provenance import hashes, title_of, versions
 from chipload.simulation.chips import Resolution, remove
@@ -77,6 +77,13 @@ def run_program(job: ProgramJob, progress: Progress = silent, *, simulate: bool 
         "versions": versions(),
     }
     return Read(title_of(job.path), job.program_file.name, reading, lines, seconds, machine, provenance, simulated)
+
+
+def look_at_program(job: ProgramJob) -> tuple[list[str], bool]:
+    """What the program and the other files of a job hold; nothing is cut."""
+    done = run_program(job, simulate=False)
+    noticed = [str(f) for f in (*done.reading.noticed, *done.reading.broken)]
+    return [*noticed, f"{job.path.name}: {verdict(done)[1]}"], not done.reading.broken
 
 
 def _simulated(

@@ -1,0 +1,104 @@
+"""A job that runs a program which exists: read, and with an operation run through a stock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from chipload.cutter.cutter import Cutter
+from chipload.errors import InputError
+from chipload.job.sources import cutters, source
+from chipload.job.tables import LoadLimitsTable, ProgramJobTable
+
+
+@dataclass(frozen=True)
+class ProgramJob:
+    """A job that runs a program; paths are absolute.
+
+    Parameters
+    ----------
+    path : the job file
+    table : its values
+    program_file : NC text or CL data
+    tools_file : tool table; None: none
+    machine : a shipped name or a file
+    overrides : the `--set` texts that were applied
+    cutters : by number; empty where the program is not simulated
+    material : a shipped name or a file; None where the program is not simulated
+    """
+
+    path: Path
+    table: ProgramJobTable
+    program_file: Path
+    tools_file: Path | None
+    machine: str | Path
+    overrides: tuple[str, ...]
+    cutters: Mapping[int, Cutter]
+    material: str | Path | None
+
+    @property
+    def simulates(self) -> bool:
+        """Whether the program is run through a stock."""
+        return bool(self.table.operation)
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """The limits that are stated, by name."""
+        return self.table.limits.stated
+
+    @property
+    def unchecked(self) -> tuple[str, ...]:
+        """Names of the limits that are not stated."""
+        return self.table.limits.unstated
+
+
+def program_job(path: Path, table: ProgramJobTable, overrides: Sequence[str]) -> ProgramJob:
+    """The job of a table that was read.
+
+    Raises
+    ------
+    InputError
+        Keys do not go together.
+    """
+    folder, tools = path.parent, table.program.tools
+    own: dict[int, Cutter] = {}
+    if table.operation:
+        _check_simulation(table)
+        own = cutters(table.cutter, folder)
+    else:
+        for key in ("stock", "material", "cutter"):
+            if getattr(table, key):
+                raise InputError(
+                    f"{key}: not used where a program is only read: add an [[operation]] with "
+                    f'kind = "simulate" or leave it out'
+                )
+    return ProgramJob(
+        path,
+        table,
+        folder / table.program.file,
+        None if tools is None else folder / tools,
+        source("machine", table.machine, folder),
+        tuple(overrides),
+        own,
+        None if table.material is None else source("material", table.material, folder),
+    )
+
+
+def _check_simulation(table: ProgramJobTable) -> None:
+    """What running a program through a stock needs."""
+    stock = table.stock
+    for key in ("stock", "material", "cutter"):
+        if not getattr(table, key):
+            raise InputError(f"{key}: missing: state it (kind = simulate needs it)")
+    if stock is not None:
+        block = (stock.low_mm is not None, stock.high_mm is not None)
+        if any(block) == (stock.file is not None) or any(block) != all(block):
+            raise InputError("stock: state either low_mm and high_mm of a block, or a file")
+        saved = stock.file is not None and stock.file.lower().endswith(".npz")
+        if saved == (stock.layer_mm is not None):
+            need = "leave it out: the layers of an earlier result stay" if saved else "missing: state it"
+            raise InputError(f"stock.layer_mm: {need}")
+    if not table.limits.stated:
+        names = ", ".join(LoadLimitsTable.model_fields)
+        raise InputError(f"limits: none is stated, so nothing would be checked: state at least one of {names}")
