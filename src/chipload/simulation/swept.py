@@ -55,15 +55,16 @@ def swept_ahead(
     InputError
         Beside or in the stock the axis lies, or looks down.
     """
-    low, high = _boxes(steps, cutters)
-    beside = (high[:, 0] < stock.xs[0]) | (low[:, 0] > stock.xs[-1])
-    beside |= (high[:, 1] < stock.ys[0]) | (low[:, 1] > stock.ys[-1])
+    low, high = _boxes(steps, some, cutters)
+    near = (high[:, 0] >= stock.xs[0]) & (low[:, 0] <= stock.xs[-1])
+    near &= (high[:, 1] >= stock.ys[0]) & (low[:, 1] <= stock.ys[-1])
 
     def swept(part: range) -> list[tuple[int, Swept]]:
         found: dict[int, tuple[Move, range]] = {}
         for k in part:
-            layers = stock.layers_between(low[k, 2], high[k, 2])
-            if not beside[k] and layers:
+            row = k - some.start
+            layers = stock.layers_between(low[row, 2], high[row, 2])
+            if near[row] and layers:
                 try:
                     found[k] = _move(steps, k, interpolation), layers
                 except InputError as err:
@@ -74,7 +75,7 @@ def swept_ahead(
             for (k, (move, layers)), met in zip(
                 own.items(), _covered(steps, own, cutters[tool], stock, tolerance), strict=True
             ):
-                out[k] = Swept(move, low[k], high[k], layers, met)
+                out[k] = Swept(move, low[k - some.start], high[k - some.start], layers, met)
         return sorted(out.items())
 
     parts = [some[i : i + TOGETHER] for i in range(0, len(some), TOGETHER)]
@@ -122,14 +123,15 @@ def _flank(steps: Steps, k: int, cutter: Cutter, heights: Floats) -> NDArray[np.
     )
 
 
-def _boxes(steps: Steps, cutters: Mapping[int, Cutter]) -> tuple[Floats, Floats]:
+def _boxes(steps: Steps, some: range, cutters: Mapping[int, Cutter]) -> tuple[Floats, Floats]:
     """(n, 3), (n, 3) corners of boxes that the cutter does not leave, as the axis turns by a few degrees in a step."""
-    top, wide = np.empty((len(steps), 1)), np.empty((len(steps), 1))
-    for tool in np.unique(steps.tool).tolist():
+    part = slice(some.start, some.stop)
+    p0, p1, a0, a1, tools = (v[part] for v in (steps.p0, steps.p1, steps.a0, steps.a1, steps.tool))
+    top, wide = np.empty((len(some), 1)), np.empty((len(some), 1))
+    for tool in np.unique(tools).tolist():
         c = cutters[tool]
-        top[steps.tool == tool] = c.flute_length
-        wide[steps.tool == tool] = max(c.radius, float(c.radius_at([c.flute_length])[0]))
-    p0, p1, a0, a1 = steps.p0, steps.p1, steps.a0, steps.a1
+        top[tools == tool] = c.flute_length
+        wide[tools == tool] = max(c.radius, float(c.radius_at([c.flute_length])[0]))
     ends = np.array([p0, p1, p0 + top * a0, p1 + top * a1])
     # the top of the cutter leaves its chord by the sagitta of the turn, and each circle reaches R across the axis
     turn = np.linalg.norm(a1 - a0, axis=1)[:, None]

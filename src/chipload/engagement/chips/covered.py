@@ -130,7 +130,7 @@ def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], toleranc
             out.append(_noded(move, K, h, tolerance, max(_KNOTS, 4 * int(knots[i]))))
         else:
             edges = buffer[start[i] : start[i + 1]].copy()
-            rings = (ring_of_edges(edges),)
+            rings: tuple[Ring, ...] = (ring_of_edges(edges),)
             if not whole[i]:
                 rings = _without_slivers(rings_of_polygons(_untangled(shapely.Polygon(edges[:, :2])), edges), tolerance)
             out.append(Covered(rings, h, tolerance, True))

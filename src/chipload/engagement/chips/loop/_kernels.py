@@ -1,6 +1,6 @@
 """Compiled loops that close the boundary where there are two grazing points: all layers of many moves in one call.
 
-Notation: arrays ``cp``, ``ca``, ``K``, ``S``, ``C``, rows and edges as in :mod:`chipload.engagement.chips.trace._kernels`.
+Notation: arrays ``cp``, ``ca``, ``K``, ``S``, ``C``, rows, edges as in :mod:`chipload.engagement.chips.trace._kernels`.
 A loop goes once round a point for each time that the cutter comes over it, for it bounds the surface of space and time
 through which points enter the cutter. It may therefore cross itself; what it goes round at least once is covered.
 """
@@ -41,7 +41,8 @@ def loops(cps, cas, K, heights, first, tol, vmin, buf, count, knots, whole):
     """Loops of layers ``heights[first[m] : first[m + 1]]`` of moves m, one after the other into ``buf``.
 
     ``cps`` and ``cas`` (m, n, 3) are filled up with zeros; ``count`` (l,) takes the edges of each layer, NOTHING or
-    GENERAL, ``knots`` (l,) how finely time was divided, ``whole`` (l,) whether the loop is known to be simple. Returns how many layers are done: all, or ``buf`` is full.
+    GENERAL, ``knots`` (l,) how finely time was divided, ``whole`` (l,) whether the loop is known to be simple. Returns
+    how many layers are done: all, or ``buf`` is full.
     """
     ends = np.empty((INSTANTS + 1, 2))
     rows = np.empty((buf.shape[0], 7))
@@ -219,7 +220,7 @@ def between(cp, ca, K, h, a, b, tol, buf, n):
 
 @njit(cache=True, nogil=True)
 def _settled(grid, dt, tol):
-    """Whether V, per unit of a time of even knots dt apart, can't have changed sign and back by more than tol / 4 of way."""
+    """Whether V, its time in even knots dt apart, can't have changed sign and back by more than tol / 4 of way."""
     for i in range(grid.shape[0] - 1):
         for k in range(NODES):
             s = 1.0 if grid[i, k] > 0.0 else -1.0
@@ -273,7 +274,7 @@ def _meeting(cp, ca, K, h, tol, vmin, t0, t1, down, up):
 
 @njit(cache=True, nogil=True)
 def _side(cp, ca, K, h, tol, vmin, first, last, knot, sign, rows, buf, n):
-    """Edges of one flank of the loop, through the roots of all knots: new count, GENERAL, FULL; whether any turns back."""
+    """Edges of one flank of the loop, by the roots of all knots: new count, GENERAL, FULL; whether any turns back."""
     rows[0] = first
     m = 1
     for i in range(knot[0].shape[0] + 1):

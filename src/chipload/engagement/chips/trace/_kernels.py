@@ -19,6 +19,7 @@ from chipload.engagement.chips.zeros._kernels import CORNER, MAX_ROOTS, NODES, d
 FIRST, LAST, GRAZING, CHORD, CHORD_END, FIRST_CHORD, LAST_CHORD = 0, 1, 2, 3, 4, 5, 6
 NOTHING, GENERAL, FULL, UNSETTLED = -1, -2, -3, -4
 INSET = 1e-10  # of a span of time: where a section that begins as a point is looked at
+SAME = 1e-12  # [rad] a corner this near to the end of an arc is its end
 
 
 @njit(cache=True, nogil=True)
@@ -135,7 +136,7 @@ def arc(S, K, C, a, b, tol, origin, buf, n):
         at = -1
         for i in range(nc):
             theta = C[i, 0] + TAU * math.floor((cur[2] - C[i, 0]) / TAU + 1.0 + 1e-15)
-            if theta < goal + 1e-15 and theta > cur[2] + 1e-14:
+            if theta < goal + SAME and theta > cur[2] + 1e-14:
                 goal = min(theta, end)
                 at = i
         straight = code in (BOTTOM, TOP) and K[1] == 0.0
