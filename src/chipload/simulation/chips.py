@@ -186,7 +186,7 @@ def remove(
                 for i, pieces, area, whole in _chips(met, taken, tolerance):
                     removed[k] += (area * thickness[i], 0.0, 1.0)
                     removed[k, 1] = max(removed[k, 1], len(whole))
-                    if len(whole) >= rank[0] and _rank(whole) > rank:
+                    if whole and rank < (len(whole), 1.0 / len(whole)) and _rank(whole) > rank:
                         rank = _rank(whole)
                         near = stock.section(i).union(MultiPolygon(pieces)).intersection(box(*low, *high))
                         cutter = cutters[int(steps.tool[k])]

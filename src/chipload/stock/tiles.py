@@ -48,6 +48,8 @@ def cut_up(part: trimesh.Trimesh, heights: Floats, boxes: Shapes) -> Shapes:
 
 def turns_of(rows: Ints) -> list[Ints]:
     """Numbers 0 .. len(rows) - 1 in groups, so that no layer comes twice in a group."""
+    if len(set(rows.tolist())) == len(rows):
+        return [np.arange(len(rows))] if len(rows) else []
     order = np.argsort(rows, kind="stable")
     ranks = np.empty(len(rows), dtype=np.int64)
     first = np.flatnonzero(np.diff(rows[order], prepend=-1))
