@@ -48,9 +48,9 @@ def with_feeds(text: str, lines: Mapping[int, float]) -> str:
     >>> with_feeds("G1 X10 F600 (wall)\nY5 ; corner\nX0", {1: 1.0, 2: 0.5, 3: 1.0})
     'G1 X10 F600 (wall)\nY5 F300 ; corner\nX0 F600'
     """
-    for line, factor in lines.items():
-        if not 0.0 < factor < math.inf:
-            raise InputError(f"line {line}: a feed {factor:g} times the old one: must be above 0")
+    for line, times in lines.items():
+        if not 0.0 < times < math.inf:
+            raise InputError(f"line {line}: a feed {times:g} times the old one: must be above 0")
     out: list[str] = []
     old, now = math.nan, ""
     units, stated_in = {"length": "mm", "time": "94"}, dict[str, str]()
