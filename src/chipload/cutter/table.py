@@ -24,7 +24,7 @@ NEEDED = ("number", "diameter_mm", "flutes", "helix_deg", "flute_length_mm", "ov
 
 
 class CutterTable(BaseModel):
-    """Keys of one ``[[cutter]]``; :meth:`cutter` makes the cutter.
+    """Keys of one ``[[cutter]]``: its own numbers, or those of a file.
 
     ``file`` is a FreeCAD tool bit (`.fctb`) or a LinuxCNC tool table (`.tbl`, with ``tool`` the number in it and
     ``file_unit`` the unit of its lengths, which the file does not say).
