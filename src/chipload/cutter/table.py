@@ -48,6 +48,9 @@ class CutterTable(BaseModel):
     runout_mm: float | None = None
     runout_deg: float | None = None
     shank_diameter_mm: float | None = None
+    holder_mm: tuple[tuple[float, float], ...] | None = Field(
+        None, strict=False, description="length and diameter of the holder's parts, upwards from the overhang"
+    )
     file: str | None = None
     tool: int | None = None
     file_unit: Literal["mm", "inch"] | None = None
@@ -83,6 +86,7 @@ class CutterTable(BaseModel):
             taper=math.radians(values.get("taper_deg", 0.0)),
             runout=(values.get("runout_mm", 0.0), math.radians(values.get("runout_deg", 0.0))),
             shank_diameter=values.get("shank_diameter_mm"),
+            holder=tuple(tuple(part) for part in values.get("holder_mm", ())),
             number=values["number"],
             name=values.get("name", ""),
         )
