@@ -50,10 +50,14 @@ def meridian(rho, z, lines, arc, top):
 
 
 @njit(cache=True, nogil=True)
-def nearest(points, order, starts, low, cell, count, tips, axes, rows, lines, arc, top, widest, far, out, at):
+def nearest(
+    points, order, starts, low, cell, count, tips, axes, rows, lines, arc, top, widest, far, depth, out, at, deep, first
+):
     """Lower ``out`` to the signed distance of each point from the body in any of its places; ``at`` its row.
 
-    ``order`` holds the points cell by cell, ``starts`` where each cell begins; distances above ``far`` are left alone.
+    ``deep`` is lowered to the least distance of any point in each row, ``first`` to the first row that has the point
+    deeper inside than ``depth``. ``order`` holds the points cell by cell, ``starts`` where each cell begins; distances
+    above ``far`` are left alone.
     """
     nx, ny, nz = count[0], count[1], count[2]
     reach = widest + far
@@ -73,8 +77,8 @@ def nearest(points, order, starts, low, cell, count, tips, axes, rows, lines, ar
         l0, l1 = max(math.floor((z0 - low[2]) / cell), 0), min(math.floor((z1 - low[2]) / cell), nz - 1)
         for i in range(i0, i1 + 1):
             for j in range(j0, j1 + 1):
-                first = (i * ny + j) * nz
-                for m in range(starts[first + l0], starts[first + l1 + 1]) if l1 >= l0 else range(0):
+                begin = (i * ny + j) * nz
+                for m in range(starts[begin + l0], starts[begin + l1 + 1]) if l1 >= l0 else range(0):
                     p = order[m]
                     x, y, z = points[p, 0] - tx, points[p, 1] - ty, points[p, 2] - tz
                     up = x * ax + y * ay + z * az
@@ -84,6 +88,11 @@ def nearest(points, order, starts, low, cell, count, tips, axes, rows, lines, ar
                     if square > reach * reach:
                         continue
                     gap = meridian(math.sqrt(max(square, 0.0)), up, lines, arc, top)
-                    if gap < out[p] and gap <= far:
+                    if gap > far:
+                        continue
+                    deep[rows[k]] = min(deep[rows[k]], gap)
+                    if gap < -depth:
+                        first[p] = min(first[p], rows[k])
+                    if gap < out[p]:
                         out[p] = gap
                         at[p] = rows[k]

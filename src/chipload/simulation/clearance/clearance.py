@@ -42,10 +42,14 @@ class Clearance:
     ----------
     distance : (p,) float [mm], below 0 inside the tool; inf: never as near as was looked
     step : (p,) int, at which; -1 where the distance is inf
+    first : (p,) int, the first step that had the point deeper inside than the tolerance; the number of steps: none
+    deepest : (n,) float [mm], least distance of any point at each step; inf: none as near as was looked
     """
 
     distance: Floats
     step: Ints
+    first: Ints
+    deepest: Floats
 
 
 def clearance(
@@ -79,33 +83,34 @@ def clearance(
         if not 0.0 < value < math.inf:
             raise InputError(f"clearance: {name} = {value:g}: must be above 0 mm")
     best, at = np.full(len(p), np.inf), np.full(len(p), -1, dtype=np.int64)
+    first, deepest = np.full(len(p), len(steps), dtype=np.int64), np.full(len(steps), np.inf)
     if len(p) == 0 or len(steps) == 0:
-        return Clearance(best, at)
+        return Clearance(best, at, first, deepest)
     grid = _cells(p, max(b.widest for b in bodies.values()) + far)
+
+    def lowered(span: Ints, body: Body, tips: Floats, axes: Floats, rows: Ints) -> tuple[Floats, Ints, Ints, Floats]:
+        out = best.copy(), at.copy(), first.copy(), deepest.copy()
+        where = (tips[span], axes[span], rows[span], body.lines, body.arc, body.top, body.widest)
+        _kernels.nearest(p, *grid, *where, far, tolerance, out[0], out[1], out[3], out[2])
+        return out
+
     for number in np.unique(steps.tool).tolist():
         body = bodies[number]
         own = np.flatnonzero((steps.tool == number) & (True if some is None else some))
         if len(body.lines) == 0:
             continue
-        for first in range(0, len(own), BLOCK):
-            progress(first / len(own), "distances")
-            tips, axes, rows = _places(steps, own[first : first + BLOCK], body, tolerance)
-            spans = np.array_split(np.arange(len(rows)), workers)
+        for begin in range(0, len(own), BLOCK):
+            progress(begin / len(own), "distances")
+            places = _places(steps, own[begin : begin + BLOCK], body, tolerance)
+            spans = np.array_split(np.arange(len(places[2])), workers)
             with ThreadPoolExecutor(workers) as pool:
-                parts = [pool.submit(_lowered, p, grid, tips[s], axes[s], rows[s], body, far, best, at) for s in spans]
-                for out, where in (part.result() for part in parts):
+                for job in [pool.submit(lowered, s, body, *places) for s in spans]:
+                    out, where, early, deep = job.result()
                     nearer = out < best
                     best[nearer], at[nearer] = out[nearer], where[nearer]
-    return Clearance(best, at)
-
-
-def _lowered(
-    p: Floats, grid: Grid, tips: Floats, axes: Floats, rows: Ints, body: Body, far: float, best: Floats, at: Ints
-) -> tuple[Floats, Ints]:
-    """Least distances after some more places."""
-    out, where = best.copy(), at.copy()
-    _kernels.nearest(p, *grid, tips, axes, rows, body.lines, body.arc, body.top, body.widest, far, out, where)
-    return out, where
+                    np.minimum(first, early, out=first)
+                    np.minimum(deepest, deep, out=deepest)
+    return Clearance(best, at, first, deepest)
 
 
 def _cells(p: Floats, reach: float) -> Grid:
