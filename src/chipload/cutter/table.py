@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.fctb import read_fctb
@@ -21,6 +21,11 @@ from chipload.tables import nearest
 
 #: keys that a cutter cannot be without
 NEEDED = ("number", "diameter_mm", "flutes", "helix_deg", "flute_length_mm", "overhang_mm", "modulus_gpa")
+
+
+def _rows(value: Any) -> Any:
+    """A list of lists as tuples."""
+    return tuple(tuple(row) if isinstance(row, list) else row for row in value) if isinstance(value, list) else value
 
 
 class CutterTable(BaseModel):
@@ -48,8 +53,8 @@ class CutterTable(BaseModel):
     runout_mm: float | None = None
     runout_deg: float | None = None
     shank_diameter_mm: float | None = None
-    holder_mm: tuple[tuple[float, float], ...] | None = Field(
-        None, strict=False, description="length and diameter of the holder's parts, upwards from the overhang"
+    holder_mm: Annotated[tuple[tuple[float, float], ...] | None, BeforeValidator(_rows)] = Field(
+        None, description="length and diameter of the holder's parts, upwards from the overhang"
     )
     file: str | None = None
     tool: int | None = None
