@@ -66,7 +66,13 @@ class Solid:
     def __post_init__(self) -> None:
         lo, hi = MODULUS_RANGE
         if not lo <= self.modulus <= hi:
-            hint = "is it in Pa?" if self.modulus > hi else "is it in GPa?"
+            hint = (
+                "is it in GPa?"
+                if self.modulus < lo
+                else "is it in Pa?"
+                if self.modulus > 1e9
+                else "was MPa given for GPa?"
+            )
             raise InputError(f"workpiece.modulus = {self.modulus:g} MPa: must be from {lo:g} to {hi:g} MPa; {hint}")
         lo, hi = DENSITY_RANGE
         if not lo <= self.density <= hi:
@@ -120,7 +126,7 @@ def assemble(solid: Solid) -> csc_array:
     assert solid.kept is not None
     e = solid.there
     elements = solid.grid.elements[e]
-    K = stiffness(solid.grid.nodes[elements], solid.modulus, solid.poisson, solid.rule, solid.kept[e])
+    K = stiffness(solid.grid.nodes[elements], solid.modulus, solid.poisson, solid.rule, solid.kept[e], e)
     return _sum(K, element_dofs(elements), 3 * len(solid.grid.nodes))
 
 
