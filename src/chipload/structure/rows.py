@@ -159,39 +159,33 @@ def _eliminated(
     there = row[solid.kept[row, 1] > solid.kept[row, 0]]
     free = ~solid.held.ravel()
     mine = element_dofs(grid.elements[there])
-    touched = np.union1d(part.dofs, mine[free[mine]])
+    touched = np.unique(mine[free[mine]])
     far = np.isin(touched // 3, plane)
-    dofs = np.concatenate([touched[~far], touched[far]])
-    e = int((~far).sum())
+    a = len(part.dofs)
+    dofs = np.concatenate([part.dofs, np.setdiff1d(touched[~far], part.dofs), touched[far]])
+    e = len(dofs) - int(far.sum())
     number = np.full(free.size, -1, dtype=np.int64)
     number[dofs] = np.arange(len(dofs))
     K = _dense(solid, there, number[mine], len(dofs))
-    old = number[part.dofs]
-    K[np.ix_(old, old)] += part.S
+    K[:a, :a] += part.S
     p, d = directions.shape[:2]
     f = np.zeros((len(dofs), p * d))
-    f[old] = part.g
+    f[:a] = part.g
     own = part.own.copy()
     inside = np.flatnonzero(here[places.element])
     gone = inside[~np.isin(places.element[inside], there)]
     if len(gone):
         raise InputError(f"row_compliances: place {gone[0]} is on material that is gone: leave it out")
-    N = shape(places.local[inside])
     at = number[element_dofs(grid.elements[places.element[inside]])].reshape(-1, 20, 3)
-    for k, i in enumerate(inside):
-        held = at[k] < 0
-        for c in range(d):
-            load = N[k][:, None] * directions[i, c]
-            np.add.at(f[:, i * d + c], at[k][~held], load[~held])
+    loads = shape(places.local[inside])[:, None, :, None] * directions[inside][:, :, None, :]
+    k, c, node, axis = np.nonzero(np.broadcast_to((at >= 0)[:, None], loads.shape))
+    np.add.at(f, (at[k, node, axis], inside[k] * d + c), loads[k, c, node, axis])
     if e:
         lower = _factor(K[:e, :e], int(row[0]))
         Y = solve_triangular(lower, K[:e, e:], lower=True, check_finite=False, overwrite_b=True)
         y = solve_triangular(lower, f[:e], lower=True, check_finite=False)
         own += _blocks(y, p, d)
-        S = K[e:, e:]
-        if S.size:
-            S = S - _square(Y)
-        return Part(dofs[e:], S, f[e:] - Y.T @ y, own)
+        return Part(dofs[e:], K[e:, e:] - _square(Y), f[e:] - Y.T @ y, own)
     return Part(dofs, K, f, own)
 
 
@@ -218,6 +212,8 @@ def _blocks(y: Array, p: int, d: int) -> Array:
 
 def _square(Y: Array) -> Array:
     """Y^T Y, half of which is computed."""
+    if not Y.shape[1]:
+        return np.zeros((0, 0))
     half = dsyrk(1.0, Y, trans=1, lower=1)
     return np.asarray(half + np.tril(half, -1).T)
 
