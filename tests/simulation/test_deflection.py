@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from chipload.cutter.cutter import Cutter
+from chipload.cutting.force import forces_over_turn, in_work
 from chipload.cutting.material import Material, material_named
 from chipload.cutting.wall import wall_profile
 from chipload.engagement.bites import bites_of_arcs
@@ -19,6 +20,7 @@ from chipload.simulation.chips import Resolution, remove
 from chipload.simulation.deflection import contacts, form_error, step_deflections
 from chipload.stock.layers import LayeredStock
 from chipload.structure.spindle import Bar, Joint, cutter_bars
+from simulation.test_steps import five_axis
 
 AL = material_named("al7075-t6")
 MILL = Cutter(10.0, 4, 0.0, 20.0, 30.0, 6e5)
@@ -210,3 +212,40 @@ def test_what_is_wrong_is_said() -> None:
     forgot, _ = ball_rows(keep=False)
     with pytest.raises(InputError, match=r"did not keep what the teeth cut: remove\(..., keep=True\)"):
         contacts(forgot)
+
+
+@pytest.mark.parametrize("turn", [400.0, -400.0])
+def test_the_moment_of_a_leaning_ball_is_that_when_its_edge_is_nearest(turn: float) -> None:
+    """Trough of a ball that leans both ways: the edge in space, over all rotations, says when it makes a point."""
+    stock = LayeredStock.block((-6.0, -6.0, -3.0), (6.0, 6.0, 0.0), 0.1, 15.0)
+    axis = np.array([0.25, 0.2, 1.0]) / math.sqrt(1.0 + 0.25**2 + 0.2**2)
+    centre = np.array([0.0, 0.0, 2.8])
+    ends = [centre + np.array([x, 0.0, 0.0]) - 4.0 * axis for x in (-4.0, 4.0)]
+    program = five_axis([e.tolist() for e in ends], [axis.tolist()] * 2, feed=10.0)
+    program = replace(program, spindle=np.full(len(program), turn))
+    removal = remove(program, stock, {1: BALL}, AL, FINE_BALL, keep=True)
+    b = np.array([-0.4, -0.1, 0.2, 0.45])
+    down = np.column_stack([np.zeros(4), np.sin(b), -np.cos(b)])
+    ball = centre + np.array([0.7, 0.0, 0.0])
+    points = ball + 4.0 * down
+    found = form_error(removal, AL, points, -down, work=None, bars=None, near=0.1)
+    assert abs(found.gap).max() < 1e-6
+    assert found.at_edge.all()
+    (cuts,) = removal.cuts
+    kappa, theta = np.linspace(0.01, 0.75, 1481), np.linspace(0.0, math.pi, 3601)
+    z = 4.0 - 4.0 * np.cos(kappa)
+    for i in range(4):
+        k = int(np.flatnonzero(cuts.step == found.step[i])[0])
+        T, n, A = cuts.bites.frame[k]
+        tip = ball - 4.0 * axis
+        best = (math.inf, 0.0)
+        for j in range(2):
+            phi = theta[:, None] - z * math.tan(BALL.helix) / 4.0 - math.pi * j
+            u = np.cos(phi)[..., None] * n + np.sin(phi)[..., None] * T
+            edge = tip + z[:, None] * A + 4.0 * np.sin(kappa)[:, None] * u
+            d = np.linalg.norm(edge - points[i], axis=2)
+            best = min(best, (float(d.min()), float(theta[np.unravel_index(d.argmin(), d.shape)[0]])))
+        assert best[0] < 0.01
+        force = in_work(forces_over_turn(cuts.bites, BALL, AL, [best[1]])[0], cuts.bites.frame)[k, 0]
+        assert found.force[i] == pytest.approx(float(force @ -down[i]), rel=0.02, abs=0.3)
+    assert np.ptp(found.force) > 2.0

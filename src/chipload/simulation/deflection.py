@@ -19,6 +19,9 @@ so the moment that makes q counts, not the greatest force. d of that step is wha
 and stock where the program leaves any). Steps that do not cut count as absent: what they would take again after a
 deflection is not known.
 
+Without helix a tooth leaves all of its bite at once: the moment just before counts, as in
+:mod:`chipload.cutting.wall`.
+
 The load is that of the rigid model in the middle of the step: bending does not thin the chip. The work gives way at q
 under the whole force as if it acted there. The cutter is stiff along its axis, and q is that of the feed's envelope:
 marks of single teeth along the feed are not seen.
@@ -54,8 +57,8 @@ Bools = NDArray[np.bool_]
 
 #: cosine of the greatest angle between the surface and that of the cutter where it makes it: a cusp, not a corner
 FACING = 0.5
-#: how near to the end of a bite the immersion of q must lie to be moved to it [rad]
-REACH = 0.05
+#: how near to the end of a bite q must lie to be made by it, along its circle [mm]: slices of a corner know no better
+REACH = 0.2
 #: points whose pairs with steps are held at once
 CHUNK = 4096
 
@@ -245,7 +248,7 @@ def form_error(
         :func:`chipload.structure.spindle.cutter_bars`; None: rigid
     near : a step that stays farther than this [mm] from a point does not make it
     facing : cosine of the greatest angle between the normals of surface and cutter
-    reach : how near to the end of a bite q must lie to be moved to it [rad]
+    reach : how near to the end of a bite a point must lie to be made by it [mm], see ``FormError.at_edge``
 
     Raises
     ------
@@ -317,7 +320,9 @@ def _made_by(
     for j in range(cuts.cutter.flutes if cuts.cutter.runout[0] > 0.0 else 1):
         there, made = np.empty(count), np.empty(count, dtype=np.bool_)
         b = cuts.bites
-        _kernels.inside_bites(k, s, phi, b.start, b.rows, b.tooth, j, model.reach, there, made)
+        _kernels.inside_bites(k, s, phi, b.start, b.rows, b.tooth, b.slice, b.slices, j, model.reach, there, made)
+        if lag > 0.0:
+            there = phi
         theta = there + lag * z + math.tau * j / cuts.cutter.flutes
         loads = _bent(cuts, k, theta, z, model.material, model.bars)
         force = np.einsum("mi,mij->mj", loads[:, :3], frame)

@@ -171,8 +171,10 @@ def contacts(points, normals, steps, shape, most, facing, owner, moment):
 
 
 @njit(cache=True, nogil=True)
-def inside_bite(s, phi, rows, tooth, lo, hi, j, reach):
-    """The immersion phi moved just inside the nearest bite of tooth j at s, and whether one is within ``reach``."""
+def inside_bite(s, phi, rows, tooth, piece, slices, lo, hi, j, reach):
+    """The immersion phi moved just inside the nearest bite of tooth j at s, and whether its end is within ``reach``
+    along the circle of its slice.
+    """
     best = reach
     out = phi
     made = False
@@ -182,16 +184,18 @@ def inside_bite(s, phi, rows, tooth, lo, hi, j, reach):
         p, q = rows[r, 0], rows[r, 1]
         x = p + (phi - p) % TAU
         if x <= q:
+            inner = min(x - p, q - x)
             off = 0.0
         elif x - q <= p + TAU - x:
-            off = x - q
+            off = inner = x - q
             x = q
         else:
-            off = p + TAU - x
+            off = inner = p + TAU - x
             x = p
-        if off <= best:
-            made = True
-            best = off
+        rho = slices[piece[r], 1]
+        made = made or inner * rho <= reach
+        if off * rho <= best:
+            best = off * rho
             margin = min(BESIDE, 0.5 * (q - p))
             out = min(max(x, p + margin), q - margin)
     return out, made
@@ -277,8 +281,8 @@ def bent_many(step, theta, z, start, rows, tooth, piece, slices, teeth, c, bars,
 
 
 @njit(cache=True, nogil=True)
-def inside_bites(step, s, phi, start, rows, tooth, j, reach, out, made):
+def inside_bites(step, s, phi, start, rows, tooth, piece, slices, j, reach, out, made):
     """``inside_bite`` of many moments (m,), for tooth j."""
     for m in range(len(step)):
         i = step[m]
-        out[m], made[m] = inside_bite(s[m], phi[m], rows, tooth, start[i], start[i + 1], j, reach)
+        out[m], made[m] = inside_bite(s[m], phi[m], rows, tooth, piece, slices, start[i], start[i + 1], j, reach)
