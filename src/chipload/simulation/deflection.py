@@ -15,9 +15,10 @@ positive where the cutter is pushed away. The surface is what the deflected cutt
 
     left(q) = min over k and j of d_k + e_k - (r_j - R) sin(kappa),
 
-so the moment that makes q counts, not the greatest force. d of that step is what a rigid cutter leaves there (cusps,
-and stock where the program leaves any). Steps that do not cut count as absent: what they would take again after a
-deflection is not known.
+over the steps at which q lies at the end of a bite (over all where there are none): the moment that makes q counts,
+not the greatest force, nor a tooth that has just left its bite and would spring back. d of that step is what a rigid
+cutter leaves there (cusps, and stock where the program leaves any). Steps that do not cut count as absent: what they
+would take again after a deflection is not known.
 
 Without helix a tooth leaves all of its bite at once: the moment just before counts, as in
 :mod:`chipload.cutting.wall`.
@@ -279,7 +280,7 @@ def form_error(
         some = todo[at : at + CHUNK]
         margin = 1e-6
         while True:
-            best[some], widest = np.inf, 0.0
+            best[some], out.at_edge[some], widest = np.inf, False, 0.0
             for cuts in all_cuts:
                 most = np.minimum(least[some] + margin, near)
                 model = _Model(cuts, material, bars, facing, reach)
@@ -333,10 +334,11 @@ def _made_by(
         gap = d - radii[j] * sine
         widest = max(widest, float(np.abs(cutter + work - radii[j] * sine).max()))
         total = gap + cutter + work
-        order = np.lexsort((total, point))
+        order = np.lexsort((total, ~made, point))
         first = order[np.r_[True, point[order][1:] != point[order][:-1]]]
-        first = first[total[first] < best[number[point[first]]]]
         at = number[point[first]]
+        better = np.where(made[first] == out.at_edge[at], total[first] < best[at], made[first])
+        first, at = first[better], at[better]
         best[at] = total[first]
         out.step[at] = cuts.step[k[first]]
         out.gap[at], out.cutter[at], out.work[at] = gap[first], cutter[first], work[first]
