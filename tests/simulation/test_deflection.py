@@ -276,7 +276,7 @@ def test_a_cantilever_wall_yields_by_the_beam_formula_under_the_force_of_the_edg
 
 
 def test_steps_kept_in_blocks_are_the_same_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole, n = ball_rows()
+    whole, _ = ball_rows()
     monkeypatch.setattr("chipload.simulation.chips.BLOCK", 7)
     parts, _ = ball_rows()
     (a,), (b,) = whole.cuts, parts.cuts
