@@ -46,7 +46,8 @@ def brute_cost(S: tuple[int, ...], x: np.ndarray, y: np.ndarray, s: float) -> fl
 
 
 @pytest.mark.parametrize(
-    ("shape", "count", "s"), [((4, 3), 4, 0.1), ((4, 3), 3, 0.1), ((4, 3), 6, 0.0), ((4, 3), 6, 0.3), ((5, 3), 6, 0.1)]
+    ("shape", "count", "s"),
+    [((4, 3), 4, 0.1), ((4, 3), 3, 0.1), ((4, 3), 6, 0.0), ((4, 3), 6, 0.3), ((5, 3), 6, 0.1), ((9, 6), 5, 0.1)],
 )
 def test_no_subset_is_much_better(shape: tuple[int, int], count: int, s: float) -> None:
     """All subsets, of those that have the corners where there are enough."""

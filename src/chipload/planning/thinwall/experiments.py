@@ -29,7 +29,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import ConvexHull, Delaunay, QhullError
+from scipy.spatial import ConvexHull, Delaunay, QhullError, cKDTree
 
 from chipload.errors import Finding, InputError
 from chipload.planning.thinwall.law import Law
@@ -38,6 +38,8 @@ from chipload.progress import Progress, silent
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+#: candidates among which sites are exchanged at first, neighbours of a site among which it is moved then
+COARSE, NEIGHBOURS = 40, 9
 #: depths nearer than this share are the same cut
 SAME = 1e-6
 
@@ -124,7 +126,8 @@ def propose_sites(
 
     Notes
     -----
-    O(m c) interpolations a sweep, of which there are a few.
+    O(m c) interpolations a sweep, of which there are a few; beyond ``COARSE`` candidates c is that many of them, spread
+    over the surface, and each site is moved among its neighbours in the end.
     """
     x, y, allowed = _checked(places, modelled, count, scatter, candidates)
 
@@ -136,23 +139,42 @@ def propose_sites(
         return float(np.mean(bias**2) + scatter**2 * np.mean(weight))
 
     chosen, fixed = _outermost(x, allowed, count)
-    rest = [int(c) for c in allowed if c not in chosen]
+    rest = [c for c in _spread(x, allowed, chosen) if c not in chosen]
     while len(chosen) < count:
         progress(0.5 * len(chosen) / count, "sites")
         best = min(rest, key=lambda c: (cost([*chosen, c]), c))
         chosen.append(best)
         rest.remove(best)
-    now, improved = cost(chosen), True
-    while improved:
-        improved = False
+    now, coarse, near = cost(chosen), len(rest) + len(chosen) < len(allowed), cKDTree(x[allowed])
+    while True:
+        before = now
         for k in range(fixed, count):
             progress(0.5 + 0.5 * k / count, "sites exchanged")
+            around = allowed[np.atleast_1d(near.query(x[chosen[k]], min(NEIGHBOURS, len(allowed)))[1])].tolist()
             others = chosen[:k] + chosen[k + 1 :]
-            least, c = min((cost([*others, c]), c) for c in rest) if rest else (math.inf, -1)
+            least, c = min(((cost([*others, c]), c) for c in {*rest, *around} - set(chosen)), default=(math.inf, -1))
             if least < now * (1.0 - 1e-9):
-                rest[rest.index(c)] = chosen[k]
-                chosen[k], now, improved = c, least, True
-    return np.sort(np.array(chosen, dtype=np.int64))
+                rest = sorted({*rest, chosen[k]} - {c}) if not coarse or rest else []
+                chosen[k], now = c, least
+        if now == before:
+            if not (coarse and rest):
+                return np.sort(np.array(chosen, dtype=np.int64))
+            rest = []  # from here on each among its neighbours only
+
+
+def _spread(x: Floats, allowed: Ints, chosen: list[int]) -> list[int]:
+    """Candidates to begin with: all, or so many that lie as far from one another as can be."""
+    if len(allowed) <= COARSE:
+        return [int(i) for i in allowed]
+    size = np.ptp(x[allowed], axis=0)
+    scaled = x[allowed] / size
+    far = cKDTree(x[chosen] / size).query(scaled)[0]
+    out: list[int] = []
+    while len(out) < COARSE:
+        k = int(np.argmax(far))
+        out.append(int(allowed[k]))
+        far = np.minimum(far, np.linalg.norm(scaled - scaled[k], axis=1))
+    return sorted(out)
 
 
 def _checked(
