@@ -118,6 +118,7 @@ def linked(
     how: Link,
     clear_of: float,
     label: str = "finish",
+    rate: float = math.inf,
     one_way: bool = False,
     outline: Floats | None = None,
 ) -> Linked:
@@ -128,6 +129,7 @@ def linked(
     tracks : as :func:`finishing` gives them
     feed : in the tracks [mm/s]
     clear_of : clearance of neck, shank and holder [mm]
+    rate : greatest of the pallet [rad/s]: rows on which it would be faster are fed more slowly
     one_way : each track in its own direction, never from its end
     outline : (k, 3) more points that the safe height is above, as of the blank
     """
@@ -176,7 +178,7 @@ def linked(
         assert up is not None
         parts.append(Moves.of(RAPID, up[None], away[1][None], 0.0, "link"))
     moves = Moves.join(parts) if parts else Moves.of(RAPID, (top * T)[None], T[None], 0.0, "link")
-    return Linked(moves, tuple(refused), direct, retracts)
+    return Linked(_within_rate(moves, rate), tuple(refused), direct, retracts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,6 +242,16 @@ class _Job:
         axes = axis_at(self.table, B)
         axes[-1] = b[1]
         return Moves.of(RAPID, tips, axes, 0.0, "link")
+
+
+def _within_rate(moves: Moves, rate: float) -> Moves:
+    """The moves, fed so that the pallet keeps its rate."""
+    B = np.arctan2(moves.axis[:, 1], moves.axis[:, 0])
+    turn = np.abs((np.diff(B, prepend=B[:1]) + math.pi) % math.tau - math.pi)
+    length = np.linalg.norm(np.diff(moves.tip, axis=0, prepend=moves.tip[:1]), axis=1)
+    with np.errstate(divide="ignore"):
+        most = np.where(turn > 0.0, length * rate * (1.0 - 1e-9) / np.where(turn > 0.0, turn, 1.0), np.inf)
+    return replace(moves, feed=np.where((moves.feed > 0.0) & (length > 0.0), np.minimum(moves.feed, most), moves.feed))
 
 
 def deepest(moves: Moves, scene: Scene, cutter: CatalogueCutter, above: float, places: int = 3) -> tuple[float, int]:
