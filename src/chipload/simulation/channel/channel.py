@@ -229,4 +229,9 @@ def scallop_numbers(crests: Floats, asked: float) -> dict[str, float]:
     if not len(crests):
         return {"greatest_mm": 0.0, "mean_mm": 0.0, "mean_share": 0.0, "count": 0.0}
     mean = math.fsum(crests) / len(crests)
-    return {"greatest_mm": float(crests.max()), "mean_mm": mean, "mean_share": mean / asked, "count": float(len(crests))}
+    return {
+        "greatest_mm": float(crests.max()),
+        "mean_mm": mean,
+        "mean_share": mean / asked,
+        "count": float(len(crests)),
+    }
