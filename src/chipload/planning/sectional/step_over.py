@@ -1,9 +1,9 @@
 """Distance between two passes of a toroidal cutter that leaves a scallop of a given height.
 
 Notation: N surface normal, T cutter axis, s = sin of the angle between them; r corner radius, rho = R - r; d unit
-vector along the path, e = N x d across it; K curvature tensor of the surface, above 0 where it bends towards N; h height of
-the scallop along the normal, w step-over along the surface.
-
+vector along the path, e = N x d across it; K curvature tensor of the surface, above 0 where it bends towards N; h
+vector along the path, e = N x d across it; K curvature tensor of the surface, above 0 where it bends towards N; height
+h of the scallop along the normal, w step-over along the surface.
 The cutter touches with the tensor C of principal curvatures 1/r, in the plane of N and T, and 1/(r + rho/s). What it
 sweeps along d is tangent to the surface along the path and to the cutter along the line where it leaves its trace, so
 to second order it bends away from the surface by q = det(C - K) / d.(C - K)d across the path. On a plane 1/q =
