@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 from chipload.errors import InputError
-from chipload.planning.sectional.step_over import step_over, trace_curvature
+from chipload.planning.sectional.step_over import contact_of, step_over, trace_curvature
 
 FLAT = np.zeros((3, 3))
 
@@ -85,14 +85,14 @@ def test_what_is_swept_over_a_twisted_surface(angle, K):
 
         return minimize_scalar(at, bounds=(-0.5, 0.5), method="bounded", options={"xatol": 1e-9}).fun
 
-    q = trace_curvature([[0, 0, 1]], [T], [d], tensor, rho, r)[0]
+    q = trace_curvature(contact_of([[0, 0, 1]], [T], [d], tensor), rho, r)[0]
     gap = brentq(swept, -1e-5, 1e-4, xtol=1e-15)
     assert gap == pytest.approx(0.5 * q * off * off, rel=0.002)
 
 
 def test_the_radii_are_mixed():
     for phi in (0.0, 0.3, 1.2):
-        q = trace_curvature([[0, 0, 1]], [lean(0.5, phi)], [[0, 2, 0]], FLAT, 8.0, 2.0)[0]
+        q = trace_curvature(contact_of([[0, 0, 1]], [lean(0.5, phi)], [[0, 2, 0]], FLAT), 8.0, 2.0)[0]
         wide = 2.0 + 8.0 / math.sqrt(0.75)
         assert 1.0 / q == pytest.approx(2.0 * math.cos(phi) ** 2 + wide * math.sin(phi) ** 2, rel=1e-12)
 
