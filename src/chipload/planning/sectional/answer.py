@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
+from chipload.planning.sectional.blocks import BLOCK
 from chipload.planning.sectional.ranges.ranges import FULL, valid_ranges
 from chipload.planning.sectional.scene import Floats, Ints, Scene
 from chipload.planning.sectional.search import CURVATURE, Limits, Sampling, limits
@@ -147,11 +148,18 @@ def one_cutter(
                 least, goes = f.rho[reachable].min(axis=0), _open(f, cutter.rho)[reachable].all(axis=0)
                 tries += [(cutter.diameter, least[t], k, int(t)) for t in np.flatnonzero(goes)]
     for _, _, k, t in sorted(tries, reverse=True):
-        got = valid_ranges(
-            scene, answer.catalogue.cutters[k], answer.tables[t], clearance, pallets, reachable, workers=workers
-        )
-        if all(len(row) for row in got.ranges):
-            return k, t, got.ranges
+        cutter = answer.catalogue.cutters[k]
+        f = next(f for f in answer.families if f.corner_radius == cutter.corner_radius)
+        # where there is least room first: most tries end there
+        order = reachable[np.argsort(f.rho[reachable, t], kind="stable")]
+        found: dict[int, Floats] = {}
+        for part in (order[:BLOCK], order[BLOCK:]):
+            got = valid_ranges(scene, cutter, answer.tables[t], clearance, pallets, part, workers=workers)
+            found |= {int(i): row for i, row in zip(part, got.ranges, strict=True) if len(row)}
+            if not all(len(row) for row in got.ranges):
+                break
+        if len(found) == len(reachable):
+            return k, t, tuple(found[int(i)] for i in reachable)
     return None
 
 

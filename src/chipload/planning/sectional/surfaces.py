@@ -14,8 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.geometry.revolve import Revolved
-from chipload.geometry.sections import Blade
 from chipload.planning.sectional.impeller import Impeller
 from chipload.planning.sectional.scene import Floats, Scene
 
@@ -143,7 +141,7 @@ def _counts(impeller: Impeller, how: Sampled) -> tuple[tuple[int, int], tuple[in
 def _floor(impeller: Impeller, index: int, u: Floats, v: Floats, walls: Scene, where: tuple[float, float]) -> Scene:
     """The scene of a floor: contact on the hub, check points of the channel's walls as before."""
     s = where[0] + u * (where[1] - where[0])
-    theta = across(impeller, index, s, v)
+    theta = impeller.across(index, s, v)
     S, W = np.repeat(s, len(v)), theta.ravel()
     hub = impeller.hub
     # of the walls' scene the hub is surface 2, the wall itself 0: they change names
@@ -153,24 +151,6 @@ def _floor(impeller: Impeller, index: int, u: Floats, v: Floats, walls: Scene, w
         hub.at(S, W), hub.normal(S, W), hub.curvature(S, W), np.zeros(len(S), dtype=np.int64),
         walls.check, names, walls.near,
     )  # fmt: skip
-
-
-def across(impeller: Impeller, index: int, s: Floats, v: Floats) -> Floats:
-    """Theta (a, b) [rad] at the shares v of a channel's width, from the plus side of a body to the next body."""
-    low = _foot(impeller.body(index), "plus", impeller.hub, s)
-    high = _foot(impeller.body(index + 1), "minus", impeller.hub, s)
-    gap = np.angle(np.exp(1j * (high - low)))
-    out: Floats = low[:, None] + gap[:, None] * v
-    return out
-
-
-def _foot(body: Blade, side: str, hub: Revolved, s: Floats) -> Floats:
-    """Theta (k,) of a side's foot at places along the hub, beyond its edges as at the edge."""
-    foot = (body.plus if side == "plus" else body.minus).at(np.linspace(0.0, 1.0, _FINE), 0.0)
-    at = hub.nearest(np.hypot(foot[:, 0], foot[:, 1]), foot[:, 2], 20 * _FINE)
-    order = np.argsort(at, kind="stable")
-    out: Floats = np.interp(s, at[order], np.unwrap(np.arctan2(foot[:, 1], foot[:, 0]))[order])
-    return out
 
 
 def _areas(grid: Floats) -> Floats:
