@@ -53,15 +53,20 @@ class ImpellerTable(Table):
     sections: SectionsTable | None = None
 
 
-class SectionalTable(Table):
-    """One surface: its largest cutters, where it is milled with which, and at which table angles."""
+class SurfaceTable(Table):
+    """One surface that is milled, and where on it."""
 
-    kind: Literal["sectional"]
     body: Literal["blade", "splitter"]
     side: Literal["plus", "minus", "floor"] = Field(description="plus faces a growing angle; floor: the hub beyond it")
     along: Span = Field(description="from where to where along the surface, 0 to 1")
     up: Span = Field(description="from where to where up from the hub, across on a floor, 0 to 1")
     points: tuple[Count, Count] = Field(description="contact points along and up")
+
+
+class SectionalTable(Table):
+    """The search for the largest cutters of all surfaces."""
+
+    kind: Literal["sectional"]
     check_mm: Positive = Field(description="most distance of check points")
     near_mm: Positive = Field(description="nearer on the own surface its curvature stands for check points")
     around: Annotated[int, Field(ge=0, le=20)] = Field(1, description="bodies beyond the channel that are checked")
@@ -73,9 +78,10 @@ class ImpellerJobTable(Table):
     """The whole file."""
 
     impeller: ImpellerTable
+    surface: tuple[SurfaceTable, ...] = Field(min_length=1)
     catalogue: SourceTable
     machine: SourceTable
-    operation: tuple[SectionalTable, ...] = Field(min_length=1)
+    operation: tuple[SectionalTable, ...] = Field(min_length=1, max_length=1)
 
 
 @dataclass(frozen=True)
@@ -99,9 +105,9 @@ class ImpellerJob:
     overrides: tuple[str, ...]
 
     @property
-    def operations(self) -> tuple[SectionalTable, ...]:
-        """The operations in their order."""
-        return self.table.operation
+    def operation(self) -> SectionalTable:
+        """The operation."""
+        return self.table.operation[0]
 
 
 def impeller_job(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) -> ImpellerJob:
@@ -116,8 +122,10 @@ def impeller_job(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) 
     if (part.shape is None) == (part.sections is None):
         said = "neither is" if part.shape is None else "both are"
         raise InputError(f"impeller: {said} stated: state either [impeller.shape] or [impeller.sections]")
-    for k, op in enumerate(table.operation):
-        _check(f"operation.{k}", op, part)
+    for k, surface in enumerate(table.surface):
+        _check(f"surface.{k}", surface, part)
+        if any((s.body, s.side) == (surface.body, surface.side) for s in table.surface[:k]):
+            raise InputError(f"surface.{k}: {surface.body} {surface.side} stands twice: list each surface once")
     files: dict[str, Path] = {}
     if part.sections is not None:
         given = part.sections
@@ -135,12 +143,12 @@ def impeller_job(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) 
     )  # fmt: skip
 
 
-def _check(at: str, op: SectionalTable, part: ImpellerTable) -> None:
+def _check(at: str, surface: SurfaceTable, part: ImpellerTable) -> None:
     for key in ("along", "up"):
-        low, high = getattr(op, key)
+        low, high = getattr(surface, key)
         if low >= high:
             raise InputError(f"{at}.{key} = [{low:g}, {high:g}]: must ascend within 0 to 1")
-    if min(op.points) < 2:
-        raise InputError(f"{at}.points = {list(op.points)}: must be at least 2 each")
-    if op.body == "splitter" and (part.sections is None or not part.sections.splitter):
-        raise InputError(f"{at}.body = 'splitter': the impeller has no splitter: leave the operation out")
+    if min(surface.points) < 2:
+        raise InputError(f"{at}.points = {list(surface.points)}: must be at least 2 each")
+    if surface.body == "splitter" and (part.sections is None or not part.sections.splitter):
+        raise InputError(f"{at}.body = 'splitter': the impeller has no splitter: leave it out")

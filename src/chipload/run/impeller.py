@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
+from typing import Any
 
 import numpy as np
 
@@ -14,18 +15,19 @@ from chipload.geometry.revolve import Revolved
 from chipload.geometry.sections import Blade, checked, loft, read_meridian, read_sections
 from chipload.job import ImpellerJob, SectionalTable
 from chipload.job.impeller import SectionsTable, ShapeTable
+from chipload.job.tables import Table
 from chipload.machine.machine import Machine, machine_named, read_machine
-from chipload.planning.sectional.answer import largest_cutters, one_cutter
+from chipload.planning.sectional.answer import largest_cutters, one_cutter, one_cutter_of
 from chipload.planning.sectional.impeller import Impeller
 from chipload.planning.sectional.parametric import Shape, impeller_of
 from chipload.planning.sectional.surfaces import Sampled, Surface, surface_of
 from chipload.planning.sectional.tables import IndexTable, index_table
 from chipload.progress import Progress, silent
-from chipload.report.impeller.outcome import Milled, OneCutter, Sectional, said
+from chipload.report.impeller.outcome import Milled, OneCutter, Searched, said
 from chipload.run.provenance import hashes, title_of, versions
 
-#: contact points of which the cutter that would fit is looked for
-LISTED = 3
+#: threads of the search; its answer does not depend on them
+WORKERS = len(os.sched_getaffinity(0))
 
 
 def run_impeller(job: ImpellerJob, progress: Progress = silent) -> Milled:
@@ -39,13 +41,15 @@ def run_impeller(job: ImpellerJob, progress: Progress = silent) -> Milled:
         By ``progress``.
     """
     machine, catalogue, impeller = _machine(job), _catalogue(job), _impeller(job)
-    surfaces = [_surface(impeller, k, op, job) for k, op in enumerate(job.operations)]
-    tables = [_tables(machine, k, op) for k, op in enumerate(job.operations)]
+    op = job.operation
+    table, surfaces = _tables(machine, op), _surfaces(job, impeller)
     done = []
-    n = len(job.operations)
-    for k, (op, surface, table) in enumerate(zip(job.operations, surfaces, tables, strict=True)):
-        done.append(_searched(op, surface, table, catalogue, part_of(progress, k, n)))
+    for k, surface in enumerate(surfaces):
+        done.append(_searched(job, k, surface, table, catalogue, part_of(progress, k, len(surfaces))))
         _reached(k, done[-1])
+    pairs = [(found.surface.scene, found.answer) for found in done]
+    whole = one_cutter_of(pairs, op.clearance_mm, table.spans, WORKERS)
+    one = None if whole is None else (catalogue.cutters[whole[0]], whole[1])
     files = {"job": job.path, **job.files}
     files |= {key: p for key, p in (("machine", job.machine), ("catalogue", job.catalogue)) if not isinstance(p, str)}
     provenance = {
@@ -56,22 +60,23 @@ def run_impeller(job: ImpellerJob, progress: Progress = silent) -> Milled:
         "versions": versions(),
     }
     return Milled(
-        title_of(job.path), impeller, catalogue, machine, tuple(done), job.table.impeller.outer_diameter_mm, provenance
-    )
+        title_of(job.path), impeller, catalogue, machine, tuple(done), one, _settings(op),
+        job.table.impeller.outer_diameter_mm, provenance,
+    )  # fmt: skip
 
 
 def look_at_impeller(job: ImpellerJob) -> tuple[list[str], bool]:
     """What the files of a job hold; nothing is searched."""
     machine, catalogue, impeller = _machine(job), _catalogue(job), _impeller(job)
     lines = [f"impeller: {impeller.blades} blades{' and as many splitters' if impeller.splitter else ''}"]
-    for k, op in enumerate(job.operations):
-        surface, table = _surface(impeller, k, op, job), _tables(machine, k, op)
+    table = _tables(machine, job.operation)
+    angles = np.degrees(table.angle)
+    lines.append(
+        f"machine {machine.name}: {len(angles)} table angles from {angles.min():.6g} to {angles.max():.6g} deg"
+    )
+    for k, surface in enumerate(_surfaces(job, impeller)):
         s = surface.scene
-        angles = np.degrees(table.angle)
-        lines.append(
-            f"operation {k}: {surface.name}: {len(s.contact)} contact points, {len(s.check)} check points, "
-            f"{len(angles)} table angles from {angles.min():g} to {angles.max():g} deg"
-        )
+        lines.append(f"surface {k}: {surface.name}: {len(s.contact)} contact points, {len(s.check)} check points")
     corners = ", ".join(f"{r:g}" for r in catalogue.families)
     lines.append(f"catalogue {catalogue.name}: {len(catalogue.cutters)} cutters, corner radii {corners} mm")
     return lines, True
@@ -83,49 +88,57 @@ def part_of(progress: Progress, k: int, n: int) -> Progress:
 
 
 def _searched(
-    op: SectionalTable, surface: Surface, table: IndexTable, catalogue: Catalogue, progress: Progress
-) -> Sectional:
+    job: ImpellerJob, k: int, surface: Surface, table: IndexTable, catalogue: Catalogue, progress: Progress
+) -> Searched:
     """The largest cutters of a surface."""
-    workers = len(os.sched_getaffinity(0))
+    op = job.operation
     begin = time.perf_counter()
     answer = largest_cutters(
-        surface.scene, catalogue, table.angle, op.clearance_mm, pallets=table.spans, workers=workers, progress=progress
+        surface.scene, catalogue, table.angle, op.clearance_mm, pallets=table.spans, workers=WORKERS, progress=progress
     )
-    one = one_cutter(surface.scene, answer, op.clearance_mm, table.spans, workers)
+    one = one_cutter(surface.scene, answer, op.clearance_mm, table.spans, WORKERS)
     took = time.perf_counter() - begin
     best = None
     if one is not None:
         reached = np.flatnonzero(answer.cutter >= 0)
         best = OneCutter(catalogue.cutters[one[0]], one[1], reached, one[2])
-    settings = {k: v for k, v in op.model_dump().items() if v is not None}
-    return Sectional(settings, surface, answer, table, best, op.clearance_mm, took)
+    settings = _settings(op) | _settings(job.table.surface[k])
+    return Searched(settings, surface, answer, table, best, op.clearance_mm, took)
 
 
-def _reached(k: int, op: Sectional) -> None:
+def _settings(table: Table) -> dict[str, Any]:
+    """The keys that are stated."""
+    return {k: v for k, v in table.model_dump().items() if v is not None}
+
+
+def _reached(k: int, op: Searched) -> None:
     """Refuse a catalogue that reaches nothing of a surface."""
     if (op.answer.cutter < 0).all():
         first = said(op, op.answer.unreachable[0])
-        raise InputError(f"operation.{k}: no cutter of catalogue {op.answer.catalogue.name} fits anywhere: {first}")
+        raise InputError(f"surface.{k}: no cutter of catalogue {op.answer.catalogue.name} fits anywhere: {first}")
 
 
-def _tables(machine: Machine, k: int, op: SectionalTable) -> IndexTable:
+def _tables(machine: Machine, op: SectionalTable) -> IndexTable:
     table = index_table(machine)
     if op.table_deg is None:
         return table
     try:
         return table.at(np.radians(op.table_deg))
     except InputError as err:
-        raise InputError(f"operation.{k}.table_deg: {err}") from None
+        raise InputError(f"operation.0.table_deg: {err}") from None
 
 
-def _surface(impeller: Impeller, k: int, op: SectionalTable, job: ImpellerJob) -> Surface:
-    given = job.table.impeller.sections
+def _surfaces(job: ImpellerJob, impeller: Impeller) -> list[Surface]:
+    given, op = job.table.impeller.sections, job.operation
     ahead = given.hub_ahead_mm if given is not None else 0.0
-    how = Sampled(op.along, op.up, op.points, op.check_mm, op.near_mm, op.around, ahead)
-    try:
-        return surface_of(impeller, op.body, op.side, how)
-    except InputError as err:
-        raise InputError(f"operation.{k}: {err}") from None
+    out = []
+    for k, s in enumerate(job.table.surface):
+        how = Sampled(s.along, s.up, s.points, op.check_mm, op.near_mm, op.around, ahead)
+        try:
+            out.append(surface_of(impeller, s.body, s.side, how))
+        except InputError as err:
+            raise InputError(f"surface.{k}: {err}") from None
+    return out
 
 
 def _machine(job: ImpellerJob) -> Machine:

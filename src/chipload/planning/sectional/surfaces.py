@@ -98,7 +98,7 @@ def surface_of(impeller: Impeller, body: str, side: str, how: Sampled) -> Surfac
         raise InputError(f"surface {body} {side}: must be {' or '.join(BODIES)} and {', '.join(SIDES)}")
     index = BODIES.index(body)
     if index >= len(impeller.bodies):
-        raise InputError(f"surface {body} {side}: the impeller has no splitter: leave the operation out")
+        raise InputError(f"surface {body} {side}: the impeller has no splitter: leave it out")
     u, v = np.linspace(*how.along, how.points[0]), np.linspace(*how.up, how.points[1])
     check, hub = _counts(impeller, how)
     where = hub_range(impeller, how.ahead)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.planning.sectional.closed import axis_at
 from chipload.report.figures import FONT, GRID, INK, LIMIT, SCALE
-from chipload.report.impeller.outcome import Sectional
+from chipload.report.impeller.outcome import Searched
 from chipload.report.impeller.scene import grid_faces, surface_mesh
 
 Floats = NDArray[np.float64]
@@ -28,7 +28,7 @@ WRITTEN = 420
 SHOWN = 6000
 
 
-def map_figure(op: Sectional) -> go.Figure:
+def map_figure(op: Searched) -> go.Figure:
     """The largest diameter over the surface, unrolled: a cell a contact point."""
     a, b = op.surface.shape
     answer, s = op.answer, op.surface
@@ -61,7 +61,7 @@ def map_figure(op: Sectional) -> go.Figure:
     return out
 
 
-def table_figure(op: Sectional) -> go.Figure:
+def table_figure(op: Searched) -> go.Figure:
     """One cutter for the whole surface by table angle: the proved limit, and the size of the catalogue below it."""
     out = go.Figure()
     for n, r in enumerate(sorted({x.corner_radius for x in op.limiting})):
@@ -77,7 +77,7 @@ def table_figure(op: Sectional) -> go.Figure:
                     x=alpha, y=values, mode=mode, name=name, connectgaps=False,
                     line={"color": colour, "dash": dash, "width": 1.6, "shape": "linear"},
                     marker={"size": 6, "symbol": "line-ew-open" if dash == "dash" else "circle", "color": colour},
-                    hovertemplate="%{x:g} deg: D %{y:.3f} mm<extra></extra>",
+                    hovertemplate="%{x:.6g} deg: D %{y:.3f} mm<extra></extra>",
                 )
             )  # fmt: skip
     if op.one is not None:
@@ -94,7 +94,7 @@ def table_figure(op: Sectional) -> go.Figure:
     return out
 
 
-def ranges_figure(op: Sectional) -> go.Figure:
+def ranges_figure(op: Searched) -> go.Figure:
     """Pallet angles: of the one cutter at its table angle, else of each contact point's own largest cutter."""
     out = go.Figure()
     one = op.one
@@ -132,7 +132,7 @@ def ranges_figure(op: Sectional) -> go.Figure:
     return out
 
 
-def space_figure(op: Sectional) -> go.Figure:
+def space_figure(op: Searched) -> go.Figure:
     """The surface coloured by its largest diameter, what is round it, and the cutter where it is tightest."""
     s, answer = op.surface.scene, op.answer
     out = go.Figure()
@@ -176,7 +176,7 @@ def space_figure(op: Sectional) -> go.Figure:
     return out
 
 
-def tightest(op: Sectional) -> tuple[int, CatalogueCutter, int, float, tuple[int, ...]] | None:
+def tightest(op: Searched) -> tuple[int, CatalogueCutter, int, float, tuple[int, ...]] | None:
     """Contact point where the one cutter has least room, it, its table angle, its pallet angle, what stops a larger."""
     one = op.one
     if one is None:
@@ -211,7 +211,7 @@ def cutter_mesh(
 
 
 # -- parts ------------------------------------------------------------------------------------------------------
-def _hover(op: Sectional, k: int, cutter: CatalogueCutter | None) -> str:
+def _hover(op: Searched, k: int, cutter: CatalogueCutter | None) -> str:
     x, y, z = op.place[k]
     at = f"contact point {k} ({x:.1f}, {y:.1f}, {z:.1f})"
     if cutter is None:

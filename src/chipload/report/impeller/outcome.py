@@ -47,12 +47,12 @@ class OneCutter:
 
 
 @dataclass(frozen=True, eq=False)
-class Sectional:
+class Searched:
     """One surface with what was found.
 
     Parameters
     ----------
-    settings : keys of the operation, as stated
+    settings : keys of the operation and of the surface, as stated
     surface, answer : contact points, and the largest cutter at each
     table : the machine's table angles that were searched
     one : the largest cutter for all of it; None: there is none
@@ -129,7 +129,9 @@ class Milled:
     ----------
     title : name of the job
     impeller, catalogue, machine : what is milled, with what, where
-    operations : in their order
+    surfaces : in their order
+    one : the largest cutter for all surfaces at one table angle, and the index of that; None: there is none
+    settings : keys of the operation, as stated
     outer_diameter : as stated [mm]
     provenance : JSON values: hashes of the inputs, versions
     """
@@ -138,12 +140,14 @@ class Milled:
     impeller: Impeller
     catalogue: Catalogue
     machine: Machine
-    operations: tuple[Sectional, ...]
+    surfaces: tuple[Searched, ...]
+    one: tuple[CatalogueCutter, int] | None
+    settings: Mapping[str, Any]
     outer_diameter: float
     provenance: Mapping[str, Any]
 
 
-def said(op: Sectional, missed: Unreachable) -> str:
+def said(op: Searched, missed: Unreachable) -> str:
     """`contact point 37 at (1.0, 2.0, 3.0): ...: D 8.300 r 2 mm would fit`."""
     x, y, z = op.place[missed.point]
     would = f"D {missed.fits:.3f} r {missed.fits_corner:g} mm would fit" if missed.fits > 0.0 else ""
@@ -151,8 +155,8 @@ def said(op: Sectional, missed: Unreachable) -> str:
     return f"contact point {missed.point} at ({x:.3f}, {y:.3f}, {z:.3f}): {REASONS[missed.reason]}: {would}"
 
 
-def failures(op: Sectional) -> tuple[str, ...]:
-    """What does not hold in an operation."""
+def failures(op: Searched) -> tuple[str, ...]:
+    """What does not hold on a surface."""
     out = []
     missed = op.answer.unreachable
     if missed:
@@ -167,18 +171,25 @@ def failures(op: Sectional) -> tuple[str, ...]:
 
 def verdict(milled: Milled) -> tuple[bool, str]:
     """Whether everything holds, and one sentence that says it."""
-    bad = [(op, f) for op in milled.operations for f in failures(op)]
+    bad = [(op, f) for op in milled.surfaces for f in failures(op)]
     if bad:
         more = f"; and {len(bad) - 1} more" if len(bad) > 1 else ""
         return False, f"Does not hold: {bad[0][0].surface.name}: {bad[0][1]}{more}."
-    held = "; ".join(f"{op.surface.name}: {largest(op)}" for op in milled.operations)
-    return True, f"Every contact point is reached and its largest cutter proved ({held})."
+    return True, f"Every contact point is reached and its largest cutter proved; {for_all(milled)}."
 
 
-def largest(op: Sectional) -> str:
+def for_all(milled: Milled) -> str:
+    """`one cutter for all: D 16 r 2 mm at 40 deg`."""
+    if milled.one is not None:
+        c, alpha = milled.one[0], np.degrees(milled.surfaces[0].table.angle[milled.one[1]])
+        return f"the largest one cutter for all: D {c.diameter:g} r {c.corner_radius:g} mm at {alpha:.6g} deg"
+    return "no one cutter mills all of it at one table angle"
+
+
+def largest(op: Searched) -> str:
     """`D 20 r 2 at 45 deg for all`, or the range of diameters."""
     if op.one is not None:
         c, alpha = op.one.cutter, np.degrees(op.table.angle[op.one.table])
-        return f"D {c.diameter:g} r {c.corner_radius:g} mm at {alpha:g} deg for all of it"
+        return f"D {c.diameter:g} r {c.corner_radius:g} mm at {alpha:.6g} deg for all of it"
     d = op.answer.diameter[op.answer.cutter >= 0]
     return f"no cutter mills all of it at one table angle, D {d.min():g} to {d.max():g} mm point by point"

@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from chipload.report.impeller.figures import map_figure, ranges_figure, space_figure, table_figure
-from chipload.report.impeller.outcome import Milled, Sectional, failures, largest, said, verdict
+from chipload.report.impeller.outcome import Milled, Searched, failures, for_all, largest, said, verdict
 from chipload.report.sheet import definitions, figure, framed, heading, items, table
 
 #: contact points that are not reached which the page lists
@@ -22,33 +22,33 @@ def page_bytes(milled: Milled) -> bytes:
     figures: dict[str, go.Figure] = {}
     body = [*heading(milled.title, holds, "Holds" if holds else "Does not hold", says.removeprefix("Does not hold: "))]
     body += [_overview(milled)]
-    for k, op in enumerate(milled.operations):
-        body += _operation(k, op, figures)
+    for k, op in enumerate(milled.surfaces):
+        body += _surface(k, op, figures)
     body += ["<h2>Where the numbers come from</h2>", definitions(milled.provenance)]
     return framed(milled.title, "holds" if holds else "does not hold", body, figures)
 
 
 def _overview(milled: Milled) -> str:
     rows = []
-    for k, op in enumerate(milled.operations):
+    for k, op in enumerate(milled.surfaces):
         one, n = op.one, len(op.place)
         d = op.answer.diameter[op.answer.cutter >= 0]
         rows.append(
             [
                 str(k), escape(op.surface.name),
                 f"D {one.cutter.diameter:g} r {one.cutter.corner_radius:g}" if one else "none",
-                f"{np.degrees(op.table.angle[one.table]):g}" if one else "",
+                f"{np.degrees(op.table.angle[one.table]):.6g}" if one else "",
                 f"{d.min():g} to {d.max():g}", str(n), str(len(op.surface.scene.check)),
                 _bad(len(op.answer.unreachable)), _bad(n - int(op.answer.certified.sum())), f"{op.search_s:.2f}",
             ]
         )  # fmt: skip
     head = ["", "surface", "one cutter for all [mm]", "table [deg]", "point by point, D [mm]", "contact points"]
     head += ["check points", "not reached", "not proved", "search [s]"]
-    return table(head, rows, numbers=(3, 4, 5, 6, 7, 8, 9))
+    return f"<p>{escape(_sentence(for_all(milled)))}.</p>{table(head, rows, numbers=(3, 4, 5, 6, 7, 8, 9))}"
 
 
-def _operation(k: int, op: Sectional, figures: dict[str, go.Figure]) -> list[str]:
-    out = [f"<h2>Operation {k}: {escape(op.surface.name)}</h2>", f"<p>{escape(_sentence(largest(op)))}.</p>"]
+def _surface(k: int, op: Searched, figures: dict[str, go.Figure]) -> list[str]:
+    out = [f"<h2>{escape(_sentence(op.surface.name))}</h2>", f"<p>{escape(_sentence(largest(op)))}.</p>"]
     if failures(op):
         out += ["<h3>What does not hold</h3>", items(failures(op))]
     out += [
@@ -73,7 +73,7 @@ def _operation(k: int, op: Sectional, figures: dict[str, go.Figure]) -> list[str
     return out
 
 
-def _space_note(op: Sectional) -> str:
+def _space_note(op: Searched) -> str:
     if op.one is None:
         return "No one cutter mills all of it at one table angle: none is drawn."
     return (
@@ -82,15 +82,15 @@ def _space_note(op: Sectional) -> str:
     )
 
 
-def _ranges_note(op: Sectional) -> str:
+def _ranges_note(op: Searched) -> str:
     if op.one is None:
         return "Of each contact point's own largest cutter at its own table angle."
     c, alpha = op.one.cutter, np.degrees(op.table.angle[op.one.table])
     name = f"D {c.diameter:g} r {c.corner_radius:g} mm"
-    return f"Where {name} is clear at the table angle {alpha:g} deg, exact at both ends."
+    return f"Where {name} is clear at the table angle {alpha:.6g} deg, exact at both ends."
 
 
-def _proof(op: Sectional) -> list[str]:
+def _proof(op: Searched) -> list[str]:
     answer = op.answer
     used = int(sum(len(b) for b in answer.blockers))
     text = (
@@ -109,7 +109,7 @@ def _proof(op: Sectional) -> list[str]:
         rows.append(
             (
                 [
-                    f"{x.corner_radius:g}", f"{np.degrees(op.table.angle[x.table]):g}", str(x.point), least,
+                    f"{x.corner_radius:g}", f"{np.degrees(op.table.angle[x.table]):.6g}", str(x.point), least,
                     "" if x.size is None else f"{x.size:g}", escape("; ".join(names)),
                     '<span class="ok">yes</span>' if x.certified else '<span class="no">no</span>',
                 ],
@@ -127,7 +127,7 @@ def _proof(op: Sectional) -> list[str]:
     return out
 
 
-def _open(op: Sectional) -> list[str]:
+def _open(op: Searched) -> list[str]:
     s, d = op.settings, float(op.settings["check_mm"])
     half = d / math.sqrt(2.0)
     radii = sorted({x.cutter.diameter / 2.0 for x in [op.one] if x}) or [float(op.answer.diameter.max()) / 2.0]
@@ -151,7 +151,7 @@ def _open(op: Sectional) -> list[str]:
     return out
 
 
-def _named(op: Sectional, check: int) -> str:
+def _named(op: Searched, check: int) -> str:
     """What a check point lies on."""
     if check < 0:
         return "own curvature at the contact"

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from chipload.planning.sectional.impeller import Impeller
 from chipload.planning.sectional.surfaces import hub_range
-from chipload.report.impeller.outcome import Milled, Sectional
+from chipload.report.impeller.outcome import Milled, Searched
 from chipload.report.scene import engagement_colours
 
 Floats = NDArray[np.float64]
@@ -29,8 +29,8 @@ def scene_bytes(milled: Milled) -> bytes:
     scene = trimesh.Scene()
     for name, (points, faces), colour in body_meshes(milled.impeller):
         _add(scene, name, points, faces, np.tile(np.array(colour, dtype=np.uint8), (len(points), 1)))
-    most = max(float(op.answer.diameter.max()) for op in milled.operations)
-    for k, op in enumerate(milled.operations):
+    most = max(float(op.answer.diameter.max()) for op in milled.surfaces)
+    for k, op in enumerate(milled.surfaces):
         points, faces = surface_mesh(op)
         colours = engagement_colours(op.answer.diameter, most)
         colours[op.answer.cutter < 0] = MISSED
@@ -39,7 +39,7 @@ def scene_bytes(milled: Milled) -> bytes:
     return glb
 
 
-def surface_mesh(op: Sectional) -> tuple[Floats, Ints]:
+def surface_mesh(op: Searched) -> tuple[Floats, Ints]:
     """Contact points (c, 3) [mm], a little off the metal, and triangles between them."""
     a, b = op.surface.shape
     return op.place + OFF * op.surface.scene.normal, grid_faces(a, b)

@@ -11,7 +11,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from chipload.report.impeller.outcome import Milled, Sectional, failures, said, verdict
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.report.impeller.outcome import Milled, Searched, failures, said, verdict
 
 
 def summary_bytes(milled: Milled) -> bytes:
@@ -28,25 +29,45 @@ def summary_bytes(milled: Milled) -> bytes:
         },
         "machine": milled.machine.name,
         "catalogue": milled.catalogue.name,
-        "operations": [operation(op) for op in milled.operations],
+        "operations": [operation(milled)],
         "provenance": dict(milled.provenance),
     }
     return (json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
-def operation(op: Sectional) -> dict[str, Any]:
-    """One surface."""
-    answer, area = op.answer, op.surface.area
-    one = op.one
+def operation(milled: Milled) -> dict[str, Any]:
+    """All surfaces together, then each."""
+    rows = [surface(op) for op in milled.surfaces]
+    fails = [f"{op.surface.name}: {f}" for op in milled.surfaces for f in failures(op)]
     return {
         "kind": "sectional",
+        "holds": not fails,
+        "fails": fails,
+        **_one(milled.surfaces[0], milled.one),
+        **{key: sum(row[key] for row in rows) for key in ("cc_points", "check_points", "unreachable", "search_s")},
+        "certified": all(row["certified"] for row in rows),
+        "surfaces": rows,
+        "settings": {k: list(v) if isinstance(v, tuple) else v for k, v in milled.settings.items()},
+    }
+
+
+def _one(op: Searched, one: tuple[CatalogueCutter, int] | None) -> dict[str, Any]:
+    """A cutter and its table angle."""
+    return {
+        "diameter_mm": one[0].diameter if one else None,
+        "corner_radius_mm": one[0].corner_radius if one else None,
+        "table_deg": _degrees(op.table.angle[one[1]]) if one else None,
+        "index_deg": _degrees(op.table.position[one[1]]) if one else None,
+    }
+
+
+def surface(op: Searched) -> dict[str, Any]:
+    """One surface."""
+    answer, area = op.answer, op.surface.area
+    return {
         "surface": op.surface.name,
         "holds": not failures(op),
-        "fails": list(failures(op)),
-        "diameter_mm": one.cutter.diameter if one else None,
-        "corner_radius_mm": one.cutter.corner_radius if one else None,
-        "table_deg": _degrees(op.table.angle[one.table]) if one else None,
-        "index_deg": _degrees(op.table.position[one.table]) if one else None,
+        **_one(op, (op.one.cutter, op.one.table) if op.one else None),
         "cc_points": len(op.place),
         "check_points": len(op.surface.scene.check),
         "unreachable": len(answer.unreachable),
@@ -86,14 +107,14 @@ def operation(op: Sectional) -> dict[str, Any]:
             }
             for u in answer.unreachable
         ],
-        "settings": {k: list(v) if isinstance(v, tuple) else v for k, v in op.settings.items()},
+        "where": {k: list(op.settings[k]) for k in ("along", "up", "points")},
     }
 
 
 def history_bytes(milled: Milled) -> bytes:
     """history.parquet: a row a contact point."""
     tables = []
-    for k, op in enumerate(milled.operations):
+    for op in milled.surfaces:
         s, answer = op.surface.scene, op.answer
         n, (a, b) = len(s.contact), op.surface.shape
         corner = np.array([c.corner_radius for c in answer.catalogue.cutters] + [np.nan])
@@ -102,7 +123,7 @@ def history_bytes(milled: Milled) -> bytes:
         for missed in answer.unreachable:
             reasons[missed.point] = missed.reason
         data: dict[str, Any] = {
-            "operation": np.full(n, k, dtype=np.int32),
+            "operation": np.zeros(n, dtype=np.int32),
             "surface": [op.surface.name] * n,
             "cc_point": np.arange(n),
             "u": np.repeat(op.surface.u, b),
@@ -124,14 +145,14 @@ def history_bytes(milled: Milled) -> bytes:
 
 
 def proof_bytes(milled: Milled) -> bytes:
-    """proof.npz: for each operation k, as `k/...`, what was searched and every bound with what proves it.
+    """proof.npz: for each surface k, as `k/...`, what was searched and every bound with what proves it.
 
     ``contact``, ``normal`` (c, 3), ``curvature`` (c, 3, 3), ``check`` (m, 3), ``check_surface`` (m,), ``near``,
     ``tables`` (t,) [rad]; of each family f as `k/f/...` ``corner_radius``, ``rho``, ``bound``, ``pallet`` (c, t),
     ``certified``, ``blockers`` (c, t, j), -1 none, -2 the curvature at the contact.
     """
     arrays: dict[str, Any] = {}
-    for k, op in enumerate(milled.operations):
+    for k, op in enumerate(milled.surfaces):
         s = op.surface.scene
         for name in ("contact", "normal", "curvature", "check", "check_surface", "near"):
             arrays[f"{k}/{name}"] = np.asarray(getattr(s, name))
