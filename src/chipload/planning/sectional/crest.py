@@ -57,7 +57,7 @@ def crests(
     D0 = np.where(known, distance(points, best_tip, best_axis, rho, corner), 1.0)
     up = points + np.where(known, D0, 0.0)[..., None] * normals
     D1 = distance(up, best_tip, best_axis, rho, corner)
-    drop = np.where(D0 - D1 > 0.2 * np.abs(D0), D0 / np.where(D0 == D1, 1.0, D0 - D1), 1.0)
+    drop = np.where(0.2 * np.abs(D0) < D0 - D1, D0 / np.where(D0 == D1, 1.0, D0 - D1), 1.0)
     out = np.where(known, away * np.where(known & (D0 > 0.0), drop, 1.0), np.nan)
     there = np.isfinite(tips[0]).all(axis=1) & np.isfinite(tips[1]).all(axis=1)
     crest: Floats = np.where(there, out.max(axis=1), np.nan)

@@ -113,7 +113,13 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Lines of one cutter on one surface at one table angle; p (n,) the stations, ``along`` the parameter they are of."""
+    """Lines of one cutter on one surface at one table angle.
+
+    Parameters
+    ----------
+    surface, along, scene, number, cutter, table, pallets : as :func:`finishing`
+    p : (n,) the stations, of the parameter ``along``
+    """
 
     surface: Patch
     along: str
@@ -128,6 +134,7 @@ class Lines:
 
     @property
     def mender(self) -> Mender:
+        """Puts points between those of a track."""
         return Mender(
             self.surface, self.scene, self.number, self.cutter, self.table, self.how.chord, self.how.clearance
         )
@@ -148,29 +155,29 @@ class Lines:
             pallet[piece.first : piece.last] = piece.pallet
         return Line(q, at, S, N, K, d, pieces, pallet)
 
-    def first(self, Q: tuple[float, float]) -> Floats:
-        """Where the first line lies: at the border, or where the cutter first reaches the surface, evened out."""
-        knots = np.unique(np.linspace(0, len(self.p) - 1, min(len(self.p), _KNOTS)).round().astype(int))
-        low, high = np.full(len(knots), Q[0]), np.full(len(knots), np.nan)
+    def border(self, Q: tuple[float, float]) -> Floats:
+        """Q at every station from Q[0] towards Q[1] where the cutter first reaches the surface, evened out."""
+        count = min(len(self.p), _KNOTS)
+        knots = np.unique(np.linspace(0, len(self.p) - 1, count).round().astype(int))
+        low, high = np.zeros(len(knots)), np.full(len(knots), np.nan)
         for f in np.concatenate([[0.0], np.geomspace(0.02, 0.6, 9)]):
-            open_ = np.isnan(high)
-            if not open_.any():
+            open_ = np.flatnonzero(np.isnan(high))
+            if not len(open_):
                 break
-            q = np.full(len(knots), Q[0] + f * (Q[1] - Q[0]))
-            got = self._reached(knots[open_], q[open_])
-            high[np.flatnonzero(open_)[got]] = q[0]
-            low[np.flatnonzero(open_)[~got]] = q[0]
-        some = np.isfinite(high) & (high > Q[0])
+            got = self._reached(knots[open_], np.full(len(open_), Q[0] + f * (Q[1] - Q[0])))
+            high[open_[got]], low[open_[~got]] = f, f
+        some = np.isfinite(high) & (high > 0.0)
         for _ in range(_BISECT if some.any() else 0):
-            q = 0.5 * (low[some] + high[some])
-            got = self._reached(knots[some], q)
-            high[some] = np.where(got, q, high[some])
-            low[some] = np.where(got, low[some], q)
+            f = 0.5 * (low[some] + high[some])
+            got = self._reached(knots[some], Q[0] + f * (Q[1] - Q[0]))
+            high[some] = np.where(got, f, high[some])
+            low[some] = np.where(got, low[some], f)
         known = np.isfinite(high)
-        if not known.any() or not some.any():
+        if not some.any():
             return np.full(len(self.p), Q[0])
-        q = np.interp(self.p, self.p[knots[known]], high[known])
-        return np.minimum(np.maximum(gaussian_filter1d(maximum_filter1d(q, 3), 1.0, mode="nearest"), q), Q[1])
+        f = np.interp(self.p, self.p[knots[known]], high[known])
+        f = np.minimum(np.maximum(gaussian_filter1d(maximum_filter1d(f, 3), 1.0, mode="nearest"), f), 1.0)
+        return Q[0] + f * (Q[1] - Q[0])
 
     def strip(self, q: Floats, border: float) -> Missed:
         """What lies between the border and the first line."""
@@ -225,6 +232,7 @@ class Lines:
         return Missed(number, (a, b), (c, d), length, reason)
 
     def on(self, q: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+        """S, N, K, direction of the line and (u, v) at the stations."""
         u, v = (self.p, q) if self.along == "u" else (q, self.p)
         Sp, Sq = (self.surface.at(u, v, *x) for x in (((1, 0), (0, 1)) if self.along == "u" else ((0, 1), (1, 0))))
         d = Sp + np.gradient(q, self.p)[:, None] * Sq

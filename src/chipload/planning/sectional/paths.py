@@ -89,7 +89,7 @@ def finishing(
     step = _Stepper(job, how.scallop, how.aim)
     tracks: list[Track] = []
     missed: list[Missed] = []
-    q = job.first(Q)
+    q = job.border(Q)
     line = job.line(q, np.full(len(p), np.nan))
     if (q > Q[0]).any():
         missed.append(job.strip(q, Q[0]))

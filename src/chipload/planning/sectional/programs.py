@@ -1,8 +1,7 @@
 """The program of one cutter at one setting of the table, in the work frame.
 
 Notation: alpha table angle, set before the first motion and kept in all of the program; B pallet angle. On the machine the
-table stands at the position that brings the tool's axis to alpha from the pallet's, found by the machine's chain; it
-must be one of those that the table can be set to.
+table stands at the position that brings the tool's axis to alpha from the pallet's (``tables.py``).
 """
 
 from __future__ import annotations
@@ -11,12 +10,9 @@ import math
 
 import numpy as np
 
-from chipload.errors import Finding, InputError
+from chipload.errors import Finding
 from chipload.machine.feed import row_time_limited
-from chipload.machine.kinematics import forward, inverse
-from chipload.machine.limits import limit_findings
 from chipload.machine.machine import Machine
-from chipload.planning.sectional.closed import axis_at
 from chipload.planning.sectional.links import Moves
 from chipload.planning.sectional.scene import Floats
 from chipload.program.motions import spans
@@ -39,68 +35,9 @@ def program_of(moves: Moves, spindle: float, tool: int) -> Program:
     )  # fmt: skip
 
 
-def table_angles(machine: Machine) -> Floats:
-    """Table angles alpha [rad] that the machine's index table can be set to, ascending.
-
-    Raises
-    ------
-    InputError
-        The machine has no index table with steps beside a turning pallet.
-
-    Examples
-    --------
-    >>> from chipload.machine.machine import machine_named
-    >>> np.degrees(table_angles(machine_named("horizontal-b"))).round(6)[[0, 1, -1]].tolist()
-    [20.0, 25.0, 90.0]
-    """
-    turning = machine.chain.rotary
-    tables = [x for x in turning if x.indexed]
-    if len(turning) != 2 or len(tables) != 1 or tables[0].step is None or tables[0].endless:
-        raise InputError(f"machine {machine.name}: must have one turning pallet and one index table with steps")
-    table = tables[0]
-    assert table.step is not None
-    first, last = math.ceil(table.low / table.step - 1e-9), math.floor(table.high / table.step + 1e-9)
-    q = np.zeros((last - first + 1, 9))
-    q[:, table.column] = np.arange(first, last + 1) * table.step
-    return np.unique(np.round(np.arccos(np.clip(_axis_z(machine, q), -1.0, 1.0)), 12))
-
-
-def _axis_z(machine: Machine, q: Floats) -> Floats:
-    out: Floats = forward(machine, q)[1][:, 2]
-    return out
-
-
-def setting(machine: Machine, table: float) -> float:
-    """Position [rad] of the index table for the table angle alpha [rad].
-
-    Raises
-    ------
-    InputError
-        The table cannot be set to it.
-    """
-    axis = axis_at(table, 0.0)[None]
-    free = "".join(x.letter for x in machine.chain.rotary)
-    column = next(x.column for x in machine.chain.rotary if x.indexed)
-    found = inverse(machine, np.zeros((1, 3)), axis, free=free)
-    for q in found.axes[0]:
-        broken = [f for f in limit_findings(machine, q[None]) if f.code in ("machine-limit", "machine-index")]
-        if found.miss[0] < 1e-9 and not any(f.text.split(":")[1].strip()[0] in free for f in broken):
-            return float(q[column])
-    known = ", ".join(f"{math.degrees(x):g}" for x in table_angles(machine))
-    raise InputError(f"table_deg = {math.degrees(table):g}: machine {machine.name} can be set to {known}")
-
-
 def pallet_rate(machine: Machine) -> float:
     """Greatest rate of the turning pallet [rad/s]."""
     return next(x.rate for x in machine.chain.rotary if not x.indexed)
-
-
-def pallet_spans(machine: Machine) -> tuple[tuple[float, float], ...]:
-    """Where the pallet may be [rad], within one turn, in the sense of B of the impeller's frame."""
-    axis = next(x for x in machine.chain.rotary if not x.indexed)
-    if axis.endless or axis.high - axis.low >= math.tau - 1e-9:
-        return ((0.0, math.tau),)
-    return ((axis.low, axis.high),)
 
 
 def table_stands(program: Program) -> bool:

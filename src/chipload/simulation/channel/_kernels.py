@@ -56,7 +56,8 @@ def left(
     gouge_row: Any, gouge_part: Any,
 ) -> None:  # fmt: skip
     """For the points ``first``..``last``: ``rest`` [mm] above the surface that no cutting move takes, ``gouge`` [mm]
-    the deepest below it that any part comes, the rows that do, the part. ``cutting`` (n,) whether a row feeds."""
+    the deepest below it that any part comes, the rows that do, the part. ``cutting`` (n,) whether a row feeds.
+    """
     tip, axis = np.empty(3), np.empty(3)
     n, parts = len(tips), len(shapes)
     for i in range(first, last):
