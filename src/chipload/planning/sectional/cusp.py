@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from chipload.planning.sectional.scene import Floats
-from chipload.planning.sectional.step_over import trace_curvature
+from chipload.planning.sectional.step_over import contact_of, trace_curvature
 
 _PHI = np.radians(np.concatenate([-np.geomspace(80.0, 0.2, 60), [0.0], np.geomspace(0.2, 80.0, 60)]))
 
@@ -29,7 +29,7 @@ def reaches(
     At most R; 0 where the cutter does not fit the curvature of the surface.
     """
     N, T = normal, axis
-    q = trace_curvature(N, T, along, curvature, rho, corner)
+    q = trace_curvature(contact_of(N, T, along, curvature), rho, corner)
     d = along - (along * N).sum(axis=1)[:, None] * N
     d /= np.linalg.norm(d, axis=1)[:, None]
     e = np.cross(N, d)
