@@ -1,9 +1,9 @@
 """How high the scallop between two lines stands: from the cutter's poses on both, not to second order.
 
-Notation: at each station i two lines lie at q and q'; points of the surface between them at shares of the way; D distance
-of a point from the cutting part, at the poses of both lines from station to station nearby. The least D over the poses,
-between them by a parabola, is what is left there, along the normal by one step of the secant; the greatest of a station's
-points is its crest.
+Notation: at each station i two lines lie at q and q'; points of the surface between them at shares of the way; D
+distance of a point from the cutting part, at the poses of both lines from station to station nearby. The least D over
+the poses, between them by a parabola, is what is left there, along the normal by one step of the secant; the greatest
+of a station's points is its crest.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Surfaces that are milled as patches with parameters: sides as they are, the floor and layers above it by fitting.
 
 Notation: u along the hub from inlet to outlet, v across a channel from the plus side of a body to the next body round,
-both 0..1, as the contact points of ``surfaces.py``. A layer lies at the share w of the way from the hub, less an allowance, to
-the shroud; it may go on beyond the outlet, straight in its meridional plane.
+both 0..1, as the contact points of ``surfaces.py``. A layer lies at the share w of the way from the hub, less an
+allowance, to the shroud; it may go on beyond the outlet, straight in its meridional plane.
 """
 
 from __future__ import annotations

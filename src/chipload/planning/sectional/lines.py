@@ -1,9 +1,9 @@
 """Lines on a surface: where they lie, the pallet angles that are valid there, the tracks on them, what is missed.
 
-Notation: a line runs along one parameter p of the surface, at fixed stations, at q(p) of the other. The pallet angles come
-from the exact ranges at its stations (``pallet.py``), looked for near those of the line before first. Where a line
-comes to a point that is not reached, its end is found by halving; points between are added where a straight row would
-leave the path (``mend.py``).
+Notation: a line runs along one parameter p of the surface, at fixed stations, at q(p) of the other. The pallet angles
+come from the exact ranges at its stations (``pallet.py``), looked for near those of the line before first. Where a
+line comes to a point that is not reached, its end is found by halving; points between are added where a straight row
+would leave the path (``mend.py``).
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """How the cutter comes to a track, from one to the next, and away: moves that are proved to be clear.
 
-Notation: p tip [mm], T axis, N normal at the contact; alpha table angle, H(alpha) the height along T above which nothing
-of the part lies, whatever the pallet angle: the part is within a body of revolution, H = max of
-r sin(alpha) + z cos(alpha). With its tip above H the cutter is clear wherever it stands.
+Notation: p tip [mm], T axis, N normal at the contact; alpha table angle, H(alpha) the height along T above which
+nothing of the part lies, whatever the pallet angle: the part is within a body of revolution, H = max of r sin(alpha) +
+z cos(alpha). With its tip above H the cutter is clear wherever it stands.
 
 The cutter leaves a track along N + T, T or N by the lift, and comes to one the same way back: on these it touches, so
 that they are looked at in small steps, and may be as deep as ``touch``. From there it goes straight to the lifted

@@ -2,8 +2,8 @@
 
 Notation: between two poses the tip goes straight and the axis turns evenly. Half-way the cutter should touch the
 surface at the middle of u, v and B: how far the straight row is off along the normal there is its chord error. A check
-point that lies deeper than the chord in the cutter at a quarter, a half or three quarters is a gouge. Either is mended by
-a point between, whose pallet angle is the nearest valid one to the middle.
+point that lies deeper than the chord in the cutter at a quarter, a half or three quarters is a gouge. Either is mended
+by a point between, whose pallet angle is the nearest valid one to the middle.
 """
 
 from __future__ import annotations

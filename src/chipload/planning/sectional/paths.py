@@ -1,10 +1,10 @@
 """Finishing paths of a patch: lines that leave a scallop of the same height between them.
 
-Notation: a line runs along one parameter p of the surface at q(p) of the other; d its direction, N normal, e = N x d; h
-height of the scallop. The next line lies at the step w across e, q + w / (S_q.e) with the derivative half-way; w is how
-far the pass reaches below h on this side and how far the next one does on its own (``cusp.py``), then mended until
-the crest between the poses of both (``crest.py``) is as high as aimed. The next line's pallet angles are not known before
-it lies: they are first taken for those of this line.
+Notation: a line runs along one parameter p of the surface at q(p) of the other; d its direction, N normal, e = N x d;
+h height of the scallop. The next line lies at the step w across e, q + w / (S_q.e) with the derivative half-way; w is
+how far the pass reaches below h on this side and how far the next one does on its own (``cusp.py``), then mended until
+the crest between the poses of both (``crest.py``) is as high as aimed. The next line's pallet angles are not known
+before it lies: they are first taken for those of this line.
 
 The pallet angles of a line come from the exact ranges at its points (``pallet.py``). Points without a range are left
 out and told; the line is split there. A line that reaches the border of the patch ends there; a part of a line along

@@ -1,7 +1,7 @@
 """The program of one cutter at one setting of the table, in the work frame.
 
-Notation: alpha table angle, set before the first motion and kept in all of the program; B pallet angle. On the machine the
-table stands at the position that brings the tool's axis to alpha from the pallet's (``tables.py``).
+Notation: alpha table angle, set before the first motion and kept in all of the program; B pallet angle. On the machine
+the table stands at the position that brings the tool's axis to alpha from the pallet's (``tables.py``).
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from chipload.errors import InputError
 from chipload.geometry.bspline import Patch
 from chipload.planning.sectional.floor import layer_of, meridian
 from chipload.planning.sectional.impeller import Impeller
-from chipload.planning.sectional.lines import Lines, Missed, Motion, Tracks, stations
+from chipload.planning.sectional.lines import Lines, Missed, Motion, Tracks
 from chipload.planning.sectional.ranges.ranges import FULL
 from chipload.planning.sectional.scene import Floats, Scene
 from chipload.planning.sectional.surfaces import hub_range
@@ -27,6 +27,8 @@ from chipload.progress import Progress, silent
 
 #: beyond the outlet a row begins so far from it, beside the cutter's diameter [mm]
 OUTSIDE = 2.0
+#: least stations of a row; how far within the border the outermost rows are, as a share of the width
+_FEWEST, _INSET = 17, 0.02
 
 
 @dataclass(frozen=True)
@@ -95,14 +97,14 @@ def roughing(
     shares = layers(impeller, how.depth, how.hub, ahead)
     for k, w in enumerate(shares):
         patch = layer_of(impeller, index, float(w), how.hub, ahead, cutter.diameter + OUTSIDE)
-        p = np.linspace(0.0, 1.0, stations(patch, "u", (0.0, 1.0), (0.0, 1.0), 4.0 * how.motion.chord))
+        p = np.linspace(0.0, 1.0, max(_FEWEST, _counts(patch, how.step)[0]))
         lines = Lines(patch, "u", p, scene, 2, cutter, table, how.motion, pallets, workers)
         first, last = lines.border((0.0, 1.0)), lines.border((1.0, 0.0))
         last = np.maximum(first, last)
         count = max(1, math.ceil(_width(patch, p, first, last) / how.step))
         before = np.full(len(p), np.nan)
         for j in range(count + 1):
-            line = lines.line(first + (last - first) * j / count, before)
+            line = lines.line(first + (last - first) * (_INSET + (1.0 - 2.0 * _INSET) * j / count), before)
             before = line.pallet
             new, gone = lines.tracks(line, np.ones(len(p), dtype=np.bool_), number)
             tracks += [t.back() for t in new[::-1]]

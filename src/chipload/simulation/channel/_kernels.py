@@ -46,7 +46,7 @@ def lower(
     lo, hi = pierce(2, 0.0, 0.0, tip, axis, shape)
     if lo > hi or hi <= -depth or lo >= height:
         return height
-    return max(lo, -depth)
+    return max(float(lo), -depth)
 
 
 @njit(cache=True, nogil=True)
@@ -60,17 +60,19 @@ def left(
     """
     tip, axis = np.empty(3), np.empty(3)
     n, parts = len(tips), len(shapes)
+    half = 0.5 * (height + depth)
     for i in range(first, last):
         S, frame = points[i], frames[i]
+        middle = S + 0.5 * (height - depth) * frame[2]
         for k in range(1, n):
             ax, ay, az = axes[k, 0], axes[k, 1], axes[k, 2]
-            x, y, z = S[0] - tips[k, 0], S[1] - tips[k, 1], S[2] - tips[k, 2]
+            x, y, z = middle[0] - tips[k, 0], middle[1] - tips[k, 1], middle[2] - tips[k, 2]
             dx, dy, dz = tips[k, 0] - tips[k - 1, 0], tips[k, 1] - tips[k - 1, 1], tips[k, 2] - tips[k - 1, 2]
             bx, by, bz = ax - axes[k - 1, 0], ay - axes[k - 1, 1], az - axes[k - 1, 2]
             long = math.sqrt(dx * dx + dy * dy + dz * dz)
             far = math.sqrt(x * x + y * y + z * z)
-            sweep = long + math.sqrt(bx * bx + by * by + bz * bz) * (far + long + height)
-            slack = sweep + max(height, depth)
+            sweep = long + math.sqrt(bx * bx + by * by + bz * bz) * (far + long + half)
+            slack = sweep + half
             h = x * ax + y * ay + z * az
             if h < -slack:
                 continue

@@ -36,6 +36,8 @@ Ints = NDArray[np.int64]
 PARTS = ("cutting part", "neck", "shank", "holder")
 #: a part without an end goes on so far [mm]
 ENDLESS = 500.0
+#: longest piece of a row [mm] that is looked at as one
+PIECE = 4.0
 _BLOCK = 512
 
 
@@ -185,8 +187,8 @@ def left_on(
     if not (height > 0.0 and depth > 0.0 and step > 0.0 and tol > 0.0):
         raise InputError("channel: height, depth, step and tol: must be above 0")
     starts, shapes, kinds = tool_parts(cutter)
-    tips, axes = np.ascontiguousarray(program.p_work), np.ascontiguousarray(program.axis)
-    cutting = program.motion == LINE
+    tips, axes, of = _pieces(program)
+    cutting = (program.motion == LINE)[of]
     out = []
     total, done = sum(len(w.points) for w in walls), 0
     for w in walls:
@@ -208,8 +210,22 @@ def left_on(
             for k, _ in enumerate(pool.map(block, range(0, n, _BLOCK)), 1):
                 progress((done + min(k * _BLOCK, n)) / total, w.name)
         done += n
+        row = np.where(row >= 0, of[np.maximum(row, 0)], -1)
         out.append(Left(w, rest, gouge, row, np.where(part >= 0, kinds[np.maximum(part, 0)], -1), height, depth))
     return tuple(out)
+
+
+def _pieces(program: Program) -> tuple[Floats, Floats, Ints]:
+    """Tips and axes (m, 3) of the rows in pieces of at most :data:`PIECE`, and the row of each."""
+    length = np.linalg.norm(np.diff(program.p_work, axis=0, prepend=program.p_work[:1]), axis=1)
+    count = np.maximum(np.ceil(length / PIECE), 1.0).astype(np.int64)
+    of = np.repeat(np.arange(len(program)), count)
+    share = ((np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count) + 1) / count[of])[:, None]
+    before = np.maximum(of - 1, 0)
+    tips = program.p_work[before] * (1.0 - share) + program.p_work[of] * share
+    axes = program.axis[before] * (1.0 - share) + program.axis[of] * share
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    return np.ascontiguousarray(tips), np.ascontiguousarray(axes), of
 
 
 def _frames(normals: Floats) -> Floats:
