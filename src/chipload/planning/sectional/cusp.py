@@ -41,18 +41,22 @@ def reaches(
     flat = corner * c1**2 + (corner + rho / s) * c2**2 if corner > 0.0 else rho / s * c2**2
     R = rho + corner
     x = np.concatenate([[0.0], np.geomspace(1e-3 * R, R, 80)])
-    cos, sin = np.cos(_PHI), np.sin(_PHI)
-    uT = -n[:, None] * cos + (e * T).sum(axis=1)[:, None] * sin
+    eT = (e * T).sum(axis=1)
+    # beside the fixed slopes that of the flank, u.T = 0
+    flank = np.clip(np.arctan2(n, np.abs(eT)), 0.0, _PHI[-1]) * np.where(eT < 0.0, -1.0, 1.0)
+    phi = np.column_stack([np.tile(_PHI, (len(N), 1)), flank])
+    cos, sin = np.cos(phi), np.sin(phi)
+    uT = -n[:, None] * cos + eT[:, None] * sin
     uV = -s[:, None] * cos + (e * V).sum(axis=1)[:, None] * sin
     H = corner * (1.0 - cos) + rho * (uV + np.sqrt(np.clip(1.0 - uT**2, 0.0, None)))
-    H = np.where(uT <= 1e-12, H, np.inf)
+    H = np.where(uT <= 1e-9, H, np.inf)
     # coupled with the curvature along the path: as the circle of the corner is
     with np.errstate(divide="ignore", invalid="ignore"):
         bare = np.where(flat > 0.0, 1.0 / np.where(flat > 0.0, flat, 1.0), np.inf) - k
         scale = np.where((bare > 0.0) & np.isfinite(bare) & np.isfinite(q), q / bare, 1.0)
     out = []
     for sign in (1.0, -1.0):
-        y = ((sign * x)[None, :, None] * sin - H[:, None, :]) / cos
+        y = ((sign * x)[None, :, None] * sin[:, None] - H[:, None]) / cos[:, None]
         g = (y.max(axis=2) - 0.5 * k[:, None] * x**2) * scale[:, None]
         over = g >= scallop
         j = np.where(over.any(axis=1), over.argmax(axis=1), len(x) - 1)
