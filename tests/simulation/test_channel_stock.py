@@ -18,7 +18,7 @@ MILL = CatalogueCutter(8.0, 0.0, 10.0, shank_diameter=6.0, reach=20.0, holder_di
 def block():
     """A ring sector: 10 to 30 mm from the axis, 20 high, a tenth of a turn about +X."""
     z = np.array([[0.0, 0.0], [0.0, 20.0]])
-    return sector(z + [10.0, 0.0], z + [30.0, 0.0], -math.pi / 10, math.pi / 10)
+    return sector(z + np.array([10.0, 0.0]), z + np.array([30.0, 0.0]), -math.pi / 10, math.pi / 10)
 
 
 def slot_area():
@@ -48,7 +48,8 @@ def test_rapid_and_holder_in_the_blank_are_found(block):
     # the cutting part ends 2 mm below the top of the blank: there the shank, 6 wide, goes through it
     low = [rapid([[40.0, 0.0, 8.0]], 100.0, 1, "link"), plunge([[0.0, 0.0, 8.0]], 10.0, 100.0, 1, "rough")]
     shank = taken_from(block, Program.join(low), MILL, 0.5)
-    assert shank.part[1] == 2 and shank.above[1] == pytest.approx(2.0 * 6.0 * 20.0, rel=0.05)
+    assert shank.part[1] == 2
+    assert shank.above[1] == pytest.approx(2.0 * 6.0 * 20.0, rel=0.05)
     # a holder 10 mm above the tip, wider than the sector: all of its top 2 mm, which the cutting part leaves
     short = CatalogueCutter(8.0, 0.0, 10.0, reach=10.0, holder_diameter=20.0)
     found = taken_from(block, Program.join(low), short, 0.5)

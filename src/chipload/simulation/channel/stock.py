@@ -1,7 +1,7 @@
 """What a program takes out of a blank, row after row: rapids and the parts above the cutting part must take nothing.
 
-Notation: the blank is the part of a body of revolution between two meridional curves, inner and outer, and two angles theta,
-as triangles. It is kept as dexels, a route of its own to the removed volume.
+Notation: the blank is the part of a body of revolution between two meridional curves, inner and outer, and two angles
+theta, as triangles. It is kept as dexels, a route of its own to the removed volume.
 """
 
 from __future__ import annotations
