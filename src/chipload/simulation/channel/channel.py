@@ -57,6 +57,9 @@ class Wall:
 def wall(name: str, surface: Patch, u: Floats, v: Floats) -> Wall:
     """The grid u x v (a,), (b,) on a surface.
 
+    Keep off the edges of the metal, as the tip of a blade: a ray inwards from there lies in the face beside it, which a
+    cutter may touch.
+
     >>> from chipload.geometry.bspline import through
     >>> flat = through([[[0, 0, 0], [0, 2, 0]], [[3, 0, 0], [3, 2, 0]]], [0, 1], [0, 1])
     >>> float(wall("flat", flat, np.linspace(0, 1, 7), np.linspace(0, 1, 5)).area.sum())
