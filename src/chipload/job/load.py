@@ -14,6 +14,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from chipload.errors import InputError
+from chipload.job.impeller import ImpellerJob, ImpellerJobTable, impeller_job
 from chipload.job.messages import first_error
 from chipload.job.override import override
 from chipload.job.planned import Job, planned_job
@@ -21,11 +22,12 @@ from chipload.job.program import ProgramJob, program_job
 from chipload.job.tables import JobTable, ProgramJobTable, Table
 
 #: a job of any kind
-AnyJob = Job | ProgramJob
+AnyJob = Job | ProgramJob | ImpellerJob
 
 #: kinds of jobs: the table that only they have, the table of the whole file, and what makes the job of it
 KINDS: Mapping[str, tuple[type[Table], Callable[[Path, Any, Sequence[str]], AnyJob]]] = {
     "program": (ProgramJobTable, program_job),
+    "impeller": (ImpellerJobTable, impeller_job),
     "part": (JobTable, planned_job),
 }
 

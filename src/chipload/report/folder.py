@@ -20,6 +20,13 @@ from chipload.errors import InputError
 from chipload.progress import Progress, silent
 from chipload.report import reading
 from chipload.report.history import history_bytes
+from chipload.report.impeller.outcome import Milled
+from chipload.report.impeller.outcome import verdict as milled_verdict
+from chipload.report.impeller.page import page_bytes as milled_page
+from chipload.report.impeller.programs import program_files as milled_files
+from chipload.report.impeller.scene import scene_bytes as milled_scene
+from chipload.report.impeller.summary import history_bytes as milled_history
+from chipload.report.impeller.summary import summary_bytes as milled_summary
 from chipload.report.outcome import Outcome
 from chipload.report.outcome import verdict as planned_verdict
 from chipload.report.page import page_bytes
@@ -51,10 +58,11 @@ KINDS: dict[type, Kind] = {
         reading.program_files,
         reading.verdict,
     ),
+    Milled: Kind((milled_summary, milled_history, milled_scene, milled_page), milled_files, milled_verdict),
 }
 
 
-def verdict(outcome: Outcome | Read) -> tuple[bool, str]:
+def verdict(outcome: Outcome | Read | Milled) -> tuple[bool, str]:
     """Whether everything holds, and one sentence that says it."""
     return KINDS[type(outcome)].verdict(outcome)
 
@@ -88,7 +96,7 @@ def check_target(out: str | Path, ours: Callable[[Path], bool] | None = None, wh
     return target
 
 
-def write_result(outcome: Outcome | Read, out: str | Path, progress: Progress = silent) -> Path:
+def write_result(outcome: Outcome | Read | Milled, out: str | Path, progress: Progress = silent) -> Path:
     """Write the whole result folder and return it.
 
     Raises

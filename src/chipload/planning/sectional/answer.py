@@ -8,12 +8,14 @@ down, each with its neck, shank and holder, by their exact ranges of the pallet 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
+from chipload.planning.sectional.blocks import BLOCK
 from chipload.planning.sectional.ranges.ranges import FULL, valid_ranges
 from chipload.planning.sectional.scene import Floats, Ints, Scene
 from chipload.planning.sectional.search import CURVATURE, Limits, Sampling, limits
@@ -137,33 +139,75 @@ def one_cutter(
     (index in the catalogue, index of the table angle, ranges of each reachable contact point), None: there is none.
     Needs an answer with ``every``.
     """
-    reachable = np.flatnonzero(answer.cutter >= 0)
-    if len(reachable) == 0:
+    found = one_cutter_of([(scene, answer)], clearance, pallets, workers)
+    return None if found is None else (found[0], found[1], found[2][0])
+
+
+def one_cutter_of(
+    parts: Sequence[tuple[Scene, Answer]], clearance: float, pallets: ArrayLike = FULL, workers: int = 1
+) -> tuple[int, int, tuple[tuple[Floats, ...], ...]] | None:
+    """The largest cutter for several surfaces at one table angle, all searched with the same catalogue and tables.
+
+    Returns
+    -------
+    As :func:`one_cutter`, the ranges for each surface.
+    """
+    reachable = [np.flatnonzero(answer.cutter >= 0) for _, answer in parts]
+    if not all(len(row) for row in reachable):
         return None
+    catalogue, tables = parts[0][1].catalogue, parts[0][1].tables
     tries = []
-    for f in answer.families:
-        for k, cutter in enumerate(answer.catalogue.cutters):
-            if cutter.corner_radius == f.corner_radius:
-                least, goes = f.rho[reachable].min(axis=0), _open(f, cutter.rho)[reachable].all(axis=0)
-                tries += [(cutter.diameter, least[t], k, int(t)) for t in np.flatnonzero(goes)]
+    for k, cutter in enumerate(catalogue.cutters):
+        bounds = [_of(answer, cutter) for _, answer in parts]
+        goes = [left_open(f, cutter.rho)[row].all(axis=0) for f, row in zip(bounds, reachable, strict=True)]
+        least = np.min([f.rho[row].min(axis=0) for f, row in zip(bounds, reachable, strict=True)], axis=0)
+        tries += [(cutter.diameter, least[t], k, int(t)) for t in np.flatnonzero(np.logical_and.reduce(goes))]
     for _, _, k, t in sorted(tries, reverse=True):
-        got = valid_ranges(
-            scene, answer.catalogue.cutters[k], answer.tables[t], clearance, pallets, reachable, workers=workers
-        )
-        if all(len(row) for row in got.ranges):
-            return k, t, got.ranges
+        cutter, found = catalogue.cutters[k], []
+        for (scene, answer), row in zip(parts, reachable, strict=True):
+            rho = _of(answer, cutter).rho[:, t]
+            got = _everywhere(
+                scene, cutter, tables[t], clearance, pallets, row[np.argsort(rho[row], kind="stable")], workers
+            )
+            if got is None:
+                break
+            found.append(tuple(got[int(i)] for i in row))
+        if len(found) == len(parts):
+            return k, t, tuple(found)
     return None
+
+
+def _everywhere(
+    scene: Scene, cutter: CatalogueCutter, table: float, clearance: float, pallets: ArrayLike, order: Ints,
+    workers: int,
+) -> dict[int, Floats] | None:  # fmt: skip
+    """Ranges of each contact point, those with least room tried first; None: somewhere there is none."""
+    found: dict[int, Floats] = {}
+    for part in (order[:BLOCK], order[BLOCK:]):
+        got = valid_ranges(scene, cutter, table, clearance, pallets, part, workers=workers)
+        if not all(len(row) for row in got.ranges):
+            return None
+        found |= {int(i): row for i, row in zip(part, got.ranges, strict=True)}
+    return found
+
+
+def _of(answer: Answer, cutter: CatalogueCutter) -> Limits:
+    """The bounds of a cutter's corner radius."""
+    return next(f for f in answer.families if f.corner_radius == cutter.corner_radius)
 
 
 def _family(
     scene: Scene, cutters: tuple[CatalogueCutter, ...], alpha: Floats, every: bool, pallets: ArrayLike,
     sampling: Sampling | None, workers: int, progress: Progress,
 ) -> Limits:  # fmt: skip
-    lengths = [c.cutting_length for c in cutters]
     r = cutters[0].corner_radius
-    cut = math.inf if None in lengths else min(x for x in lengths if x is not None) - r
     rho = [c.rho for c in cutters]
-    return limits(scene, alpha, r, max(rho), min(rho), cut, every, pallets, sampling, workers, progress)
+    return limits(scene, alpha, r, max(rho), min(rho), shortest(cutters), every, pallets, sampling, workers, progress)
+
+
+def shortest(cutters: Sequence[CatalogueCutter]) -> float:
+    """Height above the corner's centres [mm] up to which every cutter of a family cuts."""
+    return min(math.inf if c.cutting_length is None else c.cutting_length - c.corner_radius for c in cutters)
 
 
 def _candidates(catalogue: Catalogue, families: tuple[Limits, ...], k: int) -> list[tuple[int, int]]:
@@ -171,12 +215,12 @@ def _candidates(catalogue: Catalogue, families: tuple[Limits, ...], k: int) -> l
     out = []
     for index, cutter in enumerate(catalogue.cutters):
         f = next(f for f in families if f.corner_radius == cutter.corner_radius)
-        out += [(-cutter.diameter, -f.bound[k, t], index, t) for t in np.flatnonzero(_open(f, cutter.rho)[k])]
+        out += [(-cutter.diameter, -f.bound[k, t], index, t) for t in np.flatnonzero(left_open(f, cutter.rho)[k])]
     return [(index, int(t)) for _, _, index, t in sorted(out)]
 
 
-def _open(f: Limits, rho: float) -> NDArray[np.bool_]:
-    """(c, t) where the bounds leave a cutter open."""
+def left_open(f: Limits, rho: float) -> NDArray[np.bool_]:
+    """(c, t) where the bounds of a family do not exclude a cutter of it."""
     out: NDArray[np.bool_] = (rho < f.bound) | (rho <= f.rho)
     return out
 

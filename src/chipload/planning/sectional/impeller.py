@@ -102,8 +102,9 @@ class Impeller:
         first, last = -around, 1 + around
         floors = []
         for k in range(first, last):
-            near_wall, far_wall = self.body(body + step * k), self.body(body + step * (k + 1))
-            floors.append(self._floor(_side(near_wall, step), _side(far_wall, -step), hub_points, hub_range))
+            s = np.linspace(*hub_range, hub_points[0])
+            theta = self.across(body + step * k, s, np.linspace(0.0, 1.0, hub_points[1]), step)
+            floors.append(self.hub.at(np.repeat(s, hub_points[1]), theta.ravel()))
         parts = [own.at(a, b), facing.at(a, b), np.concatenate(floors)]
         if around:
             parts += [_side(self.body(body), -step).at(a, b), _side(self.body(body + step), step).at(a, b)]
@@ -115,13 +116,30 @@ class Impeller:
             np.concatenate(parts), surface, near,
         )  # fmt: skip
 
-    def _floor(self, own: Patch, facing: Patch, count: tuple[int, int], along: tuple[float, float]) -> Floats:
-        """Points of the hub of one channel, from body to body."""
-        s = np.linspace(*along, count[0])
-        low, high = (_theta_along(p, self.hub, s) for p in (own, facing))
-        gap = np.angle(np.exp(1j * (high - low)))
-        theta = low[:, None] + gap[:, None] * np.linspace(0.0, 1.0, count[1])
-        return self.hub.at(np.repeat(s, count[1]), theta.ravel())
+    def across(self, index: int, s: ArrayLike, v: ArrayLike, step: int = 1) -> Floats:
+        """Theta (a, b) [rad] on the hub at the shares v (b,) of a channel's width.
+
+        Parameters
+        ----------
+        index : the body from which v counts, as :meth:`body`
+        s : (a,) places along the hub
+        step : 1: the channel on its `plus` side, -1: that on its `minus` side
+        """
+        low, high = self._foot(index, step, s), self._foot(index + step, -step, s)
+        gap = step * np.mod(step * (high - low), 2.0 * math.pi)
+        out: Floats = low[:, None] + gap[:, None] * np.asarray(v, dtype=np.float64)
+        return out
+
+    def _foot(self, index: int, side: int, s: ArrayLike) -> Floats:
+        """Theta (a,) of a side's foot; a blade goes on straight beyond its edges, a splitter beside its blade."""
+        at = np.asarray(s, dtype=np.float64)
+        first = index - index % len(self.bodies)
+        places, theta = _theta_of(_side(self.body(index), side), self.hub)
+        out: Floats = np.interp(at, places, theta)
+        if index != first:
+            guide = _theta_of(_side(self.body(first), side), self.hub)
+            out += np.interp(at, *guide) - np.interp(np.clip(at, places[0], places[-1]), *guide)
+        return out
 
 
 def _side(blade: Blade, sign: int) -> Patch:
@@ -134,11 +152,9 @@ def _angle(blade: Blade) -> float:
     return math.atan2(p[1], p[0])
 
 
-def _theta_along(patch: Patch, hub: Revolved, s: Floats) -> Floats:
-    """Theta (k,) of a side's foot at places along the hub; beyond its edges as at the edge."""
+def _theta_of(patch: Patch, hub: Revolved) -> tuple[Floats, Floats]:
+    """Places (k,) along the hub, ascending, and theta (k,) of a side's foot there."""
     foot = patch.at(np.linspace(0.0, 1.0, 201), 0.0)
     at = hub.nearest(np.hypot(foot[:, 0], foot[:, 1]), foot[:, 2])
-    theta = np.unwrap(np.arctan2(foot[:, 1], foot[:, 0]))
     order = np.argsort(at, kind="stable")
-    out: Floats = np.interp(s, at[order], theta[order])
-    return out
+    return at[order], np.unwrap(np.arctan2(foot[:, 1], foot[:, 0]))[order]

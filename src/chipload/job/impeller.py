@@ -1,0 +1,154 @@
+"""A job that mills an impeller in sections: its blades, the cutters there are, the machine with its index table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from chipload.errors import InputError
+from chipload.job.sources import source
+from chipload.job.tables import Count, NotNegative, Number, Positive, SourceTable, Table, Text, Unit
+
+Share = Annotated[Number, Field(ge=0.0, le=1.0)]
+Span = tuple[Share, Share]
+
+
+class ShapeTable(Table):
+    """An impeller by formula, see ``planning/sectional/parametric.py``."""
+
+    channel_mm: Positive = Field(description="narrowest width of a channel, round the axis at the inlet")
+    hub_radius_mm: Positive = Field(description="of the hub at the inlet")
+    height_mm: Positive = Field(description="of the hub from outlet to inlet")
+    blade_height_mm: Positive = Field(description="at the inlet")
+    outlet_height_mm: Positive = Field(description="of the blades at the outlet")
+    wrap_deg: Number = Field(description="turn of a blade from inlet to outlet")
+    lean_deg: Number = Field(0.0, description="turn of a blade from hub to shroud")
+
+
+class SectionsTable(Table):
+    """Blades by points: closed profiles from hub to shroud, and the curves of hub and shroud."""
+
+    blade: tuple[Text, ...] = Field(min_length=1, description="files in the order hub to shroud")
+    splitter: tuple[Text, ...] = Field((), description="likewise; none: there are no splitters")
+    hub: Text
+    shroud: Text
+    unit: Unit = Field(description="of the files, which do not say it")
+    columns: Literal["X R*THETA R", "X R THETA_DEG", "X Y Z"] | None = Field(
+        None, description="of files that do not name them"
+    )
+    flow_along_x: bool = Field(description="true: the flow comes along +X of the files, and the part is turned over")
+    hub_ahead_mm: NotNegative = Field(description="how far the hub goes on ahead of the leading edge")
+
+
+class ImpellerTable(Table):
+    """The part."""
+
+    blades: Annotated[Count, Field(ge=2)] = Field(description="how many, evenly round; as many splitters")
+    outer_diameter_mm: Positive = Field(description="over the blades, as the drawing states it")
+    shape: ShapeTable | None = None
+    sections: SectionsTable | None = None
+
+
+class SurfaceTable(Table):
+    """One surface that is milled, and where on it."""
+
+    body: Literal["blade", "splitter"]
+    side: Literal["plus", "minus", "floor"] = Field(description="plus faces a growing angle; floor: the hub beyond it")
+    along: Span = Field(description="from where to where along the surface, 0 to 1")
+    up: Span = Field(description="from where to where up from the hub, across on a floor, 0 to 1")
+    points: tuple[Count, Count] = Field(description="contact points along and up")
+
+
+class SectionalTable(Table):
+    """The search for the largest cutters of all surfaces."""
+
+    kind: Literal["sectional"]
+    check_mm: Positive = Field(description="most distance of check points")
+    near_mm: Positive = Field(description="nearer on the own surface its curvature stands for check points")
+    around: Annotated[int, Field(ge=0, le=20)] = Field(1, description="bodies beyond the channel that are checked")
+    table_deg: tuple[Number, ...] | None = Field(None, min_length=1, description="table angles; none: all")
+    clearance_mm: NotNegative = Field(description="of neck, shank and holder")
+
+
+class ImpellerJobTable(Table):
+    """The whole file."""
+
+    impeller: ImpellerTable
+    surface: tuple[SurfaceTable, ...] = Field(min_length=1)
+    catalogue: SourceTable
+    machine: SourceTable
+    operation: tuple[SectionalTable, ...] = Field(min_length=1, max_length=1)
+
+
+@dataclass(frozen=True)
+class ImpellerJob:
+    """A job that mills an impeller; paths are absolute.
+
+    Parameters
+    ----------
+    path : the job file
+    table : its values
+    machine, catalogue : a shipped name or a file
+    files : what the part is read from, by what it is
+    overrides : the `--set` texts that were applied
+    """
+
+    path: Path
+    table: ImpellerJobTable
+    machine: str | Path
+    catalogue: str | Path
+    files: dict[str, Path]
+    overrides: tuple[str, ...]
+
+    @property
+    def operation(self) -> SectionalTable:
+        """The operation."""
+        return self.table.operation[0]
+
+
+def impeller_job(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) -> ImpellerJob:
+    """The job of a table that was read.
+
+    Raises
+    ------
+    InputError
+        Keys do not go together.
+    """
+    folder, part = path.parent, table.impeller
+    if (part.shape is None) == (part.sections is None):
+        said = "neither is" if part.shape is None else "both are"
+        raise InputError(f"impeller: {said} stated: state either [impeller.shape] or [impeller.sections]")
+    for k, surface in enumerate(table.surface):
+        _check(f"surface.{k}", surface, part)
+        if any((s.body, s.side) == (surface.body, surface.side) for s in table.surface[:k]):
+            raise InputError(f"surface.{k}: {surface.body} {surface.side} stands twice: list each surface once")
+    files: dict[str, Path] = {}
+    if part.sections is not None:
+        given = part.sections
+        for name in (*given.blade, *given.splitter, given.hub, given.shroud):
+            if name.lower().endswith((".stp", ".step")):
+                raise InputError(
+                    f"impeller.sections: {name}: blade faces are not read from STEP: write sections as points, X Y Z"
+                )
+        files = {f"blade {k}": folder / name for k, name in enumerate(given.blade, 1)}
+        files |= {f"splitter {k}": folder / name for k, name in enumerate(given.splitter, 1)}
+        files |= {"hub": folder / given.hub, "shroud": folder / given.shroud}
+    return ImpellerJob(
+        path, table, source("machine", table.machine, folder), source("catalogue", table.catalogue, folder), files,
+        tuple(overrides),
+    )  # fmt: skip
+
+
+def _check(at: str, surface: SurfaceTable, part: ImpellerTable) -> None:
+    for key in ("along", "up"):
+        low, high = getattr(surface, key)
+        if low >= high:
+            raise InputError(f"{at}.{key} = [{low:g}, {high:g}]: must ascend within 0 to 1")
+    if min(surface.points) < 2:
+        raise InputError(f"{at}.points = {list(surface.points)}: must be at least 2 each")
+    if surface.body == "splitter" and (part.sections is None or not part.sections.splitter):
+        raise InputError(f"{at}.body = 'splitter': the impeller has no splitter: leave it out")

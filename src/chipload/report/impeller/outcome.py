@@ -1,0 +1,195 @@
+"""What a job that mills an impeller hands to the report, and the verdict over it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.catalogue import Catalogue, CatalogueCutter
+from chipload.machine.machine import Machine
+from chipload.planning.sectional.answer import Answer, Unreachable
+from chipload.planning.sectional.impeller import Impeller
+from chipload.planning.sectional.surfaces import Surface
+from chipload.planning.sectional.tables import IndexTable
+
+Floats = NDArray[np.float64]
+
+#: why a contact point is not reached, in words
+REASONS: Mapping[str, str] = {
+    "turned away": "no table angle faces it",
+    "curvature": "every corner radius of the catalogue is larger than its radius of curvature",
+    "cutting part": "the smallest cutters of the catalogue meet other walls",
+    "above": "neck, shank or holder meet other walls",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class OneCutter:
+    """A cutter and a table angle for a whole surface.
+
+    Parameters
+    ----------
+    cutter : the cutter
+    table : index of its table angle
+    points : (k,) contact points that it mills: the reachable ones
+    ranges : for each of them (j, 2) pallet angles [rad]
+    """
+
+    cutter: CatalogueCutter
+    table: int
+    points: NDArray[np.int64]
+    ranges: tuple[Floats, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """One surface with what was found.
+
+    Parameters
+    ----------
+    settings : keys of the operation and of the surface, as stated
+    surface, answer : contact points, and the largest cutter at each
+    table : the machine's table angles that were searched
+    one : the largest cutter for all of it; None: there is none
+    clearance : of neck, shank and holder [mm]
+    search_s : time of the search [s]
+    """
+
+    settings: Mapping[str, Any]
+    surface: Surface
+    answer: Answer
+    table: IndexTable
+    one: OneCutter | None
+    clearance: float
+    search_s: float
+
+    @property
+    def place(self) -> Floats:
+        """Contact points (c, 3) [mm]."""
+        return self.surface.scene.contact
+
+    @cached_property
+    def limiting(self) -> tuple[Limiting, ...]:
+        """For each corner radius and table angle what keeps one cutter from being larger."""
+        out = []
+        reached = np.flatnonzero(self.answer.cutter >= 0)
+        for f in self.answer.families if len(reached) else ():
+            sizes = [c.diameter for c in self.answer.catalogue.family(f.corner_radius)]
+            for t in range(len(f.tables)):
+                k = int(reached[f.bound[reached, t].argmin()])
+                rho = float(f.bound[k, t])
+                most = 2.0 * (rho + f.corner_radius) if rho > -np.inf else None
+                fits = [d for d in sizes if most is not None and 0.5 * d - f.corner_radius <= max(f.rho[k, t], -1.0)]
+                who = f.blockers[k, t]
+                out.append(
+                    Limiting(
+                        f.corner_radius, t, k, most, max(fits, default=None),
+                        bool(f.certified[reached, t].all()), rho >= f.cap, tuple(int(i) for i in who[who != -1]),
+                    )
+                )  # fmt: skip
+        return tuple(out)
+
+
+@dataclass(frozen=True)
+class Limiting:
+    """What keeps one cutter for a whole surface from being larger at a table angle.
+
+    Parameters
+    ----------
+    corner_radius : [mm]
+    table : index of the table angle
+    point : the contact point whose limit is least
+    most : diameter [mm] that no cutter of that corner radius exceeds there; None: it is turned away
+    size : largest of the catalogue below, by the cutting part alone; None: none
+    certified : proved for every reachable contact point
+    capped : the search ended at the largest of the catalogue
+    blockers : check points that prove it
+    """
+
+    corner_radius: float
+    table: int
+    point: int
+    most: float | None
+    size: float | None
+    certified: bool
+    capped: bool
+    blockers: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Milled:
+    """A whole run.
+
+    Parameters
+    ----------
+    title : name of the job
+    impeller, catalogue, machine : what is milled, with what, where
+    surfaces : in their order
+    one : the largest cutter for all surfaces at one table angle, and the index of that; None: there is none
+    settings : keys of the operation, as stated
+    outer_diameter : as stated [mm]
+    provenance : JSON values: hashes of the inputs, versions
+    """
+
+    title: str
+    impeller: Impeller
+    catalogue: Catalogue
+    machine: Machine
+    surfaces: tuple[Searched, ...]
+    one: tuple[CatalogueCutter, int] | None
+    settings: Mapping[str, Any]
+    outer_diameter: float
+    provenance: Mapping[str, Any]
+
+
+def said(op: Searched, missed: Unreachable) -> str:
+    """`contact point 37 at (1.0, 2.0, 3.0): ...: D 8.300 r 2 mm would fit`."""
+    x, y, z = op.place[missed.point]
+    would = f"D {missed.fits:.3f} r {missed.fits_corner:g} mm would fit" if missed.fits > 0.0 else ""
+    would = would or ("none of these corner radii fits" if missed.reason == "cutting part" else "no diameter would fit")
+    return f"contact point {missed.point} at ({x:.3f}, {y:.3f}, {z:.3f}): {REASONS[missed.reason]}: {would}"
+
+
+def failures(op: Searched) -> tuple[str, ...]:
+    """What does not hold on a surface."""
+    out = []
+    missed = op.answer.unreachable
+    if missed:
+        share = op.surface.area[[u.point for u in missed]].sum() / op.surface.area.sum()
+        many = f"{len(missed)} of {len(op.place)} contact points, {100.0 * share:.3g} % of the area, are not reached"
+        out.append(f"{many}; {said(op, missed[0])}")
+    open_points = int((~op.answer.certified).sum())
+    if open_points:
+        out.append(f"the largest cutter of {open_points} contact points is not proved")
+    return tuple(out)
+
+
+def verdict(milled: Milled) -> tuple[bool, str]:
+    """Whether everything holds, and one sentence that says it."""
+    bad = [(op, f) for op in milled.surfaces for f in failures(op)]
+    if bad:
+        more = f"; and {len(bad) - 1} more" if len(bad) > 1 else ""
+        return False, f"Does not hold: {bad[0][0].surface.name}: {bad[0][1]}{more}."
+    return True, f"Every contact point is reached and its largest cutter proved; {for_all(milled)}."
+
+
+def for_all(milled: Milled) -> str:
+    """`one cutter for all: D 16 r 2 mm at 40 deg`."""
+    if milled.one is not None:
+        c, alpha = milled.one[0], np.degrees(milled.surfaces[0].table.angle[milled.one[1]])
+        return f"the largest one cutter for all: D {c.diameter:g} r {c.corner_radius:g} mm at {alpha:.6g} deg"
+    return "no one cutter mills all of it at one table angle"
+
+
+def largest(op: Searched) -> str:
+    """`D 20 r 2 at 45 deg for all`, or the range of diameters."""
+    if op.one is not None:
+        c, alpha = op.one.cutter, np.degrees(op.table.angle[op.one.table])
+        return f"D {c.diameter:g} r {c.corner_radius:g} mm at {alpha:.6g} deg for all of it"
+    d = op.answer.diameter[op.answer.cutter >= 0]
+    return f"no cutter mills all of it at one table angle, D {d.min():g} to {d.max():g} mm point by point"

@@ -1,0 +1,174 @@
+"""summary.json, history.parquet and proof.npz of an impeller: the verdict first, then each surface in numbers."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.report.impeller.outcome import Milled, Searched, failures, said, verdict
+
+
+def summary_bytes(milled: Milled) -> bytes:
+    """summary.json; of its numbers ``search_s`` alone is a time of this computer."""
+    holds, says = verdict(milled)
+    values = {
+        "holds": holds,
+        "says": says,
+        "job": milled.title,
+        "impeller": {
+            "blades": milled.impeller.blades,
+            "splitters": milled.impeller.blades if milled.impeller.splitter is not None else 0,
+            "outer_diameter_mm": milled.outer_diameter,
+        },
+        "machine": milled.machine.name,
+        "catalogue": milled.catalogue.name,
+        "operations": [operation(milled)],
+        "provenance": dict(milled.provenance),
+    }
+    return (json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def operation(milled: Milled) -> dict[str, Any]:
+    """All surfaces together, then each."""
+    rows = [surface(op) for op in milled.surfaces]
+    fails = [f"{op.surface.name}: {f}" for op in milled.surfaces for f in failures(op)]
+    return {
+        "kind": "sectional",
+        "holds": not fails,
+        "fails": fails,
+        **_one(milled.surfaces[0], milled.one),
+        **{key: sum(row[key] for row in rows) for key in ("cc_points", "check_points", "unreachable", "search_s")},
+        "certified": all(row["certified"] for row in rows),
+        "surfaces": rows,
+        "settings": {k: list(v) if isinstance(v, tuple) else v for k, v in milled.settings.items()},
+    }
+
+
+def _one(op: Searched, one: tuple[CatalogueCutter, int] | None) -> dict[str, Any]:
+    """A cutter and its table angle."""
+    return {
+        "diameter_mm": one[0].diameter if one else None,
+        "corner_radius_mm": one[0].corner_radius if one else None,
+        "table_deg": _degrees(op.table.angle[one[1]]) if one else None,
+        "index_deg": _degrees(op.table.position[one[1]]) if one else None,
+    }
+
+
+def surface(op: Searched) -> dict[str, Any]:
+    """One surface."""
+    answer, area = op.answer, op.surface.area
+    return {
+        "surface": op.surface.name,
+        "holds": not failures(op),
+        **_one(op, (op.one.cutter, op.one.table) if op.one else None),
+        "cc_points": len(op.place),
+        "check_points": len(op.surface.scene.check),
+        "unreachable": len(answer.unreachable),
+        "certified": bool(answer.certified.all()),
+        "search_s": op.search_s,
+        "area_mm2": float(area.sum()),
+        "pointwise": [
+            {
+                "diameter_mm": c.diameter,
+                "corner_radius_mm": c.corner_radius,
+                "cc_points": int((answer.cutter == k).sum()),
+                "area_share": float(area[answer.cutter == k].sum() / area.sum()),
+            }
+            for k, c in enumerate(answer.catalogue.cutters)
+            if (answer.cutter == k).any()
+        ],
+        "limits": [
+            {
+                "corner_radius_mm": x.corner_radius,
+                "table_deg": _degrees(op.table.angle[x.table]),
+                "none_above_mm": None if x.capped else x.most,
+                "capped": x.capped,
+                "catalogue_mm": x.size,
+                "cc_point": x.point,
+                "certified": x.certified,
+            }
+            for x in op.limiting
+        ],
+        "unreachable_points": [
+            {
+                "cc_point": u.point,
+                "at_mm": op.place[u.point].tolist(),
+                "reason": u.reason,
+                "fits_mm": u.fits if u.fits > 0.0 else None,
+                "fits_corner_radius_mm": u.fits_corner if u.fits > 0.0 else None,
+                "says": said(op, u),
+            }
+            for u in answer.unreachable
+        ],
+        "where": {k: list(op.settings[k]) for k in ("along", "up", "points")},
+    }
+
+
+def history_bytes(milled: Milled) -> bytes:
+    """history.parquet: a row a contact point."""
+    tables = []
+    for op in milled.surfaces:
+        s, answer = op.surface.scene, op.answer
+        n, (a, b) = len(s.contact), op.surface.shape
+        corner = np.array([c.corner_radius for c in answer.catalogue.cutters] + [np.nan])
+        reached = answer.cutter >= 0
+        reasons = np.full(n, "", dtype=object)
+        for missed in answer.unreachable:
+            reasons[missed.point] = missed.reason
+        data: dict[str, Any] = {
+            "operation": np.zeros(n, dtype=np.int32),
+            "surface": [op.surface.name] * n,
+            "cc_point": np.arange(n),
+            "u": np.repeat(op.surface.u, b),
+            "v": np.tile(op.surface.v, a),
+            **{f"{x}_mm": s.contact[:, i] for i, x in enumerate("xyz")},
+            **{f"normal_{x}": s.normal[:, i] for i, x in enumerate("xyz")},
+            "area_mm2": op.surface.area,
+            "diameter_mm": answer.diameter,
+            "corner_radius_mm": corner[answer.cutter],
+            "table_deg": np.where(reached, np.degrees(answer.tables[answer.table]).round(9), np.nan),
+            "pallet_deg": [np.degrees(r).ravel().tolist() for r in answer.ranges],
+            "certified": answer.certified,
+            "unreachable": reasons.tolist(),
+        }
+        tables.append(pa.table({key: pa.array(v) for key, v in data.items()}))
+    sink = io.BytesIO()
+    pq.write_table(pa.concat_tables(tables), sink, compression="zstd")
+    return sink.getvalue()
+
+
+def proof_bytes(milled: Milled) -> bytes:
+    """proof.npz: for each surface k, as `k/...`, what was searched and every bound with what proves it.
+
+    ``contact``, ``normal`` (c, 3), ``curvature`` (c, 3, 3), ``check`` (m, 3), ``check_surface`` (m,), ``near``,
+    ``tables`` (t,) [rad]; of each family f as `k/f/...` ``corner_radius``, ``rho``, ``bound``, ``pallet`` (c, t),
+    ``certified``, ``blockers`` (c, t, j), -1 none, -2 the curvature at the contact.
+    """
+    arrays: dict[str, Any] = {}
+    for k, op in enumerate(milled.surfaces):
+        s = op.surface.scene
+        for name in ("contact", "normal", "curvature", "check", "check_surface", "near"):
+            arrays[f"{k}/{name}"] = np.asarray(getattr(s, name))
+        arrays[f"{k}/tables"] = op.answer.tables
+        for f, found in enumerate(op.answer.families):
+            for name in ("corner_radius", "rho", "bound", "pallet", "certified", "blockers"):
+                arrays[f"{k}/{f}/{name}"] = np.asarray(getattr(found, name))
+    # as numpy's savez, but with no time of day in the archive
+    sink = io.BytesIO()
+    with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, value in arrays.items():
+            part = io.BytesIO()
+            np.save(part, value, allow_pickle=False)
+            archive.writestr(zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0)), part.getvalue())
+    return sink.getvalue()
+
+
+def _degrees(angle: float) -> float:
+    return round(float(np.degrees(angle)), 9)

@@ -1,0 +1,183 @@
+"""A job that mills an impeller: read, its surfaces searched for the largest cutters."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from typing import Any
+
+import numpy as np
+
+from chipload.cutter.catalogue import Catalogue, catalogue_named, read_catalogue
+from chipload.errors import InputError
+from chipload.geometry.revolve import Revolved
+from chipload.geometry.sections import Blade, checked, loft, read_meridian, read_sections
+from chipload.job import ImpellerJob, SectionalTable
+from chipload.job.impeller import SectionsTable, ShapeTable
+from chipload.job.tables import Table
+from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.planning.sectional.answer import largest_cutters, one_cutter, one_cutter_of
+from chipload.planning.sectional.impeller import Impeller
+from chipload.planning.sectional.parametric import Shape, impeller_of
+from chipload.planning.sectional.surfaces import Sampled, Surface, surface_of
+from chipload.planning.sectional.tables import IndexTable, index_table
+from chipload.progress import Progress, silent
+from chipload.report.impeller.outcome import Milled, OneCutter, Searched, said
+from chipload.run.provenance import hashes, title_of, versions
+
+#: threads of the search; its answer does not depend on them
+WORKERS = len(os.sched_getaffinity(0))
+
+
+def run_impeller(job: ImpellerJob, progress: Progress = silent) -> Milled:
+    """The largest cutters of every surface that the job names.
+
+    Raises
+    ------
+    InputError
+        A file cannot be used, or no cutter of the catalogue reaches any point of a surface.
+    Cancelled
+        By ``progress``.
+    """
+    machine, catalogue, impeller = _machine(job), _catalogue(job), _impeller(job)
+    op = job.operation
+    table, surfaces = _tables(machine, op), _surfaces(job, impeller)
+    done = []
+    for k, surface in enumerate(surfaces):
+        done.append(_searched(job, k, surface, table, catalogue, part_of(progress, k, len(surfaces))))
+        _reached(k, done[-1])
+    pairs = [(found.surface.scene, found.answer) for found in done]
+    whole = one_cutter_of(pairs, op.clearance_mm, table.spans, WORKERS)
+    one = None if whole is None else (catalogue.cutters[whole[0]], whole[1])
+    files = {"job": job.path, **job.files}
+    files |= {key: p for key, p in (("machine", job.machine), ("catalogue", job.catalogue)) if not isinstance(p, str)}
+    provenance = {
+        "inputs": hashes(files),
+        "overrides": list(job.overrides),
+        "machine": f"{machine.name}: {machine.note}" if machine.note else machine.name,
+        "catalogue": f"{catalogue.name}: {catalogue.note}" if catalogue.note else catalogue.name,
+        "versions": versions(),
+    }
+    return Milled(
+        title_of(job.path), impeller, catalogue, machine, tuple(done), one, _settings(op),
+        job.table.impeller.outer_diameter_mm, provenance,
+    )  # fmt: skip
+
+
+def look_at_impeller(job: ImpellerJob) -> tuple[list[str], bool]:
+    """What the files of a job hold; nothing is searched."""
+    machine, catalogue, impeller = _machine(job), _catalogue(job), _impeller(job)
+    lines = [f"impeller: {impeller.blades} blades{' and as many splitters' if impeller.splitter else ''}"]
+    table = _tables(machine, job.operation)
+    angles = np.degrees(table.angle)
+    lines.append(
+        f"machine {machine.name}: {len(angles)} table angles from {angles.min():.6g} to {angles.max():.6g} deg"
+    )
+    for k, surface in enumerate(_surfaces(job, impeller)):
+        s = surface.scene
+        lines.append(f"surface {k}: {surface.name}: {len(s.contact)} contact points, {len(s.check)} check points")
+    corners = ", ".join(f"{r:g}" for r in catalogue.families)
+    lines.append(f"catalogue {catalogue.name}: {len(catalogue.cutters)} cutters, corner radii {corners} mm")
+    return lines, True
+
+
+def part_of(progress: Progress, k: int, n: int) -> Progress:
+    """Progress of the k-th of n like parts."""
+    return lambda done, what: progress((k + done) / n, what)
+
+
+def _searched(
+    job: ImpellerJob, k: int, surface: Surface, table: IndexTable, catalogue: Catalogue, progress: Progress
+) -> Searched:
+    """The largest cutters of a surface."""
+    op = job.operation
+    begin = time.perf_counter()
+    answer = largest_cutters(
+        surface.scene, catalogue, table.angle, op.clearance_mm, pallets=table.spans, workers=WORKERS, progress=progress
+    )
+    one = one_cutter(surface.scene, answer, op.clearance_mm, table.spans, WORKERS)
+    took = time.perf_counter() - begin
+    best = None
+    if one is not None:
+        reached = np.flatnonzero(answer.cutter >= 0)
+        best = OneCutter(catalogue.cutters[one[0]], one[1], reached, one[2])
+    settings = _settings(op) | _settings(job.table.surface[k])
+    return Searched(settings, surface, answer, table, best, op.clearance_mm, took)
+
+
+def _settings(table: Table) -> dict[str, Any]:
+    """The keys that are stated."""
+    return {k: v for k, v in table.model_dump().items() if v is not None}
+
+
+def _reached(k: int, op: Searched) -> None:
+    """Refuse a catalogue that reaches nothing of a surface."""
+    if (op.answer.cutter < 0).all():
+        first = said(op, op.answer.unreachable[0])
+        raise InputError(f"surface.{k}: no cutter of catalogue {op.answer.catalogue.name} fits anywhere: {first}")
+
+
+def _tables(machine: Machine, op: SectionalTable) -> IndexTable:
+    table = index_table(machine)
+    if op.table_deg is None:
+        return table
+    try:
+        return table.at(np.radians(op.table_deg))
+    except InputError as err:
+        raise InputError(f"operation.0.table_deg: {err}") from None
+
+
+def _surfaces(job: ImpellerJob, impeller: Impeller) -> list[Surface]:
+    given, op = job.table.impeller.sections, job.operation
+    ahead = given.hub_ahead_mm if given is not None else 0.0
+    out = []
+    for k, s in enumerate(job.table.surface):
+        how = Sampled(s.along, s.up, s.points, op.check_mm, op.near_mm, op.around, ahead)
+        try:
+            out.append(surface_of(impeller, s.body, s.side, how))
+        except InputError as err:
+            raise InputError(f"surface.{k}: {err}") from None
+    return out
+
+
+def _machine(job: ImpellerJob) -> Machine:
+    return machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
+
+
+def _catalogue(job: ImpellerJob) -> Catalogue:
+    return catalogue_named(job.catalogue) if isinstance(job.catalogue, str) else read_catalogue(job.catalogue)
+
+
+def _impeller(job: ImpellerJob) -> Impeller:
+    part = job.table.impeller
+    if part.sections is not None:
+        return _of_sections(job, part.sections, part.blades, part.outer_diameter_mm)
+    assert part.shape is not None
+    return _of_shape(part.shape, part.blades, part.outer_diameter_mm)
+
+
+def _of_shape(given: ShapeTable, blades: int, outer_diameter: float) -> Impeller:
+    shape = Shape(
+        blades, given.channel_mm, given.hub_radius_mm, 0.5 * outer_diameter, given.height_mm, given.blade_height_mm,
+        math.radians(given.wrap_deg), math.radians(given.lean_deg), given.outlet_height_mm,
+    )  # fmt: skip
+    return impeller_of(shape)
+
+
+def _of_sections(job: ImpellerJob, given: SectionsTable, blades: int, outer_diameter: float) -> Impeller:
+    folder, over = job.path.parent, given.flow_along_x
+
+    def blade(names: tuple[str, ...], key: str) -> Blade:
+        try:
+            found = read_sections([folder / name for name in names], given.unit, over, given.columns)
+            return loft(checked(found, outer_diameter))
+        except InputError as err:
+            raise InputError(f"impeller.sections.{key}: {err}") from None
+
+    hub, shroud = (
+        Revolved(read_meridian(folder / name, given.unit, over), side)
+        for name, side in ((given.hub, 1), (given.shroud, -1))
+    )
+    splitter = blade(given.splitter, "splitter") if given.splitter else None
+    return Impeller(blade(given.blade, "blade"), splitter, hub, shroud, blades)
