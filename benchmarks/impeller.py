@@ -162,6 +162,7 @@ def paper() -> None:
 def large(out) -> None:
     """Cost against both numbers, one table angle."""
     rows = []
+    timed(scene_of(4, 100), TABLES[5:6], True)
     for contact in (100, 1000, 10_000):
         for check in (1000, 10_000, 100_000):
             scene = scene_of(contact, check)
@@ -183,7 +184,8 @@ def plot(rows) -> str:
             name = f"{n} {'check' if own == 0 else 'contact'} points"
             figure.add_scatter(x=x, y=y, name=name, mode="lines+markers", row=1, col=place)
         figure.update_xaxes(type="log", title=f"{what} points", row=1, col=place)
-    figure.update_yaxes(type="log", title="time of the cores [s]", col=1)
+    figure.update_yaxes(type="log")
+    figure.update_yaxes(title="time of the cores [s]", col=1)
     figure.update_layout(template="simple_white", title="Largest cutters at one table angle")
     return figure.to_html(include_plotlyjs=True)
 
