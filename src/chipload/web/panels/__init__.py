@@ -1,0 +1,1 @@
+"""The parts of the page: each shows a track and follows its row."""
