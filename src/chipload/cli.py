@@ -222,7 +222,7 @@ def example(
 @app.command()
 def view(
     path: Annotated[Path, typer.Argument(metavar="PATH", help="a result folder, a job, or a folder that holds them")],
-    port: Annotated[int | None, typer.Option("--port", min=1, max=65535, help="of the page; else 8170 or a free one")] = None,
+    port: Annotated[int | None, typer.Option("--port", min=1, max=65535, help="else 8170, or a free one")] = None,
     open_browser: Annotated[bool, typer.Option("--open/--no-open", help="open the page in the browser")] = True,
     debug: Debug = False,
 ) -> None:

@@ -1,22 +1,26 @@
 """The shape of the cutter that a track was run with, by tool number.
 
 It is that of the job where the opened folder has the job that the result was made from (by its hash), else the CUTTER
-of the result's CL data. Where neither says it, the page shows a pointer and says that the shape is not known.
+of CL data: the result's own, or the program where the folder has it. Where none says it, the page shows a pointer and
+says that the shape is not known.
 """
 
 from __future__ import annotations
 
+import contextlib
+from pathlib import Path
 from typing import Any
 
 from chipload.cutter.cutter import Cutter
-from chipload.errors import ChiploadError
+from chipload.errors import ChiploadError, InputError
 from chipload.job import load_job
 from chipload.program.apt.cutters import read_cutters
+from chipload.program.read import ENDINGS
 from chipload.web.inside import by_hash
 from chipload.web.result import Result, Track
 from chipload.web.scene import cutter_glb, needle_glb, outline_glb
 
-UNKNOWN = "The shape of the cutter is not in this folder: a pointer stands for it. Open the folder that holds the job too."
+UNKNOWN = "A pointer stands for the cutter: no job in the opened folder and no CL data of this result say its shape."
 
 
 def cutters_of(result: Result, track: Track, size: float) -> tuple[dict[int, bytes], str]:
@@ -50,11 +54,17 @@ def _numbers(result: Result, track: Track) -> set[int]:
     return {number} if isinstance(number, int) else set()
 
 
-def _of_job(result: Result) -> dict[int, Cutter]:
+def _input(result: Result, name: str) -> Path | None:
+    """A file that the result was made from, where the opened folder has it."""
     provenance = result.summary.get("provenance")
     inputs = provenance.get("inputs") if isinstance(provenance, dict) else None
-    wanted = inputs.get("job") if isinstance(inputs, dict) else None
-    path = by_hash(result.root, wanted) if isinstance(wanted, str) else None
+    wanted = inputs.get(name) if isinstance(inputs, dict) else None
+    return by_hash(result.root, wanted) if isinstance(wanted, str) else None
+
+
+def _of_job(result: Result) -> dict[int, Cutter]:
+    path = _input(result, "job")
+    provenance = result.summary.get("provenance")
     overrides = provenance.get("overrides", []) if isinstance(provenance, dict) else []
     if path is None or not isinstance(overrides, list):
         return {}
@@ -67,8 +77,17 @@ def _of_job(result: Result) -> dict[int, Cutter]:
 
 
 def _of_apt(result: Result, track: Track, size: float) -> dict[int, bytes]:
+    program = _input(result, "program")
+    with contextlib.suppress(InputError):
+        own = result.file(f"{track.operation}-{track.strategy or 'program'}.apt")
+        if shapes := _shapes(own, size):
+            return shapes
+    return _shapes(program, size) if program is not None and ENDINGS.get(program.suffix.lower()) == "apt" else {}
+
+
+def _shapes(path: Path, size: float) -> dict[int, bytes]:
     try:
-        text = result.file(f"{track.operation}-{track.strategy or 'program'}.apt").read_bytes().decode("utf-8", "replace")
-        return {n: outline_glb(shape, size) for n, shape in read_cutters(text)[0].items()}
+        shapes = read_cutters(path.read_bytes().decode("utf-8", "replace"))[0]
+        return {n: outline_glb(shape, size) for n, shape in shapes.items()}
     except (ChiploadError, OSError):
         return {}

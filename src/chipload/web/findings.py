@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chipload.report.outcome import WORDS
 from chipload.report.simulated import LIMITS
@@ -68,13 +69,36 @@ def named(column: str) -> tuple[str, str]:
     return column.replace("_", " "), ""
 
 
-def limit_of(result: Result, track: Track, column: str) -> float | None:
-    """The stated limit of a column."""
-    for entry in _limits(result, track):
-        name = str(entry.get("name", ""))
-        if _column(name) == column and _number(entry.get("limit")) is not None:
-            return _number(entry.get("limit"))
-    return None
+@dataclass(frozen=True, eq=False)
+class Bound:
+    """A stated limit of a column: ``free`` passes are not held to it, ``above`` (n,) rows exceed it."""
+
+    limit: float
+    free: tuple[str, ...]
+    above: NDArray[np.bool_]
+
+
+def bound_of(result: Result, track: Track, column: str) -> Bound | None:
+    """The stated limit of a column.
+
+    A limit need not hold everywhere: a pass with values beyond what the summary calls the worst was not held to it.
+    """
+    entry = next((e for e in _limits(result, track) if _column(str(e.get("name", ""))) == column), {})
+    limit, worst = _number(entry.get("limit")), _number(entry.get("worst"))
+    if limit is None or column not in result.columns:
+        return None
+    values = result.column(track, column)
+    if isinstance(values, Text):
+        return None
+    above = np.nan_to_num(values) > limit
+    free: list[str] = []
+    passes = result.column(track, "pass") if "pass" in result.columns else None
+    if worst is not None and isinstance(passes, Text):
+        beyond = np.nan_to_num(values) > worst * (1.0 + 1e-9)
+        codes = np.unique(passes.codes[beyond & (passes.codes >= 0)]).tolist()
+        free = [passes.words[k] for k in codes]
+        above &= ~np.isin(passes.codes, codes)
+    return Bound(limit, tuple(free), above)
 
 
 def limits(result: Result, track: Track) -> list[Held]:
@@ -104,20 +128,16 @@ def failures(result: Result, track: Track) -> list[Failing]:
     summary, found = result.summary, _strategy(result, track)
     shown = tuple(h.name for h in limits(result, track) if h.state != "holds")
     texts = [str(t) for t in _list(found.get("fails"))]
-    out = [
-        _of_text(result, track, t, True) for t in texts if not (" exceeds " in t and t.startswith(tuple(shown)))
-    ]
+    out = [_of_text(result, track, t, True) for t in texts if not (" exceeds " in t and t.startswith(tuple(shown)))]
     use = released(summary, track.operation)
     if use is not None and use != track.strategy:
         out.append(Failing(f"{track.strategy} is not released: the job uses {use}", None, False))
-    for entry in _dicts(summary.get("broken")):
-        out.append(_of_line(result, track, entry, True))
+    out += [_of_line(result, track, entry, True) for entry in _dicts(summary.get("broken"))]
     for entry in _dicts(found.get("events")):
         at = _point([entry.get("x_mm"), entry.get("y_mm")])
         row = _row(result, track, at, None, None, None)
         out.append(Failing(str(entry.get("text", entry.get("code", ""))), row, entry.get("failure") is True))
-    for entry in _dicts(summary.get("findings")):
-        out.append(_of_line(result, track, entry, False))
+    out += [_of_line(result, track, entry, False) for entry in _dicts(summary.get("findings"))]
     out += [Failing(str(t), None, False) for t in _list(summary.get("findings")) if isinstance(t, str)]
     proof = found.get("verification")
     if isinstance(proof, dict):

@@ -34,7 +34,11 @@ class Shape:
 
 def glb_bytes(shapes: Sequence[Shape]) -> bytes:
     """The file."""
-    blob, views, accessors, meshes, materials = bytearray(), [], [], [], []
+    blob = bytearray()
+    views: list[dict[str, Any]] = []
+    accessors: list[dict[str, Any]] = []
+    meshes: list[dict[str, Any]] = []
+    materials: list[dict[str, Any]] = []
 
     def put(data: NDArray[Any], target: int, kind: str, component: int, **more: Any) -> int:
         views.append({"buffer": 0, "byteOffset": len(blob), "byteLength": data.nbytes, "target": target})

@@ -23,7 +23,10 @@ POLICY = (
     "form-action 'none'; frame-ancestors 'none'"
 )
 #: a report is a file of somebody: its scripts may draw, and see and ask nothing
-SANDBOX = "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+SANDBOX = (
+    "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    "img-src data: blob:"
+)
 #: headers of every answer
 HEADERS = (
     (b"x-content-type-options", b"nosniff"),

@@ -1,7 +1,7 @@
 """What of the opened folder may be read: results and jobs in it, nothing outside it.
 
-A **name** is a path relative to the opened folder, with `/`. It is followed to what it really is (links resolved) before
-anything is opened; what then lies outside the folder is refused.
+A **name** is a path relative to the opened folder, with `/`. It is followed to what it really is (links resolved)
+before anything is opened; what then lies outside the folder is refused.
 """
 
 from __future__ import annotations

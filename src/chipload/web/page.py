@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
+from html import escape
 from importlib import resources
 from pathlib import PurePosixPath
 from typing import Any
 from urllib.parse import quote
 
-from nicegui import background_tasks, run, ui
+from nicegui import background_tasks, ui
 
 from chipload.errors import InputError
 from chipload.report.folder import check_target
 from chipload.web.inside import Found, Opened, inside, is_job, listed
-from chipload.web.result import REPORT, Result, load_result
+from chipload.web.result import Result, load_result
 from chipload.web.runs import Run
 from chipload.web.shelf import Shelf
 from chipload.web.view import RELEASE, VERDICTS, View
@@ -86,7 +88,7 @@ class Page:
         self.opening.close()
         self.busy.set_visibility(True)
         try:
-            result = await run.io_bound(load_result, self.opened.root, name)
+            result = await asyncio.to_thread(load_result, self.opened.root, name)
             self.result = result
             self.home.set_visibility(False)
             self.stage.set_visibility(True)
@@ -157,7 +159,7 @@ class Page:
 
     # -- opening ------------------------------------------------------------------------------------------------
     async def _open(self) -> None:
-        found = await run.io_bound(listed, self.opened.root)
+        found = await asyncio.to_thread(listed, self.opened.root)
         self.list.clear()
         with self.list:
             self._listed(found)
@@ -195,15 +197,18 @@ class Page:
                     _button("Show", lambda n=f.name: self.show(n)).mark(f"show-{f.name}")
                 else:
                     ui.label("job").classes("cl-pill")
-                    _button("Look", lambda n=f.name: (self.opening.close(), self._home(n)))
+                    _button("Look", lambda n=f.name: self._job(n))
                     _button("Run", lambda n=f.name: self._ask(n), "play_arrow").mark(f"run-{f.name}")
+
+    def _job(self, name: str) -> None:
+        """Show a job."""
+        self.opening.close()
+        self._home(name)
 
     def _called(self, name: str) -> str:
         return self.opened.root.name if name == "." else name
 
     def _text(self, job: str) -> str:
-        from html import escape
-
         lines = inside(self.opened.root, job).read_text("utf-8", "replace").splitlines()
         return "".join(f'<div class="cl-line"><i>{k}</i>{escape(t) or " "}</div>' for k, t in enumerate(lines, 1))
 
@@ -215,7 +220,7 @@ class Page:
         out = (folder / ("result" if stem == "job" else f"result-{stem}")).as_posix()
         self.ask.clear()
         with self.ask:
-            ui.label(f"{self._called(job)}: the result is written into this folder of the opened one:").classes("cl-note")
+            ui.label(f"{self._called(job)}: its result goes into this folder of the opened one:").classes("cl-note")
             where = ui.input(value=out).props("dense outlined").classes("cl-out").mark("out")
             said = ui.label("").classes("cl-no")
             with ui.element("div").classes("cl-entry"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from html import escape
 from typing import Any
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from chipload.report.figures import FONT, GRID, INK, LIMIT
 from chipload.report.shape import thinned
-from chipload.web.findings import limit_of, named
+from chipload.web.findings import bound_of, named
 from chipload.web.result import Result, Text, Track
 
 Floats = NDArray[np.float64]
@@ -38,15 +39,16 @@ def plots(result: Result, track: Track, columns: list[str], against: str, row: i
         values = result.column(track, column)
         y = values.codes.astype(np.float64) if isinstance(values, Text) else values
         rows = drawn_rows(y)
-        word, unit = named(column)
+        unit = escape(named(column)[1])
         colour = COLOURS[k % len(COLOURS)]
         axis = "" if k == 0 else str(k + 1)
         top = 1.0 - k * (height + gap)
         finite = y[np.isfinite(y)]
         low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
-        limit = limit_of(result, track, column)
-        near = limit is not None and limit <= FAR * high
-        reach = max(high, limit if near and limit is not None else high)
+        bound = bound_of(result, track, column)
+        limit = bound.limit if bound is not None else math.inf
+        near = limit <= FAR * high
+        reach = max(high, limit) if near else high
         span = (reach - min(low, 0.0)) or 1.0
         axes[f"yaxis{axis}"] = {
             "domain": [max(top - height, 0.0), top],
@@ -56,19 +58,20 @@ def plots(result: Result, track: Track, columns: list[str], against: str, row: i
             "nticks": 4,
             "tickfont": {"size": 10, "color": "#5f6b7a"},
             "automargin": False,
-            **({"tickvals": list(range(len(values.words))), "ticktext": _short(values)} if isinstance(values, Text) else {}),
+            **(_words(values) if isinstance(values, Text) else {}),
         }
         data.append(
             {
                 "type": "scatter", "mode": "lines", "name": column, "x": x[rows], "y": y[rows],
-                "xaxis": "x", "yaxis": f"y{axis}", "line": {"color": colour, "width": 1.3},
-                "connectgaps": False, "hovertemplate": f"%{{y:.5g}} {unit}<extra>{word}</extra>", "showlegend": False,
+                "xaxis": "x", "yaxis": f"y{axis}", "connectgaps": False, "showlegend": False,
+                "line": {"color": colour, "width": 1.3, "shape": "vh" if track.line is not None else "linear"},
+                "hovertemplate": f"%{{y:.5g}} {unit}<extra></extra>",
             }
         )  # fmt: skip
         notes.append(
             {
-                "text": noted(result, track, column, row), "xref": "paper", "yref": "paper", "x": 0.004, "y": top, "xanchor": "left",
-                "yanchor": "top", "showarrow": False, "font": {"size": 11, "color": colour},
+                "text": noted(result, track, column, row), "xref": "paper", "yref": "paper", "x": 0.004, "y": top,
+                "xanchor": "left", "yanchor": "top", "showarrow": False, "font": {"size": 11, "color": colour},
                 "bgcolor": "rgba(255,255,255,0.75)", "borderpad": 1,
             }
         )  # fmt: skip
@@ -117,9 +120,12 @@ def noted(result: Result, track: Track, column: str, row: int) -> str:
     values = result.column(track, column)
     code = int(values.codes[row]) if isinstance(values, Text) else -1
     value = f"{values[row]:.5g}" if not isinstance(values, Text) else values.words[code] if code >= 0 else ""
-    limit = limit_of(result, track, column)
-    said = f'  <span style="color:{LIMIT}">limit {limit:g}</span>' if limit is not None else ""
-    return f"{escape(word)} <b>{escape(value)}</b> {unit}{said}"
+    bound = bound_of(result, track, column)
+    said = ""
+    if bound is not None:
+        but = f", not for {', '.join(bound.free)}" if bound.free else ""
+        said = f'  <span style="color:{LIMIT}">limit {bound.limit:g}{escape(but)}</span>'
+    return f"{escape(word)} <b>{escape(value)}</b> {escape(unit)}{said}"
 
 
 def cursor(at: float) -> dict[str, Any]:
@@ -139,5 +145,6 @@ def drawn_rows(values: Floats) -> NDArray[np.int64]:
     return some[thinned(values[some], POINTS)]
 
 
-def _short(values: Text) -> list[str]:
-    return [w if len(w) <= 8 else w[:7] + "\u2026" for w in values.words]
+def _words(values: Text) -> dict[str, Any]:
+    short = [escape(w if len(w) <= 8 else w[:7] + "\u2026") for w in values.words[:40]]
+    return {"tickvals": list(range(len(short))), "ticktext": short}

@@ -46,8 +46,8 @@ class Track:
     title : what it is called
     operation, strategy : of the summary
     rows : (n,) of history.parquet
-    t, s : (n,) time [s] and path [mm] at the end of each row, never falling; the row's number where the history has none
-    timed : whether the history states a time
+    t, s : (n,) time [s] and path [mm] at the end of each row, never falling
+    timed : whether the history states a time; else t is the row's number
     place : (n, 3) [mm]
     axis : (n, 3) from the tip to the spindle
     line, tool : (n,), of the source and of the machine; None where the history does not say

@@ -1,7 +1,8 @@
 """A job runs in a process of its own: it tells where it is, can be stopped, and ends when the page does.
 
 Notation: the process writes a JSON value a line: ``{"done": 0..1, "what": text}`` while it works and at its end
-``{"code": exit code of `chipload run`, "says": text}``. It stops when its input closes, so that no run outlives the page.
+``{"code": exit code of `chipload run`, "says": text}``. It stops when its input closes, so that no run outlives the
+page.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ State = Literal["running", "stopping", "done", "stopped", "failed"]
 
 
 class Run:
-    """One run: ``state``, the share that is ``done`` and ``what`` it does; at the end its ``code`` and what it ``says``."""
+    """One run: its ``state``, the share ``done``, ``what`` it does; at its end its ``code`` and what it ``says``."""
 
     def __init__(self, job: str, out: str) -> None:
         self.job, self.out = job, out

@@ -20,6 +20,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.report.figures import SCALE
 from chipload.report.shape import thinned
+from chipload.web.findings import bound_of
 from chipload.web.glb import Shape, glb_bytes
 from chipload.web.result import SCENE, Result, Text, Track
 
@@ -29,7 +30,7 @@ Ints = NDArray[np.int64]
 #: points that a drawn path has at most, about
 POINTS = 9000
 #: radius of the tube by the diagonal of the path
-THICK = 0.0028
+THICK = 0.0034
 #: colours: above a limit, no value, words one after another
 ABOVE, NONE = (200, 30, 30, 255), (150, 156, 165, 255)
 WORDS = ("#3457a6", "#c9821a", "#0b7a75", "#8a4fa3", "#7a8a2e", "#b0567a", "#4d8fb8", "#6b5b4b", "#94a0ae", "#2f6f3e")
@@ -54,7 +55,7 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Scale:
-    """How a column is coloured: least and greatest value, the limit, or words with their colours."""
+    """How a column is coloured: least and greatest value, the limit that rows exceed, or words with their colours."""
 
     low: float
     high: float
@@ -78,12 +79,12 @@ def bodies(result: Result) -> tuple[tuple[Body, ...], str]:
     return tuple(out), "" if out else "The scene of this result holds no body: only the path is shown."
 
 
-def path_glb(result: Result, track: Track, column: str, limit: float | None) -> tuple[bytes, Scale]:
+def path_glb(result: Result, track: Track, column: str) -> tuple[bytes, Scale]:
     """The path of a track coloured by a column, and what the colours mean."""
     values = result.column(track, column)
     rows = shown_rows(track, values)
     if isinstance(values, Text):
-        own = [tuple(int(c[i : i + 2], 16) for i in (1, 3, 5)) + (255,) for c in WORDS]
+        own = [(*_rgb(c), 255) for c in WORDS]
         table = np.array([*(own[k % len(own)] for k in range(len(values.words))), NONE], dtype=np.uint8)
         colours = table[np.where(values.codes[rows] < 0, len(values.words), values.codes[rows])]
         present = np.unique(values.codes[values.codes >= 0]).tolist()
@@ -92,26 +93,27 @@ def path_glb(result: Result, track: Track, column: str, limit: float | None) -> 
     else:
         finite = values[np.isfinite(values)]
         low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
-        scale = Scale(low, high, limit)
-        colours = shades(values[rows], scale)
+        bound = bound_of(result, track, column)
+        above = bound.above if bound is not None else np.zeros(len(values), dtype=np.bool_)
+        scale = Scale(low, high, bound.limit if bound is not None and above.any() else None)
+        colours = shades(values[rows], scale, above[rows])
     return glb_bytes([tube(track.place[rows], _apart(track, rows), colours, radius(track))]), scale
 
 
-def shades(values: Floats, scale: Scale) -> NDArray[np.uint8]:
+def shades(values: Floats, scale: Scale, above: NDArray[np.bool_]) -> NDArray[np.uint8]:
     """(n, 4) colours: dark (least) to bright (greatest), red above the limit, grey where there is no value.
 
-    >>> shades(np.array([0.0, 2.0, 3.0]), Scale(0.0, 2.0, 2.5)).tolist()
+    >>> shades(np.array([0.0, 2.0, 3.0]), Scale(0.0, 2.0, 2.5), np.array([False, False, True])).tolist()
     [[48, 36, 92, 255], [251, 182, 26, 255], [200, 30, 30, 255]]
     """
-    stops = np.array([[int(c[i : i + 2], 16) for i in (1, 3, 5)] for _, c in SCALE], dtype=np.float64)
+    stops = np.array([_rgb(str(c)) for _, c in SCALE], dtype=np.float64)
     span = scale.high - scale.low
     share = np.clip((np.nan_to_num(values) - scale.low) / span, 0.0, 1.0) if span > 0.0 else np.zeros(len(values))
-    places = [float(s) for s, _ in SCALE]
+    places = np.array([s for s, _ in SCALE], dtype=np.float64)
     rgb = [np.interp(share, places, stops[:, k]) for k in range(3)]
     out = np.column_stack([*rgb, np.full(len(values), 255.0)]).round().astype(np.uint8)
     out[~np.isfinite(values)] = NONE
-    if scale.limit is not None:
-        out[np.nan_to_num(values) > scale.limit] = ABOVE
+    out[above] = ABOVE
     return out
 
 
@@ -190,6 +192,11 @@ def needle_glb(size: float) -> bytes:
 
 
 # -- parts ------------------------------------------------------------------------------------------------------
+def _rgb(colour: str) -> tuple[int, int, int]:
+    """`#rrggbb` as numbers."""
+    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
+
+
 def _own(name: str) -> bool:
     """Whether the page draws a node itself.
 

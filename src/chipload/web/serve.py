@@ -128,5 +128,5 @@ def _application(opened: Opened, port: int) -> tuple[Any, Any]:
 
     app.config.socket_io_js_transports = ["websocket"]
     outer = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    ui.run_with(outer, title="chipload", tailwind=False, show_welcome_message=False, dark=False)
+    ui.run_with(outer, title="chipload", tailwind=False, show_welcome_message=False, reconnect_timeout=30.0)
     return Guard(outer, port), runs

@@ -1,8 +1,8 @@
 """The text of the program that a track ran, and the line of each row of its history.
 
-The text is the original where the opened folder has it (found by the hash that the result states), else the program that
-the result holds for the machine, else its CL data. Where the history does not count in the lines of that text, rows are
-followed along its motions: each row lies on the motion that is shown, within a tolerance.
+The text is the original where the opened folder has it (found by the hash that the result states), else the program
+that the result holds for the machine, else its CL data. Where the history does not count in the lines of that text,
+rows are followed along its motions: each row lies on the motion that is shown, within a tolerance.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Run one job for the page: `python -m chipload.web.worker JOB OUT`; see :mod:`chipload.web.runs` for what it writes."""
+"""Run one job for the page: `python -m chipload.web.worker JOB OUT`; :mod:`chipload.web.runs` says what it writes."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ def work(job: str, out: str) -> dict[str, Any]:
         from chipload.report.folder import check_target, verdict, write_result
         from chipload.run import run
 
-        _tell(0.0, "reading")
+        tell = Teller()
+        tell(0.0, "reading")
         read = load_job(job)
         check_target(out)
-        done = run(read, lambda part, what: _tell(0.85 * part, what))
-        write_result(done, out, lambda part, what: _tell(0.85 + 0.15 * part, what))
+        done = run(read, lambda part, what: tell(0.85 * part, what))
+        write_result(done, out, lambda part, what: tell(0.85 + 0.15 * part, what))
         holds, says = verdict(done)
         return {"code": 0 if holds else 3, "says": says}
     except InputError as err:
@@ -38,14 +39,18 @@ def work(job: str, out: str) -> dict[str, Any]:
         return {"code": 1, "says": f"a fault of chipload: {type(err).__name__}: {err}"}
 
 
-_last = [0.0, ""]
+class Teller:
+    """Writes where the work is, not too often."""
 
+    def __init__(self) -> None:
+        self.last, self.what = 0.0, ""
 
-def _tell(done: float, what: str) -> None:
-    now = time.monotonic()
-    if now - float(_last[0]) >= BREATH or what != _last[1]:
-        _last[:] = [now, what]
-        _write({"done": done, "what": what})
+    def __call__(self, done: float, what: str) -> None:
+        """Take a share and what is done."""
+        now = time.monotonic()
+        if now - self.last >= BREATH or what != self.what:
+            self.last, self.what = now, what
+            _write({"done": done, "what": what})
 
 
 def _write(value: dict[str, Any]) -> None:

@@ -12,6 +12,8 @@ from chipload.web.findings import named
 from chipload.web.plots import abscissa, noted, plots
 from chipload.web.result import Result, Text, Track
 
+#: a click on a plot gives the abscissa of the nearest point
+CLICK = "(e) => { if (e.points && e.points.length) emit(e.points[0].x) }"
 #: columns that are drawn first, where the history has them; how many at a time
 FIRST = ("engagement_deg", "force_n", "force_xy_n", "torque_nm", "deflection_um", "error_um", "feed_mm_min")
 MOST, AT_FIRST = 4, 2
@@ -24,7 +26,7 @@ class Lines:
         self.pick, self.turned = pick, turned
         self.result: Result | None = None
         self.track: Track | None = None
-        self.row = 0
+        self.row, self.drawn = 0, -1
         with ui.element("div").classes("cl-panel cl-plots"):
             with ui.element("div").classes("cl-head"):
                 self.columns = ui.select({}, multiple=True, on_change=self._changed).props(
@@ -34,9 +36,7 @@ class Lines:
                     "dense no-caps size=sm unelevated toggle-color=blue-grey-7"
                 )
             self.figure = ui.plotly({"data": [], "layout": {}, "config": {}}).classes("cl-figure")
-            self.figure.on(
-                "plotly_click", self._clicked, js_handler="(e) => { if (e.points && e.points.length) emit(e.points[0].x) }"
-            )
+            self.figure.on("plotly_click", self._clicked, js_handler=CLICK)
 
     def open(self, result: Result, track: Track) -> None:
         """Show a track."""
@@ -52,8 +52,9 @@ class Lines:
     def at(self, row: int) -> None:
         """Put the cursor at a row, and say the values there."""
         self.row = row
-        if self.result is None or self.track is None:
+        if self.result is None or self.track is None or self.drawn == row:
             return
+        self.drawn = row
         x = float(abscissa(self.track, self.against.value)[row])
         change: dict[str, Any] = {"shapes[0].x0": x, "shapes[0].x1": x}
         for k, column in enumerate(self._chosen()):
@@ -67,6 +68,7 @@ class Lines:
         if self.result is not None and self.track is not None:
             figure = plots(self.result, self.track, self._chosen(), self.against.value, self.row)
             self.figure.update_figure(figure)
+            self.drawn = self.row
 
     def _changed(self) -> None:
         self._draw()

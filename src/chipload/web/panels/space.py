@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass
+from html import escape
 from typing import Any
 
 import numpy as np
-from nicegui import run, ui
+from nicegui import ui
 from numpy.typing import NDArray
 
 from chipload.report.figures import SCALE
 from chipload.web.cutters import cutters_of
-from chipload.web.findings import limit_of, limits, named
+from chipload.web.findings import limits, named
 from chipload.web.result import Result, Track
-from chipload.web.scene import Body, Scale, bodies, path_glb, radius
+from chipload.web.scene import Scale, bodies, path_glb, radius
 from chipload.web.shelf import Shelf
 
 Floats = NDArray[np.float64]
@@ -25,16 +26,6 @@ MARK = "#c81e1e"
 VIEWS = {"iso": (0.62, -1.0, 0.78), "top": (0.0, -0.001, 1.0), "front": (0.0, -1.0, 0.02), "side": (1.0, 0.0, 0.02)}
 #: columns that a path is coloured by first, where the history has them
 FIRST = ("engagement_deg", "force_n", "force_xy_n", "deflection_um", "error_um", "feed_mm_min")
-
-
-@dataclass(frozen=True, eq=False)
-class Shown:
-    """What the view needs of a track, made away from the page's own thread."""
-
-    bodies: tuple[Body, ...]
-    said: str
-    cutters: dict[int, bytes]
-    unknown: str
 
 
 class Space:
@@ -51,6 +42,7 @@ class Space:
         self.marks: list[Any] = []
         self.layers: dict[str, Any] = {}
         self.seen: dict[str, bool] = {}
+        self.bodies_said = ""
         with ui.element("div").classes("cl-panel cl-space") as self.frame:
             self.stage = ui.element("div").classes("cl-stage")
             with ui.element("div").classes("cl-over cl-over-left"):
@@ -69,7 +61,7 @@ class Space:
     async def open(self, result: Result, track: Track) -> None:
         """Show a result from its beginning."""
         self.result, self.track = result, track
-        found, said = await run.io_bound(bodies, result)
+        found, said = await asyncio.to_thread(bodies, result)
         lows = [t.place.min(axis=0) for t in result.tracks] + [b.low for b in found]
         highs = [t.place.max(axis=0) for t in result.tracks] + [b.high for b in found]
         self.box = (np.min(lows, axis=0), np.max(highs, axis=0))
@@ -79,9 +71,10 @@ class Space:
         with self.stage:
             camera = ui.scene.perspective_camera(fov=36, near=size * 2e-3, far=size * 60.0)
             self.view = ui.scene(grid=False, camera=camera, background_color=BACKGROUND, fps=25).classes("cl-scene")
+            self.view.axes_helper(0.12 * size)
         for body in found:
             self.layers[body.name] = self.view.gltf(self.shelf.put(body.glb))
-        self.said.set_text(said)
+        self.bodies_said = said
         self.look("iso", 0.0)
         columns = {c: _called(c) for c in result.columns}
         chosen = self.column.value if self.column.value in columns else None
@@ -93,12 +86,11 @@ class Space:
         assert self.result is not None
         self.track = track
         size = 0.25 * float(np.linalg.norm(self.box[1] - self.box[0]))
-        made, unknown = await run.io_bound(cutters_of, self.result, track, size)
+        made, unknown = await asyncio.to_thread(cutters_of, self.result, track, size)
         for shape in (*self.cutters.values(), *self.marks):
             shape.delete()
         self.cutters = {n: self.view.gltf(self.shelf.put(glb)).visible(False) for n, glb in made.items()}
-        if unknown:
-            self.said.set_text(unknown)
+        self.said.set_text(" ".join(t for t in (self.bodies_said, unknown) if t))
         self.marks = []
         mark = 2.6 * radius(track)
         for held in limits(self.result, track):
@@ -129,7 +121,7 @@ class Space:
         low, high = self.box
         middle = 0.5 * (low + high)
         away = np.array(VIEWS[name])
-        reach = 1.55 * max(float(np.linalg.norm(high - low)), 1e-3)
+        reach = 1.4 * max(float(np.linalg.norm(high - low)), 1e-3)
         eye = middle + away / np.linalg.norm(away) * reach
         x, y, z = middle.tolist()
         self.view.move_camera(*eye.tolist(), x, y, z, 0, 0, 1, duration=seconds)
@@ -142,7 +134,7 @@ class Space:
         result, track, column = self.result, self.track, self.column.value
         if result is None or track is None or not isinstance(column, str):
             return
-        glb, scale = await run.io_bound(path_glb, result, track, column, limit_of(result, track, column))
+        glb, scale = await asyncio.to_thread(path_glb, result, track, column)
         if (track, column) != (self.track, self.column.value):
             return
         if self.path is not None:
@@ -188,8 +180,6 @@ def frame(axis: Floats) -> Floats:
 
 def legend(column: str, scale: Scale) -> str:
     """The scale of the colours as HTML."""
-    from html import escape
-
     word, unit = named(column)
     title = escape(f"{word} [{unit}]" if unit else word)
     if scale.words:
@@ -198,7 +188,7 @@ def legend(column: str, scale: Scale) -> str:
             for text, colour in scale.words[:12]
         )
         return f'<div class="cl-title">{title}</div>{rows}'
-    stops = ", ".join(f"{colour} {100.0 * float(share):g}%" for share, colour in SCALE)
+    stops = ", ".join(f"{colour} {100.0 * float(str(share)):g}%" for share, colour in SCALE)
     above = scale.limit is not None and scale.high > scale.limit
     red = f'<div class="cl-red">red: above {scale.limit:g}</div>' if above else ""
     return (

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 from html import escape
 from typing import Any
 
-from nicegui import run, ui
+from nicegui import ui
 
 from chipload.web.result import Result, Track
 from chipload.web.source import Source, source_of
@@ -33,7 +34,7 @@ class Lines:
 
     async def open(self, result: Result, track: Track) -> None:
         """Show the text of a track."""
-        self.source = await run.io_bound(source_of, result, track)
+        self.source = await asyncio.to_thread(source_of, result, track)
         self.line = 0
         if self.source is None:
             self.name.set_text("program")
