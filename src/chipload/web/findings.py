@@ -118,7 +118,7 @@ def limits(result: Result, track: Track) -> list[Held]:
         row = _row(result, track, at, line, _column(name), worst)
         said = f"line {line}" if isinstance(line, int) and line > 0 else ""
         if at is not None:
-            said += (" \u00b7 " if said else "") + ", ".join(f"{x:.3f}" for x in at)
+            said += (" \u00b7 " if said else "") + ", ".join(f"{x:.2f}" for x in at)
         out.append(Held(word, unit, limit, worst, state, said, row))
     return sorted(out, key=lambda h: h.state == "holds")
 

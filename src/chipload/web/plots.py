@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from chipload.report.figures import FONT, GRID, INK, LIMIT
 from chipload.report.shape import thinned
-from chipload.web.findings import bound_of, named
+from chipload.web.findings import Bound, bound_of, named
 from chipload.web.result import Result, Text, Track
 
 Floats = NDArray[np.float64]
@@ -24,18 +25,23 @@ CURSOR = "#b3261e"
 FAR = 1.8
 
 
-def plots(result: Result, track: Track, columns: list[str], against: str, row: int) -> dict[str, Any]:
-    """The figure (plotly, plain values) of columns with the cursor at a row."""
+def bounds(result: Result, track: Track, columns: Sequence[str]) -> dict[str, Bound | None]:
+    """The stated limit of each column."""
+    return {c: bound_of(result, track, c) for c in columns}
+
+
+def plots(result: Result, track: Track, held: Mapping[str, Bound | None], against: str, row: int) -> dict[str, Any]:
+    """The figure (plotly, plain values) of columns and their limits with the cursor at a row."""
     x = abscissa(track, against)
     at = float(x[row])
     data: list[dict[str, Any]] = []
     axes: dict[str, Any] = {}
     notes: list[dict[str, Any]] = []
     shapes: list[dict[str, Any]] = [cursor(at)]
-    count = max(len(columns), 1)
+    count = max(len(held), 1)
     gap = 0.05 if count > 1 else 0.0
     height = (1.0 - gap * (count - 1)) / count
-    for k, column in enumerate(columns):
+    for k, (column, bound) in enumerate(held.items()):
         values = result.column(track, column)
         y = values.codes.astype(np.float64) if isinstance(values, Text) else values
         rows = drawn_rows(y)
@@ -45,7 +51,6 @@ def plots(result: Result, track: Track, columns: list[str], against: str, row: i
         top = 1.0 - k * (height + gap)
         finite = y[np.isfinite(y)]
         low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
-        bound = bound_of(result, track, column)
         limit = bound.limit if bound is not None else math.inf
         near = limit <= FAR * high
         reach = max(high, limit) if near else high
@@ -70,9 +75,10 @@ def plots(result: Result, track: Track, columns: list[str], against: str, row: i
         )  # fmt: skip
         notes.append(
             {
-                "text": noted(result, track, column, row), "xref": "paper", "yref": "paper", "x": 0.004, "y": top,
-                "xanchor": "left", "yanchor": "top", "showarrow": False, "font": {"size": 11, "color": colour},
-                "bgcolor": "rgba(255,255,255,0.75)", "borderpad": 1,
+                "text": noted(result, track, column, row, bound), "x": 0.004, "y": top,
+                "xref": "paper", "yref": "paper", "xanchor": "left", "yanchor": "top", "showarrow": False,
+                "font": {"size": 11, "color": colour},
+                "bgcolor": "rgba(255,255,255,0.85)", "borderpad": 1,
             }
         )  # fmt: skip
         if near:
@@ -114,13 +120,12 @@ def abscissa(track: Track, against: str) -> Floats:
     return track.t if against == "time" else track.s
 
 
-def noted(result: Result, track: Track, column: str, row: int) -> str:
+def noted(result: Result, track: Track, column: str, row: int, bound: Bound | None) -> str:
     """Name of a column, its value at a row, and its limit."""
     word, unit = named(column)
     values = result.column(track, column)
     code = int(values.codes[row]) if isinstance(values, Text) else -1
     value = f"{values[row]:.5g}" if not isinstance(values, Text) else values.words[code] if code >= 0 else ""
-    bound = bound_of(result, track, column)
     said = ""
     if bound is not None:
         but = f", not for {', '.join(bound.free)}" if bound.free else ""

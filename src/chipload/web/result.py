@@ -115,7 +115,9 @@ class Result:
                 self._cache.pop(next(iter(self._cache)))
             self._cache[name] = _column(_table(self.file(HISTORY), [name]), name)
         whole = self._cache[name]
-        return Text(whole.codes[track.rows], whole.words) if isinstance(whole, Text) else whole[track.rows]
+        first, last = int(track.rows[0]), int(track.rows[-1])
+        some = slice(first, last + 1) if last - first + 1 == len(track.rows) else track.rows
+        return Text(whole.codes[some], whole.words) if isinstance(whole, Text) else whole[some]
 
 
 def load_result(root: Path, name: str) -> Result:

@@ -28,9 +28,11 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: points that a drawn path has at most, about
-POINTS = 9000
+POINTS = 16_000
 #: radius of the tube by the diagonal of the path
 THICK = 0.0034
+#: the same by the square of the diagonal over the length of the path
+DENSE = 0.12
 #: colours: above a limit, no value, words one after another
 ABOVE, NONE = (200, 30, 30, 255), (150, 156, 165, 255)
 WORDS = ("#3457a6", "#c9821a", "#0b7a75", "#8a4fa3", "#7a8a2e", "#b0567a", "#4d8fb8", "#6b5b4b", "#94a0ae", "#2f6f3e")
@@ -132,8 +134,9 @@ def shown_rows(track: Track, values: Floats | Text) -> Ints:
 
 
 def radius(track: Track) -> float:
-    """Radius of the drawn tube [mm]."""
-    return max(THICK * float(np.linalg.norm(np.ptp(track.place, axis=0))), 1e-3)
+    """Radius of the drawn tube [mm]: thinner where the path is so long that it would hide itself."""
+    size = float(np.linalg.norm(np.ptp(track.place, axis=0)))
+    return max(min(THICK * size, DENSE * size * size / max(float(track.s[-1] - track.s[0]), size)), 1e-3)
 
 
 def tube(points: Floats, apart: NDArray[np.bool_], colours: NDArray[np.uint8], size: float) -> Shape:

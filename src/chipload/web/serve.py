@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import socket
 import tempfile
@@ -42,7 +43,7 @@ def serve(path: str | Path, port: int | None, show: bool, say: Callable[[str], N
     os.environ["NICEGUI_STORAGE_PATH"] = str(Path(tempfile.gettempdir()) / "chipload-keeps-nothing")
     import uvicorn
 
-    application, runs = _application(opened, own)
+    application = _application(opened, own)
     config = uvicorn.Config(
         application, log_level="error", access_log=False, timeout_graceful_shutdown=1, ws_max_size=4_000_000
     )
@@ -56,9 +57,9 @@ def serve(path: str | Path, port: int | None, show: bool, say: Callable[[str], N
             await server.serve(sockets=[listener])
         finally:
             started.cancel()
-            await runs.stop()
 
-    asyncio.run(work())
+    with contextlib.suppress(KeyboardInterrupt, asyncio.CancelledError):
+        asyncio.run(work())
 
 
 def listen(port: int | None) -> tuple[socket.socket, bool]:
@@ -91,8 +92,8 @@ async def _told(server: Any, tell: Callable[[], None]) -> None:
     tell()
 
 
-def _application(opened: Opened, port: int) -> tuple[Any, Any]:
-    """The application behind its guard, and its runs."""
+def _application(opened: Opened, port: int) -> Any:
+    """The application behind its guard; its runs end with it."""
     from fastapi import FastAPI
     from nicegui import app, ui
     from starlette.responses import FileResponse, PlainTextResponse, Response
@@ -126,7 +127,8 @@ def _application(opened: Opened, port: int) -> tuple[Any, Any]:
         await ui.context.client.connected()
         await page.begin(show)
 
+    app.on_shutdown(runs.stop)
     app.config.socket_io_js_transports = ["websocket"]
     outer = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     ui.run_with(outer, title="chipload", tailwind=False, show_welcome_message=False, reconnect_timeout=30.0)
-    return Guard(outer, port), runs
+    return Guard(outer, port)

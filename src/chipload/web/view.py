@@ -151,7 +151,8 @@ class View:
             return
         x = abscissa(self.track, self.lines.against.value)
         low, high = float(x[0]), float(x[-1]) if x[-1] > x[0] else float(x[0]) + 1.0
-        self.slider.props(f"min={low} max={high} step={(high - low) / STEPS}")
+        self.slider.props.update({"min": low, "max": high, "step": (high - low) / STEPS})
+        self.slider.update()
         self.slider.set_value(float(x[self.row]) if self.row < len(x) else low)
 
     def _slid(self, event: Any) -> None:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
-from chipload.web.findings import named
-from chipload.web.plots import abscissa, noted, plots
+from chipload.web.findings import Bound, named
+from chipload.web.plots import abscissa, bounds, noted, plots
 from chipload.web.result import Result, Text, Track
 
 #: a click on a plot gives the abscissa of the nearest point
@@ -27,6 +27,7 @@ class Lines:
         self.result: Result | None = None
         self.track: Track | None = None
         self.row, self.drawn = 0, -1
+        self.held: dict[str, Bound | None] = {}
         with ui.element("div").classes("cl-panel cl-plots"):
             with ui.element("div").classes("cl-head"):
                 self.columns = ui.select({}, multiple=True, on_change=self._changed).props(
@@ -57,8 +58,8 @@ class Lines:
         self.drawn = row
         x = float(abscissa(self.track, self.against.value)[row])
         change: dict[str, Any] = {"shapes[0].x0": x, "shapes[0].x1": x}
-        for k, column in enumerate(self._chosen()):
-            change[f"annotations[{k}].text"] = noted(self.result, self.track, column, row)
+        for k, (column, bound) in enumerate(self.held.items()):
+            change[f"annotations[{k}].text"] = noted(self.result, self.track, column, row, bound)
         self.figure.run_plot_method("relayout", change)
 
     def _chosen(self) -> list[str]:
@@ -66,7 +67,8 @@ class Lines:
 
     def _draw(self) -> None:
         if self.result is not None and self.track is not None:
-            figure = plots(self.result, self.track, self._chosen(), self.against.value, self.row)
+            self.held = bounds(self.result, self.track, self._chosen())
+            figure = plots(self.result, self.track, self.held, self.against.value, self.row)
             self.figure.update_figure(figure)
             self.drawn = self.row
 

@@ -15,7 +15,7 @@ from chipload.report.figures import SCALE
 from chipload.web.cutters import cutters_of
 from chipload.web.findings import limits, named
 from chipload.web.result import Result, Track
-from chipload.web.scene import Scale, bodies, path_glb, radius
+from chipload.web.scene import POINTS, Scale, bodies, path_glb, radius
 from chipload.web.shelf import Shelf
 
 Floats = NDArray[np.float64]
@@ -90,7 +90,8 @@ class Space:
         for shape in (*self.cutters.values(), *self.marks):
             shape.delete()
         self.cutters = {n: self.view.gltf(self.shelf.put(glb)).visible(False) for n, glb in made.items()}
-        self.said.set_text(" ".join(t for t in (self.bodies_said, unknown) if t))
+        few = f"The path is drawn by some {POINTS} of its {len(track)} steps." if len(track) > POINTS else ""
+        self.said.set_text(" ".join(t for t in (self.bodies_said, unknown, few) if t))
         self.marks = []
         mark = 2.6 * radius(track)
         for held in limits(self.result, track):

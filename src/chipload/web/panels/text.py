@@ -57,12 +57,12 @@ class Lines:
             self._window(line)
         place = f"document.getElementById('c{self.html.id}')"
         ui.run_javascript(
-            f"requestAnimationFrame(() => {{ const box = {place}; if (!box) return;"
+            f"setTimeout(() => {{ const box = {place}; if (!box) return;"
             "box.querySelectorAll('.cl-now').forEach(x => x.classList.remove('cl-now'));"
             f"const now = box.querySelector('[data-line=\"{line}\"]'); if (!now) return; now.classList.add('cl-now');"
             "const top = now.offsetTop - box.offsetTop;"
             "if (top < box.scrollTop + 20 || top > box.scrollTop + box.clientHeight - 40)"
-            "box.scrollTop = top - box.clientHeight / 3; })"
+            "box.scrollTop = top - box.clientHeight / 3; }, 20)"
         )
 
     def step(self, row: int, by: int) -> int | None:
