@@ -71,7 +71,9 @@ def test_a_job_is_refused_run_shown_and_stopped(window, folder) -> None:
     start(page, "contour/job.toml", "contour/again")
     page.wait_for_function("document.querySelector('.cl-run-text').textContent.includes('%')")
     page.get_by_text("Stop", exact=True).click()
-    page.wait_for_function("document.querySelector('.cl-run-text').textContent.includes('stopped, nothing was written')")
+    page.wait_for_function(
+        "document.querySelector('.cl-run-text').textContent.includes('stopped, nothing was written')"
+    )
     wait(lambda: not workers(job))
     assert not (folder / "contour" / "again").exists()
     assert not list((folder / "contour").glob(".chipload-*"))
