@@ -159,6 +159,11 @@ def test_the_scene_is_not_blank_and_a_column_changes_its_colours(square, pixels)
     page.click(".cl-colour")
     page.get_by_role("option", name="feed [mm/min]").click()
     page.wait_for_function("document.querySelector('.cl-title').textContent.includes('feed')")
+    # the keys are the page's again after a list was open
+    page.keyboard.press("ArrowRight")
+    settle(page, 1)
+    page.keyboard.press("Home")
+    settle(page, 0)
     assert page.inner_text(".cl-ends").split() == [f"{FEED.min():.4g}", f"{FEED.max():.4g}"]
     after = scene_pixels(page, pixels)
     assert (np.abs(after.astype(int) - before).max(axis=2) > 40).sum() > 200

@@ -201,7 +201,7 @@ def test_what_is_in_the_folder_and_what_is_not(root: Path, tmp_path_factory: pyt
     (root / "job.toml").write_text('[program]\nfile = "square.ngc"\n')
     (root / ".hidden").mkdir()
     (root / ".hidden" / "job.toml").write_text("[program]\n")
-    assert [(f.kind, f.name, f.word) for f in listed(root)] == [
+    assert [(f.kind, f.name, f.word) for f in listed(root)[0]] == [
         ("job", "job.toml", ""),
         ("result", "r", "Does not hold"),
     ]

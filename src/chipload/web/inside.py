@@ -110,10 +110,11 @@ def is_job(file: Path) -> bool:
     return any(isinstance(raw.get(key), dict) for key in KINDS)
 
 
-def listed(root: Path) -> list[Found]:
-    """Results and jobs in the folder, by name; at most :data:`ENTRIES` entries are looked at."""
+def listed(root: Path) -> tuple[list[Found], bool]:
+    """Results and jobs in the folder, by name, and whether no more than :data:`ENTRIES` files were there to look at."""
     out: list[Found] = []
-    for path in _walk(root):
+    files = list(_walk(root, ENTRIES + 1))
+    for path in files[:ENTRIES]:
         name = path.relative_to(root).as_posix()
         try:
             real = inside(root, name)
@@ -125,7 +126,7 @@ def listed(root: Path) -> list[Found]:
                 out.append(Found(path.parent.relative_to(root).as_posix(), "result", word(summary)))
         elif is_job(real):
             out.append(Found(name, "job", ""))
-    return sorted(out, key=lambda f: (f.kind, f.name))
+    return sorted(out, key=lambda f: (f.kind, f.name)), len(files) <= ENTRIES
 
 
 def word(summary: dict[str, Any]) -> str:
@@ -161,16 +162,17 @@ def _hash(path: Path, _changed: int, _size: int) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _walk(root: Path) -> Iterator[Path]:
-    """Files of the folder, links to folders not followed, hidden ones left out."""
+def _walk(root: Path, most: int = ENTRIES) -> Iterator[Path]:
+    """At most so many files of the folder, links to folders not followed, hidden ones left out."""
     seen = 0
     for where, folders, files in os.walk(root):
         here = Path(where)
         deep = len(here.relative_to(root).parts) >= DEEPEST
         folders[:] = [] if deep else sorted(f for f in folders if not f.startswith("."))
         for name in sorted(files):
+            if name.startswith("."):
+                continue
             seen += 1
-            if seen > ENTRIES:
+            if seen > most:
                 return
-            if not name.startswith("."):
-                yield here / name
+            yield here / name

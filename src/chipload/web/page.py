@@ -13,11 +13,12 @@ from nicegui import background_tasks, ui
 
 from chipload.errors import InputError
 from chipload.report.folder import check_target
-from chipload.web.inside import Found, Opened, inside, is_job, listed
+from chipload.web.inside import ENTRIES, Found, Opened, inside, is_job, listed
+from chipload.web.panels import RELEASE
 from chipload.web.result import Result, load_result
 from chipload.web.runs import Run
 from chipload.web.shelf import Shelf
-from chipload.web.view import RELEASE, VERDICTS, View
+from chipload.web.view import VERDICTS, View
 
 KEYS = (
     ("\u2190 \u2192", "one step back or on; with Shift twenty"),
@@ -51,6 +52,7 @@ class Page:
     def __init__(self, opened: Opened, runs: Runs, shelf: Shelf) -> None:
         self.opened, self.runs, self.shelf = opened, runs, shelf
         self.result: Result | None = None
+        self.own: Run | None = None
         self.seen: Run | None = runs.now if runs.now is not None and runs.now.over else None
         ui.add_css(resources.files(__package__).joinpath("page.css").read_text("utf-8"))
         ui.colors(primary="#2f5d8a")
@@ -71,16 +73,16 @@ class Page:
         """Show what the address or the command names, else what there is."""
         first = name if name is not None else self.opened.first
         if first is None:
-            self._home()
+            await self._home()
             return
         try:
             path = inside(self.opened.root, first)
             if path.is_file():
-                self._home(first)
+                await self._home(first)
             else:
                 await self.show(first)
         except InputError as err:
-            self._home()
+            await self._home()
             ui.notify(str(err), type="negative")
 
     async def show(self, name: str) -> None:
@@ -100,11 +102,12 @@ class Page:
             self.tracks.set_visibility(len(options) > 1)
             self.report.set_visibility(True)
             self.report.props(f'href="/report?name={quote(name)}"')
+            ui.navigate.history.replace(f"/?show={quote(name)}")
             await self.view.open(result)
         except InputError as err:
             ui.notify(str(err), type="negative")
             if self.result is None:
-                self._home()
+                await self._home()
         finally:
             self.busy.set_visibility(False)
 
@@ -117,6 +120,7 @@ class Page:
             self.tracks = ui.select({0: ""}, value=0, on_change=self._tracked).props(
                 "dense options-dense outlined hide-bottom-space"
             ).classes("cl-tracks").mark("track")  # fmt: skip
+            self.tracks.on("popup-hide", js_handler=RELEASE)
             self.tracks.set_visibility(False)
             self.busy = ui.spinner(size="sm")
             self.busy.set_visibility(False)
@@ -132,7 +136,7 @@ class Page:
         with ui.element("div").classes("cl-run").mark("run") as self.bar:
             self.bar_text = ui.label("").classes("cl-run-text").mark("run-text")
             self.bar_line = ui.linear_progress(0.0, show_value=False, size="8px").classes("cl-run-line")
-            self.bar_stop = ui.button("Stop", on_click=self.runs.stop).props("outline dense no-caps size=sm color=red")
+            self.bar_stop = ui.button("Stop", on_click=self.runs.stop).props("outline dense no-caps color=red")
             self.bar_stop.mark("stop")
             self.bar_close = ui.button(icon="close", on_click=lambda: self.bar.set_visibility(False)).props(
                 "flat dense round size=sm"
@@ -159,15 +163,16 @@ class Page:
 
     # -- opening ------------------------------------------------------------------------------------------------
     async def _open(self) -> None:
-        found = await asyncio.to_thread(listed, self.opened.root)
+        found, all_seen = await asyncio.to_thread(listed, self.opened.root)
         self.list.clear()
         with self.list:
-            self._listed(found)
+            self._listed(found, all_seen)
         self.opening.open()
 
-    def _home(self, job: str | None = None) -> None:
+    async def _home(self, job: str | None = None) -> None:
         """What the folder holds, where no result is shown."""
-        found = listed(self.opened.root)
+        self.result = None
+        found, all_seen = await asyncio.to_thread(listed, self.opened.root)
         self.stage.set_visibility(False)
         self.home.set_visibility(True)
         self.home.clear()
@@ -183,9 +188,11 @@ class Page:
                     ui.label("plans, proves and writes a result; it can be stopped").classes("cl-note")
                 ui.html(self._text(job), sanitize=True).classes("cl-scroll cl-code cl-job")
             ui.label("Results and jobs in this folder").classes("cl-dialog-title")
-            self._listed(found)
+            self._listed(found, all_seen)
 
-    def _listed(self, found: list[Found]) -> None:
+    def _listed(self, found: list[Found], all_seen: bool) -> None:
+        if not all_seen:
+            ui.label(f"The folder holds more than {ENTRIES} files: only so many were looked at.").classes("cl-note")
         if not found:
             ui.label("This folder holds no result and no job. `chipload example` copies one.").classes("cl-note")
         for f in found:
@@ -200,10 +207,10 @@ class Page:
                     _button("Look", lambda n=f.name: self._job(n))
                     _button("Run", lambda n=f.name: self._ask(n), "play_arrow").mark(f"run-{f.name}")
 
-    def _job(self, name: str) -> None:
+    async def _job(self, name: str) -> None:
         """Show a job."""
         self.opening.close()
-        self._home(name)
+        await self._home(name)
 
     def _called(self, name: str) -> str:
         return self.opened.root.name if name == "." else name
@@ -224,7 +231,9 @@ class Page:
             where = ui.input(value=out).props("dense outlined").classes("cl-out").mark("out")
             said = ui.label("").classes("cl-no")
             with ui.element("div").classes("cl-entry"):
-                _button("Run", lambda: self._run(job, str(where.value), said), "play_arrow").mark("start")
+                _button("Run", lambda: self._run(job, str(where.value), said), "play_arrow").props(
+                    "unelevated color=primary"
+                ).props(remove="flat").mark("start")
                 _button("Cancel", self.running.close)
         self.running.open()
 
@@ -244,7 +253,7 @@ class Page:
             return
         self.running.close()
         self.runs.now = now = Run(job, target.relative_to(root).as_posix())
-        self.seen = None
+        self.seen, self.own = None, now
         self.bar.set_visibility(True)
         background_tasks.create(now.work(path, target))
 
@@ -267,13 +276,12 @@ class Page:
         self.bar_text.set_text(said)
         if now.over:
             self.seen = now
-            if now.state == "done":
+            if now.state == "done" and now is self.own:
                 await self.show(now.out)
                 self.bar.set_visibility(False)
 
     # -- keys ---------------------------------------------------------------------------------------------------
     async def _tracked(self) -> None:
-        ui.run_javascript(f"({RELEASE})()")
         if self.result is not None and isinstance(self.tracks.value, int):
             await self.view.follow(self.tracks.value)
 

@@ -57,7 +57,7 @@ def plots(result: Result, track: Track, held: Mapping[str, Bound | None], agains
         span = (reach - min(low, 0.0)) or 1.0
         axes[f"yaxis{axis}"] = {
             "domain": [max(top - height, 0.0), top],
-            "range": [min(low, 0.0) - 0.04 * span, reach + 0.14 * span],
+            "range": [min(low, 0.0) - 0.04 * span, reach + 0.26 * span],
             "gridcolor": GRID,
             "zerolinecolor": "#c9ced6",
             "nticks": 4,

@@ -81,6 +81,7 @@ class Result:
     summary : summary.json
     columns : that can be drawn, in their order
     tracks : the one in use of each operation first
+    count : rows of history.parquet
     """
 
     name: str
@@ -88,6 +89,7 @@ class Result:
     summary: dict[str, Any]
     columns: tuple[str, ...]
     tracks: tuple[Track, ...]
+    count: int
     _cache: dict[str, Floats | Text] = field(default_factory=dict)
 
     def file(self, name: str) -> Path:
@@ -113,7 +115,10 @@ class Result:
         if name not in self._cache:
             while len(self._cache) >= KEPT:
                 self._cache.pop(next(iter(self._cache)))
-            self._cache[name] = _column(_table(self.file(HISTORY), [name]), name)
+            table = _table(self.file(HISTORY), [name])
+            if table.num_rows != self.count:
+                raise InputError(f"{self.name}/{HISTORY}: has changed: open the result again")
+            self._cache[name] = _column(table, name)
         whole = self._cache[name]
         first, last = int(track.rows[0]), int(track.rows[-1])
         some = slice(first, last + 1) if last - first + 1 == len(track.rows) else track.rows
@@ -143,7 +148,7 @@ def load_result(root: Path, name: str) -> Result:
     missing = [c for c in PLACE if c not in table.column_names]
     if missing or table.num_rows == 0:
         raise InputError(f"{name}/{HISTORY}: {'no row' if not missing else 'no ' + missing[0]}: nothing to show")
-    return Result(name, root, summary, drawn, _tracks(table, summary))
+    return Result(name, root, summary, drawn, _tracks(table, summary), table.num_rows)
 
 
 def released(summary: dict[str, Any], operation: int) -> str | None:

@@ -5,6 +5,7 @@ The row is the one thing that moves: slider, plots, lines, table and keys set it
 
 from __future__ import annotations
 
+import asyncio
 import time
 from collections.abc import Callable
 from typing import Any
@@ -13,6 +14,7 @@ import numpy as np
 from nicegui import ui
 
 from chipload.web.inside import word
+from chipload.web.panels import RELEASE
 from chipload.web.panels.lines import Lines, nearest
 from chipload.web.panels.space import Space
 from chipload.web.panels.tables import Tables
@@ -28,8 +30,6 @@ SPEEDS = {0: "30 s", 1: "\u00d71", 10: "\u00d710", 100: "\u00d7100"}
 VERDICTS = {"Holds": "ok", "Unproven": "may", "Does not hold": "no"}
 #: steps of the slider
 STEPS = 4000
-#: the slider gives the keys back to the page
-RELEASE = "() => document.activeElement && document.activeElement.blur()"
 
 
 class View:
@@ -40,6 +40,7 @@ class View:
         self.track: Track | None = None
         self.row, self.clock, self.before = 0, 0.0, 0.0
         self.playing = False
+        self.turn = asyncio.Lock()
         with ui.element("div").classes("cl-verdict") as self.verdict:
             self.word = ui.label("").classes("cl-word").mark("verdict")
             self.says = ui.label("").classes("cl-says")
@@ -59,6 +60,7 @@ class View:
             self._button("chevron_right", "on (\u2192)", lambda: self.move(1))
             self._button("last_page", "to the end (End)", lambda: self.go(len(self.track or ()) - 1))
             self.speed = ui.select(SPEEDS, value=0).props("dense options-dense borderless").classes("cl-speed")
+            self.speed.on("popup-hide", js_handler=RELEASE)
             with self.speed:
                 ui.tooltip("the whole in 30 s, or times as fast as the machine")
             self.slider = ui.slider(min=0.0, max=1.0, step=0.001, value=0.0).props("dense").classes("cl-slider")
@@ -70,28 +72,18 @@ class View:
 
     async def open(self, result: Result) -> None:
         """Show a result from the beginning of its first track."""
-        self.pause()
-        self.result, self.track = result, result.tracks[0]
-        verdict = word(result.summary)
-        says = str(result.summary.get("says", ""))
-        for state in VERDICTS.values():
-            self.verdict.classes(remove=f"cl-{state}")
-        self.verdict.classes(f"cl-{VERDICTS[verdict]}")
-        self.word.set_text(verdict)
-        rest = says.removeprefix(f"{verdict}: ")
-        self.says.set_text(rest[:1].upper() + rest[1:])
-        self.tip.set_text(says)
-        await self.space.open(result, self.track)
-        await self._tracked()
+        async with self.turn:
+            await self._open(result)
 
     async def follow(self, k: int) -> None:
         """Show another track of the result."""
-        if self.result is None or not 0 <= k < len(self.result.tracks) or self.track is self.result.tracks[k]:
-            return
-        self.pause()
-        self.track = self.result.tracks[k]
-        await self.space.follow(self.track)
-        await self._tracked()
+        async with self.turn:
+            if self.result is None or not 0 <= k < len(self.result.tracks) or self.track is self.result.tracks[k]:
+                return
+            self.pause()
+            self.track = self.result.tracks[k]
+            await self.space.follow(self.track)
+            await self._tracked()
 
     def pick(self, row: int) -> None:
         """A panel asks for a row; below 0: to be told again where it is."""
@@ -136,6 +128,21 @@ class View:
         self.timer.deactivate()
 
     # -- parts --------------------------------------------------------------------------------------------------
+    async def _open(self, result: Result) -> None:
+        self.pause()
+        self.result, self.track = result, result.tracks[0]
+        verdict = word(result.summary)
+        says = str(result.summary.get("says", ""))
+        for state in VERDICTS.values():
+            self.verdict.classes(remove=f"cl-{state}")
+        self.verdict.classes(f"cl-{VERDICTS[verdict]}")
+        self.word.set_text(verdict)
+        rest = says.removeprefix(f"{verdict}: ")
+        self.says.set_text(rest[:1].upper() + rest[1:])
+        self.tip.set_text(says)
+        await self.space.open(result, self.track)
+        await self._tracked()
+
     async def _tracked(self) -> None:
         assert self.result is not None
         assert self.track is not None

@@ -9,6 +9,7 @@ import numpy as np
 from nicegui import ui
 
 from chipload.web.findings import Bound, named
+from chipload.web.panels import RELEASE
 from chipload.web.plots import abscissa, bounds, noted, plots
 from chipload.web.result import Result, Text, Track
 
@@ -33,6 +34,7 @@ class Lines:
                 self.columns = ui.select({}, multiple=True, on_change=self._changed).props(
                     f"dense options-dense borderless use-chips hide-bottom-space max-values={MOST}"
                 ).classes("cl-columns").mark("columns")  # fmt: skip
+                self.columns.on("popup-hide", js_handler=RELEASE)
                 self.against = ui.toggle({"time": "time", "path": "path"}, value="time", on_change=self._turned).props(
                     "dense no-caps size=sm unelevated toggle-color=blue-grey-7"
                 )

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from chipload.report.figures import SCALE
 from chipload.web.cutters import cutters_of
 from chipload.web.findings import limits, named
+from chipload.web.panels import RELEASE
 from chipload.web.result import Result, Track
 from chipload.web.scene import POINTS, Scale, bodies, path_glb, radius
 from chipload.web.shelf import Shelf
@@ -49,6 +50,7 @@ class Space:
                 self.column = ui.select({}, label="path coloured by", on_change=self._recoloured).props(
                     "dense options-dense outlined hide-bottom-space"
                 ).classes("cl-colour").mark("colour")  # fmt: skip
+                self.column.on("popup-hide", js_handler=RELEASE)
                 self.boxes = ui.element("div").classes("cl-layers")
             with ui.element("div").classes("cl-over cl-over-right"):
                 for name in VIEWS:
@@ -93,7 +95,7 @@ class Space:
         few = f"The path is drawn by some {POINTS} of its {len(track)} steps." if len(track) > POINTS else ""
         self.said.set_text(" ".join(t for t in (self.bodies_said, unknown, few) if t))
         self.marks = []
-        mark = 2.6 * radius(track)
+        mark = 4.0 * radius(track)
         for held in limits(self.result, track):
             if held.state == "does not hold" and held.row is not None:
                 with self.view:
@@ -122,7 +124,7 @@ class Space:
         low, high = self.box
         middle = 0.5 * (low + high)
         away = np.array(VIEWS[name])
-        reach = 1.4 * max(float(np.linalg.norm(high - low)), 1e-3)
+        reach = 1.3 * max(float(np.linalg.norm(high - low)), 1e-3)
         eye = middle + away / np.linalg.norm(away) * reach
         x, y, z = middle.tolist()
         self.view.move_camera(*eye.tolist(), x, y, z, 0, 0, 1, duration=seconds)
