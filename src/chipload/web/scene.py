@@ -33,9 +33,10 @@ POINTS = 16_000
 THICK = 0.0034
 #: the same by the square of the diagonal over the length of the path
 DENSE = 0.12
-#: colours: above a limit, no value, words one after another
+#: colours: above a limit, no value, words one after another; opacity and bend [rad] of edges
 ABOVE, NONE = (200, 30, 30, 255), (150, 156, 165, 255)
 WORDS = ("#3457a6", "#c9821a", "#0b7a75", "#8a4fa3", "#7a8a2e", "#b0567a", "#4d8fb8", "#6b5b4b", "#94a0ae", "#2f6f3e")
+CLEAR, BENT = 150, 0.35
 FLUTES, SHANK = (126, 140, 158, 190), (176, 184, 194, 130)
 #: largest scene [bytes] and triangles of one body that the page shows
 LARGEST, TRIANGLES = 400_000_000, 400_000
@@ -47,12 +48,14 @@ OWN = ("path", "rapids", "cutter")
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A body of the scene: its name, its GLB, its lower and upper corner [mm]."""
+    """A body of the scene: its name, its GLB, its lower and upper corner [mm], its triangles and colour."""
 
     name: str
     glb: bytes
     low: Floats
     high: Floats
+    mesh: trimesh.Trimesh
+    colour: NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,10 +78,20 @@ def bodies(result: Result) -> tuple[tuple[Body, ...], str]:
         if path.stat().st_size > LARGEST:
             return (), f"{SCENE} is larger than {LARGEST // 1_000_000} MB: only the path is shown."
         scene = trimesh.load(io.BytesIO(path.read_bytes()), file_type="glb", force="scene")
-        out = [Body(name, _body(mesh), *mesh.bounds) for name, mesh in _meshes(scene) if not _own(name)]
+        out = [_body(name, mesh) for name, mesh in _meshes(scene) if not _own(name)]
     except Exception:  # a reader of foreign files may fail in any way; the page says so
         return (), f"{SCENE} cannot be read: only the path is shown."
     return tuple(out), "" if out else "The scene of this result holds no body: only the path is shown."
+
+
+def edges_glb(body: Body) -> bytes:
+    """The edges of a body at which it bends, and those of one face only, to see through it."""
+    mesh = body.mesh
+    bent = mesh.face_adjacency_edges[mesh.face_adjacency_angles > BENT]
+    every, count = np.unique(np.sort(mesh.edges, axis=1), axis=0, return_counts=True)
+    lines = np.vstack([bent, every[count == 1]]).astype(np.int64)
+    colour = np.append(body.colour[:3], CLEAR).astype(np.uint8)
+    return glb_bytes([Shape(np.asarray(mesh.vertices, dtype=np.float64), lines, colour, lit=False)])
 
 
 def path_glb(result: Result, track: Track, column: str) -> tuple[bytes, Scale]:
@@ -220,17 +233,17 @@ def _meshes(scene: trimesh.Scene) -> list[tuple[str, trimesh.Trimesh]]:
     return out
 
 
-def _body(mesh: trimesh.Trimesh) -> bytes:
-    faces = np.asarray(mesh.faces, dtype=np.int64)
+def _body(name: str, mesh: trimesh.Trimesh) -> Body:
     visual = mesh.visual
     colours = np.asarray(visual.to_color().vertex_colors if visual.kind == "texture" else visual.vertex_colors)
-    plain = colours.reshape(-1, 4).astype(np.uint8)
-    if len(plain) != len(mesh.vertices):
-        plain = np.tile(np.array([[168, 176, 186, 255]], dtype=np.uint8), (len(mesh.vertices), 1))
+    each = colours.reshape(-1, 4).astype(np.uint8)
+    if len(each) != len(mesh.vertices):
+        each = np.tile(np.array([[168, 176, 186, 255]], dtype=np.uint8), (len(mesh.vertices), 1))
     vertices = np.asarray(mesh.vertices, dtype=np.float64)
-    if (plain == plain[0]).all():
-        return glb_bytes([Shape(vertices, faces, plain[0])])
-    return glb_bytes([Shape(vertices, faces, plain)])
+    painted = each[0] if (each == each[0]).all() else each
+    low, high = mesh.bounds
+    glb = glb_bytes([Shape(vertices, np.asarray(mesh.faces, dtype=np.int64), painted)])
+    return Body(name, glb, low, high, mesh, each[0])
 
 
 def _revolved(profile: Floats, colour: tuple[int, int, int, int]) -> Shape:

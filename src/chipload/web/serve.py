@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import os
 import socket
 import tempfile
@@ -103,6 +104,8 @@ def _application(opened: Opened, port: int) -> Any:
     from chipload.web.result import REPORT
     from chipload.web.shelf import Shelf
 
+    # what is on its way to a window that was closed is no news for the terminal
+    logging.getLogger("nicegui").setLevel(logging.ERROR)
     runs, shelf = Runs(), Shelf()
 
     @app.get("/shape/{key}.glb")
@@ -123,9 +126,11 @@ def _application(opened: Opened, port: int) -> Any:
 
     @ui.page("/", title="chipload", response_timeout=30.0)
     async def index(show: str | None = None) -> None:
-        page = Page(opened, runs, shelf)
-        await ui.context.client.connected()
-        await page.begin(show)
+        page, window = Page(opened, runs, shelf), ui.context.client
+        with contextlib.suppress(TimeoutError):
+            await window.connected()
+            if window.has_socket_connection:
+                await page.begin(show)
 
     app.on_shutdown(runs.stop)
     app.config.socket_io_js_transports = ["websocket"]

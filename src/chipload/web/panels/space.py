@@ -16,13 +16,15 @@ from chipload.web.cutters import cutters_of
 from chipload.web.findings import limits, named
 from chipload.web.panels import RELEASE
 from chipload.web.result import Result, Track
-from chipload.web.scene import POINTS, Scale, bodies, path_glb, radius
+from chipload.web.scene import POINTS, Body, Scale, bodies, edges_glb, path_glb, radius
 from chipload.web.shelf import Shelf
 
 Floats = NDArray[np.float64]
 
 BACKGROUND = "#eef1f5"
 MARK = "#c81e1e"
+#: the box that leaves of bodies their edges
+CLEAR = "see through"
 #: directions that the camera looks from
 VIEWS = {"iso": (0.62, -1.0, 0.78), "top": (0.0, -0.001, 1.0), "front": (0.0, -1.0, 0.02), "side": (1.0, 0.0, 0.02)}
 #: columns that a path is coloured by first, where the history has them
@@ -43,6 +45,7 @@ class Space:
         self.marks: list[Any] = []
         self.layers: dict[str, Any] = {}
         self.seen: dict[str, bool] = {}
+        self.bodies: tuple[Body, ...] = ()
         self.bodies_said = ""
         with ui.element("div").classes("cl-panel cl-space") as self.frame:
             self.stage = ui.element("div").classes("cl-stage")
@@ -74,8 +77,8 @@ class Space:
             camera = ui.scene.perspective_camera(fov=36, near=size * 2e-3, far=size * 60.0)
             self.view = ui.scene(grid=False, camera=camera, background_color=BACKGROUND, fps=25).classes("cl-scene")
             self.view.axes_helper(0.12 * size)
-        for body in found:
-            self.layers[body.name] = self.view.gltf(self.shelf.put(body.glb))
+        self.bodies = found
+        await self._bodies()
         self.bodies_said = said
         self.look("iso", 0.0)
         columns = {c: _called(c) for c in result.columns}
@@ -145,19 +148,35 @@ class Space:
         self.path = self.view.gltf(self.shelf.put(glb)).visible(self.seen.get("path", True))
         self.legend.set_content(legend(column, scale))
 
+    async def _bodies(self) -> None:
+        """The bodies, as they are or their edges."""
+        clear, found = self.seen.get(CLEAR, False), self.bodies
+        made = await asyncio.to_thread(lambda: [edges_glb(b) if clear else b.glb for b in found])
+        if found is not self.bodies:
+            return
+        for layer in self.layers.values():
+            layer.delete()
+        for body, glb in zip(found, made, strict=True):
+            layer = self.view.gltf(self.shelf.put(glb))
+            self.layers[body.name] = layer.visible(self.seen.get(body.name, True))
+
     def _boxes(self) -> None:
         self.boxes.clear()
         with self.boxes:
+            if self.layers:
+                ui.checkbox(CLEAR, value=self.seen.get(CLEAR, False)).props("dense size=xs").on_value_change(
+                    lambda e: self._see(CLEAR, bool(e.value))
+                )
             for name in (*self.layers, "path", "cutter"):
                 ui.checkbox(_plain(name), value=self.seen.get(name, True)).props("dense size=xs").on_value_change(
                     lambda e, n=name: self._see(n, bool(e.value))
                 )
-        for name, layer in self.layers.items():
-            layer.visible(self.seen.get(name, True))
 
-    def _see(self, name: str, wanted: bool) -> None:
+    async def _see(self, name: str, wanted: bool) -> None:
         self.seen[name] = wanted
-        if name == "path" and self.path is not None:
+        if name == CLEAR:
+            await self._bodies()
+        elif name == "path" and self.path is not None:
             self.path.visible(wanted)
         elif name == "cutter":
             for shape in self.cutters.values():
