@@ -245,6 +245,17 @@ def test_a_scene_that_cannot_be_read_is_said(root: Path) -> None:
     assert scene.bodies(load_result(root, "r"))[1] == "This result has no scene: only its path is shown."
 
 
+def test_of_a_box_its_twelve_edges_are_left(root: Path) -> None:
+    body = scene.bodies(load_result(root, "r"))[0][0]
+    tree, blob = parsed(scene.edges_glb(body))
+    primitive = tree["meshes"][0]["primitives"][0]
+    p = column_of(tree, blob, primitive["attributes"]["POSITION"])
+    ends = p[column_of(tree, blob, primitive["indices"])].reshape(-1, 2, 3)
+    assert primitive["mode"] == 1
+    assert sorted(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).tolist()) == [10.0] * 4 + [60.0] * 8
+    assert (body.low.tolist(), body.high.tolist()) == ([-10.0, -10.0, -12.0], [50.0, 50.0, -2.0])
+
+
 def test_texts_are_escaped(root: Path) -> None:
     summary = json.loads((root / "r" / "summary.json").read_text())
     summary["operations"][0]["limits"][0]["name"] = "<b>x"

@@ -191,6 +191,9 @@ def _tracks(table: Any, summary: dict[str, Any]) -> tuple[Track, ...]:
     operation = _whole(table, "operation") if "operation" in have else np.zeros(n, dtype=np.int64)
     named = _column(table, "strategy") if "strategy" in have else Text(np.zeros(n, dtype=np.int64), ("",))
     strategy = named if isinstance(named, Text) else Text(np.zeros(n, dtype=np.int64), ("",))
+    if (strategy.codes < 0).any():
+        nameless = np.where(strategy.codes < 0, len(strategy.words), strategy.codes)
+        strategy = Text(nameless, (*strategy.words, ""))
     passes = _column(table, "pass") if "pass" in have else Text(np.zeros(n, dtype=np.int64), ("",))
     code = operation * len(strategy.words) + strategy.codes
     out = []

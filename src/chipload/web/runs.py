@@ -44,9 +44,14 @@ class Run:
         """Start the process and follow it to its end."""
         words = [sys.executable, "-m", "chipload.web.worker", str(job), str(out)]
         pipe = asyncio.subprocess.PIPE
-        self._process = process = await asyncio.create_subprocess_exec(
-            *words, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
-        )
+        try:
+            process = await asyncio.create_subprocess_exec(
+                *words, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
+            )
+        except OSError as err:
+            self.state, self.code, self.says = "failed", 1, f"no process could be started: {err.strerror}"
+            return
+        self._process = process
         assert process.stdout is not None
         assert process.stderr is not None
         faults = asyncio.create_task(_tail(process.stderr))

@@ -53,7 +53,8 @@ def serve(path: str | Path, port: int | None, show: bool, say: Callable[[str], N
     async def work() -> None:
         started = asyncio.create_task(_told(server, lambda: say(f"{opened.root}: {address} (Ctrl-C ends it)")))
         if show:
-            started.add_done_callback(lambda _: webbrowser.open(address))
+            loop = asyncio.get_running_loop()
+            started.add_done_callback(lambda _: loop.run_in_executor(None, webbrowser.open, address))
         try:
             await server.serve(sockets=[listener])
         finally:

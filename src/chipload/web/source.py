@@ -30,6 +30,8 @@ Ints = NDArray[np.int64]
 TURN, NEAR_MM = 0.01, 0.02
 #: rows that are followed one by one, chords that are looked ahead, and the largest text [bytes]
 FOLLOWED, AHEAD, LARGEST = 20_000, 48, 50_000_000
+#: after so many rows on no motion at all the rest of the program is no longer searched for one
+LOST = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,10 +96,10 @@ def followed(place: Floats, program: Program) -> Ints:
     line = np.asarray(chords.line)
     n = len(place)
     rows = np.unique(np.linspace(0, n - 1, min(n, FOLLOWED)).astype(np.int64))
-    out, j = np.zeros(len(rows), dtype=np.int64), 0
+    out, j, lost = np.zeros(len(rows), dtype=np.int64), 0, 0
     for k, row in enumerate(rows.tolist()):
         p = place[row]
-        for stop in (j + AHEAD, len(a)):
+        for stop in (j + AHEAD, len(a) if lost < LOST else 0):
             some = slice(j, stop)
             share = np.clip(((p - a[some]) * d[some]).sum(axis=1) / square[some], 0.0, 1.0)
             off = np.linalg.norm(a[some] + share[:, None] * d[some] - p, axis=1)
@@ -105,6 +107,8 @@ def followed(place: Floats, program: Program) -> Ints:
             if len(near):
                 j += int(near[0])
                 break
+        else:
+            lost += 1
         out[k] = line[j]
     return out[np.searchsorted(rows, np.arange(n), side="right") - 1]
 
