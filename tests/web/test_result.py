@@ -151,6 +151,19 @@ def test_rows_follow_the_lines_of_a_text_that_numbers_otherwise(root: Path) -> N
     assert other.of_row.tolist() == np.repeat(goto, ROWS // 4).tolist()
 
 
+def test_of_two_rows_at_a_place_the_worse_one_is_meant(tmp_path: Path) -> None:
+    folder = tmp_path / "twice"
+    folder.mkdir()
+    there = np.array([0.0, 1.0, 2.0, 3.0, 2.0, 1.0, 0.0])
+    force = np.array([10.0, 20.0, 30.0, 40.0, 90.0, 25.0, 15.0])
+    table = {"x_mm": there, "y_mm": np.zeros(7), "z_mm": np.zeros(7), "force_n": force}
+    pq.write_table(pa.table(table), folder / "history.parquet")
+    limit = {"name": "force_n", "limit": 50.0, "worst": 90.0, "at_mm": [2.0, 0.0, 0.0], "holds": False}
+    (folder / "summary.json").write_text(json.dumps({"holds": False, "operations": [{"limits": [limit]}]}))
+    r = load_result(tmp_path, "twice")
+    assert [h.row for h in limits(r, r.tracks[0])] == [4]
+
+
 def test_an_arc_and_a_path_that_comes_back_are_followed() -> None:
     text = "UNITS/MM\nRAPID\nGOTO/0,0,0\nFEDRAT/100,MMPM\nGOTO/10,0,0\nCIRCLE/10,5,0,0,0,1\nGOTO/10,10,0\nGOTO/0,10,0\n"
     program, _ = read_apt(text + "GOTO/0,0,0\nGOTO/10,0,0\nFINI")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable
 from html import escape
 from typing import Any
@@ -25,6 +26,8 @@ BACKGROUND = "#eef1f5"
 MARK = "#c81e1e"
 #: the box that leaves of bodies their edges
 CLEAR = "see through"
+#: opening of the camera from below to above, width of the view by its height at least, and room around a box
+FOV_DEG, ASPECT, MORE = 36.0, 2.0, 1.06
 #: directions that the camera looks from
 VIEWS = {"iso": (0.62, -1.0, 0.78), "top": (0.0, -0.001, 1.0), "front": (0.0, -1.0, 0.02), "side": (1.0, 0.0, 0.02)}
 #: columns that a path is coloured by first, where the history has them
@@ -74,7 +77,7 @@ class Space:
         self.stage.clear()
         self.path, self.cutters, self.marks, self.layers = None, {}, [], {}
         with self.stage:
-            camera = ui.scene.perspective_camera(fov=36, near=size * 2e-3, far=size * 60.0)
+            camera = ui.scene.perspective_camera(fov=FOV_DEG, near=size * 2e-3, far=size * 60.0)
             self.view = ui.scene(grid=False, camera=camera, background_color=BACKGROUND, fps=25).classes("cl-scene")
             self.view.axes_helper(0.12 * size)
         self.bodies = found
@@ -124,11 +127,8 @@ class Space:
         """Look from a side, at everything."""
         if self.view is None:
             return
-        low, high = self.box
-        middle = 0.5 * (low + high)
-        away = np.array(VIEWS[name])
-        reach = 1.3 * max(float(np.linalg.norm(high - low)), 1e-3)
-        eye = middle + away / np.linalg.norm(away) * reach
+        middle = 0.5 * (self.box[0] + self.box[1])
+        eye = seen_from(*self.box, np.array(VIEWS[name]))
         x, y, z = middle.tolist()
         self.view.move_camera(*eye.tolist(), x, y, z, 0, 0, 1, duration=seconds)
 
@@ -184,6 +184,24 @@ class Space:
             self.pick(-1)
         elif name in self.layers:
             self.layers[name].visible(wanted)
+
+
+def seen_from(low: Floats, high: Floats, away: Floats) -> Floats:
+    """(3,) where a camera stands [mm] that looks along -``away`` at the middle of a box and sees all of it.
+
+    >>> eye = seen_from(np.array([-1.0, -1.0, -1.0]), np.array([1.0, 1.0, 1.0]), np.array([0.0, -1.0, 0.0]))
+    >>> eye.round(3).tolist()
+    [0.0, -4.322, 0.0]
+    """
+    e = away / np.linalg.norm(away)
+    right = np.cross([0.0, 0.0, 1.0], e)
+    right /= np.linalg.norm(right)
+    up = np.cross(e, right)
+    signs = np.array(np.meshgrid([-0.5, 0.5], [-0.5, 0.5], [-0.5, 0.5])).reshape(3, 8).T
+    corners = signs * np.maximum(high - low, 1e-3)
+    half = math.tan(0.5 * math.radians(FOV_DEG))
+    wide = np.maximum(np.abs(corners @ up) / half, np.abs(corners @ right) / (half * ASPECT))
+    return np.asarray(0.5 * (low + high) + MORE * float((corners @ e + wide).max()) * e)
 
 
 def frame(axis: Floats) -> Floats:
