@@ -3,6 +3,7 @@
 from chipload.job.load import AnyJob, load_job
 from chipload.job.planned import Job
 from chipload.job.program import ProgramJob
+from chipload.job.shell import ShellJob
 from chipload.job.tables import MAY, NEEDS, JobTable, OperationTable, ProgramJobTable
 
-__all__ = ["MAY", "NEEDS", "AnyJob", "Job", "JobTable", "OperationTable", "ProgramJob", "ProgramJobTable", "load_job"]
+__all__ = ["MAY", "NEEDS", "AnyJob", "Job", "JobTable", "OperationTable", "ProgramJob", "ProgramJobTable", "ShellJob", "load_job"]

@@ -18,13 +18,16 @@ from chipload.job.messages import first_error
 from chipload.job.override import override
 from chipload.job.planned import Job, planned_job
 from chipload.job.program import ProgramJob, program_job
+from chipload.job.shell import ShellJob, shell_job
+from chipload.job.shell_tables import ShellJobTable
 from chipload.job.tables import JobTable, ProgramJobTable, Table
 
 #: a job of any kind
-AnyJob = Job | ProgramJob
+AnyJob = Job | ProgramJob | ShellJob
 
 #: kinds of jobs: the table that only they have, the table of the whole file, and what makes the job of it
 KINDS: Mapping[str, tuple[type[Table], Callable[[Path, Any, Sequence[str]], AnyJob]]] = {
+    "shell": (ShellJobTable, shell_job),
     "program": (ProgramJobTable, program_job),
     "part": (JobTable, planned_job),
 }
