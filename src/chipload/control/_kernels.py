@@ -269,7 +269,8 @@ def run(
 ):  # fmt: skip
     """Controller, axes and spindle along a path; see :func:`chipload.control.plant.run`.
 
-    ``model_edge, model_cut`` are over ``relief``, as is what the controller is told. ``drive`` (dt, acceleration, longest time, share of the speed at which the spindle stalls); ``spindle`` (J, K_T,
+    ``model_edge, model_cut`` are over ``relief``, as is what the controller is told.
+    ``drive`` (dt, acceleration, longest time, share of the speed at which the spindle stalls); ``spindle`` (J, K_T,
     idle 0, idle 1, K_P, K_I, most current, speed, lags of sensor and filter); ``fault`` (kind, from, to, value);
     ``noise`` (m,) [A], used in turn; ``delay`` in steps of control. ``out`` (rows, 8): t, s, feed, torque, measured,
     override, status, speed. Returns rows filled, how it ended, time, greatest torque, the same over its relief, time in

@@ -153,6 +153,37 @@ def load_hal(file: str | Path) -> HalJob:
     )
 
 
+def write_hal(job: HalJob, path: str, fuzzy: str | None = None) -> str:
+    """The TOML of a job whose path lies in the file ``path`` and its table in ``fuzzy``; :func:`load_hal` reads it."""
+    lines = [
+        f'path = "{path}"',
+        *([f'fuzzy = "{fuzzy}"'] if fuzzy is not None else []),
+        f'source = "{job.source}"',
+        f"acceleration_mm_s2 = {float(job.acceleration)!r}",
+        f"period_s = {float(job.period)!r}",
+        f"latency_s = {float(job.latency)!r}",
+        f"feed_forward = {str(job.modelled).lower()}",
+        f"window_mm = {float(job.window)!r}",
+        f"away_mm = {float(job.away)!r}",
+    ]
+    units = {name: (key, factor) for key, (name, factor) in _SCALED.items()}
+    for title, part in (("override", job.override), ("spindle", job.spindle)):
+        lines += ["", f"[{title}]"]
+        for field in fields(part):
+            key, factor = units.get(field.name, (field.name, 1.0))
+            value = getattr(part, field.name)
+            lines.append(f"{key} = {_toml(value, factor)}")
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: Any, factor: float) -> str:
+    if isinstance(value, bool | str):
+        return str(value).lower() if isinstance(value, bool) else f'"{value}"'
+    if isinstance(value, tuple):
+        return f"[{', '.join(repr(float(x)) for x in value)}]"
+    return repr(value) if isinstance(value, int) else repr(float(value) / factor)
+
+
 def control(
     job: HalJob,
     machine: Machine,

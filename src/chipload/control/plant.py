@@ -270,8 +270,8 @@ def run(
     limit : torque for ``time_over`` [N mm]
     fault : of the sensor
     every_row : keep every so many steps of the controller
-    relief : (n,) float, above 0, at the rows of ``truth``: what is borne there over what is held, so that the controller
-        is told the torque over it; None: 1 everywhere
+    relief : (n,) float, above 0, at the rows of ``truth``: what is borne there over what is held; the
+        controller is told the torque over it; None: 1 everywhere
 
     Raises
     ------
@@ -299,7 +299,8 @@ def run(
     out = np.empty((min(rows, 2_000_000), 8))
     fault = fault or Fault()
     filled, ended, time, greatest, load, over = _kernels.run(
-        truth.s, truth.feed, truth.edge, truth.cut, believed.edge / borne, believed.cut / borne, borne, model is not None,
+        truth.s, truth.feed, truth.edge, truth.cut, believed.edge / borne, believed.cut / borne, borne,
+        model is not None,
         controller.numbers, table.error, table.change, table.output, table.rules, table.whole_ends,
         np.empty(len(table.output)), state, delay * loop.period,
         np.array([loop.period / every, loop.acceleration, loop.longest_s, STALL]),

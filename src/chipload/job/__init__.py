@@ -6,4 +6,15 @@ from chipload.job.program import ProgramJob
 from chipload.job.shell import ShellJob
 from chipload.job.tables import MAY, NEEDS, JobTable, OperationTable, ProgramJobTable
 
-__all__ = ["MAY", "NEEDS", "AnyJob", "Job", "JobTable", "OperationTable", "ProgramJob", "ProgramJobTable", "ShellJob", "load_job"]
+__all__ = [
+    "MAY",
+    "NEEDS",
+    "AnyJob",
+    "Job",
+    "JobTable",
+    "OperationTable",
+    "ProgramJob",
+    "ProgramJobTable",
+    "ShellJob",
+    "load_job",
+]

@@ -13,8 +13,8 @@ from chipload.cutter.table import CutterTable
 from chipload.job.tables import (
     Count,
     Limits,
-    Number,
     NotNegative,
+    Number,
     Positive,
     SourceTable,
     Table,
@@ -62,7 +62,9 @@ class ShellTable(Table):
     mean_radius_mm: Positive = Field(le=2000.0, description="of the middle of the wall at the clamped end")
     length_mm: Positive = Field(le=5000.0, description="along the wall, from the clamp to the free end")
     wall_mm: Positive = Field(description="thickness of the finished wall, along its normal")
-    angle_deg: Number = Field(0.0, ge=-60.0, le=60.0, description="half angle of a cone; above 0: wider at its free end")
+    angle_deg: Number = Field(
+        0.0, ge=-60.0, le=60.0, description="half angle of a cone; above 0: wider at its free end"
+    )
     clamped: Literal["low", "high"] = Field(description="which end is clamped")
     clamp_z_mm: Number = Field(description="z of the clamped end")
     modulus_gpa: Number = Field(ge=0.1, le=1000.0, description="Young's modulus: aluminium 70, titanium 114, steel 210")
@@ -81,7 +83,9 @@ class SurpriseTable(Table):
     at_deg: Angle | None = Field(None, description="where round the wall, counter-clockwise from +X")
     width_mm: Positive | None = Field(None, description="of a hard spot, round the wall")
     ramp_mm: Positive | None = Field(None, description="over so much path a hard spot comes and goes")
-    edge_share: NotNegative | None = Field(None, le=9.0, description="of a worn cutter: the edge's part grows by so much")
+    edge_share: NotNegative | None = Field(
+        None, le=9.0, description="of a worn cutter: the edge's part grows by so much"
+    )
 
 
 class OverrideTable(Table):
@@ -133,7 +137,9 @@ class LoopTable(Table):
     period_ms: Positive = Field(le=1000.0, description="between two steps of the controller")
     latency_ms: NotNegative = Field(le=10_000.0, description="until an override acts")
     override_step: NotNegative = Field(le=0.1, description="step of the override that the controller takes, 0.01: 1 %")
-    acceleration_mm_s2: Positive | None = Field(None, description="of the axes along the path; else the machine's least")
+    acceleration_mm_s2: Positive | None = Field(
+        None, description="of the axes along the path; else the machine's least"
+    )
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
 
 

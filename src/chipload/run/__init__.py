@@ -3,19 +3,22 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from chipload.job import AnyJob, Job, ProgramJob
+from chipload.job import AnyJob, Job, ProgramJob, ShellJob
 from chipload.progress import Progress, silent
 from chipload.report.outcome import Outcome
 from chipload.report.reading import Read
+from chipload.report.shell.outcome import ShellOutcome
 from chipload.run.planned import Inputs, look_at_job, prove, read_inputs, run_job
 from chipload.run.program import look_at_program, run_program
+from chipload.run.shell import look_at_shell, run_shell
 
 #: an outcome of any kind
-AnyOutcome = Outcome | Read
+AnyOutcome = Outcome | Read | ShellOutcome
 #: kinds of jobs: what runs them, and what reads all that they name and says what it found and whether that holds
 KINDS: Mapping[type[AnyJob], tuple[Callable[[Any, Progress], AnyOutcome], Callable[[Any], tuple[list[str], bool]]]] = {
     Job: (run_job, look_at_job),
     ProgramJob: (run_program, look_at_program),
+    ShellJob: (run_shell, look_at_shell),
 }
 
 

@@ -49,7 +49,7 @@ from chipload.run.shell_cut import (
     true_loads,
 )
 from chipload.stock.rings import surface_off
-from chipload.structure.shell import Ritz, Shell, beam_compliance, compliance, ovalisation, ritz
+from chipload.structure.shell import Ritz, Shell, compliance, ovalisation, ritz
 from chipload.structure.wall_solid import normal_compliance, wall_solid
 
 Floats = NDArray[np.float64]
@@ -78,7 +78,9 @@ def run_shell(job: ShellJob, progress: Progress = silent) -> ShellOutcome:
     thinner = thinner_share(surprises)
     planned = cut(job, program, shell_stock(job, program), material, machine.rapid, _part(progress, 0.0, 0.3))
     centre = off_centre(job.table.shell.stock_mm, surprises)
-    real = cut(job, program, shell_stock(job, program, centre, thinner), material, machine.rapid, _part(progress, 0.3, 0.6))
+    real = cut(
+        job, program, shell_stock(job, program, centre, thinner), material, machine.rapid, _part(progress, 0.3, 0.6)
+    )
     loads = true_loads(real.loads, real.points, place, surprises)
     progress(0.6, "the wall")
     shell = wall_of(job)
@@ -98,7 +100,9 @@ def run_shell(job: ShellJob, progress: Progress = silent) -> ShellOutcome:
     cases: tuple[Case, ...] = ()
     if torque > 0.0:
         controller = _controller(job, torque)
-        cases = _cases(job, path, controller, table, spindle, torque, _walls(path, loads, walls, real), machine, progress)
+        cases = _cases(
+            job, path, controller, table, spindle, torque, _walls(path, loads, walls, real), machine, progress
+        )
     progress(0.9, "second opinion")
     c = planned.removal.columns
     first = int(np.flatnonzero(~c["rapid"])[0])
@@ -137,7 +141,6 @@ def run_shell(job: ShellJob, progress: Progress = silent) -> ShellOutcome:
         estimator=_estimator(cases, spindle, controller) if cases else None,
         oval=ovalisation(thin, thin.shell.length),
         oval_s=thin.shell.length,
-        beam=beam_compliance(thin.shell, thin.shell.length) if thin.shell.cone_angle == 0.0 else None,
         solid=_second_opinion(thin, width, planned),
         surface=surface_off(real.stock, place.outer, low, high),
         surprises=tuple(_said(x.model_dump(exclude_none=True)) for x in surprises),
@@ -157,17 +160,15 @@ def look_at_shell(job: ShellJob) -> tuple[list[str], bool]:
     stock = shell_stock(job, program, off_centre(job.table.shell.stock_mm, job.table.surprise))
     return [
         f"{job.path.name}: a {kind}, radius {shell.radius:g}, length {shell.length:g}, wall {shell.thickness:g} mm; "
-        f"{len(program)} motions on machine {machine.name}, stock of {stock.volume():.5g} mm3, material {material.name}, "
-        f"controller {table.name}, {len(job.table.surprise)} surprises"
+        f"{len(program)} motions on machine {machine.name}, stock of {stock.volume():.5g} mm3, material "
+        f"{material.name}, controller {table.name}, {len(job.table.surprise)} surprises"
     ], True
 
 
 def wall_of(job: ShellJob) -> Shell:
     """The finished wall as planned."""
     t = job.table.shell
-    return Shell(
-        t.mean_radius_mm, t.length_mm, t.wall_mm, 1e3 * t.modulus_gpa, t.poisson, math.radians(t.angle_deg)
-    )
+    return Shell(t.mean_radius_mm, t.length_mm, t.wall_mm, 1e3 * t.modulus_gpa, t.poisson, math.radians(t.angle_deg))
 
 
 def _named(job: ShellJob) -> tuple[Machine, Material, FuzzyTable]:
@@ -234,7 +235,13 @@ def _cases(
         )
     out = []
     for k, (latency, quantum) in enumerate(((0.0, 0.0), (1e-3 * ask.latency_ms, ask.override_step))):
-        loop = Loop(ask.acceleration_mm_s2 or most, 1e-3 * ask.period_ms, latency, min(1e-3, 1e-3 * ask.period_ms), seed=ask.seed)
+        loop = Loop(
+            ask.acceleration_mm_s2 or most,
+            1e-3 * ask.period_ms,
+            latency,
+            min(1e-3, 1e-3 * ask.period_ms),
+            seed=ask.seed,
+        )
         config = replace(controller, quantum=quantum)
 
         def one(override: Override, modelled: bool, loop: Loop = loop) -> Run:
@@ -300,7 +307,7 @@ def _estimator(cases: tuple[Case, ...], spindle: Spindle, controller: Override) 
 
 
 def _second_opinion(modes: Ritz, width: float, planned: Cut) -> Solid:
-    """The wall by hexahedra, where the depth of cut is nearest to the free end, in the middle and nearest to the clamp."""
+    """The wall by hexahedra, nearest to the free end, in the middle of the rounds and nearest to the clamp."""
     on = np.flatnonzero(planned.makes & (planned.far > planned.near))
     rows = on[np.argsort(planned.far[on], kind="stable")] if len(on) else np.argsort(planned.far)[-1:]
     wall = wall_solid(modes.shell, MESH)
@@ -328,7 +335,12 @@ def _said(values: dict[str, Any]) -> str:
 
 
 def _provenance(job: ShellJob, machine: Machine, material: Material) -> dict[str, Any]:
-    named = {"program": job.program_file, "machine": job.machine, "material": job.material, "controller": job.control_file}
+    named = {
+        "program": job.program_file,
+        "machine": job.machine,
+        "material": job.material,
+        "controller": job.control_file,
+    }
     files: dict[str, Path] = {"job": job.path} | {k: v for k, v in named.items() if isinstance(v, Path)}
     files |= {f"cutter {k}": job.path.parent / c.file for k, c in enumerate(job.table.cutter) if c.file is not None}
     return {

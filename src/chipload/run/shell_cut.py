@@ -1,7 +1,7 @@
 """What a program cuts from the stock of a thin tube or cone, as planned and as it really is.
 
-Notation: z height [mm], s distance from the clamp along the wall, f half angle: z = z_0 +- s cos f; r(s) = r_0 + s sin f
-radius of the middle surface; the wall t / cos f wide across Z, its outer edge at r + t / (2 cos f).
+Notation: z height [mm], s distance from the clamp along the wall, f half angle: z = z_0 +- s cos f; r_0 + s sin f the
+radius of the middle surface; the wall t / cos f wide across Z, its outer edge t / (2 cos f) outside that.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Place:
 
     @property
     def angle(self) -> float:
-        """f [rad]."""
+        """F [rad]."""
         return math.radians(self.table.angle_deg)
 
     @property
@@ -65,7 +65,7 @@ class Place:
         return min(self.table.clamp_z_mm, other), max(self.table.clamp_z_mm, other)
 
     def along(self, z: Floats) -> Floats:
-        """s of heights [mm]; outside 0 .. length beside the wall."""
+        """S of heights [mm]; outside 0 .. length beside the wall."""
         return np.asarray(self._up * (z - self.table.clamp_z_mm) / math.cos(self.angle))
 
     def outer(self, z: Floats) -> Floats:
@@ -163,7 +163,9 @@ def round_program(ask: RoundTable, place: Place, cutter: Cutter) -> Program:
         plunge([radius(top), 0.0, top], feed, spindle, tool, "lead"),
     ]
     if place.angle == 0.0:
-        parts.append(helix((radius(top), 0.0), (0.0, 0.0), (top, low), ask.pitch_mm, feed, spindle, tool, "round", sense))
+        parts.append(
+            helix((radius(top), 0.0), (0.0, 0.0), (top, low), ask.pitch_mm, feed, spindle, tool, "round", sense)
+        )
     else:
         turns = math.ceil((top - low) / ask.pitch_mm - 1e-9)
         step = 2.0 * math.acos(1.0 - CHORD_MM / max(radius(top), radius(low)))
@@ -205,7 +207,9 @@ def shell_stock(
     )
 
 
-def cut(job: ShellJob, program: Program, stock: LayeredStock, material: Material, rapids: float, progress: Progress) -> Cut:
+def cut(
+    job: ShellJob, program: Program, stock: LayeredStock, material: Material, rapids: float, progress: Progress
+) -> Cut:
     """Run the program through the stock, which changes.
 
     Parameters
@@ -234,7 +238,9 @@ def cut(job: ShellJob, program: Program, stock: LayeredStock, material: Material
     before = stock.state()
     less = remove(program, stock, job.cutters, light, fine, progress=lambda x, what: progress(0.5 * x, what)).columns
     stock.restore(before)
-    removal = remove(program, stock, job.cutters, material, fine, progress=lambda x, what: progress(0.5 + 0.5 * x, what))
+    removal = remove(
+        program, stock, job.cutters, material, fine, progress=lambda x, what: progress(0.5 + 0.5 * x, what)
+    )
     c = removal.columns
     feeds = np.flatnonzero(~c["rapid"])
     own = slice(int(feeds[0]), int(feeds[-1]) + 1)
@@ -261,7 +267,7 @@ def cut(job: ShellJob, program: Program, stock: LayeredStock, material: Material
 
 
 def _depths(place: Place, bounds: Floats, points: Floats, layers: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
-    """s of both ends of each step's depth of cut, and its height: as many layers from the tip up as lost something."""
+    """S of both ends of each step's depth of cut, and its height: as many layers from the tip up as lost something."""
     tip = 0.5 * (points[1:, 2] + points[:-1, 2])
     first = np.clip(np.searchsorted(0.5 * (bounds[1:] + bounds[:-1]), tip), 0, len(bounds) - 1)
     top = bounds[np.clip(first + layers, 0, len(bounds) - 1)]
@@ -273,8 +279,10 @@ def _depths(place: Place, bounds: Floats, points: Floats, layers: NDArray[np.int
     return np.where(cuts, near, 0.0), np.where(cuts, far, 0.0), np.where(cuts, top - low, 0.0)
 
 
-def _on_the_wall(place: Place, cutter: Cutter, points: Floats, rows: NDArray[np.int64], height: Floats) -> tuple[Bools, Floats]:
-    """Whether the flank is at the finished surface in the middle of the depth of cut, and the cutter's compliance there."""
+def _on_the_wall(
+    place: Place, cutter: Cutter, points: Floats, rows: NDArray[np.int64], height: Floats
+) -> tuple[Bools, Floats]:
+    """Whether the flank makes the finished surface, and the cutter's compliance, in the middle of the depth of cut."""
     middle = 0.5 * (points[rows] + points[rows + 1])
     half = np.minimum(0.5 * height[rows], cutter.flute_length)
     gap = np.hypot(middle[:, 0], middle[:, 1]) - cutter.radius_at(half) - place.outer(middle[:, 2] + half)
@@ -292,7 +300,9 @@ def true_loads(loads: Loads, points: Floats, place: Place, surprises: tuple[Surp
             cut *= 1.0 + x.share
             edge *= 1.0 + x.edge_share
         elif x.kind == "hard-spot":
-            assert x.at_deg is not None and x.width_mm is not None and x.ramp_mm is not None
+            assert x.at_deg is not None
+            assert x.width_mm is not None
+            assert x.ramp_mm is not None
             turn = np.arctan2(middle[:, 1], middle[:, 0]) - math.radians(x.at_deg)
             away = around * np.abs(np.angle(np.exp(1j * turn)))
             there = np.clip((0.5 * x.width_mm - away) / x.ramp_mm + 1.0, 0.0, 1.0)

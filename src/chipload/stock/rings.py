@@ -76,8 +76,8 @@ def ring_stock(
     if (high - off <= low).any() or (low <= 0.0).any():
         k = int(np.argmin(high - low))
         raise InputError(
-            f"stock: at z = {heights[k]:g} mm a ring from {low[k]:g} to {high[k]:g} mm, {off:g} mm off its centre: must "
-            "have a width all round"
+            f"stock: at z = {heights[k]:g} mm a ring from {low[k]:g} to {high[k]:g} mm, {off:g} mm off its centre: "
+            "must have a width all round"
         )
     reach = float(high.max()) + off + max((b.radial for b in bosses), default=0.0) + ROOM
     stock = LayeredStock.block((-reach, -reach, bounds[0]), (reach, reach, bounds[-1]), bounds, tile_mm)

@@ -109,7 +109,6 @@ def normal_compliance(wall: WallSolid, s_force: float, s_point: float, length: f
     return answer
 
 
-
 def _place(shell: Shell, p: Floats) -> Floats:
     """(p, 3) theta, s and distance from the middle surface to x, y, z; s = 0 at z = 0."""
     theta, s, out = p.T

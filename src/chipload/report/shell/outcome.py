@@ -169,7 +169,6 @@ class ShellOutcome:
     estimator: Estimator | None
     oval: Ovalisation
     oval_s: float
-    beam: float | None
     solid: Solid
     surface: tuple[float, float] | None
     surprises: tuple[str, ...]
@@ -203,8 +202,8 @@ class ShellOutcome:
         if not self.attainable:
             return (
                 *out,
-                f"no torque is borne: at step {self.limit.step} the edge alone takes more than the {self.limit.force:.4g} N "
-                f"that the wall bears by its {self.limit.by}",
+                f"no torque is borne: at step {self.limit.step} the edge alone takes more than the "
+                f"{self.limit.force:.4g} N that the wall bears by its {self.limit.by}",
             )
         if self.surface is None:
             out.append("the program finishes no part of the wall")
