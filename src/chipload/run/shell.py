@@ -96,7 +96,7 @@ def run_shell(job: ShellJob, progress: Progress = silent) -> ShellOutcome:
     torque = min(limit.torque, 1e3 * ask.torque_nm) if ask.torque_nm is not None else limit.torque
     path = _path(planned, loads, _relief(limit, torque))
     spindle = _spindle(job, program.spindle)
-    controller = _controller(job, max(torque, limit.torque, 1.0))
+    controller: Override | None = None
     cases: tuple[Case, ...] = ()
     if torque > 0.0:
         controller = _controller(job, torque)
@@ -138,7 +138,7 @@ def run_shell(job: ShellJob, progress: Progress = silent) -> ShellOutcome:
         controller=controller,
         table=table,
         spindle=spindle,
-        estimator=_estimator(cases, spindle, controller) if cases else None,
+        estimator=_estimator(cases, spindle, controller) if controller is not None else None,
         oval=ovalisation(thin, thin.shell.length),
         oval_s=thin.shell.length,
         solid=_second_opinion(thin, width, planned),
@@ -216,6 +216,13 @@ def _spindle(job: ShellJob, speeds: Floats) -> Spindle:
 def _controller(job: ShellJob, torque: float) -> Override:
     t = job.table.control.override.model_dump()
     hold = t.pop("hold")
+    for key, value in (("light_nm", 1e3 * t["light_nm"]), ("overload_nm", 1e3 * t["overload_nm"])):
+        if (value >= hold * torque) == (key == "light_nm"):
+            side = "below" if key == "light_nm" else "above"
+            raise InputError(
+                f"control.override.{key} = {1e-3 * value:g}: must be {side} the torque that is held, "
+                f"{1e-3 * hold * torque:.4g} N m"
+            )
     newton_mm = {k: 1e3 * t.pop(f"{k}_nm") for k in ("overload", "torque_most", "light")}
     plain = {k.removesuffix("_per_s"): v for k, v in t.items()}
     return Override(kind="mamdani", torque_ref=hold * torque, quantum=0.0, **newton_mm, **plain)

@@ -34,7 +34,7 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 #: chords of a conical helix leave it by at most this [mm]
-CHORD_MM = 0.002
+CHORD_MM = 0.005
 #: least cutting coefficient that is believed [MPa]: what the other simulation of the two is made with
 LITTLE_MPA = 10.0
 #: a flank within so much of the finished surface makes it [mm]

@@ -136,7 +136,8 @@ def answers(table: FuzzyTable) -> go.Figure:
 
 def measured(outcome: ShellOutcome) -> go.Figure:
     """Measured against true torque of the controller of the verdict, and what is not trusted."""
-    run = outcome.cases[-1].runs[HELD].outcome
+    run_of = outcome.cases[-1].runs[HELD]
+    run = run_of.outcome
     keep = np.unique(np.linspace(0, len(run.t) - 1, min(len(run.t), 3000)).astype(np.int64))
     figure = go.Figure(
         go.Scattergl(
@@ -149,7 +150,7 @@ def measured(outcome: ShellOutcome) -> go.Figure:
     figure.add_trace(go.Scatter(x=[0.0, top], y=[0.0, top], mode="lines", line=line, name="equal"))
     low = min(0.0, 1e-3 * float(run.measured.min()))
     figure.add_hrect(
-        y0=low, y1=1e-3 * outcome.controller.light, fillcolor=LIMIT, opacity=0.12, line_width=0,
+        y0=low, y1=1e-3 * run_of.config.light, fillcolor=LIMIT, opacity=0.12, line_width=0,
         annotation={"text": "not trusted", "font": {"color": LIMIT, "size": 11}},
     )  # fmt: skip
     figure.update_xaxes(title_text="true torque [N m]")

@@ -60,6 +60,7 @@ def program_files(outcome: ShellOutcome) -> dict[str, bytes]:
 def planned_override(outcome: ShellOutcome) -> Floats:
     """(n,) override of each step that the model alone allows, in whole steps, rounded down but not below the floor."""
     told, config = outcome.path.told, outcome.controller
+    assert config is not None
     with np.errstate(divide="ignore", invalid="ignore"):
         rows = np.where(told.cut > 0.0, (config.torque_ref - told.edge) / told.cut, np.inf)
     rows = np.where((told.cut == 0.0) & (told.edge > config.torque_ref), 0.0, rows)

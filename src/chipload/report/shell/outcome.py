@@ -139,7 +139,8 @@ class ShellOutcome:
     true_torque : what the wall as it really is would bear [N mm]
     one_tooth : the limit by the closed formula of one tooth [N mm], to compare
     path : with what is planned and what is true
-    cases : the loop without latency, and as stated
+    cases : the loop without latency, and as stated; none where no torque is borne
+    controller : of the verdict; None: likewise
     steps : (n,) columns of the planned path by name
     oval : harmonics at the free end; solid : second opinion
     surface : least and greatest distance of what is left from the finished surface [mm]; None: no whole layer was cut
@@ -163,7 +164,7 @@ class ShellOutcome:
     path: ToolPath
     steps: Mapping[str, NDArray[Any]]
     cases: tuple[Case, ...]
-    controller: Override
+    controller: Override | None
     table: FuzzyTable
     spindle: Spindle
     estimator: Estimator | None

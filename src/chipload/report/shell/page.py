@@ -35,9 +35,9 @@ def page_bytes(outcome: ShellOutcome) -> bytes:
     body += [
         "<h2>On a machine</h2>",
         f"<p><code>0-override</code> beside <code>chipload hal {HAL}</code> holds the torque along "
-        f"<code>{PATH}</code>, which has the path, its planned torque in two parts, the true one for a trial "
-        "without a spindle, and the relief. <code>0-feedforward</code> has the feeds that the planned torque allows written into it, for a machine that "
-        "measures nothing.</p>",
+        f"<code>{PATH}</code>, which has the path, its planned torque in two parts, the true one for a "
+        "trial without a spindle, and the relief. <code>0-feedforward</code> has the feeds that the planned "
+        "torque allows written into it, for a machine that measures nothing.</p>",
         "<h2>What was not checked</h2>",
         "<p>The teeth: torque and forces are those of a revolution, no chatter, no runout beyond that of the cutter. "
         "The wall has one thickness, that of the end of the cut. The wall error is that of the moment in which the "
@@ -157,7 +157,8 @@ def _wall(outcome: ShellOutcome, figures: dict[str, go.Figure]) -> list[str]:
     a, b, c = solid.counts
     share = 100.0 * float(outcome.oval.share[1]) / whole
     beam = (
-        f"A beam with shear gives {1e3 * outcome.oval.beam:.3g} um: it is wrong by {whole / outcome.oval.beam:.3g} times."
+        f"A beam with shear gives {1e3 * outcome.oval.beam:.3g} um: it is wrong by {whole / outcome.oval.beam:.3g} "
+        "times."
         if outcome.oval.beam is not None
         else f"There is no beam for a cone; its first harmonic, which a beam would have, is {share:.3g} % of it."
     )

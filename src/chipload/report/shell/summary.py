@@ -33,7 +33,7 @@ def operation(outcome: ShellOutcome) -> dict[str, Any]:
             "force_n": outcome.limit.force,
             "s_mm": float(outcome.path.model.s[outcome.limit.step + 1]),
             "at_mm": outcome.path.points[outcome.limit.step + 1].tolist(),
-            "held_nm": 1e-3 * outcome.controller.torque_ref,
+            "held_nm": 0.0 if outcome.controller is None else 1e-3 * outcome.controller.torque_ref,
             "true_wall_nm": 1e-3 * outcome.true_torque,
             "one_tooth_formula_nm": 1e-3 * outcome.one_tooth,
             "relief_max": float(outcome.path.relief.max()),

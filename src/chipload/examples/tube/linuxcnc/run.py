@@ -1,9 +1,12 @@
 """Start all of it: LinuxCNC without a screen, the cut beside it, the controller; then say whether they agree.
 
-    python run.py OUT [--result DIR] [--lost stop|programmed] [--kill-at MM | --kill-stopped] [--hang] [--overload-nm T] [--seconds S]
+    python run.py OUT [--result DIR] [--lost stop|programmed] [--kill-at MM | --kill-stopped] [--hang]
+                      [--overload-nm T] [--seconds S]
 
-The program, its path and the controller are those of the job beside this folder: `DIR` is what `chipload run` made of it;
-without it the job is run first, into `OUT/job`. OUT gets `machine.csv` (what the machine did), `control.csv` (what the controller saw and sent), `linuxcnc.log` and
+The program, its path and the controller are those of the job beside this folder: `DIR` is what `chipload run` made of
+it; without it the job is run first, into `OUT/job`.
+
+OUT gets `machine.csv` (what the machine did), `control.csv` (what the controller saw and sent), `linuxcnc.log` and
 `summary.json`: time and greatest torque here and in our own closed loop, the greatest feed over the programmed one, how
 closely the feed follows the override. With `--kill-at` the controller is killed when the machine has come so far, with
 `--kill-stopped` when it has stopped the machine (SIGKILL: it cannot say goodbye; with `--hang` SIGSTOP: it is there and
@@ -229,9 +232,7 @@ def made(out: Path) -> Path:
     return out / "job"
 
 
-def summed(
-    job: HalJob, rows: np.ndarray, control: np.ndarray, killed: float | None, limit: float
-) -> dict[str, object]:
+def summed(job: HalJob, rows: np.ndarray, control: np.ndarray, killed: float | None, limit: float) -> dict[str, object]:
     """What the run says; ``limit`` of torque [N mm] at the place where the wall bears least."""
     s, programmed = along(job, rows), float(job.path.model.feed[0])
     # rapids go at the machine's own speed
