@@ -1,9 +1,9 @@
 """A level round outside a tube: torque, normal force and depth of cut from the chips against closed forms.
 
 Notation: D distance of the cutter's centre from the tube's, R its radius, R_s that of the stock; psi angle from the
-wall's normal. The rim is engaged over 0 .. alpha, cos alpha = (D^2 + R^2 - R_s^2) / (2 D R); because the path goes round
-the tube the chip is f sin psi exactly. Mean torque N b R / 2 pi [Ktc f (1 - cos alpha) + Kte alpha]; a straight tooth at
-psi presses on the wall with (Ktc f sin psi + Kte) b sin psi + (Krc f sin psi + Kre) b cos psi.
+wall's normal. The rim is engaged over 0 .. alpha, cos alpha = (D^2 + R^2 - R_s^2) / (2 D R); because the path goes
+round the tube the chip is f sin psi exactly. Mean torque N b R / 2 pi [Ktc f (1 - cos alpha) + Kte alpha]; a straight
+tooth at psi presses on the wall with (Ktc f sin psi + Kte) b sin psi + (Krc f sin psi + Kre) b cos psi.
 """
 
 from __future__ import annotations
