@@ -100,7 +100,10 @@ def test_a_killed_controller_leaves_it_at_the_programmed_feed(tmp_path, result):
     killed = found["killed"]
     assert 0.2 < killed["override_before"] < 0.95
     assert killed["override_after"] == [1.0, 1.0]
-    assert killed["feed_after_mm_s"] == pytest.approx([found["programmed_mm_s"]] * 2, rel=0.002)
+    # at the joints of the helix its planner slows by a little
+    slowest, fastest = killed["feed_after_mm_s"]
+    assert fastest == pytest.approx(found["programmed_mm_s"], rel=0.002)
+    assert slowest > 0.9 * found["programmed_mm_s"]
     assert killed["moved_after_mm"] > 5.0
 
 
