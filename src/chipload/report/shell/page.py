@@ -59,7 +59,7 @@ def _limit(outcome: ShellOutcome, figures: dict[str, go.Figure]) -> list[str]:
         "strength": f"{outcome.limits['strength_share']:g} of its strength of {outcome.strength:g} MPa",
         "stated": "the limit that the job states",
     }[outcome.source]
-    place = ", ".join(f"{x:.4g}" for x in where["at_mm"])
+    place = ", ".join(f"{round(x, 3) + 0.0:g}" for x in where["at_mm"])
     body = ["<h2>What the wall bears</h2>"]
     if outcome.attainable:
         body.append(
@@ -99,7 +99,7 @@ def _controllers(outcome: ShellOutcome, figures: dict[str, go.Figure]) -> list[s
             f"<h3>{title}</h3>",
             _table(outcome, case),
             f"<p>{drawn.NAMES[HELD]}: {by['shorter_percent']:.3g} % shorter than the constant feed that respects the "
-            f"limit everywhere, wall error {by['wall_error_change_percent']:+.3g} % of that one's.</p>",
+            f"limit everywhere, wall error {by['wall_error_change_percent']:+.3g} % against that one's.</p>",
         ]
     plain, late = outcome.cases
     lost = late.runs[HELD].outcome.time - plain.runs[HELD].outcome.time
