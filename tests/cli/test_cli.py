@@ -137,7 +137,7 @@ def test_check_reads_every_file(job_dir: Path, text: str, said: str) -> None:
 def test_examples_are_listed_with_a_line_each() -> None:
     code, out, _ = call("example")
     assert code == 0
-    assert [line.split()[0] for line in out.splitlines()] == ["chips", "contour", "pocket", "trunnion"]
+    assert [line.split()[0] for line in out.splitlines()] == ["chips", "cone", "contour", "pocket", "trunnion", "tube"]
 
 
 @pytest.mark.parametrize("name", list(examples.example_titles()))
@@ -157,9 +157,8 @@ def test_an_example_overwrites_nothing(tmp_path: Path) -> None:
 def test_an_unknown_example_names_the_nearest(tmp_path: Path) -> None:
     code, _, err = call("example", "contur", tmp_path / "a")
     assert code == 2
-    assert (
-        err == "chipload: example contur: not known; did you mean contour? (known: chips, contour, pocket, trunnion)\n"
-    )
+    known = "chips, cone, contour, pocket, trunnion, tube"
+    assert err == f"chipload: example contur: not known; did you mean contour? (known: {known})\n"
 
 
 def test_version() -> None:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
-from chipload.control.fuzzy import standard
-from chipload.control.hal import HalJob, control, load_hal
+from chipload.control.fuzzy import additive, standard, write_fuzzy
+from chipload.control.hal import HalJob, control, load_hal, write_hal
 from chipload.control.linuxcnc.beside import Load, advance, measure, turning
 from chipload.control.linuxcnc.door import HalPins, Seen
 from chipload.control.linuxcnc.path import locate, read_path, tool_path, write_path
@@ -301,6 +301,39 @@ def test_a_job_from_its_file(tmp_path):
     assert job.override == RULES
     assert job.spindle == replace(SPINDLE, speed=6000.0 * math.tau / 60.0)
     assert job.period == 0.01
+
+
+def test_a_job_written_and_read(tmp_path):
+    """Every value comes back; another table by its file; relief and truth in the path."""
+    relief = np.linspace(1.0, 2.0, len(PATH.points))
+    config = replace(RULES, quantum=0.01, above_programmed=True, cap=1.2, settle_steps=7, slew_up=1.25)
+    job = replace(JOB, path=replace(PATH, relief=relief), override=config, table=additive(5), latency=0.05)
+    (tmp_path / "path.csv").write_text(write_path(job.path))
+    (tmp_path / "table.toml").write_text(write_fuzzy(job.table))
+    (tmp_path / "hal.toml").write_text(write_hal(job, "path.csv", "table.toml"))
+    back = load_hal(tmp_path / "hal.toml")
+    assert back.override.numbers == pytest.approx(config.numbers, rel=1e-12)
+    assert back.override.above_programmed
+    assert (back.latency, back.modelled, back.source) == (0.05, True, "plant")
+    assert back.spindle.idle == SPINDLE.idle
+    for field in fields(SPINDLE):
+        if field.name != "idle":
+            assert getattr(back.spindle, field.name) == pytest.approx(getattr(SPINDLE, field.name), rel=1e-12)
+    for name in ("error", "change", "output", "rules"):
+        np.testing.assert_array_equal(getattr(back.table, name), getattr(job.table, name))
+    np.testing.assert_allclose(back.path.relief, relief, rtol=1e-8)
+    np.testing.assert_allclose(back.path.truth.cut, PATH.truth.cut, rtol=1e-8)
+    np.testing.assert_allclose(back.path.told.cut, PATH.model.cut / relief, rtol=1e-8)
+
+
+def test_a_wall_that_bears_more_is_given_more():
+    """Twice the relief everywhere is twice the torque that is held: the same feeds as with twice the limit."""
+    double = replace(JOB, path=replace(PATH, relief=np.full(len(PATH.points), 2.0)))
+    heavy = replace(RULES, torque_ref=2.0 * RULES.torque_ref, overload=8000.0, torque_most=36e3, light=160.0)
+    one, _ = go(double)
+    other, _ = go(replace(JOB, override=heavy))
+    np.testing.assert_allclose(one.column("override"), other.column("override"), atol=1e-9)
+    assert one.torque_max > 1.5 * RULES.torque_ref
 
 
 @pytest.mark.parametrize(

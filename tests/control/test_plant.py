@@ -294,3 +294,23 @@ def test_refused(make, text):
     with pytest.raises(InputError) as err:
         make()
     assert str(err.value) == text
+
+
+def test_relief_is_held_as_a_share():
+    """What is borne grows from once to twice: the torque follows it, and the same share of it is kept everywhere."""
+    path = profile([(60.0, 4000.0)])
+    relief = np.interp(path.s, [0.0, 20.0, 40.0, 60.0], [1.0, 1.0, 2.0, 2.0])
+    found = run(path, path, RULES, TABLE, SPINDLE, LOOP, LIMIT, relief=relief)
+    share = found.torque / np.interp(found.s, path.s, relief)
+    settled = (found.s > 10.0) & (found.s < 58.0)
+    assert share[settled] == pytest.approx(RULES.torque_ref, rel=0.08)
+    assert found.torque[found.s > 50.0].max() > 1.8 * found.torque[found.s < 20.0].max()
+    assert found.load_max == pytest.approx(share.max(), rel=0.01)
+    assert found.torque_max == pytest.approx(found.torque.max(), rel=0.01)
+
+
+@pytest.mark.parametrize("relief", [np.zeros(3), np.ones(2), np.array([1.0, np.nan, 1.0])])
+def test_a_relief_that_is_none(relief):
+    path = TorqueProfile(np.arange(3.0), np.ones(3), np.ones(3), np.ones(3))
+    with pytest.raises(InputError, match="relief: must be 3 numbers above 0"):
+        run(path, None, RULES, TABLE, SPINDLE, LOOP, LIMIT, relief=relief)

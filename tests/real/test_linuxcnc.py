@@ -17,7 +17,7 @@ import pytest
 
 from chipload.control.linuxcnc.door import HalPins
 
-FOLDER = Path(__file__).parents[2] / "src" / "chipload" / "examples" / "tube" / "linuxcnc"
+TUBE = Path(__file__).parents[2] / "src" / "chipload" / "examples" / "tube"
 
 pytestmark = [
     pytest.mark.skipif(
@@ -44,11 +44,20 @@ def _free():
         subprocess.run(["halrun", "-U"], capture_output=True, timeout=20, check=False)
 
 
-def played(folder, *options):
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    """What the job of the example gives; every limit of it holds."""
+    out = tmp_path_factory.mktemp("tube") / "result"
+    command = [sys.executable, "-c", "from chipload.cli import main; main()", "run", TUBE / "job.toml", "--out", out]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=900)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return out
+
+
+def played(folder, result, *options):
     """The summary of one run; whatever happens, nothing of it is left."""
-    done = subprocess.run(
-        [sys.executable, FOLDER / "run.py", folder, *options], capture_output=True, text=True, timeout=150
-    )
+    command = [sys.executable, TUBE / "linuxcnc" / "run.py", folder, "--result", result, *options]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=150)
     log = folder / "linuxcnc.log"
     assert done.returncode == 0, done.stderr + (log.read_text() if log.exists() else "")
     summary = json.loads((folder / "summary.json").read_text())
@@ -61,13 +70,15 @@ def played(folder, *options):
     return summary
 
 
-def test_the_torque_is_held(tmp_path):
+def test_the_torque_is_held(tmp_path, result):
     """Time and greatest torque within 5 % of our own loop; the feed is override times programmed feed."""
-    found = played(tmp_path)
+    found = played(tmp_path, result)
     real, simulated = found["linuxcnc"], found["simulated"]
     assert real["time_s"] == pytest.approx(simulated["time_s"], rel=0.05)
     assert real["torque_nm_max"] == pytest.approx(simulated["torque_nm_max"], rel=0.05)
-    assert real["away_mm_max"] < 0.02
+    assert real["torque_nm_max"] <= 1.05 * found["torque_limit_nm"]
+    # 40 mm/s, and the three pins are not read at once where the machine is busy
+    assert real["away_mm_max"] < 0.3
     follows = found["follows"]
     assert follows["steady_steps"] > 300
     assert follows["steady_within_1_percent"] > 0.95
@@ -75,8 +86,8 @@ def test_the_torque_is_held(tmp_path):
     assert follows["place_error_mean"] < 0.02
 
 
-def test_a_controller_that_hangs_leaves_it_stopped(tmp_path):
-    killed = played(tmp_path, "--lost", "stop", "--kill-at", "113", "--hang")["killed"]
+def test_a_controller_that_hangs_leaves_it_stopped(tmp_path, result):
+    killed = played(tmp_path, result, "--lost", "stop", "--kill-at", "260", "--hang")["killed"]
     assert 0.2 < killed["override_before"] < 0.95
     assert killed["feed_after_mm_s"] == [0.0, 0.0]
     assert killed["override_after"] == [0.0, 0.0]
@@ -84,18 +95,21 @@ def test_a_controller_that_hangs_leaves_it_stopped(tmp_path):
     assert killed["feed_over_programmed_max"] < 0.97
 
 
-def test_a_killed_controller_leaves_it_at_the_programmed_feed(tmp_path):
-    found = played(tmp_path, "--lost", "programmed", "--kill-at", "113")
+def test_a_killed_controller_leaves_it_at_the_programmed_feed(tmp_path, result):
+    found = played(tmp_path, result, "--lost", "programmed", "--kill-at", "260")
     killed = found["killed"]
     assert 0.2 < killed["override_before"] < 0.95
     assert killed["override_after"] == [1.0, 1.0]
-    assert killed["feed_after_mm_s"] == pytest.approx([found["programmed_mm_s"]] * 2, rel=0.002)
+    # at the joints of the helix its planner slows by a little
+    slowest, fastest = killed["feed_after_mm_s"]
+    assert fastest == pytest.approx(found["programmed_mm_s"], rel=0.002)
+    assert slowest > 0.9 * found["programmed_mm_s"]
     assert killed["moved_after_mm"] > 5.0
 
 
-def test_a_stop_outlives_its_controller(tmp_path):
+def test_a_stop_outlives_its_controller(tmp_path, result):
     """The controller has stopped the machine for an overload: its death does not release it, whatever is configured."""
-    killed = played(tmp_path, "--lost", "programmed", "--overload-nm", "0.81", "--kill-stopped")["killed"]
+    killed = played(tmp_path, result, "--lost", "programmed", "--overload-nm", "0.197", "--kill-stopped")["killed"]
     assert killed["override_before"] == 0.0
     assert killed["override_after"] == [0.0, 0.0]
     assert killed["moved_after_mm"] == 0.0

@@ -263,16 +263,18 @@ def between_rows(at, values, i, s):
 
 @njit(cache=True, nogil=True)
 def run(
-    at, feed, edge, cut, model_edge, model_cut, modelled,
+    at, feed, edge, cut, model_edge, model_cut, relief, modelled,
     p, error, change, output, rules, whole_ends, strength, state, latency_known,
     drive, spindle, fault, noise, every, delay, limit, quick, out,
 ):  # fmt: skip
     """Controller, axes and spindle along a path; see :func:`chipload.control.plant.run`.
 
+    ``model_edge, model_cut`` are over ``relief``, as is what the controller is told.
     ``drive`` (dt, acceleration, longest time, share of the speed at which the spindle stalls); ``spindle`` (J, K_T,
     idle 0, idle 1, K_P, K_I, most current, speed, lags of sensor and filter); ``fault`` (kind, from, to, value);
     ``noise`` (m,) [A], used in turn; ``delay`` in steps of control. ``out`` (rows, 8): t, s, feed, torque, measured,
-    override, status, speed. Returns rows filled, how it ended, time, greatest torque, time over the limit.
+    override, status, speed. Returns rows filled, how it ended, time, greatest torque, the same over its relief, time in
+    which that is over the limit.
     """
     dt, acc, longest, stall = drive[0], drive[1], drive[2], drive[3]
     inertia, kt, idle0, idle1 = spindle[0], spindle[1], spindle[2], spindle[3]
@@ -285,10 +287,10 @@ def run(
     sensed, rate, expected, filtered = summed, 0.0, 0.0, 0.0
     rows, k, status, head = 0, 0, RUN, 0
     sent, command = 0.0, 0.0
-    greatest, over = 0.0, 0.0
+    greatest, most_load, over = 0.0, 0.0, 0.0
     end = at[len(at) - 1]
     ended = TIMED_OUT
-    reading, held, torque = 0.0, 0.0, 0.0
+    reading, held, torque, borne = 0.0, 0.0, 0.0, 1.0
     while t < longest:
         while i + 2 < len(at) and at[i + 1] <= s:
             i += 1
@@ -298,7 +300,8 @@ def run(
             current = sensed + noise[number % len(noise)]
             raw = kt * (current - idle0 - idle1 * w) - rate
             filtered += (raw - filtered) * min(every * dt / smooth, 1.0) if smooth > 0.0 else raw - filtered
-            reading = filtered
+            borne = between_rows(at, relief, i, s)
+            reading = filtered / borne
             if fault[1] <= t < fault[2]:
                 if fault[0] == 1.0:
                     reading = np.nan
@@ -344,11 +347,13 @@ def run(
         y = min(dt / (lag + smooth), 1.0) if lag + smooth > 0.0 else 1.0
         expected += (believed - expected) * y
         greatest = max(greatest, torque)
-        if torque > limit:
+        load = torque / between_rows(at, relief, i, s)
+        most_load = max(most_load, load)
+        if load > limit:
             over += dt
         if k % (every * quick) == 0 and rows < len(out):
             out[rows, 0], out[rows, 1], out[rows, 2], out[rows, 3] = t, s, v, torque
-            out[rows, 4], out[rows, 5], out[rows, 6], out[rows, 7] = reading, sent, status, w
+            out[rows, 4], out[rows, 5], out[rows, 6], out[rows, 7] = reading * borne, sent, status, w
             rows += 1
         s += v * dt
         t += dt
@@ -364,6 +369,6 @@ def run(
             break
     if rows < len(out):
         out[rows, 0], out[rows, 1], out[rows, 2], out[rows, 3] = t, s, v, torque
-        out[rows, 4], out[rows, 5], out[rows, 6], out[rows, 7] = reading, sent, status, w
+        out[rows, 4], out[rows, 5], out[rows, 6], out[rows, 7] = reading * borne, sent, status, w
         rows += 1
-    return rows, ended, t, greatest, over
+    return rows, ended, t, greatest, most_load, over

@@ -134,6 +134,21 @@ def standard() -> FuzzyTable:
     return read_fuzzy(str(resources.files("chipload.control") / "standard.toml"))
 
 
+def write_fuzzy(table: FuzzyTable) -> str:
+    """The TOML of a table; :func:`read_fuzzy` gives the same one back.
+
+    >>> write_fuzzy(additive(3)).splitlines()[-2]
+    '    [2, 3, 4],'
+    """
+    if any(ord(c) < 32 or c in '"\\' for c in table.name):
+        raise InputError(f"fuzzy: name = {table.name!r}: must be without quotes, backslashes and control characters")
+    lines = [f'name = "{table.name}"']
+    lines += [f"{key} = [{', '.join(repr(float(x)) for x in getattr(table, key))}]" for key in _CENTRES]
+    lines += [f'ends = "{_ENDS[int(table.whole_ends)]}"', "rules = ["]
+    lines += [f"    {row}," for row in table.rules.tolist()]
+    return "\n".join([*lines, "]"]) + "\n"
+
+
 def additive(sets: int = 7) -> FuzzyTable:
     """Equally spaced sets and rules i + j that are not cut off; product and sum of it, clipped to +-1, is clip(e + d).
 

@@ -35,7 +35,9 @@ SOURCES = ("plant", "pin")
 #: longest substep of the simulated spindle [s]
 SUBSTEP = 0.001
 #: columns of a record
-COLUMNS = ("t_s", "s_mm", "feed_mm_s", "override", "in_force", "torque_nmm", "measured_nmm", "status", "away_mm")
+COLUMNS = (
+    "t_s", "s_mm", "feed_mm_s", "override", "in_force", "torque_nmm", "measured_nmm", "status", "away_mm", "relief",
+)  # fmt: skip
 #: keys of the file whose unit is another than inside: name, factor
 _SCALED = {
     "torque_ref_nm": ("torque_ref", 1e3), "overload_nm": ("overload", 1e3), "torque_most_nm": ("torque_most", 1e3),
@@ -94,7 +96,7 @@ class Record:
 
     Parameters
     ----------
-    rows : (n, 9) float, ``COLUMNS``, a row a step
+    rows : (n, 10) float, ``COLUMNS``, a row a step
     ended : ``path`` its end was reached, ``gone`` HAL has left, ``stopped`` it was asked to
     torque_max : greatest torque, between steps too [N mm]
     """
@@ -151,6 +153,37 @@ def load_hal(file: str | Path) -> HalJob:
     )
 
 
+def write_hal(job: HalJob, path: str, fuzzy: str | None = None) -> str:
+    """The TOML of a job whose path lies in the file ``path`` and its table in ``fuzzy``; :func:`load_hal` reads it."""
+    lines = [
+        f'path = "{path}"',
+        *([f'fuzzy = "{fuzzy}"'] if fuzzy is not None else []),
+        f'source = "{job.source}"',
+        f"acceleration_mm_s2 = {float(job.acceleration)!r}",
+        f"period_s = {float(job.period)!r}",
+        f"latency_s = {float(job.latency)!r}",
+        f"feed_forward = {str(job.modelled).lower()}",
+        f"window_mm = {float(job.window)!r}",
+        f"away_mm = {float(job.away)!r}",
+    ]
+    units = {name: (key, factor) for key, (name, factor) in _SCALED.items()}
+    for title, part in (("override", job.override), ("spindle", job.spindle)):
+        lines += ["", f"[{title}]"]
+        for field in fields(part):
+            key, factor = units.get(field.name, (field.name, 1.0))
+            value = getattr(part, field.name)
+            lines.append(f"{key} = {_toml(value, factor)}")
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: Any, factor: float) -> str:
+    if isinstance(value, bool | str):
+        return str(value).lower() if isinstance(value, bool) else f'"{value}"'
+    if isinstance(value, tuple):
+        return f"[{', '.join(repr(float(x)) for x in value)}]"
+    return repr(value) if isinstance(value, int) else repr(float(value) / factor)
+
+
 def control(
     job: HalJob,
     machine: Machine,
@@ -170,7 +203,8 @@ def control(
     seed : of the noise of the simulated current
     """
     path, spindle, config = job.path, job.spindle, job.override
-    model = (path.model.s, path.model.feed, path.model.edge, path.model.cut)
+    told = path.told
+    model = (told.s, told.feed, told.edge, told.cut)
     noise = np.random.default_rng(seed).normal(0.0, spindle.noise, 65_536)
     state, wheel = begin(config, job.modelled), turning(spindle)
     s, row, greatest, beat = float(path.model.s[0]), 0, 0.0, False
@@ -202,10 +236,11 @@ def control(
         if job.modelled:
             known = job.latency + job.period
             most_allowed, row = allowed(config, state, model, s, actual, known, job.acceleration, row)
-        reading = Reading(torque, seconds, True, actual, wheel.expected, most_allowed)
+        borne = float(np.interp(s, path.model.s, path.relief))
+        reading = Reading(torque / borne, seconds, True, actual, wheel.expected / borne, most_allowed)
         sent, said, state = step(config, job.table, state, reading)
         status = STATUS.index(said)
-        rows.append((seen.time, s, seen.velocity, sent, seen.feed, true.edge + true.cut, torque, status, away))
+        rows.append((seen.time, s, seen.velocity, sent, seen.feed, true.edge + true.cut, torque, status, away, borne))
         if s >= path.model.s[-1] - 1e-3 and seen.velocity == 0.0:
             ended = "path"
             break

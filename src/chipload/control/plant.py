@@ -9,6 +9,9 @@ K_T [N mm/A], I current [A].
     I = K_P (w_0 - w) + K_I integral of (w_0 - w), within the drive's current,
     T_measured = lag of [K_T (I - I_idle) - J dw/dt] + K_T noise, smoothed.
 
+Where the wall bears more than what is held, the controller is told the torque over its relief (T and T_model alike): it
+holds the same share of what is borne everywhere.
+
 What the controller believes (the model) and what is true (its columns with surprises) are two sets of columns. The axes
 accelerate within their limit; the override acts after its latency. Teeth are below the bandwidth and are not in it.
 """
@@ -221,7 +224,8 @@ class Outcome:
     ended : ``finished``; ``overload`` or ``stopped`` by the controller; ``time``: longest_s; ``stalled``: the spindle
     time : [s]
     torque_max : greatest true torque [N mm]
-    time_over : with the true torque above the limit [s]
+    load_max : greatest true torque over its relief [N mm]
+    time_over : with the true torque, over its relief, above the limit [s]
     t, s, feed, torque, measured, override, speed : (k,) float, a row each step of the controller and the last
         [s, mm, mm/s, N mm, N mm, -, rad/s]
     status : (k,) int, of ``STATUS``
@@ -231,6 +235,7 @@ class Outcome:
     ended: str
     time: float
     torque_max: float
+    load_max: float
     time_over: float
     t: Floats
     s: Floats
@@ -252,6 +257,7 @@ def run(
     limit: float,
     fault: Fault | None = None,
     every_row: int = 1,
+    relief: Floats | None = None,
 ) -> Outcome:
     """Run a controller along a path.
 
@@ -264,13 +270,18 @@ def run(
     limit : torque for ``time_over`` [N mm]
     fault : of the sensor
     every_row : keep every so many steps of the controller
+    relief : (n,) float, above 0, at the rows of ``truth``: what is borne there over what is held; the
+        controller is told the torque over it; None: 1 everywhere
 
     Raises
     ------
     InputError
-        The model covers another path than the truth.
+        The model covers another path than the truth, or the relief is not one number above 0 a row.
     """
-    believed = truth
+    believed, rows_s = truth, truth.s
+    borne = np.ones(len(rows_s)) if relief is None else np.asarray(relief, dtype=np.float64)
+    if borne.shape != rows_s.shape or not ((borne > 0.0) & np.isfinite(borne)).all():
+        raise InputError(f"plant.relief: must be {len(rows_s)} numbers above 0, one for each row of the truth")
     if model is not None:
         if (model.s[0], model.s[-1]) != (truth.s[0], truth.s[-1]):
             raise InputError(
@@ -279,6 +290,7 @@ def run(
             )
         believed = _on_rows(model, truth.s)
         truth = _on_rows(truth, believed.s)
+    borne = np.interp(truth.s, rows_s, borne)
     every = max(round(loop.period / loop.substep), 1)
     delay = round(loop.latency / loop.period)
     noise = np.random.default_rng(loop.seed).normal(0.0, spindle.noise, 65_536)
@@ -286,8 +298,9 @@ def run(
     rows = math.ceil(loop.longest_s / loop.period / every_row) + 3
     out = np.empty((min(rows, 2_000_000), 8))
     fault = fault or Fault()
-    filled, ended, time, greatest, over = _kernels.run(
-        truth.s, truth.feed, truth.edge, truth.cut, believed.edge, believed.cut, model is not None,
+    filled, ended, time, greatest, load, over = _kernels.run(
+        truth.s, truth.feed, truth.edge, truth.cut, believed.edge / borne, believed.cut / borne, borne,
+        model is not None,
         controller.numbers, table.error, table.change, table.output, table.rules, table.whole_ends,
         np.empty(len(table.output)), state, delay * loop.period,
         np.array([loop.period / every, loop.acceleration, loop.longest_s, STALL]),
@@ -302,6 +315,7 @@ def run(
         ended=STATUS[int(status[-1])] if ENDS[ended] == "stopped" else ENDS[ended],
         time=time,
         torque_max=greatest,
+        load_max=load,
         time_over=over,
         t=t,
         s=s,

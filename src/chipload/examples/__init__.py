@@ -33,7 +33,7 @@ def copy_example(name: str, folder: str | Path) -> Path:
         if target.exists() and (not target.is_dir() or any(target.iterdir())):
             raise InputError(f"{folder}: is not empty: name a folder that is new or empty")
         with resources.as_file(resources.files(__name__) / name) as source:
-            shutil.copytree(source, target, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__", "*.py"))
+            shutil.copytree(source, target, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
     except OSError as err:
         raise InputError(f"{folder}: cannot be written: {err.strerror or err}") from None
     return target

@@ -4,6 +4,7 @@ from chipload.job.impeller import ImpellerJob, ImpellerJobTable, SectionalTable
 from chipload.job.load import AnyJob, load_job
 from chipload.job.planned import Job
 from chipload.job.program import ProgramJob
+from chipload.job.shell import ShellJob
 from chipload.job.tables import MAY, NEEDS, JobTable, OperationTable, ProgramJobTable
 
 __all__ = [
@@ -18,5 +19,6 @@ __all__ = [
     "ProgramJob",
     "ProgramJobTable",
     "SectionalTable",
+    "ShellJob",
     "load_job",
 ]

@@ -19,13 +19,16 @@ from chipload.job.messages import first_error
 from chipload.job.override import override
 from chipload.job.planned import Job, planned_job
 from chipload.job.program import ProgramJob, program_job
+from chipload.job.shell import ShellJob, shell_job
+from chipload.job.shell_tables import ShellJobTable
 from chipload.job.tables import JobTable, ProgramJobTable, Table
 
 #: a job of any kind
-AnyJob = Job | ProgramJob | ImpellerJob
+AnyJob = Job | ProgramJob | ImpellerJob | ShellJob
 
 #: kinds of jobs: the table that only they have, the table of the whole file, and what makes the job of it
 KINDS: Mapping[str, tuple[type[Table], Callable[[Path, Any, Sequence[str]], AnyJob]]] = {
+    "shell": (ShellJobTable, shell_job),
     "program": (ProgramJobTable, program_job),
     "impeller": (ImpellerJobTable, impeller_job),
     "part": (JobTable, planned_job),
@@ -48,9 +51,9 @@ def load_job(path: str | Path, overrides: Sequence[str] = ()) -> AnyJob:
         raise InputError(f"{path}: cannot be read: {err.strerror}") from None
     except (ValueError, RecursionError) as err:
         raise InputError(f"{label}: not a TOML file: {err}") from None
-    for text in overrides:
-        override(raw, text)
     root, made = KINDS[next((key for key in KINDS if key in raw), "part")]
+    for text in overrides:
+        override(raw, text, root)
     try:
         return made(path, root.model_validate(raw), tuple(overrides))
     except ValidationError as err:

@@ -33,6 +33,11 @@ from chipload.report.page import page_bytes
 from chipload.report.programs import program_files
 from chipload.report.reading import Read
 from chipload.report.scene import scene_bytes
+from chipload.report.shell import files as shell_files
+from chipload.report.shell import outcome as shell_outcome
+from chipload.report.shell import page as shell_page
+from chipload.report.shell import summary as shell_summary
+from chipload.report.shell.outcome import ShellOutcome
 from chipload.report.summary import summary_bytes
 
 SUMMARY = "summary.json"
@@ -40,6 +45,8 @@ SUMMARY = "summary.json"
 Makers = list[tuple[str, Callable[[], bytes]]]
 #: files that every result has
 NAMES = (SUMMARY, "history.parquet", "scene.glb", "report.html")
+#: files that some have
+MORE = (shell_files.PATH, shell_files.TABLE, shell_files.HAL)
 
 
 class Kind(NamedTuple):
@@ -59,10 +66,15 @@ KINDS: dict[type, Kind] = {
         reading.verdict,
     ),
     Milled: Kind((milled_summary, milled_history, milled_scene, milled_page), milled_files, milled_verdict),
+    ShellOutcome: Kind(
+        (shell_summary.summary_bytes, shell_summary.history_bytes, shell_summary.scene_bytes, shell_page.page_bytes),
+        shell_files.program_files,
+        shell_outcome.verdict,
+    ),
 }
 
 
-def verdict(outcome: Outcome | Read | Milled) -> tuple[bool, str]:
+def verdict(outcome: Outcome | Read | Milled | ShellOutcome) -> tuple[bool, str]:
     """Whether everything holds, and one sentence that says it."""
     return KINDS[type(outcome)].verdict(outcome)
 
@@ -96,7 +108,7 @@ def check_target(out: str | Path, ours: Callable[[Path], bool] | None = None, wh
     return target
 
 
-def write_result(outcome: Outcome | Read | Milled, out: str | Path, progress: Progress = silent) -> Path:
+def write_result(outcome: Outcome | Read | Milled | ShellOutcome, out: str | Path, progress: Progress = silent) -> Path:
     """Write the whole result folder and return it.
 
     Raises
@@ -165,7 +177,7 @@ def _ours(folder: Path) -> bool:
         return (
             isinstance(holds, dict)
             and "holds" in holds
-            and all(p.name in NAMES or p.suffix in (".ngc", ".nc", ".apt", ".npz") for p in folder.iterdir())
+            and all(p.name in NAMES + MORE or p.suffix in (".ngc", ".nc", ".apt", ".npz") for p in folder.iterdir())
         )
     except (OSError, ValueError):
         return False

@@ -3,22 +3,25 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from chipload.job import AnyJob, ImpellerJob, Job, ProgramJob
+from chipload.job import AnyJob, ImpellerJob, Job, ProgramJob, ShellJob
 from chipload.progress import Progress, silent
 from chipload.report.impeller.outcome import Milled
 from chipload.report.outcome import Outcome
 from chipload.report.reading import Read
+from chipload.report.shell.outcome import ShellOutcome
 from chipload.run.impeller import look_at_impeller, run_impeller
 from chipload.run.planned import Inputs, look_at_job, prove, read_inputs, run_job
 from chipload.run.program import look_at_program, run_program
+from chipload.run.shell import look_at_shell, run_shell
 
 #: an outcome of any kind
-AnyOutcome = Outcome | Read | Milled
+AnyOutcome = Outcome | Read | Milled | ShellOutcome
 #: kinds of jobs: what runs them, and what reads all that they name and says what it found and whether that holds
 KINDS: Mapping[type[AnyJob], tuple[Callable[[Any, Progress], AnyOutcome], Callable[[Any], tuple[list[str], bool]]]] = {
     Job: (run_job, look_at_job),
     ProgramJob: (run_program, look_at_program),
     ImpellerJob: (run_impeller, look_at_impeller),
+    ShellJob: (run_shell, look_at_shell),
 }
 
 

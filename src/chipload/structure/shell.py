@@ -324,14 +324,14 @@ class Ovalisation:
     ----------
     harmonics : (h,) int
     share : (h,) float [mm/N], normal deflection at the force that harmonic n gives
-    beam : the same of a beam with shear [mm/N]
+    beam : the same of a beam with shear [mm/N]; None: for a cone there is none
     theta : (k,) float [rad]
     rim : (k,) float [mm/N], normal displacement round at the height of the force
     """
 
     harmonics: NDArray[np.int64]
     share: Floats
-    beam: float
+    beam: float | None
     theta: Floats
     rim: Floats
 
@@ -342,7 +342,8 @@ def ovalisation(modes: Ritz, s_force: float, points: int = 181) -> Ovalisation:
     share = modes.repeat * np.sum((modes.inverse @ load) ** 2, axis=1)
     theta = np.linspace(-math.pi, math.pi, points)
     rim = np.cos(theta[:, None] * modes.harmonics) @ share
-    return Ovalisation(modes.harmonics, share, beam_compliance(modes.shell, s_force), theta, rim)
+    beam = beam_compliance(modes.shell, s_force) if modes.shell.cone_angle == 0.0 else None
+    return Ovalisation(modes.harmonics, share, beam, theta, rim)
 
 
 def beam_compliance(shell: Shell, s_force: float) -> float:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path as File
 
 import numpy as np
@@ -29,6 +29,7 @@ Floats = NDArray[np.float64]
 MOST_BYTES = 1 << 28
 COLUMNS = ("x_mm", "y_mm", "z_mm", "feed_mm_min", "edge_nm", "cut_nm")
 TRUE_COLUMNS = ("true_edge_nm", "true_cut_nm")
+RELIEF = "relief"
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,8 @@ class ToolPath:
     points : (n, 3) float [mm], in the coordinates of the machine's pins
     model : rows at the points
     truth : rows at the points; the model itself where nothing else is known
+    relief : (n,) float, above 0, what is borne at the points over what is held; the controller is told the torque over
+        it
 
     Raises
     ------
@@ -50,6 +53,7 @@ class ToolPath:
     points: Floats
     model: TorqueProfile
     truth: TorqueProfile
+    relief: Floats
 
     def __post_init__(self) -> None:
         points = np.array(self.points, dtype=np.float64)
@@ -57,12 +61,27 @@ class ToolPath:
             raise InputError(f"path.points: must be {len(self.model.s)} rows of 3 numbers, one for each row of torque")
         if len(self.truth.s) != len(self.model.s):
             raise InputError(f"path.truth: {len(self.truth.s)} rows: must have the {len(self.model.s)} of the model")
-        points.setflags(write=False)
-        object.__setattr__(self, "points", points)
+        relief = np.array(self.relief, dtype=np.float64)
+        if relief.shape != (len(points),) or not ((relief > 0.0) & np.isfinite(relief)).all():
+            raise InputError(f"path.relief: must be {len(points)} numbers above 0, one for each point")
+        for name, column in (("points", points), ("relief", relief)):
+            column.setflags(write=False)
+            object.__setattr__(self, name, column)
+
+    @property
+    def told(self) -> TorqueProfile:
+        """The model as the controller is told it, over the relief."""
+        return replace(self.model, edge=self.model.edge / self.relief, cut=self.model.cut / self.relief)
 
 
-def tool_path(points: ArrayLike, feed: ArrayLike, model: ArrayLike, truth: ArrayLike | None = None) -> ToolPath:
-    """A path from points (n, 3) [mm], feed (n,) [mm/s] and torque (n, 2), edge and cut [N mm]."""
+def tool_path(
+    points: ArrayLike,
+    feed: ArrayLike,
+    model: ArrayLike,
+    truth: ArrayLike | None = None,
+    relief: ArrayLike | None = None,
+) -> ToolPath:
+    """A path from points (n, 3) [mm], feed (n,) [mm/s], torque (n, 2), edge and cut [N mm], and relief (n,)."""
     p = np.asarray(points, dtype=np.float64)
     if p.ndim != 2 or p.shape[1] != 3:
         raise InputError("path.points: must be rows of x, y, z")
@@ -70,11 +89,12 @@ def tool_path(points: ArrayLike, feed: ArrayLike, model: ArrayLike, truth: Array
     believed = np.asarray(model, dtype=np.float64)
     real = believed if truth is None else np.asarray(truth, dtype=np.float64)
     f = np.asarray(feed, dtype=np.float64)
-    return ToolPath(p, TorqueProfile(s, f, *believed.T), TorqueProfile(s, f, *real.T))
+    borne = np.ones(len(p)) if relief is None else np.asarray(relief, dtype=np.float64)
+    return ToolPath(p, TorqueProfile(s, f, *believed.T), TorqueProfile(s, f, *real.T), borne)
 
 
 def read_path(file: str | File) -> ToolPath:
-    """A path from a CSV with the columns ``COLUMNS`` and, for a plant, ``TRUE_COLUMNS``.
+    """A path from a CSV with the columns ``COLUMNS`` and, for a plant, ``TRUE_COLUMNS``; ``RELIEF`` is 1 if not there.
 
     Raises
     ------
@@ -95,7 +115,8 @@ def read_path(file: str | File) -> ToolPath:
     for name in COLUMNS:
         if name not in head:
             raise InputError(f"{label}: column {name} is missing: it has {', '.join(head) or 'none'}")
-    names = COLUMNS + (TRUE_COLUMNS if all(x in head for x in TRUE_COLUMNS) else ())
+    true = all(x in head for x in TRUE_COLUMNS)
+    names = COLUMNS + (TRUE_COLUMNS if true else ()) + ((RELIEF,) if RELIEF in head else ())
     places = [head.index(x) for x in names]
     values = np.empty((len(rows) - 1, len(names)))
     for k, row in enumerate(rows[1:]):
@@ -105,15 +126,16 @@ def read_path(file: str | File) -> ToolPath:
             except (ValueError, IndexError):
                 raise InputError(f"{label}: line {k + 2}: {names[j]}: must be a number") from None
     feed = values[:, 3] * mm_s_from_mm_min(1.0)
-    torque = 1e3 * values[:, 4:]
-    return tool_path(values[:, :3], feed, torque[:, :2], torque[:, 2:] if len(names) > len(COLUMNS) else None)
+    torque = 1e3 * values[:, 4:8]
+    relief = values[:, -1] if RELIEF in head else None
+    return tool_path(values[:, :3], feed, torque[:, :2], torque[:, 2:] if true else None, relief)
 
 
 def write_path(path: ToolPath) -> str:
     """The CSV of a path, truth and all."""
-    lines = [",".join(COLUMNS + TRUE_COLUMNS)]
+    lines = [",".join((*COLUMNS, *TRUE_COLUMNS, RELIEF))]
     torque = [x * 1e-3 for x in (path.model.edge, path.model.cut, path.truth.edge, path.truth.cut)]
-    rows = np.column_stack([path.points, path.model.feed * mm_min_from_mm_s(1.0), *torque])
+    rows = np.column_stack([path.points, path.model.feed * mm_min_from_mm_s(1.0), *torque, path.relief])
     lines += [",".join(f"{x:.9g}" for x in row) for row in rows]
     return "\n".join(lines) + "\n"
 

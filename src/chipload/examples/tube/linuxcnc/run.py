@@ -1,6 +1,10 @@
 """Start all of it: LinuxCNC without a screen, the cut beside it, the controller; then say whether they agree.
 
-    python run.py OUT [--lost stop|programmed] [--kill-at MM | --kill-stopped] [--hang] [--overload-nm T] [--seconds S]
+    python run.py OUT [--result DIR] [--lost stop|programmed] [--kill-at MM | --kill-stopped] [--hang]
+                      [--overload-nm T] [--seconds S]
+
+The program, its path and the controller are those of the job beside this folder: `DIR` is what `chipload run` made of
+it; without it the job is run first, into `OUT/job`.
 
 OUT gets `machine.csv` (what the machine did), `control.csv` (what the controller saw and sent), `linuxcnc.log` and
 `summary.json`: time and greatest torque here and in our own closed loop, the greatest feed over the programmed one, how
@@ -18,6 +22,7 @@ import argparse
 import fcntl
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -37,14 +42,16 @@ from chipload.control.linuxcnc.path import locate
 from chipload.control.plant import Loop, run
 
 HERE = Path(__file__).parent
-FILES = ("tube.ini", "tube.hal", "tube.tbl", "drive.py", "program.ngc")
+FILES = ("tube.ini", "tube.hal", "tube.tbl", "drive.py")
+#: of the result: the program that takes the override, and what the controller reads
+PROGRAM, CONTROL = "0-override.ngc", ("hal.toml", "path.csv", "controller.toml")
 NOBODY = 65534
 #: HAL's own shared memory; it is there while a controller runs
 HAL_KEY = "0x48414c32"
 LOST = {"stop": "0", "programmed": "1"}
 MARK = "CHIPLOAD_RUN"
-#: torque counts as over the limit above so much of what is held
-LIMIT_OVER_HELD = 1.0 / 0.93
+#: until an override acts here [s]: the next period
+LATENCY_S = 0.01
 #: what the machine is watched for after its controller is killed [s]
 AFTER_S = 2.0
 
@@ -70,11 +77,12 @@ def wait(what: str, done: Callable[[], bool], seconds: float) -> None:
 class LinuxCNC:
     """LinuxCNC in a folder of its own, to be used in a ``with``."""
 
-    def __init__(self, lost: str, seconds: float) -> None:
+    def __init__(self, program: Path, lost: str, seconds: float) -> None:
         self.folder = Path(tempfile.mkdtemp(prefix="tube-"))
         self.mark = uuid.uuid4().hex
         for name in FILES:
             shutil.copy(HERE / name, self.folder / name)
+        shutil.copy(program, self.folder / "program.ngc")
         ini = (self.folder / "tube.ini").read_text().replace("LOST_FEED = 0", f"LOST_FEED = {LOST[lost]}")
         (self.folder / "tube.ini").write_text(ini)
         (self.folder / "drive.py").chmod(0o755)
@@ -163,16 +171,19 @@ def along(job: HalJob, rows: np.ndarray) -> np.ndarray:
 def play(args: argparse.Namespace) -> dict[str, object]:
     """Run the program once; see the head of this file."""
     out, lost, seconds = args.out, args.lost, args.seconds
-    for name in ("hal.toml", "path.csv"):
-        shutil.copyfile(HERE / name, out / name)
+    result = args.result or made(out)
+    for name in CONTROL:
+        shutil.copyfile(result / name, out / name)
+    limit = 1e3 * json.loads((result / "summary.json").read_text())["operations"][0]["torque_limit_nm"]
+    text = re.sub(r"(?m)^latency_s = .*$", f"latency_s = {LATENCY_S!r}", (out / "hal.toml").read_text())
     if args.overload_nm is not None:
-        text = (out / "hal.toml").read_text()
-        (out / "hal.toml").write_text(text.replace("overload_nm = 2.0", f"overload_nm = {args.overload_nm!r}"))
+        text = re.sub(r"(?m)^overload_nm = .*$", f"overload_nm = {args.overload_nm!r}", text)
+    (out / "hal.toml").write_text(text)
     job = load_hal(out / "hal.toml")
     if hal_in_use():
         raise Failed("HAL: a controller runs on this machine already, and there is room for one: end it first")
     killed = None
-    with LinuxCNC(lost, seconds) as cnc:
+    with LinuxCNC(result / PROGRAM, lost, seconds) as cnc:
         command = [sys.executable, "-c", "from chipload.cli import main; main()", "hal", str(out / "hal.toml")]
         controller = subprocess.Popen([*command, "--out", str(out / "control.csv")], env=os.environ.copy())
         machine = cnc.folder / "machine.csv"
@@ -206,14 +217,23 @@ def play(args: argparse.Namespace) -> dict[str, object]:
             left = cnc.left()
             shutil.rmtree(cnc.folder)
     rows = rows_of(out / "machine.csv")
-    summary = summed(job, rows, rows_of(out / "control.csv"), killed)
+    summary = summed(job, rows, rows_of(out / "control.csv"), killed, limit)
     summary |= {"lost": lost, "processes_left": len(left), "hal_left": hal_in_use()}
     (out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
     return summary
 
 
-def summed(job: HalJob, rows: np.ndarray, control: np.ndarray, killed: float | None) -> dict[str, object]:
-    """What the run says."""
+def made(out: Path) -> Path:
+    """The result of the job beside this folder."""
+    command = [sys.executable, "-c", "from chipload.cli import main; main()", "run", str(HERE.parent / "job.toml")]
+    done = subprocess.run([*command, "--out", str(out / "job")], check=False)
+    if done.returncode not in (0, 3):
+        raise Failed(f"the job of the example: exit code {done.returncode}")
+    return out / "job"
+
+
+def summed(job: HalJob, rows: np.ndarray, control: np.ndarray, killed: float | None, limit: float) -> dict[str, object]:
+    """What the run says; ``limit`` of torque [N mm] at the place where the wall bears least."""
     s, programmed = along(job, rows), float(job.path.model.feed[0])
     # rapids go at the machine's own speed
     on = (s > 0.0) & (s < job.path.model.s[-1])
@@ -243,9 +263,9 @@ def summed(job: HalJob, rows: np.ndarray, control: np.ndarray, killed: float | N
     # the controller waited in the air before the path: the simulation begins with the override of that moment
     begun = min(max(float(c["override"][max(first - 1, 0)]), job.override.floor), job.override.cap)
     held = replace(job.override, start=begun, air_override=max(job.override.air_override, begun))
-    limit = LIMIT_OVER_HELD * job.override.torque_ref
     loop = Loop(job.acceleration, job.period, job.latency)
-    same = run(job.path.truth, job.path.model, held, job.table, job.spindle, loop, limit)
+    same = run(job.path.truth, job.path.model, held, job.table, job.spindle, loop, limit, relief=job.path.relief)
+    load = c["torque_nmm"] / c["relief"]
     # steady: the override of 0.1 s is the same within a step; at a corner and at the ends the machine slows by itself
     goal, feed = c["in_force"] * programmed, c["feed_mm_s"]
     places = np.flatnonzero(moving)[10:]
@@ -258,10 +278,12 @@ def summed(job: HalJob, rows: np.ndarray, control: np.ndarray, killed: float | N
     by_place = (at[b] - at[a]) / (t[b] - t[a])
     sums = np.concatenate([[0.0], np.cumsum(0.5 * (goal[moving][1:] + goal[moving][:-1]) * np.diff(t))])
     asked = (sums[b] - sums[a]) / (t[b] - t[a])
+    answer["torque_limit_nm"] = 1e-3 * limit
     answer["linuxcnc"] = {
         "time_s": seconds,
-        "torque_nm_max": 1e-3 * float(c["torque_nmm"].max()),
-        "torque_over_limit_s": float(np.diff(t)[c["torque_nmm"][moving][1:] > limit].sum()),
+        "torque_nm_max": 1e-3 * float(load.max()),
+        "torque_raw_nm_max": 1e-3 * float(c["torque_nmm"].max()),
+        "torque_over_limit_s": float(np.diff(t)[load[moving][1:] > limit].sum()),
         "steps": len(control),
         "period_s": float(np.median(np.diff(t))),
         "period_s_max": float(np.diff(t).max()),
@@ -269,7 +291,8 @@ def summed(job: HalJob, rows: np.ndarray, control: np.ndarray, killed: float | N
     }
     answer["simulated"] = {
         "time_s": same.time,
-        "torque_nm_max": 1e-3 * same.torque_max,
+        "torque_nm_max": 1e-3 * same.load_max,
+        "torque_raw_nm_max": 1e-3 * same.torque_max,
         "torque_over_limit_s": same.time_over,
         "start": begun,
     }
@@ -286,6 +309,7 @@ def main() -> int:
     """Parse, run, show."""
     parser = argparse.ArgumentParser(description="A round pass on a tube under LinuxCNC, torque held.")
     parser.add_argument("out", type=Path, help="folder for the results")
+    parser.add_argument("--result", type=Path, metavar="DIR", help="result of the job; none: it is run first")
     parser.add_argument(
         "--lost", choices=tuple(LOST), default="stop", help="what the machine does without a controller"
     )

@@ -1,0 +1,207 @@
+"""What a torque along a path does to a thin wall, and which torque the wall bears at each place of the path.
+
+Notation: k a step of the path; s_k [mm] the middle of its depth of cut along the wall, b_k its length there, f_k the
+end of it that is nearer to the wall's free end; C_w [mm/N] the normal displacement of the wall at f_k under a unit
+normal force that is spread over b_k and the width of the contact; C_t the compliance of the cutter in the middle of
+b_k; g [MPa/N] the greatest equivalent stress of the wall under that force. Both loads of a step have a part of the edge
+and a part that goes with the feed per tooth, o the override, w_0 / w the droop of the spindle:
+
+    T(o) = T_e + T_c o w_0 / w      mean torque over a revolution,
+    F(o) = F_e + F_c o w_0 / w      greatest force of a revolution on the surface that is left, along its normal.
+
+F is convex in o, so between 0 and 1 the straight line lies above it, never below. The wall gives way by F (C_w + C_t);
+it bears F_lim = min(d / (C_w + C_t), S / g), which is reached at o_lim = (F_lim - F_e) / F_c, at a torque of T(o_lim):
+the limit of torque is the least of these over the steps where o_lim is at most 1, or where it is least if it nowhere
+is. Where a light cut bears less torque than that, it is because so little of the round is cut: its feed is not limited.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.control.plant import Outcome, TorqueProfile
+from chipload.errors import InputError
+from chipload.structure.shell import Ritz, compliance, greatest_stress
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+#: depths of cut that agree within so many mm are one
+SAME_MM = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """Both loads of n steps in their two parts, at the programmed feed.
+
+    Parameters
+    ----------
+    torque_edge, torque_cut : (n,) float [N mm]
+    force_edge, force_cut : (n,) float [N]
+    """
+
+    torque_edge: Floats
+    torque_cut: Floats
+    force_edge: Floats
+    force_cut: Floats
+
+
+def two_parts(torque: Floats, force: Floats, little_torque: Floats, little_force: Floats, little: float) -> Loads:
+    """Loads from those of the material and of one whose cutting coefficients are ``little`` times as great.
+
+    A load is E + C with the material and E + little C with the other one, so C is their difference over 1 - little.
+
+    Parameters
+    ----------
+    torque, little_torque : (n,) float [N mm]; force, little_force : (n,) float [N]
+    little : above 0 and below 1
+
+    Examples
+    --------
+    >>> one = np.array([1.0])
+    >>> parts = two_parts(5 * one, 7 * one, 2 * one, 4 * one, 0.25)
+    >>> parts.torque_edge.tolist(), parts.torque_cut.tolist(), parts.force_edge.tolist(), parts.force_cut.tolist()
+    ([1.0], [4.0], [3.0], [4.0])
+    """
+    if not 0.0 < little < 1.0:
+        raise InputError(f"two_parts: little = {little:g}: must be above 0 and below 1")
+    torque_cut, force_cut = (
+        np.clip((a - b) / (1.0 - little), 0.0, a) for a, b in ((torque, little_torque), (force, little_force))
+    )
+    return Loads(torque - torque_cut, torque_cut, force - force_cut, force_cut)
+
+
+@dataclass(frozen=True, eq=False)
+class Bearing:
+    """What a wall does under a unit force at n steps; steps beside the wall have 0.
+
+    Parameters
+    ----------
+    compliance : (n,) float [mm/N], C_w + C_t
+    stress : (n,) float [MPa/N], g
+    """
+
+    compliance: Floats
+    stress: Floats
+
+
+def bearing(modes: Ritz, near: Floats, far: Floats, width: float, tool: Floats) -> Bearing:
+    """Compliance and stress for depths of cut along a wall.
+
+    Parameters
+    ----------
+    modes : of the wall, clamped at s = 0
+    near, far : (n,) float [mm], s of the two ends of the depth of cut, near <= far; where equal the step is beside it
+    width : of the contact round the wall [mm]
+    tool : (n,) float [mm/N], C_t
+
+    Each different depth of cut costs one look at the stress; steps of one depth share it.
+    """
+    bounds = np.round(np.column_stack([near, far]) / SAME_MM) * SAME_MM
+    bounds = np.clip(bounds, 0.0, modes.shell.length)
+    some, place = np.unique(bounds, axis=0, return_inverse=True)
+    wall, strained = np.zeros(len(some)), np.zeros(len(some))
+    for k, (a, b) in enumerate(some.tolist()):
+        if b > a:
+            middle = 0.5 * (a + b)
+            wall[k] = compliance(modes, middle, s_point=b, length=b - a, width=width)[2, 2]
+            strained[k] = max(greatest_stress(modes, middle, b - a, width))
+    place = place.ravel()
+    on = bounds[:, 1] > bounds[:, 0]
+    return Bearing(np.where(on, wall[place] + tool, 0.0), strained[place])
+
+
+@dataclass(frozen=True, eq=False)
+class PathLimit:
+    """The torque that the wall bears along a path.
+
+    Parameters
+    ----------
+    torque : [N mm]; 0: not attainable, the edge alone is too much somewhere
+    by : ``deflection`` or ``strength``
+    step : where it is reached
+    force : F_lim there [N]
+    each : (n,) float [N mm], T(o_lim) of every step; inf beside the wall
+    """
+
+    torque: float
+    by: str
+    step: int
+    force: float
+    each: Floats
+
+
+def path_limit(loads: Loads, wall: Bearing, deflection: float, stress: float) -> PathLimit:
+    """The limit of torque; see the head of this file.
+
+    Parameters
+    ----------
+    loads, wall : of the same steps
+    deflection, stress : that are allowed [mm], [MPa]
+
+    Raises
+    ------
+    InputError
+        Nothing is cut on the wall.
+    """
+    on = (wall.compliance > 0.0) & (loads.force_cut > 0.0)
+    if not on.any():
+        raise InputError("shell: the program cuts nothing from the wall: check shell.clamp_z_mm, its radius and stock")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bend = np.where(on, deflection / wall.compliance, np.inf)
+        force = np.where(on, np.minimum(bend, stress / wall.stress), np.inf)
+        override = np.where(on, (force - loads.force_edge) / loads.force_cut, np.inf)
+    each = np.where(on, loads.torque_edge + loads.torque_cut * np.where(on, override, 0.0), np.inf)
+    asked = override <= max(1.0, float(override.min()))
+    k = int(np.argmin(np.where(asked, each, np.inf)))
+    unattainable = float(override.min()) <= 0.0
+    if unattainable:
+        k = int(np.argmin(override))
+    by = "deflection" if bend[k] <= stress / wall.stress[k] else "strength"
+    return PathLimit(0.0 if unattainable else float(each[k]), by, k, float(force[k]), each)
+
+
+def row_means(steps: Floats) -> Floats:
+    """(n + 1,) values at the ends of n steps: the mean of both sides."""
+    padded = np.concatenate([steps[:1], steps, steps[-1:]])
+    return np.asarray(0.5 * (padded[1:] + padded[:-1]))
+
+
+@dataclass(frozen=True, eq=False)
+class WallPath:
+    """What is needed of the wall along a path.
+
+    Parameters
+    ----------
+    s : (n + 1,) float [mm], ends of the steps along the path
+    edge, cut : (n + 1,) float [N], the two parts of F there
+    compliance : (n,) float [mm/N], C_w + C_t of the steps that make the finished surface, 0 of others
+    """
+
+    s: Floats
+    edge: Floats
+    cut: Floats
+    compliance: Floats
+
+
+def wall_error(path: WallPath, programmed: TorqueProfile, outcome: Outcome, speed: float) -> Floats:
+    """How far wall and cutter give way, together, at each row of an outcome.
+
+    Parameters
+    ----------
+    path : of the wall
+    programmed : its feeds
+    outcome : of a run along it
+    speed : w_0 [rad/s]
+
+    Returns
+    -------
+    (k,) float [mm], along the normal of the wall; 0 where no finished surface is made or nothing moves.
+    """
+    ratio = outcome.feed / np.interp(outcome.s, programmed.s, programmed.feed) * (speed / outcome.speed)
+    force = np.interp(outcome.s, path.s, path.edge) + np.interp(outcome.s, path.s, path.cut) * ratio
+    step = np.clip(np.searchsorted(path.s, outcome.s, "right") - 1, 0, len(path.compliance) - 1)
+    return np.asarray(np.where(outcome.feed > 0.0, force, 0.0) * path.compliance[step])

@@ -1,0 +1,1 @@
+"""The result of holding the torque on a thin tube or cone."""

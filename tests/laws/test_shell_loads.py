@@ -1,0 +1,181 @@
+"""A level round outside a tube: torque, normal force and depth of cut from the chips against closed forms.
+
+Notation: D distance of the cutter's centre from the tube's, R its radius, R_s that of the stock; psi angle from the
+wall's normal. The rim is engaged over 0 .. alpha, cos alpha = (D^2 + R^2 - R_s^2) / (2 D R); because the path goes
+round the tube the chip is f sin psi exactly. Mean torque N b R / 2 pi [Ktc f (1 - cos alpha) + Kte alpha]; a straight
+tooth at psi presses on the wall with (Ktc f sin psi + Kte) b sin psi + (Krc f sin psi + Kre) b cos psi.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from chipload.cutting.material import material_named
+from chipload.job import load_job
+from chipload.program.build import helix, plunge, rapid
+from chipload.program.program import Program
+from chipload.run.shell_cut import Place, cut, off_centre, shell_stock, true_loads
+from chipload.structure import beam
+
+JOB = """
+[program]
+file = "none.ngc"
+[machine]
+name = "vmc"
+[material]
+name = "al6082-t6"
+[[cutter]]
+number = 1
+diameter_mm = 10.0
+flutes = 3
+helix_deg = 0.0
+flute_length_mm = 22.0
+overhang_mm = 30.0
+modulus_gpa = 580.0
+[shell]
+mean_radius_mm = 20.0
+length_mm = 40.0
+wall_mm = 2.0
+clamped = "low"
+clamp_z_mm = -40.0
+modulus_gpa = 70.0
+poisson = 0.33
+strength_mpa = 250.0
+stock_mm = 1.5
+wall_tolerance_mm = 0.0
+[[surprise]]
+kind = "thicker-side"
+share = 0.4
+at_deg = 90.0
+[[surprise]]
+kind = "hard-spot"
+share = 0.5
+at_deg = 180.0
+width_mm = 10.0
+ramp_mm = 5.0
+[[surprise]]
+kind = "worn-cutter"
+share = 0.1
+edge_share = 0.3
+[spindle]
+inertia_kg_m2 = 0.003
+torque_constant_nm_a = 0.15
+idle_a = [2.0, 0.004]
+stiffness_a_s = 0.5
+reset_a = 5.0
+most_current_a = 40.0
+sensor_lag_s = 0.01
+smoothing_s = 0.02
+noise_a = 0.03
+[control.override]
+hold = 0.9
+overload_nm = 2.0
+torque_most_nm = 6.0
+light_nm = 0.03
+floor = 0.05
+cap = 1.0
+start = 0.3
+air_override = 1.0
+lost_override = 0.2
+lost_s = 1.0
+[loop]
+period_ms = 10.0
+latency_ms = 50.0
+override_step = 0.01
+[simulation]
+step_mm = 2.0
+layer_mm = 0.5
+tolerance_mm = 0.002
+[limits]
+deflection_um = 60.0
+strength_share = 0.6
+"""
+FEED, SPEED, DEPTH, R, FINISHED = 30.0, 628.3185307, 2.0, 5.0, 21.0
+MATERIAL = material_named("al6082-t6")
+CENTRE = FINISHED + R
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory):
+    file = tmp_path_factory.mktemp("law") / "job.toml"
+    file.write_text(JOB)
+    return load_job(file)
+
+
+@pytest.fixture(scope="module")
+def program():
+    return Program.join([
+        rapid([[CENTRE, 12.0, 10.0], [CENTRE, 12.0, -DEPTH]], SPEED, 1, "link"),
+        plunge([CENTRE, 0.0, -DEPTH], FEED, SPEED, 1, "lead"),
+        helix((CENTRE, 0.0), (0.0, 0.0), (-DEPTH, -DEPTH), 1.0, FEED, SPEED, 1, "round", -1),
+    ])  # fmt: skip
+
+
+def done(job, program, centre=(0.0, 0.0)):
+    return cut(job, program, shell_stock(job, program, centre), MATERIAL, 400.0, lambda *_: None)
+
+
+def closed(stock_radius):
+    """Torque of edge and cut [N mm], greatest normal force of the edge and of all [N]."""
+    f = FEED / (3.0 * SPEED / math.tau)
+    alpha = math.acos((CENTRE**2 + R**2 - stock_radius**2) / (2.0 * CENTRE * R))
+    psi = np.linspace(0.0, alpha, 20_001)
+    scale = 3.0 * DEPTH * R / math.tau
+    m = MATERIAL
+    edge = DEPTH * (m.Kte * np.sin(psi) + m.Kre * np.cos(psi))
+    whole = edge + DEPTH * f * np.sin(psi) * (m.Ktc * np.sin(psi) + m.Krc * np.cos(psi))
+    return scale * m.Kte * alpha, scale * m.Ktc * f * (1.0 - math.cos(alpha)), edge.max(), whole.max()
+
+
+def at(made, degrees):
+    """The step in the round whose middle is there, clockwise from +X: seen from the tube a quarter is -90."""
+    middle = 0.5 * (made.points[1:] + made.points[:-1])
+    on = np.flatnonzero(np.abs(np.hypot(middle[:, 0], middle[:, 1]) - CENTRE) < 0.1)
+    turn = np.degrees(np.angle(np.exp(1j * (np.arctan2(middle[on, 1], middle[on, 0]) - math.radians(degrees)))))
+    return int(on[np.argmin(np.abs(turn))])
+
+
+def test_loads_in_closed_form(job, program):
+    made = done(job, program)
+    edge, whole, push_edge, push = closed(FINISHED + 1.5)
+    for degrees in (-90.0, 180.0, 120.0):
+        k = at(made, degrees)
+        assert made.loads.torque_edge[k] == pytest.approx(edge, rel=0.01)
+        assert made.loads.torque_cut[k] == pytest.approx(whole, rel=0.01)
+        # the peak is where a tooth comes in, and the rotation is looked at every degree
+        assert made.loads.force_edge[k] == pytest.approx(push_edge, rel=0.02)
+        assert made.loads.force_edge[k] + made.loads.force_cut[k] == pytest.approx(push, rel=0.02)
+        assert (made.near[k], made.far[k]) == pytest.approx((38.0, 40.0))
+        assert made.makes[k]
+        assert made.feed[k] == pytest.approx(FEED, rel=1e-3)
+        (mill,) = job.cutters.values()
+        assert made.tool[k] == pytest.approx(float(beam.compliance(mill, 1.0, 1.0)))
+    assert not made.makes[:3].any()
+
+
+def test_a_thicker_side_in_closed_form(job, program):
+    """0.6 mm off centre towards +Y: there 2.1 mm are cut, opposite 0.9."""
+    centre = off_centre(1.5, job.table.surprise)
+    assert centre == pytest.approx((0.0, 0.6), abs=1e-12)
+    made = done(job, program, centre)
+    for degrees, depth in ((90.0, 2.1), (-90.0, 0.9)):
+        edge, whole, _, _ = closed(FINISHED + depth)
+        k = at(made, degrees)
+        # the stock's edge is a circle about another centre: nearly the same arc
+        assert made.loads.torque_edge[k] == pytest.approx(edge, rel=0.04)
+        assert made.loads.torque_cut[k] == pytest.approx(whole, rel=0.06)
+
+
+def test_a_hard_spot_and_a_worn_cutter(job, program):
+    """Factors 1.1 and 1.3 everywhere, 1.5 in the middle of the spot, 1.25 where half of its ramp is over."""
+    made = done(job, program)
+    true = true_loads(made.loads, made.points, Place(job.table.shell), job.table.surprise)
+    spot, far = at(made, 180.0), at(made, -60.0)
+    assert true.torque_cut[far] == pytest.approx(1.1 * made.loads.torque_cut[far])
+    assert true.force_edge[far] == pytest.approx(1.3 * made.loads.force_edge[far])
+    assert true.torque_cut[spot] == pytest.approx(1.5 * 1.1 * made.loads.torque_cut[spot])
+    half = at(made, 180.0 - math.degrees(7.5 / FINISHED))
+    assert true.force_cut[half] / made.loads.force_cut[half] == pytest.approx(1.1 * 1.25, rel=0.08)

@@ -1,0 +1,70 @@
+"""Rings as stock: volumes and thicknesses in closed form."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from shapely import LineString, Point
+
+from chipload.errors import InputError
+from chipload.stock.rings import Boss, ring_stock, surface_off
+
+BOUNDS = np.linspace(-4.0, 0.0, 5)
+
+
+def flat(radius):
+    return lambda z: np.full(len(z), radius)
+
+
+def cone(radius, slope):
+    return lambda z: radius - slope * z
+
+
+def thickness(stock, layer, degrees):
+    """Of the ring along a ray."""
+    a = math.radians(degrees)
+    ray = LineString([(0.0, 0.0), (50.0 * math.cos(a), 50.0 * math.sin(a))])
+    return stock.section(layer).intersection(ray).length
+
+
+def test_volume_of_a_tube_and_a_cone():
+    tube = ring_stock(BOUNDS, flat(18.0), flat(22.0))
+    assert tube.volume() == pytest.approx(4.0 * math.pi * (22.0**2 - 18.0**2), rel=1e-4)
+    made = ring_stock(BOUNDS, cone(18.0, 0.1), cone(22.0, 0.1))
+    heights = np.array([-3.5, -2.5, -1.5, -0.5])
+    areas = math.pi * ((22.0 - 0.1 * heights) ** 2 - (18.0 - 0.1 * heights) ** 2)
+    assert made.volume() == pytest.approx(areas.sum(), rel=1e-4)
+
+
+def test_thicker_on_one_side():
+    """0.45 mm off centre towards -45 deg: 30 % of 1.5 mm more there, as much less opposite."""
+    off = 0.45 * math.sqrt(0.5)
+    stock = ring_stock(BOUNDS, flat(20.0), flat(21.5), (off, -off))
+    assert thickness(stock, 0, -45.0) == pytest.approx(1.95, abs=1e-3)
+    assert thickness(stock, 0, 135.0) == pytest.approx(1.05, abs=1e-3)
+    assert thickness(stock, 3, 45.0) == pytest.approx(1.5, abs=0.01)
+
+
+def test_a_boss():
+    stock = ring_stock(BOUNDS, flat(20.0), flat(21.5), bosses=[Boss(math.radians(150.0), math.radians(200.0), 1.2)])
+    assert thickness(stock, 1, 175.0) == pytest.approx(2.7, abs=1e-3)
+    assert thickness(stock, 1, 149.0) == pytest.approx(1.5, abs=1e-3)
+    sector = 0.5 * math.radians(50.0) * (22.7**2 - 21.5**2)
+    assert stock.area(1) == pytest.approx(math.pi * (21.5**2 - 20.0**2) + sector, rel=1e-4)
+
+
+def test_distance_from_the_surface():
+    """A bite of 0.3 mm into a wall at 20 mm, and 1.5 mm left elsewhere."""
+    stock = ring_stock(BOUNDS, flat(18.0), flat(21.5))
+    stock.remove(2, Point(24.7, 0.0).buffer(5.0, 256))
+    low, high = surface_off(stock, flat(20.0), -4.0, 0.0)
+    assert low == pytest.approx(-0.3, abs=1e-3)
+    assert high == pytest.approx(1.5, abs=1e-3)
+    assert surface_off(stock, flat(20.0), 5.0, 6.0) is None
+
+
+def test_no_ring():
+    with pytest.raises(InputError, match="must have a width all round"):
+        ring_stock(BOUNDS, flat(20.0), flat(20.5), (0.6, 0.0))
