@@ -175,9 +175,10 @@ def _of_sections(job: ImpellerJob, given: SectionsTable, blades: int, outer_diam
         except InputError as err:
             raise InputError(f"impeller.sections.{key}: {err}") from None
 
+    main = blade(given.blade, "blade")
+    splitter = blade(given.splitter, "splitter") if given.splitter else None
     hub, shroud = (
         Revolved(read_meridian(folder / name, given.unit, over), side)
         for name, side in ((given.hub, 1), (given.shroud, -1))
     )
-    splitter = blade(given.splitter, "splitter") if given.splitter else None
-    return Impeller(blade(given.blade, "blade"), splitter, hub, shroud, blades)
+    return Impeller(main, splitter, hub, shroud, blades)
