@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from chipload.job.tables import Table
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.sectional.answer import largest_cutters, one_cutter, one_cutter_of
 from chipload.planning.sectional.impeller import Impeller
+from chipload.planning.sectional.missed import with_fits
 from chipload.planning.sectional.parametric import Shape, impeller_of
 from chipload.planning.sectional.surfaces import Sampled, Surface, surface_of
 from chipload.planning.sectional.tables import IndexTable, index_table
@@ -96,6 +98,7 @@ def _searched(
     answer = largest_cutters(
         surface.scene, catalogue, table.angle, op.clearance_mm, pallets=table.spans, workers=WORKERS, progress=progress
     )
+    answer = replace(answer, unreachable=with_fits(surface.scene, answer, table.spans, WORKERS))
     one = one_cutter(surface.scene, answer, op.clearance_mm, table.spans, WORKERS)
     took = time.perf_counter() - begin
     best = None
