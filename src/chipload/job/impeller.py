@@ -63,6 +63,13 @@ class SurfaceTable(Table):
     points: tuple[Count, Count] = Field(description="contact points along and up")
 
 
+class PickedTable(Table):
+    """A cutter of the catalogue that a programmer would take."""
+
+    diameter_mm: Positive
+    corner_radius_mm: NotNegative
+
+
 class SectionalTable(Table):
     """The search for the largest cutters of all surfaces."""
 
@@ -72,6 +79,13 @@ class SectionalTable(Table):
     around: Annotated[int, Field(ge=0, le=20)] = Field(1, description="bodies beyond the channel that are checked")
     table_deg: tuple[Number, ...] | None = Field(None, min_length=1, description="table angles; none: all")
     clearance_mm: NotNegative = Field(description="of neck, shank and holder")
+    scallop_mm: Positive = Field(le=5.0, description="greatest height between two passes")
+    feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's tip")
+    speed_rpm: Positive = Field(le=1e6, description="spindle speed")
+    most_cutters: Annotated[Count, Field(le=6)] = Field(description="different cutters at most; fewer are compared")
+    cutter_change_s: NotNegative = Field(description="time of a cutter change")
+    table_change_s: NotNegative = Field(description="time of setting the index table to another angle")
+    hand_picked: PickedTable | None = Field(None, description="the cutter that is compared with")
 
 
 class ImpellerJobTable(Table):

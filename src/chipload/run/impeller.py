@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import os
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from chipload.cutter.catalogue import Catalogue, catalogue_named, read_catalogue
+from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named, read_catalogue
 from chipload.errors import InputError
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.sections import Blade, checked, loft, read_meridian, read_sections
@@ -18,15 +19,18 @@ from chipload.job import ImpellerJob, SectionalTable
 from chipload.job.impeller import SectionsTable, ShapeTable
 from chipload.job.tables import Table
 from chipload.machine.machine import Machine, machine_named, read_machine
-from chipload.planning.sectional.answer import largest_cutters, one_cutter, one_cutter_of
+from chipload.planning.sectional.answer import Answer, largest_cutters, one_cutter, one_cutter_of
+from chipload.planning.sectional.costs import Side, Terms
 from chipload.planning.sectional.impeller import Impeller
 from chipload.planning.sectional.missed import with_fits
 from chipload.planning.sectional.parametric import Shape, impeller_of
-from chipload.planning.sectional.surfaces import Sampled, Surface, surface_of
+from chipload.planning.sectional.patches import costs_of, divided
+from chipload.planning.sectional.surfaces import BODIES, Sampled, Surface, surface_of
 from chipload.planning.sectional.tables import IndexTable, index_table
 from chipload.progress import Progress, silent
-from chipload.report.impeller.outcome import Milled, OneCutter, Searched, said
+from chipload.report.impeller.outcome import PICKED, Milled, OneCutter, Searched, Way, said
 from chipload.run.provenance import hashes, title_of, versions
+from chipload.units import mm_s_from_mm_min
 
 #: threads of the search; its answer does not depend on them
 WORKERS = len(os.sched_getaffinity(0))
@@ -43,15 +47,17 @@ def run_impeller(job: ImpellerJob, progress: Progress = silent) -> Milled:
         By ``progress``.
     """
     machine, catalogue, impeller = _machine(job), _catalogue(job), _impeller(job)
+    _picked(job, catalogue)
     op = job.operation
     table, surfaces = _tables(machine, op), _surfaces(job, impeller)
     done = []
     for k, surface in enumerate(surfaces):
-        done.append(_searched(job, k, surface, table, catalogue, part_of(progress, k, len(surfaces))))
+        done.append(_searched(job, k, surface, table, catalogue, part_of(part_of(progress, 0, 2), k, len(surfaces))))
         _reached(k, done[-1])
     pairs = [(found.surface.scene, found.answer) for found in done]
     whole = one_cutter_of(pairs, op.clearance_mm, table.spans, WORKERS)
     one = None if whole is None else (catalogue.cutters[whole[0]], whole[1])
+    ways = _ways(job, done, catalogue, impeller, part_of(progress, 1, 2))
     files = {"job": job.path, **job.files}
     files |= {key: p for key, p in (("machine", job.machine), ("catalogue", job.catalogue)) if not isinstance(p, str)}
     provenance = {
@@ -62,7 +68,7 @@ def run_impeller(job: ImpellerJob, progress: Progress = silent) -> Milled:
         "versions": versions(),
     }
     return Milled(
-        title_of(job.path), impeller, catalogue, machine, tuple(done), one, _settings(op),
+        title_of(job.path), impeller, catalogue, machine, tuple(done), one, ways, _settings(op),
         job.table.impeller.outer_diameter_mm, provenance,
     )  # fmt: skip
 
@@ -70,6 +76,7 @@ def run_impeller(job: ImpellerJob, progress: Progress = silent) -> Milled:
 def look_at_impeller(job: ImpellerJob) -> tuple[list[str], bool]:
     """What the files of a job hold; nothing is searched."""
     machine, catalogue, impeller = _machine(job), _catalogue(job), _impeller(job)
+    _picked(job, catalogue)
     lines = [f"impeller: {impeller.blades} blades{' and as many splitters' if impeller.splitter else ''}"]
     table = _tables(machine, job.operation)
     angles = np.degrees(table.angle)
@@ -107,6 +114,58 @@ def _searched(
         best = OneCutter(catalogue.cutters[one[0]], one[1], reached, one[2])
     settings = _settings(op) | _settings(job.table.surface[k])
     return Searched(settings, surface, answer, table, best, op.clearance_mm, took)
+
+
+def _ways(
+    job: ImpellerJob, done: Sequence[Searched], catalogue: Catalogue, impeller: Impeller, progress: Progress
+) -> tuple[Way, ...]:
+    """The cutter picked by hand where one is stated, then one cutter, two, ..."""
+    op = job.operation
+    terms = Terms(
+        mm_s_from_mm_min(op.feed_mm_min), op.scallop_mm, op.cutter_change_s, op.table_change_s, impeller.blades
+    )
+    out = []
+    picked = _picked(job, catalogue)
+    if picked is not None:
+        alone = Catalogue(picked.name or "picked by hand", (picked,))
+        answers = [
+            largest_cutters(
+                x.surface.scene, alone, x.table.angle, x.clearance, pallets=x.table.spans, workers=WORKERS,
+                progress=part_of(progress, k, 4 * len(done)),
+            )
+            for k, x in enumerate(done)
+        ]  # fmt: skip
+        costs = costs_of([_side(x, a) for x, a in zip(done, answers, strict=True)], terms, WORKERS)
+        reached = sum(float(x.surface.area[a.cutter >= 0].sum()) for x, a in zip(done, answers, strict=True))
+        out.append(Way(PICKED, 1, alone, divided(costs, 1, WORKERS), reached))
+    costs = costs_of([_side(x, x.answer) for x in done], terms, WORKERS)
+    reached = sum(float(x.surface.area[x.answer.cutter >= 0].sum()) for x in done)
+    for most in range(1, op.most_cutters + 1):
+        found = divided(costs, most, WORKERS, part_of(progress, most, 1 + op.most_cutters))
+        out.append(Way(f"{most} cutter{'s' if most > 1 else ''}", most, catalogue, found, reached))
+    return tuple(out)
+
+
+def _side(op: Searched, answer: Answer) -> Side:
+    s = op.surface
+    body = BODIES.index(s.body)
+    return Side(body, s.side, s.scene, s.u, s.v, s.area, answer, op.clearance, op.table.spans)
+
+
+def _picked(job: ImpellerJob, catalogue: Catalogue) -> CatalogueCutter | None:
+    """The cutter of the catalogue that is picked by hand."""
+    picked = job.operation.hand_picked
+    if picked is None:
+        return None
+    d, r = picked.diameter_mm, picked.corner_radius_mm
+    for cutter in catalogue.cutters:
+        if (cutter.diameter, cutter.corner_radius) == (d, r):
+            return cutter
+    near = min(catalogue.cutters, key=lambda c: abs(c.diameter - d) + abs(c.corner_radius - r))
+    raise InputError(
+        f"operation.0.hand_picked: D {d:g} r {r:g} mm is not in catalogue {catalogue.name}: the nearest is "
+        f"D {near.diameter:g} r {near.corner_radius:g} mm"
+    )
 
 
 def _settings(table: Table) -> dict[str, Any]:

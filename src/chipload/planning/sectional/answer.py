@@ -159,7 +159,7 @@ def one_cutter_of(
     tries = []
     for k, cutter in enumerate(catalogue.cutters):
         bounds = [_of(answer, cutter) for _, answer in parts]
-        goes = [_open(f, cutter.rho)[row].all(axis=0) for f, row in zip(bounds, reachable, strict=True)]
+        goes = [left_open(f, cutter.rho)[row].all(axis=0) for f, row in zip(bounds, reachable, strict=True)]
         least = np.min([f.rho[row].min(axis=0) for f, row in zip(bounds, reachable, strict=True)], axis=0)
         tries += [(cutter.diameter, least[t], k, int(t)) for t in np.flatnonzero(np.logical_and.reduce(goes))]
     for _, _, k, t in sorted(tries, reverse=True):
@@ -200,11 +200,14 @@ def _family(
     scene: Scene, cutters: tuple[CatalogueCutter, ...], alpha: Floats, every: bool, pallets: ArrayLike,
     sampling: Sampling | None, workers: int, progress: Progress,
 ) -> Limits:  # fmt: skip
-    lengths = [c.cutting_length for c in cutters]
     r = cutters[0].corner_radius
-    cut = math.inf if None in lengths else min(x for x in lengths if x is not None) - r
     rho = [c.rho for c in cutters]
-    return limits(scene, alpha, r, max(rho), min(rho), cut, every, pallets, sampling, workers, progress)
+    return limits(scene, alpha, r, max(rho), min(rho), shortest(cutters), every, pallets, sampling, workers, progress)
+
+
+def shortest(cutters: Sequence[CatalogueCutter]) -> float:
+    """Height above the corner's centres [mm] up to which every cutter of a family cuts."""
+    return min(math.inf if c.cutting_length is None else c.cutting_length - c.corner_radius for c in cutters)
 
 
 def _candidates(catalogue: Catalogue, families: tuple[Limits, ...], k: int) -> list[tuple[int, int]]:
@@ -212,12 +215,12 @@ def _candidates(catalogue: Catalogue, families: tuple[Limits, ...], k: int) -> l
     out = []
     for index, cutter in enumerate(catalogue.cutters):
         f = next(f for f in families if f.corner_radius == cutter.corner_radius)
-        out += [(-cutter.diameter, -f.bound[k, t], index, t) for t in np.flatnonzero(_open(f, cutter.rho)[k])]
+        out += [(-cutter.diameter, -f.bound[k, t], index, t) for t in np.flatnonzero(left_open(f, cutter.rho)[k])]
     return [(index, int(t)) for _, _, index, t in sorted(out)]
 
 
-def _open(f: Limits, rho: float) -> NDArray[np.bool_]:
-    """(c, t) where the bounds leave a cutter open."""
+def left_open(f: Limits, rho: float) -> NDArray[np.bool_]:
+    """(c, t) where the bounds of a family do not exclude a cutter of it."""
     out: NDArray[np.bool_] = (rho < f.bound) | (rho <= f.rho)
     return out
 

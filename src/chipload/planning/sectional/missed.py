@@ -5,13 +5,12 @@ Notation: as in ``search.py``; the search of a catalogue ends at its smallest cu
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chipload.planning.sectional.answer import Answer, Unreachable
+from chipload.planning.sectional.answer import Answer, Unreachable, shortest
 from chipload.planning.sectional.ranges.ranges import FULL
 from chipload.planning.sectional.scene import Scene
 from chipload.planning.sectional.search import limits
@@ -37,8 +36,7 @@ def with_fits(
     best = np.full(len(at), np.nan)
     corner = np.full(len(at), np.nan)
     for f in answer.families:
-        lengths = [c.cutting_length for c in answer.catalogue.family(f.corner_radius)]
-        cut = min(math.inf if x is None else x - f.corner_radius for x in lengths)
+        cut = shortest(answer.catalogue.family(f.corner_radius))
         found = limits(part, answer.tables, f.corner_radius, f.cap, 0.0, cut, pallets=pallets, workers=workers)
         rho = found.rho.max(axis=1)
         size = np.where(rho >= 0.0, 2.0 * (rho + f.corner_radius), np.nan)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,11 +15,15 @@ from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.machine.machine import Machine
 from chipload.planning.sectional.answer import Answer, Unreachable
 from chipload.planning.sectional.impeller import Impeller
-from chipload.planning.sectional.surfaces import Surface
+from chipload.planning.sectional.patch import Patch
+from chipload.planning.sectional.patches import Divided
+from chipload.planning.sectional.surfaces import BODIES, Surface
 from chipload.planning.sectional.tables import IndexTable
 
 Floats = NDArray[np.float64]
 
+#: name of the way of the cutter picked by hand
+PICKED = "hand-picked"
 #: why a contact point is not reached, in words
 REASONS: Mapping[str, str] = {
     "turned away": "no table angle faces it",
@@ -122,6 +127,30 @@ class Limiting:
 
 
 @dataclass(frozen=True, eq=False)
+class Way:
+    """One way to mill all surfaces.
+
+    Parameters
+    ----------
+    name : `hand-picked`, `1 cutter`, ...
+    most : how many different cutters it may have
+    catalogue : that it chose from
+    divided : its patches; None: no so many cutters mill all that can be reached
+    area : of the contact points that it reaches [mm^2], once
+    """
+
+    name: str
+    most: int
+    catalogue: Catalogue
+    divided: Divided | None
+    area: float
+
+    def cutter(self, patch: Patch) -> CatalogueCutter:
+        """The cutter of a patch."""
+        return self.catalogue.cutters[patch.cutter]
+
+
+@dataclass(frozen=True, eq=False)
 class Milled:
     """A whole run.
 
@@ -131,6 +160,7 @@ class Milled:
     impeller, catalogue, machine : what is milled, with what, where
     surfaces : in their order
     one : the largest cutter for all surfaces at one table angle, and the index of that; None: there is none
+    ways : the cutter picked by hand where one is stated, then one cutter, two, ...
     settings : keys of the operation, as stated
     outer_diameter : as stated [mm]
     provenance : JSON values: hashes of the inputs, versions
@@ -142,9 +172,32 @@ class Milled:
     machine: Machine
     surfaces: tuple[Searched, ...]
     one: tuple[CatalogueCutter, int] | None
+    ways: tuple[Way, ...]
     settings: Mapping[str, Any]
     outer_diameter: float
     provenance: Mapping[str, Any]
+
+    @property
+    def picked(self) -> Way | None:
+        """The way of the cutter picked by hand."""
+        return next((way for way in self.ways if way.name == PICKED), None)
+
+    @property
+    def used(self) -> Way | None:
+        """The way with the least time; of equal ones that with fewer cutters. None: nothing mills all."""
+        able = [way for way in self.ways if way.name != PICKED and way.divided is not None]
+        return min(able, key=lambda way: way.divided.total if way.divided else math.inf, default=None)
+
+    @property
+    def area(self) -> float:
+        """Of all surfaces [mm^2], one channel."""
+        return float(sum(op.surface.area.sum() for op in self.surfaces))
+
+    def searched(self, patch: Patch) -> Searched:
+        """The surface of a patch."""
+        return next(
+            op for op in self.surfaces if (BODIES.index(op.surface.body), op.surface.side) == (patch.body, patch.side)
+        )
 
 
 def said(op: Searched, missed: Unreachable) -> str:
@@ -169,13 +222,28 @@ def failures(op: Searched) -> tuple[str, ...]:
     return tuple(out)
 
 
+def unmilled(milled: Milled) -> tuple[str, ...]:
+    """What the patches leave open."""
+    if milled.used is None:
+        most = max((way.most for way in milled.ways), default=0)
+        return (f"no {most} cutters of the catalogue mill all that can be reached",)
+    divided = milled.used.divided
+    untold = divided.untold if divided else 0
+    return (f"{untold} ranges of pallet angles had too many arcs to tell: they count as closed",) if untold else ()
+
+
 def verdict(milled: Milled) -> tuple[bool, str]:
     """Whether everything holds, and one sentence that says it."""
-    bad = [(op, f) for op in milled.surfaces for f in failures(op)]
+    bad = fails(milled)
     if bad:
         more = f"; and {len(bad) - 1} more" if len(bad) > 1 else ""
-        return False, f"Does not hold: {bad[0][0].surface.name}: {bad[0][1]}{more}."
+        return False, f"Does not hold: {bad[0]}{more}."
     return True, f"Every contact point is reached and its largest cutter proved; {for_all(milled)}."
+
+
+def fails(milled: Milled) -> tuple[str, ...]:
+    """All that does not hold."""
+    return (*(f"{op.surface.name}: {f}" for op in milled.surfaces for f in failures(op)), *unmilled(milled))
 
 
 def for_all(milled: Milled) -> str:

@@ -12,7 +12,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.report.impeller.outcome import Milled, Searched, failures, said, verdict
+from chipload.planning.sectional.patch import Patch
+from chipload.report.impeller.outcome import Milled, Searched, Way, fails, failures, said, verdict
 
 
 def summary_bytes(milled: Milled) -> bytes:
@@ -38,17 +39,63 @@ def summary_bytes(milled: Milled) -> bytes:
 def operation(milled: Milled) -> dict[str, Any]:
     """All surfaces together, then each."""
     rows = [surface(op) for op in milled.surfaces]
-    fails = [f"{op.surface.name}: {f}" for op in milled.surfaces for f in failures(op)]
+    used, picked = milled.used, milled.picked
     return {
         "kind": "sectional",
-        "holds": not fails,
-        "fails": fails,
+        "holds": not fails(milled),
+        "fails": list(fails(milled)),
         **_one(milled.surfaces[0], milled.one),
         **{key: sum(row[key] for row in rows) for key in ("cc_points", "check_points", "unreachable", "search_s")},
         "certified": all(row["certified"] for row in rows),
+        **(way_of(milled, used) if used is not None else {}),
+        "hand_picked": None if picked is None else _picked(milled, picked),
+        "ways": [way_of(milled, way) for way in milled.ways],
         "surfaces": rows,
         "settings": {k: list(v) if isinstance(v, tuple) else v for k, v in milled.settings.items()},
     }
+
+
+def way_of(milled: Milled, way: Way) -> dict[str, Any]:
+    """A way to mill all surfaces; path and time are of all channels."""
+    d = way.divided
+    head = {"way": way.name, "reached_share": way.area / milled.area}
+    if d is None:
+        return head | {"patches": None, "path_mm": None, "time_min": None}
+    return head | {
+        "cutters": [_size(way.catalogue.cutters[k]) for k in d.cutters],
+        "path_mm": d.path,
+        "time_min": d.total / 60.0,
+        "milling_min": d.milling / 60.0,
+        "cutter_changes": d.cutter_changes,
+        "table_changes": d.table_changes,
+        "least_time_min": d.bound / 60.0,
+        "gap": d.gap,
+        "patches": [_patch(milled, way, p) for p in d.patches],
+    }
+
+
+def _patch(milled: Milled, way: Way, patch: Patch) -> dict[str, Any]:
+    return {
+        "surface": milled.searched(patch).surface.name,
+        **_size(way.cutter(patch)),
+        "table_deg": _degrees(patch.table),
+        "across": patch.order,
+        "from": patch.low,
+        "to": patch.high,
+        "part": list(patch.part),
+        "cc_points": len(patch.at),
+        "area_share": patch.area / milled.area,
+        "path_mm": patch.path,
+        "time_min": patch.time / 60.0,
+    }
+
+
+def _picked(milled: Milled, way: Way) -> dict[str, Any]:
+    return {**_size(way.catalogue.cutters[0]), **way_of(milled, way)}
+
+
+def _size(cutter: CatalogueCutter) -> dict[str, float]:
+    return {"diameter_mm": cutter.diameter, "corner_radius_mm": cutter.corner_radius}
 
 
 def _one(op: Searched, one: tuple[CatalogueCutter, int] | None) -> dict[str, Any]:
