@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from chipload.errors import InputError
 from chipload.planning.sectional import assignment
-from chipload.planning.sectional.assignment import Changes, assigned, least_time
+from chipload.planning.sectional.assignment import Changes, assigned, bound_of_cells, bound_of_strips
 
 
 def random_sides(seed, shape, sides, closed):
@@ -68,7 +68,7 @@ def brute(sides, changes, most):
     return best
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     seed=st.integers(0, 10**6), cutter=st.floats(0.0, 6.0), table=st.floats(0.0, 6.0),
     most=st.sampled_from([1, 2, None]), closed=st.sampled_from([0.0, 0.3, 0.5]),
@@ -110,7 +110,8 @@ def check(found, sides, changes, most):
     assert price(run, changes) == pytest.approx(found.total, rel=1e-12)
     if most is not None:
         assert len({s.cutter for s in found.steps}) <= most
-    assert least_time(sides, changes, most) <= found.total + 1e-9
+    bounds = bound_of_cells(sides, changes, most), bound_of_strips(sides, changes, most), found.total + 1e-9
+    assert list(bounds) == sorted(bounds)
 
 
 def test_more_cutters_are_not_slower():

@@ -26,6 +26,7 @@ from chipload.planning.sectional.scene import Floats
 
 #: most sets of cutters that are looked at
 SETS = 300_000
+_BATCH = 512  # sets that are looked at together
 
 
 @dataclass(frozen=True)
@@ -92,19 +93,31 @@ def assigned(sides: Sequence[tuple[Floats, Floats]], changes: Changes, most: int
     count = sides[0][0].shape[2]
     if most is None:
         return _solved(sides, np.arange(count), changes)
-    best: Assignment | None = None
-    for bound, chosen in _sets(sides, changes, most):
-        if best is not None and bound >= best.total:
+    bounds, sets = _sets(sides, changes, most)
+    best, who = math.inf, -1
+    for first in range(0, len(sets), _BATCH):
+        if bounds[first] >= best:
             break
-        found = _solved(sides, chosen, changes)
-        if found is not None and (best is None or found.total < best.total):
-            best = found
-    return best
+        totals = _totals(sides, sets[first : first + _BATCH], changes)
+        if totals.min() < best:
+            best, who = float(totals.min()), first + int(totals.argmin())
+    return None if who < 0 else _solved(sides, np.unique(sets[who]), changes)
 
 
-def least_time(sides: Sequence[tuple[Floats, Floats]], changes: Changes, most: int | None = None) -> float:
-    """A bound [s] below the time of patches of any shape: each cell its own best of at most ``most`` cutters, either
-    way of the paths, table angles for nothing, one change for each cutter after the first.
+def bound_of_strips(sides: Sequence[tuple[Floats, Floats]], changes: Changes, most: int | None = None) -> float:
+    """No time [s] is below this in whatever sequence the strips are milled: each strip its own best of at most ``most``
+    cutters, each side in its better order, table angles for nothing, one change for each cutter after the first.
+    """  # fmt: skip
+    if most is None:
+        whole = np.arange(sides[0][0].shape[2])[None]
+        return float(_bounds(sides, whole)[0])
+    bounds, _ = _sets(sides, changes, most)
+    return float(bounds[0]) if len(bounds) else math.inf
+
+
+def bound_of_cells(sides: Sequence[tuple[Floats, Floats]], changes: Changes, most: int | None = None) -> float:
+    """No time [s] is below this whatever the shape of the patches: as :func:`bound_of_strips`, with each cell its own
+    best, either way of the paths.
     """  # fmt: skip
     best = [np.minimum(u, v.swapaxes(0, 1)).min(axis=3).reshape(-1, u.shape[2]) for u, v in sides]
     cells = np.concatenate(best)
@@ -112,9 +125,8 @@ def least_time(sides: Sequence[tuple[Floats, Floats]], changes: Changes, most: i
         return float(cells.min(axis=1).sum())
     low = math.inf
     for sets, size in _choices(np.flatnonzero(np.isfinite(cells).any(axis=0)), most):
-        # long tables in pieces
-        for first in range(0, len(sets), 4096):
-            some = cells[:, sets[first : first + 4096]].min(axis=2).sum(axis=0)
+        for first in range(0, len(sets), _BATCH):
+            some = cells[:, sets[first : first + _BATCH]].min(axis=2).sum(axis=0)
             low = min(low, float(some.min()) + (size - 1) * changes.cutter)
     return low
 
@@ -168,10 +180,7 @@ def _side(number: int, orders: list[Floats]) -> _Node:
 def _forward(node: _Node, before: Floats, changes: Changes) -> tuple[Floats, object]:
     """Least times (cutters, tables) after a node, and what is needed to go back."""
     if isinstance(node, _Leaf):
-        entered = np.minimum(before, before.min(axis=1, keepdims=True) + changes.table)
-        entered = np.minimum(entered, before.min(axis=0, keepdims=True) + changes.cutter)
-        entered = np.minimum(entered, before.min() + changes.cutter + changes.table)
-        return entered + node.cost, before
+        return _entered(before, changes) + node.cost, before
     records = []
     if isinstance(node, _Row):
         for part in node.parts:
@@ -217,26 +226,74 @@ def _choices(usable: NDArray[np.int64], most: int) -> list[tuple[NDArray[np.int6
     return [(np.array(list(combinations(usable.tolist(), size))), size) for size in sizes]
 
 
-def _sets(sides: Sequence[tuple[Floats, Floats]], changes: Changes, most: int) -> list[tuple[float, NDArray[np.int64]]]:
-    """Sets of cutters that can mill all cells, with bounds below their times, ascending."""
-    tables = [[cost.min(axis=3) for cost in side] for side in sides]
-    strips = [[cost.sum(axis=1).min(axis=2) for cost in side] for side in sides]
-    usable = np.flatnonzero(np.any([np.isfinite(side[0]).any(axis=(0, 1)) for side in tables], axis=0))
-    out: list[tuple[float, NDArray[np.int64]]] = []
+def _sets(sides: Sequence[tuple[Floats, Floats]], changes: Changes, most: int) -> tuple[Floats, NDArray[np.int64]]:
+    """Bounds below the times of sets of cutters that can mill all cells, ascending; the sets (n, most), the last cutter
+    again and again where there are fewer.
+    """  # fmt: skip
+    usable = np.flatnonzero(np.any([np.isfinite(u).any(axis=(0, 1, 3)) for u, _ in sides], axis=0))
+    rows, low = [], []
     for sets, size in _choices(usable, most):
-        bound = np.full(len(sets), (size - 1) * changes.cutter)
-        for cells, whole in zip(tables, strips, strict=True):
-            ways = []
-            for cell, strip in zip(cells, whole, strict=True):
-                low = np.zeros(len(sets))
-                for k in range(len(strip)):
-                    best = strip[k][sets].min(axis=1)
-                    split = ~np.isfinite(best)
+        rows.append(np.concatenate([sets, np.repeat(sets[:, -1:], most - size, axis=1)], axis=1))
+        low.append(_bounds(sides, sets) + (size - 1) * changes.cutter)
+    if not rows:
+        return np.zeros(0), np.zeros((0, most), dtype=np.int64)
+    bound, all_sets = np.concatenate(low), np.concatenate(rows)
+    order = np.argsort(bound, kind="stable")
+    order = order[np.isfinite(bound[order])]
+    return bound[order], all_sets[order]
+
+
+def _bounds(sides: Sequence[tuple[Floats, Floats]], sets: NDArray[np.int64]) -> Floats:
+    """(n,) strips without changes."""
+    out = np.zeros(len(sets))
+    for side in sides:
+        ways = []
+        for cost in side:
+            strips, cells = cost.sum(axis=1).min(axis=2), cost.min(axis=3)
+            low = np.zeros(len(sets))
+            for strip, cell in zip(strips, cells, strict=True):
+                best = strip[sets].min(axis=1)
+                split = ~np.isfinite(best)
+                if split.any():
+                    best[split] = cell[:, sets[split]].min(axis=2).sum(axis=0)
+                low += best
+            ways.append(low)
+        out += np.minimum(*ways)
+    return out
+
+
+def _totals(sides: Sequence[tuple[Floats, Floats]], sets: NDArray[np.int64], changes: Changes) -> Floats:
+    """(n,) the least times of many sets, as :func:`_solved` without the way; inf: cells are left."""
+    state = np.zeros((*sets.shape, sides[0][0].shape[3]))
+    for side in sides:
+        ways = []
+        for cost in side:
+            of_sets = cost[:, :, sets]
+            for forth in (1, -1):
+                after = state
+                for cells in of_sets[::forth]:
+                    whole = cells.sum(axis=0)
+                    through = _entered(after, changes) + whole
+                    split = ~np.isfinite(whole).any(axis=(1, 2))
                     if split.any():
-                        best[split] = cell[k][:, sets[split]].min(axis=2).sum(axis=0)
-                    low += best
-                ways.append(low)
-            bound += np.minimum(*ways)
-        goes = np.isfinite(bound)
-        out += list(zip(bound[goes].tolist(), sets[goes], strict=True))
-    return sorted(out, key=lambda pair: pair[0])
+                        both = []
+                        for way in (1, -1):
+                            part = after[split]
+                            for cell in cells[::way, split]:
+                                part = _entered(part, changes) + cell
+                            both.append(part)
+                        through[split] = np.minimum(*both)
+                    after = through
+                ways.append(after)
+        state = np.minimum.reduce(ways)
+    out: Floats = state.min(axis=(1, 2))
+    return out
+
+
+def _entered(before: Floats, changes: Changes) -> Floats:
+    """Least times (..., cutters, tables) when each state may be come to from every other."""
+    table, cutter = before.min(axis=-1, keepdims=True), before.min(axis=-2, keepdims=True)
+    out = np.minimum(before, table + changes.table)
+    out = np.minimum(out, cutter + changes.cutter)
+    least: Floats = np.minimum(out, table.min(axis=-2, keepdims=True) + changes.cutter + changes.table)
+    return least

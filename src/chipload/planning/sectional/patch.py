@@ -25,8 +25,9 @@ class Patch:
     table : alpha [rad]
     at : (k, 2) u and v of its contact points
     ranges : for each contact point (m, 2) valid pallet angles [rad]; m = 0: unreachable with every cutter
-    path, time : predicted [mm], [s]
-    area : [mm2]
+    path, time : predicted, of one such side [mm], [s]
+    area : that is milled [mm2]
+    part : range of the other parameter; not 0..1 where no cutter at one table angle mills a whole strip
     """
 
     body: int
@@ -41,3 +42,4 @@ class Patch:
     path: float
     time: float
     area: float
+    part: tuple[float, float] = (0.0, 1.0)

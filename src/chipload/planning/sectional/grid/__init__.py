@@ -1,0 +1,1 @@
+"""The largest cutter at each of given pallet angles."""
