@@ -140,6 +140,7 @@ def test_a_catalogue_of_which_nothing_fits(formula):
         'name = "large"\ncutter = [{ diameter_mm = 70.0, corner_radius_mm = 2.0 }]\n'
     )
     changed(formula, 'name = "wu2019"', 'file = "large.toml"')
+    changed(formula, "diameter_mm = 14.0, corner_radius_mm = 1.5", "diameter_mm = 70.0, corner_radius_mm = 2.0")
     sets = ["surface.0.points=[2, 2]", "surface.0.along=[0.2, 0.4]", "surface.0.up=[0.3, 0.5]"]
     text = refused(formula, *sets, call=run)
     head = "surface.0: no cutter of catalogue large fits anywhere: contact point 0 at ("
@@ -149,3 +150,10 @@ def test_a_catalogue_of_which_nothing_fits(formula):
     assert np.hypot(*map(float, place.split(", ")[:2])) > 45.88
     # with the paper's catalogue D 36 to 40 go there, see the map of the example
     assert 34.0 < float(said.split()[0]) < 42.0
+
+
+def test_a_cutter_picked_by_hand_that_is_not_in_the_catalogue(formula):
+    changed(formula, "diameter_mm = 14.0, corner_radius_mm = 1.5", "diameter_mm = 15.0, corner_radius_mm = 1.5")
+    assert refused(formula) == (
+        "operation.0.hand_picked: D 15 r 1.5 mm is not in catalogue wu2019: the nearest is D 14 r 1.5 mm"
+    )

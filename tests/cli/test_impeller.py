@@ -18,7 +18,11 @@ from chipload.planning.sectional.closed import axis_at, contact_limit
 
 EXAMPLES = Path(examples.__file__).parent
 #: fewer points than the example's, so that it is quick
-FEW = [f"surface.{k}.points=[6, 4]" for k in range(3)] + ["operation.0.check_mm=5", "surface.2.up=[0.05, 0.75]"]
+FEW = [f"surface.{k}.points=[6, 4]" for k in range(3)] + [
+    "operation.0.check_mm=5",
+    "operation.0.most_cutters=2",
+    "surface.2.up=[0.05, 0.75]",
+]
 GRID = np.radians(np.arange(0.0, 360.0, 1.0))
 
 
@@ -131,6 +135,43 @@ def test_the_one_cutter_and_the_next(summary, proof):
                 n_k = T @ data["normal"][x["cc_point"]]
                 for one in T[(n_k >= 0.0) & (n_k < 1.0 - 1e-9)]:
                     assert not goes(data, x["cc_point"], following[0], 2.0, one)
+
+
+def test_patches_cover_what_is_reached_and_are_clear(summary, proof):
+    (op,) = summary["operations"]
+    names = [s["surface"] for s in op["surfaces"]]
+    total = sum(s["area_mm2"] for s in op["surfaces"])
+    reached = sum(p["area_share"] * s["area_mm2"] for s in op["surfaces"] for p in s["pointwise"]) / total
+    for way in (w for w in op["ways"] if w["way"] != "hand-picked"):
+        assert sum(p["area_share"] for p in way["patches"]) == pytest.approx(reached, abs=1e-9)
+        assert way["reached_share"] == pytest.approx(reached, abs=1e-9)
+    for way in op["ways"]:
+        path = sum(p["path_mm"] for p in way["patches"])
+        # of the job: 11 channels, 100 mm/min, 60 s and 300 s a change
+        assert way["path_mm"] == pytest.approx(11 * path)
+        changes = way["cutter_changes"] + 5 * way["table_changes"]
+        assert way["time_min"] == pytest.approx(11 * path / 100.0 + changes)
+        assert way["least_time_min"] <= way["time_min"] + 1e-9
+        assert way["gap"] == pytest.approx(way["time_min"] / way["least_time_min"] - 1.0)
+    times = [w["time_min"] for w in op["ways"][1:]]
+    assert times == sorted(times, reverse=True)
+    assert (op["time_min"], op["way"]) == (min(times), op["ways"][1 + times.index(min(times))]["way"])
+    assert op["hand_picked"]["diameter_mm"] == 14.0
+    assert op["hand_picked"]["patches"] == op["ways"][0]["patches"]
+    points = {(s["surface"], u["cc_point"]) for s in op["surfaces"] for u in s["unreachable_points"]}
+    for patch in op["patches"]:
+        n = names.index(patch["surface"])
+        grid = np.linspace(*op["surfaces"][n]["where"]["along"], 6), np.linspace(*op["surfaces"][n]["where"]["up"], 4)
+        x = np.repeat(grid[0], 4) if patch["across"] == "u" else np.tile(grid[1], 6)
+        y = np.tile(grid[1], 6) if patch["across"] == "u" else np.repeat(grid[0], 4)
+        low, high = patch["part"]
+        inside = (x >= patch["from"]) & (x <= patch["to"]) & (y >= low) & (y <= high)
+        assert inside.sum() == patch["cc_points"]
+        T = axis_at(math.radians(patch["table_deg"]), GRID)
+        for k in np.flatnonzero(inside)[::5]:
+            if (patch["surface"], int(k)) not in points:
+                facing = T[((T @ proof[n]["normal"][k]) >= 0.0) & (T @ proof[n]["normal"][k] < 1.0 - 1e-9)]
+                assert any(goes(proof[n], k, patch["diameter_mm"], patch["corner_radius_mm"], one) for one in facing)
 
 
 def test_the_scene_has_the_surfaces(result):

@@ -20,15 +20,15 @@ from chipload.job.impeller import SectionsTable, ShapeTable
 from chipload.job.tables import Table
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.sectional.answer import Answer, largest_cutters, one_cutter, one_cutter_of
+from chipload.planning.sectional.compare import Compared, compared
 from chipload.planning.sectional.costs import Side, Terms
 from chipload.planning.sectional.impeller import Impeller
 from chipload.planning.sectional.missed import with_fits
 from chipload.planning.sectional.parametric import Shape, impeller_of
-from chipload.planning.sectional.patches import costs_of, divided
 from chipload.planning.sectional.surfaces import BODIES, Sampled, Surface, surface_of
 from chipload.planning.sectional.tables import IndexTable, index_table
 from chipload.progress import Progress, silent
-from chipload.report.impeller.outcome import PICKED, Milled, OneCutter, Searched, Way, said
+from chipload.report.impeller.outcome import Milled, OneCutter, Searched, said
 from chipload.run.provenance import hashes, title_of, versions
 from chipload.units import mm_s_from_mm_min
 
@@ -118,32 +118,16 @@ def _searched(
 
 def _ways(
     job: ImpellerJob, done: Sequence[Searched], catalogue: Catalogue, impeller: Impeller, progress: Progress
-) -> tuple[Way, ...]:
+) -> tuple[Compared, ...]:
     """The cutter picked by hand where one is stated, then one cutter, two, ..."""
     op = job.operation
     terms = Terms(
         mm_s_from_mm_min(op.feed_mm_min), op.scallop_mm, op.cutter_change_s, op.table_change_s, impeller.blades
     )
-    out = []
     picked = _picked(job, catalogue)
-    if picked is not None:
-        alone = Catalogue(picked.name or "picked by hand", (picked,))
-        answers = [
-            largest_cutters(
-                x.surface.scene, alone, x.table.angle, x.clearance, pallets=x.table.spans, workers=WORKERS,
-                progress=part_of(progress, k, 4 * len(done)),
-            )
-            for k, x in enumerate(done)
-        ]  # fmt: skip
-        costs = costs_of([_side(x, a) for x, a in zip(done, answers, strict=True)], terms, WORKERS)
-        reached = sum(float(x.surface.area[a.cutter >= 0].sum()) for x, a in zip(done, answers, strict=True))
-        out.append(Way(PICKED, 1, alone, divided(costs, 1, WORKERS), reached))
-    costs = costs_of([_side(x, x.answer) for x in done], terms, WORKERS)
-    reached = sum(float(x.surface.area[x.answer.cutter >= 0].sum()) for x in done)
-    for most in range(1, op.most_cutters + 1):
-        found = divided(costs, most, WORKERS, part_of(progress, most, 1 + op.most_cutters))
-        out.append(Way(f"{most} cutter{'s' if most > 1 else ''}", most, catalogue, found, reached))
-    return tuple(out)
+    index = None if picked is None else catalogue.cutters.index(picked)
+    sides = [_side(x, x.answer) for x in done]
+    return compared(sides, terms, index, range(1, op.most_cutters + 1), WORKERS, progress)
 
 
 def _side(op: Searched, answer: Answer) -> Side:

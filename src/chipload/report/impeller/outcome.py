@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.machine.machine import Machine
 from chipload.planning.sectional.answer import Answer, Unreachable
+from chipload.planning.sectional.compare import Compared
 from chipload.planning.sectional.impeller import Impeller
 from chipload.planning.sectional.patch import Patch
-from chipload.planning.sectional.patches import Divided
 from chipload.planning.sectional.surfaces import BODIES, Surface
 from chipload.planning.sectional.tables import IndexTable
 
@@ -127,30 +127,6 @@ class Limiting:
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
-    """One way to mill all surfaces.
-
-    Parameters
-    ----------
-    name : `hand-picked`, `1 cutter`, ...
-    most : how many different cutters it may have
-    catalogue : that it chose from
-    divided : its patches; None: no so many cutters mill all that can be reached
-    area : of the contact points that it reaches [mm^2], once
-    """
-
-    name: str
-    most: int
-    catalogue: Catalogue
-    divided: Divided | None
-    area: float
-
-    def cutter(self, patch: Patch) -> CatalogueCutter:
-        """The cutter of a patch."""
-        return self.catalogue.cutters[patch.cutter]
-
-
-@dataclass(frozen=True, eq=False)
 class Milled:
     """A whole run.
 
@@ -172,18 +148,18 @@ class Milled:
     machine: Machine
     surfaces: tuple[Searched, ...]
     one: tuple[CatalogueCutter, int] | None
-    ways: tuple[Way, ...]
+    ways: tuple[Compared, ...]
     settings: Mapping[str, Any]
     outer_diameter: float
     provenance: Mapping[str, Any]
 
     @property
-    def picked(self) -> Way | None:
+    def picked(self) -> Compared | None:
         """The way of the cutter picked by hand."""
         return next((way for way in self.ways if way.name == PICKED), None)
 
     @property
-    def used(self) -> Way | None:
+    def used(self) -> Compared | None:
         """The way with the least time; of equal ones that with fewer cutters. None: nothing mills all."""
         able = [way for way in self.ways if way.name != PICKED and way.divided is not None]
         return min(able, key=lambda way: way.divided.total if way.divided else math.inf, default=None)
@@ -225,8 +201,7 @@ def failures(op: Searched) -> tuple[str, ...]:
 def unmilled(milled: Milled) -> tuple[str, ...]:
     """What the patches leave open."""
     if milled.used is None:
-        most = max((way.most for way in milled.ways), default=0)
-        return (f"no {most} cutters of the catalogue mill all that can be reached",)
+        return (f"not {milled.ways[-1].name} of the catalogue mill all that can be reached",)
     divided = milled.used.divided
     untold = divided.untold if divided else 0
     return (f"{untold} ranges of pallet angles had too many arcs to tell: they count as closed",) if untold else ()

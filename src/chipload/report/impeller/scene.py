@@ -11,8 +11,9 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from chipload.planning.sectional.compare import Compared
 from chipload.report.impeller.mesh import OFF, body_meshes, surface_mesh
-from chipload.report.impeller.outcome import Milled, Searched, Way
+from chipload.report.impeller.outcome import Milled, Searched
 from chipload.report.impeller.ways import patch_grid, shade_of
 from chipload.report.scene import engagement_colours
 
@@ -41,7 +42,7 @@ def scene_bytes(milled: Milled) -> bytes:
     return glb
 
 
-def _patches(milled: Milled, way: Way, op: Searched) -> NDArray[np.uint8]:
+def _patches(milled: Milled, way: Compared, op: Searched) -> NDArray[np.uint8]:
     """(c, 4) colours of the contact points by patch."""
     grid = patch_grid(milled, way, op).ravel()
     out = np.tile(np.array(MISSED, dtype=np.uint8), (len(grid), 1))

@@ -12,8 +12,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from chipload.cutter.catalogue import CatalogueCutter
+from chipload.planning.sectional.compare import Compared
 from chipload.planning.sectional.patch import Patch
-from chipload.report.impeller.outcome import Milled, Searched, Way, fails, failures, said, verdict
+from chipload.report.impeller.outcome import Milled, Searched, fails, failures, said, verdict
 
 
 def summary_bytes(milled: Milled) -> bytes:
@@ -55,10 +56,10 @@ def operation(milled: Milled) -> dict[str, Any]:
     }
 
 
-def way_of(milled: Milled, way: Way) -> dict[str, Any]:
+def way_of(milled: Milled, way: Compared) -> dict[str, Any]:
     """A way to mill all surfaces; path and time are of all channels."""
     d = way.divided
-    head = {"way": way.name, "reached_share": way.area / milled.area}
+    head = {"way": way.name, "reached_share": way.share}
     if d is None:
         return head | {"patches": None, "path_mm": None, "time_min": None}
     return head | {
@@ -74,10 +75,10 @@ def way_of(milled: Milled, way: Way) -> dict[str, Any]:
     }
 
 
-def _patch(milled: Milled, way: Way, patch: Patch) -> dict[str, Any]:
+def _patch(milled: Milled, way: Compared, patch: Patch) -> dict[str, Any]:
     return {
         "surface": milled.searched(patch).surface.name,
-        **_size(way.cutter(patch)),
+        **_size(way.catalogue.cutters[patch.cutter]),
         "table_deg": _degrees(patch.table),
         "across": patch.order,
         "from": patch.low,
@@ -90,7 +91,7 @@ def _patch(milled: Milled, way: Way, patch: Patch) -> dict[str, Any]:
     }
 
 
-def _picked(milled: Milled, way: Way) -> dict[str, Any]:
+def _picked(milled: Milled, way: Compared) -> dict[str, Any]:
     return {**_size(way.catalogue.cutters[0]), **way_of(milled, way)}
 
 

@@ -8,10 +8,11 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
+from chipload.planning.sectional.compare import Compared
 from chipload.planning.sectional.patch import Patch
 from chipload.report.figures import FONT, GRID
 from chipload.report.impeller.figures import styled
-from chipload.report.impeller.outcome import PICKED, Milled, Searched, Way
+from chipload.report.impeller.outcome import PICKED, Milled, Searched
 from chipload.report.sheet import figure, table
 
 Ints = NDArray[np.int64]
@@ -67,8 +68,9 @@ def _compared(milled: Milled) -> str:
             less = [f"{100.0 * (a / b - 1.0):+.1f}" for a, b in ((d.path, base.path), (d.total, base.total))]
         rows.append(
             [
-                name, cutters, f"{100.0 * way.area / milled.area:.4g}", f"{d.path:.0f}", less[0], f"{d.total / 60.0:.1f}",
-                less[1], f"{d.cutter_changes} + {d.table_changes}", f"{d.bound / 60.0:.1f}", f"{100.0 * d.gap:.1f}",
+                name, cutters, f"{100.0 * way.share:.4g}", f"{d.path:.0f}", less[0],
+                f"{d.total / 60.0:.1f}", less[1], f"{d.cutter_changes} + {d.table_changes}", f"{d.bound / 60.0:.1f}",
+                f"{100.0 * d.gap:.1f}",
             ]
         )  # fmt: skip
     head = ["way", "cutters [mm]", "reached [%]", "path [mm]", "[%]", "time [min]", "[%]", "changes of cutter + table"]
@@ -105,7 +107,7 @@ def ways_figure(milled: Milled) -> go.Figure:
     return out
 
 
-def patch_grid(milled: Milled, way: Way, op: Searched) -> Ints:
+def patch_grid(milled: Milled, way: Compared, op: Searched) -> Ints:
     """(a, b) number of the patch of each contact point of a surface; -1: none."""
     out = np.full(op.surface.shape, -1, dtype=np.int64)
     for n, p in enumerate(way.divided.patches if way.divided is not None else ()):
@@ -117,7 +119,7 @@ def patch_grid(milled: Milled, way: Way, op: Searched) -> Ints:
     return out
 
 
-def shade_of(way: Way, patch: Patch) -> tuple[int, int, int]:
+def shade_of(way: Compared, patch: Patch) -> tuple[int, int, int]:
     """A colour by cutter, its shade by table angle."""
     d = way.divided
     assert d is not None
@@ -129,7 +131,7 @@ def shade_of(way: Way, patch: Patch) -> tuple[int, int, int]:
     return r, g, b
 
 
-def patch_figure(milled: Milled, way: Way, op: Searched) -> go.Figure:
+def patch_figure(milled: Milled, way: Compared, op: Searched) -> go.Figure:
     """Patches of a surface, unrolled; a colour a cutter, its shade a table angle."""
     grid = patch_grid(milled, way, op)
     numbers = [int(n) for n in np.unique(grid) if n >= 0]
@@ -164,6 +166,6 @@ def patch_figure(milled: Milled, way: Way, op: Searched) -> go.Figure:
     return out
 
 
-def _size(way: Way, patch: Patch) -> str:
-    c = way.cutter(patch)
+def _size(way: Compared, patch: Patch) -> str:
+    c = way.catalogue.cutters[patch.cutter]
     return f"D {c.diameter:g} r {c.corner_radius:g}"
