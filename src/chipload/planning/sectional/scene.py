@@ -48,8 +48,10 @@ class Scene:
     check: Floats
     check_surface: Ints
     near: float
+    known: Tree | None = field(default=None, repr=False)
     tree: Tree = field(init=False, repr=False)
     rows: Floats = field(init=False, repr=False)
+    ordered: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         c, m = len(self.contact), len(self.check)
@@ -75,8 +77,14 @@ class Scene:
             raise InputError(f"scene.normal of contact point {int(wrong.argmax())}: must be a unit vector")
         if not 0.0 <= self.near < np.inf:
             raise InputError(f"scene.near_mm = {self.near:g}: must be at least 0")
-        object.__setattr__(self, "tree", tree_of(self.check))
+        object.__setattr__(self, "tree", tree_of(self.check) if self.known is None else self.known)
         object.__setattr__(self, "rows", self._rows())
+        object.__setattr__(self, "ordered", np.ascontiguousarray(self.check[self.tree.order]))
+
+    def milled_at(self, contact: Floats, normal: Floats, curvature: Floats, surface: int) -> Scene:
+        """The same check points with other contact points, all on one surface."""
+        number = np.full(len(contact), surface, dtype=np.int64)
+        return Scene(contact, normal, curvature, number, self.check, self.check_surface, self.near, self.tree)
 
     def _rows(self) -> Floats:
         """(c, 16): S, N, tangents E1, E2, K in them, the surface."""

@@ -1,0 +1,1 @@
+"""How far a whole cutter stands from the check points."""

@@ -1,0 +1,104 @@
+"""Surfaces that are milled as patches with parameters: sides as they are, the floor and layers above it by fitting.
+
+Notation: u along the hub from inlet to outlet, v across a channel from the plus side of a body to the next body round,
+both 0..1, as the contact points of ``surfaces.py``. A layer lies at the share w of the way from the hub, less an
+allowance, to the shroud; it may go on beyond the outlet, straight in its meridional plane.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+
+from chipload.geometry.bspline import Patch, through
+from chipload.planning.sectional.impeller import Impeller
+from chipload.planning.sectional.scene import Floats
+from chipload.planning.sectional.surfaces import BODIES, hub_range
+
+_ALONG, _ACROSS = 81, 17  # points that a floor or a layer is fitted through
+
+
+def patch_of(impeller: Impeller, body: str, side: str, ahead: float = 0.0) -> Patch:
+    """The surface of :func:`surface_of` with the same u and v.
+
+    Parameters
+    ----------
+    ahead : how far the hub goes on ahead of the blade's leading edge [mm]
+    """
+    index = BODIES.index(body)
+    if side != "floor":
+        blade = impeller.body(index)
+        return blade.plus if side == "plus" else blade.minus
+    low, high = hub_range(impeller, ahead)
+    u, v = np.linspace(0.0, 1.0, _ALONG), np.linspace(0.0, 1.0, _ACROSS)
+    s = low + u * (high - low)
+    theta = impeller.across(index, s, v)
+    return _fitted(impeller.hub.curve(s), theta, u, v)
+
+
+def layer_of(
+    impeller: Impeller, index: int, share: float, allowance: float, ahead: float = 0.0, beyond: float = 0.0
+) -> Patch:
+    """The layer of the channel on the plus side of a body at the ``share`` w.
+
+    Parameters
+    ----------
+    allowance : between the hub and the layer w = 0 [mm]
+    beyond : how far the layer goes on beyond the outlet [mm]
+    """
+    low, high = hub_range(impeller, ahead)
+    u, v = np.linspace(0.0, 1.0, _ALONG), np.linspace(0.0, 1.0, _ACROSS)
+    s = low + u * (high - low)
+    m = meridian(impeller, s, share, allowance, (low, high))
+    theta = impeller.across(index, s, v)
+    shift = [_shift(impeller, index + k, w, s, m) for k, w in ((0, 1), (1, -1))]
+    theta = theta + shift[0][:, None] * (1.0 - v) + shift[1][:, None] * v
+    if beyond > 0.0:
+        out = m[-1] - m[-2]
+        rows = max(4, _ALONG // 8)
+        step = np.arange(1, rows + 1)[:, None] / rows * beyond
+        m = np.vstack([m, m[-1] + step * out / np.linalg.norm(out)])
+        theta = np.vstack([theta, np.repeat(theta[-1:], rows, axis=0)])
+        length = np.concatenate([[0.0], np.linalg.norm(np.diff(m, axis=0), axis=1).cumsum()])
+        u = length / length[-1]
+    return _fitted(m, theta, u, v)
+
+
+def meridian(impeller: Impeller, s: Floats, share: float, allowance: float, where: tuple[float, float]) -> Floats:
+    """(k, 2) r and z of a layer at places s of the hub, which goes from ``where`` to where."""
+    n = impeller.hub.normal(s, np.zeros(len(s)))
+    low = impeller.hub.curve(s) + allowance * n[:, [0, 2]]
+    tip = impeller.blade.plus.at([0.0, 1.0], 1.0)
+    a, b = impeller.shroud.nearest(np.hypot(tip[:, 0], tip[:, 1]), tip[:, 2])
+    high = impeller.shroud.curve(a + (s - where[0]) / (where[1] - where[0]) * (b - a))
+    out: Floats = low + share * (high - low)
+    return out
+
+
+def _shift(impeller: Impeller, index: int, side: int, s: Floats, m: Floats) -> Floats:
+    """How far round (k,) [rad] a side is from its foot at places (k, 2) of a layer above."""
+    body = impeller.body(index)
+    patch = body.plus if side > 0 else body.minus
+    u, v = (x.ravel() for x in np.meshgrid(np.linspace(0, 1, 61), np.linspace(0, 1, 21), indexing="ij"))
+    p = patch.at(u, v)
+    at = np.stack([np.hypot(p[:, 0], p[:, 1]), p[:, 2]], axis=-1)
+    foot = impeller.across(index if side > 0 else index - 1, s, np.array([0.0 if side > 0 else 1.0]))[:, 0]
+    theta = np.arctan2(p[:, 1], p[:, 0])
+    near = NearestNDInterpolator(at, theta)(m)
+    inside = LinearNDInterpolator(at, np.unwrap(theta.reshape(61, 21), axis=0).ravel())(m)
+    found = np.where(np.isfinite(inside), inside, near)
+    shift = np.angle(np.exp(1j * (found - foot)))
+    # ahead of a side and behind it as at its edge
+    ok = np.flatnonzero(np.isfinite(inside))
+    out: Floats = shift if not len(ok) else np.interp(np.arange(len(s)), ok, shift[ok])
+    return out
+
+
+def _fitted(m: Floats, theta: Floats, u: Floats, v: Floats) -> Patch:
+    """Patch through the meridional curve m (k, 2) at theta (k, l), its normal away from the axis and up."""
+    r = m[:, :1]
+    grid = np.stack([r * np.cos(theta), r * np.sin(theta), np.repeat(m[:, 1:], theta.shape[1], axis=1)], axis=-1)
+    patch = through(grid, u, v)
+    p, n = patch.at(0.5, 0.5)[0], patch.normal(0.5, 0.5)[0]
+    out = n @ np.array([p[0], p[1], 0.0]) / np.hypot(p[0], p[1]) + n[2]
+    return patch if out > 0.0 else through(grid, u, v, side=-1)

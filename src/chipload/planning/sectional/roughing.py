@@ -1,0 +1,163 @@
+"""Roughing of a channel between two bodies: layers from the shroud down to the hub, rows in each.
+
+Notation: a layer lies at the share w between the hub, with its allowance, and the shroud (``floor.py``); w falls from
+layer to layer so that none is thicker than the depth. In a layer the rows run along u, as far across as the cutter
+goes beside walls thicker by their allowance, no further apart than the step. Each begins beyond the outlet, in the air,
+and goes to the inlet: the cutter comes to a row from outside, never from above into the full.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.errors import InputError
+from chipload.geometry.bspline import Patch
+from chipload.planning.sectional.floor import layer_of, meridian
+from chipload.planning.sectional.impeller import Impeller
+from chipload.planning.sectional.lines import Lines, Missed, Motion, Tracks
+from chipload.planning.sectional.ranges.ranges import FULL
+from chipload.planning.sectional.scene import Floats, Scene
+from chipload.planning.sectional.surfaces import hub_range
+from chipload.planning.sectional.track import Track
+from chipload.progress import Progress, silent
+
+#: beyond the outlet a row begins so far from it, beside the cutter's diameter [mm]
+OUTSIDE = 2.0
+#: least stations of a row; how far within the border the outermost rows are, as a share of the width
+_FEWEST, _INSET = 17, 0.02
+
+
+@dataclass(frozen=True)
+class Rough:
+    """How a channel is roughed.
+
+    Parameters
+    ----------
+    depth : greatest thickness of a layer [mm]
+    step : greatest distance of rows [mm]
+    blades, hub : allowances [mm]
+    motion : what the rows are milled with
+    spacing : of the check points [mm]
+    around : bodies beyond the channel's two on either side that are checked
+    """
+
+    depth: float
+    step: float
+    blades: float
+    hub: float
+    motion: Motion
+    spacing: float = 1.5
+    around: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("depth", "step", "spacing"):
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise InputError(f"rough.{name}_mm = {value:g}: must be above 0")
+        if not (self.blades >= 0.0 and self.hub >= 0.0 and self.around >= 0):
+            raise InputError("rough: allowances and around must be at least 0")
+
+
+def layers(impeller: Impeller, depth: float, allowance: float, ahead: float = 0.0) -> Floats:
+    """Shares w of the layers, falling to 0, none thicker than ``depth`` [mm]."""
+    where = hub_range(impeller, ahead)
+    s = np.linspace(*where, 101)
+    low, high = (meridian(impeller, s, w, allowance, where) for w in (0.0, 1.0))
+    count = max(1, math.ceil(float(np.linalg.norm(high - low, axis=1).max()) / depth - 1e-9))
+    out: Floats = np.arange(count - 1, -1, -1) / count
+    return out
+
+
+def roughing(
+    impeller: Impeller,
+    index: int,
+    cutter: CatalogueCutter,
+    table: float,
+    how: Rough,
+    ahead: float = 0.0,
+    pallets: tuple[tuple[float, float], ...] = FULL,
+    workers: int = 1,
+    progress: Progress = silent,
+) -> tuple[Tracks, Scene]:
+    """Tracks of the channel on the plus side of a body, and the thickened walls that they keep clear of.
+
+    Parameters
+    ----------
+    index : 0 blade, 1 splitter
+    ahead : how far the hub goes on ahead of the leading edge [mm]
+    """
+    scene = thickened(impeller, index, how, ahead)
+    tracks: list[Track] = []
+    missed: list[Missed] = []
+    number = 0
+    shares = layers(impeller, how.depth, how.hub, ahead)
+    for k, w in enumerate(shares):
+        patch = layer_of(impeller, index, float(w), how.hub, ahead, cutter.diameter + OUTSIDE)
+        p = np.linspace(0.0, 1.0, max(_FEWEST, _counts(patch, how.step)[0]))
+        lines = Lines(patch, "u", p, scene, 2, cutter, table, how.motion, pallets, workers)
+        first, last = lines.border((0.0, 1.0)), lines.border((1.0, 0.0))
+        last = np.maximum(first, last)
+        count = max(1, math.ceil(_width(patch, p, first, last) / how.step))
+        before = np.full(len(p), np.nan)
+        for j in range(count + 1):
+            line = lines.line(first + (last - first) * (_INSET + (1.0 - 2.0 * _INSET) * j / count), before)
+            before = line.pallet
+            new, gone = lines.tracks(line, np.ones(len(p), dtype=np.bool_), number)
+            tracks += [t.back() for t in new[::-1]]
+            missed += gone
+            number += 1
+            progress((k + (j + 1) / (count + 1)) / len(shares), f"layer {k + 1} of {len(shares)}")
+    return Tracks(tuple(tracks), tuple(missed), number), scene
+
+
+def thickened(impeller: Impeller, index: int, how: Rough, ahead: float = 0.0) -> Scene:
+    """Check points of the channel's walls and those around, moved out by the allowances; the hub is surface 2."""
+    parts: list[Floats] = []
+    names: list[int] = []
+    for k in range(-how.around, 2 + how.around):
+        for side in (1, -1):
+            patch = impeller.body(index + k).plus if side > 0 else impeller.body(index + k).minus
+            if how.around == 0 and side != (1 if k == 0 else -1):
+                continue
+            u, v = (
+                x.ravel()
+                for x in np.meshgrid(*(np.linspace(0, 1, n) for n in _counts(patch, how.spacing)), indexing="ij")
+            )
+            parts.append(patch.at(u, v) + how.blades * patch.normal(u, v))
+            names.append(0 if (k, side) == (0, 1) else 1 if (k, side) == (1, -1) else 3)
+    low, high = hub_range(impeller, ahead)
+    curve = impeller.hub.curve(np.linspace(low, high, 101))
+    along = math.ceil(float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum()) / how.spacing) + 1
+    pitch = math.tau * float(curve[:, 0].max()) / (impeller.blades * len(impeller.bodies))
+    s, v = np.linspace(low, high, along), np.linspace(0.0, 1.0, math.ceil(pitch / how.spacing) + 1)
+    for k in range(-how.around, 1 + how.around):
+        theta = impeller.across(index + k, s, v).ravel()
+        S = np.repeat(s, len(v))
+        parts.append(impeller.hub.at(S, theta) + how.hub * impeller.hub.normal(S, theta))
+        names.append(2)
+    surface = np.repeat(names, [len(p) for p in parts])
+    one = parts[0][:1]
+    return Scene(
+        one, np.array([[0.0, 0.0, 1.0]]), np.zeros((1, 3, 3)), np.zeros(1, dtype=np.int64), np.concatenate(parts),
+        surface, 2.0 * how.spacing,
+    )  # fmt: skip
+
+
+def _counts(patch: Patch, spacing: float) -> tuple[int, int]:
+    t = np.linspace(0.0, 1.0, 51)
+
+    def longest(lines: list[Floats]) -> int:
+        return math.ceil(max(float(np.linalg.norm(np.diff(x, axis=0), axis=1).sum()) for x in lines) / spacing) + 1
+
+    return longest([patch.at(t, v) for v in (0.0, 0.5, 1.0)]), longest([patch.at(u, t) for u in (0.0, 0.5, 1.0)])
+
+
+def _width(patch: Patch, p: Floats, first: Floats, last: Floats) -> float:
+    """Widest distance [mm] across, from line to line."""
+    v = first + np.linspace(0.0, 1.0, 9)[:, None] * (last - first)
+    grid = patch.at(np.tile(p, 9), v.ravel()).reshape(9, len(p), 3)
+    return float(np.linalg.norm(np.diff(grid, axis=0), axis=2).sum(axis=0).max())

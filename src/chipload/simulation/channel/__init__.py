@@ -1,0 +1,1 @@
+"""What a program of a turning pallet leaves on the walls and the floor of a channel."""

@@ -1,0 +1,118 @@
+"""Compiled: where the moving cutter meets rays that stand on a surface.
+
+Notation: a ray is S + s N, S a point of the surface, N its normal, s [mm] from -depth to height. A part of the tool is
+a row ``[r, e, f, m, z1, z2, c, tb, h, big]`` as in the kernels of the dexels, and the height above the tip at which it
+begins. On a move the tip goes straight, the axis along the normalised chord; while a ray is met the lower end of what
+it loses is convex in time for a straight move, so that its least is found by golden section beside the least instant.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from chipload.stock.dexels._kernels import pierce
+
+_GOLDEN = 0.6180339887498949
+_STEPS = 14
+
+
+@njit(cache=True, nogil=True)
+def lower(
+    t: float, tips: Any, axes: Any, k: int, start: float, shape: Any, S: Any, frame: Any, depth: float, height: float,
+    tip: Any, axis: Any,
+) -> float:  # fmt: skip
+    """Least s of the ray in the part at the share ``t`` of move k, from -depth; ``height``: not met below it."""
+    norm = 0.0
+    for j in range(3):
+        axis[j] = axes[k - 1, j] * (1.0 - t) + axes[k, j] * t
+        norm += axis[j] * axis[j]
+    norm = math.sqrt(norm)
+    x0 = x1 = x2 = a0 = a1 = a2 = 0.0
+    for j in range(3):
+        a = axis[j] / norm
+        p = tips[k - 1, j] * (1.0 - t) + tips[k, j] * t + start * a - S[j]
+        x0 += frame[0, j] * p
+        x1 += frame[1, j] * p
+        x2 += frame[2, j] * p
+        a0 += frame[0, j] * a
+        a1 += frame[1, j] * a
+        a2 += frame[2, j] * a
+    tip[0], tip[1], tip[2] = x0, x1, x2
+    axis[0], axis[1], axis[2] = a0, a1, a2
+    lo, hi = pierce(2, 0.0, 0.0, tip, axis, shape)
+    if lo > hi or hi <= -depth or lo >= height:
+        return height
+    return max(float(lo), -depth)
+
+
+@njit(cache=True, nogil=True)
+def left(
+    points: Any, frames: Any, tips: Any, axes: Any, starts: Any, shapes: Any, cutting: Any, depth: float,
+    height: float, step: float, tol: float, first: int, last: int, rest: Any, rest_row: Any, gouge: Any,
+    gouge_row: Any, gouge_part: Any,
+) -> None:  # fmt: skip
+    """For the points ``first``..``last``: ``rest`` [mm] above the surface that no cutting move takes, ``gouge`` [mm]
+    the deepest below it that any part comes, the rows that do, the part. ``cutting`` (n,) whether a row feeds.
+    """
+    tip, axis = np.empty(3), np.empty(3)
+    n, parts = len(tips), len(shapes)
+    half = 0.5 * (height + depth)
+    for i in range(first, last):
+        S, frame = points[i], frames[i]
+        middle = S + 0.5 * (height - depth) * frame[2]
+        for k in range(1, n):
+            ax, ay, az = axes[k, 0], axes[k, 1], axes[k, 2]
+            x, y, z = middle[0] - tips[k, 0], middle[1] - tips[k, 1], middle[2] - tips[k, 2]
+            dx, dy, dz = tips[k, 0] - tips[k - 1, 0], tips[k, 1] - tips[k - 1, 1], tips[k, 2] - tips[k - 1, 2]
+            bx, by, bz = ax - axes[k - 1, 0], ay - axes[k - 1, 1], az - axes[k - 1, 2]
+            long = math.sqrt(dx * dx + dy * dy + dz * dz)
+            far = math.sqrt(x * x + y * y + z * z)
+            sweep = long + math.sqrt(bx * bx + by * by + bz * bz) * (far + long + half)
+            slack = sweep + half
+            h = x * ax + y * ay + z * az
+            if h < -slack:
+                continue
+            d2 = far * far - h * h
+            for part in range(parts):
+                big = shapes[part, 9] + slack
+                if d2 > big * big or h < starts[part] - slack or h > starts[part] + shapes[part, 8] + slack:
+                    continue
+                count = max(1, math.ceil(sweep / step))
+                best, at = height, 0
+                for m in range(count + 1):
+                    s = lower(m / count, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis)
+                    if s < best:
+                        best, at = s, m
+                if best >= height:
+                    continue
+                known = rest[i] if part == 0 and cutting[k] else height
+                if best - 0.1 < known or best < 0.1:
+                    lo, hi = max(at - 1, 0) / count, min(at + 1, count) / count
+                    t1, t2 = hi - _GOLDEN * (hi - lo), lo + _GOLDEN * (hi - lo)
+                    f1 = lower(t1, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis)
+                    f2 = lower(t2, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis)
+                    for _ in range(_STEPS):
+                        best = min(best, f1, f2)
+                        if abs(f1 - f2) < tol and f1 < height:
+                            break
+                        if f1 <= f2:
+                            hi, t2, f2 = t2, t1, f1
+                            t1 = hi - _GOLDEN * (hi - lo)
+                            f1 = lower(
+                                t1, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis
+                            )
+                        else:
+                            lo, t1, f1 = t1, t2, f2
+                            t2 = lo + _GOLDEN * (hi - lo)
+                            f2 = lower(
+                                t2, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis
+                            )
+                    best = min(best, f1, f2)
+                if part == 0 and cutting[k] and best < rest[i]:
+                    rest[i], rest_row[i] = best, k
+                if -best > gouge[i]:
+                    gouge[i], gouge_row[i], gouge_part[i] = -best, k, part

@@ -1,0 +1,253 @@
+"""The independent check of programs that mill between walls: gouges, holder included, and what is left.
+
+Notation: S points of the true surface, dense, N their normals out of the metal. On each stands a ray S + s N; every part
+of the tool (cutting part, neck, shank, holder) is taken through every row of the program and the exact interval of the
+ray in it is found. The least s of the cutting part in feeds is the material left there (the scallop), a least s below
+0 of any part in any row is a gouge of that depth.
+
+Nothing of the planner is used: no closed form of the largest cutter, none of its check points, ranges or step-overs.
+
+Reference: [Jerard1989].
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import find_peaks
+
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.errors import InputError
+from chipload.geometry.bspline import Patch
+from chipload.program.motions import is_arc
+from chipload.program.program import LINE, Program
+from chipload.progress import Progress, silent
+from chipload.simulation.channel import _kernels
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: parts of a tool, in their order
+PARTS = ("cutting part", "neck", "shank", "holder")
+#: a part without an end goes on so far [mm]
+ENDLESS = 500.0
+#: longest piece of a row [mm] that is looked at as one
+PIECE = 4.0
+_BLOCK = 512
+
+
+@dataclass(frozen=True, eq=False)
+class Wall:
+    """Points on a surface, a grid of ``shape`` (a, b) with u the slower, their normals, u, v and area [mm2] of each."""
+
+    name: str
+    points: Floats
+    normals: Floats
+    u: Floats
+    v: Floats
+    area: Floats
+    shape: tuple[int, int]
+
+
+def wall(name: str, surface: Patch, u: Floats, v: Floats) -> Wall:
+    """The grid u x v (a,), (b,) on a surface.
+
+    >>> from chipload.geometry.bspline import through
+    >>> flat = through([[[0, 0, 0], [0, 2, 0]], [[3, 0, 0], [3, 2, 0]]], [0, 1], [0, 1])
+    >>> float(wall("flat", flat, np.linspace(0, 1, 7), np.linspace(0, 1, 5)).area.sum())
+    6.0
+    """
+    U, V = (x.ravel() for x in np.meshgrid(u, v, indexing="ij"))
+    size = np.linalg.norm(np.cross(surface.at(U, V, 1, 0), surface.at(U, V, 0, 1)), axis=1)
+    share = np.outer(_weights(u), _weights(v)).ravel()
+    return Wall(name, surface.at(U, V), surface.normal(U, V), U, V, size * share, (len(u), len(v)))
+
+
+def _weights(x: Floats) -> Floats:
+    step = np.diff(x)
+    out: Floats = 0.5 * (np.concatenate([step, [0.0]]) + np.concatenate([[0.0], step]))
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Left:
+    """What a program leaves on a wall, and where it gouges.
+
+    Parameters
+    ----------
+    wall : the points
+    rest : (n,) [mm] material left along the normal, at most ``height``: so much or more
+    gouge : (n,) [mm] greatest depth below the surface, at most ``depth``
+    row, part : (n,) of the program, of :data:`PARTS`, that gouges; -1: none does
+    height, depth : how far the rays go
+    """
+
+    wall: Wall
+    rest: Floats
+    gouge: Floats
+    row: Ints
+    part: Ints
+    height: float
+    depth: float
+
+    @property
+    def deepest(self) -> tuple[float, int]:
+        """The deepest gouge [mm] and its point."""
+        k = int(self.gouge.argmax())
+        return float(self.gouge[k]), k
+
+    def says(self) -> str:
+        """Where the deepest gouge is, in words."""
+        deep, k = self.deepest
+        if self.row[k] < 0:
+            return f"{self.wall.name}: nothing comes below the surface"
+        x, y, z = self.wall.points[k].tolist()
+        return (
+            f"{self.wall.name}: the {PARTS[int(self.part[k])]} comes {deep:.4f} mm below the surface at "
+            f"({x:.2f}, {y:.2f}, {z:.2f}) in row {int(self.row[k])}"
+        )
+
+    def crests(self, across: str, within: NDArray[np.bool_] | None = None, prominence: float = 1e-3) -> Floats:
+        """Heights [mm] of the scallops: of the highest points between two passes, along every grid line.
+
+        Parameters
+        ----------
+        across : `u` or `v`, the direction in which pass follows on pass
+        within : (n,) which points count, as those between the passes; None: those with less than ``height`` left
+        prominence : [mm] what stands out less is no scallop
+        """
+        rest = self.rest.reshape(self.wall.shape)
+        use = (self.rest < self.height if within is None else within).reshape(self.wall.shape)
+        if across == "u":
+            rest, use = rest.T, use.T
+        found = [
+            row[peaks[ok[peaks]]]
+            for row, ok in zip(rest, use, strict=True)
+            for peaks in [find_peaks(row, prominence=prominence)[0]]
+        ]
+        out: Floats = np.concatenate(found) if found else np.zeros(0)
+        return out
+
+    def excess(self, over: float) -> float:
+        """Share of the area on which more than ``over`` [mm] is left."""
+        return float(self.wall.area[self.rest > over].sum() / self.wall.area.sum())
+
+
+def tool_parts(cutter: CatalogueCutter) -> tuple[Floats, Floats, Ints]:
+    """Heights above the tip (k,) [mm] at which the parts begin, their shapes (k, 10), which of :data:`PARTS`."""
+    top = ENDLESS if cutter.cutting_length is None else cutter.cutting_length
+    end = ENDLESS if cutter.reach is None else cutter.reach
+    rows = [(0.0, min(top, end), 0.5 * cutter.diameter, cutter.corner_radius, 0)]
+    if cutter.cutting_length is not None:
+        low = top
+        if cutter.neck_diameter is not None and cutter.neck_length is not None:
+            rows.append((low, cutter.neck_length, 0.5 * cutter.neck_diameter, 0.0, 1))
+            low = cutter.neck_length
+        shank = cutter.diameter if cutter.shank_diameter is None else cutter.shank_diameter
+        rows.append((low, end, 0.5 * shank, 0.0, 2))
+    if cutter.reach is not None and cutter.holder_diameter is not None:
+        rows.append((cutter.reach, cutter.reach + ENDLESS, 0.5 * cutter.holder_diameter, 0.0, 3))
+    rows = [row for row in rows if row[1] > row[0]]
+    shapes = [[r, R - r, r, 0.0, 0.0, r, R, 0.0, high - low, R] for low, high, R, r, _ in rows]
+    return np.array([row[0] for row in rows]), np.array(shapes), np.array([row[4] for row in rows])
+
+
+def left_on(
+    walls: Sequence[Wall],
+    program: Program,
+    cutter: CatalogueCutter,
+    height: float,
+    depth: float,
+    step: float = 0.25,
+    tol: float = 1e-5,
+    workers: int = 1,
+    progress: Progress = silent,
+) -> tuple[Left, ...]:
+    """What the program leaves on each wall.
+
+    Parameters
+    ----------
+    height : [mm] above the surface that is looked at
+    depth : [mm] below it; less than the thickness of a blade, else its other side counts as gouged
+    step : [mm] between the instants at which a move is looked at first
+    tol : [mm] of the extremes between them
+
+    Raises
+    ------
+    InputError
+        The program has arcs, or a number is out of range.
+    """
+    if is_arc(program).any():
+        raise InputError("channel: the program has arcs: must be of straight rows")
+    if not (height > 0.0 and depth > 0.0 and step > 0.0 and tol > 0.0):
+        raise InputError("channel: height, depth, step and tol: must be above 0")
+    starts, shapes, kinds = tool_parts(cutter)
+    tips, axes, of = _pieces(program)
+    cutting = (program.motion == LINE)[of]
+    out = []
+    total, done = sum(len(w.points) for w in walls), 0
+    for w in walls:
+        n = len(w.points)
+        frames = _frames(w.normals)
+        rest, gouge = np.full(n, height), np.zeros(n)
+        rest_row, row, part = np.full(n, -1), np.full(n, -1), np.full(n, -1)
+
+        def block(
+            first: int, w: Wall = w, frames: Floats = frames, rest: Floats = rest, rest_row: Ints = rest_row,
+            gouge: Floats = gouge, row: Ints = row, part: Ints = part,
+        ) -> None:  # fmt: skip
+            _kernels.left(
+                w.points, frames, tips, axes, starts, shapes, cutting, depth, height, step, tol, first,
+                min(first + _BLOCK, len(w.points)), rest, rest_row, gouge, row, part,
+            )  # fmt: skip
+
+        with ThreadPoolExecutor(workers) as pool:
+            for k, _ in enumerate(pool.map(block, range(0, n, _BLOCK)), 1):
+                progress((done + min(k * _BLOCK, n)) / total, w.name)
+        done += n
+        row = np.where(row >= 0, of[np.maximum(row, 0)], -1)
+        out.append(Left(w, rest, gouge, row, np.where(part >= 0, kinds[np.maximum(part, 0)], -1), height, depth))
+    return tuple(out)
+
+
+def _pieces(program: Program) -> tuple[Floats, Floats, Ints]:
+    """Tips and axes (m, 3) of the rows in pieces of at most :data:`PIECE`, and the row of each."""
+    length = np.linalg.norm(np.diff(program.p_work, axis=0, prepend=program.p_work[:1]), axis=1)
+    count = np.maximum(np.ceil(length / PIECE), 1.0).astype(np.int64)
+    of = np.repeat(np.arange(len(program)), count)
+    share = ((np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count) + 1) / count[of])[:, None]
+    before = np.maximum(of - 1, 0)
+    tips = program.p_work[before] * (1.0 - share) + program.p_work[of] * share
+    axes = program.axis[before] * (1.0 - share) + program.axis[of] * share
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    return np.ascontiguousarray(tips), np.ascontiguousarray(axes), of
+
+
+def _frames(normals: Floats) -> Floats:
+    """(n, 3, 3) rows e1, e2, N."""
+    other = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    e1 = np.cross(other, normals)
+    e1 /= np.linalg.norm(e1, axis=1)[:, None]
+    return np.ascontiguousarray(np.stack([e1, np.cross(normals, e1), normals], axis=1))
+
+
+def scallop_numbers(crests: Floats, asked: float) -> dict[str, float]:
+    """Greatest and mean height of the scallops [mm], and the mean as a share of what is asked; 0 where there is none.
+
+    >>> scallop_numbers(np.array([0.04, 0.05]), 0.05)
+    {'greatest_mm': 0.05, 'mean_mm': 0.045, 'mean_share': 0.9, 'count': 2.0}
+    """
+    if not len(crests):
+        return {"greatest_mm": 0.0, "mean_mm": 0.0, "mean_share": 0.0, "count": 0.0}
+    mean = math.fsum(crests) / len(crests)
+    return {
+        "greatest_mm": float(crests.max()),
+        "mean_mm": mean,
+        "mean_share": mean / asked,
+        "count": float(len(crests)),
+    }
