@@ -167,7 +167,8 @@ def test_patches_cover_what_is_reached_and_are_clear(summary, proof):
         low, high = patch["part"]
         inside = (x >= patch["from"]) & (x <= patch["to"]) & (y >= low) & (y <= high)
         assert inside.sum() == patch["cc_points"]
-        T = axis_at(math.radians(patch["table_deg"]), GRID)
+        # ranges may be narrower than a degree
+        T = axis_at(math.radians(patch["table_deg"]), np.concatenate([GRID, np.radians(np.arange(0.0, 360.0, 0.05))]))
         for k in np.flatnonzero(inside)[::5]:
             if (patch["surface"], int(k)) not in points:
                 facing = T[((T @ proof[n]["normal"][k]) >= 0.0) & (T @ proof[n]["normal"][k] < 1.0 - 1e-9)]
