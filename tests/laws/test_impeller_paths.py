@@ -1,0 +1,135 @@
+"""Finishing paths of an impeller, planned, written, read and simulated: the planner against the check of channels."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.machine.kinematics import forward
+from chipload.machine.machine import machine_named
+from chipload.planning.sectional.covered import between_lines
+from chipload.planning.sectional.lines import Motion
+from chipload.planning.sectional.links import Link, linked, safe_height
+from chipload.planning.sectional.parametric import Shape, impeller_of
+from chipload.planning.sectional.paths import Finish, finishing
+from chipload.planning.sectional.programs import pallet_rate, pallet_speed, program_of, table_stands, too_fast
+from chipload.program.gcode.writer import write_gcode
+from chipload.program.program import RAPID
+from chipload.program.to_axes import to_axes
+from chipload.simulation.channel.channel import left_on, wall
+from tests.rs274 import MISSING, canonical, rs274_installed
+
+MACHINE = machine_named("horizontal-b")
+CUTTER = CatalogueCutter(12.0, 2.0, cutting_length=45.0, reach=60.0, holder_diameter=30.0)
+TABLE, SCALLOP, CHORD = math.radians(55.0), 0.1, 0.005
+BOX = ((0.3, 0.45), (0.5, 0.7))
+
+
+@pytest.fixture(scope="module")
+def impeller():
+    return impeller_of(Shape())
+
+
+@pytest.fixture(scope="module")
+def scene(impeller):
+    return impeller.scene(0, "plus", ([0.5], [0.5]), (90, 40), near=1.5, around=0, hub_points=(40, 12))
+
+
+@pytest.fixture(scope="module", params=["u", "v"])
+def milled(request, impeller, scene):
+    motion = Motion(CHORD, 100.0 / 60.0, pallet_rate(MACHINE), 0.5)
+    tracks = finishing(
+        impeller.blade.plus, request.param, BOX, scene, 0, CUTTER, TABLE, Finish(SCALLOP, motion), workers=2
+    )
+    link = Link(lift=2.0, margin=0.5, touch=0.01, near=6.0, feed=20.0, above=5.0)
+    way = linked(tracks.tracks, scene, CUTTER, TABLE, 100.0 / 60.0, link, 0.5, rate=pallet_rate(MACHINE))
+    return request.param, tracks, way, program_of(way.moves, 90.0, 1)
+
+
+def test_no_gouge_and_scallop_as_asked(impeller, milled):
+    along, tracks, way, program = milled
+    assert not tracks.missed and not way.refused
+    fine, few = np.linspace(0.0, 1.0, 401), np.linspace(0.05, 0.95, 9)
+    (u0, u1), (v0, v1) = BOX
+    share = (few, fine) if along == "u" else (fine, few)
+    own = wall("blade", impeller.blade.plus, u0 + share[0] * (u1 - u0), v0 + share[1] * (v1 - v0))
+    grid = np.linspace(0.0, 1.0, 41), np.linspace(0.0, 1.0, 21)
+    others = [
+        wall("own side", impeller.blade.plus, *grid), wall("facing blade", impeller.body(1).minus, *grid),
+        wall("back of the blade", impeller.blade.minus, *grid),
+    ]  # fmt: skip
+    s, theta = (x.ravel() for x in np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 1, 15), indexing="ij"))
+    low = impeller.across(0, np.linspace(0, 1, 41), np.linspace(0, 1, 15)).ravel()
+    hub = type(own)("hub", impeller.hub.at(s, low), impeller.hub.normal(s, low), s, theta, np.ones(len(s)), (41, 15))
+    found = left_on([own, *others, hub], program, CUTTER, 1.0, 1.0, workers=2)
+    # two surfaces are approximated by straight rows: a chord each
+    assert max(x.deepest[0] for x in found) <= 2.0 * CHORD, [x.says() for x in found]
+    at = np.column_stack([own.u, own.v])
+    within = between_lines(tracks.tracks, along, at)
+    assert within.mean() > 0.95
+    assert found[0].rest[within].max() <= SCALLOP
+    crests = found[0].crests("v" if along == "u" else "u", within)
+    assert len(crests) >= 9 * (tracks.lines - 2)
+    assert 0.6 * SCALLOP <= crests.mean() <= SCALLOP
+
+
+def test_steps_are_those_of_the_cutter(milled):
+    # no step is needlessly fine: along u the corner alone, 2 sqrt(2 r h), is the least that a step may be
+    along, tracks, _, _ = milled
+    if along == "u":
+        least = 2.0 * math.sqrt(2.0 * 2.0 * SCALLOP * 0.8)
+        p = [t.contact[np.abs(t.at[:, 0] - 0.37).argmin()] for t in tracks.tracks]
+        steps = np.linalg.norm(np.diff(p, axis=0), axis=1)
+        assert (steps[:-1] > least).all()
+
+
+def test_pallet_keeps_its_rate_and_the_table_stands(milled, scene):
+    _, _, way, program = milled
+    assert table_stands(program)
+    assert pallet_speed(program).max() <= pallet_rate(MACHINE)
+    assert too_fast(program, MACHINE) == ()
+    # rapids are over the part or leave it along the axis
+    top = safe_height(scene.check, TABLE)
+    rapid = program.motion == RAPID
+    assert (np.einsum("ij,ij->i", program.p_work[rapid], program.axis[rapid]) > top + 4.9).all()
+    # a tool that is twice as fast shows
+    quick = program_of(type(way.moves)(**{**way.moves.__dict__, "feed": way.moves.feed * 1e4}), 90.0, 1)
+    assert too_fast(quick, MACHINE)
+
+
+def test_written_axes_lead_to_the_path(milled):
+    """Positions as they stand in the text, by the chain of the machine, against the CL path."""
+    _, tracks, _, program = milled
+    text = write_gcode(program, MACHINE, title="finish", verified=False)
+    q, rows = np.zeros(9), []
+    for line in text.splitlines():
+        if line.startswith("(") or not re.search(r"[XYZAB]-?[\d.]", line):
+            continue
+        for letter, value in re.findall(r"([XYZAB])(-?[\d.]+)", line):
+            q["XYZAB".index(letter)] = float(value) * (math.pi / 180.0 if letter in "AB" else 1.0)
+        rows.append(q.copy())
+    tips, axes = forward(MACHINE, np.array(rows))
+    # every pose of the planner is one of the text; between them there are pieces
+    for track in tracks.tracks:
+        for p, a in zip(track.tip, track.axis, strict=True):
+            off = np.linalg.norm(tips - p, axis=1)
+            k = int(off.argmin())
+            assert off[k] <= 1e-6
+            assert np.abs(axes[k] - a).max() < 1e-9
+    commands, findings = to_axes(program, MACHINE)
+    assert findings == ()
+    assert np.ptp(commands.position[:, 3]) == 0.0
+
+
+@pytest.mark.skipif(not rs274_installed(), reason=MISSING)
+def test_linuxcnc_reads_it(milled):
+    *_, program = milled
+    calls = canonical(write_gcode(program, MACHINE, title="finish", verified=False))
+    ends = [w for name, w in calls if name in ("STRAIGHT_FEED", "STRAIGHT_TRAVERSE")]
+    commands, _ = to_axes(program, MACHINE)
+    assert len(ends) >= len(commands)
+    got = np.array([float(x) for x in ends[-1][:5]])
+    last = commands.position[-1]
+    assert np.abs(got - np.concatenate([last[:3], np.degrees(last[3:5])])).max() <= 1e-4
