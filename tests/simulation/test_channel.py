@@ -75,7 +75,7 @@ def test_each_part_of_the_tool_beside_a_wall(x, part, deep):
 
 def test_parts_without_end_and_refusals():
     starts, shapes, kinds = tool_parts(CatalogueCutter(10.0, 1.0))
-    assert starts.tolist() == [0.0] and kinds.tolist() == [0] and shapes[0, 8] == 500.0
+    assert (starts.tolist(), kinds.tolist(), shapes[0, 8]) == ([0.0], [0], 500.0)
     grid = wall("floor", FLAT, np.linspace(0, 1, 3), np.linspace(0, 1, 3))
     with pytest.raises(InputError, match="must be above 0"):
         left_on([grid], over([6.0]), BALL, 0.0, 0.5)

@@ -8,7 +8,7 @@ allowance, to the shroud; it may go on beyond the outlet, straight in its meridi
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+from numpy.typing import NDArray
 
 from chipload.geometry.bspline import Patch, through
 from chipload.planning.sectional.impeller import Impeller
@@ -16,6 +16,9 @@ from chipload.planning.sectional.scene import Floats
 from chipload.planning.sectional.surfaces import BODIES, hub_range
 
 _ALONG, _ACROSS = 81, 17  # points that a floor or a layer is fitted through
+_NEWTON, _MET = 8, 1e-3  # steps; [mm] a point of a side is met
+
+Flags = NDArray[np.bool_]
 
 
 def patch_of(impeller: Impeller, body: str, side: str, ahead: float = 0.0) -> Patch:
@@ -79,19 +82,33 @@ def _shift(impeller: Impeller, index: int, side: int, s: Floats, m: Floats) -> F
     """How far round (k,) [rad] a side is from its foot at places (k, 2) of a layer above."""
     body = impeller.body(index)
     patch = body.plus if side > 0 else body.minus
-    u, v = (x.ravel() for x in np.meshgrid(np.linspace(0, 1, 61), np.linspace(0, 1, 21), indexing="ij"))
-    p = patch.at(u, v)
-    at = np.stack([np.hypot(p[:, 0], p[:, 1]), p[:, 2]], axis=-1)
+    theta, found = _round_at(patch, m)
     foot = impeller.across(index if side > 0 else index - 1, s, np.array([0.0 if side > 0 else 1.0]))[:, 0]
-    theta = np.arctan2(p[:, 1], p[:, 0])
-    near = NearestNDInterpolator(at, theta)(m)
-    inside = LinearNDInterpolator(at, np.unwrap(theta.reshape(61, 21), axis=0).ravel())(m)
-    found = np.where(np.isfinite(inside), inside, near)
-    shift = np.angle(np.exp(1j * (found - foot)))
+    shift = np.angle(np.exp(1j * (theta - foot)))
     # ahead of a side and behind it as at its edge
-    ok = np.flatnonzero(np.isfinite(inside))
+    ok = np.flatnonzero(found)
     out: Floats = shift if not len(ok) else np.interp(np.arange(len(s)), ok, shift[ok])
     return out
+
+
+def _round_at(patch: Patch, m: Floats) -> tuple[Floats, Flags]:
+    """Theta (k,) of a side where it has r and z (k, 2), and whether it has them: by Newton from its nearest point."""
+    u, v = (x.ravel() for x in np.meshgrid(np.linspace(0, 1, 61), np.linspace(0, 1, 21), indexing="ij"))
+    p = patch.at(u, v)
+    grid = np.stack([np.hypot(p[:, 0], p[:, 1]), p[:, 2]], axis=-1)
+    first = ((m[:, None] - grid[None]) ** 2).sum(axis=2).argmin(axis=1)
+    u, v = u[first], v[first]
+    for _ in range(_NEWTON):
+        p = patch.at(u, v)
+        r = np.hypot(p[:, 0], p[:, 1])
+        off = m - np.stack([r, p[:, 2]], axis=-1)
+        d = [patch.at(u, v, *x) for x in ((1, 0), (0, 1))]
+        J = np.stack([np.stack([(x[:, :2] * p[:, :2]).sum(axis=1) / r, x[:, 2]], axis=-1) for x in d], axis=-1)
+        step = np.linalg.solve(J, off[..., None])[..., 0]
+        u, v = np.clip(u + step[:, 0], 0.0, 1.0), np.clip(v + step[:, 1], 0.0, 1.0)
+    p = patch.at(u, v)
+    away = np.hypot(np.hypot(p[:, 0], p[:, 1]) - m[:, 0], p[:, 2] - m[:, 1])
+    return np.arctan2(p[:, 1], p[:, 0]), away < _MET
 
 
 def _fitted(m: Floats, theta: Floats, u: Floats, v: Floats) -> Patch:

@@ -177,7 +177,8 @@ class Lines:
             return np.full(len(self.p), Q[0])
         f = np.interp(self.p, self.p[knots[known]], high[known])
         f = np.minimum(np.maximum(gaussian_filter1d(maximum_filter1d(f, 3), 1.0, mode="nearest"), f), 1.0)
-        return Q[0] + f * (Q[1] - Q[0])
+        out: Floats = Q[0] + f * (Q[1] - Q[0])
+        return out
 
     def strip(self, q: Floats, border: float) -> Missed:
         """What lies between the border and the first line."""
@@ -199,6 +200,7 @@ class Lines:
         missed: list[Missed] = []
         covered = np.zeros(len(use), dtype=np.bool_)
         ways = self.mender
+        ends: dict[tuple[int, bool], Floats] = {}  # where a track ends, by the first station that is not reached
         for piece in line.pieces:
             for a, b in runs(use[piece.first : piece.last]):
                 i, j = piece.first + a, piece.first + b
@@ -208,6 +210,8 @@ class Lines:
                     open_ = 0 <= there < len(use) and use[there] and not math.isfinite(line.pallet[there])
                     end = at[0] if k == 0 else at[-1]
                     more = ways.furthest(end, B[0 if k == 0 else -1], line.at[there]) if open_ else None
+                    if open_:
+                        ends[there, k > 0] = end if more is None else more[0]
                     if more is not None:
                         at.insert(k and len(at), more[0])
                         B.insert(k and len(B), more[1])
@@ -217,19 +221,23 @@ class Lines:
                 tracks += parts
                 if len(bad):
                     k = i + min(int(bad[0]), j - i - 1)
-                    missed.append(self._missed(line, number, k, min(k + 1, j - 1), "touches"))
-        missed += [
-            self._missed(line, number, max(a - 1, 0), min(b, len(use) - 1), "no pallet angle")
-            for a, b in runs(use & ~covered)
-        ]
+                    missed.append(self._missed(number, line.at[k : min(k + 2, j)], "touches"))
+        for a, b in runs(use & ~covered):
+            first, last = ends.get((a, True)), ends.get((b - 1, False))
+            at = [*([] if first is None else [first]), *line.at[a:b], *([] if last is None else [last])]
+            missed.append(self._missed(number, np.array(at), "no pallet angle"))
         joints = [x.last for x, y in zip(line.pieces[:-1], line.pieces[1:], strict=True) if x.last == y.first]
-        missed += [self._missed(line, number, k - 1, k, "cannot follow") for k in joints if use[k - 1] and use[k]]
+        missed += [
+            self._missed(number, line.at[k - 1 : k + 1], "cannot follow") for k in joints if use[k - 1] and use[k]
+        ]
         return tracks, missed
 
-    def _missed(self, line: Line, number: int, i: int, j: int, reason: str) -> Missed:
-        length = float(np.linalg.norm(np.diff(line.S[i : j + 1], axis=0), axis=1).sum())
-        (a, b), (c, d) = line.at[i].tolist(), line.at[j].tolist()
-        return Missed(number, (a, b), (c, d), length, reason)
+    def _missed(self, number: int, at: Floats, reason: str) -> Missed:
+        (a, b), (c, d) = at[0].tolist(), at[-1].tolist()
+        return Missed(number, (a, b), (c, d), self._length(at), reason)
+
+    def _length(self, at: Floats) -> float:
+        return float(np.linalg.norm(np.diff(self.surface.at(*at.T), axis=0), axis=1).sum())
 
     def on(self, q: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
         """S, N, K, direction of the line and (u, v) at the stations."""

@@ -53,7 +53,8 @@ class Link:
     def __post_init__(self) -> None:
         if not (0.0 < self.margin < self.lift < math.inf and 0.0 <= self.touch < self.margin):
             raise InputError(
-                f"link: lift {self.lift:g}, margin {self.margin:g}, touch {self.touch:g} mm: must be touch < margin < lift"
+                f"link: lift {self.lift:g}, margin {self.margin:g}, touch {self.touch:g} mm: "
+                "must be touch < margin < lift"
             )
         if not (self.near >= 0.0 and 0.0 < self.feed < math.inf and 0.0 < self.above < math.inf):
             raise InputError("link: must be near at least 0, feed and above above 0")
@@ -71,11 +72,13 @@ class Moves:
 
     @staticmethod
     def of(motion: int, tip: Floats, axis: Floats, feed: float, label: str) -> Moves:
+        """Moves of one kind."""
         n = len(tip)
         return Moves((motion,) * n, tip, axis, np.full(n, feed), (label,) * n)
 
     @staticmethod
     def join(parts: list[Moves]) -> Moves:
+        """Moves that follow one another."""
         return Moves(
             tuple(m for x in parts for m in x.motion), np.vstack([x.tip for x in parts]),
             np.vstack([x.axis for x in parts]), np.concatenate([x.feed for x in parts]),

@@ -8,6 +8,7 @@ by a point between, whose pallet angle is the nearest valid one to the middle.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,7 +57,7 @@ class Mender:
             track = grown
         bad = self.bad(track)
         ends = [0, *(int(k) + 1 for k in bad), len(track.tip)]
-        parts = [_part(track, a, b) for a, b in zip(ends[:-1], ends[1:], strict=True) if b - a > 1]
+        parts = [_part(track, a, b) for a, b in itertools.pairwise(ends) if b - a > 1]
         return tuple(parts), bad
 
     def bad(self, track: Track) -> Ints:

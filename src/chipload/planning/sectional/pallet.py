@@ -144,7 +144,7 @@ def _smooth(
 ) -> Floats:
     """B without jumps of whole turns, drawn towards the mean of the neighbours, within the ranges and the steps."""
     B, which = piece
-    out = B[0] + np.concatenate([[0.0], np.cumsum(_near(np.diff(B)))])
+    out: Floats = B[0] + np.concatenate([[0.0], np.cumsum(_near(np.diff(B)))])
     own = np.array([ranges[first + k][j] for k, j in enumerate(which)])
     own = own + (out - B)[:, None]
     width = own[:, 1] - own[:, 0]

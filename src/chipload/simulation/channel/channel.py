@@ -1,9 +1,9 @@
 """The independent check of programs that mill between walls: gouges, holder included, and what is left.
 
-Notation: S points of the true surface, dense, N their normals out of the metal. On each stands a ray S + s N; every part
-of the tool (cutting part, neck, shank, holder) is taken through every row of the program and the exact interval of the
-ray in it is found. The least s of the cutting part in feeds is the material left there (the scallop), a least s below
-0 of any part in any row is a gouge of that depth.
+Notation: S points of the true surface, dense, N their normals out of the metal. On each stands a ray S + s N; every
+part of the tool (cutting part, neck, shank, holder) is taken through every row of the program and the exact interval
+of the ray in it is found. The least s of the cutting part in feeds is the material left there (the scallop), a least s
+below 0 of any part in any row is a gouge of that depth.
 
 Nothing of the planner is used: no closed form of the largest cutter, none of its check points, ranges or step-overs.
 

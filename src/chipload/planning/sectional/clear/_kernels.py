@@ -29,11 +29,8 @@ def distance(h: float, d: float, rho: float, r: float, stages: Any) -> float:
         low = stages[j, 0]
         high = stages[j + 1, 0] if j + 1 < k else math.inf
         out, away = d - stages[j, 1], max(low - h, h - high)
-        if out <= 0.0 and away <= 0.0:
-            one = max(out, away)
-        else:
-            one = math.sqrt(max(out, 0.0) ** 2 + max(away, 0.0) ** 2)
-        best = min(best, one)
+        inside = out <= 0.0 and away <= 0.0
+        best = min(best, max(out, away) if inside else math.sqrt(max(out, 0.0) ** 2 + max(away, 0.0) ** 2))
     return best
 
 
