@@ -1,6 +1,9 @@
 """The largest cutters of the paper's problem, certified, against its own sampled test; and cost against both numbers.
 
-    python benchmarks/impeller.py [--large]
+    python benchmarks/impeller.py [--patches] [--large [--out FOLDER]]
+
+`--patches`: instead, one, two, three cutters against one picked by hand, on that impeller and on NASA's HECC.
+`--large`: cost against both numbers; a picture of it in the folder.
 
 Reference: [Wu2019]: 100 contact points, 2900 check points, 15 table angles, 36 diameters. The impeller is the one by
 formula. Its method, compiled the same way on the same two threads: for every table angle, diameter, contact point and
@@ -11,17 +14,31 @@ too (``every``); the whole answer adds the second corner radius and the exact ra
 """
 
 import math
+import os
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numba import njit
+from plotly.subplots import make_subplots
 
-from chipload.cutter.catalogue import catalogue_named
+from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named
+from chipload.geometry.revolve import Revolved
+from chipload.geometry.sections import checked, loft, read_meridian, read_sections
 from chipload.planning.sectional.answer import largest_cutters
+from chipload.planning.sectional.compare import compared
+from chipload.planning.sectional.costs import Side, Terms
+from chipload.planning.sectional.impeller import Impeller
 from chipload.planning.sectional.parametric import Shape, impeller_of
 from chipload.planning.sectional.search import limits
+from chipload.planning.sectional.surfaces import Sampled, surface_of
+
+HECC = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[1].parent / "shared" / "data")) / "blades/nasa_hecc"
+HECC = HECC / "HECC_Vaned_Configuration/Coordinates"
+HECC = HECC / "HECC Design-Intent Stage Coordinates (Hot, No Fillets)"
 
 R_CORNER, NEAR = 2.0, 2.0
 TABLES = np.radians(np.arange(20.0, 91.0, 5.0))
@@ -142,21 +159,120 @@ def paper() -> None:
               f"{at_points[1]} of {len(out)} points")  # fmt: skip
 
 
-def large() -> None:
-    for contact, check in (
-        (100, 100_000),
-        (1000, 1000),
-        (1000, 10_000),
-        (1000, 100_000),
-        (10_000, 1000),
-        (10_000, 100_000),
-    ):
-        scene = scene_of(contact, check)
-        found, took, _ = timed(scene, TABLES[5:6], True)
-        print(f"{len(scene.contact):6d} x {len(scene.check):6d}  {took:8.2f} s  certified {found.certified.mean():.2%}")
+def large(out) -> None:
+    """Cost against both numbers, one table angle."""
+    rows = []
+    timed(scene_of(4, 100), TABLES[5:6], True)
+    for contact in (100, 1000, 10_000):
+        for check in (1000, 10_000, 100_000):
+            scene = scene_of(contact, check)
+            found, took, cpu = timed(scene, TABLES[5:6], True)
+            rows.append((len(scene.contact), len(scene.check), cpu))
+            print(f"{rows[-1][0]:6d} x {rows[-1][1]:6d}  {took:8.2f} s ({cpu:.2f} s of the cores)  "
+                  f"certified {found.certified.mean():.2%}")  # fmt: skip
+    if out:
+        (Path(out) / "cost.html").write_text(plot(rows))
+
+
+def plot(rows) -> str:
+    """The page of a picture: time against contact points and against check points."""
+    figure = make_subplots(1, 2, shared_yaxes=True)
+    for place, own, other, what in ((1, 0, 1, "contact"), (2, 1, 0, "check")):
+        for n in sorted({round(row[other], -2) for row in rows}):
+            line = sorted((row[own], row[2]) for row in rows if round(row[other], -2) == n)
+            x, y = zip(*line, strict=True)
+            name = f"{n} {'check' if own == 0 else 'contact'} points"
+            figure.add_scatter(x=x, y=y, name=name, mode="lines+markers", row=1, col=place)
+        figure.update_xaxes(type="log", title=f"{what} points", row=1, col=place)
+    figure.update_yaxes(type="log")
+    figure.update_yaxes(title="time of the cores [s]", col=1)
+    figure.update_layout(template="simple_white", title="Largest cutters at one table angle")
+    return figure.to_html(include_plotlyjs=True)
+
+
+def hecc():
+    kinds = [sorted(HECC.glob(f"*impeller_{kind}_blade_section_*.txt")) for kind in ("main", "splitter")]
+    blades = [loft(checked(read_sections(k, "inch", True, "X R*THETA R"), 431.5)) for k in kinds]
+    hub, shroud = (
+        read_meridian(HECC / f"HECCvanedCoordinates_flowpathCoordinates_{n}.txt", "inch", over=True)
+        for n in ("hub", "shroud")
+    )
+    return Impeller(*blades, Revolved(hub, 1), Revolved(shroud, -1), 15)
+
+
+def shop():
+    """Long-reach cutters of assumed lengths; the first is the one picked by hand."""
+    rows = [(4, 60, 80), (5, 60, 80), (6, 90, 110), (8, 90, 110), (10, 90, 110), (12, 90, 110), (14, 90, 110)]
+    rows += [(16, 90, 110), (20, 90, 110), (25, 90, 110)]
+    cutters = []
+    for d, neck, reach in rows:
+        for r in (1.0, 2.0) if d > 4 else (1.0,):
+            shank = max(d, 10.0)
+            cutters.append(CatalogueCutter(d, r, max(2.0 * d, 12.0), d - 0.4, neck, shank, reach, max(28.0, d + 12.0)))
+    return Catalogue("shop", tuple(cutters))
+
+
+def divide(title, impeller, catalogue, picked, tables, names, how, terms) -> None:
+    """One, two, three cutters against one picked by hand, all sides of a channel."""
+    sides, begun, unreached = [], time.perf_counter(), []
+    for body, side, along, up in names:
+        surface = surface_of(impeller, body, side, replace(how, along=along, up=up))
+        answer = largest_cutters(surface.scene, catalogue, tables, 0.5, workers=2)
+        unreached.append(f"{surface.name} {len(answer.unreachable)}")
+        index = -1 if side == "floor" else ("blade", "splitter").index(body)
+        sides.append(Side(index, side, surface.scene, surface.u, surface.v, surface.area, answer, 0.5))
+    print(f"\n{title}: {sum(len(s.area) for s in sides)} contact points, scallop {terms.scallop} mm; searched in "
+          f"{time.perf_counter() - begun:.1f} s; not reached: {', '.join(unreached)}")  # fmt: skip
+    begun = time.perf_counter()
+    ways = compared(sides, terms, picked, (1, 2, 3, None), workers=2)
+    print(f"patches in {time.perf_counter() - begun:.1f} s")
+    base = ways[0].divided
+    for way in ways:
+        d = way.divided
+        if d is None:
+            print(f"| {way.name} | not possible |")
+            continue
+        used = ", ".join(f"D {way.catalogue.cutters[k].diameter:g} r {way.catalogue.cutters[k].corner_radius:g}"
+                         for k in d.cutters)  # fmt: skip
+        print(f"| {way.name} | {used} | {len(d.patches)} | {d.cutter_changes} + {d.table_changes} | {d.path / 1e3:.2f} "
+              f"({d.path / base.path - 1.0:+.1%}) | {d.total / 60.0:.1f} ({d.total / base.total - 1.0:+.1%}) | "
+              f"{d.gap:.1%} | {d.total / d.bound_any_shape - 1.0:.0%} | {way.share:.1%} |")  # fmt: skip
+        for p in d.patches:
+            c = way.catalogue.cutters[p.cutter]
+            part = "" if p.part == (0.0, 1.0) else f" part {p.part[0]:.2f}..{p.part[1]:.2f}"
+            name = f"{('floor', 'blade', 'splitter')[p.body + 1]} {p.side}: {p.order} {p.low:.2f}..{p.high:.2f}"
+            print(f"      {name}{part} "
+                  f"D {c.diameter:g} r {c.corner_radius:g} at {math.degrees(p.table):.0f} deg, {p.area:.0f} mm2, "
+                  f"{p.path:.0f} mm")  # fmt: skip
+
+
+def patches() -> None:
+    wide, tall, flat = (0.03, 0.97), (0.30, 0.98), (0.15, 0.85)
+    how = Sampled(wide, tall, (10, 10), 2.0, 2.0)
+    names = [("blade", "plus", wide, tall), ("blade", "minus", wide, tall), ("blade", "floor", wide, flat)]
+    catalogue = catalogue_named("wu2019")
+    picked = next(k for k, c in enumerate(catalogue.cutters) if c.corner_radius == 1.5)
+    # the source: 100 mm/min, 0.1 mm; the changes are ours
+    terms = Terms(100.0 / 60.0, 0.1, 60.0, 30.0, 11)
+    divide("impeller by formula", impeller_of(Shape()), catalogue, picked, TABLES, names[:2], how, terms)
+    divide("with the floor", impeller_of(Shape()), catalogue, picked, TABLES, names, how, terms)
+    if not HECC.is_dir():
+        return
+    wide, tall = (0.05, 0.95), (0.20, 0.98)
+    how = Sampled(wide, tall, (12, 7), 4.0, 2.0, ahead=10.0)
+    names = [
+        (b, s, wide, flat if s == "floor" else tall) for b in ("blade", "splitter") for s in ("plus", "minus", "floor")
+    ]
+    catalogue = shop()
+    picked = next(k for k, c in enumerate(catalogue.cutters) if c.diameter == 6.0)
+    terms = Terms(600.0 / 60.0, 0.05, 60.0, 30.0, 15)
+    divide("HECC", hecc(), catalogue, picked, TABLES, names, how, terms)
 
 
 if __name__ == "__main__":
-    paper()
+    if "--patches" in sys.argv:
+        patches()
+    else:
+        paper()
     if "--large" in sys.argv:
-        large()
+        large(sys.argv[sys.argv.index("--out") + 1] if "--out" in sys.argv else None)

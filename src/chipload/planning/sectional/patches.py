@@ -67,7 +67,7 @@ def costs_of(sides: Sequence[Side], terms: Terms, workers: int = 1) -> tuple[Cos
     if not sides:
         raise InputError("sides: none: must be at least one")
     catalogue = sides[0].answer.catalogue
-    if any(side.answer.catalogue is not catalogue for side in sides):
+    if any(side.answer.catalogue != catalogue for side in sides):
         raise InputError("sides: must be searched with one catalogue")
     tables = np.unique(np.concatenate([side.answer.tables for side in sides]))
     return tuple(Costs(side, tables, terms, workers) for side in sides)
