@@ -70,6 +70,20 @@ class PickedTable(Table):
     corner_radius_mm: NotNegative
 
 
+class PathsTable(Table):
+    """Finishing programs of the patches in the least time, checked by simulation."""
+
+    check_mm: Positive = Field(description="most distance of check points of the paths")
+    chord_mm: Positive = Field(le=1.0, description="how far the tip may leave its path between two rows")
+    lift_mm: Positive = Field(description="off the surface at the ends of a line")
+    margin_mm: Positive = Field(description="that links keep from the part")
+    touch_mm: NotNegative = Field(description="how deep a lift may touch the check points")
+    near_mm: NotNegative = Field(description="longest direct link")
+    above_mm: Positive = Field(description="of the safe height above the part")
+    link_feed_mm_min: Positive = Field(le=1e5, description="feed of lifts and links")
+    gouge_mm: Positive = Field(le=1.0, description="deepest that the check may find a program below a surface")
+
+
 class SectionalTable(Table):
     """The search for the largest cutters of all surfaces."""
 
@@ -85,6 +99,7 @@ class SectionalTable(Table):
     most_cutters: Annotated[Count, Field(le=6)] = Field(description="different cutters at most; fewer are compared")
     cutter_change_s: NotNegative = Field(description="time of a cutter change")
     table_change_s: NotNegative = Field(description="time of setting the index table to another angle")
+    paths: PathsTable | None = Field(None, description="none: the search and the patches alone, no programs")
     hand_picked: PickedTable | None = Field(None, description="the cutter that is compared with")
 
 

@@ -29,6 +29,7 @@ from chipload.planning.sectional.surfaces import BODIES, Sampled, Surface, surfa
 from chipload.planning.sectional.tables import IndexTable, index_table
 from chipload.progress import Progress, silent
 from chipload.report.impeller.outcome import Milled, OneCutter, Searched, said
+from chipload.run.impeller_paths import checked_programs
 from chipload.run.provenance import hashes, title_of, versions
 from chipload.units import mm_s_from_mm_min
 
@@ -57,20 +58,31 @@ def run_impeller(job: ImpellerJob, progress: Progress = silent) -> Milled:
     pairs = [(found.surface.scene, found.answer) for found in done]
     whole = one_cutter_of(pairs, op.clearance_mm, table.spans, WORKERS)
     one = None if whole is None else (catalogue.cutters[whole[0]], whole[1])
-    ways = _ways(job, done, catalogue, impeller, part_of(progress, 1, 2))
+    half = part_of(progress, 1, 2)
+    ways = _ways(job, done, catalogue, impeller, part_of(half, 0, 2))
+    milled = Milled(
+        title_of(job.path), impeller, catalogue, machine, tuple(done), one, ways, None, _settings(op),
+        job.table.impeller.outer_diameter_mm, _provenance(job, machine, catalogue),
+    )  # fmt: skip
+    if op.paths is None or milled.used is None:
+        return milled
+    programs = checked_programs(
+        impeller, machine, table, milled.used, op, op.paths, _ahead(job), WORKERS, part_of(half, 1, 2)
+    )
+    return replace(milled, programs=programs)
+
+
+def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue) -> dict[str, Any]:
+    """Where the numbers come from."""
     files = {"job": job.path, **job.files}
     files |= {key: p for key, p in (("machine", job.machine), ("catalogue", job.catalogue)) if not isinstance(p, str)}
-    provenance = {
+    return {
         "inputs": hashes(files),
         "overrides": list(job.overrides),
         "machine": f"{machine.name}: {machine.note}" if machine.note else machine.name,
         "catalogue": f"{catalogue.name}: {catalogue.note}" if catalogue.note else catalogue.name,
         "versions": versions(),
     }
-    return Milled(
-        title_of(job.path), impeller, catalogue, machine, tuple(done), one, ways, _settings(op),
-        job.table.impeller.outer_diameter_mm, provenance,
-    )  # fmt: skip
 
 
 def look_at_impeller(job: ImpellerJob) -> tuple[list[str], bool]:
@@ -175,8 +187,7 @@ def _tables(machine: Machine, op: SectionalTable) -> IndexTable:
 
 
 def _surfaces(job: ImpellerJob, impeller: Impeller) -> list[Surface]:
-    given, op = job.table.impeller.sections, job.operation
-    ahead = given.hub_ahead_mm if given is not None else 0.0
+    op, ahead = job.operation, _ahead(job)
     out = []
     for k, s in enumerate(job.table.surface):
         how = Sampled(s.along, s.up, s.points, op.check_mm, op.near_mm, op.around, ahead)
@@ -185,6 +196,12 @@ def _surfaces(job: ImpellerJob, impeller: Impeller) -> list[Surface]:
         except InputError as err:
             raise InputError(f"surface.{k}: {err}") from None
     return out
+
+
+def _ahead(job: ImpellerJob) -> float:
+    """How far the hub goes on ahead of the leading edge [mm]."""
+    given = job.table.impeller.sections
+    return given.hub_ahead_mm if given is not None else 0.0
 
 
 def _machine(job: ImpellerJob) -> Machine:

@@ -99,7 +99,8 @@ def settings_of(
     groups: dict[tuple[int, float], list[Patch]] = {}
     for patch in patches:
         groups.setdefault((patch.cutter, patch.table), []).append(patch)
-    out, done = [], 0
+    out: list[Setting] = []
+    done = 0
     for (index, alpha), members in groups.items():
         cutter, millings = catalogue.cutters[index], []
         for patch in members:

@@ -17,6 +17,7 @@ from chipload.planning.sectional.answer import Answer, Unreachable
 from chipload.planning.sectional.compare import Compared
 from chipload.planning.sectional.impeller import Impeller
 from chipload.planning.sectional.patch import Patch
+from chipload.planning.sectional.settings import Setting
 from chipload.planning.sectional.surfaces import BODIES, Surface
 from chipload.planning.sectional.tables import IndexTable
 
@@ -126,6 +127,85 @@ class Limiting:
     blockers: tuple[int, ...]
 
 
+@dataclass(frozen=True)
+class Scallop:
+    """What the check measures on a patch: ``asked``, greatest rest between two passes, mean height of the crests [mm],
+    how many crests, the share of the patch on which no more than asked is left.
+    """
+
+    asked: float
+    greatest: float
+    mean: float
+    crests: int
+    covered: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing between two passes is higher than asked."""
+        return self.greatest <= self.asked
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """A program of one setting with what the simulation found.
+
+    Parameters
+    ----------
+    setting : cutter, table angle, patches, moves
+    gouge : deepest that any part of the tool comes below a surface [mm], where it is: ``says``
+    allowed : what of it is allowed [mm]
+    scallops : of each patch
+    findings : what the program asks of the machine that it does not give
+    seconds : predicted time of one channel [s]
+    """
+
+    setting: Setting
+    gouge: float
+    says: str
+    allowed: float
+    scallops: tuple[Scallop, ...]
+    findings: tuple[str, ...]
+    seconds: float
+
+    @property
+    def verified(self) -> bool:
+        """No gouge, nothing beyond the machine, no scallop higher than asked."""
+        return self.gouge <= self.allowed and not self.findings and all(s.holds for s in self.scallops)
+
+    @property
+    def missed(self) -> float:
+        """Length of lines that are not milled [mm]."""
+        gone = {line for line, _ in self.setting.linked.refused}
+        short = math.fsum(x.length for m in self.setting.millings for x in m.tracks.missed)
+        return (
+            short + math.fsum(t.length for m in self.setting.millings for t in m.tracks.tracks if t.line in gone)
+            if gone
+            else short
+        )
+
+    @property
+    def name(self) -> str:
+        """`D 12 r 2 mm at 45 deg`."""
+        c = self.setting.cutter
+        return f"D {c.diameter:g} r {c.corner_radius:g} mm at {np.degrees(self.setting.table):.6g} deg"
+
+    @property
+    def fails(self) -> tuple[str, ...]:
+        """What does not hold."""
+        out = [f"{self.name}: {f}" for f in self.findings]
+        if self.gouge > self.allowed:
+            out.append(f"{self.name}: {self.says}: gouge_mm = {self.allowed:g} is allowed")
+        for m, s in zip(self.setting.millings, self.scallops, strict=True):
+            if not s.holds:
+                where = f"{BODIES[m.patch.body]} {m.patch.side}"
+                out.append(f"{self.name}, {where}: {s.greatest:.4f} mm are left between passes: asked {s.asked:g}")
+        if self.missed > 0.0:
+            many = len(self.setting.linked.refused)
+            why = f", {many} lines have no way off the surface" if many else ""
+            out.append(f"{self.name}: {self.missed:.1f} mm of lines are not milled{why}")
+        return tuple(out)
+
+
 @dataclass(frozen=True, eq=False)
 class Milled:
     """A whole run.
@@ -137,6 +217,7 @@ class Milled:
     surfaces : in their order
     one : the largest cutter for all surfaces at one table angle, and the index of that; None: there is none
     ways : the cutter picked by hand where one is stated, then one cutter, two, ...
+    programs : of the way with the least time, checked; None: the job asks for none
     settings : keys of the operation, as stated
     outer_diameter : as stated [mm]
     provenance : JSON values: hashes of the inputs, versions
@@ -149,6 +230,7 @@ class Milled:
     surfaces: tuple[Searched, ...]
     one: tuple[CatalogueCutter, int] | None
     ways: tuple[Compared, ...]
+    programs: tuple[Checked, ...] | None
     settings: Mapping[str, Any]
     outer_diameter: float
     provenance: Mapping[str, Any]
@@ -213,12 +295,16 @@ def verdict(milled: Milled) -> tuple[bool, str]:
     if bad:
         more = f"; and {len(bad) - 1} more" if len(bad) > 1 else ""
         return False, f"Does not hold: {bad[0]}{more}."
-    return True, f"Every contact point is reached and its largest cutter proved; {for_all(milled)}."
+    text = f"Every contact point is reached and its largest cutter proved; {for_all(milled)}"
+    if milled.programs is None:
+        return True, f"{text}. No program is asked for."
+    return True, f"{text}. {len(milled.programs)} programs are verified: no gouge, holder included."
 
 
 def fails(milled: Milled) -> tuple[str, ...]:
     """All that does not hold."""
-    return (*(f"{op.surface.name}: {f}" for op in milled.surfaces for f in failures(op)), *unmilled(milled))
+    own = [f"{op.surface.name}: {f}" for op in milled.surfaces for f in failures(op)]
+    return (*own, *unmilled(milled), *(f for p in milled.programs or () for f in p.fails))
 
 
 def for_all(milled: Milled) -> str:

@@ -8,6 +8,7 @@ from html import escape
 import numpy as np
 import plotly.graph_objects as go
 
+from chipload.report.impeller.checked import program_sections
 from chipload.report.impeller.figures import map_figure, ranges_figure, space_figure, table_figure
 from chipload.report.impeller.outcome import Milled, Searched, fails, failures, for_all, largest, said, verdict
 from chipload.report.impeller.ways import divided_sections
@@ -24,7 +25,7 @@ def page_bytes(milled: Milled) -> bytes:
     body = [*heading(milled.title, holds, "Holds" if holds else "Does not hold", says.removeprefix("Does not hold: "))]
     if fails(milled):
         body += ["<h3>What does not hold</h3>", items(fails(milled))]
-    body += [_overview(milled), *divided_sections(milled, figures)]
+    body += [_overview(milled), *divided_sections(milled, figures), *program_sections(milled, figures)]
     for k, op in enumerate(milled.surfaces):
         body += _surface(k, op, figures)
     body += ["<h2>Where the numbers come from</h2>", definitions(milled.provenance)]

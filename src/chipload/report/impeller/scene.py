@@ -38,6 +38,13 @@ def scene_bytes(milled: Milled) -> bytes:
             _add(
                 scene, f"{k}-patches", points + OFF * op.surface.scene.normal, faces, _patches(milled, milled.used, op)
             )
+    for k, p in enumerate(milled.programs or (), 1):
+        n = len(p.setting.program)
+        if n > 1:
+            colour = np.array((34, 120, 132, 255), dtype=np.uint8)
+            line = trimesh.path.entities.Line(np.arange(n), color=colour)
+            path = trimesh.path.Path3D(entities=[line], vertices=p.setting.program.p_work, process=False)
+            scene.add_geometry(path, node_name=f"path-{k}", geom_name=f"path-{k}")
     glb: bytes = scene.export(file_type="glb", extension_webp=False, tree_postprocessor=_say_units)
     return glb
 

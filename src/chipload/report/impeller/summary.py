@@ -14,7 +14,8 @@ import pyarrow.parquet as pq
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.planning.sectional.compare import Compared
 from chipload.planning.sectional.patch import Patch
-from chipload.report.impeller.outcome import Milled, Searched, fails, failures, said, verdict
+from chipload.planning.sectional.surfaces import BODIES
+from chipload.report.impeller.outcome import Checked, Milled, Searched, fails, failures, said, verdict
 
 
 def summary_bytes(milled: Milled) -> bytes:
@@ -51,6 +52,7 @@ def operation(milled: Milled) -> dict[str, Any]:
         **(way_of(milled, used) if used is not None else {}),
         "hand_picked": None if picked is None else _picked(milled, picked),
         "ways": [way_of(milled, way) for way in milled.ways],
+        "programs": None if milled.programs is None else [_program(p) for p in milled.programs],
         "surfaces": rows,
         "settings": {k: list(v) if isinstance(v, tuple) else v for k, v in milled.settings.items()},
     }
@@ -88,6 +90,38 @@ def _patch(milled: Milled, way: Compared, patch: Patch) -> dict[str, Any]:
         "area_share": patch.area / milled.area,
         "path_mm": patch.path,
         "time_min": patch.time / 60.0,
+    }
+
+
+def _program(p: Checked) -> dict[str, Any]:
+    """A program of one channel with its check."""
+    return {
+        **_size(p.setting.cutter),
+        "table_deg": _degrees(p.setting.table),
+        "verified": p.verified,
+        "holds": not p.fails,
+        "fails": list(p.fails),
+        "rows": len(p.setting.program),
+        "path_mm": float(sum(m.tracks.length for m in p.setting.millings)),
+        "time_min": p.seconds / 60.0,
+        "missed_mm": p.missed,
+        "refused_lines": len(p.setting.linked.refused),
+        "direct_links": p.setting.linked.direct,
+        "retracts": p.setting.linked.retracts,
+        "gouge_mm": p.gouge,
+        "patches": [
+            {
+                "surface": f"{BODIES[m.patch.body]} {m.patch.side}",
+                "lines": m.tracks.lines,
+                "path_mm": m.tracks.length,
+                "scallop_greatest_mm": s.greatest,
+                "scallop_mean_mm": s.mean,
+                "scallop_mean_share": s.mean / s.asked,
+                "crests": s.crests,
+                "covered_share": s.covered,
+            }
+            for m, s in zip(p.setting.millings, p.scallops, strict=True)
+        ],
     }
 
 
