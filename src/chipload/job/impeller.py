@@ -155,6 +155,12 @@ def impeller_job(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) 
         _check(f"surface.{k}", surface, part)
         if any((s.body, s.side) == (surface.body, surface.side) for s in table.surface[:k]):
             raise InputError(f"surface.{k}: {surface.body} {surface.side} stands twice: list each surface once")
+    paths = table.operation[0].paths
+    if paths is not None and not paths.touch_mm < paths.margin_mm < paths.lift_mm:
+        raise InputError(
+            f"operation.0.paths.margin_mm = {paths.margin_mm:g}: must be above touch_mm = {paths.touch_mm:g} and below "
+            f"lift_mm = {paths.lift_mm:g}"
+        )
     files: dict[str, Path] = {}
     if part.sections is not None:
         given = part.sections

@@ -28,6 +28,10 @@ from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 #: points of the walls that are looked for gouges, along and up
 _COARSE = (61, 25)
+#: not at the very edges of a blade: there a ray into the metal leaves it again
+_EDGE = 0.01
+#: how far the rays go above and below a surface [mm]
+_HEIGHT, _DEPTH = 1.0, 0.5
 #: grid lines across the passes of a patch on which the scallop is measured, points between two passes
 _FEW, _BETWEEN = 7, 14
 
@@ -66,7 +70,7 @@ def _checked(
 ) -> Checked:  # fmt: skip
     program = setting.program
     dense = [_dense(impeller, m, ahead) for m in setting.millings]
-    found = left_on([*walls, *dense], program, setting.cutter, 1.0, 1.0, workers=workers)
+    found = left_on([*walls, *dense], program, setting.cutter, _HEIGHT, _DEPTH, workers=workers)
     scallops = tuple(_scallop(m, left, scallop) for m, left in zip(setting.millings, found[len(walls) :], strict=True))
     commands, findings = to_axes(program, machine)
     said = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
@@ -96,7 +100,7 @@ def _dense(impeller: Impeller, milling: Milling, ahead: float) -> Wall:
 
 def _walls(impeller: Impeller, ahead: float) -> list[Wall]:
     """Both sides of the bodies round the channels, and their floors."""
-    u, v = (np.linspace(0.0, 1.0, n) for n in _COARSE)
+    u, v = np.linspace(_EDGE, 1.0 - _EDGE, _COARSE[0]), np.linspace(0.0, 1.0 - _EDGE, _COARSE[1])
     last = 1 + len(impeller.bodies)
     out = []
     for k in range(-1, last):
