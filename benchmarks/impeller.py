@@ -201,9 +201,9 @@ def hecc():
 
 
 def shop():
-    """Long-reach cutters of assumed lengths; the first is the one picked by hand."""
+    """Long-reach cutters of assumed lengths."""
     rows = [(4, 60, 80), (5, 60, 80), (6, 90, 110), (8, 90, 110), (10, 90, 110), (12, 90, 110), (14, 90, 110)]
-    rows += [(16, 90, 110), (20, 90, 110), (25, 90, 110)]
+    rows += [(16, 90, 110)]
     cutters = []
     for d, neck, reach in rows:
         for r in (1.0, 2.0) if d > 4 else (1.0,):
@@ -224,7 +224,7 @@ def divide(title, impeller, catalogue, picked, tables, names, how, terms) -> Non
     print(f"\n{title}: {sum(len(s.area) for s in sides)} contact points, scallop {terms.scallop} mm; searched in "
           f"{time.perf_counter() - begun:.1f} s; not reached: {', '.join(unreached)}")  # fmt: skip
     begun = time.perf_counter()
-    ways = compared(sides, terms, picked, (1, 2, 3, None), workers=2)
+    ways = compared(sides, terms, picked, (1, 2, 3), workers=2)
     print(f"patches in {time.perf_counter() - begun:.1f} s")
     base = ways[0].divided
     for way in ways:
@@ -259,14 +259,14 @@ def patches() -> None:
     if not HECC.is_dir():
         return
     wide, tall = (0.05, 0.95), (0.20, 0.98)
-    how = Sampled(wide, tall, (12, 7), 4.0, 2.0, ahead=10.0)
+    how = Sampled(wide, tall, (7, 4), 5.0, 2.0, ahead=10.0)
     names = [
         (b, s, wide, flat if s == "floor" else tall) for b in ("blade", "splitter") for s in ("plus", "minus", "floor")
     ]
     catalogue = shop()
     picked = next(k for k, c in enumerate(catalogue.cutters) if c.diameter == 6.0)
     terms = Terms(600.0 / 60.0, 0.05, 60.0, 30.0, 15)
-    divide("HECC", hecc(), catalogue, picked, TABLES, names, how, terms)
+    divide("HECC", hecc(), catalogue, picked, TABLES[::2], names, how, terms)
 
 
 if __name__ == "__main__":

@@ -220,6 +220,24 @@ def example(
 
 
 @app.command()
+def view(
+    path: Annotated[Path, typer.Argument(metavar="PATH", help="a result folder, a job, or a folder that holds them")],
+    port: Annotated[int | None, typer.Option("--port", min=1, max=65535, help="else 8170, or a free one")] = None,
+    open_browser: Annotated[bool, typer.Option("--open/--no-open", help="open the page in the browser")] = True,
+    debug: Debug = False,
+) -> None:
+    """Show results and jobs of a folder in the browser, run jobs there; only for this computer; Ctrl-C ends it."""
+
+    def work() -> int:
+        from chipload.web.serve import serve
+
+        serve(path, port, open_browser, typer.echo)
+        return 0
+
+    _guarded(work, debug)
+
+
+@app.command()
 def hal(
     file: Annotated[Path, typer.Argument(metavar="HAL", help="the controller (TOML): path, override, spindle")],
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="what happened, step by step (CSV)")] = None,

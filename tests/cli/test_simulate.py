@@ -87,7 +87,7 @@ def test_a_slot_in_numbers(job: Path, tmp_path: Path) -> None:
     # 2 mm deep, 30 mm long and half a disc at its end
     assert op["chip_volume_mm3"] == pytest.approx(2.0 * (300.0 + 0.5 * np.pi * 25.0), rel=1e-3)
     assert summary["program"]["status"] == "simulated"
-    assert op["unchecked"] == ["torque_nm", "power_w", "chip_mm"]
+    assert op["unchecked"] == ["torque_nm", "power_w", "chip_mm", "gouge_mm", "excess_mm"]
     t = pq.read_table(tmp_path / "r" / "history.parquet")
     assert sum(t["chip_volume_mm3"].to_pylist()) == pytest.approx(op["chip_volume_mm3"])
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from chipload.job import MAY, NEEDS, OperationTable, load_job
+from chipload.job.reference import reference
 
 
 def test_the_example_is_read_whole(job_dir: Path) -> None:
@@ -70,3 +71,11 @@ def test_a_limit_that_is_not_stated_is_listed_as_unchecked(job_dir: Path) -> Non
 def test_every_key_of_a_kind_exists() -> None:
     for table in (NEEDS, MAY):
         assert {key for keys in table.values() for key in keys} <= set(OperationTable.model_fields)
+
+
+def test_the_page_of_keys_is_that_of_the_tables() -> None:
+    """Made again by: python -c "from chipload.job.reference import reference; print(reference(), end='')"."""
+    page = Path(__file__).parents[2] / "docs" / "jobs.md"
+    assert page.read_text("utf-8") == reference()
+    for key in ("radial_depth_mm", "force_n", "low_mm", "units_if_unsaid", "clearance_mm"):
+        assert f"| `{key}` |" in reference()

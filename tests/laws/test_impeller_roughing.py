@@ -11,7 +11,7 @@ from chipload.planning.sectional.lines import Motion
 from chipload.planning.sectional.links import Link, linked
 from chipload.planning.sectional.parametric import Shape, impeller_of
 from chipload.planning.sectional.programs import program_of
-from chipload.planning.sectional.roughing import Rough, layers, roughing
+from chipload.planning.sectional.roughing import Rough, guarded, layers, roughing
 from chipload.simulation.channel.channel import left_on, wall
 
 CUTTER = CatalogueCutter(12.0, 2.0, cutting_length=45.0, reach=60.0, holder_diameter=30.0)
@@ -43,6 +43,18 @@ def test_floor_is_the_hub(impeller):
     x = (s.outer_radius - r) / (s.outer_radius - s.hub_radius)
     assert np.abs(x**2 + (1.0 - z / s.height) ** 2 - 1.0).max() < 1e-3
     assert (patch.normal(u, v) * np.column_stack([p[:, :2] / r[:, None], np.ones(len(r))])).sum(axis=1).min() > 0.0
+
+
+def test_guarded_walls_stand_out_by_the_sag_and_the_milled_one_does_not(impeller):
+    s = Shape()
+    for milled in (0, 2):
+        scene = guarded(impeller, 0, milled, 2.0, 2.0, around=0)
+        p = scene.check[scene.check_surface == 2]
+        # distance from the ellipse of the hub, to first order of its equation
+        x, y = s.outer_radius - np.hypot(p[:, 0], p[:, 1]), s.height - p[:, 2]
+        a, b = s.outer_radius - s.hub_radius, s.height
+        off = ((x / a) ** 2 + (y / b) ** 2 - 1.0) / (2.0 * np.hypot(x / a**2, y / b**2))
+        assert np.abs(off + (0.25 if milled == 0 else 0.0)).max() < 0.01
 
 
 def test_no_layer_is_thicker_than_asked(impeller):

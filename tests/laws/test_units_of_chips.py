@@ -61,7 +61,10 @@ def scaled(cutter: Cutter, k: float) -> Cutter:
 @pytest.mark.parametrize("k", [0.1, 25.4])
 @pytest.mark.parametrize(("cutter", "seed"), [(FLAT, 21), (BULL, 22)], ids=["flat", "bull"])
 def test_the_unit_of_length_does_not_matter(cutter: Cutter, seed: int, k: float) -> None:
-    """Areas grow by k^2, volumes by k^3, forces by k^2 where the edge terms grow by k; torques by k^3."""
+    """Areas grow by k^2, volumes by k^3, forces by k^2 where the edge terms grow by k; torques by k^3.
+
+    Rounding may decide how many chords an edge gets, so that what a step loses follows to the share of the chords.
+    """
     tips, axes = walk(seed, 5)
     move, larger = (Move.slerp(s * tips[0], axes[0], s * tips[1], axes[1]) for s in (1.0, k))
     heights = tips[0, 2] + np.array([0.2, 1.7, 4.0])
@@ -76,4 +79,5 @@ def test_the_unit_of_length_does_not_matter(cutter: Cutter, seed: int, k: float)
     two = run(tips, axes, scaled(cutter, k), stocks[1], k).columns
     for name, power in (("chip_volume_mm3", 3), *((f, 2) for f in FORCES), ("torque_mean_nm", 3), ("chip_max_mm", 1)):
         size = np.abs(one[name]).max()
-        np.testing.assert_allclose(two[name] / k**power, one[name], rtol=1e-9, atol=1e-9 * size, err_msg=name)
+        np.testing.assert_allclose(two[name] / k**power, one[name], rtol=0.0, atol=3e-4 * size, err_msg=name)
+    assert two["chip_volume_mm3"].sum() / k**3 == pytest.approx(one["chip_volume_mm3"].sum(), rel=2e-5)

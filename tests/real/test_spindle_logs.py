@@ -77,7 +77,7 @@ def test_a_held_out_run_is_predicted(condition, record_property):
     other, _, there = run(held_out)
     predicted, measured = log.current[cutting].mean(), other.current[there].mean()
     error = predicted / measured - 1.0
-    record_property("error", error)
+    record_property("error", float(error))
     print(condition, learned, held_out, int(cutting.sum()), int(there.sum()), f"{100 * error:+.2f} %")
     assert abs(error) < (0.02 if min(cutting.sum(), there.sum()) > 400 else 0.06)
 

@@ -40,6 +40,7 @@ class Cutter:
     taper : beta [rad], 0 <= beta
     runout : (offset [mm], direction [rad] from tooth 0): the axis of the teeth beside that of the spindle
     shank_diameter : [mm]; None: as the diameter
+    holder : (length, diameter) [mm] of its parts, upwards from the overhang; empty: not known
     number : tool number, >= 1
     name : as the shop calls it
 
@@ -62,6 +63,7 @@ class Cutter:
     taper: float = 0.0
     runout: tuple[float, float] = (0.0, 0.0)
     shank_diameter: float | None = None
+    holder: tuple[tuple[float, float], ...] = ()
     number: int = 1
     name: str = ""
 
@@ -118,6 +120,9 @@ class Cutter:
         need(self.runout[0] >= 0.0, "runout_mm", self.runout[0], "must be at least 0")
         shank = self.shank_diameter
         need(shank is None or shank > 0.0, "shank_diameter_mm", shank or 0.0, "must be above 0")
+        for k, part in enumerate(self.holder):
+            for key, size in zip(("length", "diameter"), part, strict=True):
+                need(0.0 < size < math.inf, f"holder.{k}.{key}_mm", size, "must be above 0")
         need(self.number >= 1, "number", self.number, "must be at least 1")
 
     @property

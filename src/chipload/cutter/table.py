@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.fctb import read_fctb
@@ -23,8 +23,13 @@ from chipload.tables import nearest
 NEEDED = ("number", "diameter_mm", "flutes", "helix_deg", "flute_length_mm", "overhang_mm", "modulus_gpa")
 
 
+def _rows(value: Any) -> Any:
+    """A list of lists as tuples."""
+    return tuple(tuple(row) if isinstance(row, list) else row for row in value) if isinstance(value, list) else value
+
+
 class CutterTable(BaseModel):
-    """Keys of one ``[[cutter]]``; :meth:`cutter` makes the cutter.
+    """Keys of one ``[[cutter]]``: its own numbers, or those of a file.
 
     ``file`` is a FreeCAD tool bit (`.fctb`) or a LinuxCNC tool table (`.tbl`, with ``tool`` the number in it and
     ``file_unit`` the unit of its lengths, which the file does not say).
@@ -48,6 +53,9 @@ class CutterTable(BaseModel):
     runout_mm: float | None = None
     runout_deg: float | None = None
     shank_diameter_mm: float | None = None
+    holder_mm: Annotated[tuple[tuple[float, float], ...] | None, BeforeValidator(_rows)] = Field(
+        None, description="length and diameter of the holder's parts, upwards from the overhang"
+    )
     file: str | None = None
     tool: int | None = None
     file_unit: Literal["mm", "inch"] | None = None
@@ -83,6 +91,7 @@ class CutterTable(BaseModel):
             taper=math.radians(values.get("taper_deg", 0.0)),
             runout=(values.get("runout_mm", 0.0), math.radians(values.get("runout_deg", 0.0))),
             shank_diameter=values.get("shank_diameter_mm"),
+            holder=tuple(tuple(part) for part in values.get("holder_mm", ())),
             number=values["number"],
             name=values.get("name", ""),
         )

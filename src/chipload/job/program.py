@@ -67,7 +67,7 @@ def program_job(path: Path, table: ProgramJobTable, overrides: Sequence[str]) ->
         _check_simulation(table)
         own = cutters(table.cutter, folder)
     else:
-        for key in ("stock", "material", "cutter"):
+        for key in ("stock", "part", "fixture", "material", "cutter"):
             if getattr(table, key):
                 raise InputError(
                     f"{key}: not used where a program is only read: add an [[operation]] with "
@@ -99,6 +99,9 @@ def _check_simulation(table: ProgramJobTable) -> None:
         if saved == (stock.layer_mm is not None):
             need = "leave it out: the layers of an earlier result stay" if saved else "missing: state it"
             raise InputError(f"stock.layer_mm: {need}")
+    for key in ("gouge_mm", "excess_mm"):
+        if table.part is None and getattr(table.limits, key) is not None:
+            raise InputError(f"limits.{key}: needs the part that should come out: state [part] or leave it out")
     if not table.limits.stated:
         names = ", ".join(LoadLimitsTable.model_fields)
         raise InputError(f"limits: none is stated, so nothing would be checked: state at least one of {names}")

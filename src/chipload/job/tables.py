@@ -139,6 +139,25 @@ class SolidTable(Table):
     layer_mm: Positive | None = Field(None, description="thickness of the layers; an earlier result has its own")
 
 
+class TargetTable(Table):
+    """The part that the program should leave: what is cut into it is a gouge, what stands over it is excess."""
+
+    file: Text = Field(description=".stl or .step, closed")
+    units: Unit | None = Field(None, description="unit of an STL file, which does not say it")
+    chord_mm: Positive = Field(0.01, le=1.0, description="how far facets may leave a model's faces")
+    spacing_mm: Positive = Field(description="longest side of the triangles whose corners are looked at")
+    look_mm: Positive = Field(1.0, description="material over the part is measured up to this")
+
+
+class FixtureTable(Table):
+    """What no part of a tool may touch."""
+
+    file: Text = Field(description=".stl or .step, closed")
+    units: Unit | None = Field(None, description="unit of an STL file, which does not say it")
+    chord_mm: Positive = Field(0.1, le=1.0, description="how far facets may leave a model's faces")
+    spacing_mm: Positive = Field(description="longest side of the triangles whose corners are looked at")
+
+
 class SimulateTable(Table):
     """Run the program through the stock: chips, forces, torque, power."""
 
@@ -148,6 +167,9 @@ class SimulateTable(Table):
     interpolation: Literal["slerp", "lerp"] = Field("slerp", description="how the axis turns within a step")
     corner_slices: Count = Field(12, le=200, description="slices of a corner radius")
     flank_mm: Positive | None = Field(None, description="length of a slice of the flank; else half the radius")
+    stock_points_mm: Positive | None = Field(
+        None, description="pitch of the points of the stock that shank and holder are held against; none: they are not"
+    )
 
 
 class LoadLimitsTable(Limits):
@@ -157,6 +179,8 @@ class LoadLimitsTable(Limits):
     torque_nm: Positive | None = None
     power_w: Positive | None = None
     chip_mm: Positive | None = None
+    gouge_mm: Positive | None = Field(None, description="deepest cut into the [part]")
+    excess_mm: Positive | None = Field(None, description="most material over the [part] where the tool came near it")
 
 
 class ProgramJobTable(Table):
@@ -165,6 +189,8 @@ class ProgramJobTable(Table):
     program: ProgramTable
     machine: SourceTable
     stock: SolidTable | None = None
+    part: TargetTable | None = None
+    fixture: tuple[FixtureTable, ...] = ()
     material: SourceTable | None = None
     cutter: tuple[CutterTable, ...] = ()
     operation: tuple[SimulateTable, ...] = Field((), max_length=1)

@@ -31,6 +31,7 @@ from chipload.report.figures import FONT, GRID, LIMIT, SCALE, SPACE_POINTS, STOC
 from chipload.report.sheet import definitions, figure, framed, heading, items, table
 from chipload.report.simulated import Simulated, operation, sections
 from chipload.report.simulated import history as steps
+from chipload.report.surface import coloured_mesh, span_of
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
 
 Floats = NDArray[np.float64]
@@ -194,6 +195,9 @@ def scene_bytes(read: Read) -> bytes:
         stock = read.simulated.stock.mesh()
         stock.visual.face_colors = (168, 122, 58, 255)
         scene.add_geometry(stock, node_name="stock", geom_name="stock")
+        left, columns = read.simulated.left, read.simulated.removal.columns
+        if left is not None:
+            scene.add_geometry(coloured_mesh(left, span_of(left, columns)), node_name="part", geom_name="part")
     glb: bytes = scene.export(file_type="glb", extension_webp=False)
     return glb
 
@@ -335,12 +339,17 @@ def _sentence(text: str) -> str:
 def _unchecked(read: Read) -> str:
     if read.simulated is None:
         return "Removal, engagement, force, collision: the program was only held against the limits of the machine."
-    names = ", ".join(read.simulated.unchecked)
-    limits = f" No limit is stated for {escape(names)}." if names else ""
-    return (
-        "Whether the cutter leaves the part right, and whether shank, holder or fixtures collide: neither part nor "
-        f"fixtures are known to this job.{limits}"
-    )
+    done = read.simulated
+    out = ["whether the part comes out right: no part is stated"] if done.left is None else []
+    if "stock" not in done.held_against:
+        out.append("whether shank and holder run into the stock: stock_points_mm is not stated")
+    if not any(name.startswith("fixture") for name in done.held_against):
+        out.append("fixtures: none is stated")
+    if done.no_holder:
+        out.append(f"holders of tools {', '.join(map(str, done.no_holder))}: not stated")
+    if done.unchecked:
+        out.append(f"limits that are not stated: {', '.join(done.unchecked)}")
+    return escape(_sentence("; ".join(out)) + "." if out else "Everything that chipload can check of a program was.")
 
 
 def _findings(title: str, findings: tuple[Finding, ...]) -> list[str]:

@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from chipload.cutting.material import Material
+from chipload.report import surface
 from chipload.report.diagram import diagram_figure
 from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, STOCK
 from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table
 from chipload.simulation.chips import Removal
+from chipload.simulation.surface import Collision, Difference
 from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]
@@ -32,6 +34,8 @@ LIMITS: Mapping[str, tuple[str, str]] = {
     "torque_nm": ("torque_nm", "N m"),
     "power_w": ("power_w", "W"),
     "chip_mm": ("chip_max_mm", "mm"),
+    "gouge_mm": ("gouge_mm", "mm"),
+    "excess_mm": ("", "mm"),
 }
 SURE = "\u00b1 is twice the standard deviation that the spread of the material's coefficients gives."
 UNSURE = "How sure these are cannot be said: the material states neither a spread nor a covariance of its coefficients."
@@ -89,6 +93,10 @@ class Simulated:
     material : whose coefficients were used
     limits, unchecked : stated limits by name, and names of those that are not stated
     settings : the keys of the operation
+    left : what is left on the part; None: no part is stated
+    collisions : what ran into what
+    held_against : names of what shank and holder were held against
+    no_holder : tools whose holder is not stated
     """
 
     removal: Removal
@@ -97,12 +105,21 @@ class Simulated:
     limits: Mapping[str, float]
     unchecked: tuple[str, ...]
     settings: Mapping[str, Any]
+    left: Difference | None = None
+    collisions: tuple[Collision, ...] = ()
+    held_against: tuple[str, ...] = ()
+    no_holder: tuple[int, ...] = ()
 
     @cached_property
     def held(self) -> tuple[Held, ...]:
         """Every stated limit."""
         c, out = self.removal.columns, []
         for name, limit in self.limits.items():
+            if name in ("gouge_mm", "excess_mm"):
+                assert self.left is not None
+                found = surface.worst(self.left, c, name.removesuffix("_mm"))
+                out.append(Held(name, limit, found["max"], found["line"], tuple(found["at_mm"] or (0.0, 0.0, 0.0))))
+                continue
             values = c[LIMITS[name][0]]
             k = int(np.argmax(values))
             at = (float(c["x_mm"][k]), float(c["y_mm"][k]), float(c["z_mm"][k]))
@@ -113,7 +130,13 @@ class Simulated:
     def fails(self) -> tuple[str, ...]:
         """What does not hold."""
         found = [h.says for h in self.held if not h.holds]
-        return (*found, *(f"line {f.line}: {f.text}" for f in self.removal.findings))
+        rapids = (f"line {f.line}: {f.text}" for f in self.removal.findings)
+        touched = (
+            f"line {c.line}: {c.what} goes {c.depth_mm:.3g} mm into {c.into}, tip at "
+            f"({c.at[0]:.4g}, {c.at[1]:.4g}, {c.at[2]:.4g})"
+            for c in self.collisions
+        )
+        return (*found, *rapids, *touched)
 
 
 def operation(simulated: Simulated) -> dict[str, Any]:
@@ -160,6 +183,10 @@ def operation(simulated: Simulated) -> dict[str, Any]:
             {"name": h.name, "limit": h.limit, "worst": h.worst, "line": h.line, "at_mm": list(h.at), "holds": h.holds}
             for h in simulated.held
         ],
+        **(surface.numbers(simulated.left, c) if simulated.left is not None else {}),
+        "collisions": surface.listed(simulated.collisions, c),
+        "held_against": list(simulated.held_against),
+        "no_holder": list(simulated.no_holder),
         "unchecked": list(simulated.unchecked),
         "settings": dict(simulated.settings),
     }
@@ -169,6 +196,8 @@ def history(simulated: Simulated) -> dict[str, NDArray[Any]]:
     """The columns of history.parquet, a row a step."""
     columns = dict(simulated.removal.columns)
     names = np.array([label or "program" for label in simulated.removal.labels], dtype=object)
+    if simulated.left is not None:
+        columns["gouge_mm"] = np.maximum(-simulated.left.deepest, 0.0)
     return {"pass": names[columns.pop("label")], **columns}
 
 
@@ -230,7 +259,7 @@ def _mean(values: Mapping[str, Any]) -> str:
 
 def sections(simulated: Simulated, figures: dict[str, go.Figure]) -> list[str]:
     """The part of the page that shows chips and forces; figures are put among ``figures``."""
-    what = operation(simulated)
+    what, c = operation(simulated), simulated.removal.columns
     force, torque, power = what["force_n"], what["torque_nm"], what["power_w"]
     sure = torque["mean_sd"] is not None
     rows = [
@@ -260,4 +289,5 @@ def sections(simulated: Simulated, figures: dict[str, go.Figure]) -> list[str]:
             "(left: around the edge across, time in the step up) and what of it was still there (right).</p>",
             figure("chip", drawn, figures),
         ]
+    body += surface.section(simulated.left, simulated.collisions, c, simulated.held_against, figures)
     return body

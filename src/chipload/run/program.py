@@ -7,10 +7,13 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+import shapely
+import trimesh
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named, read_material
+from chipload.errors import InputError
 from chipload.geometry.mesh import read_mesh
 from chipload.job import ProgramJob
 from chipload.job.tables import SimulateTable
@@ -22,6 +25,8 @@ from chipload.report.reading import Read, verdict
 from chipload.report.simulated import Simulated
 from chipload.run.provenance import hashes, title_of, versions
 from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.steps import steps_of
+from chipload.simulation.surface import MOST_POINTS, collisions, difference, fine, in_stock
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min
 
@@ -65,8 +70,10 @@ def run_program(job: ProgramJob, progress: Progress = silent, *, simulate: bool 
             )
     files: dict[str, Path] = {"job": job.path, "program": job.program_file}
     named = {"machine": job.machine, "tools": job.tools_file, "material": job.material}
-    if job.table.stock is not None and job.table.stock.file is not None:
-        named["stock"] = job.path.parent / job.table.stock.file
+    fixtures = {f"fixture {k}": f for k, f in enumerate(job.table.fixture)}
+    for name, solid in {"stock": job.table.stock, "part": job.table.part, **fixtures}.items():
+        if solid is not None and solid.file is not None:
+            named[name] = job.path.parent / solid.file
     files |= {k: v for k, v in named.items() if isinstance(v, Path)}
     files |= {f"cutter {k}": job.path.parent / c.file for k, c in enumerate(job.table.cutter) if c.file is not None}
     provenance = {
@@ -93,9 +100,65 @@ def _simulated(
     op: SimulateTable = job.table.operation[0]
     smallest = min(c.radius for c in job.cutters.values())
     fine = Resolution(op.step_mm, op.tolerance_mm, op.corner_slices, op.flank_mm or 0.5 * smallest)
-    removal = remove(program, stock, job.cutters, material, fine, interpolation=op.interpolation, progress=progress)
+    points = _grid(stock, op.stock_points_mm) if op.stock_points_mm is not None else None
+    part, fixtures = _part(job), _fixtures(job)
+    removal = remove(
+        program, stock, job.cutters, material, fine, interpolation=op.interpolation,
+        progress=lambda done, what: progress(0.8 * done, what),
+    )  # fmt: skip
+    steps = steps_of(program, op.step_mm, op.tolerance_mm)
+    left, solids = None, dict(fixtures)
+    if part is not None:
+        table = job.table.part
+        assert table is not None
+        left = difference(
+            steps, job.cutters, part, table.spacing_mm, table.look_mm, op.tolerance_mm,
+            lambda done, what: progress(0.8 + 0.1 * done, what),
+        )  # fmt: skip
+        solids["part"] = left.points
+    touched = collisions(steps, job.cutters, solids, op.tolerance_mm, above_only=frozenset(["part"]))
+    if points is not None:
+        touched += in_stock(steps, job.cutters, points, op.tolerance_mm)
     settings = {k: v for k, v in op.model_dump().items() if v is not None}
-    return Simulated(removal, stock, material, job.limits, job.unchecked, settings)
+    held_against = (*solids, *(["stock"] if points is not None else []))
+    return Simulated(
+        removal, stock, material, job.limits, job.unchecked, settings, left, touched, held_against, _no_holder(job)
+    )
+
+
+def _part(job: ProgramJob) -> trimesh.Trimesh | None:
+    """The part that should come out."""
+    table = job.table.part
+    if table is None:
+        return None
+    return read_mesh(job.path.parent / table.file, unit=table.units, chord_mm=table.chord_mm, key="part.file")
+
+
+def _fixtures(job: ProgramJob) -> dict[str, NDArray[np.float64]]:
+    """Points of the fixtures by name."""
+    out = {}
+    for k, table in enumerate(job.table.fixture):
+        path, key = job.path.parent / table.file, f"fixture.{k}.file"
+        mesh = read_mesh(path, unit=table.units, chord_mm=table.chord_mm, key=key)
+        out[f"fixture {k}"] = fine(mesh, table.spacing_mm, f"fixture.{k}")[0]
+    return out
+
+
+def _grid(stock: LayeredStock, pitch: float) -> NDArray[np.float64]:
+    """Points [mm] of a grid that lie in the stock."""
+    low, high = (np.array([stock.xs[i], stock.ys[i], stock.bounds[i]]) for i in (0, -1))
+    x, y, z = (np.arange(a + 0.5 * pitch, b, pitch) for a, b in zip(low, high, strict=True))
+    if len(x) * len(y) * len(z) > MOST_POINTS:
+        raise InputError(f"operation.0.stock_points_mm = {pitch:g}: more than {MOST_POINTS} points: state a larger one")
+    xy = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    layers = np.clip(np.searchsorted(stock.bounds, z, side="right") - 1, 0, stock.layers - 1)
+    inside = [xy[shapely.contains_xy(stock.section(int(i)), *xy.T)] for i in layers]
+    return np.concatenate([np.column_stack([p, np.full(len(p), h)]) for p, h in zip(inside, z, strict=True)])
+
+
+def _no_holder(job: ProgramJob) -> tuple[int, ...]:
+    """Tools whose holder is not stated."""
+    return tuple(n for n, c in sorted(job.cutters.items()) if not c.holder)
 
 
 def _material(job: ProgramJob) -> Material:

@@ -12,11 +12,13 @@ and :mod:`chipload.engagement.immersion.immersion` for the one in force.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon, box
 
@@ -29,9 +31,9 @@ from chipload.engagement.immersion.immersion import Section
 from chipload.errors import Finding, InputError
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
-from chipload.simulation.loads import LOADS, StepBite, bite_of_step, bites_of_steps, loads_of_steps
+from chipload.simulation.loads import LOADS, Cuts, StepBite, bite_of_step, bites_of_steps, joined, loads_of_steps
 from chipload.simulation.steps import Steps, steps_of
-from chipload.simulation.swept import Interpolation, swept_ahead
+from chipload.simulation.swept import TOGETHER, Interpolation, swept_ahead
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_min_from_mm_s
 
@@ -98,6 +100,7 @@ class Removal:
     piece : the chip with most pieces that are most alike; None where nothing was cut
     findings : rapids that cut
     labels : of the program, `label` of the columns counts in them
+    cuts : what the teeth cut, one a cutter that cut; empty unless it was asked for
     """
 
     columns: Columns
@@ -107,6 +110,7 @@ class Removal:
     piece: Piece | None
     findings: tuple[Finding, ...]
     labels: tuple[str, ...]
+    cuts: tuple[Cuts, ...] = ()
 
 
 def remove(
@@ -117,6 +121,7 @@ def remove(
     resolution: Resolution,
     *,
     interpolation: Interpolation = "slerp",
+    keep: bool = False,
     progress: Progress = silent,
 ) -> Removal:
     """Take what the program cuts from ``stock``, which changes, and say what it costs.
@@ -126,6 +131,7 @@ def remove(
     program : in the work frame of the stock
     cutters : by tool number
     interpolation : of the axis within a step: along a great circle (slerp) or normalised straight line (lerp)
+    keep : keep what the teeth cut in every step, for :mod:`chipload.simulation.deflection`; some kB a step
 
     Returns
     -------
@@ -153,44 +159,61 @@ def remove(
     profiles = {
         n: slices(c, corner_pieces=resolution.corner_pieces, flank_mm=resolution.flank_mm) for n, c in cutters.items()
     }
-    before = stock.volume()
+    before, thickness, tolerance = stock.volume(), stock.thickness, resolution.tolerance
     removed = np.zeros((len(steps), 3))
     loads = np.zeros((len(steps), len(LOADS)))
     basis = np.zeros((4, 6))
+    kept: dict[int, list[Cuts]] = {}
     best: Piece | None = None
     rank = (0, 0.0)
+
+    def bites(those: list[tuple[int, Move, Section]]) -> list[StepBite]:
+        tools = [int(steps.tool[k]) for k, _, _ in those]
+        return [
+            bite_of_step(steps, k, move, cutters[n], profiles[n], there)
+            for n, (k, move, there) in zip(tools, those, strict=True)
+        ]
+
     for first in range(0, len(steps), BLOCK):
         progress(first / len(steps), "removing")
         some = range(first, min(first + BLOCK, len(steps)))
-        cuts: list[StepBite] = []
-        for k, swept in swept_ahead(steps, some, stock, cutters, interpolation, resolution.tolerance):
-            cutter, met, low, high = cutters[int(steps.tool[k])], swept.met, swept.low, swept.high
-            # a face that looks down is held against the layer below
-            layers = range(max(swept.layers.start - 1, 0), swept.layers.stop)
-            there = Section(*stock.edges(layers, low[:2], high[:2]))
-            tidied = stock.tidied
-            taken = stock.remove_many([i for i, _ in met], [shape for _, shape in met], 0.5 * resolution.tolerance)
-            removed[k, 0] = tidied - stock.tidied
-            for (i, _), pieces in zip(met, taken, strict=True):
-                if not pieces:
-                    continue
-                whole = [p for p in pieces if _whole(p, resolution.tolerance)]
-                removed[k] += (sum(p.area for p in pieces) * stock.thickness[i], 0.0, 1.0)
-                removed[k, 1] = max(removed[k, 1], len(whole))
-                if _rank(whole) > rank:
-                    rank = _rank(whole)
-                    near = stock.section(i).union(MultiPolygon(pieces)).intersection(box(*low[:2], *high[:2]))
-                    best = Piece(k, swept.move, cutter, float(stock.heights[i]), near, tuple(whole))
-            # what is thinner than the tolerance can tell is no cut
-            if removed[k, 1] > 0.0 and not steps.rapid[k]:
-                cuts.append(bite_of_step(steps, k, swept.move, cutter, profiles[int(steps.tool[k])], there))
+        cutting: list[tuple[int, Move, Section]] = []
+        waiting: list[Future[list[StepBite]]] = []
+        with ThreadPoolExecutor(1) as beside:
+            for k, swept in swept_ahead(steps, some, stock, cutters, interpolation, tolerance):
+                met, low, high = swept.met, swept.low[:2], swept.high[:2]
+                # a face that looks down is held against the layer below
+                layers = range(max(swept.layers.start - 1, 0), swept.layers.stop)
+                there = Section(*stock.edges(layers, low, high))
+                tidied = stock.tidied
+                taken = stock.remove_many([i for i, _ in met], [shape for _, shape in met], 0.5 * tolerance)
+                removed[k, 0] = tidied - stock.tidied
+                for i, pieces, area, whole in _chips(met, taken, tolerance):
+                    removed[k] += (area * thickness[i], 0.0, 1.0)
+                    removed[k, 1] = max(removed[k, 1], len(whole))
+                    if whole and rank < (len(whole), 1.0 / len(whole)) and _rank(whole) > rank:
+                        rank = _rank(whole)
+                        near = stock.section(i).union(MultiPolygon(pieces)).intersection(box(*low, *high))
+                        cutter = cutters[int(steps.tool[k])]
+                        best = Piece(k, swept.move, cutter, float(stock.heights[i]), near, tuple(whole))
+                # what is thinner than the tolerance can tell is no cut
+                if removed[k, 1] > 0.0 and not steps.rapid[k]:
+                    cutting.append((k, swept.move, there))
+                if len(cutting) == TOGETHER:
+                    waiting.append(beside.submit(bites, cutting))
+                    cutting = []
+            waiting.append(beside.submit(bites, cutting))
+            cuts = [bite for several in waiting for bite in several.result()]
         for number in sorted({int(steps.tool[c.step]) for c in cuts}):
             own = [c for c in cuts if steps.tool[c.step] == number]
             at = [c.step for c in own]
-            bites = bites_of_steps(own, cutters[number], profiles[number])
-            loads[at] = loads_of_steps(bites, own, cutters[number], material, resolution.rotation, steps.spindle[at])
+            bitten = bites_of_steps(own, cutters[number], profiles[number])
+            loads[at] = loads_of_steps(bitten, own, cutters[number], material, resolution.rotation, steps.spindle[at])
+            if keep:
+                way = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
+                kept.setdefault(number, []).append(Cuts(number, cutters[number], np.array(at), way, bitten))
             if _sure(material):
-                each = mean_basis(bites, cutters[number], material, bites.frame)
+                each = mean_basis(bitten, cutters[number], material, bitten.frame)
                 basis += np.tensordot(steps.seconds[at], each, 1)
     progress(1.0, "removed")
     band = None
@@ -199,7 +222,14 @@ def remove(
         sd = deviations(basis / cut_s, material) if cut_s > 0.0 else np.zeros(4)
         band = (*sd[:3].tolist(), float(sd[3]) / 1000.0)
     return Removal(
-        _columns(steps, removed, loads), before, stock.volume(), band, best, _findings(steps, removed), program.labels
+        _columns(steps, removed, loads),
+        before,
+        stock.volume(),
+        band,
+        best,
+        _findings(steps, removed),
+        program.labels,
+        tuple(joined(kept[number]) for number in sorted(kept)),
     )
 
 
@@ -214,9 +244,20 @@ def _rank(whole: list[Polygon]) -> tuple[int, float]:
     return len(areas), min(areas) / sum(areas) if areas else 0.0
 
 
-def _whole(piece: Polygon, tolerance: float) -> bool:
-    """Whether a piece is more than a film that chords have left."""
-    return bool(2.0 * piece.area > FILM * tolerance * piece.length)
+def _chips(
+    met: list[tuple[int, Polygon | MultiPolygon]], taken: list[list[Polygon]], tolerance: float
+) -> Iterator[tuple[int, list[Polygon], float, list[Polygon]]]:
+    """Of each layer that lost something: its number, the pieces, their area, those that are more than films."""
+    flat = [p for pieces in taken for p in pieces]
+    area = shapely.area(flat)
+    film = 2.0 * area <= FILM * tolerance * shapely.length(flat)
+    at = 0
+    for (i, _), pieces in zip(met, taken, strict=True):
+        if pieces:
+            a, b = at, at + len(pieces)
+            whole = [p for p, thin in zip(pieces, film[a:b].tolist(), strict=True) if not thin]
+            yield i, pieces, float(area[a:b].sum()), whole
+            at = b
 
 
 def _columns(steps: Steps, removed: Floats, loads: Floats) -> dict[str, NDArray[Any]]:

@@ -17,6 +17,7 @@ from chipload.cutter.slices import Slices
 from chipload.cutting.force import forces_over_turn, in_work, mean_forces
 from chipload.cutting.material import Material
 from chipload.engagement.bites import Bites, with_runout
+from chipload.engagement.chips._kernels import state
 from chipload.engagement.chips.move import Move
 from chipload.engagement.immersion.immersion import Section, immersed, tool_frame
 from chipload.errors import InputError
@@ -52,15 +53,52 @@ class StepBite:
     owner: NDArray[np.int64]
 
 
+@dataclass(frozen=True, eq=False)
+class Cuts:
+    """What the teeth of one cutter cut, step by step.
+
+    Parameters
+    ----------
+    tool : its number in the program
+    cutter : its numbers
+    step : (c,) int, the steps that cut, rows of ``Removal.columns``
+    way : (c, 12) float, tip at the start and the end [mm], axis at the start and the end
+    bites : of those steps, in the middle of each, with frames
+    """
+
+    tool: int
+    cutter: Cutter
+    step: NDArray[np.int64]
+    way: Floats
+    bites: Bites
+
+    def __len__(self) -> int:
+        return len(self.step)
+
+
+def joined(cuts: list[Cuts]) -> Cuts:
+    """Cuts of one cutter that follow one another as one."""
+    bites = [c.bites for c in cuts]
+    start = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(b.start) for b in bites]))])
+    rows, tooth, piece = (np.concatenate([getattr(b, name) for b in bites]) for name in ("rows", "tooth", "slice"))
+    frame = np.concatenate([b.frame for b in bites if b.frame is not None])
+    whole = Bites(start, rows, tooth, piece, bites[0].slices, frame)
+    step, way = np.concatenate([c.step for c in cuts]), np.concatenate([c.way for c in cuts])
+    return Cuts(cuts[0].tool, cuts[0].cutter, step, way, whole)
+
+
 def bite_of_step(steps: Steps, k: int, move: Move, cutter: Cutter, profile: Slices, section: Section) -> StepBite:
     """What the teeth cut at the middle of a step."""
     if steps.spindle[k] == 0.0:
         raise InputError(f"line {steps.line[k]}: cuts with the spindle at rest: start it (M3 S) before the cut")
-    (tip, axis), (speed, swing) = ((v[0] for v in pair) for pair in (move.at([0.5]), move.rates([0.5])))
+    S = np.empty(27)
+    state(move.tip, move.axis, 0.5, S)
+    tip, axis, speed, swing = S[:3], S[3:6], S[6:9], S[9:12]
     tooth = math.tau / (cutter.flutes * abs(float(steps.spindle[k]))) / float(steps.seconds[k])
-    turn = np.cross(axis, swing)
+    (a, b, c), (x, y, z) = axis.tolist(), swing.tolist()
+    turn = np.array([b * z - c * y, c * x - a * z, a * y - b * x])
     middle = speed + 0.5 * cutter.flute_length * swing
-    frame = tool_frame(axis, speed if np.linalg.norm(speed) > 0.0 else middle, bool(steps.spindle[k] > 0.0))
+    frame = tool_frame(axis, speed if speed.any() else middle, bool(steps.spindle[k] > 0.0))
     rows, owner = immersed(tip, frame, speed * tooth, turn * tooth, profile, section)
     return StepBite(k, frame, rows, owner)
 
@@ -83,7 +121,7 @@ def loads_of_steps(
     force, torque = forces_over_turn(bites, cutter, material, np.arange(count) * (pitch / count))
     mean, torque_mean = mean_forces(bites, cutter, material)
     turned = in_work(force, bites.frame)
-    left = np.array([_left(c, bites.slices) for c in cuts])
+    left = _left(bites, cuts)
     return np.column_stack(
         [
             in_work(mean, bites.frame),
@@ -99,19 +137,23 @@ def loads_of_steps(
     )
 
 
-def _left(cut: StepBite, slices: Floats) -> Floats:
-    """Outward normal of the cutter, in the work frame, where it leaves a surface behind: nu averaged over the ends of
-    bites at which h = 0, by their length along the profile; (3,), 0 where no surface or two that face each other are
+def _left(bites: Bites, cuts: list[StepBite]) -> Floats:
+    """(c, 3) outward normal of the cutter, in the work frame, where it leaves a surface behind: nu averaged over the
+    ends of bites at which h = 0, by their length along the profile; 0 where no surface or two that face each other are
     left.
     """
-    p, q, a, b, along, offset, across = cut.rows.T
-    sk, ck = slices[cut.owner, 3], slices[cut.owner, 4]
-    total, whole = np.zeros(3), 0.0
+    rows, owner = np.concatenate([c.rows for c in cuts]), np.concatenate([c.owner for c in cuts])
+    of = np.repeat(np.arange(len(cuts)), [len(c.rows) for c in cuts])
+    p, q, a, b, along, offset, across = rows.T
+    sk, ck = bites.slices[owner, 3], bites.slices[owner, 4]
+    total, whole = np.zeros((len(cuts), 3)), np.zeros(len(cuts))
     for phi in (p, q):
         h = along * np.sin(phi) + across * np.cos(phi) + offset
         made = np.where(np.abs(h) <= GRAZES * (np.hypot(along, across) + np.abs(offset)), b - a, 0.0)
-        nu = np.column_stack([sk * np.sin(phi), sk * np.cos(phi), -ck]) @ cut.frame
-        total += made @ nu
-        whole += float(made.sum())
-    size = float(np.linalg.norm(total))
-    return total / size if size > ONE_SIDE * whole > 0.0 else np.zeros(3)
+        for i, nu in enumerate((sk * np.sin(phi), sk * np.cos(phi), -ck)):
+            total[:, i] += np.bincount(of, made * nu, len(cuts))
+        whole += np.bincount(of, made, len(cuts))
+    size = np.linalg.norm(total, axis=1)
+    one = (size > ONE_SIDE * whole) & (whole > 0.0)
+    turned = np.einsum("ni,nij->nj", total, np.array([c.frame for c in cuts]))
+    return np.asarray(np.where(one[:, None], turned / np.where(one, size, 1.0)[:, None], 0.0))

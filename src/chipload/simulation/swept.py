@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from chipload.cutter.cutter import Cutter
-from chipload.engagement.chips.covered import covered_areas
+from chipload.engagement.chips.covered import covered_polygons
 from chipload.engagement.chips.move import Move
 from chipload.errors import InputError
 from chipload.simulation.steps import Steps
@@ -24,6 +24,9 @@ from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]
 Interpolation = Literal["slerp", "lerp"]
+
+#: steps whose areas are found in one go
+TOGETHER = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,63 +55,89 @@ def swept_ahead(
     InputError
         Beside or in the stock the axis lies, or looks down.
     """
+    low, high = _boxes(steps, some, cutters)
+    near = (high[:, 0] >= stock.xs[0]) & (low[:, 0] <= stock.xs[-1])
+    near &= (high[:, 1] >= stock.ys[0]) & (low[:, 1] <= stock.ys[-1])
 
-    def swept(k: int) -> Swept | None:
-        cutter = cutters[int(steps.tool[k])]
-        low, high = _box(steps, k, cutter)
-        layers = stock.layers_between(low[2], high[2])
-        beside = high[0] < stock.xs[0] or low[0] > stock.xs[-1] or high[1] < stock.ys[0] or low[1] > stock.ys[-1]
-        if beside or not layers:
-            return None
-        try:
-            move = _move(steps, k, interpolation)
-        except InputError as err:
-            raise InputError(f"line {steps.line[k]}: {err}") from None
-        return Swept(move, low, high, layers, _covered(steps, k, move, cutter, stock, layers, tolerance))
+    def swept(part: range) -> list[tuple[int, Swept]]:
+        found: dict[int, tuple[Move, range]] = {}
+        for k in part:
+            row = k - some.start
+            layers = stock.layers_between(low[row, 2], high[row, 2])
+            if near[row] and layers:
+                try:
+                    found[k] = _move(steps, k, interpolation), layers
+                except InputError as err:
+                    raise InputError(f"line {steps.line[k]}: {err}") from None
+        out: dict[int, Swept] = {}
+        for tool in sorted({int(steps.tool[k]) for k in found}):
+            own = {k: both for k, both in found.items() if steps.tool[k] == tool}
+            for (k, (move, layers)), met in zip(
+                own.items(), _covered(steps, own, cutters[tool], stock, tolerance), strict=True
+            ):
+                out[k] = Swept(move, low[k - some.start], high[k - some.start], layers, met)
+        return sorted(out.items())
 
+    parts = [some[i : i + TOGETHER] for i in range(0, len(some), TOGETHER)]
     with ThreadPoolExecutor(2) as pool:
-        for k, found in zip(some, pool.map(swept, some), strict=True):
-            if found is not None and found.met:
-                yield k, found
+        for several in pool.map(swept, parts):
+            for k, found in several:
+                if found.met:
+                    yield k, found
 
 
 def _covered(
-    steps: Steps, k: int, move: Move, cutter: Cutter, stock: LayeredStock, layers: range, tolerance: float
-) -> list[tuple[int, Polygon | MultiPolygon]]:
-    """What a step covers of each layer that it meets; layers that an upright flank crosses share one polygon."""
-    heights = stock.heights[layers.start : layers.stop]
-    shared = np.zeros(len(heights), dtype=np.bool_)
-    if steps.a0[k, 2] == steps.a1[k, 2] == 1.0 and cutter.taper == 0.0:
-        _, r, _, f, _, _, top = cutter.apt
-        low, high = sorted((steps.p0[k, 2], steps.p1[k, 2]))
-        shared = (heights > high + (f if r > 0.0 else cutter.radius * math.tan(cutter.bottom))) & (heights < low + top)
-    own = np.flatnonzero(~shared)
-    if shared.any():
-        own = np.append(own, np.flatnonzero(shared)[0])
-    shapes = {int(own[n]): a for n, a in enumerate(covered_areas(move, cutter, heights[own], tolerance))}
-    common = shapes[int(own[-1])] if shared.any() else None
-    flank = common.polygon if common is not None else None
-    out = []
-    for n, i in enumerate(layers):
-        area = shapes.get(n)
-        if shared[n]:
-            out.append((i, flank))
-        elif area is not None:
-            out.append((i, area.polygon))
-    return [(i, shape) for i, shape in out if shape is not None]
+    steps: Steps, own: Mapping[int, tuple[Move, range]], cutter: Cutter, stock: LayeredStock, tolerance: float
+) -> list[list[tuple[int, Polygon | MultiPolygon]]]:
+    """What steps cover of each layer that they meet; layers that an upright flank crosses share one polygon."""
+    heights = stock.heights
+    asked: list[Floats] = []
+    of: list[NDArray[np.int64]] = []
+    for k, (_, layers) in own.items():
+        z = heights[layers.start : layers.stop]
+        rows = np.arange(len(z))
+        flank = _flank(steps, k, cutter, z)
+        if flank.any():
+            # the last one asked for stands for all that the flank crosses
+            shared = int(np.flatnonzero(~flank).size)
+            asked.append(np.append(z[~flank], z[flank][0]))
+            rows[~flank], rows[flank] = np.arange(shared), shared
+        else:
+            asked.append(z)
+        of.append(rows)
+    shapes = covered_polygons([move for move, _ in own.values()], cutter, asked, tolerance)
+    return [
+        [(i, shape) for i, n in zip(layers, rows.tolist(), strict=True) if (shape := found[n]) is not None]
+        for (_, layers), rows, found in zip(own.values(), of, shapes, strict=True)
+    ]
 
 
-def _box(steps: Steps, k: int, cutter: Cutter) -> tuple[Floats, Floats]:
-    """(3,), (3,) corners of a box that the cutter does not leave during a step, as the axis turns by a few degrees."""
-    top = cutter.flute_length
-    wide = max(cutter.radius, float(cutter.radius_at([top])[0]))
-    ends = np.array([steps.p0[k], steps.p1[k], steps.p0[k] + top * steps.a0[k], steps.p1[k] + top * steps.a1[k]])
+def _flank(steps: Steps, k: int, cutter: Cutter, heights: Floats) -> NDArray[np.bool_]:
+    """Which layers only the flank of an upright cylinder crosses, in all of the step."""
+    if not (steps.a0[k, 2] == steps.a1[k, 2] == 1.0 and cutter.taper == 0.0):
+        return np.zeros(len(heights), dtype=np.bool_)
+    _, r, _, f, _, _, top = cutter.apt
+    low, high = sorted((steps.p0[k, 2], steps.p1[k, 2]))
+    return np.asarray(
+        (heights > high + (f if r > 0.0 else cutter.radius * math.tan(cutter.bottom))) & (heights < low + top)
+    )
+
+
+def _boxes(steps: Steps, some: range, cutters: Mapping[int, Cutter]) -> tuple[Floats, Floats]:
+    """(n, 3), (n, 3) corners of boxes that the cutter does not leave, as the axis turns by a few degrees in a step."""
+    part = slice(some.start, some.stop)
+    p0, p1, a0, a1, tools = (v[part] for v in (steps.p0, steps.p1, steps.a0, steps.a1, steps.tool))
+    top, wide = np.empty((len(some), 1)), np.empty((len(some), 1))
+    for tool in np.unique(tools).tolist():
+        c = cutters[tool]
+        top[tools == tool] = c.flute_length
+        wide[tools == tool] = max(c.radius, float(c.radius_at([c.flute_length])[0]))
+    ends = np.array([p0, p1, p0 + top * a0, p1 + top * a1])
     # the top of the cutter leaves its chord by the sagitta of the turn, and each circle reaches R across the axis
-    axes = np.array([steps.a0[k], steps.a1[k]])
-    turn = float(np.linalg.norm(axes[1] - axes[0]))
-    reach = wide * np.minimum(np.sqrt(np.maximum(1.0 - axes.min(axis=0) ** 2, 1.0 - axes.max(axis=0) ** 2)) + turn, 1.0)
-    reach = reach + top * turn**2
-    return ends.min(axis=0) - reach, ends.max(axis=0) + reach
+    turn = np.linalg.norm(a1 - a0, axis=1)[:, None]
+    lean = np.sqrt(np.maximum(1.0 - np.minimum(a0, a1) ** 2, 1.0 - np.maximum(a0, a1) ** 2))
+    reach = wide * np.minimum(lean + turn, 1.0) + top * turn**2
+    return np.asarray(ends.min(axis=0) - reach), np.asarray(ends.max(axis=0) + reach)
 
 
 def _move(steps: Steps, k: int, interpolation: Interpolation) -> Move:

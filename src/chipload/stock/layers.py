@@ -14,7 +14,6 @@ import itertools
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import shapely
@@ -24,24 +23,32 @@ from shapely import MultiPolygon, Polygon
 
 from chipload.errors import InputError
 from chipload.files import write_whole
-from chipload.geometry.mesh import require_closed, sections
+from chipload.geometry.mesh import require_closed
+from chipload.stock.edges._kernels import ring_edges
 from chipload.stock.shapes import read_shapes, shape_bytes
 from chipload.stock.solid import glb, prisms
+from chipload.stock.tiles import (
+    MULTIPOLYGON,
+    POLYGON,
+    borders_of,
+    bounds_of,
+    boxes_of,
+    cut_up,
+    polygons,
+    span,
+    turns_of,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Shapes = NDArray[np.object_]
 
-#: most tiles times layers
-TILE_LIMIT = 20_000_000
 #: what a saved stock says of itself
 KIND = "chipload layered stock 1"
 #: arrays of a saved stock and their numbers of dimensions
 SAVED = {"bounds": 1, "xs": 1, "ys": 1, "cut": 1, "room": 1, "tidied": 1, "vertices": 2, "faces": 2}
 #: a tile with fewer points than this is not tidied
 ROOM = 128
-#: type numbers of GEOS
-POLYGON, MULTIPOLYGON = 3, 6
 
 
 class LayeredStock:
@@ -97,13 +104,13 @@ class LayeredStock:
         a, b = (np.asarray(corner, dtype=np.float64) for corner in (low, high))
         if a.shape != (3,) or b.shape != (3,) or not np.isfinite([a, b]).all() or not (b > a).all():
             raise InputError(f"stock: from {a.tolist()} to {b.tolist()} mm: each side must be above 0 and finite")
-        bounds = _bounds(bounds_or_layer_mm, float(a[2]), float(b[2]))
+        bounds = bounds_of(bounds_or_layer_mm, float(a[2]), float(b[2]))
         if bounds[0] != a[2] or bounds[-1] != b[2]:
             raise InputError(
                 f"stock.bounds from {bounds[0]:g} to {bounds[-1]:g} mm: must be the block's, {a[2]:g} and {b[2]:g}"
             )
-        xs, ys = _borders(a[0], b[0], tile_mm), _borders(a[1], b[1], tile_mm)
-        boxes = _boxes(xs, ys, len(bounds) - 1)
+        xs, ys = borders_of(a[0], b[0], tile_mm), borders_of(a[1], b[1], tile_mm)
+        boxes = boxes_of(xs, ys, len(bounds) - 1)
         tiles = np.empty((len(bounds) - 1, *boxes.shape), dtype=object)
         tiles[:] = boxes
         return cls(bounds, xs, ys, tiles)
@@ -127,14 +134,14 @@ class LayeredStock:
         require_closed(mesh, "stock")
         part = trimesh.Trimesh(np.array(mesh.vertices), np.array(mesh.faces), process=False)
         (x0, y0, z0), (x1, y1, z1) = part.bounds
-        bounds = _bounds(bounds_or_layer_mm, float(z0), float(z1))
+        bounds = bounds_of(bounds_or_layer_mm, float(z0), float(z1))
         if bounds[0] > z0 or bounds[-1] < z1:
             raise InputError(
                 f"stock.bounds from {bounds[0]:g} to {bounds[-1]:g} mm: must hold the mesh, {z0:g} to {z1:g} mm"
             )
-        xs, ys = _borders(x0, x1, tile_mm), _borders(y0, y1, tile_mm)
-        boxes = _boxes(xs, ys, len(bounds) - 1)
-        return cls(bounds, xs, ys, _cut_up(part, 0.5 * (bounds[:-1] + bounds[1:]), boxes), part)
+        xs, ys = borders_of(x0, x1, tile_mm), borders_of(y0, y1, tile_mm)
+        boxes = boxes_of(xs, ys, len(bounds) - 1)
+        return cls(bounds, xs, ys, cut_up(part, 0.5 * (bounds[:-1] + bounds[1:]), boxes), part)
 
     @property
     def layers(self) -> int:
@@ -180,20 +187,15 @@ class LayeredStock:
         edges : (m, 4) float [mm], rows x0, y0, x1, y1; those that no ray along +x from the rectangle meets are left out
         """
         (x0, y0), (x1, y1) = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
-        ia, ib = _span(self.xs, np.array([x0]), np.array([x1]))
-        ja, jb = _span(self.ys, np.array([y0]), np.array([y1]))
-        tiles = self.tiles[layers.start : layers.stop, ja[0] : jb[0], ia[0] : ib[0]]
+        i, j = span(self.xs.tolist(), x0, x1), span(self.ys.tolist(), y0, y1)
+        tiles = self.tiles[layers.start : layers.stop, j.start : j.stop, i.start : i.stop]
         width = max(tiles.shape[1] * tiles.shape[2], 1)
         parts, tile = shapely.get_parts(tiles.ravel(), return_index=True)
         rings, part = shapely.get_rings(parts, return_index=True)
         points, ring = shapely.get_coordinates(rings, return_index=True)
-        joined = np.flatnonzero(ring[1:] == ring[:-1])
-        edges = np.hstack([points[joined], points[joined + 1]])
-        kept = (np.maximum(edges[:, 1], edges[:, 3]) >= y0) & (np.minimum(edges[:, 1], edges[:, 3]) <= y1)
-        kept &= np.maximum(edges[:, 0], edges[:, 2]) >= x0
-        layer = tile[part[ring[joined[kept]]]] // width
-        start = np.searchsorted(layer, np.arange(len(layers) + 1)).astype(np.int64)
-        return self.bounds[layers.start : layers.stop + 1], start, np.ascontiguousarray(edges[kept])
+        edges, start = np.empty((len(points), 4)), np.zeros(len(layers) + 1, dtype=np.int64)
+        count = ring_edges(points, ring, tile[part] // width, x0, y0, y1, edges, start)
+        return self.bounds[layers.start : layers.stop + 1], start, edges[:count].copy()
 
     def volumes(self) -> Floats:
         """(n,) float [mm^3] that is left of each layer."""
@@ -234,12 +236,13 @@ class LayeredStock:
         given[:] = list(shapes)
         if rows.shape != given.shape:
             raise InputError(f"stock: {len(rows)} layers for {len(given)} polygons: one layer a polygon")
-        for i in rows:
-            self._layer(int(i))
-        if not (np.isin(shapely.get_type_id(given), (POLYGON, MULTIPOLYGON)) & shapely.is_valid(given)).all():
+        for i in rows.tolist():
+            self._layer(i)
+        kind = shapely.get_type_id(given)
+        if not (((kind == POLYGON) | (kind == MULTIPOLYGON)) & shapely.is_valid(given)).all():
             raise InputError("stock: a shape to remove is no polygon or crosses itself: mend it first")
         chips: list[list[Polygon]] = [[] for _ in rows]
-        for turn in _turns(rows):
+        for turn in turns_of(rows):
             self._take(turn, rows, given, chips, tidy)
         return chips
 
@@ -272,12 +275,12 @@ class LayeredStock:
         bounds = np.sort(np.concatenate([self.bounds, levels]))
         heights = 0.5 * (bounds[:-1] + bounds[1:])
         parents = np.searchsorted(self.bounds, heights, "right") - 1
-        boxes = _boxes(self.xs, self.ys, len(heights))
+        boxes = boxes_of(self.xs, self.ys, len(heights))
         again = ~self.cut[parents] & (np.bincount(parents)[parents] > 1)
         self.bounds, self.cut, self.room = bounds, self.cut[parents], self.room[parents]
         self.tiles = self.tiles[parents]
         if self.part is not None:
-            self.tiles[again] = _cut_up(self.part, heights[again], boxes)
+            self.tiles[again] = cut_up(self.part, heights[again], boxes)
 
     def mesh(self) -> trimesh.Trimesh:
         """What is left as one closed mesh [mm], the prism of each layer by itself, z up."""
@@ -343,51 +346,56 @@ class LayeredStock:
 
     def _take(self, turn: Ints, rows: Ints, given: Shapes, chips: list[list[Polygon]], tidy: float) -> None:
         """Remove the shapes numbered ``turn``, no two of one layer."""
-        x0, y0, x1, y1 = shapely.bounds(given[turn]).reshape(-1, 4).T
-        with np.errstate(invalid="ignore"):
-            ia, ib = _span(self.xs, x0, x1)
-            ja, jb = _span(self.ys, y0, y1)
+        xs, ys = self.xs.tolist(), self.ys.tolist()
         which: list[tuple[int, int, int, int]] = []
-        for k, a, b, c, d in zip(turn, ia, ib, ja, jb, strict=True):
-            which += [(k, rows[k], j, i) for j, i in itertools.product(range(c, d), range(a, b))]
-        if not which:
-            return
-        k, layer, j, i = np.array(which, dtype=np.int64).T
-        before, shape = self.tiles[layer, j, i], given[k]
+        for k, row, (x0, y0, x1, y1) in zip(
+            turn.tolist(), rows[turn].tolist(), shapely.bounds(given[turn]).reshape(-1, 4).tolist(), strict=True
+        ):
+            which += [(k, row, j, i) for j, i in itertools.product(span(ys, y0, y1), span(xs, x0, x1))]
         # layers that were cut alike so far share their tiles, and what is alike is cut once
         seen: dict[tuple[int, int], int] = {}
-        same = np.array([seen.setdefault((id(b), id(s)), len(seen)) for b, s in zip(before, shape, strict=True)])
-        first = np.unique(same, return_index=True)[1]
-        taken = shapely.intersection(before[first], shape[first])
-        parts, pair = shapely.get_parts(taken, return_index=True)
+        before, shape, same = [], [], []
+        for k, row, j, i in which:
+            tile, cutting = self.tiles[row, j, i], given[k]
+            key = (id(tile), id(cutting))
+            if key not in seen:
+                seen[key] = len(seen)
+                before.append(tile)
+                shape.append(cutting)
+            same.append(seen[key])
+        if not before:
+            return
+        old, new = np.array(before, dtype=object), np.array(shape, dtype=object)
+        parts, pair = shapely.get_parts(shapely.intersection(old, new), return_index=True)
         solid = (shapely.get_type_id(parts) == POLYGON) & (shapely.area(parts) > 0.0)
-        parts, pair = parts[solid], pair[solid]
-        hit = np.unique(pair)
-        left = shapely.difference(before[first[hit]], shape[first[hit]])
-        pieces: list[list[Polygon]] = [[] for _ in first]
-        for n, part in zip(pair.tolist(), parts, strict=True):
+        pieces: list[list[Polygon]] = [[] for _ in before]
+        for n, part in zip(pair[solid].tolist(), parts[solid].tolist(), strict=True):
             pieces[n].append(part)
-        after = before[first]
-        after[hit] = left
-        cut = np.isin(same, hit)
-        self.tiles[layer[cut], j[cut], i[cut]] = after[same[cut]]
-        self.cut[layer[cut]] = True
-        if tidy > 0.0:
-            self._tidy(layer[cut], j[cut], i[cut], tidy)
+        hit = [n for n, found in enumerate(pieces) if found]
+        left = dict(zip(hit, shapely.difference(old[hit], new[hit]).tolist(), strict=True))
+        cut = [(at, n) for at, n in zip(which, same, strict=True) if n in left]
+        for (_, row, j, i), n in cut:
+            self.tiles[row, j, i] = left[n]
+            self.cut[row] = True
+        if tidy > 0.0 and cut:
+            row, j, i = np.array([at[1:] for at, _ in cut], dtype=np.int64).T
+            self._tidy(row, j, i, tidy)
         groups: dict[int, list[int]] = {}
-        for n, g in zip(k[cut].tolist(), same[cut].tolist(), strict=True):
-            groups.setdefault(n, []).append(g)
+        for (k, *_), n in cut:
+            groups.setdefault(k, []).append(n)
         joined: dict[tuple[int, ...], list[Polygon]] = {}
-        for n, several in groups.items():
-            key = tuple(several)
-            if key not in joined:
-                flat = [p for g in several for p in pieces[g]]
-                joined[key] = flat if len(several) == 1 else polygons(shapely.union_all(flat))
-            chips[n] = list(joined[key])
+        for k, several in groups.items():
+            alike = tuple(several)
+            if alike not in joined:
+                flat = [p for n in several for p in pieces[n]]
+                joined[alike] = flat if len(several) == 1 else polygons(shapely.union_all(flat))
+            chips[k] = list(joined[alike])
 
     def _tidy(self, layer: Ints, j: Ints, i: Ints, tidy: float) -> None:
         """Leave vertices out of tiles that have twice as many as when they were last tidied."""
         many = shapely.get_num_coordinates(self.tiles[layer, j, i]) > self.room[layer, j, i]
+        if not many.any():
+            return
         layer, j, i = layer[many], j[many], i[many]
         old = self.tiles[layer, j, i]
         alike: dict[int, int] = {}
@@ -402,67 +410,3 @@ class LayeredStock:
         if not 0 <= layer < self.layers:
             raise InputError(f"stock: layer {layer}: must be from 0 to {self.layers - 1}")
         return layer
-
-
-def polygons(shape: Any) -> list[Polygon]:
-    """The polygons of a geometry that have an area; its lines and points are left out."""
-    parts = shapely.get_parts(shape)
-    return list(parts[(shapely.get_type_id(parts) == POLYGON) & (shapely.area(parts) > 0.0)])
-
-
-def _cut_up(part: trimesh.Trimesh, heights: Floats, boxes: Shapes) -> Shapes:
-    """(n, rows, columns) tiles of the sections of a mesh."""
-    whole = np.empty((len(heights), 1, 1), dtype=object)
-    whole[:, 0, 0] = sections(part, heights)
-    shapely.prepare(whole)
-    tiles = shapely.intersection(boxes, whole)
-    for at in zip(*np.nonzero(~np.isin(shapely.get_type_id(tiles), (POLYGON, MULTIPOLYGON))), strict=True):
-        tiles[at] = MultiPolygon(polygons(tiles[at]))
-    return np.asarray(tiles)
-
-
-def _turns(rows: Ints) -> list[Ints]:
-    """Numbers 0 .. len(rows) - 1 in groups, so that no layer comes twice in a group."""
-    order = np.argsort(rows, kind="stable")
-    ranks = np.empty(len(rows), dtype=np.int64)
-    first = np.flatnonzero(np.diff(rows[order], prepend=-1))
-    ranks[order] = np.arange(len(rows)) - np.repeat(first, np.diff([*first, len(rows)]))
-    return [np.flatnonzero(ranks == turn) for turn in range(int(ranks.max(initial=-1)) + 1)]
-
-
-def _span(borders: Floats, low: Floats, high: Floats) -> tuple[Ints, Ints]:
-    """First and last + 1 of the tiles that the open intervals low .. high reach into; not a number: none."""
-    a = np.clip(np.searchsorted(borders, low, "right") - 1, 0, None)
-    b = np.clip(np.searchsorted(borders, high, "left"), 0, len(borders) - 1)
-    return a, np.where(high > low, b, 0)
-
-
-def _bounds(bounds_or_layer_mm: ArrayLike, low: float, high: float) -> Floats:
-    """(n + 1,) bounds [mm] of the layers: as given, or equal ones no thicker than the number given."""
-    given = np.asarray(bounds_or_layer_mm, dtype=np.float64)
-    if given.ndim == 0:
-        thickest = float(given)
-        if not 0.0 < thickest < math.inf:
-            raise InputError(f"stock.layer_mm = {thickest:g}: must be above 0")
-        given = np.linspace(low, high, max(1, math.ceil((high - low) / thickest * (1.0 - 1e-12))) + 1)
-    if given.ndim != 1 or len(given) < 2 or not np.isfinite(given).all() or not (np.diff(given) > 0.0).all():
-        raise InputError("stock.bounds: must be two or more ascending heights [mm]")
-    return given
-
-
-def _borders(low: float, high: float, tile_mm: float) -> Floats:
-    """Borders [mm] of equal tiles no longer than ``tile_mm``."""
-    if not 0.0 < tile_mm < math.inf:
-        raise InputError(f"stock.tile_mm = {tile_mm:g}: must be above 0; two to four cutter diameters")
-    return np.linspace(low, high, max(1, math.ceil((high - low) / tile_mm * (1.0 - 1e-12))) + 1)
-
-
-def _boxes(xs: Floats, ys: Floats, layers: int) -> Shapes:
-    """(rows, columns) squares of the tiles."""
-    if layers * len(xs) * len(ys) > TILE_LIMIT:
-        raise InputError(
-            f"stock: {layers} layers of {len(xs) - 1} x {len(ys) - 1} tiles: at most {TILE_LIMIT} in all: "
-            "take larger tiles or thicker layers"
-        )
-    boxes: Shapes = shapely.box(xs[None, :-1], ys[:-1, None], xs[None, 1:], ys[1:, None])
-    return boxes

@@ -10,7 +10,8 @@ Arrays: ``cp``, ``ca`` (n, 3) Chebyshev coefficients of the tip and of the axis,
 ``K`` cutter: e, r, f, sin, cos, tan of alpha, sin, cos, tan of beta, flank radius at w = 0, H, rho(H).
 ``S`` instant: p, A, p', A' (0-11), h 12, c 13-14, w at c 15, from the axis to c 16-18, its square 19, corners 20, t 21;
 where the section is a whole ellipse, 22 is R (else 0) and N . v = g . c + (R a . c / A_z)(m . c), c = (cos theta, sin
-theta), g 23-24, m = M a' 25-26.
+theta), g 23-24, m = M a' 25-26; where it is a whole circle of a ball about b, 22 is -rho and V = b' . u + rho', u
+outward unit, b' 23-24, rho' 25.
 ``C`` (8, 5) corners of the section: theta, x, y, code of the piece before, after (counter-clockwise).
 Rows of edges and vertices: x, y, theta, t, n_x, n_y (outward, across the curve), code.
 """
@@ -202,6 +203,10 @@ def point_at(S, K, theta, ct, st, row):
         row[5] = ny / n
         row[6] = FLANK
         return (S[23] * ct + S[24] * st + S[22] * ac / S[5] * (S[25] * ct + S[26] * st)) / n
+    if S[22] < 0.0:
+        ux, uy = ct + S[3] * k, st + S[4] * k
+        n = math.sqrt(ux * ux + uy * uy)
+        return on_circle(S, ux / n, uy / n, theta, row)
     lam, code = ray(S, K, ct, st)
     row[0] = S[13] + lam * (ct + S[3] * k)
     row[1] = S[14] + lam * (st + S[4] * k)
@@ -210,6 +215,19 @@ def point_at(S, K, theta, ct, st, row):
     v, row[4], row[5] = speed(S, K, row[0], row[1], code)
     row[6] = code
     return v
+
+
+@njit(cache=True, nogil=True)
+def on_circle(S, ux, uy, theta, row):
+    """The point of a ball's circle in the direction (ux, uy) into ``row``; returns V."""
+    row[0] = S[13] - S[22] * ux
+    row[1] = S[14] - S[22] * uy
+    row[2] = theta
+    row[3] = S[21]
+    row[4] = ux
+    row[5] = uy
+    row[6] = TORUS
+    return S[23] * ux + S[24] * uy + S[25]
 
 
 @njit(cache=True, nogil=True)
@@ -240,6 +258,21 @@ def _ellipse(S, R):
 
 
 @njit(cache=True, nogil=True)
+def _circle(S, K):
+    """Coefficients of V on a ball that the layer cuts through."""
+    f = K[2]
+    dz = S[12] - S[2] - f * S[5]
+    rho = math.sqrt(max((K[1] - dz) * (K[1] + dz), 0.0))
+    if rho == 0.0:
+        return
+    _centre(S, S[0] + f * S[3], S[1] + f * S[4])
+    S[22] = -rho
+    S[23] = S[6] + f * S[9]
+    S[24] = S[7] + f * S[10]
+    S[25] = dz * (S[8] + f * S[11]) / rho
+
+
+@njit(cache=True, nogil=True)
 def instant(cp, ca, K, h, t, S, C):
     """Fill ``S`` and the corners ``C``; False where the layer doesn't cut the open cutter."""
     state(cp, ca, t, S)
@@ -264,6 +297,9 @@ def instant(cp, ca, K, h, t, S, C):
     if high == FLANK and low == FLANK:
         if K[8] == 0.0:
             _ellipse(S, K[9])
+        return True
+    if high == TORUS and low == TORUS and K[0] == 0.0:
+        _circle(S, K)
         return True
     n = 0
     for which in range(2):

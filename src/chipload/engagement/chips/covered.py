@@ -5,8 +5,10 @@ the edge outward in the layer. The boundary of all sections together is a subset
 first section where V < 0, the last where V > 0, likewise at both ends of a time in which the layer is cut at all.
 
 Where V has two zeros at every t the pieces form one loop; if it is simple it is the boundary: no other candidate
-exists, so nothing inside is left out and nothing outside is covered. Else the pieces are noded and those faces kept of
-which a point is covered at some t, found by branch and bound.
+exists, so nothing inside is left out and nothing outside is covered. If it isn't: it bounds the surface in space and
+time through which points enter the cutter, so it goes once round a point for each time that the cutter comes over it,
+and what it goes round at least once is covered. In all other cases the pieces are noded and those faces kept of which a
+point is covered at some t, found by branch and bound.
 
 Reference: Undeformed chips in five-axis milling by boundary construction diagrams, Computer-Aided Design 88 (2017)
 42-59. Differs from source: the speed of the cutter's surface stands for the derivative of the ellipse's equation, so
@@ -16,9 +18,11 @@ point.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias, cast
 
 import numpy as np
 import shapely
@@ -27,13 +31,17 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.engagement.chips._kernels import instant
 from chipload.engagement.chips.faces import _kernels as faces
+from chipload.engagement.chips.loop import _kernels as loop
 from chipload.engagement.chips.move import Move
 from chipload.engagement.chips.ring import Origin, Ring, ring_of_edges, rings_of_polygons
 from chipload.engagement.chips.section import cutter_numbers
 from chipload.engagement.chips.trace import _kernels as trace
+from chipload.engagement.chips.trace._kernels import GENERAL, NOTHING
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Shape: TypeAlias = shapely.Polygon | shapely.MultiPolygon
 
 #: slower than this share of the tolerance per move, the edge stands still
 STILL = 1e-3
@@ -81,7 +89,7 @@ class Covered:
                 around = min((o for o in outer if o[0].contains(inside)), key=lambda o: float(o[0].area))
                 around[1].append(hole.exterior)
         made = [shapely.Polygon(o.exterior, holes) for o, holes in outer]
-        return made[0] if len(made) == 1 else shapely.MultiPolygon(made)
+        return cast(Shape, made[0] if len(made) == 1 else shapely.MultiPolygon(made))
 
 
 def covered(move: Move, cutter: Cutter, height: float, tolerance: float) -> Covered | None:
@@ -111,30 +119,92 @@ def covered(move: Move, cutter: Cutter, height: float, tolerance: float) -> Cove
 
 def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], tolerance: float) -> list[Covered | None]:
     """``covered`` of many layers."""
+    K, levels = cutter_numbers(cutter), np.array([float(h) for h in heights])
+    buffer, count, knots, whole = _loops([move], K, levels, np.array([0, len(levels)]), tolerance)
+    start = np.cumsum([0, *count.clip(0)])
+    out: list[Covered | None] = []
+    for i, h in enumerate(levels.tolist()):
+        if count[i] == NOTHING:
+            out.append(None)
+        elif count[i] == GENERAL:
+            out.append(_noded(move, K, h, tolerance, max(_KNOTS, 4 * int(knots[i]))))
+        else:
+            edges = buffer[start[i] : start[i + 1]].copy()
+            rings: tuple[Ring, ...] = (ring_of_edges(edges),)
+            if not whole[i]:
+                rings = _without_slivers(rings_of_polygons(_untangled(shapely.Polygon(edges[:, :2])), edges), tolerance)
+            out.append(Covered(rings, h, tolerance, True))
+    return out
+
+
+def covered_polygons(
+    moves: Sequence[Move], cutter: Cutter, heights: Sequence[Floats], tolerance: float
+) -> list[list[Shape | None]]:
+    """``Covered.polygon`` of many layers of many moves: ``heights[m]`` of move m; None where it is never in the layer.
+
+    One loop over all of them without the interpreter: in threads it costs no more than the areas do.
+    """
+    K, levels = cutter_numbers(cutter), np.concatenate([np.empty(0), *heights])
+    first = np.cumsum([0, *(len(h) for h in heights)])
+    buffer, count, knots, whole = _loops(moves, K, levels, first, tolerance)
+    which = np.flatnonzero(count >= 0)
+    shapes: NDArray[np.object_] = np.full(len(levels), None, dtype=object)
+    points = buffer[: int(count[which].sum()), :2]
+    if len(which):
+        ring = np.repeat(np.arange(len(which)), count[which])
+        shapes[which] = shapely.polygons(shapely.linearrings(points, indices=ring))
+    for i in which[~whole[which]]:
+        shapes[i] = _thick(_untangled(shapes[i]), tolerance)
+    for i in np.flatnonzero(count == GENERAL).tolist():
+        move = moves[int(np.searchsorted(first, i, "right")) - 1]
+        area = _noded(move, K, float(levels[i]), tolerance, max(_KNOTS, 4 * int(knots[i])))
+        shapes[i] = None if area is None else area.polygon
+    return [list(shapes[a:b]) for a, b in itertools.pairwise(first.tolist())]
+
+
+def _loops(
+    moves: Sequence[Move], K: Floats, heights: Floats, first: Ints, tolerance: float
+) -> tuple[Floats, Ints, Ints, NDArray[np.bool_]]:
+    """Edges of the layers whose boundary is one loop; of each layer how many, NOTHING or GENERAL, how finely time was
+    divided, whether the loop is known to be simple.
+    """
     if not 0.0 < tolerance < math.inf:
         raise InputError(f"covered: tolerance = {tolerance:g} mm: must be above 0")
-    K = cutter_numbers(cutter)
-    buffer = np.empty((2048, 12))
-    out: list[Covered | None] = []
-    for height in heights:
-        h = float(height)
-        if not math.isfinite(h):
-            raise InputError(f"covered: height = {h:g} mm: must be finite")
-        knots = trace.KNOTS
-        n = trace.loop(move.tip, move.axis, K, h, tolerance, STILL * tolerance, knots, buffer)
-        while n in (trace.FULL, trace.UNSETTLED):
-            if n == trace.FULL:
-                buffer = _larger(buffer)
-            else:
-                knots = 4 * knots - 3
-            n = trace.loop(move.tip, move.axis, K, h, tolerance, STILL * tolerance, knots, buffer)
-        if n == trace.NOTHING:
-            out.append(None)
-        elif n == trace.GENERAL:
-            out.append(_noded(move, K, h, tolerance, max(_KNOTS, 4 * knots)))
-        else:
-            out.append(Covered((ring_of_edges(buffer[:n].copy()),), h, tolerance, True))
+    if not np.isfinite(heights).all():
+        bad = float(heights[~np.isfinite(heights)][0])
+        raise InputError(f"covered: height = {bad:g} mm: must be finite")
+    tips, axes = _filled([m.tip for m in moves]), _filled([m.axis for m in moves])
+    count, knots = np.empty(len(heights), np.int64), np.empty(len(heights), np.int64)
+    whole = np.empty(len(heights), np.bool_)
+    buffer, still = np.empty((max(2048, 128 * len(heights)), 12)), STILL * tolerance
+    while loop.loops(tips, axes, K, heights, first, tolerance, still, buffer, count, knots, whole) < len(heights):
+        buffer = _larger(buffer)
+    return buffer, count, knots, whole
+
+
+def _filled(coefficients: Sequence[Floats]) -> Floats:
+    """(m, n, 3) coefficients of many moves, with zeros up to the same order."""
+    out = np.zeros((len(coefficients), max((len(c) for c in coefficients), default=1), 3))
+    for m, c in enumerate(coefficients):
+        out[m, : len(c)] = c
     return out
+
+
+def _untangled(loop: shapely.Polygon) -> Shape:
+    """What a counter-clockwise loop that may cross itself goes round at least once."""
+    return cast(Shape, shapely.buffer(loop, 0.0))
+
+
+def _thick(shape: Shape, tolerance: float) -> Shape:
+    """Without holes and specks that are no wider than the polygon's own error."""
+    parts = [p for p in shapely.get_parts(shape) if p.area > 2.0 * tolerance * p.exterior.length]
+    if not parts:
+        return shape
+    made = [
+        shapely.Polygon(p.exterior, [q for q in p.interiors if shapely.Polygon(q).area > 2.0 * tolerance * q.length])
+        for p in parts
+    ]
+    return cast(Shape, made[0] if len(made) == 1 else shapely.MultiPolygon(made))
 
 
 def _larger(buffer: Floats) -> Floats:
@@ -150,8 +220,9 @@ def candidates(move: Move, cutter: Cutter, height: float, tolerance: float) -> F
 
 def _pieces(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> Floats:
     cp, ca, vmin = move.tip, move.axis, STILL * tolerance
-    span = np.empty((_SPANS, 2))
-    m = trace.spans(cp, ca, K, h, knots, span)
+    span, ends = np.empty((_SPANS, 2)), np.empty((knots + 1, 2))
+    trace.levels(cp, ca, K, ends)
+    m = trace.spans(cp, ca, K, h, ends, span)
     buffer, jumps = np.empty((8192, 12)), np.empty(16)
     found: list[Floats] = []
     for ta, tb in span[:m]:
@@ -216,4 +287,4 @@ def _without_slivers(rings: tuple[Ring, ...], tolerance: float) -> tuple[Ring, .
     return tuple(kept)
 
 
-__all__ = ["Covered", "Origin", "candidates", "covered", "covered_areas", "whole_section"]
+__all__ = ["Covered", "Origin", "candidates", "covered", "covered_areas", "covered_polygons", "whole_section"]

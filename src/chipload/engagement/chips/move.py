@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import jv
 
 from chipload.errors import InputError
 from chipload.machine.kinematics import forward
@@ -27,6 +28,8 @@ LEAST_AXIS_Z = 0.01
 FIT = 1e-10
 _ORDERS = (4, 8, 16, 32)
 _REMEDY = "split the move"
+_ORDER = np.arange(26)
+_JACOBI_ANGER = np.where(_ORDER == 0, 1.0, 2.0) * np.where(_ORDER // 2 % 2 == 0, 1.0, -1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,12 +100,10 @@ class Move:
         if angle == 0.0:
             return Move.lerp(p0, a0, p1, a1)
         middle, across = middle / np.linalg.norm(middle), across / np.linalg.norm(across)
-
-        def axis(t: Floats) -> tuple[Floats, Floats]:
-            turn = (t[:, None] - 0.5) * angle
-            return p0 + t[:, None] * (p1 - p0), np.cos(turn) * middle + np.sin(turn) * across
-
-        return Move.of(axis)
+        # cos and sin of u angle / 2 in Chebyshev polynomials (Jacobi and Anger)
+        size = jv(_ORDER, 0.5 * angle) * _JACOBI_ANGER
+        axis = size[:, None] * np.where(_ORDER[:, None] % 2 == 0, middle, across)
+        return Move(np.array([p0 + p1, p1 - p0]) / 2.0, _short(axis))
 
     @staticmethod
     def machine_linear(
@@ -166,7 +167,10 @@ def _short(c: Floats) -> Floats:
 
 
 def _least_z(axis: Floats) -> float:
-    """Least A_z of coefficients; of two of them (a great arc), that of an end."""
+    """Least A_z of coefficients, or a bound below it that is enough; of two of them (a great arc), that of an end."""
+    most, rest = float(np.linalg.norm(axis, axis=1).sum()), float(np.abs(axis[1:, 2]).sum())
+    if float(axis[0, 2]) - rest >= LEAST_AXIS_Z * most > 0.0:
+        return LEAST_AXIS_Z  # by the coefficients alone
     u = np.array([-1.0, 1.0]) if len(axis) <= 2 else _FINE
     b = chebyshev.chebval(u, axis).T
     length = np.linalg.norm(b, axis=1)

@@ -23,7 +23,9 @@ Differs from source: h is to first order in the feed per tooth, the path of a to
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -60,16 +62,29 @@ def tool_frame(axis: ArrayLike, toward: ArrayLike, clockwise: bool = True) -> Fl
     >>> tool_frame([0, 0, 1], [3, 0, 4]).tolist()
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     """
-    A, v = np.asarray(axis, dtype=np.float64), np.asarray(toward, dtype=np.float64)
-    across = v - (v @ A) * A
-    size = float(np.linalg.norm(across))
-    if size <= 1e-12 * float(np.linalg.norm(v)) or size == 0.0:
-        across = np.eye(3)[int(np.argmin(np.abs(A)))]
-        across = across - (across @ A) * A
-        size = float(np.linalg.norm(across))
-    T = across / size
-    n = np.cross(A, T) if clockwise else np.cross(T, A)
-    return np.array([T, n, A]) + 0.0
+    ax, ay, az = np.asarray(axis, dtype=np.float64).tolist()
+    vx, vy, vz = np.asarray(toward, dtype=np.float64).tolist()
+    along = vx * ax + vy * ay + vz * az
+    tx, ty, tz = vx - along * ax, vy - along * ay, vz - along * az
+    size = math.sqrt(tx * tx + ty * ty + tz * tz)
+    if size <= 1e-12 * math.sqrt(vx * vx + vy * vy + vz * vz) or size == 0.0:
+        least = int(np.argmin(np.abs([ax, ay, az])))
+        tx, ty, tz = (float(i == least) - (ax, ay, az)[least] * a for i, a in enumerate((ax, ay, az)))
+        size = math.sqrt(tx * tx + ty * ty + tz * tz)
+    tx, ty, tz = tx / size, ty / size, tz / size
+    hand = 1.0 if clockwise else -1.0
+    n = [hand * (ay * tz - az * ty), hand * (az * tx - ax * tz), hand * (ax * ty - ay * tx)]
+    return np.array([[tx, ty, tz], n, [ax, ay, az]]) + 0.0
+
+
+@lru_cache(maxsize=64)
+def _table(cutter: Slices) -> Floats:
+    """(k, 8) s from, s to, rho, z at the middle, sin kappa, cos kappa, z at s from and to, of slices."""
+    half = 0.5 * (cutter.s_to - cutter.s_from) * cutter.sin_kappa
+    sides = [cutter.sin_kappa, cutter.cos_kappa, cutter.z, cutter.z + 2.0 * half]
+    out = np.column_stack([cutter.s_from, cutter.s_to, cutter.rho, cutter.z + half, *sides])
+    out.setflags(write=False)
+    return out
 
 
 def immersed(
@@ -103,19 +118,7 @@ def immersed(
     R = np.ascontiguousarray(frame, dtype=np.float64)
     if R.shape != (3, 3) or not R[2, 2] > 0.0:
         raise InputError(f"axis z = {R[2, 2]:g}: must be above 0: the spindle stands above the layers")
-    half = 0.5 * (cutter.s_to - cutter.s_from) * cutter.sin_kappa
-    table = np.column_stack(
-        [
-            cutter.s_from,
-            cutter.s_to,
-            cutter.rho,
-            cutter.z + half,
-            cutter.sin_kappa,
-            cutter.cos_kappa,
-            cutter.z,
-            cutter.z + 2.0 * half,
-        ]
-    )
+    table = _table(cutter)
     room = 4 * len(table) + 16
     while True:
         rows, owner = np.empty((room, 7)), np.empty(room, dtype=np.int64)

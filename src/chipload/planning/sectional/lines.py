@@ -26,7 +26,7 @@ from chipload.planning.sectional.scene import Floats, Ints, Scene
 from chipload.planning.sectional.track import Track
 
 #: points of a line whose pallet angles are looked for together, and how far from those of the line before [rad]
-_GROUP, _WINDOW = 6, math.radians(20.0)
+_GROUP, _WINDOW = 6, math.radians(10.0)
 #: stations and halvings by which the first line that is reached is looked for
 _KNOTS, _BISECT = 17, 4
 

@@ -48,7 +48,7 @@ class Finish:
 
     scallop: float
     motion: Motion
-    aim: float = 0.92
+    aim: float = 0.88
 
     def __post_init__(self) -> None:
         if not (0.0 < self.scallop < math.inf and 0.0 < self.aim <= 1.0):

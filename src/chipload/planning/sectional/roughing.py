@@ -116,34 +116,60 @@ def roughing(
 
 def thickened(impeller: Impeller, index: int, how: Rough, ahead: float = 0.0) -> Scene:
     """Check points of the channel's walls and those around, moved out by the allowances; the hub is surface 2."""
+    out = (how.blades, how.blades, how.hub, how.blades)
+    return _walls(impeller, index, how.spacing, how.around, ahead, out, 2.0 * how.spacing)
+
+
+def guarded(
+    impeller: Impeller, index: int, milled: int, spacing: float, corner: float, around: int = 1, ahead: float = 0.0
+) -> Scene:
+    """Check points for finishing one wall of the channel on the plus side of a body; between them nothing is cut.
+
+    The others are moved out by spacing^2 / (8 corner), as deep as a corner can come between them.
+
+    Parameters
+    ----------
+    milled : 0 the plus side of the body, 1 the minus side of the next body round, 2 the hub: the number that
+        :func:`finishing` takes
+    spacing, corner : of the check points, of the cutter [mm]
+    """
+    if milled not in (0, 1, 2) or not (spacing > 0.0 and corner > 0.0):
+        raise InputError(f"milled = {milled}, spacing {spacing:g}, corner {corner:g} mm: must be 0, 1 or 2, above 0")
+    sag = spacing**2 / (8.0 * corner)
+    out = tuple(0.0 if k == milled else sag for k in range(4))
+    return _walls(impeller, index, spacing, around, ahead, out, 1.25 * spacing)
+
+
+def _walls(
+    impeller: Impeller, index: int, spacing: float, around: int, ahead: float, out: tuple[float, ...], near: float
+) -> Scene:
     parts: list[Floats] = []
     names: list[int] = []
-    for k in range(-how.around, 2 + how.around):
+    for k in range(-around, 2 + around):
         for side in (1, -1):
             patch = impeller.body(index + k).plus if side > 0 else impeller.body(index + k).minus
-            if how.around == 0 and side != (1 if k == 0 else -1):
+            if around == 0 and side != (1 if k == 0 else -1):
                 continue
             u, v = (
-                x.ravel()
-                for x in np.meshgrid(*(np.linspace(0, 1, n) for n in _counts(patch, how.spacing)), indexing="ij")
+                x.ravel() for x in np.meshgrid(*(np.linspace(0, 1, n) for n in _counts(patch, spacing)), indexing="ij")
             )
-            parts.append(patch.at(u, v) + how.blades * patch.normal(u, v))
             names.append(0 if (k, side) == (0, 1) else 1 if (k, side) == (1, -1) else 3)
+            parts.append(patch.at(u, v) + out[names[-1]] * patch.normal(u, v))
     low, high = hub_range(impeller, ahead)
     curve = impeller.hub.curve(np.linspace(low, high, 101))
-    along = math.ceil(float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum()) / how.spacing) + 1
+    along = math.ceil(float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum()) / spacing) + 1
     pitch = math.tau * float(curve[:, 0].max()) / (impeller.blades * len(impeller.bodies))
-    s, v = np.linspace(low, high, along), np.linspace(0.0, 1.0, math.ceil(pitch / how.spacing) + 1)
-    for k in range(-how.around, 1 + how.around):
+    s, v = np.linspace(low, high, along), np.linspace(0.0, 1.0, math.ceil(pitch / spacing) + 1)
+    for k in range(-around, 1 + around):
         theta = impeller.across(index + k, s, v).ravel()
         S = np.repeat(s, len(v))
-        parts.append(impeller.hub.at(S, theta) + how.hub * impeller.hub.normal(S, theta))
+        parts.append(impeller.hub.at(S, theta) + out[2] * impeller.hub.normal(S, theta))
         names.append(2)
     surface = np.repeat(names, [len(p) for p in parts])
     one = parts[0][:1]
     return Scene(
         one, np.array([[0.0, 0.0, 1.0]]), np.zeros((1, 3, 3)), np.zeros(1, dtype=np.int64), np.concatenate(parts),
-        surface, 2.0 * how.spacing,
+        surface, near,
     )  # fmt: skip
 
 

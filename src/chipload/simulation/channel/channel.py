@@ -57,6 +57,9 @@ class Wall:
 def wall(name: str, surface: Patch, u: Floats, v: Floats) -> Wall:
     """The grid u x v (a,), (b,) on a surface.
 
+    Keep off the edges of the metal, as the tip of a blade: a ray inwards from there lies in the face beside it, which a
+    cutter may touch.
+
     >>> from chipload.geometry.bspline import through
     >>> flat = through([[[0, 0, 0], [0, 2, 0]], [[3, 0, 0], [3, 2, 0]]], [0, 1], [0, 1])
     >>> float(wall("flat", flat, np.linspace(0, 1, 7), np.linspace(0, 1, 5)).area.sum())
@@ -239,8 +242,8 @@ def _frames(normals: Floats) -> Floats:
 def scallop_numbers(crests: Floats, asked: float) -> dict[str, float]:
     """Greatest and mean height of the scallops [mm], and the mean as a share of what is asked; 0 where there is none.
 
-    >>> scallop_numbers(np.array([0.04, 0.05]), 0.05)
-    {'greatest_mm': 0.05, 'mean_mm': 0.045, 'mean_share': 0.9, 'count': 2.0}
+    >>> scallop_numbers(np.array([0.25, 0.5]), 0.5)
+    {'greatest_mm': 0.5, 'mean_mm': 0.375, 'mean_share': 0.75, 'count': 2.0}
     """
     if not len(crests):
         return {"greatest_mm": 0.0, "mean_mm": 0.0, "mean_share": 0.0, "count": 0.0}

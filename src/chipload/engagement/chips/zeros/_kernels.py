@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
-from chipload.engagement.chips._kernels import TAU, point, point_at, speed
+from chipload.engagement.chips._kernels import TAU, on_circle, point, point_at, speed
 
 CORNER = 5  # a root at a corner of the section
 NODES = 32
@@ -39,6 +39,38 @@ def _newton(S, guess, sign, row):
             row[2] = theta
             return True
     return False
+
+
+@njit(cache=True, nogil=True)
+def _graze(S, sign, row):
+    """The grazing point of this sign of a ball's circle into ``row``, V = 0 in closed form; False if there is none."""
+    size2 = S[23] * S[23] + S[24] * S[24]
+    rest = size2 - S[25] * S[25]
+    if not rest > 0.0:
+        return False
+    along, across = -S[25] / size2, sign * math.sqrt(rest) / size2
+    ux = along * S[23] + across * S[24]
+    uy = along * S[24] - across * S[23]
+    k = (S[3] * ux + S[4] * uy) / (1.0 + S[5])
+    on_circle(S, ux, uy, math.atan2(uy - k * S[4], ux - k * S[3]) % TAU, row)
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _circle_roots(S, vmin, R, sign):
+    """``roots`` of a ball's circle."""
+    fastest = math.hypot(S[23], S[24])
+    outward, inward = S[25] + fastest >= vmin, S[25] - fastest <= -vmin
+    if not outward or not inward:
+        return 0, (1 if outward else (-1 if inward else 0))
+    if not _graze(S, -1, R[0]) or not _graze(S, 1, R[1]):
+        return -1, 0
+    sign[0], sign[1] = -1, 1
+    if R[1, 2] < R[0, 2]:
+        for i in range(7):
+            R[0, i], R[1, i] = R[1, i], R[0, i]
+        sign[0], sign[1] = 1, -1
+    return 2, -sign[0]
 
 
 @njit(cache=True, nogil=True)
@@ -90,6 +122,11 @@ def roots(S, K, C, vmin, R, sign, grid):
     Speeds under ``vmin`` take the sign before them. Returns (count, sign of V where count is 0; 0: |V| < vmin all
     round). ``grid`` (NODES,) takes V at even angles.
     """
+    if S[22] < 0.0:
+        around = R[0]
+        for i in range(NODES):
+            grid[i] = point_at(S, K, i * (TAU / NODES), _COS[i], _SIN[i], around)
+        return _circle_roots(S, vmin, R, sign)
     th = np.empty(NODES + 16)
     vv = np.empty(NODES + 16)
     at = np.empty(NODES + 16, np.int64)
@@ -208,6 +245,8 @@ def deviation(a, b):
 @njit(cache=True, nogil=True)
 def root_near(S, K, C, guess, width, sign, row):
     """The change of V of this sign near ``guess``, into ``row``; False if there is none within a quarter turn."""
+    if S[22] < 0.0:
+        return _graze(S, sign, row)
     if S[22] > 0.0 and _newton(S, guess, sign, row):
         point(S, K, row[2], row)
         return True

@@ -1,0 +1,1 @@
+"""How near a moving tool comes to points of a surface, and how deep into it."""

@@ -1,0 +1,98 @@
+"""Compiled loops: the least distance of points from a body of revolution in many places.
+
+Notation: the body stands with its tip at T and its unit axis A; z [mm] height above the tip, rho [mm] distance from the
+axis. Its meridian is ``lines`` (m, 4) ``[rho0, z0, rho1, z1]``, z0 <= z1, and one arc ``[e, f, r, a0, a1]``,
+centre, radius and range of the angle from the direction -z towards +rho (r = 0: none). A distance is below 0 inside.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def meridian(rho, z, lines, arc, top):
+    """Signed distance of (rho, z) from the meridian; the flat end at ``top`` is no surface, above it is outside."""
+    best = 1e300
+    e, f, r = arc[0], arc[1], arc[2]
+    if r > 0.0:
+        x, y = rho - e, f - z
+        size = math.hypot(x, y)
+        if size > 0.0:
+            angle = math.atan2(x, y)
+            if arc[3] <= angle <= arc[4]:
+                best = abs(size - r)
+        else:
+            best = r
+    inside = 0.0 <= z <= top
+    reach = -1.0
+    for i in range(len(lines)):
+        x0, y0, x1, y1 = lines[i, 0], lines[i, 1], lines[i, 2], lines[i, 3]
+        dx, dy = x1 - x0, y1 - y0
+        size = dx * dx + dy * dy
+        u = 0.0
+        if size > 0.0:
+            u = min(max(((rho - x0) * dx + (z - y0) * dy) / size, 0.0), 1.0)
+        gap = math.hypot(rho - x0 - u * dx, z - y0 - u * dy)
+        best = min(best, gap)
+        if y0 < y1 and y0 <= z <= y1:
+            reach = max(reach, x0 + (z - y0) / (y1 - y0) * dx)
+    if r > 0.0:
+        y = f - z
+        low, high = r * math.cos(arc[4]), r * math.cos(arc[3])
+        if low <= y <= high:
+            reach = max(reach, e + math.sqrt(max(r * r - y * y, 0.0)))
+    if inside and rho <= reach:
+        return -best
+    return best
+
+
+@njit(cache=True, nogil=True)
+def nearest(
+    points, order, starts, low, cell, count, tips, axes, rows, lines, arc, top, widest, far, depth, out, at, deep, first
+):
+    """Lower ``out`` to the signed distance of each point from the body in any of its places; ``at`` its row.
+
+    ``deep`` is lowered to the least distance of any point in each row, ``first`` to the first row that has the point
+    deeper inside than ``depth``. ``order`` holds the points cell by cell, ``starts`` where each cell begins; distances
+    above ``far`` are left alone.
+    """
+    nx, ny, nz = count[0], count[1], count[2]
+    reach = widest + far
+    for k in range(len(tips)):
+        tx, ty, tz = tips[k, 0], tips[k, 1], tips[k, 2]
+        ax, ay, az = axes[k, 0], axes[k, 1], axes[k, 2]
+        sx, sy = math.sqrt(max(1.0 - ax * ax, 0.0)), math.sqrt(max(1.0 - ay * ay, 0.0))
+        sz = math.sqrt(max(1.0 - az * az, 0.0))
+        x0 = tx + min(0.0, top * ax) - widest * sx - far
+        x1 = tx + max(0.0, top * ax) + widest * sx + far
+        y0 = ty + min(0.0, top * ay) - widest * sy - far
+        y1 = ty + max(0.0, top * ay) + widest * sy + far
+        z0 = tz + min(0.0, top * az) - widest * sz - far
+        z1 = tz + max(0.0, top * az) + widest * sz + far
+        i0, i1 = max(math.floor((x0 - low[0]) / cell), 0), min(math.floor((x1 - low[0]) / cell), nx - 1)
+        j0, j1 = max(math.floor((y0 - low[1]) / cell), 0), min(math.floor((y1 - low[1]) / cell), ny - 1)
+        l0, l1 = max(math.floor((z0 - low[2]) / cell), 0), min(math.floor((z1 - low[2]) / cell), nz - 1)
+        for i in range(i0, i1 + 1):
+            for j in range(j0, j1 + 1):
+                begin = (i * ny + j) * nz
+                for m in range(starts[begin + l0], starts[begin + l1 + 1]) if l1 >= l0 else range(0):
+                    p = order[m]
+                    x, y, z = points[p, 0] - tx, points[p, 1] - ty, points[p, 2] - tz
+                    up = x * ax + y * ay + z * az
+                    if up < -far or up > top + far:
+                        continue
+                    square = x * x + y * y + z * z - up * up
+                    if square > reach * reach:
+                        continue
+                    gap = meridian(math.sqrt(max(square, 0.0)), up, lines, arc, top)
+                    if gap > far:
+                        continue
+                    deep[rows[k]] = min(deep[rows[k]], gap)
+                    if gap < -depth:
+                        first[p] = min(first[p], rows[k])
+                    if gap < out[p]:
+                        out[p] = gap
+                        at[p] = rows[k]

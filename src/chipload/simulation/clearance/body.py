@@ -1,0 +1,78 @@
+"""The meridian of a cutter's cutting part, and of what stands above it.
+
+Notation: rho [mm] distance from the axis, z [mm] height above the tip; an arc is ``[e, f, r, a0, a1]``, its angle
+counted from the direction -z towards +rho.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.simulation.clearance import _kernels
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A body of revolution.
+
+    Parameters
+    ----------
+    lines : (m, 4) float [mm], ``[rho0, z0, rho1, z1]``, z0 <= z1
+    arc : (5,) float [mm, rad]; radius 0: none
+    top : [mm] height at which it ends
+    """
+
+    lines: Floats
+    arc: Floats
+    top: float
+
+    @property
+    def widest(self) -> float:
+        """Greatest rho [mm]."""
+        corner = self.arc[0] + self.arc[2] if self.arc[2] > 0.0 else 0.0
+        return float(max(self.lines[:, [0, 2]].max(initial=0.0), corner))
+
+    def distance(self, rho: float, z: float) -> float:
+        """Signed distance [mm] of a point from the surface, below 0 inside."""
+        return float(_kernels.meridian(rho, z, self.lines, self.arc, self.top))
+
+
+def cutting_part(cutter: Cutter) -> Body:
+    """Tip to end of the flutes.
+
+    >>> ball = cutting_part(Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=5.0))
+    >>> [abs(ball.distance(*p)) for p in ((0.0, -1.0), (3.0, 1.0), (4.0, 10.0), (7.0, 10.0))]
+    [1.0, 0.0, 1.0, 2.0]
+    """
+    _, r, e, f, alpha, beta, h = cutter.apt
+    foot = (e + r * math.sin(alpha), f - r * math.cos(alpha))
+    flank = (e + r * math.cos(beta), f - r * math.sin(beta))
+    lines = [[0.0, 0.0, *foot], [*flank, float(cutter.radius_at(h)), h]]
+    return Body(np.array(lines), np.array([e, f, r, alpha, 0.5 * math.pi - beta]), h)
+
+
+def above_cutting(cutter: Cutter) -> Body:
+    """Shank and holder: what must touch nothing.
+
+    >>> cutter = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, shank_diameter=8.0, holder=((15.0, 40.0), (30.0, 50.0)))
+    >>> body = above_cutting(cutter)
+    >>> body.distance(5.0, 25.0), body.distance(19.0, 35.0), body.distance(15.0, 24.0), body.top
+    (1.0, -1.0, 6.0, 75.0)
+    """
+    z, radius = cutter.flute_length, 0.5 * (cutter.shank_diameter or cutter.diameter)
+    own = float(cutter.radius_at(z))
+    lines = [[own, z, radius, z]] if radius > own else []
+    if cutter.overhang > z:
+        lines.append([radius, z, radius, cutter.overhang])
+    z = cutter.overhang
+    for length, diameter in cutter.holder:
+        lines += [[radius, z, 0.5 * diameter, z], [0.5 * diameter, z, 0.5 * diameter, z + length]]
+        z, radius = z + length, 0.5 * diameter
+    return Body(np.array(lines, dtype=np.float64).reshape(-1, 4), np.zeros(5), z)

@@ -1,0 +1,149 @@
+"""How near every point of a surface comes to a tool that runs a program, and how deep the tool goes into it.
+
+Notation: a step as in :mod:`chipload.simulation.steps`; the distance of a point from the tool is its least over the
+whole program, below 0 where the tool was around the point (gouge), above 0 where material is left over it (excess).
+
+Method: the tool stands in places along each step, so near to one another that what passes between them lies within the
+tolerance: places d apart leave d^2 / (8 r) between two circles of radius r, and at a sharp edge that moves obliquely d
+times the sine and the cosine of its slope. Points wait in cells, so that a place looks at those around the tool alone.
+Independent of the layers and of the chips.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.errors import InputError
+from chipload.progress import Progress, silent
+from chipload.simulation.clearance import _kernels
+from chipload.simulation.clearance.body import Body
+from chipload.simulation.steps import Steps
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+Grid = tuple[Ints, Ints, Floats, float, Ints]
+
+#: places that are looked at together, and most cells
+BLOCK, CELLS = 4096, 2_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Clearance:
+    """Least distance of points from the tool.
+
+    Parameters
+    ----------
+    distance : (p,) float [mm], below 0 inside the tool; inf: never as near as was looked
+    step : (p,) int, at which; -1 where the distance is inf
+    first : (p,) int, the first step that had the point deeper inside than the tolerance; the number of steps: none
+    deepest : (n,) float [mm], least distance of any point at each step; inf: none as near as was looked
+    """
+
+    distance: Floats
+    step: Ints
+    first: Ints
+    deepest: Floats
+
+
+def clearance(
+    steps: Steps,
+    bodies: Mapping[int, Body],
+    points: ArrayLike,
+    far: float,
+    tolerance: float,
+    *,
+    some: NDArray[np.bool_] | None = None,
+    workers: int = 2,
+    progress: Progress = silent,
+) -> Clearance:
+    """Least distance of each point from the tool over the steps; O(places x points around the tool).
+
+    Parameters
+    ----------
+    bodies : by tool number
+    points : (p, 3) float [mm], in the work frame
+    far : [mm] distances above this are not looked for
+    tolerance : of the path between two places [mm]
+    some : (n,) bool, the steps that count; None: all
+
+    Raises
+    ------
+    InputError
+        ``far`` or ``tolerance`` is not above 0.
+    """
+    p = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
+    for name, value in (("far", far), ("tolerance", tolerance)):
+        if not 0.0 < value < math.inf:
+            raise InputError(f"clearance: {name} = {value:g}: must be above 0 mm")
+    best, at = np.full(len(p), np.inf), np.full(len(p), -1, dtype=np.int64)
+    first, deepest = np.full(len(p), len(steps), dtype=np.int64), np.full(len(steps), np.inf)
+    if len(p) == 0 or len(steps) == 0:
+        return Clearance(best, at, first, deepest)
+    grid = _cells(p, max(b.widest for b in bodies.values()) + far)
+
+    def lowered(span: Ints, body: Body, tips: Floats, axes: Floats, rows: Ints) -> tuple[Floats, Ints, Ints, Floats]:
+        out = best.copy(), at.copy(), first.copy(), deepest.copy()
+        where = (tips[span], axes[span], rows[span], body.lines, body.arc, body.top, body.widest)
+        _kernels.nearest(p, *grid, *where, far, tolerance, out[0], out[1], out[3], out[2])
+        return out
+
+    for number in np.unique(steps.tool).tolist():
+        body = bodies[number]
+        own = np.flatnonzero((steps.tool == number) & (True if some is None else some))
+        if len(body.lines) == 0:
+            continue
+        for begin in range(0, len(own), BLOCK):
+            progress(begin / len(own), "distances")
+            places = _places(steps, own[begin : begin + BLOCK], body, tolerance)
+            spans = np.array_split(np.arange(len(places[2])), workers)
+            with ThreadPoolExecutor(workers) as pool:
+                for job in [pool.submit(lowered, s, body, *places) for s in spans]:
+                    out, where, early, deep = job.result()
+                    nearer = out < best
+                    best[nearer], at[nearer] = out[nearer], where[nearer]
+                    np.minimum(first, early, out=first)
+                    np.minimum(deepest, deep, out=deepest)
+    return Clearance(best, at, first, deepest)
+
+
+def _cells(p: Floats, reach: float) -> Grid:
+    """Points sorted into cells: (order, where each cell begins, low corner, side, counts)."""
+    low, high = p.min(axis=0), p.max(axis=0)
+    cell = max(reach / 8.0, float(np.cbrt(np.prod(np.maximum(high - low, reach / 8.0)) / CELLS)))
+    count = np.floor((high - low) / cell).astype(np.int64) + 1
+    place = np.minimum(((p - low) / cell).astype(np.int64), count - 1)
+    key = (place[:, 0] * count[1] + place[:, 1]) * count[2] + place[:, 2]
+    order = np.argsort(key, kind="stable")
+    starts = np.searchsorted(key[order], np.arange(int(count.prod()) + 1))
+    return order, starts, low, cell, count
+
+
+def _places(steps: Steps, own: Ints, body: Body, tolerance: float) -> tuple[Floats, Floats, Ints]:
+    """Tips, axes and steps of places along some steps, both ends among them."""
+    p0, p1, a0, a1 = (x[own] for x in (steps.p0, steps.p1, steps.a0, steps.a1))
+    move = p1 - p0
+    length = np.linalg.norm(move, axis=1)
+    turn = np.linalg.norm(a1 - a0, axis=1)
+    along = np.abs(np.einsum("ij,ij->i", move, a0))
+    slope = np.where(length > 0.0, along / np.where(length > 0.0, length, 1.0), 0.0).clip(0.0, 1.0)
+    oblique = slope * np.sqrt(1.0 - slope**2)
+    span = length + turn * body.top
+    with np.errstate(divide="ignore"):
+        across = math.sqrt(8.0 * body.widest * tolerance)
+        sharp = np.where(oblique > 1e-9, tolerance / np.maximum(oblique, 1e-9), np.inf)
+        round_ = math.sqrt(8.0 * body.arc[2] * tolerance)
+        apart = np.minimum(across, np.where(oblique > 1e-9, np.maximum(sharp, round_), np.inf))
+    count = np.maximum(np.ceil(span / apart), 1.0).astype(np.int64)
+    at = np.repeat(np.arange(len(own)), count + 1)
+    k = np.arange(len(at)) - np.repeat(np.cumsum(count + 1) - count - 1, count + 1)
+    u = (k / count[at])[:, None]
+    axis = (1.0 - u) * a0[at] + u * a1[at]
+    axis /= np.linalg.norm(axis, axis=1)[:, None]
+    return p0[at] + u * move[at], axis, own[at]

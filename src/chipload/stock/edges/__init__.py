@@ -1,0 +1,1 @@
+"""Edges of the rings of a layered workpiece, as rows of numbers."""

@@ -1,0 +1,1 @@
+"""The page: jobs and results of one folder in the browser of this computer."""

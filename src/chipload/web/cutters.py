@@ -1,0 +1,93 @@
+"""The shape of the cutter that a track was run with, by tool number.
+
+It is that of the job where the opened folder has the job that the result was made from (by its hash), else the CUTTER
+of CL data: the result's own, or the program where the folder has it. Where none says it, the page shows a pointer and
+says that the shape is not known.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+from typing import Any
+
+from chipload.cutter.cutter import Cutter
+from chipload.errors import ChiploadError, InputError
+from chipload.job import load_job
+from chipload.program.apt.cutters import read_cutters
+from chipload.program.read import ENDINGS
+from chipload.web.inside import by_hash
+from chipload.web.result import Result, Track
+from chipload.web.scene import cutter_glb, needle_glb, outline_glb
+
+UNKNOWN = "A pointer stands for the cutter: no job in the opened folder and no CL data of this result say its shape."
+
+
+def cutters_of(result: Result, track: Track, size: float) -> tuple[dict[int, bytes], str]:
+    """GLB of the cutter of each tool number of a track (number 0: of every other), and what is not known.
+
+    Parameters
+    ----------
+    size : length of a pointer [mm], and of a cutter whose length CL data leave open
+    """
+    numbers = _numbers(result, track)
+    own = {n: c for n, c in _of_job(result).items() if not numbers or n in numbers}
+    if own and (not numbers or numbers <= set(own)):
+        made = {n: cutter_glb(c) for n, c in own.items()}
+    else:
+        made = _of_apt(result, track, size)
+    if made and len(made) == 1 and len(numbers) <= 1:
+        return {0: next(iter(made.values()))}, ""
+    if made and numbers <= set(made):
+        return made, ""
+    return {0: needle_glb(size), **made}, UNKNOWN
+
+
+def _numbers(result: Result, track: Track) -> set[int]:
+    """Tool numbers that a track uses, as far as the result says it."""
+    if track.tool is not None:
+        return {int(n) for n in set(track.tool.tolist())}
+    some = result.summary.get("operations")
+    operation: Any = some[track.operation] if isinstance(some, list) and track.operation < len(some) else {}
+    settings = operation.get("settings") if isinstance(operation, dict) else None
+    number = settings.get("cutter") if isinstance(settings, dict) else None
+    return {number} if isinstance(number, int) else set()
+
+
+def _input(result: Result, name: str) -> Path | None:
+    """A file that the result was made from, where the opened folder has it."""
+    provenance = result.summary.get("provenance")
+    inputs = provenance.get("inputs") if isinstance(provenance, dict) else None
+    wanted = inputs.get(name) if isinstance(inputs, dict) else None
+    return by_hash(result.root, wanted) if isinstance(wanted, str) else None
+
+
+def _of_job(result: Result) -> dict[int, Cutter]:
+    path = _input(result, "job")
+    provenance = result.summary.get("provenance")
+    overrides = provenance.get("overrides", []) if isinstance(provenance, dict) else []
+    if path is None or not isinstance(overrides, list):
+        return {}
+    try:
+        job = load_job(path, [str(o) for o in overrides])
+    except ChiploadError:
+        return {}
+    found = getattr(job, "cutters", {})
+    return dict(found) if isinstance(found, dict) else {}
+
+
+def _of_apt(result: Result, track: Track, size: float) -> dict[int, bytes]:
+    program = _input(result, "program")
+    with contextlib.suppress(InputError):
+        own = result.file(f"{track.operation}-{track.strategy or 'program'}.apt")
+        if shapes := _shapes(own, size):
+            return shapes
+    return _shapes(program, size) if program is not None and ENDINGS.get(program.suffix.lower()) == "apt" else {}
+
+
+def _shapes(path: Path, size: float) -> dict[int, bytes]:
+    try:
+        shapes = read_cutters(path.read_bytes().decode("utf-8", "replace"))[0]
+        return {n: outline_glb(shape, size) for n, shape in shapes.items()}
+    except (ChiploadError, OSError):
+        return {}

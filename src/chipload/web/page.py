@@ -1,0 +1,337 @@
+"""The page: open what the folder holds, run a job and stop it, see a result, drive it with the keyboard."""
+
+from __future__ import annotations
+
+import asyncio
+from html import escape
+from importlib import resources
+from pathlib import PurePosixPath
+from typing import Any
+from urllib.parse import quote
+
+from nicegui import background_tasks, ui
+
+from chipload.errors import InputError
+from chipload.report.folder import check_target
+from chipload.web.inside import ENTRIES, Found, Opened, inside, is_job, listed
+from chipload.web.panels import RELEASE
+from chipload.web.result import Result, load_result
+from chipload.web.runs import Run
+from chipload.web.shelf import Shelf
+from chipload.web.view import VERDICTS, View
+
+KEYS = (
+    ("\u2190 \u2192", "one step back or on; with Shift twenty"),
+    ("\u2191 \u2193", "the line of the program before or after"),
+    ("Home, End", "to the beginning, to the end"),
+    ("Space", "play, pause"),
+    ("1 2 3 4", "look from a corner, from above, from the front, from the side"),
+    ("t", "the next operation or strategy"),
+    ("o", "open a result or a job"),
+    ("?", "this list"),
+)
+#: seconds between two looks at a run
+LOOK = 0.25
+
+
+class Runs:
+    """The runs of this page: one at a time, seen in every window."""
+
+    def __init__(self) -> None:
+        self.now: Run | None = None
+
+    async def stop(self) -> None:
+        """Stop what runs."""
+        if self.now is not None:
+            await self.now.stop()
+
+
+class Page:
+    """One window."""
+
+    def __init__(self, opened: Opened, runs: Runs, shelf: Shelf) -> None:
+        self.opened, self.runs, self.shelf = opened, runs, shelf
+        self.result: Result | None = None
+        self.own: Run | None = None
+        self.seen: Run | None = runs.now if runs.now is not None and runs.now.over else None
+        ui.add_css(resources.files(__package__).joinpath("page.css").read_text("utf-8"))
+        ui.colors(primary="#2f5d8a")
+        with ui.element("div").classes("cl-page"):
+            self._header()
+            self._bar()
+            self.home = ui.element("div").classes("cl-home")
+            with ui.element("div").classes("cl-view") as self.stage:
+                self.view = View(shelf)
+        self.opening, self.list = self._dialog("Open")
+        self.running, self.ask = self._dialog("Run")
+        self._help()
+        ui.keyboard(on_key=self._key, ignore=["input", "textarea"])
+        ui.timer(LOOK, self._look)
+        self.stage.set_visibility(False)
+
+    async def begin(self, name: str | None) -> None:
+        """Show what the address or the command names, else what there is."""
+        first = name if name is not None else self.opened.first
+        if first is None:
+            await self._home()
+            return
+        try:
+            path = inside(self.opened.root, first)
+            if path.is_file():
+                await self._home(first)
+            else:
+                await self.show(first)
+        except InputError as err:
+            await self._home()
+            ui.notify(str(err), type="negative")
+
+    async def show(self, name: str) -> None:
+        """Show a result."""
+        self.opening.close()
+        self.busy.set_visibility(True)
+        try:
+            result = await asyncio.to_thread(load_result, self.opened.root, name)
+            self.result = result
+            self.home.set_visibility(False)
+            self.stage.set_visibility(True)
+            title = str(result.summary.get("job", "")) or "result"
+            self.title.set_text(title)
+            self.name.set_text(self._called(name))
+            options = {k: t.title for k, t in enumerate(result.tracks)}
+            self.tracks.set_options(options, value=0)
+            self.tracks.set_visibility(len(options) > 1)
+            self.report.set_visibility(True)
+            self.report.props(f'href="/report?name={quote(name)}"')
+            ui.navigate.history.replace(f"/?show={quote(name)}")
+            await self.view.open(result)
+        except InputError as err:
+            ui.notify(str(err), type="negative")
+            if self.result is None:
+                await self._home()
+        finally:
+            self.busy.set_visibility(False)
+
+    # -- frame --------------------------------------------------------------------------------------------------
+    def _header(self) -> None:
+        with ui.element("div").classes("cl-header"):
+            _button("Open", self._open, "folder_open").mark("open")
+            self.title = ui.label("chipload").classes("cl-name")
+            self.name = ui.label("").classes("cl-path")
+            self.tracks = ui.select({0: ""}, value=0, on_change=self._tracked).props(
+                "dense options-dense outlined hide-bottom-space"
+            ).classes("cl-tracks").mark("track")  # fmt: skip
+            self.tracks.on("popup-hide", js_handler=RELEASE)
+            self.tracks.set_visibility(False)
+            self.busy = ui.spinner(size="sm")
+            self.busy.set_visibility(False)
+            ui.element("div").classes("cl-gap")
+            self.report = ui.element("a").props('target="_blank" rel="noopener"').classes("cl-link")
+            with self.report:
+                ui.label("Report")
+            self.report.set_visibility(False)
+            _button("", lambda: self.help.open(), "help_outline", "keys (?)").mark("help")
+
+    def _bar(self) -> None:
+        """Where a run is."""
+        with ui.element("div").classes("cl-run").mark("run") as self.bar:
+            self.bar_text = ui.label("").classes("cl-run-text").mark("run-text")
+            self.bar_line = ui.linear_progress(0.0, show_value=False, size="8px").classes("cl-run-line")
+            self.bar_stop = ui.button("Stop", on_click=self.runs.stop).props("outline dense no-caps color=red")
+            self.bar_stop.mark("stop")
+            self.bar_close = ui.button(icon="close", on_click=lambda: self.bar.set_visibility(False)).props(
+                "flat dense round size=sm"
+            )
+        self.bar.set_visibility(False)
+
+    def _dialog(self, title: str) -> tuple[Any, Any]:
+        with ui.dialog() as dialog, ui.card().classes("cl-dialog"):
+            ui.label(title).classes("cl-dialog-title")
+            box = ui.element("div").classes("cl-list")
+        return dialog, box
+
+    def _help(self) -> None:
+        with ui.dialog() as self.help, ui.card().classes("cl-dialog").mark("keys"):
+            ui.label("Keys").classes("cl-dialog-title")
+            with ui.element("div").classes("cl-keys"):
+                for key, says in KEYS:
+                    ui.label(key).classes("cl-key")
+                    ui.label(says)
+            ui.label(
+                "Click a plot, a line of the program, a limit or a finding to go there. Drag in the 3D view turns it, "
+                "the wheel zooms, the right button shifts. Drag in a plot zooms it, a double click undoes that."
+            ).classes("cl-note")
+
+    # -- opening ------------------------------------------------------------------------------------------------
+    async def _open(self) -> None:
+        found, all_seen = await asyncio.to_thread(listed, self.opened.root)
+        self.list.clear()
+        with self.list:
+            self._listed(found, all_seen)
+        self.opening.open()
+
+    async def _home(self, job: str | None = None) -> None:
+        """What the folder holds, where no result is shown."""
+        self.result = None
+        found, all_seen = await asyncio.to_thread(listed, self.opened.root)
+        self.stage.set_visibility(False)
+        self.home.set_visibility(True)
+        self.home.clear()
+        self.title.set_text("chipload")
+        self.name.set_text(str(self.opened.root.name))
+        self.report.set_visibility(False)
+        self.tracks.set_visibility(False)
+        with self.home, ui.element("div").classes("cl-card"):
+            if job is not None:
+                ui.label(self._called(job)).classes("cl-dialog-title")
+                with ui.element("div").classes("cl-entry"):
+                    _button("Run", lambda: self._ask(job), "play_arrow").mark(f"run-{job}")
+                    ui.label("plans, proves and writes a result; it can be stopped").classes("cl-note")
+                ui.html(self._text(job), sanitize=True).classes("cl-scroll cl-code cl-job")
+            ui.label("Results and jobs in this folder").classes("cl-dialog-title")
+            self._listed(found, all_seen)
+
+    def _listed(self, found: list[Found], all_seen: bool) -> None:
+        if not all_seen:
+            ui.label(f"The folder holds more than {ENTRIES} files: only so many were looked at.").classes("cl-note")
+        if not found:
+            ui.label("This folder holds no result and no job. `chipload example` copies one.").classes("cl-note")
+        for f in found:
+            with ui.element("div").classes("cl-entry"):
+                ui.icon("analytics" if f.kind == "result" else "description").classes("cl-icon")
+                ui.label(self._called(f.name)).classes("cl-what")
+                if f.kind == "result":
+                    ui.label(f.word).classes(f"cl-pill cl-{VERDICTS[f.word]}")
+                    _button("Show", lambda n=f.name: self.show(n)).mark(f"show-{f.name}")
+                else:
+                    ui.label("job").classes("cl-pill")
+                    _button("Look", lambda n=f.name: self._job(n))
+                    _button("Run", lambda n=f.name: self._ask(n), "play_arrow").mark(f"run-{f.name}")
+
+    async def _job(self, name: str) -> None:
+        """Show a job."""
+        self.opening.close()
+        await self._home(name)
+
+    def _called(self, name: str) -> str:
+        return self.opened.root.name if name == "." else name
+
+    def _text(self, job: str) -> str:
+        lines = inside(self.opened.root, job).read_text("utf-8", "replace").splitlines()
+        return "".join(f'<div class="cl-line"><i>{k}</i>{escape(t) or " "}</div>' for k, t in enumerate(lines, 1))
+
+    # -- running ------------------------------------------------------------------------------------------------
+    def _ask(self, job: str) -> None:
+        """Where the result goes."""
+        self.opening.close()
+        stem, folder = PurePosixPath(job).stem, PurePosixPath(job).parent
+        out = (folder / ("result" if stem == "job" else f"result-{stem}")).as_posix()
+        self.ask.clear()
+        with self.ask:
+            ui.label(f"{self._called(job)}: its result goes into this folder of the opened one:").classes("cl-note")
+            where = ui.input(value=out).props("dense outlined").classes("cl-out").mark("out")
+            said = ui.label("").classes("cl-no")
+            with ui.element("div").classes("cl-entry"):
+                _button("Run", lambda: self._run(job, str(where.value), said), "play_arrow").props(
+                    "unelevated color=primary"
+                ).props(remove="flat").mark("start")
+                _button("Cancel", self.running.close)
+        self.running.open()
+
+    def _run(self, job: str, out: str, said: Any) -> None:
+        """Start a run, unless one runs or its folder cannot be written."""
+        root = self.opened.root
+        try:
+            if self.runs.now is not None and not self.runs.now.over:
+                raise InputError("a job runs already: stop it first")
+            path = inside(root, job)
+            if not is_job(path):
+                raise InputError(f"{job}: is no job any more")
+            target = target_in(root, out)
+            check_target(target)
+        except InputError as err:
+            said.set_text(str(err).replace(f"--out {root}/", ""))
+            return
+        self.running.close()
+        self.runs.now = now = Run(job, target.relative_to(root).as_posix())
+        self.seen, self.own = None, now
+        self.bar.set_visibility(True)
+        background_tasks.create(now.work(path, target))
+
+    async def _look(self) -> None:
+        now = self.runs.now
+        if now is None or self.seen is now:
+            return
+        self.bar.set_visibility(True)
+        self.bar_line.set_value(round(now.done, 3))
+        self.bar_line.set_visibility(not now.over)
+        self.bar_stop.set_visibility(now.state == "running")
+        self.bar_close.set_visibility(now.over)
+        said = {
+            "running": f"{now.job}: {100.0 * now.done:.0f} % \u00b7 {now.what}",
+            "stopping": f"{now.job}: stopping",
+            "done": f"{now.job}: done. {now.says}",
+            "stopped": f"{now.job}: stopped, nothing was written",
+            "failed": f"{now.job}: {now.says}",
+        }[now.state]
+        self.bar_text.set_text(said)
+        if now.over:
+            self.seen = now
+            if now.state == "done" and now is self.own:
+                await self.show(now.out)
+                self.bar.set_visibility(False)
+
+    # -- keys ---------------------------------------------------------------------------------------------------
+    async def _tracked(self) -> None:
+        if self.result is not None and isinstance(self.tracks.value, int):
+            await self.view.follow(self.tracks.value)
+
+    async def _key(self, event: Any) -> None:
+        if not event.action.keydown or event.modifiers.ctrl or event.modifiers.meta or event.modifiers.alt:
+            return
+        key, many = event.key, 20 if event.modifiers.shift else 1
+        if key.name == "?":
+            self.help.open()
+        elif key.name == "o" and not event.action.repeat:
+            await self._open()
+        elif self.result is None or self.help.value or self.opening.value or self.running.value:
+            return
+        elif key.arrow_left or key.arrow_right:
+            self.view.move(many if key.arrow_right else -many)
+        elif key.arrow_up or key.arrow_down:
+            self.view.line(1 if key.arrow_down else -1)
+        elif key.home:
+            self.view.go(0)
+        elif key.end:
+            self.view.go(len(self.view.track or ()) - 1)
+        elif key.name == " " and not event.action.repeat:
+            self.view.toggle()
+        elif key.name in ("1", "2", "3", "4"):
+            self.view.space.look(("iso", "top", "front", "side")[int(key.name) - 1])
+        elif key.name == "t":
+            self.tracks.set_value((int(self.tracks.value or 0) + 1) % len(self.result.tracks))
+
+
+def target_in(root: Any, out: str) -> Any:
+    """The folder of a result that a person named, in the opened folder.
+
+    Raises
+    ------
+    InputError
+        It is not in the opened folder, or the folder itself.
+    """
+    part = PurePosixPath(out.strip())
+    if not out.strip() or part.is_absolute() or ".." in part.parts or "\\" in out or "\0" in out:
+        raise InputError(f"{out}: must be the name of a folder in the opened one")
+    target = root / part
+    above = next(p for p in (target, *target.parents) if p.exists())
+    if not above.resolve().is_relative_to(root) or target == root:
+        raise InputError(f"{out}: must be the name of a folder in the opened one")
+    return target
+
+
+def _button(text: str, act: Any, icon: str | None = None, says: str = "") -> Any:
+    button = ui.button(text, on_click=act, icon=icon).props("flat dense no-caps size=md").on("mousedown.prevent")
+    if says:
+        with button:
+            ui.tooltip(says)
+    return button

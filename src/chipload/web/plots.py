@@ -1,0 +1,155 @@
+"""The linked plots: chosen columns, one over the other, against time or path; a cursor stands in all of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.report.figures import FONT, GRID, INK, LIMIT
+from chipload.report.shape import thinned
+from chipload.web.findings import Bound, bound_of, named
+from chipload.web.result import Result, Text, Track
+
+Floats = NDArray[np.float64]
+
+#: points of one line at most, about
+POINTS = 4000
+COLOURS = ("#3457a6", "#0b7a75", "#c9821a", "#8a4fa3")
+CURSOR = "#b3261e"
+#: a limit farther above the values than this is named but would flatten them if it were drawn
+FAR = 1.8
+
+
+def bounds(result: Result, track: Track, columns: Sequence[str]) -> dict[str, Bound | None]:
+    """The stated limit of each column."""
+    return {c: bound_of(result, track, c) for c in columns}
+
+
+def plots(result: Result, track: Track, held: Mapping[str, Bound | None], against: str, row: int) -> dict[str, Any]:
+    """The figure (plotly, plain values) of columns and their limits with the cursor at a row."""
+    x = abscissa(track, against)
+    at = float(x[row])
+    data: list[dict[str, Any]] = []
+    axes: dict[str, Any] = {}
+    notes: list[dict[str, Any]] = []
+    shapes: list[dict[str, Any]] = [cursor(at)]
+    count = max(len(held), 1)
+    gap = 0.05 if count > 1 else 0.0
+    height = (1.0 - gap * (count - 1)) / count
+    for k, (column, bound) in enumerate(held.items()):
+        values = result.column(track, column)
+        y = values.codes.astype(np.float64) if isinstance(values, Text) else values
+        rows = drawn_rows(y)
+        unit = escape(named(column)[1])
+        colour = COLOURS[k % len(COLOURS)]
+        axis = "" if k == 0 else str(k + 1)
+        top = 1.0 - k * (height + gap)
+        finite = y[np.isfinite(y)]
+        low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
+        limit = bound.limit if bound is not None else math.inf
+        near = limit <= FAR * high
+        reach = max(high, limit) if near else high
+        span = (reach - min(low, 0.0)) or 1.0
+        axes[f"yaxis{axis}"] = {
+            "domain": [max(top - height, 0.0), top],
+            "range": [min(low, 0.0) - 0.04 * span, reach + 0.26 * span],
+            "gridcolor": GRID,
+            "zerolinecolor": "#c9ced6",
+            "nticks": 4,
+            "tickfont": {"size": 10, "color": "#5f6b7a"},
+            "automargin": False,
+            **(_words(values) if isinstance(values, Text) else {}),
+        }
+        data.append(
+            {
+                "type": "scatter", "mode": "lines", "name": column, "x": x[rows], "y": y[rows],
+                "xaxis": "x", "yaxis": f"y{axis}", "connectgaps": False, "showlegend": False,
+                "line": {"color": colour, "width": 1.3, "shape": "vh" if track.line is not None else "linear"},
+                "hovertemplate": f"%{{y:.5g}} {unit}<extra></extra>",
+            }
+        )  # fmt: skip
+        notes.append(
+            {
+                "text": noted(result, track, column, row, bound), "x": 0.004, "y": top,
+                "xref": "paper", "yref": "paper", "xanchor": "left", "yanchor": "top", "showarrow": False,
+                "font": {"size": 11, "color": colour},
+                "bgcolor": "rgba(255,255,255,0.85)", "borderpad": 1,
+            }
+        )  # fmt: skip
+        if near:
+            shapes.append(
+                {
+                    "type": "line", "xref": "paper", "x0": 0, "x1": 1, "yref": f"y{axis}", "y0": limit, "y1": limit,
+                    "line": {"color": LIMIT, "width": 1, "dash": "dash"},
+                }
+            )  # fmt: skip
+    title = {"time": "time [s]" if track.timed else "row", "path": "path [mm]"}[against]
+    layout = {
+        "font": {**FONT, "size": 11, "color": INK},
+        "margin": {"l": 52, "r": 10, "t": 4, "b": 32},
+        "paper_bgcolor": "white",
+        "plot_bgcolor": "white",
+        "hovermode": "x",
+        "hoverdistance": -1,
+        "dragmode": "zoom",
+        "xaxis": {
+            "title": {"text": title, "standoff": 2, "font": {"size": 11}},
+            "anchor": "free",
+            "position": 0.0,
+            "gridcolor": GRID,
+            "zeroline": False,
+            "range": [float(x[0]), float(x[-1])] if x[-1] > x[0] else [float(x[0]) - 1.0, float(x[0]) + 1.0],
+            "tickfont": {"size": 10, "color": "#5f6b7a"},
+        },
+        "shapes": shapes,
+        "annotations": notes,
+        "uirevision": f"{result.name}/{track.title}/{against}",
+        **axes,
+    }
+    config = {"displaylogo": False, "displayModeBar": False, "doubleClick": "reset"}
+    return {"data": data, "layout": layout, "config": config}
+
+
+def abscissa(track: Track, against: str) -> Floats:
+    """(n,) time or path of each row."""
+    return track.t if against == "time" else track.s
+
+
+def noted(result: Result, track: Track, column: str, row: int, bound: Bound | None) -> str:
+    """Name of a column, its value at a row, and its limit."""
+    word, unit = named(column)
+    values = result.column(track, column)
+    code = int(values.codes[row]) if isinstance(values, Text) else -1
+    value = f"{values[row]:.5g}" if not isinstance(values, Text) else values.words[code] if code >= 0 else ""
+    said = ""
+    if bound is not None:
+        but = f", not for {', '.join(bound.free)}" if bound.free else ""
+        said = f'  <span style="color:{LIMIT}">limit {bound.limit:g}{escape(but)}</span>'
+    return f"{escape(word)} <b>{escape(value)}</b> {escape(unit)}{said}"
+
+
+def cursor(at: float) -> dict[str, Any]:
+    """The line that stands at the slider's time."""
+    line = {"color": CURSOR, "width": 1.4}
+    return {"type": "line", "xref": "x", "x0": at, "x1": at, "yref": "paper", "y0": 0, "y1": 1, "line": line}
+
+
+def drawn_rows(values: Floats) -> NDArray[np.int64]:
+    """(m,) rows of a line: each bucket's least and greatest; of a run of rows without a value only the first.
+
+    >>> drawn_rows(np.array([1.0, np.nan, np.nan, 2.0])).tolist()
+    [0, 1, 3]
+    """
+    void = np.isnan(values)
+    some = np.flatnonzero(~(void & np.concatenate([[False], void[:-1]])))
+    return some[thinned(values[some], POINTS)]
+
+
+def _words(values: Text) -> dict[str, Any]:
+    short = [escape(w if len(w) <= 8 else w[:7] + "\u2026") for w in values.words[:40]]
+    return {"tickvals": list(range(len(short))), "ticktext": short}

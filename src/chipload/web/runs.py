@@ -1,0 +1,100 @@
+"""A job runs in a process of its own: it tells where it is, can be stopped, and ends when the page does.
+
+Notation: the process writes a JSON value a line: ``{"done": 0..1, "what": text}`` while it works and at its end
+``{"code": exit code of `chipload run`, "says": text}``. It stops when its input closes, so that no run outlives the
+page.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import signal
+import sys
+from pathlib import Path
+from typing import Literal
+
+#: seconds that a run has to stop by itself
+PATIENCE = 8.0
+#: characters kept of what a failed run says
+KEPT = 2000
+
+State = Literal["running", "stopping", "done", "stopped", "failed"]
+
+
+class Run:
+    """One run: its ``state``, the share ``done``, ``what`` it does; at its end its ``code`` and what it ``says``."""
+
+    def __init__(self, job: str, out: str) -> None:
+        self.job, self.out = job, out
+        self.state: State = "running"
+        self.done, self.what = 0.0, "starting"
+        self.code: int | None = None
+        self.says = ""
+        self._process: asyncio.subprocess.Process | None = None
+
+    @property
+    def over(self) -> bool:
+        """Whether it has ended."""
+        return self.state in ("done", "stopped", "failed")
+
+    async def work(self, job: Path, out: Path) -> None:
+        """Start the process and follow it to its end."""
+        words = [sys.executable, "-m", "chipload.web.worker", str(job), str(out)]
+        pipe = asyncio.subprocess.PIPE
+        try:
+            process = await asyncio.create_subprocess_exec(
+                *words, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
+            )
+        except OSError as err:
+            self.state, self.code, self.says = "failed", 1, f"no process could be started: {err.strerror}"
+            return
+        self._process = process
+        assert process.stdout is not None
+        assert process.stderr is not None
+        faults = asyncio.create_task(_tail(process.stderr))
+        async for line in process.stdout:
+            self._heard(line)
+        code = await process.wait()
+        fault = await faults
+        stopped = self.state == "stopping"
+        if self.code is None:
+            self.code = code
+            self.says = "stopped: nothing was written" if stopped else f"the run ended without a word: {fault or code}"
+        self.state = "stopped" if stopped or self.code == 130 else "done" if self.code in (0, 3) else "failed"
+
+    async def stop(self) -> None:
+        """Ask it to stop, and end it where it does not."""
+        process = self._process
+        if process is None or self.over or process.returncode is not None:
+            return
+        self.state = "stopping"
+        _signal(process.pid, signal.SIGTERM)
+        try:
+            await asyncio.wait_for(process.wait(), PATIENCE)
+        except TimeoutError:
+            _signal(process.pid, signal.SIGKILL)
+
+    def _heard(self, line: bytes) -> None:
+        with contextlib.suppress(ValueError, TypeError, AttributeError):
+            said = json.loads(line)
+            if "code" in said:
+                self.code, self.says = int(said["code"]), str(said["says"])
+            else:
+                self.done, self.what = float(said["done"]), str(said["what"])
+
+
+def _signal(pid: int, number: int) -> None:
+    """To the process and all that it started: they are a session of their own."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(pid, number)
+
+
+async def _tail(stream: asyncio.StreamReader) -> str:
+    kept = b""
+    while chunk := await stream.read(4096):
+        kept = (kept + chunk)[-KEPT:]
+    lines = kept.decode("utf-8", "replace").strip().splitlines()
+    return lines[-1] if lines else ""

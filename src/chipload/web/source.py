@@ -1,0 +1,126 @@
+"""The text of the program that a track ran, and the line of each row of its history.
+
+The text is the original where the opened folder has it (found by the hash that the result states), else the program
+that the result holds for the machine, else its CL data. Where the history does not count in the lines of that text,
+rows are followed along its motions: each row lies on the motion that is shown, within a tolerance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import ChiploadError
+from chipload.machine.machine import machine_named, machine_names
+from chipload.program.apt.reader import read_apt_file
+from chipload.program.motions import is_arc, straightened
+from chipload.program.program import Program
+from chipload.program.read import read_program
+from chipload.web.inside import by_hash
+from chipload.web.result import Result, Track
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: turn of the chords [rad] that rows are followed along, and how far a row may lie from its chord [mm]
+TURN, NEAR_MM = 0.01, 0.02
+#: rows that are followed one by one, chords that are looked ahead, and the largest text [bytes]
+FOLLOWED, AHEAD, LARGEST = 20_000, 48, 50_000_000
+#: after so many rows on no motion at all the rest of the program is no longer searched for one
+LOST = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A text beside a track.
+
+    Parameters
+    ----------
+    name : of the file
+    lines : its lines
+    of_row : (n,) line of each row of the track, counted from 1; 0: none
+    note : what the text is, where it is not the program itself
+    """
+
+    name: str
+    lines: Sequence[str]
+    of_row: Ints
+    note: str
+
+    def row_of(self, line: int) -> int | None:
+        """The first row of a line, or of the next one that moves."""
+        later = np.where(self.of_row >= line, self.of_row, np.iinfo(np.int64).max)
+        k = int(np.argmin(later)) if len(later) else 0
+        return k if len(later) and later[k] < np.iinfo(np.int64).max else None
+
+
+def source_of(result: Result, track: Track) -> Source | None:
+    """The text of a track; None where the result holds none that can be read."""
+    inputs = result.summary.get("provenance", {})
+    inputs = inputs.get("inputs", {}) if isinstance(inputs, dict) else {}
+    wanted = inputs.get("program") if isinstance(inputs, dict) else None
+    if track.line is not None and track.line.any() and isinstance(wanted, str):
+        original = by_hash(result.root, wanted)
+        if original is not None and original.stat().st_size <= LARGEST:
+            return Source(original.name, _lines(original), track.line, "")
+        note = f"CL data of {wanted.rsplit(' sha256 ', 1)[0]}, whose own text is not in the opened folder"
+    else:
+        note = ""
+    stem = f"{track.operation}-{track.strategy or 'program'}"
+    for ending in ("ngc", "nc", "apt"):
+        try:
+            path = result.file(f"{stem}.{ending}")
+            if path.stat().st_size > LARGEST:
+                continue
+            program = read_apt_file(path)[0] if ending == "apt" else _read_axes(path, result)
+        except (ChiploadError, OSError):
+            continue
+        if program is not None:
+            return Source(path.name, _lines(path), followed(track.place, program), note)
+    return None
+
+
+def followed(place: Floats, program: Program) -> Ints:
+    """(n,) line of the motion that each place lies on, going along the program; 0 before the first.
+
+    A place that lies on no motion ahead keeps the line of the place before.
+    """
+    chords = straightened(program, np.where(is_arc(program), TURN, np.inf))
+    a = np.vstack([chords.p_work[:1], chords.p_work[:-1]])
+    d = chords.p_work - a
+    square = np.maximum((d * d).sum(axis=1), np.finfo(np.float64).tiny)
+    line = np.asarray(chords.line)
+    n = len(place)
+    rows = np.unique(np.linspace(0, n - 1, min(n, FOLLOWED)).astype(np.int64))
+    out, j, lost = np.zeros(len(rows), dtype=np.int64), 0, 0
+    for k, row in enumerate(rows.tolist()):
+        p = place[row]
+        for stop in (j + AHEAD, len(a) if lost < LOST else 0):
+            some = slice(j, stop)
+            share = np.clip(((p - a[some]) * d[some]).sum(axis=1) / square[some], 0.0, 1.0)
+            off = np.linalg.norm(a[some] + share[:, None] * d[some] - p, axis=1)
+            near = np.flatnonzero(off <= NEAR_MM)
+            if len(near):
+                j += int(near[0])
+                break
+        else:
+            lost += 1
+        out[k] = line[j]
+    return out[np.searchsorted(rows, np.arange(n), side="right") - 1]
+
+
+def _read_axes(path: Path, result: Result) -> Program | None:
+    """The program of a shipped machine that moves straight axes only."""
+    provenance = result.summary.get("provenance", {})
+    name = provenance.get("machine") if isinstance(provenance, dict) else None
+    if not isinstance(name, str) or name not in machine_names():
+        return None
+    return read_program(path, machine_named(name)).program
+
+
+def _lines(path: Path) -> list[str]:
+    return path.read_bytes().decode("utf-8", "replace").splitlines()

@@ -1,0 +1,74 @@
+"""Run one job for the page: `python -m chipload.web.worker JOB OUT`; :mod:`chipload.web.runs` says what it writes."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import threading
+import time
+from typing import Any, NoReturn
+
+from chipload.errors import Cancelled, InputError
+
+#: seconds between two lines of progress
+BREATH = 0.1
+
+
+def work(job: str, out: str) -> dict[str, Any]:
+    """Run the job and write its result; the exit code that `chipload run` has, and what it says."""
+    try:
+        from chipload.job import load_job
+        from chipload.report.folder import check_target, verdict, write_result
+        from chipload.run import run
+
+        tell = Teller()
+        tell(0.0, "reading")
+        read = load_job(job)
+        check_target(out)
+        done = run(read, lambda part, what: tell(0.85 * part, what))
+        write_result(done, out, lambda part, what: tell(0.85 + 0.15 * part, what))
+        holds, says = verdict(done)
+        return {"code": 0 if holds else 3, "says": says}
+    except InputError as err:
+        return {"code": 2, "says": str(err)}
+    except (KeyboardInterrupt, Cancelled):
+        return {"code": 130, "says": "stopped: nothing was written"}
+    except Exception as err:
+        return {"code": 1, "says": f"a fault of chipload: {type(err).__name__}: {err}"}
+
+
+class Teller:
+    """Writes where the work is, not too often."""
+
+    def __init__(self) -> None:
+        self.last, self.what = 0.0, ""
+
+    def __call__(self, done: float, what: str) -> None:
+        """Take a share and what is done."""
+        now = time.monotonic()
+        if now - self.last >= BREATH or what != self.what:
+            self.last, self.what = now, what
+            _write({"done": done, "what": what})
+
+
+def _write(value: dict[str, Any]) -> None:
+    sys.stdout.write(json.dumps(value) + "\n")
+    sys.stdout.flush()
+
+
+def _stop(_number: int, _frame: object) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def _watch() -> None:
+    """End with the page: its end of our input closes when it goes."""
+    sys.stdin.buffer.read()
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, _stop)
+    threading.Thread(target=_watch, daemon=True).start()
+    _write(work(*sys.argv[1:3]))

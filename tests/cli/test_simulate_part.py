@@ -1,0 +1,123 @@
+"""A program held against the part, fixtures and its own stock, by the command line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import trimesh
+from typer.testing import CliRunner
+
+from chipload.cli import app
+
+SLOT = "G21 G90 G17 G94\nT1 M6\nS3000 M3\nG0 X-10 Y0 Z5\nG0 Z-2.1\nG1 X25 F600\nG0 Z5\nM2\n"
+JOB = """[program]
+file = "slot.ngc"
+[machine]
+name = "vmc"
+[stock]
+low_mm = [0.0, -15.0, -5.0]
+high_mm = [50.0, 15.0, 0.0]
+layer_mm = 1.0
+[part]
+file = "part.stl"
+units = "mm"
+spacing_mm = 1.0
+look_mm = 0.5
+[[fixture]]
+file = "clamp.stl"
+units = "mm"
+spacing_mm = 1.0
+[material]
+name = "al7075-t6"
+[[cutter]]
+number = 1
+diameter_mm = 10.0
+flutes = 2
+helix_deg = 30.0
+flute_length_mm = 20.0
+overhang_mm = 30.0
+modulus_gpa = 580.0
+holder_mm = [[40.0, 40.0]]
+[[operation]]
+kind = "simulate"
+step_mm = 2.0
+stock_points_mm = 2.0
+[limits]
+force_n = 1000.0
+gouge_mm = 0.02
+excess_mm = 0.1
+"""
+
+
+def box(low, high):
+    low, high = np.array(low, dtype=float), np.array(high, dtype=float)
+    mesh = trimesh.creation.box(extents=high - low)
+    mesh.apply_translation(0.5 * (low + high))
+    return mesh
+
+
+def call(*words):
+    done = CliRunner().invoke(app, [str(w) for w in words])
+    return done.exit_code, done.stdout, done.stderr
+
+
+@pytest.fixture
+def job(tmp_path: Path) -> Path:
+    """A slot 2 mm deep and 10.12 mm wide is wanted, one of 2.1 and 10 is milled beside a clamp 30 mm high."""
+    (tmp_path / "slot.ngc").write_text(SLOT)
+    (tmp_path / "job.toml").write_text(JOB)
+    block, slot = box([0, -15, -5], [50, 15, 0]), box([-1, -5.06, -2], [25, 5.06, 1])
+    end = trimesh.creation.cylinder(radius=5.06, height=3.0, sections=256)
+    end.apply_translation([25.0, 0.0, -0.5])
+    part = block.difference(slot.union(end, engine="manifold"), engine="manifold")
+    part.export(tmp_path / "part.stl")
+    box([40, -15, 0], [50, 15, 30]).export(tmp_path / "clamp.stl")
+    return tmp_path / "job.toml"
+
+
+def test_gouge_excess_and_collision(job: Path, tmp_path: Path) -> None:
+    out = tmp_path / "r"
+    code, said, _ = call("run", job, "--out", out)
+    assert code == 3
+    op = json.loads((out / "summary.json").read_bytes())["operations"][0]
+    assert op["gouge_mm"]["max"] == pytest.approx(0.1, abs=2e-3)
+    assert op["gouge_mm"]["line"] == 6
+    assert op["gouge_mm"]["at_mm"][2] == -2.0
+    assert op["excess_mm"]["max"] == pytest.approx(0.06, abs=2e-3)
+    assert abs(op["excess_mm"]["at_mm"][1]) <= 5.0601
+    assert "gouge 0.1 mm exceeds 0.02 mm in line 6" in said
+    by = {x["name"]: x["holds"] for x in op["limits"]}
+    assert by == {"force_n": True, "gouge_mm": False, "excess_mm": True}
+    # the tip goes to x = 25 and to z = -2.1, the holder to x = 45 and down to z = 27.9
+    (hit,) = op["collisions"]
+    assert (hit["what"], hit["into"], hit["line"], hit["tool"]) == ("shank or holder", "fixture 0", 6, 1)
+    assert hit["depth_mm"] == pytest.approx(2.1, abs=0.01)
+    assert op["held_against"] == ["fixture 0", "part", "stock"]
+    assert op["no_holder"] == []
+    history = pq.read_table(out / "history.parquet")
+    assert max(history["gouge_mm"].to_pylist()) == pytest.approx(op["gouge_mm"]["max"])
+    page = (out / "report.html").read_text()
+    assert "What is left on the part" in page
+    assert "shank or holder goes 2.1 mm into fixture 0" in page
+    scene = trimesh.load(out / "scene.glb", process=False)
+    assert "part" in scene.geometry
+    assert len(np.unique(np.asarray(scene.geometry["part"].visual.vertex_colors), axis=0)) > 3
+
+
+def test_what_is_not_stated_is_said_to_be_unchecked(job: Path, tmp_path: Path) -> None:
+    text = job.read_text().replace("stock_points_mm = 2.0\n", "").replace("holder_mm = [[40.0, 40.0]]\n", "")
+    job.write_text(text.replace(text[text.index("[[fixture]]") : text.index("[material]")], ""))
+    assert call("run", job, "--out", tmp_path / "r")[0] == 3
+    page = (tmp_path / "r" / "report.html").read_text()
+    assert "Whether shank and holder run into the stock: stock_points_mm is not stated" in page
+    assert "fixtures: none is stated; holders of tools 1: not stated" in page
+
+
+def test_a_limit_of_a_part_that_is_not_stated(job: Path, tmp_path: Path) -> None:
+    text = job.read_text()
+    job.write_text(text.replace(text[text.index("[part]") : text.index("[[fixture]]")], ""))
+    code, _, err = call("run", job, "--out", tmp_path / "r")
+    assert code == 2
+    assert "job.toml: limits.gouge_mm: needs the part that should come out: state [part] or leave it out" in err

@@ -1,0 +1,206 @@
+"""The page in a real browser: every panel stands at the row that the hand-made history says."""
+
+import re
+
+import numpy as np
+import pytest
+
+from square import FEED, FORCE, LINE, ROWS, T, X, Y
+
+BACKGROUND = (238, 241, 245)
+
+
+def settle(page, row):
+    """Wait until the page says that it stands at a row."""
+    page.wait_for_function("r => document.querySelector('.cl-where').textContent.includes(r)", arg=f"step {row + 1} of")
+
+
+def cutter(page):
+    """Where the moved group of the scene is."""
+    return page.evaluate(
+        """() => { const name = Object.keys(window).find(x => x.startsWith('scene_'));
+        const moved = window[name].children.filter(o => o.type == 'Group' && o.visible && o.position.length() > 0);
+        return moved.map(o => [o.position.x, o.position.y, o.position.z])[0] }"""
+    )
+
+
+def stands_at(page, row):
+    """Every panel is at a row of the history."""
+    settle(page, row)
+    page.wait_for_function("n => document.querySelector('.cl-now')?.dataset.line == n", arg=str(LINE[row]))
+    page.wait_for_function(
+        "t => Math.abs(document.querySelector('.cl-figure').layout.shapes[0].x0 - t) < 1e-9", arg=float(T[row])
+    )
+    said = page.inner_text(".cl-where")
+    assert f"X {X[row]:.3f} Y {Y[row]:.3f} Z -2.000" in said
+    assert f"line {LINE[row]}" in said
+    assert float(page.get_attribute(".cl-slider", "aria-valuenow")) == pytest.approx(T[row], abs=0.006)
+    texts = page.evaluate("document.querySelector('.cl-figure').layout.annotations.map(a => a.text)")
+    assert f"{FORCE[row]:.5g}" in texts[0]
+    assert cutter(page) == pytest.approx([X[row], Y[row], -2.0])
+
+
+def test_what_the_folder_holds_is_listed_and_opened(window) -> None:
+    page = window("")
+    page.wait_for_selector(".cl-entry")
+    names = page.locator(".cl-what").all_inner_texts()
+    assert names == ["contour/job.toml", "bare", "link", "square"]
+    page.locator(".cl-entry", has_text="square").get_by_text("Show").click()
+    page.wait_for_selector(".cl-limits", state="visible")
+    assert page.inner_text(".cl-word") == "Does not hold"
+    assert "cl-no" in page.get_attribute(".cl-verdict", "class")
+    assert page.inner_text(".cl-says") == "Force 900 N exceeds 800 N in line 9; and 1 more."
+
+
+def test_limits_and_findings_lead_to_their_place(square) -> None:
+    page = square
+    rows = [re.split(r"\s{1,}", t) for t in page.locator(".cl-limits tbody tr").all_inner_texts()]
+    assert rows[0][:4] == ["force", "900", "800", "N"]
+    assert " ".join(rows[0][4:7]) == "does not hold"
+    assert rows[1][:5] == ["torque", "9", "12", "N", "m"]
+    assert rows[1][5] == "holds"
+    page.click(".cl-limits tbody tr >> nth=0")
+    stands_at(page, int(FORCE.argmax()))
+    page.get_by_text("line 8: a rapid goes through material").click()
+    stands_at(page, int(np.flatnonzero(LINE == 8)[0]))
+    assert page.get_by_text("not checked, no limit stated: power_w").is_visible()
+
+
+def test_the_slider_moves_everything(square) -> None:
+    page = square
+    box = page.locator(".cl-slider").bounding_box()
+    page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    page.wait_for_function("!document.querySelector('.cl-where').textContent.includes('step 1 of')")
+    page.wait_for_timeout(300)
+    row = int(re.search(r"step (\d+) of", page.inner_text(".cl-where"))[1]) - 1
+    assert abs(row - 100) <= 2
+    assert page.inner_text(".cl-where").startswith(f"{T[row]:.3f} of 20 s")
+    page.keyboard.press("ArrowRight")
+    stands_at(page, row + 1)
+
+
+def test_a_plot_and_a_line_move_the_slider(square) -> None:
+    page = square
+    plot = page.locator(".cl-figure .nsewdrag").first.bounding_box()
+    page.mouse.move(plot["x"] + 0.7 * plot["width"], plot["y"] + 0.5 * plot["height"])
+    page.wait_for_timeout(400)
+    page.mouse.click(plot["x"] + 0.7 * plot["width"], plot["y"] + 0.5 * plot["height"])
+    page.wait_for_function("!document.querySelector('.cl-where').textContent.includes('step 1 of')")
+    row = int(re.search(r"step (\d+) of", page.inner_text(".cl-where"))[1]) - 1
+    assert T[row] == pytest.approx(T[0] + 0.7 * (T[-1] - T[0]), abs=0.3)
+    stands_at(page, row)
+    page.click(".cl-line[data-line='9']")
+    stands_at(page, int(np.flatnonzero(LINE == 9)[0]))
+    # a line that moves nothing leads to the next one that does
+    page.click(".cl-line[data-line='2']")
+    stands_at(page, 0)
+
+
+def test_keys(square) -> None:
+    page = square
+    row = 0
+    for key, moved in (
+        ("ArrowRight", 1), ("ArrowRight", 2), ("ArrowLeft", 1), ("Shift+ArrowRight", 21), ("End", ROWS - 1),
+        ("ArrowRight", ROWS - 1), ("ArrowUp", 100), ("ArrowDown", 150), ("Home", 0), ("ArrowLeft", 0),
+    ):  # fmt: skip
+        page.keyboard.press(key)
+        row = moved
+        settle(page, row)
+    stands_at(page, row)
+    page.keyboard.press("Space")
+    page.wait_for_function("Number(document.querySelector('.cl-where').textContent.match(/step (\\d+)/)[1]) > 5")
+    page.keyboard.press("Space")
+    page.wait_for_timeout(400)
+    here = page.inner_text(".cl-where")
+    page.wait_for_timeout(700)
+    assert page.inner_text(".cl-where") == here
+    page.keyboard.press("?")
+    page.get_by_text("one step back or on").wait_for(state="visible")
+    page.keyboard.press("Escape")
+    page.get_by_text("one step back or on").wait_for(state="hidden")
+
+
+def test_the_frame_does_not_scroll_and_nothing_lies_outside(square) -> None:
+    page = square
+    assert page.evaluate("[document.documentElement.scrollHeight, document.documentElement.scrollWidth]") == [720, 1280]
+    for part in (".cl-space", ".cl-plots", ".cl-tables", ".cl-source", ".cl-foot", ".cl-where"):
+        box = page.locator(part).bounding_box()
+        assert box["width"] > 100
+        assert box["height"] > 10
+        assert box["x"] >= 0
+        assert box["y"] >= 0
+        assert box["x"] + box["width"] <= 1280
+        assert box["y"] + box["height"] <= 720
+
+
+def scene_pixels(page, pixels):
+    page.wait_for_timeout(1500)
+    box = page.locator(".cl-stage").bounding_box()
+    # the middle, which nothing is laid over
+    clip = {
+        "x": box["x"] + 0.3 * box["width"],
+        "y": box["y"] + 40,
+        "width": 0.5 * box["width"],
+        "height": box["height"] - 110,
+    }
+    return pixels(page.screenshot(clip=clip))
+
+
+def test_the_scene_is_not_blank_and_a_column_changes_its_colours(square, pixels) -> None:
+    page = square
+    before = scene_pixels(page, pixels)
+    drawn = np.abs(before.astype(int) - BACKGROUND).max(axis=2) > 8
+    assert drawn.mean() > 0.1
+    assert len(np.unique(before.reshape(-1, 3), axis=0)) > 60
+    assert page.inner_text(".cl-legend .cl-red") == "red: above 800"
+    red = ((before[..., 0] > 170) & (before[..., 1] < 60) & (before[..., 2] < 60)).sum()
+    assert red > 20
+    assert page.inner_text(".cl-ends").split() == [f"{FORCE.min():.4g}", f"{FORCE.max():.4g}"]
+    page.click(".cl-colour")
+    page.get_by_role("option", name="feed [mm/min]").click()
+    page.wait_for_function("document.querySelector('.cl-title').textContent.includes('feed')")
+    # the keys are the page's again after a list was open
+    page.keyboard.press("ArrowRight")
+    settle(page, 1)
+    page.keyboard.press("Home")
+    settle(page, 0)
+    assert page.inner_text(".cl-ends").split() == [f"{FEED.min():.4g}", f"{FEED.max():.4g}"]
+    after = scene_pixels(page, pixels)
+    assert (np.abs(after.astype(int) - before).max(axis=2) > 40).sum() > 200
+    for name in ("stock", "path", "cutter"):
+        page.locator(".cl-layers").get_by_text(name).click()
+    bare = scene_pixels(page, pixels)
+    assert (np.abs(bare.astype(int) - BACKGROUND).max(axis=2) > 8).mean() < 0.02
+    for name in ("stock", "path", "cutter"):
+        page.locator(".cl-layers").get_by_text(name).click()
+
+
+def test_plots_show_the_columns_that_are_chosen(square) -> None:
+    page = square
+    traces = "document.querySelector('.cl-figure').data.map(d => [d.name, Math.max(...d.y), d.x[d.x.length - 1]])"
+    assert page.evaluate(traces) == [["force_n", 900.0, T[-1]], ["torque_nm", 9.0, T[-1]]]
+    page.click(".cl-columns")
+    page.get_by_role("option", name="feed [mm/min]").click()
+    page.wait_for_function("document.querySelector('.cl-figure').data.length == 3")
+    assert page.evaluate(traces)[2] == ["feed_mm_min", 480.0, T[-1]]
+    page.keyboard.press("Escape")
+    page.get_by_text("path", exact=True).last.click()
+    page.wait_for_function("document.querySelector('.cl-figure').layout.xaxis.title.text.includes('path')")
+    assert page.evaluate(traces)[0][2] == pytest.approx(160.0)
+    page.keyboard.press("End")
+    settle(page, ROWS - 1)
+    page.wait_for_timeout(400)
+    assert float(page.get_attribute(".cl-slider", "aria-valuenow")) == pytest.approx(160.0)
+    page.get_by_text("time", exact=True).last.click()
+    page.wait_for_function("document.querySelector('.cl-figure').layout.xaxis.title.text.includes('time')")
+
+
+def test_names_and_texts_of_a_result_are_only_shown(window) -> None:
+    page = window("?show=bare")
+    page.wait_for_selector(".cl-limits", state="visible")
+    page.wait_for_timeout(1000)
+    assert page.evaluate("window.hacked") is None
+    assert page.inner_text(".cl-name") == "<img src=x onerror='window.hacked=1'>"
+    assert "<script>" in page.inner_text(".cl-says")
+    assert page.evaluate("document.querySelectorAll('.cl-page img, .cl-page svg[onload]').length") == 0
+    assert "This result has no scene" in page.inner_text(".cl-said")

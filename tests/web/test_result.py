@@ -1,0 +1,317 @@
+"""What the page makes of a result, without a browser: against the numbers that the result was written with."""
+
+import json
+import math
+import struct
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from chipload.cutter.cutter import Cutter
+from chipload.errors import InputError
+from chipload.program.apt.reader import read_apt
+from chipload.report.folder import write_result
+from chipload.web import plots, scene
+from chipload.web.cutters import UNKNOWN, cutters_of
+from chipload.web.findings import bound_of, failures, limits
+from chipload.web.glb import Shape, glb_bytes
+from chipload.web.inside import by_hash, inside, listed, open_path
+from chipload.web.page import target_in
+from chipload.web.panels.space import frame, legend
+from chipload.web.panels.tables import finding_list, limit_table
+from chipload.web.result import Text, load_result
+from chipload.web.shelf import ROOM, Shelf
+from chipload.web.source import followed, source_of
+from square import CL, FEED, FORCE, LINE, PROGRAM, ROWS, X, Y, make_result
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    (tmp_path / "square.ngc").write_text(PROGRAM)
+    make_result(tmp_path / "r")
+    return tmp_path
+
+
+def parsed(glb: bytes) -> tuple[dict, bytes]:
+    """Tree and numbers of a GLB, read by the format's own words."""
+    magic, version, length = struct.unpack_from("<4sII", glb)
+    assert (magic, version, length) == (b"glTF", 2, len(glb))
+    size, kind = struct.unpack_from("<I4s", glb, 12)
+    assert kind == b"JSON"
+    tree = json.loads(glb[20 : 20 + size])
+    more, kind = struct.unpack_from("<I4s", glb, 20 + size)
+    assert kind == b"BIN\0"
+    return tree, glb[28 + size : 28 + size + more]
+
+
+def column_of(tree: dict, blob: bytes, k: int) -> np.ndarray:
+    accessor = tree["accessors"][k]
+    view = tree["bufferViews"][accessor["bufferView"]]
+    kind = {5126: "<f4", 5125: "<u4", 5123: "<u2"}[accessor["componentType"]]
+    wide = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]]
+    data = np.frombuffer(blob[view["byteOffset"] : view["byteOffset"] + view["byteLength"]], dtype=kind)
+    return data.reshape(accessor["count"], wide) if wide > 1 else data
+
+
+def test_a_path_keeps_its_places_and_its_red(root: Path) -> None:
+    r = load_result(root, "r")
+    glb, scale = scene.path_glb(r, r.tracks[0], "force_n")
+    assert (scale.low, scale.high, scale.limit) == (FORCE.min(), FORCE.max(), 800.0)
+    tree, blob = parsed(glb)
+    attributes = tree["meshes"][0]["primitives"][0]["attributes"]
+    middle = column_of(tree, blob, attributes["POSITION"]).reshape(ROWS, 3, 3).mean(axis=1)
+    assert middle[:, 0] == pytest.approx(X, abs=1e-4)
+    assert middle[:, 1] == pytest.approx(Y, abs=1e-4)
+    colours = column_of(tree, blob, attributes["COLOR_0"])[::3].astype(float) / 65535.0
+    red = colours[:, 0] > 0.5
+    red &= colours[:, 1] < 0.05
+    assert np.flatnonzero(red).tolist() == np.flatnonzero(FORCE > 800.0).tolist()
+    _, scale = scene.path_glb(r, r.tracks[0], "pass")
+    assert scale.words == (("square", scene.WORDS[0]),)
+
+
+def test_a_tube_has_its_radius_and_its_gaps() -> None:
+    points = np.array([[0.0, 0, 0], [10.0, 0, 0], [20.0, 5, 0], [30.0, 5, 9]])
+    shape = scene.tube(points, np.array([False, False, True, False]), np.zeros((4, 4), dtype=np.uint8), 0.5)
+    rings = shape.vertices.reshape(4, 3, 3)
+    assert np.linalg.norm(rings - points[:, None], axis=2) == pytest.approx(0.5)
+    assert rings[0, :, 0] == pytest.approx(0.0, abs=1e-12)
+    joined = {tuple(sorted({int(v) // 3 for v in face})) for face in shape.faces}
+    assert joined == {(0, 1), (2, 3)}
+
+
+def test_a_cutter_is_its_profile_turned() -> None:
+    ball = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=5.0, shank_diameter=8.0)
+    tree, blob = parsed(scene.cutter_glb(ball))
+    flutes, shank = (column_of(tree, blob, m["primitives"][0]["attributes"]["POSITION"]) for m in tree["meshes"])
+    rho, z = np.hypot(flutes[:, 0], flutes[:, 1]), flutes[:, 2]
+    low = z < 5.0
+    assert np.hypot(rho[low], z[low] - 5.0) == pytest.approx(5.0, abs=1e-5)
+    assert (float(z.min()), float(z.max())) == pytest.approx((0.0, 20.0))
+    top = np.hypot(shank[:, 0], shank[:, 1])[shank[:, 2] > 20.0]
+    assert float(top.max()) == pytest.approx(4.0)
+    assert float(shank[:, 2].max()) == pytest.approx(30.0)
+
+
+def test_the_cutter_comes_from_the_cl_data_else_a_pointer_stands_for_it(root: Path) -> None:
+    r = load_result(root, "r")
+    made, unknown = cutters_of(r, r.tracks[0], 25.0)
+    tree, blob = parsed(made[0])
+    p = column_of(tree, blob, 0)
+    assert unknown == ""
+    assert (float(np.hypot(p[:, 0], p[:, 1]).max()), float(p[:, 2].max())) == pytest.approx((4.0, 25.0))
+    (root / "r" / "0-program.apt").unlink()
+    made, unknown = cutters_of(r, r.tracks[0], 25.0)
+    assert unknown == UNKNOWN
+    assert list(made) == [0]
+
+
+def test_the_cutter_and_the_title_of_a_planned_result(outcome, tmp_path: Path) -> None:
+    write_result(outcome(), tmp_path / "p")
+    r = load_result(tmp_path, "p")
+    assert [t.title for t in r.tracks] == ["0: contour, backward", "0: contour, plain", "0: contour, feed"]
+    plain = r.tracks[1]
+    # the limit was not held against the semi-finish pass, whose engagement of 25 degrees lies above the worst
+    bound = bound_of(r, plain, "engagement_deg")
+    values, passes = r.column(plain, "engagement_deg"), r.column(plain, "pass")
+    assert isinstance(passes, Text)
+    finish = np.array([passes.words[k] == "finish" for k in passes.codes])
+    assert bound.free == ("semifinish",)
+    assert (bound.above == (finish & (values > 13.0))).all()
+    held = limits(r, plain)
+    assert [(h.name, h.state) for h in held] == [("engagement", "does not hold"), ("force", "holds")]
+    # the row is the one in the middle of the corner, in the finish pass
+    assert finish[held[0].row]
+    assert values[held[0].row] == pytest.approx(held[0].worst)
+    assert "plain is not released: the job uses backward" in [f.text for f in failures(r, plain)]
+    names = {b.name for b in scene.bodies(r)[0]}
+    assert names == {"0-wall", "0-stock"}
+    # the path jumps from the end of one pass to the beginning of the next, as its length shows
+    assert np.flatnonzero(plain.apart).tolist() == [900]
+
+
+def test_rows_follow_the_lines_of_a_text_that_numbers_otherwise(root: Path) -> None:
+    r = load_result(root, "r")
+    track = r.tracks[0]
+    own = source_of(r, track)
+    assert (own.name, own.note) == ("square.ngc", "")
+    assert own.of_row.tolist() == LINE.tolist()
+    assert own.row_of(2) == 0
+    assert own.row_of(9) == 100
+    assert own.row_of(11) is None
+    (root / "square.ngc").write_text(PROGRAM + "\n")
+    other = source_of(r, track)
+    assert other.name == "0-program.apt"
+    assert "square.ngc" in other.note
+    # sides of the square are the lines 7 to 10 of the CL data too, by another count: its GOTOs
+    goto = [k for k, text in enumerate(CL.splitlines(), 1) if text.startswith("GOTO")][1:]
+    assert other.of_row.tolist() == np.repeat(goto, ROWS // 4).tolist()
+
+
+def test_of_two_rows_at_a_place_the_worse_one_is_meant(tmp_path: Path) -> None:
+    folder = tmp_path / "twice"
+    folder.mkdir()
+    there = np.array([0.0, 1.0, 2.0, 3.0, 2.0, 1.0, 0.0])
+    force = np.array([10.0, 20.0, 30.0, 40.0, 90.0, 25.0, 15.0])
+    table = {"x_mm": there, "y_mm": np.zeros(7), "z_mm": np.zeros(7), "force_n": force}
+    pq.write_table(pa.table(table), folder / "history.parquet")
+    limit = {"name": "force_n", "limit": 50.0, "worst": 90.0, "at_mm": [2.0, 0.0, 0.0], "holds": False}
+    (folder / "summary.json").write_text(json.dumps({"holds": False, "operations": [{"limits": [limit]}]}))
+    r = load_result(tmp_path, "twice")
+    assert [h.row for h in limits(r, r.tracks[0])] == [4]
+
+
+def test_an_arc_and_a_path_that_comes_back_are_followed() -> None:
+    text = "UNITS/MM\nRAPID\nGOTO/0,0,0\nFEDRAT/100,MMPM\nGOTO/10,0,0\nCIRCLE/10,5,0,0,0,1\nGOTO/10,10,0\nGOTO/0,10,0\n"
+    program, _ = read_apt(text + "GOTO/0,0,0\nGOTO/10,0,0\nFINI")
+    turn = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 40)[1:]
+    straight = np.linspace(0.0, 10.0, 21)[1:]
+    nothing = np.zeros(20)
+    p = np.concatenate(
+        [
+            np.column_stack([straight, nothing, nothing]),
+            np.column_stack([10.0 + 5.0 * np.cos(turn), 5.0 + 5.0 * np.sin(turn), np.zeros(39)]),
+            np.column_stack([10.0 - straight, nothing + 10.0, nothing]),
+            np.column_stack([nothing, 10.0 - straight, nothing]),
+            np.column_stack([straight, nothing, nothing]),
+        ]
+    )
+    assert followed(p, program).tolist() == [5] * 20 + [7] * 39 + [8] * 20 + [9] * 20 + [10] * 20
+
+
+def test_a_million_rows_keep_their_extremes(tmp_path: Path) -> None:
+    n = 1_000_000
+    values = np.full(n, 100.0)
+    values[[123_456, 777_777]] = (5000.0, -70.0)
+    values[500_000:600_000] = np.nan
+    folder = tmp_path / "big"
+    folder.mkdir()
+    (folder / "summary.json").write_text('{"holds": true, "says": "Holds"}')
+    t = np.arange(n) * 0.01
+    table = {"t_s": t, "x_mm": t, "y_mm": np.sin(t), "z_mm": np.zeros(n), "force_n": values}
+    pq.write_table(pa.table(table), folder / "history.parquet")
+    r = load_result(tmp_path, "big")
+    track = r.tracks[0]
+    drawn = plots.plots(r, track, {"force_n": None}, "time", 0)["data"][0]
+    assert len(drawn["x"]) < 3 * plots.POINTS
+    assert (np.nanmax(drawn["y"]), np.nanmin(drawn["y"])) == (5000.0, -70.0)
+    assert drawn["x"][int(np.nanargmax(drawn["y"]))] == t[123_456]
+    assert np.isnan(drawn["y"]).any()
+    rows = scene.shown_rows(track, r.column(track, "force_n"))
+    assert len(rows) < 1.2 * scene.POINTS
+    assert {0, n - 1, 123_456, 777_777} <= set(rows.tolist())
+
+
+def test_what_is_in_the_folder_and_what_is_not(root: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    outside = make_result(tmp_path_factory.mktemp("away") / "r")
+    (root / "away").symlink_to(outside, target_is_directory=True)
+    (root / "summary-away").mkdir()
+    (root / "summary-away" / "summary.json").symlink_to(outside / "summary.json")
+    (root / "note.toml").write_text("[tool]\nx = 1\n")
+    (root / "job.toml").write_text('[program]\nfile = "square.ngc"\n')
+    (root / ".hidden").mkdir()
+    (root / ".hidden" / "job.toml").write_text("[program]\n")
+    assert [(f.kind, f.name, f.word) for f in listed(root)[0]] == [
+        ("job", "job.toml", ""),
+        ("result", "r", "Does not hold"),
+    ]
+    assert inside(root, "r/summary.json") == root / "r" / "summary.json"
+    for name in ("away", "../x", "/etc/passwd", "r/../r", "r\0", "summary-away/summary.json", "none"):
+        with pytest.raises(InputError, match="opened folder"):
+            inside(root, name)
+    assert open_path(root / "r").first == "."
+    assert open_path(root / "job.toml").first == "job.toml"
+    assert open_path(root).first is None
+    assert by_hash(root, "square.ngc sha256 00") is None
+    for out in ("", ".", "../x", "/x", "away/x", "a\\b"):
+        with pytest.raises(InputError, match="must be the name of a folder in the opened one"):
+            target_in(root, out)
+    assert target_in(root, "new/deep") == root / "new" / "deep"
+
+
+EMPTY = pa.table({c: pa.array([], pa.float64()) for c in ("x_mm", "y_mm", "z_mm")})
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda f: (f / "summary.json").write_text("[]"), "is no result of chipload"),
+        (lambda f: (f / "history.parquet").write_bytes(b"PAR1"), "cannot be read: run the job again"),
+        (lambda f: (f / "history.parquet").unlink(), "is not in the opened folder"),
+        (lambda f: pq.write_table(pa.table({"x_mm": [0.0]}), f / "history.parquet"), "no y_mm: nothing to show"),
+        (lambda f: pq.write_table(EMPTY, f / "history.parquet"), "no row: nothing to show"),
+    ],
+)
+def test_a_result_that_cannot_be_shown_says_why(root: Path, spoil, said: str) -> None:
+    spoil(root / "r")
+    with pytest.raises(InputError, match=said):
+        load_result(root, "r")
+
+
+def test_a_scene_that_cannot_be_read_is_said(root: Path) -> None:
+    (root / "r" / "scene.glb").write_bytes(b"glTF nothing")
+    assert scene.bodies(load_result(root, "r")) == ((), "scene.glb cannot be read: only the path is shown.")
+    (root / "r" / "scene.glb").unlink()
+    assert scene.bodies(load_result(root, "r"))[1] == "This result has no scene: only its path is shown."
+
+
+def test_of_a_box_its_twelve_edges_are_left(root: Path) -> None:
+    body = scene.bodies(load_result(root, "r"))[0][0]
+    tree, blob = parsed(scene.edges_glb(body))
+    primitive = tree["meshes"][0]["primitives"][0]
+    p = column_of(tree, blob, primitive["attributes"]["POSITION"])
+    ends = p[column_of(tree, blob, primitive["indices"])].reshape(-1, 2, 3)
+    assert primitive["mode"] == 1
+    assert sorted(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).tolist()) == [10.0] * 4 + [60.0] * 8
+    assert (body.low.tolist(), body.high.tolist()) == ([-10.0, -10.0, -12.0], [50.0, 50.0, -2.0])
+
+
+def test_texts_are_escaped(root: Path) -> None:
+    summary = json.loads((root / "r" / "summary.json").read_text())
+    summary["operations"][0]["limits"][0]["name"] = "<b>x"
+    summary["operations"][0]["fails"] = ["<img src=x onerror=alert(1)>"]
+    (root / "r" / "summary.json").write_text(json.dumps(summary))
+    r = load_result(root, "r")
+    html = limit_table(limits(r, r.tracks[0])) + finding_list(failures(r, r.tracks[0]))
+    html += legend("<i>_n", scene.Scale(0.0, 1.0, None, (("<u>", "#000000"),)))
+    assert "<b>" not in html
+    assert "<img" not in html
+    assert "<i>" not in html
+    assert "<u>" not in html
+    assert "&lt;img src=x" in html
+
+
+def test_the_frame_of_an_axis_is_a_rotation() -> None:
+    rng = np.random.default_rng(3)
+    for axis in (*np.eye(3), *-np.eye(3), *rng.normal(size=(20, 3))):
+        R = frame(axis)
+        assert pytest.approx(np.eye(3), abs=1e-12) == R @ R.T
+        assert np.linalg.det(R) == pytest.approx(1.0)
+        assert R[:, 2] == pytest.approx(axis / np.linalg.norm(axis))
+
+
+def test_the_shelf_forgets_the_oldest() -> None:
+    shelf = Shelf()
+    first = shelf.put(b"a" * (ROOM // 2))
+    second = shelf.put(b"b" * (ROOM // 2))
+    key = first.removeprefix("/shape/").removesuffix(".glb")
+    assert shelf.get(key) is not None
+    shelf.put(b"c")
+    assert shelf.get(key) is None
+    assert shelf.get(second.removeprefix("/shape/").removesuffix(".glb")) is not None
+    assert shelf.get("../../etc/passwd") is None
+
+
+def test_opacity_and_lines_of_a_file() -> None:
+    clear = Shape(np.eye(3), np.array([[0, 1, 2]]), np.array([255, 0, 0, 128], dtype=np.uint8))
+    lines = Shape(np.eye(3), np.array([[0, 1], [1, 2]]), np.full((3, 4), 255, dtype=np.uint8), lit=False)
+    tree, blob = parsed(glb_bytes([clear, lines]))
+    assert [m["alphaMode"] for m in tree["materials"]] == ["BLEND", "OPAQUE"]
+    assert tree["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] == pytest.approx([1.0, 0.0, 0.0, 128 / 255])
+    assert [m["primitives"][0]["mode"] for m in tree["meshes"]] == [4, 1]
+    assert column_of(tree, blob, tree["meshes"][1]["primitives"][0]["indices"]).tolist() == [0, 1, 1, 2]
+    assert "extensions" in tree["materials"][1]
+    assert np.array(FEED).min() == 240.0
