@@ -72,6 +72,7 @@ def way_of(milled: Milled, way: Compared) -> dict[str, Any]:
         "cutter_changes": d.cutter_changes,
         "table_changes": d.table_changes,
         "least_time_min": d.bound / 60.0,
+        "least_time_any_shape_min": d.bound_any_shape / 60.0,
         "gap": d.gap,
         "patches": [_patch(milled, way, p) for p in d.patches],
     }
