@@ -29,8 +29,8 @@ def divided_sections(milled: Milled, figures: dict[str, go.Figure]) -> list[str]
         "<h2>One cutter, two, three</h2>",
         '<p class="note">All channels; path and feed time of the contact points at the stated scallop, with changes of '
         "cutter and table, without lead-in, links and rapids. No sequence of the same strips, with as many cutters, "
-        "takes less than the least time; patches of other shapes on the same contact points might. The reached share is "
-        "of the area that has contact points.</p>",
+        "takes less than the least time; patches of other shapes on the same contact points might. The reached share "
+        "is of the area that has contact points.</p>",
         _compared(milled),
         figure("ways", ways_figure(milled), figures),
     ]
@@ -95,7 +95,7 @@ def ways_figure(milled: Milled) -> go.Figure:
         )
     out.add_trace(
         go.Scatter(
-            y=names, x=[d.bound / 60.0 for _, d in able], mode="markers", name="no sequence of the same strips takes less",
+            y=names, x=[d.bound / 60.0 for _, d in able], mode="markers", name="no sequence of strips takes less",
             marker={"symbol": "line-ns-open", "size": 26, "color": "#1f2933", "line": {"width": 2}},
             hovertemplate="%{x:.2f} min",
         )
