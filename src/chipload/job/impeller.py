@@ -63,6 +63,27 @@ class SurfaceTable(Table):
     points: tuple[Count, Count] = Field(description="contact points along and up")
 
 
+class PickedTable(Table):
+    """A cutter of the catalogue that a programmer would take."""
+
+    diameter_mm: Positive
+    corner_radius_mm: NotNegative
+
+
+class PathsTable(Table):
+    """Finishing programs of the patches in the least time, checked by simulation."""
+
+    check_mm: Positive = Field(description="most distance of check points of the paths")
+    chord_mm: Positive = Field(le=1.0, description="how far the tip may leave its path between two rows")
+    lift_mm: Positive = Field(description="off the surface at the ends of a line")
+    margin_mm: Positive = Field(description="that links keep from the part")
+    touch_mm: NotNegative = Field(description="how deep a lift may touch the check points")
+    near_mm: NotNegative = Field(description="longest direct link")
+    above_mm: Positive = Field(description="of the safe height above the part")
+    link_feed_mm_min: Positive = Field(le=1e5, description="feed of lifts and links")
+    gouge_mm: Positive = Field(le=1.0, description="deepest that the check may find a program below a surface")
+
+
 class SectionalTable(Table):
     """The search for the largest cutters of all surfaces."""
 
@@ -72,6 +93,14 @@ class SectionalTable(Table):
     around: Annotated[int, Field(ge=0, le=20)] = Field(1, description="bodies beyond the channel that are checked")
     table_deg: tuple[Number, ...] | None = Field(None, min_length=1, description="table angles; none: all")
     clearance_mm: NotNegative = Field(description="of neck, shank and holder")
+    scallop_mm: Positive = Field(le=5.0, description="greatest height between two passes")
+    feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's tip")
+    speed_rpm: Positive = Field(le=1e6, description="spindle speed")
+    most_cutters: Annotated[Count, Field(le=6)] = Field(description="different cutters at most; fewer are compared")
+    cutter_change_s: NotNegative = Field(description="time of a cutter change")
+    table_change_s: NotNegative = Field(description="time of setting the index table to another angle")
+    paths: PathsTable | None = Field(None, description="none: the search and the patches alone, no programs")
+    hand_picked: PickedTable | None = Field(None, description="the cutter that is compared with")
 
 
 class ImpellerJobTable(Table):
@@ -126,6 +155,12 @@ def impeller_job(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) 
         _check(f"surface.{k}", surface, part)
         if any((s.body, s.side) == (surface.body, surface.side) for s in table.surface[:k]):
             raise InputError(f"surface.{k}: {surface.body} {surface.side} stands twice: list each surface once")
+    paths = table.operation[0].paths
+    if paths is not None and not paths.touch_mm < paths.margin_mm < paths.lift_mm:
+        raise InputError(
+            f"operation.0.paths.margin_mm = {paths.margin_mm:g}: must be above touch_mm = {paths.touch_mm:g} and below "
+            f"lift_mm = {paths.lift_mm:g}"
+        )
     files: dict[str, Path] = {}
     if part.sections is not None:
         given = part.sections

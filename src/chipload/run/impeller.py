@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import os
 import time
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from chipload.cutter.catalogue import Catalogue, catalogue_named, read_catalogue
+from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named, read_catalogue
 from chipload.errors import InputError
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.sections import Blade, checked, loft, read_meridian, read_sections
@@ -17,14 +19,19 @@ from chipload.job import ImpellerJob, SectionalTable
 from chipload.job.impeller import SectionsTable, ShapeTable
 from chipload.job.tables import Table
 from chipload.machine.machine import Machine, machine_named, read_machine
-from chipload.planning.sectional.answer import largest_cutters, one_cutter, one_cutter_of
+from chipload.planning.sectional.answer import Answer, largest_cutters, one_cutter, one_cutter_of
+from chipload.planning.sectional.compare import Compared, compared
+from chipload.planning.sectional.costs import Side, Terms
 from chipload.planning.sectional.impeller import Impeller
+from chipload.planning.sectional.missed import with_fits
 from chipload.planning.sectional.parametric import Shape, impeller_of
-from chipload.planning.sectional.surfaces import Sampled, Surface, surface_of
+from chipload.planning.sectional.surfaces import BODIES, Sampled, Surface, surface_of
 from chipload.planning.sectional.tables import IndexTable, index_table
 from chipload.progress import Progress, silent
 from chipload.report.impeller.outcome import Milled, OneCutter, Searched, said
+from chipload.run.impeller_paths import checked_programs
 from chipload.run.provenance import hashes, title_of, versions
+from chipload.units import mm_s_from_mm_min
 
 #: threads of the search; its answer does not depend on them
 WORKERS = len(os.sched_getaffinity(0))
@@ -41,33 +48,47 @@ def run_impeller(job: ImpellerJob, progress: Progress = silent) -> Milled:
         By ``progress``.
     """
     machine, catalogue, impeller = _machine(job), _catalogue(job), _impeller(job)
+    _picked(job, catalogue)
     op = job.operation
     table, surfaces = _tables(machine, op), _surfaces(job, impeller)
     done = []
     for k, surface in enumerate(surfaces):
-        done.append(_searched(job, k, surface, table, catalogue, part_of(progress, k, len(surfaces))))
+        done.append(_searched(job, k, surface, table, catalogue, part_of(part_of(progress, 0, 2), k, len(surfaces))))
         _reached(k, done[-1])
     pairs = [(found.surface.scene, found.answer) for found in done]
     whole = one_cutter_of(pairs, op.clearance_mm, table.spans, WORKERS)
     one = None if whole is None else (catalogue.cutters[whole[0]], whole[1])
+    half = part_of(progress, 1, 2)
+    ways = _ways(job, done, catalogue, impeller, part_of(half, 0, 2))
+    milled = Milled(
+        title_of(job.path), impeller, catalogue, machine, tuple(done), one, ways, None, _settings(op),
+        job.table.impeller.outer_diameter_mm, _provenance(job, machine, catalogue),
+    )  # fmt: skip
+    if op.paths is None or milled.used is None:
+        return milled
+    programs = checked_programs(
+        impeller, machine, table, milled.used, op, op.paths, _ahead(job), WORKERS, part_of(half, 1, 2)
+    )
+    return replace(milled, programs=programs)
+
+
+def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue) -> dict[str, Any]:
+    """Where the numbers come from."""
     files = {"job": job.path, **job.files}
     files |= {key: p for key, p in (("machine", job.machine), ("catalogue", job.catalogue)) if not isinstance(p, str)}
-    provenance = {
+    return {
         "inputs": hashes(files),
         "overrides": list(job.overrides),
         "machine": f"{machine.name}: {machine.note}" if machine.note else machine.name,
         "catalogue": f"{catalogue.name}: {catalogue.note}" if catalogue.note else catalogue.name,
         "versions": versions(),
     }
-    return Milled(
-        title_of(job.path), impeller, catalogue, machine, tuple(done), one, _settings(op),
-        job.table.impeller.outer_diameter_mm, provenance,
-    )  # fmt: skip
 
 
 def look_at_impeller(job: ImpellerJob) -> tuple[list[str], bool]:
     """What the files of a job hold; nothing is searched."""
     machine, catalogue, impeller = _machine(job), _catalogue(job), _impeller(job)
+    _picked(job, catalogue)
     lines = [f"impeller: {impeller.blades} blades{' and as many splitters' if impeller.splitter else ''}"]
     table = _tables(machine, job.operation)
     angles = np.degrees(table.angle)
@@ -96,6 +117,7 @@ def _searched(
     answer = largest_cutters(
         surface.scene, catalogue, table.angle, op.clearance_mm, pallets=table.spans, workers=WORKERS, progress=progress
     )
+    answer = replace(answer, unreachable=with_fits(surface.scene, answer, table.spans, WORKERS))
     one = one_cutter(surface.scene, answer, op.clearance_mm, table.spans, WORKERS)
     took = time.perf_counter() - begin
     best = None
@@ -104,6 +126,42 @@ def _searched(
         best = OneCutter(catalogue.cutters[one[0]], one[1], reached, one[2])
     settings = _settings(op) | _settings(job.table.surface[k])
     return Searched(settings, surface, answer, table, best, op.clearance_mm, took)
+
+
+def _ways(
+    job: ImpellerJob, done: Sequence[Searched], catalogue: Catalogue, impeller: Impeller, progress: Progress
+) -> tuple[Compared, ...]:
+    """The cutter picked by hand where one is stated, then one cutter, two, ..."""
+    op = job.operation
+    terms = Terms(
+        mm_s_from_mm_min(op.feed_mm_min), op.scallop_mm, op.cutter_change_s, op.table_change_s, impeller.blades
+    )
+    picked = _picked(job, catalogue)
+    index = None if picked is None else catalogue.cutters.index(picked)
+    sides = [_side(x, x.answer) for x in done]
+    return compared(sides, terms, index, range(1, op.most_cutters + 1), WORKERS, progress)
+
+
+def _side(op: Searched, answer: Answer) -> Side:
+    s = op.surface
+    body = BODIES.index(s.body)
+    return Side(body, s.side, s.scene, s.u, s.v, s.area, answer, op.clearance, op.table.spans)
+
+
+def _picked(job: ImpellerJob, catalogue: Catalogue) -> CatalogueCutter | None:
+    """The cutter of the catalogue that is picked by hand."""
+    picked = job.operation.hand_picked
+    if picked is None:
+        return None
+    d, r = picked.diameter_mm, picked.corner_radius_mm
+    for cutter in catalogue.cutters:
+        if (cutter.diameter, cutter.corner_radius) == (d, r):
+            return cutter
+    near = min(catalogue.cutters, key=lambda c: abs(c.diameter - d) + abs(c.corner_radius - r))
+    raise InputError(
+        f"operation.0.hand_picked: D {d:g} r {r:g} mm is not in catalogue {catalogue.name}: the nearest is "
+        f"D {near.diameter:g} r {near.corner_radius:g} mm"
+    )
 
 
 def _settings(table: Table) -> dict[str, Any]:
@@ -129,8 +187,7 @@ def _tables(machine: Machine, op: SectionalTable) -> IndexTable:
 
 
 def _surfaces(job: ImpellerJob, impeller: Impeller) -> list[Surface]:
-    given, op = job.table.impeller.sections, job.operation
-    ahead = given.hub_ahead_mm if given is not None else 0.0
+    op, ahead = job.operation, _ahead(job)
     out = []
     for k, s in enumerate(job.table.surface):
         how = Sampled(s.along, s.up, s.points, op.check_mm, op.near_mm, op.around, ahead)
@@ -139,6 +196,12 @@ def _surfaces(job: ImpellerJob, impeller: Impeller) -> list[Surface]:
         except InputError as err:
             raise InputError(f"surface.{k}: {err}") from None
     return out
+
+
+def _ahead(job: ImpellerJob) -> float:
+    """How far the hub goes on ahead of the leading edge [mm]."""
+    given = job.table.impeller.sections
+    return given.hub_ahead_mm if given is not None else 0.0
 
 
 def _machine(job: ImpellerJob) -> Machine:
@@ -175,9 +238,10 @@ def _of_sections(job: ImpellerJob, given: SectionsTable, blades: int, outer_diam
         except InputError as err:
             raise InputError(f"impeller.sections.{key}: {err}") from None
 
+    main = blade(given.blade, "blade")
+    splitter = blade(given.splitter, "splitter") if given.splitter else None
     hub, shroud = (
         Revolved(read_meridian(folder / name, given.unit, over), side)
         for name, side in ((given.hub, 1), (given.shroud, -1))
     )
-    splitter = blade(given.splitter, "splitter") if given.splitter else None
-    return Impeller(blade(given.blade, "blade"), splitter, hub, shroud, blades)
+    return Impeller(main, splitter, hub, shroud, blades)

@@ -100,7 +100,7 @@ def surface_of(impeller: Impeller, body: str, side: str, how: Sampled) -> Surfac
     if index >= len(impeller.bodies):
         raise InputError(f"surface {body} {side}: the impeller has no splitter: leave it out")
     u, v = np.linspace(*how.along, how.points[0]), np.linspace(*how.up, how.points[1])
-    check, hub = _counts(impeller, how)
+    check, hub = counts(impeller, how)
     where = hub_range(impeller, how.ahead)
     walls = "plus" if side == "floor" else side
     scene = impeller.scene(index, walls, (u, v), check, how.near, how.around, hub, where)
@@ -122,7 +122,7 @@ def hub_range(impeller: Impeller, ahead: float) -> tuple[float, float]:
     return float(np.interp(max(first, 0.0), length, s)), float(at.max())
 
 
-def _counts(impeller: Impeller, how: Sampled) -> tuple[tuple[int, int], tuple[int, int]]:
+def counts(impeller: Impeller, how: Sampled) -> tuple[tuple[int, int], tuple[int, int]]:
     """How many check points along and up a side, along and across a channel's floor."""
     t = np.linspace(0.0, 1.0, _FINE)
     sides = [p for body in impeller.bodies for p in (body.plus, body.minus)]

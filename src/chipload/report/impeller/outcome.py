@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,12 +14,17 @@ from numpy.typing import NDArray
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.machine.machine import Machine
 from chipload.planning.sectional.answer import Answer, Unreachable
+from chipload.planning.sectional.compare import Compared
 from chipload.planning.sectional.impeller import Impeller
-from chipload.planning.sectional.surfaces import Surface
+from chipload.planning.sectional.patch import Patch
+from chipload.planning.sectional.settings import Setting
+from chipload.planning.sectional.surfaces import BODIES, Surface
 from chipload.planning.sectional.tables import IndexTable
 
 Floats = NDArray[np.float64]
 
+#: name of the way of the cutter picked by hand
+PICKED = "hand-picked"
 #: why a contact point is not reached, in words
 REASONS: Mapping[str, str] = {
     "turned away": "no table angle faces it",
@@ -121,6 +127,85 @@ class Limiting:
     blockers: tuple[int, ...]
 
 
+@dataclass(frozen=True)
+class Scallop:
+    """What the check measures on a patch: ``asked``, greatest rest between two passes, mean height of the crests [mm],
+    how many crests, the share of the patch on which no more than asked is left.
+    """
+
+    asked: float
+    greatest: float
+    mean: float
+    crests: int
+    covered: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing between two passes is higher than asked."""
+        return self.greatest <= self.asked
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """A program of one setting with what the simulation found.
+
+    Parameters
+    ----------
+    setting : cutter, table angle, patches, moves
+    gouge : deepest that any part of the tool comes below a surface [mm], where it is: ``says``
+    allowed : what of it is allowed [mm]
+    scallops : of each patch
+    findings : what the program asks of the machine that it does not give
+    seconds : predicted time of one channel [s]
+    """
+
+    setting: Setting
+    gouge: float
+    says: str
+    allowed: float
+    scallops: tuple[Scallop, ...]
+    findings: tuple[str, ...]
+    seconds: float
+
+    @property
+    def verified(self) -> bool:
+        """No gouge, nothing beyond the machine, no scallop higher than asked."""
+        return self.gouge <= self.allowed and not self.findings and all(s.holds for s in self.scallops)
+
+    @property
+    def missed(self) -> float:
+        """Length of lines that are not milled [mm]."""
+        gone = {line for line, _ in self.setting.linked.refused}
+        short = math.fsum(x.length for m in self.setting.millings for x in m.tracks.missed)
+        return (
+            short + math.fsum(t.length for m in self.setting.millings for t in m.tracks.tracks if t.line in gone)
+            if gone
+            else short
+        )
+
+    @property
+    def name(self) -> str:
+        """`D 12 r 2 mm at 45 deg`."""
+        c = self.setting.cutter
+        return f"D {c.diameter:g} r {c.corner_radius:g} mm at {np.degrees(self.setting.table):.6g} deg"
+
+    @property
+    def fails(self) -> tuple[str, ...]:
+        """What does not hold."""
+        out = [f"{self.name}: {f}" for f in self.findings]
+        if self.gouge > self.allowed:
+            out.append(f"{self.name}: {self.says}: gouge_mm = {self.allowed:g} is allowed")
+        for m, s in zip(self.setting.millings, self.scallops, strict=True):
+            if not s.holds:
+                where = f"{BODIES[m.patch.body]} {m.patch.side}"
+                out.append(f"{self.name}, {where}: {s.greatest:.4f} mm are left between passes: asked {s.asked:g}")
+        if self.missed > 0.0:
+            many = len(self.setting.linked.refused)
+            why = f", {many} lines have no way off the surface" if many else ""
+            out.append(f"{self.name}: {self.missed:.1f} mm of lines are not milled{why}")
+        return tuple(out)
+
+
 @dataclass(frozen=True, eq=False)
 class Milled:
     """A whole run.
@@ -131,6 +216,8 @@ class Milled:
     impeller, catalogue, machine : what is milled, with what, where
     surfaces : in their order
     one : the largest cutter for all surfaces at one table angle, and the index of that; None: there is none
+    ways : the cutter picked by hand where one is stated, then one cutter, two, ...
+    programs : of the way with the least time, checked; None: the job asks for none
     settings : keys of the operation, as stated
     outer_diameter : as stated [mm]
     provenance : JSON values: hashes of the inputs, versions
@@ -142,9 +229,33 @@ class Milled:
     machine: Machine
     surfaces: tuple[Searched, ...]
     one: tuple[CatalogueCutter, int] | None
+    ways: tuple[Compared, ...]
+    programs: tuple[Checked, ...] | None
     settings: Mapping[str, Any]
     outer_diameter: float
     provenance: Mapping[str, Any]
+
+    @property
+    def picked(self) -> Compared | None:
+        """The way of the cutter picked by hand."""
+        return next((way for way in self.ways if way.name == PICKED), None)
+
+    @property
+    def used(self) -> Compared | None:
+        """The way with the least time; of equal ones that with fewer cutters. None: nothing mills all."""
+        able = [way for way in self.ways if way.name != PICKED and way.divided is not None]
+        return min(able, key=lambda way: way.divided.total if way.divided else math.inf, default=None)
+
+    @property
+    def area(self) -> float:
+        """Of all surfaces [mm^2], one channel."""
+        return float(sum(op.surface.area.sum() for op in self.surfaces))
+
+    def searched(self, patch: Patch) -> Searched:
+        """The surface of a patch."""
+        return next(
+            op for op in self.surfaces if (BODIES.index(op.surface.body), op.surface.side) == (patch.body, patch.side)
+        )
 
 
 def said(op: Searched, missed: Unreachable) -> str:
@@ -169,13 +280,31 @@ def failures(op: Searched) -> tuple[str, ...]:
     return tuple(out)
 
 
+def unmilled(milled: Milled) -> tuple[str, ...]:
+    """What the patches leave open."""
+    if milled.used is None:
+        return (f"not {milled.ways[-1].name} of the catalogue mill all that can be reached",)
+    divided = milled.used.divided
+    untold = divided.untold if divided else 0
+    return (f"{untold} ranges of pallet angles had too many arcs to tell: they count as closed",) if untold else ()
+
+
 def verdict(milled: Milled) -> tuple[bool, str]:
     """Whether everything holds, and one sentence that says it."""
-    bad = [(op, f) for op in milled.surfaces for f in failures(op)]
+    bad = fails(milled)
     if bad:
         more = f"; and {len(bad) - 1} more" if len(bad) > 1 else ""
-        return False, f"Does not hold: {bad[0][0].surface.name}: {bad[0][1]}{more}."
-    return True, f"Every contact point is reached and its largest cutter proved; {for_all(milled)}."
+        return False, f"Does not hold: {bad[0]}{more}."
+    text = f"Every contact point is reached and its largest cutter proved; {for_all(milled)}"
+    if milled.programs is None:
+        return True, f"{text}. No program is asked for."
+    return True, f"{text}. {len(milled.programs)} programs are verified: no gouge, holder included."
+
+
+def fails(milled: Milled) -> tuple[str, ...]:
+    """All that does not hold."""
+    own = [f"{op.surface.name}: {f}" for op in milled.surfaces for f in failures(op)]
+    return (*own, *unmilled(milled), *(f for p in milled.programs or () for f in p.fails))
 
 
 def for_all(milled: Milled) -> str:

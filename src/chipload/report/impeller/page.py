@@ -8,8 +8,10 @@ from html import escape
 import numpy as np
 import plotly.graph_objects as go
 
+from chipload.report.impeller.checked import program_sections
 from chipload.report.impeller.figures import map_figure, ranges_figure, space_figure, table_figure
-from chipload.report.impeller.outcome import Milled, Searched, failures, for_all, largest, said, verdict
+from chipload.report.impeller.outcome import Milled, Searched, fails, failures, for_all, largest, said, verdict
+from chipload.report.impeller.ways import divided_sections
 from chipload.report.sheet import definitions, figure, framed, heading, items, table
 
 #: contact points that are not reached which the page lists
@@ -21,7 +23,9 @@ def page_bytes(milled: Milled) -> bytes:
     holds, says = verdict(milled)
     figures: dict[str, go.Figure] = {}
     body = [*heading(milled.title, holds, "Holds" if holds else "Does not hold", says.removeprefix("Does not hold: "))]
-    body += [_overview(milled)]
+    if fails(milled):
+        body += ["<h3>What does not hold</h3>", items(fails(milled))]
+    body += [_overview(milled), *divided_sections(milled, figures), *program_sections(milled, figures)]
     for k, op in enumerate(milled.surfaces):
         body += _surface(k, op, figures)
     body += ["<h2>Where the numbers come from</h2>", definitions(milled.provenance)]
@@ -100,7 +104,8 @@ def _proof(op: Searched) -> list[str]:
         "contact points together; proof.npz has them, with every bound."
     )
     rows = []
-    for x in op.limiting:
+    shown = [x for x in op.limiting if not op.one or x.corner_radius == op.one.cutter.corner_radius]
+    for x in shown:
         least = (
             "any up to the catalogue's largest" if x.capped else "turned away" if x.most is None else f"{x.most:.3f}"
         )
@@ -119,6 +124,8 @@ def _proof(op: Searched) -> list[str]:
     head = ["r [mm]", "table [deg]", "tightest contact point", "none above D [mm]", "catalogue D [mm]"]
     head += ["what stops a larger one there", "proved"]
     out = [f"<p>{text}</p>", table(head, [r for r, _ in rows], numbers=(0, 1, 2, 3, 4), used=[t for _, t in rows])]
+    if len(shown) < len(op.limiting):
+        out.append('<p class="note">Other corner radii in summary.json.</p>')
     missed = answer.unreachable
     if missed:
         out += ["<h3>Not reached</h3>", items(said(op, u) for u in missed[:LISTED])]

@@ -11,17 +11,16 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from chipload.planning.sectional.impeller import Impeller
-from chipload.planning.sectional.surfaces import hub_range
+from chipload.planning.sectional.compare import Compared
+from chipload.report.impeller.mesh import OFF, body_meshes, surface_mesh
 from chipload.report.impeller.outcome import Milled, Searched
+from chipload.report.impeller.ways import patch_grid, shade_of
 from chipload.report.scene import engagement_colours
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-HUB, BLADE, MISSED = (150, 156, 166, 255), (120, 130, 144, 255), (179, 38, 30, 255)
-#: how far a coloured surface stands off the metal, so that it is seen [mm]
-OFF = 0.05
+MISSED = (179, 38, 30, 255)
 
 
 def scene_bytes(milled: Milled) -> bytes:
@@ -35,47 +34,28 @@ def scene_bytes(milled: Milled) -> bytes:
         colours = engagement_colours(op.answer.diameter, most)
         colours[op.answer.cutter < 0] = MISSED
         _add(scene, f"{k}-largest", points, faces, colours)
+        if milled.used is not None:
+            _add(
+                scene, f"{k}-patches", points + OFF * op.surface.scene.normal, faces, _patches(milled, milled.used, op)
+            )
+    for k, p in enumerate(milled.programs or (), 1):
+        n = len(p.setting.program)
+        if n > 1:
+            colour = np.array((34, 120, 132, 255), dtype=np.uint8)
+            line = trimesh.path.entities.Line(np.arange(n), color=colour)
+            path = trimesh.path.Path3D(entities=[line], vertices=p.setting.program.p_work, process=False)
+            scene.add_geometry(path, node_name=f"path-{k}", geom_name=f"path-{k}")
     glb: bytes = scene.export(file_type="glb", extension_webp=False, tree_postprocessor=_say_units)
     return glb
 
 
-def surface_mesh(op: Searched) -> tuple[Floats, Ints]:
-    """Contact points (c, 3) [mm], a little off the metal, and triangles between them."""
-    a, b = op.surface.shape
-    return op.place + OFF * op.surface.scene.normal, grid_faces(a, b)
-
-
-def body_meshes(impeller: Impeller, fine: tuple[int, int] = (33, 7)) -> list[tuple[str, tuple[Floats, Ints], Any]]:
-    """Hub and blades: name, vertices and triangles, colour."""
-    low, high = hub_range(impeller, 0.0)
-    s, theta = np.linspace(low, high, fine[0]), np.linspace(0.0, 2.0 * np.pi, 121)
-    hub = impeller.hub.at(np.repeat(s, len(theta)), np.tile(theta, len(s)))
-    out = [("hub", (hub, grid_faces(len(s), len(theta))), HUB)]
-    u, v = (x.ravel() for x in np.meshgrid(np.linspace(0, 1, fine[0]), np.linspace(0, 1, fine[1]), indexing="ij"))
-    for body, name in zip(impeller.bodies, ("blade", "splitter"), strict=False):
-        parts = [(side.at(u, v), grid_faces(*fine)) for side in (body.plus, body.minus)]
-        plus, minus = (p.reshape(*fine, 3) for p, _ in parts)
-        parts += [_strip(plus[:, -1], minus[:, -1]), _strip(plus[0], minus[0]), _strip(plus[-1], minus[-1])]
-        whole: list[tuple[Floats, Ints]] = []
-        for k in range(impeller.blades):
-            c, w = np.cos(k * impeller.pitch), np.sin(k * impeller.pitch)
-            turn = np.array([[c, w, 0.0], [-w, c, 0.0], [0.0, 0.0, 1.0]])
-            whole += [(p @ turn, f) for p, f in parts]
-        starts = np.cumsum([0] + [len(p) for p, _ in whole[:-1]])
-        faces = np.concatenate([f + k for (_, f), k in zip(whole, starts, strict=True)])
-        out.append((f"{name}s", (np.concatenate([p for p, _ in whole]), faces), BLADE))
+def _patches(milled: Milled, way: Compared, op: Searched) -> NDArray[np.uint8]:
+    """(c, 4) colours of the contact points by patch."""
+    grid = patch_grid(milled, way, op).ravel()
+    out = np.tile(np.array(MISSED, dtype=np.uint8), (len(grid), 1))
+    for n, p in enumerate(way.divided.patches if way.divided is not None else ()):
+        out[grid == n, :3] = shade_of(way, p)
     return out
-
-
-def grid_faces(a: int, b: int) -> Ints:
-    """Triangles (2 (a - 1)(b - 1), 3) of a grid of a x b points, the second index the faster."""
-    k = (np.arange(a - 1)[:, None] * b + np.arange(b - 1)).ravel()
-    return np.concatenate([np.stack([k, k + b, k + b + 1], axis=1), np.stack([k, k + b + 1, k + 1], axis=1)])
-
-
-def _strip(plus: Floats, minus: Floats) -> tuple[Floats, Ints]:
-    """Between the same edge of both sides of a blade."""
-    return np.concatenate([plus, minus]), grid_faces(2, len(plus))
 
 
 def _add(scene: Any, name: str, points: Floats, faces: Ints, colours: NDArray[np.uint8]) -> None:

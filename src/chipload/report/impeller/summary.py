@@ -12,7 +12,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.report.impeller.outcome import Milled, Searched, failures, said, verdict
+from chipload.planning.sectional.compare import Compared
+from chipload.planning.sectional.patch import Patch
+from chipload.planning.sectional.surfaces import BODIES
+from chipload.report.impeller.outcome import Checked, Milled, Searched, fails, failures, said, verdict
 
 
 def summary_bytes(milled: Milled) -> bytes:
@@ -38,17 +41,97 @@ def summary_bytes(milled: Milled) -> bytes:
 def operation(milled: Milled) -> dict[str, Any]:
     """All surfaces together, then each."""
     rows = [surface(op) for op in milled.surfaces]
-    fails = [f"{op.surface.name}: {f}" for op in milled.surfaces for f in failures(op)]
+    used, picked = milled.used, milled.picked
     return {
         "kind": "sectional",
-        "holds": not fails,
-        "fails": fails,
+        "holds": not fails(milled),
+        "fails": list(fails(milled)),
         **_one(milled.surfaces[0], milled.one),
         **{key: sum(row[key] for row in rows) for key in ("cc_points", "check_points", "unreachable", "search_s")},
         "certified": all(row["certified"] for row in rows),
+        **(way_of(milled, used) if used is not None else {}),
+        "hand_picked": None if picked is None else _picked(milled, picked),
+        "ways": [way_of(milled, way) for way in milled.ways],
+        "programs": None if milled.programs is None else [_program(p) for p in milled.programs],
         "surfaces": rows,
         "settings": {k: list(v) if isinstance(v, tuple) else v for k, v in milled.settings.items()},
     }
+
+
+def way_of(milled: Milled, way: Compared) -> dict[str, Any]:
+    """A way to mill all surfaces; path and time are of all channels."""
+    d = way.divided
+    head = {"way": way.name, "reached_share": way.share}
+    if d is None:
+        return head | {"patches": None, "path_mm": None, "time_min": None}
+    return head | {
+        "cutters": [_size(way.catalogue.cutters[k]) for k in d.cutters],
+        "path_mm": d.path,
+        "time_min": d.total / 60.0,
+        "milling_min": d.milling / 60.0,
+        "cutter_changes": d.cutter_changes,
+        "table_changes": d.table_changes,
+        "least_time_min": d.bound / 60.0,
+        "least_time_any_shape_min": d.bound_any_shape / 60.0,
+        "gap": d.gap,
+        "patches": [_patch(milled, way, p) for p in d.patches],
+    }
+
+
+def _patch(milled: Milled, way: Compared, patch: Patch) -> dict[str, Any]:
+    return {
+        "surface": milled.searched(patch).surface.name,
+        **_size(way.catalogue.cutters[patch.cutter]),
+        "table_deg": _degrees(patch.table),
+        "across": patch.order,
+        "from": patch.low,
+        "to": patch.high,
+        "part": list(patch.part),
+        "cc_points": len(patch.at),
+        "area_share": patch.area / milled.area,
+        "path_mm": patch.path,
+        "time_min": patch.time / 60.0,
+    }
+
+
+def _program(p: Checked) -> dict[str, Any]:
+    """A program of one channel with its check."""
+    return {
+        **_size(p.setting.cutter),
+        "table_deg": _degrees(p.setting.table),
+        "verified": p.verified,
+        "holds": not p.fails,
+        "fails": list(p.fails),
+        "rows": len(p.setting.program),
+        "path_mm": float(sum(m.tracks.length for m in p.setting.millings)),
+        "time_min": p.seconds / 60.0,
+        "missed_mm": p.missed,
+        "refused_lines": len(p.setting.linked.refused),
+        "direct_links": p.setting.linked.direct,
+        "retracts": p.setting.linked.retracts,
+        "gouge_mm": p.gouge,
+        "patches": [
+            {
+                "surface": f"{BODIES[m.patch.body]} {m.patch.side}",
+                "lines": m.tracks.lines,
+                "path_mm": m.tracks.length,
+                "scallop_greatest_mm": s.greatest,
+                "scallop_mean_mm": s.mean,
+                "scallop_mean_share": s.mean / s.asked,
+                "crests": s.crests,
+                "covered_share": s.covered,
+            }
+            for m, s in zip(p.setting.millings, p.scallops, strict=True)
+        ],
+    }
+
+
+def _picked(milled: Milled, way: Compared) -> dict[str, Any]:
+    return {**_size(way.catalogue.cutters[0]), **way_of(milled, way)}
+
+
+def _size(cutter: CatalogueCutter) -> dict[str, float]:
+    return {"diameter_mm": cutter.diameter, "corner_radius_mm": cutter.corner_radius}
 
 
 def _one(op: Searched, one: tuple[CatalogueCutter, int] | None) -> dict[str, Any]:

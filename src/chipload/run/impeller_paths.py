@@ -1,0 +1,113 @@
+"""The finishing programs of an impeller: planned patch by patch, then checked by the simulation of the channel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from chipload.job.impeller import PathsTable, SectionalTable
+from chipload.machine.machine import Machine
+from chipload.planning.sectional.compare import Compared
+from chipload.planning.sectional.covered import between_lines
+from chipload.planning.sectional.floor import patch_of
+from chipload.planning.sectional.impeller import Impeller
+from chipload.planning.sectional.lines import Motion
+from chipload.planning.sectional.links import Link
+from chipload.planning.sectional.paths import Finish
+from chipload.planning.sectional.programs import pallet_rate, predicted_time, too_fast
+from chipload.planning.sectional.settings import Milling, Setting, channel_scene, settings_of
+from chipload.planning.sectional.surfaces import BODIES, Sampled
+from chipload.planning.sectional.tables import IndexTable
+from chipload.program.check import check_program
+from chipload.program.to_axes import to_axes
+from chipload.progress import Progress
+from chipload.report.impeller.outcome import Checked, Scallop
+from chipload.simulation.channel.channel import Left, Wall, left_on, scallop_numbers, wall
+from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
+
+#: points of the walls that are looked for gouges, along and up
+_COARSE = (61, 25)
+#: not at the very edges of a blade: there a ray into the metal leaves it again
+_EDGE = 0.01
+#: how far the rays go above and below a surface [mm]
+_HEIGHT, _DEPTH = 1.0, 0.5
+#: grid lines across the passes of a patch on which the scallop is measured, points between two passes
+_FEW, _BETWEEN = 7, 14
+
+
+def checked_programs(
+    impeller: Impeller, machine: Machine, table: IndexTable, way: Compared, op: SectionalTable, paths: PathsTable,
+    ahead: float, workers: int, progress: Progress,
+) -> tuple[Checked, ...]:  # fmt: skip
+    """A program for each setting of the way, each with what the check finds."""
+    assert way.divided is not None
+    feed = mm_s_from_mm_min(op.feed_mm_min)
+    motion = Motion(paths.chord_mm, feed, pallet_rate(machine), op.clearance_mm)
+    how = Finish(op.scallop_mm, motion)
+    link = Link(
+        paths.lift_mm, paths.margin_mm, paths.touch_mm, paths.near_mm, mm_s_from_mm_min(paths.link_feed_mm_min),
+        paths.above_mm,
+    )  # fmt: skip
+    scene = channel_scene(
+        impeller, Sampled((0.0, 1.0), (0.0, 1.0), (2, 2), paths.check_mm, op.near_mm, op.around, ahead)
+    )
+    settings = settings_of(
+        impeller, way.divided.patches, way.catalogue, scene, how, link, rad_s_from_rpm(op.speed_rpm), table, ahead,
+        workers, lambda done, what: progress(0.8 * done, what),
+    )  # fmt: skip
+    walls = _walls(impeller, ahead)
+    out = []
+    for k, setting in enumerate(settings):
+        out.append(_checked(impeller, machine, setting, walls, op.scallop_mm, paths, ahead, workers))
+        progress(0.8 + 0.2 * (k + 1) / len(settings), f"check of {k + 1} programs")
+    return tuple(out)
+
+
+def _checked(
+    impeller: Impeller, machine: Machine, setting: Setting, walls: Sequence[Wall], scallop: float, paths: PathsTable,
+    ahead: float, workers: int,
+) -> Checked:  # fmt: skip
+    program = setting.program
+    dense = [_dense(impeller, m, ahead) for m in setting.millings]
+    found = left_on([*walls, *dense], program, setting.cutter, _HEIGHT, _DEPTH, workers=workers)
+    scallops = tuple(_scallop(m, left, scallop) for m, left in zip(setting.millings, found[len(walls) :], strict=True))
+    commands, findings = to_axes(program, machine)
+    said = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
+    worst = max(found, key=lambda left: left.deepest[0])
+    seconds = predicted_time(program, machine, commands.position if len(commands) == len(program) else None)
+    return Checked(setting, worst.deepest[0], worst.says(), paths.gouge_mm, scallops, tuple(said), seconds)
+
+
+def _scallop(milling: Milling, left: Left, asked: float) -> Scallop:
+    """The scallop of a patch where passes lie on both sides."""
+    within = between_lines(milling.tracks.tracks, milling.along, np.column_stack([left.wall.u, left.wall.v]))
+    numbers = scallop_numbers(left.crests("v" if milling.along == "u" else "u", within), asked)
+    most = float(left.rest[within].max()) if within.any() else 0.0
+    covered = float(left.wall.area[left.rest <= asked].sum() / left.wall.area.sum())
+    return Scallop(asked, most, numbers["mean_mm"], int(numbers["count"]), covered)
+
+
+def _dense(impeller: Impeller, milling: Milling, ahead: float) -> Wall:
+    """Points of a patch, fine across its passes."""
+    surface = patch_of(impeller, BODIES[milling.patch.body], milling.patch.side, ahead)
+    fine = np.linspace(0.0, 1.0, min(max(milling.tracks.lines, 2) * _BETWEEN, 1200) + 1)
+    few = np.linspace(0.06, 0.94, _FEW)
+    share = (few, fine) if milling.along == "u" else (fine, few)
+    u, v = (low + x * (high - low) for x, (low, high) in zip(share, milling.box, strict=True))
+    return wall(f"{BODIES[milling.patch.body]} {milling.patch.side}", surface, u, v)
+
+
+def _walls(impeller: Impeller, ahead: float) -> list[Wall]:
+    """Both sides of the bodies round the channels, and their floors."""
+    u, v = np.linspace(_EDGE, 1.0 - _EDGE, _COARSE[0]), np.linspace(0.0, 1.0 - _EDGE, _COARSE[1])
+    last = 1 + len(impeller.bodies)
+    out = []
+    for k in range(-1, last):
+        body = impeller.body(k)
+        out += [wall(f"body {k} plus", body.plus, u, v), wall(f"body {k} minus", body.minus, u, v)]
+    for index in range(len(impeller.bodies)):
+        floor = patch_of(impeller, BODIES[index], "floor", ahead)
+        turn = impeller.pitch
+        out += [wall(f"floor {index}", floor, u, v), wall(f"floor {index} behind", floor.turned(-turn), u, v)]
+    return out

@@ -1,0 +1,163 @@
+"""Impellers that must be refused, each with its exact message."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chipload import examples
+from chipload.errors import InputError
+from chipload.job import load_job
+from chipload.run import look, run
+
+EXAMPLES = Path(examples.__file__).parent
+
+
+@pytest.fixture
+def hecc(tmp_path):
+    return Path(shutil.copytree(EXAMPLES / "hecc", tmp_path / "hecc")) / "job.toml"
+
+
+@pytest.fixture
+def formula(tmp_path):
+    return Path(shutil.copytree(EXAMPLES / "impeller", tmp_path / "impeller")) / "job.toml"
+
+
+def refused(path, *sets, call=look):
+    with pytest.raises(InputError) as caught:
+        call(load_job(path, sets))
+    return str(caught.value).replace(str(path.parent) + "/", "")
+
+
+def changed(path, old, new):
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+
+
+def test_sections_out_of_order(hecc):
+    changed(hecc, '  "main_05.txt",\n  "main_06.txt",\n', '  "main_06.txt",\n  "main_05.txt",\n')
+    assert refused(hecc) == (
+        "impeller.sections.blade: section 5: out of order: lies not between sections 4 and 6: sort hub to shroud"
+    )
+
+
+def test_a_section_that_crosses_itself(hecc):
+    path = hecc.parent / "main_04.txt"
+    lines = path.read_text().splitlines()
+    lines[40], lines[60] = lines[60], lines[40]
+    path.write_text("\n".join(lines))
+    assert refused(hecc) == (
+        "impeller.sections.blade: section 4: crosses itself: its points must go once round the profile"
+    )
+
+
+def test_too_few_sections(hecc):
+    text = hecc.read_text()
+    hecc.write_text(text[: text.index("blade = [")] + 'blade = ["main_01.txt"]\n' + text[text.index("splitter = [") :])
+    assert refused(hecc) == "impeller.sections.blade: sections: 1: must be at least 2, from hub to shroud"
+
+
+def test_too_few_points_in_a_section(hecc):
+    path = hecc.parent / "splitter_02.txt"
+    path.write_text("\n".join(path.read_text().splitlines()[:9]))
+    assert refused(hecc) == "impeller.sections.splitter: section 2: 8 points: must be at least 12"
+
+
+def test_inches_taken_for_millimetres(hecc):
+    changed(hecc, 'unit = "inch"', 'unit = "mm"')
+    assert refused(hecc) == (
+        "impeller.sections.blade: sections: outer diameter 16.9994 mm: must be 431.5 as stated: smaller by 25.38, as "
+        "inch read as mm"
+    )
+
+
+def test_another_outer_diameter(hecc):
+    changed(hecc, "outer_diameter_mm = 431.5", "outer_diameter_mm = 400.0")
+    assert refused(hecc) == (
+        "impeller.sections.blade: sections: outer diameter 431.784 mm: must be 400 as stated: check the unit"
+    )
+
+
+def test_columns_that_no_line_names(hecc):
+    changed(hecc, 'columns = "X R*THETA R"\n', "")
+    assert refused(hecc) == (
+        "impeller.sections.blade: main_07.txt: no line names the columns: say which they are, as X R*THETA R"
+    )
+
+
+def test_a_file_that_is_missing(hecc):
+    (hecc.parent / "hub.txt").unlink()
+    assert refused(hecc) == "hub.txt: cannot be read: No such file or directory"
+
+
+def test_faces_of_a_model(hecc):
+    changed(hecc, '"main_01.txt"', '"blade.stp"')
+    assert refused(hecc) == (
+        "job.toml: impeller.sections: blade.stp: blade faces are not read from STEP: write sections as points, X Y Z"
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('name = "horizontal-b"', 'name = "vmc"',
+         "machine vmc: rotary axes none: must have one pallet axis and one index axis with steps, as horizontal-b"),
+        ("clearance_mm = 0.5", "clearance_mm = 0.5\ntable_deg = [45.0, 42.0]",
+         "operation.0.table_deg: table angle 42 deg: no position of axis A: the nearest are 35, 40, 45 deg"),
+        ("along = [0.03, 0.97]", "along = [0.97, 0.03]",
+         "job.toml: surface.0.along = [0.97, 0.03]: must ascend within 0 to 1"),
+        ("along = [0.03, 0.97]", "along = [0.03, 1.97]", "job.toml: surface.0.along.1 = 1.97: must be at most 1"),
+        ("along = [0.03, 0.97]", "along = [0.03]", "job.toml: surface.0.along.1: missing: state it"),
+        ("points = [20, 10]", "points = [1, 10]", "job.toml: surface.0.points = [1, 10]: must be at least 2 each"),
+        ('body = "blade"\nside = "minus"', 'body = "splitter"\nside = "minus"',
+         "job.toml: surface.1.body = 'splitter': the impeller has no splitter: leave it out"),
+        ('body = "blade"\nside = "minus"', 'body = "blade"\nside = "plus"',
+         "job.toml: surface.1: blade plus stands twice: list each surface once"),
+        ("[impeller.shape]\n", "[impeller.shap]\n", "job.toml: impeller.shap: unknown key; did you mean shape?"),
+        ("channel_mm = 24.185", "channel_mm = 30.0",
+         "shape: must be hub_radius + blade_height < outer_radius, outlet_height < height, blades thick"),
+        ("margin_mm = 0.1", "margin_mm = 9.0",
+         "job.toml: operation.0.paths.margin_mm = 9: must be above touch_mm = 0.01 and below lift_mm = 8"),
+        ("scallop_mm = 0.1", "scallop_inch = 0.004",
+         "job.toml: operation.0.scallop_inch: unknown key; did you mean scallop_mm?"),
+        ("blades = 11", "blades = 1", "job.toml: impeller.blades = 1: must be at least 2 (how many, evenly round; as "
+         "many splitters)"),
+    ],
+)  # fmt: skip
+def test_a_wrong_line(formula, old, new, message):
+    changed(formula, old, new)
+    assert refused(formula) == message
+
+
+def test_neither_shape_nor_sections(formula):
+    text = formula.read_text()
+    formula.write_text(text[: text.index("[impeller.shape]")] + text[text.index("[catalogue]") :])
+    assert refused(formula) == (
+        "job.toml: impeller: neither is stated: state either [impeller.shape] or [impeller.sections]"
+    )
+
+
+def test_a_catalogue_of_which_nothing_fits(formula):
+    (formula.parent / "large.toml").write_text(
+        'name = "large"\ncutter = [{ diameter_mm = 70.0, corner_radius_mm = 2.0 }]\n'
+    )
+    changed(formula, 'name = "wu2019"', 'file = "large.toml"')
+    changed(formula, "diameter_mm = 14.0, corner_radius_mm = 1.5", "diameter_mm = 70.0, corner_radius_mm = 2.0")
+    sets = ["surface.0.points=[2, 2]", "surface.0.along=[0.2, 0.4]", "surface.0.up=[0.3, 0.5]"]
+    text = refused(formula, *sets, call=run)
+    head = "surface.0: no cutter of catalogue large fits anywhere: contact point 0 at ("
+    assert text.startswith(head)
+    assert text.endswith(" r 2 mm would fit")
+    place, said = text.removeprefix(head).split("): the smallest cutters of the catalogue meet other walls: D ")
+    assert np.hypot(*map(float, place.split(", ")[:2])) > 45.88
+    # with the paper's catalogue D 36 to 40 go there, see the map of the example
+    assert 34.0 < float(said.split()[0]) < 42.0
+
+
+def test_a_cutter_picked_by_hand_that_is_not_in_the_catalogue(formula):
+    changed(formula, "diameter_mm = 14.0, corner_radius_mm = 1.5", "diameter_mm = 15.0, corner_radius_mm = 1.5")
+    assert refused(formula) == (
+        "operation.0.hand_picked: D 15 r 1.5 mm is not in catalogue wu2019: the nearest is D 14 r 1.5 mm"
+    )
