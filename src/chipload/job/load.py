@@ -19,13 +19,15 @@ from chipload.job.override import override
 from chipload.job.planned import Job, planned_job
 from chipload.job.program import ProgramJob, program_job
 from chipload.job.tables import JobTable, ProgramJobTable, Table
+from chipload.job.wall import WallJob, WallJobTable, wall_job
 
 #: a job of any kind
-AnyJob = Job | ProgramJob
+AnyJob = Job | ProgramJob | WallJob
 
 #: kinds of jobs: the table that only they have, the table of the whole file, and what makes the job of it
 KINDS: Mapping[str, tuple[type[Table], Callable[[Path, Any, Sequence[str]], AnyJob]]] = {
     "program": (ProgramJobTable, program_job),
+    "wall": (WallJobTable, wall_job),
     "part": (JobTable, planned_job),
 }
 
