@@ -29,7 +29,7 @@ from chipload.engagement.immersion.immersion import Section
 from chipload.errors import Finding, InputError
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
-from chipload.simulation.loads import LOADS, StepBite, bite_of_step, bites_of_steps, loads_of_steps
+from chipload.simulation.loads import LOADS, Cuts, StepBite, bite_of_step, bites_of_steps, joined, loads_of_steps
 from chipload.simulation.steps import Steps, steps_of
 from chipload.simulation.swept import Interpolation, swept_ahead
 from chipload.stock.layers import LayeredStock
@@ -98,6 +98,7 @@ class Removal:
     piece : the chip with most pieces that are most alike; None where nothing was cut
     findings : rapids that cut
     labels : of the program, `label` of the columns counts in them
+    cuts : what the teeth cut, one a cutter that cut; empty unless it was asked for
     """
 
     columns: Columns
@@ -107,6 +108,7 @@ class Removal:
     piece: Piece | None
     findings: tuple[Finding, ...]
     labels: tuple[str, ...]
+    cuts: tuple[Cuts, ...] = ()
 
 
 def remove(
@@ -117,6 +119,7 @@ def remove(
     resolution: Resolution,
     *,
     interpolation: Interpolation = "slerp",
+    keep: bool = False,
     progress: Progress = silent,
 ) -> Removal:
     """Take what the program cuts from ``stock``, which changes, and say what it costs.
@@ -126,6 +129,7 @@ def remove(
     program : in the work frame of the stock
     cutters : by tool number
     interpolation : of the axis within a step: along a great circle (slerp) or normalised straight line (lerp)
+    keep : keep what the teeth cut in every step, for :mod:`chipload.simulation.deflection`; some kB a step
 
     Returns
     -------
@@ -157,6 +161,7 @@ def remove(
     removed = np.zeros((len(steps), 3))
     loads = np.zeros((len(steps), len(LOADS)))
     basis = np.zeros((4, 6))
+    kept: dict[int, list[Cuts]] = {}
     best: Piece | None = None
     rank = (0, 0.0)
     for first in range(0, len(steps), BLOCK):
@@ -189,6 +194,9 @@ def remove(
             at = [c.step for c in own]
             bites = bites_of_steps(own, cutters[number], profiles[number])
             loads[at] = loads_of_steps(bites, own, cutters[number], material, resolution.rotation, steps.spindle[at])
+            if keep:
+                way = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
+                kept.setdefault(number, []).append(Cuts(number, cutters[number], np.array(at), way, bites))
             if _sure(material):
                 each = mean_basis(bites, cutters[number], material, bites.frame)
                 basis += np.tensordot(steps.seconds[at], each, 1)
@@ -199,7 +207,14 @@ def remove(
         sd = deviations(basis / cut_s, material) if cut_s > 0.0 else np.zeros(4)
         band = (*sd[:3].tolist(), float(sd[3]) / 1000.0)
     return Removal(
-        _columns(steps, removed, loads), before, stock.volume(), band, best, _findings(steps, removed), program.labels
+        _columns(steps, removed, loads),
+        before,
+        stock.volume(),
+        band,
+        best,
+        _findings(steps, removed),
+        program.labels,
+        tuple(joined(kept[number]) for number in sorted(kept)),
     )
 
 

@@ -52,6 +52,40 @@ class StepBite:
     owner: NDArray[np.int64]
 
 
+@dataclass(frozen=True, eq=False)
+class Cuts:
+    """What the teeth of one cutter cut, step by step.
+
+    Parameters
+    ----------
+    tool : its number in the program
+    cutter : its numbers
+    step : (c,) int, the steps that cut, rows of ``Removal.columns``
+    way : (c, 12) float, tip at the start and the end [mm], axis at the start and the end
+    bites : of those steps, in the middle of each, with frames
+    """
+
+    tool: int
+    cutter: Cutter
+    step: NDArray[np.int64]
+    way: Floats
+    bites: Bites
+
+    def __len__(self) -> int:
+        return len(self.step)
+
+
+def joined(cuts: list[Cuts]) -> Cuts:
+    """Cuts of one cutter that follow one another as one."""
+    bites = [c.bites for c in cuts]
+    start = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(b.start) for b in bites]))])
+    rows, tooth, piece = (np.concatenate([getattr(b, name) for b in bites]) for name in ("rows", "tooth", "slice"))
+    frame = np.concatenate([b.frame for b in bites if b.frame is not None])
+    whole = Bites(start, rows, tooth, piece, bites[0].slices, frame)
+    step, way = np.concatenate([c.step for c in cuts]), np.concatenate([c.way for c in cuts])
+    return Cuts(cuts[0].tool, cuts[0].cutter, step, way, whole)
+
+
 def bite_of_step(steps: Steps, k: int, move: Move, cutter: Cutter, profile: Slices, section: Section) -> StepBite:
     """What the teeth cut at the middle of a step."""
     if steps.spindle[k] == 0.0:

@@ -1,0 +1,284 @@
+"""Compiled loops of the form error; arrays and scalars only.
+
+Notation as in :mod:`chipload.simulation.deflection`: q point of the surface, n its normal, p tip, A axis, d distance
+from q to the cutter, (rho, z) its foot on the profile, s the length along it; theta rotation of tooth 0 at the tip. A
+``shape`` is (r, e, f, alpha, beta, h, rho where the bottom line ends), a bar (length, 1 / (E I), c_ff, c_mm, c_fm), a
+row of ``steps`` (p0, p1, a0, a1), 12 numbers; bites and slices as in :mod:`chipload.cutting._kernels`.
+Oracles: closed forms, the wall of :mod:`chipload.cutting.wall` and sums over slices in tests/simulation.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from chipload.cutting._kernels import BESIDE, TAU, edge
+from chipload.cutting.bending._kernels import NODES, PIECE, WEIGHTS
+
+GOLDEN = 0.6180339887498949
+#: steps of the golden section: the bracket shrinks to 1e-6 of the step, the distance to its square
+NARROWED = 29
+
+
+@njit(cache=True, nogil=True)
+def foot(rho, z, shape, out):
+    """Distance of a point at (rho, z) from the profile, below 0 inside: out = d, s, foot's z, sin and cos of kappa
+    (of the direction to the point on a sharp corner, 0 and 0 where the foot is the end of the flutes).
+    """
+    r, e, f, alpha, beta, h, end = shape
+    sa, ca = math.sin(alpha), math.cos(alpha)
+    sb, cb = math.sin(beta), math.cos(beta)
+    low = f - r * ca
+    high = f - r * sb
+    inside = z >= 0.0 and z <= h
+    wide = e + r * cb
+    if inside:
+        if z < low:
+            inside = sa > 0.0 and rho * sa <= z * ca
+        elif z < high:
+            inside = rho <= e + math.sqrt(max(r * r - (f - z) ** 2, 0.0))
+        else:
+            inside = rho <= wide + (z - high) * sb / cb
+    best = math.inf
+    if end > 0.0:  # bottom line
+        t = min(max(rho * ca + z * sa, 0.0), end / ca)
+        best = math.hypot(rho - t * ca, z - t * sa)
+        out[1] = t - end / ca
+        out[2] = t * sa
+        out[3], out[4] = sa, ca
+        if t == end / ca and r == 0.0 and best > 0.0:
+            out[3], out[4] = (rho - end) / best, -(z - low) / best
+    if r > 0.0:
+        kappa = math.atan2(rho - e, f - z)
+        if alpha <= kappa <= 0.5 * math.pi - beta:
+            d = abs(math.hypot(rho - e, f - z) - r)
+            if d < best:
+                best = d
+                out[1] = r * (kappa - alpha)
+                out[2] = f - r * math.cos(kappa)
+                out[3], out[4] = math.sin(kappa), math.cos(kappa)
+    top = (h - high) / cb
+    if top > 0.0:
+        t = min(max((rho - wide) * sb + (z - high) * cb, 0.0), top)
+        d = math.hypot(rho - wide - t * sb, z - high - t * cb)
+        if d < best:
+            best = d
+            out[1] = r * (0.5 * math.pi - beta - alpha) + t
+            out[2] = high + t * cb
+            out[3], out[4] = cb, sb
+            if t == top and d > 0.0:
+                out[3], out[4] = 0.0, 0.0
+    out[0] = -best if inside else best
+
+
+@njit(cache=True, nogil=True)
+def at_share(q, row, t, shape, frame, out):
+    """``foot`` of q with the cutter a share t into the step; ``frame`` gets the tip, the axis and the unit direction
+    from the axis to q.
+    """
+    size = 0.0
+    for c in range(3):
+        frame[c] = row[c] + t * (row[3 + c] - row[c])
+        frame[3 + c] = row[6 + c] + t * (row[9 + c] - row[6 + c])
+        size += frame[3 + c] ** 2
+    size = math.sqrt(size)
+    z = 0.0
+    for c in range(3):
+        frame[3 + c] /= size
+        z += (q[c] - frame[c]) * frame[3 + c]
+    rho = 0.0
+    for c in range(3):
+        frame[6 + c] = q[c] - frame[c] - z * frame[3 + c]
+        rho += frame[6 + c] ** 2
+    rho = math.sqrt(rho)
+    for c in range(3):
+        frame[6 + c] = frame[6 + c] / rho if rho > 0.0 else 0.0
+    foot(rho, z, shape, out)
+
+
+@njit(cache=True, nogil=True)
+def nearest(q, n, row, shape, most, facing, frame, out):
+    """Share of the step at which the cutter is nearest to q; -1 where it stays farther than ``most`` or does not face
+    the surface there. Fills ``frame`` and ``out`` for that moment.
+    """
+    at_share(q, row, 0.5, shape, frame, out)
+    way = 0.0
+    turn = 0.0
+    for c in range(3):
+        way += (row[3 + c] - row[c]) ** 2
+        turn += (row[9 + c] - row[6 + c]) ** 2
+    way = math.sqrt(way)
+    if out[0] - 0.5 * (way + math.sqrt(turn) * (shape[5] + most)) > most:
+        return -1.0
+    a, b = 0.0, 1.0
+    x, y = b - GOLDEN, a + GOLDEN
+    at_share(q, row, x, shape, frame, out)
+    dx = out[0]
+    at_share(q, row, y, shape, frame, out)
+    dy = out[0]
+    for _ in range(NARROWED):
+        if dx <= dy:
+            b, y, dy = y, x, dx
+            x = b - GOLDEN * (b - a)
+            at_share(q, row, x, shape, frame, out)
+            dx = out[0]
+        else:
+            a, x, dx = x, y, dy
+            y = a + GOLDEN * (b - a)
+            at_share(q, row, y, shape, frame, out)
+            dy = out[0]
+    t = 0.5 * (a + b)
+    at_share(q, row, t, shape, frame, out)
+    if out[0] > most:
+        return -1.0
+    towards = 0.0
+    for c in range(3):
+        towards -= (out[3] * frame[6 + c] - out[4] * frame[3 + c]) * n[c]
+    return t if towards >= facing else -1.0
+
+
+@njit(cache=True, nogil=True)
+def least_gaps(points, normals, steps, shape, most, facing, out):
+    """Least distance of each point from the cutter over all steps, if below ``most``: out (p,)."""
+    frame, found = np.empty(9), np.empty(5)
+    for p in range(len(points)):
+        best = out[p]
+        for k in range(len(steps)):
+            if nearest(points[p], normals[p], steps[k], shape, min(best, most), facing, frame, found) >= 0.0:
+                best = min(best, found[0])
+        out[p] = best
+
+
+@njit(cache=True, nogil=True)
+def contacts(points, normals, steps, shape, most, facing, owner, moment):
+    """Pairs of point and step no farther apart than ``most`` (p,): owner (m, 2), moment (m, 14) = d, s, z, sin and cos
+    of kappa, tip, axis, direction to q. Returns how many there are; fills as many as there is room for.
+    """
+    frame, found = np.empty(9), np.empty(5)
+    m = 0
+    for p in range(len(points)):
+        for k in range(len(steps)):
+            if nearest(points[p], normals[p], steps[k], shape, most[p], facing, frame, found) < 0.0:
+                continue
+            if m < len(owner):
+                owner[m, 0], owner[m, 1] = p, k
+                moment[m, :5] = found
+                moment[m, 5:] = frame
+            m += 1
+    return m
+
+
+@njit(cache=True, nogil=True)
+def inside_bite(s, phi, rows, tooth, lo, hi, j, reach):
+    """The immersion phi moved just inside the nearest bite of tooth j at s, and whether one is within ``reach``."""
+    best = reach
+    out = phi
+    made = False
+    for r in range(lo, hi):
+        if not rows[r, 2] - 1e-9 <= s <= rows[r, 3] + 1e-9 or (tooth[r] >= 0 and tooth[r] != j):
+            continue
+        p, q = rows[r, 0], rows[r, 1]
+        x = p + (phi - p) % TAU
+        if x <= q:
+            off = 0.0
+        elif x - q <= p + TAU - x:
+            off = x - q
+            x = q
+        else:
+            off = p + TAU - x
+            x = p
+        if off <= best:
+            made = True
+            best = off
+            margin = min(BESIDE, 0.5 * (q - p))
+            out = min(max(x, p + margin), q - margin)
+    return out, made
+
+
+@njit(cache=True, nogil=True)
+def chained(za, zb, bars):
+    """Deflection at height zb under a unit force at za; see :func:`chipload.structure.spindle.chain_compliance`."""
+    top = max(za, zb)
+    c = top - min(za, zb)
+    end = 0.0
+    total = 0.0
+    for i in range(len(bars)):
+        low = max(end - top, 0.0)
+        end += bars[i, 0]
+        high = max(end - top, 0.0)
+        total += bars[i, 1] * ((high**3 - low**3) / 3.0 + c * (high**2 - low**2) / 2.0)
+        if end >= top:
+            total += bars[i, 2] + bars[i, 4] * (2.0 * end - za - zb) + bars[i, 3] * (end - za) * (end - zb)
+    return total
+
+
+@njit(cache=True, nogil=True)
+def bent(theta, z, rows, tooth, piece, slices, lo, hi, teeth, c, bars, out):
+    """Load of all teeth at one rotation: out (5,) = force on the cutter along T, n, A [N], displacement of the cutter
+    at height z along T, n [mm]. Five points of Gauss on pieces that neither z nor ``PIECE`` of immersion divides.
+    """
+    out[:] = 0.0
+    for r in range(lo, hi):
+        p = rows[r, 0]
+        q = rows[r, 1]
+        k = piece[r]
+        rate = slices[k, 6]
+        base = slices[k, 5] - rate * slices[k, 0]
+        first = base + rate * rows[r, 2]
+        last = base + rate * rows[r, 3]
+        one = tooth[r] >= 0
+        for i in range(1 if one else teeth):
+            j = tooth[r] if one else i
+            turn = theta - TAU * j / teeth
+            turn -= TAU * math.floor(turn / TAU)
+            if turn - first < p:
+                turn += TAU * math.ceil((p + first - turn) / TAU)
+            while turn - last <= q:
+                s1 = rows[r, 2]
+                s2 = rows[r, 3]
+                if rate > 0.0:
+                    s1 = max(s1, (turn - base - q) / rate)
+                    s2 = min(s2, (turn - base - p) / rate)
+                elif turn - first >= q:
+                    s2 = s1
+                sine = slices[k, 3]
+                split = slices[k, 0] + (z - slices[k, 2]) / sine if sine > 0.0 else s1
+                for side in range(2):
+                    b1 = s1 if side == 0 else max(s1, split)
+                    b2 = min(s2, split) if side == 0 else s2
+                    if b2 <= b1:
+                        continue
+                    parts = max(math.ceil(rate * (b2 - b1) / PIECE), 1)
+                    h = (b2 - b1) / parts
+                    for part in range(parts):
+                        for g in range(5):
+                            s = b1 + h * (part + 0.5 + 0.5 * NODES[g])
+                            phi = turn - base - rate * s
+                            t, n, a, _ = edge(phi, 0.0, rows[r, 4], rows[r, 5], rows[r, 6], sine, slices[k, 4], c)
+                            w = 0.5 * h * WEIGHTS[g]
+                            out[0] += w * t
+                            out[1] += w * n
+                            out[2] += w * a
+                            if len(bars):
+                                flex = w * chained(slices[k, 2] + sine * (s - slices[k, 0]), z, bars)
+                                out[3] += flex * t
+                                out[4] += flex * n
+                turn += TAU
+
+
+@njit(cache=True, nogil=True)
+def bent_many(step, theta, z, start, rows, tooth, piece, slices, teeth, c, bars, out):
+    """``bent`` of many moments (m,): out (m, 5)."""
+    for m in range(len(step)):
+        i = step[m]
+        bent(theta[m], z[m], rows, tooth, piece, slices, start[i], start[i + 1], teeth, c, bars, out[m])
+
+
+@njit(cache=True, nogil=True)
+def inside_bites(step, s, phi, start, rows, tooth, j, reach, out, made):
+    """``inside_bite`` of many moments (m,), for tooth j."""
+    for m in range(len(step)):
+        i = step[m]
+        out[m], made[m] = inside_bite(s[m], phi[m], rows, tooth, start[i], start[i + 1], j, reach)

@@ -1,0 +1,392 @@
+"""What gives way while a program cuts: the deflection of every step, and the form error of the surface that is left.
+
+Notation: q point of the wanted surface, n its unit normal out of the part; p, A tip and axis of the cutter, T, n_c, A
+its frame; s length along its profile, phi immersion, theta rotation of tooth 0, lag(s) of its edge, bites as in
+:mod:`chipload.engagement.bites`; F [N] force ON THE CUTTER, that on the work is -F; C (3, 3) [mm/N] compliance of the
+work at q, C_nn = n . C n; C_b(z', z) that of the bars of cutter, holder and spindle.
+
+The rigid cutter passes q at a distance d_k in step k, least at a moment when the normal of its surface at the foot of q
+does not move: there its edge makes the surface. Tooth j is there at theta = phi + lag(s) + 2 pi j / N. What all teeth
+cut at that rotation bends both, and they part along n by
+
+    e_k = n . C F + n . (T, n_c) integral over the edges of C_b(z', z) dF(z'),
+
+positive where the cutter is pushed away. The surface is what the deflected cutter leaves:
+
+    left(q) = min over k and j of d_k + e_k - (r_j - R) sin(kappa),
+
+so the moment that makes q counts, not the greatest force. d of that step is what a rigid cutter leaves there (cusps,
+and stock where the program leaves any). Steps that do not cut count as absent: what they would take again after a
+deflection is not known.
+
+The load is that of the rigid model in the middle of the step: bending does not thin the chip. The work gives way at q
+under the whole force as if it acted there. The cutter is stiff along its axis, and q is that of the feed's envelope:
+marks of single teeth along the feed are not seen.
+
+Reference: [Uddin2007] and [Altintas2012] ch. 2 for the wall of an end mill, which this repeats for any cutter and
+surface.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.force import forces_over_turn, in_work
+from chipload.cutting.material import Material
+from chipload.engagement.bites import tooth_radii
+from chipload.errors import InputError
+from chipload.progress import Progress, silent
+from chipload.simulation.bending import _kernels
+from chipload.simulation.chips import Removal
+from chipload.simulation.loads import GRAZES, ONE_SIDE, Cuts
+from chipload.structure.spindle import Bar
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+#: cosine of the greatest angle between the surface and that of the cutter where it makes it: a cusp, not a corner
+FACING = 0.5
+#: how near to the end of a bite the immersion of q must lie to be moved to it [rad]
+REACH = 0.05
+#: points whose pairs with steps are held at once
+CHUNK = 4096
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Where the steps leave a surface, one a step that cuts.
+
+    Attributes
+    ----------
+    step : (c,) int, rows of the removal's columns
+    point : (c, 3) float [mm], on the cutter in the middle of the step: mean of the ends of its bites at which h = 0
+    normal : (c, 3) float, unit, out of the surface that is left; 0 where it leaves two that face each other
+    """
+
+    step: Ints
+    point: Floats
+    normal: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class FormError:
+    """What is left on a surface by a cutter and a workpiece that give way.
+
+    Attributes
+    ----------
+    step : (p,) int, the step that makes each point; -1: none comes near, the other columns are then 0
+    gap : (p,) float [mm], what the rigid cutter leaves there; below 0: it gouges
+    cutter, work : (p,) float [mm], by how much each gives way along n at that moment
+    force : (p,) float [N], F . n at that moment: it pushes work and cutter apart where above 0
+    at_edge : (p,) bool, whether q lies at the end of a bite, as it should; False: it is touched again by a cutter that
+        cuts elsewhere
+    """
+
+    step: Ints
+    gap: Floats
+    cutter: Floats
+    work: Floats
+    force: Floats
+    at_edge: Bools
+
+    @property
+    def made(self) -> Bools:
+        """Points that some step makes."""
+        return np.asarray(self.step >= 0)
+
+    @property
+    def error(self) -> Floats:
+        """Form error by deflection [mm], positive where material is left."""
+        return self.cutter + self.work
+
+    @property
+    def left(self) -> Floats:
+        """Material left over the wanted surface [mm], cusps and all."""
+        return self.gap + self.error
+
+
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """What one cutter cut, and how it is judged."""
+
+    cuts: Cuts
+    material: Material
+    bars: Mapping[int, tuple[Bar, ...]] | None
+    facing: float
+    reach: float
+
+
+def contacts(removal: Removal) -> Contacts:
+    """Where each step that cut leaves a surface.
+
+    Raises
+    ------
+    InputError
+        The removal was made without ``keep``.
+    """
+    parts = []
+    for cuts in _kept(removal):
+        bites = cuts.bites
+        assert bites.frame is not None
+        owner = np.repeat(np.arange(len(bites)), np.diff(bites.start))
+        p, q, a, b, along, offset, across = bites.rows.T
+        s0, rho, z0, sk, ck = bites.slices[bites.slice, :5].T
+        half = 0.5 * (a + b) - s0
+        height, radius = z0 + sk * half, rho
+        total, place, weight = np.zeros((len(bites), 3)), np.zeros((len(bites), 3)), np.zeros(len(bites))
+        frame = bites.frame[owner]
+        tip = 0.5 * (cuts.way[owner, :3] + cuts.way[owner, 3:6])
+        for phi in (p, q):
+            h = along * np.sin(phi) + across * np.cos(phi) + offset
+            made = np.where(np.abs(h) <= GRAZES * (np.hypot(along, across) + np.abs(offset)), b - a, 0.0)
+            u = np.column_stack([np.sin(phi), np.cos(phi), np.zeros(len(phi))])
+            nu = np.column_stack([sk[:, None] * u[:, :2], -ck])
+            at = radius[:, None] * u
+            at[:, 2] = height
+            np.add.at(total, owner, made[:, None] * np.einsum("bi,bij->bj", nu, frame))
+            np.add.at(place, owner, made[:, None] * (tip + np.einsum("bi,bij->bj", at, frame)))
+            np.add.at(weight, owner, made)
+        size = np.linalg.norm(total, axis=1)
+        one = size > ONE_SIDE * weight
+        point = 0.5 * (cuts.way[:, :3] + cuts.way[:, 3:6])
+        point[weight > 0.0] = place[weight > 0.0] / weight[weight > 0.0, None]
+        normal = np.zeros((len(cuts), 3))
+        normal[one] = -total[one] / size[one, None]
+        parts.append((cuts.step, point, normal))
+    step, point, normal = (np.concatenate([part[i] for part in parts]) for i in range(3))
+    order = np.argsort(step, kind="stable")
+    return Contacts(step[order], point[order], normal[order])
+
+
+def step_deflections(
+    removal: Removal,
+    material: Material,
+    place: Contacts,
+    *,
+    work: ArrayLike | None,
+    bars: Mapping[int, tuple[Bar, ...]] | None,
+    rotation: float = math.radians(2.0),
+) -> dict[str, NDArray[Any]]:
+    """How far work and cutter give way in every step, at most over a revolution.
+
+    Parameters
+    ----------
+    removal : made with ``keep``
+    place : :func:`contacts` of it
+    work : compliance at these places in the state of removal in which each is cut, (c,) [mm/N] normal or (c, 3, 3);
+        None: rigid
+    bars : by tool number, from the tip upwards; None: rigid
+    rotation : between two rotations that are looked at [rad]
+
+    Returns
+    -------
+    columns, (n,) each, a row a step of the removal, 0 where nothing is cut or two surfaces are left
+        ``work_mm``, ``cutter_mm`` float: greatest motion of work and cutter along the normal by which they part;
+        ``deflection_mm`` the greatest of their sum; ``force_normal_n`` the greatest force that does it.
+    """
+    stiff = _work(work, place.normal, "step_deflections")
+    names = ("work_mm", "cutter_mm", "deflection_mm", "force_normal_n")
+    out = {name: np.zeros(len(removal.columns["line"])) for name in names}
+    for cuts in _kept(removal):
+        at = np.searchsorted(place.step, cuts.step)
+        if not (len(place.step) and (place.step[np.minimum(at, len(place.step) - 1)] == cuts.step).all()):
+            raise InputError("step_deflections: the contacts are not those of this removal")
+        assert cuts.bites.frame is not None
+        pitch = math.tau if cuts.cutter.runout[0] > 0.0 else math.tau / cuts.cutter.flutes
+        count = max(math.ceil(pitch / rotation), 8)
+        theta = np.arange(count) * (pitch / count)
+        force = in_work(forces_over_turn(cuts.bites, cuts.cutter, material, theta)[0], cuts.bites.frame)
+        n = place.normal[at]
+        away = np.einsum("cmi,ci->cm", force, n)
+        bent = np.einsum("cij,cmj,ci->cm", stiff[at], force, n)
+        middle = 0.5 * (cuts.way[:, :3] + cuts.way[:, 3:6])
+        z = np.einsum("ci,ci->c", place.point[at] - middle, cuts.bites.frame[:, 2])
+        m = len(theta)
+        moments = _bent(
+            cuts, np.repeat(np.arange(len(cuts)), m), np.tile(theta, len(cuts)), np.repeat(z, m), material, bars
+        )
+        swing = np.einsum("cmi,cij->cmj", moments[:, 3:].reshape(-1, m, 2), cuts.bites.frame[:, :2])
+        pushed = np.einsum("cmi,ci->cm", swing, n)
+        for name, values in zip(names, (bent, pushed, bent + pushed, away), strict=True):
+            out[name][cuts.step] = values.max(axis=1).clip(0.0)
+    return out
+
+
+def form_error(
+    removal: Removal,
+    material: Material,
+    points: ArrayLike,
+    normals: ArrayLike,
+    *,
+    work: ArrayLike | None,
+    bars: Mapping[int, tuple[Bar, ...]] | None,
+    near: float,
+    facing: float = FACING,
+    reach: float = REACH,
+    progress: Progress = silent,
+) -> FormError:
+    """Form error of the points of a surface.
+
+    Parameters
+    ----------
+    removal : made with ``keep``
+    points, normals : (p, 3) float [mm] and unit, out of the part, in the frame of the program
+    work : compliance of the work at the points in the state of removal in which they are made, (p,) [mm/N] normal or
+        (p, 3, 3); None: rigid
+    bars : of cutter, holder and spindle by tool number, from the tip upwards, e.g.
+        :func:`chipload.structure.spindle.cutter_bars`; None: rigid
+    near : a step that stays farther than this [mm] from a point does not make it
+    facing : cosine of the greatest angle between the normals of surface and cutter
+    reach : how near to the end of a bite q must lie to be moved to it [rad]
+
+    Raises
+    ------
+    InputError
+        The removal was made without ``keep``, shapes do not fit, a cutter has no bars, or they are shorter than it.
+
+    Notes
+    -----
+    Every step that may win is looked at: those whose distance is within twice the greatest deflection of the least.
+    """
+    q, n = (np.ascontiguousarray(np.atleast_2d(np.asarray(v, dtype=np.float64))) for v in (points, normals))
+    if q.ndim != 2 or q.shape[1] != 3 or n.shape != q.shape or not (np.isfinite(q).all() and np.isfinite(n).all()):
+        raise InputError(f"form_error: points {q.shape}, normals {n.shape}: need (p, 3) finite numbers, one of each")
+    if not np.isclose(np.linalg.norm(n, axis=1), 1.0, rtol=0.0, atol=1e-6).all():
+        raise InputError("form_error: normals must be unit vectors")
+    if not 0.0 < near < math.inf:
+        raise InputError(f"form_error: near_mm = {near:g}: must be above 0")
+    stiff = _work(work, n, "form_error")
+    all_cuts = _kept(removal)
+    least = np.full(len(q), np.inf)
+    for cuts in all_cuts:
+        _kernels.least_gaps(q, n, cuts.way, _shape(cuts.cutter), near, facing, least)
+    gap, cutter, yielded, force = (np.zeros(len(q)) for _ in range(4))
+    out = FormError(np.full(len(q), -1), gap, cutter, yielded, force, np.zeros(len(q), dtype=np.bool_))
+    best = np.full(len(q), np.inf)
+    todo = np.flatnonzero(np.isfinite(least))
+    for at in range(0, len(todo), CHUNK):
+        some = todo[at : at + CHUNK]
+        margin = 1e-6
+        while True:
+            best[some], widest = np.inf, 0.0
+            for cuts in all_cuts:
+                most = np.minimum(least[some] + margin, near)
+                model = _Model(cuts, material, bars, facing, reach)
+                widest = max(widest, _made_by(model, q[some], n[some], stiff[some], most, some, best, out))
+            needed = float((best[some] - least[some]).max()) + widest
+            if needed <= margin or margin >= 2.0 * near:
+                break
+            margin = 2.0 * needed
+        progress(min(1.0, (at + CHUNK) / len(todo)), "form error")
+    return out
+
+
+def _made_by(
+    model: _Model, q: Floats, n: Floats, stiff: Floats, most: Floats, number: Ints, best: Floats, out: FormError
+) -> float:
+    """Let the steps of one cutter make points where they leave less than ``best``; the greatest deflection seen."""
+    cuts = model.cuts
+    assert cuts.bites.frame is not None
+    shape = _shape(cuts.cutter)
+    room = 16 * len(q) + 64
+    while True:
+        owner, moment = np.empty((room, 2), dtype=np.int64), np.empty((room, 14))
+        count = _kernels.contacts(q, n, cuts.way, shape, most, model.facing, owner, moment)
+        if count <= room:
+            break
+        room = count
+    owner, moment = owner[:count], moment[:count]
+    if not count:
+        return 0.0
+    point, k = owner.T
+    d, s, z, sine = moment[:, :4].T
+    frame = cuts.bites.frame[k]
+    along, left = (np.einsum("mi,mi->m", moment[:, 11:], frame[:, i]) for i in (0, 1))
+    phi = np.arctan2(along, left) % math.tau
+    lag = math.tan(cuts.cutter.helix) / cuts.cutter.radius
+    radii = tooth_radii(cuts.cutter)
+    widest = 0.0
+    for j in range(cuts.cutter.flutes if cuts.cutter.runout[0] > 0.0 else 1):
+        there, made = np.empty(count), np.empty(count, dtype=np.bool_)
+        b = cuts.bites
+        _kernels.inside_bites(k, s, phi, b.start, b.rows, b.tooth, j, model.reach, there, made)
+        theta = there + lag * z + math.tau * j / cuts.cutter.flutes
+        loads = _bent(cuts, k, theta, z, model.material, model.bars)
+        force = np.einsum("mi,mij->mj", loads[:, :3], frame)
+        bent = np.einsum("mi,mij->mj", loads[:, 3:], frame[:, :2])
+        away = np.einsum("mi,mi->m", force, n[point])
+        work = np.einsum("mi,mij,mj->m", n[point], stiff[point], force)
+        cutter = np.einsum("mi,mi->m", bent, n[point])
+        gap = d - radii[j] * sine
+        widest = max(widest, float(np.abs(cutter + work - radii[j] * sine).max()))
+        total = gap + cutter + work
+        order = np.lexsort((total, point))
+        first = order[np.r_[True, point[order][1:] != point[order][:-1]]]
+        first = first[total[first] < best[number[point[first]]]]
+        at = number[point[first]]
+        best[at] = total[first]
+        out.step[at] = cuts.step[k[first]]
+        out.gap[at], out.cutter[at], out.work[at] = gap[first], cutter[first], work[first]
+        out.force[at], out.at_edge[at] = away[first], made[first]
+    return widest
+
+
+def _kept(removal: Removal) -> tuple[Cuts, ...]:
+    if not removal.cuts:
+        if not removal.columns["chip_volume_mm3"].any():
+            raise InputError("deflection: the program cuts nothing")
+        raise InputError("deflection: the removal did not keep what the teeth cut: remove(..., keep=True)")
+    return removal.cuts
+
+
+def _work(work: ArrayLike | None, n: Floats, name: str) -> Floats:
+    """Compliance (p, 3, 3) of the work at places with normals n: (p,) along the normal is C_nn n n^T."""
+    if work is None:
+        return np.zeros((len(n), 3, 3))
+    C = np.asarray(work, dtype=np.float64)
+    if C.shape == (len(n),):
+        bad = np.flatnonzero(~((C >= 0.0) & np.isfinite(C)))
+        if len(bad):
+            raise InputError(f"{name}: work[{bad[0]}] = {C[bad[0]]:g} mm/N: a compliance must be at least 0")
+        return np.asarray(C[:, None, None] * n[:, :, None] * n[:, None, :])
+    if C.shape != (len(n), 3, 3) or not np.isfinite(C).all():
+        raise InputError(f"{name}: work of shape {C.shape}: must be ({len(n)},) or ({len(n)}, 3, 3) finite numbers")
+    return C
+
+
+def _shape(cutter: Cutter) -> Floats:
+    """The cutter as the kernels take it."""
+    _, r, e, f, alpha, beta, h = cutter.apt
+    return np.array([r, e, f, alpha, beta, h, e + r * math.sin(alpha)])
+
+
+def _bent(
+    cuts: Cuts, k: Ints, theta: Floats, z: Floats, material: Material, bars: Mapping[int, tuple[Bar, ...]] | None
+) -> Floats:
+    """(m, 5) force along T, n, A [N] and displacement of the cutter at the height z along T, n [mm]."""
+    chain = np.zeros((0, 5))
+    if bars is not None:
+        number = cuts.tool
+        if number not in bars:
+            raise InputError(f"deflection: tool {number} has no bars: give them, or None for rigid cutters")
+        chain = np.array(
+            [[b.length, b.flexibility, b.joint.c_ff, b.joint.c_mm, b.joint.c_fm] for b in bars[number]]
+        ).reshape(-1, 5)
+        if chain[:, 0].sum() < cuts.cutter.flute_length * (1.0 - 1e-9):
+            raise InputError(
+                f"deflection: the bars of tool {number} are {chain[:, 0].sum():g} mm long: must be at least its "
+                f"flute_length_mm = {cuts.cutter.flute_length:g}"
+            )
+    out = np.empty((len(k), 5))
+    b = cuts.bites
+    law = np.array(material.law)
+    _kernels.bent_many(k, theta, z, b.start, b.rows, b.tooth, b.slice, b.slices, cuts.cutter.flutes, law, chain, out)
+    return out

@@ -1,0 +1,212 @@
+"""Form error against closed forms: a bar, a rigid wall on springs, the wall that an end mill makes, sums by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material, material_named
+from chipload.cutting.wall import wall_profile
+from chipload.engagement.bites import bites_of_arcs
+from chipload.errors import InputError
+from chipload.program.build import plunge, rapid
+from chipload.program.program import Program
+from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.deflection import contacts, form_error, step_deflections
+from chipload.stock.layers import LayeredStock
+from chipload.structure.spindle import Bar, Joint, cutter_bars
+
+AL = material_named("al7075-t6")
+MILL = Cutter(10.0, 4, 0.0, 20.0, 30.0, 6e5)
+BALL = Cutter(8.0, 2, math.radians(30.0), 20.0, 40.0, 6e5, corner_radius=4.0)
+FINE = Resolution(step_mm=1.0, tolerance=1e-4, corner_pieces=60, flank_mm=0.5)
+#: where h = 0 the edge alone pushes along the normal: a known force, whatever is cut
+EDGE = Material("edge", 1000.0, 0.0, 0.0, 0.0, 20.0, 0.0, source="made up for this test")
+
+
+def along_a_wall(cutter: Cutter, material: Material, depth: float = 4.0, width: float = 1.5, tolerance: float = 1e-4):
+    """A wall at y = 0 whose material lies below it; the cutter goes along x, climb (+x at M3 has it on the right)."""
+    stock = LayeredStock.block((0.0, -10.0, -depth), (30.0, width, 0.0), 0.5, 15.0)
+    y = cutter.radius
+    program = Program.join(
+        [rapid([-10.0, y, -depth], 300.0, 1, "link"), plunge([40.0, y, -depth], 20.0, 300.0, 1, "cut")]
+    )
+    return remove(program, stock, {1: cutter}, material, replace(FINE, tolerance=tolerance), keep=True)
+
+
+def wall_points(z: np.ndarray, x: float = 15.2):
+    return np.column_stack([np.full(len(z), x), np.zeros(len(z)), z]), np.tile([0.0, 1.0, 0.0], (len(z), 1))
+
+
+def test_without_helix_a_bar_bends_under_the_force_of_its_edge() -> None:
+    """phi = pi, h = 0: a uniform load Kre a mm over the depth b on a bar that is clamped at l: e(z) in closed form."""
+    depth, z = 4.0, np.array([0.5, 2.0, 3.5])
+    removal = along_a_wall(MILL, EDGE, depth)
+    found = form_error(removal, EDGE, *wall_points(z - depth), work=None, bars={1: cutter_bars(MILL)}, near=0.1)
+    L, EI = MILL.overhang, 6e5 * math.pi * 8.0**4 / 64.0
+    EIs = 6e5 * math.pi * 10.0**4 / 64.0
+    expected = []
+    for x in z:
+        # integral over the load at a of C(a, x), C = integral over h from max(a, x) of (h - a)(h - x) / E I
+        a = (np.arange(4000) + 0.5) * depth / 4000
+        h = (np.arange(9000) + 0.5) * L / 9000
+        moment = np.where(h[:, None] > a, h[:, None] - a, 0.0).sum(axis=1) * depth / 4000
+        arm = np.where(h > x, h - x, 0.0)
+        expected.append(20.0 * (moment * arm / np.where(h < 20.0, EI, EIs)).sum() * L / 9000)
+    assert found.cutter == pytest.approx(expected, rel=1e-5)
+    assert (found.cutter > 0.0).all()
+    assert found.force == pytest.approx(20.0 * depth, rel=1e-9)
+    assert found.at_edge.all()
+    assert abs(found.gap).max() < 1e-9
+
+
+@pytest.mark.parametrize("milling", ["down", "up"])
+@pytest.mark.parametrize("helix", [0.0, 30.0])
+def test_it_is_the_wall_of_the_closed_form(milling: str, helix: float) -> None:
+    mill = replace(MILL, helix=math.radians(helix))
+    depth, width = 6.0, 1.5
+    stock = LayeredStock.block((0.0, -10.0, -depth), (30.0, width, 0.0), 0.5, 15.0)
+    ends = (-10.0, 40.0) if milling == "down" else (40.0, -10.0)
+    program = Program.join(
+        [
+            rapid([ends[0], 5.0, -depth], 300.0, 1, "link"),
+            plunge([ends[1], 5.0, -depth], 20.0, 300.0, 1, "cut"),
+        ]
+    )
+    removal = remove(program, stock, {1: mill}, AL, FINE, keep=True)
+    z = np.linspace(0.3, depth - 0.3, 7)
+    p, n = wall_points(z - depth)
+    work = 3e-6
+    found = form_error(removal, AL, p, n, work=np.full(len(p), work), bars={1: cutter_bars(mill)}, near=0.1)
+    a = math.acos(1.0 - width / 5.0)
+    arc = (math.pi - a, math.pi) if milling == "down" else (0.0, a)
+    bites = bites_of_arcs([arc[0]], [arc[1]], math.tau * 20.0 / (4 * 300.0), mill, depth)
+    closed = wall_profile(bites, mill, AL, z, milling=milling, work_compliance=work)[0]
+    assert abs(closed).max() > 1e-4
+    np.testing.assert_allclose(found.error, closed, rtol=0.0, atol=1e-5 * abs(closed).max())
+
+
+def ball_rows(material: Material = AL, cutter: Cutter = BALL, x: float = 0.0, keep: bool = True):
+    """Two rows of a ball 0.6 mm apart over a plane that leans: surface z = 0.2 y, y the way across, feed along x."""
+    stock = LayeredStock.block((-6.0, -4.0, -3.0), (6.0, 4.0, 0.5), 0.1, 15.0)
+    n = np.array([0.0, -0.2, 1.0]) / math.hypot(0.2, 1.0)
+    r = cutter.corner_radius
+    parts = []
+    for y in (-0.3, 0.3):
+        centre = np.array([0.0, y, 0.2 * y - 1.0]) + r * n
+        tip = centre - [0.0, 0.0, r]
+        parts += [rapid([-3.0, tip[1], 9.0], 400.0, 1, "link"), rapid([-3.0, tip[1], tip[2]], 400.0, 1, "link")]
+        parts += [plunge([3.0, tip[1], tip[2]], 10.0, 400.0, 1, "cut"), rapid([3.0, tip[1], 9.0], 400.0, 1, "link")]
+    return remove(Program.join(parts), stock, {1: cutter}, material, FINE_BALL, keep=keep), n
+
+
+FINE_BALL = Resolution(step_mm=0.5, tolerance=5e-4, corner_pieces=40, flank_mm=1.0)
+
+
+def leaning_points():
+    y = np.array([-0.5, -0.3, -0.1, 0.1, 0.3, 0.5])
+    return np.column_stack([np.full(6, 0.1), y, 0.2 * y - 1.0])
+
+
+def test_cusps_of_a_ball_are_the_gap_and_each_point_belongs_to_the_nearer_row() -> None:
+    removal, n = ball_rows()
+    found = form_error(removal, AL, leaning_points(), np.tile(n, (6, 1)), work=None, bars=None, near=0.2)
+    slope = math.hypot(1.0, 0.2)
+    away = slope * np.array([0.2, 0.0, 0.2, 0.2, 0.0, 0.2])
+    assert found.gap == pytest.approx(np.hypot(4.0, away) - 4.0, abs=1e-6)
+    assert not found.error.any()
+    y = removal.columns["y_mm"][found.step]
+    assert (np.sign(y - y.mean()) == [-1, -1, -1, 1, 1, 1]).all()
+    assert abs(removal.columns["x_mm"][found.step] - 0.25).max() <= 0.25 + 1e-9
+
+
+def test_compliances_add_and_the_whole_one_equals_the_normal_one_along_the_normal() -> None:
+    """Superposition: of one and the same load work and cutter give way, each as if the other were rigid."""
+    removal, n = ball_rows()
+    p, N = leaning_points()[[1, 4]], np.tile(n, (2, 1))
+    bars = {1: cutter_bars(BALL, Joint(1e-5, 1e-9))}
+    only = {"near": 0.2}
+    both = form_error(removal, AL, p, N, work=[2e-4, 1e-4], bars=bars, **only)
+    work = form_error(removal, AL, p, N, work=[2e-4, 1e-4], bars=None, **only)
+    cutter = form_error(removal, AL, p, N, work=None, bars=bars, **only)
+    assert both.error == pytest.approx(work.work + cutter.cutter, rel=1e-12)
+    assert work.work == pytest.approx(np.array([2e-4, 1e-4]) * work.force, rel=1e-12)
+    assert (work.force > 1.0).all()
+    # C = 1e-4 along x alone does not move the surface, whose normal has no x
+    sideways = np.tile(np.diag([1e-4, 0.0, 0.0]), (2, 1, 1))
+    assert abs(form_error(removal, AL, p, N, work=sideways, bars=None, **only).work).max() < 1e-12
+    isotropic = np.tile(np.diag([2e-4] * 3), (2, 1, 1))
+    assert form_error(removal, AL, p, N, work=isotropic, bars=None, **only).work == pytest.approx(
+        2e-4 * work.force, rel=1e-12
+    )
+
+
+def test_a_rigid_bar_on_a_joint_moves_as_the_lever_says() -> None:
+    """The joint gives way by c_ff to a force and c_mm to a moment at 40 mm; edge force Kre over 4 mm of depth."""
+    bar = (Bar(30.0, 0.0, Joint(1e-5, 1e-8)),)
+    removal = along_a_wall(MILL, EDGE, 4.0)
+    found = form_error(removal, EDGE, *wall_points(np.array([-3.0])), work=None, bars={1: bar}, near=0.1)
+    force, arm = 80.0, 30.0 - 2.0
+    assert found.cutter == pytest.approx([1e-5 * force + 1e-8 * force * arm * 29.0], rel=1e-9)
+
+
+def test_the_surface_is_made_at_its_moment_not_under_the_greatest_force() -> None:
+    """Climb milling without helix: at the wall h = 0, so that the edge force is all, whatever the chip was before."""
+    removal = along_a_wall(MILL, AL, 4.0, width=4.0)
+    p, n = wall_points(np.array([-2.0]))
+    found = form_error(removal, AL, p, n, work=[1e-4], bars=None, near=0.1)
+    assert found.force == pytest.approx([AL.Kre * 4.0], rel=1e-6)
+    greatest = removal.columns["force_normal_n"][found.step[0]]
+    assert greatest > 3.0 * found.force[0]
+    place = contacts(removal)
+    step = step_deflections(removal, AL, place, work=np.full(len(place.step), 1e-4), bars=None, rotation=0.01)
+    assert step["work_mm"][found.step[0]] == pytest.approx(1e-4 * greatest, rel=0.01)
+    assert step["deflection_mm"] == pytest.approx(step["work_mm"])
+    at = int(np.flatnonzero(place.step == found.step[0])[0])
+    assert place.normal[at] == pytest.approx([0.0, 1.0, 0.0], abs=1e-6)
+    assert place.point[at, 1:] == pytest.approx([0.0, -2.0], abs=1e-6)
+
+
+def test_with_runout_the_longer_tooth_makes_the_wall_and_takes_more() -> None:
+    """Two teeth, their radii 0.01 mm apart and 0.01 mm a tooth: the longer one alone, and it is 5 um longer."""
+    mill = replace(MILL, flutes=2, runout=(0.005, 0.0))
+    stock = LayeredStock.block((0.0, -10.0, -2.0), (20.0, 1.0, 0.0), 0.5, 15.0)
+    feed = 0.01 * 2 * 300.0 / math.tau
+    path = [rapid([-10.0, 5.0, -2.0], 300.0, 1, "link"), plunge([25.0, 5.0, -2.0], feed, 300.0, 1, "cut")]
+    removal = remove(Program.join(path), stock, {1: mill}, EDGE, FINE, keep=True)
+    p, n = wall_points(np.array([-1.0]), x=10.2)
+    found = form_error(removal, EDGE, p, n, work=[1e-4], bars=None, near=0.1)
+    assert found.gap == pytest.approx([-0.005], abs=1e-6)
+    assert found.work == pytest.approx([1e-4 * 20.0 * 2.0], rel=1e-9)
+    assert found.left == pytest.approx([-0.001], abs=1e-6)
+
+
+def test_a_point_that_no_step_reaches_is_said_to_be_unmade() -> None:
+    removal, n = ball_rows()
+    far = form_error(removal, AL, [[0.0, 3.5, -0.3], [0.1, 0.3, -0.94]], [n, n], work=None, bars=None, near=0.2)
+    assert far.made.tolist() == [False, True]
+    assert far.left[0] == 0.0
+
+
+def test_what_is_wrong_is_said() -> None:
+    removal, n = ball_rows()
+    p, N = leaning_points(), np.tile(n, (6, 1))
+    short = {1: (Bar(10.0, 1e-9),)}
+    for message, change in (
+        (r"tool 1 has no bars: give them, or None for rigid cutters", {"bars": {2: cutter_bars(BALL)}}),
+        (r"the bars of tool 1 are 10 mm long: must be at least its flute_length_mm = 20", {"bars": short}),
+        (r"form_error: near_mm = 0: must be above 0", {"near": 0.0}),
+        (r"form_error: work\[1\] = -1 mm/N: a compliance must be at least 0", {"work": [0, -1, 0, 0, 0, 0]}),
+        (r"form_error: work of shape \(5,\): must be \(6,\) or \(6, 3, 3\)", {"work": np.zeros(5)}),
+    ):
+        with pytest.raises(InputError, match=message):
+            form_error(removal, AL, p, N, **({"work": None, "bars": None, "near": 0.2} | change))
+    with pytest.raises(InputError, match="normals must be unit vectors"):
+        form_error(removal, AL, p, 2.0 * N, work=None, bars=None, near=0.2)
+    forgot, _ = ball_rows(keep=False)
+    with pytest.raises(InputError, match=r"did not keep what the teeth cut: remove\(..., keep=True\)"):
+        contacts(forgot)
