@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,9 @@ from chipload.progress import Progress, silent
 Floats = NDArray[np.float64]
 #: what the places of a side bear, ``(left on each side, side) -> threshold``
 Bears = Callable[[Sequence[Floats], int], Threshold]
+
+#: in which order the sides are cut
+Order = Literal["alternately", "one after the other"]
 
 #: depths below this are no cut [mm]
 NOTHING = 1e-9
@@ -114,10 +118,11 @@ def variable(
     law: Law,
     slope: float,
     *,
+    order: Order = "alternately",
     most: int = 200,
     progress: Progress = silent,
 ) -> Plan:
-    """Variable depths on the sides alternately.
+    """Variable depths.
 
     Parameters
     ----------
@@ -125,6 +130,7 @@ def variable(
     bears : threshold of a side in a state; the stock left is that of all sides, in their order
     law : depth of a threshold
     slope : L > 0 of the offset function
+    order : of the sides; one after the other: the first one whole while the second has all of its stock
     most : passes on a side before it is given up
 
     Raises
@@ -137,12 +143,11 @@ def variable(
     done: list[Pass] = []
     infeasible: set[tuple[int, int, int]] = set()
     for _ in range(most):
-        if all((D[s] >= surfaces[s].allowance - NOTHING).all() for s in range(count)):
+        open_sides = [s for s in reversed(range(count)) if (D[s] < surfaces[s].allowance - NOTHING).any()]
+        if not open_sides:
             return Plan("variable", tuple(reversed(done)), tuple(sorted(infeasible)))
-        for side in reversed(range(count)):
+        for side in open_sides if order == "alternately" else open_sides[:1]:
             a = surfaces[side].allowance
-            if (D[side] >= a - NOTHING).all():
-                continue
             threshold = bears(D, side)
             F = threshold.force.reshape(D[side].shape)
             open_ = D[side] < a - NOTHING
@@ -169,8 +174,15 @@ def least_first_depth(surfaces: Sequence[Surface], bears: Bears, law: Law) -> fl
     return min(float(law.depth(bears(D, side).force).min()) for side in range(len(surfaces)))
 
 
-def constant(surfaces: Sequence[Surface], bears: Bears, law: Law, depth: float, name: str = "constant") -> Plan:
-    """Equal passes of at most ``depth``, the fewest, on the sides alternately.
+def constant(
+    surfaces: Sequence[Surface],
+    bears: Bears,
+    law: Law,
+    depth: float,
+    name: str = "constant",
+    order: Order = "alternately",
+) -> Plan:
+    """Equal passes of at most ``depth``, the fewest.
 
     Raises
     ------
@@ -183,14 +195,13 @@ def constant(surfaces: Sequence[Surface], bears: Bears, law: Law, depth: float, 
             "more deflection, less feed or a smaller step-over"
         )
     number = [math.ceil(s.allowance / depth - 1e-9) for s in surfaces]
+    turns = [(k, side) for side in reversed(range(len(surfaces))) for k in range(number[side])]
+    if order == "alternately":
+        turns.sort(key=lambda turn: turn[0])
     D = [np.zeros(s.points.shape[:2]) for s in surfaces]
     done = []
-    for k in range(max(number)):
-        for side in reversed(range(len(surfaces))):
-            if k >= number[side]:
-                continue
-            a = surfaces[side].allowance
-            high = np.full_like(D[side], a * (k + 1) / number[side])
-            done.append(_made(side, D[side], high, bears(D, side), law))
-            D[side] = high
+    for k, side in turns:
+        high = np.full_like(D[side], surfaces[side].allowance * (k + 1) / number[side])
+        done.append(_made(side, D[side], high, bears(D, side), law))
+        D[side] = high
     return Plan(name, tuple(reversed(done)))
