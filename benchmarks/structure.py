@@ -12,15 +12,22 @@ in the same run:
 * refactoring: assemble, factor, solve the 61 forces, with our own factors
 * CalculiX: ``ccx`` with the 61 forces, each a step of its own (one and three steps are run, the rest is extrapolated)
 
+Then whole rows again, all states of a pass at once by elimination from both sides (:mod:`chipload.structure.rows`): a
+layer of two that goes, and a wall of one layer that is thinned, as the planner has it. ``all`` is everything that it
+takes, a state; ``join`` what one more state takes once both sides are eliminated.
+
+Times are processor seconds of this process and of ``ccx``; with OPENBLAS_NUM_THREADS=1 they do not depend on what else
+the computer does.
+
 Then: how the solution of many right-hand sides compares with that of SuperLU itself, and at which rank a correction
 without columns solved ahead takes as long as factoring again.
 """
 
+import os
 import shutil
 import subprocess
 import sys
 import tempfile
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,6 +36,7 @@ import numpy as np
 from chipload.structure.grid import from_map
 from chipload.structure.places import normals_of, on_side
 from chipload.structure.removal import cut, prepare, start
+from chipload.structure.rows import row_compliances
 from chipload.structure.solid import Solid, compliance, factorise, loads
 from chipload.structure.watched import compliance as corrected
 from chipload.structure.watched import watch
@@ -36,15 +44,21 @@ from chipload.structure.watched import watch
 PLACES = 61
 
 
+def spent() -> float:
+    """Processor seconds of this process and of those that it has waited for."""
+    used = os.times()
+    return used.user + used.system + used.children_user + used.children_system
+
+
 def timed(call):
-    begun = time.perf_counter()
+    begun = spent()
     value = call()
-    return value, time.perf_counter() - begun
+    return value, spent() - begun
 
 
-def wall(rows: int) -> Solid:
+def wall(rows: int, layers: int = 2) -> Solid:
     u, v = np.linspace(0.0, 120.0, 2 * rows + 1), np.linspace(0.0, 60.0, rows + 1)
-    grid = from_map(u, v, [0.0, 2.0, 3.0], lambda p: p)
+    grid = from_map(u, v, [0.0, 2.0, 3.0] if layers == 2 else [0.0, 3.0], lambda p: p)
     return Solid(grid, 1.14e5, 0.34, 4.43e-9, grid.side("j-"))
 
 
@@ -84,6 +98,31 @@ def row(solid: Solid, below: int):
     """Stock of one row, counted from the free edge."""
     columns, rows, _ = solid.grid.counts
     return solid.grid.element(np.arange(columns), np.full(columns, rows - 1 - below), 1)
+
+
+def by_rows(name: str, solid: Solid, left: float, ccx: float) -> None:
+    """A line of the table of whole rows."""
+    grid = solid.grid
+    _, rows, layers = grid.counts
+    places = on_side(grid, "k-", np.linspace(0.0, 1.0, PLACES), np.full(PLACES, 0.9))
+    normals = normals_of(grid, places, "k-")
+    after = np.tile([0.0, 1.0], (len(grid.elements), 1))
+    after[layers - 1 :: layers] = [0.0, left]
+    _, t_ends = timed(lambda: row_compliances(solid, after, places, normals, side="j+", cut=[0, rows]))
+    found, t_all = timed(lambda: row_compliances(solid, after, places, normals, side="j+"))
+    kept = np.tile([0.0, 1.0], (len(grid.elements), 1))
+    half = rows // 2
+    top = np.arange(len(grid.elements)).reshape(grid.counts)[:, rows - half :].ravel()
+    kept[top] = after[top]
+    now = replace(solid, kept=kept)
+    expected, t_anew = timed(lambda: compliance(factorise(now), places, normals))
+    each, join = t_all / (rows + 1), max(t_all - t_ends, 0.0) / (rows - 1)
+    other = f"{ccx / each:.0f}" if ccx else "not run"
+    print(f"| {name} | {each:.3f} | {1e3 * join:.0f} | {t_anew:.2f} | {t_anew / each:.1f} | ", end="")
+    print(
+        f"{t_anew / join if join else np.inf:.0f} | {other} | {abs(found[half] / expected - 1.0).max():.0e} |",
+        flush=True,
+    )
 
 
 def main() -> None:
@@ -127,6 +166,12 @@ def main() -> None:
         other = f"{ccx / ours:.0f}" if ccx else "not here"
         print(f"| {size} | {min(ranks)} to {max(ranks)} | {1e3 * ours:.0f} | {anew:.2f} | {anew / ours:.1f} ", end="")
         print(f"| {other} | {worst:.0e} |", flush=True)
+    print(
+        "\n| pass | all [s a state] | join [ms] | refactoring [s] | ratio, all | ratio, join | CalculiX / all ", end=""
+    )
+    print("| difference |\n|---|---|---|---|---|---|---|---|")
+    for name, part, left in (("layer gone", solid, 0.0), ("thinned by a third", wall(grid.counts[1], 1), 2.0 / 3.0)):
+        by_rows(name, part, left, ccx if part is solid else 0.0)
     right = np.random.default_rng(0).standard_normal((n, 64))
     t_theirs = timed(lambda: base.factors.lu.solve(right))[1] / 64.0
     t_ours = timed(lambda: base.solve(right))[1] / 64.0

@@ -17,6 +17,7 @@ Reference: [Zienkiewicz2005] ch. 4 to 6; the rule of 14 points is that of [Irons
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,31 +126,43 @@ def _integration(kept: Array | None, m: int, rule: int) -> tuple[Array, Array, b
     return local, weights * span[:, None], False
 
 
-def _determinant(J: Array, first: int) -> Array:
+def _determinant(J: Array, numbers: Sequence[int] | NDArray[np.int64]) -> Array:
     """Det J of every element and point; refused where it is not above 0."""
     det = np.asarray(np.linalg.det(J))
     bad = np.flatnonzero(~(det.min(axis=1) > 0.0))
     if len(bad):
         raise InputError(
-            f"element {first + bad[0]}: det(dx/dxi) = {det[bad[0]].min():g} mm^3: must be above 0 everywhere; the "
+            f"element {numbers[bad[0]]}: det(dx/dxi) = {det[bad[0]].min():g} mm^3: must be above 0 everywhere; the "
             "element is inverted, folded or flat: turn the order of the points or move its nodes"
         )
     return det
 
 
-def gradients(xyz: Array, rule: int = 27, kept: Array | None = None, first: int = 0) -> tuple[Array, Array]:
-    """Gradients g (m, points, 20, 3) [1/mm] and weight times det J (m, points) [mm^3] of elements (m, 20, 3) [mm]."""
+def gradients(
+    xyz: Array, rule: int = 27, kept: Array | None = None, numbers: NDArray[np.int64] | None = None
+) -> tuple[Array, Array]:
+    """Gradients g (m, points, 20, 3) [1/mm] and weight times det J (m, points) [mm^3] of elements (m, 20, 3) [mm].
+
+    ``numbers`` (m,) int is what a message calls them; None: 0, 1, ..
+    """
     local, weights, alike = _integration(kept, len(xyz), rule)
     if alike:
         dN = shape_gradient(local[0])[None]
     else:
         dN = shape_gradient(local.reshape(-1, 3)).reshape(*local.shape[:2], 20, 3)
     J = np.swapaxes(dN, 2, 3) @ xyz[:, None]  # rows: d/dxi, columns: x y z
-    volume = _determinant(J, first) * weights
+    volume = _determinant(J, range(len(xyz)) if numbers is None else numbers) * weights
     return dN @ np.swapaxes(np.linalg.inv(J), 2, 3), volume
 
 
-def stiffness(xyz: Array, modulus: float, poisson: float, rule: int = 27, kept: Array | None = None) -> Array:
+def stiffness(
+    xyz: Array,
+    modulus: float,
+    poisson: float,
+    rule: int = 27,
+    kept: Array | None = None,
+    numbers: NDArray[np.int64] | None = None,
+) -> Array:
     """Stiffness of every element.
 
     K[ia, jb] = lambda H[ia, jb] + mu H[ib, ja] + mu delta_ab sum_c H[ic, jc] with H[ia, jb] = integral of g_ia g_jb.
@@ -161,6 +174,7 @@ def stiffness(xyz: Array, modulus: float, poisson: float, rule: int = 27, kept: 
     modulus, poisson : E [MPa], nu
     rule : points of integration, 8, 14 or 27
     kept : (m, 2) float, part of the thickness that is there; None: all of it. (0, 0) gives zeros
+    numbers : (m,) int, what a message calls the elements; None: 0, 1, ..
 
     Returns
     -------
@@ -181,10 +195,11 @@ def stiffness(xyz: Array, modulus: float, poisson: float, rule: int = 27, kept: 
     1000.0
     """
     lam, mu = lame(modulus, poisson)
+    called = np.arange(len(xyz)) if numbers is None else numbers
     out = np.empty((len(xyz), 60, 60))
     for at in range(0, len(xyz), _CHUNK):
         part = slice(at, at + _CHUNK)
-        g, volume = gradients(xyz[part], rule, None if kept is None else kept[part], at)
+        g, volume = gradients(xyz[part], rule, None if kept is None else kept[part], called[part])
         flat = g.reshape(len(g), -1, 60) * np.sqrt(volume)[:, :, None]
         H = np.swapaxes(flat, 1, 2) @ flat
         blocks = H.reshape(-1, 20, 3, 20, 3)
@@ -211,7 +226,7 @@ def mass(xyz: Array, density: float, rule: int = 27, kept: Array | None = None) 
     for at in range(0, len(xyz), _CHUNK):
         part = slice(at, at + _CHUNK)
         some = None if kept is None else kept[part]
-        _, volume = gradients(xyz[part], rule, some, at)
+        _, volume = gradients(xyz[part], rule, some, np.arange(at, at + len(xyz[part])))
         local, _, _ = _integration(some, len(volume), rule)
         N = shape(local.reshape(-1, 3)).reshape(*local.shape[:2], 20)
         flat = N * np.sqrt(density * volume)[:, :, None]

@@ -289,7 +289,7 @@ def _cut_elements(base: Factored, solid: Solid) -> tuple[Indices, NDArray[np.boo
     def summed(kept: Array) -> csc_array:
         K = np.zeros((len(e), 60, 60))
         part = kept[:, 1] > kept[:, 0]
-        K[part] = stiffness(xyz[part], solid.modulus, solid.poisson, solid.rule, kept[part])
+        K[part] = stiffness(xyz[part], solid.modulus, solid.poisson, solid.rule, kept[part], e[part])
         size = (len(touched), len(touched))
         return coo_array((K.ravel()[free], (rows[free], columns[free])), shape=size).tocsc()
 

@@ -66,7 +66,13 @@ class Solid:
     def __post_init__(self) -> None:
         lo, hi = MODULUS_RANGE
         if not lo <= self.modulus <= hi:
-            hint = "is it in Pa?" if self.modulus > hi else "is it in GPa?"
+            hint = (
+                "is it in GPa?"
+                if self.modulus < lo
+                else "is it in Pa?"
+                if self.modulus > 1e9
+                else "was MPa given for GPa?"
+            )
             raise InputError(f"workpiece.modulus = {self.modulus:g} MPa: must be from {lo:g} to {hi:g} MPa; {hint}")
         lo, hi = DENSITY_RANGE
         if not lo <= self.density <= hi:
@@ -120,7 +126,7 @@ def assemble(solid: Solid) -> csc_array:
     assert solid.kept is not None
     e = solid.there
     elements = solid.grid.elements[e]
-    K = stiffness(solid.grid.nodes[elements], solid.modulus, solid.poisson, solid.rule, solid.kept[e])
+    K = stiffness(solid.grid.nodes[elements], solid.modulus, solid.poisson, solid.rule, solid.kept[e], e)
     return _sum(K, element_dofs(elements), 3 * len(solid.grid.nodes))
 
 
@@ -178,13 +184,23 @@ def check_held(solid: Solid) -> None:
             values, vectors = np.zeros(6), np.eye(6)
         loose = vectors[:, values <= 1e-9 * len(mine)]
         if loose.shape[1]:
-            share = (loose**2).sum(axis=1)
-            names = [RIGID_MOTIONS[c] for c in range(6) if share[c] > 0.1]
+            names = _motions(loose)
             what = "workpiece" if count == 1 else f"the piece of element {int(e[np.argmax(piece == number)])}"
             raise InputError(
-                f"{what}: not held against motion {', '.join(names)}: {loose.shape[1]} rigid motions are free; "
-                "fix more nodes"
+                f"{what}: not held against motion {', '.join(names)}: "
+                f"{loose.shape[1]} rigid {'motion is' if loose.shape[1] == 1 else 'motions are'} free; fix more nodes"
             )
+
+
+def _motions(loose: Array) -> list[str]:
+    """Names of free rigid motions (6, k): directions of those that do not turn, axes of the rest, wherever they lie."""
+    _, sizes, turned = np.linalg.svd(loose[3:])
+    still = np.ones(loose.shape[1], dtype=np.bool_)
+    still[: len(sizes)] = sizes <= 1e-6
+    along = ((loose[:3] @ turned[still].T) ** 2).sum(axis=1)
+    turning = loose[3:] @ turned[~still].T
+    about = ((turning / np.linalg.norm(turning, axis=0)) ** 2).sum(axis=1)
+    return [name for name, share in zip(RIGID_MOTIONS, (*along, *about), strict=True) if share > 0.1]
 
 
 @dataclass(frozen=True, eq=False)
