@@ -37,7 +37,9 @@ Floats = NDArray[np.float64]
 
 #: safe height of the tip over the wall, in radii of the cutter
 SAFE = 1.5
-#: rows run on beyond the edges of the wall by so many [mm], over the reach of the cutter in its stock
+#: links sag by this share of their distance to the stock
+SAG = 0.3
+#: rows run on beyond the edges of the wall by so many [mm], over the reach of the corner in its stock
 BEYOND = 1.0
 
 
@@ -122,8 +124,10 @@ def _planned(inputs: WallInputs, progress: Progress) -> Mapping[str, Planned]:
 def _tour(inputs: WallInputs, plan: Plan) -> tuple[Leg, ...]:
     sides = [inputs.fine(s) for s in inputs.side_numbers]
     cutter = inputs.cutter
-    reach = math.sqrt(2.0 * cutter.corner_radius * max(inputs.allowance)) + cutter.corner_radius
-    margins = Margins(BEYOND + reach, inputs.top + SAFE * cutter.radius)
+    allowance = max(inputs.allowance)
+    reach = math.sqrt(2.0 * cutter.corner_radius * allowance)
+    sag = SAG * (inputs.going.clearance - allowance)
+    margins = Margins(BEYOND + reach, inputs.top + SAFE * cutter.radius, sag)
     return tour(plan.passes, sides, inputs.places, inputs.going, margins)
 
 

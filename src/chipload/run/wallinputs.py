@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import trimesh
@@ -27,7 +26,8 @@ from chipload.planning.thinwall.engaged import Posture
 from chipload.planning.thinwall.law import Law, law_of
 from chipload.planning.thinwall.passes import Bears
 from chipload.planning.thinwall.paths import Going
-from chipload.planning.thinwall.threshold import Experiments, Threshold, calibrated, from_deflections
+from chipload.planning.thinwall.table import read_cuts
+from chipload.planning.thinwall.threshold import Experiments, Threshold, calibrated
 from chipload.planning.thinwall.tours import Side
 from chipload.planning.thinwall.wall import SIDES, Surface, Wall
 from chipload.run.provenance import title_of
@@ -165,9 +165,9 @@ def read_wall(job: WallJob) -> WallInputs:
     )
     law = law_of(posture, material, Limits(op.depth_min_mm, op.depth_max_mm), measure="greatest")
     i, j, _ = wall.solid.grid.counts
-    experiments = None
+    experiments, noticed = None, ()
     if job.threshold_file is not None:
-        experiments = read_experiments(job.threshold_file, table.limits.deflection_um / 1000.0)
+        experiments, noticed = read_cuts(job.threshold_file, table.limits.deflection_um / 1000.0)
     return WallInputs(
         job=job,
         title=title_of(job.path),
@@ -252,31 +252,3 @@ def _step_over(job: WallJob, cutter: Cutter) -> float:
     if not h < 0.5 * r:
         raise InputError(f"operation.0.scallop_um = {op.scallop_um:g}: must be below {500.0 * r:g}, half the radius")
     return 2.0 * math.sqrt(2.0 * r * h - h * h)
-
-
-def read_experiments(path: Path, deflection: float) -> Experiments:
-    """Experiments of a CSV table: u, v, normal_force_n, and deflection_um where that was measured.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, a column is missing, a line is not numbers.
-    """
-    try:
-        lines = path.read_text("utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as err:
-        raise InputError(f"{path.name}: cannot be read: {err}") from None
-    rows = [[x.strip() for x in text.split(",")] for text in lines if text.strip() and not text.startswith("#")]
-    names = rows[0] if rows else []
-    for key in ("u", "v", "normal_force_n"):
-        if key not in names:
-            raise InputError(f"{path.name}: column {key}: missing: need u, v, normal_force_n (and deflection_um)")
-    try:
-        values = np.array([[float(x) for x in row] for row in rows[1:]]).reshape(-1, len(names))
-    except ValueError as err:
-        raise InputError(f"{path.name}: not a table of {len(names)} numbers a line: {err}") from None
-    place = values[:, [names.index("u"), names.index("v")]]
-    force = values[:, names.index("normal_force_n")]
-    if "deflection_um" in names:
-        return from_deflections(place, force, values[:, names.index("deflection_um")] / 1000.0, deflection)
-    return Experiments(place, force)

@@ -31,7 +31,7 @@ from chipload.structure.spindle import cutter_bars
 Floats = NDArray[np.float64]
 
 #: side of a tile of the stock, in diameters of the cutter
-TILE = 4.0
+TILE = 1.0
 #: layers below the reach of the cutter are so many times as thick
 COARSE = 8.0
 #: points of a finished side, along and up

@@ -4,7 +4,9 @@ Notation: D_k [mm] stock that is left on a side before its pass k, D_0 = 0 the f
 bears; d~ its lower Lipschitz envelope of slope L; a allowance. Passes are numbered from the finish outwards, the order
 of planning; they are cut the other way round, the sides alternately: ... A_2 B_2 A_1 B_1.
 
-    D_k = min(D_(k-1) + d~_k, a)      until D_k = a everywhere.
+    D_k = min(D_(k-1) + d~_k, a)      until D_k = a everywhere,
+
+but at most a - d_min where a is not reached, so that the pass before has more than a film to cut.
 
 The depth of pass k is that which the wall bears with D_(k-1) left on its side everywhere, as if the whole pass were cut
 already: the softest state in which the pass is cut. The other side still has what its own later passes take.
@@ -112,6 +114,12 @@ def _made(side: int, low: Floats, high: Floats, threshold: Threshold, law: Law) 
     return Pass(side, low, high, threshold, force, force > threshold.force.reshape(low.shape) * (1.0 + 1e-9))
 
 
+def _no_sliver(low: Floats, high: Floats, allowance: float, smallest: float) -> Floats:
+    """Stock before a pass: the allowance where it is reached, else at least the smallest depth below it."""
+    rest = np.maximum(np.minimum(high, allowance - smallest), low)
+    return np.where(high >= allowance - NOTHING, allowance, rest)
+
+
 def variable(
     surfaces: Sequence[Surface],
     bears: Bears,
@@ -155,7 +163,7 @@ def variable(
             weak = (depth == 0.0) & open_
             infeasible |= {(side, int(i), int(j)) for i, j in np.argwhere(weak)}
             depth = lower_envelope(surfaces[side].points, np.maximum(depth, law.limits.smallest), slope)
-            high = np.minimum(D[side] + depth, a)
+            high = _no_sliver(D[side], D[side] + depth, a, law.limits.smallest)
             done.append(_made(side, D[side], high, threshold, law))
             D[side] = high
             progress(

@@ -71,13 +71,16 @@ class Leg:
 
 @dataclass(frozen=True)
 class Margins:
-    """Distances [mm] of a tour: beyond the edges of the wall, and the safe height of the tip."""
+    """Distances [mm] of a tour: beyond the edges of the wall, the safe height of the tip, and how far links may leave
+    their distance to the surface.
+    """
 
     beyond: float
     safe: float
+    sag: float
 
     def __post_init__(self) -> None:
-        for key in ("beyond", "safe"):
+        for key in ("beyond", "safe", "sag"):
             if not 0.0 < getattr(self, key) < math.inf:
                 raise InputError(f"tour.{key}_mm = {getattr(self, key):g}: must be above 0")
 
@@ -163,7 +166,8 @@ def _leg(
                 path.rapid(lifted[r, first], axis[r, first])
             else:
                 step = 1 if first >= before[1] else -1
-                for k in range(before[1], first + step, step):
+                back = np.arange(before[1], first + step, step)
+                for k in back[_corners(lifted[r, back], margins.sag)]:
                     path.rapid(lifted[r, k], axis[r, k])
             path.line(tip[r, first], axis[r, first], centre[r, first], lifted[r, first] - tip[r, first])
             for k in range(first, last + 1):
@@ -175,6 +179,25 @@ def _leg(
     assert before is not None
     path.rapid(outside[before], axis[before])
     return path.leg(p.side, going, label)
+
+
+def _corners(points: Floats, sag: float) -> NDArray[np.int64]:
+    """Numbers of the points (n, 3) whose chords stay within ``sag`` of all, first and last among them."""
+    keep, todo = {0, len(points) - 1}, [(0, len(points) - 1)]
+    while todo:
+        a, b = todo.pop()
+        if b - a < 2:
+            continue
+        chord = points[b] - points[a]
+        v = points[a + 1 : b] - points[a]
+        size = float(chord @ chord)
+        t = np.clip(v @ chord / size, 0.0, 1.0) if size > 0.0 else np.zeros(len(v))
+        off = np.linalg.norm(v - t[:, None] * chord, axis=1)
+        k = int(off.argmax())
+        if off[k] > sag:
+            keep.add(a + 1 + k)
+            todo += [(a, a + 1 + k), (a + 1 + k, b)]
+    return np.array(sorted(keep))
 
 
 def _known(rows: Rows, side: Side, depth: Floats) -> tuple[Floats, Floats]:
