@@ -27,6 +27,10 @@ from chipload.report.programs import program_files
 from chipload.report.reading import Read
 from chipload.report.scene import scene_bytes
 from chipload.report.summary import summary_bytes
+from chipload.report.wall import page as wall_page
+from chipload.report.wall import scene as wall_scene
+from chipload.report.wall import summary as wall_summary
+from chipload.report.wall.outcome import Walled
 
 SUMMARY = "summary.json"
 #: files and who makes them
@@ -51,10 +55,15 @@ KINDS: dict[type, Kind] = {
         reading.program_files,
         reading.verdict,
     ),
+    Walled: Kind(
+        (wall_summary.summary_bytes, wall_summary.history_bytes, wall_scene.scene_bytes, wall_page.page_bytes),
+        wall_summary.program_files,
+        wall_summary.verdict,
+    ),
 }
 
 
-def verdict(outcome: Outcome | Read) -> tuple[bool, str]:
+def verdict(outcome: Outcome | Read | Walled) -> tuple[bool, str]:
     """Whether everything holds, and one sentence that says it."""
     return KINDS[type(outcome)].verdict(outcome)
 
@@ -88,7 +97,7 @@ def check_target(out: str | Path, ours: Callable[[Path], bool] | None = None, wh
     return target
 
 
-def write_result(outcome: Outcome | Read, out: str | Path, progress: Progress = silent) -> Path:
+def write_result(outcome: Outcome | Read | Walled, out: str | Path, progress: Progress = silent) -> Path:
     """Write the whole result folder and return it.
 
     Raises

@@ -3,19 +3,22 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from chipload.job import AnyJob, Job, ProgramJob
+from chipload.job import AnyJob, Job, ProgramJob, WallJob
 from chipload.progress import Progress, silent
 from chipload.report.outcome import Outcome
 from chipload.report.reading import Read
+from chipload.report.wall.outcome import Walled
 from chipload.run.planned import Inputs, look_at_job, prove, read_inputs, run_job
 from chipload.run.program import look_at_program, run_program
+from chipload.run.wall import look_at_wall, run_wall
 
 #: an outcome of any kind
-AnyOutcome = Outcome | Read
+AnyOutcome = Outcome | Read | Walled
 #: kinds of jobs: what runs them, and what reads all that they name and says what it found and whether that holds
 KINDS: Mapping[type[AnyJob], tuple[Callable[[Any, Progress], AnyOutcome], Callable[[Any], tuple[list[str], bool]]]] = {
     Job: (run_job, look_at_job),
     ProgramJob: (run_program, look_at_program),
+    WallJob: (run_wall, look_at_wall),
 }
 
 
@@ -43,4 +46,4 @@ def look(job: AnyJob) -> tuple[list[str], bool]:
     return KINDS[type(job)][1](job)
 
 
-__all__ = ["AnyOutcome", "Inputs", "look", "prove", "read_inputs", "run", "run_job", "run_program"]
+__all__ = ["AnyOutcome", "Inputs", "look", "prove", "read_inputs", "run", "run_job", "run_program", "run_wall"]

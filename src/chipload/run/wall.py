@@ -22,7 +22,6 @@ from chipload.planning.thinwall.variants import variants
 from chipload.planning.thinwall.wall import SIDES
 from chipload.program.check import check_program
 from chipload.program.commands import Commands
-from chipload.program.gcode.writer import write_commands
 from chipload.program.program import Program
 from chipload.program.read import Reading, line_times
 from chipload.program.to_axes import to_axes
@@ -70,7 +69,7 @@ def run_wall(job: WallJob, progress: Progress = silent) -> Walled:
     body, finished = inputs.stock_mesh(), inputs.finished_mesh()
     text = inputs.bears(inputs.deflection)([np.zeros(inputs.wall.shape)] * 2, inputs.side_numbers[0])
     settings: dict[str, Any] = {k: v for k, v in job.operation.model_dump().items() if v is not None}
-    settings |= {"gouge_tolerance_mm": inputs.gouge_tolerance, "turned_wall": inputs.shape.name}
+    settings |= {"gouge_tolerance_mm": inputs.gouge_tolerance, "yield_mpa": job.table.workpiece.yield_mpa}
     return Walled(
         title=title_of(job.path),
         wall=inputs.shape,
@@ -116,9 +115,7 @@ def _planned(inputs: WallInputs, progress: Progress) -> Mapping[str, Planned]:
     def bears_at(deflection: float) -> Any:
         return inputs.bears(deflection)
 
-    return variants(
-        surfaces, bears_at, inputs.law, inputs.slope, inputs.deflection, inputs.factor, progress
-    )
+    return variants(surfaces, bears_at, inputs.law, inputs.slope, inputs.deflection, inputs.factor, progress)
 
 
 def _tour(inputs: WallInputs, plan: Plan) -> tuple[Leg, ...]:
@@ -134,7 +131,7 @@ def _tour(inputs: WallInputs, plan: Plan) -> tuple[Leg, ...]:
 def _variant(inputs: WallInputs, name: str, planned: Planned, legs: tuple[Leg, ...], proof: Proof) -> Variant:
     plan = planned.plan
     program = Program.join([leg.program for leg in legs])
-    commands, text, found, seconds = _on_machine(inputs, program, name)
+    commands, found, seconds = _on_machine(inputs, program)
     maps = tuple(
         PassMap(p.side, inputs.coarse(inputs.side_numbers[p.side]).points, *inputs.places, p.depth, threshold)
         for p, threshold in zip(plan.passes, proof.thresholds, strict=True)
@@ -147,7 +144,6 @@ def _variant(inputs: WallInputs, name: str, planned: Planned, legs: tuple[Leg, .
         maps,
         program,
         commands,
-        text,
         found,
         seconds,
         proof.columns,
@@ -156,11 +152,12 @@ def _variant(inputs: WallInputs, name: str, planned: Planned, legs: tuple[Leg, .
         plan.force_max,
         plan.deflection_max,
         _infeasible(inputs, plan) if name == "variable" else (),
+        proof.stress,
     )
 
 
-def _on_machine(inputs: WallInputs, program: Program, name: str) -> tuple[Commands, str, tuple[str, ...], float]:
-    """The axes, the text without its first line's verdict, what the machine does not give, and the time [s]."""
+def _on_machine(inputs: WallInputs, program: Program) -> tuple[Commands, tuple[str, ...], float]:
+    """The axes, what the machine does not give, and the time [s]."""
     machine: Machine = inputs.machine
     lengths = {inputs.cutter.number: inputs.cutter.overhang}
     commands, findings = to_axes(program, machine, tool_lengths=lengths)
@@ -168,8 +165,7 @@ def _on_machine(inputs: WallInputs, program: Program, name: str) -> tuple[Comman
     broken = [*check_program(program, machine), *limit_findings(machine, axes, commands.line, placed=False)]
     broken = [f for f in broken if f.code != "machine-offset"]
     _, seconds = line_times(Reading(commands, program, axes, findings, ()), machine)
-    text = write_commands(commands, machine, title=f"{inputs.title}, {name}", verified=False)
-    return commands, text, tuple(f.text for f in broken), float(seconds.sum())
+    return commands, tuple(f.text for f in broken), float(seconds.sum())
 
 
 def _infeasible(inputs: WallInputs, plan: Plan) -> tuple[Help, ...]:
@@ -196,9 +192,10 @@ def _infeasible(inputs: WallInputs, plan: Plan) -> tuple[Help, ...]:
 
 
 def _noticed(inputs: WallInputs) -> tuple[str, ...]:
-    op = inputs.job.operation
+    """What asks more of the coefficients than they were measured for, and what the experiments' reader noticed."""
     speed = inputs.going.spindle * inputs.cutter.radius * math.sin(inputs.posture.beta)
-    return beyond(inputs.material, inputs.posture.feed_per_tooth, speed) if op.feed_mm_min else ()
+    found = beyond(inputs.material, inputs.posture.feed_per_tooth, speed)
+    return (*found, *(str(f) for f in inputs.noticed))
 
 
 def _provenance(job: WallJob, inputs: WallInputs) -> dict[str, Any]:
@@ -219,9 +216,7 @@ def _provenance(job: WallJob, inputs: WallInputs) -> dict[str, Any]:
             "conditions": material.conditions,
         },
         "workpiece": job.table.workpiece.model_dump(),
-        "threshold": inputs.bears(inputs.deflection)(
-            [np.zeros(inputs.wall.shape)] * 2, inputs.side_numbers[0]
-        ).text,
+        "threshold": inputs.bears(inputs.deflection)([np.zeros(inputs.wall.shape)] * 2, inputs.side_numbers[0]).text,
         "versions": versions(),
     }
 

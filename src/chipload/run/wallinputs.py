@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named, read_material
-from chipload.errors import InputError
+from chipload.errors import Finding, InputError
 from chipload.geometry.sections import checked, loft, read_sections
 from chipload.geometry.wall import ThinWall, blade, plate, through_sections
 from chipload.job import WallJob
@@ -54,6 +54,7 @@ class WallInputs:
     places : u (n,) and v (m,) of the wall's places
     law : F_n of depths
     experiments : None: thresholds are modelled
+    noticed : while they were read
     """
 
     job: WallJob
@@ -76,6 +77,7 @@ class WallInputs:
     deflection: float
     factor: float
     experiments: Experiments | None
+    noticed: tuple[Finding, ...]
     gouge_tolerance: float = GOUGE
 
     @property
@@ -165,7 +167,8 @@ def read_wall(job: WallJob) -> WallInputs:
     )
     law = law_of(posture, material, Limits(op.depth_min_mm, op.depth_max_mm), measure="greatest")
     i, j, _ = wall.solid.grid.counts
-    experiments, noticed = None, ()
+    experiments: Experiments | None = None
+    noticed: tuple[Finding, ...] = ()
     if job.threshold_file is not None:
         experiments, noticed = read_cuts(job.threshold_file, table.limits.deflection_um / 1000.0)
     return WallInputs(
@@ -189,6 +192,7 @@ def read_wall(job: WallJob) -> WallInputs:
         deflection=table.limits.deflection_um / 1000.0,
         factor=1.0 - op.reserve,
         experiments=experiments,
+        noticed=noticed,
     )
 
 

@@ -26,7 +26,10 @@ from chipload.simulation.deflection import form_error, step_deflections
 from chipload.simulation.finished import beside, nearest
 from chipload.simulation.touched import touched
 from chipload.stock.layers import LayeredStock
+from chipload.structure.places import normals_of, on_cut, on_side, weights
+from chipload.structure.solid import displacement, factorise
 from chipload.structure.spindle import cutter_bars
+from chipload.structure.stress import greatest
 
 Floats = NDArray[np.float64]
 
@@ -49,12 +52,14 @@ class Proof:
     columns : a row a step, all passes one after another
     thresholds : (n, m) [N] a pass, at the places of its side
     finish, shape : of the finished wall
+    stress : greatest equivalent stress at the clamp [MPa]
     """
 
     columns: Mapping[str, NDArray[Any]]
     thresholds: tuple[Floats, ...]
     finish: tuple[Finish, ...]
     shape: Shape
+    stress: float
 
 
 def prove(inputs: WallInputs, plan: Plan, legs: Sequence[Leg], progress: Progress) -> Proof:
@@ -71,7 +76,7 @@ def prove(inputs: WallInputs, plan: Plan, legs: Sequence[Leg], progress: Progres
     parts: list[dict[str, NDArray[Any]]] = []
     thresholds: list[Floats] = []
     finish: dict[int, Finish] = {}
-    time = way = 0.0
+    time = way = stress = 0.0
     for k, (p, leg) in enumerate(zip(plan.passes, legs, strict=True)):
         removal = remove(
             leg.program,
@@ -94,10 +99,11 @@ def prove(inputs: WallInputs, plan: Plan, legs: Sequence[Leg], progress: Progres
         time, way = float(columns["t_s"][-1]), float(columns["s_mm"][-1])
         columns["pass"] = np.full(len(columns["t_s"]), leg.program.labels[0], dtype=object)
         parts.append(columns)
+        stress = max(stress, _stress(inputs, left, number, columns))
         if float(p.low.max()) <= 1e-9:
             finish[number] = _finish(inputs, removal, number, C, bars)
     whole = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-    return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(inputs, stock, legs))
+    return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(inputs, stock, legs), stress)
 
 
 def _compliance(inputs: WallInputs, left: Sequence[Floats], number: int) -> Floats:
@@ -105,6 +111,29 @@ def _compliance(inputs: WallInputs, left: Sequence[Floats], number: int) -> Floa
     found = inputs.wall.bears(inputs.both(left), SIDES[number], 1.0).compliance
     assert found is not None
     return found.reshape(inputs.wall.shape)
+
+
+def _stress(inputs: WallInputs, left: Sequence[Floats], number: int, columns: Mapping[str, NDArray[Any]]) -> float:
+    """Greatest equivalent stress [MPa] of the elements at the clamp by the contact point whose force bends them most:
+    its force times its height.
+    """
+    k = int(np.argmax(columns["force_normal_n"] * columns["contact_z_mm"]))
+    if not columns["force_normal_n"][k] > 0.0:
+        return 0.0
+    solid = inputs.wall.state(inputs.both(left))
+    grid = solid.grid
+    places = on_side(grid, SIDES[number], [columns["u"][k]], [_rows(inputs, float(columns["v"][k])) / grid.counts[1]])
+    assert solid.kept is not None
+    places = on_cut(places, solid.kept, SIDES[number])
+    force = weights(grid, places).T @ (columns["force_normal_n"][k] * normals_of(grid, places, SIDES[number]))
+    foot = np.arange(len(grid.elements)).reshape(grid.counts)[:, 0].ravel()
+    return greatest(solid, displacement(factorise(solid), force), foot)
+
+
+def _rows(inputs: WallInputs, v: float) -> float:
+    """How many rows of elements a parameter v lies above the clamp."""
+    j = inputs.wall.solid.grid.counts[1]
+    return float(np.interp(v, [0.0, inputs.foot, 1.0], [0.0, inputs.wall.foot + 1e-9, j]))
 
 
 def between(places: tuple[Floats, Floats], values: Floats, u: Floats, v: Floats) -> Floats:
@@ -151,9 +180,7 @@ def _columns(
     return columns
 
 
-def _finish(
-    inputs: WallInputs, removal: Removal, number: int, C: Floats, bars: Mapping[int, Any]
-) -> Finish:
+def _finish(inputs: WallInputs, removal: Removal, number: int, C: Floats, bars: Mapping[int, Any]) -> Finish:
     """Form error of a side by its last pass."""
     u, v = np.meshgrid(
         np.linspace(0.02, 0.98, POINTS[0]), np.linspace(inputs.foot, 1.0, POINTS[1] + 1)[1:], indexing="ij"
@@ -168,16 +195,16 @@ def _finish(
         bars=bars,
         near=0.5 * inputs.allowance[number],
     )
-    return Finish(
-        number, points, found.error.reshape(u.shape), found.gap.reshape(u.shape), found.made.reshape(u.shape)
-    )
+    return Finish(number, points, found.error.reshape(u.shape), found.gap.reshape(u.shape), found.made.reshape(u.shape))
 
 
 def _shape(inputs: WallInputs, stock: LayeredStock, legs: Sequence[Leg]) -> Shape:
     """Path and stock beside the finished wall."""
     length, height, _ = inputs.shape.size()
     u, v = np.meshgrid(
-        np.linspace(0.0, 1.0, round(length / CLOUD) + 1), np.linspace(0.0, 1.0, round(height / CLOUD) + 1), indexing="ij"
+        np.linspace(0.0, 1.0, round(length / CLOUD) + 1),
+        np.linspace(0.0, 1.0, round(height / CLOUD) + 1),
+        indexing="ij",
     )
     cloud = np.concatenate([p.reshape(-1, 3) for p in inputs.shape.sides(u, v)])
     gap = nearest(Program.join([leg.program for leg in legs]), inputs.cutter, cloud)

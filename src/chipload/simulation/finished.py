@@ -84,17 +84,19 @@ def nearest(program: Program, cutter: Cutter, points: ArrayLike) -> Gap:
             d = np.hypot(np.maximum(rho - e, 0.0), h) - r
             corner[k] = float(d.min())
             which[k] = tree.query(v[int(d.argmin())])[1]
-    k = int(corner.argmin())
-    best = Gap(float(corner[k]), _place(cloud[which[k]]), int(row[k]))
+    low = int(corner.argmin())
+    best = Gap(float(corner[low]), _place(cloud[which[low]]), int(row[low]))
     some = np.arange(0, len(tip), FLANKS)
     for height in np.arange(f + BALLS * cutter.radius, cutter.overhang, BALLS * cutter.radius):
         thick = float(cutter.radius_at([min(height, cutter.flute_length)])[0])
         if height > cutter.flute_length and cutter.shank_diameter is not None:
             thick = max(thick, 0.5 * cutter.shank_diameter)
-        distance, near = tree.query(tip[some] + height * axis[some], distance_upper_bound=thick + max(best.distance, 0.0))
-        k = int(distance.argmin())
-        if distance[k] - thick < best.distance:
-            best = Gap(float(distance[k] - thick), _place(cloud[near[k]]), int(row[some[k]]))
+        distance, near = tree.query(
+            tip[some] + height * axis[some], distance_upper_bound=thick + max(best.distance, 0.0)
+        )
+        low = int(distance.argmin())
+        if distance[low] - thick < best.distance:
+            best = Gap(float(distance[low] - thick), _place(cloud[near[low]]), int(row[some[low]]))
     return best
 
 
@@ -116,9 +118,9 @@ def beside(stock: LayeredStock, body: trimesh.Trimesh, low: float) -> Beside:
         within = shapely.intersects(there, edge)
         count += len(edge)
         out = np.where(within, 0.0, apart)
-        k = int(out.argmax())
-        if out[k] > gouge:
-            gouge, at = float(out[k]), (float(edge[k].x), float(edge[k].y), float(heights[i]))
+        worst = int(out.argmax())
+        if out[worst] > gouge:
+            gouge, at = float(out[worst]), (float(edge[worst].x), float(edge[worst].y), float(heights[i]))
         if heights[i] >= low:
             left = max(left, float(np.where(within, apart, 0.0).max()))
     return Beside(gouge, at, left, count)

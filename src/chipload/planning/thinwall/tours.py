@@ -3,7 +3,7 @@
 Notation: rows, q, n and t as in :mod:`chipload.planning.thinwall.paths`; C [mm] the middle of the corner circle's
 centres; c [mm] clearance along n; A the cutter's axis. A row runs on beyond both edges of the wall by o [mm], so that
 the cutter comes to its depth in the air. Between two pieces it lifts by c along n and goes back along the next row at
-that distance; between two passes it goes out along A until its tip is as high as the safe height, over the wall, and in
+that distance; between two passes it goes out along A, a little away from the wall, until its tip is as high as the safe height, over the wall, and in
 along the next axis.
 
 The feed is that of C, which is what a chip's thickness comes from, not that of the tip, which is nearer to the surface.
@@ -29,6 +29,10 @@ from chipload.planning.thinwall.wall import Surface
 from chipload.program.program import LINE, RAPID, Program
 
 Floats = NDArray[np.float64]
+
+
+#: the way out leans by this share of n from the axis: away from the wall
+ASIDE = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,9 +139,7 @@ def tour(
     return tuple(out)
 
 
-def _leg(
-    p: Pass, side: Side, places: tuple[Floats, Floats], going: Going, margins: Margins, label: str
-) -> Leg:
+def _leg(p: Pass, side: Side, places: tuple[Floats, Floats], going: Going, margins: Margins, label: str) -> Leg:
     low, high = (refined(d, places, (side.u, side.v)) for d in (p.low, p.high))
     bare = rows_of(side.surface, low, high, going.posture)
     if not bare.cut.any():
@@ -148,14 +150,15 @@ def _leg(
     depth = np.pad(depth, ((0, 0), (1, 1)))
     tip, axis, centre = placed(rows, going.posture)
     low_axis = float(axis[..., 2].min())
-    if low_axis < 0.02:
+    if min(low_axis, float((axis + ASIDE * rows.normal)[..., 2].min())) < 0.02:
         raise InputError(
             f"{label}: the cutter's axis stands {math.degrees(math.asin(low_axis)):.3g} deg above the horizontal: lean "
             "it more towards the free edge (operation.lean_deg)"
         )
     path = _Path()
     lifted = tip + going.clearance * rows.normal
-    outside = lifted + ((margins.safe - lifted[..., 2]) / axis[..., 2]).clip(0.0)[..., None] * axis
+    away = axis + ASIDE * rows.normal
+    outside = lifted + ((margins.safe - lifted[..., 2]) / away[..., 2]).clip(0.0)[..., None] * away
     before: tuple[int, int] | None = None
     for r in range(len(tip)):
         on = np.concatenate([[0], rows.cut[r].astype(np.int64), [0]])

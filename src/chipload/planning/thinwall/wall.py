@@ -127,7 +127,9 @@ class Wall:
 
     def _cut(self) -> NDArray[np.int64]:
         """Numbers of the elements above the foot, in the order of :meth:`_blocks`."""
-        return np.asarray(np.arange(len(self.solid.grid.elements)).reshape(self.solid.grid.counts)[:, self.foot :].ravel())
+        return np.asarray(
+            np.arange(len(self.solid.grid.elements)).reshape(self.solid.grid.counts)[:, self.foot :].ravel()
+        )
 
     def state(self, left: Sequence[Floats]) -> Solid:
         """The workpiece with stock ``left`` D, (n, m) float [mm] on k- and on k+."""

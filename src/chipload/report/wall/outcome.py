@@ -110,7 +110,7 @@ class Variant:
     held : deflection [mm] that it was planned under; infinite: none
     maps : a pass each, in the order of cutting
     program : the whole of it
-    commands, text : on the machine; the text is not yet headed by a verdict
+    commands : on the machine
     beyond : what the machine does not give
     seconds : on the machine
     columns : a row a step of the simulation
@@ -118,6 +118,7 @@ class Variant:
     shape : the simulated stock beside the finished wall
     planned_force, planned_deflection : greatest [N], [mm]; None: compliance not known
     infeasible : places that bear nothing
+    stress : greatest equivalent stress at the clamp [MPa] under the simulated forces
     """
 
     name: str
@@ -127,7 +128,6 @@ class Variant:
     maps: tuple[PassMap, ...]
     program: Program
     commands: Commands
-    text: str
     beyond: tuple[str, ...]
     seconds: float
     columns: Mapping[str, NDArray[Any]]
@@ -136,6 +136,7 @@ class Variant:
     planned_force: float
     planned_deflection: float | None
     infeasible: tuple[Help, ...]
+    stress: float
 
     @property
     def over(self) -> NDArray[np.int64]:
@@ -169,7 +170,7 @@ class Walled:
     title : of the job
     wall : its finished shape
     allowance : [mm] on k- and k+
-    stock : (vertices (n, 3), faces (m, 3)) of the workpiece before, and of the finished wall
+    stock, finished : (vertices (n, 3), faces (m, 3)) of the workpiece before, and of the finished wall
     cutter, machine : of the operation
     limits, unchecked : stated limits by name, and names of those that are not stated
     threshold_source, threshold_text : ``modelled`` or ``calibrated``, and a sentence
@@ -177,7 +178,6 @@ class Walled:
     step_over : [mm]
     feed_per_tooth : [mm]
     variants : by name
-    stress : greatest bending stress at the clamp [MPa] by the simulated forces, and the yield stress
     findings : what was noticed
     settings, provenance : JSON values
     """
@@ -232,6 +232,9 @@ def fails(walled: Walled, name: str) -> tuple[str, ...]:
         out.append(
             f"gouges the finished wall by {max(one.shape.gouge, -one.shape.nearest):.4g} mm near {_at(one.shape.at)}"
         )
+    strength = float(walled.settings["yield_mpa"])
+    if one.stress > strength:
+        out.append(f"stress {one.stress:.4g} MPa at the clamp exceeds the yield stress {strength:g} MPa: it stays bent")
     missed = sum(int((~f.made).sum()) for f in one.finish)
     if missed:
         out.append(f"{missed} points of the finished surface are not made by any step")
