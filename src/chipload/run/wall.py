@@ -14,7 +14,7 @@ from chipload.cutting.material import beyond
 from chipload.job import WallJob
 from chipload.machine.limits import limit_findings
 from chipload.machine.machine import Machine
-from chipload.planning.thinwall.depth import largest_depths
+from chipload.planning.thinwall.depth import largest_depths, normal_force
 from chipload.planning.thinwall.passes import Plan
 from chipload.planning.thinwall.tours import Leg, Margins, tour
 from chipload.planning.thinwall.variants import Variant as Planned
@@ -115,7 +115,7 @@ def _planned(inputs: WallInputs, progress: Progress) -> Mapping[str, Planned]:
     def bears_at(deflection: float) -> Any:
         return inputs.bears(deflection)
 
-    return variants(surfaces, bears_at, inputs.law, inputs.slope, inputs.deflection, inputs.factor, progress)
+    return variants(surfaces, bears_at, inputs.law, inputs.even_law, inputs.slope, inputs.deflection, inputs.factor, progress)
 
 
 def _tour(inputs: WallInputs, plan: Plan) -> tuple[Leg, ...]:
@@ -180,14 +180,19 @@ def _infeasible(inputs: WallInputs, plan: Plan) -> tuple[Help, ...]:
                 key = (side, i, j)
                 least[key] = min(least.get(key, math.inf), float(force[i, j]))
     keys = sorted(least)
+    limits = inputs.law.limits
+    plane = float(normal_force(inputs.posture, inputs.material, [limits.smallest], measure=inputs.measure)[0])
+    share = plane / float(inputs.law.forces[0])  # what helps is asked of plane stock
     found = largest_depths(
-        inputs.posture, inputs.material, [least[k] for k in keys], inputs.law.limits, measure=inputs.measure
+        inputs.posture, inputs.material, [share * least[k] for k in keys], limits, measure=inputs.measure
     )
     out = []
     for one in found.infeasible:
         side, i, j = keys[one.place]
         x, y, z = inputs.coarse(inputs.side_numbers[side]).points[i, j].tolist()
-        out.append(Help(side, (x, y, z), one.threshold, one.force, one.feed_per_tooth, one.diameter))
+        out.append(
+            Help(side, (x, y, z), one.threshold / share, one.force / share, one.feed_per_tooth, one.diameter)
+        )
     return tuple(out)
 
 

@@ -23,7 +23,7 @@ from chipload.job import WallJob
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.thinwall.depth import Limits, Measure
 from chipload.planning.thinwall.engaged import Posture
-from chipload.planning.thinwall.law import Law, law_of
+from chipload.planning.thinwall.law import Law, law_on_stock
 from chipload.planning.thinwall.passes import Bears
 from chipload.planning.thinwall.paths import Going
 from chipload.planning.thinwall.table import read_cuts
@@ -52,7 +52,7 @@ class WallInputs:
     side_numbers : of the sides that have stock, 0 for k-, 1 for k+
     foot : share of v that keeps its stock
     places : u (n,) and v (m,) of the wall's places
-    law : F_n of depths
+    law, even_law : F_n of depths on stock with the slope, and on even stock, both with cusps of the height ``cusp`` [mm]
     experiments : None: thresholds are modelled
     noticed : while they were read
     """
@@ -72,6 +72,8 @@ class WallInputs:
     going: Going
     step_over: float
     law: Law
+    even_law: Law
+    cusp: float
     measure: Measure
     slope: float
     deflection: float
@@ -165,8 +167,11 @@ def read_wall(job: WallJob) -> WallInputs:
         math.radians(op.lead_deg),
         -math.copysign(math.radians(op.lean_deg), step),
     )
-    law = law_of(posture, material, Limits(op.depth_min_mm, op.depth_max_mm), measure="greatest")
-    i, j, _ = wall.solid.grid.counts
+    cusp = step * step / (8.0 * cutter.corner_radius)
+    limits = Limits(op.depth_min_mm, op.depth_max_mm)
+    law, even = (
+        law_on_stock(posture, material, limits, slope=slope, cusp=cusp, measure="greatest") for slope in (op.slope, 0.0)
+    )
     experiments: Experiments | None = None
     noticed: tuple[Finding, ...] = ()
     if job.threshold_file is not None:
@@ -187,6 +192,8 @@ def read_wall(job: WallJob) -> WallInputs:
         going=Going(posture, feed, machine.rapid, spindle, op.clearance_mm),
         step_over=step,
         law=law,
+        even_law=even,
+        cusp=cusp,
         measure="greatest",
         slope=op.slope,
         deflection=table.limits.deflection_um / 1000.0,

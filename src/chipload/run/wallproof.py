@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
+from chipload.planning.thinwall.law import Law
 from chipload.planning.thinwall.passes import Plan
 from chipload.planning.thinwall.tours import Leg
 from chipload.planning.thinwall.wall import SIDES
@@ -72,6 +73,7 @@ def prove(inputs: WallInputs, plan: Plan, legs: Sequence[Leg], progress: Progres
     longest = max(float(np.linalg.norm(np.diff(leg.program.p_work, axis=0), axis=1).max()) for leg in legs)
     fine = Resolution(max(longest, op.step_mm), op.tolerance_mm, op.corner_slices, 0.5 * cutter.radius)
     bars = {cutter.number: cutter_bars(cutter)}
+    law = inputs.law if plan.name == "variable" else inputs.even_law
     left = [np.full(inputs.wall.shape, inputs.allowance[s]) for s in inputs.side_numbers]
     parts: list[dict[str, NDArray[Any]]] = []
     thresholds: list[Floats] = []
@@ -93,7 +95,7 @@ def prove(inputs: WallInputs, plan: Plan, legs: Sequence[Leg], progress: Progres
         bearing = inputs.bears(inputs.deflection)(left, p.side)
         F_th = (bearing.force / bearing.factor if inputs.experiments is None else bearing.force).reshape(C.shape)
         thresholds.append(F_th)
-        columns = _columns(inputs, removal, leg, C, F_th, bars)
+        columns = _columns(inputs, removal, leg, C, F_th, bars, law)
         columns["t_s"] = columns["t_s"] + time
         columns["s_mm"] = columns["s_mm"] + way
         time, way = float(columns["t_s"][-1]), float(columns["s_mm"][-1])
@@ -144,7 +146,7 @@ def between(places: tuple[Floats, Floats], values: Floats, u: Floats, v: Floats)
 
 
 def _columns(
-    inputs: WallInputs, removal: Removal, leg: Leg, C: Floats, F_th: Floats, bars: Mapping[int, Any]
+    inputs: WallInputs, removal: Removal, leg: Leg, C: Floats, F_th: Floats, bars: Mapping[int, Any], law: Law
 ) -> dict[str, NDArray[Any]]:
     """Columns of a pass: those of the removal, and what its contact points feel."""
     columns = dict(removal.columns)
@@ -168,7 +170,7 @@ def _columns(
         ("v", v),
         ("depth_mm", values[:, 2]),
         ("threshold_n", threshold),
-        ("planned_force_n", inputs.law.force(values[:, 2])),
+        ("planned_force_n", law.force(values[:, 2])),
         *((f"contact_{x}_mm", place.point[:, k]) for k, x in enumerate("xyz")),
     ):
         columns[name] = np.zeros(n)

@@ -45,6 +45,7 @@ def variants(
     surfaces: Sequence[Surface],
     bears_at: Callable[[float], Bears],
     law: Law,
+    even_law: Law,
     slope: float,
     deflection: float,
     factor: float = 1.0,
@@ -56,6 +57,7 @@ def variants(
     ----------
     surfaces : one or two sides
     bears_at : deflection [mm] -> thresholds of a side in a state, ``factor`` in them
+    law, even_law : of stock with the slope, and of even stock
     slope : L of the variable depths
     deflection : [mm] that is allowed
     factor : share of the thresholds that is used
@@ -66,8 +68,8 @@ def variants(
         A place bears not even the smallest depth by constant passes, or the passes do not end.
     """
     allowed = bears_at(deflection)
-    least = max(least_first_depth(surfaces, allowed, law), law.limits.smallest)
-    even = _better(surfaces, lambda order: constant(surfaces, allowed, law, least, order=order), deflection)
+    least = max(least_first_depth(surfaces, allowed, even_law), law.limits.smallest)
+    even = _better(surfaces, lambda order: constant(surfaces, allowed, even_law, least, order=order), deflection)
     progress(0.3, "constant depth")
     reached = even.plan.deflection_max
     held = deflection if reached is None or not even.plan.holds else min(reached / factor, deflection)
@@ -75,7 +77,7 @@ def variants(
     progress(0.9, "variable depth")
     deepest = law.limits.greatest
     free = _better(
-        surfaces, lambda order: constant(surfaces, allowed, law, deepest, "unconstrained", order), float("inf")
+        surfaces, lambda order: constant(surfaces, allowed, even_law, deepest, "unconstrained", order), float("inf")
     )
     return {"variable": uneven, "constant": even, "unconstrained": free}
 
