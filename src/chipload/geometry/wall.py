@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: step of the differences that normals are made from, in u and v
-STEP = 1e-4
+STEP = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +93,8 @@ class ThinWall:
         n, m = u.shape
         number = np.arange(n * m).reshape(n, m)
         faces = [_quads(number)[:, ::-1], _quads(number + n * m)]
-        for edge in (number[0, ::-1], number[-1], number[:, 0], number[::-1, -1]):
-            faces.append(_quads(np.stack([edge, edge + n * m], axis=1)))
+        edges = (number[0, ::-1], number[-1], number[:, 0], number[::-1, -1])
+        faces += [_quads(np.stack([edge, edge + n * m], axis=1)) for edge in edges]
         return trimesh.Trimesh(np.vstack([minus.reshape(-1, 3), plus.reshape(-1, 3)]), np.vstack(faces), process=False)
 
 

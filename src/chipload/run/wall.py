@@ -18,7 +18,7 @@ from chipload.planning.thinwall.depth import largest_depths, normal_force
 from chipload.planning.thinwall.passes import Plan
 from chipload.planning.thinwall.tours import Leg, Margins, tour
 from chipload.planning.thinwall.variants import Variant as Planned
-from chipload.planning.thinwall.variants import variants
+from chipload.planning.thinwall.variants import NAMES, held_to, variants
 from chipload.planning.thinwall.wall import SIDES
 from chipload.program.check import check_program
 from chipload.program.commands import Commands
@@ -27,13 +27,19 @@ from chipload.program.read import Reading, line_times
 from chipload.program.to_axes import to_axes
 from chipload.program.to_work import axes_of
 from chipload.progress import Progress, silent
-from chipload.report.wall.outcome import Help, PassMap, Variant, Walled, verdict
+from chipload.report.wall.outcome import USED, Help, PassMap, Variant, Walled, verdict
 from chipload.run.provenance import hashes, title_of, versions
 from chipload.run.wallinputs import WallInputs, read_wall
 from chipload.run.wallproof import Proof, prove
 
 Floats = NDArray[np.float64]
 
+#: share of the work that planning is, for the progress
+PLANNING = 0.1
+#: plans of variable depths that are simulated at most, until one bends the wall no more than the constant depth does
+TRIES = 3
+#: the next one is held to this share of what would just do
+HOLD = 0.99
 #: safe height of the tip over the wall, in radii of the cutter
 SAFE = 1.5
 #: links sag by this share of their distance to the stock
@@ -53,23 +59,45 @@ def run_wall(job: WallJob, progress: Progress = silent) -> Walled:
         By ``progress``.
     """
     inputs = read_wall(job)
-    planned = _planned(inputs, lambda done, what: progress(0.1 * done, what))
+    planned = dict(_planned(inputs, lambda done, what: progress(PLANNING * done, what)))
     tours = {name: _tour(inputs, one.plan) for name, one in planned.items()}
-    whole = sum(len(leg.program) for legs in tours.values() for leg in legs)
+    work = {name: sum(len(leg.program) for leg in legs) for name, legs in tours.items()}
+    whole = sum(work.values()) + work[USED]  # the one in use may be cut again
     made: dict[str, Variant] = {}
     done = 0
-    for name, legs in tours.items():
-        count = sum(len(leg.program) for leg in legs)
-        low, share = 0.1 + 0.9 * done / whole, 0.9 * count / whole
-        proof = prove(
-            inputs, planned[name].plan, legs, lambda part, what: progress(low + share * part, f"{name}: {what}")
-        )
+
+    def proved(name: str) -> None:
+        nonlocal done
+        low, share = PLANNING + (1.0 - PLANNING) * done / whole, (1.0 - PLANNING) * work[name] / whole
+        legs = tours[name]
+
+        def tell(part: float, what: str) -> None:
+            progress(min(low + share * part, 1.0), f"{name}: {what}")
+
+        proof = prove(inputs, planned[name].plan, legs, tell)
         made[name] = _variant(inputs, name, planned[name], legs, proof)
-        done += count
+        done += work[name]
+
+    for name in ("constant", "unconstrained", USED):
+        proved(name)
+    tries = 1
+    while tries < TRIES and made["constant"].deflection < made[USED].deflection and inputs.experiments is None:
+        less = HOLD * made["constant"].deflection / made[USED].deflection * planned[USED].deflection
+        planned[USED] = _held(inputs, less)
+        tours[USED] = _tour(inputs, planned[USED].plan)
+        work[USED] = sum(len(leg.program) for leg in tours[USED])
+        done = whole - work[USED]
+        proved(USED)
+        tries += 1
+    made = {name: made[name] for name in NAMES}
     body, finished = inputs.stock_mesh(), inputs.finished_mesh()
     text = inputs.bears(inputs.deflection)([np.zeros(inputs.wall.shape)] * 2, inputs.side_numbers[0])
     settings: dict[str, Any] = {k: v for k, v in job.operation.model_dump().items() if v is not None}
-    settings |= {"gouge_tolerance_mm": inputs.gouge_tolerance, "yield_mpa": job.table.workpiece.yield_mpa}
+    settings |= {
+        "gouge_tolerance_mm": inputs.gouge_tolerance,
+        "yield_mpa": job.table.workpiece.yield_mpa,
+        "simulated_tries": tries,
+    }
     return Walled(
         title=title_of(job.path),
         wall=inputs.shape,
@@ -111,11 +139,14 @@ def look_at_wall(job: WallJob) -> tuple[list[str], bool]:
 
 def _planned(inputs: WallInputs, progress: Progress) -> Mapping[str, Planned]:
     surfaces = [inputs.coarse(s) for s in inputs.side_numbers]
+    return variants(
+        surfaces, inputs.bears, inputs.law, inputs.even_law, inputs.slope, inputs.deflection, inputs.factor, progress
+    )
 
-    def bears_at(deflection: float) -> Any:
-        return inputs.bears(deflection)
 
-    return variants(surfaces, bears_at, inputs.law, inputs.even_law, inputs.slope, inputs.deflection, inputs.factor, progress)
+def _held(inputs: WallInputs, deflection: float) -> Planned:
+    surfaces = [inputs.coarse(s) for s in inputs.side_numbers]
+    return held_to(surfaces, inputs.bears, inputs.law, inputs.slope, deflection)
 
 
 def _tour(inputs: WallInputs, plan: Plan) -> tuple[Leg, ...]:
@@ -190,9 +221,7 @@ def _infeasible(inputs: WallInputs, plan: Plan) -> tuple[Help, ...]:
     for one in found.infeasible:
         side, i, j = keys[one.place]
         x, y, z = inputs.coarse(inputs.side_numbers[side]).points[i, j].tolist()
-        out.append(
-            Help(side, (x, y, z), one.threshold / share, one.force / share, one.feed_per_tooth, one.diameter)
-        )
+        out.append(Help(side, (x, y, z), one.threshold / share, one.force / share, one.feed_per_tooth, one.diameter))
     return tuple(out)
 
 

@@ -87,7 +87,8 @@ def nearest(program: Program, cutter: Cutter, points: ArrayLike) -> Gap:
     low = int(corner.argmin())
     best = Gap(float(corner[low]), _place(cloud[which[low]]), int(row[low]))
     some = np.arange(0, len(tip), FLANKS)
-    for height in np.arange(f + BALLS * cutter.radius, cutter.overhang, BALLS * cutter.radius):
+    # a ball lower than its radius would reach out of the bottom of a bull nose
+    for height in np.arange(max(f + BALLS * cutter.radius, cutter.radius), cutter.overhang, BALLS * cutter.radius):
         thick = float(cutter.radius_at([min(height, cutter.flute_length)])[0])
         if height > cutter.flute_length and cutter.shank_diameter is not None:
             thick = max(thick, 0.5 * cutter.shank_diameter)

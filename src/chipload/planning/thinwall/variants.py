@@ -2,7 +2,8 @@
 
 The constant one is the least depth that the last passes bear, in the fewest equal passes; those need less than it, so
 that the wall gives way less than it may. Variable depths are then held to what the constant ones reach, so that both
-are compared at one deflection. Without the limit the depth is the greatest that is allowed.
+are compared at one deflection. They may be
+held to less, where a simulation finds that the constant ones reach less. Without the limit the depth is the greatest that is allowed.
 
 The sides are cut alternately or one after the other, whichever leaves fewer passes; at as many, whichever needs the
 least normal force: each choice is planned, and named.
@@ -73,13 +74,21 @@ def variants(
     progress(0.3, "constant depth")
     reached = even.plan.deflection_max
     held = deflection if reached is None or not even.plan.holds else min(reached / factor, deflection)
-    uneven = _better(surfaces, lambda order: variable(surfaces, bears_at(held), law, slope, order=order), held)
+    uneven = held_to(surfaces, bears_at, law, slope, held)
     progress(0.9, "variable depth")
     deepest = law.limits.greatest
     free = _better(
         surfaces, lambda order: constant(surfaces, allowed, even_law, deepest, "unconstrained", order), float("inf")
     )
     return {"variable": uneven, "constant": even, "unconstrained": free}
+
+
+def held_to(
+    surfaces: Sequence[Surface], bears_at: Callable[[float], Bears], law: Law, slope: float, deflection: float
+) -> Variant:
+    """Variable depths under thresholds that allow ``deflection`` [mm]."""
+    bears = bears_at(deflection)
+    return _better(surfaces, lambda order: variable(surfaces, bears, law, slope, order=order), deflection)
 
 
 def _better(surfaces: Sequence[Surface], made: Callable[[Order], Plan], deflection: float) -> Variant:
