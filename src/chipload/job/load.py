@@ -48,9 +48,9 @@ def load_job(path: str | Path, overrides: Sequence[str] = ()) -> AnyJob:
         raise InputError(f"{path}: cannot be read: {err.strerror}") from None
     except (ValueError, RecursionError) as err:
         raise InputError(f"{label}: not a TOML file: {err}") from None
-    for text in overrides:
-        override(raw, text)
     root, made = KINDS[next((key for key in KINDS if key in raw), "part")]
+    for text in overrides:
+        override(raw, text, root)
     try:
         return made(path, root.model_validate(raw), tuple(overrides))
     except ValidationError as err:

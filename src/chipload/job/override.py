@@ -8,13 +8,12 @@ from typing import Any
 
 from chipload.errors import InputError
 from chipload.job.messages import keys_at, nearest_key
-from chipload.job.tables import JobTable, ProgramJobTable
+from chipload.job.tables import Table
 
 
-def override(raw: dict[str, Any], text: str) -> None:
-    """Apply one ``key.path=value`` to the table of the file, in place."""
+def override(raw: dict[str, Any], text: str, root: type[Table]) -> None:
+    """Apply one ``key.path=value`` to the table of the file, in place; ``root`` knows the keys of its kind."""
     path, equals, value = text.partition("=")
-    root: type[ProgramJobTable] | type[JobTable] = ProgramJobTable if "program" in raw else JobTable
     keys = [k.strip() for k in path.split(".")]
     if not equals or not all(keys):
         raise InputError(f"--set {text}: must be key.path=value, as cutter.0.diameter_mm=12")
