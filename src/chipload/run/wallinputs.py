@@ -39,8 +39,8 @@ Floats = NDArray[np.float64]
 
 #: pieces of the meshes of stock and finished wall, along and up
 FACETS = (96, 64)
-#: the finished wall may be cut into by so much [mm], for the chords of chips and facets
-GOUGE = 0.005
+#: the finished wall may be cut into by the chord of its rows and by so much [mm], for those of chips and facets
+GOUGE = 0.003
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,13 +80,17 @@ class WallInputs:
     factor: float
     experiments: Experiments | None
     noticed: tuple[Finding, ...]
-    gouge_tolerance: float = GOUGE
 
     @property
     def top(self) -> float:
         """Height of the wall [mm]."""
         minus, plus = self.shape.sides(np.linspace(0.0, 1.0, 65), 1.0)
         return float(max(minus[:, 2].max(), plus[:, 2].max()))
+
+    @property
+    def gouge_tolerance(self) -> float:
+        """How deep the finished wall may be cut into [mm]."""
+        return self.job.operation.chord_mm + GOUGE
 
     @property
     def foot_height(self) -> float:
@@ -104,10 +108,21 @@ class WallInputs:
         p = self._surface(side, u, v).points
         along = np.linalg.norm(np.diff(p, axis=0), axis=2).sum(axis=0).max()
         up = np.linalg.norm(np.diff(p, axis=1), axis=2).sum(axis=1).max()
-        n = max(math.ceil(along / self.job.operation.step_mm), 2) + 1
+        n = max(math.ceil(along / self.job.operation.step_mm), self._pieces(side), 2) + 1
         m = math.ceil(up / abs(self.step_over)) + 1
         u, v = np.linspace(0.0, 1.0, n), np.linspace(self.foot, 1.0, m)
         return Side(self._surface(side, u, v), u, v)
+
+    def _pieces(self, side: int) -> int:
+        """Straight pieces along a row that stay within the chord's tolerance: the sag of one falls as its square."""
+        u, v = np.meshgrid(np.linspace(0.0, 1.0, 65), np.linspace(self.foot, 1.0, 17), indexing="ij")
+        p = self.shape.sides(u, v)[side]
+        a, b = p[:-1], p[1:]
+        middle = self.shape.sides(0.5 * (u[:-1] + u[1:]), v[1:])[side]
+        along = (b - a) / np.linalg.norm(b - a, axis=-1, keepdims=True)
+        off = middle - a - ((middle - a) * along).sum(axis=-1, keepdims=True) * along
+        sag = float(np.linalg.norm(off, axis=-1).max())
+        return math.ceil(64 * math.sqrt(sag / self.job.operation.chord_mm))
 
     def _surface(self, side: int, u: Floats, v: Floats) -> Surface:
         a, b = np.meshgrid(u, v, indexing="ij")
