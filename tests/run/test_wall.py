@@ -1,4 +1,4 @@
-"""A small plate from its job to its result: three variants, simulated; what must be in the result, and what must hold."""
+"""A small plate from its job to its result: three variants, simulated; what the result has and what must hold."""
 
 import io
 import json
@@ -77,8 +77,8 @@ def test_variable_bends_no_more_than_constant_and_is_no_slower(done):
 
 
 def test_deflection_is_force_over_threshold_times_the_limit(done):
-    """The threshold is limit / C_nn and the deflection F_n C_nn: their quotients are the same; F_n along the normal of a
-    plate is that along y."""
+    """The threshold is limit / C_nn and the deflection F_n C_nn: their quotients are the same; F_n along the normal of
+    a plate is that along y."""
     for one in done.variants.values():
         c = one.columns
         cut = c["force_normal_n"] > 0.0

@@ -22,7 +22,8 @@ def path(points, axis) -> Program:
     zero, none = np.zeros((n, 3)), np.zeros(n, dtype=np.int64)
     motion = np.array([RAPID] + [LINE] * (n - 1))
     return Program(
-        motion, p, np.tile(axis, (n, 1)), zero, np.tile([0.0, 0.0, 1.0], (n, 1)), none, np.where(motion == LINE, 5.0, 0.0),
+        motion, p, np.tile(axis, (n, 1)), zero, np.tile([0.0, 0.0, 1.0], (n, 1)), none,
+        np.where(motion == LINE, 5.0, 0.0),
         np.full(n, 100.0), np.ones(n, dtype=np.int64), none, none, ("x",),
     )  # fmt: skip
 
@@ -45,7 +46,7 @@ def test_ball_beside_a_wall(deep):
 
 
 def test_flank_leans_into_a_wall():
-    """Axis leaning 5 deg towards the wall, centre 5 mm off it: at the height h of the axis, 5 - h sin 5 - 4 / cos 5..."""
+    """Axis leaning 5 deg towards the wall, centre 5 mm off it: 5 - (h - 4) sin 5 - 4 at a height h along it."""
     a = math.radians(5.0)
     axis = np.array([0.0, -math.sin(a), math.cos(a)])
     centre = np.array([[-2.0, 5.0, 5.0], [2.0, 5.0, 5.0]])

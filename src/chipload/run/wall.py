@@ -91,7 +91,7 @@ def run_wall(job: WallJob, progress: Progress = silent) -> Walled:
         tries += 1
     made = {name: made[name] for name in NAMES}
     body, finished = inputs.stock_mesh(), inputs.finished_mesh()
-    text = inputs.bears(inputs.deflection)([np.zeros(inputs.wall.shape)] * 2, inputs.side_numbers[0])
+    text = inputs.finished_bears()
     settings: dict[str, Any] = {k: v for k, v in job.operation.model_dump().items() if v is not None}
     settings |= {
         "gouge_tolerance_mm": inputs.gouge_tolerance,
@@ -125,11 +125,11 @@ def look_at_wall(job: WallJob) -> tuple[list[str], bool]:
     inputs = read_wall(job)
     length, height, thickness = inputs.shape.size()
     nodes = len(inputs.wall.solid.grid.nodes)
-    found = inputs.bears(inputs.deflection)([np.zeros(inputs.wall.shape)] * 2, inputs.side_numbers[0])
+    found = inputs.finished_bears()
     lines = [
         *_noticed(inputs),
-        f"{job.path.name}: {inputs.shape.name}: {length:.4g} mm long, {height:.4g} mm high, at least {thickness:.4g} mm "
-        f"thick; {len(inputs.wall.solid.grid.elements)} elements, {nodes} nodes",
+        f"{job.path.name}: {inputs.shape.name}: {length:.4g} mm long, {height:.4g} mm high, at least "
+        f"{thickness:.4g} mm thick; {len(inputs.wall.solid.grid.elements)} elements, {nodes} nodes",
         f"threshold of the finished side {SIDES[inputs.side_numbers[0]]}, {found.source}: {found.force.min():.4g} to "
         f"{found.force.max():.4g} N; normal force {inputs.law.forces[0]:.4g} N at {inputs.law.depths[0]:g} mm, "
         f"{inputs.law.forces[-1]:.4g} N at {inputs.law.depths[-1]:g} mm",
@@ -250,7 +250,7 @@ def _provenance(job: WallJob, inputs: WallInputs) -> dict[str, Any]:
             "conditions": material.conditions,
         },
         "workpiece": job.table.workpiece.model_dump(),
-        "threshold": inputs.bears(inputs.deflection)([np.zeros(inputs.wall.shape)] * 2, inputs.side_numbers[0]).text,
+        "threshold": inputs.finished_bears().text,
         "versions": versions(),
     }
 

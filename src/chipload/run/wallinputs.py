@@ -7,7 +7,7 @@ the reserve: the planner uses the share 1 - r of a threshold.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,7 +52,7 @@ class WallInputs:
     side_numbers : of the sides that have stock, 0 for k-, 1 for k+
     foot : share of v that keeps its stock
     places : u (n,) and v (m,) of the wall's places
-    law, even_law : F_n of depths on stock with the slope, and on even stock, both with cusps of the height ``cusp`` [mm]
+    law, even_law : F_n of depths on stock with the slope, and on even stock, both with cusps of ``cusp`` [mm]
     experiments : None: thresholds are modelled
     noticed : while they were read
     """
@@ -142,6 +142,10 @@ class WallInputs:
             return calibrated(self.experiments, place, self.job.table.threshold.deviations)
 
         return modelled if self.experiments is None else measured
+
+    def finished_bears(self) -> Threshold:
+        """Thresholds of the first side with stock when the wall is finished."""
+        return self.bears(self.deflection)([np.zeros(self.wall.shape) for _ in self.side_numbers], 0)
 
     def both(self, left: Sequence[Floats]) -> list[Floats]:
         """Stock on k- and k+ of stock on the sides that have any."""

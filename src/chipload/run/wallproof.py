@@ -1,7 +1,8 @@
 """One variant of the passes over a thin wall, run through the stock: forces, deflections, form error, gouges.
 
-Notation: F_n [N] greatest force along the normal of the surface that a pass leaves; C_nn [mm/N] normal compliance of the
-wall in the state of that pass, by finite elements; F_th [N] threshold. C_nn between places by cubics of its logarithm.
+Notation: F_n [N] greatest force along the normal of the surface that a pass leaves; C_nn [mm/N] normal compliance of
+the wall in the state of that pass, by finite elements; F_th [N] threshold. C_nn between places by cubics of its
+logarithm.
 """
 
 from __future__ import annotations

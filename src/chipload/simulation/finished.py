@@ -8,8 +8,8 @@ Two routes, neither of which knows how the path was made:
 * **path**: at both ends and in the middle of every motion, rapids too, the least distance of the body's points to the
   corner (a torus, a sphere where e = 0) and to the flank and shank above it. Points of a grid of spacing s miss the
   nearest by at most s^2 / (8 r) on a flat body.
-* **stock**: on every layer, how far the edge of the body's section lies outside the stock's (gouge) or inside it (left).
-  In the plane of the layer, hence rather too great where a side leans.
+* **stock**: on every layer, how far the edge of the body's section lies outside the stock's (gouge) or inside it
+  (left). In the plane of the layer, hence rather too great where a side leans.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Tours over a plate by geometry: the ball touches what a pass leaves, links stay off the stock, sides are changed above."""
+"""Tours over a plate by geometry: the ball touches what a pass leaves, links stay off the stock, sides change above."""
 
 import math
 
@@ -100,5 +100,7 @@ def test_refined_stays_between_its_neighbours():
 
 def test_axis_below_the_horizontal_is_refused():
     going = Going(Posture(BALL, 0.05, -0.9, 0.0, -TILT), 10.0, 100.0, 300.0, 1.5)
-    with pytest.raises(InputError, match=r"stands -4\d\S* deg above the horizontal: lean it more towards the free edge"):
+    with pytest.raises(
+        InputError, match=r"stands -4\d\S* deg above the horizontal: lean it more towards the free edge"
+    ):
         tour(two_passes()[:1], sides(-0.9), PLACES, going, Margins(3.0, 26.0, 0.3))

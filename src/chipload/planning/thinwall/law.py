@@ -80,8 +80,9 @@ def law_on_stock(
     deepest = float(met(np.array(limits.greatest)))
     if deepest > posture.deepest:
         raise InputError(
-            f"depth_max_mm = {limits.greatest:g}: the cutter meets stock of {deepest:.4g} mm with cusps of {cusp:.3g} mm "
-            f"and a slope of {slope:g}: must be at most {posture.deepest:.4g}, where the flank begins to cut"
+            f"depth_max_mm = {limits.greatest:g}: the cutter meets stock of {deepest:.4g} mm with cusps of "
+            f"{cusp:.3g} mm and a slope of {slope:g}: must be at most {posture.deepest:.4g}, where the flank "
+            "begins to cut"
         )
     plane = law_of(posture, material, Limits(limits.smallest, deepest, limits.tolerance), measure=measure)
     d = np.geomspace(limits.smallest, limits.greatest, len(plane.depths))

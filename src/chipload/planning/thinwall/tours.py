@@ -3,8 +3,8 @@
 Notation: rows, q, n and t as in :mod:`chipload.planning.thinwall.paths`; C [mm] the middle of the corner circle's
 centres; c [mm] clearance along n; A the cutter's axis. A row runs on beyond both edges of the wall by o [mm], so that
 the cutter comes to its depth in the air. Between two pieces it lifts by c along n and goes back along the next row at
-that distance; between two passes it goes out along A, a little away from the wall, until its tip is as high as the safe height, over the wall, and in
-along the next axis.
+that distance; between two passes it goes out along A, a little away from the wall, until its tip is as high as the
+safe height, over the wall, and in along the next axis.
 
 The feed is that of C, which is what a chip's thickness comes from, not that of the tip, which is nearer to the surface.
 

@@ -2,8 +2,8 @@
 
 The constant one is the least depth that the last passes bear, in the fewest equal passes; those need less than it, so
 that the wall gives way less than it may. Variable depths are then held to what the constant ones reach, so that both
-are compared at one deflection. They may be
-held to less, where a simulation finds that the constant ones reach less. Without the limit the depth is the greatest that is allowed.
+are compared at one deflection; they may be held to less, where a simulation finds that the constant ones reach less.
+Without the limit the depth is the greatest that is allowed.
 
 The sides are cut alternately or one after the other, whichever leaves fewer passes; at as many, whichever needs the
 least normal force: each choice is planned, and named.

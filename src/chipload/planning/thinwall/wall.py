@@ -2,8 +2,8 @@
 
 Notation: i, j, k, zeta as in :mod:`chipload.structure.grid`; the mesh is the workpiece with all of its stock, a [mm]
 the allowance of a side, D [mm] what is left of it, T [mm] the thickness of the mesh at a place. A place is numbered
-along i and j; c places an element edge. The foot, f rows of elements at the clamp, keeps its stock: no place lies in it.
-An element keeps (a_m - D_m) / T .. 1 - (a_p - D_p) / T of its thickness, m the
+along i and j; c places an element edge. The foot, f rows of elements at the clamp, keeps its stock: no place lies in
+it. An element keeps (a_m - D_m) / T .. 1 - (a_p - D_p) / T of its thickness, m the
 side k-, p the side k+, D the least of its places and T the mean: the wall is taken a little too soft where D varies.
 
 The compliance is that of a force on the face that the cut leaves. A state that differs from the last one everywhere is

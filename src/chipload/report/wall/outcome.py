@@ -1,7 +1,7 @@
 """What cutting a thin wall gave: three variants of its passes, each planned, written and simulated.
 
-Notation: F_n [N] greatest force along the normal of the surface that a pass leaves, over a revolution; F_th [N] what the
-place bears, limit over normal compliance in the state of that pass; u, v parameters of a side.
+Notation: F_n [N] greatest force along the normal of the surface that a pass leaves, over a revolution; F_th [N] what
+the place bears, limit over normal compliance in the state of that pass; u, v parameters of a side.
 """
 
 from __future__ import annotations
@@ -208,8 +208,8 @@ def fails(walled: Walled, name: str) -> tuple[str, ...]:
     if len(one.infeasible):
         worst = min(one.infeasible, key=lambda h: h.threshold_n)
         out.append(
-            f"{len(one.infeasible)} places bear not even the smallest depth: at {_at(worst.at)} {worst.threshold_n:.4g} "
-            f"N where it takes {worst.force_n:.4g} N: {helps(worst)}"
+            f"{len(one.infeasible)} places bear not even the smallest depth: at {_at(worst.at)} "
+            f"{worst.threshold_n:.4g} N where it takes {worst.force_n:.4g} N: {helps(worst)}"
         )
     if len(one.over):
         k = int(one.over[0])

@@ -30,15 +30,15 @@ def page_bytes(walled: Walled) -> bytes:
         *heading(walled.title, holds, word, says.removeprefix("Does not hold: ")),
         *_failed(walled),
         f"<h2>Operation 0: {escape(walled.wall.name)}</h2>",
-        f"<p>{length:.4g} mm long, {height:.4g} mm high, at least {thickness:.4g} mm thick when finished, clamped at z = 0; "
-        f"{walled.allowance[0]:g} and {walled.allowance[1]:g} mm of stock on its sides. Cutter {c.number}: D {c.diameter:g} mm, "
-        f"corner {c.corner_radius:g} mm, {c.flutes} flutes; rows {walled.step_over:.4g} mm apart, "
+        f"<p>{length:.4g} mm long, {height:.4g} mm high, at least {thickness:.4g} mm thick when finished, clamped at "
+        f"z = 0; {walled.allowance[0]:g} and {walled.allowance[1]:g} mm of stock on its sides. Cutter {c.number}: "
+        f"D {c.diameter:g} mm, corner {c.corner_radius:g} mm, {c.flutes} flutes; rows {walled.step_over:.4g} mm apart, "
         f"{walled.feed_per_tooth:.4g} mm a tooth.</p>",
         f'<p class="note">{escape(", ".join(f"{k} {said(v)}" for k, v in walled.settings.items()))}</p>',
         "<h3>Three ways to cut it</h3>",
-        '<p class="note">Variable: as deep in each place as it bears. Constant: one depth everywhere under the same limit. '
-        "Unconstrained: the greatest depth, whatever the wall does. Numbers are those of the simulation; the time is "
-        "that of the machine.</p>",
+        '<p class="note">Variable: as deep in each place as it bears. Constant: one depth everywhere under the same '
+        "limit. Unconstrained: the greatest depth, whatever the wall does. Numbers are those of the simulation; "
+        "the time is that of the machine.</p>",
         _variants(walled),
         figure("bars", _bars(walled), figures),
         "<h3>What each place bears</h3>",
@@ -62,8 +62,9 @@ def page_bytes(walled: Walled) -> bytes:
         "<h3>Along the path</h3>",
         figure("along", along(walled), figures),
         "<h3>The finished surface</h3>",
-        '<p class="note">Form error by the deflection of cutter and wall at the moment each point is made; blue: material '
-        "is left. Cusps between rows are not in it. Every pass meets what the passes before were planned to leave.</p>",
+        '<p class="note">Form error by the deflection of cutter and wall at the moment each point is made; blue: '
+        "material is left. Cusps between rows are not in it. Every pass meets what the passes before "
+        "were planned to leave.</p>",
     ]
     finish = [(f"{name}, side {f.side + 1}", f) for name, v in walled.variants.items() for f in v.finish]
     if finish:
@@ -218,10 +219,10 @@ def _checked(walled: Walled) -> str:
     used = walled.variants[USED]
     s = used.shape
     texts = [
-        f"Path of {USED} against the finished wall: the cutter comes no nearer than {1000.0 * s.nearest:.3g} um (below 0 it "
-        f"would gouge; {walled.settings['gouge_tolerance_mm']:g} mm is allowed for chords).",
-        f"What is left of the stock against the finished wall: at most {1000.0 * s.gouge:.3g} um into it, {1000.0 * s.left:.3g} "
-        f"um over it above the foot ({s.points} points of its sections).",
+        f"Path of {USED} against the finished wall: the cutter comes no nearer than {1000.0 * s.nearest:.3g} um "
+        f"(below 0 it would gouge; {walled.settings['gouge_tolerance_mm']:g} mm is allowed for chords).",
+        f"What is left of the stock against the finished wall: at most {1000.0 * s.gouge:.3g} um into it, "
+        f"{1000.0 * s.left:.3g} um over it above the foot ({s.points} points of its sections).",
         "Not checked: the holder, the clamp and the machine's own parts; vibration; that a bent wall is cut less deep "
         "and leaves more for the pass after; tangential forces do not bend the wall here.",
     ]
