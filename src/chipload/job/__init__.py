@@ -6,6 +6,7 @@ from chipload.job.planned import Job
 from chipload.job.program import ProgramJob
 from chipload.job.shell import ShellJob
 from chipload.job.tables import MAY, NEEDS, JobTable, OperationTable, ProgramJobTable
+from chipload.job.wall import WallJob, WallJobTable
 
 __all__ = [
     "MAY",
@@ -20,5 +21,7 @@ __all__ = [
     "ProgramJobTable",
     "SectionalTable",
     "ShellJob",
+    "WallJob",
+    "WallJobTable",
     "load_job",
 ]

@@ -22,15 +22,17 @@ from chipload.job.program import ProgramJob, program_job
 from chipload.job.shell import ShellJob, shell_job
 from chipload.job.shell_tables import ShellJobTable
 from chipload.job.tables import JobTable, ProgramJobTable, Table
+from chipload.job.wall import WallJob, WallJobTable, wall_job
 
 #: a job of any kind
-AnyJob = Job | ProgramJob | ImpellerJob | ShellJob
+AnyJob = Job | ProgramJob | ImpellerJob | ShellJob | WallJob
 
 #: kinds of jobs: the table that only they have, the table of the whole file, and what makes the job of it
 KINDS: Mapping[str, tuple[type[Table], Callable[[Path, Any, Sequence[str]], AnyJob]]] = {
     "shell": (ShellJobTable, shell_job),
     "program": (ProgramJobTable, program_job),
     "impeller": (ImpellerJobTable, impeller_job),
+    "wall": (WallJobTable, wall_job),
     "part": (JobTable, planned_job),
 }
 

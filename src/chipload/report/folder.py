@@ -39,8 +39,14 @@ from chipload.report.shell import page as shell_page
 from chipload.report.shell import summary as shell_summary
 from chipload.report.shell.outcome import ShellOutcome
 from chipload.report.summary import summary_bytes
+from chipload.report.wall import page as wall_page
+from chipload.report.wall import scene as wall_scene
+from chipload.report.wall import summary as wall_summary
+from chipload.report.wall.outcome import Walled
 
 SUMMARY = "summary.json"
+#: an outcome of any kind
+Shown = Outcome | Read | Milled | ShellOutcome | Walled
 #: files and who makes them
 Makers = list[tuple[str, Callable[[], bytes]]]
 #: files that every result has
@@ -71,10 +77,15 @@ KINDS: dict[type, Kind] = {
         shell_files.program_files,
         shell_outcome.verdict,
     ),
+    Walled: Kind(
+        (wall_summary.summary_bytes, wall_summary.history_bytes, wall_scene.scene_bytes, wall_page.page_bytes),
+        wall_summary.program_files,
+        wall_summary.verdict,
+    ),
 }
 
 
-def verdict(outcome: Outcome | Read | Milled | ShellOutcome) -> tuple[bool, str]:
+def verdict(outcome: Shown) -> tuple[bool, str]:
     """Whether everything holds, and one sentence that says it."""
     return KINDS[type(outcome)].verdict(outcome)
 
@@ -108,7 +119,7 @@ def check_target(out: str | Path, ours: Callable[[Path], bool] | None = None, wh
     return target
 
 
-def write_result(outcome: Outcome | Read | Milled | ShellOutcome, out: str | Path, progress: Progress = silent) -> Path:
+def write_result(outcome: Shown, out: str | Path, progress: Progress = silent) -> Path:
     """Write the whole result folder and return it.
 
     Raises

@@ -3,25 +3,28 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from chipload.job import AnyJob, ImpellerJob, Job, ProgramJob, ShellJob
+from chipload.job import AnyJob, ImpellerJob, Job, ProgramJob, ShellJob, WallJob
 from chipload.progress import Progress, silent
 from chipload.report.impeller.outcome import Milled
 from chipload.report.outcome import Outcome
 from chipload.report.reading import Read
 from chipload.report.shell.outcome import ShellOutcome
+from chipload.report.wall.outcome import Walled
 from chipload.run.impeller import look_at_impeller, run_impeller
 from chipload.run.planned import Inputs, look_at_job, prove, read_inputs, run_job
 from chipload.run.program import look_at_program, run_program
 from chipload.run.shell import look_at_shell, run_shell
+from chipload.run.wall import look_at_wall, run_wall
 
 #: an outcome of any kind
-AnyOutcome = Outcome | Read | Milled | ShellOutcome
+AnyOutcome = Outcome | Read | Milled | ShellOutcome | Walled
 #: kinds of jobs: what runs them, and what reads all that they name and says what it found and whether that holds
 KINDS: Mapping[type[AnyJob], tuple[Callable[[Any, Progress], AnyOutcome], Callable[[Any], tuple[list[str], bool]]]] = {
     Job: (run_job, look_at_job),
     ProgramJob: (run_program, look_at_program),
     ImpellerJob: (run_impeller, look_at_impeller),
     ShellJob: (run_shell, look_at_shell),
+    WallJob: (run_wall, look_at_wall),
 }
 
 
@@ -50,3 +53,4 @@ def look(job: AnyJob) -> tuple[list[str], bool]:
 
 
 __all__ = ["AnyOutcome", "Inputs", "look", "prove", "read_inputs", "run", "run_impeller", "run_job", "run_program"]
+__all__ = ["AnyOutcome", "Inputs", "look", "prove", "read_inputs", "run", "run_job", "run_program", "run_wall"]

@@ -52,3 +52,38 @@ def law_of(posture: Posture, material: Material, limits: Limits, *, measure: Mea
         )
     d = np.geomspace(limits.smallest, limits.greatest, looks)
     return Law(limits, d, np.maximum.accumulate(normal_force(posture, material, d, measure=measure)))
+
+
+def law_on_stock(
+    posture: Posture, material: Material, limits: Limits, *, slope: float, cusp: float, measure: Measure
+) -> Law:
+    """Table of F_n on stock that is not plane: deeper below the contact point, with cusps of the pass before on it.
+
+    Within the reach sqrt(2 r (d + c)) of the cutter stock whose depth changes with a slope of at most L, and that has
+    cusps of at most c, is nowhere deeper than d + c + L sqrt(2 r (d + c)). The force is taken there, so that it is
+    rather too great.
+
+    Parameters
+    ----------
+    slope : L, at least 0
+    cusp : c, at least 0 [mm]
+
+    Raises
+    ------
+    InputError
+        The greatest depth, so deepened, is beyond the corner of the cutter.
+    """
+
+    def met(d: Floats) -> Floats:
+        return np.asarray(d + cusp + slope * np.sqrt(2.0 * posture.cutter.corner_radius * (d + cusp)))
+
+    deepest = float(met(np.array(limits.greatest)))
+    if deepest > posture.deepest:
+        raise InputError(
+            f"depth_max_mm = {limits.greatest:g}: the cutter meets stock of {deepest:.4g} mm with cusps of "
+            f"{cusp:.3g} mm and a slope of {slope:g}: must be at most {posture.deepest:.4g}, where the flank "
+            "begins to cut"
+        )
+    plane = law_of(posture, material, Limits(limits.smallest, deepest, limits.tolerance), measure=measure)
+    d = np.geomspace(limits.smallest, limits.greatest, len(plane.depths))
+    return Law(limits, d, plane.force(met(d)))

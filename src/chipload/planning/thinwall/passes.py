@@ -4,7 +4,9 @@ Notation: D_k [mm] stock that is left on a side before its pass k, D_0 = 0 the f
 bears; d~ its lower Lipschitz envelope of slope L; a allowance. Passes are numbered from the finish outwards, the order
 of planning; they are cut the other way round, the sides alternately: ... A_2 B_2 A_1 B_1.
 
-    D_k = min(D_(k-1) + d~_k, a)      until D_k = a everywhere.
+    D_k = min(D_(k-1) + d~_k, a)      until D_k = a everywhere,
+
+but at most a - d_min where a is not reached, so that the pass before has more than a film to cut.
 
 The depth of pass k is that which the wall bears with D_(k-1) left on its side everywhere, as if the whole pass were cut
 already: the softest state in which the pass is cut. The other side still has what its own later passes take.
@@ -19,6 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +36,9 @@ from chipload.progress import Progress, silent
 Floats = NDArray[np.float64]
 #: what the places of a side bear, ``(left on each side, side) -> threshold``
 Bears = Callable[[Sequence[Floats], int], Threshold]
+
+#: in which order the sides are cut
+Order = Literal["alternately", "one after the other"]
 
 #: depths below this are no cut [mm]
 NOTHING = 1e-9
@@ -108,16 +114,23 @@ def _made(side: int, low: Floats, high: Floats, threshold: Threshold, law: Law) 
     return Pass(side, low, high, threshold, force, force > threshold.force.reshape(low.shape) * (1.0 + 1e-9))
 
 
+def _no_sliver(low: Floats, high: Floats, allowance: float, smallest: float) -> Floats:
+    """Stock before a pass: the allowance where it is reached, else at least the smallest depth below it."""
+    rest = np.maximum(np.minimum(high, allowance - smallest), low)
+    return np.where(high >= allowance - NOTHING, allowance, rest)
+
+
 def variable(
     surfaces: Sequence[Surface],
     bears: Bears,
     law: Law,
     slope: float,
     *,
+    order: Order = "alternately",
     most: int = 200,
     progress: Progress = silent,
 ) -> Plan:
-    """Variable depths on the sides alternately.
+    """Variable depths.
 
     Parameters
     ----------
@@ -125,6 +138,7 @@ def variable(
     bears : threshold of a side in a state; the stock left is that of all sides, in their order
     law : depth of a threshold
     slope : L > 0 of the offset function
+    order : of the sides; one after the other: the first one whole while the second has all of its stock
     most : passes on a side before it is given up
 
     Raises
@@ -137,12 +151,11 @@ def variable(
     done: list[Pass] = []
     infeasible: set[tuple[int, int, int]] = set()
     for _ in range(most):
-        if all((D[s] >= surfaces[s].allowance - NOTHING).all() for s in range(count)):
+        open_sides = [s for s in reversed(range(count)) if (D[s] < surfaces[s].allowance - NOTHING).any()]
+        if not open_sides:
             return Plan("variable", tuple(reversed(done)), tuple(sorted(infeasible)))
-        for side in reversed(range(count)):
+        for side in open_sides if order == "alternately" else open_sides[:1]:
             a = surfaces[side].allowance
-            if (D[side] >= a - NOTHING).all():
-                continue
             threshold = bears(D, side)
             F = threshold.force.reshape(D[side].shape)
             open_ = D[side] < a - NOTHING
@@ -150,7 +163,7 @@ def variable(
             weak = (depth == 0.0) & open_
             infeasible |= {(side, int(i), int(j)) for i, j in np.argwhere(weak)}
             depth = lower_envelope(surfaces[side].points, np.maximum(depth, law.limits.smallest), slope)
-            high = np.minimum(D[side] + depth, a)
+            high = _no_sliver(D[side], D[side] + depth, a, law.limits.smallest)
             done.append(_made(side, D[side], high, threshold, law))
             D[side] = high
             progress(
@@ -169,8 +182,15 @@ def least_first_depth(surfaces: Sequence[Surface], bears: Bears, law: Law) -> fl
     return min(float(law.depth(bears(D, side).force).min()) for side in range(len(surfaces)))
 
 
-def constant(surfaces: Sequence[Surface], bears: Bears, law: Law, depth: float, name: str = "constant") -> Plan:
-    """Equal passes of at most ``depth``, the fewest, on the sides alternately.
+def constant(
+    surfaces: Sequence[Surface],
+    bears: Bears,
+    law: Law,
+    depth: float,
+    name: str = "constant",
+    order: Order = "alternately",
+) -> Plan:
+    """Equal passes of at most ``depth``, the fewest.
 
     Raises
     ------
@@ -183,14 +203,13 @@ def constant(surfaces: Sequence[Surface], bears: Bears, law: Law, depth: float, 
             "more deflection, less feed or a smaller step-over"
         )
     number = [math.ceil(s.allowance / depth - 1e-9) for s in surfaces]
+    turns = [(k, side) for side in reversed(range(len(surfaces))) for k in range(number[side])]
+    if order == "alternately":
+        turns.sort(key=lambda turn: turn[0])
     D = [np.zeros(s.points.shape[:2]) for s in surfaces]
     done = []
-    for k in range(max(number)):
-        for side in reversed(range(len(surfaces))):
-            if k >= number[side]:
-                continue
-            a = surfaces[side].allowance
-            high = np.full_like(D[side], a * (k + 1) / number[side])
-            done.append(_made(side, D[side], high, bears(D, side), law))
-            D[side] = high
+    for k, side in turns:
+        high = np.full_like(D[side], surfaces[side].allowance * (k + 1) / number[side])
+        done.append(_made(side, D[side], high, bears(D, side), law))
+        D[side] = high
     return Plan(name, tuple(reversed(done)))

@@ -2,7 +2,8 @@
 
 Notation: i, j, k, zeta as in :mod:`chipload.structure.grid`; the mesh is the workpiece with all of its stock, a [mm]
 the allowance of a side, D [mm] what is left of it, T [mm] the thickness of the mesh at a place. A place is numbered
-along i and j; c places an element edge. An element keeps (a_m - D_m) / T .. 1 - (a_p - D_p) / T of its thickness, m the
+along i and j; c places an element edge. The foot, f rows of elements at the clamp, keeps its stock: no place lies in
+it. An element keeps (a_m - D_m) / T .. 1 - (a_p - D_p) / T of its thickness, m the
 side k-, p the side k+, D the least of its places and T the mean: the wall is taken a little too soft where D varies.
 
 The compliance is that of a force on the face that the cut leaves. A state that differs from the last one everywhere is
@@ -66,22 +67,28 @@ class Wall:
     solid : the clamped workpiece with all of its stock, one layer of elements thick
     allowance : [mm] of stock on the sides k- and k+; 0: this side is not cut
     density : c >= 1, places along an element's edge
+    foot : f, rows of elements at the clamp that keep their stock
 
     Raises
     ------
     InputError
-        More than one layer, or the stock is as thick as the wall.
+        More than one layer, the stock is as thick as the wall, or nothing but the foot is there.
     """
 
     solid: Solid
     allowance: tuple[float, float]
     density: int = 1
+    foot: int = 0
 
     def __post_init__(self) -> None:
         if self.solid.grid.counts[2] != 1:
             raise InputError(f"wall: {self.solid.grid.counts[2]} layers of elements: must be 1 through the thickness")
         if self.density < 1 or min(self.allowance) < 0.0 or max(self.allowance) == 0.0:
             raise InputError(f"wall: allowance_mm = {self.allowance}, density = {self.density}: need stock to cut")
+        if not 0 <= self.foot < self.solid.grid.counts[1]:
+            raise InputError(
+                f"wall: foot of {self.foot} rows of elements: must be from 0 to below {self.solid.grid.counts[1]}"
+            )
         if not (self._thickness() > sum(self.allowance) * (1.0 + 1e-9)).all():
             raise InputError(
                 f"wall: allowance_mm {self.allowance[0]:g} and {self.allowance[1]:g} leave no wall: it is "
@@ -92,14 +99,17 @@ class Wall:
     def shape(self) -> tuple[int, int]:
         """Places along i and j."""
         i, j, _ = self.solid.grid.counts
-        return self.density * i + 1, self.density * j + 1
+        return self.density * i + 1, self.density * (j - self.foot) + 1
 
     def sides(self) -> tuple[Side, ...]:
         """Sides that have stock."""
         return tuple(s for s, a in zip(SIDES, self.allowance, strict=True) if a > 0.0)
 
     def _places(self, side: Side) -> Places:
-        u, v = np.meshgrid(*(np.linspace(0.0, 1.0, n) for n in self.shape), indexing="ij")
+        i, j, _ = self.solid.grid.counts
+        along, up = np.linspace(0.0, i, self.shape[0]) / i, np.linspace(self.foot, j, self.shape[1]) / j
+        up[0] = (self.foot + 1e-9) / j if self.foot else 0.0  # in the row above the foot
+        u, v = np.meshgrid(along, up, indexing="ij")
         return on_side(self.solid.grid, side, u.ravel(), v.ravel())
 
     def _thickness(self) -> Floats:
@@ -108,12 +118,18 @@ class Wall:
 
     def _blocks(self, values: Floats) -> Floats:
         """Values (n, m) of places as (elements, places of each)."""
-        i, j, _ = self.solid.grid.counts
+        i, j = self.solid.grid.counts[0], self.solid.grid.counts[1] - self.foot
         c = self.density
         parts = [
             values[a : a + c * (i - 1) + 1 : c, b : b + c * (j - 1) + 1 : c] for a in range(c + 1) for b in range(c + 1)
         ]
         return np.stack(parts, axis=-1).reshape(i * j, -1)
+
+    def _cut(self) -> NDArray[np.int64]:
+        """Numbers of the elements above the foot, in the order of :meth:`_blocks`."""
+        return np.asarray(
+            np.arange(len(self.solid.grid.elements)).reshape(self.solid.grid.counts)[:, self.foot :].ravel()
+        )
 
     def state(self, left: Sequence[Floats]) -> Solid:
         """The workpiece with stock ``left`` D, (n, m) float [mm] on k- and on k+."""
@@ -121,7 +137,9 @@ class Wall:
         D = [
             np.clip(self._blocks(np.asarray(x)).min(axis=1), 0.0, a) for x, a in zip(left, self.allowance, strict=True)
         ]
-        kept = np.stack([(self.allowance[0] - D[0]) / T, 1.0 - (self.allowance[1] - D[1]) / T], axis=1)
+        kept = np.tile([0.0, 1.0], (len(self.solid.grid.elements), 1))
+        kept[self._cut(), 0] = (self.allowance[0] - D[0]) / T
+        kept[self._cut(), 1] = 1.0 - (self.allowance[1] - D[1]) / T
         return replace(self.solid, kept=kept)
 
     def surface(self, side: Side) -> Surface:

@@ -1,0 +1,233 @@
+"""A job that cuts a thin wall: a plate or a blade with stock on its sides, as deep in each place as the wall bears."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutter.table import CutterTable
+from chipload.errors import InputError
+from chipload.job.sources import cutters, source
+from chipload.job.tables import Count, Limits, NotNegative, Number, Positive, SourceTable, Table, Text, Unit
+
+
+def _range(low: float, high: float, unit: str, hint: tuple[str, str]) -> BeforeValidator:
+    """Refuse what is no number within a range that any metal is in; name the unit that was probably meant."""
+
+    def checked(value: Any) -> Any:
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and not low <= value <= high:
+            meant = hint[0] if value > high else hint[1]
+            raise ValueError(f"must be from {low:g} to {high:g} {unit}; {meant}")
+        return value
+
+    return BeforeValidator(checked)
+
+
+#: ranges that workpieces of metal are in
+Gigapascal = Annotated[Number, _range(1.0, 1000.0, "GPa", ("is it in MPa or Pa?", "is it in MPa / 1e6?"))]
+Density = Annotated[Number, _range(500.0, 25000.0, "kg/m3", ("is it in g/m3?", "is it in g/cm3?"))]
+Megapascal = Annotated[Number, _range(10.0, 5000.0, "MPa", ("is it in Pa?", "is it in GPa?"))]
+
+#: keys that a shape needs, and those that it also understands
+SHAPES: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "plate": (("length_mm", "height_mm", "thickness_mm"), ()),
+    "blade": (
+        (
+            "chord_root_mm",
+            "chord_tip_mm",
+            "height_mm",
+            "thickness_root_mm",
+            "thickness_tip_mm",
+            "edge_share",
+            "camber_deg",
+            "stagger_root_deg",
+            "stagger_tip_deg",
+        ),
+        (),
+    ),
+    "sections": (("files", "unit", "edge_share"), ("columns", "span")),
+}
+#: keys of every shape
+EVERY = ("shape", "foot_mm", "allowance_mm", "elements")
+
+
+class WallTable(Table):
+    """The wall, clamped below; which keys it needs depends on its shape, see :data:`SHAPES`."""
+
+    shape: Literal["plate", "blade", "sections"]
+    foot_mm: Positive = Field(description="height above the clamp that keeps its stock")
+    allowance_mm: tuple[NotNegative, NotNegative] = Field(description="stock on the side towards +y and towards -y")
+    elements: tuple[Count, Count] = Field(description="finite elements along the wall and up it, the foot among them")
+    length_mm: Positive | None = None
+    height_mm: Positive | None = None
+    thickness_mm: Positive | None = None
+    chord_root_mm: Positive | None = None
+    chord_tip_mm: Positive | None = None
+    thickness_root_mm: Positive | None = None
+    thickness_tip_mm: Positive | None = None
+    edge_share: NotNegative | None = Field(
+        None, description="of a blade: its thickness at the edges; of sections: the part of u left out at each edge"
+    )
+    camber_deg: Number | None = None
+    stagger_root_deg: Number | None = None
+    stagger_tip_deg: Number | None = None
+    files: tuple[Text, ...] | None = Field(None, description="sections from the clamp to the free edge")
+    unit: Unit | None = Field(None, description="of the files, which do not say it")
+    columns: Text | None = Field(None, description="of files that do not name them, as X Y Z")
+    span: tuple[NotNegative, NotNegative] | None = Field(None, description="part of the span that is the wall")
+
+
+class WorkpieceTable(Table):
+    """What the wall is made of."""
+
+    name: Text
+    modulus_gpa: Gigapascal = Field(description="Young's modulus")
+    poisson: NotNegative = Field(lt=0.5, description="Poisson's ratio")
+    density_kg_m3: Density
+    yield_mpa: Megapascal = Field(description="stress up to which the wall springs back")
+
+
+class ThresholdTable(Table):
+    """Experiments that say which force a place bears; without it the threshold is modelled."""
+
+    file: Text = Field(description="CSV: u, v, normal_force_n, and deflection_um where that was measured")
+    deviations: NotNegative = Field(description="standard deviations of its scatter that are kept as reserve")
+
+
+class WallOperationTable(Table):
+    """How the wall is cut."""
+
+    kind: Literal["thinwall"]
+    cutter: Count = Field(description="number of a [[cutter]]")
+    milling: Literal["down", "up"]
+    feed_mm_min: Positive = Field(le=1e5, description="of the middle of the cutter's corner")
+    speed_rpm: Positive = Field(le=1e6)
+    lean_deg: Positive = Field(lt=89.0, description="of the axis from the surface's normal towards the free edge")
+    lead_deg: Number = Field(description="of the axis forward along the feed")
+    step_over_mm: Positive | None = Field(None, description="from row to row; or scallop_um")
+    scallop_um: Positive | None = Field(None, description="height of what rows leave between them; or step_over_mm")
+    depth_min_mm: Positive
+    depth_max_mm: Positive
+    slope: Positive = Field(le=1.0, description="greatest change of depth over a way along the surface")
+    reserve: NotNegative = Field(
+        lt=1.0, description="share by which the planner keeps below the threshold for what its force model leaves out"
+    )
+    clearance_mm: Positive = Field(description="from the surface between two pieces of the path")
+    step_mm: Positive = Field(le=10.0, description="from contact point to contact point, a step of the simulation")
+    chord_mm: Positive = Field(0.005, le=0.1, description="how far rows may leave the surface between contact points")
+    layer_mm: Positive = Field(le=1.0, description="thickness of the layers of the simulation")
+    tolerance_mm: Positive = Field(0.001, le=0.05, description="how far chords may leave the edges of chips")
+    corner_slices: Count = Field(48, le=400, description="slices of the corner radius in the simulation")
+
+
+class WallLimits(Limits):
+    """What the plan must keep."""
+
+    deflection_um: Positive = Field(description="greatest deflection of the wall normal to its surface")
+    error_um: Positive | None = Field(None, description="greatest form error of the finished surface")
+    torque_nm: Positive | None = None
+
+
+class WallJobTable(Table):
+    """The whole file of a job that cuts a thin wall."""
+
+    wall: WallTable
+    workpiece: WorkpieceTable
+    machine: SourceTable
+    material: SourceTable
+    threshold: ThresholdTable | None = None
+    cutter: tuple[CutterTable, ...] = Field(min_length=1)
+    operation: tuple[WallOperationTable, ...] = Field(min_length=1, max_length=1)
+    limits: WallLimits
+
+
+@dataclass(frozen=True)
+class WallJob:
+    """A job that cuts a thin wall; paths are absolute.
+
+    Parameters
+    ----------
+    path : the job file
+    table : its values
+    cutters : by number
+    machine, material : a shipped name or a file
+    section_files : of the sections; empty for other shapes
+    threshold_file : experiments; None: the threshold is modelled
+    overrides : the `--set` texts that were applied
+    """
+
+    path: Path
+    table: WallJobTable
+    cutters: Mapping[int, Cutter]
+    machine: str | Path
+    material: str | Path
+    section_files: tuple[Path, ...]
+    threshold_file: Path | None
+    overrides: tuple[str, ...]
+
+    @property
+    def operation(self) -> WallOperationTable:
+        """The operation."""
+        return self.table.operation[0]
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """The limits that are stated, by name."""
+        return self.table.limits.stated
+
+    @property
+    def unchecked(self) -> tuple[str, ...]:
+        """Names of the limits that are not stated."""
+        return self.table.limits.unstated
+
+
+def wall_job(path: Path, table: WallJobTable, overrides: Sequence[str]) -> WallJob:
+    """The job of a table that was read.
+
+    Raises
+    ------
+    InputError
+        Keys do not go together.
+    """
+    folder = path.parent
+    tools = cutters(table.cutter, folder)
+    wall, op = table.wall, table.operation[0]
+    needs, may = SHAPES[wall.shape]
+    for key in needs:
+        if getattr(wall, key) is None:
+            raise InputError(f"wall.{key}: missing: state it (shape = {wall.shape} needs it)")
+    for key in type(wall).model_fields:
+        if getattr(wall, key) is not None and key not in (*EVERY, *needs, *may):
+            raise InputError(f"wall.{key}: not used by shape = {wall.shape}: leave it out")
+    if op.cutter not in tools:
+        known = ", ".join(str(n) for n in sorted(tools))
+        raise InputError(f"operation.0.cutter = {op.cutter}: no [[cutter]] has this number: state one of {known}")
+    if (op.step_over_mm is None) == (op.scallop_um is None):
+        said = "none is" if op.step_over_mm is None else "both are"
+        raise InputError(f"operation.0: {said} stated: state either step_over_mm or scallop_um")
+    radius = tools[op.cutter].corner_radius
+    if wall.foot_mm < radius:
+        raise InputError(
+            f"wall.foot_mm = {wall.foot_mm:g}: must be at least the corner radius of cutter {op.cutter}, {radius:g}: "
+            "the cutter reaches so far below its last row, towards the clamp"
+        )
+    if op.clearance_mm <= max(wall.allowance_mm):
+        raise InputError(
+            f"operation.0.clearance_mm = {op.clearance_mm:g}: must be above wall.allowance_mm = "
+            f"{max(wall.allowance_mm):g}: the cutter goes back over stock"
+        )
+    return WallJob(
+        path,
+        table,
+        tools,
+        source("machine", table.machine, folder),
+        source("material", table.material, folder),
+        tuple(folder / f for f in wall.files or ()),
+        None if table.threshold is None else folder / table.threshold.file,
+        tuple(overrides),
+    )

@@ -1,0 +1,1 @@
+"""The result of cutting a thin wall: three variants, simulated."""

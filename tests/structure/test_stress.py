@@ -1,0 +1,31 @@
+"""Stress at a clamp against beam theory."""
+
+import numpy as np
+import pytest
+
+from chipload.structure.grid import plate
+from chipload.structure.places import on_side, weights
+from chipload.structure.solid import Solid, displacement, factorise
+from chipload.structure.stress import greatest, mises, stresses
+
+
+def test_cantilever():
+    """Beam without Poisson's ratio, 2 x 40 x 1 mm, 10 N at its end: 6 F a / (b t^2) at a = the lowest points of
+    integration, drawn out to the faces."""
+    b, a, t, F = 2.0, 40.0, 1.0, 10.0
+    grid = plate(b, a, t, (1, 20, 1))
+    solid = Solid(grid, 2e5, 0.0, 7.8e-9, grid.side("j-"))
+    places = on_side(grid, "k+", [0.5], [1.0])
+    u = displacement(factorise(solid), weights(grid, places).T @ [[0.0, 0.0, F]])
+    first = np.array([0])
+    low = 0.5 * (a / 20) * (1.0 - np.sqrt(0.6))
+    assert greatest(solid, u, first) == pytest.approx(6.0 * F * (a - low) / (b * t * t), rel=0.01)
+    assert stresses(solid, u, first).shape == (1, 27, 3, 3)
+
+
+def test_equivalent_stress():
+    """Shear alone: sqrt(3) tau; equal in all directions: none."""
+    shear = np.zeros((3, 3))
+    shear[0, 1] = shear[1, 0] = 100.0
+    assert float(mises(shear)) == pytest.approx(173.2050807, rel=1e-9)
+    assert float(mises(70.0 * np.eye(3))) == pytest.approx(0.0, abs=1e-9)
