@@ -137,7 +137,18 @@ def test_check_reads_every_file(job_dir: Path, text: str, said: str) -> None:
 def test_examples_are_listed_with_a_line_each() -> None:
     code, out, _ = call("example")
     assert code == 0
-    assert [line.split()[0] for line in out.splitlines()] == ["chips", "cone", "contour", "pocket", "trunnion", "tube"]
+    assert [line.split()[0] for line in out.splitlines()] == [
+        "blade",
+        "chips",
+        "cone",
+        "contour",
+        "hecc",
+        "impeller",
+        "plate",
+        "pocket",
+        "trunnion",
+        "tube",
+    ]
 
 
 @pytest.mark.parametrize("name", list(examples.example_titles()))
