@@ -182,7 +182,7 @@ def _variant(inputs: WallInputs, name: str, planned: Planned, legs: tuple[Leg, .
         proof.shape,
         plan.force_max,
         plan.deflection_max,
-        _infeasible(inputs, plan) if name == "variable" else (),
+        _infeasible(inputs, plan, planned.deflection) if name == "variable" else (),
         proof.stress,
     )
 
@@ -199,8 +199,8 @@ def _on_machine(inputs: WallInputs, program: Program) -> tuple[Commands, tuple[s
     return commands, tuple(f.text for f in broken), float(seconds.sum())
 
 
-def _infeasible(inputs: WallInputs, plan: Plan) -> tuple[Help, ...]:
-    """Places that bear not even the smallest depth in some pass, with what would help there."""
+def _infeasible(inputs: WallInputs, plan: Plan, held: float) -> tuple[Help, ...]:
+    """Places that bear not even the smallest depth in some pass under the limit itself, with what would help there."""
     if not plan.infeasible:
         return ()
     least: dict[tuple[int, int, int], float] = {}
@@ -214,6 +214,8 @@ def _infeasible(inputs: WallInputs, plan: Plan) -> tuple[Help, ...]:
     limits = inputs.law.limits
     plane = float(normal_force(inputs.posture, inputs.material, [limits.smallest], measure=inputs.measure)[0])
     share = plane / float(inputs.law.forces[0])  # what helps is asked of plane stock
+    if inputs.experiments is None:  # the plan may be held to less than the limit
+        least = {key: force * inputs.deflection / held for key, force in least.items()}
     found = largest_depths(
         inputs.posture, inputs.material, [share * least[k] for k in keys], limits, measure=inputs.measure
     )

@@ -267,6 +267,8 @@ def verdict(walled: Walled) -> tuple[bool, str]:
         beside += f"{len(v.maps)} instead of {len(c.maps)} passes"
     else:
         beside += f" a constant depth under the same limit ({len(v.maps)} instead of {len(c.maps)} passes)"
+    if v.deflection > c.deflection * (1.0 + 1e-6):
+        beside += f", which bends the wall by {1e3 * c.deflection:.4g} um"
     return True, (
         f"Every contact point stays within 1 % of its threshold in the simulation: deflection {1e3 * v.deflection:.4g} "
         f"of {walled.limits['deflection_um']:g} um, {v.seconds / 60.0:.4g} min, {beside}."
