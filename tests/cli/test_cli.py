@@ -168,7 +168,7 @@ def test_an_example_overwrites_nothing(tmp_path: Path) -> None:
 def test_an_unknown_example_names_the_nearest(tmp_path: Path) -> None:
     code, _, err = call("example", "contur", tmp_path / "a")
     assert code == 2
-    known = "chips, cone, contour, pocket, trunnion, tube"
+    known = "blade, chips, cone, contour, hecc, impeller, plate, pocket, trunnion, tube"
     assert err == f"chipload: example contur: not known; did you mean contour? (known: {known})\n"
 
 
