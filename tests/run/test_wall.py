@@ -58,8 +58,8 @@ def test_summary_has_what_is_compared(done, operation):
 
 
 def test_all_stock_is_taken_and_nothing_else(done):
-    """Volume of the chips = length x height above the foot x both allowances, more 2/3 a sqrt(2 r a) of the fillets below
-    it, less a third of the cusps; no gouge by path or by stock, all points of the finished sides made."""
+    """Volume of the chips = length x height above the foot x both allowances, more 2/3 a sqrt(2 r a) of the fillets
+    below it, less a third of the cusps; no gouge by path or by stock, all points of the finished sides made."""
     fillet, cusp = 2.0 / 3.0 * 0.2 * math.sqrt(2.0 * 4.0 * 0.2), 0.04
     expected = 2.0 * 8.0 * (5.0 * (0.2 - cusp / 3.0) + fillet)
     for one in done.variants.values():
