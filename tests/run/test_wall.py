@@ -58,8 +58,8 @@ def test_summary_has_what_is_compared(done, operation):
 
 
 def test_all_stock_is_taken_and_nothing_else(done):
-    """Volume of the chips = length x height above the foot x both allowances, more 2/3 a sqrt(2 r a) of fillets below
-    it, less a third of the cusps; no gouge by path or by stock, all points of the finished sides made."""
+    """Volume of the chips = length x height above the foot x both allowances, more 2/3 a sqrt(2 r a) of the fillets
+    below it, less a third of the cusps; no gouge by path or by stock, all points of the finished sides made."""
     fillet, cusp = 2.0 / 3.0 * 0.2 * math.sqrt(2.0 * 4.0 * 0.2), 0.04
     expected = 2.0 * 8.0 * (5.0 * (0.2 - cusp / 3.0) + fillet)
     for one in done.variants.values():
@@ -71,12 +71,13 @@ def test_all_stock_is_taken_and_nothing_else(done):
         assert not (one.columns["rapid"] & (one.columns["chip_pieces"] > 0)).any()
 
 
-def test_variable_is_held_to_the_constant_one_and_is_no_slower(done):
+def test_variable_is_held_to_the_constant_one(done, operation):
     variable, constant = done.variants["variable"], done.variants["constant"]
     held = variable.deflection <= constant.deflection * (1.0 + 1e-9)
     assert held or done.settings["simulated_tries"] == 3
-    assert held or f"bends the wall by {1e3 * constant.deflection:.4g} um" in verdict(done)[1]
-    assert variable.seconds <= constant.seconds * (1.0 + 1e-9)
+    said = verdict(done)
+    assert held or not said[0] or f"bends the wall by {1e3 * constant.deflection:.4g} um" in said[1]
+    assert operation["time_constant_over_variable"] == pytest.approx(constant.seconds / variable.seconds)
     assert done.variants["unconstrained"].deflection > variable.deflection
 
 

@@ -96,8 +96,8 @@ def _failed(walled: Walled) -> list[str]:
 
 
 def _variants(walled: Walled) -> str:
-    head = ["variant", "passes", "time [min]", "wall gives way [um]", "form error [um]", "normal force [N]"]
-    head += ["force over threshold", "stress [MPa]", "limits", "program"]
+    head = ["variant", "passes", "time [min]", "gives way [um]", "form error [um]", "force [N]"]
+    head += ["over threshold", "stress [MPa]", "limits", "program"]
     rows = []
     for name, one in walled.variants.items():
         bad = fails(walled, name)
