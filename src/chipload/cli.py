@@ -197,6 +197,46 @@ def fit(
 
 
 @app.command()
+def cuts(
+    job: JobFile,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="the table (CSV), to be filled in")],
+    sites: Annotated[int, typer.Option("--sites", help="places on the wall, at least 4")] = 6,
+    repeats: Annotated[
+        int, typer.Option("--repeats", help="places that are cut twice, which says how they scatter")
+    ] = 2,
+    steps: Annotated[int, typer.Option("--steps", help="depths below and above what the model says, each")] = 2,
+    bracket: Annotated[float, typer.Option("--bracket", help="factor from force to force")] = 1.25,
+    scatter_percent: Annotated[float, typer.Option("--scatter-percent", help="expected of one cut")] = 5.0,
+    sets: Sets = None,
+    debug: Debug = False,
+) -> None:
+    """Propose calibration cuts for a job with a [wall]: what it bears, measured; [threshold] file reads the table."""
+
+    def work() -> int:
+        from chipload.job import WallJob, load_job
+
+        read = load_job(job, sets or ())
+        if not isinstance(read, WallJob):
+            raise InputError(f"{job.name}: has no [wall]: calibration cuts are proposed for a thin wall")
+        from chipload.planning.thinwall.table import write_cuts
+        from chipload.run import propose
+
+        with _bar() as progress:
+            found = propose(read, sites, scatter_percent / 100.0, bracket, steps, repeats, progress)
+        write_cuts(out, found)
+        for f in found.findings:
+            typer.echo(str(f))
+        typer.echo(
+            f"{len(found.site)} cuts at {len(found.sites)} places: interpolation misses {100.0 * found.bias:.2g} %, "
+            f"scatter brings {100.0 * found.noise:.2g} % (root mean square over the wall)"
+        )
+        typer.echo(f'fill in and name it in the job: [threshold] file = "{out.name}"')
+        return 0
+
+    _guarded(work, debug)
+
+
+@app.command()
 def example(
     name: Annotated[str | None, typer.Argument(help="the example; none: list them")] = None,
     folder: Annotated[Path | None, typer.Argument(metavar="DIR", help="where it is copied to")] = None,

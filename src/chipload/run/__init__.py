@@ -14,7 +14,7 @@ from chipload.run.impeller import look_at_impeller, run_impeller
 from chipload.run.planned import Inputs, look_at_job, prove, read_inputs, run_job
 from chipload.run.program import look_at_program, run_program
 from chipload.run.shell import look_at_shell, run_shell
-from chipload.run.wall import look_at_wall, run_wall
+from chipload.run.wall import look_at_wall, propose, run_wall
 
 #: an outcome of any kind
 AnyOutcome = Outcome | Read | Milled | ShellOutcome | Walled
@@ -52,5 +52,4 @@ def look(job: AnyJob) -> tuple[list[str], bool]:
     return KINDS[type(job)][1](job)
 
 
-__all__ = ["AnyOutcome", "Inputs", "look", "prove", "read_inputs", "run", "run_impeller", "run_job", "run_program"]
-__all__ = ["AnyOutcome", "Inputs", "look", "prove", "read_inputs", "run", "run_job", "run_program", "run_wall"]
+__all__ = ["AnyOutcome", "Inputs", "look", "propose", "prove", "read_inputs", "run", "run_job", "run_program"]

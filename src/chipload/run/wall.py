@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from chipload.job import WallJob
 from chipload.machine.limits import limit_findings
 from chipload.machine.machine import Machine
 from chipload.planning.thinwall.depth import largest_depths, normal_force
+from chipload.planning.thinwall.experiments import Proposal, propose_cuts
 from chipload.planning.thinwall.passes import Plan
 from chipload.planning.thinwall.tours import Leg, Margins, tour
 from chipload.planning.thinwall.variants import NAMES, held_to, variants
@@ -37,9 +39,9 @@ Floats = NDArray[np.float64]
 #: share of the work that planning is, for the progress
 PLANNING = 0.1
 #: plans of variable depths that are simulated at most, until one bends the wall no more than the constant depth does
-TRIES = 3
+TRIES = 5
 #: the next one is held to this share of what would just do
-HOLD = 0.99
+HOLD = 0.97
 #: safe height of the tip over the wall, in radii of the cutter
 SAFE = 1.5
 #: links sag by this share of their distance to the stock
@@ -135,6 +137,31 @@ def look_at_wall(job: WallJob) -> tuple[list[str], bool]:
         f"{inputs.law.forces[-1]:.4g} N at {inputs.law.depths[-1]:g} mm",
     ]
     return lines, True
+
+
+def propose(
+    job: WallJob, sites: int, scatter: float, bracket: float, steps: int, repeats: int, progress: Progress = silent
+) -> Proposal:
+    """Calibration cuts that pin best what the finished wall bears: where and how deep, around the modelled threshold.
+
+    Parameters
+    ----------
+    sites, scatter, bracket, steps, repeats : as of :func:`chipload.planning.thinwall.experiments.propose_cuts`
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, values do not go together, or a site bears not even the smallest depth.
+    """
+    inputs = replace(read_wall(job), experiments=None)
+    u, v = np.meshgrid(*inputs.places, indexing="ij")
+    points = inputs.coarse(inputs.side_numbers[0]).points.reshape(-1, 3)
+    places = np.column_stack([u.ravel(), v.ravel()])
+    modelled = inputs.finished_bears().force.ravel()
+    return propose_cuts(
+        places, points, modelled, inputs.law, sites, scatter, bracket=bracket, steps=steps, repeats=repeats,
+        progress=progress,
+    )  # fmt: skip
 
 
 def _planned(inputs: WallInputs, progress: Progress) -> Mapping[str, Planned]:
