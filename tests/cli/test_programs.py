@@ -186,8 +186,8 @@ def test_a_job_with_a_program(files: Path):
     [
         ('[program]\nfil = "a.ngc"\n[machine]\nname = "vmc"\n', "program.fil: unknown key; did you mean file?"),
         (
-            '[program]\nfile = "a.ngc"\n[machine]\nname = "vmc"\n[part]\nfile = "x"\n',
-            "part: not used where a [program]",
+            '[program]\nfile = "a.ngc"\n[machine]\nname = "vmc"\n[part]\nfile = "x.stl"\nspacing_mm = 1.0\n',
+            "part: not used where a program is only read: add an [[operation]]",
         ),
         ('[program]\nfile = "a.ngc"\n', "machine: missing: state it"),
         (

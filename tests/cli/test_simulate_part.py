@@ -91,7 +91,9 @@ def test_gouge_excess_and_collision(job: Path, tmp_path: Path) -> None:
     by = {x["name"]: x["holds"] for x in op["limits"]}
     assert by == {"force_n": True, "gouge_mm": False, "excess_mm": True}
     # the tip goes to x = 25 and to z = -2.1, the holder to x = 45 and down to z = 27.9
-    (hit,) = op["collisions"]
+    # on the way in, and where the way out begins
+    hit, again = op["collisions"]
+    assert (again["line"], again["depth_mm"]) == (7, pytest.approx(2.1, abs=0.01))
     assert (hit["what"], hit["into"], hit["line"], hit["tool"]) == ("shank or holder", "fixture 0", 6, 1)
     assert hit["depth_mm"] == pytest.approx(2.1, abs=0.01)
     assert op["held_against"] == ["fixture 0", "part", "stock"]

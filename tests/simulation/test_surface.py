@@ -30,6 +30,10 @@ def line(*points):
     return steps_of(Program.join(moves), 2.0, 0.001)
 
 
+def everywhere(points):
+    return np.ones(len(points), dtype=bool)
+
+
 def test_triangles_are_fine_and_stay_on_the_part():
     points, faces = fine(box([0, 0, 0], [10, 6, 4]), 0.5, "part")
     sides = np.linalg.norm(points[faces] - points[np.roll(faces, 1, axis=1)], axis=2)
@@ -42,7 +46,7 @@ def test_a_finished_plane():
     """Passes of a ball 1 mm apart, the last 0.03 mm too deep: cusps and a gouge of that depth in closed form."""
     rows = [[[-6.0, y, 0.0 if y < 7.9 else -0.03], [16.0, y, 0.0 if y < 7.9 else -0.03]] for y in np.arange(-5.0, 8.1)]
     path = [p for k, row in enumerate(rows) for p in (row if k % 2 == 0 else row[::-1])]
-    found = difference(line(*path), {1: BALL}, box([0, 0, -5], [10, 8, 0]), 0.25, 1.0, 1e-4)
+    found = difference(line(*path), {1: BALL}, box([0, 0, -5], [10, 8, 0]), everywhere, 0.25, 1.0, 1e-4)
     top = found.points[:, 2] == 0.0
     y = found.points[top, 1]
     centre = np.arange(-5.0, 8.1)

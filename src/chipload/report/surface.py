@@ -30,7 +30,8 @@ MOST_FACES, LISTED = 60_000, 200
 def worst(left: Difference, columns: Mapping[str, NDArray[Any]], kind: str) -> dict[str, Any]:
     """Deepest gouge or highest excess: ``{max, line, at_mm, t_s}``; line 0 and no place where there is none."""
     sign = -1.0 if kind == "gouge" else 1.0
-    value = np.where(np.isfinite(left.distance), sign * left.distance, -np.inf)
+    counts = np.isfinite(left.distance) & (left.over | (left.distance < 0.0))
+    value = np.where(counts, sign * left.distance, -np.inf)
     k = int(np.argmax(value))
     if not value[k] > 0.0:
         return {"max": 0.0, "line": 0, "at_mm": None, "t_s": None}
@@ -43,12 +44,13 @@ def worst(left: Difference, columns: Mapping[str, NDArray[Any]], kind: str) -> d
 
 def numbers(left: Difference, columns: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
     """Keys of an operation in summary.json."""
-    known = np.isfinite(left.distance)
+    known = np.isfinite(left.distance)[left.over]
     return {
         "gouge_mm": worst(left, columns, "gouge"),
         "excess_mm": worst(left, columns, "excess"),
         "part_points": len(left.points),
-        "part_reached_share": float(known.mean()),
+        "part_under_stock": len(known),
+        "part_reached_share": float(known.mean()) if len(known) else 1.0,
         "look_mm": left.look,
     }
 
@@ -66,10 +68,11 @@ def listed(collisions: tuple[Collision, ...], columns: Mapping[str, NDArray[Any]
 
 def colours(left: Difference, span: float) -> NDArray[np.uint8]:
     """(p, 4) colour of each point; ``span`` [mm] of distance is the full colour."""
-    share = np.clip(np.where(np.isfinite(left.distance), left.distance, 0.0) / span, -1.0, 1.0)
+    known = np.isfinite(left.distance) & (left.over | (left.distance < 0.0))
+    share = np.clip(np.where(known, left.distance, 0.0) / span, -1.0, 1.0)
     ends = np.array([GOUGE, DONE, EXCESS], dtype=np.float64)
     rgb = np.stack([np.interp(share, [-1.0, 0.0, 1.0], ends[:, i]) for i in range(3)], axis=1)
-    rgb[~np.isfinite(left.distance)] = UNKNOWN
+    rgb[left.over & ~np.isfinite(left.distance)] = UNKNOWN
     return np.column_stack([rgb, np.full(len(rgb), 255.0)]).round().astype(np.uint8)
 
 
@@ -130,8 +133,9 @@ def section(
         body += [
             "<h2>What is left on the part</h2>",
             table(["", "mm", "line", "at x, y, z [mm]"], rows, numbers=(1, 2)),
-            f"<p>{100.0 * what['part_reached_share']:.3g} % of {what['part_points']} points of the part lie within "
-            f"{left.look:g} mm of the tool's way; over the others there is more, or nothing is milled.</p>",
+            f"<p>Of {what['part_under_stock']} points of the part that had stock over them "
+            f"{100.0 * what['part_reached_share']:.3g} % lie within {left.look:g} mm of the tool's way; over the "
+            "others there is more.</p>",
             f'<p class="note">Red is cut too deep, blue stands over the part, in full colour by {span:.3g} mm; pale: '
             "more than was looked for.</p>",
             figure("part", part_figure(left, span), figures),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -101,7 +101,7 @@ def _simulated(
     smallest = min(c.radius for c in job.cutters.values())
     fine = Resolution(op.step_mm, op.tolerance_mm, op.corner_slices, op.flank_mm or 0.5 * smallest)
     points = _grid(stock, op.stock_points_mm) if op.stock_points_mm is not None else None
-    part, fixtures = _part(job), _fixtures(job)
+    part, fixtures, before = _part(job), _fixtures(job), _insides(stock)
     removal = remove(
         program, stock, job.cutters, material, fine, interpolation=op.interpolation,
         progress=lambda done, what: progress(0.8 * done, what),
@@ -112,7 +112,7 @@ def _simulated(
         table = job.table.part
         assert table is not None
         left = difference(
-            steps, job.cutters, part, table.spacing_mm, table.look_mm, op.tolerance_mm,
+            steps, job.cutters, part, before, table.spacing_mm, table.look_mm, op.tolerance_mm,
             lambda done, what: progress(0.8 + 0.1 * done, what),
         )  # fmt: skip
         solids["part"] = left.points
@@ -150,10 +150,23 @@ def _grid(stock: LayeredStock, pitch: float) -> NDArray[np.float64]:
     x, y, z = (np.arange(a + 0.5 * pitch, b, pitch) for a, b in zip(low, high, strict=True))
     if len(x) * len(y) * len(z) > MOST_POINTS:
         raise InputError(f"operation.0.stock_points_mm = {pitch:g}: more than {MOST_POINTS} points: state a larger one")
-    xy = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    layers = np.clip(np.searchsorted(stock.bounds, z, side="right") - 1, 0, stock.layers - 1)
-    inside = [xy[shapely.contains_xy(stock.section(int(i)), *xy.T)] for i in layers]
-    return np.concatenate([np.column_stack([p, np.full(len(p), h)]) for p, h in zip(inside, z, strict=True)])
+    grid = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
+    return grid[_insides(stock)(grid)]
+
+
+def _insides(stock: LayeredStock) -> Callable[[NDArray[np.float64]], NDArray[np.bool_]]:
+    """Which points [mm] lie in the stock as it is now."""
+    bounds, sections = np.asarray(stock.bounds), [stock.section(i) for i in range(stock.layers)]
+
+    def inside(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        layer = np.searchsorted(bounds, points[:, 2], side="right") - 1
+        out = np.zeros(len(points), dtype=np.bool_)
+        for i in np.unique(layer[(layer >= 0) & (layer < len(sections))]).tolist():
+            own = layer == i
+            out[own] = shapely.contains_xy(sections[i], points[own, 0], points[own, 1])
+        return out
+
+    return inside
 
 
 def _no_holder(job: ProgramJob) -> tuple[int, ...]:

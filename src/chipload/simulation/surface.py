@@ -9,7 +9,7 @@ a grid of that pitch. What lies between them is not looked at: a rod thinner tha
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +26,8 @@ from chipload.simulation.steps import Steps
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+#: what lies so many tolerances over a point of the part is over it
+OVER = 4.0
 #: points of a part or a fixture at most
 MOST_POINTS = 4_000_000
 
@@ -41,6 +43,7 @@ class Difference:
     step : (p,) int, nearest step; -1: none
     deepest : (n,) float [mm] of each step; inf: far from the part
     look : [mm]
+    over : (p,) bool, whether the stock stood over the point before: elsewhere nothing can be left
     """
 
     points: Floats
@@ -49,6 +52,7 @@ class Difference:
     step: Ints
     deepest: Floats
     look: float
+    over: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,7 @@ def difference(
     steps: Steps,
     cutters: Mapping[int, Cutter],
     part: trimesh.Trimesh,
+    in_stock: Callable[[Floats], NDArray[np.bool_]],
     spacing: float,
     look: float,
     tolerance: float,
@@ -95,12 +100,15 @@ def difference(
 
     Parameters
     ----------
+    in_stock : which points (p, 3) lay in the stock before the program
     spacing, look, tolerance : [mm], of the points; how far material is looked for; of the path
     """
     points, faces = fine(part, spacing, "part")
+    normals = np.asarray(trimesh.Trimesh(points, faces, process=False).vertex_normals)
+    over = in_stock(points + OVER * tolerance * normals)
     bodies = {n: cutting_part(c) for n, c in cutters.items()}
     found = clearance(steps, bodies, points, look, tolerance, progress=progress)
-    return Difference(points, faces, found.distance, found.step, found.deepest, look)
+    return Difference(points, faces, found.distance, found.step, found.deepest, look, over)
 
 
 def collisions(

@@ -63,7 +63,8 @@ class Run:
         if self.code is None:
             self.code = code
             self.says = "stopped: nothing was written" if stopped else f"the run ended without a word: {fault or code}"
-        self.state = "stopped" if stopped or self.code == 130 else "done" if self.code in (0, 3) else "failed"
+        finished = self.code in (0, 3)  # it may have been done before the stop came
+        self.state = "done" if finished else "stopped" if stopped or self.code == 130 else "failed"
 
     async def stop(self) -> None:
         """Ask it to stop, and end it where it does not."""

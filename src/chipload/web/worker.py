@@ -14,6 +14,8 @@ from chipload.errors import Cancelled, InputError
 
 #: seconds between two lines of progress
 BREATH = 0.1
+#: set when the run is asked to stop: an interrupt that falls into foreign code may be lost
+ASKED = threading.Event()
 
 
 def work(job: str, out: str) -> dict[str, Any]:
@@ -47,6 +49,8 @@ class Teller:
 
     def __call__(self, done: float, what: str) -> None:
         """Take a share and what is done."""
+        if ASKED.is_set():
+            raise Cancelled("stopped")
         now = time.monotonic()
         if now - self.last >= BREATH or what != self.what:
             self.last, self.what = now, what
@@ -59,6 +63,7 @@ def _write(value: dict[str, Any]) -> None:
 
 
 def _stop(_number: int, _frame: object) -> NoReturn:
+    ASKED.set()
     raise KeyboardInterrupt
 
 
