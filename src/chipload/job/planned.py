@@ -8,12 +8,12 @@ from pathlib import Path
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
-from chipload.job.sources import cutters, source
+from chipload.job.sources import Limited, cutters, source
 from chipload.job.tables import ALWAYS, MAY, NEEDS, JobTable, LimitsTable, OperationTable
 
 
 @dataclass(frozen=True)
-class Job:
+class Job(Limited):
     """A job that was read and found whole; paths are absolute.
 
     Parameters
@@ -40,16 +40,6 @@ class Job:
     def operations(self) -> tuple[OperationTable, ...]:
         """The operations in their order."""
         return self.table.operation
-
-    @property
-    def limits(self) -> dict[str, float]:
-        """The limits that are stated, by name."""
-        return self.table.limits.stated
-
-    @property
-    def unchecked(self) -> tuple[str, ...]:
-        """Names of the limits that are not stated, so that nothing holds the job against them."""
-        return self.table.limits.unstated
 
 
 def planned_job(path: Path, table: JobTable, overrides: Sequence[str]) -> Job:

@@ -8,12 +8,12 @@ from pathlib import Path
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
-from chipload.job.sources import cutters, source
+from chipload.job.sources import Limited, cutters, source
 from chipload.job.tables import LoadLimitsTable, ProgramJobTable
 
 
 @dataclass(frozen=True)
-class ProgramJob:
+class ProgramJob(Limited):
     """A job that runs a program; paths are absolute.
 
     Parameters
@@ -41,16 +41,6 @@ class ProgramJob:
     def simulates(self) -> bool:
         """Whether the program is run through a stock."""
         return bool(self.table.operation)
-
-    @property
-    def limits(self) -> dict[str, float]:
-        """The limits that are stated, by name."""
-        return self.table.limits.stated
-
-    @property
-    def unchecked(self) -> tuple[str, ...]:
-        """Names of the limits that are not stated."""
-        return self.table.limits.unstated
 
 
 def program_job(path: Path, table: ProgramJobTable, overrides: Sequence[str]) -> ProgramJob:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.table import CutterTable
@@ -43,3 +44,19 @@ def cutters(entries: Sequence[CutterTable], folder: Path) -> dict[int, Cutter]:
             raise InputError(f"cutter.{k}.number = {cutter.number}: is taken by another cutter: give each its own")
         out[cutter.number] = cutter
     return out
+
+
+class Limited:
+    """A job whose table has limits."""
+
+    table: Any
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """The limits that are stated, by name."""
+        return dict(self.table.limits.stated)
+
+    @property
+    def unchecked(self) -> tuple[str, ...]:
+        """Names of the limits that are not stated, so that nothing holds the job against them."""
+        return tuple(self.table.limits.unstated)

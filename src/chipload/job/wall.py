@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.table import CutterTable
 from chipload.errors import InputError
-from chipload.job.sources import cutters, source
+from chipload.job.sources import Limited, cutters, source
 from chipload.job.tables import Count, Limits, NotNegative, Number, Positive, SourceTable, Table, Text, Unit
 
 
@@ -147,7 +147,7 @@ class WallJobTable(Table):
 
 
 @dataclass(frozen=True)
-class WallJob:
+class WallJob(Limited):
     """A job that cuts a thin wall; paths are absolute.
 
     Parameters
@@ -174,16 +174,6 @@ class WallJob:
     def operation(self) -> WallOperationTable:
         """The operation."""
         return self.table.operation[0]
-
-    @property
-    def limits(self) -> dict[str, float]:
-        """The limits that are stated, by name."""
-        return self.table.limits.stated
-
-    @property
-    def unchecked(self) -> tuple[str, ...]:
-        """Names of the limits that are not stated."""
-        return self.table.limits.unstated
 
 
 def wall_job(path: Path, table: WallJobTable, overrides: Sequence[str]) -> WallJob:
