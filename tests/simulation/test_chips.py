@@ -117,6 +117,18 @@ def test_a_rapid_through_material_is_found_and_costs_no_force() -> None:
     assert removal.columns["chip_volume_mm3"].sum() > 0.0
 
 
+def test_what_is_watched_becomes_columns_of_the_steps_that_cut() -> None:
+    removal = remove(
+        straight([-10, 0, -3], [30, 0, -3]), block(), {1: MILL}, ENERGY, FINE,
+        watch=lambda cuts: {"thickest_mm": cuts.bites.chip_max(), "step": cuts.step.astype(np.float64)},
+    )  # fmt: skip
+    c = removal.columns
+    cut = c["chip_pieces"] > 0
+    assert not c["thickest_mm"][~cut].any()
+    assert c["thickest_mm"][c["x_mm"] > 6.5] == pytest.approx(math.tau * 20.0 / (4 * 300.0), rel=1e-9)
+    assert c["step"][cut].tolist() == np.flatnonzero(cut).tolist()
+
+
 def test_what_is_wrong_with_a_program_is_said() -> None:
     with pytest.raises(InputError, match=r"tool 1: no \[\[cutter\]\] has this number: state one beside 2"):
         remove(straight([-10, 0, -3], [30, 0, -3]), block(), {2: MILL}, ENERGY, FINE)

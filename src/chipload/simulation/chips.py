@@ -12,7 +12,7 @@ and :mod:`chipload.engagement.immersion.immersion` for the one in force.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -39,6 +39,9 @@ from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
 Columns = Mapping[str, NDArray[Any]]
+
+#: more columns of steps that cut
+Watch = Callable[[Cuts], Mapping[str, Floats]]
 
 #: steps whose forces are calculated at once
 BLOCK = 512
@@ -122,6 +125,7 @@ def remove(
     *,
     interpolation: Interpolation = "slerp",
     keep: bool = False,
+    watch: Watch | None = None,
     progress: Progress = silent,
 ) -> Removal:
     """Take what the program cuts from ``stock``, which changes, and say what it costs.
@@ -132,6 +136,8 @@ def remove(
     cutters : by tool number
     interpolation : of the axis within a step: along a great circle (slerp) or normalised straight line (lerp)
     keep : keep what the teeth cut in every step, for :mod:`chipload.simulation.deflection`; some kB a step
+    watch : called with what one cutter cut in some hundred steps; gives more columns, a value for each of them; they
+        are 0 in steps that do not cut
 
     Returns
     -------
@@ -164,6 +170,7 @@ def remove(
     loads = np.zeros((len(steps), len(LOADS)))
     basis = np.zeros((4, 6))
     kept: dict[int, list[Cuts]] = {}
+    watched: dict[str, Floats] = {}
     best: Piece | None = None
     rank = (0, 0.0)
 
@@ -209,9 +216,13 @@ def remove(
             at = [c.step for c in own]
             bitten = bites_of_steps(own, cutters[number], profiles[number])
             loads[at] = loads_of_steps(bitten, own, cutters[number], material, resolution.rotation, steps.spindle[at])
+            way = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
+            bite = Cuts(number, cutters[number], np.array(at), way, bitten)
             if keep:
-                way = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
-                kept.setdefault(number, []).append(Cuts(number, cutters[number], np.array(at), way, bitten))
+                kept.setdefault(number, []).append(bite)
+            if watch is not None:
+                for name, values in watch(bite).items():
+                    watched.setdefault(name, np.zeros(len(steps)))[at] = values
             if _sure(material):
                 each = mean_basis(bitten, cutters[number], material, bitten.frame)
                 basis += np.tensordot(steps.seconds[at], each, 1)
@@ -222,7 +233,7 @@ def remove(
         sd = deviations(basis / cut_s, material) if cut_s > 0.0 else np.zeros(4)
         band = (*sd[:3].tolist(), float(sd[3]) / 1000.0)
     return Removal(
-        _columns(steps, removed, loads),
+        {**_columns(steps, removed, loads), **watched},
         before,
         stock.volume(),
         band,
