@@ -85,7 +85,7 @@ def greatest_factor(
     at_low, at_high = ratio(low) - wanted, ratio(high) - wanted
     over, under = 0.5 * close, -0.5 * close
     none, free = at_low > over, at_high <= over
-    out = np.where(none, np.nan, np.where(free, high, low))
+    out = np.where(free & ~none, high, low)
     active = ~none & ~free & (at_low < under)
     side = np.zeros(len(low))
     for _ in range(MOST_LOOKS):
@@ -94,7 +94,7 @@ def greatest_factor(
             break
         with np.errstate(divide="ignore", invalid="ignore"):
             aim = high - at_high * (high - low) / (at_high - at_low)
-        x = np.where(active, np.clip(aim, low, high), out)
+        x = np.where(active, np.clip(np.where(np.isnan(aim), low, aim), low, high), out)
         y = ratio(x) - wanted
         below = active & (y <= over)
         out = np.where(below, x, out)
@@ -105,7 +105,7 @@ def greatest_factor(
         low, high = np.where(below, x, low), np.where(above, x, high)
         side = np.where(below, -1.0, np.where(above, 1.0, side))
         active &= ~(below & (y >= under))
-    return out
+    return np.where(none, np.nan, out)
 
 
 def line_feeds(line: ArrayLike, touch: ArrayLike, least: ArrayLike, most: ArrayLike, by: ArrayLike) -> LineFeeds:
