@@ -29,6 +29,10 @@ Ints = NDArray[np.int64]
 MOST_LOOKS = 60
 #: the ratio that is aimed at is within (1 - TARGET - CLOSE, 1 - TARGET]: rounding must not lift a load over its limit
 TARGET = 1e-6
+#: a bracket as narrow as this is closed: a jump of the ratio lies in it
+NARROW = 1e-7
+#: looks before a bracket is halved, which closes in on a jump
+SECANTS = 12
 
 
 class Touch(IntEnum):
@@ -88,12 +92,14 @@ def greatest_factor(
     out = np.where(free & ~none, high, low)
     active = ~none & ~free & (at_low < under)
     side = np.zeros(len(low))
-    for _ in range(MOST_LOOKS):
-        active &= high - low > 1e-12 * high
+    for look in range(MOST_LOOKS):
+        active &= high - low > NARROW * high
         if not active.any():
             break
         with np.errstate(divide="ignore", invalid="ignore"):
             aim = high - at_high * (high - low) / (at_high - at_low)
+        if look >= SECANTS:
+            aim = 0.5 * (low + high)
         x = np.where(active, np.clip(np.where(np.isnan(aim), low, aim), low, high), out)
         y = ratio(x) - wanted
         below = active & (y <= over)

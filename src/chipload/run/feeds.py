@@ -173,10 +173,7 @@ def with_new_feeds(
     factor, useful = _wanted(lines, reading, machine, asked.table)
     new = with_feeds(text, dict(zip(lines.line.tolist(), factor.tolist(), strict=True)))
     after = read(new)
-    of_row = np.ones(len(reading.program))
-    known = np.isin(reading.program.line, lines.line)
-    of_row[known] = factor[np.searchsorted(lines.line, reading.program.line[known])]
-    _same(reading.program, after.program, of_row)
+    _same(reading.program, after.program, lines.line, factor)
     names = {FASTEST: "fastest", MACHINE: "machine", AIR: "air", SLOWEST: "slowest", KEPT: "programmed"}
     names |= {LIMITED + k: name for k, name in enumerate(asked.limits)}
     held = np.where((useful < lines.allowed) & (lines.by != SLOWEST), MACHINE, lines.by)
@@ -282,22 +279,22 @@ def _by_rates(lines: LineFeeds, reading: Reading, machine: Machine) -> Floats:
     return np.asarray(np.where(rates > 0.0, path / np.where(rates > 0.0, rates, 1.0), np.inf))
 
 
-def _same(old: Program, new: Program, factor: Floats) -> None:
+def _same(old: Program, new: Program, line: Ints, factor: Floats) -> None:
     """Refuse a new text that is not the old program at the wanted feeds, which rounding makes slower by a digit."""
-    same = len(old) == len(new)
-    wrong = np.ones(1, dtype=np.bool_)
-    if same:
-        names = ("motion", "p_work", "axis", "centre", "normal", "turns", "spindle", "tool", "line")
-        wrong = np.zeros(len(old), dtype=np.bool_)
-        for name in names:
-            off = np.asarray(getattr(old, name)) != np.asarray(getattr(new, name))
-            wrong |= off if off.ndim == 1 else off.any(axis=1)
-        feeds = (old.motion != RAPID) & (old.motion != DWELL)
-        wanted = old.feed * np.where(feeds, factor, 1.0)
-        wrong |= (new.feed > wanted * (1.0 + 1e-9)) | (new.feed < wanted * (1.0 - 1.01 * 10.0 ** (1 - DIGITS)))
-    if wrong.any():
-        line = int(old.line[np.argmax(wrong)]) if same else 0
-        where = f"line {line}: " if line else ""
+    at, wrong = 0, len(old) != len(new)
+    if not wrong:
+        off = np.zeros(len(old), dtype=np.bool_)
+        for name in ("motion", "p_work", "axis", "centre", "normal", "turns", "spindle", "tool", "line"):
+            differs = np.asarray(getattr(old, name)) != np.asarray(getattr(new, name))
+            off |= differs if differs.ndim == 1 else differs.any(axis=1)
+        off |= (old.motion == DWELL) & (old.feed != new.feed)
+        moves = np.isin(old.line, line) & (old.motion != RAPID) & (old.motion != DWELL)
+        wanted = old.feed[moves] * factor[np.searchsorted(line, old.line[moves])]
+        rounded = 1.0 - 1.01 * 10.0 ** (1 - DIGITS)
+        off[moves] |= (new.feed[moves] > wanted * (1.0 + 1e-9)) | (new.feed[moves] < wanted * rounded)
+        wrong, at = bool(off.any()), int(old.line[np.argmax(off)])
+    if wrong:
+        where = f"line {at}: " if at else ""
         raise InputError(f"{where}its feed cannot be set by a word of its own: convert the program first")
 
 
