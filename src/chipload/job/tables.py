@@ -29,11 +29,23 @@ def _only_count(value: Any) -> Any:
     return value
 
 
+def _only_face(value: Any) -> Any:
+    if isinstance(value, int) and not isinstance(value, bool):
+        if not 1 <= value <= 1_000_000:
+            raise ValueError("must be from 1")
+        return value
+    if isinstance(value, (list, tuple)) and len(value) == 3:
+        return tuple(float(_only_number(x)) for x in value)
+    raise ValueError("must be the number of a face or a point [x, y, z] on it, in mm")
+
+
 Number = Annotated[float, BeforeValidator(_only_number), Field(allow_inf_nan=False)]
 Positive = Annotated[Number, Field(gt=0.0)]
 NotNegative = Annotated[Number, Field(ge=0.0)]
 Point = Annotated[tuple[Number, Number, Number], Field()]
 Count = Annotated[int, BeforeValidator(_only_count), Field(ge=1, le=1000)]
+#: a face of a STEP file, by its number or by a point [mm] on it
+FaceName = Annotated[int | tuple[float, float, float], BeforeValidator(_only_face)]
 Text = Annotated[str, Field(min_length=1)]
 Unit = Literal["um", "mm", "cm", "m", "inch", "foot"]
 Strategy = Literal["plain", "backward", "feed"]
