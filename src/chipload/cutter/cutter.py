@@ -41,7 +41,7 @@ class Cutter:
     runout : (offset [mm], direction [rad] from tooth 0): the axis of the teeth beside that of the spindle
     shank_diameter : [mm]; None: as the diameter
     holder : (length, diameter) [mm] of its parts, upwards from the overhang; empty: not known
-    number : tool number, >= 1
+    number : tool number, >= 0; 0: what is in the spindle where a program names no tool
     name : as the shop calls it
 
     Raises
@@ -123,7 +123,7 @@ class Cutter:
         for k, part in enumerate(self.holder):
             for key, size in zip(("length", "diameter"), part, strict=True):
                 need(0.0 < size < math.inf, f"holder.{k}.{key}_mm", size, "must be above 0")
-        need(self.number >= 1, "number", self.number, "must be at least 1")
+        need(self.number >= 0, "number", self.number, "must be at least 0")
 
     @property
     def radius(self) -> float:

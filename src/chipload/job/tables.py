@@ -170,6 +170,23 @@ class FixtureTable(Table):
     spacing_mm: Positive = Field(description="longest side of the triangles whose corners are looked at")
 
 
+class FeedsTable(Table):
+    """New feeds for the lines of the program, as fast as the stated limits of loads allow; the path stays."""
+
+    slowest_percent: Positive = Field(le=100.0, description="least feed of a line that cuts, of the programmed one")
+    fastest_percent: Positive = Field(ge=100.0, le=1e4, description="greatest feed of a line that cuts, likewise")
+    fastest_mm_min: Positive | None = Field(None, le=1e6, description="greatest feed of a line that cuts")
+    tooth_feed_least_mm: Positive | None = Field(
+        None, description="least feed per tooth of a line that cuts, so that it does not rub"
+    )
+    air_mm_min: Positive | None = Field(
+        None, le=1e6, description="feed of a line that touches nothing, if it is slower; none: it keeps its own"
+    )
+    change_least_percent: NotNegative = Field(
+        5.0, lt=100.0, description="a feed that could rise by less than this stays that of the line before"
+    )
+
+
 class SimulateTable(Table):
     """Run the program through the stock: chips, forces, torque, power."""
 
@@ -182,6 +199,7 @@ class SimulateTable(Table):
     stock_points_mm: Positive | None = Field(
         None, description="pitch of the points of the stock that shank and holder are held against; none: they are not"
     )
+    feeds: FeedsTable | None = Field(None, description="new feeds for the lines of the program; none: they stay")
 
 
 class LoadLimitsTable(Limits):
@@ -193,6 +211,10 @@ class LoadLimitsTable(Limits):
     chip_mm: Positive | None = None
     gouge_mm: Positive | None = Field(None, description="deepest cut into the [part]")
     excess_mm: Positive | None = Field(None, description="most material over the [part] where the tool came near it")
+
+
+#: limits that feeds can hold
+LOADS = ("force_n", "torque_nm", "power_w", "chip_mm")
 
 
 class ProgramJobTable(Table):

@@ -16,13 +16,15 @@ from chipload.cutting.material import Material, material_named, read_material
 from chipload.errors import InputError
 from chipload.geometry.mesh import read_mesh
 from chipload.job import ProgramJob
-from chipload.job.tables import SimulateTable
-from chipload.machine.machine import machine_named, read_machine
+from chipload.job.tables import LOADS, SimulateTable
+from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.program import RAPID, Program
-from chipload.program.read import line_times, read_program, read_tools
+from chipload.program.read import Reading, line_times, read_program, read_tools
 from chipload.progress import Progress, silent
+from chipload.report.feeds import Fed
 from chipload.report.reading import Read, verdict
 from chipload.report.simulated import Simulated
+from chipload.run.feeds import Asked, changeable, read_as, straight, watching, with_new_feeds
 from chipload.run.provenance import hashes, title_of, versions
 from chipload.simulation.chips import Resolution, remove
 from chipload.simulation.steps import steps_of
@@ -51,22 +53,40 @@ def run_program(job: ProgramJob, progress: Progress = silent, *, simulate: bool 
     machine = machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
     table = job.table.program
     share = 0.1 if job.simulates else 1.0
-    reading = read_program(
-        job.program_file,
-        machine,
-        dialect=table.dialect,
-        tools=read_tools(job.tools_file) if job.tools_file is not None else None,
-        feed=mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None,
-        tolerance=table.tolerance_mm,
-        progress=lambda done, what: progress(share * done, what),
-    )
+    tools = read_tools(job.tools_file) if job.tools_file is not None else None
+
+    def read(text: str | None = None) -> Reading:
+        return read_program(
+            job.program_file,
+            machine,
+            dialect=table.dialect,
+            tools=tools,
+            feed=mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None,
+            tolerance=table.tolerance_mm,
+            text=text,
+            progress=lambda done, what: progress(share * done, what) if text is None else None,
+        )
+
+    reading = read()
     lines, seconds = line_times(reading, machine)
-    simulated = None
+    simulated, fed = None, None
     if job.simulates:
-        stock, material = _stock(job, reading.program), _material(job)
+        stock, material, begin = _stock(job, reading.program), _material(job), share
+        wants_feeds = job.table.operation[0].feeds is not None
+        if wants_feeds:
+            own = changeable(job.program_file, machine, table.dialect)
+            straight(reading.program)
+            if simulate:
+                begin = 0.5 * (1.0 + share)
+                fed, reading = _fed(
+                    job, *own, reading, stock, material, machine, read, float(seconds.sum()),
+                    lambda done, what: progress(share + (begin - share) * done, what),
+                )  # fmt: skip
+                lines, seconds = line_times(reading, machine)
+                stock = _stock(job, reading.program)
         if simulate:
             simulated = _simulated(
-                job, reading.program, stock, material, lambda done, what: progress(share + (1.0 - share) * done, what)
+                job, reading.program, stock, material, lambda done, what: progress(begin + (1.0 - begin) * done, what)
             )
     files: dict[str, Path] = {"job": job.path, "program": job.program_file}
     named = {"machine": job.machine, "tools": job.tools_file, "material": job.material}
@@ -83,7 +103,7 @@ def run_program(job: ProgramJob, progress: Progress = silent, *, simulate: bool 
         **({"material": material_provenance(simulated.material)} if simulated is not None else {}),
         "versions": versions(),
     }
-    return Read(title_of(job.path), job.program_file.name, reading, lines, seconds, machine, provenance, simulated)
+    return Read(title_of(job.path), job.program_file.name, reading, lines, seconds, machine, provenance, simulated, fed)
 
 
 def look_at_program(job: ProgramJob) -> tuple[list[str], bool]:
@@ -93,13 +113,46 @@ def look_at_program(job: ProgramJob) -> tuple[list[str], bool]:
     return [*noticed, f"{job.path.name}: {verdict(done)[1]}"], not done.reading.broken
 
 
+def _fed(
+    job: ProgramJob,
+    text: str,
+    dialect: str,
+    reading: Reading,
+    stock: LayeredStock,
+    material: Material,
+    machine: Machine,
+    read: Callable[[str], Reading],
+    seconds: float,
+    progress: Progress,
+) -> tuple[Fed, Reading]:
+    """The text with new feeds, from what the program cuts of a stock, which changes; and what it does then."""
+    op: SimulateTable = job.table.operation[0]
+    assert op.feeds is not None
+    fine = _resolution(job)
+    limits = {name: limit for name, limit in job.limits.items() if name in LOADS}
+    asked = Asked(op.feeds, limits, fine.rotation)
+    steps = steps_of(reading.program, op.step_mm, op.tolerance_mm)
+    removal = remove(
+        reading.program, stock, job.cutters, material, fine, interpolation=op.interpolation,
+        watch=watching(steps, asked, job.cutters, material, machine), progress=progress,
+    )  # fmt: skip
+    return with_new_feeds(
+        text, dialect, reading, steps, removal, asked, job.cutters, machine, lambda new: read(read_as(new)), seconds
+    )
+
+
+def _resolution(job: ProgramJob) -> Resolution:
+    op: SimulateTable = job.table.operation[0]
+    smallest = min(c.radius for c in job.cutters.values())
+    return Resolution(op.step_mm, op.tolerance_mm, op.corner_slices, op.flank_mm or 0.5 * smallest)
+
+
 def _simulated(
     job: ProgramJob, program: Program, stock: LayeredStock, material: Material, progress: Progress
 ) -> Simulated:
     """The program, run through the stock of the job."""
     op: SimulateTable = job.table.operation[0]
-    smallest = min(c.radius for c in job.cutters.values())
-    fine = Resolution(op.step_mm, op.tolerance_mm, op.corner_slices, op.flank_mm or 0.5 * smallest)
+    fine = _resolution(job)
     points = _grid(stock, op.stock_points_mm) if op.stock_points_mm is not None else None
     part, fixtures, before = _part(job), _fixtures(job), _insides(stock)
     removal = remove(

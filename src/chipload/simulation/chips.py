@@ -26,6 +26,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import slices
 from chipload.cutting.band import deviations, mean_basis
 from chipload.cutting.material import Material
+from chipload.engagement.bites import with_runout
 from chipload.engagement.chips.move import Move
 from chipload.engagement.immersion.immersion import Section
 from chipload.errors import Finding, InputError
@@ -214,10 +215,11 @@ def remove(
         for number in sorted({int(steps.tool[c.step]) for c in cuts}):
             own = [c for c in cuts if steps.tool[c.step] == number]
             at = [c.step for c in own]
-            bitten = bites_of_steps(own, cutters[number], profiles[number])
+            plain = bites_of_steps(own, profiles[number])
+            bitten = with_runout(plain, cutters[number])
             loads[at] = loads_of_steps(bitten, own, cutters[number], material, resolution.rotation, steps.spindle[at])
             way = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
-            bite = Cuts(number, cutters[number], np.array(at), way, bitten)
+            bite = Cuts(number, cutters[number], np.array(at), way, bitten, plain, steps.spindle[at])
             if keep:
                 kept.setdefault(number, []).append(bite)
             if watch is not None:
