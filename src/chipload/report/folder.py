@@ -43,6 +43,7 @@ from chipload.report.wall import page as wall_page
 from chipload.report.wall import scene as wall_scene
 from chipload.report.wall import summary as wall_summary
 from chipload.report.wall.outcome import Walled
+from chipload.simulation.unfinished import require_ours
 
 SUMMARY = "summary.json"
 #: an outcome of any kind
@@ -117,6 +118,20 @@ def check_target(out: str | Path, ours: Callable[[Path], bool] | None = None, wh
     except OSError as err:
         raise InputError(f"--out {out}: cannot be written: {err.strerror}: name another folder") from None
     return target
+
+
+def unfinished_folder(out: str | Path) -> Path:
+    """Where a run keeps what it has finished until its result is written: beside it.
+
+    Raises
+    ------
+    InputError
+        Something else is there.
+    """
+    target = Path(out).absolute()
+    folder = target.with_name(f"{target.name}.unfinished")
+    require_ours(folder)
+    return folder
 
 
 def write_result(outcome: Shown, out: str | Path, progress: Progress = silent) -> Path:

@@ -25,10 +25,12 @@ from chipload.report.feeds import Fed
 from chipload.report.reading import Read, verdict
 from chipload.report.simulated import Simulated
 from chipload.run.feeds import Asked, changeable, read_as, straight, watching, with_new_feeds
-from chipload.run.provenance import hashes, title_of, versions
+from chipload.run.provenance import hashes, sources, title_of, versions
 from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.pieces import remove_in_pieces
 from chipload.simulation.steps import steps_of
 from chipload.simulation.surface import MOST_POINTS, collisions, difference, fine, in_stock
+from chipload.simulation.unfinished import Unfinished
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min
 
@@ -38,11 +40,14 @@ TILE = 4.0
 COARSE = 4.0
 
 
-def run_program(job: ProgramJob, progress: Progress = silent, *, simulate: bool = True) -> Read:
+def run_program(
+    job: ProgramJob, progress: Progress = silent, unfinished: Unfinished | None = None, *, simulate: bool = True
+) -> Read:
     """Read the program of a job for its machine; simulate it where the job says so.
 
     Parameters
     ----------
+    unfinished : the folder that keeps what is finished, from which the run goes on; None: all is kept in memory
     simulate : False: every file is read, nothing is cut
 
     Raises
@@ -86,8 +91,9 @@ def run_program(job: ProgramJob, progress: Progress = silent, *, simulate: bool 
                 stock = _stock(job, reading.program)
         if simulate:
             simulated = _simulated(
-                job, reading.program, stock, material, lambda done, what: progress(begin + (1.0 - begin) * done, what)
-            )
+                job, reading.program, stock, material, unfinished,
+                lambda done, what: progress(begin + (1.0 - begin) * done, what),
+            )  # fmt: skip
     files: dict[str, Path] = {"job": job.path, "program": job.program_file}
     named = {"machine": job.machine, "tools": job.tools_file, "material": job.material}
     fixtures = {f"fixture {k}": f for k, f in enumerate(job.table.fixture)}
@@ -148,17 +154,31 @@ def _resolution(job: ProgramJob) -> Resolution:
 
 
 def _simulated(
-    job: ProgramJob, program: Program, stock: LayeredStock, material: Material, progress: Progress
+    job: ProgramJob,
+    program: Program,
+    stock: LayeredStock,
+    material: Material,
+    unfinished: Unfinished | None,
+    progress: Progress,
 ) -> Simulated:
     """The program, run through the stock of the job."""
     op: SimulateTable = job.table.operation[0]
     fine = _resolution(job)
     points = _grid(stock, op.stock_points_mm) if op.stock_points_mm is not None else None
     part, fixtures, before = _part(job), _fixtures(job), _insides(stock)
-    removal = remove(
-        program, stock, job.cutters, material, fine, interpolation=op.interpolation,
-        progress=lambda done, what: progress(0.8 * done, what),
-    )  # fmt: skip
+
+    def removing(done: float, what: str) -> None:
+        progress(0.8 * done, what)
+
+    if unfinished is None:
+        removal = remove(
+            program, stock, job.cutters, material, fine, interpolation=op.interpolation, progress=removing
+        )  # fmt: skip
+    else:
+        removal = remove_in_pieces(
+            program, stock, job.cutters, material, fine, unfinished, interpolation=op.interpolation,
+            also=(versions(), sources()), progress=removing,
+        )  # fmt: skip
     steps = steps_of(program, op.step_mm, op.tolerance_mm)
     left, solids = None, dict(fixtures)
     if part is not None:
