@@ -57,7 +57,7 @@ def program_job(path: Path, table: ProgramJobTable, overrides: Sequence[str]) ->
         _check_simulation(table)
         own = cutters(table.cutter, folder)
     else:
-        for key in ("stock", "part", "fixture", "material", "cutter"):
+        for key in ("stock", "part", "fixture", "material", "cutter", "stiffness"):
             if getattr(table, key):
                 raise InputError(
                     f"{key}: not used where a program is only read: add an [[operation]] with "

@@ -17,13 +17,14 @@ from chipload.errors import InputError
 from chipload.geometry.mesh import read_mesh
 from chipload.job import ProgramJob
 from chipload.job.tables import SimulateTable
-from chipload.machine.machine import machine_named, read_machine
+from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.program import RAPID, Program
 from chipload.program.read import line_times, read_program, read_tools
 from chipload.progress import Progress, silent
 from chipload.report.reading import Read, verdict
 from chipload.report.simulated import Simulated
 from chipload.run.provenance import hashes, title_of, versions
+from chipload.run.stiffness import deflecting, stiffness_of, with_deflections
 from chipload.simulation.chips import Resolution, remove
 from chipload.simulation.steps import steps_of
 from chipload.simulation.surface import MOST_POINTS, collisions, difference, fine, in_stock
@@ -66,7 +67,12 @@ def run_program(job: ProgramJob, progress: Progress = silent, *, simulate: bool 
         stock, material = _stock(job, reading.program), _material(job)
         if simulate:
             simulated = _simulated(
-                job, reading.program, stock, material, lambda done, what: progress(share + (1.0 - share) * done, what)
+                job,
+                reading.program,
+                stock,
+                machine,
+                material,
+                lambda done, what: progress(share + (1.0 - share) * done, what),
             )
     files: dict[str, Path] = {"job": job.path, "program": job.program_file}
     named = {"machine": job.machine, "tools": job.tools_file, "material": job.material}
@@ -94,7 +100,7 @@ def look_at_program(job: ProgramJob) -> tuple[list[str], bool]:
 
 
 def _simulated(
-    job: ProgramJob, program: Program, stock: LayeredStock, material: Material, progress: Progress
+    job: ProgramJob, program: Program, stock: LayeredStock, machine: Machine, material: Material, progress: Progress
 ) -> Simulated:
     """The program, run through the stock of the job."""
     op: SimulateTable = job.table.operation[0]
@@ -102,10 +108,12 @@ def _simulated(
     fine = Resolution(op.step_mm, op.tolerance_mm, op.corner_slices, op.flank_mm or 0.5 * smallest)
     points = _grid(stock, op.stock_points_mm) if op.stock_points_mm is not None else None
     part, fixtures, before = _part(job), _fixtures(job), _insides(stock)
+    gives = stiffness_of(job.table.stiffness, job.cutters)
     removal = remove(
         program, stock, job.cutters, material, fine, interpolation=op.interpolation,
-        progress=lambda done, what: progress(0.8 * done, what),
+        watch=deflecting(gives, material), progress=lambda done, what: progress(0.8 * done, what),
     )  # fmt: skip
+    removal = with_deflections(removal, gives)
     steps = steps_of(program, op.step_mm, op.tolerance_mm)
     left, solids = None, dict(fixtures)
     if part is not None:
@@ -122,8 +130,9 @@ def _simulated(
     settings = {k: v for k, v in op.model_dump().items() if v is not None}
     held_against = (*solids, *(["stock"] if points is not None else []))
     return Simulated(
-        removal, stock, material, job.limits, job.unchecked, settings, left, touched, held_against, _no_holder(job)
-    )
+        removal, stock, machine, material, job.limits, job.unchecked, settings, left, touched, held_against,
+        _no_holder(job), gives.unknown,
+    )  # fmt: skip
 
 
 def _part(job: ProgramJob) -> trimesh.Trimesh | None:
