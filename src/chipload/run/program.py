@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -19,7 +20,7 @@ from chipload.job import ProgramJob
 from chipload.job.tables import SimulateTable
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.program import RAPID, Program
-from chipload.program.read import line_times, read_program, read_tools
+from chipload.program.read import Reading, line_times, read_program, read_tools
 from chipload.progress import Progress, silent
 from chipload.report.reading import Read, verdict
 from chipload.report.simulated import Simulated
@@ -99,6 +100,29 @@ def look_at_program(job: ProgramJob) -> tuple[list[str], bool]:
     return [*noticed, f"{job.path.name}: {verdict(done)[1]}"], not done.reading.broken
 
 
+def simulate_read(
+    job: ProgramJob,
+    reading: Reading,
+    machine: Machine,
+    material: Material,
+    stock: LayeredStock | None,
+    provenance: Mapping[str, Any],
+    progress: Progress = silent,
+) -> Read:
+    """Run a program that was read already through a stock.
+
+    Parameters
+    ----------
+    job : its operation, cutters, limits, part, fixtures and stiffness count
+    stock : which changes; None: that of the job
+    """
+    if stock is None:
+        stock = _stock(job, reading.program)
+    lines, seconds = line_times(reading, machine)
+    done = _simulated(job, reading.program, stock, machine, material, progress)
+    return Read(title_of(job.path), job.program_file.name, reading, lines, seconds, machine, provenance, done)
+
+
 def _simulated(
     job: ProgramJob, program: Program, stock: LayeredStock, machine: Machine, material: Material, progress: Progress
 ) -> Simulated:
@@ -138,8 +162,8 @@ def _simulated(
 def _part(job: ProgramJob) -> trimesh.Trimesh | None:
     """The part that should come out."""
     table = job.table.part
-    if table is None:
-        return None
+    if table is None or "part" in job.meshes:
+        return job.meshes.get("part")
     return read_mesh(job.path.parent / table.file, unit=table.units, chord_mm=table.chord_mm, key="part.file")
 
 
@@ -148,7 +172,9 @@ def _fixtures(job: ProgramJob) -> dict[str, NDArray[np.float64]]:
     out = {}
     for k, table in enumerate(job.table.fixture):
         path, key = job.path.parent / table.file, f"fixture.{k}.file"
-        mesh = read_mesh(path, unit=table.units, chord_mm=table.chord_mm, key=key)
+        mesh = job.meshes.get(f"fixture {k}")
+        if mesh is None:
+            mesh = read_mesh(path, unit=table.units, chord_mm=table.chord_mm, key=key)
         out[f"fixture {k}"] = fine(mesh, table.spacing_mm, f"fixture.{k}")[0]
     return out
 
@@ -195,16 +221,18 @@ def _stock(job: ProgramJob, program: Program) -> LayeredStock:
     """
     table, folder = job.table.stock, job.path.parent
     assert table is not None
-    if table.file is not None and table.file.lower().endswith(".npz"):
+    mesh = job.meshes.get("stock")
+    if mesh is None and table.file is not None and table.file.lower().endswith(".npz"):
         return LayeredStock.load(folder / table.file)
     assert table.layer_mm is not None
     tile = TILE * max(c.diameter for c in job.cutters.values())
-    if table.file is None:
+    if mesh is None and table.file is None:
         assert table.low_mm is not None
         assert table.high_mm is not None
         stock = LayeredStock.block(table.low_mm, table.high_mm, COARSE * table.layer_mm, tile)
     else:
-        mesh = read_mesh(folder / table.file, unit=table.units, chord_mm=table.chord_mm)
+        if mesh is None:
+            mesh = read_mesh(folder / str(table.file), unit=table.units, chord_mm=table.chord_mm)
         stock = LayeredStock.of_mesh(mesh, COARSE * table.layer_mm, tile)
     top = float(stock.bounds[-1])
     stock.refine(min(_lowest(program, job.cutters), top), top, table.layer_mm)
