@@ -209,12 +209,35 @@ class LoadLimitsTable(Limits):
     torque_nm: Positive | None = None
     power_w: Positive | None = None
     chip_mm: Positive | None = None
+    deflection_um: Positive | None = Field(None, description="how far tool and work part, see [stiffness]")
     gouge_mm: Positive | None = Field(None, description="deepest cut into the [part]")
     excess_mm: Positive | None = Field(None, description="most material over the [part] where the tool came near it")
 
 
 #: limits that feeds can hold
-LOADS = ("force_n", "torque_nm", "power_w", "chip_mm")
+LOADS = ("force_n", "torque_nm", "power_w", "chip_mm", "deflection_um")
+
+
+def _stiff(value: Any) -> Any:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or math.isnan(value):
+        raise ValueError("must be a number, or inf where it is rigid")
+    return float(value)
+
+
+Stiff = Annotated[float, BeforeValidator(_stiff), Field(gt=0.0)]
+
+
+class StiffnessTable(Table):
+    """What gives way beside the cutter; inf: rigid. What is not stated counts as rigid and leaves deflections
+    unproven.
+    """
+
+    holder_gpa: Stiff | None = Field(None, description="Young's modulus of the holders, solid parts of holder_mm")
+    grip_n_um: Stiff | None = Field(None, description="cutter in its holder, across the axis")
+    grip_nm_rad: Stiff | None = Field(None, description="cutter in its holder, against tilting")
+    spindle_n_um: Stiff | None = Field(None, description="end of the spindle, across the axis")
+    spindle_nm_rad: Stiff | None = Field(None, description="end of the spindle, against tilting")
+    work_n_um: Stiff | None = Field(None, description="work where it is cut, the same in every direction")
 
 
 class ProgramJobTable(Table):
@@ -227,6 +250,7 @@ class ProgramJobTable(Table):
     fixture: tuple[FixtureTable, ...] = ()
     material: SourceTable | None = None
     cutter: tuple[CutterTable, ...] = ()
+    stiffness: StiffnessTable | None = None
     operation: tuple[SimulateTable, ...] = Field((), max_length=1)
     limits: LoadLimitsTable = Field(default_factory=LoadLimitsTable.model_construct)
 

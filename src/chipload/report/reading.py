@@ -86,6 +86,10 @@ def verdict(read: Read) -> tuple[bool, str]:
         if fails:
             more = f"; and {len(fails) - 1} more" if len(fails) > 1 else ""
             return False, f"Does not hold: {fails[0]}{more}."
+        unproven = read.simulated.unproven
+        if unproven:
+            more = f"; and {len(unproven) - 1} more" if len(unproven) > 1 else ""
+            return False, f"Unproven: nothing that is known exceeds a limit; {unproven[0]}{more}."
         held = ", ".join(h.says for h in read.simulated.held)
         return True, f"Every stated limit holds in the simulation: {held}."
     return False, f"Unproven: the limits of machine {read.machine.name} hold; what the cutter meets was not simulated."
@@ -99,9 +103,9 @@ def _fails(read: Read) -> tuple[str, ...]:
 
 def _status(read: Read) -> str:
     """`failed`, `unproven` or `simulated`."""
-    if not verdict(read)[0] and (read.reading.broken or read.simulated is not None):
+    if read.reading.broken or (read.simulated is not None and read.simulated.verdict == "fails"):
         return "failed"
-    return "unproven" if read.simulated is None else "simulated"
+    return "unproven" if read.simulated is None or read.simulated.verdict == "unproven" else "simulated"
 
 
 def _said(finding: Finding) -> str:
@@ -152,7 +156,7 @@ def summary_bytes(read: Read) -> bytes:
 
 def _operation(read: Read) -> dict[str, Any]:
     assert read.simulated is not None
-    out = operation(read.simulated)
+    out = operation(read.simulated, float(read.seconds.sum()))
     if read.fed is None:
         return out
     fails = list(_fails(read))
@@ -255,6 +259,8 @@ def page_bytes(read: Read) -> bytes:
     box = ", ".join(f"{x} {a:.4g} to {b:.4g}" for x, a, b in zip("XYZ", low, high, strict=True))
     body = [*heading(read.title, holds, word, _sentence(says.removeprefix(f"{word}: ")))]
     body += _findings("What does not hold", bad)
+    if read.simulated is not None and read.simulated.unproven:
+        body += ["<h3>What is not proved</h3>", items(read.simulated.unproven[:LISTED])]
     if _fails(read):
         body += ["<h3>What the simulation found</h3>", items(_fails(read)[:LISTED])]
     if read.fed is not None and read.simulated is not None:
@@ -272,7 +278,7 @@ def page_bytes(read: Read) -> bytes:
         "<h3>Lines that take longest</h3>",
         _slowest(read),
         *_findings("What the reader noticed", read.reading.noticed),
-        *(sections(read.simulated, figures) if read.simulated is not None else ()),
+        *(sections(read.simulated, what["time_s"], figures) if read.simulated is not None else ()),
         "<h2>What was not checked</h2>",
         f"<p>{_unchecked(read)}</p>",
         "<h2>Where the numbers come from</h2>",
@@ -384,6 +390,8 @@ def _unchecked(read: Read) -> str:
         out.append("fixtures: none is stated")
     if done.no_holder:
         out.append(f"holders of tools {', '.join(map(str, done.no_holder))}: not stated")
+    if done.rigid:
+        out.append(f"what gives way and is not stated: {', '.join(done.rigid)}")
     if done.unchecked:
         out.append(f"limits that are not stated: {', '.join(done.unchecked)}")
     return escape(_sentence("; ".join(out)) + "." if out else "Everything that chipload can check of a program was.")
