@@ -63,9 +63,14 @@ def radius_of(blade: Blade) -> float:
 
 
 def _distance(points: Floats, surface: Revolved) -> Floats:
-    """Distance (n,) [mm] of points to the nearest of the meridian's, which lie close."""
+    """Distance (n,) [mm] of points to a meridian: to the tangent at its nearest point, beyond an end to that end."""
     r, z = np.hypot(points[:, 0], points[:, 1]), points[:, 2]
-    out: Floats = np.linalg.norm(surface.curve(surface.nearest(r, z, 4001)) - np.stack([r, z], axis=-1), axis=1)
+    s = surface.nearest(r, z)
+    away, tangent = np.stack([r, z], axis=-1) - surface.curve(s), surface.curve(s, 1)
+    along = (away * tangent).sum(axis=1) / np.linalg.norm(tangent, axis=1)
+    beyond = ((s == 0.0) & (along < 0.0)) | ((s == 1.0) & (along > 0.0))
+    far = np.linalg.norm(away, axis=1)
+    out: Floats = np.where(beyond, far, np.sqrt(np.maximum(far**2 - along**2, 0.0)))
     return out
 
 

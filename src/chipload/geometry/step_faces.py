@@ -53,7 +53,8 @@ class Face:
     shape: Any = field(repr=False)
 
     def __str__(self) -> str:
-        box = ", ".join(f"{a} {p:.6g} to {q:.6g}" for a, p, q in zip("xyz", self.low, self.high, strict=True))
+        corners = np.stack([self.low, self.high]).round(4) + 0.0
+        box = ", ".join(f"{a} {p:.6g} to {q:.6g}" for a, p, q in zip("xyz", *corners, strict=True))
         holes = "" if not self.holes else f", {self.holes} {'hole' if self.holes == 1 else 'holes'}"
         return f"face {self.number}: {self.kind}, {self.area:.5g} mm2, {self.edges} edges{holes}; {box} mm"
 
@@ -137,9 +138,9 @@ def read_faces(path: str | Path, key: str = "part.file") -> Model:
     from OCP.TopoDS import TopoDS
 
     file = Path(path)
-    shape = read_shape(file, key)
-    if file.stat().st_size > _LARGEST_FILE:
+    if file.is_file() and file.stat().st_size > _LARGEST_FILE:
         raise InputError(f"{key} = {file.name}: more than {_LARGEST_FILE} bytes: write the part alone")
+    shape = read_shape(file, key)
     if b"LENGTH_UNIT" not in file.read_bytes():
         raise InputError(f"{key} = {file.name}: states no unit of length: write it again with its unit")
     out: list[Face] = []
