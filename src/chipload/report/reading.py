@@ -6,12 +6,12 @@ cutter meets is not known.
 
 from __future__ import annotations
 
-import io
+import itertools
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from html import escape
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -168,15 +168,24 @@ def row_times(read: Read) -> Floats:
     return np.asarray(own + more * share)
 
 
-def history_bytes(read: Read) -> bytes:
-    """history.parquet."""
-    columns = history(read) if read.simulated is None else steps(read.simulated)
+def history_writer(read: Read) -> Callable[[IO[bytes]], None]:
+    """What writes history.parquet; of a simulated program some ten thousand rows at a time are in memory."""
+
+    def write(file: IO[bytes]) -> None:
+        tables = map(_table, (history(read),) if read.simulated is None else steps(read.simulated))
+        first = next(tables)
+        with pq.ParquetWriter(file, first.schema, compression="zstd") as writer:
+            for table in itertools.chain([first], tables):
+                writer.write_table(table)
+
+    return write
+
+
+def _table(columns: Mapping[str, Any]) -> pa.Table:
     n = len(columns["pass"])
     data = {"operation": pa.array(np.zeros(n, dtype=np.int32)), "strategy": pa.array(["program"] * n)}
     data |= {k: pa.array(v.tolist() if v.dtype == object else np.ascontiguousarray(v)) for k, v in columns.items()}
-    sink = io.BytesIO()
-    pq.write_table(pa.table(data), sink, compression="zstd")
-    return sink.getvalue()
+    return pa.table(data)
 
 
 def scene_bytes(read: Read) -> bytes:
