@@ -6,13 +6,13 @@ cutter meets is not known.
 
 from __future__ import annotations
 
-import io
+import itertools
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -200,17 +200,37 @@ def row_times(read: Read) -> Floats:
     return np.asarray(own + more * share)
 
 
-def history_bytes(read: Read) -> bytes:
-    """history.parquet."""
-    columns = history(read) if read.simulated is None else steps(read.simulated)
-    if read.fed is not None and read.simulated is not None:
-        columns |= fed_feeds.columns(read.fed, read.simulated)
+def history_writer(read: Read) -> Callable[[IO[bytes]], None]:
+    """What writes history.parquet; of a simulated program some ten thousand rows at a time are in memory."""
+
+    def write(file: IO[bytes]) -> None:
+        tables = map(_table, _rows(read))
+        first = next(tables)
+        with pq.ParquetWriter(file, first.schema, compression="zstd") as writer:
+            for table in itertools.chain([first], tables):
+                writer.write_table(table)
+
+    return write
+
+
+def _rows(read: Read) -> Iterator[Mapping[str, Any]]:
+    """The columns of history.parquet, some rows at a time."""
+    if read.simulated is None:
+        yield history(read)
+        return
+    fed = fed_feeds.columns(read.fed, read.simulated) if read.fed is not None else {}
+    at = 0
+    for some in steps(read.simulated):
+        count = len(some["pass"])
+        yield {**some, **{name: values[at : at + count] for name, values in fed.items()}}
+        at += count
+
+
+def _table(columns: Mapping[str, Any]) -> pa.Table:
     n = len(columns["pass"])
     data = {"operation": pa.array(np.zeros(n, dtype=np.int32)), "strategy": pa.array(["program"] * n)}
     data |= {k: pa.array(v.tolist() if v.dtype == object else np.ascontiguousarray(v)) for k, v in columns.items()}
-    sink = io.BytesIO()
-    pq.write_table(pa.table(data), sink, compression="zstd")
-    return sink.getvalue()
+    return pa.table(data)
 
 
 def scene_bytes(read: Read) -> bytes:

@@ -77,12 +77,21 @@ class Stored(Mapping[str, NDArray[Any]]):
             yield {name: _read(file, name, count) for name in self.names}
 
 
-def pieces_of(columns: Arrays) -> Iterator[Arrays]:
-    """Columns piece after piece: those in files as they were written, others at once."""
-    if isinstance(columns, Stored):
-        yield from columns.pieces()
-    else:
-        yield columns
+def in_rows(columns: Arrays, size: int) -> Iterator[dict[str, NDArray[Any]]]:
+    """Columns, ``size`` rows at a time and the rest.
+
+    >>> [some["x"].tolist() for some in in_rows({"x": np.arange(5)}, 2)]
+    [[0, 1], [2, 3], [4]]
+    """
+    held: dict[str, NDArray[Any]] = {}
+    for piece in columns.pieces() if isinstance(columns, Stored) else (columns,):
+        held = {k: np.concatenate([held[k], v]) if held else v for k, v in piece.items()}
+        count = len(next(iter(held.values())))
+        for at in range(0, count - size + 1, size):
+            yield {k: v[at : at + size] for k, v in held.items()}
+        held = {k: v[count // size * size :] for k, v in held.items()}
+    if held and len(next(iter(held.values()))):
+        yield held
 
 
 class Unfinished:
