@@ -225,10 +225,10 @@ def page_bytes(read: Read) -> bytes:
     box = ", ".join(f"{x} {a:.4g} to {b:.4g}" for x, a, b in zip("XYZ", low, high, strict=True))
     body = [*heading(read.title, holds, word, _sentence(says.removeprefix(f"{word}: ")))]
     body += _findings("What does not hold", bad)
-    if read.simulated is not None and read.simulated.unproven:
-        body += ["<h3>What is not proved</h3>", items(read.simulated.unproven[:LISTED])]
     if read.simulated is not None and read.simulated.fails:
         body += ["<h3>What the simulation found</h3>", items(read.simulated.fails[:LISTED])]
+    if read.simulated is not None and read.simulated.unproven:
+        body += ["<h3>What is not proved</h3>", items(read.simulated.unproven[:LISTED])]
     body += [
         f"<h2>{escape(read.name)} on {escape(read.machine.name)}</h2>",
         f"<p>{what['motions']} motions, {what['cutting_mm']:.5g} mm at feed and {what['rapid_mm']:.5g} mm of rapids, "
