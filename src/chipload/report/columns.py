@@ -66,7 +66,10 @@ def columns_figure(
                 given = {"x": across[over], "y": y[over], "customdata": columns["line"][over], "hovertemplate": says}
                 mark = {"color": LIMIT, "size": 5}
                 out.add_trace(go.Scatter(**given, mode="markers", name=f"{name} exceeds", marker=mark), row=row, col=1)
-        out.update_yaxes(title_text=name, row=row, col=1)
+        top = max(float(y.max(initial=0.0)), bound.get(name, 0.0))
+        low = min(float(y.min(initial=0.0)), 0.0)
+        room = 0.06 * (top - low) or 1.0
+        out.update_yaxes(title_text=name, range=[low - room, top + room], row=row, col=1)
     out.update_xaxes(gridcolor=GRID, zeroline=False)
     out.update_yaxes(gridcolor=GRID, zerolinecolor=GRID)
     out.update_xaxes(title_text=AGAINST[x], row=len(names), col=1)

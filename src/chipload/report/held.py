@@ -59,7 +59,8 @@ class Held:
         unit = LIMITS[self.name][1]
         word = " ".join(self.name.split("_")[:-1])
         if self.worst > self.limit:
-            return f"{word} {self.worst:.4g} {unit} exceeds {self.limit:g} {unit} in line {self.line}"
+            place = f"in line {self.line}" if self.line else f"at ({', '.join(f'{x:.4g}' for x in self.at)})"
+            return f"{word} {self.worst:.4g} {unit} exceeds {self.limit:g} {unit} {place}"
         if self.unknown:
             return (
                 f"{word} is at least {self.worst:.4g} of {self.limit:g} {unit}, but {', '.join(self.unknown)} "

@@ -279,10 +279,10 @@ def page_bytes(read: Read) -> bytes:
     box = ", ".join(f"{x} {a:.4g} to {b:.4g}" for x, a, b in zip("XYZ", low, high, strict=True))
     body = [*heading(read.title, holds, word, _sentence(says.removeprefix(f"{word}: ")))]
     body += _findings("What does not hold", bad)
-    if read.simulated is not None and read.simulated.unproven:
-        body += ["<h3>What is not proved</h3>", items(read.simulated.unproven[:LISTED])]
     if _fails(read):
         body += ["<h3>What the simulation found</h3>", items(_fails(read)[:LISTED])]
+    if read.simulated is not None and read.simulated.unproven:
+        body += ["<h3>What is not proved</h3>", items(read.simulated.unproven[:LISTED])]
     if read.fed is not None and read.simulated is not None:
         name = feeds_name(read)
         body += fed_feeds.section(read.fed, read.simulated, float(read.seconds.sum()), name, holds, figures)

@@ -22,7 +22,7 @@ from chipload.machine.machine import Machine
 from chipload.report import surface
 from chipload.report.diagram import diagram_figure
 from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, STOCK
-from chipload.report.held import Held, held_limits
+from chipload.report.held import LIMITS, Held, held_limits
 from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table
 from chipload.simulation.chips import Removal
@@ -257,6 +257,22 @@ def _mean(values: Mapping[str, Any]) -> str:
     return f"{values['mean']:.4g}" if sd is None else f"{values['mean']:.4g} \u00b1 {2.0 * sd:.2g}"
 
 
+def _limits(simulated: Simulated) -> str:
+    """Every limit against its worst step."""
+    columns, rows = simulated.removal.columns, []
+    for h in simulated.held:
+        word = {True: "holds", False: '<span class="no">does not hold</span>', None: "unproven"}[h.holds]
+        column, unit = LIMITS[h.name]
+        t = f"{float(columns['t_s'][int(np.argmax(columns[column]))]):.4g}" if column in columns else ""
+        place = ", ".join(f"{x:.4g}" for x in h.at)
+        name = " ".join(h.name.split("_")[:-1])
+        rows.append([f"{name} [{unit}]", word, f"{h.limit:g}", f"{h.worst:.4g}", str(h.line or ""), t, place])
+    if not rows:
+        return ""
+    heads = ["limit", "", "at most", "worst", "line", "time [s]", "tip at x, y, z [mm]"]
+    return table(heads, rows, numbers=(2, 3, 4, 5))
+
+
 def _rigid(simulated: Simulated) -> str:
     """What deflections leave out."""
     if not simulated.rigid:
@@ -284,6 +300,7 @@ def sections(simulated: Simulated, time_s: float, figures: dict[str, go.Figure])
         f"in air; thickest chip {what['chip_mm']['max']:.4g} mm; in films too thin to be told from the tolerance "
         f"{what['films_mm3']:.2g} mm\u00b3.</p>",
         table(["", "mean", "greatest", "least"], rows, numbers=(1, 2, 3)),
+        _limits(simulated),
         f'<p class="note">{SURE if sure else UNSURE}{_rigid(simulated)}</p>',
         figure("loads", along(simulated), figures),
     ]

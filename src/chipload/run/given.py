@@ -45,7 +45,7 @@ Cutters: TypeAlias = Cutter | Mapping[str, Any] | Mapping[int, Cutter | Mapping[
 #: lengths that are not given, in diameters of the smallest cutter: a step, a layer, points of part and fixtures
 STEP, LAYER, SPACING = 0.25, 0.05, 0.1
 #: what stands for the name of a file where a value is given
-VALUE = "value"
+VALUE = "program"
 
 Model = TypeVar("Model", bound=BaseModel)
 

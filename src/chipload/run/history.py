@@ -43,6 +43,9 @@ class History:
     def __len__(self) -> int:
         return len(self.columns["line"])
 
+    def __repr__(self) -> str:
+        return f"History({self.read.name} on {self.read.machine.name}, {len(self)} steps: {self.verdict})"
+
     def __getitem__(self, column: str) -> NDArray[Any]:
         """(n,) values of a column, as ``history["force_n"]``."""
         if column not in self.columns:
