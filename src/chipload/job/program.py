@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+
+import trimesh
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
@@ -26,6 +28,7 @@ class ProgramJob(Limited):
     overrides : the `--set` texts that were applied
     cutters : by number; empty where the program is not simulated
     material : a shipped name or a file; None where the program is not simulated
+    meshes : what stands for the files of ``stock``, ``part``, ``fixture 0`` and so on
     """
 
     path: Path
@@ -36,6 +39,7 @@ class ProgramJob(Limited):
     overrides: tuple[str, ...]
     cutters: Mapping[int, Cutter]
     material: str | Path | None
+    meshes: Mapping[str, trimesh.Trimesh] = field(default_factory=dict)
 
     @property
     def simulates(self) -> bool:
@@ -57,7 +61,7 @@ def program_job(path: Path, table: ProgramJobTable, overrides: Sequence[str]) ->
         _check_simulation(table)
         own = cutters(table.cutter, folder)
     else:
-        for key in ("stock", "part", "fixture", "material", "cutter"):
+        for key in ("stock", "part", "fixture", "material", "cutter", "stiffness"):
             if getattr(table, key):
                 raise InputError(
                     f"{key}: not used where a program is only read: add an [[operation]] with "

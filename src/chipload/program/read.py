@@ -6,6 +6,7 @@ each leads to the other, so that a :class:`Reading` always has both.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, cast, get_args
@@ -109,6 +110,42 @@ def read_program(
         if len(commands) == 0:
             raise InputError(f"{path.name}: no motion: nothing to check")
         program, more = to_work(commands, machine, tolerance=tolerance)
+    return _held(commands, program, machine, noticed, more)
+
+
+def reading_of(
+    program: Program,
+    machine: Machine,
+    *,
+    tool_lengths: Mapping[int, float] | None = None,
+    tolerance: float = TOLERANCE_MM,
+) -> Reading:
+    """What the axes of a machine do for a program that comes from no file, and what is wrong with it there.
+
+    Parameters
+    ----------
+    tool_lengths : [mm] of each tool; one that is not named has 0
+    tolerance : of rows on which a rotary axis moves [mm]
+
+    Raises
+    ------
+    InputError
+        It does not move, or the machine has not the axes that it moves.
+    """
+    if len(program) == 0:
+        raise InputError("program: no motion: nothing to check")
+    commands, found = to_axes(program, machine, tool_lengths=tool_lengths, tolerance=tolerance)
+    return _held(commands, program, machine, (), tuple(f for f in found if f.code not in LIMITS))
+
+
+def _held(
+    commands: Commands,
+    program: Program,
+    machine: Machine,
+    noticed: tuple[Finding, ...],
+    more: tuple[Finding, ...],
+) -> Reading:
+    """A program held against the limits of a machine."""
     axes = axes_of(commands, machine)
     broken = [*check_program(program, machine)]
     if machine.chain.rotary:

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, WALL
+from chipload.report.held import LIMITS
 from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table
-from chipload.report.simulated import LIMITS, Simulated
+from chipload.report.simulated import Simulated
 
 Floats = NDArray[np.float64]
 

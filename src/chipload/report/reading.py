@@ -6,13 +6,13 @@ cutter meets is not known.
 
 from __future__ import annotations
 
-import io
+import itertools
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -86,6 +86,10 @@ def verdict(read: Read) -> tuple[bool, str]:
         if fails:
             more = f"; and {len(fails) - 1} more" if len(fails) > 1 else ""
             return False, f"Does not hold: {fails[0]}{more}."
+        unproven = read.simulated.unproven
+        if unproven:
+            more = f"; and {len(unproven) - 1} more" if len(unproven) > 1 else ""
+            return False, f"Unproven: nothing that is known exceeds a limit; {unproven[0]}{more}."
         held = ", ".join(h.says for h in read.simulated.held)
         return True, f"Every stated limit holds in the simulation: {held}."
     return False, f"Unproven: the limits of machine {read.machine.name} hold; what the cutter meets was not simulated."
@@ -99,9 +103,9 @@ def _fails(read: Read) -> tuple[str, ...]:
 
 def _status(read: Read) -> str:
     """`failed`, `unproven` or `simulated`."""
-    if not verdict(read)[0] and (read.reading.broken or read.simulated is not None):
+    if read.reading.broken or (read.simulated is not None and read.simulated.verdict == "fails"):
         return "failed"
-    return "unproven" if read.simulated is None else "simulated"
+    return "unproven" if read.simulated is None or read.simulated.verdict == "unproven" else "simulated"
 
 
 def _said(finding: Finding) -> str:
@@ -152,7 +156,7 @@ def summary_bytes(read: Read) -> bytes:
 
 def _operation(read: Read) -> dict[str, Any]:
     assert read.simulated is not None
-    out = operation(read.simulated)
+    out = operation(read.simulated, float(read.seconds.sum()))
     if read.fed is None:
         return out
     fails = list(_fails(read))
@@ -196,17 +200,37 @@ def row_times(read: Read) -> Floats:
     return np.asarray(own + more * share)
 
 
-def history_bytes(read: Read) -> bytes:
-    """history.parquet."""
-    columns = history(read) if read.simulated is None else steps(read.simulated)
-    if read.fed is not None and read.simulated is not None:
-        columns |= fed_feeds.columns(read.fed, read.simulated)
+def history_writer(read: Read) -> Callable[[IO[bytes]], None]:
+    """What writes history.parquet; of a simulated program some ten thousand rows at a time are in memory."""
+
+    def write(file: IO[bytes]) -> None:
+        tables = map(_table, _rows(read))
+        first = next(tables)
+        with pq.ParquetWriter(file, first.schema, compression="zstd") as writer:
+            for table in itertools.chain([first], tables):
+                writer.write_table(table)
+
+    return write
+
+
+def _rows(read: Read) -> Iterator[Mapping[str, Any]]:
+    """The columns of history.parquet, some rows at a time."""
+    if read.simulated is None:
+        yield history(read)
+        return
+    fed = fed_feeds.columns(read.fed, read.simulated) if read.fed is not None else {}
+    at = 0
+    for some in steps(read.simulated):
+        count = len(some["pass"])
+        yield {**some, **{name: values[at : at + count] for name, values in fed.items()}}
+        at += count
+
+
+def _table(columns: Mapping[str, Any]) -> pa.Table:
     n = len(columns["pass"])
     data = {"operation": pa.array(np.zeros(n, dtype=np.int32)), "strategy": pa.array(["program"] * n)}
     data |= {k: pa.array(v.tolist() if v.dtype == object else np.ascontiguousarray(v)) for k, v in columns.items()}
-    sink = io.BytesIO()
-    pq.write_table(pa.table(data), sink, compression="zstd")
-    return sink.getvalue()
+    return pa.table(data)
 
 
 def scene_bytes(read: Read) -> bytes:
@@ -257,6 +281,8 @@ def page_bytes(read: Read) -> bytes:
     body += _findings("What does not hold", bad)
     if _fails(read):
         body += ["<h3>What the simulation found</h3>", items(_fails(read)[:LISTED])]
+    if read.simulated is not None and read.simulated.unproven:
+        body += ["<h3>What is not proved</h3>", items(read.simulated.unproven[:LISTED])]
     if read.fed is not None and read.simulated is not None:
         name = feeds_name(read)
         body += fed_feeds.section(read.fed, read.simulated, float(read.seconds.sum()), name, holds, figures)
@@ -272,7 +298,7 @@ def page_bytes(read: Read) -> bytes:
         "<h3>Lines that take longest</h3>",
         _slowest(read),
         *_findings("What the reader noticed", read.reading.noticed),
-        *(sections(read.simulated, figures) if read.simulated is not None else ()),
+        *(sections(read.simulated, what["time_s"], figures) if read.simulated is not None else ()),
         "<h2>What was not checked</h2>",
         f"<p>{_unchecked(read)}</p>",
         "<h2>Where the numbers come from</h2>",
@@ -384,6 +410,8 @@ def _unchecked(read: Read) -> str:
         out.append("fixtures: none is stated")
     if done.no_holder:
         out.append(f"holders of tools {', '.join(map(str, done.no_holder))}: not stated")
+    if done.rigid:
+        out.append(f"what gives way and is not stated: {', '.join(done.rigid)}")
     if done.unchecked:
         out.append(f"limits that are not stated: {', '.join(done.unchecked)}")
     return escape(_sentence("; ".join(out)) + "." if out else "Everything that chipload can check of a program was.")

@@ -29,7 +29,7 @@ from chipload.program.program import DWELL, RAPID, Program
 from chipload.program.read import Reading, dialect_of
 from chipload.program.time import peak_speed, program_time
 from chipload.report.feeds import Fed
-from chipload.report.simulated import LIMITS
+from chipload.report.held import LIMITS
 from chipload.simulation.chips import Removal, Watch
 from chipload.simulation.loads import Cuts, at_feeds, greatest_loads
 from chipload.simulation.steps import Steps

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -22,13 +23,17 @@ from chipload.program.program import RAPID, Program
 from chipload.program.read import Reading, line_times, read_program, read_tools
 from chipload.progress import Progress, silent
 from chipload.report.feeds import Fed
+from chipload.report.held import spindle_limits
 from chipload.report.reading import Read, verdict
 from chipload.report.simulated import Simulated
 from chipload.run.feeds import Asked, changeable, read_as, straight, watching, with_new_feeds
-from chipload.run.provenance import hashes, title_of, versions
+from chipload.run.provenance import hashes, sources, title_of, versions
+from chipload.run.stiffness import deflecting, stiffness_of, with_deflections
 from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.pieces import remove_in_pieces
 from chipload.simulation.steps import steps_of
 from chipload.simulation.surface import MOST_POINTS, collisions, difference, fine, in_stock
+from chipload.simulation.unfinished import Unfinished
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min
 
@@ -38,11 +43,14 @@ TILE = 4.0
 COARSE = 4.0
 
 
-def run_program(job: ProgramJob, progress: Progress = silent, *, simulate: bool = True) -> Read:
+def run_program(
+    job: ProgramJob, progress: Progress = silent, unfinished: Unfinished | None = None, *, simulate: bool = True
+) -> Read:
     """Read the program of a job for its machine; simulate it where the job says so.
 
     Parameters
     ----------
+    unfinished : the folder that keeps what is finished, from which the run goes on; None: all is kept in memory
     simulate : False: every file is read, nothing is cut
 
     Raises
@@ -86,8 +94,9 @@ def run_program(job: ProgramJob, progress: Progress = silent, *, simulate: bool 
                 stock = _stock(job, reading.program)
         if simulate:
             simulated = _simulated(
-                job, reading.program, stock, material, lambda done, what: progress(begin + (1.0 - begin) * done, what)
-            )
+                job, reading.program, stock, machine, material, unfinished,
+                lambda done, what: progress(begin + (1.0 - begin) * done, what),
+            )  # fmt: skip
     files: dict[str, Path] = {"job": job.path, "program": job.program_file}
     named = {"machine": job.machine, "tools": job.tools_file, "material": job.material}
     fixtures = {f"fixture {k}": f for k, f in enumerate(job.table.fixture)}
@@ -113,6 +122,29 @@ def look_at_program(job: ProgramJob) -> tuple[list[str], bool]:
     return [*noticed, f"{job.path.name}: {verdict(done)[1]}"], not done.reading.broken
 
 
+def simulate_read(
+    job: ProgramJob,
+    reading: Reading,
+    machine: Machine,
+    material: Material,
+    stock: LayeredStock | None,
+    provenance: Mapping[str, Any],
+    progress: Progress = silent,
+) -> Read:
+    """Run a program that was read already through a stock.
+
+    Parameters
+    ----------
+    job : its operation, cutters, limits, part, fixtures and stiffness count
+    stock : which changes; None: that of the job
+    """
+    if stock is None:
+        stock = _stock(job, reading.program)
+    lines, seconds = line_times(reading, machine)
+    done = _simulated(job, reading.program, stock, machine, material, None, progress)
+    return Read(title_of(job.path), job.program_file.name, reading, lines, seconds, machine, provenance, done)
+
+
 def _fed(
     job: ProgramJob,
     text: str,
@@ -129,13 +161,17 @@ def _fed(
     op: SimulateTable = job.table.operation[0]
     assert op.feeds is not None
     fine = _resolution(job)
-    limits = {name: limit for name, limit in job.limits.items() if name in LOADS}
-    asked = Asked(op.feeds, limits, fine.rotation)
+    limits = {name: limit for name, limit in job.limits.items() if name in LOADS} | spindle_limits(machine)
+    gives = stiffness_of(job.table.stiffness, job.cutters)
+    bends = deflecting(gives, material)
+    asked = Asked(op.feeds, limits, fine.rotation, bends if "deflection_um" in limits else None)
     steps = steps_of(reading.program, op.step_mm, op.tolerance_mm)
+    allowed = watching(steps, asked, job.cutters, material, machine)
     removal = remove(
         reading.program, stock, job.cutters, material, fine, interpolation=op.interpolation,
-        watch=watching(steps, asked, job.cutters, material, machine), progress=progress,
+        watch=lambda cuts: {**allowed(cuts), **bends(cuts)}, progress=progress,
     )  # fmt: skip
+    removal = with_deflections(removal, gives)
     return with_new_feeds(
         text, dialect, reading, steps, removal, asked, job.cutters, machine, lambda new: read(read_as(new)), seconds
     )
@@ -148,17 +184,36 @@ def _resolution(job: ProgramJob) -> Resolution:
 
 
 def _simulated(
-    job: ProgramJob, program: Program, stock: LayeredStock, material: Material, progress: Progress
+    job: ProgramJob,
+    program: Program,
+    stock: LayeredStock,
+    machine: Machine,
+    material: Material,
+    unfinished: Unfinished | None,
+    progress: Progress,
 ) -> Simulated:
     """The program, run through the stock of the job."""
     op: SimulateTable = job.table.operation[0]
     fine = _resolution(job)
     points = _grid(stock, op.stock_points_mm) if op.stock_points_mm is not None else None
     part, fixtures, before = _part(job), _fixtures(job), _insides(stock)
-    removal = remove(
-        program, stock, job.cutters, material, fine, interpolation=op.interpolation,
-        progress=lambda done, what: progress(0.8 * done, what),
-    )  # fmt: skip
+    stiffness = job.table.stiffness
+    gives = stiffness_of(stiffness, job.cutters)
+    watch = deflecting(gives, material)
+
+    def removing(done: float, what: str) -> None:
+        progress(0.8 * done, what)
+
+    if unfinished is None:
+        removal = remove(
+            program, stock, job.cutters, material, fine, interpolation=op.interpolation, watch=watch, progress=removing
+        )  # fmt: skip
+    else:
+        removal = remove_in_pieces(
+            program, stock, job.cutters, material, fine, unfinished, interpolation=op.interpolation, watch=watch,
+            also=(versions(), sources(), repr(stiffness)), progress=removing,
+        )  # fmt: skip
+    removal = with_deflections(removal, gives)
     steps = steps_of(program, op.step_mm, op.tolerance_mm)
     left, solids = None, dict(fixtures)
     if part is not None:
@@ -175,15 +230,16 @@ def _simulated(
     settings = {k: v for k, v in op.model_dump().items() if v is not None}
     held_against = (*solids, *(["stock"] if points is not None else []))
     return Simulated(
-        removal, stock, material, job.limits, job.unchecked, settings, left, touched, held_against, _no_holder(job)
-    )
+        removal, stock, machine, material, job.limits, job.unchecked, settings, left, touched, held_against,
+        _no_holder(job), gives.unknown,
+    )  # fmt: skip
 
 
 def _part(job: ProgramJob) -> trimesh.Trimesh | None:
     """The part that should come out."""
     table = job.table.part
-    if table is None:
-        return None
+    if table is None or "part" in job.meshes:
+        return job.meshes.get("part")
     return read_mesh(job.path.parent / table.file, unit=table.units, chord_mm=table.chord_mm, key="part.file")
 
 
@@ -192,7 +248,9 @@ def _fixtures(job: ProgramJob) -> dict[str, NDArray[np.float64]]:
     out = {}
     for k, table in enumerate(job.table.fixture):
         path, key = job.path.parent / table.file, f"fixture.{k}.file"
-        mesh = read_mesh(path, unit=table.units, chord_mm=table.chord_mm, key=key)
+        mesh = job.meshes.get(f"fixture {k}")
+        if mesh is None:
+            mesh = read_mesh(path, unit=table.units, chord_mm=table.chord_mm, key=key)
         out[f"fixture {k}"] = fine(mesh, table.spacing_mm, f"fixture.{k}")[0]
     return out
 
@@ -239,16 +297,18 @@ def _stock(job: ProgramJob, program: Program) -> LayeredStock:
     """
     table, folder = job.table.stock, job.path.parent
     assert table is not None
-    if table.file is not None and table.file.lower().endswith(".npz"):
+    mesh = job.meshes.get("stock")
+    if mesh is None and table.file is not None and table.file.lower().endswith(".npz"):
         return LayeredStock.load(folder / table.file)
     assert table.layer_mm is not None
     tile = TILE * max(c.diameter for c in job.cutters.values())
-    if table.file is None:
+    if mesh is None and table.file is None:
         assert table.low_mm is not None
         assert table.high_mm is not None
         stock = LayeredStock.block(table.low_mm, table.high_mm, COARSE * table.layer_mm, tile)
     else:
-        mesh = read_mesh(folder / table.file, unit=table.units, chord_mm=table.chord_mm)
+        if mesh is None:
+            mesh = read_mesh(folder / str(table.file), unit=table.units, chord_mm=table.chord_mm)
         stock = LayeredStock.of_mesh(mesh, COARSE * table.layer_mm, tile)
     top = float(stock.bounds[-1])
     stock.refine(min(_lowest(program, job.cutters), top), top, table.layer_mm)

@@ -224,6 +224,51 @@ def step_deflections(
     return out
 
 
+def tip_deflections(
+    cuts: Cuts,
+    material: Material,
+    *,
+    bars: tuple[Bar, ...],
+    work: float | None = None,
+    rotation: float = math.radians(2.0),
+) -> dict[str, Floats]:
+    """How far the tip of one cutter and the work part in some steps, at most over a revolution.
+
+    With u the lateral motion of the tip under what all teeth cut and F the force on the cutter, the work with a
+    compliance c in every direction goes -c F, and they part by u + c F.
+
+    Parameters
+    ----------
+    cuts : of one cutter, as the watch of :func:`chipload.simulation.chips.remove` gets them
+    bars : of cutter, holder and spindle, from the tip upwards
+    work : c [mm/N]; None: the work counts as rigid
+    rotation : between two rotations that are looked at [rad]
+
+    Returns
+    -------
+    columns, (c,) each
+        ``deflection_cutter_um`` greatest size of u, with ``work`` also ``deflection_work_um`` c times that of F,
+        ``deflection_um`` greatest size of u + c F.
+    """
+    if work is not None and not 0.0 <= work < math.inf:
+        raise InputError(f"tip_deflections: work = {work:g} mm/N: a compliance must be at least 0")
+    pitch = math.tau if cuts.cutter.runout[0] > 0.0 else math.tau / cuts.cutter.flutes
+    m = max(math.ceil(pitch / rotation), 8)
+    theta = np.arange(m) * (pitch / m)
+    n = len(cuts)
+    moments = _bent(
+        cuts, np.repeat(np.arange(n), m), np.tile(theta, n), np.zeros(n * m), material, {cuts.tool: bars}
+    ).reshape(n, m, 5)
+    force, bent = moments[..., :3], moments[..., 3:]
+    out = {"deflection_cutter_um": 1e3 * np.linalg.norm(bent, axis=2).max(axis=1)}
+    if work is None:
+        return out | {"deflection_um": out["deflection_cutter_um"]}
+    apart = work * force
+    out["deflection_work_um"] = 1e3 * np.linalg.norm(apart, axis=2).max(axis=1)
+    apart[..., :2] += bent
+    return out | {"deflection_um": 1e3 * np.linalg.norm(apart, axis=2).max(axis=1)}
+
+
 def form_error(
     removal: Removal,
     material: Material,

@@ -136,14 +136,15 @@ def bites_of_steps(cuts: list[StepBite], profile: Slices) -> Bites:
 
 
 def greatest_loads(cuts: Cuts, material: Material, rotation: float) -> dict[str, Floats]:
-    """The columns (c,) of :data:`LOADS` that limits hold: greatest force [N] and torque [N m], mean power [W], thickest
-    chip [mm].
+    """Columns (c,) of :data:`LOADS` that limits hold: greatest force [N], greatest and mean torque [N m], mean power
+    [W], thickest chip [mm].
     """
     force, torque = _over_turn(cuts.bites, cuts.cutter, material, rotation)
     _, mean = mean_forces(cuts.bites, cuts.cutter, material)
     return {
         "force_n": np.linalg.norm(force, axis=2).max(axis=1),
         "torque_nm": torque.max(axis=1) / 1000.0,
+        "torque_mean_nm": mean / 1000.0,
         "power_w": mean * np.abs(cuts.spindle) / 1000.0,
         "chip_max_mm": cuts.bites.chip_max(),
     }

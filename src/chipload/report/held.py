@@ -1,0 +1,110 @@
+"""Limits of a simulated program, stated ones and those of the machine, each against its worst step.
+
+Notation: a limit holds, does not hold, or is unproven: nothing that is known exceeds it, but what was left out of the
+number could. The spindle's torque and power are means over a turn, which is what its motor has to give.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.machine.machine import Machine
+from chipload.report import surface
+from chipload.simulation.surface import Difference
+
+Columns = Mapping[str, NDArray[Any]]
+
+#: limit, the column that it holds, and its unit
+LIMITS: Mapping[str, tuple[str, str]] = {
+    "force_n": ("force_n", "N"),
+    "torque_nm": ("torque_nm", "N m"),
+    "power_w": ("power_w", "W"),
+    "chip_mm": ("chip_max_mm", "mm"),
+    "deflection_um": ("deflection_um", "um"),
+    "gouge_mm": ("gouge_mm", "mm"),
+    "excess_mm": ("", "mm"),
+    "spindle_torque_nm": ("torque_mean_nm", "N m"),
+    "spindle_power_w": ("power_w", "W"),
+}
+
+
+@dataclass(frozen=True)
+class Held:
+    """A limit against the worst step: where (x, y, z) [mm], at which line of the source; ``unknown`` says what was left
+    out of the number, so that it may be greater.
+    """
+
+    name: str
+    limit: float
+    worst: float
+    line: int
+    at: tuple[float, float, float]
+    unknown: tuple[str, ...] = ()
+
+    @property
+    def holds(self) -> bool | None:
+        """Whether the limit is kept; None: that is unproven."""
+        if self.worst > self.limit:
+            return False
+        return None if self.unknown else True
+
+    @property
+    def says(self) -> str:
+        """`force 812 N exceeds 500 N in line 12`."""
+        unit = LIMITS[self.name][1]
+        word = " ".join(self.name.split("_")[:-1])
+        if self.worst > self.limit:
+            place = f"in line {self.line}" if self.line else f"at ({', '.join(f'{x:.4g}' for x in self.at)})"
+            return f"{word} {self.worst:.4g} {unit} exceeds {self.limit:g} {unit} {place}"
+        if self.unknown:
+            return (
+                f"{word} is at least {self.worst:.4g} of {self.limit:g} {unit}, but {', '.join(self.unknown)} "
+                f"{'is' if len(self.unknown) == 1 else 'are'} not stated"
+            )
+        return f"{word} {self.worst:.4g} of {self.limit:g} {unit}"
+
+
+def held_limits(
+    limits: Mapping[str, float],
+    machine: Machine,
+    columns: Columns,
+    left: Difference | None,
+    unknown: tuple[str, ...],
+) -> tuple[Held, ...]:
+    """Every stated limit, then those of the spindle.
+
+    Parameters
+    ----------
+    limits : by name, keys of :data:`LIMITS`
+    columns : of the removal
+    left : what is left on the part, where it is stated
+    unknown : stiffness that is not stated
+    """
+    out = []
+    for name, limit in limits.items():
+        if name in ("gouge_mm", "excess_mm"):
+            assert left is not None
+            found = surface.worst(left, columns, name.removesuffix("_mm"))
+            out.append(Held(name, limit, found["max"], found["line"], tuple(found["at_mm"] or (0.0, 0.0, 0.0))))
+        else:
+            out.append(_worst(name, limit, columns, unknown if name == "deflection_um" else ()))
+    return (*out, *(_worst(name, limit, columns) for name, limit in spindle_limits(machine).items()))
+
+
+def spindle_limits(machine: Machine) -> dict[str, float]:
+    """What the spindle of a machine can give, by name of the limit; empty where its file does not say it."""
+    torque = None if machine.torque is None else machine.torque / 1000.0
+    stated = {"spindle_torque_nm": torque, "spindle_power_w": machine.power_w}
+    return {name: limit for name, limit in stated.items() if limit is not None}
+
+
+def _worst(name: str, limit: float, columns: Columns, unknown: tuple[str, ...] = ()) -> Held:
+    values = columns[LIMITS[name][0]]
+    k = int(np.argmax(values))
+    at = (float(columns["x_mm"][k]), float(columns["y_mm"][k]), float(columns["z_mm"][k]))
+    return Held(name, limit, float(values[k]), int(columns["line"][k]), at, unknown)
