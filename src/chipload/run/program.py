@@ -31,7 +31,7 @@ from chipload.run.provenance import hashes, sources, title_of, versions
 from chipload.run.stiffness import deflecting, stiffness_of, with_deflections
 from chipload.simulation.chips import Resolution, remove
 from chipload.simulation.pieces import remove_in_pieces
-from chipload.simulation.steps import steps_of
+from chipload.simulation.steps import StepBlocks, steps_of
 from chipload.simulation.surface import MOST_POINTS, collisions, difference, fine, in_stock
 from chipload.simulation.unfinished import Unfinished
 from chipload.stock.layers import LayeredStock
@@ -39,6 +39,8 @@ from chipload.units import mm_s_from_mm_min
 
 #: side of a tile of the stock in diameters of the largest cutter
 TILE = 4.0
+#: of a simulation, what one pass over its steps beside the removal takes
+SHARE = 0.2 / 3.0
 #: layers where no cutter comes are so many times as thick
 COARSE = 4.0
 
@@ -214,19 +216,28 @@ def _simulated(
             also=(versions(), sources(), repr(stiffness)), progress=removing,
         )  # fmt: skip
     removal = with_deflections(removal, gives)
-    steps = steps_of(program, op.step_mm, op.tolerance_mm)
+    steps, count = StepBlocks(program, op.step_mm, op.tolerance_mm), len(removal.columns["line"])
+
+    def passing(share: float, what: str) -> Callable[[int], None]:
+        return lambda done: progress(share + SHARE * done / count, what)
+
     left, solids = None, dict(fixtures)
     if part is not None:
         table = job.table.part
         assert table is not None
         left = difference(
             steps, job.cutters, part, before, table.spacing_mm, table.look_mm, op.tolerance_mm,
-            lambda done, what: progress(0.8 + 0.1 * done, what),
+            passing(0.8, "distances to the part"),
         )  # fmt: skip
         solids["part"] = left.points
-    touched = collisions(steps, job.cutters, solids, op.tolerance_mm, above_only=frozenset(["part"]))
+    touched = collisions(
+        steps, job.cutters, solids, op.tolerance_mm, above_only=frozenset(["part"]),
+        progress=passing(0.8 + SHARE, "collisions"),
+    )  # fmt: skip
     if points is not None:
-        touched += in_stock(steps, job.cutters, points, op.tolerance_mm)
+        touched += in_stock(
+            steps, job.cutters, points, op.tolerance_mm, passing(0.8 + 2.0 * SHARE, "holders in the stock")
+        )  # fmt: skip
     settings = {k: v for k, v in op.model_dump().items() if v is not None}
     held_against = (*solids, *(["stock"] if points is not None else []))
     return Simulated(
