@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from chipload.geometry.mesh import read_mesh
 from chipload.job import ProgramJob
 from chipload.job.tables import SimulateTable
 from chipload.machine.machine import machine_named, read_machine
+from chipload.program.motions import lengths
 from chipload.program.program import RAPID, Program
 from chipload.program.read import line_times, read_program, read_tools
 from chipload.progress import Progress, silent
@@ -66,7 +68,11 @@ def run_program(job: ProgramJob, progress: Progress = silent, *, simulate: bool 
         stock, material = _stock(job, reading.program), _material(job)
         if simulate:
             simulated = _simulated(
-                job, reading.program, stock, material, lambda done, what: progress(share + (1.0 - share) * done, what)
+                job,
+                _with_tool(reading.program),
+                stock,
+                material,
+                lambda done, what: progress(share + (1.0 - share) * done, what),
             )
     files: dict[str, Path] = {"job": job.path, "program": job.program_file}
     named = {"machine": job.machine, "tools": job.tools_file, "material": job.material}
@@ -199,7 +205,7 @@ def _stock(job: ProgramJob, program: Program) -> LayeredStock:
         stock = LayeredStock.of_mesh(mesh, COARSE * table.layer_mm, tile)
     top = float(stock.bounds[-1])
     stock.refine(min(_lowest(program, job.cutters), top), top, table.layer_mm)
-    stock.refine_at(_levels(program))
+    stock.refine_at(_levels(program, job.cutters, table.layer_mm))
     return stock
 
 
@@ -214,12 +220,34 @@ def _lowest(program: Program, cutters: Mapping[int, Cutter]) -> float:
     return float((np.asarray(program.p_work)[rows, 2] - widest * lean).min())
 
 
-def _levels(program: Program) -> NDArray[np.float64]:
-    """Heights [mm] at which an upright cutter moves level at a feed."""
+def _with_tool(program: Program) -> Program:
+    """The program without the rapids at its beginning that are made before a tool is in the spindle (T0)."""
+    idle = (program.tool == 0) & (program.motion == RAPID)
+    first = len(program) if idle.all() else int(np.argmin(idle))
+    if first < 2:
+        return program
+    kept = {f.name: getattr(program, f.name)[first - 1 :] for f in fields(program) if f.name != "labels"}
+    return replace(program, **kept)
+
+
+def _levels(program: Program, cutters: Mapping[int, Cutter], apart: float) -> NDArray[np.float64]:
+    """Heights [mm] at which an upright cutter moves level at a feed.
+
+    A cutter that ends in a point leaves a floor only where it goes to and fro for long: of its heights those on which
+    its way is longest, none nearer to another than ``apart`` [mm].
+    """
     p = np.asarray(program.p_work)
     level = (np.abs(np.diff(p[:, 2], prepend=p[:1, 2])) < 1e-9) & (program.motion != RAPID)
     upright = np.asarray(program.axis)[:, 2] > 1.0 - 1e-12
-    return np.unique(p[level & upright, 2].round(9))
+    flat = np.isin(program.tool, [n for n, c in cutters.items() if c.bottom == 0.0 and c.apt[2] > 0.0])
+    kept = np.unique(p[level & upright & flat, 2].round(9))
+    pointed = level & upright & ~flat
+    heights, at = np.unique(p[pointed, 2].round(9), return_inverse=True)
+    way = np.bincount(at.ravel(), lengths(program)[pointed], minlength=len(heights))
+    for z in heights[np.argsort(-way, kind="stable")].tolist():
+        if np.abs(kept - z).min(initial=math.inf) >= apart:
+            kept = np.append(kept, z)
+    return np.sort(kept)
 
 
 def material_provenance(material: Material) -> dict[str, str]:
