@@ -11,6 +11,7 @@ import pytest
 
 from chipload import examples
 from chipload.errors import InputError
+from chipload.examples import copy_example
 from chipload.geometry.bspline import Patch
 from chipload.geometry.revolve import Revolved
 from chipload.job import load_job
@@ -196,3 +197,90 @@ def test_sections_that_are_a_model(tmp_path):
     assert refused(path, '"main_01.txt"', '"blade.stp"') == (
         "job.toml: impeller.sections: blade.stp: is a STEP file: name its faces in [impeller.step]"
     )
+
+
+WALL = """# a wall
+[wall]
+shape = "step"
+file = "wall.step"
+front = {front}
+back = {back}
+clamp = {clamp}
+{more}foot_mm = 6.0
+allowance_mm = [0.3, 0.2]
+elements = [4, 4]
+
+"""
+FRONT, BACK, BELOW = [7.0, 3.0, 9.0], [11.0, 0.0, 4.0], [20.0, 1.5, 0.0]
+
+
+def block(cut=None):
+    """A plate of 40 x 3 x 30 mm, less a box or a bore."""
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+
+    plate = BRepPrimAPI_MakeBox(40.0, 3.0, 30.0).Shape()
+    return plate if cut is None else BRepAlgoAPI_Cut(plate, cut).Shape()
+
+
+def bore():
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
+    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
+
+    return BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(30, -1, 20), gp_Dir(0, 1, 0)), 2.0, 6.0).Shape()
+
+
+def slot():
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+    from OCP.gp import gp_Pnt
+
+    return BRepPrimAPI_MakeBox(gp_Pnt(-1, 1, 10), gp_Pnt(41, 2, 31)).Shape()
+
+
+@pytest.mark.parametrize(
+    ("cut", "front", "back", "clamp", "more", "message"),
+    [
+        (None, 1, 9, 5, "",
+         "wall.back = 9: no such face: must be from 1 to 6: chipload check wall.step lists the faces"),
+        (None, 1, 1, 5, "", "wall.back: is face 1 as wall.front: state the face opposite"),
+        (None, FRONT, [20.0, 1.0, 30.0], [20.0, 3.0, 0.0], "",
+         "wall between faces 4 and 6 of wall.step: not opposite each other: lines across lean by 84.3 deg from the "
+         "normals: must be at most 45 deg, and apart: state the two sides of one wall, or a greater edge_share"),
+        (None, FRONT, BACK, [20.0, 1.5, 30.0], "",
+         "wall.clamp = [20, 1.5, 30]: lies 1.5 mm off the nearest edge of face 4: must be within 0.01 mm (mm, in the "
+         "frame of the file)"),
+        (None, FRONT, BACK, BACK, "",
+         "wall.clamp = [11, 0, 4]: lies 5 mm off the nearest edge of face 4: must be within 0.01 mm (mm, in the "
+         "frame of the file)"),
+        (None, FRONT, BACK, 3, "",
+         "wall.clamp: face 3 lies 3 mm off the nearest side of face 4: must touch it along a side, or state a point of "
+         "the edge that is clamped"),
+        (None, FRONT, BACK, [0.0, 3.0, 0.0], "",
+         "wall.clamp = [0, 3, 0]: lies at a corner of face 4: take a point within the edge"),
+        (bore, FRONT, BACK, 5, "", "wall.front: face 4 has a hole: must be one piece without any"),
+        (slot, [7.0, 1.0, 20.0], [7.0, 2.0, 20.0], [20.0, 1.0, 10.0], "",
+         "wall between faces 3 and 5 of wall.step: between them is no metal: state the sides of a wall, not of a slot"),
+        (None, FRONT, BACK, [20.0, 3.0, 0.0], "length_mm = 5.0\n",
+         "job.toml: wall.length_mm: not used by shape = step: leave it out"),
+        (None, FRONT, BACK, [20.0, 3.0, 0.0], "edge_share = 0.6\n",
+         "wall.edge_share = 0.6: must be from 0 to below 0.5"),
+    ],
+)  # fmt: skip
+def test_walls(tmp_path, cut, front, back, clamp, more, message):
+    path = copy_example("plate", tmp_path / "job") / "job.toml"
+    written(path.parent / "wall.step", block(None if cut is None else cut()))
+    text = path.read_text()
+    path.write_text(WALL.format(front=front, back=back, clamp=clamp, more=more) + text[text.index("[workpiece]") :])
+    assert refused(path) == message
+
+
+def test_a_wall_in_inches_taken_for_millimetres(tmp_path):
+    """Its foot would be higher than the wall."""
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+
+    path = copy_example("plate", tmp_path / "job") / "job.toml"
+    written(path.parent / "wall.step", BRepPrimAPI_MakeBox(40.0 / 25.4, 3.0 / 25.4, 30.0 / 25.4).Shape())
+    text = path.read_text()
+    names = {k: [round(x / 25.4, 9) for x in p] for k, p in (("front", FRONT), ("back", BACK), ("clamp", [20, 3, 0]))}
+    path.write_text(WALL.format(more="", **names) + text[text.index("[workpiece]") :])
+    assert refused(path) == ("wall.foot_mm = 6: must be below 0.8 of the wall's height of 1.181 mm: the rest is cut")

@@ -70,10 +70,11 @@ class Face:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A part with its faces."""
+    """A part with its faces; ``solid``: all of them bound solids, so that their normals look out of the metal."""
 
     file: Path
     faces: tuple[Face, ...]
+    solid: bool
 
     def face(self, name: Name, key: str) -> Face:
         """The face of a name; ``key`` says who asks.
@@ -134,7 +135,7 @@ def read_faces(path: str | Path, key: str = "part.file") -> Model:
     from OCP.BRepBndLib import BRepBndLib
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
-    from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_WIRE
+    from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID, TopAbs_WIRE
     from OCP.TopoDS import TopoDS
 
     file = Path(path)
@@ -155,7 +156,8 @@ def read_faces(path: str | Path, key: str = "part.file") -> Model:
         out.append(Face(k, kind, float(properties.Mass()), low, high, wires - 1, edges, face))
     if not out:
         raise InputError(f"{key} = {file.name}: no faces in this STEP file")
-    return Model(file, tuple(out))
+    bounding = sum(len(_all(body, TopAbs_FACE)) for body in _all(shape, TopAbs_SOLID))
+    return Model(file, tuple(out), bounding == len(out))
 
 
 def _all(shape: Any, what: Any) -> list[Any]:

@@ -108,9 +108,10 @@ class History:
             for name, value in _rows(said)
         )
         colour = COLOURS[self.verdict]
+        says = self.says.removeprefix("Unproven: ").removeprefix("Does not hold: ")
         return (
             f"<div style='border-left:5px solid {colour};padding:4px 12px'><b style='color:{colour}'>{self.verdict}"
-            f"</b>: {escape(self.says)}</div><table>{rows}</table>"
+            f"</b>: {escape(says)}</div><table>{rows}</table>"
         )
 
     @property

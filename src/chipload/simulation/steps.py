@@ -7,7 +7,7 @@ become chords first. Row 0 of a program is where it begins and gives no step, a 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -99,6 +99,25 @@ def steps_in_blocks(
                 kept, count = [], 0
     if kept:
         yield _joined(kept)
+
+
+@dataclass(frozen=True, eq=False)
+class StepBlocks:
+    """The steps of a program, block after block, as often as they are gone through: see :func:`steps_in_blocks`."""
+
+    program: Program
+    step_mm: float
+    chord_mm: float
+    turn: float = TURN
+    size: int = ROWS
+
+    def __iter__(self) -> Iterator[Steps]:
+        return steps_in_blocks(self.program, self.step_mm, self.chord_mm, self.turn, self.size)
+
+
+def blocks_of(steps: Steps | Iterable[Steps]) -> Iterable[Steps]:
+    """Blocks of steps, also where all are there."""
+    return [steps] if isinstance(steps, Steps) else steps
 
 
 @dataclass(frozen=True, eq=False)

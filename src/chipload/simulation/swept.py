@@ -19,6 +19,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.engagement.chips.covered import covered_polygons
 from chipload.engagement.chips.move import Move
 from chipload.errors import InputError
+from chipload.simulation.reach import reached
 from chipload.simulation.steps import Steps
 from chipload.stock.layers import LayeredStock
 
@@ -92,8 +93,9 @@ def _covered(
     heights = stock.heights
     asked: list[Floats] = []
     of: list[NDArray[np.int64]] = []
-    for k, (_, layers) in own.items():
-        z = heights[layers.start : layers.stop]
+    near = _near(steps, own, cutter, stock)
+    for k, layers in near.items():
+        z = heights[layers]
         rows = np.arange(len(z))
         flank = _flank(steps, k, cutter, z)
         if flank.any():
@@ -106,9 +108,18 @@ def _covered(
         of.append(rows)
     shapes = covered_polygons([move for move, _ in own.values()], cutter, asked, tolerance)
     return [
-        [(i, shape) for i, n in zip(layers, rows.tolist(), strict=True) if (shape := found[n]) is not None]
-        for (_, layers), rows, found in zip(own.values(), of, shapes, strict=True)
+        [(i, shape) for i, n in zip(layers.tolist(), rows.tolist(), strict=True) if (shape := found[n]) is not None]
+        for layers, rows, found in zip(near.values(), of, shapes, strict=True)
     ]
+
+
+def _near(
+    steps: Steps, own: Mapping[int, tuple[Move, range]], cutter: Cutter, stock: LayeredStock
+) -> dict[int, NDArray[np.int64]]:
+    """Layers that steps may take anything from; of upright cutters, whose layers cost little, all that they reach."""
+    out = {k: np.arange(layers.start, layers.stop) for k, (_, layers) in own.items()}
+    leaning = [k for k in own if min(steps.a0[k, 2], steps.a1[k, 2]) < 1.0]
+    return out | dict(zip(leaning, reached(steps, leaning, [out[k] for k in leaning], cutter, stock), strict=True))
 
 
 def _flank(steps: Steps, k: int, cutter: Cutter, heights: Floats) -> NDArray[np.bool_]:
