@@ -30,6 +30,7 @@ LIMITS: Mapping[str, tuple[str, str]] = {
     "excess_mm": ("", "mm"),
     "spindle_torque_nm": ("torque_mean_nm", "N m"),
     "spindle_power_w": ("power_w", "W"),
+    "flute_fill_share": ("flute_fill", ""),
 }
 
 
@@ -56,17 +57,18 @@ class Held:
     @property
     def says(self) -> str:
         """`force 812 N exceeds 500 N in line 12`."""
-        unit = LIMITS[self.name][1]
+        unit = f" {LIMITS[self.name][1]}".rstrip()
         word = " ".join(self.name.split("_")[:-1])
         if self.worst > self.limit:
             place = f"in line {self.line}" if self.line else f"at ({', '.join(f'{x:.4g}' for x in self.at)})"
-            return f"{word} {self.worst:.4g} {unit} exceeds {self.limit:g} {unit} {place}"
+            return f"{word} {self.worst:.4g}{unit} exceeds {self.limit:g}{unit} {place}"
         if self.unknown:
+            are = "is" if len(self.unknown) == 1 else "are"
             return (
-                f"{word} is at least {self.worst:.4g} of {self.limit:g} {unit}, but {', '.join(self.unknown)} "
-                f"{'is' if len(self.unknown) == 1 else 'are'} not stated"
+                f"{word} is at least {self.worst:.4g} of {self.limit:g}{unit}, but {', '.join(self.unknown)} {are} "
+                "not stated"
             )
-        return f"{word} {self.worst:.4g} of {self.limit:g} {unit}"
+        return f"{word} {self.worst:.4g} of {self.limit:g}{unit}"
 
 
 def held_limits(
@@ -76,7 +78,7 @@ def held_limits(
     left: Difference | None,
     unknown: tuple[str, ...],
 ) -> tuple[Held, ...]:
-    """Every stated limit, then those of the spindle.
+    """Every stated limit, then those of the spindle at the speed of each step, and the room for chips.
 
     Parameters
     ----------
@@ -93,15 +95,25 @@ def held_limits(
             out.append(Held(name, limit, found["max"], found["line"], tuple(found["at_mm"] or (0.0, 0.0, 0.0))))
         else:
             out.append(_worst(name, limit, columns, unknown if name == "deflection_um" else ()))
-    if machine.torque is not None:
-        out.append(_worst("spindle_torque_nm", machine.torque / 1000.0, columns))
+    torque, power = columns["torque_mean_nm"], columns["power_w"]
+    speed = np.divide(power, torque, out=np.zeros(len(power)), where=torque > 0.0)
+    given = machine.torque_at(speed) / 1000.0
+    k = int(np.argmax(torque / given))
+    if np.isfinite(given[k]):
+        out.append(_at("spindle_torque_nm", float(given[k]), columns, k))
     if machine.power_w is not None:
         out.append(_worst("spindle_power_w", machine.power_w, columns))
+    if "flute_fill" in columns:
+        out.append(_worst("flute_fill_share", 1.0, columns))
     return tuple(out)
 
 
 def _worst(name: str, limit: float, columns: Columns, unknown: tuple[str, ...] = ()) -> Held:
-    values = columns[LIMITS[name][0]]
-    k = int(np.argmax(values))
+    """A limit of a column, at its greatest value."""
+    return _at(name, limit, columns, int(np.argmax(columns[LIMITS[name][0]])), unknown)
+
+
+def _at(name: str, limit: float, columns: Columns, k: int, unknown: tuple[str, ...] = ()) -> Held:
+    """A limit of a column at one step."""
     at = (float(columns["x_mm"][k]), float(columns["y_mm"][k]), float(columns["z_mm"][k]))
-    return Held(name, limit, float(values[k]), int(columns["line"][k]), at, unknown)
+    return Held(name, limit, float(columns[LIMITS[name][0]][k]), int(columns["line"][k]), at, unknown)
