@@ -43,7 +43,7 @@ class Cutter:
     holder : (length, diameter) [mm] of its parts, upwards from the overhang; empty: not known
     gullet : area between two teeth in a section across the axis [mm^2]; None: not known
     chip_ratio : volume that chips fill over what they are cut from, >= 1; with ``gullet`` or not at all
-    number : tool number, >= 1
+    number : tool number, >= 0; 0: what is in the spindle where a program names no tool
     name : as the shop calls it
 
     Raises
@@ -135,7 +135,7 @@ class Cutter:
         need(self.gullet is None or 0.0 < self.gullet < room, "gullet_mm2", self.gullet or 0.0, limit)
         ratio = self.chip_ratio
         need(ratio is None or 1.0 <= ratio < math.inf, "chip_ratio", ratio or 0.0, "must be at least 1")
-        need(self.number >= 1, "number", self.number, "must be at least 1")
+        need(self.number >= 0, "number", self.number, "must be at least 0")
 
     @property
     def radius(self) -> float:

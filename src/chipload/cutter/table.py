@@ -37,7 +37,7 @@ class CutterTable(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
-    number: int | None = Field(None, ge=1)
+    number: int | None = Field(None, ge=0)
     name: str | None = None
     diameter_mm: float | None = None
     flutes: int | None = None

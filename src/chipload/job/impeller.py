@@ -11,7 +11,7 @@ from pydantic import Field
 
 from chipload.errors import InputError
 from chipload.job.sources import source
-from chipload.job.tables import Count, NotNegative, Number, Positive, SourceTable, Table, Text, Unit
+from chipload.job.tables import Count, FaceName, NotNegative, Number, Positive, SourceTable, Table, Text, Unit
 
 Share = Annotated[Number, Field(ge=0.0, le=1.0)]
 Span = tuple[Share, Share]
@@ -44,6 +44,24 @@ class SectionsTable(Table):
     hub_ahead_mm: NotNegative = Field(description="how far the hub goes on ahead of the leading edge")
 
 
+class StepTable(Table):
+    """Blades by faces of a STEP file; a face is named by its number or by a point [mm] on it, in the file's frame."""
+
+    file: Text = Field(description="`chipload check FILE` lists its faces")
+    flow: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = Field(
+        description="which way along the axis of rotation the flow comes in; the axis goes through the origin"
+    )
+    plus: FaceName = Field(description="side that faces a growing angle about the axis, seen against the flow")
+    minus: FaceName = Field(description="side that faces a falling angle, of the same blade or of another")
+    splitter_plus: FaceName | None = Field(None, description="likewise of a splitter; none: there are no splitters")
+    splitter_minus: FaceName | None = None
+    hub: tuple[FaceName, ...] | Text = Field(description="faces of revolution, or a file of points as of sections")
+    shroud: tuple[FaceName, ...] | Text = Field(description="likewise; the tip of one blade is a face of it")
+    unit: Unit | None = Field(None, description="of hub and shroud where they are files of points")
+    fit_mm: Positive = Field(0.001, le=0.1, description="how far a patch may leave its face where it is fitted")
+    hub_ahead_mm: NotNegative = Field(description="how far the hub goes on ahead of the leading edge")
+
+
 class ImpellerTable(Table):
     """The part."""
 
@@ -51,6 +69,13 @@ class ImpellerTable(Table):
     outer_diameter_mm: Positive = Field(description="over the blades, as the drawing states it")
     shape: ShapeTable | None = None
     sections: SectionsTable | None = None
+    step: StepTable | None = None
+
+    @property
+    def has_splitter(self) -> bool:
+        """Whether splitters stand between the blades."""
+        by_points = self.sections is not None and bool(self.sections.splitter)
+        return by_points or (self.step is not None and self.step.splitter_plus is not None)
 
 
 class SurfaceTable(Table):
@@ -148,9 +173,12 @@ def impeller_job(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) 
         Keys do not go together.
     """
     folder, part = path.parent, table.impeller
-    if (part.shape is None) == (part.sections is None):
-        said = "neither is" if part.shape is None else "both are"
-        raise InputError(f"impeller: {said} stated: state either [impeller.shape] or [impeller.sections]")
+    stated = [key for key in ("shape", "sections", "step") if getattr(part, key) is not None]
+    if len(stated) != 1:
+        said = f"{' and '.join(stated)} are" if stated else "none is"
+        raise InputError(
+            f"impeller: {said} stated: state one of [impeller.shape], [impeller.sections], [impeller.step]"
+        )
     for k, surface in enumerate(table.surface):
         _check(f"surface.{k}", surface, part)
         if any((s.body, s.side) == (surface.body, surface.side) for s in table.surface[:k]):
@@ -166,16 +194,30 @@ def impeller_job(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) 
         given = part.sections
         for name in (*given.blade, *given.splitter, given.hub, given.shroud):
             if name.lower().endswith((".stp", ".step")):
-                raise InputError(
-                    f"impeller.sections: {name}: blade faces are not read from STEP: write sections as points, X Y Z"
-                )
+                raise InputError(f"impeller.sections: {name}: is a STEP file: name its faces in [impeller.step]")
         files = {f"blade {k}": folder / name for k, name in enumerate(given.blade, 1)}
         files |= {f"splitter {k}": folder / name for k, name in enumerate(given.splitter, 1)}
         files |= {"hub": folder / given.hub, "shroud": folder / given.shroud}
+    if part.step is not None:
+        files = _step_files(part.step, folder)
     return ImpellerJob(
         path, table, source("machine", table.machine, folder), source("catalogue", table.catalogue, folder), files,
         tuple(overrides),
     )  # fmt: skip
+
+
+def _step_files(given: StepTable, folder: Path) -> dict[str, Path]:
+    if (given.splitter_plus is None) != (given.splitter_minus is None):
+        missing = "plus" if given.splitter_plus is None else "minus"
+        raise InputError(f"impeller.step.splitter_{missing}: missing: state both sides of the splitter or neither")
+    points = {key: name for key in ("hub", "shroud") if isinstance(name := getattr(given, key), str)}
+    for key in ("hub", "shroud"):
+        if not getattr(given, key):
+            raise InputError(f"impeller.step.{key} = []: must name at least one face, or a file of points")
+    if bool(points) == (given.unit is None):
+        said = "missing: state it for the points of " + " and ".join(points) if points else "of no file: leave it out"
+        raise InputError(f"impeller.step.unit: {said}")
+    return {"step": folder / given.file} | {key: folder / name for key, name in points.items()}
 
 
 def _check(at: str, surface: SurfaceTable, part: ImpellerTable) -> None:
@@ -185,5 +227,5 @@ def _check(at: str, surface: SurfaceTable, part: ImpellerTable) -> None:
             raise InputError(f"{at}.{key} = [{low:g}, {high:g}]: must ascend within 0 to 1")
     if min(surface.points) < 2:
         raise InputError(f"{at}.points = {list(surface.points)}: must be at least 2 each")
-    if surface.body == "splitter" and (part.sections is None or not part.sections.splitter):
+    if surface.body == "splitter" and not part.has_splitter:
         raise InputError(f"{at}.body = 'splitter': the impeller has no splitter: leave it out")

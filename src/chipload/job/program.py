@@ -11,7 +11,7 @@ import trimesh
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.job.sources import Limited, cutters, source
-from chipload.job.tables import LoadLimitsTable, ProgramJobTable
+from chipload.job.tables import LOADS, LoadLimitsTable, ProgramJobTable
 
 
 @dataclass(frozen=True)
@@ -96,6 +96,11 @@ def _check_simulation(table: ProgramJobTable) -> None:
     for key in ("gouge_mm", "excess_mm"):
         if table.part is None and getattr(table.limits, key) is not None:
             raise InputError(f"limits.{key}: needs the part that should come out: state [part] or leave it out")
+    if table.operation[0].feeds is not None and not any(getattr(table.limits, name) is not None for name in LOADS):
+        raise InputError(
+            f"operation.0.feeds: no limit of a load is stated, so nothing would hold them: state at least one of "
+            f"{', '.join(LOADS)} in [limits]"
+        )
     if not table.limits.stated:
         names = ", ".join(LoadLimitsTable.model_fields)
         raise InputError(f"limits: none is stated, so nothing would be checked: state at least one of {names}")

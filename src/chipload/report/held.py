@@ -6,12 +6,13 @@ number could. The spindle's torque and power are means over a turn, which is wha
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chipload.machine.machine import Machine
 from chipload.report import surface
@@ -106,6 +107,15 @@ def held_limits(
     if "flute_fill" in columns:
         out.append(_worst("flute_fill_share", 1.0, columns))
     return tuple(out)
+
+
+def spindle_limits(machine: Machine, speeds: ArrayLike = ()) -> dict[str, float]:
+    """What the spindle of a machine gives at every one of some speeds [rad/s], by name of the limit; empty where its
+    file does not say it.
+    """
+    torque = float(machine.torque_at(speeds).min(initial=math.inf if machine.torque is None else machine.torque))
+    stated = {"spindle_torque_nm": torque / 1000.0, "spindle_power_w": machine.power_w}
+    return {name: limit for name, limit in stated.items() if limit is not None and limit < math.inf}
 
 
 def _worst(name: str, limit: float, columns: Columns, unknown: tuple[str, ...] = ()) -> Held:

@@ -6,7 +6,7 @@ rotation of the spindle in any step. Forces are on the cutter, in the work frame
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
@@ -27,10 +27,13 @@ from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table
 from chipload.simulation.chips import Removal
 from chipload.simulation.surface import Collision, Difference
+from chipload.simulation.unfinished import in_rows
 from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]
 
+#: rows of history.parquet that are held in memory together
+HISTORY_ROWS = 65_536
 SURE = "\u00b1 is twice the standard deviation that the spread of the material's coefficients gives."
 UNSURE = "How sure these are cannot be said: the material states neither a spread nor a covariance of its coefficients."
 #: rows of the figure: lines (column, name, colour) and the title of their axis, and the limit
@@ -184,25 +187,30 @@ def deflection(simulated: Simulated) -> dict[str, Any]:
     }
 
 
-def history(simulated: Simulated) -> dict[str, NDArray[Any]]:
-    """The columns of history.parquet, a row a step."""
-    columns = dict(simulated.removal.columns)
+def history(simulated: Simulated) -> Iterator[dict[str, NDArray[Any]]]:
+    """The columns of history.parquet, a row a step, some ten thousand rows at a time."""
     names = np.array([label or "program" for label in simulated.removal.labels], dtype=object)
-    if simulated.left is not None:
-        columns["gouge_mm"] = np.maximum(-simulated.left.deepest, 0.0)
-    return {"pass": names[columns.pop("label")], **columns}
+    at = 0
+    for columns in in_rows(simulated.removal.columns, HISTORY_ROWS):
+        count = len(columns["label"])
+        if simulated.left is not None:
+            columns["gouge_mm"] = np.maximum(-simulated.left.deepest[at : at + count], 0.0)
+        yield {"pass": names[columns.pop("label")], **columns}
+        at += count
 
 
 def along(simulated: Simulated) -> go.Figure:
     """Force, torque, power, chip thickness, deflection and removal against time."""
-    columns = dict(simulated.removal.columns)
-    seconds = columns["seconds"]
-    columns["rate"] = np.where(seconds > 0.0, columns["chip_volume_mm3"] / np.where(seconds > 0.0, seconds, 1.0), 0.0)
+    columns = simulated.removal.columns
+    seconds, of = columns["seconds"], columns["line"]
     t = columns["t_s"] - 0.5 * seconds
     out = make_subplots(rows=len(ROWS), cols=1, shared_xaxes=True, vertical_spacing=0.03)
     for row, (lines, title, limit) in enumerate(ROWS, start=1):
         for column, name, colour in lines:
-            y = np.asarray(columns[column], dtype=np.float64)
+            if column == "rate":
+                y = np.where(seconds > 0.0, columns["chip_volume_mm3"] / np.where(seconds > 0.0, seconds, 1.0), 0.0)
+            else:
+                y = np.asarray(columns[column], dtype=np.float64)
             keep = thinned(y, LINE_POINTS)
             out.add_trace(
                 go.Scatter(
@@ -211,7 +219,7 @@ def along(simulated: Simulated) -> go.Figure:
                     name=name,
                     mode="lines",
                     line={"color": colour, "width": 1.3},
-                    customdata=columns["line"][keep],
+                    customdata=of[keep],
                     hovertemplate=f"{name}: %{{y:.4g}}, line %{{customdata}}<extra>{title}</extra>",
                     showlegend=row == 1,
                 ),

@@ -19,6 +19,7 @@ from chipload.report.columns import USUAL, columns_figure
 from chipload.report.folder import write_result
 from chipload.report.reading import Read, summary_bytes, verdict
 from chipload.report.simulated import Simulated, history
+from chipload.simulation.chips import stacked
 from chipload.stock.layers import LayeredStock
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ class History:
     @cached_property
     def columns(self) -> Mapping[str, NDArray[Any]]:
         """(n,) arrays by name, those of history.parquet: see :func:`chipload.simulation.chips.remove`."""
-        return history(self._simulated)
+        return stacked(list(history(self._simulated)))
 
     @property
     def stock(self) -> LayeredStock:

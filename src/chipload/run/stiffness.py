@@ -105,8 +105,8 @@ def deflecting(stiffness: Stiffness, material: Material) -> Callable[[Cuts], dic
 
 
 def with_deflections(removal: Removal, stiffness: Stiffness) -> Removal:
-    """The same with columns of deflections also where no step cut."""
+    """The same with columns of deflections also where no step cut at all."""
     work = () if stiffness.work is None else ("deflection_work_um",)
     names = ("deflection_cutter_um", *work, "deflection_um", *(("flute_fill",) if stiffness.room else ()))
     still = {name: np.zeros(len(removal.columns["line"])) for name in names if name not in removal.columns}
-    return replace(removal, columns={**removal.columns, **still})
+    return replace(removal, columns={**removal.columns, **still}) if still else removal
