@@ -90,7 +90,15 @@ def test_a_slot_in_numbers(job: Path, tmp_path: Path) -> None:
     # 2 mm deep, 30 mm long and half a disc at its end
     assert op["chip_volume_mm3"] == pytest.approx(2.0 * (300.0 + 0.5 * np.pi * 25.0), rel=1e-3)
     assert summary["program"]["status"] == "simulated"
-    assert op["unchecked"] == ["torque_nm", "power_w", "chip_mm", "deflection_um", "gouge_mm", "excess_mm"]
+    assert op["unchecked"] == [
+        "torque_nm",
+        "power_w",
+        "chip_mm",
+        "deflection_um",
+        "form_error_um",
+        "gouge_mm",
+        "excess_mm",
+    ]
     assert op["removed_mm3"] == pytest.approx(op["chip_volume_mm3"], rel=1e-9)
     # the rim meets the stock when the tip is at x = -5, after 0.5 s at 10 mm/s; a step of 0.2 s cuts or does not
     assert 0.3 < op["air_cut_s"] <= 0.5

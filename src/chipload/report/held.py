@@ -27,6 +27,7 @@ LIMITS: Mapping[str, tuple[str, str]] = {
     "power_w": ("power_w", "W"),
     "chip_mm": ("chip_max_mm", "mm"),
     "deflection_um": ("deflection_um", "um"),
+    "form_error_um": ("form_error_um", "um"),
     "gouge_mm": ("gouge_mm", "mm"),
     "excess_mm": ("", "mm"),
     "spindle_torque_nm": ("torque_mean_nm", "N m"),
@@ -38,7 +39,7 @@ LIMITS: Mapping[str, tuple[str, str]] = {
 @dataclass(frozen=True)
 class Held:
     """A limit against the worst step: where (x, y, z) [mm], at which line of the source; ``unknown`` says what was left
-    out of the number, so that it may be greater.
+    out of the number, so that it may be greater; empty: nothing.
     """
 
     name: str
@@ -46,7 +47,7 @@ class Held:
     worst: float
     line: int
     at: tuple[float, float, float]
-    unknown: tuple[str, ...] = ()
+    unknown: str = ""
 
     @property
     def holds(self) -> bool | None:
@@ -64,11 +65,7 @@ class Held:
             place = f"in line {self.line}" if self.line else f"at ({', '.join(f'{x:.4g}' for x in self.at)})"
             return f"{word} {self.worst:.4g}{unit} exceeds {self.limit:g}{unit} {place}"
         if self.unknown:
-            are = "is" if len(self.unknown) == 1 else "are"
-            return (
-                f"{word} is at least {self.worst:.4g} of {self.limit:g}{unit}, but {', '.join(self.unknown)} {are} "
-                "not stated"
-            )
+            return f"{word} is at least {self.worst:.4g} of {self.limit:g}{unit}, but {self.unknown}"
         return f"{word} {self.worst:.4g} of {self.limit:g}{unit}"
 
 
@@ -88,14 +85,20 @@ def held_limits(
     left : what is left on the part, where it is stated
     unknown : stiffness that is not stated
     """
-    out = []
+    out, rigid = [], ""
+    if unknown:
+        rigid = f"{', '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} not stated"
     for name, limit in limits.items():
         if name in ("gouge_mm", "excess_mm"):
             assert left is not None
             found = surface.worst(left, columns, name.removesuffix("_mm"))
             out.append(Held(name, limit, found["max"], found["line"], tuple(found["at_mm"] or (0.0, 0.0, 0.0))))
+        elif name == "form_error_um":
+            some = "" if columns["form_points"].any() else "no point of the part is finished"
+            k = int(np.argmax(np.abs(columns[name])))
+            out.append(_at(name, limit, columns, k, some or rigid))
         else:
-            out.append(_worst(name, limit, columns, unknown if name == "deflection_um" else ()))
+            out.append(_worst(name, limit, columns, rigid if name == "deflection_um" else ""))
     torque, power = columns["torque_mean_nm"], columns["power_w"]
     speed = np.divide(power, torque, out=np.zeros(len(power)), where=torque > 0.0)
     given = machine.torque_at(speed) / 1000.0
@@ -118,12 +121,12 @@ def spindle_limits(machine: Machine, speeds: ArrayLike = ()) -> dict[str, float]
     return {name: limit for name, limit in stated.items() if limit is not None and limit < math.inf}
 
 
-def _worst(name: str, limit: float, columns: Columns, unknown: tuple[str, ...] = ()) -> Held:
+def _worst(name: str, limit: float, columns: Columns, unknown: str = "") -> Held:
     """A limit of a column, at its greatest value."""
     return _at(name, limit, columns, int(np.argmax(columns[LIMITS[name][0]])), unknown)
 
 
-def _at(name: str, limit: float, columns: Columns, k: int, unknown: tuple[str, ...] = ()) -> Held:
-    """A limit of a column at one step."""
+def _at(name: str, limit: float, columns: Columns, k: int, unknown: str = "") -> Held:
+    """A limit of the size of a column at one step."""
     at = (float(columns["x_mm"][k]), float(columns["y_mm"][k]), float(columns["z_mm"][k]))
-    return Held(name, limit, float(columns[LIMITS[name][0]][k]), int(columns["line"][k]), at, unknown)
+    return Held(name, limit, abs(float(columns[LIMITS[name][0]][k])), int(columns["line"][k]), at, unknown)

@@ -134,7 +134,7 @@ def simulate(
         _body(f"fixture {k}", body, FixtureTable, SPACING * smallest, meshes, files) for k, body in enumerate(fixtures)
     )
     made = _table(table, ProgramJobTable)
-    for key in ("gouge_mm", "excess_mm"):
+    for key in ("form_error_um", "gouge_mm", "excess_mm"):
         if made.part is None and getattr(made.limits, key) is not None:
             raise InputError(f"limits.{key}: needs the part that should come out: give part or leave it out")
     job = ProgramJob(

@@ -104,9 +104,20 @@ def deflecting(stiffness: Stiffness, material: Material) -> Callable[[Cuts], dic
     return columns
 
 
-def with_deflections(removal: Removal, stiffness: Stiffness) -> Removal:
-    """The same with columns of deflections also where no step cut at all."""
+def watched(stiffness: Stiffness, *, formed: bool = False) -> tuple[str, ...]:
+    """Names of the columns that are watched; ``formed``: also those of the form error."""
     work = () if stiffness.work is None else ("deflection_work_um",)
-    names = ("deflection_cutter_um", *work, "deflection_um", *(("flute_fill",) if stiffness.room else ()))
+    room = ("flute_fill",) if stiffness.room else ()
+    return (
+        "deflection_cutter_um",
+        *work,
+        "deflection_um",
+        *room,
+        *(("form_error_um", "form_points") if formed else ()),
+    )
+
+
+def with_columns(removal: Removal, names: tuple[str, ...]) -> Removal:
+    """The same with these columns also where no step cut at all."""
     still = {name: np.zeros(len(removal.columns["line"])) for name in names if name not in removal.columns}
     return replace(removal, columns={**removal.columns, **still}) if still else removal
