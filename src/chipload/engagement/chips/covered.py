@@ -122,7 +122,9 @@ def covered(move: Move, cutter: Cutter, height: float, tolerance: float) -> Cove
 def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], tolerance: float) -> list[Covered | None]:
     """``covered`` of many layers."""
     K, levels = cutter_numbers(cutter), np.array([float(h) for h in heights])
-    move, K = _along(move, K, tolerance) or (move, K)
+    along = _along(move, K, tolerance)
+    if along is not None:
+        return [_standing(*along, h, tolerance) for h in levels.tolist()]
     buffer, count, knots, whole = _loops([move], K, levels, np.array([0, len(levels)]), tolerance)
     start = np.cumsum([0, *count.clip(0)])
     out: list[Covered | None] = []
@@ -153,10 +155,14 @@ def covered_polygons(
         return _polygons(moves, K, heights, tolerance)
     kept = [(move, h) for move, h, found in zip(moves, heights, along, strict=True) if found is None]
     others = iter(_polygons([move for move, _ in kept], K, [h for _, h in kept], tolerance))
-    return [
-        next(others) if found is None else _polygons([found[0]], found[1], [h], tolerance)[0]
-        for found, h in zip(along, heights, strict=True)
-    ]
+    out: list[list[Shape | None]] = []
+    for found, levels in zip(along, heights, strict=True):
+        if found is None:
+            out.append(next(others))
+        else:
+            areas = [_standing(*found, h, tolerance) for h in levels.tolist()]
+            out.append([area.polygon if area is not None else None for area in areas])
+    return out
 
 
 def _along(move: Move, K: Floats, tolerance: float) -> tuple[Move, Floats] | None:
@@ -177,6 +183,14 @@ def _along(move: Move, K: Floats, tolerance: float) -> tuple[Move, Floats] | Non
     longer[10] += 2.0 * abs(half)
     longer.setflags(write=False)
     return Move((move.tip[0] - abs(half) * axis)[None], axis[None]), longer
+
+
+def _standing(move: Move, K: Floats, h: float, tolerance: float) -> Covered | None:
+    """What a cutter that stands covers of a layer: its section."""
+    if not 0.0 < tolerance < math.inf:
+        raise InputError(f"covered: tolerance = {tolerance:g} mm: must be above 0")
+    edges = whole_section(move, K, h, 0.0, tolerance)
+    return Covered((ring_of_edges(edges),), h, tolerance, True) if len(edges) else None
 
 
 def _polygons(
@@ -283,7 +297,7 @@ def _pieces(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> Fl
 
 
 def whole_section(move: Move, K: Floats, h: float, t: float, tolerance: float) -> Floats:
-    """Edges (n, 11) of the section at t, counter-clockwise; none where the layer isn't cut."""
+    """Edges (n, 12) of the section at t, counter-clockwise; none where the layer isn't cut."""
     S, C, buffer = np.empty(27), np.empty((8, 5)), np.empty((2048, 12))
     if not instant(move.tip, move.axis, K, h, t, S, C):
         return np.empty((0, 12))
