@@ -90,7 +90,15 @@ def test_a_slot_in_numbers(job: Path, tmp_path: Path) -> None:
     # 2 mm deep, 30 mm long and half a disc at its end
     assert op["chip_volume_mm3"] == pytest.approx(2.0 * (300.0 + 0.5 * np.pi * 25.0), rel=1e-3)
     assert summary["program"]["status"] == "simulated"
-    assert op["unchecked"] == ["torque_nm", "power_w", "chip_mm", "deflection_um", "gouge_mm", "excess_mm"]
+    assert op["unchecked"] == [
+        "torque_nm",
+        "power_w",
+        "chip_mm",
+        "deflection_um",
+        "form_error_um",
+        "gouge_mm",
+        "excess_mm",
+    ]
     assert op["removed_mm3"] == pytest.approx(op["chip_volume_mm3"], rel=1e-9)
     # the rim meets the stock when the tip is at x = -5, after 0.5 s at 10 mm/s; a step of 0.2 s cuts or does not
     assert 0.3 < op["air_cut_s"] <= 0.5
@@ -191,6 +199,33 @@ def test_a_spindle_that_is_too_weak_does_not_hold(job: Path, tmp_path: Path) -> 
     assert [x["name"] for x in op["limits"] if x["holds"] is False] == ["spindle_torque_nm", "spindle_power_w"]
 
 
+def test_the_spindle_gives_what_its_curve_says_at_the_speed_of_the_step(job: Path, tmp_path: Path) -> None:
+    vmc = (files("chipload") / "data" / "machines" / "vmc.toml").read_text()
+    curve = "torque_curve = [[0.0, 1.0], [6000.0, 0.4], [15000.0, 0.1]]"
+    (job.parent / "weak.toml").write_text(vmc.replace("torque_nm = 70.0", curve))
+    job.write_text(JOB.replace('name = "vmc"', 'file = "weak.toml"'))
+    code, out, _ = call("run", job, "--out", tmp_path / "r")
+    assert code == 3
+    assert "Does not hold: spindle torque 0.7653 N m exceeds 0.7 N m in line 6" in out
+
+
+def test_chips_that_the_flutes_have_no_room_for(job: Path, tmp_path: Path) -> None:
+    """A tooth of a slot cuts f D b in a turn: f D q / A of the gullet over the depth b, whatever b is."""
+    text = JOB.replace("modulus_gpa = 580.0", "modulus_gpa = 580.0\ngullet_mm2 = 12.0\nchip_ratio = 6.0")
+    job.write_text(text)
+    code, out, _ = call("run", job, "--out", tmp_path / "r")
+    assert code == 0
+    assert "flute fill 0.5 of 1" in out
+    op = json.loads((tmp_path / "r" / "summary.json").read_text())["operations"][0]
+    fill = next(x for x in op["limits"] if x["name"] == "flute_fill_share")
+    assert (fill["limit"], fill["holds"]) == (1.0, True)
+    assert fill["worst"] == pytest.approx(0.1 * 10.0 * 6.0 / 12.0, rel=1e-3)
+    job.write_text(text.replace("chip_ratio = 6.0", "chip_ratio = 13.0"))
+    code, out, _ = call("run", job, "--out", tmp_path / "s")
+    assert code == 3
+    assert "Does not hold: flute fill 1.083 exceeds 1 in line 6" in out
+
+
 def test_a_rapid_through_material_is_said(job: Path, tmp_path: Path) -> None:
     (job.parent / "slot.ngc").write_text(SLOT.replace("G1 X30 F600", "G0 X30"))
     code, out, _ = call("run", job, "--out", tmp_path / "r")
@@ -214,6 +249,14 @@ def test_check_reads_the_stock_and_cuts_nothing(job: Path) -> None:
         ("step_mm = 2.0", "step_mm = 0.0", "operation.0.step_mm = 0: must be above 0"),
         ("[[operation]]\nkind = \"simulate\"\nstep_mm = 2.0\n", "", "stock: not used where a program is only read"),
         ("number = 1\n", "number = 4\n", "line 5: tool 1: no [[cutter]] has this number: state one beside 4"),
+        ("modulus_gpa = 580.0", "modulus_gpa = 580.0\ngullet_mm2 = 9.0", "cutter.0.chip_ratio is missing: give it"),
+        ("modulus_gpa = 580.0", "modulus_gpa = 580.0\ngullet_mm2 = 99.0\nchip_ratio = 4.0",
+         "cutter.0.gullet_mm2 = 99: must be above 0 and below the tooth's share of the section, 39.27"),
+        ("modulus_gpa = 580.0", "modulus_gpa = 580.0\ngullet_mm2 = 9.0\nchip_ratio = 0.4",
+         "cutter.0.chip_ratio = 0.4: must be at least 1"),
+        ("[limits]", "[stiffness]\nspindle_n_um = \"stiff\"\n[limits]",
+         "stiffness.spindle_n_um = 'stiff': must be a number, or inf where it is rigid"),
+        ("[limits]", "[stiffness]\nspindle_n_um = 0.0\n[limits]", "stiffness.spindle_n_um = 0: must be above 0"),
         ("S3000", "S0", "cuts with the spindle at rest"),
     ],
 )  # fmt: skip

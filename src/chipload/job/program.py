@@ -93,7 +93,7 @@ def _check_simulation(table: ProgramJobTable) -> None:
         if saved == (stock.layer_mm is not None):
             need = "leave it out: the layers of an earlier result stay" if saved else "missing: state it"
             raise InputError(f"stock.layer_mm: {need}")
-    for key in ("gouge_mm", "excess_mm"):
+    for key in ("form_error_um", "gouge_mm", "excess_mm"):
         if table.part is None and getattr(table.limits, key) is not None:
             raise InputError(f"limits.{key}: needs the part that should come out: state [part] or leave it out")
     if table.operation[0].feeds is not None and not any(getattr(table.limits, name) is not None for name in LOADS):

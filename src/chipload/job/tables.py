@@ -210,6 +210,7 @@ class LoadLimitsTable(Limits):
     power_w: Positive | None = None
     chip_mm: Positive | None = None
     deflection_um: Positive | None = Field(None, description="how far tool and work part, see [stiffness]")
+    form_error_um: Positive | None = Field(None, description="what giving way leaves on, or takes from, the [part]")
     gouge_mm: Positive | None = Field(None, description="deepest cut into the [part]")
     excess_mm: Positive | None = Field(None, description="most material over the [part] where the tool came near it")
 

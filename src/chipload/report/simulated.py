@@ -160,6 +160,7 @@ def operation(simulated: Simulated, time_s: float) -> dict[str, Any]:
         "power_w": {"mean": mean("power_w"), "max": float(c["power_w"].max(initial=0.0))},
         "chip_mm": {"max": float(c["chip_max_mm"].max(initial=0.0))},
         "deflection_um": deflection(simulated),
+        "form_error_um": form_error(simulated),
         "limits": [
             {"name": h.name, "limit": h.limit, "worst": h.worst, "line": h.line, "at_mm": list(h.at), "holds": h.holds}
             for h in simulated.held
@@ -185,6 +186,18 @@ def deflection(simulated: Simulated) -> dict[str, Any]:
         "at_mm": [float(c[f"{x}_mm"][k]) for x in "xyz"],
         "not_stated": list(simulated.rigid),
     }
+
+
+def form_error(simulated: Simulated) -> dict[str, Any]:
+    """What giving way leaves on the part (below 0: takes), in summary.json; None: no finished point of a part."""
+    c = simulated.removal.columns
+    points = int(c["form_points"].sum()) if "form_points" in c else 0
+    if not points:
+        return {"max": None, "greatest": None, "least": None, "line": 0, "at_mm": None, "points": 0}
+    error = c["form_error_um"]
+    k = int(np.argmax(np.abs(error)))
+    ends = {"max": abs(float(error[k])), "greatest": float(error.max()), "least": float(error.min())}
+    return {**ends, "line": int(c["line"][k]), "at_mm": [float(c[f"{x}_mm"][k]) for x in "xyz"], "points": points}
 
 
 def history(simulated: Simulated) -> Iterator[dict[str, NDArray[Any]]]:
@@ -292,6 +305,9 @@ def sections(simulated: Simulated, time_s: float, figures: dict[str, go.Figure])
     rows += [["force on the surface that is left, along its normal [N]", "", f"{force['normal_max']:.4g}", ""]]
     rows += [["torque [N m]", _mean(torque), f"{torque['max']:.4g}", ""]]
     rows += [["power [W]", f"{power['mean']:.4g}", f"{power['max']:.4g}", ""]]
+    if what["form_error_um"]["points"]:
+        ends = (f"{what['form_error_um'][key]:.4g}" for key in ("greatest", "least"))
+        rows += [["form error of the part by giving way [\u00b5m]", "", *ends]]
     rows += [["tool and work part by [\u00b5m]", "", f"{what['deflection_um']['max']:.4g}", ""]]
     body = [
         "<h2>Chips, force, torque, power</h2>",

@@ -134,7 +134,7 @@ def simulate(
         _body(f"fixture {k}", body, FixtureTable, SPACING * smallest, meshes, files) for k, body in enumerate(fixtures)
     )
     made = _table(table, ProgramJobTable)
-    for key in ("gouge_mm", "excess_mm"):
+    for key in ("form_error_um", "gouge_mm", "excess_mm"):
         if made.part is None and getattr(made.limits, key) is not None:
             raise InputError(f"limits.{key}: needs the part that should come out: give part or leave it out")
     job = ProgramJob(
@@ -192,7 +192,7 @@ def _cutters(given: Cutters, program: Program) -> dict[int, Cutter]:
         raise InputError(
             f"cutter: the program uses tools {', '.join(map(str, used))}: give one for each, as {{{used[0]}: ...}}"
         )
-    return {used[0]: replace(alone, number=max(used[0], 1))}
+    return {used[0]: replace(alone, number=used[0])}
 
 
 def _cutter(given: Any, number: int) -> Cutter:
@@ -200,7 +200,7 @@ def _cutter(given: Any, number: int) -> Cutter:
         return given
     if not isinstance(given, Mapping):
         raise InputError(f"cutter {number}: {type(given).__name__}: give a Cutter or the keys of a [[cutter]]")
-    return cutter_from_table({"number": max(number, 1), **given})
+    return cutter_from_table({"number": number, **given})
 
 
 def _solid(

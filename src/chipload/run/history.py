@@ -131,6 +131,7 @@ def _rows(said: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("greatest power [W]", said["power_w"]["max"]),
         ("thickest chip [mm]", said["chip_mm"]["max"]),
         ("tool and work part by [\u00b5m]", said["deflection_um"]["max"]),
+        ("form error [\u00b5m]", said["form_error_um"]["max"]),
         ("deepest gouge [mm]", said["gouge_mm"]["max"]),
         ("highest excess [mm]", said["excess_mm"]["max"]),
     )

@@ -29,9 +29,11 @@ from chipload.report.held import spindle_limits
 from chipload.report.reading import Read, verdict
 from chipload.report.simulated import Simulated
 from chipload.run.feeds import Asked, changeable, read_as, straight, watching, with_new_feeds
+from chipload.run.formed import forming
 from chipload.run.provenance import hashes, sources, title_of, versions
-from chipload.run.stiffness import deflecting, stiffness_of, with_deflections
-from chipload.simulation.chips import Resolution, remove
+from chipload.run.stiffness import deflecting, stiffness_of, watched, with_columns
+from chipload.simulation.chips import Resolution, counted, remove
+from chipload.simulation.loads import Cuts
 from chipload.simulation.pieces import remove_in_pieces
 from chipload.simulation.steps import StepBlocks, steps_of
 from chipload.simulation.surface import MOST_POINTS, collisions, difference, fine, in_stock
@@ -165,7 +167,8 @@ def _fed(
     op: SimulateTable = job.table.operation[0]
     assert op.feeds is not None
     fine = _resolution(job)
-    limits = {name: limit for name, limit in job.limits.items() if name in LOADS} | spindle_limits(machine)
+    turning = np.unique(reading.program.spindle[reading.program.motion != RAPID])
+    limits = {name: limit for name, limit in job.limits.items() if name in LOADS} | spindle_limits(machine, turning)
     gives = stiffness_of(job.table.stiffness, job.cutters)
     bends = deflecting(gives, material)
     asked = Asked(op.feeds, limits, fine.rotation, bends if "deflection_um" in limits else None)
@@ -176,7 +179,7 @@ def _fed(
         program, stock, job.cutters, material, fine, interpolation=op.interpolation,
         watch=lambda cuts: {**allowed(cuts), **bends(cuts)}, progress=progress,
     )  # fmt: skip
-    removal = with_deflections(removal, gives)
+    removal = with_columns(removal, watched(gives))
     return with_new_feeds(
         text, dialect, reading, steps, removal, asked, job.cutters, machine, lambda new: read(read_as(new)), seconds
     )
@@ -205,22 +208,9 @@ def _simulated(
     part, fixtures, before = _part(job), _fixtures(job), _insides(stock)
     stiffness = job.table.stiffness
     gives = stiffness_of(stiffness, job.cutters)
-    watch = deflecting(gives, material)
-
-    def removing(done: float, what: str) -> None:
-        progress(0.8 * done, what)
-
-    if unfinished is None:
-        removal = remove(
-            program, stock, job.cutters, material, fine, interpolation=op.interpolation, watch=watch, progress=removing
-        )  # fmt: skip
-    else:
-        removal = remove_in_pieces(
-            program, stock, job.cutters, material, fine, unfinished, interpolation=op.interpolation, watch=watch,
-            also=(versions(), sources(), repr(stiffness)), progress=removing,
-        )  # fmt: skip
-    removal = with_deflections(removal, gives)
-    steps, count = StepBlocks(program, op.step_mm, op.tolerance_mm), len(removal.columns["line"])
+    watches = [deflecting(gives, material)]
+    steps = StepBlocks(program, op.step_mm, op.tolerance_mm)
+    count = counted(program, job.cutters, fine)
 
     def passing(share: float, what: str) -> Callable[[int], None]:
         return lambda done: progress(share + SHARE * done / count, what)
@@ -231,9 +221,28 @@ def _simulated(
         assert table is not None
         left = difference(
             steps, job.cutters, part, before, table.spacing_mm, table.look_mm, op.tolerance_mm,
-            passing(0.8, "distances to the part"),
+            passing(0.0, "distances to the part"),
         )  # fmt: skip
         solids["part"] = left.points
+        watches.append(forming(left, gives, material))
+
+    def watch(cuts: Cuts) -> dict[str, NDArray[np.float64]]:
+        return {name: values for each in watches for name, values in each(cuts).items()}
+
+    def removing(done: float, what: str) -> None:
+        progress(SHARE + 0.8 * done, what)
+
+    if unfinished is None:
+        removal = remove(
+            program, stock, job.cutters, material, fine, interpolation=op.interpolation, watch=watch, progress=removing
+        )  # fmt: skip
+    else:
+        formed = None if left is None else (left.points, left.faces, left.distance, left.step)
+        removal = remove_in_pieces(
+            program, stock, job.cutters, material, fine, unfinished, interpolation=op.interpolation, watch=watch,
+            also=(versions(), sources(), repr(stiffness), formed), progress=removing,
+        )  # fmt: skip
+    removal = with_columns(removal, watched(gives, formed=left is not None))
     touched = collisions(
         steps, job.cutters, solids, op.tolerance_mm, above_only=frozenset(["part"]),
         progress=passing(0.8 + SHARE, "collisions"),

@@ -20,6 +20,7 @@ from chipload.errors import InputError
 from chipload.job.tables import StiffnessTable
 from chipload.simulation.chips import Removal
 from chipload.simulation.deflection import tip_deflections
+from chipload.simulation.gullet import flute_fill
 from chipload.simulation.loads import Cuts, Floats
 from chipload.structure.spindle import RIGID, Bar, cutter_bars, springs, tube
 
@@ -37,11 +38,13 @@ class Stiffness:
     ----------
     bars : by tool number, from the tip to the spindle
     work : compliance of the work [mm/N]; None: not stated
+    room : whether the room for chips is stated of a cutter
     unknown : what was not stated and counts as rigid
     """
 
     bars: Mapping[int, tuple[Bar, ...]]
     work: float | None
+    room: bool
     unknown: tuple[str, ...]
 
 
@@ -78,7 +81,8 @@ def stiffness_of(table: StiffnessTable | None, cutters: Mapping[int, Cutter]) ->
     for number, cutter in cutters.items():
         holder = [_part(length, diameter, modulus) for length, diameter in cutter.holder]
         bars[number] = (*cutter_bars(cutter, grip), *holder, Bar(0.0, 0.0, nose))
-    return Stiffness(bars, None if said.work_n_um is None else 1.0 / (PER * said.work_n_um), tuple(missing))
+    work = None if said.work_n_um is None else 1.0 / (PER * said.work_n_um)
+    return Stiffness(bars, work, any(c.gullet is not None for c in cutters.values()), tuple(missing))
 
 
 def _part(length: float, diameter: float, modulus: float | None) -> Bar:
@@ -89,16 +93,31 @@ def _part(length: float, diameter: float, modulus: float | None) -> Bar:
 
 
 def deflecting(stiffness: Stiffness, material: Material) -> Callable[[Cuts], dict[str, Floats]]:
-    """More columns of a simulation: how far tool and work give way in the steps of one cutter."""
+    """More columns of a simulation: how far tool and work give way in the steps of one cutter, and how full its flutes
+    are where their room is stated.
+    """
 
     def columns(cuts: Cuts) -> dict[str, Floats]:
-        return tip_deflections(cuts, material, bars=stiffness.bars[cuts.tool], work=stiffness.work)
+        found = tip_deflections(cuts, material, bars=stiffness.bars[cuts.tool], work=stiffness.work)
+        return found if cuts.cutter.gullet is None else found | {"flute_fill": flute_fill(cuts)}
 
     return columns
 
 
-def with_deflections(removal: Removal, stiffness: Stiffness) -> Removal:
-    """The same with columns of deflections also where no step cut at all."""
-    names = ("deflection_cutter_um", "deflection_um", *(() if stiffness.work is None else ("deflection_work_um",)))
+def watched(stiffness: Stiffness, *, formed: bool = False) -> tuple[str, ...]:
+    """Names of the columns that are watched; ``formed``: also those of the form error."""
+    work = () if stiffness.work is None else ("deflection_work_um",)
+    room = ("flute_fill",) if stiffness.room else ()
+    return (
+        "deflection_cutter_um",
+        *work,
+        "deflection_um",
+        *room,
+        *(("form_error_um", "form_points") if formed else ()),
+    )
+
+
+def with_columns(removal: Removal, names: tuple[str, ...]) -> Removal:
+    """The same with these columns also where no step cut at all."""
     still = {name: np.zeros(len(removal.columns["line"])) for name in names if name not in removal.columns}
     return replace(removal, columns={**removal.columns, **still}) if still else removal

@@ -34,7 +34,7 @@ surface.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -305,6 +305,26 @@ def form_error(
     -----
     Every step that may win is looked at: those whose distance is within twice the greatest deflection of the least.
     """
+    return form_error_of(
+        _kept(removal), material, points, normals, work=work, bars=bars, near=near, facing=facing, reach=reach,
+        progress=progress,
+    )  # fmt: skip
+
+
+def form_error_of(
+    all_cuts: Sequence[Cuts],
+    material: Material,
+    points: ArrayLike,
+    normals: ArrayLike,
+    *,
+    work: ArrayLike | None,
+    bars: Mapping[int, tuple[Bar, ...]] | None,
+    near: float,
+    facing: float = FACING,
+    reach: float = REACH,
+    progress: Progress = silent,
+) -> FormError:
+    """:func:`form_error` by some of the cuts of a program; ``step`` counts as their ``step`` does."""
     q, n = (np.ascontiguousarray(np.atleast_2d(np.asarray(v, dtype=np.float64))) for v in (points, normals))
     if q.ndim != 2 or q.shape[1] != 3 or n.shape != q.shape or not (np.isfinite(q).all() and np.isfinite(n).all()):
         raise InputError(f"form_error: points {q.shape}, normals {n.shape}: need (p, 3) finite numbers, one of each")
@@ -313,7 +333,6 @@ def form_error(
     if not 0.0 < near < math.inf:
         raise InputError(f"form_error: near_mm = {near:g}: must be above 0")
     stiff = _work(work, n, "form_error")
-    all_cuts = _kept(removal)
     least = np.full(len(q), np.inf)
     for cuts in all_cuts:
         _kernels.least_gaps(q, n, cuts.way, _shape(cuts.cutter), near, facing, least)
