@@ -116,6 +116,53 @@ def test_the_least_of_two_limits_holds_a_line(tmp_path: Path) -> None:
     assert feed_of(read.fed.text, 6) == pytest.approx(feeds[least][1], rel=1.2e-3)
 
 
+@pytest.mark.parametrize(
+    ("text", "per"),
+    [
+        (SLOT.replace("G21", "G20").replace("X-8", "X-0.314961").replace("X34 F600", "X1.338583 F23.6")
+         .replace("Z-3", "Z-0.11811"), 25.4),
+        (SLOT.replace("G94", "G93").replace("F600", "F14."), 42.0),
+        (SLOT.replace("G94", "G95").replace("F600", "F0.2"), 3000.0),
+    ],
+    ids=["inch", "inverse time", "per turn"],
+)  # fmt: skip
+def test_feeds_are_changed_in_the_unit_of_the_text(tmp_path: Path, text: str, per: float) -> None:
+    limit, feed = slot_feeds()["force_n"]
+    read = done(tmp_path, text, f"force_n = {limit}\n")
+    assert feed_of(read.fed.text, 6) == pytest.approx(feed / per, rel=1.3e-3)
+    assert re.sub(r" F[\d.]+", "", read.fed.text) == re.sub(r" F[\d.]+", "", text)
+    assert verdict(read)[0]
+
+
+def test_the_words_of_a_sinumerik_are_changed_too(tmp_path: Path) -> None:
+    limit, feed = slot_feeds()["force_n"]
+    text = "; a slot\nG71 G90 G94 G17\nT1 M6\nS3000 M3\nG0 X-8 Y0 Z5\nG0 Z-3\nG1 X34 F=600 ; F9\nG0 Z5\nM30\n"
+    (tmp_path / "a.mpf").write_text(text)
+    job = JOB.replace("a.ngc", "a.mpf")
+    read = done(tmp_path, SLOT, f"force_n = {limit}\n", job=job)
+    word = re.search(r"F=([\d.]+) ; F9", read.fed.text)
+    assert float(word[1]) == pytest.approx(feed, rel=1.2e-3)
+    assert read.fed.text == text.replace("600", word[1])
+    bad = done(tmp_path, SLOT, "force_n = 50.0\n", job=job)
+    first, rest = program_files(bad)["0-feeds.mpf"].decode().split("\n", 1)
+    assert first.startswith("; a slot ; NOT VERIFIED: force")
+    assert rest == bad.fed.text.split("\n", 1)[1]
+
+
+def test_no_feed_is_asked_that_a_short_line_does_not_reach(tmp_path: Path) -> None:
+    """From rest to rest over s at the acceleration a the machine reaches sqrt(a s), here of 3000 mm/s^2."""
+    text = HEAD + "G0 X60 Y60 Z5\nG1 X60.03 F300\nG0 Y50\nG1 X68 F300\nG0 X70\nM2\n"
+    read = done(tmp_path, text, "force_n = 620.0\n", ("operation.0.feeds.air_mm_min=6000",))
+    assert feed_of(read.fed.text, 5) == pytest.approx(60.0 * math.sqrt(3000.0 * 0.03), rel=1e-3)
+    assert feed_of(read.fed.text, 7) == 6000.0
+    assert read.fed.by == ("machine", "air")
+    # the long one: up and down takes v / a, the rest is at 100 mm/s
+    before, after = read.fed.seconds_before, float(read.seconds.sum())
+    long = (7.97 / 5.0 + 5.0 / 3000.0) - (7.97 / 100.0 + 100.0 / 3000.0)
+    short = (0.03 / 5.0 + 5.0 / 3000.0) - 2.0 * math.sqrt(0.03 / 3000.0)
+    assert before - after == pytest.approx(long + short, rel=1e-3)
+
+
 WAYS = (
     HEAD
     + """G0 X-8 Y-12 Z5

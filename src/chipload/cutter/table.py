@@ -157,7 +157,7 @@ def _first(err: ValidationError, table: Mapping[str, Any]) -> str:
         "int_type": "must be a whole number",
         "string_type": "must be a text",
         "literal_error": "must be mm or inch",
-        "greater_than_equal": "must be at least 1",
+        "greater_than_equal": f"must be at least {row.get('ctx', {}).get('ge')}",
     }
     value = table[str(row["loc"][0])]
     return f"cutter.{key} = {value!r}: {wanted.get(row['type'], row['msg'])}"

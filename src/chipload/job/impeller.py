@@ -100,6 +100,7 @@ class PathsTable(Table):
 
     check_mm: Positive = Field(description="most distance of check points of the paths")
     chord_mm: Positive = Field(le=1.0, description="how far the tip may leave its path between two rows")
+    overrun_mm: NotNegative = Field(1.0, description="of lines beyond the ends of their patch, where they can")
     lift_mm: Positive = Field(description="off the surface at the ends of a line")
     margin_mm: Positive = Field(description="that links keep from the part")
     touch_mm: NotNegative = Field(description="how deep a lift may touch the check points")
@@ -107,6 +108,29 @@ class PathsTable(Table):
     above_mm: Positive = Field(description="of the safe height above the part")
     link_feed_mm_min: Positive = Field(le=1e5, description="feed of lifts and links")
     gouge_mm: Positive = Field(le=1.0, description="deepest that the check may find a program below a surface")
+
+
+class RoughTable(Table):
+    """Roughing programs of the channels by layers, before the finishing ones; links are those of the paths."""
+
+    diameter_mm: Positive | None = Field(None, description="of a cutter of the catalogue; none: the largest that fits")
+    corner_radius_mm: NotNegative | None = Field(None, description="of that cutter")
+    share: Annotated[Number, Field(gt=0.0, le=1.0)] = Field(
+        0.9, description="of the points of the channels at which the largest cutter that fits must go"
+    )
+    depth_mm: Positive = Field(description="greatest thickness of a layer")
+    step_mm: Positive = Field(description="greatest distance of rows")
+    blades_mm: NotNegative = Field(description="allowance on blades and splitters")
+    hub_mm: NotNegative = Field(description="allowance on the hub")
+    over_mm: NotNegative = Field(description="how far the blank stands over the shroud")
+    feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's tip")
+    speed_rpm: Positive = Field(le=1e6, description="spindle speed")
+    check_mm: Positive = Field(description="most distance of check points")
+    coarser: Annotated[Number, Field(ge=1.0, le=100.0)] = Field(
+        10.0, description="how many times paths.chord_mm the tip may leave its path"
+    )
+    grid_mm: Positive = Field(description="distance of the lines by which the blank is simulated")
+    touch_mm3: NotNegative = Field(description="what a rapid, or parts above the cutting part, may take in one row")
 
 
 class SectionalTable(Table):
@@ -125,6 +149,7 @@ class SectionalTable(Table):
     cutter_change_s: NotNegative = Field(description="time of a cutter change")
     table_change_s: NotNegative = Field(description="time of setting the index table to another angle")
     paths: PathsTable | None = Field(None, description="none: the search and the patches alone, no programs")
+    rough: RoughTable | None = Field(None, description="none: the programs finish only")
     hand_picked: PickedTable | None = Field(None, description="the cutter that is compared with")
 
 
@@ -188,6 +213,13 @@ def impeller_job(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) 
         raise InputError(
             f"operation.0.paths.margin_mm = {paths.margin_mm:g}: must be above touch_mm = {paths.touch_mm:g} and below "
             f"lift_mm = {paths.lift_mm:g}"
+        )
+    rough = table.operation[0].rough
+    if rough is not None and paths is None:
+        raise InputError("operation.0.rough: takes its links from [operation.paths]: state that too")
+    if rough is not None and (rough.diameter_mm is None) != (rough.corner_radius_mm is None):
+        raise InputError(
+            "operation.0.rough: state both diameter_mm and corner_radius_mm, or neither for the largest that fits"
         )
     files: dict[str, Path] = {}
     if part.sections is not None:

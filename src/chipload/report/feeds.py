@@ -17,7 +17,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, WALL
+from chipload.report.figures import FONT, GRID, LIMIT, LINE_POINTS
 from chipload.report.held import LIMITS
 from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table
@@ -26,8 +26,15 @@ from chipload.report.simulated import Simulated
 Floats = NDArray[np.float64]
 
 #: columns that are compared, their units and names
-COMPARED = {"force_n": ("force", "N"), "torque_nm": ("torque", "N m"), "power_w": ("power", "W"),
-            "chip_max_mm": ("chip", "mm")}  # fmt: skip
+COMPARED = {
+    "force_n": ("force", "N"),
+    "torque_nm": ("torque", "N m"),
+    "power_w": ("power", "W"),
+    "chip_max_mm": ("chip", "mm"),
+    "deflection_um": ("deflection", "um"),
+}
+#: colours of the program as it was, and with its new feeds
+BEFORE, AFTER = "#c9821a", "#3457a6"
 #: what holds a line, beside limits
 HELD = {
     "fastest": "the greatest feed that the job allows",
@@ -75,19 +82,24 @@ class Fed:
         )
 
 
+def limited(fed: Fed, simulated: Simulated) -> dict[str, float]:
+    """Limits that the feed can hold, stated ones and those of the spindle."""
+    return {h.name: h.limit for h in simulated.held if LIMITS[h.name][0] in fed.before}
+
+
 def exceeding(fed: Fed, simulated: Simulated) -> list[dict[str, Any]]:
     """Lines that exceed a limit of a load after all: the worst step of each."""
     c, out = simulated.removal.columns, []
     factor = dict(zip(fed.line.tolist(), zip(fed.factor.tolist(), fed.by, strict=True), strict=True))
-    for name, limit in simulated.limits.items():
-        values = c.get(LIMITS[name][0])
-        if values is None:
-            continue
+    for name, limit in limited(fed, simulated).items():
+        values = c[LIMITS[name][0]]
         over = np.flatnonzero(values > limit)
         order = over[np.argsort(-values[over], kind="stable")]
-        _, first = np.unique(c["line"][order], return_index=True)
-        for k in order[first].tolist():
-            line = int(c["line"][k])
+        lines, first = np.unique(c["line"][order], return_index=True)
+        at = order[first]
+        before, feed, t = fed.before[LIMITS[name][0]], c["feed_mm_min"], c["t_s"]
+        place = np.column_stack([c[f"{x}_mm"] for x in "xyz"])
+        for line, k in zip(lines.tolist(), at.tolist(), strict=True):
             times, by = factor[line]
             out.append(
                 {
@@ -95,12 +107,12 @@ def exceeding(fed: Fed, simulated: Simulated) -> list[dict[str, Any]]:
                     "limit": name,
                     "allowed": limit,
                     "worst": float(values[k]),
-                    "before": float(fed.before[LIMITS[name][0]][k]),
-                    "feed_mm_min": float(c["feed_mm_min"][k]),
+                    "before": float(before[k]),
+                    "feed_mm_min": float(feed[k]),
                     "factor": times,
                     "slowest": by == "slowest",
-                    "at_mm": [float(c[f"{x}_mm"][k]) for x in "xyz"],
-                    "t_s": float(c["t_s"][k]),
+                    "at_mm": place[k].tolist(),
+                    "t_s": float(t[k]),
                 }
             )
     return sorted(out, key=lambda x: (x["line"], x["limit"]))
@@ -110,13 +122,13 @@ def summary(fed: Fed, simulated: Simulated, seconds_after: float, name: str, ver
     """``feeds`` of the operation in summary.json."""
     c, listed = simulated.removal.columns, exceeding(fed, simulated)
     changed = fed.factor != 1.0
-    cuts = c["chip_pieces"] > 0
+    cuts = (c["chip_pieces"] > 0) & ~c["rapid"]
 
     def greatest(columns: Mapping[str, Floats]) -> dict[str, float]:
         return {k.replace("_max_", "_"): float(columns[k].max(initial=0.0)) for k in COMPARED}
 
     def feeds(columns: Mapping[str, Floats]) -> dict[str, float] | None:
-        some = columns["feed_mm_min"][cuts & ~c["rapid"]]
+        some = columns["feed_mm_min"][cuts]
         return {"min": float(some.min()), "max": float(some.max())} if len(some) else None
 
     return {
@@ -157,16 +169,16 @@ def along(fed: Fed, simulated: Simulated) -> go.Figure:
     c = simulated.removal.columns
     s = np.asarray(c["s_mm"])
     rows: list[tuple[str, str, float | None]] = [("feed_mm_min", "feed [mm/min]", None)]
-    for name, limit in simulated.limits.items():
+    for name, limit in limited(fed, simulated).items():
         column = LIMITS[name][0]
-        if column in COMPARED:
+        if column in COMPARED and not name.startswith("spindle"):
             rows.append((column, f"{COMPARED[column][0]} [{COMPARED[column][1]}]", limit))
     if len(rows) == 1:
         rows.append(("force_n", "force [N]", None))
     out = make_subplots(rows=len(rows), cols=1, shared_xaxes=True, vertical_spacing=0.04)
     at_feed = ~np.asarray(c["rapid"])
     for k, (column, title, most) in enumerate(rows, start=1):
-        for values, name, colour in ((fed.before, "before", WALL), (c, "after", INK)):
+        for values, name, colour in ((fed.before, "before", BEFORE), (c, "after", AFTER)):
             y = np.where(at_feed, np.asarray(values[column], dtype=np.float64), 0.0)
             keep = thinned(y, LINE_POINTS)
             out.add_trace(
@@ -201,7 +213,7 @@ def section(
     """The part of the page about new feeds."""
     what = summary(fed, simulated, seconds_after, name, verified)
     gain = 100.0 * (1.0 - seconds_after / fed.seconds_before) if fed.seconds_before > 0.0 else 0.0
-    before, after, limits = what["before"], what["after"], simulated.limits
+    before, after, limits = what["before"], what["after"], limited(fed, simulated)
     rows = [["time of the program [s]", f"{fed.seconds_before:.5g}", f"{seconds_after:.5g}", ""]]
     if before["feed_mm_min"] is not None:
         spans = (f"{x['feed_mm_min']['min']:.4g} to {x['feed_mm_min']['max']:.4g}" for x in (before, after))

@@ -103,7 +103,7 @@ def _fails(read: Read) -> tuple[str, ...]:
 
 def _status(read: Read) -> str:
     """`failed`, `unproven` or `simulated`."""
-    if read.reading.broken or (read.simulated is not None and read.simulated.verdict == "fails"):
+    if read.reading.broken or _fails(read):
         return "failed"
     return "unproven" if read.simulated is None or read.simulated.verdict == "unproven" else "simulated"
 
@@ -159,9 +159,10 @@ def _operation(read: Read) -> dict[str, Any]:
     out = operation(read.simulated, float(read.seconds.sum()))
     if read.fed is None:
         return out
-    fails = list(_fails(read))
     said = fed_feeds.summary(read.fed, read.simulated, float(read.seconds.sum()), feeds_name(read), verdict(read)[0])
-    return out | {"holds": not fails, "fails": fails, "feeds": said}
+    if read.fed.fails:
+        out |= {"holds": False, "verdict": "fails", "fails": list(_fails(read))}
+    return out | {"feeds": said}
 
 
 def feeds_name(read: Read) -> str:

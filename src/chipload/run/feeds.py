@@ -167,7 +167,8 @@ def with_new_feeds(
     touch[c["chip_pieces"] > 0] = Touch.CUT
     least, most, by = _bounds(steps, asked.table, cutters, machine)
     cuts = feeds & (touch == Touch.CUT)
-    most, by = np.where(cuts, c[_FACTOR], most), np.where(cuts, c[_BY].astype(np.int64), by)
+    if cuts.any():
+        most, by = np.where(cuts, c[_FACTOR], most), np.where(cuts, c[_BY].astype(np.int64), by)
     lines = line_feeds(*(x[feeds] for x in (steps.line, touch, least, most, by)))
     lines = _in_air(lines, steps, feeds, asked.table, machine)
     factor, useful = _wanted(lines, reading, machine, asked.table)

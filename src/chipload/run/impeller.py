@@ -25,7 +25,8 @@ from chipload.planning.sectional.tables import IndexTable, index_table
 from chipload.progress import Progress, silent
 from chipload.report.impeller.outcome import Milled, OneCutter, Searched, said
 from chipload.run.impeller_part import Part, read_part
-from chipload.run.impeller_paths import checked_programs
+from chipload.run.impeller_paths import checked_programs, walls_of
+from chipload.run.impeller_rough import checked_roughing
 from chipload.run.provenance import hashes, title_of, versions
 from chipload.units import mm_s_from_mm_min
 
@@ -46,6 +47,7 @@ def run_impeller(job: ImpellerJob, progress: Progress = silent) -> Milled:
     machine, catalogue, part = _machine(job), _catalogue(job), read_part(job)
     impeller = part.impeller
     _picked(job, catalogue)
+    _rougher(job, catalogue)
     op = job.operation
     table, surfaces = _tables(machine, op), _surfaces(job, impeller)
     done = []
@@ -58,15 +60,22 @@ def run_impeller(job: ImpellerJob, progress: Progress = silent) -> Milled:
     half = part_of(progress, 1, 2)
     ways = _ways(job, done, catalogue, impeller, part_of(half, 0, 2))
     milled = Milled(
-        title_of(job.path), impeller, catalogue, machine, tuple(done), one, ways, None, _settings(op),
+        title_of(job.path), impeller, catalogue, machine, tuple(done), one, ways, None, None, None, _settings(op),
         job.table.impeller.outer_diameter_mm, _provenance(job, machine, catalogue, part),
     )  # fmt: skip
     if op.paths is None or milled.used is None:
         return milled
-    programs = checked_programs(
-        impeller, machine, table, milled.used, op, op.paths, _ahead(job), WORKERS, part_of(half, 1, 2)
-    )
-    return replace(milled, programs=programs)
+    roughs = None
+    if op.rough is not None:
+        roughs = checked_roughing(
+            impeller, machine, table, catalogue, _rougher(job, catalogue), op, op.paths, op.rough,
+            walls_of(impeller, _ahead(job)), _ahead(job), WORKERS, part_of(half, 2, 4),
+        )  # fmt: skip
+    programs, covered = checked_programs(
+        impeller, machine, table, milled.used, op, op.paths, _ahead(job), len(roughs or ()), WORKERS,
+        part_of(half, 3, 4) if roughs else part_of(half, 1, 2),
+    )  # fmt: skip
+    return replace(milled, programs=programs, covered=covered, roughs=roughs)
 
 
 def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue, part: Part) -> dict[str, Any]:
@@ -88,6 +97,7 @@ def look_at_impeller(job: ImpellerJob) -> tuple[list[str], bool]:
     machine, catalogue, part = _machine(job), _catalogue(job), read_part(job)
     impeller = part.impeller
     _picked(job, catalogue)
+    _rougher(job, catalogue)
     lines = [f"impeller: {impeller.blades} blades{' and as many splitters' if impeller.splitter else ''}", *part.faces]
     table = _tables(machine, job.operation)
     angles = np.degrees(table.angle)
@@ -152,13 +162,24 @@ def _picked(job: ImpellerJob, catalogue: Catalogue) -> CatalogueCutter | None:
     picked = job.operation.hand_picked
     if picked is None:
         return None
-    d, r = picked.diameter_mm, picked.corner_radius_mm
+    return _of_catalogue(catalogue, picked.diameter_mm, picked.corner_radius_mm, "hand_picked")
+
+
+def _rougher(job: ImpellerJob, catalogue: Catalogue) -> CatalogueCutter | None:
+    """The cutter of the catalogue that roughs; None: the largest that fits."""
+    rough = job.operation.rough
+    if rough is None or rough.diameter_mm is None or rough.corner_radius_mm is None:
+        return None
+    return _of_catalogue(catalogue, rough.diameter_mm, rough.corner_radius_mm, "rough")
+
+
+def _of_catalogue(catalogue: Catalogue, d: float, r: float, key: str) -> CatalogueCutter:
     for cutter in catalogue.cutters:
         if (cutter.diameter, cutter.corner_radius) == (d, r):
             return cutter
     near = min(catalogue.cutters, key=lambda c: abs(c.diameter - d) + abs(c.corner_radius - r))
     raise InputError(
-        f"operation.0.hand_picked: D {d:g} r {r:g} mm is not in catalogue {catalogue.name}: the nearest is "
+        f"operation.0.{key}: D {d:g} r {r:g} mm is not in catalogue {catalogue.name}: the nearest is "
         f"D {near.diameter:g} r {near.corner_radius:g} mm"
     )
 

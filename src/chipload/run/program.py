@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from chipload.geometry.mesh import read_mesh
 from chipload.job import ProgramJob
 from chipload.job.tables import LOADS, SimulateTable
 from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.program.motions import lengths
 from chipload.program.program import RAPID, Program
 from chipload.program.read import Reading, line_times, read_program, read_tools
 from chipload.progress import Progress, silent
@@ -170,10 +172,11 @@ def _fed(
     gives = stiffness_of(job.table.stiffness, job.cutters)
     bends = deflecting(gives, material)
     asked = Asked(op.feeds, limits, fine.rotation, bends if "deflection_um" in limits else None)
-    steps = steps_of(reading.program, op.step_mm, op.tolerance_mm)
+    program = _with_tool(reading.program, job)
+    steps = steps_of(program, op.step_mm, op.tolerance_mm)
     allowed = watching(steps, asked, job.cutters, material, machine)
     removal = remove(
-        reading.program, stock, job.cutters, material, fine, interpolation=op.interpolation,
+        program, stock, job.cutters, material, fine, interpolation=op.interpolation,
         watch=lambda cuts: {**allowed(cuts), **bends(cuts)}, progress=progress,
     )  # fmt: skip
     removal = with_columns(removal, watched(gives))
@@ -199,6 +202,7 @@ def _simulated(
 ) -> Simulated:
     """The program, run through the stock of the job."""
     op: SimulateTable = job.table.operation[0]
+    program = _with_tool(program, job)
     fine = _resolution(job)
     points = _grid(stock, op.stock_points_mm) if op.stock_points_mm is not None else None
     part, fixtures, before = _part(job), _fixtures(job), _insides(stock)
@@ -332,7 +336,7 @@ def _stock(job: ProgramJob, program: Program) -> LayeredStock:
         stock = LayeredStock.of_mesh(mesh, COARSE * table.layer_mm, tile)
     top = float(stock.bounds[-1])
     stock.refine(min(_lowest(program, job.cutters), top), top, table.layer_mm)
-    stock.refine_at(_levels(program))
+    stock.refine_at(_levels(program, job.cutters, table.layer_mm))
     return stock
 
 
@@ -347,12 +351,38 @@ def _lowest(program: Program, cutters: Mapping[int, Cutter]) -> float:
     return float((np.asarray(program.p_work)[rows, 2] - widest * lean).min())
 
 
-def _levels(program: Program) -> NDArray[np.float64]:
-    """Heights [mm] at which an upright cutter moves level at a feed."""
+def _with_tool(program: Program, job: ProgramJob) -> Program:
+    """The program without the rapids at its beginning that are made before a tool is in the spindle (T0), unless the
+    job says what is in it.
+    """
+    if 0 in job.cutters:
+        return program
+    idle = (program.tool == 0) & (program.motion == RAPID)
+    first = len(program) if idle.all() else int(np.argmin(idle))
+    if first < 2:
+        return program
+    kept = {f.name: getattr(program, f.name)[first - 1 :] for f in fields(program) if f.name != "labels"}
+    return replace(program, **kept)
+
+
+def _levels(program: Program, cutters: Mapping[int, Cutter], apart: float) -> NDArray[np.float64]:
+    """Heights [mm] at which an upright cutter moves level at a feed.
+
+    A cutter that ends in a point leaves a floor only where it goes to and fro for long: of its heights those on which
+    its way is longest, none nearer to another than ``apart`` [mm].
+    """
     p = np.asarray(program.p_work)
     level = (np.abs(np.diff(p[:, 2], prepend=p[:1, 2])) < 1e-9) & (program.motion != RAPID)
     upright = np.asarray(program.axis)[:, 2] > 1.0 - 1e-12
-    return np.unique(p[level & upright, 2].round(9))
+    flat = np.isin(program.tool, [n for n, c in cutters.items() if c.bottom == 0.0 and c.apt[2] > 0.0])
+    kept = np.unique(p[level & upright & flat, 2].round(9))
+    pointed = level & upright & ~flat
+    heights, at = np.unique(p[pointed, 2].round(9), return_inverse=True)
+    way = np.bincount(at.ravel(), lengths(program)[pointed], minlength=len(heights))
+    for z in heights[np.argsort(-way, kind="stable")].tolist():
+        if np.abs(kept - z).min(initial=math.inf) >= apart:
+            kept = np.append(kept, z)
+    return np.sort(kept)
 
 
 def material_provenance(material: Material) -> dict[str, str]:
