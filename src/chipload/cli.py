@@ -6,6 +6,7 @@ a limit or a status does not hold; 1 a fault of ours; 130 stopped by Ctrl-C. Imp
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 FAULT, WRONG, EXCEEDED, STOPPED = 1, 2, 3, 130
 #: [mm] where none is stated
 TOLERANCE_MM = 0.001
+#: [s] between two states of a simulation
+KEEP_S = 10.0
 #: findings of a machine that break nothing
 HARMLESS = ("machine-singular", "machine-rewind", "machine-offset")
 
@@ -67,22 +70,48 @@ def run(
     job: JobFile,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="the result folder; appears whole or not at all")],
     sets: Sets = None,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="throw away what an earlier run of a program kept when it was stopped")
+    ] = False,
+    keep_s: Annotated[
+        float,
+        typer.Option(
+            "--keep-s",
+            help="seconds of simulation between two states from which a stopped run can go on; 0: as often as possible",
+        ),
+    ] = KEEP_S,
     debug: Debug = False,
 ) -> None:
-    """Plan a job and prove its programs, or read the program that it names; write the result folder."""
+    """Plan a job and prove its programs, or read the program that it names; write the result folder.
+
+    A simulation that was stopped goes on where it was when the same command is given again.
+    """
 
     def work() -> int:
         from chipload.job import load_job
 
         read = load_job(job, sets or ())
-        from chipload.report.folder import check_target, verdict, write_result
+        from chipload.report.folder import check_target, unfinished_folder, verdict, write_result
         from chipload.run import run as run_any
+        from chipload.simulation.unfinished import Unfinished
 
         check_target(out)
-        with _bar() as progress:
-            done = run_any(read, lambda part, what: progress(0.8 * part, what))
-            target = write_result(done, out, lambda part, what: progress(0.8 + 0.2 * part, what))
-        holds, says = verdict(done)
+        if not 0.0 <= keep_s < math.inf:
+            raise InputError(f"--keep-s = {keep_s:g}: must be at least 0 s")
+        with Unfinished(unfinished_folder(out), keep_s, fresh=fresh, notice=_say) as kept:
+            try:
+                with _bar() as progress:
+                    done = run_any(read, lambda part, what: progress(0.8 * part, what), kept)
+                    target = write_result(done, out, lambda part, what: progress(0.8 + 0.2 * part, what))
+                holds, says = verdict(done)
+            except (KeyboardInterrupt, Cancelled):
+                if not kept.safe:
+                    raise
+                raise Cancelled(
+                    f"{kept.safe} steps are kept in {kept.folder.name}: the same command goes on from there, with "
+                    "--fresh it begins again"
+                ) from None
+            kept.discard()
         typer.echo(says)
         typer.echo(f"report: {target / 'report.html'}")
         return 0 if holds else EXCEEDED
@@ -92,7 +121,10 @@ def run(
 
 @app.command()
 def check(
-    file: Annotated[Path, typer.Argument(metavar="JOB|PROGRAM", help="a job (TOML) or a program (NC text, CL data)")],
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="JOB|PROGRAM|MODEL", help="a job (TOML), a program (NC text, CL data) or a STEP file"),
+    ],
     machine: MachineName = None,
     tools: Tools = None,
     dialect: DialectName = None,
@@ -101,9 +133,11 @@ def check(
     sets: Sets = None,
     debug: Debug = False,
 ) -> None:
-    """Read a job and every file that it names, or a program as its controller does; write nothing."""
+    """Read a job and all that it names, a program as its controller does, or list a model's faces; write nothing."""
 
     def work() -> int:
+        if file.suffix.lower() in (".step", ".stp"):
+            return _check_model(file)
         if file.suffix.lower() != ".toml":
             if sets:
                 raise InputError("--set: belongs to a job: leave it out for a program")
@@ -346,6 +380,15 @@ def _check_job(job: Path, sets: Sequence[str]) -> int:
     return 0 if holds else EXCEEDED
 
 
+def _check_model(model: Path) -> int:
+    """List the faces of a STEP file, as jobs name them."""
+    from chipload.geometry.step_faces import read_faces
+
+    for text in read_faces(model, "model").lines():
+        typer.echo(text)
+    return 0
+
+
 def _check_program(
     path: Path,
     machine: str | None,
@@ -409,8 +452,8 @@ def _guarded(work: Callable[[], int], debug: bool) -> NoReturn:
     except InputError as err:
         _say(str(err))
         code = WRONG
-    except (KeyboardInterrupt, Cancelled):
-        _say("stopped: nothing was written")
+    except (KeyboardInterrupt, Cancelled) as err:
+        _say(f"stopped: {str(err) or 'nothing was written'}")
         code = STOPPED
     except (typer.Exit, BrokenPipeError):
         raise

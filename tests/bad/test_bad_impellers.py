@@ -92,13 +92,6 @@ def test_a_file_that_is_missing(hecc):
     assert refused(hecc) == "hub.txt: cannot be read: No such file or directory"
 
 
-def test_faces_of_a_model(hecc):
-    changed(hecc, '"main_01.txt"', '"blade.stp"')
-    assert refused(hecc) == (
-        "job.toml: impeller.sections: blade.stp: blade faces are not read from STEP: write sections as points, X Y Z"
-    )
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -135,7 +128,7 @@ def test_neither_shape_nor_sections(formula):
     text = formula.read_text()
     formula.write_text(text[: text.index("[impeller.shape]")] + text[text.index("[catalogue]") :])
     assert refused(formula) == (
-        "job.toml: impeller: neither is stated: state either [impeller.shape] or [impeller.sections]"
+        "job.toml: impeller: none is stated: state one of [impeller.shape], [impeller.sections], [impeller.step]"
     )
 
 

@@ -79,7 +79,7 @@ def run(folder: Path, layer: float, **said: object) -> dict:
     (op,) = json.loads((folder / "result" / "summary.json").read_bytes())["operations"]
     table = pq.read_table(folder / "result" / "history.parquet").to_pydict()
     # what the steps took is what the stock lost, and the last line that moves is reached
-    assert math.fsum(table["chip_volume_mm3"]) == pytest.approx(op["stock_removed_mm3"], rel=1e-9)
+    assert math.fsum(table["chip_volume_mm3"]) == pytest.approx(op["removed_mm3"], rel=1e-9)
     last = np.array([table[f"{x}_mm"][-1] for x in "xyz"])
     return op | {"last": last, "lines": np.array(table["line"])}
 
@@ -165,7 +165,7 @@ def test_the_bear_whole(tmp_path: Path) -> None:
     moved = np.linalg.norm(np.diff(places, axis=0, prepend=places[:1]), axis=1) > 0.0
     assert set(lines[moved]) <= set(done["lines"].tolist())
     np.testing.assert_allclose(done["last"], places[-1], atol=1e-9)
-    assert done["stock_removed_mm3"] == pytest.approx(dexels_of_bear(0.4), rel=1e-3)
+    assert done["removed_mm3"] == pytest.approx(dexels_of_bear(0.4), rel=1e-3)
 
 
 def test_the_boat_whole(tmp_path: Path) -> None:
@@ -175,17 +175,17 @@ def test_the_boat_whole(tmp_path: Path) -> None:
     np.testing.assert_allclose(done["last"], tip, atol=1e-9)
     mean = math.fsum(other.values()) / 3.0
     assert max(other.values()) - min(other.values()) < 2e-4 * mean
-    assert done["stock_removed_mm3"] == pytest.approx(mean, rel=3e-4)
+    assert done["removed_mm3"] == pytest.approx(mean, rel=3e-4)
 
 
 @long
 def test_the_bear_finer(tmp_path: Path) -> None:
-    assert run_bear(tmp_path, 0.5)["stock_removed_mm3"] == pytest.approx(dexels_of_bear(0.2), rel=2e-4)
+    assert run_bear(tmp_path, 0.5)["removed_mm3"] == pytest.approx(dexels_of_bear(0.2), rel=2e-4)
 
 
 @long
 def test_the_boat_finer(tmp_path: Path) -> None:
     """Against finer rays, and against the union of hulls, which cover more where the axis turns."""
-    removed = run_boat(tmp_path, 0.25)["stock_removed_mm3"]
+    removed = run_boat(tmp_path, 0.25)["removed_mm3"]
     assert removed == pytest.approx(dexels_of_boat(0.2)["z"], rel=1e-4)
     assert removed == pytest.approx(hulls_of_boat(96, math.radians(0.5)), rel=5e-4)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
-from chipload.simulation.steps import steps_of
+from chipload.simulation.steps import StepBlocks, steps_of
 from chipload.simulation.surface import collisions, difference, fine, in_stock
 
 BALL = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=5.0)
@@ -101,3 +102,31 @@ def test_a_holder_in_the_stock(depth, hits):
     assert bool(found) == hits
     if hits:
         assert found[0].depth_mm == pytest.approx(2.0, abs=0.1)
+
+
+def test_blocks_of_steps_find_what_all_steps_find():
+    """A program that cuts too deep, runs its holder into a fixture and the stock; two tools; cut into blocks of 5."""
+    holder = ((40.0, 40.0),)
+    cutters = {1: replace(BALL, holder=holder), 2: Cutter(6.0, 2, 0.5, 20.0, 30.0, 6e5, holder=holder)}
+    path = [[-6, 2, 4], [-6, 2, -1], [16, 2, -1], [16, 6, -25], [-6, 6, -25], [-6, 4, -33], [16, 4, -33]]
+    moves = [rapid(path[0], 800, 1, "way"), *(plunge(p, 10.0, 800.0, 1 + k // 4, "cut") for k, p in enumerate(path))]
+    lines = [replace(m, line=np.full(1, k)) for k, m in enumerate(moves)]
+    program = Program.join(lines)
+    whole, blocks = steps_of(program, 2.0, 0.001), StepBlocks(program, 2.0, 0.001, size=5)
+    part, fixture = box([0, 0, -40], [10, 8, 0]), fine(box([4, 12, -10], [8, 20, 0]), 0.5, "fixture")[0]
+    grid = np.stack(np.meshgrid(*(np.arange(a, b, 2.0) for a, b in ((-30, 30), (-30, 30), (-40, 1)))), -1).reshape(
+        -1, 3
+    )
+    one, two = (difference(s, cutters, part, everywhere, 1.0, 1.0, 1e-2) for s in (whole, blocks))
+    for name in ("distance", "step", "deepest"):
+        assert np.array_equal(getattr(one, name), getattr(two, name)), name
+    assert len(two.deepest) == len(whole)
+    assert two.step.max() > 20
+    touched = [collisions(s, cutters, {"fixture": fixture, "part": part.vertices}, 0.01) for s in (whole, blocks)]
+    assert touched[0] == touched[1]
+    assert len({c.line for c in touched[0]}) > 2
+    sunk = [in_stock(s, cutters, grid, 0.05) for s in (whole, blocks)]
+    assert sunk[0] == sunk[1]
+    assert len(sunk[0]) > 1
+    for c in (*touched[0], *sunk[0]):
+        assert (int(whole.line[c.step]), whole.p1[c.step].tolist()) == (c.line, list(c.at))

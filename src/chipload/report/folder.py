@@ -14,7 +14,7 @@ import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 from chipload.errors import InputError
 from chipload.progress import Progress, silent
@@ -43,12 +43,15 @@ from chipload.report.wall import page as wall_page
 from chipload.report.wall import scene as wall_scene
 from chipload.report.wall import summary as wall_summary
 from chipload.report.wall.outcome import Walled
+from chipload.simulation.unfinished import require_ours
 
 SUMMARY = "summary.json"
 #: an outcome of any kind
 Shown = Outcome | Read | Milled | ShellOutcome | Walled
+#: what a file holds, or what writes it bit by bit
+Content = bytes | Callable[[IO[bytes]], None]
 #: files and who makes them
-Makers = list[tuple[str, Callable[[], bytes]]]
+Makers = list[tuple[str, Callable[[], Content]]]
 #: files that every result has
 NAMES = (SUMMARY, "history.parquet", "scene.glb", "report.html")
 #: files that some have
@@ -58,7 +61,7 @@ MORE = (shell_files.PATH, shell_files.TABLE, shell_files.HAL)
 class Kind(NamedTuple):
     """How an outcome is shown: the files of :data:`NAMES`, its programs and other files, and its verdict."""
 
-    files: tuple[Callable[[Any], bytes], ...]
+    files: tuple[Callable[[Any], Content], ...]
     programs: Callable[[Any], dict[str, bytes]]
     verdict: Callable[[Any], tuple[bool, str]]
 
@@ -67,7 +70,7 @@ class Kind(NamedTuple):
 KINDS: dict[type, Kind] = {
     Outcome: Kind((summary_bytes, history_bytes, scene_bytes, page_bytes), program_files, planned_verdict),
     Read: Kind(
-        (reading.summary_bytes, reading.history_bytes, reading.scene_bytes, reading.page_bytes),
+        (reading.summary_bytes, reading.history_writer, reading.scene_bytes, reading.page_bytes),
         reading.program_files,
         reading.verdict,
     ),
@@ -117,6 +120,20 @@ def check_target(out: str | Path, ours: Callable[[Path], bool] | None = None, wh
     except OSError as err:
         raise InputError(f"--out {out}: cannot be written: {err.strerror}: name another folder") from None
     return target
+
+
+def unfinished_folder(out: str | Path) -> Path:
+    """Where a run keeps what it has finished until its result is written: beside it.
+
+    Raises
+    ------
+    InputError
+        Something else is there.
+    """
+    target = Path(out).absolute()
+    folder = target.with_name(f"{target.name}.unfinished")
+    require_ours(folder)
+    return folder
 
 
 def write_result(outcome: Shown, out: str | Path, progress: Progress = silent) -> Path:
@@ -188,15 +205,21 @@ def _ours(folder: Path) -> bool:
         return (
             isinstance(holds, dict)
             and "holds" in holds
-            and all(p.name in NAMES + MORE or p.suffix in (".ngc", ".nc", ".apt", ".npz") for p in folder.iterdir())
+            and all(
+                p.name in NAMES + MORE or p.suffix in (".ngc", ".nc", ".apt", ".npz") or p.stem == reading.FEEDS
+                for p in folder.iterdir()
+            )
         )
     except (OSError, ValueError):
         return False
 
 
-def _write(path: Path, data: bytes) -> None:
+def _write(path: Path, data: Content) -> None:
     with path.open("wb") as file:
-        file.write(data)
+        if isinstance(data, bytes):
+            file.write(data)
+        else:
+            data(file)
         file.flush()
         os.fsync(file.fileno())
 

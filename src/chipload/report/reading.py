@@ -6,12 +6,13 @@ cutter meets is not known.
 
 from __future__ import annotations
 
-import io
+import itertools
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from html import escape
-from typing import Any
+from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -27,6 +28,8 @@ from chipload.program.motions import is_arc, lengths, radii, spans, straightened
 from chipload.program.program import DWELL, RAPID, Program
 from chipload.program.read import Reading
 from chipload.program.time import program_time
+from chipload.report import feeds as fed_feeds
+from chipload.report.feeds import Fed
 from chipload.report.figures import FONT, GRID, LIMIT, SCALE, SPACE_POINTS, STOCK
 from chipload.report.sheet import definitions, figure, framed, heading, items, table
 from chipload.report.simulated import Simulated, operation, sections
@@ -39,6 +42,8 @@ Floats = NDArray[np.float64]
 MOTIONS = ("rapid", "line", "arc clockwise", "arc counter-clockwise", "dwell")
 #: chords of arcs in pictures leave them by at most this [mm]
 CHORD_MM = 0.01
+#: stem of the program with new feeds
+FEEDS = "0-feeds"
 #: findings and lines that the page lists
 LISTED, SLOWEST = 300, 12
 
@@ -56,6 +61,7 @@ class Read:
     machine : that it was read for
     provenance : JSON values: hashes of the inputs, versions
     simulated : what the program does to its stock; None: it was only read
+    fed : how it came to its feeds where they are new; None: they are those of the file
     """
 
     title: str
@@ -66,6 +72,7 @@ class Read:
     machine: Machine
     provenance: Mapping[str, Any]
     simulated: Simulated | None = None
+    fed: Fed | None = None
 
 
 def verdict(read: Read) -> tuple[bool, str]:
@@ -75,20 +82,30 @@ def verdict(read: Read) -> tuple[bool, str]:
         more = f"; and {len(bad) - 1} more" if len(bad) > 1 else ""
         return False, f"Does not hold: {_said(bad[0])}{more}."
     if read.simulated is not None:
-        fails = read.simulated.fails
+        fails = _fails(read)
         if fails:
             more = f"; and {len(fails) - 1} more" if len(fails) > 1 else ""
             return False, f"Does not hold: {fails[0]}{more}."
+        unproven = read.simulated.unproven
+        if unproven:
+            more = f"; and {len(unproven) - 1} more" if len(unproven) > 1 else ""
+            return False, f"Unproven: nothing that is known exceeds a limit; {unproven[0]}{more}."
         held = ", ".join(h.says for h in read.simulated.held)
         return True, f"Every stated limit holds in the simulation: {held}."
     return False, f"Unproven: the limits of machine {read.machine.name} hold; what the cutter meets was not simulated."
 
 
+def _fails(read: Read) -> tuple[str, ...]:
+    """What the simulation found, and what new feeds do not reach."""
+    found = read.simulated.fails if read.simulated is not None else ()
+    return (*found, *(read.fed.fails if read.fed is not None else ()))
+
+
 def _status(read: Read) -> str:
     """`failed`, `unproven` or `simulated`."""
-    if not verdict(read)[0] and (read.reading.broken or read.simulated is not None):
+    if read.reading.broken or _fails(read):
         return "failed"
-    return "unproven" if read.simulated is None else "simulated"
+    return "unproven" if read.simulated is None or read.simulated.verdict == "unproven" else "simulated"
 
 
 def _said(finding: Finding) -> str:
@@ -128,13 +145,29 @@ def summary_bytes(read: Read) -> bytes:
         "says": says,
         "job": read.title,
         "program": numbers(read) | {"status": _status(read)},
-        "operations": [operation(read.simulated)] if read.simulated is not None else [],
+        "operations": [_operation(read)] if read.simulated is not None else [],
         "machine": read.machine.name,
         "broken": rows(read.reading.broken),
         "findings": rows(read.reading.noticed),
         "provenance": dict(read.provenance),
     }
     return (json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def _operation(read: Read) -> dict[str, Any]:
+    assert read.simulated is not None
+    out = operation(read.simulated, float(read.seconds.sum()))
+    if read.fed is None:
+        return out
+    said = fed_feeds.summary(read.fed, read.simulated, float(read.seconds.sum()), feeds_name(read), verdict(read)[0])
+    if read.fed.fails:
+        out |= {"holds": False, "verdict": "fails", "fails": list(_fails(read))}
+    return out | {"feeds": said}
+
+
+def feeds_name(read: Read) -> str:
+    """Name of the program with new feeds."""
+    return f"{FEEDS}{Path(read.name).suffix}"
 
 
 def history(read: Read) -> dict[str, Any]:
@@ -168,15 +201,37 @@ def row_times(read: Read) -> Floats:
     return np.asarray(own + more * share)
 
 
-def history_bytes(read: Read) -> bytes:
-    """history.parquet."""
-    columns = history(read) if read.simulated is None else steps(read.simulated)
+def history_writer(read: Read) -> Callable[[IO[bytes]], None]:
+    """What writes history.parquet; of a simulated program some ten thousand rows at a time are in memory."""
+
+    def write(file: IO[bytes]) -> None:
+        tables = map(_table, _rows(read))
+        first = next(tables)
+        with pq.ParquetWriter(file, first.schema, compression="zstd") as writer:
+            for table in itertools.chain([first], tables):
+                writer.write_table(table)
+
+    return write
+
+
+def _rows(read: Read) -> Iterator[Mapping[str, Any]]:
+    """The columns of history.parquet, some rows at a time."""
+    if read.simulated is None:
+        yield history(read)
+        return
+    fed = fed_feeds.columns(read.fed, read.simulated) if read.fed is not None else {}
+    at = 0
+    for some in steps(read.simulated):
+        count = len(some["pass"])
+        yield {**some, **{name: values[at : at + count] for name, values in fed.items()}}
+        at += count
+
+
+def _table(columns: Mapping[str, Any]) -> pa.Table:
     n = len(columns["pass"])
     data = {"operation": pa.array(np.zeros(n, dtype=np.int32)), "strategy": pa.array(["program"] * n)}
     data |= {k: pa.array(v.tolist() if v.dtype == object else np.ascontiguousarray(v)) for k, v in columns.items()}
-    sink = io.BytesIO()
-    pq.write_table(pa.table(data), sink, compression="zstd")
-    return sink.getvalue()
+    return pa.table(data)
 
 
 def scene_bytes(read: Read) -> bytes:
@@ -203,9 +258,13 @@ def scene_bytes(read: Read) -> bytes:
 
 
 def program_files(read: Read) -> dict[str, bytes]:
-    """CL data of the program, and the stock that it leaves."""
+    """CL data of the program, the stock that it leaves, and its own text where feeds are new."""
     text = write_apt(read.reading.program, None, title=f"{read.title}, {read.name}", verified=False)
     files = {"0-program.apt": text.encode("ascii")}
+    if read.fed is not None:
+        holds, says = verdict(read)
+        own = fed_feeds.program_text(read.fed, None if holds else says.removeprefix("Does not hold: "))
+        files[feeds_name(read)] = own.encode("utf-8", "surrogateescape")
     return files if read.simulated is None else files | {"stock.npz": read.simulated.stock.to_bytes()}
 
 
@@ -221,8 +280,13 @@ def page_bytes(read: Read) -> bytes:
     box = ", ".join(f"{x} {a:.4g} to {b:.4g}" for x, a, b in zip("XYZ", low, high, strict=True))
     body = [*heading(read.title, holds, word, _sentence(says.removeprefix(f"{word}: ")))]
     body += _findings("What does not hold", bad)
-    if read.simulated is not None and read.simulated.fails:
-        body += ["<h3>What the simulation found</h3>", items(read.simulated.fails[:LISTED])]
+    if _fails(read):
+        body += ["<h3>What the simulation found</h3>", items(_fails(read)[:LISTED])]
+    if read.simulated is not None and read.simulated.unproven:
+        body += ["<h3>What is not proved</h3>", items(read.simulated.unproven[:LISTED])]
+    if read.fed is not None and read.simulated is not None:
+        name = feeds_name(read)
+        body += fed_feeds.section(read.fed, read.simulated, float(read.seconds.sum()), name, holds, figures)
     body += [
         f"<h2>{escape(read.name)} on {escape(read.machine.name)}</h2>",
         f"<p>{what['motions']} motions, {what['cutting_mm']:.5g} mm at feed and {what['rapid_mm']:.5g} mm of rapids, "
@@ -235,7 +299,7 @@ def page_bytes(read: Read) -> bytes:
         "<h3>Lines that take longest</h3>",
         _slowest(read),
         *_findings("What the reader noticed", read.reading.noticed),
-        *(sections(read.simulated, figures) if read.simulated is not None else ()),
+        *(sections(read.simulated, what["time_s"], figures) if read.simulated is not None else ()),
         "<h2>What was not checked</h2>",
         f"<p>{_unchecked(read)}</p>",
         "<h2>Where the numbers come from</h2>",
@@ -347,6 +411,8 @@ def _unchecked(read: Read) -> str:
         out.append("fixtures: none is stated")
     if done.no_holder:
         out.append(f"holders of tools {', '.join(map(str, done.no_holder))}: not stated")
+    if done.rigid:
+        out.append(f"what gives way and is not stated: {', '.join(done.rigid)}")
     if done.unchecked:
         out.append(f"limits that are not stated: {', '.join(done.unchecked)}")
     return escape(_sentence("; ".join(out)) + "." if out else "Everything that chipload can check of a program was.")

@@ -42,8 +42,11 @@ def worst(left: Difference, columns: Mapping[str, NDArray[Any]], kind: str) -> d
     }  # fmt: skip
 
 
-def numbers(left: Difference, columns: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
-    """Keys of an operation in summary.json."""
+def numbers(left: Difference | None, columns: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+    """Keys of an operation in summary.json; without a part nothing is known of gouges and excess."""
+    if left is None:
+        nothing = {"max": None, "line": 0, "at_mm": None, "t_s": None}
+        return dict.fromkeys(("gouge_mm", "excess_mm"), nothing)
     known = np.isfinite(left.distance)[left.over]
     return {
         "gouge_mm": worst(left, columns, "gouge"),
@@ -57,10 +60,11 @@ def numbers(left: Difference, columns: Mapping[str, NDArray[Any]]) -> dict[str, 
 
 def listed(collisions: tuple[Collision, ...], columns: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:
     """``collisions`` of an operation in summary.json."""
+    t, tool = columns["t_s"], columns["tool"]
     return [
         {
             "what": c.what, "into": c.into, "depth_mm": c.depth_mm, "line": c.line, "at_mm": list(c.at),
-            "t_s": float(columns["t_s"][c.step]), "tool": int(columns["tool"][c.step]),
+            "t_s": float(t[c.step]), "tool": int(tool[c.step]),
         }
         for c in collisions
     ]  # fmt: skip
@@ -147,9 +151,10 @@ def section(
             f"{len(collisions) or 'no'} line{'s' if len(collisions) != 1 else ''} with a collision.</p>",
         ]
     if collisions:
+        t = columns["t_s"]
         rows = [
             [
-                str(c.line), c.what, c.into, f"{c.depth_mm:.3g}", f"{float(columns['t_s'][c.step]):.4g}",
+                str(c.line), c.what, c.into, f"{c.depth_mm:.3g}", f"{float(t[c.step]):.4g}",
                 ", ".join(f"{x:.4g}" for x in c.at),
             ]
             for c in collisions[:LISTED]

@@ -15,6 +15,7 @@ from chipload.run.planned import Inputs, look_at_job, prove, read_inputs, run_jo
 from chipload.run.program import look_at_program, run_program
 from chipload.run.shell import look_at_shell, run_shell
 from chipload.run.wall import look_at_wall, propose, run_wall
+from chipload.simulation.unfinished import Unfinished
 
 #: an outcome of any kind
 AnyOutcome = Outcome | Read | Milled | ShellOutcome | Walled
@@ -28,8 +29,12 @@ KINDS: Mapping[type[AnyJob], tuple[Callable[[Any, Progress], AnyOutcome], Callab
 }
 
 
-def run(job: AnyJob, progress: Progress = silent) -> AnyOutcome:
-    """Run a job of any kind; nothing is written.
+def run(job: AnyJob, progress: Progress = silent, unfinished: Unfinished | None = None) -> AnyOutcome:
+    """Run a job of any kind; no result is written.
+
+    Parameters
+    ----------
+    unfinished : the folder that keeps what is finished of a simulated program; other jobs begin at their beginning
 
     Raises
     ------
@@ -38,6 +43,8 @@ def run(job: AnyJob, progress: Progress = silent) -> AnyOutcome:
     Cancelled
         By ``progress``.
     """
+    if isinstance(job, ProgramJob):
+        return run_program(job, progress, unfinished)
     return KINDS[type(job)][0](job, progress)
 
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -17,32 +18,45 @@ from chipload.cutting.material import Material, material_named, read_material
 from chipload.errors import InputError
 from chipload.geometry.mesh import read_mesh
 from chipload.job import ProgramJob
-from chipload.job.tables import SimulateTable
-from chipload.machine.machine import machine_named, read_machine
+from chipload.job.tables import LOADS, SimulateTable
+from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.motions import lengths
 from chipload.program.program import RAPID, Program
-from chipload.program.read import line_times, read_program, read_tools
+from chipload.program.read import Reading, line_times, read_program, read_tools
 from chipload.progress import Progress, silent
+from chipload.report.feeds import Fed
+from chipload.report.held import spindle_limits
 from chipload.report.reading import Read, verdict
 from chipload.report.simulated import Simulated
-from chipload.run.provenance import hashes, title_of, versions
-from chipload.simulation.chips import Resolution, remove
-from chipload.simulation.steps import steps_of
+from chipload.run.feeds import Asked, changeable, read_as, straight, watching, with_new_feeds
+from chipload.run.formed import forming
+from chipload.run.provenance import hashes, sources, title_of, versions
+from chipload.run.stiffness import deflecting, stiffness_of, watched, with_columns
+from chipload.simulation.chips import Resolution, counted, remove
+from chipload.simulation.loads import Cuts
+from chipload.simulation.pieces import remove_in_pieces
+from chipload.simulation.steps import StepBlocks, steps_of
 from chipload.simulation.surface import MOST_POINTS, collisions, difference, fine, in_stock
+from chipload.simulation.unfinished import Unfinished
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min
 
 #: side of a tile of the stock in diameters of the largest cutter
 TILE = 4.0
+#: of a simulation, what one pass over its steps beside the removal takes
+SHARE = 0.2 / 3.0
 #: layers where no cutter comes are so many times as thick
 COARSE = 4.0
 
 
-def run_program(job: ProgramJob, progress: Progress = silent, *, simulate: bool = True) -> Read:
+def run_program(
+    job: ProgramJob, progress: Progress = silent, unfinished: Unfinished | None = None, *, simulate: bool = True
+) -> Read:
     """Read the program of a job for its machine; simulate it where the job says so.
 
     Parameters
     ----------
+    unfinished : the folder that keeps what is finished, from which the run goes on; None: all is kept in memory
     simulate : False: every file is read, nothing is cut
 
     Raises
@@ -53,27 +67,42 @@ def run_program(job: ProgramJob, progress: Progress = silent, *, simulate: bool 
     machine = machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
     table = job.table.program
     share = 0.1 if job.simulates else 1.0
-    reading = read_program(
-        job.program_file,
-        machine,
-        dialect=table.dialect,
-        tools=read_tools(job.tools_file) if job.tools_file is not None else None,
-        feed=mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None,
-        tolerance=table.tolerance_mm,
-        progress=lambda done, what: progress(share * done, what),
-    )
+    tools = read_tools(job.tools_file) if job.tools_file is not None else None
+
+    def read(text: str | None = None) -> Reading:
+        return read_program(
+            job.program_file,
+            machine,
+            dialect=table.dialect,
+            tools=tools,
+            feed=mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None,
+            tolerance=table.tolerance_mm,
+            text=text,
+            progress=lambda done, what: progress(share * done, what) if text is None else None,
+        )
+
+    reading = read()
     lines, seconds = line_times(reading, machine)
-    simulated = None
+    simulated, fed = None, None
     if job.simulates:
-        stock, material = _stock(job, reading.program), _material(job)
+        stock, material, begin = _stock(job, reading.program), _material(job), share
+        wants_feeds = job.table.operation[0].feeds is not None
+        if wants_feeds:
+            own = changeable(job.program_file, machine, table.dialect)
+            straight(reading.program)
+            if simulate:
+                begin = 0.5 * (1.0 + share)
+                fed, reading = _fed(
+                    job, *own, reading, stock, material, machine, read, float(seconds.sum()),
+                    lambda done, what: progress(share + (begin - share) * done, what),
+                )  # fmt: skip
+                lines, seconds = line_times(reading, machine)
+                stock = _stock(job, reading.program)
         if simulate:
             simulated = _simulated(
-                job,
-                _with_tool(reading.program),
-                stock,
-                material,
-                lambda done, what: progress(share + (1.0 - share) * done, what),
-            )
+                job, reading.program, stock, machine, material, unfinished,
+                lambda done, what: progress(begin + (1.0 - begin) * done, what),
+            )  # fmt: skip
     files: dict[str, Path] = {"job": job.path, "program": job.program_file}
     named = {"machine": job.machine, "tools": job.tools_file, "material": job.material}
     fixtures = {f"fixture {k}": f for k, f in enumerate(job.table.fixture)}
@@ -89,7 +118,7 @@ def run_program(job: ProgramJob, progress: Progress = silent, *, simulate: bool 
         **({"material": material_provenance(simulated.material)} if simulated is not None else {}),
         "versions": versions(),
     }
-    return Read(title_of(job.path), job.program_file.name, reading, lines, seconds, machine, provenance, simulated)
+    return Read(title_of(job.path), job.program_file.name, reading, lines, seconds, machine, provenance, simulated, fed)
 
 
 def look_at_program(job: ProgramJob) -> tuple[list[str], bool]:
@@ -99,44 +128,142 @@ def look_at_program(job: ProgramJob) -> tuple[list[str], bool]:
     return [*noticed, f"{job.path.name}: {verdict(done)[1]}"], not done.reading.broken
 
 
+def simulate_read(
+    job: ProgramJob,
+    reading: Reading,
+    machine: Machine,
+    material: Material,
+    stock: LayeredStock | None,
+    provenance: Mapping[str, Any],
+    progress: Progress = silent,
+) -> Read:
+    """Run a program that was read already through a stock.
+
+    Parameters
+    ----------
+    job : its operation, cutters, limits, part, fixtures and stiffness count
+    stock : which changes; None: that of the job
+    """
+    if stock is None:
+        stock = _stock(job, reading.program)
+    lines, seconds = line_times(reading, machine)
+    done = _simulated(job, reading.program, stock, machine, material, None, progress)
+    return Read(title_of(job.path), job.program_file.name, reading, lines, seconds, machine, provenance, done)
+
+
+def _fed(
+    job: ProgramJob,
+    text: str,
+    dialect: str,
+    reading: Reading,
+    stock: LayeredStock,
+    material: Material,
+    machine: Machine,
+    read: Callable[[str], Reading],
+    seconds: float,
+    progress: Progress,
+) -> tuple[Fed, Reading]:
+    """The text with new feeds, from what the program cuts of a stock, which changes; and what it does then."""
+    op: SimulateTable = job.table.operation[0]
+    assert op.feeds is not None
+    fine = _resolution(job)
+    turning = np.unique(reading.program.spindle[reading.program.motion != RAPID])
+    limits = {name: limit for name, limit in job.limits.items() if name in LOADS} | spindle_limits(machine, turning)
+    gives = stiffness_of(job.table.stiffness, job.cutters)
+    bends = deflecting(gives, material)
+    asked = Asked(op.feeds, limits, fine.rotation, bends if "deflection_um" in limits else None)
+    program = _with_tool(reading.program, job)
+    steps = steps_of(program, op.step_mm, op.tolerance_mm)
+    allowed = watching(steps, asked, job.cutters, material, machine)
+    removal = remove(
+        program, stock, job.cutters, material, fine, interpolation=op.interpolation,
+        watch=lambda cuts: {**allowed(cuts), **bends(cuts)}, progress=progress,
+    )  # fmt: skip
+    removal = with_columns(removal, watched(gives))
+    return with_new_feeds(
+        text, dialect, reading, steps, removal, asked, job.cutters, machine, lambda new: read(read_as(new)), seconds
+    )
+
+
+def _resolution(job: ProgramJob) -> Resolution:
+    op: SimulateTable = job.table.operation[0]
+    smallest = min(c.radius for c in job.cutters.values())
+    return Resolution(op.step_mm, op.tolerance_mm, op.corner_slices, op.flank_mm or 0.5 * smallest)
+
+
 def _simulated(
-    job: ProgramJob, program: Program, stock: LayeredStock, material: Material, progress: Progress
+    job: ProgramJob,
+    program: Program,
+    stock: LayeredStock,
+    machine: Machine,
+    material: Material,
+    unfinished: Unfinished | None,
+    progress: Progress,
 ) -> Simulated:
     """The program, run through the stock of the job."""
     op: SimulateTable = job.table.operation[0]
-    smallest = min(c.radius for c in job.cutters.values())
-    fine = Resolution(op.step_mm, op.tolerance_mm, op.corner_slices, op.flank_mm or 0.5 * smallest)
+    program = _with_tool(program, job)
+    fine = _resolution(job)
     points = _grid(stock, op.stock_points_mm) if op.stock_points_mm is not None else None
     part, fixtures, before = _part(job), _fixtures(job), _insides(stock)
-    removal = remove(
-        program, stock, job.cutters, material, fine, interpolation=op.interpolation,
-        progress=lambda done, what: progress(0.8 * done, what),
-    )  # fmt: skip
-    steps = steps_of(program, op.step_mm, op.tolerance_mm)
+    stiffness = job.table.stiffness
+    gives = stiffness_of(stiffness, job.cutters)
+    watches = [deflecting(gives, material)]
+    steps = StepBlocks(program, op.step_mm, op.tolerance_mm)
+    count = counted(program, job.cutters, fine)
+
+    def passing(share: float, what: str) -> Callable[[int], None]:
+        return lambda done: progress(share + SHARE * done / count, what)
+
     left, solids = None, dict(fixtures)
     if part is not None:
         table = job.table.part
         assert table is not None
         left = difference(
             steps, job.cutters, part, before, table.spacing_mm, table.look_mm, op.tolerance_mm,
-            lambda done, what: progress(0.8 + 0.1 * done, what),
+            passing(0.0, "distances to the part"),
         )  # fmt: skip
         solids["part"] = left.points
-    touched = collisions(steps, job.cutters, solids, op.tolerance_mm, above_only=frozenset(["part"]))
+        watches.append(forming(left, gives, material))
+
+    def watch(cuts: Cuts) -> dict[str, NDArray[np.float64]]:
+        return {name: values for each in watches for name, values in each(cuts).items()}
+
+    def removing(done: float, what: str) -> None:
+        progress(SHARE + 0.8 * done, what)
+
+    if unfinished is None:
+        removal = remove(
+            program, stock, job.cutters, material, fine, interpolation=op.interpolation, watch=watch, progress=removing
+        )  # fmt: skip
+    else:
+        formed = None if left is None else (left.points, left.faces, left.distance, left.step)
+        removal = remove_in_pieces(
+            program, stock, job.cutters, material, fine, unfinished, interpolation=op.interpolation, watch=watch,
+            also=(versions(), sources(), repr(stiffness), formed), progress=removing,
+        )  # fmt: skip
+    removal = with_columns(removal, watched(gives, formed=left is not None))
+    touched = collisions(
+        steps, job.cutters, solids, op.tolerance_mm, above_only=frozenset(["part"]),
+        progress=passing(0.8 + SHARE, "collisions"),
+    )  # fmt: skip
     if points is not None:
-        touched += in_stock(steps, job.cutters, points, op.tolerance_mm)
+        touched += in_stock(
+            steps, job.cutters, points, op.tolerance_mm, passing(0.8 + 2.0 * SHARE, "holders in the stock")
+        )  # fmt: skip
     settings = {k: v for k, v in op.model_dump().items() if v is not None}
     held_against = (*solids, *(["stock"] if points is not None else []))
     return Simulated(
-        removal, stock, material, job.limits, job.unchecked, settings, left, touched, held_against, _no_holder(job)
-    )
+        removal, stock, machine, material, job.limits, job.unchecked, settings, left, touched, held_against,
+        _no_holder(job), gives.unknown,
+    )  # fmt: skip
 
 
 def _part(job: ProgramJob) -> trimesh.Trimesh | None:
     """The part that should come out."""
     table = job.table.part
-    if table is None:
-        return None
+    if table is None or "part" in job.meshes:
+        return job.meshes.get("part")
     return read_mesh(job.path.parent / table.file, unit=table.units, chord_mm=table.chord_mm, key="part.file")
 
 
@@ -145,7 +272,9 @@ def _fixtures(job: ProgramJob) -> dict[str, NDArray[np.float64]]:
     out = {}
     for k, table in enumerate(job.table.fixture):
         path, key = job.path.parent / table.file, f"fixture.{k}.file"
-        mesh = read_mesh(path, unit=table.units, chord_mm=table.chord_mm, key=key)
+        mesh = job.meshes.get(f"fixture {k}")
+        if mesh is None:
+            mesh = read_mesh(path, unit=table.units, chord_mm=table.chord_mm, key=key)
         out[f"fixture {k}"] = fine(mesh, table.spacing_mm, f"fixture.{k}")[0]
     return out
 
@@ -192,16 +321,18 @@ def _stock(job: ProgramJob, program: Program) -> LayeredStock:
     """
     table, folder = job.table.stock, job.path.parent
     assert table is not None
-    if table.file is not None and table.file.lower().endswith(".npz"):
+    mesh = job.meshes.get("stock")
+    if mesh is None and table.file is not None and table.file.lower().endswith(".npz"):
         return LayeredStock.load(folder / table.file)
     assert table.layer_mm is not None
     tile = TILE * max(c.diameter for c in job.cutters.values())
-    if table.file is None:
+    if mesh is None and table.file is None:
         assert table.low_mm is not None
         assert table.high_mm is not None
         stock = LayeredStock.block(table.low_mm, table.high_mm, COARSE * table.layer_mm, tile)
     else:
-        mesh = read_mesh(folder / table.file, unit=table.units, chord_mm=table.chord_mm)
+        if mesh is None:
+            mesh = read_mesh(folder / str(table.file), unit=table.units, chord_mm=table.chord_mm)
         stock = LayeredStock.of_mesh(mesh, COARSE * table.layer_mm, tile)
     top = float(stock.bounds[-1])
     stock.refine(min(_lowest(program, job.cutters), top), top, table.layer_mm)
@@ -220,8 +351,12 @@ def _lowest(program: Program, cutters: Mapping[int, Cutter]) -> float:
     return float((np.asarray(program.p_work)[rows, 2] - widest * lean).min())
 
 
-def _with_tool(program: Program) -> Program:
-    """The program without the rapids at its beginning that are made before a tool is in the spindle (T0)."""
+def _with_tool(program: Program, job: ProgramJob) -> Program:
+    """The program without the rapids at its beginning that are made before a tool is in the spindle (T0), unless the
+    job says what is in it.
+    """
+    if 0 in job.cutters:
+        return program
     idle = (program.tool == 0) & (program.motion == RAPID)
     first = len(program) if idle.all() else int(np.argmin(idle))
     if first < 2:

@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
+import chipload
+
 #: libraries whose version may change a number
 LIBRARIES = ("chipload", "numpy", "scipy", "numba", "shapely", "embreex", "ezdxf", "cadquery-ocp-novtk")
 
@@ -20,6 +22,15 @@ def hashes(files: Mapping[str, Path]) -> dict[str, str]:
 def versions() -> dict[str, str]:
     """Versions of the libraries and of Python."""
     return {name: version(name) for name in LIBRARIES} | {"python": platform.python_version()}
+
+
+def sources() -> str:
+    """Hash of the sources of chipload: what was begun with others is not gone on with."""
+    out = hashlib.sha256()
+    folder = Path(chipload.__file__).parent
+    for file in sorted(folder.rglob("*.py")):
+        out.update(f"{file.relative_to(folder).as_posix()} ".encode() + file.read_bytes())
+    return out.hexdigest()
 
 
 def title_of(path: Path) -> str:

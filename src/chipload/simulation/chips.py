@@ -12,9 +12,9 @@ and :mod:`chipload.engagement.immersion.immersion` for the one in force.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -23,18 +23,20 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon, box
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutter.slices import slices
+from chipload.cutter.slices import Slices, slices
 from chipload.cutting.band import deviations, mean_basis
 from chipload.cutting.material import Material
+from chipload.engagement.bites import with_runout
 from chipload.engagement.chips.move import Move
 from chipload.engagement.immersion.immersion import Section
 from chipload.errors import Finding, InputError
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
 from chipload.simulation.loads import LOADS, Cuts, StepBite, bite_of_step, bites_of_steps, joined, loads_of_steps
-from chipload.simulation.steps import Steps, steps_of
+from chipload.simulation.steps import BLOCK, ROWS, Steps, steps_in_blocks
 from chipload.simulation.swept import TOGETHER, Interpolation, swept_ahead
 from chipload.stock.layers import LayeredStock
+from chipload.stock.tiles import polygons
 from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
@@ -43,8 +45,6 @@ Columns = Mapping[str, NDArray[Any]]
 #: more columns of steps that cut
 Watch = Callable[[Cuts], Mapping[str, Floats]]
 
-#: steps whose forces are calculated at once
-BLOCK = 512
 #: a piece of a chip narrower than so many tolerances is a film left by chords, no piece
 FILM = 4.0
 
@@ -78,7 +78,7 @@ class Piece:
     step : its number
     move, cutter : of the step
     height : of the layer's section [mm]
-    before : the section before the step, around the cutter
+    before : (multi)polygon, the section before the step, around the cutter
     chips : the pieces
     """
 
@@ -116,6 +116,43 @@ class Removal:
     cuts: tuple[Cuts, ...] = ()
 
 
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What a run keeps to, step after step: see :func:`remove`; ``profiles`` are slices of the cutters."""
+
+    cutters: Mapping[int, Cutter]
+    profiles: Mapping[int, Slices]
+    material: Material
+    resolution: Resolution
+    interpolation: Interpolation
+    watch: Watch | None
+    workers: int
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """What is known after some steps and goes on in the next.
+
+    Parameters
+    ----------
+    before : volume of the stock before the first step [mm^3]
+    steps : how many they are
+    s_mm, t_s, cut_s : their length [mm], their time and the time in cut [s]
+    basis : (4, 6) integral over the time in cut of what the coefficients are multiplied with
+    rapids : lines with rapids that cut
+    piece : as in :class:`Removal`
+    """
+
+    before: float
+    steps: int = 0
+    s_mm: float = 0.0
+    t_s: float = 0.0
+    cut_s: float = 0.0
+    basis: Floats = field(default_factory=lambda: np.zeros((4, 6)))
+    rapids: tuple[int, ...] = ()
+    piece: Piece | None = None
+
+
 def remove(
     program: Program,
     stock: LayeredStock,
@@ -126,9 +163,13 @@ def remove(
     interpolation: Interpolation = "slerp",
     keep: bool = False,
     watch: Watch | None = None,
+    workers: int = 2,
     progress: Progress = silent,
 ) -> Removal:
     """Take what the program cuts from ``stock``, which changes, and say what it costs.
+
+    All columns are kept in memory; :func:`chipload.simulation.pieces.remove_in_pieces` keeps them in files and goes on
+    where it was stopped.
 
     Parameters
     ----------
@@ -138,6 +179,7 @@ def remove(
     keep : keep what the teeth cut in every step, for :mod:`chipload.simulation.deflection`; some kB a step
     watch : called with what one cutter cut in some hundred steps; gives more columns, a value for each of them; they
         are 0 in steps that do not cut
+    workers : threads that find areas ahead of the removal; the result does not depend on it
 
     Returns
     -------
@@ -160,88 +202,162 @@ def remove(
     -----
     O(n l m): n steps, l layers under the cutter, m edges of the stock around it; m does not grow with n.
     """
-    steps = steps_of(program, resolution.step_mm, resolution.tolerance)
-    _check(steps, cutters)
-    profiles = {
-        n: slices(c, corner_pieces=resolution.corner_pieces, flank_mm=resolution.flank_mm) for n, c in cutters.items()
-    }
-    before, thickness, tolerance = stock.volume(), stock.thickness, resolution.tolerance
-    removed = np.zeros((len(steps), 3))
-    loads = np.zeros((len(steps), len(LOADS)))
-    basis = np.zeros((4, 6))
-    kept: dict[int, list[Cuts]] = {}
+    count = counted(program, cutters, resolution)
+    setting = setting_of(cutters, material, resolution, interpolation, watch, workers)
+    sums, kept, columns = Sums(stock.volume()), dict[int, list[Cuts]](), list[Columns]()
+    for steps in steps_in_blocks(program, resolution.step_mm, resolution.tolerance, size=BLOCK):
+        progress(sums.steps / count, "removing")
+        sums, some, cuts = remove_block(steps, stock, sums, setting)
+        columns.append(some)
+        for bite in cuts if keep else ():
+            kept.setdefault(bite.tool, []).append(bite)
+    progress(1.0, "removed")
+    cut = tuple(joined(kept[number]) for number in sorted(kept))
+    return removal_of(program, stock, material, sums, stacked(columns), cut)
+
+
+def setting_of(
+    cutters: Mapping[int, Cutter],
+    material: Material,
+    resolution: Resolution,
+    interpolation: Interpolation,
+    watch: Watch | None,
+    workers: int,
+) -> Setting:
+    """What a run keeps to."""
+    pieces, flank = resolution.corner_pieces, resolution.flank_mm
+    profiles = {n: slices(c, corner_pieces=pieces, flank_mm=flank) for n, c in cutters.items()}
+    return Setting(cutters, profiles, material, resolution, interpolation, watch, workers)
+
+
+def counted(program: Program, cutters: Mapping[int, Cutter], resolution: Resolution) -> int:
+    """The number of steps of a program of which every tool has a cutter.
+
+    Raises
+    ------
+    InputError
+        One has none, or there is no step.
+    """
+    count = 0
+    for steps in steps_in_blocks(program, resolution.step_mm, resolution.tolerance, size=ROWS):
+        count += len(steps)
+        for number in np.unique(steps.tool).tolist():
+            if number not in cutters:
+                line = int(steps.line[np.flatnonzero(steps.tool == number)[0]])
+                known = ", ".join(str(n) for n in sorted(cutters))
+                raise InputError(f"line {line}: tool {number}: no [[cutter]] has this number: state one beside {known}")
+    if count == 0:
+        raise InputError("program: no motion: nothing to simulate")
+    return count
+
+
+def remove_block(
+    steps: Steps, stock: LayeredStock, sums: Sums, setting: Setting
+) -> tuple[Sums, dict[str, NDArray[Any]], list[Cuts]]:
+    """Take what some steps cut from the stock: the sums after them, their columns, what the teeth cut in them."""
+    removed, bites, piece = _removed(steps, stock, sums, setting)
+    loads, basis, cut = np.zeros((len(steps), len(LOADS))), sums.basis, list[Cuts]()
     watched: dict[str, Floats] = {}
-    best: Piece | None = None
-    rank = (0, 0.0)
+    for number in sorted({int(steps.tool[c.step]) for c in bites}):
+        own = [c for c in bites if steps.tool[c.step] == number]
+        at, cutter, material = [c.step for c in own], setting.cutters[number], setting.material
+        plain = bites_of_steps(own, setting.profiles[number])
+        bitten = with_runout(plain, cutter)
+        loads[at] = loads_of_steps(bitten, own, cutter, material, setting.resolution.rotation, steps.spindle[at])
+        way = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
+        cut.append(Cuts(number, cutter, sums.steps + np.array(at), way, bitten, plain, steps.spindle[at]))
+        if setting.watch is not None:
+            for name, values in setting.watch(cut[-1]).items():
+                watched.setdefault(name, np.zeros(len(steps)))[at] = values
+        if _sure(material):
+            each = mean_basis(bitten, cutter, material, bitten.frame)
+            basis = basis + np.tensordot(steps.seconds[at], each, 1)
+    columns = {**_columns(steps, removed, loads, sums), **watched}
+    cuts = (removed[:, 0] > 0.0) & ~steps.rapid
+    lines = steps.line[steps.rapid & (removed[:, 1] > 0.0)].tolist()
+    after = Sums(
+        sums.before,
+        sums.steps + len(steps),
+        float(columns["s_mm"][-1]),
+        float(columns["t_s"][-1]),
+        sums.cut_s + float(steps.seconds[cuts].sum()),
+        basis,
+        tuple(dict.fromkeys((*sums.rapids, *lines))),
+        piece,
+    )
+    return after, columns, cut
+
+
+def removal_of(
+    program: Program,
+    stock: LayeredStock,
+    material: Material,
+    sums: Sums,
+    columns: Columns,
+    cuts: tuple[Cuts, ...] = (),
+) -> Removal:
+    """What was removed when all steps are done."""
+    band = None
+    if _sure(material):
+        sd = deviations(sums.basis / sums.cut_s, material) if sums.cut_s > 0.0 else np.zeros(4)
+        band = (*sd[:3].tolist(), float(sd[3]) / 1000.0)
+    # rapids that cut more than films
+    found = tuple(Finding("rapid-cuts", line, "a rapid goes through material") for line in sums.rapids)
+    return Removal(columns, sums.before, stock.volume(), band, sums.piece, found, program.labels, cuts)
+
+
+def stacked(blocks: Sequence[Columns]) -> dict[str, NDArray[Any]]:
+    """Columns of blocks one below the other; a column that a block lacks is 0 there."""
+    count = [len(b["line"]) for b in blocks]
+    return {
+        name: np.concatenate([b[name] if name in b else np.zeros(n) for b, n in zip(blocks, count, strict=True)])
+        for name in dict.fromkeys(name for b in blocks for name in b)
+    }
+
+
+def _removed(
+    steps: Steps, stock: LayeredStock, sums: Sums, setting: Setting
+) -> tuple[Floats, list[StepBite], Piece | None]:
+    """(n, 3) volume, pieces and layers of each chip; what the teeth cut; the chip of most pieces so far."""
+    thickness, tolerance, best = stock.thickness, setting.resolution.tolerance, sums.piece
+    rank = _rank(best.chips) if best is not None else (0, 0.0)
+    removed = np.zeros((len(steps), 3))
+    cutting: list[tuple[int, Move, Section]] = []
+    waiting: list[Future[list[StepBite]]] = []
 
     def bites(those: list[tuple[int, Move, Section]]) -> list[StepBite]:
         tools = [int(steps.tool[k]) for k, _, _ in those]
         return [
-            bite_of_step(steps, k, move, cutters[n], profiles[n], there)
+            bite_of_step(steps, k, move, setting.cutters[n], setting.profiles[n], there)
             for n, (k, move, there) in zip(tools, those, strict=True)
         ]
 
-    for first in range(0, len(steps), BLOCK):
-        progress(first / len(steps), "removing")
-        some = range(first, min(first + BLOCK, len(steps)))
-        cutting: list[tuple[int, Move, Section]] = []
-        waiting: list[Future[list[StepBite]]] = []
-        with ThreadPoolExecutor(1) as beside:
-            for k, swept in swept_ahead(steps, some, stock, cutters, interpolation, tolerance):
-                met, low, high = swept.met, swept.low[:2], swept.high[:2]
-                # a face that looks down is held against the layer below
-                layers = range(max(swept.layers.start - 1, 0), swept.layers.stop)
-                there = Section(*stock.edges(layers, low, high))
-                tidied = stock.tidied
-                taken = stock.remove_many([i for i, _ in met], [shape for _, shape in met], 0.5 * tolerance)
-                removed[k, 0] = tidied - stock.tidied
-                for i, pieces, area, whole in _chips(met, taken, tolerance):
-                    removed[k] += (area * thickness[i], 0.0, 1.0)
-                    removed[k, 1] = max(removed[k, 1], len(whole))
-                    if whole and rank < (len(whole), 1.0 / len(whole)) and _rank(whole) > rank:
-                        rank = _rank(whole)
-                        near = stock.section(i).union(MultiPolygon(pieces)).intersection(box(*low, *high))
-                        cutter = cutters[int(steps.tool[k])]
-                        best = Piece(k, swept.move, cutter, float(stock.heights[i]), near, tuple(whole))
-                # what is thinner than the tolerance can tell is no cut
-                if removed[k, 1] > 0.0 and not steps.rapid[k]:
-                    cutting.append((k, swept.move, there))
-                if len(cutting) == TOGETHER:
-                    waiting.append(beside.submit(bites, cutting))
-                    cutting = []
-            waiting.append(beside.submit(bites, cutting))
-            cuts = [bite for several in waiting for bite in several.result()]
-        for number in sorted({int(steps.tool[c.step]) for c in cuts}):
-            own = [c for c in cuts if steps.tool[c.step] == number]
-            at = [c.step for c in own]
-            bitten = bites_of_steps(own, cutters[number], profiles[number])
-            loads[at] = loads_of_steps(bitten, own, cutters[number], material, resolution.rotation, steps.spindle[at])
-            way = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
-            bite = Cuts(number, cutters[number], np.array(at), way, bitten)
-            if keep:
-                kept.setdefault(number, []).append(bite)
-            if watch is not None:
-                for name, values in watch(bite).items():
-                    watched.setdefault(name, np.zeros(len(steps)))[at] = values
-            if _sure(material):
-                each = mean_basis(bitten, cutters[number], material, bitten.frame)
-                basis += np.tensordot(steps.seconds[at], each, 1)
-    progress(1.0, "removed")
-    band = None
-    if _sure(material):
-        cut_s = float(steps.seconds[(removed[:, 0] > 0.0) & ~steps.rapid].sum())
-        sd = deviations(basis / cut_s, material) if cut_s > 0.0 else np.zeros(4)
-        band = (*sd[:3].tolist(), float(sd[3]) / 1000.0)
-    return Removal(
-        {**_columns(steps, removed, loads), **watched},
-        before,
-        stock.volume(),
-        band,
-        best,
-        _findings(steps, removed),
-        program.labels,
-        tuple(joined(kept[number]) for number in sorted(kept)),
-    )
+    ahead = swept_ahead(steps, stock, setting.cutters, setting.interpolation, tolerance, setting.workers)
+    with ThreadPoolExecutor(1) as beside:
+        for k, swept in ahead:
+            met, low, high = swept.met, swept.low[:2], swept.high[:2]
+            # a face that looks down is held against the layer below
+            layers = range(max(swept.layers.start - 1, 0), swept.layers.stop)
+            there = Section(*stock.edges(layers, low, high))
+            tidied = stock.tidied
+            taken = stock.remove_many([i for i, _ in met], [shape for _, shape in met], 0.5 * tolerance)
+            removed[k, 0] = tidied - stock.tidied
+            for i, pieces, area, whole in _chips(met, taken, tolerance):
+                removed[k] += (area * thickness[i], 0.0, 1.0)
+                removed[k, 1] = max(removed[k, 1], len(whole))
+                if whole and rank < (len(whole), 1.0 / len(whole)) and _rank(whole) > rank:
+                    rank = _rank(whole)
+                    near = polygons(stock.section(i).union(MultiPolygon(pieces)).intersection(box(*low, *high)))
+                    cutter, z = setting.cutters[int(steps.tool[k])], float(stock.heights[i])
+                    best = Piece(sums.steps + k, swept.move, cutter, z, MultiPolygon(near), tuple(whole))
+            # what is thinner than the tolerance can tell is no cut
+            if removed[k, 1] > 0.0 and not steps.rapid[k]:
+                cutting.append((k, swept.move, there))
+            if len(cutting) == TOGETHER:
+                waiting.append(beside.submit(bites, cutting))
+                cutting = []
+        waiting.append(beside.submit(bites, cutting))
+        return removed, [bite for several in waiting for bite in several.result()], best
 
 
 def _sure(material: Material) -> bool:
@@ -249,7 +365,7 @@ def _sure(material: Material) -> bool:
     return material.spread is not None or material.covariance is not None
 
 
-def _rank(whole: list[Polygon]) -> tuple[int, float]:
+def _rank(whole: Sequence[Polygon]) -> tuple[int, float]:
     """By how many pieces a chip stands out, and by how alike they are."""
     areas = [p.area for p in whole]
     return len(areas), min(areas) / sum(areas) if areas else 0.0
@@ -271,7 +387,7 @@ def _chips(
             at = b
 
 
-def _columns(steps: Steps, removed: Floats, loads: Floats) -> dict[str, NDArray[Any]]:
+def _columns(steps: Steps, removed: Floats, loads: Floats, sums: Sums) -> dict[str, NDArray[Any]]:
     length = np.linalg.norm(steps.p1 - steps.p0, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         feed = np.where(steps.seconds > 0.0, mm_min_from_mm_s(1.0) * length / steps.seconds, 0.0)
@@ -280,8 +396,8 @@ def _columns(steps: Steps, removed: Floats, loads: Floats) -> dict[str, NDArray[
         "tool": steps.tool,
         "label": steps.label,
         "rapid": steps.rapid,
-        "s_mm": np.cumsum(length),
-        "t_s": np.cumsum(steps.seconds),
+        "s_mm": np.cumsum([sums.s_mm, *length])[1:],
+        "t_s": np.cumsum([sums.t_s, *steps.seconds])[1:],
         "seconds": steps.seconds,
         **{f"{x}_mm": steps.p1[:, i] for i, x in enumerate("xyz")},
         **{f"axis_{x}": steps.a1[:, i] for i, x in enumerate("xyz")},
@@ -291,19 +407,3 @@ def _columns(steps: Steps, removed: Floats, loads: Floats) -> dict[str, NDArray[
         "chip_layers": removed[:, 2].astype(np.int64),
         **{name: loads[:, i] for i, name in enumerate(LOADS)},
     }
-
-
-def _check(steps: Steps, cutters: Mapping[int, Cutter]) -> None:
-    if len(steps) == 0:
-        raise InputError("program: no motion: nothing to simulate")
-    for number in np.unique(steps.tool).tolist():
-        if number not in cutters:
-            line = int(steps.line[np.flatnonzero(steps.tool == number)[0]])
-            known = ", ".join(str(n) for n in sorted(cutters))
-            raise InputError(f"line {line}: tool {number}: no [[cutter]] has this number: state one beside {known}")
-
-
-def _findings(steps: Steps, removed: Floats) -> tuple[Finding, ...]:
-    """Rapids that cut more than films."""
-    lines = dict.fromkeys(steps.line[steps.rapid & (removed[:, 1] > 0.0)].tolist())
-    return tuple(Finding("rapid-cuts", line, "a rapid goes through material") for line in lines)

@@ -9,7 +9,7 @@ a grid of that pitch. What lies between them is not looked at: a rod thinner tha
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,16 +18,16 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
-from chipload.progress import Progress, silent
 from chipload.simulation.clearance.body import above_cutting, cutting_part
-from chipload.simulation.clearance.clearance import clearance
-from chipload.simulation.steps import Steps
+from chipload.simulation.clearance.clearance import NEVER, Nearness
+from chipload.simulation.steps import Steps, blocks_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: what lies so many tolerances over a point of the part is over it
 OVER = 4.0
+ABOVE = "shank or holder"
 #: points of a part or a fixture at most
 MOST_POINTS = 4_000_000
 
@@ -87,61 +87,74 @@ def fine(mesh: trimesh.Trimesh, spacing: float, name: str) -> tuple[Floats, Ints
 
 
 def difference(
-    steps: Steps,
+    steps: Steps | Iterable[Steps],
     cutters: Mapping[int, Cutter],
     part: trimesh.Trimesh,
     in_stock: Callable[[Floats], NDArray[np.bool_]],
     spacing: float,
     look: float,
     tolerance: float,
-    progress: Progress = silent,
+    progress: Callable[[int], None] = lambda done: None,
 ) -> Difference:
     """What the program leaves on the part; O(places of the tool x points around it).
 
     Parameters
     ----------
+    steps : all, or block after block
     in_stock : which points (p, 3) lay in the stock before the program
     spacing, look, tolerance : [mm], of the points; how far material is looked for; of the path
+    progress : is told how many steps are done
     """
     points, faces = fine(part, spacing, "part")
     normals = np.asarray(trimesh.Trimesh(points, faces, process=False).vertex_normals)
     over = in_stock(points + OVER * tolerance * normals)
-    bodies = {n: cutting_part(c) for n, c in cutters.items()}
-    found = clearance(steps, bodies, points, look, tolerance, progress=progress)
-    return Difference(points, faces, found.distance, found.step, found.deepest, look, over)
+    near = Nearness({n: cutting_part(c) for n, c in cutters.items()}, points, look, tolerance)
+    deepest = [np.empty(0)]
+    for block in blocks_of(steps):
+        progress(near.done)
+        deepest.append(near.take(block))
+    return Difference(points, faces, near.distance, near.step, np.concatenate(deepest), look, over)
 
 
 def collisions(
-    steps: Steps,
+    steps: Steps | Iterable[Steps],
     cutters: Mapping[int, Cutter],
     solids: Mapping[str, Floats],
     tolerance: float,
     *,
     above_only: frozenset[str] = frozenset(),
-    progress: Progress = silent,
+    progress: Callable[[int], None] = lambda done: None,
 ) -> tuple[Collision, ...]:
     """Where shank and holder, and the cutting part too, come into solids; one entry for each line, tool part and solid.
 
     Parameters
     ----------
+    steps : all, or block after block
     solids : points (p, 3) [mm] by name
     tolerance : what is less deep [mm] is none
     above_only : names of solids that the cutting part may touch, as the part
+    progress : is told how many steps are done
     """
-    out: list[Collision] = []
-    kinds = (("shank or holder", above_cutting), ("cutting part", cutting_part))
+    held: list[tuple[str, str, Nearness, dict[int, Collision]]] = []
     for name, points in solids.items():
-        for what, body in kinds:
-            if what == "cutting part" and name in above_only:
-                continue
-            bodies = {n: body(c) for n, c in cutters.items()}
-            found = clearance(steps, bodies, points, tolerance, tolerance, progress=progress)
-            out += _by_line(steps, what, name, found.deepest, tolerance)
-    return tuple(sorted(out, key=lambda c: (c.step, c.what, c.into)))
+        for what, body in ((ABOVE, above_cutting), ("cutting part", cutting_part)):
+            if what == ABOVE or name not in above_only:
+                bodies = {n: body(c) for n, c in cutters.items()}
+                held.append((what, name, Nearness(bodies, points, tolerance, tolerance), {}))
+    for block in blocks_of(steps) if held else ():
+        progress(held[0][2].done)
+        for what, name, near, best in held:
+            first = near.done
+            _by_line(block, first, what, name, near.take(block), tolerance, best)
+    return tuple(sorted((c for *_, best in held for c in best.values()), key=lambda c: (c.step, c.what, c.into)))
 
 
 def in_stock(
-    steps: Steps, cutters: Mapping[int, Cutter], points: Floats, tolerance: float, progress: Progress = silent
+    steps: Steps | Iterable[Steps],
+    cutters: Mapping[int, Cutter],
+    points: Floats,
+    tolerance: float,
+    progress: Callable[[int], None] = lambda done: None,
 ) -> tuple[Collision, ...]:
     """Where shank and holder come into what is still there of the stock.
 
@@ -150,25 +163,33 @@ def in_stock(
 
     Parameters
     ----------
+    steps : all, or block after block; gone through twice
     points : (p, 3) float [mm] of a grid in the stock
+    progress : is told how many steps are done
     """
-    cut = clearance(steps, {n: cutting_part(c) for n, c in cutters.items()}, points, tolerance, tolerance).first
-    above = {n: above_cutting(c) for n, c in cutters.items()}
-    hit = clearance(steps, above, points, tolerance, tolerance, progress=progress)
-    bad = (hit.first < cut) & (hit.first < len(steps))
-    depth = np.full(len(steps), np.inf)
-    np.minimum.at(depth, hit.first[bad], hit.distance[bad])
-    return tuple(_by_line(steps, "shank or holder", "stock", depth, tolerance))
-
-
-def _by_line(steps: Steps, what: str, into: str, deepest: Floats, tolerance: float) -> list[Collision]:
-    """The deepest of each line."""
+    cut = Nearness({n: cutting_part(c) for n, c in cutters.items()}, points, tolerance, tolerance)
+    hit = Nearness({n: above_cutting(c) for n, c in cutters.items()}, points, tolerance, tolerance)
+    for block in blocks_of(steps):
+        progress(cut.done)
+        cut.take(block)
+        hit.take(block)
+    bad = (hit.first < cut.first) & (hit.first != NEVER)
+    at, depth = hit.first[bad], hit.distance[bad]
     best: dict[int, Collision] = {}
+    done = 0
+    for block in blocks_of(steps) if len(at) else ():
+        deepest, own = np.full(len(block), np.inf), (at >= done) & (at < done + len(block))
+        np.minimum.at(deepest, at[own] - done, depth[own])
+        _by_line(block, done, ABOVE, "stock", deepest, tolerance, best)
+        done += len(block)
+    return tuple(best.values())
+
+
+def _by_line(
+    steps: Steps, first: int, what: str, into: str, deepest: Floats, tolerance: float, best: dict[int, Collision]
+) -> None:
+    """Put the deepest of each line among ``best``; the steps begin with number ``first``."""
     for k in np.flatnonzero(deepest < -tolerance).tolist():
-        tip = steps.p1[k]
-        found = Collision(
-            what, into, float(-deepest[k]), k, int(steps.line[k]), (float(tip[0]), float(tip[1]), float(tip[2]))
-        )
-        if found.line not in best or found.depth_mm > best[found.line].depth_mm:
-            best[found.line] = found
-    return list(best.values())
+        line, depth, tip = int(steps.line[k]), float(-deepest[k]), steps.p1[k].tolist()
+        if line not in best or depth > best[line].depth_mm:
+            best[line] = Collision(what, into, depth, first + k, line, (tip[0], tip[1], tip[2]))

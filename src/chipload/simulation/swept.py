@@ -19,6 +19,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.engagement.chips.covered import covered_polygons
 from chipload.engagement.chips.move import Move
 from chipload.errors import InputError
+from chipload.simulation.reach import reached
 from chipload.simulation.steps import Steps
 from chipload.stock.layers import LayeredStock
 
@@ -42,29 +43,28 @@ class Swept:
 
 def swept_ahead(
     steps: Steps,
-    some: range,
     stock: LayeredStock,
     cutters: Mapping[int, Cutter],
     interpolation: Interpolation,
     tolerance: float,
+    workers: int,
 ) -> Iterator[tuple[int, Swept]]:
-    """Those of ``some`` steps that meet a layer, in their order; found in threads that run ahead of the caller.
+    """Those steps that meet a layer, in their order; found in threads that run ahead of the caller.
 
     Raises
     ------
     InputError
         Beside or in the stock the axis lies, or looks down.
     """
-    low, high = _boxes(steps, some, cutters)
+    low, high = _boxes(steps, cutters)
     near = (high[:, 0] >= stock.xs[0]) & (low[:, 0] <= stock.xs[-1])
     near &= (high[:, 1] >= stock.ys[0]) & (low[:, 1] <= stock.ys[-1])
 
     def swept(part: range) -> list[tuple[int, Swept]]:
         found: dict[int, tuple[Move, range]] = {}
         for k in part:
-            row = k - some.start
-            layers = stock.layers_between(low[row, 2], high[row, 2])
-            if near[row] and layers:
+            layers = stock.layers_between(low[k, 2], high[k, 2]) if near[k] else range(0)
+            if layers:
                 try:
                     found[k] = _move(steps, k, interpolation), layers
                 except InputError as err:
@@ -75,11 +75,11 @@ def swept_ahead(
             for (k, (move, layers)), met in zip(
                 own.items(), _covered(steps, own, cutters[tool], stock, tolerance), strict=True
             ):
-                out[k] = Swept(move, low[k - some.start], high[k - some.start], layers, met)
+                out[k] = Swept(move, low[k], high[k], layers, met)
         return sorted(out.items())
 
-    parts = [some[i : i + TOGETHER] for i in range(0, len(some), TOGETHER)]
-    with ThreadPoolExecutor(2) as pool:
+    parts = [range(i, min(i + TOGETHER, len(steps))) for i in range(0, len(steps), TOGETHER)]
+    with ThreadPoolExecutor(workers) as pool:
         for several in pool.map(swept, parts):
             for k, found in several:
                 if found.met:
@@ -93,8 +93,9 @@ def _covered(
     heights = stock.heights
     asked: list[Floats] = []
     of: list[NDArray[np.int64]] = []
-    for k, (_, layers) in own.items():
-        z = heights[layers.start : layers.stop]
+    near = _near(steps, own, cutter, stock)
+    for k, layers in near.items():
+        z = heights[layers]
         rows = np.arange(len(z))
         flank = _flank(steps, k, cutter, z)
         if flank.any():
@@ -107,9 +108,18 @@ def _covered(
         of.append(rows)
     shapes = covered_polygons([move for move, _ in own.values()], cutter, asked, tolerance)
     return [
-        [(i, shape) for i, n in zip(layers, rows.tolist(), strict=True) if (shape := found[n]) is not None]
-        for (_, layers), rows, found in zip(own.values(), of, shapes, strict=True)
+        [(i, shape) for i, n in zip(layers.tolist(), rows.tolist(), strict=True) if (shape := found[n]) is not None]
+        for layers, rows, found in zip(near.values(), of, shapes, strict=True)
     ]
+
+
+def _near(
+    steps: Steps, own: Mapping[int, tuple[Move, range]], cutter: Cutter, stock: LayeredStock
+) -> dict[int, NDArray[np.int64]]:
+    """Layers that steps may take anything from; of upright cutters, whose layers cost little, all that they reach."""
+    out = {k: np.arange(layers.start, layers.stop) for k, (_, layers) in own.items()}
+    leaning = [k for k in own if min(steps.a0[k, 2], steps.a1[k, 2]) < 1.0]
+    return out | dict(zip(leaning, reached(steps, leaning, [out[k] for k in leaning], cutter, stock), strict=True))
 
 
 def _flank(steps: Steps, k: int, cutter: Cutter, heights: Floats) -> NDArray[np.bool_]:
@@ -123,11 +133,10 @@ def _flank(steps: Steps, k: int, cutter: Cutter, heights: Floats) -> NDArray[np.
     )
 
 
-def _boxes(steps: Steps, some: range, cutters: Mapping[int, Cutter]) -> tuple[Floats, Floats]:
+def _boxes(steps: Steps, cutters: Mapping[int, Cutter]) -> tuple[Floats, Floats]:
     """(n, 3), (n, 3) corners of boxes that the cutter does not leave, as the axis turns by a few degrees in a step."""
-    part = slice(some.start, some.stop)
-    p0, p1, a0, a1, tools = (v[part] for v in (steps.p0, steps.p1, steps.a0, steps.a1, steps.tool))
-    top, wide = np.empty((len(some), 1)), np.empty((len(some), 1))
+    p0, p1, a0, a1, tools = steps.p0, steps.p1, steps.a0, steps.a1, steps.tool
+    top, wide = np.empty((len(steps), 1)), np.empty((len(steps), 1))
     for tool in np.unique(tools).tolist():
         c = cutters[tool]
         top[tools == tool] = c.flute_length

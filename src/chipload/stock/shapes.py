@@ -73,10 +73,13 @@ def read_shapes(
     if (ends < starts).any() or (starts < 0).any() or (int(ends[-1]) if len(ends) else 0) != len(wkb):
         raise damaged
     whole = wkb.tobytes()
-    binary = np.empty(len(ends), dtype=object)
-    binary[:] = [whole[a:b] for a, b in zip(starts.tolist(), ends.tolist(), strict=True)]
+    # what is alike becomes one object, as it was
+    alike: dict[bytes, int] = {}
+    same = [alike.setdefault(whole[a:b], len(alike)) for a, b in zip(starts.tolist(), ends.tolist(), strict=True)]
+    binary = np.empty(len(alike), dtype=object)
+    binary[:] = list(alike)
     try:
-        shapes: NDArray[np.object_] = shapely.from_wkb(binary)
+        shapes: NDArray[np.object_] = shapely.from_wkb(binary)[np.array(same, dtype=np.int64)]
     except shapely.errors.ShapelyError:
         raise damaged from None
     if not (np.isin(shapely.get_type_id(shapes), (3, 6)).all() and np.isfinite(shapely.get_coordinates(shapes)).all()):

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from chipload.cutter.cutter import Cutter
-from chipload.engagement.chips.covered import covered
+from chipload.engagement.chips.covered import covered, covered_polygons
 from chipload.engagement.chips.move import LEAST_AXIS_Z, Move
 from chipload.errors import InputError
 from chipload.machine.machine import machine_named
@@ -142,6 +142,36 @@ def test_flute_end_crosses_the_layer():
     dense = shapely.unary_union(sections(FLAT, move, 0.0, np.linspace(0, 1, 400), 400))
     assert dense.difference(c.polygon.buffer(2e-4)).area < 1e-9
     assert c.area == pytest.approx(dense.area, rel=2e-3)
+
+
+@pytest.mark.parametrize("cutter", ["flat", "ball", "bull"])
+@pytest.mark.parametrize("way", [-6.0, 6.0])
+@pytest.mark.parametrize("height", [-2.0, 8.0, 21.0])
+def test_along_its_own_leaning_axis(cutter, way, height):
+    """The flank slides along itself; tip, flank and flute end are met; against the union of sections."""
+    axis = np.array([-math.sin(1.0), 0.0, math.cos(1.0)])
+    start = np.array([-1.2485300350335815, -1.8326183344303573, -3.0])
+    move = Move.slerp(start, axis, start + way * axis + 1e-12, axis)
+    c = covered(move, CUTTERS[cutter], height, 1e-3)
+    met = sections(CUTTERS[cutter], move, height, np.linspace(0, 1, 150), 300)
+    if not met:
+        assert c is None
+        return
+    dense = shapely.unary_union(met)
+    assert dense.difference(c.polygon.buffer(2e-3)).area < 1e-9
+    assert c.area == pytest.approx(dense.area, rel=3e-3)
+    (many,) = covered_polygons([move], CUTTERS[cutter], [np.array([height])], 1e-3)
+    assert many[0].equals(c.polygon)
+
+
+def test_a_rapid_along_a_leaning_axis_ends():
+    """A bull nose that leans by 69 degrees: its boundary had 100,000 edges, and more with each halving of the time."""
+    axis = np.array([math.sin(1.2) * math.cos(math.pi), math.sin(1.2) * math.sin(math.pi), math.cos(1.2)])
+    low = np.array([-1.2485300350335815, -1.8326183344303573, -11.913370352777413])
+    move = Move.slerp(low + 18.0 * axis, axis, low + 17.5 * axis, axis)
+    c = covered(move, Cutter(10.0, 2, 0.5, 26.0, 40.0, 6e5, corner_radius=2.0), -0.5, 0.005)
+    assert c.area == pytest.approx(math.pi * 25.0 / math.cos(1.2), rel=0.2)
+    assert len(c.rings[0].points) < 1000
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, math.nan, math.inf])

@@ -45,6 +45,8 @@ Shape: TypeAlias = shapely.Polygon | shapely.MultiPolygon
 
 #: slower than this share of the tolerance per move, the edge stands still
 STILL = 1e-3
+#: a way that leaves its own axis by less than this share of the tolerance is along it
+STRAIGHT = 1e-2
 #: instants at which the general case looks for grazing points before it halves
 _KNOTS = 64
 _MOST_EDGES = 4_000_000
@@ -120,6 +122,9 @@ def covered(move: Move, cutter: Cutter, height: float, tolerance: float) -> Cove
 def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], tolerance: float) -> list[Covered | None]:
     """``covered`` of many layers."""
     K, levels = cutter_numbers(cutter), np.array([float(h) for h in heights])
+    along = _along(move, K, tolerance)
+    if along is not None:
+        return [_standing(*along, h, tolerance) for h in levels.tolist()]
     buffer, count, knots, whole = _loops([move], K, levels, np.array([0, len(levels)]), tolerance)
     start = np.cumsum([0, *count.clip(0)])
     out: list[Covered | None] = []
@@ -144,7 +149,55 @@ def covered_polygons(
 
     One loop over all of them without the interpreter: in threads it costs no more than the areas do.
     """
-    K, levels = cutter_numbers(cutter), np.concatenate([np.empty(0), *heights])
+    K = cutter_numbers(cutter)
+    along = [_along(move, K, tolerance) for move in moves]
+    if not any(along):
+        return _polygons(moves, K, heights, tolerance)
+    kept = [(move, h) for move, h, found in zip(moves, heights, along, strict=True) if found is None]
+    others = iter(_polygons([move for move, _ in kept], K, [h for _, h in kept], tolerance))
+    out: list[list[Shape | None]] = []
+    for found, levels in zip(along, heights, strict=True):
+        if found is None:
+            out.append(next(others))
+        else:
+            areas = [_standing(*found, h, tolerance) for h in levels.tolist()]
+            out.append([area.polygon if area is not None else None for area in areas])
+    return out
+
+
+def _along(move: Move, K: Floats, tolerance: float) -> tuple[Move, Floats] | None:
+    """A cylinder that moves along its own leaning axis as a longer one that stands at the lower end, or None.
+
+    Its flank slides along itself, so that every point of it and none would be a grazing point.
+    """
+    near = STRAIGHT * tolerance
+    axis = move.axis[0] / np.linalg.norm(move.axis[0])
+    if K[8] != 0.0 or axis[2] == 1.0 or len(move.tip) < 2 or np.abs(move.tip[2:]).sum() > near:
+        return None
+    if np.abs(move.axis[1:]).sum() * K[10] > near * np.linalg.norm(move.axis[0]):
+        return None
+    half = float(move.tip[1] @ axis)
+    if half == 0.0 or 2.0 * float(np.linalg.norm(move.tip[1] - half * axis)) > near:
+        return None
+    longer = K.copy()
+    longer[10] += 2.0 * abs(half)
+    longer.setflags(write=False)
+    return Move((move.tip[0] - abs(half) * axis)[None], axis[None]), longer
+
+
+def _standing(move: Move, K: Floats, h: float, tolerance: float) -> Covered | None:
+    """What a cutter that stands covers of a layer: its section."""
+    if not 0.0 < tolerance < math.inf:
+        raise InputError(f"covered: tolerance = {tolerance:g} mm: must be above 0")
+    edges = whole_section(move, K, h, 0.0, tolerance)
+    return Covered((ring_of_edges(edges),), h, tolerance, True) if len(edges) else None
+
+
+def _polygons(
+    moves: Sequence[Move], K: Floats, heights: Sequence[Floats], tolerance: float
+) -> list[list[Shape | None]]:
+    """What :func:`covered_polygons` gives, of a cutter by its numbers."""
+    levels = np.concatenate([np.empty(0), *heights])
     first = np.cumsum([0, *(len(h) for h in heights)])
     buffer, count, knots, whole = _loops(moves, K, levels, first, tolerance)
     which = np.flatnonzero(count >= 0)
@@ -244,7 +297,7 @@ def _pieces(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> Fl
 
 
 def whole_section(move: Move, K: Floats, h: float, t: float, tolerance: float) -> Floats:
-    """Edges (n, 11) of the section at t, counter-clockwise; none where the layer isn't cut."""
+    """Edges (n, 12) of the section at t, counter-clockwise; none where the layer isn't cut."""
     S, C, buffer = np.empty(27), np.empty((8, 5)), np.empty((2048, 12))
     if not instant(move.tip, move.axis, K, h, t, S, C):
         return np.empty((0, 12))

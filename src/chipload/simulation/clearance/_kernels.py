@@ -51,13 +51,14 @@ def meridian(rho, z, lines, arc, top):
 
 @njit(cache=True, nogil=True)
 def nearest(
-    points, order, starts, low, cell, count, tips, axes, rows, lines, arc, top, widest, far, depth, out, at, deep, first
-):
-    """Lower ``out`` to the signed distance of each point from the body in any of its places; ``at`` its row.
+    points, order, starts, low, cell, count, tips, axes, rows, lines, arc, top, widest, far, depth, done, out, at, deep,
+    first,
+):  # fmt: skip
+    """Lower ``out`` to the signed distance of each point from the body in any of its places; ``at`` its step.
 
-    ``deep`` is lowered to the least distance of any point in each row, ``first`` to the first row that has the point
-    deeper inside than ``depth``. ``order`` holds the points cell by cell, ``starts`` where each cell begins; distances
-    above ``far`` are left alone.
+    The step of a row is the row and those ``done`` before. ``deep`` is lowered to the least distance of any point in
+    each row, ``first`` to the first step that has the point deeper inside than ``depth``. ``order`` holds the points
+    cell by cell, ``starts`` where each cell begins; distances above ``far`` are left alone.
     """
     nx, ny, nz = count[0], count[1], count[2]
     reach = widest + far
@@ -92,7 +93,7 @@ def nearest(
                         continue
                     deep[rows[k]] = min(deep[rows[k]], gap)
                     if gap < -depth:
-                        first[p] = min(first[p], rows[k])
+                        first[p] = min(first[p], done + rows[k])
                     if gap < out[p]:
                         out[p] = gap
-                        at[p] = rows[k]
+                        at[p] = done + rows[k]

@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
-from chipload.progress import Progress, silent
 from chipload.simulation.clearance import _kernels
 from chipload.simulation.clearance.body import Body
 from chipload.simulation.steps import Steps
@@ -32,6 +31,8 @@ Grid = tuple[Ints, Ints, Floats, float, Ints]
 
 #: places that are looked at together, and most cells
 BLOCK, CELLS = 4096, 2_000_000
+#: a step after all others
+NEVER = np.iinfo(np.int64).max
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +53,68 @@ class Clearance:
     deepest: Floats
 
 
+class Nearness:
+    """The least distance of points from a tool so far; :meth:`take` lowers it by some steps.
+
+    Parameters
+    ----------
+    bodies, points, far, tolerance, workers : as in :func:`clearance`
+
+    It keeps ``distance``, ``step`` and ``first`` of :class:`Clearance`; ``first`` is ``NEVER`` where there is none.
+    """
+
+    def __init__(
+        self, bodies: Mapping[int, Body], points: ArrayLike, far: float, tolerance: float, workers: int = 2
+    ) -> None:
+        self.points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
+        for name, value in (("far", far), ("tolerance", tolerance)):
+            if not 0.0 < value < math.inf:
+                raise InputError(f"clearance: {name} = {value:g}: must be above 0 mm")
+        self.bodies, self.far, self.tolerance, self.workers = bodies, far, tolerance, workers
+        count = len(self.points)
+        self.distance, self.step = np.full(count, np.inf), np.full(count, -1, dtype=np.int64)
+        self.first = np.full(count, NEVER)
+        self.done = 0
+        self._grid = _cells(self.points, max(b.widest for b in bodies.values()) + far) if count else None
+
+    def take(self, steps: Steps, some: NDArray[np.bool_] | None = None) -> Floats:
+        """(n,) float [mm], least distance of any point at each of the steps that follow; inf: none as near as looked.
+
+        Parameters
+        ----------
+        some : (n,) bool, the steps that count; None: all
+        """
+        deepest = np.full(len(steps), np.inf)
+        for number in np.unique(steps.tool).tolist() if self._grid is not None else ():
+            body = self.bodies[number]
+            own = np.flatnonzero((steps.tool == number) & (True if some is None else some))
+            if len(body.lines):
+                for begin in range(0, len(own), BLOCK):
+                    self._lower(steps, own[begin : begin + BLOCK], body, deepest)
+        self.done += len(steps)
+        return deepest
+
+    def _lower(self, steps: Steps, own: Ints, body: Body, deepest: Floats) -> None:
+        assert self._grid is not None
+        tips, axes, rows = _places(steps, own, body, self.tolerance)
+        grid, meridian = self._grid, (body.lines, body.arc, body.top, body.widest)
+
+        def lowered(span: Ints) -> tuple[Floats, Ints, Ints, Floats]:
+            out = self.distance.copy(), self.step.copy(), self.first.copy(), deepest.copy()
+            _kernels.nearest(
+                self.points, *grid, tips[span], axes[span], rows[span], *meridian, self.far, self.tolerance, self.done,
+                out[0], out[1], out[3], out[2],
+            )  # fmt: skip
+            return out
+
+        with ThreadPoolExecutor(self.workers) as pool:
+            for out, where, early, deep in pool.map(lowered, np.array_split(np.arange(len(rows)), self.workers)):
+                nearer = out < self.distance
+                self.distance[nearer], self.step[nearer] = out[nearer], where[nearer]
+                np.minimum(self.first, early, out=self.first)
+                np.minimum(deepest, deep, out=deepest)
+
+
 def clearance(
     steps: Steps,
     bodies: Mapping[int, Body],
@@ -61,7 +124,6 @@ def clearance(
     *,
     some: NDArray[np.bool_] | None = None,
     workers: int = 2,
-    progress: Progress = silent,
 ) -> Clearance:
     """Least distance of each point from the tool over the steps; O(places x points around the tool).
 
@@ -78,39 +140,9 @@ def clearance(
     InputError
         ``far`` or ``tolerance`` is not above 0.
     """
-    p = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
-    for name, value in (("far", far), ("tolerance", tolerance)):
-        if not 0.0 < value < math.inf:
-            raise InputError(f"clearance: {name} = {value:g}: must be above 0 mm")
-    best, at = np.full(len(p), np.inf), np.full(len(p), -1, dtype=np.int64)
-    first, deepest = np.full(len(p), len(steps), dtype=np.int64), np.full(len(steps), np.inf)
-    if len(p) == 0 or len(steps) == 0:
-        return Clearance(best, at, first, deepest)
-    grid = _cells(p, max(b.widest for b in bodies.values()) + far)
-
-    def lowered(span: Ints, body: Body, tips: Floats, axes: Floats, rows: Ints) -> tuple[Floats, Ints, Ints, Floats]:
-        out = best.copy(), at.copy(), first.copy(), deepest.copy()
-        where = (tips[span], axes[span], rows[span], body.lines, body.arc, body.top, body.widest)
-        _kernels.nearest(p, *grid, *where, far, tolerance, out[0], out[1], out[3], out[2])
-        return out
-
-    for number in np.unique(steps.tool).tolist():
-        body = bodies[number]
-        own = np.flatnonzero((steps.tool == number) & (True if some is None else some))
-        if len(body.lines) == 0:
-            continue
-        for begin in range(0, len(own), BLOCK):
-            progress(begin / len(own), "distances")
-            places = _places(steps, own[begin : begin + BLOCK], body, tolerance)
-            spans = np.array_split(np.arange(len(places[2])), workers)
-            with ThreadPoolExecutor(workers) as pool:
-                for job in [pool.submit(lowered, s, body, *places) for s in spans]:
-                    out, where, early, deep = job.result()
-                    nearer = out < best
-                    best[nearer], at[nearer] = out[nearer], where[nearer]
-                    np.minimum(first, early, out=first)
-                    np.minimum(deepest, deep, out=deepest)
-    return Clearance(best, at, first, deepest)
+    near = Nearness(bodies, points, far, tolerance, workers)
+    deepest = near.take(steps, some)
+    return Clearance(near.distance, near.step, np.minimum(near.first, len(steps)), deepest)
 
 
 def _cells(p: Floats, reach: float) -> Grid:

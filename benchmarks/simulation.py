@@ -1,0 +1,126 @@
+"""Moves a second and peak memory of a simulated program, at three lengths.
+
+    python benchmarks/simulation.py [--moves 10000 30000 100000] [--memory]
+
+The program is a three-axis finishing program as a CAM writes it: a ball nose of 8 mm in rows 0.4 mm apart over a wavy
+surface, short lines of 0.4 mm, a rapid from row to row; the stock is a block in layers of 0.25 mm. Every move is a step:
+its chip, force, torque and power are calculated and kept. The length of a row stays, so that a longer program has more
+rows. Each length runs in a process of its own, with its columns in files (``remove_in_pieces``, as `chipload run` has
+them) or, with ``--memory``, in memory (``remove``). Peak memory is the most that the process ever had in memory;
+"before" is what it had with libraries, program and stock, when the simulation began.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import material_named
+from chipload.program.program import LINE, RAPID, Program
+from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.pieces import remove_in_pieces
+from chipload.simulation.unfinished import Unfinished
+from chipload.stock.layers import LayeredStock
+
+BALL = Cutter(8.0, 2, math.radians(30.0), 20.0, 35.0, 6e5, corner_radius=4.0)
+#: moves of a row, from point to point and from row to row [mm]
+ROW, ALONG, ACROSS = 250, 0.4, 0.4
+RESOLUTION = Resolution(step_mm=1.0, tolerance=5e-3, corner_pieces=12, flank_mm=2.0, rotation=math.radians(3.0))
+
+
+def finishing(moves: int) -> Program:
+    """Rows there and back over a wavy surface."""
+    k = np.arange(moves + 1)
+    row, at = k // ROW, k % ROW
+    x = ALONG * np.where(row % 2 == 0, at, ROW - 1 - at)
+    y = ACROSS * row
+    z = -1.5 + 0.6 * np.sin(x / 9.0) * np.cos(y / 8.0)
+    n = len(k)
+    motion = np.full(n, LINE)
+    motion[0] = RAPID
+    return Program(
+        motion=motion, p_work=np.column_stack([x, y, z]), axis=np.tile([0.0, 0.0, 1.0], (n, 1)),
+        centre=np.zeros((n, 3)), normal=np.tile([0.0, 0.0, 1.0], (n, 1)), turns=np.zeros(n, dtype=int),
+        feed=np.where(motion == RAPID, 0.0, 20.0), spindle=np.full(n, 1000.0), tool=np.ones(n, dtype=int),
+        line=k + 1, label=np.zeros(n, dtype=int), labels=("finish",),
+    )  # fmt: skip
+
+
+def peak() -> float:
+    """Most memory of this process so far [MB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+def one(moves: int, memory: bool) -> dict[str, float]:
+    """Run one length."""
+    material = material_named("al7075-t6")
+    small = finishing(40)
+    remove(small, block(small), {1: BALL}, material, RESOLUTION)
+    program = finishing(moves)
+    stock = block(program)
+    before = peak()
+    wall, own = time.perf_counter(), time.process_time()
+    states = 0.0
+    with tempfile.TemporaryDirectory() as folder, Unfinished(Path(folder) / "unfinished") as kept:
+        if memory:
+            removal = remove(program, stock, {1: BALL}, material, RESOLUTION)
+        else:
+            removal = remove_in_pieces(program, stock, {1: BALL}, material, RESOLUTION, kept)
+        wall, own = time.perf_counter() - wall, time.process_time() - own
+        after = peak()
+        force = float(removal.columns["force_n"].max())
+        states = sum(f.stat().st_size for f in Path(folder).rglob("*") if f.is_file()) / 1e6
+        kept.discard()
+    return {
+        "moves": moves, "steps": len(removal.columns["line"]) if memory or not states else moves, "wall_s": wall,
+        "own_s": own, "before_mb": before, "peak_mb": after, "disk_mb": states, "force_n": force,
+        "removed_mm3": removal.volume_before - removal.volume_after,
+    }  # fmt: skip
+
+
+def block(program: Program) -> LayeredStock:
+    """The block under the rows."""
+    y = float(program.p_work[:, 1].max())
+    return LayeredStock.block((-6.0, -6.0, -8.0), (ALONG * ROW + 6.0, y + 6.0, 0.0), 0.25, 32.0)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--moves", type=int, nargs="+", default=[10_000, 30_000, 100_000])
+    parser.add_argument("--memory", action="store_true", help="keep the columns in memory")
+    parser.add_argument("--one", action="store_true", help="run in this process")
+    args = parser.parse_args()
+    if args.one:
+        print(json.dumps(one(args.moves[0], args.memory)))
+        return
+    found = []
+    print("   moves  moves/s   wall [s]  processors [s]  before [MB]  peak [MB]  grown [MB]  on disk [MB]")
+    for moves in args.moves:
+        words = [sys.executable, __file__, "--one", "--moves", str(moves), *(["--memory"] if args.memory else [])]
+        r = json.loads(subprocess.run(words, check=True, capture_output=True, text=True).stdout)
+        found.append(r)
+        print(
+            f"{moves:8d} {moves / r['wall_s']:8.0f} {r['wall_s']:10.1f} {r['own_s']:15.1f} {r['before_mb']:12.0f} "
+            f"{r['peak_mb']:10.0f} {r['peak_mb'] - r['before_mb']:11.1f} {r['disk_mb']:13.1f}",
+            flush=True,
+        )
+    if len(found) > 2:
+        n, t, m = (np.array([r[k] for r in found]) for k in ("moves", "own_s", "peak_mb"))
+        rate = np.polyfit(n, t, 1)
+        rest = ((t - np.polyval(rate, n)) ** 2).sum() / ((t - t.mean()) ** 2).sum()
+        print(f"processors: {rate[1]:.2g} s + {1e3 * rate[0]:.3g} ms a move, R2 = {1.0 - rest:.5f}")
+        print(f"memory: {1e6 * np.polyfit(n, m, 1)[0]:.0f} bytes a move")
+
+
+if __name__ == "__main__":
+    main()

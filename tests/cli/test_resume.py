@@ -1,0 +1,113 @@
+"""Simulations that are killed or stopped and run again, by the command line."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from cli.test_simulate import JOB
+
+COMMAND = [sys.executable, "-c", "from chipload.cli import main; main()"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A job of some thousand short steps, and its result from a run that nobody disturbed."""
+    place = tmp_path_factory.mktemp("job")
+    words = ["G21 G90 G17 G94", "T1 M6", "S3000 M3", "G0 X-10 Y-15 Z5", "G0 Z-1", "F600"]
+    for k in range(16):
+        words += [f"G1 X{60 if k % 2 == 0 else -10}", f"G1 Y{-15 + 2 * (k + 1)}"]
+    (place / "slot.ngc").write_text("\n".join([*words, "G0 Z5", "M2", ""]))
+    (place / "job.toml").write_text(JOB.replace("step_mm = 2.0", "step_mm = 0.5"))
+    done = ended(start(place, "whole"))
+    assert (done.returncode, done.stderr) == (0, "")
+    return place
+
+
+def start(place: Path, out: str, *more: str, before: tuple[str, ...] = ()) -> subprocess.Popen[str]:
+    words = [*before, *COMMAND, "run", str(place / "job.toml"), "--out", str(place / out), *more]
+    return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def ended(process: subprocess.Popen[str]) -> subprocess.CompletedProcess[str]:
+    out, err = process.communicate(timeout=500)
+    return subprocess.CompletedProcess(process.args, process.returncode, out, err)
+
+
+def stop(place: Path, out: str, how: signal.Signals, *more: str) -> subprocess.CompletedProcess[str]:
+    """Start a run and end it when it has kept something."""
+    process = start(place, out, "--keep-s", "0", *more)
+    while process.poll() is None and not (place / f"{out}.unfinished" / "last.json").exists():
+        time.sleep(0.01)
+    process.send_signal(how)
+    return ended(process)
+
+
+def same(place: Path, out: str) -> None:
+    """The result has the bytes of the one that nobody disturbed, and nothing is left beside it."""
+    names = sorted(p.name for p in (place / "whole").iterdir())
+    assert names == sorted(p.name for p in (place / out).iterdir())
+    assert "history.parquet" in names
+    for name in names:
+        assert (place / out / name).read_bytes() == (place / "whole" / name).read_bytes(), name
+    assert not (place / f"{out}.unfinished").exists()
+
+
+def test_a_run_that_was_killed_goes_on_to_the_same_bytes(folder: Path) -> None:
+    killed = stop(folder, "killed", signal.SIGKILL)
+    assert killed.returncode == -signal.SIGKILL
+    assert not (folder / "killed").exists()
+    assert (folder / "killed.unfinished" / "last.json").exists()
+    again = ended(start(folder, "killed"))
+    assert again.returncode == 0
+    found = re.fullmatch(r"chipload: goes on after step (\d+) of (\d+), kept in \S+killed.unfinished\n", again.stderr)
+    assert found is not None
+    assert 0 < int(found[1]) < int(found[2])
+    same(folder, "killed")
+
+
+def test_ctrl_c_says_what_is_kept_and_how_to_go_on(folder: Path) -> None:
+    stopped = stop(folder, "stopped", signal.SIGINT)
+    assert stopped.returncode == 130
+    assert re.fullmatch(
+        r"chipload: stopped: \d+ steps are kept in stopped.unfinished: the same command goes on from there, with "
+        r"--fresh it begins again\n",
+        stopped.stderr,
+    )
+    fresh = ended(start(folder, "stopped", "--fresh"))
+    assert (fresh.returncode, fresh.stderr) == (0, "chipload: begins again: it was asked to\n")
+    same(folder, "stopped")
+
+
+def test_another_input_does_not_go_on(folder: Path) -> None:
+    stop(folder, "other", signal.SIGKILL)
+    again = ended(start(folder, "other", "--set", "operation.0.tolerance_mm=0.002"))
+    assert again.stderr == "chipload: begins again: what was kept is of another input, or damaged\n"
+    other = (folder / "other" / "history.parquet").read_bytes()
+    assert other != (folder / "whole" / "history.parquet").read_bytes()
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="cores cannot be chosen here")
+def test_one_core_and_two_give_the_same_bytes(folder: Path) -> None:
+    mine = sorted(os.sched_getaffinity(0))
+    if len(mine) < 2:
+        pytest.skip("there is one core")
+    os.sched_setaffinity(0, mine[:1])
+    try:
+        process = start(folder, "one")
+    finally:
+        os.sched_setaffinity(0, mine)
+    assert ended(process).returncode == 0
+    same(folder, "one")
+
+
+def test_a_number_of_seconds_that_is_none(folder: Path) -> None:
+    done = ended(start(folder, "none", "--keep-s", "-1"))
+    assert (done.returncode, done.stderr) == (2, "chipload: --keep-s = -1: must be at least 0 s\n")
