@@ -12,19 +12,23 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from chipload.cutter.cutter import Cutter
 from chipload.engagement.chips.covered import covered_polygons
-from chipload.engagement.chips.move import Move
+from chipload.engagement.chips.move import LEAST_AXIS_Z, Move
 from chipload.errors import InputError
 from chipload.simulation.steps import Steps
 from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Interpolation = Literal["slerp", "lerp"]
 
+#: a step, the layers in its box, which of them still have material in its way
+Met = tuple[Move, range, NDArray[np.bool_]]
 #: steps whose areas are found in one go
 TOGETHER = 16
 
@@ -60,18 +64,22 @@ def swept_ahead(
     near &= (high[:, 1] >= stock.ys[0]) & (low[:, 1] <= stock.ys[-1])
 
     def swept(part: range) -> list[tuple[int, Swept]]:
-        found: dict[int, tuple[Move, range]] = {}
-        for k in part:
-            layers = stock.layers_between(low[k, 2], high[k, 2]) if near[k] else range(0)
-            if layers:
+        found: dict[int, Met] = {}
+        ranges = {k: stock.layers_between(low[k, 2], high[k, 2]) for k in part if near[k]}
+        ranges = {k: layers for k, layers in ranges.items() if layers}
+        for (k, layers), left in zip(
+            ranges.items(), _left(steps, ranges, low, high, cutters, stock, tolerance), strict=True
+        ):
+            # an axis that lies is refused in air too
+            if left.any() or min(steps.a0[k, 2], steps.a1[k, 2]) < 2.0 * LEAST_AXIS_Z:
                 try:
-                    found[k] = _move(steps, k, interpolation), layers
+                    found[k] = _move(steps, k, interpolation), layers, left
                 except InputError as err:
                     raise InputError(f"line {steps.line[k]}: {err}") from None
         out: dict[int, Swept] = {}
         for tool in sorted({int(steps.tool[k]) for k in found}):
             own = {k: both for k, both in found.items() if steps.tool[k] == tool}
-            for (k, (move, layers)), met in zip(
+            for (k, (move, layers, _)), met in zip(
                 own.items(), _covered(steps, own, cutters[tool], stock, tolerance), strict=True
             ):
                 out[k] = Swept(move, low[k], high[k], layers, met)
@@ -85,29 +93,75 @@ def swept_ahead(
                     yield k, found
 
 
+def _left(
+    steps: Steps,
+    ranges: Mapping[int, range],
+    low: Floats,
+    high: Floats,
+    cutters: Mapping[int, Cutter],
+    stock: LayeredStock,
+    tolerance: float,
+) -> list[NDArray[np.bool_]]:
+    """Which layers of each step still have material where the cutter may come in them.
+
+    Asked ahead of the removal, so that more may be there than when the step comes, never less. In a layer the cutter
+    stays in the section of an endless cylinder about its axis: an ellipse whose box is known at both ends; between
+    them the middle of the ellipse leaves its chord by the product of the two motions, and by the turn of the axis.
+    """
+    counts = [len(layers) for layers in ranges.values()]
+    if not counts:
+        return []
+    step, layer = np.repeat(list(ranges), counts), np.concatenate([np.array(r) for r in ranges.values()])
+    z = stock.heights[layer]
+    wide = {n: max(c.radius, float(c.radius_at([c.flute_length])[0])) for n, c in cutters.items()}
+    own = np.array([wide[n] for n in steps.tool[step].tolist()])
+    middle, half, slope = [], [], []
+    for p, axis in ((steps.p0[step], steps.a0[step]), (steps.p1[step], steps.a1[step])):
+        slope.append(axis[:, :2] / np.maximum(axis[:, 2:], LEAST_AXIS_Z))
+        middle.append(p[:, :2] + (z - p[:, 2])[:, None] * slope[-1])
+        half.append(own[:, None] * np.sqrt(1.0 + slope[-1] ** 2))
+    turn = np.linalg.norm(steps.a1[step] - steps.a0[step], axis=1)
+    least = np.maximum(np.minimum(steps.a0[step, 2], steps.a1[step, 2]), LEAST_AXIS_Z)
+    climb = np.abs(steps.p1[step, 2] - steps.p0[step, 2])
+    far = np.maximum(np.abs(z - steps.p0[step, 2]), np.abs(z - steps.p1[step, 2])) + own
+    slack = 0.25 * climb * np.abs(slope[1] - slope[0]).max(axis=1) + 0.5 * far * turn**2 / least**3 + 4.0 * tolerance
+    a = np.maximum(np.minimum(middle[0] - half[0], middle[1] - half[1]) - slack[:, None], low[step, :2])
+    b = np.minimum(np.maximum(middle[0] + half[0], middle[1] + half[1]) + slack[:, None], high[step, :2])
+    left = np.zeros(len(step), dtype=np.bool_)
+    boxes = shapely.box(a[:, 0], a[:, 1], b[:, 0], b[:, 1])
+    i0, j0 = np.searchsorted(stock.xs, a[:, 0], "right"), np.searchsorted(stock.ys, a[:, 1], "right")
+    i1, j1 = np.searchsorted(stock.xs, b[:, 0], "left"), np.searchsorted(stock.ys, b[:, 1], "left")
+    i0, j0 = np.maximum(i0 - 1, 0), np.maximum(j0 - 1, 0)
+    i1, j1 = np.minimum(i1, len(stock.xs) - 1), np.minimum(j1, len(stock.ys) - 1)
+    for dj in range(int((j1 - j0).max(initial=0))):
+        for di in range(int((i1 - i0).max(initial=0))):
+            ask = np.flatnonzero(~left & (j0 + dj < j1) & (i0 + di < i1))
+            left[ask] = shapely.intersects(boxes[ask], stock.tiles[layer[ask], j0[ask] + dj, i0[ask] + di])
+    return np.split(left, np.cumsum(counts)[:-1])
+
+
 def _covered(
-    steps: Steps, own: Mapping[int, tuple[Move, range]], cutter: Cutter, stock: LayeredStock, tolerance: float
+    steps: Steps, own: Mapping[int, Met], cutter: Cutter, stock: LayeredStock, tolerance: float
 ) -> list[list[tuple[int, Polygon | MultiPolygon]]]:
     """What steps cover of each layer that they meet; layers that an upright flank crosses share one polygon."""
     heights = stock.heights
     asked: list[Floats] = []
-    of: list[NDArray[np.int64]] = []
-    for k, (_, layers) in own.items():
+    of: list[Ints] = []
+    for k, (_, layers, left) in own.items():
         z = heights[layers.start : layers.stop]
-        rows = np.arange(len(z))
         flank = _flank(steps, k, cutter, z)
-        if flank.any():
-            # the last one asked for stands for all that the flank crosses
-            shared = int(np.flatnonzero(~flank).size)
-            asked.append(np.append(z[~flank], z[flank][0]))
-            rows[~flank], rows[flank] = np.arange(shared), shared
-        else:
-            asked.append(z)
-        of.append(rows)
-    shapes = covered_polygons([move for move, _ in own.values()], cutter, asked, tolerance)
+        alone = left & ~flank
+        asked.append(z[alone])
+        rows = np.cumsum(alone) - 1
+        if (left & flank).any():
+            # the last one asked for stands for all that the flank crosses; which are left does not choose its height
+            asked[-1] = np.append(asked[-1], z[flank][0])
+            rows[flank] = len(asked[-1]) - 1
+        of.append(np.where(left, rows, -1))
+    shapes = covered_polygons([move for move, _, _ in own.values()], cutter, asked, tolerance)
     return [
-        [(i, shape) for i, n in zip(layers, rows.tolist(), strict=True) if (shape := found[n]) is not None]
-        for (_, layers), rows, found in zip(own.values(), of, shapes, strict=True)
+        [(i, shape) for i, n in zip(layers, rows.tolist(), strict=True) if n >= 0 and (shape := found[n]) is not None]
+        for (_, layers, _), rows, found in zip(own.values(), of, shapes, strict=True)
     ]
 
 
