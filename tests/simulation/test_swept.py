@@ -22,10 +22,10 @@ ROUGH = Resolution(step_mm=2.0, tolerance=0.01, corner_pieces=4, flank_mm=2.0, r
 
 
 def leaning(turn: float) -> Program:
-    """A flute along a wall, twice; its axis turns by up to ``turn`` [rad] from point to point."""
+    """A flute along a wall, twice, that it meets with its upper half; its axis turns by up to ``turn`` [rad] from point to point."""
     rng = np.random.default_rng(8)
     x = np.tile(np.linspace(-4.0, 34.0, 14), 2)
-    p = np.column_stack([x, np.repeat([2.0, 1.5], 14), -12.0 + 2.0 * np.sin(x)])
+    p = np.column_stack([x, np.repeat([-6.5, -7.0], 14), -12.0 + 2.0 * np.sin(x)])
     a = np.column_stack([turn * rng.uniform(-1.0, 1.0, 28), 0.4 + turn * rng.uniform(-1.0, 1.0, 28), np.ones(28)])
     return five_axis(p.tolist(), a.tolist())
 
