@@ -19,6 +19,7 @@ from chipload.cli import app
 from chipload.job import Job
 from chipload.progress import Progress
 from chipload.report.outcome import Outcome
+from chipload.simulation.unfinished import Unfinished
 
 Maker = Callable[..., Outcome]
 CHIPLOAD = [sys.executable, "-c", "from chipload.cli import main; main()"]
@@ -34,7 +35,7 @@ def planned(monkeypatch: pytest.MonkeyPatch, outcome: Maker) -> Callable[[Outcom
     """Let `run` find an outcome, or an accident, in place of the planner."""
 
     def put(made: Outcome | BaseException) -> None:
-        def stand_in(job: Job, progress: Progress) -> Outcome:
+        def stand_in(job: Job, progress: Progress, kept: Unfinished) -> Outcome:
             progress(0.5, "half")
             if isinstance(made, BaseException):
                 raise made
@@ -197,7 +198,7 @@ def test_a_stopped_run_leaves_no_half_file(job_dir: Path, tmp_path: Path, number
         f"spec = spec_from_file_location('made', {str(Path(__file__).parents[1] / 'conftest.py')!r})\n"
         "made = module_from_spec(spec)\n"
         "spec.loader.exec_module(made)\n"
-        "run.run = lambda job, progress: made.made_outcome()\n"
+        "run.run = lambda job, progress, kept: made.made_outcome()\n"
         "main()\n"
     )
     words = [sys.executable, "-c", slow, "run", str(job_dir / "job.toml"), "--out", str(tmp_path / "r")]

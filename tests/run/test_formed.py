@@ -77,6 +77,8 @@ def test_the_work_gives_way_too_and_what_is_not_stated_is_unproven() -> None:
     assert history.summary()["form_error_um"]["max"] == pytest.approx(1e3 * bar(z) + 80.0 / 40.0, rel=2e-3)
     history = walled(limits={"form_error_um": 0.1})
     assert history.verdict == "fails"
+    _, marks = history.plot("form_error_um").data
+    assert len(marks.y) == (np.abs(history["form_error_um"]) > 0.1).sum()
     assert history.says.startswith("Does not hold: form error ")
 
 
@@ -97,6 +99,8 @@ def test_an_edge_of_the_part_is_no_surface() -> None:
     """The part ends where the cut does: the corners of its mesh there do not count."""
     history = walled(part_z=(-DEPTH, 0.0))
     left = history.read.simulated.left
-    z = left.points[(np.abs(left.points[:, 1]) < 1e-9) & (left.points[:, 0] > 1.0) & (left.points[:, 0] < 29.0), 2]
-    above = float(z[z > -DEPTH + 1e-9].min()) + DEPTH
+    x, y, z = left.points.T
+    inside = (np.abs(y) < 1e-9) & (x > 1e-9) & (x < 30.0 - 1e-9) & (z > -DEPTH + 1e-9) & (z < -1e-9)
+    assert history.summary()["form_error_um"]["points"] == inside.sum()
+    above = float(z[inside].min()) + DEPTH
     assert history.summary()["form_error_um"]["max"] == pytest.approx(1e3 * bar(above), rel=2e-3)

@@ -137,3 +137,20 @@ def test_a_shroud_from_the_tip_of_a_blade(tmp_path):
     given = IMPELLER.shroud.curve(np.linspace(0.0, 1.0, 20001))
     p = found.curve(np.linspace(0.0, 1.0, 31))
     assert np.sqrt(((p[:, None] - given[None]) ** 2).sum(axis=2)).min(axis=1).max() < 5e-3
+
+
+def test_fillets_are_said_and_what_is_not_milled(tmp_path):
+    path = Path(shutil.copytree(EXAMPLES / "impeller", tmp_path / "job")) / "job.toml"
+    text = path.read_text().replace("outer_diameter_mm = 223.0", "outer_diameter_mm = 223.0\nfillet_mm = 3.0")
+    path.write_text(text.replace('side = "minus"', 'side = "minus fillet"'))
+    lines, holds = look(load_job(path))
+    assert holds
+    assert lines[1].startswith("blade plus fillet: 3 mm, up to 3.634 mm of the side are under it, within ")
+    assert lines[3] == "floor: at least 18.67 mm wide between two fillets, round the axis"
+    assert lines[4] == "not milled, for no [[surface]] names it: blade plus fillet"
+    assert lines[7].startswith("surface 1: blade minus fillet: 200 contact points, ")
+    found = read_part(load_job(path)).impeller
+    # both ways: a side begins where its fillet ends
+    for w, side in ((1, found.blade.plus), (-1, found.blade.minus)):
+        assert np.abs(found.foot(0, w).at(U, 1.0) - side.at(U, 0.0)).max() < 1e-3
+        assert np.abs(found.foot(0, w).normal(U, 1.0) - side.normal(U, 0.0)).max() < 2e-3

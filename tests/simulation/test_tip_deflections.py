@@ -66,6 +66,10 @@ def test_a_cutter_alone_is_a_cantilever_and_all_else_is_named() -> None:
     assert found["deflection_cutter_um"] == pytest.approx(1e3 * bar(), rel=1e-6)
     assert found["deflection_um"] == found["deflection_cutter_um"]
     assert "deflection_work_um" not in found
+    assert columns["force_n"].max() == pytest.approx(LOAD * DEPTH, rel=1e-6)
+    chip = math.tau * FEED / (2 * SPEED)
+    assert columns["torque_nm"].max() == pytest.approx(5.0 * DEPTH * (900.0 * chip + 12.0) / 1000.0, rel=1e-6)
+    assert columns["chip_max_mm"].max() == pytest.approx(chip, rel=1e-6)
     assert columns["deflection_um"].max() == pytest.approx(1e3 * bar(), rel=1e-6)
     assert not columns["deflection_um"][columns["chip_volume_mm3"] == 0.0].any()
     names = ("grip_n_um", "grip_nm_rad", "spindle_n_um", "spindle_nm_rad", "work_n_um", "holder_gpa")

@@ -70,6 +70,9 @@ class ImpellerTable(Table):
     shape: ShapeTable | None = None
     sections: SectionsTable | None = None
     step: StepTable | None = None
+    fillet_mm: Positive | None = Field(
+        None, description="fillets between sides and hub, which meet without them; sides begin above theirs"
+    )
 
     @property
     def has_splitter(self) -> bool:
@@ -82,7 +85,9 @@ class SurfaceTable(Table):
     """One surface that is milled, and where on it."""
 
     body: Literal["blade", "splitter"]
-    side: Literal["plus", "minus", "floor"] = Field(description="plus faces a growing angle; floor: the hub beyond it")
+    side: Literal["plus", "minus", "floor", "plus fillet", "minus fillet"] = Field(
+        description="plus faces a growing angle; floor: the hub beyond it; fillet: between the side and the hub"
+    )
     along: Span = Field(description="from where to where along the surface, 0 to 1")
     up: Span = Field(description="from where to where up from the hub, across on a floor, 0 to 1")
     points: tuple[Count, Count] = Field(description="contact points along and up")
@@ -259,5 +264,7 @@ def _check(at: str, surface: SurfaceTable, part: ImpellerTable) -> None:
             raise InputError(f"{at}.{key} = [{low:g}, {high:g}]: must ascend within 0 to 1")
     if min(surface.points) < 2:
         raise InputError(f"{at}.points = {list(surface.points)}: must be at least 2 each")
+    if surface.side.endswith(" fillet") and part.fillet_mm is None:
+        raise InputError(f"{at}.side = {surface.side!r}: the impeller has no fillets: state impeller.fillet_mm")
     if surface.body == "splitter" and not part.has_splitter:
         raise InputError(f"{at}.body = 'splitter': the impeller has no splitter: leave it out")

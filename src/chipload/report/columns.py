@@ -20,6 +20,8 @@ from chipload.tables import nearest
 USUAL = ("force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um")
 #: axes that columns are drawn against, and their titles
 AGAINST = {"t_s": "time at the commanded feed [s]", "s_mm": "path [mm]"}
+#: columns whose size is held, whatever their sign
+SIGNED = ("form_error_um",)
 #: height of a row [px]
 ROW = 190
 
@@ -60,14 +62,16 @@ def columns_figure(
         given = {"x": across[keep], "y": y[keep], "customdata": columns["line"][keep], "hovertemplate": says}
         out.add_trace(go.Scatter(**given, mode="lines", name=name, line={"color": INK, "width": 1.3}), row=row, col=1)
         if name in bound:
-            out.add_hline(y=bound[name], line={"color": LIMIT, "width": 1.2, "dash": "dash"}, row=row, col=1)
-            over = keep[y[keep] > bound[name]]
+            for end in (bound[name], *((-bound[name],) if name in SIGNED else ())):
+                out.add_hline(y=end, line={"color": LIMIT, "width": 1.2, "dash": "dash"}, row=row, col=1)
+            size = np.abs(y[keep]) if name in SIGNED else y[keep]
+            over = keep[size > bound[name]]
             if len(over):
                 given = {"x": across[over], "y": y[over], "customdata": columns["line"][over], "hovertemplate": says}
                 mark = {"color": LIMIT, "size": 5}
                 out.add_trace(go.Scatter(**given, mode="markers", name=f"{name} exceeds", marker=mark), row=row, col=1)
         top = max(float(y.max(initial=0.0)), bound.get(name, 0.0))
-        low = min(float(y.min(initial=0.0)), 0.0)
+        low = min(float(y.min(initial=0.0)), -bound.get(name, 0.0) if name in SIGNED else 0.0)
         room = 0.06 * (top - low) or 1.0
         out.update_yaxes(title_text=name, range=[low - room, top + room], row=row, col=1)
     out.update_xaxes(gridcolor=GRID, zeroline=False)

@@ -38,8 +38,9 @@ LIMITS: Mapping[str, tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class Held:
-    """A limit against the worst step: where (x, y, z) [mm], at which line of the source; ``unknown`` says what was left
-    out of the number, so that it may be greater; empty: nothing.
+    """A limit against the worst step: where (x, y, z) [mm], at which line of the source and which time.
+
+    ``unknown`` says what was left out of the number, so that it may be greater; empty: nothing.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Held:
     line: int
     at: tuple[float, float, float]
     unknown: str = ""
+    t_s: float | None = None
 
     @property
     def holds(self) -> bool | None:
@@ -92,7 +94,8 @@ def held_limits(
         if name in ("gouge_mm", "excess_mm"):
             assert left is not None
             found = surface.worst(left, columns, name.removesuffix("_mm"))
-            out.append(Held(name, limit, found["max"], found["line"], tuple(found["at_mm"] or (0.0, 0.0, 0.0))))
+            at = tuple(found["at_mm"] or (0.0, 0.0, 0.0))
+            out.append(Held(name, limit, found["max"], found["line"], at, "", found["t_s"]))
         elif name == "form_error_um":
             some = "" if columns["form_points"].any() else "no point of the part is finished"
             k = int(np.argmax(np.abs(columns[name])))
@@ -129,4 +132,5 @@ def _worst(name: str, limit: float, columns: Columns, unknown: str = "") -> Held
 def _at(name: str, limit: float, columns: Columns, k: int, unknown: str = "") -> Held:
     """A limit of the size of a column at one step."""
     at = (float(columns["x_mm"][k]), float(columns["y_mm"][k]), float(columns["z_mm"][k]))
-    return Held(name, limit, abs(float(columns[LIMITS[name][0]][k])), int(columns["line"][k]), at, unknown)
+    value, t = abs(float(columns[LIMITS[name][0]][k])), float(columns["t_s"][k])
+    return Held(name, limit, value, int(columns["line"][k]), at, unknown, t)

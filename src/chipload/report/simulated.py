@@ -162,7 +162,15 @@ def operation(simulated: Simulated, time_s: float) -> dict[str, Any]:
         "deflection_um": deflection(simulated),
         "form_error_um": form_error(simulated),
         "limits": [
-            {"name": h.name, "limit": h.limit, "worst": h.worst, "line": h.line, "at_mm": list(h.at), "holds": h.holds}
+            {
+                "name": h.name,
+                "limit": h.limit,
+                "worst": h.worst,
+                "line": h.line,
+                "at_mm": list(h.at),
+                "t_s": h.t_s,
+                "holds": h.holds,
+            }
             for h in simulated.held
         ],
         **surface.numbers(simulated.left, c),
@@ -272,14 +280,14 @@ def _mean(values: Mapping[str, Any]) -> str:
 
 def _limits(simulated: Simulated) -> str:
     """Every limit against its worst step."""
-    columns, rows = simulated.removal.columns, []
+    rows = []
     for h in simulated.held:
         word = {True: "holds", False: '<span class="no">does not hold</span>', None: "unproven"}[h.holds]
-        column, unit = LIMITS[h.name]
-        t = f"{float(columns['t_s'][int(np.argmax(columns[column]))]):.4g}" if column in columns else ""
-        place = ", ".join(f"{x:.4g}" for x in h.at)
-        name = " ".join(h.name.split("_")[:-1])
-        rows.append([f"{name} [{unit}]", word, f"{h.limit:g}", f"{h.worst:.4g}", str(h.line or ""), t, place])
+        unit = LIMITS[h.name][1]
+        name = " ".join(h.name.split("_")[:-1]) + (f" [{unit}]" if unit else "")
+        t = "" if h.t_s is None else f"{h.t_s:.4g}"
+        place = ", ".join(f"{x:.4g}" for x in h.at) if h.worst > 0.0 else ""
+        rows.append([name, word, f"{h.limit:g}", f"{h.worst:.4g}", str(h.line or ""), t, place])
     if not rows:
         return ""
     heads = ["limit", "", "at most", "worst", "line", "time [s]", "tip at x, y, z [mm]"]

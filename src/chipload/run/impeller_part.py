@@ -22,8 +22,10 @@ from chipload.geometry.step_meridian import meridian_of
 from chipload.geometry.step_patch import patch_of
 from chipload.job import ImpellerJob
 from chipload.job.impeller import SectionsTable, ShapeTable, StepTable
+from chipload.planning.sectional.fillets import with_fillets
 from chipload.planning.sectional.impeller import Impeller
 from chipload.planning.sectional.parametric import Shape, impeller_of
+from chipload.planning.sectional.surfaces import BODIES
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +38,7 @@ AGAINST_Z |= {key.replace("-", "+"): _OVER @ R for key, R in AGAINST_Z.items()}
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """An impeller, and what its faces became, a line each."""
+    """An impeller, and what its faces became and its fillets take, a line each."""
 
     impeller: Impeller
     faces: tuple[str, ...] = ()
@@ -50,6 +52,19 @@ def read_part(job: ImpellerJob) -> Part:
     InputError
         A file cannot be used, or its numbers are not those of an impeller.
     """
+    part = job.table.impeller
+    plain = _without_fillets(job)
+    if part.fillet_mm is None:
+        return plain
+    made, said = with_fillets(plain.impeller, part.fillet_mm)
+    milled = {(s.body, s.side) for s in job.table.surface}
+    names = [(b, f"{k} fillet") for b in BODIES[: len(made.bodies)] for k in ("plus", "minus")]
+    left = [" ".join(name) for name in names if name not in milled]
+    not_milled = (f"not milled, for no [[surface]] names it: {', '.join(left)}",) if left else ()
+    return Part(made, (*plain.faces, *said, *not_milled))
+
+
+def _without_fillets(job: ImpellerJob) -> Part:
     part = job.table.impeller
     if part.step is not None:
         return _of_step(job.files, part.step, part.blades, part.outer_diameter_mm)

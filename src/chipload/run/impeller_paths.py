@@ -140,6 +140,9 @@ def walls_of(impeller: Impeller, ahead: float) -> list[Wall]:
     for k in range(-1, last):
         body = impeller.body(k)
         out += [wall(f"body {k} plus", body.plus, u, v), wall(f"body {k} minus", body.minus, u, v)]
+        if impeller.fillets:
+            inner = np.linspace(0.05, 0.95, _COARSE[1])
+            out += [wall(f"fillet {k} {n}", impeller.foot(k, w), u, inner) for n, w in (("plus", 1), ("minus", -1))]
     for index in range(len(impeller.bodies)):
         floor = patch_of(impeller, BODIES[index], "floor", ahead)
         turn = impeller.pitch

@@ -270,7 +270,7 @@ class Page:
             "running": f"{now.job}: {100.0 * now.done:.0f} % \u00b7 {now.what}",
             "stopping": f"{now.job}: stopping",
             "done": f"{now.job}: done. {now.says}",
-            "stopped": f"{now.job}: stopped, nothing was written",
+            "stopped": f"{now.job}: stopped, {now.says.removeprefix('stopped: ') or 'nothing was written'}",
             "failed": f"{now.job}: {now.says}",
         }[now.state]
         self.bar_text.set_text(said)

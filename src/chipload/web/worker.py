@@ -20,23 +20,31 @@ ASKED = threading.Event()
 
 def work(job: str, out: str) -> dict[str, Any]:
     """Run the job and write its result; the exit code that `chipload run` has, and what it says."""
+    safe = 0
     try:
         from chipload.job import load_job
-        from chipload.report.folder import check_target, verdict, write_result
+        from chipload.report.folder import check_target, unfinished_folder, verdict, write_result
         from chipload.run import run
+        from chipload.simulation.unfinished import Unfinished
 
         tell = Teller()
         tell(0.0, "reading")
         read = load_job(job)
         check_target(out)
-        done = run(read, lambda part, what: tell(0.85 * part, what))
-        write_result(done, out, lambda part, what: tell(0.85 + 0.15 * part, what))
-        holds, says = verdict(done)
+        with Unfinished(unfinished_folder(out)) as kept:
+            try:
+                done = run(read, lambda part, what: tell(0.85 * part, what), kept)
+                write_result(done, out, lambda part, what: tell(0.85 + 0.15 * part, what))
+                holds, says = verdict(done)
+            finally:
+                safe = kept.safe
+            kept.discard()
         return {"code": 0 if holds else 3, "says": says}
     except InputError as err:
         return {"code": 2, "says": str(err)}
     except (KeyboardInterrupt, Cancelled):
-        return {"code": 130, "says": "stopped: nothing was written"}
+        why = f"{safe} steps are kept: the next run goes on from there" if safe else "nothing was written"
+        return {"code": 130, "says": f"stopped: {why}"}
     except Exception as err:
         return {"code": 1, "says": f"a fault of chipload: {type(err).__name__}: {err}"}
 

@@ -19,7 +19,7 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.bspline import Patch
 from chipload.planning.sectional.floor import layer_of, meridian
-from chipload.planning.sectional.impeller import Impeller
+from chipload.planning.sectional.impeller import ARC, SUNK, Impeller
 from chipload.planning.sectional.lines import Lines, Missed, Motion, Tracks
 from chipload.planning.sectional.ranges.ranges import FULL
 from chipload.planning.sectional.scene import Floats, Scene
@@ -211,6 +211,12 @@ def _walls(
             )
             names.append(0 if (k, side) == (0, 1) else 1 if (k, side) == (1, -1) else 3)
             parts.append(patch.at(u, v) + out[names[-1]] * patch.normal(u, v))
+    for k, side in ((k, side) for k in range(-around, 2 + around) for side in (1, -1) if impeller.fillets):
+        patch = impeller.foot(index + k, side)
+        v = (np.arange(ARC) + 0.5) / ARC
+        u, v = (x.ravel() for x in np.meshgrid(np.linspace(0, 1, _counts(patch, spacing)[0]), v, indexing="ij"))
+        parts.append(patch.at(u, v) + (out[3] - SUNK) * patch.normal(u, v))
+        names.append(3)
     low, high = hub_range(impeller, ahead)
     curve = impeller.hub.curve(np.linspace(low, high, 101))
     along = math.ceil(float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum()) / spacing) + 1

@@ -18,7 +18,7 @@ import numpy as np
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.geometry.bspline import Patch as Surface
 from chipload.planning.sectional.floor import patch_of
-from chipload.planning.sectional.impeller import Impeller
+from chipload.planning.sectional.impeller import FILLET, Impeller
 from chipload.planning.sectional.lines import Tracks
 from chipload.planning.sectional.links import Link, Linked, linked
 from chipload.planning.sectional.patch import Patch
@@ -34,6 +34,7 @@ from chipload.progress import Progress, silent
 
 #: number of each surface in the scene of the blade's plus side
 NUMBERS = {(0, "plus"): 0, (1, "minus"): 1, (0, "minus"): 3, (1, "plus"): 4}
+NUMBERS |= {(body, f"{side} fillet"): FILLET + n for (body, side), n in NUMBERS.items()}
 _FLOOR = 2
 #: rest passes take what is left above this share of the scallop: the count is of points, and not exact
 _AIM = 0.95

@@ -192,7 +192,19 @@ def _finished(milled: Milled) -> dict[str, Any]:
 
 
 def _picked(milled: Milled, way: Compared) -> dict[str, Any]:
-    return {**_size(way.catalogue.cutters[0]), **way_of(milled, way)}
+    first = way.divided.patches[0].table if way.divided is not None and way.divided.patches else None
+    tables = {p.table for p in way.divided.patches} if way.divided is not None else set()
+    return {
+        **_size(way.catalogue.cutters[0]),
+        "table_deg": _degrees(first) if first is not None and len(tables) == 1 else None,
+        "tables_deg": sorted(_degrees(t) for t in tables),
+        "cc_points": sum(len(op.place) for op in milled.surfaces),
+        "check_points": sum(len(op.surface.scene.check) for op in milled.surfaces),
+        "unreachable": way.unreachable,
+        "search_s": way.search_s,
+        "certified": way.certified,
+        **way_of(milled, way),
+    }
 
 
 def _size(cutter: CatalogueCutter) -> dict[str, float]:
