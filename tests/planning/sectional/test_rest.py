@@ -15,6 +15,8 @@ from chipload.planning.sectional.track import track_of
 BALL = CatalogueCutter(10.0, 5.0)
 SMALL = CatalogueCutter(6.0, 3.0)
 TABLE = math.radians(40.0)
+OWN = Catalogue("own", (BALL, SMALL))
+LARGE, LITTLE = OWN.cutters.index(BALL), OWN.cutters.index(SMALL)
 UP = np.array([0.0, 0.0, 1.0])
 #: 40 by 30 mm
 FLAT = through([[[0, 0, 0], [0, 30, 0]], [[40, 0, 0], [40, 30, 0]]], [0, 1], [0, 1])
@@ -66,7 +68,7 @@ def resting(pallets=((0.0, 2.0 * math.pi),)):
     far = np.array([[0.0, 0.0, -500.0]])
     scene = Scene(far, UP[None], np.zeros((1, 3, 3)), np.array([9]), far, np.array([9]), 1.0)
     return Resting(
-        scene, Catalogue("own", (BALL, SMALL)), Motion(0.01, 2.0, 2.0, 0.0), 0.1, 1.0, ((0, TABLE),),
+        scene, OWN, Motion(0.01, 2.0, 2.0, 0.0), 0.1, 1.0, ((LARGE, TABLE),),
         np.array([TABLE]), pallets, 1,
     )  # fmt: skip
 
@@ -85,15 +87,15 @@ def test_rest_passes_take_what_lines_left_out(face):
     assert 12.1 < 30.0 * face.v[j.max()] < 13.0
     plan = resting()
     pair = plan.chosen(face, found[0])
-    assert pair == (0, TABLE)
+    assert pair == (LARGE, TABLE)
     rest = plan.passes(face, found[0], pair)
     after = left_over(face, [(BALL, [*own, *rest.tracks])])
     assert after.max() <= 0.1
     # no more passes than the gap needs at the step of the ball, one for luck
     assert len(rest.tracks) <= math.ceil((14.0 - 7.6) / corner_step(5.0, 0.1)) + 2
     # what was tried is not tried so again: the smaller cutter is next, then nothing is
-    assert plan.chosen(face, found[0]) == (1, TABLE)
-    plan.passes(face, found[0], (1, TABLE))
+    assert plan.chosen(face, found[0]) == (LITTLE, TABLE)
+    plan.passes(face, found[0], (LITTLE, TABLE))
     assert plan.chosen(face, found[0]) is None
     assert not regions(left, 0.1, found[0])
 
@@ -106,7 +108,7 @@ def test_a_pallet_that_cannot_turn_so_far_reaches_nothing(face):
     )  # fmt: skip
     # a lid of check points over all of the plane: no cutter goes under it
     plan = Resting(
-        wall, Catalogue("own", (BALL, SMALL)), Motion(0.01, 2.0, 2.0, 0.0), 0.1, 1.0, ((0, TABLE),),
+        wall, OWN, Motion(0.01, 2.0, 2.0, 0.0), 0.1, 1.0, ((LARGE, TABLE),),
         np.array([TABLE]), ((0.0, 2.0 * math.pi),), 1,
     )  # fmt: skip
     assert plan.chosen(face, np.ones((len(face.u), len(face.v)), dtype=bool)) is None
