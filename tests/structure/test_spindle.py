@@ -75,7 +75,7 @@ def test_rigid_spindle_on_bearings():
 
 
 def test_measured_tip():
-    """A cutter in a holder that only shifts, its tip measured: the sum of both at all heights; in one that tilts: of the
+    """A cutter in a holder that only shifts, its tip measured: the sum of both at all heights; one that tilts: of the
     tip, and no less above it."""
     z = np.linspace(0.0, 22.0, 7)
     bars = cutter_bars(MILL)
