@@ -8,7 +8,7 @@ import pytest
 
 DOCS = Path(__file__).parent.parent / "docs"
 EXAMPLES = Path(__file__).parent.parent / "src" / "chipload" / "examples"
-NAMES = sorted(p.parent.name for p in EXAMPLES.glob("*/job.toml"))
+NAMES = sorted(p.parent.name for p in EXAMPLES.glob("*/README.md"))
 GALLERY = (DOCS / "gallery.md").read_text()
 #: width [pixels] and size [bytes] of a picture at most
 WIDTH, SIZE = 1000, 150_000
