@@ -224,6 +224,9 @@ def _simulated(
             passing(0.0, "distances to the part"),
         )  # fmt: skip
         solids["part"] = left.points
+    # costs as much as the chips, and says little where nothing is known to give way
+    forms = left is not None and (stiffness is not None or "form_error_um" in job.limits)
+    if left is not None and forms:
         watches.append(forming(left, gives, material))
 
     def watch(cuts: Cuts) -> dict[str, NDArray[np.float64]]:
@@ -237,12 +240,12 @@ def _simulated(
             program, stock, job.cutters, material, fine, interpolation=op.interpolation, watch=watch, progress=removing
         )  # fmt: skip
     else:
-        formed = None if left is None else (left.points, left.faces, left.distance, left.step)
+        formed = (left.points, left.faces, left.distance, left.step) if left is not None and forms else None
         removal = remove_in_pieces(
             program, stock, job.cutters, material, fine, unfinished, interpolation=op.interpolation, watch=watch,
             also=(versions(), sources(), repr(stiffness), formed), progress=removing,
         )  # fmt: skip
-    removal = with_columns(removal, watched(gives, formed=left is not None))
+    removal = with_columns(removal, watched(gives, formed=forms))
     touched = collisions(
         steps, job.cutters, solids, op.tolerance_mm, above_only=frozenset(["part"]),
         progress=passing(0.8 + SHARE, "collisions"),
