@@ -148,8 +148,8 @@ def test_uneven_parameters_are_put_over_lengths(tmp_path):
         assert p[[0, -1]] == pytest.approx(uneven.at([0.0, 1.0], 0.5), abs=1e-9)
 
 
-@pytest.fixture(scope="module")
-def shaft(tmp_path_factory):
+@pytest.fixture(scope="module", params=[1, -1])
+def shaft(request, tmp_path_factory):
     """A cylinder of radius 10, a round of radius 10 and a flat disc: faces in the order disc, cylinder, round."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
@@ -159,7 +159,7 @@ def shaft(tmp_path_factory):
     from OCP.TopoDS import TopoDS
 
     a = np.linspace(0.0, 0.5 * math.pi, 201)
-    quarter = Revolved(np.stack([20.0 - 10.0 * np.cos(a), 15.0 - 10.0 * np.sin(a)], axis=-1), 1)
+    quarter = Revolved(np.stack([20.0 - 10.0 * np.cos(a), 15.0 - 10.0 * np.sin(a)], axis=-1)[:: request.param], 1)
     outer, inner = (
         BRepBuilderAPI_MakeWire(
             BRepBuilderAPI_MakeEdge(gp_Circ(gp_Ax2(gp_Pnt(0, 0, 5), gp_Dir(0, 0, 1)), r)).Edge()

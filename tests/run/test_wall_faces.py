@@ -86,19 +86,20 @@ def test_front_and_back_changed_are_the_wall_turned(tmp_path, plate):
 
 @pytest.fixture(scope="module")
 def sections() -> np.ndarray:
-    """Ellipses of 24 x 3 mm that twist by 20 deg and taper, stacked along y at x = 100."""
+    """Ellipses of 24 x 3 mm with a camber of 2 mm that twist by 20 deg and taper, stacked along y at x = 100."""
     t = np.linspace(0.0, math.tau, 121)
     out = []
     for k in range(5):
         g, size = math.radians(5.0 * k), 1.0 - 0.05 * k
-        a, b = 12.0 * size * np.cos(t), 1.5 * size * np.sin(t)
+        a, b = 12.0 * size * np.cos(t), 1.5 * size * np.sin(t) + 2.0 * size * np.sin(t) ** 2
         out.append(
             np.stack([100.0 + b * np.cos(g) + a * np.sin(g), 0 * t + 6.0 * k, a * np.cos(g) - b * np.sin(g)], axis=1)
         )
     return np.array(out)
 
 
-def test_a_blade_from_faces_is_that_through_sections(tmp_path, sections):
+@pytest.mark.parametrize("flip", [False, True])
+def test_a_blade_from_faces_is_that_through_sections(tmp_path, sections, flip):
     folder = tmp_path / "job"
     copy_example("plate", folder)
     text = "".join("# section\n" + "".join(f"{x:.9f} {y:.9f} {z:.9f}\n" for x, y, z in s) for s in sections)
@@ -110,7 +111,7 @@ def test_a_blade_from_faces_is_that_through_sections(tmp_path, sections):
     along = made.plus.at(1.0, 0.5)[0] - made.plus.at(0.0, 0.5)[0]
     towards = made.plus.at(0.5, 0.5)[0] - made.minus.at(0.5, 0.5)[0]
     front, back = (made.plus, made.minus) if np.cross(up, along) @ towards > 0 else (made.minus, made.plus)
-    written(folder / "wall.step", face(back.swapped()), face(front.reversed(True, True)))
+    written(folder / "wall.step", face(back.swapped()), face(front.reversed(flip, True)))
     clamp = made.plus.at(0.4, 0.0)[0].round(9).tolist()
     found = inputs(folder, FACES.format(front=2, back=1, clamp=clamp) + "edge_share = 0.1\nspan = [0.0, 0.9]\n")
     same(found, given)
