@@ -3,10 +3,11 @@
     python benchmarks/simulation.py [--moves 10000 30000 100000] [--memory]
 
 The program is a three-axis finishing program as a CAM writes it: a ball nose of 8 mm in rows 0.4 mm apart over a wavy
-surface, short lines of 0.4 mm, a rapid from row to row; the stock is a block in layers of 0.25 mm. Every move is a step:
-its chip, force, torque and power are calculated and kept. The length of a row stays, so that a longer program has more
-rows. Each length runs in a process of its own, with its columns in files (``remove_in_pieces``, as `chipload run` has
-them) or, with ``--memory``, in memory (``remove``). Peak memory is the most that the process ever had in memory;
+surface, short lines of 0.4 mm, a rapid from row to row; the stock is a block in layers of 0.25 mm. Every move is a
+step: its chip, force, torque and power are calculated and kept. The length of a row stays, so that a longer program
+has more rows. Each length runs in a process of its own, with its columns in files (``remove_in_pieces``, as
+`chipload run` has them) or, with ``--memory``, in memory (``remove``). Peak memory is the most that the process ever
+had in memory;
 "before" is what it had with libraries, program and stock, when the simulation began.
 """
 

@@ -226,6 +226,18 @@ def test_chips_that_the_flutes_have_no_room_for(job: Path, tmp_path: Path) -> No
     assert "Does not hold: flute fill 1.083 exceeds 1 in line 6" in out
 
 
+def test_chips_thicker_than_the_coefficients_know_are_unproven(job: Path, tmp_path: Path) -> None:
+    al = (files("chipload") / "data" / "materials" / "al7075-t6.toml").read_text()
+    job.write_text(JOB.replace('name = "al7075-t6"', 'file = "al.toml"'))
+    for most, code in ((0.1, 0), (0.08, 3)):
+        (job.parent / "al.toml").write_text(f"{al}\nchip_min_mm = 0.01\nchip_max_mm = {most}\n")
+        found, out, err = call("run", job, "--out", tmp_path / f"r{code}")
+        assert (found, err) == (code, "")
+        verdict = json.loads((tmp_path / f"r{code}" / "summary.json").read_text())["operations"][0]["verdict"]
+        assert verdict == ("unproven" if code else "holds")
+    assert "chips are up to 0.1 mm thick in line 6: the coefficients of al7075-t6 hold up to 0.08 mm" in out
+
+
 def test_a_rapid_through_material_is_said(job: Path, tmp_path: Path) -> None:
     (job.parent / "slot.ngc").write_text(SLOT.replace("G1 X30 F600", "G0 X30"))
     code, out, _ = call("run", job, "--out", tmp_path / "r")

@@ -6,11 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from chipload.examples import copy_example
+from chipload.geometry.sections import checked, loft
+from chipload.geometry.wall import through_sections
 from chipload.job import load_job
 from chipload.run import look, run
 from chipload.run.impeller_part import AGAINST_Z, read_part
+from chipload.run.wallfaces import wall_of_faces
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2].parent / "shared" / "data"))
 ROTOR = DATA / "cad" / "tblade3_rotor"
@@ -103,3 +107,37 @@ def test_its_side_is_searched(job):
     assert (found.surfaces[0].answer.cutter >= 0).all()
     assert found.one is not None
     assert [text[:5] for text in found.provenance["faces"]] == ["hub: ", "shrou", "plus:", "minus", "blade"]
+
+
+WALL = """# a blade as a wall
+[wall]
+shape = "step"
+file = "rotor.step"
+front = 1
+back = 2
+clamp = 3
+edge_share = 0.15
+foot_mm = 8.0
+allowance_mm = [0.3, 0.3]
+elements = [8, 8]
+
+"""
+
+
+def test_the_blade_as_a_wall(tmp_path):
+    """As thick as the wall through the 21 sections of the other file."""
+    path = copy_example("plate", tmp_path / "job") / "job.toml"
+    shutil.copy(ROTOR / "Case_7-28-8_Rotor.step", path.parent / "rotor.step")
+    text = path.read_text()
+    path.write_text(WALL + text[text.index("[workpiece]") :])
+    found = wall_of_faces(load_job(path))
+    rows = np.loadtxt(ROTOR / "blade3d.Case7-28-8.dat", skiprows=1).reshape(21, 241, 3)
+    given = through_sections(loft(checked(tuple(rows @ AGAINST_Z["+x"].T))), 0.15)
+    # the two have other parameters along the blade: what they share is the distance from one side to the other
+    u, v = np.meshgrid(np.linspace(0.0, 1.0, 401), np.linspace(0.0, 1.0, 401), indexing="ij")
+    greatest = []
+    for wall in (found, given):
+        other = cKDTree(wall.sides(u, v)[1].reshape(-1, 3))
+        rows = [wall.sides(u[:, 0], np.full(401, height))[0] for height in (0.2, 0.4, 0.6, 0.8)]
+        greatest.append([float(other.query(p)[0].max()) for p in rows])
+    assert greatest[0] == pytest.approx(greatest[1], rel=0.01)

@@ -143,6 +143,26 @@ def test_a_program_beyond_the_machine_fails(history) -> None:
     assert "X = 1000 mm: machine vmc goes from -400 to 400 mm" in found.says
 
 
+def test_a_program_of_five_axes_is_read_for_its_machine(tmp_path: Path) -> None:
+    """The tip and the axis of a text, given as a Program, come back to the same axes and the same chips."""
+    lean, more = "0.336824089,0.059391175,0.939692621", "0.394654826,0.098398500,0.913545458"
+    (tmp_path / "lean.cls").write_text(
+        "PARTNO/LEAN\nUNITS/MM\nLOADTL/1\nSPINDL/6000,RPM,CLW\nMULTAX/ON\nRAPID\n"
+        f"GOTO/0,0,30,{lean}\nFEDRAT/600,MMPM\nGOTO/0,0,-1.5,{lean}\nGOTO/4,0,-1.5,{more}\nRAPID\nGOTO/4,0,30,{more}\n"
+        "FINI\n"
+    )
+    given = {
+        "machine": "cradle-ac", "stock": ([-30.0, -30.0, -20.0], [30.0, 30.0, 0.0]), "step_mm": 2.0, "layer_mm": 1.0,
+        "tolerance_mm": 0.01,
+    }  # fmt: skip
+    text = simulated(program=tmp_path / "lean.cls", **given)
+    again = simulated(program=text.read.reading.program, **given)
+    same(text.columns, again.columns)
+    assert text["chip_volume_mm3"].sum() > 10.0
+    axes = text.read.reading.axes, again.read.reading.axes
+    np.testing.assert_allclose(axes[1][-1], axes[0][-1], atol=1e-6)
+
+
 def test_pictures_have_the_columns_and_their_limits(history) -> None:
     figure = history.plot(x="s_mm")
     assert [t.name for t in figure.data] == ["force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um"]

@@ -10,6 +10,10 @@ from typing import Any
 
 import pytest
 
+import chipload
+from chipload.job import load_job
+from chipload.run import run
+
 nbformat = pytest.importorskip("nbformat")
 nbclient = pytest.importorskip("nbclient")
 pytest.importorskip("ipykernel")
@@ -46,6 +50,8 @@ def test_program() -> None:
     assert said["verdict"] == ("unproven", "holds")
     alone, whole = said["deflection_um"]
     assert 0.0 < alone < whole < 60.0
+    job = run(load_job(FOLDER / "job.toml"))
+    assert chipload.History(job).summary()["deflection_um"]["max"] == pytest.approx(whole, rel=1e-9)
     assert "<table>" in out[0].data["text/html"]
     assert len(out[1].data["application/vnd.plotly.v1+json"]["data"]) >= 3
 

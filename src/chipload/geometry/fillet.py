@@ -14,7 +14,6 @@ Reference: [Rossignac1984].
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +31,7 @@ BEYOND = 0.2
 _COARSE, _NEWTON, _STEPS = 101, 8, 60
 _MET = 1e-11  # [mm] the ball is met
 _ARC = 13  # points of an arc
-_ALONG = (2, 4, 8, 16)  # pieces of a span of knots along a side
+_ROUNDS = 9  # of halving the pieces along a side
 _UP = (17, 33, 65, 129)  # points of a side above its fillet
 _SCAN = np.linspace(0.0, 1.0, 65)
 
@@ -63,18 +62,19 @@ def filleted(side: Patch, hub: Revolved, radius: float) -> Filleted:
     InputError
         No ball of that radius touches the side and the hub, or the patches leave the exact surfaces.
     """
-    ends, off = np.unique(side.knots_u), np.inf
-    for pieces in _ALONG:
-        parts = [np.linspace(p, q, pieces, endpoint=False) for p, q in pairwise(ends)]
-        made = _made(side, hub, radius, np.concatenate([*parts, [1.0]]))
+    ends = np.unique(side.knots_u)
+    u, off = np.sort(np.concatenate([ends, 0.5 * (ends[1:] + ends[:-1])])), np.inf
+    for _ in range(_ROUNDS):
+        made, away = _made(side, hub, radius, u)
         off = made.off
         if off <= FIT:
             return made
+        u = np.sort(np.concatenate([u, (0.5 * (u[1:] + u[:-1]))[away > 0.2 * FIT]]))
     raise InputError(f"the fillet of {radius:g} mm is left by its patches by {off:.4g} mm: must be at most {FIT:g} mm")
 
 
-def _made(side: Patch, hub: Revolved, radius: float, u: Floats) -> Filleted:
-    """Through what is exact at the places u."""
+def _made(side: Patch, hub: Revolved, radius: float, u: Floats) -> tuple[Filleted, Floats]:
+    """Through what is exact at the places u (n,), and how far that is left between them (n - 1,) [mm]."""
     middle = 0.5 * (u[1:] + u[:-1])
     v, between = (_touched(side, hub, radius, x) for x in (u, middle))
     w = np.linspace(0.0, 1.0, _ARC)
@@ -84,13 +84,25 @@ def _made(side: Patch, hub: Revolved, radius: float, u: Floats) -> Filleted:
     if made.normal(u[k], 0.5)[0] @ towards < 0.0:
         made = replace(made, side=-1)
     x = 0.5 * (w[1:] + w[:-1])
-    exact = _arcs(side, hub, radius, middle, between, x).reshape(-1, 3)
-    off = float(np.linalg.norm(made.at(np.repeat(middle, len(x)), np.tile(x, len(middle))) - exact, axis=1).max())
-    above, away = _above(side, u, v, middle, between)
+    exact = _arcs(side, hub, radius, middle, between, x)
+    away = np.linalg.norm(_grid(made, middle, x) - exact, axis=2).max(axis=1)
+    above = _above(side, u, v)
     share = np.linspace(0.0, 1.0, 33)
-    under = side.at(np.repeat(u, 33), (share * v[:, None]).ravel()).reshape(len(u), 33, 3)
+    left = _grid(above, middle, share) - _between(side, middle, between + share[:, None] * (1.0 - between))
+    away = np.maximum(away, np.linalg.norm(left, axis=2).max(axis=1))
+    under = _between(side, u, share[:, None] * v)
     height = float(np.linalg.norm(np.diff(under, axis=1), axis=2).sum(axis=1).max())
-    return Filleted(above, made, height, max(off, away))
+    return Filleted(above, made, height, float(away.max())), away
+
+
+def _grid(patch: Patch, u: Floats, v: Floats) -> Floats:
+    """(n, m, 3) points at u (n,) and v (m,)."""
+    return _between(patch, u, np.repeat(v[:, None], len(u), axis=1))
+
+
+def _between(patch: Patch, u: Floats, v: Floats) -> Floats:
+    """(n, m, 3) points at u (n,), each with its own v (m, n)."""
+    return patch.at(np.repeat(u, len(v)), v.T.ravel()).reshape(len(u), len(v), 3)
 
 
 def from_hub(hub: Revolved, points: Floats) -> tuple[Floats, Floats]:
@@ -162,19 +174,13 @@ def _arcs(side: Patch, hub: Revolved, radius: float, u: Floats, v: Floats, w: Fl
     return out
 
 
-def _above(side: Patch, u: Floats, v: Floats, middle: Floats, between: Floats) -> tuple[Patch, float]:
-    """The side above v* at u, and how far it leaves the whole one, looked at ``middle`` with its v* ``between``."""
-
-    def places(at: Floats, low: Floats, x: Floats) -> tuple[Floats, Floats]:
-        return np.repeat(at, len(x)), (low[:, None] + x * (1.0 - low[:, None])).ravel()
-
-    made, off = side, np.inf
+def _above(side: Patch, u: Floats, v: Floats) -> Patch:
+    """The side above v* at u, through as many points up it as keep within a tenth of what it may leave it."""
+    made = side
     for count in _UP:
         x = np.linspace(0.0, 1.0, count)
-        made = through(side.at(*places(u, v, x)).reshape(len(u), count, 3), u, x, side=side.side)
+        made = through(_between(side, u, v + x[:, None] * (1.0 - v)), u, x, side=side.side)
         x = 0.5 * (x[1:] + x[:-1])
-        exact = side.at(*places(middle, between, x))
-        off = float(np.linalg.norm(made.at(np.repeat(middle, len(x)), np.tile(x, len(middle))) - exact, axis=1).max())
-        if off <= 0.1 * FIT:
+        if np.abs(_grid(made, u, x) - _between(side, u, v + x[:, None] * (1.0 - v))).max() <= 0.1 * FIT:
             break
-    return made, off
+    return made

@@ -31,7 +31,7 @@ COMPARED = {
     "torque_nm": ("torque", "N m"),
     "power_w": ("power", "W"),
     "chip_max_mm": ("chip", "mm"),
-    "deflection_um": ("deflection", "um"),
+    "deflection_um": ("deflection", "\u00b5m"),
 }
 #: colours of the program as it was, and with its new feeds
 BEFORE, AFTER = "#c9821a", "#3457a6"

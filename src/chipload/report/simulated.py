@@ -108,12 +108,26 @@ class Simulated:
     @cached_property
     def unproven(self) -> tuple[str, ...]:
         """What nothing speaks against, and what could still fail."""
-        return tuple(h.says for h in self.held if h.holds is None)
+        return (*(h.says for h in self.held if h.holds is None), *_extrapolated(self))
 
     @property
     def verdict(self) -> str:
         """`fails`, `unproven` or `holds`."""
         return "fails" if self.fails else "unproven" if self.unproven else "holds"
+
+
+def _extrapolated(simulated: Simulated) -> tuple[str, ...]:
+    """Chips that are thicker than those that the coefficients were measured with."""
+    chip, c = simulated.material.chip, simulated.removal.columns
+    k = int(np.argmax(c["chip_max_mm"]))
+    thickest = float(c["chip_max_mm"][k])
+    if chip is None or thickest <= chip[1] * (1.0 + 1e-9):
+        return ()
+    line = f" in line {c['line'][k]}" if c["line"][k] else ""
+    return (
+        f"chips are up to {thickest:.4g} mm thick{line}: the coefficients of {simulated.material.name} hold up to "
+        f"{chip[1]:g} mm, what the loads are beyond it is not known",
+    )
 
 
 def operation(simulated: Simulated, time_s: float) -> dict[str, Any]:

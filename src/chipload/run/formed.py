@@ -40,9 +40,9 @@ def forming(left: Difference, stiffness: Stiffness, material: Material) -> Calla
     """
     mesh = trimesh.Trimesh(left.points, left.faces, process=False)
     normals = np.asarray(mesh.vertex_normals)
-    facing = np.einsum("fj,fcj->fc", np.asarray(mesh.face_normals), normals[left.faces])
-    least = np.ones(len(left.points))
-    np.minimum.at(least, left.faces.ravel(), facing.ravel())
+    least, flat = np.ones(len(left.points)), np.asarray(mesh.face_normals)
+    for corner in left.faces.T:
+        np.minimum.at(least, corner, np.einsum("fj,fj->f", flat, normals[corner]))
     counts = left.over & (np.abs(left.distance) <= NEAR) & (least >= math.cos(SMOOTH))
     at = np.flatnonzero(counts)
     at = at[np.argsort(left.step[at], kind="stable")]

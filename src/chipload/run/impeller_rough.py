@@ -38,6 +38,8 @@ _STEP, _HEIGHT, _DEPTH = 1.0, 3.0, 0.5
 _MERIDIAN, _UNDER, _BESIDE = 61, 1.0, 0.8
 #: how often rows are left out before a program counts as not verified
 _ROUNDS = 8
+#: share of the blank that a further table angle must take
+_LEAST = 1e-3
 
 
 def checked_roughing(
@@ -65,12 +67,17 @@ def checked_roughing(
         impeller, catalogue, stated, how, link, rad_s_from_rpm(rough.speed_rpm), table, rough.share, ahead, workers,
         lambda done, what: progress(0.6 * done, what),
     )  # fmt: skip
-    out, stock = [], {}
+    out: list[CheckedRough] = []
+    stock: dict[int, TriDexel] = {}
     for k, plan in enumerate(plans):
         if plan.index not in stock:
             stock[plan.index] = TriDexel.of_mesh(blank_of(impeller, plan.index, how, ahead), rough.grid_mm)
-        safe, taken, stock[plan.index] = without_touch(plan, stock[plan.index], rough.grid_mm, rough.touch_mm3)
-        out.append(_checked(machine, safe, taken, rough.touch_mm3, paths, walls, workers))
+        safe, taken, left = without_touch(plan, stock[plan.index], rough.grid_mm, rough.touch_mm3)
+        first = not any(r.rough.index == plan.index for r in out)
+        # a further table angle that takes nothing that is left is no program
+        if first or taken.before - taken.after > _LEAST * taken.before:
+            stock[plan.index] = left
+            out.append(_checked(machine, safe.numbered(len(out) + 1), taken, rough.touch_mm3, paths, walls, workers))
         progress(0.6 + 0.4 * (k + 1) / len(plans), f"check of {k + 1} roughing programs")
     return tuple(out)
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutting.material import beyond
+from chipload.errors import InputError
 from chipload.job import WallJob
 from chipload.machine.limits import limit_findings
 from chipload.machine.machine import Machine
@@ -69,6 +70,7 @@ def run_wall(job: WallJob, progress: Progress = silent) -> Walled:
         By ``progress``.
     """
     inputs = read_wall(job)
+    _thick_enough(inputs)
     tried = _Tried(places_of(inputs), progress)
     free = tried.prove(_unlimited(tried.places), 0.25)
     constant, corrections = _constant(tried, free)
@@ -105,9 +107,20 @@ def run_wall(job: WallJob, progress: Progress = silent) -> Walled:
     )
 
 
+def _thick_enough(inputs: WallInputs) -> None:
+    """Refuse a finished wall that is thinner than what is cut off it at once."""
+    thickness, deepest = inputs.shape.size()[2], min(inputs.law.limits.greatest, max(inputs.allowance))
+    if not thickness >= deepest:
+        raise InputError(
+            f"wall: {thickness:.4g} mm thick where it is thinnest, thinner than a cut of {deepest:g} mm: state less "
+            "operation.0.depth_max_mm, or a thicker wall"
+        )
+
+
 def look_at_wall(job: WallJob) -> tuple[list[str], bool]:
     """What the job names: the wall, its finite elements, the greatest threshold; nothing is planned."""
     inputs = read_wall(job)
+    _thick_enough(inputs)
     length, height, thickness = inputs.shape.size()
     nodes = len(inputs.wall.solid.grid.nodes)
     bearing = inputs.finished_bears()
@@ -211,7 +224,7 @@ def _variable(tried: _Tried, constant: Variant, corrections: tuple[Floats, ...])
     least: tuple[float, Variant] | None = None
     share = 1.0
     for turn in range(TRIES):
-        bears = places.bears(share * held, inputs.factor)
+        bears = places.bears(share * held, inputs.factor) if modelled else places.bears(held, share * inputs.factor)
         planned = held_to(places.surfaces, bears, inputs.law, inputs.slope, share * held, corrections)
         if best is not None and _seconds(places, planned) > FASTER * best.seconds:
             break
@@ -228,7 +241,7 @@ def _variable(tried: _Tried, constant: Variant, corrections: tuple[Floats, ...])
         measured = _measured(places, one, inputs.law, corrections)
         if not good:
             measured = tuple(np.maximum(c, m) for c, m in zip(corrections, measured, strict=True))
-            share *= HOLD / over if modelled and turn >= ROUNDS - 1 else 1.0
+            share *= HOLD / over if turn >= ROUNDS - 1 else 1.0
         corrections = measured
     if best is not None:
         return best

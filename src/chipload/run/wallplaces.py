@@ -73,8 +73,11 @@ class Places:
             C = between(self.inputs.places, self.compliance(left, side), u.ravel(), v.ravel())
             return modelled(C, deflection, factor)
 
-        # what experiments say does not know a state, but places
-        return limited if self.inputs.experiments is None else replace(self.inputs, places=self.grid).bears(deflection)
+        def measured(left: Sequence[Floats], side: int) -> Threshold:
+            known = replace(self.inputs, places=self.grid).bears(deflection)(left, side)
+            return replace(known, force=factor * known.force, factor=factor * known.factor)
+
+        return limited if self.inputs.experiments is None else measured
 
 
 def places_of(inputs: WallInputs) -> Places:

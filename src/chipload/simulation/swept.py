@@ -12,20 +12,24 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from chipload.cutter.cutter import Cutter
 from chipload.engagement.chips.covered import covered_polygons
-from chipload.engagement.chips.move import Move
+from chipload.engagement.chips.move import LEAST_AXIS_Z, Move
 from chipload.errors import InputError
 from chipload.simulation.reach import reached
 from chipload.simulation.steps import Steps
 from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Interpolation = Literal["slerp", "lerp"]
 
+#: a step, the layers in its box, which of them still have material in its way
+Met = tuple[Move, range, NDArray[np.bool_]]
 #: steps whose areas are found in one go
 TOGETHER = 16
 
@@ -61,18 +65,20 @@ def swept_ahead(
     near &= (high[:, 1] >= stock.ys[0]) & (low[:, 1] <= stock.ys[-1])
 
     def swept(part: range) -> list[tuple[int, Swept]]:
-        found: dict[int, tuple[Move, range]] = {}
-        for k in part:
-            layers = stock.layers_between(low[k, 2], high[k, 2]) if near[k] else range(0)
-            if layers:
+        found: dict[int, Met] = {}
+        ranges = {k: stock.layers_between(low[k, 2], high[k, 2]) for k in part if near[k]}
+        ranges = {k: layers for k, layers in ranges.items() if layers}
+        for k, left in _left(steps, ranges, low, high, cutters, stock).items():
+            # an axis that lies is refused in air too
+            if left.any() or min(steps.a0[k, 2], steps.a1[k, 2]) < 2.0 * LEAST_AXIS_Z:
                 try:
-                    found[k] = _move(steps, k, interpolation), layers
+                    found[k] = _move(steps, k, interpolation), ranges[k], left
                 except InputError as err:
                     raise InputError(f"line {steps.line[k]}: {err}") from None
         out: dict[int, Swept] = {}
         for tool in sorted({int(steps.tool[k]) for k in found}):
             own = {k: both for k, both in found.items() if steps.tool[k] == tool}
-            for (k, (move, layers)), met in zip(
+            for (k, (move, layers, _)), met in zip(
                 own.items(), _covered(steps, own, cutters[tool], stock, tolerance), strict=True
             ):
                 out[k] = Swept(move, low[k], high[k], layers, met)
@@ -86,40 +92,67 @@ def swept_ahead(
                     yield k, found
 
 
+def _left(
+    steps: Steps,
+    ranges: Mapping[int, range],
+    low: Floats,
+    high: Floats,
+    cutters: Mapping[int, Cutter],
+    stock: LayeredStock,
+) -> dict[int, NDArray[np.bool_]]:
+    """Which layers of each step still have material where the cutter may come in them: in its box, and where it leans
+    in the figure of :mod:`chipload.simulation.reach`.
+
+    Asked ahead of the removal, so that more may be there than when the step comes, never less.
+    """
+    if not ranges:
+        return {}
+    of = list(ranges)
+    counts = [len(layers) for layers in ranges.values()]
+    step, layer = np.repeat(of, counts), np.concatenate([np.array(r) for r in ranges.values()])
+    a, b = low[step, :2], high[step, :2]
+    boxes = shapely.box(a[:, 0], a[:, 1], b[:, 0], b[:, 1])
+    i0, j0 = np.searchsorted(stock.xs, a[:, 0], "right"), np.searchsorted(stock.ys, a[:, 1], "right")
+    i1, j1 = np.searchsorted(stock.xs, b[:, 0], "left"), np.searchsorted(stock.ys, b[:, 1], "left")
+    i0, j0 = np.maximum(i0 - 1, 0), np.maximum(j0 - 1, 0)
+    i1, j1 = np.minimum(i1, len(stock.xs) - 1), np.minimum(j1, len(stock.ys) - 1)
+    left = np.zeros(len(step), dtype=np.bool_)
+    for dj in range(int((j1 - j0).max(initial=0))):
+        for di in range(int((i1 - i0).max(initial=0))):
+            ask = np.flatnonzero(~left & (j0 + dj < j1) & (i0 + di < i1))
+            left[ask] = shapely.intersects(boxes[ask], stock.tiles[layer[ask], j0[ask] + dj, i0[ask] + di])
+    out = dict(zip(of, np.split(left, np.cumsum(counts)[:-1]), strict=True))
+    for tool in np.unique(steps.tool[of]).tolist():
+        lean = [k for k in of if steps.tool[k] == tool and out[k].any() and min(steps.a0[k, 2], steps.a1[k, 2]) < 1.0]
+        asked = [np.array(ranges[k])[out[k]] for k in lean]
+        for k, met in zip(lean, reached(steps, lean, asked, cutters[tool], stock), strict=True):
+            out[k] = np.isin(ranges[k], met)
+    return out
+
+
 def _covered(
-    steps: Steps, own: Mapping[int, tuple[Move, range]], cutter: Cutter, stock: LayeredStock, tolerance: float
+    steps: Steps, own: Mapping[int, Met], cutter: Cutter, stock: LayeredStock, tolerance: float
 ) -> list[list[tuple[int, Polygon | MultiPolygon]]]:
     """What steps cover of each layer that they meet; layers that an upright flank crosses share one polygon."""
     heights = stock.heights
     asked: list[Floats] = []
-    of: list[NDArray[np.int64]] = []
-    near = _near(steps, own, cutter, stock)
-    for k, layers in near.items():
-        z = heights[layers]
-        rows = np.arange(len(z))
+    of: list[Ints] = []
+    for k, (_, layers, left) in own.items():
+        z = heights[layers.start : layers.stop]
         flank = _flank(steps, k, cutter, z)
-        if flank.any():
-            # the last one asked for stands for all that the flank crosses
-            shared = int(np.flatnonzero(~flank).size)
-            asked.append(np.append(z[~flank], z[flank][0]))
-            rows[~flank], rows[flank] = np.arange(shared), shared
-        else:
-            asked.append(z)
-        of.append(rows)
-    shapes = covered_polygons([move for move, _ in own.values()], cutter, asked, tolerance)
+        alone = left & ~flank
+        asked.append(z[alone])
+        rows = np.cumsum(alone) - 1
+        if (left & flank).any():
+            # the last one asked for stands for all that the flank crosses; which are left does not choose its height
+            asked[-1] = np.append(asked[-1], z[flank][0])
+            rows[flank] = len(asked[-1]) - 1
+        of.append(np.where(left, rows, -1))
+    shapes = covered_polygons([move for move, _, _ in own.values()], cutter, asked, tolerance)
     return [
-        [(i, shape) for i, n in zip(layers.tolist(), rows.tolist(), strict=True) if (shape := found[n]) is not None]
-        for layers, rows, found in zip(near.values(), of, shapes, strict=True)
+        [(i, shape) for i, n in zip(layers, rows.tolist(), strict=True) if n >= 0 and (shape := found[n]) is not None]
+        for (_, layers, _), rows, found in zip(own.values(), of, shapes, strict=True)
     ]
-
-
-def _near(
-    steps: Steps, own: Mapping[int, tuple[Move, range]], cutter: Cutter, stock: LayeredStock
-) -> dict[int, NDArray[np.int64]]:
-    """Layers that steps may take anything from; of upright cutters, whose layers cost little, all that they reach."""
-    out = {k: np.arange(layers.start, layers.stop) for k, (_, layers) in own.items()}
-    leaning = [k for k in own if min(steps.a0[k, 2], steps.a1[k, 2]) < 1.0]
-    return out | dict(zip(leaning, reached(steps, leaning, [out[k] for k in leaning], cutter, stock), strict=True))
 
 
 def _flank(steps: Steps, k: int, cutter: Cutter, heights: Floats) -> NDArray[np.bool_]:

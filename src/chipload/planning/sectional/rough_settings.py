@@ -77,6 +77,10 @@ class Roughed:
         program = program_of(way.moves, self.spindle, self.tool)
         return replace(self, tracks=tracks, linked=way, program=program, stopped=(*self.stopped, *out))
 
+    def numbered(self, tool: int) -> Roughed:
+        """The same with another tool number."""
+        return replace(self, tool=tool, program=program_of(self.linked.moves, self.spindle, tool))
+
     @property
     def milled(self) -> tuple[Track, ...]:
         """The rows that are in the moves."""

@@ -28,7 +28,6 @@ def program_sections(milled: Milled, figures: dict[str, go.Figure]) -> list[str]
         return ["<h2>Programs</h2>", "<p>The job asks for none: state [operation.paths].</p>"]
     head = [
         "",
-        "cutter and table",
         "program",
         "rows",
         "path [mm]",
@@ -40,7 +39,7 @@ def program_sections(milled: Milled, figures: dict[str, go.Figure]) -> list[str]
     head += ["links direct + over", "check"]
     rows = [
         [
-            str(k), escape(p.name), f"<code>{escape(program_name(milled, k))}</code>", str(len(p.setting.program)),
+            str(k), f"<code>{escape(program_name(milled, k))}</code>", str(len(p.setting.program)),
             f"{p.setting.length:.1f}", f"{p.seconds / 60.0:.2f}", f"{p.gouge:.4f}",
             f"{p.missed:.1f}", str(sum(len(r.tracks) for r in p.setting.rests)),
             f"{p.setting.linked.direct} + {p.setting.linked.retracts}",
@@ -83,7 +82,7 @@ def program_sections(milled: Milled, figures: dict[str, go.Figure]) -> list[str]
         "surfaces and uses nothing of the planner. "
         + ("" if milled.roughs is not None else "They finish: roughing is not asked for.")
         + "</p>",
-        table(head, rows, numbers=(3, 4, 5, 6, 7, 8, 9)),
+        table(head, rows, numbers=(2, 3, 4, 5, 6, 7, 8)),
         table(scallop, patches, numbers=(0, 2, 3, 4, 5, 6, 7, 8)),
         figure("paths", paths_figure(milled), figures),
         "<h2>What all programs leave</h2>",

@@ -108,18 +108,17 @@ def rough_sections(roughs: tuple[CheckedRough, ...] | None, names: list[str]) ->
     """The part of the page about roughing; none where the job asks for none."""
     if roughs is None:
         return []
-    head = ["", "cutter and table", "program", "layers", "rows", "path [mm]", "time [min]", "taken [cm3]"]
-    head += ["left on blades, hub [mm]", "gouge [mm]", "rapids take, above takes [mm3]", "missed [mm]", "check"]
+    head = ["program", "layers", "rows", "path [mm]", "time [min]", "taken [cm3]", "left on blades, hub [mm]"]
+    head += ["gouge [mm]", "rapids, above take [mm3]", "missed [mm]", "check"]
     rows = []
-    for k, (r, name) in enumerate(zip(roughs, names, strict=True), 1):
+    for r, name in zip(roughs, names, strict=True):
         v = r.values()
         stands = ", ".join("-" if x is None else f"{x:.2f}" for x in r.stands)
         rows.append(
             [
-                str(k), escape(r.name), f"<code>{escape(name)}</code>", str(v["layers"]), str(v["rows"]),
-                f"{v['path_mm']:.0f}", f"{v['time_min']:.2f}", f"{v['taken_mm3'] / 1e3:.2f}", stands,
-                f"{v['gouge_mm']:.3f}", f"{v['rapids_take_mm3']:.2f}, {v['above_takes_mm3']:.2f}",
-                f"{v['missed_mm']:.0f}",
+                f"<code>{escape(name)}</code>", str(v["layers"]), str(v["rows"]), f"{v['path_mm']:.0f}",
+                f"{v['time_min']:.2f}", f"{v['taken_mm3'] / 1e3:.2f}", stands, f"{v['gouge_mm']:.3f}",
+                f"{v['rapids_take_mm3']:.2f}, {v['above_takes_mm3']:.2f}", f"{v['missed_mm']:.0f}",
                 '<span class="ok">verified</span>' if r.verified else '<span class="no">not verified</span>',
             ]
         )  # fmt: skip
@@ -128,5 +127,5 @@ def rough_sections(roughs: tuple[CheckedRough, ...] | None, names: list[str]) ->
         '<p class="note">Rows in layers from the shroud down to the hub, each from outside inwards. The blank is a '
         "body of revolution that stands over the shroud, its neighbour channels uncut; what every part of the tool "
         "takes of it is counted row by row, program after program.</p>",
-        table(head, rows, numbers=(3, 4, 5, 6, 7, 8, 9, 10, 11)),
+        table(head, rows, numbers=(1, 2, 3, 4, 5, 6, 7, 8, 9)),
     ]
