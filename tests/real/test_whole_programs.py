@@ -17,6 +17,7 @@ import math
 import os
 import re
 from pathlib import Path
+from typing import Any
 
 import manifold3d
 import numpy as np
@@ -71,13 +72,15 @@ LOW, HIGH = [-50.0, -27.0, -13.25], [47.0, 23.0, 0.5]
 MILL = Cutter(10.0, 3, math.radians(30.0), 30.0, 45.0, 580e3)
 
 
-def run(folder: Path, layer: float, **said: object) -> dict:
+def run(folder: Path, layer: float, **said: Any) -> dict:
     """The summary's operation of a job, by the command line."""
     (folder / "job.toml").write_text(JOB.format(layer=layer, **said))
     done = CliRunner().invoke(app, ["run", str(folder / "job.toml"), "--out", str(folder / "result")])
     assert done.exit_code == 0, done.stderr
     (op,) = json.loads((folder / "result" / "summary.json").read_bytes())["operations"]
     table = pq.read_table(folder / "result" / "history.parquet").to_pydict()
+    # the CL data name the cutter, so that the page can draw it
+    assert re.search(rf"^CUTTER/{said['cutter'].diameter:g}\b", (folder / "result" / "0-program.apt").read_text(), re.M)
     # what the steps took is what the stock lost, and the last line that moves is reached
     assert math.fsum(table["chip_volume_mm3"]) == pytest.approx(op["removed_mm3"], rel=1e-9)
     last = np.array([table[f"{x}_mm"][-1] for x in "xyz"])

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
 from typing import IO, Any
@@ -21,6 +21,7 @@ import pyarrow.parquet as pq
 import trimesh
 from numpy.typing import NDArray
 
+from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding
 from chipload.machine.machine import Machine
 from chipload.program.apt.writer import write_apt
@@ -62,6 +63,7 @@ class Read:
     provenance : JSON values: hashes of the inputs, versions
     simulated : what the program does to its stock; None: it was only read
     fed : how it came to its feeds where they are new; None: they are those of the file
+    cutters : by tool number; empty: not known
     """
 
     title: str
@@ -73,6 +75,7 @@ class Read:
     provenance: Mapping[str, Any]
     simulated: Simulated | None = None
     fed: Fed | None = None
+    cutters: Mapping[int, Cutter] = field(default_factory=dict)
 
 
 def verdict(read: Read) -> tuple[bool, str]:
@@ -171,21 +174,24 @@ def feeds_name(read: Read) -> str:
 
 
 def history(read: Read) -> dict[str, Any]:
-    """A row a motion of the tip, columns by name."""
+    """A row a motion of the tip, or a chord of an arc, columns by name."""
     program = read.reading.program
+    chords = _chords(program)
+    row = np.asarray(_chords(replace(program, line=np.arange(len(program)))).line)
+    share = 1.0 / np.bincount(row, minlength=len(program))[row]
     names = np.array([label or "program" for label in program.labels], dtype=object)
-    axis = {f"axis_{x}": program.axis[:, k] for k, x in enumerate("xyz")}
+    axis = {f"axis_{x}": chords.axis[:, k] for k, x in enumerate("xyz")}
     return {
-        "pass": names[program.label],
-        "line": program.line,
-        "motion": np.array(MOTIONS, dtype=object)[program.motion],
-        **{f"{x}_mm": program.p_work[:, k] for k, x in enumerate("xyz")},
+        "pass": names[chords.label],
+        "line": chords.line,
+        "motion": np.array(MOTIONS, dtype=object)[program.motion[row]],
+        **{f"{x}_mm": chords.p_work[:, k] for k, x in enumerate("xyz")},
         **axis,
-        "s_mm": np.cumsum(lengths(program)),
-        "t_s": np.cumsum(row_times(read)),
-        "feed_mm_min": np.where(program.motion == DWELL, 0.0, mm_min_from_mm_s(1.0) * program.feed),
-        "spindle_rpm": rpm_from_rad_s(1.0) * program.spindle,
-        "tool": program.tool,
+        "s_mm": np.cumsum(lengths(program)[row] * share),
+        "t_s": np.cumsum(row_times(read)[row] * share),
+        "feed_mm_min": np.where(program.motion == DWELL, 0.0, mm_min_from_mm_s(1.0) * program.feed)[row],
+        "spindle_rpm": rpm_from_rad_s(1.0) * chords.spindle,
+        "tool": chords.tool,
     }
 
 
@@ -259,7 +265,10 @@ def scene_bytes(read: Read) -> bytes:
 
 def program_files(read: Read) -> dict[str, bytes]:
     """CL data of the program, the stock that it leaves, and its own text where feeds are new."""
-    text = write_apt(read.reading.program, None, title=f"{read.title}, {read.name}", verified=False)
+    program = read.reading.program
+    tools = set(np.unique(program.tool).tolist())
+    known = read.cutters if tools - {0} <= set(read.cutters) else None
+    text = write_apt(program, known, title=f"{read.title}, {read.name}", verified=False)
     files = {"0-program.apt": text.encode("ascii")}
     if read.fed is not None:
         holds, says = verdict(read)

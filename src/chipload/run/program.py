@@ -118,7 +118,10 @@ def run_program(
         **({"material": material_provenance(simulated.material)} if simulated is not None else {}),
         "versions": versions(),
     }
-    return Read(title_of(job.path), job.program_file.name, reading, lines, seconds, machine, provenance, simulated, fed)
+    name = job.program_file.name
+    return Read(
+        title_of(job.path), name, reading, lines, seconds, machine, provenance, simulated, fed, job.cutters
+    )  # fmt: skip
 
 
 def look_at_program(job: ProgramJob) -> tuple[list[str], bool]:
@@ -148,7 +151,10 @@ def simulate_read(
         stock = _stock(job, reading.program)
     lines, seconds = line_times(reading, machine)
     done = _simulated(job, reading.program, stock, machine, material, None, progress)
-    return Read(title_of(job.path), job.program_file.name, reading, lines, seconds, machine, provenance, done)
+    name = job.program_file.name
+    return Read(
+        title_of(job.path), name, reading, lines, seconds, machine, provenance, done, cutters=job.cutters
+    )  # fmt: skip
 
 
 def _fed(
