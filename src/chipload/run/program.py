@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import shapely
-import trimesh
 from numpy.typing import NDArray
 
-from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named, read_material
-from chipload.errors import InputError
-from chipload.geometry.mesh import read_mesh
 from chipload.job import ProgramJob
 from chipload.job.tables import LOADS, SimulateTable
 from chipload.machine.machine import Machine, machine_named, read_machine
-from chipload.program.motions import lengths
 from chipload.program.program import RAPID, Program
 from chipload.program.read import Reading, line_times, read_program, read_tools
 from chipload.progress import Progress, silent
@@ -28,6 +21,7 @@ from chipload.report.feeds import Fed
 from chipload.report.held import spindle_limits
 from chipload.report.reading import Read, verdict
 from chipload.report.simulated import Simulated
+from chipload.run.bodies import fixture_points, insides, part_body, stock_body, stock_points
 from chipload.run.feeds import Asked, changeable, read_as, straight, watching, with_new_feeds
 from chipload.run.formed import forming
 from chipload.run.provenance import hashes, sources, title_of, versions
@@ -36,17 +30,13 @@ from chipload.simulation.chips import Resolution, counted, remove
 from chipload.simulation.loads import Cuts
 from chipload.simulation.pieces import remove_in_pieces
 from chipload.simulation.steps import StepBlocks, steps_of
-from chipload.simulation.surface import MOST_POINTS, collisions, difference, fine, in_stock
+from chipload.simulation.surface import collisions, difference, in_stock
 from chipload.simulation.unfinished import Unfinished
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min
 
-#: side of a tile of the stock in diameters of the largest cutter
-TILE = 4.0
 #: of a simulation, what one pass over its steps beside the removal takes
 SHARE = 0.2 / 3.0
-#: layers where no cutter comes are so many times as thick
-COARSE = 4.0
 
 
 def run_program(
@@ -85,7 +75,7 @@ def run_program(
     lines, seconds = line_times(reading, machine)
     simulated, fed = None, None
     if job.simulates:
-        stock, material, begin = _stock(job, reading.program), _material(job), share
+        stock, material, begin = stock_body(job, reading.program), _material(job), share
         wants_feeds = job.table.operation[0].feeds is not None
         if wants_feeds:
             own = changeable(job.program_file, machine, table.dialect)
@@ -97,7 +87,7 @@ def run_program(
                     lambda done, what: progress(share + (begin - share) * done, what),
                 )  # fmt: skip
                 lines, seconds = line_times(reading, machine)
-                stock = _stock(job, reading.program)
+                stock = stock_body(job, reading.program)
         if simulate:
             simulated = _simulated(
                 job, reading.program, stock, machine, material, unfinished,
@@ -148,7 +138,7 @@ def simulate_read(
     stock : which changes; None: that of the job
     """
     if stock is None:
-        stock = _stock(job, reading.program)
+        stock = stock_body(job, reading.program)
     lines, seconds = line_times(reading, machine)
     done = _simulated(job, reading.program, stock, machine, material, None, progress)
     name = job.program_file.name
@@ -210,8 +200,8 @@ def _simulated(
     op: SimulateTable = job.table.operation[0]
     program = _with_tool(program, job)
     fine = _resolution(job)
-    points = _grid(stock, op.stock_points_mm) if op.stock_points_mm is not None else None
-    part, fixtures, before = _part(job), _fixtures(job), _insides(stock)
+    points = stock_points(stock, op.stock_points_mm) if op.stock_points_mm is not None else None
+    part, fixtures, before = part_body(job), fixture_points(job), insides(stock)
     stiffness = job.table.stiffness
     gives = stiffness_of(stiffness, job.cutters)
     watches = [deflecting(gives, material)]
@@ -268,51 +258,6 @@ def _simulated(
     )  # fmt: skip
 
 
-def _part(job: ProgramJob) -> trimesh.Trimesh | None:
-    """The part that should come out."""
-    table = job.table.part
-    if table is None or "part" in job.meshes:
-        return job.meshes.get("part")
-    return read_mesh(job.path.parent / table.file, unit=table.units, chord_mm=table.chord_mm, key="part.file")
-
-
-def _fixtures(job: ProgramJob) -> dict[str, NDArray[np.float64]]:
-    """Points of the fixtures by name."""
-    out = {}
-    for k, table in enumerate(job.table.fixture):
-        path, key = job.path.parent / table.file, f"fixture.{k}.file"
-        mesh = job.meshes.get(f"fixture {k}")
-        if mesh is None:
-            mesh = read_mesh(path, unit=table.units, chord_mm=table.chord_mm, key=key)
-        out[f"fixture {k}"] = fine(mesh, table.spacing_mm, f"fixture.{k}")[0]
-    return out
-
-
-def _grid(stock: LayeredStock, pitch: float) -> NDArray[np.float64]:
-    """Points [mm] of a grid that lie in the stock."""
-    low, high = (np.array([stock.xs[i], stock.ys[i], stock.bounds[i]]) for i in (0, -1))
-    x, y, z = (np.arange(a + 0.5 * pitch, b, pitch) for a, b in zip(low, high, strict=True))
-    if len(x) * len(y) * len(z) > MOST_POINTS:
-        raise InputError(f"operation.0.stock_points_mm = {pitch:g}: more than {MOST_POINTS} points: state a larger one")
-    grid = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
-    return grid[_insides(stock)(grid)]
-
-
-def _insides(stock: LayeredStock) -> Callable[[NDArray[np.float64]], NDArray[np.bool_]]:
-    """Which points [mm] lie in the stock as it is now."""
-    bounds, sections = np.asarray(stock.bounds), [stock.section(i) for i in range(stock.layers)]
-
-    def inside(points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        layer = np.searchsorted(bounds, points[:, 2], side="right") - 1
-        out = np.zeros(len(points), dtype=np.bool_)
-        for i in np.unique(layer[(layer >= 0) & (layer < len(sections))]).tolist():
-            own = layer == i
-            out[own] = shapely.contains_xy(sections[i], points[own, 0], points[own, 1])
-        return out
-
-    return inside
-
-
 def _no_holder(job: ProgramJob) -> tuple[int, ...]:
     """Tools whose holder is not stated."""
     return tuple(n for n, c in sorted(job.cutters.items()) if not c.holder)
@@ -322,42 +267,6 @@ def _material(job: ProgramJob) -> Material:
     """The coefficients that the job names."""
     assert job.material is not None
     return material_named(job.material) if isinstance(job.material, str) else read_material(job.material)
-
-
-def _stock(job: ProgramJob, program: Program) -> LayeredStock:
-    """The stock that the job names: its layers as thin as stated where the cutters come, and some times as thick
-    elsewhere; they end where an upright cutter stands while it cuts level.
-    """
-    table, folder = job.table.stock, job.path.parent
-    assert table is not None
-    mesh = job.meshes.get("stock")
-    if mesh is None and table.file is not None and table.file.lower().endswith(".npz"):
-        return LayeredStock.load(folder / table.file)
-    assert table.layer_mm is not None
-    tile = TILE * max(c.diameter for c in job.cutters.values())
-    if mesh is None and table.file is None:
-        assert table.low_mm is not None
-        assert table.high_mm is not None
-        stock = LayeredStock.block(table.low_mm, table.high_mm, COARSE * table.layer_mm, tile)
-    else:
-        if mesh is None:
-            mesh = read_mesh(folder / str(table.file), unit=table.units, chord_mm=table.chord_mm)
-        stock = LayeredStock.of_mesh(mesh, COARSE * table.layer_mm, tile)
-    top = float(stock.bounds[-1])
-    stock.refine(min(_lowest(program, job.cutters), top), top, table.layer_mm)
-    stock.refine_at(_levels(program, job.cutters, table.layer_mm))
-    return stock
-
-
-def _lowest(program: Program, cutters: Mapping[int, Cutter]) -> float:
-    """A height [mm] that no cutter comes below at a feed."""
-    feeds = np.flatnonzero(program.motion != RAPID)
-    if len(feeds) == 0:
-        return math.inf
-    rows = np.unique(np.concatenate([feeds, np.maximum(feeds - 1, 0)]))
-    widest = max(max(c.radius, float(c.radius_at([c.flute_length])[0])) for c in cutters.values())
-    lean = np.sqrt(np.clip(1.0 - np.asarray(program.axis)[rows, 2] ** 2, 0.0, None))
-    return float((np.asarray(program.p_work)[rows, 2] - widest * lean).min())
 
 
 def _with_tool(program: Program, job: ProgramJob) -> Program:
@@ -372,26 +281,6 @@ def _with_tool(program: Program, job: ProgramJob) -> Program:
         return program
     kept = {f.name: getattr(program, f.name)[first - 1 :] for f in fields(program) if f.name != "labels"}
     return replace(program, **kept)
-
-
-def _levels(program: Program, cutters: Mapping[int, Cutter], apart: float) -> NDArray[np.float64]:
-    """Heights [mm] at which an upright cutter moves level at a feed.
-
-    A cutter that ends in a point leaves a floor only where it goes to and fro for long: of its heights those on which
-    its way is longest, none nearer to another than ``apart`` [mm].
-    """
-    p = np.asarray(program.p_work)
-    level = (np.abs(np.diff(p[:, 2], prepend=p[:1, 2])) < 1e-9) & (program.motion != RAPID)
-    upright = np.asarray(program.axis)[:, 2] > 1.0 - 1e-12
-    flat = np.isin(program.tool, [n for n, c in cutters.items() if c.bottom == 0.0 and c.apt[2] > 0.0])
-    kept = np.unique(p[level & upright & flat, 2].round(9))
-    pointed = level & upright & ~flat
-    heights, at = np.unique(p[pointed, 2].round(9), return_inverse=True)
-    way = np.bincount(at.ravel(), lengths(program)[pointed], minlength=len(heights))
-    for z in heights[np.argsort(-way, kind="stable")].tolist():
-        if np.abs(kept - z).min(initial=math.inf) >= apart:
-            kept = np.append(kept, z)
-    return np.sort(kept)
 
 
 def material_provenance(material: Material) -> dict[str, str]:
