@@ -37,7 +37,8 @@ def sets(*texts):
 def without_programs(folder):
     """The example, with nothing of programs."""
     text = (EXAMPLES / "impeller" / "job.toml").read_text()
-    path = folder / "job.toml"
+    path = folder / "impeller" / "job.toml"
+    path.parent.mkdir()
     path.write_text(text[: text.index("[operation.rough]")])
     return path
 
