@@ -108,8 +108,8 @@ def rough_sections(roughs: tuple[CheckedRough, ...] | None, names: list[str]) ->
     """The part of the page about roughing; none where the job asks for none."""
     if roughs is None:
         return []
-    head = ["program", "layers", "rows", "path [mm]", "time [min]", "taken [cm3]", "left on blades, hub [mm]"]
-    head += ["gouge [mm]", "rapids, above take [mm3]", "missed [mm]", "check"]
+    head = ["program", "layers", "rows", "path [mm]", "time [min]", "taken [cm3]", "left [mm]"]
+    head += ["gouge [mm]", "not by cutting [mm3]", "missed [mm]", "check"]
     rows = []
     for r, name in zip(roughs, names, strict=True):
         v = r.values()
@@ -126,6 +126,7 @@ def rough_sections(roughs: tuple[CheckedRough, ...] | None, names: list[str]) ->
         "<h2>Roughing</h2>",
         '<p class="note">Rows in layers from the shroud down to the hub, each from outside inwards. The blank is a '
         "body of revolution that stands over the shroud, its neighbour channels uncut; what every part of the tool "
-        "takes of it is counted row by row, program after program.</p>",
+        "takes of it is counted row by row, program after program: not by cutting is what rapids, and what neck, shank "
+        "and holder take at most in a row. Left is the least on the blades, and on the hub.</p>",
         table(head, rows, numbers=(1, 2, 3, 4, 5, 6, 7, 8, 9)),
     ]
