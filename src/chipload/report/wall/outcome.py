@@ -266,7 +266,8 @@ def verdict(walled: Walled) -> tuple[bool, str]:
         beside += " a constant depth, which does not hold: "
         beside += f"{len(v.maps)} instead of {len(c.maps)} passes"
     else:
-        beside += f" a constant depth under the same limit ({len(v.maps)} instead of {len(c.maps)} passes)"
+        passes = f"{len(v.maps)} instead of {len(c.maps)} passes" if len(v.maps) != len(c.maps) else "as many passes"
+        beside += f" a constant depth under the same limit ({passes})"
     if v.deflection > c.deflection * (1.0 + 1e-6):
         beside += f", which bends the wall by {1e3 * c.deflection:.4g} um"
     return True, (
