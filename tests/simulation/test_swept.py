@@ -22,7 +22,7 @@ ROUGH = Resolution(step_mm=2.0, tolerance=0.01, corner_pieces=4, flank_mm=2.0, r
 
 
 def leaning(turn: float) -> Program:
-    """A flute along a wall, twice, that it meets with its upper half; its axis turns by up to ``turn`` [rad] from point to point."""
+    """A flute along a wall that it meets with its upper half, twice; its axis turns by up to ``turn`` [rad] a row."""
     rng = np.random.default_rng(8)
     x = np.tile(np.linspace(-4.0, 34.0, 14), 2)
     p = np.column_stack([x, np.repeat([-6.5, -7.0], 14), -12.0 + 2.0 * np.sin(x)])
