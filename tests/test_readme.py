@@ -5,17 +5,25 @@ import io
 import re
 from pathlib import Path
 
+from chipload import examples
+
 README = (Path(__file__).parent.parent / "README.md").read_text()
 
 
-def test_example():
-    (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-    assert len(code.strip().splitlines()) <= 16
-    shown = code.strip().rsplit("# ", 1)[1]
-    out = io.StringIO()
-    with contextlib.redirect_stdout(out):
-        exec(compile(code, "README.md", "exec"), {})
-    assert out.getvalue().strip() == shown
+def test_examples(tmp_path, monkeypatch):
+    """One after the other, as in one notebook."""
+    examples.copy_example("notebooks", tmp_path / "my-notebooks")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    blocks = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    assert len(blocks) == 2
+    for code in blocks:
+        assert len(code.strip().splitlines()) <= 16
+        shown = code.strip().rsplit("# ", 1)[1]
+        out = io.StringIO()
+        with contextlib.redirect_stdout(out):
+            exec(compile(code, "README.md", "exec"), names)
+        assert out.getvalue().strip() == shown
 
 
 def test_files_of_the_table_exist():

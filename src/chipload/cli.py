@@ -121,7 +121,10 @@ def run(
 
 @app.command()
 def check(
-    file: Annotated[Path, typer.Argument(metavar="JOB|PROGRAM", help="a job (TOML) or a program (NC text, CL data)")],
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="JOB|PROGRAM|MODEL", help="a job (TOML), a program (NC text, CL data) or a STEP file"),
+    ],
     machine: MachineName = None,
     tools: Tools = None,
     dialect: DialectName = None,
@@ -130,9 +133,11 @@ def check(
     sets: Sets = None,
     debug: Debug = False,
 ) -> None:
-    """Read a job and every file that it names, or a program as its controller does; write nothing."""
+    """Read a job and all that it names, a program as its controller does, or list a model's faces; write nothing."""
 
     def work() -> int:
+        if file.suffix.lower() in (".step", ".stp"):
+            return _check_model(file)
         if file.suffix.lower() != ".toml":
             if sets:
                 raise InputError("--set: belongs to a job: leave it out for a program")
@@ -373,6 +378,15 @@ def _check_job(job: Path, sets: Sequence[str]) -> int:
     for text in lines:
         typer.echo(text)
     return 0 if holds else EXCEEDED
+
+
+def _check_model(model: Path) -> int:
+    """List the faces of a STEP file, as jobs name them."""
+    from chipload.geometry.step_faces import read_faces
+
+    for text in read_faces(model, "model").lines():
+        typer.echo(text)
+    return 0
 
 
 def _check_program(

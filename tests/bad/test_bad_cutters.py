@@ -37,7 +37,7 @@ NEVER = "must be given, a cutter is never guessed"
         ({"diameter_mm": -10.0}, "cutter.diameter_mm = -10: must be above 0"),
         ({"flutes": 2.5}, "cutter.flutes = 2.5: must be a whole number"),
         ({"flutes": 0}, "cutter.flutes = 0: must be at least 1"),
-        ({"number": 0}, "cutter.number = 0: must be at least 1"),
+        ({"number": -1}, "cutter.number = -1: must be at least 0"),
         ({"name": 5}, "cutter.name = 5: must be a text"),
         ({"helix_deg": 80.0}, "cutter.helix_deg = 80: must be from 0 to below 80"),
         ({"overhang_mm": 20.0}, "cutter.overhang_mm = 20: must be at least flute_length_mm = 22"),

@@ -1,7 +1,6 @@
 """Drawings that must be refused, each with its exact message."""
 
 import re
-import time
 
 import ezdxf
 import pytest
@@ -66,7 +65,7 @@ def test_binary_dxf_with_rubbish_in_it(tmp_path):
         read_dxf(path)
 
 
-def test_a_million_lines_are_refused_in_seconds(tmp_path):
+def test_a_million_lines_are_refused(tmp_path):
     path = tmp_path / "huge.dxf"
     one = "\n".join(line_of("1.0")) + "\n"
     with path.open("w") as stream:
@@ -74,12 +73,10 @@ def test_a_million_lines_are_refused_in_seconds(tmp_path):
         for _ in range(100):
             stream.write(one * 10_000)
         stream.write("0\nENDSEC\n0\nEOF\n")
-    start = time.perf_counter()
     assert_refused(
         path,
         "part.file = huge.dxf: 1000000 entities: must be at most 200000; keep only the part there",
     )
-    assert time.perf_counter() - start < 8.0
 
 
 def test_too_many_by_blocks_in_blocks(drawn):

@@ -92,13 +92,6 @@ def test_a_file_that_is_missing(hecc):
     assert refused(hecc) == "hub.txt: cannot be read: No such file or directory"
 
 
-def test_faces_of_a_model(hecc):
-    changed(hecc, '"main_01.txt"', '"blade.stp"')
-    assert refused(hecc) == (
-        "job.toml: impeller.sections: blade.stp: blade faces are not read from STEP: write sections as points, X Y Z"
-    )
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -135,7 +128,7 @@ def test_neither_shape_nor_sections(formula):
     text = formula.read_text()
     formula.write_text(text[: text.index("[impeller.shape]")] + text[text.index("[catalogue]") :])
     assert refused(formula) == (
-        "job.toml: impeller: neither is stated: state either [impeller.shape] or [impeller.sections]"
+        "job.toml: impeller: none is stated: state one of [impeller.shape], [impeller.sections], [impeller.step]"
     )
 
 
@@ -160,4 +153,27 @@ def test_a_cutter_picked_by_hand_that_is_not_in_the_catalogue(formula):
     changed(formula, "diameter_mm = 14.0, corner_radius_mm = 1.5", "diameter_mm = 15.0, corner_radius_mm = 1.5")
     assert refused(formula) == (
         "operation.0.hand_picked: D 15 r 1.5 mm is not in catalogue wu2019: the nearest is D 14 r 1.5 mm"
+    )
+
+
+@pytest.mark.parametrize(
+    ("fillet", "message"),
+    [
+        ("17.0", "impeller.fillet_mm = 17: larger than half of the channel: two fillets overlap by 0.4496 mm on the "
+         "hub: state a smaller one"),
+        ("30.0", "impeller.fillet_mm = 30: blade plus: a ball of 30 mm reaches above the side at u = 0.213: state "
+         "a smaller one"),
+        ("0.0", "job.toml: impeller.fillet_mm = 0: must be above 0 (fillets between sides and hub, which meet without "
+         "them; sides begin above theirs)"),
+    ],
+)  # fmt: skip
+def test_fillets_that_do_not_fit(formula, fillet, message):
+    changed(formula, "outer_diameter_mm = 223.0", f"outer_diameter_mm = 223.0\nfillet_mm = {fillet}")
+    assert refused(formula) == message
+
+
+def test_a_fillet_that_is_milled_but_not_stated(formula):
+    changed(formula, 'side = "minus"', 'side = "minus fillet"')
+    assert refused(formula) == (
+        "job.toml: surface.1.side = 'minus fillet': the impeller has no fillets: state impeller.fillet_mm"
     )

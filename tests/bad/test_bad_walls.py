@@ -6,8 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from chipload.cli import app
 from chipload.errors import InputError
+from chipload.examples import copy_example
 from chipload.planning.thinwall.table import read_cuts
 from chipload.planning.thinwall.threshold import Experiments, calibrated, modelled
 from chipload.planning.thinwall.wall import Wall
@@ -127,3 +130,95 @@ def test_experiments_on_a_line() -> None:
 
 def test_a_compliance_of_nothing() -> None:
     assert said(lambda: modelled([0.0], 0.05)) == ("threshold: the normal compliance of a place is not above 0 mm/N")
+
+
+def run(job: Path, *changes: str) -> str:
+    """What ``chipload run`` says of a job that it refuses with code 2."""
+    words = [w for change in changes for w in ("--set", change)]
+    done = CliRunner().invoke(app, ["run", str(job), "--out", str(job.parent / "result"), *words])
+    assert done.exit_code == 2, done.output
+    assert not (job.parent / "result").exists()
+    return done.stderr.strip().splitlines()[-1]
+
+
+@pytest.fixture
+def plate_job(tmp_path: Path) -> Path:
+    return copy_example("plate", tmp_path / "plate") / "job.toml"
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (
+            "wall.thickness_mm=0.3",
+            "chipload: wall: 0.3 mm thick where it is thinnest, thinner than a cut of 0.4 mm: state less "
+            "operation.0.depth_max_mm, or a thicker wall",
+        ),
+        (
+            "workpiece.modulus_gpa=113800.0",
+            "chipload: job.toml: workpiece.modulus_gpa = 113800: must be from 1 to 1000 GPa; is it in MPa or Pa?",
+        ),
+        (
+            "wall.allowance_mm=[0.0, 0.0]",
+            "chipload: wall.allowance_mm = [0.0, 0.0], density = 1: must be at least 0, above 0 on one side, and at "
+            "least 1: state stock to cut",
+        ),
+    ],
+)
+def test_a_run_refuses_a_wall(plate_job: Path, change: str, says: str) -> None:
+    assert run(plate_job, change).startswith(says)
+
+
+def test_a_run_refuses_a_table_with_one_place(plate_job: Path) -> None:
+    (plate_job.parent / "cuts.csv").write_text(
+        "u,v,repeat,expected_normal_force_n,normal_force_n,deflection_um,too_much\n0,1,1,20,21,40,\n"
+    )
+    plate_job.write_text(plate_job.read_text() + '\n[threshold]\nfile = "cuts.csv"\ndeviations = 2.0\n')
+    assert run(plate_job) == (
+        "chipload: experiments cuts.csv: 1 places filled in: must be at least 3, not on a line: fill in deflection_um, "
+        "or too_much with yes or no, of more cuts"
+    )
+
+
+SECTIONS = """[wall]
+shape = "sections"
+files = ["a.curve"]
+unit = "mm"
+edge_share = %s
+foot_mm = 5.0
+allowance_mm = %s
+elements = [6, 6]
+
+"""
+
+
+def with_sections(job: Path, heights, edge: float, allowance) -> None:
+    """A job of slender sections stacked on the axis of rotation: where that passes through them, theta turns round."""
+    t = np.linspace(0.0, 2.0 * np.pi, 81)
+    x, y = 10.0 * np.cos(t), 1.5 * np.sin(t) * np.abs(np.sin(t)) ** 0.2
+    lines = []
+    for k, z in enumerate(heights):
+        lines += [f"# Profile {k + 1}", *(f"{a:.6f} {b:.6f} {z:.6f}" for a, b in zip(x, y, strict=True))]
+    (job.parent / "a.curve").write_text("\n".join(lines) + "\n")
+    text = job.read_text()
+    job.write_text(SECTIONS % (edge, list(allowance)) + text[text.index("[workpiece]") :])
+
+
+@pytest.mark.parametrize(
+    ("heights", "edge", "allowance", "says"),
+    [
+        ((40.0, 50.0, 60.0), 0.1, (0.4, 0.4), "chipload: element 0: det(dx/dxi) = -1.00107 mm^3: must be above 0"),
+        ((40.0, 60.0, 50.0), 0.1, (0.4, 0.4), "chipload: section 2: out of order: lies not between sections 1 and 3"),
+        ((40.0, 50.0, 50.0), 0.1, (0.4, 0.4), "chipload: section 2: out of order: lies not between sections 1 and 3"),
+        (
+            (40.0, 50.0, 60.0),
+            0.0,
+            (0.4, 0.0),
+            "chipload: wall: allowance_mm 0.4 and 0 leave no wall: it is 0.4 mm thick with its stock",
+        ),
+    ],
+)
+def test_a_run_refuses_sections(plate_job: Path, heights, edge: float, allowance, says: str) -> None:
+    """Inside out, out of order, a layer of elements without height, no thickness at the edges."""
+    with_sections(plate_job, heights, edge, allowance)
+    assert run(plate_job).startswith(says)

@@ -25,9 +25,11 @@ points = [4, 4]
 """
 
 
-def job(folder, **changes):
+def job(folder, rough=False, **changes):
     text = (Path(examples.__file__).parent / "impeller" / "job.toml").read_text()
     text = text[: text.index("[[surface]]")] + SURFACE + text[text.index("[[operation]]") :]
+    if not rough:
+        text = text[: text.index("[operation.rough]")] + text[text.index("[operation.paths]") :]
     for key, value in ({"most_cutters": "1", "check_mm": "2.0"} | changes).items():
         text, n = re.subn(rf"^{key} = .*$", f"{key} = {value}", text, flags=re.MULTILINE)
         assert n
@@ -59,6 +61,39 @@ def test_exit_code_and_first_lines_say_whether_it_is_verified(result):
             program["gouge_mm"] <= 0.05 and all(x["scallop_greatest_mm"] <= 0.1 for x in program["patches"])
         )
         assert text.with_suffix(".apt").is_file()
+
+
+def test_the_surface_is_covered_or_the_verdict_says_where_not(result):
+    done, _, summary = result
+    (op,) = summary["operations"]
+    (surface,) = op["finished"]["surfaces"]
+    assert surface["spacing_mm"] <= 0.6
+    assert surface["holds"] == (surface["greatest_mm"] <= 0.1) == (surface["within_share"] == 1.0)
+    assert surface["holds"] == (not any("is left" in text for text in op["fails"]))
+    assert done.exit_code == 0
+    assert op["finished"]["time_min"] == pytest.approx(sum(p["time_min"] for p in op["programs"]))
+    assert 0.6 <= op["finished"]["scallop_mean_share"] <= 1.0
+    assert op["roughing"] is None
+
+
+def test_every_number_of_the_answer_is_there(result):
+    *_, summary = result
+    (op,) = summary["operations"]
+    keys = {"diameter_mm", "corner_radius_mm", "table_deg"}
+    more = {"cc_points", "check_points", "unreachable", "search_s", "certified"}
+    assert {*keys, *more, "patches", "path_mm", "time_min"} <= set(op)
+    picked = op["hand_picked"]
+    assert {*keys, *more, "patches", "path_mm", "time_min"} <= set(picked)
+    for way in (op, picked):
+        assert way["cc_points"] == 16
+        assert way["check_points"] > 100
+        assert way["certified"] is True
+        assert way["search_s"] > 0.0
+        assert sum(p["area_share"] for p in way["patches"]) == pytest.approx(1.0)
+        assert sum(p["path_mm"] for p in way["patches"]) * 11 == pytest.approx(way["path_mm"])
+        assert all({*keys, "area_share"} <= set(p) for p in way["patches"])
+        assert min(way["path_mm"], way["time_min"]) > 0.0
+    assert (picked["diameter_mm"], picked["corner_radius_mm"]) == (14.0, 1.5)
 
 
 def test_the_scallop_is_as_asked(result):
@@ -98,3 +133,53 @@ def test_the_axes_lead_the_cutter_along_the_blade(result):
             gap = np.where(h < 0.0, np.inf, away - profile).min()
             # the cloud is 0.15 mm wide: it misses the contact by its sagitta
             assert -0.03 <= gap <= 0.03
+
+
+def test_roughing_comes_first_and_leaves_the_allowance(tmp_path):
+    path = job(tmp_path / "one", rough=True, scallop_mm="0.3", depth_mm="60.0", step_mm="25.0", check_mm="4.0")
+    done = CliRunner().invoke(app, ["run", str(path), "--out", str(tmp_path / "out")])
+    assert done.exit_code in (0, 3), done.output
+    (op,) = json.loads((tmp_path / "out" / "summary.json").read_bytes())["operations"]
+    roughs = op["roughing"]["programs"]
+    names = sorted(p.name for p in (tmp_path / "out").glob("*.ngc"))
+    assert len(names) == len(roughs) + len(op["programs"])
+    assert [n.startswith(f"{k}-rough-") for k, n in enumerate(names, 1)] == [True] * len(roughs) + [False] * len(
+        op["programs"]
+    )
+    for k, (name, rough) in enumerate(zip(names, roughs, strict=False), 1):
+        text = (tmp_path / "out" / name).read_text()
+        assert f"T{k} M6" in text
+        assert ("NOT VERIFIED" not in text.splitlines()[0]) == rough["verified"]
+        assert rough["rapids_take_mm3"] <= 2.0
+        assert rough["above_takes_mm3"] <= 2.0
+        assert rough["gouge_mm"] <= 0.05
+        # of the allowance of 0.5 mm check points 4 mm apart may lose s^2 / (8 r), a row its chord
+        for key in ("stands_on_blades_mm", "stands_on_hub_mm"):
+            assert rough[key] is None or rough[key] >= 0.5 - 4.0**2 / 16.0 - 0.1
+    assert roughs[0]["taken_mm3"] > 1e4
+    assert op["roughing"]["time_min"] == pytest.approx(sum(r["time_min"] for r in roughs))
+    assert op["roughing"]["time_all_channels_min"] == pytest.approx(11 * op["roughing"]["time_min"])
+    assert f"T{len(roughs) + 1} M6" in (tmp_path / "out" / names[len(roughs)]).read_text()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("diameter_mm = 14.0\ndepth_mm", "depth_mm"), "state both diameter_mm and corner_radius_mm, or neither"),
+        (("diameter_mm = 14.0\ncorner_radius_mm = 2.5\ndepth_mm", "depth_mm"), "D 14 r 2.5 mm is not in catalogue"),
+    ],
+)
+def test_a_wrong_cutter_for_roughing_is_refused(tmp_path, change, message):
+    path = job(tmp_path / "one", rough=True)
+    path.write_text(path.read_text().replace(change[1], change[0], 1))
+    done = CliRunner().invoke(app, ["check", str(path)])
+    assert done.exit_code == 2
+    assert message in " ".join(done.output.split())
+
+
+def test_roughing_without_paths_is_refused(tmp_path):
+    path = job(tmp_path / "one", rough=True)
+    path.write_text(path.read_text()[: path.read_text().index("[operation.paths]")])
+    done = CliRunner().invoke(app, ["check", str(path)])
+    assert done.exit_code == 2
+    assert "takes its links from [operation.paths]" in " ".join(done.output.split())

@@ -171,7 +171,12 @@ def test_a_job_with_a_program(files: Path):
     assert {"operation", "strategy", "pass", "line", "x_mm", "y_mm", "z_mm", "axis_z", "feed_mm_min", "t_s"} <= set(
         history.column_names
     )
-    assert history["line"].to_pylist() == [5, 7, 8, 9, 10, 11, 12, 13]
+    assert list(dict.fromkeys(history["line"].to_pylist())) == [5, 7, 8, 9, 10, 11, 12, 13]
+    # an arc has a row a chord, no chord is farther than 0.01 mm from it
+    where = np.column_stack([history[f"{x}_mm"].to_numpy() for x in "xyz"])
+    length = np.linalg.norm(np.diff(where, axis=0), axis=1).sum()
+    assert length < history["s_mm"][-1].as_py() == pytest.approx(12 + 60 + 20 * np.pi)
+    assert length == pytest.approx(12 + 60 + 20 * np.pi, rel=2e-4)
     assert history["t_s"][-1].as_py() == pytest.approx(summary["program"]["time_s"])
     page = (files / "result" / "report.html").read_text()
     assert "<b>Unproven</b>" in page

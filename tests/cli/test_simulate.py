@@ -1,6 +1,8 @@
 """Jobs that run a program through a stock, by the command line."""
 
 import json
+import math
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ from typer.testing import CliRunner
 
 from chipload import examples
 from chipload.cli import app
+from chipload.cutting.material import material_named
 from chipload.stock.layers import LayeredStock
 
 SLOT = """G21 G90 G17 G94
@@ -68,7 +71,7 @@ def test_the_example_cuts_two_pieces_and_as_much_as_the_stock_loses(tmp_path: Pa
     op = summary["operations"][0]
     assert op["kind"] == "simulate"
     assert op["chip_pieces_max"] == 2
-    assert op["chip_volume_mm3"] == pytest.approx(op["stock_removed_mm3"], rel=1e-6)
+    assert op["chip_volume_mm3"] == pytest.approx(op["removed_mm3"], rel=1e-6)
     assert op["chip_volume_mm3"] > 100.0
     for x in "xyz":
         assert op["force_n"][x]["min"] <= op["force_n"][x]["mean"] <= op["force_n"][x]["max"]
@@ -87,8 +90,31 @@ def test_a_slot_in_numbers(job: Path, tmp_path: Path) -> None:
     # 2 mm deep, 30 mm long and half a disc at its end
     assert op["chip_volume_mm3"] == pytest.approx(2.0 * (300.0 + 0.5 * np.pi * 25.0), rel=1e-3)
     assert summary["program"]["status"] == "simulated"
-    assert op["unchecked"] == ["torque_nm", "power_w", "chip_mm", "gouge_mm", "excess_mm"]
+    assert op["unchecked"] == [
+        "torque_nm",
+        "power_w",
+        "chip_mm",
+        "deflection_um",
+        "form_error_um",
+        "gouge_mm",
+        "excess_mm",
+    ]
+    assert op["removed_mm3"] == pytest.approx(op["chip_volume_mm3"], rel=1e-9)
+    # the rim meets the stock when the tip is at x = -5, after 0.5 s at 10 mm/s; a step of 0.2 s cuts or does not
+    assert 0.3 < op["air_cut_s"] <= 0.5
+    assert op["air_cut_s"] + op["cutting_s"] == pytest.approx(4.0, rel=1e-12)
+    assert op["time_s"] == summary["program"]["time_s"] > 4.0
+    # mean torque of a full slot: teeth / (2 pi) R b (2 Ktc f + pi Kte)
+    al = material_named("al7075-t6")
+    torque = 2.0 / math.tau * 5.0 * 2.0 * (2.0 * al.Ktc * 0.1 + math.pi * al.Kte) / 1000.0
+    mean = {x["name"]: (x["limit"], x["worst"], x["holds"]) for x in op["limits"]}
+    assert mean["spindle_torque_nm"] == (70.0, pytest.approx(torque, rel=1e-3), True)
+    assert mean["spindle_power_w"] == (11000.0, pytest.approx(torque * 100.0 * math.pi, rel=1e-3), True)
+    assert op["power_w"]["max"] == pytest.approx(torque * 100.0 * math.pi, rel=1e-3)
+    assert op["chip_mm"]["max"] == pytest.approx(0.1, rel=1e-6)
+    assert op["gouge_mm"]["max"] is op["excess_mm"]["max"] is None
     t = pq.read_table(tmp_path / "r" / "history.parquet")
+    assert max(t["deflection_um"].to_pylist()) == op["deflection_um"]["max"] > 1.0
     assert sum(t["chip_volume_mm3"].to_pylist()) == pytest.approx(op["chip_volume_mm3"])
 
 
@@ -107,6 +133,7 @@ def test_what_is_left_is_the_stock_of_the_next_job(job: Path, tmp_path: Path) ->
     assert op["chip_volume_mm3"] == pytest.approx(op["films_mm3"])
     assert op["films_mm3"] == pytest.approx(0.0, abs=1e-2)
     assert op["force_n"]["max"] == 0.0
+    assert op["deflection_um"]["max"] == 0.0
 
 
 def test_a_limit_that_does_not_hold_is_said_and_is_the_exit_code(job: Path, tmp_path: Path) -> None:
@@ -118,6 +145,97 @@ def test_a_limit_that_does_not_hold_is_said_and_is_the_exit_code(job: Path, tmp_
     assert summary["holds"] is False
     assert summary["program"]["status"] == "failed"
     assert summary["operations"][0]["limits"][0]["holds"] is False
+
+
+STIFF = """[stiffness]
+holder_gpa = inf
+grip_n_um = 100.0
+grip_nm_rad = inf
+spindle_n_um = 50.0
+spindle_nm_rad = inf
+work_n_um = inf
+"""
+
+
+def test_a_deflection_is_unproven_where_what_gives_way_is_not_stated(job: Path, tmp_path: Path) -> None:
+    job.write_text(JOB.replace("force_n = 1000.0", "deflection_um = 20.0"))
+    code, out, _ = call("run", job, "--out", tmp_path / "r")
+    assert code == 3
+    assert "Unproven: nothing that is known exceeds a limit; deflection is at least" in out
+    assert "but stiffness.grip_n_um, stiffness.grip_nm_rad, stiffness.spindle_n_um" in out
+    summary = json.loads((tmp_path / "r" / "summary.json").read_text())
+    op = summary["operations"][0]
+    assert (op["verdict"], op["holds"], summary["holds"], op["fails"]) == ("unproven", False, False, [])
+    assert summary["program"]["status"] == "unproven"
+    assert op["limits"][0]["holds"] is None
+    assert "What is not proved" in (tmp_path / "r" / "report.html").read_text()
+    # stated, the cutter gives way more by two springs, and it is proved
+    job.write_text(job.read_text() + STIFF)
+    code, out, err = call("run", job, "--out", tmp_path / "s")
+    assert (code, err) == (0, "")
+    found = json.loads((tmp_path / "s" / "summary.json").read_text())["operations"][0]
+    assert found["verdict"] == "holds"
+    assert found["deflection_um"]["not_stated"] == []
+    more = found["deflection_um"]["max"] - op["deflection_um"]["max"]
+    lateral = max(math.hypot(found["force_n"][x]["max"], found["force_n"][y]["max"]) for x, y in ("xy", "yx"))
+    assert 0.0 < more < 1e3 * lateral * (1e-5 + 2e-5)
+    assert found["deflection_um"]["work_max"] == 0.0
+    # and exceeded it fails, whatever is stated
+    code, out, _ = call("run", job, "--out", tmp_path / "t", "--set", "limits.deflection_um=8")
+    assert code == 3
+    assert "Does not hold: deflection " in out
+
+
+def test_a_spindle_that_is_too_weak_does_not_hold(job: Path, tmp_path: Path) -> None:
+    vmc = (files("chipload") / "data" / "machines" / "vmc.toml").read_text()
+    (job.parent / "weak.toml").write_text(
+        vmc.replace("torque_nm = 70.0", "torque_nm = 0.5").replace("11000.0", "100.0")
+    )
+    job.write_text(JOB.replace('name = "vmc"', 'file = "weak.toml"'))
+    code, out, _ = call("run", job, "--out", tmp_path / "r")
+    assert code == 3
+    assert "Does not hold: spindle torque 0.76" in out
+    op = json.loads((tmp_path / "r" / "summary.json").read_text())["operations"][0]
+    assert [x["name"] for x in op["limits"] if x["holds"] is False] == ["spindle_torque_nm", "spindle_power_w"]
+
+
+def test_the_spindle_gives_what_its_curve_says_at_the_speed_of_the_step(job: Path, tmp_path: Path) -> None:
+    vmc = (files("chipload") / "data" / "machines" / "vmc.toml").read_text()
+    curve = "torque_curve = [[0.0, 1.0], [6000.0, 0.4], [15000.0, 0.1]]"
+    (job.parent / "weak.toml").write_text(vmc.replace("torque_nm = 70.0", curve))
+    job.write_text(JOB.replace('name = "vmc"', 'file = "weak.toml"'))
+    code, out, _ = call("run", job, "--out", tmp_path / "r")
+    assert code == 3
+    assert "Does not hold: spindle torque 0.7653 N m exceeds 0.7 N m in line 6" in out
+
+
+def test_chips_that_the_flutes_have_no_room_for(job: Path, tmp_path: Path) -> None:
+    """A tooth of a slot cuts f D b in a turn: f D q / A of the gullet over the depth b, whatever b is."""
+    text = JOB.replace("modulus_gpa = 580.0", "modulus_gpa = 580.0\ngullet_mm2 = 12.0\nchip_ratio = 6.0")
+    job.write_text(text)
+    code, out, _ = call("run", job, "--out", tmp_path / "r")
+    assert code == 0
+    assert "flute fill 0.5 of 1" in out
+    op = json.loads((tmp_path / "r" / "summary.json").read_text())["operations"][0]
+    fill = next(x for x in op["limits"] if x["name"] == "flute_fill_share")
+    assert (fill["limit"], fill["holds"]) == (1.0, True)
+    assert fill["worst"] == pytest.approx(0.1 * 10.0 * 6.0 / 12.0, rel=1e-3)
+    job.write_text(text.replace("chip_ratio = 6.0", "chip_ratio = 13.0"))
+    code, out, _ = call("run", job, "--out", tmp_path / "s")
+    assert code == 3
+    assert "Does not hold: flute fill 1.083 exceeds 1 in line 6" in out
+
+
+def test_chips_thicker_than_the_coefficients_know_are_unproven(job: Path, tmp_path: Path) -> None:
+    al = (files("chipload") / "data" / "materials" / "al7075-t6.toml").read_text()
+    job.write_text(JOB.replace('name = "al7075-t6"', 'file = "al.toml"'))
+    for most, code in ((0.1, 0), (0.08, 3)):
+        (job.parent / "al.toml").write_text(f"{al}\nchip_min_mm = 0.01\nchip_max_mm = {most}\n")
+        found, out, err = call("run", job, "--out", tmp_path / f"r{code}")
+        assert (found, err) == (code, "")
+        verdict = json.loads((tmp_path / f"r{code}" / "summary.json").read_text())["operations"][0]["verdict"]
+        assert verdict == ("unproven" if code else "holds")
+    assert "chips are up to 0.1 mm thick in line 6: the coefficients of al7075-t6 hold up to 0.08 mm" in out
 
 
 def test_a_rapid_through_material_is_said(job: Path, tmp_path: Path) -> None:
@@ -143,6 +261,14 @@ def test_check_reads_the_stock_and_cuts_nothing(job: Path) -> None:
         ("step_mm = 2.0", "step_mm = 0.0", "operation.0.step_mm = 0: must be above 0"),
         ("[[operation]]\nkind = \"simulate\"\nstep_mm = 2.0\n", "", "stock: not used where a program is only read"),
         ("number = 1\n", "number = 4\n", "line 5: tool 1: no [[cutter]] has this number: state one beside 4"),
+        ("modulus_gpa = 580.0", "modulus_gpa = 580.0\ngullet_mm2 = 9.0", "cutter.0.chip_ratio is missing: give it"),
+        ("modulus_gpa = 580.0", "modulus_gpa = 580.0\ngullet_mm2 = 99.0\nchip_ratio = 4.0",
+         "cutter.0.gullet_mm2 = 99: must be above 0 and below the tooth's share of the section, 39.27"),
+        ("modulus_gpa = 580.0", "modulus_gpa = 580.0\ngullet_mm2 = 9.0\nchip_ratio = 0.4",
+         "cutter.0.chip_ratio = 0.4: must be at least 1"),
+        ("[limits]", "[stiffness]\nspindle_n_um = \"stiff\"\n[limits]",
+         "stiffness.spindle_n_um = 'stiff': must be a number, or inf where it is rigid"),
+        ("[limits]", "[stiffness]\nspindle_n_um = 0.0\n[limits]", "stiffness.spindle_n_um = 0: must be above 0"),
         ("S3000", "S0", "cuts with the spindle at rest"),
     ],
 )  # fmt: skip

@@ -89,7 +89,8 @@ def test_gouge_excess_and_collision(job: Path, tmp_path: Path) -> None:
     assert abs(op["excess_mm"]["at_mm"][1]) <= 5.0601
     assert "gouge 0.1 mm exceeds 0.02 mm in line 6" in said
     by = {x["name"]: x["holds"] for x in op["limits"]}
-    assert by == {"force_n": True, "gouge_mm": False, "excess_mm": True}
+    spindle = {"spindle_torque_nm": True, "spindle_power_w": True}
+    assert by == {"force_n": True, "gouge_mm": False, "excess_mm": True} | spindle
     # the tip goes to x = 25 and to z = -2.1, the holder to x = 45 and down to z = 27.9
     # on the way in, and where the way out begins
     hit, again = op["collisions"]

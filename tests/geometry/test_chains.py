@@ -83,16 +83,12 @@ def test_two_arcs_between_the_same_ends_are_not_one_drawn_twice():
     assert findings == ()
 
 
-def test_twenty_thousand_segments_in_seconds():
-    import time
-
+def test_twenty_thousand_segments():
     n = 20_000
     x = np.arange(n + 1.0)
     parts = [line(a, 0, b, 0) for a, b in pairwise(x)]
-    start = time.perf_counter()
     (c,), _ = chained(parts[::-1], 0.01)
     assert len(c.segments) == n
-    assert time.perf_counter() - start < 5.0
 
 
 @pytest.mark.parametrize("gap", [-1.0, np.nan])

@@ -82,3 +82,39 @@ def test_not_a_machine(tmp_path):
     bad.write_bytes(b"\x00\xff")
     with pytest.raises(InputError, match="not a TOML file"):
         read_machine(bad)
+
+
+CURVE = "torque_curve = [[0.0, 80.0], [3000.0, 60.0], [15000.0, 12.0]]"
+
+
+def test_a_curve_of_torque_is_straight_between_its_points(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(VMC.replace("torque_nm = 70.0", f"torque_nm = 70.0\n{CURVE}"))
+    mine = read_machine(path)
+    speeds = [math.tau / 60.0 * n for n in (0.0, 1500.0, 2000.0, -3000.0, 9000.0, 15000.0)]
+    # the greatest torque is not exceeded either
+    assert mine.torque_at(speeds) == pytest.approx([7e4, 7e4, 80e3 - 20e3 * 2.0 / 3.0, 6e4, 3.6e4, 1.2e4])
+    alone = replace(mine, torque=None)
+    assert alone.torque_at(speeds[:2]) == pytest.approx([8e4, 7e4])
+    assert replace(alone, torque_curve=()).torque_at(speeds[0]) == math.inf
+
+
+@pytest.mark.parametrize(
+    ("curve", "message"),
+    [
+        ("[[100.0, 80.0], [15000.0, 12.0]]", "from 100 to 15000 rpm: must hold min_rpm = 60 to max_rpm = 15000"),
+        ("[[0.0, 80.0], [9000.0, 12.0]]", "from 0 to 9000 rpm: must hold min_rpm = 60 to max_rpm = 15000"),
+        ("[[0.0, 80.0], [9000.0, 12.0], [9000.0, 11.0]]", "9000 rpm after 9000: speeds must rise"),
+        ("[[0.0, 80.0], [15000.0, 0.0]]", "a torque must be above 0"),
+        ("[[0.0, 80.0, 3.0]]", "must be pairs of numbers"),
+        ("[0.0, 80.0]", "must be pairs of numbers"),
+        ("70.0", "must be pairs of numbers"),
+    ],
+)
+def test_curves_that_are_refused(tmp_path, curve, message):
+    path = tmp_path / "mine.toml"
+    path.write_text(VMC.replace("torque_nm = 70.0", f"torque_curve = {curve}"))
+    with pytest.raises(InputError) as caught:
+        read_machine(path)
+    assert "torque_curve" in str(caught.value)
+    assert message in str(caught.value)

@@ -21,6 +21,7 @@ from chipload.program.commands import (
 )
 from chipload.program.gcode.reader import read_gcode
 from chipload.program.gcode.writer import write_commands
+from chipload.program.to_work import to_work
 
 SHIFTED = Frame(
     2, [100.0, 20, 5, 0.1, 0, 0, 1, 0, 0], math.pi / 2, [1.0, 2, 3, 0, 0, 0.5, 0, 0, 0], [0, 0, 50.0, *[0] * 6]
@@ -81,6 +82,19 @@ def test_chords_of_an_arc_in_another_plane():
     )
     assert 10 * (1 - math.cos(0.25 * math.pi / (len(c) - 1))) <= 0.01
     assert set(c.motion[1:]) == {LINE}
+
+
+def test_an_arc_whose_radii_differ_is_a_spiral():
+    """The half circle about (0, 0) from 5 to -5.002, as LinuxCNC takes it: the radius grows evenly with the angle."""
+    text = "G21 G90 G94 G17\nG0 X5 Y0 Z0\nG3 X-5.002 Y0 I-5 J0 F600\nM2\n"
+    program = to_work(read_gcode(text)[0], machine_named("vmc"))[0]
+    chords = program.p_work[program.line == 3][:, :2]
+    a = np.linspace(0.0, math.pi, len(chords) + 1)[1:]
+    r = 5.0 + 0.002 * a / math.pi
+    np.testing.assert_allclose(chords, np.column_stack([r * np.cos(a), r * np.sin(a)]), atol=1e-9)
+    assert 5.0 * (1.0 - math.cos(0.5 * math.pi / len(chords))) <= 1e-3
+    even = to_work(read_gcode(text.replace("5.002", "5.0005"))[0], machine_named("vmc"))[0]
+    assert (even.line == 3).sum() == 1
 
 
 def test_a_shift_is_written_into_the_coordinates():

@@ -12,7 +12,7 @@ from chipload.machine.machine import machine_named
 from chipload.program.build import dwell, follow, helix, plunge, rapid
 from chipload.program.check import check_program
 from chipload.program.program import Program
-from chipload.program.time import program_time
+from chipload.program.time import peak_speed, program_time
 
 VMC = machine_named("vmc")
 
@@ -107,3 +107,20 @@ def test_what_the_machine_cannot_do():
     inside = Program.join([rapid([395, -10, 0], 800.0, 1, "link"), follow(bulge, 0.0, 5.0, 800.0, 1, "cut")])
     assert check_program(inside, VMC)[0].text == "row 1: X = 405 mm: machine vmc goes from -400 to 400 mm"
     assert check_program(plunge([0, 0, 0], 5.0, 100.0, 1, "cut"), VMC)[0].code == "program-start"
+
+
+def test_asking_no_more_than_the_peak_changes_no_time_and_less_does():
+    """Short lines, arcs and corners: the peak is what the feed of a row may be lowered to for nothing."""
+    rng = np.random.default_rng(4)
+    points = np.cumsum(rng.normal(0.0, 1.0, (60, 3)) * rng.choice([0.02, 0.5, 8.0], (60, 1)), axis=0)
+    program = cut(points, feed=150.0)
+    peak = peak_speed(program, VMC)
+    feeds = program.motion != 0
+    assert (peak[feeds] < 150.0).sum() > 20
+    whole = program_time(program, VMC)
+    np.testing.assert_allclose(program_time(replace(program, feed=np.where(feeds, peak, 0.0)), VMC), whole, rtol=1e-9)
+    for k in np.flatnonzero(feeds)[::7]:
+        slower = replace(program, feed=np.where(np.arange(len(peak)) == k, 0.98 * peak, program.feed))
+        assert program_time(slower, VMC).sum() > whole.sum() * (1.0 + 1e-9)
+    rapids = np.flatnonzero(~feeds)
+    assert (peak[rapids] <= VMC.rapid).all()

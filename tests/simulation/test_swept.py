@@ -22,7 +22,7 @@ ROUGH = Resolution(step_mm=2.0, tolerance=0.01, corner_pieces=4, flank_mm=2.0, r
 
 
 def leaning(turn: float) -> Program:
-    """A flute along a wall that it meets with its upper half, twice; its axis turns by up to ``turn`` [rad] a row."""
+    """A flute along a wall, twice, that meets it with its upper half; the axis turns by up to ``turn`` [rad]."""
     rng = np.random.default_rng(8)
     x = np.tile(np.linspace(-4.0, 34.0, 14), 2)
     p = np.column_stack([x, np.repeat([-6.5, -7.0], 14), -12.0 + 2.0 * np.sin(x)])
@@ -42,12 +42,14 @@ def test_layers_without_material_are_left_out_and_no_others(turn: float, monkeyp
 
     def watched(*words):
         found = left(*words)
-        asked.extend(found)
+        asked.extend(found.values())
         return found
 
     monkeypatch.setattr(swept, "_left", watched)
     some = run()
-    monkeypatch.setattr(swept, "_left", lambda *words: [np.ones(len(f), dtype=bool) for f in left(*words)])
+    monkeypatch.setattr(
+        swept, "_left", lambda *words: {k: np.ones(len(f), dtype=bool) for k, f in left(*words).items()}
+    )
     assert run() == some
     assert np.concatenate(asked).mean() < 0.97
 
@@ -64,8 +66,8 @@ def test_a_box_holds_all_that_its_layer_is_covered_by() -> None:
             tiny = shapely.box(x - 1e-6, y - 1e-6, x + 1e-6, y + 1e-6)
             stock.tiles[:] = shapely.Polygon()
             stock.tiles[i, 0, 0] = tiny
-            (left,) = swept._left(steps, {k: range(i, i + 1)}, low, high, CUTTERS, stock, 0.01)
-            assert left.tolist() == [True]
+            left = swept._left(steps, {k: range(i, i + 1)}, low, high, CUTTERS, stock)
+            assert left[k].tolist() == [True]
             seen += 1
         stock.tiles[:] = shapely.box(-60.0, -60.0, 60.0, 60.0)
     assert seen > 50

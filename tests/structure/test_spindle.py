@@ -8,7 +8,8 @@ import pytest
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.structure.beam import compliance
-from chipload.structure.spindle import Bar, Joint, bearings, chain_compliance, cutter_bars, springs, tube
+from chipload.structure.receptance import Receptance, static_compliance
+from chipload.structure.spindle import Bar, Joint, as_measured, bearings, chain_compliance, cutter_bars, springs, tube
 
 MILL = Cutter(10.0, 4, 0.5, 22.0, 40.0, 5.8e5, shank_diameter=12.0)
 GRIP = springs(6e4, 8e6)
@@ -73,6 +74,25 @@ def test_rigid_spindle_on_bearings():
     assert float(chain_compliance(chain, 0.0, 0.0)) == pytest.approx(1.5**2 / 1e5 + 0.5**2 / 2e5, rel=1e-13)
 
 
+def test_measured_tip():
+    """A cutter in a holder that only shifts, its tip measured: the sum of both at all heights; one that tilts: of the
+    tip, and no less above it."""
+    z = np.linspace(0.0, 22.0, 7)
+    bars = cutter_bars(MILL)
+    own = compliance(MILL, z[:, None], z[None])
+    f = np.arange(5.0, 400.0, 5.0)
+    for joint, exact in ((springs(2e4), True), (springs(rotation=3e7), False)):
+        arm = 40.0 - z
+        true = own + joint.c_ff + joint.c_mm * arm[:, None] * arm[None]
+        measured = Receptance(f, true[0, 0] / (1.0 - (f / 1800.0) ** 2 + 0.05j * f / 1800.0))
+        found = as_measured(bars, static_compliance(measured, (5.0, 300.0))[0])
+        C = chain_compliance(found, z[:, None], z[None])
+        assert C[0, 0] == pytest.approx(true[0, 0], rel=1e-3)
+        assert (C / true >= 1.0 - 1e-3).all()
+        if exact:
+            np.testing.assert_allclose(C, true, rtol=1e-3)
+
+
 def test_refused():
     for call, message in (
         (lambda: springs(0.0), "joint.translation = 0: a stiffness must be above 0; inf for a rigid one"),
@@ -80,6 +100,7 @@ def test_refused():
         (lambda: tube(10.0, 8.0, 2e5, inner=9.0), "tube: outer_mm = 8, inner_mm = 9"),
         (lambda: Joint(1e-5, 1e-9, 1e-6), "joint: c_ff = 1e-05, c_mm = 1e-09, c_fm = 1e-06"),
         (lambda: Bar(-1.0, 0.0), "bar: length_mm = -1"),
+        (lambda: as_measured(cutter_bars(MILL), 1e-6), "tip: measured compliance 0.001 um/N: must be at least that of"),
         (lambda: chain_compliance(CHAIN, 146.0, 0.0), "chain_compliance: z_force = 146 mm: must be from 0 to 145"),
     ):
         with pytest.raises(InputError) as err:

@@ -151,6 +151,23 @@ def test_rows_follow_the_lines_of_a_text_that_numbers_otherwise(root: Path) -> N
     assert other.of_row.tolist() == np.repeat(goto, ROWS // 4).tolist()
 
 
+def test_a_text_with_new_feeds_is_shown_in_the_place_of_the_old_one(root: Path) -> None:
+    r = load_result(root, "r")
+    (root / "r" / "0-feeds.ngc").write_text(PROGRAM.replace("F", "F1"))
+    summary = json.loads((root / "r" / "summary.json").read_text())
+    for name, shown in (("0-feeds.ngc", "0-feeds.ngc"), ("../square.ngc", "square.ngc"), ("../../x", "square.ngc")):
+        summary["operations"][0]["feeds"] = {"program": name}
+        (root / "r" / "summary.json").write_text(json.dumps(summary))
+        r = load_result(root, "r")
+        own = source_of(r, r.tracks[0])
+        assert own.name == shown
+        assert own.of_row.tolist() == LINE.tolist()
+    summary["operations"][0]["feeds"] = {"program": "0-feeds.ngc"}
+    (root / "r" / "summary.json").write_text(json.dumps(summary))
+    r = load_result(root, "r")
+    assert source_of(r, r.tracks[0]).note == "with its new feeds"
+
+
 def test_of_two_rows_at_a_place_the_worse_one_is_meant(tmp_path: Path) -> None:
     folder = tmp_path / "twice"
     folder.mkdir()

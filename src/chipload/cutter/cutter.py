@@ -41,7 +41,9 @@ class Cutter:
     runout : (offset [mm], direction [rad] from tooth 0): the axis of the teeth beside that of the spindle
     shank_diameter : [mm]; None: as the diameter
     holder : (length, diameter) [mm] of its parts, upwards from the overhang; empty: not known
-    number : tool number, >= 1
+    gullet : area between two teeth in a section across the axis [mm^2]; None: not known
+    chip_ratio : volume that chips fill over what they are cut from, >= 1; with ``gullet`` or not at all
+    number : tool number, >= 0; 0: what is in the spindle where a program names no tool
     name : as the shop calls it
 
     Raises
@@ -64,6 +66,8 @@ class Cutter:
     runout: tuple[float, float] = (0.0, 0.0)
     shank_diameter: float | None = None
     holder: tuple[tuple[float, float], ...] = ()
+    gullet: float | None = None
+    chip_ratio: float | None = None
     number: int = 1
     name: str = ""
 
@@ -123,7 +127,15 @@ class Cutter:
         for k, part in enumerate(self.holder):
             for key, size in zip(("length", "diameter"), part, strict=True):
                 need(0.0 < size < math.inf, f"holder.{k}.{key}_mm", size, "must be above 0")
-        need(self.number >= 1, "number", self.number, "must be at least 1")
+        if (self.gullet is None) != (self.chip_ratio is None):
+            lacks, has = ("gullet_mm2", "chip_ratio") if self.gullet is None else ("chip_ratio", "gullet_mm2")
+            raise InputError(f"cutter.{lacks} is missing: give it with {has} or leave both out")
+        room = 0.25 * math.pi * self.diameter**2 / self.flutes
+        limit = f"must be above 0 and below the tooth's share of the section, {room:.4g}"
+        need(self.gullet is None or 0.0 < self.gullet < room, "gullet_mm2", self.gullet or 0.0, limit)
+        ratio = self.chip_ratio
+        need(ratio is None or 1.0 <= ratio < math.inf, "chip_ratio", ratio or 0.0, "must be at least 1")
+        need(self.number >= 0, "number", self.number, "must be at least 0")
 
     @property
     def radius(self) -> float:

@@ -37,7 +37,7 @@ class CutterTable(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
-    number: int | None = Field(None, ge=1)
+    number: int | None = Field(None, ge=0)
     name: str | None = None
     diameter_mm: float | None = None
     flutes: int | None = None
@@ -56,6 +56,8 @@ class CutterTable(BaseModel):
     holder_mm: Annotated[tuple[tuple[float, float], ...] | None, BeforeValidator(_rows)] = Field(
         None, description="length and diameter of the holder's parts, upwards from the overhang"
     )
+    gullet_mm2: float | None = Field(None, description="area between two teeth in a section across the axis")
+    chip_ratio: float | None = Field(None, description="volume that chips fill over what they are cut from")
     file: str | None = None
     tool: int | None = None
     file_unit: Literal["mm", "inch"] | None = None
@@ -92,6 +94,8 @@ class CutterTable(BaseModel):
             runout=(values.get("runout_mm", 0.0), math.radians(values.get("runout_deg", 0.0))),
             shank_diameter=values.get("shank_diameter_mm"),
             holder=tuple(tuple(part) for part in values.get("holder_mm", ())),
+            gullet=values.get("gullet_mm2"),
+            chip_ratio=values.get("chip_ratio"),
             number=values["number"],
             name=values.get("name", ""),
         )
@@ -153,7 +157,7 @@ def _first(err: ValidationError, table: Mapping[str, Any]) -> str:
         "int_type": "must be a whole number",
         "string_type": "must be a text",
         "literal_error": "must be mm or inch",
-        "greater_than_equal": "must be at least 1",
+        "greater_than_equal": f"must be at least {row.get('ctx', {}).get('ge')}",
     }
     value = table[str(row["loc"][0])]
     return f"cutter.{key} = {value!r}: {wanted.get(row['type'], row['msg'])}"

@@ -114,6 +114,28 @@ class Patch:
         c, s = np.cos(angle), np.sin(angle)
         return replace(self, control=self.control @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
 
+    def rotated(self, R: Floats) -> Patch:
+        """The patch turned by a rotation (3, 3)."""
+        return replace(self, control=self.control @ R.T)
+
+    def swapped(self) -> Patch:
+        """The same surface with u and v changed, its normal kept."""
+        return Patch(self.knots_v, self.knots_u, np.swapaxes(self.control, 0, 1), -self.side)
+
+    def reversed(self, u: bool, v: bool) -> Patch:
+        """The same surface with u, v or both counted from their other ends, its normal kept.
+
+        >>> flat = through([[[0, 0, 0], [0, 2, 0]], [[3, 0, 0], [3, 2, 0]]], [0, 1], [0, 1])
+        >>> flat.reversed(True, False).at(0.0, 1.0).tolist()
+        [[3.0, 2.0, 0.0]]
+        """
+        return Patch(
+            1.0 - self.knots_u[::-1] if u else self.knots_u,
+            1.0 - self.knots_v[::-1] if v else self.knots_v,
+            self.control[:: -1 if u else 1, :: -1 if v else 1],
+            self.side if u == v else -self.side,
+        )
+
 
 def basis(knots: Floats, degree: int, x: Floats, derivative: int = 0) -> tuple[NDArray[np.int64], Floats]:
     """First index (k,) of the basis functions that are not 0 at x (k,); their values or derivatives (k, degree + 1).

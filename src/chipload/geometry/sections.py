@@ -12,7 +12,7 @@ two is along the axis. Files say no unit: it is asked for.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -115,14 +115,19 @@ def checked(sections: tuple[Floats, ...], outer_diameter: float | None = None) -
         )
     if outer_diameter is not None:
         found = 2.0 * max(float(np.hypot(p[:, 0], p[:, 1]).max()) for p in sections)
-        if abs(found / outer_diameter - 1.0) > _OUTER:
-            factor = outer_diameter / found
-            pairs = [
-                f"{a} read as {b}" for a in MM_PER for b in MM_PER if abs(MM_PER[a] / MM_PER[b] / factor - 1.0) < _OUTER
-            ]
-            hint = f": smaller by {factor:.4g}, as {' or '.join(pairs)}" if pairs else ": check the unit"
-            raise InputError(f"sections: outer diameter {found:.6g} mm: must be {outer_diameter:g} as stated{hint}")
+        checked_diameter(found, outer_diameter, "sections")
     return sections
+
+
+def checked_diameter(found: float, stated: float, what: str) -> None:
+    """Refuse an outer diameter [mm] that is not the stated one, and say which unit was probably taken for which."""
+    if abs(found / stated - 1.0) > _OUTER:
+        factor = stated / found
+        pairs = [
+            f"{a} read as {b}" for a in MM_PER for b in MM_PER if abs(MM_PER[a] / MM_PER[b] / factor - 1.0) < _OUTER
+        ]
+        hint = f": smaller by {factor:.4g}, as {' or '.join(pairs)}" if pairs else ": check the unit"
+        raise InputError(f"{what}: outer diameter {found:.6g} mm: must be {stated:g} as stated{hint}")
 
 
 def loft(sections: tuple[Floats, ...], count: int = 61) -> Blade:
@@ -147,12 +152,14 @@ def loft(sections: tuple[Floats, ...], count: int = 61) -> Blade:
 
 
 def _side(grid: Floats, u: Floats, v: Floats, sign: float) -> Patch:
-    patch = through(np.swapaxes(grid, 0, 1), u, v)
+    return facing(through(np.swapaxes(grid, 0, 1), u, v), sign)
+
+
+def facing(patch: Patch, sign: float) -> Patch:
+    """The patch with its normal towards a growing theta (sign 1) or a falling one (-1)."""
     at = patch.at(0.5, 0.5)[0]
     towards = sign * np.array([-at[1], at[0], 0.0])
-    return (
-        patch if patch.normal(0.5, 0.5)[0] @ towards > 0.0 else Patch(patch.knots_u, patch.knots_v, patch.control, -1)
-    )
+    return patch if patch.normal(0.5, 0.5)[0] @ towards > 0.0 else replace(patch, side=-patch.side)
 
 
 def _halves(p: Floats) -> tuple[_Half, _Half]:

@@ -44,10 +44,9 @@ def read_step_face(
         The file is missing or no STEP file, or has no horizontal planar face (at ``z_mm``); the heights are named.
     """
     file = Path(path)
-    _check(file, "part.file")
     if z_mm is not None and not np.isfinite(z_mm):
         raise InputError(f"part.z_mm = {z_mm:g}: must be a finite number")
-    faces = list(_level_faces(_shape(file)))
+    faces = list(_level_faces(read_shape(file)))
     if not faces:
         raise InputError(f"part.file = {file.name}: no horizontal planar face in the part: turn it, or state a DXF")
     heights = sorted({round(z, 3) + 0.0 for z, _ in faces})
@@ -96,8 +95,7 @@ def step_triangles(
     from OCP.TopoDS import TopoDS
 
     file = Path(path)
-    _check(file, key)
-    shape = _shape(file, key)
+    shape = read_shape(file, key)
     BRepMesh_IncrementalMesh(shape, chord_mm, False, angle, False)
     points: list[Floats] = []
     corners: list[NDArray[np.int64]] = []
@@ -120,16 +118,19 @@ def step_triangles(
     return np.vstack(points), np.vstack(corners)
 
 
-def _check(file: Path, key: str) -> None:
+def read_shape(file: Path, key: str = "part.file") -> Any:
+    """The part as one shape of the CAD kernel, in mm.
+
+    Raises
+    ------
+    InputError
+        The file is missing or no STEP file.
+    """
     if not file.is_file():
         raise InputError(f"{key} = {file}: no such file")
     with file.open("rb") as stream:
         if b"ISO-10303-21" not in stream.read(4096):
             raise InputError(f"{key} = {file.name}: not a STEP file")
-
-
-def _shape(file: Path, key: str = "part.file") -> Any:
-    """The part as one shape, in mm."""
     import OCP.IFSelect
     from OCP.Message import Message, Message_Fail
     from OCP.STEPControl import STEPControl_Reader

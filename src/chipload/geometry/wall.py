@@ -30,6 +30,8 @@ Ints = NDArray[np.int64]
 
 #: step of the differences that normals are made from, in u and v
 STEP = 1e-5
+#: most angle [rad] between the lines across a wall and the normals of its sides
+LEAN = math.radians(45.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +190,9 @@ def blade(
     return ThinWall(f"blade, chord {chord[0]:g} to {chord[1]:g} mm, height {height:g} mm", at)
 
 
-def through_sections(made: Blade, edge: float, span: tuple[float, float] = (0.0, 1.0)) -> ThinWall:
+def through_sections(
+    made: Blade, edge: float, span: tuple[float, float] = (0.0, 1.0), name: str = "blade through sections"
+) -> ThinWall:
     """A blade through sections, turned so that it stands upright, its edges left out.
 
     Parameters
@@ -196,6 +200,7 @@ def through_sections(made: Blade, edge: float, span: tuple[float, float] = (0.0,
     made : its two sides
     edge : share of u that is left out at each edge, from 0 to below 0.5
     span : part of v that is the wall
+    name : what it is, in words
 
     Raises
     ------
@@ -229,4 +234,31 @@ def through_sections(made: Blade, edge: float, span: tuple[float, float] = (0.0,
         one, other = ((p - foot) @ turned.T for p in raw(u, v))
         return (other, one) if swap else (one, other)
 
-    return ThinWall("blade through sections", at)
+    return ThinWall(name, at)
+
+
+def opposite(wall: ThinWall) -> ThinWall:
+    """The wall, if its sides lie opposite each other: lines across it lean by at most :data:`LEAN` from its normals.
+
+    Raises
+    ------
+    InputError
+        Says by how much they lean, or that there is no metal between the sides.
+    """
+    u, v = np.meshgrid(np.linspace(0.0, 1.0, 33), np.linspace(0.0, 1.0, 17), indexing="ij")
+    minus, plus = wall.sides(u, v)
+    across = plus - minus
+    thick = np.linalg.norm(across, axis=-1)
+    there = thick > 0.0
+    least = min(
+        float((sign * (across * n).sum(axis=-1)[there] / thick[there]).min(initial=1.0))
+        for sign, n in zip((-1.0, 1.0), wall.normals(u, v), strict=True)
+    )
+    lean = math.acos(max(-1.0, min(1.0, least)))
+    if lean > LEAN or not there.all():
+        said = f"lines across lean by {math.degrees(lean):.3g} deg from the normals" if lean > LEAN else "they meet"
+        raise InputError(
+            f"{wall.name}: not opposite each other: {said}: must be at most {math.degrees(LEAN):g} deg, and apart: "
+            "state the two sides of one wall, or a greater edge_share"
+        )
+    return wall

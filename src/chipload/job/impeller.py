@@ -11,7 +11,7 @@ from pydantic import Field
 
 from chipload.errors import InputError
 from chipload.job.sources import source
-from chipload.job.tables import Count, NotNegative, Number, Positive, SourceTable, Table, Text, Unit
+from chipload.job.tables import Count, FaceName, NotNegative, Number, Positive, SourceTable, Table, Text, Unit
 
 Share = Annotated[Number, Field(ge=0.0, le=1.0)]
 Span = tuple[Share, Share]
@@ -44,6 +44,24 @@ class SectionsTable(Table):
     hub_ahead_mm: NotNegative = Field(description="how far the hub goes on ahead of the leading edge")
 
 
+class StepTable(Table):
+    """Blades by faces of a STEP file; a face is named by its number or by a point [mm] on it, in the file's frame."""
+
+    file: Text = Field(description="`chipload check FILE` lists its faces")
+    flow: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = Field(
+        description="which way along the axis of rotation the flow comes in; the axis goes through the origin"
+    )
+    plus: FaceName = Field(description="side that faces a growing angle about the axis, seen against the flow")
+    minus: FaceName = Field(description="side that faces a falling angle, of the same blade or of another")
+    splitter_plus: FaceName | None = Field(None, description="likewise of a splitter; none: there are no splitters")
+    splitter_minus: FaceName | None = None
+    hub: tuple[FaceName, ...] | Text = Field(description="faces of revolution, or a file of points as of sections")
+    shroud: tuple[FaceName, ...] | Text = Field(description="likewise; the tip of one blade is a face of it")
+    unit: Unit | None = Field(None, description="of hub and shroud where they are files of points")
+    fit_mm: Positive = Field(0.001, le=0.1, description="how far a patch may leave its face where it is fitted")
+    hub_ahead_mm: NotNegative = Field(description="how far the hub goes on ahead of the leading edge")
+
+
 class ImpellerTable(Table):
     """The part."""
 
@@ -51,13 +69,25 @@ class ImpellerTable(Table):
     outer_diameter_mm: Positive = Field(description="over the blades, as the drawing states it")
     shape: ShapeTable | None = None
     sections: SectionsTable | None = None
+    step: StepTable | None = None
+    fillet_mm: Positive | None = Field(
+        None, description="fillets between sides and hub, which meet without them; sides begin above theirs"
+    )
+
+    @property
+    def has_splitter(self) -> bool:
+        """Whether splitters stand between the blades."""
+        by_points = self.sections is not None and bool(self.sections.splitter)
+        return by_points or (self.step is not None and self.step.splitter_plus is not None)
 
 
 class SurfaceTable(Table):
     """One surface that is milled, and where on it."""
 
     body: Literal["blade", "splitter"]
-    side: Literal["plus", "minus", "floor"] = Field(description="plus faces a growing angle; floor: the hub beyond it")
+    side: Literal["plus", "minus", "floor", "plus fillet", "minus fillet"] = Field(
+        description="plus faces a growing angle; floor: the hub beyond it; fillet: between the side and the hub"
+    )
     along: Span = Field(description="from where to where along the surface, 0 to 1")
     up: Span = Field(description="from where to where up from the hub, across on a floor, 0 to 1")
     points: tuple[Count, Count] = Field(description="contact points along and up")
@@ -75,6 +105,7 @@ class PathsTable(Table):
 
     check_mm: Positive = Field(description="most distance of check points of the paths")
     chord_mm: Positive = Field(le=1.0, description="how far the tip may leave its path between two rows")
+    overrun_mm: NotNegative = Field(1.0, description="of lines beyond the ends of their patch, where they can")
     lift_mm: Positive = Field(description="off the surface at the ends of a line")
     margin_mm: Positive = Field(description="that links keep from the part")
     touch_mm: NotNegative = Field(description="how deep a lift may touch the check points")
@@ -82,6 +113,29 @@ class PathsTable(Table):
     above_mm: Positive = Field(description="of the safe height above the part")
     link_feed_mm_min: Positive = Field(le=1e5, description="feed of lifts and links")
     gouge_mm: Positive = Field(le=1.0, description="deepest that the check may find a program below a surface")
+
+
+class RoughTable(Table):
+    """Roughing programs of the channels by layers, before the finishing ones; links are those of the paths."""
+
+    diameter_mm: Positive | None = Field(None, description="of a cutter of the catalogue; none: the largest that fits")
+    corner_radius_mm: NotNegative | None = Field(None, description="of that cutter")
+    share: Annotated[Number, Field(gt=0.0, le=1.0)] = Field(
+        0.9, description="of the points of the channels at which the largest cutter that fits must go"
+    )
+    depth_mm: Positive = Field(description="greatest thickness of a layer")
+    step_mm: Positive = Field(description="greatest distance of rows")
+    blades_mm: NotNegative = Field(description="allowance on blades and splitters")
+    hub_mm: NotNegative = Field(description="allowance on the hub")
+    over_mm: NotNegative = Field(description="how far the blank stands over the shroud")
+    feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's tip")
+    speed_rpm: Positive = Field(le=1e6, description="spindle speed")
+    check_mm: Positive = Field(description="most distance of check points")
+    coarser: Annotated[Number, Field(ge=1.0, le=100.0)] = Field(
+        10.0, description="how many times paths.chord_mm the tip may leave its path"
+    )
+    grid_mm: Positive = Field(description="distance of the lines by which the blank is simulated")
+    touch_mm3: NotNegative = Field(description="what a rapid, or parts above the cutting part, may take in one row")
 
 
 class SectionalTable(Table):
@@ -100,6 +154,7 @@ class SectionalTable(Table):
     cutter_change_s: NotNegative = Field(description="time of a cutter change")
     table_change_s: NotNegative = Field(description="time of setting the index table to another angle")
     paths: PathsTable | None = Field(None, description="none: the search and the patches alone, no programs")
+    rough: RoughTable | None = Field(None, description="none: the programs finish only")
     hand_picked: PickedTable | None = Field(None, description="the cutter that is compared with")
 
 
@@ -148,9 +203,12 @@ def impeller_job(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) 
         Keys do not go together.
     """
     folder, part = path.parent, table.impeller
-    if (part.shape is None) == (part.sections is None):
-        said = "neither is" if part.shape is None else "both are"
-        raise InputError(f"impeller: {said} stated: state either [impeller.shape] or [impeller.sections]")
+    stated = [key for key in ("shape", "sections", "step") if getattr(part, key) is not None]
+    if len(stated) != 1:
+        said = f"{' and '.join(stated)} are" if stated else "none is"
+        raise InputError(
+            f"impeller: {said} stated: state one of [impeller.shape], [impeller.sections], [impeller.step]"
+        )
     for k, surface in enumerate(table.surface):
         _check(f"surface.{k}", surface, part)
         if any((s.body, s.side) == (surface.body, surface.side) for s in table.surface[:k]):
@@ -161,21 +219,42 @@ def impeller_job(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) 
             f"operation.0.paths.margin_mm = {paths.margin_mm:g}: must be above touch_mm = {paths.touch_mm:g} and below "
             f"lift_mm = {paths.lift_mm:g}"
         )
+    rough = table.operation[0].rough
+    if rough is not None and paths is None:
+        raise InputError("operation.0.rough: takes its links from [operation.paths]: state that too")
+    if rough is not None and (rough.diameter_mm is None) != (rough.corner_radius_mm is None):
+        raise InputError(
+            "operation.0.rough: state both diameter_mm and corner_radius_mm, or neither for the largest that fits"
+        )
     files: dict[str, Path] = {}
     if part.sections is not None:
         given = part.sections
         for name in (*given.blade, *given.splitter, given.hub, given.shroud):
             if name.lower().endswith((".stp", ".step")):
-                raise InputError(
-                    f"impeller.sections: {name}: blade faces are not read from STEP: write sections as points, X Y Z"
-                )
+                raise InputError(f"impeller.sections: {name}: is a STEP file: name its faces in [impeller.step]")
         files = {f"blade {k}": folder / name for k, name in enumerate(given.blade, 1)}
         files |= {f"splitter {k}": folder / name for k, name in enumerate(given.splitter, 1)}
         files |= {"hub": folder / given.hub, "shroud": folder / given.shroud}
+    if part.step is not None:
+        files = _step_files(part.step, folder)
     return ImpellerJob(
         path, table, source("machine", table.machine, folder), source("catalogue", table.catalogue, folder), files,
         tuple(overrides),
     )  # fmt: skip
+
+
+def _step_files(given: StepTable, folder: Path) -> dict[str, Path]:
+    if (given.splitter_plus is None) != (given.splitter_minus is None):
+        missing = "plus" if given.splitter_plus is None else "minus"
+        raise InputError(f"impeller.step.splitter_{missing}: missing: state both sides of the splitter or neither")
+    points = {key: name for key in ("hub", "shroud") if isinstance(name := getattr(given, key), str)}
+    for key in ("hub", "shroud"):
+        if not getattr(given, key):
+            raise InputError(f"impeller.step.{key} = []: must name at least one face, or a file of points")
+    if bool(points) == (given.unit is None):
+        said = "missing: state it for the points of " + " and ".join(points) if points else "of no file: leave it out"
+        raise InputError(f"impeller.step.unit: {said}")
+    return {"step": folder / given.file} | {key: folder / name for key, name in points.items()}
 
 
 def _check(at: str, surface: SurfaceTable, part: ImpellerTable) -> None:
@@ -185,5 +264,7 @@ def _check(at: str, surface: SurfaceTable, part: ImpellerTable) -> None:
             raise InputError(f"{at}.{key} = [{low:g}, {high:g}]: must ascend within 0 to 1")
     if min(surface.points) < 2:
         raise InputError(f"{at}.points = {list(surface.points)}: must be at least 2 each")
-    if surface.body == "splitter" and (part.sections is None or not part.sections.splitter):
+    if surface.side.endswith(" fillet") and part.fillet_mm is None:
+        raise InputError(f"{at}.side = {surface.side!r}: the impeller has no fillets: state impeller.fillet_mm")
+    if surface.body == "splitter" and not part.has_splitter:
         raise InputError(f"{at}.body = 'splitter': the impeller has no splitter: leave it out")

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+
+import trimesh
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.job.sources import Limited, cutters, source
-from chipload.job.tables import LoadLimitsTable, ProgramJobTable
+from chipload.job.tables import LOADS, LoadLimitsTable, ProgramJobTable
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,7 @@ class ProgramJob(Limited):
     overrides : the `--set` texts that were applied
     cutters : by number; empty where the program is not simulated
     material : a shipped name or a file; None where the program is not simulated
+    meshes : what stands for the files of ``stock``, ``part``, ``fixture 0`` and so on
     """
 
     path: Path
@@ -36,6 +39,7 @@ class ProgramJob(Limited):
     overrides: tuple[str, ...]
     cutters: Mapping[int, Cutter]
     material: str | Path | None
+    meshes: Mapping[str, trimesh.Trimesh] = field(default_factory=dict)
 
     @property
     def simulates(self) -> bool:
@@ -57,7 +61,7 @@ def program_job(path: Path, table: ProgramJobTable, overrides: Sequence[str]) ->
         _check_simulation(table)
         own = cutters(table.cutter, folder)
     else:
-        for key in ("stock", "part", "fixture", "material", "cutter"):
+        for key in ("stock", "part", "fixture", "material", "cutter", "stiffness"):
             if getattr(table, key):
                 raise InputError(
                     f"{key}: not used where a program is only read: add an [[operation]] with "
@@ -89,9 +93,14 @@ def _check_simulation(table: ProgramJobTable) -> None:
         if saved == (stock.layer_mm is not None):
             need = "leave it out: the layers of an earlier result stay" if saved else "missing: state it"
             raise InputError(f"stock.layer_mm: {need}")
-    for key in ("gouge_mm", "excess_mm"):
+    for key in ("form_error_um", "gouge_mm", "excess_mm"):
         if table.part is None and getattr(table.limits, key) is not None:
             raise InputError(f"limits.{key}: needs the part that should come out: state [part] or leave it out")
+    if table.operation[0].feeds is not None and not any(getattr(table.limits, name) is not None for name in LOADS):
+        raise InputError(
+            f"operation.0.feeds: no limit of a load is stated, so nothing would hold them: state at least one of "
+            f"{', '.join(LOADS)} in [limits]"
+        )
     if not table.limits.stated:
         names = ", ".join(LoadLimitsTable.model_fields)
         raise InputError(f"limits: none is stated, so nothing would be checked: state at least one of {names}")

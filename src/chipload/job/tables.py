@@ -29,11 +29,23 @@ def _only_count(value: Any) -> Any:
     return value
 
 
+def _only_face(value: Any) -> Any:
+    if isinstance(value, int) and not isinstance(value, bool):
+        if not 1 <= value <= 1_000_000:
+            raise ValueError("must be from 1")
+        return value
+    if isinstance(value, (list, tuple)) and len(value) == 3:
+        return tuple(float(_only_number(x)) for x in value)
+    raise ValueError("must be the number of a face or a point [x, y, z] on it, in mm")
+
+
 Number = Annotated[float, BeforeValidator(_only_number), Field(allow_inf_nan=False)]
 Positive = Annotated[Number, Field(gt=0.0)]
 NotNegative = Annotated[Number, Field(ge=0.0)]
 Point = Annotated[tuple[Number, Number, Number], Field()]
 Count = Annotated[int, BeforeValidator(_only_count), Field(ge=1, le=1000)]
+#: a face of a STEP file, by its number or by a point [mm] on it
+FaceName = Annotated[int | tuple[float, float, float], BeforeValidator(_only_face)]
 Text = Annotated[str, Field(min_length=1)]
 Unit = Literal["um", "mm", "cm", "m", "inch", "foot"]
 Strategy = Literal["plain", "backward", "feed"]
@@ -158,6 +170,23 @@ class FixtureTable(Table):
     spacing_mm: Positive = Field(description="longest side of the triangles whose corners are looked at")
 
 
+class FeedsTable(Table):
+    """New feeds for the lines of the program, as fast as the stated limits of loads allow; the path stays."""
+
+    slowest_percent: Positive = Field(le=100.0, description="least feed of a line that cuts, of the programmed one")
+    fastest_percent: Positive = Field(ge=100.0, le=1e4, description="greatest feed of a line that cuts, likewise")
+    fastest_mm_min: Positive | None = Field(None, le=1e6, description="greatest feed of a line that cuts")
+    tooth_feed_least_mm: Positive | None = Field(
+        None, description="least feed per tooth of a line that cuts, so that it does not rub"
+    )
+    air_mm_min: Positive | None = Field(
+        None, le=1e6, description="feed of a line that touches nothing, if it is slower; none: it keeps its own"
+    )
+    change_least_percent: NotNegative = Field(
+        5.0, lt=100.0, description="a feed that could rise by less than this stays that of the line before"
+    )
+
+
 class SimulateTable(Table):
     """Run the program through the stock: chips, forces, torque, power."""
 
@@ -170,6 +199,7 @@ class SimulateTable(Table):
     stock_points_mm: Positive | None = Field(
         None, description="pitch of the points of the stock that shank and holder are held against; none: they are not"
     )
+    feeds: FeedsTable | None = Field(None, description="new feeds for the lines of the program; none: they stay")
 
 
 class LoadLimitsTable(Limits):
@@ -179,8 +209,36 @@ class LoadLimitsTable(Limits):
     torque_nm: Positive | None = None
     power_w: Positive | None = None
     chip_mm: Positive | None = None
+    deflection_um: Positive | None = Field(None, description="how far tool and work part, see [stiffness]")
+    form_error_um: Positive | None = Field(None, description="what giving way leaves on, or takes from, the [part]")
     gouge_mm: Positive | None = Field(None, description="deepest cut into the [part]")
     excess_mm: Positive | None = Field(None, description="most material over the [part] where the tool came near it")
+
+
+#: limits that feeds can hold
+LOADS = ("force_n", "torque_nm", "power_w", "chip_mm", "deflection_um")
+
+
+def _stiff(value: Any) -> Any:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or math.isnan(value):
+        raise ValueError("must be a number, or inf where it is rigid")
+    return float(value)
+
+
+Stiff = Annotated[float, BeforeValidator(_stiff), Field(gt=0.0)]
+
+
+class StiffnessTable(Table):
+    """What gives way beside the cutter; inf: rigid. What is not stated counts as rigid and leaves deflections
+    unproven.
+    """
+
+    holder_gpa: Stiff | None = Field(None, description="Young's modulus of the holders, solid parts of holder_mm")
+    grip_n_um: Stiff | None = Field(None, description="cutter in its holder, across the axis")
+    grip_nm_rad: Stiff | None = Field(None, description="cutter in its holder, against tilting")
+    spindle_n_um: Stiff | None = Field(None, description="end of the spindle, across the axis")
+    spindle_nm_rad: Stiff | None = Field(None, description="end of the spindle, against tilting")
+    work_n_um: Stiff | None = Field(None, description="work where it is cut, the same in every direction")
 
 
 class ProgramJobTable(Table):
@@ -193,6 +251,7 @@ class ProgramJobTable(Table):
     fixture: tuple[FixtureTable, ...] = ()
     material: SourceTable | None = None
     cutter: tuple[CutterTable, ...] = ()
+    stiffness: StiffnessTable | None = None
     operation: tuple[SimulateTable, ...] = Field((), max_length=1)
     limits: LoadLimitsTable = Field(default_factory=LoadLimitsTable.model_construct)
 

@@ -13,7 +13,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.table import CutterTable
 from chipload.errors import InputError
 from chipload.job.sources import Limited, cutters, source
-from chipload.job.tables import Count, Limits, NotNegative, Number, Positive, SourceTable, Table, Text, Unit
+from chipload.job.tables import Count, FaceName, Limits, NotNegative, Number, Positive, SourceTable, Table, Text, Unit
 
 
 def _range(low: float, high: float, unit: str, hint: tuple[str, str]) -> BeforeValidator:
@@ -51,6 +51,7 @@ SHAPES: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         (),
     ),
     "sections": (("files", "unit", "edge_share"), ("columns", "span")),
+    "step": (("file", "front", "back", "clamp"), ("edge_share", "span", "fit_mm")),
 }
 #: keys of every shape
 EVERY = ("shape", "foot_mm", "allowance_mm", "elements")
@@ -59,7 +60,7 @@ EVERY = ("shape", "foot_mm", "allowance_mm", "elements")
 class WallTable(Table):
     """The wall, clamped below; which keys it needs depends on its shape, see :data:`SHAPES`."""
 
-    shape: Literal["plate", "blade", "sections"]
+    shape: Literal["plate", "blade", "sections", "step"]
     foot_mm: Positive = Field(description="height above the clamp that keeps its stock")
     allowance_mm: tuple[NotNegative, NotNegative] = Field(description="stock on the side towards +y and towards -y")
     elements: tuple[Count, Count] = Field(description="finite elements along the wall and up it, the foot among them")
@@ -71,7 +72,7 @@ class WallTable(Table):
     thickness_root_mm: Positive | None = None
     thickness_tip_mm: Positive | None = None
     edge_share: NotNegative | None = Field(
-        None, description="of a blade: its thickness at the edges; of sections: the part of u left out at each edge"
+        None, description="of a blade: its thickness at the edges; else the part of u left out at each edge"
     )
     camber_deg: Number | None = None
     stagger_root_deg: Number | None = None
@@ -80,6 +81,15 @@ class WallTable(Table):
     unit: Unit | None = Field(None, description="of the files, which do not say it")
     columns: Text | None = Field(None, description="of files that do not name them, as X Y Z")
     span: tuple[NotNegative, NotNegative] | None = Field(None, description="part of the span that is the wall")
+    file: Text | None = Field(None, description="STEP file; `chipload check FILE` lists its faces")
+    front: FaceName | None = Field(None, description="face, by number or point [mm] on it: the side towards +y")
+    back: FaceName | None = Field(None, description="the face opposite: the side towards -y")
+    clamp: FaceName | None = Field(
+        None, description="what is clamped: a face beside the front, or a point of that edge"
+    )
+    fit_mm: Positive | None = Field(
+        None, le=0.1, description="how far a patch may leave its face where it is fitted; none: 0.001"
+    )
 
 
 class WorkpieceTable(Table):
@@ -156,7 +166,7 @@ class WallJob(Limited):
     table : its values
     cutters : by number
     machine, material : a shipped name or a file
-    section_files : of the sections; empty for other shapes
+    section_files : of the sections, or the STEP file; empty for other shapes
     threshold_file : experiments; None: the threshold is modelled
     overrides : the `--set` texts that were applied
     """
@@ -217,7 +227,7 @@ def wall_job(path: Path, table: WallJobTable, overrides: Sequence[str]) -> WallJ
         tools,
         source("machine", table.machine, folder),
         source("material", table.material, folder),
-        tuple(folder / f for f in wall.files or ()),
+        tuple(folder / f for f in wall.files or (() if wall.file is None else (wall.file,))),
         None if table.threshold is None else folder / table.threshold.file,
         tuple(overrides),
     )

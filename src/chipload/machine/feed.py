@@ -177,13 +177,3 @@ def row_time_limited(machine: Machine, axes: ArrayLike, time: ArrayLike = 0.0) -
     for axis in machine.chain.axes:
         out = np.maximum(out, np.abs(np.diff(q[:, axis.column])) / axis.rate)
     return out
-
-
-def inverse_time_feed(time: ArrayLike) -> Floats:
-    """What G93 takes for F: how many times a minute the move would fit [1/min], inf where it takes no time.
-
-    >>> inverse_time_feed([2.0, 0.0]).tolist()
-    [30.0, inf]
-    """
-    with np.errstate(divide="ignore"):
-        return np.asarray(60.0 / np.asarray(time, dtype=np.float64))

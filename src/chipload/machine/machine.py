@@ -11,11 +11,14 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from chipload.errors import InputError
 from chipload.machine.chain import Chain
 from chipload.machine.schema import Row, chain_from_table, checked
 from chipload.tables import read_table, shipped_names, shipped_table
-from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
+from chipload.units import mm_s_from_mm_min, rad_s_from_rpm, rpm_from_rad_s
 
 AXES = ("x", "y", "z")
 DIALECTS = ("linuxcnc", "fanuc")
@@ -37,6 +40,8 @@ class Machine:
     decimals : of a written position [mm], 3 to 6
     power_w : power of the spindle [W]; None: not known
     torque : torque of the spindle [N mm]; None: not known
+    torque_curve : (speed [rad/s], torque [N mm]) of the spindle, rising speeds that hold its range, straight between
+        them; empty: not known
     note : where its numbers come from and which are assumed
     tcp_words : blocks that begin and end tool centre point control, ``{tool}`` for the tool's number; None: it has none
 
@@ -59,6 +64,7 @@ class Machine:
     torque: float | None = None
     note: str = ""
     tcp_words: tuple[str, str] | None = None
+    torque_curve: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
         def need(ok: bool, key: str, value: object, limit: str) -> None:
@@ -83,6 +89,38 @@ class Machine:
         need(3 <= self.decimals <= 6, "decimals", self.decimals, "must be from 3 to 6")
         for key, value, factor in (("power_w", self.power_w, 1.0), ("torque_nm", self.torque, 1e-3)):
             need(value is None or 0.0 < value < math.inf, f"spindle.{key}", (value or 0.0) * factor, "must be above 0")
+
+        self._check_curve()
+
+    def _check_curve(self) -> None:
+        """Refuse a curve of torque that does not rise in speed, is not above 0, or leaves a part of the range open."""
+        if not self.torque_curve:
+            return
+        speed, torque = np.array(self.torque_curve).T
+        rpm, nm = rpm_from_rad_s(1.0) * speed, torque / 1000.0
+        key = "machine.spindle.torque_curve"
+        falls = np.flatnonzero(~(np.diff(speed) > 0.0))
+        if len(falls):
+            raise InputError(f"{key}: {rpm[falls[0] + 1]:g} rpm after {rpm[falls[0]]:g}: speeds must rise")
+        if not (nm > 0.0).all() or not np.isfinite(nm).all():
+            raise InputError(f"{key}: a torque must be above 0 and finite")
+        low, high = rpm_from_rad_s(self.spindle_min), rpm_from_rad_s(self.spindle_max)
+        if not (speed[0] <= self.spindle_min * (1.0 + 1e-12) and speed[-1] >= self.spindle_max * (1.0 - 1e-12)):
+            raise InputError(
+                f"{key}: from {rpm[0]:g} to {rpm[-1]:g} rpm: must hold min_rpm = {low:g} to max_rpm = {high:g}"
+            )
+
+    def torque_at(self, speed: ArrayLike) -> NDArray[np.float64]:
+        """Torque that the spindle gives at speeds [rad/s], by its greatest torque and its curve [N mm]; inf: not known.
+
+        >>> machine_named("vmc").torque_at([100.0, 1000.0]).tolist()
+        [70000.0, 70000.0]
+        """
+        w = np.abs(np.asarray(speed, dtype=np.float64))
+        out = np.full(w.shape, math.inf if self.torque is None else self.torque)
+        if self.torque_curve:
+            out = np.minimum(out, np.interp(w, *np.array(self.torque_curve).T))
+        return out
 
     @property
     def limits(self) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
@@ -121,6 +159,7 @@ def _from_table(label: str, table: Row) -> Machine:
             power_w=float(spindle["power_w"]) if "power_w" in spindle else None,
             torque=float(spindle["torque_nm"]) * 1e3 if "torque_nm" in spindle else None,
             note=top.get("note", ""),
+            torque_curve=tuple((rad_s_from_rpm(n), 1e3 * t) for n, t in spindle.get("torque_curve", ())),
             tcp_words=_tcp_words(top),
         )
     except InputError as err:
@@ -150,9 +189,9 @@ def read_machine(path: str | Path) -> Machine:
     head), ``indexed``, ``step_mm``. In ``[axis.a]``, b, c: ``side``, ``direction``, ``pivot_mm``, ``min_deg`` and
     ``max_deg`` or ``endless = true``, ``rate_deg_min``, ``acceleration_deg_s2``, optional ``indexed``, ``step_deg``.
 
-    In ``[spindle]``: ``min_rpm``, ``max_rpm``, optional ``power_w``, ``torque_nm``, ``direction`` (from the tip to the
-    spindle; else +Z), and ``nose_mm`` or ``gauge_mm``: the nose is so far from the pivot of the head's last rotary
-    axis. In ``[work]``, which may be left out: ``zero_mm``, ``x_axis``, ``z_axis``.
+    In ``[spindle]``: ``min_rpm``, ``max_rpm``, optional ``power_w``, ``torque_nm``, ``torque_curve`` (pairs of rpm and
+    N m), ``direction`` (from the tip to the spindle; else +Z), and ``nose_mm`` or ``gauge_mm``: the nose is so far from
+    the pivot of the head's last rotary axis. In ``[work]``, which may be left out: ``zero_mm``, ``x_axis``, ``z_axis``.
 
     Raises
     ------

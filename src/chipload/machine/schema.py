@@ -15,6 +15,7 @@ from chipload.units import mm_s_from_mm_min
 Row = dict[str, Any]
 
 _NUMBER, _WHOLE, _TEXT, _FLAG, _VECTOR = "a number", "a whole number", "a text", "true or false", "three numbers"
+_PAIRS = "pairs of numbers"
 _MACHINE = {
     "name": _TEXT,
     "dialect": _TEXT,
@@ -32,6 +33,7 @@ _SPINDLE = {
     "max_rpm": _NUMBER,
     "power_w?": _NUMBER,
     "torque_nm?": _NUMBER,
+    "torque_curve?": _PAIRS,
     "direction?": _VECTOR,
     "nose_mm?": _VECTOR,
     "gauge_mm?": _NUMBER,
@@ -70,6 +72,10 @@ def _is(kind: str, value: object) -> bool:
         return isinstance(value, bool)
     if kind == _VECTOR:
         return isinstance(value, list) and len(value) == 3 and all(_is(_NUMBER, v) for v in value)
+    if kind == _PAIRS:
+        if not isinstance(value, list) or not all(isinstance(row, list) and len(row) == 2 for row in value):
+            return False
+        return all(_is(_NUMBER, v) for row in value for v in row)
     if isinstance(value, bool):
         return False
     return isinstance(value, int) if kind == _WHOLE else isinstance(value, (int, float))

@@ -210,7 +210,10 @@ def extents(commands: Commands) -> Floats:
 
 
 def chorded(commands: Commands, chosen: NDArray[np.bool_], tolerance: float) -> Commands:
-    """The commands with the ``chosen`` (n,) arcs as chords that leave them by at most ``tolerance`` [mm]."""
+    """The commands with the ``chosen`` (n,) arcs as chords that leave them by at most ``tolerance`` [mm].
+
+    Where the radii at both ends differ, that of the arc goes evenly from one to the other.
+    """
     chosen = chosen & (commands.motion == ARC)
     if not chosen.any():
         return commands
@@ -218,7 +221,7 @@ def chorded(commands: Commands, chosen: NDArray[np.bool_], tolerance: float) -> 
     pair = np.array(PLANE_AXES)[commands.plane][:, :2]
     begin = starts(commands)
     v0 = np.take_along_axis(begin, pair, axis=1) - commands.centre
-    r = np.hypot(*v0.T)
+    r, r1 = np.hypot(*v0.T), np.hypot(*(np.take_along_axis(commands.position, pair, axis=1) - commands.centre).T)
     step = 2.0 * np.arccos(1.0 - np.minimum(tolerance / np.where(r > 0.0, r, math.inf), 0.5))
     count = np.where(chosen, np.ceil(np.abs(sweep) / np.where(step > 0.0, step, 1.0)), 1.0).astype(np.int64).clip(1)
     row = np.repeat(np.arange(len(commands)), count)
@@ -229,7 +232,9 @@ def chorded(commands: Commands, chosen: NDArray[np.bool_], tolerance: float) -> 
     )
     a = sweep[row] * part
     c, s = np.cos(a), np.sin(a)
-    turned = commands.centre[row] + np.column_stack([c * v0[row, 0] - s * v0[row, 1], s * v0[row, 0] + c * v0[row, 1]])
+    grown = 1.0 + part * np.where(r > 0.0, r1 / np.where(r > 0.0, r, 1.0) - 1.0, 0.0)[row]
+    turned = np.column_stack([c * v0[row, 0] - s * v0[row, 1], s * v0[row, 0] + c * v0[row, 1]])
+    turned = commands.centre[row] + grown[:, None] * turned
     which = np.flatnonzero(inner)
     position[which[:, None], pair[row][which]] = turned[which]
     columns = {f.name: getattr(commands, f.name)[row] for f in fields(Commands) if f.name not in ("frames", "labels")}
@@ -238,6 +243,16 @@ def chorded(commands: Commands, chosen: NDArray[np.bool_], tolerance: float) -> 
     columns["centre"] = np.where(chosen[row][:, None], 0.0, commands.centre[row])
     columns["turns"] = np.where(chosen[row], 0, commands.turns[row])
     return Commands(**columns, frames=commands.frames, labels=commands.labels)
+
+
+def spirals(commands: Commands, skew: float) -> NDArray[np.bool_]:
+    """(n,) whether a row is an arc whose radii at its ends differ by more than ``skew`` [mm]."""
+    pair = np.array(PLANE_AXES)[commands.plane][:, :2]
+    r0, r1 = (
+        np.hypot(*(np.take_along_axis(p, pair, axis=1) - commands.centre).T)
+        for p in (starts(commands), commands.position)
+    )
+    return np.asarray((commands.motion == ARC) & (np.abs(r1 - r0) > skew))
 
 
 def commands_from_rows(rows: Sequence[Row], frames: Sequence[Frame], labels: Sequence[str]) -> Commands:

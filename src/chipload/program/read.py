@@ -6,6 +6,7 @@ each leads to the other, so that a :class:`Reading` always has both.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, cast, get_args
@@ -20,7 +21,7 @@ from chipload.machine.machine import Machine
 from chipload.program.apt.reader import read_apt_file
 from chipload.program.check import check_program
 from chipload.program.commands import Commands
-from chipload.program.gcode.reader import read_gcode_file
+from chipload.program.gcode.reader import read_gcode, read_gcode_file
 from chipload.program.gcode.tools import ToolTable, read_tool_table
 from chipload.program.heidenhain.reader import read_heidenhain_file
 from chipload.program.program import Program
@@ -72,12 +73,14 @@ def read_program(
     tools: ToolTable | None = None,
     feed: float | None = None,
     tolerance: float = TOLERANCE_MM,
+    text: str | None = None,
     progress: Progress = silent,
 ) -> Reading:
     """Read a program for a machine.
 
     Parameters
     ----------
+    text : an NC text that stands for that of the file; None: the file is read
     dialect : None: by the ending of the file, for NC texts that of the machine
     tools : diameters and lengths; without it they count as 0
     feed : [mm/s] of CL data that state none
@@ -89,7 +92,7 @@ def read_program(
         The file cannot be read, its controller would refuse it, the machine has not the axes that it moves.
     """
     path = Path(path)
-    kind = _dialect(path, machine, dialect)
+    kind = dialect_of(path, machine, dialect)
     if kind == "apt":
         lengths = tools.lengths() if tools is not None else {}
         program, noticed = read_apt_file(path, feed=feed)
@@ -98,11 +101,51 @@ def read_program(
     else:
         if kind == "heidenhain":
             commands, noticed = read_heidenhain_file(path)
-        else:
+        elif text is None:
             commands, noticed = read_gcode_file(path, dialect=kind, tools=tools, progress=progress)
+        else:
+            commands, noticed = read_gcode(
+                text, name=path.name, folder=path.parent, dialect=kind, tools=tools, progress=progress
+            )
         if len(commands) == 0:
             raise InputError(f"{path.name}: no motion: nothing to check")
         program, more = to_work(commands, machine, tolerance=tolerance)
+    return _held(commands, program, machine, noticed, more)
+
+
+def reading_of(
+    program: Program,
+    machine: Machine,
+    *,
+    tool_lengths: Mapping[int, float] | None = None,
+    tolerance: float = TOLERANCE_MM,
+) -> Reading:
+    """What the axes of a machine do for a program that comes from no file, and what is wrong with it there.
+
+    Parameters
+    ----------
+    tool_lengths : [mm] of each tool; one that is not named has 0
+    tolerance : of rows on which a rotary axis moves [mm]
+
+    Raises
+    ------
+    InputError
+        It does not move, or the machine has not the axes that it moves.
+    """
+    if len(program) == 0:
+        raise InputError("program: no motion: nothing to check")
+    commands, found = to_axes(program, machine, tool_lengths=tool_lengths, tolerance=tolerance)
+    return _held(commands, program, machine, (), tuple(f for f in found if f.code not in LIMITS))
+
+
+def _held(
+    commands: Commands,
+    program: Program,
+    machine: Machine,
+    noticed: tuple[Finding, ...],
+    more: tuple[Finding, ...],
+) -> Reading:
+    """A program held against the limits of a machine."""
     axes = axes_of(commands, machine)
     broken = [*check_program(program, machine)]
     if machine.chain.rotary:
@@ -151,7 +194,14 @@ def read_tools(path: str | Path) -> ToolTable:
     return read_tool_table(text, name=path.name)[0]
 
 
-def _dialect(path: Path, machine: Machine, said: str | None) -> Dialect:
+def dialect_of(path: Path, machine: Machine, said: str | None = None) -> Dialect:
+    """The dialect of a file: as it is said, else by its ending, for NC texts that of the machine.
+
+    Raises
+    ------
+    InputError
+        The dialect or the ending is not known.
+    """
     if said is not None:
         if said not in get_args(Dialect):
             raise InputError(f"dialect = {said!r}: must be one of {', '.join(get_args(Dialect))}")

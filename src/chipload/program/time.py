@@ -13,6 +13,8 @@ change the tool or to run up the spindle takes no time.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +24,18 @@ from chipload.program.motions import bases, directions, is_arc, lengths, radii, 
 from chipload.program.program import DWELL, RAPID, Program
 
 Floats = NDArray[np.float64]
+
+
+class _Speeds(NamedTuple):
+    """Rows that have a length: their numbers, lengths [mm], greatest speeds [mm/s], accelerations along the path
+    [mm/s^2], and speeds at their ends [mm/s], one more than rows.
+    """
+
+    row: NDArray[np.int64]
+    length: Floats
+    most: Floats
+    acceleration: Floats
+    ends: Floats
 
 
 def program_time(program: Program, machine: Machine) -> Floats:
@@ -43,10 +57,42 @@ def program_time(program: Program, machine: Machine) -> Floats:
     [0.0, 2.263333]
     """
     out = np.where(program.motion == DWELL, program.feed, 0.0)
+    if (lengths(program) > 0.0).any():
+        row, length, most, a, v = _speeds(program, machine)
+        out[row] = move_time(length, most, a, v[:-1], v[1:])
+    return out
+
+
+def peak_speed(program: Program, machine: Machine) -> Floats:
+    """Greatest speed that each row reaches; what its feed asks beyond that changes no time.
+
+    Returns
+    -------
+    (n,) float [mm/s]
+        0 in rows without length.
+
+    Examples
+    --------
+    0.3 mm from rest to rest at 3000 mm/s^2: sqrt(900) mm/s, whatever is asked.
+
+    >>> from chipload.machine.machine import machine_named
+    >>> from chipload.program.build import plunge, rapid
+    >>> p = Program.join([rapid([0, 0, 0], 0, 1, "link"), plunge([0.3, 0, 0], 90.0, 800.0, 1, "cut")])
+    >>> peak_speed(p, machine_named("vmc")).round(6).tolist()
+    [0.0, 30.0]
+    """
+    out = np.zeros(len(program))
+    if (lengths(program) > 0.0).any():
+        row, length, most, a, v = _speeds(program, machine)
+        peak = np.minimum(most, np.sqrt(a * length + 0.5 * (v[:-1] ** 2 + v[1:] ** 2)))
+        out[row] = np.maximum(peak, np.maximum(v[:-1], v[1:]))
+    return out
+
+
+def _speeds(program: Program, machine: Machine) -> _Speeds:
+    """How fast rows may go, and how fast one passes into the next; some row has a length."""
     length = lengths(program)
     row = np.flatnonzero(length > 0.0)
-    if len(row) == 0:
-        return out
     first, last = directions(program)
     arc = is_arc(program)
     speed = np.where(program.motion == RAPID, machine.rapid, np.minimum(program.feed, machine.feed_max))
@@ -77,5 +123,4 @@ def program_time(program: Program, machine: Machine) -> Floats:
     joint = np.where(rest, 0.0, joint)
     ends = np.concatenate([[0.0], joint, [0.0]])
     v, _ = limited_speed(np.concatenate([[0.0], np.cumsum(length[row])]), ends, a[row])
-    out[row] = move_time(length[row], speed[row], a[row], v[:-1], v[1:])
-    return out
+    return _Speeds(row, length[row], speed[row], a[row], v)

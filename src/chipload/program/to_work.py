@@ -3,7 +3,7 @@
 Notation: a **known** work offset is one that the text or its parameters set; where it is all zero the work's zero is
 where the machine's file puts it. L [mm] tool length, kept in a frame as what it adds to the axes. Rows on which no
 rotary axis moves are mapped rigidly: arcs stay arcs. Where one moves, the tip of a machine without tool centre point
-control leaves the straight line: the row is cut into pieces.
+control leaves the straight line: the row is cut into pieces. So is an arc whose radii at its ends differ.
 """
 
 from __future__ import annotations
@@ -17,9 +17,21 @@ from chipload.errors import Finding, InputError
 from chipload.machine.kinematics import forward, with_tip
 from chipload.machine.linearise import traced
 from chipload.machine.machine import Machine
-from chipload.program.commands import ARC, DWELL, LETTERS, LINE, PLANE_AXES, PROBE, Commands, Frame, chorded, extents
+from chipload.program.commands import (
+    ARC,
+    DWELL,
+    LETTERS,
+    LINE,
+    PLANE_AXES,
+    PROBE,
+    Commands,
+    Frame,
+    chorded,
+    extents,
+    spirals,
+)
 from chipload.program.motions import lengths, spans
-from chipload.program.program import ARC_CCW, ARC_CW, Program
+from chipload.program.program import ARC_CCW, ARC_CW, ARC_SKEW_MM, Program
 from chipload.program.program import DWELL as WORK_DWELL
 from chipload.program.program import LINE as WORK_LINE
 from chipload.program.program import RAPID as WORK_RAPID
@@ -75,7 +87,7 @@ def to_work(
     base = work_frame(commands)
     known = bool(base.offset.any())
     zero, shift = _work_zero(machine, base, known)
-    commands = chorded(commands, _turning(commands), tolerance)
+    commands = chorded(commands, _turning(commands) | spirals(commands, 0.999 * ARC_SKEW_MM), tolerance)
     turning = _turning(commands)
     axes = commands.machine() + shift
     tool = np.array([tool_length(machine, f) for f in commands.frames])[commands.frame]

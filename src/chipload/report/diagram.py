@@ -97,6 +97,8 @@ def diagram_figure(
     if stock_polygon is not None:
         found = chips(made.covered, stock_polygon, before)
         for polygon in shapely.get_parts(stock_polygon):
+            if polygon.geom_type != "Polygon":  # where the cutter's surroundings only touch the stock
+                continue
             line = {"color": STOCK, "width": 1.2, "dash": "dot"}
             _outline(figure, shapely.get_coordinates(polygon.exterior), "stock", line, None)
         for chip in found:

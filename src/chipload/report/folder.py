@@ -205,7 +205,10 @@ def _ours(folder: Path) -> bool:
         return (
             isinstance(holds, dict)
             and "holds" in holds
-            and all(p.name in NAMES + MORE or p.suffix in (".ngc", ".nc", ".apt", ".npz") for p in folder.iterdir())
+            and all(
+                p.name in NAMES + MORE or p.suffix in (".ngc", ".nc", ".apt", ".npz") or p.stem == reading.FEEDS
+                for p in folder.iterdir()
+            )
         )
     except (OSError, ValueError):
         return False

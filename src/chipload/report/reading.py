@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from html import escape
+from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
@@ -20,6 +21,7 @@ import pyarrow.parquet as pq
 import trimesh
 from numpy.typing import NDArray
 
+from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding
 from chipload.machine.machine import Machine
 from chipload.program.apt.writer import write_apt
@@ -27,6 +29,8 @@ from chipload.program.motions import is_arc, lengths, radii, spans, straightened
 from chipload.program.program import DWELL, RAPID, Program
 from chipload.program.read import Reading
 from chipload.program.time import program_time
+from chipload.report import feeds as fed_feeds
+from chipload.report.feeds import Fed
 from chipload.report.figures import FONT, GRID, LIMIT, SCALE, SPACE_POINTS, STOCK
 from chipload.report.sheet import definitions, figure, framed, heading, items, table
 from chipload.report.simulated import Simulated, operation, sections
@@ -39,6 +43,8 @@ Floats = NDArray[np.float64]
 MOTIONS = ("rapid", "line", "arc clockwise", "arc counter-clockwise", "dwell")
 #: chords of arcs in pictures leave them by at most this [mm]
 CHORD_MM = 0.01
+#: stem of the program with new feeds
+FEEDS = "0-feeds"
 #: findings and lines that the page lists
 LISTED, SLOWEST = 300, 12
 
@@ -56,6 +62,8 @@ class Read:
     machine : that it was read for
     provenance : JSON values: hashes of the inputs, versions
     simulated : what the program does to its stock; None: it was only read
+    fed : how it came to its feeds where they are new; None: they are those of the file
+    cutters : by tool number; empty: not known
     """
 
     title: str
@@ -66,6 +74,8 @@ class Read:
     machine: Machine
     provenance: Mapping[str, Any]
     simulated: Simulated | None = None
+    fed: Fed | None = None
+    cutters: Mapping[int, Cutter] = field(default_factory=dict)
 
 
 def verdict(read: Read) -> tuple[bool, str]:
@@ -75,20 +85,30 @@ def verdict(read: Read) -> tuple[bool, str]:
         more = f"; and {len(bad) - 1} more" if len(bad) > 1 else ""
         return False, f"Does not hold: {_said(bad[0])}{more}."
     if read.simulated is not None:
-        fails = read.simulated.fails
+        fails = _fails(read)
         if fails:
             more = f"; and {len(fails) - 1} more" if len(fails) > 1 else ""
             return False, f"Does not hold: {fails[0]}{more}."
+        unproven = read.simulated.unproven
+        if unproven:
+            more = f"; and {len(unproven) - 1} more" if len(unproven) > 1 else ""
+            return False, f"Unproven: nothing that is known exceeds a limit; {unproven[0]}{more}."
         held = ", ".join(h.says for h in read.simulated.held)
         return True, f"Every stated limit holds in the simulation: {held}."
     return False, f"Unproven: the limits of machine {read.machine.name} hold; what the cutter meets was not simulated."
 
 
+def _fails(read: Read) -> tuple[str, ...]:
+    """What the simulation found, and what new feeds do not reach."""
+    found = read.simulated.fails if read.simulated is not None else ()
+    return (*found, *(read.fed.fails if read.fed is not None else ()))
+
+
 def _status(read: Read) -> str:
     """`failed`, `unproven` or `simulated`."""
-    if not verdict(read)[0] and (read.reading.broken or read.simulated is not None):
+    if read.reading.broken or _fails(read):
         return "failed"
-    return "unproven" if read.simulated is None else "simulated"
+    return "unproven" if read.simulated is None or read.simulated.verdict == "unproven" else "simulated"
 
 
 def _said(finding: Finding) -> str:
@@ -128,7 +148,7 @@ def summary_bytes(read: Read) -> bytes:
         "says": says,
         "job": read.title,
         "program": numbers(read) | {"status": _status(read)},
-        "operations": [operation(read.simulated)] if read.simulated is not None else [],
+        "operations": [_operation(read)] if read.simulated is not None else [],
         "machine": read.machine.name,
         "broken": rows(read.reading.broken),
         "findings": rows(read.reading.noticed),
@@ -137,22 +157,41 @@ def summary_bytes(read: Read) -> bytes:
     return (json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
+def _operation(read: Read) -> dict[str, Any]:
+    assert read.simulated is not None
+    out = operation(read.simulated, float(read.seconds.sum()))
+    if read.fed is None:
+        return out
+    said = fed_feeds.summary(read.fed, read.simulated, float(read.seconds.sum()), feeds_name(read), verdict(read)[0])
+    if read.fed.fails:
+        out |= {"holds": False, "verdict": "fails", "fails": list(_fails(read))}
+    return out | {"feeds": said}
+
+
+def feeds_name(read: Read) -> str:
+    """Name of the program with new feeds."""
+    return f"{FEEDS}{Path(read.name).suffix}"
+
+
 def history(read: Read) -> dict[str, Any]:
-    """A row a motion of the tip, columns by name."""
+    """A row a motion of the tip, or a chord of an arc, columns by name."""
     program = read.reading.program
+    chords = _chords(program)
+    row = np.asarray(_chords(replace(program, line=np.arange(len(program)))).line)
+    share = 1.0 / np.bincount(row, minlength=len(program))[row]
     names = np.array([label or "program" for label in program.labels], dtype=object)
-    axis = {f"axis_{x}": program.axis[:, k] for k, x in enumerate("xyz")}
+    axis = {f"axis_{x}": chords.axis[:, k] for k, x in enumerate("xyz")}
     return {
-        "pass": names[program.label],
-        "line": program.line,
-        "motion": np.array(MOTIONS, dtype=object)[program.motion],
-        **{f"{x}_mm": program.p_work[:, k] for k, x in enumerate("xyz")},
+        "pass": names[chords.label],
+        "line": chords.line,
+        "motion": np.array(MOTIONS, dtype=object)[program.motion[row]],
+        **{f"{x}_mm": chords.p_work[:, k] for k, x in enumerate("xyz")},
         **axis,
-        "s_mm": np.cumsum(lengths(program)),
-        "t_s": np.cumsum(row_times(read)),
-        "feed_mm_min": np.where(program.motion == DWELL, 0.0, mm_min_from_mm_s(1.0) * program.feed),
-        "spindle_rpm": rpm_from_rad_s(1.0) * program.spindle,
-        "tool": program.tool,
+        "s_mm": np.cumsum(lengths(program)[row] * share),
+        "t_s": np.cumsum(row_times(read)[row] * share),
+        "feed_mm_min": np.where(program.motion == DWELL, 0.0, mm_min_from_mm_s(1.0) * program.feed)[row],
+        "spindle_rpm": rpm_from_rad_s(1.0) * chords.spindle,
+        "tool": chords.tool,
     }
 
 
@@ -172,13 +211,26 @@ def history_writer(read: Read) -> Callable[[IO[bytes]], None]:
     """What writes history.parquet; of a simulated program some ten thousand rows at a time are in memory."""
 
     def write(file: IO[bytes]) -> None:
-        tables = map(_table, (history(read),) if read.simulated is None else steps(read.simulated))
+        tables = map(_table, _rows(read))
         first = next(tables)
         with pq.ParquetWriter(file, first.schema, compression="zstd") as writer:
             for table in itertools.chain([first], tables):
                 writer.write_table(table)
 
     return write
+
+
+def _rows(read: Read) -> Iterator[Mapping[str, Any]]:
+    """The columns of history.parquet, some rows at a time."""
+    if read.simulated is None:
+        yield history(read)
+        return
+    fed = fed_feeds.columns(read.fed, read.simulated) if read.fed is not None else {}
+    at = 0
+    for some in steps(read.simulated):
+        count = len(some["pass"])
+        yield {**some, **{name: values[at : at + count] for name, values in fed.items()}}
+        at += count
 
 
 def _table(columns: Mapping[str, Any]) -> pa.Table:
@@ -212,9 +264,16 @@ def scene_bytes(read: Read) -> bytes:
 
 
 def program_files(read: Read) -> dict[str, bytes]:
-    """CL data of the program, and the stock that it leaves."""
-    text = write_apt(read.reading.program, None, title=f"{read.title}, {read.name}", verified=False)
+    """CL data of the program, the stock that it leaves, and its own text where feeds are new."""
+    program = read.reading.program
+    tools = set(np.unique(program.tool).tolist())
+    known = read.cutters if tools - {0} <= set(read.cutters) else None
+    text = write_apt(program, known, title=f"{read.title}, {read.name}", verified=False)
     files = {"0-program.apt": text.encode("ascii")}
+    if read.fed is not None:
+        holds, says = verdict(read)
+        own = fed_feeds.program_text(read.fed, None if holds else says.removeprefix("Does not hold: "))
+        files[feeds_name(read)] = own.encode("utf-8", "surrogateescape")
     return files if read.simulated is None else files | {"stock.npz": read.simulated.stock.to_bytes()}
 
 
@@ -230,8 +289,13 @@ def page_bytes(read: Read) -> bytes:
     box = ", ".join(f"{x} {a:.4g} to {b:.4g}" for x, a, b in zip("XYZ", low, high, strict=True))
     body = [*heading(read.title, holds, word, _sentence(says.removeprefix(f"{word}: ")))]
     body += _findings("What does not hold", bad)
-    if read.simulated is not None and read.simulated.fails:
-        body += ["<h3>What the simulation found</h3>", items(read.simulated.fails[:LISTED])]
+    if _fails(read):
+        body += ["<h3>What the simulation found</h3>", items(_fails(read)[:LISTED])]
+    if read.simulated is not None and read.simulated.unproven:
+        body += ["<h3>What is not proved</h3>", items(read.simulated.unproven[:LISTED])]
+    if read.fed is not None and read.simulated is not None:
+        name = feeds_name(read)
+        body += fed_feeds.section(read.fed, read.simulated, float(read.seconds.sum()), name, holds, figures)
     body += [
         f"<h2>{escape(read.name)} on {escape(read.machine.name)}</h2>",
         f"<p>{what['motions']} motions, {what['cutting_mm']:.5g} mm at feed and {what['rapid_mm']:.5g} mm of rapids, "
@@ -244,7 +308,7 @@ def page_bytes(read: Read) -> bytes:
         "<h3>Lines that take longest</h3>",
         _slowest(read),
         *_findings("What the reader noticed", read.reading.noticed),
-        *(sections(read.simulated, figures) if read.simulated is not None else ()),
+        *(sections(read.simulated, what["time_s"], figures) if read.simulated is not None else ()),
         "<h2>What was not checked</h2>",
         f"<p>{_unchecked(read)}</p>",
         "<h2>Where the numbers come from</h2>",
@@ -356,6 +420,8 @@ def _unchecked(read: Read) -> str:
         out.append("fixtures: none is stated")
     if done.no_holder:
         out.append(f"holders of tools {', '.join(map(str, done.no_holder))}: not stated")
+    if done.rigid:
+        out.append(f"what gives way and is not stated: {', '.join(done.rigid)}")
     if done.unchecked:
         out.append(f"limits that are not stated: {', '.join(done.unchecked)}")
     return escape(_sentence("; ".join(out)) + "." if out else "Everything that chipload can check of a program was.")

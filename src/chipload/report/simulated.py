@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,11 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from chipload.cutting.material import Material
+from chipload.machine.machine import Machine
 from chipload.report import surface
 from chipload.report.diagram import diagram_figure
 from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, STOCK
+from chipload.report.held import LIMITS, Held, held_limits
 from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table
 from chipload.simulation.chips import Removal
@@ -29,15 +32,6 @@ from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]
 
-#: limit, the column that it holds, and its unit
-LIMITS: Mapping[str, tuple[str, str]] = {
-    "force_n": ("force_n", "N"),
-    "torque_nm": ("torque_nm", "N m"),
-    "power_w": ("power_w", "W"),
-    "chip_mm": ("chip_max_mm", "mm"),
-    "gouge_mm": ("gouge_mm", "mm"),
-    "excess_mm": ("", "mm"),
-}
 #: rows of history.parquet that are held in memory together
 HISTORY_ROWS = 65_536
 SURE = "\u00b1 is twice the standard deviation that the spread of the material's coefficients gives."
@@ -57,32 +51,9 @@ ROWS = (
     ((("torque_mean_nm", "mean", "#8a8f98"), ("torque_nm", "greatest", INK)), "torque [N m]", "torque_nm"),
     ((("power_w", "mean over a turn", INK),), "power [W]", "power_w"),
     ((("chip_max_mm", "thickest", INK),), "chip [mm]", "chip_mm"),
+    ((("deflection_um", "tool from work", INK),), "deflection [\u00b5m]", "deflection_um"),
     ((("rate", "removed", STOCK),), "removal [mm\u00b3/s]", ""),
 )
-
-
-@dataclass(frozen=True)
-class Held:
-    """A limit against the worst step: where (x, y, z) [mm], at which line of the source."""
-
-    name: str
-    limit: float
-    worst: float
-    line: int
-    at: tuple[float, float, float]
-
-    @property
-    def holds(self) -> bool:
-        """Whether the limit is kept."""
-        return self.worst <= self.limit
-
-    @property
-    def says(self) -> str:
-        """`force 812 N exceeds 500 N in line 12`."""
-        word, unit = self.name.split("_")[0], LIMITS[self.name][1]
-        if self.holds:
-            return f"{word} {self.worst:.4g} of {self.limit:g} {unit}"
-        return f"{word} {self.worst:.4g} {unit} exceeds {self.limit:g} {unit} in line {self.line}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +64,7 @@ class Simulated:
     ----------
     removal : what every step removed and what it cost
     stock : as it is afterwards
+    machine : whose spindle has to give torque and power
     material : whose coefficients were used
     limits, unchecked : stated limits by name, and names of those that are not stated
     settings : the keys of the operation
@@ -100,10 +72,12 @@ class Simulated:
     collisions : what ran into what
     held_against : names of what shank and holder were held against
     no_holder : tools whose holder is not stated
+    rigid : what was not stated of what gives way, and counts as rigid
     """
 
     removal: Removal
     stock: LayeredStock
+    machine: Machine
     material: Material
     limits: Mapping[str, float]
     unchecked: tuple[str, ...]
@@ -112,27 +86,17 @@ class Simulated:
     collisions: tuple[Collision, ...] = ()
     held_against: tuple[str, ...] = ()
     no_holder: tuple[int, ...] = ()
+    rigid: tuple[str, ...] = ()
 
     @cached_property
     def held(self) -> tuple[Held, ...]:
-        """Every stated limit."""
-        c, out = self.removal.columns, []
-        for name, limit in self.limits.items():
-            if name in ("gouge_mm", "excess_mm"):
-                assert self.left is not None
-                found = surface.worst(self.left, c, name.removesuffix("_mm"))
-                out.append(Held(name, limit, found["max"], found["line"], tuple(found["at_mm"] or (0.0, 0.0, 0.0))))
-                continue
-            values = c[LIMITS[name][0]]
-            k = int(np.argmax(values))
-            at = (float(c["x_mm"][k]), float(c["y_mm"][k]), float(c["z_mm"][k]))
-            out.append(Held(name, limit, float(values[k]), int(c["line"][k]), at))
-        return tuple(out)
+        """Every stated limit, and those of the spindle."""
+        return held_limits(self.limits, self.machine, self.removal.columns, self.left, self.rigid)
 
     @cached_property
     def fails(self) -> tuple[str, ...]:
         """What does not hold."""
-        found = [h.says for h in self.held if not h.holds]
+        found = [h.says for h in self.held if h.holds is False]
         rapids = (f"line {f.line}: {f.text}" for f in self.removal.findings)
         touched = (
             f"line {c.line}: {c.what} goes {c.depth_mm:.3g} mm into {c.into}, tip at "
@@ -141,9 +105,33 @@ class Simulated:
         )
         return (*found, *rapids, *touched)
 
+    @cached_property
+    def unproven(self) -> tuple[str, ...]:
+        """What nothing speaks against, and what could still fail."""
+        return (*(h.says for h in self.held if h.holds is None), *_extrapolated(self))
 
-def operation(simulated: Simulated) -> dict[str, Any]:
-    """The operation in summary.json."""
+    @property
+    def verdict(self) -> str:
+        """`fails`, `unproven` or `holds`."""
+        return "fails" if self.fails else "unproven" if self.unproven else "holds"
+
+
+def _extrapolated(simulated: Simulated) -> tuple[str, ...]:
+    """Chips that are thicker than those that the coefficients were measured with."""
+    chip, c = simulated.material.chip, simulated.removal.columns
+    k = int(np.argmax(c["chip_max_mm"]))
+    thickest = float(c["chip_max_mm"][k])
+    if chip is None or thickest <= chip[1] * (1.0 + 1e-9):
+        return ()
+    line = f" in line {c['line'][k]}" if c["line"][k] else ""
+    return (
+        f"chips are up to {thickest:.4g} mm thick{line}: the coefficients of {simulated.material.name} hold up to "
+        f"{chip[1]:g} mm, what the loads are beyond it is not known",
+    )
+
+
+def operation(simulated: Simulated, time_s: float) -> dict[str, Any]:
+    """The operation in summary.json; ``time_s`` is its time on the machine, with rapids and accelerations."""
     removal = simulated.removal
     c = removal.columns
     cuts = (c["chip_volume_mm3"] > 0.0) & ~c["rapid"]
@@ -168,31 +156,70 @@ def operation(simulated: Simulated) -> dict[str, Any]:
     torque = {"mean": mean("torque_mean_nm"), "max": float(c["torque_nm"].max(initial=0.0))}
     return {
         "kind": "simulate",
-        "holds": not simulated.fails,
+        "verdict": simulated.verdict,
+        "holds": simulated.verdict == "holds",
         "fails": list(simulated.fails),
+        "unproven": list(simulated.unproven),
         "steps": len(c["line"]),
         "chip_pieces_max": int(c["chip_pieces"].max(initial=0)),
         "chip_volume_mm3": float(c["chip_volume_mm3"].sum()),
         "films_mm3": float(c["chip_volume_mm3"][c["chip_pieces"] == 0].sum()),
         "stock_before_mm3": removal.volume_before,
-        "stock_removed_mm3": removal.volume_before - removal.volume_after,
+        "removed_mm3": removal.volume_before - removal.volume_after,
+        "time_s": time_s,
         "cutting_s": whole,
         "air_cut_s": float(c["seconds"][~cuts & ~c["rapid"]].sum()),
         "force_n": {**force, "max": float(c["force_n"].max(initial=0.0)), "normal_max": normal},
         "torque_nm": torque | {"mean_sd": band[3] if band is not None else None},
         "power_w": {"mean": mean("power_w"), "max": float(c["power_w"].max(initial=0.0))},
         "chip_mm": {"max": float(c["chip_max_mm"].max(initial=0.0))},
+        "deflection_um": deflection(simulated),
+        "form_error_um": form_error(simulated),
         "limits": [
-            {"name": h.name, "limit": h.limit, "worst": h.worst, "line": h.line, "at_mm": list(h.at), "holds": h.holds}
+            {
+                "name": h.name,
+                "limit": h.limit,
+                "worst": h.worst,
+                "line": h.line,
+                "at_mm": list(h.at),
+                "t_s": h.t_s,
+                "holds": h.holds,
+            }
             for h in simulated.held
         ],
-        **(surface.numbers(simulated.left, c) if simulated.left is not None else {}),
+        **surface.numbers(simulated.left, c),
         "collisions": surface.listed(simulated.collisions, c),
         "held_against": list(simulated.held_against),
         "no_holder": list(simulated.no_holder),
         "unchecked": list(simulated.unchecked),
         "settings": dict(simulated.settings),
     }
+
+
+def deflection(simulated: Simulated) -> dict[str, Any]:
+    """How far tool and work give way, in summary.json; what was not stated counts as rigid."""
+    c = simulated.removal.columns
+    k = int(np.argmax(c["deflection_um"]))
+    return {
+        "max": float(c["deflection_um"][k]),
+        "cutter_max": float(c["deflection_cutter_um"].max()),
+        "work_max": float(c["deflection_work_um"].max()) if "deflection_work_um" in c else None,
+        "line": int(c["line"][k]),
+        "at_mm": [float(c[f"{x}_mm"][k]) for x in "xyz"],
+        "not_stated": list(simulated.rigid),
+    }
+
+
+def form_error(simulated: Simulated) -> dict[str, Any]:
+    """What giving way leaves on the part (below 0: takes), in summary.json; None: no finished point of a part."""
+    c = simulated.removal.columns
+    points = int(c["form_points"].sum()) if "form_points" in c else 0
+    if not points:
+        return {"max": None, "greatest": None, "least": None, "line": 0, "at_mm": None, "points": 0}
+    error = c["form_error_um"]
+    k = int(np.argmax(np.abs(error)))
+    ends = {"max": abs(float(error[k])), "greatest": float(error.max()), "least": float(error.min())}
+    return {**ends, "line": int(c["line"][k]), "at_mm": [float(c[f"{x}_mm"][k]) for x in "xyz"], "points": points}
 
 
 def history(simulated: Simulated) -> Iterator[dict[str, NDArray[Any]]]:
@@ -208,7 +235,7 @@ def history(simulated: Simulated) -> Iterator[dict[str, NDArray[Any]]]:
 
 
 def along(simulated: Simulated) -> go.Figure:
-    """Force, torque, power, chip thickness and removal against time."""
+    """Force, torque, power, chip thickness, deflection and removal against time."""
     columns = simulated.removal.columns
     seconds, of = columns["seconds"], columns["line"]
     t = columns["t_s"] - 0.5 * seconds
@@ -251,7 +278,7 @@ def along(simulated: Simulated) -> go.Figure:
     out.update_xaxes(title_text="time at the commanded feed [s]", row=len(ROWS), col=1)
     out.update_layout(
         template="none",
-        height=900,
+        height=1050,
         font=FONT,
         margin={"l": 74, "r": 16, "t": 30, "b": 46},
         legend={"orientation": "h", "y": 1.01, "yanchor": "bottom", "x": 0.0},
@@ -265,9 +292,32 @@ def _mean(values: Mapping[str, Any]) -> str:
     return f"{values['mean']:.4g}" if sd is None else f"{values['mean']:.4g} \u00b1 {2.0 * sd:.2g}"
 
 
-def sections(simulated: Simulated, figures: dict[str, go.Figure]) -> list[str]:
+def _limits(simulated: Simulated) -> str:
+    """Every limit against its worst step."""
+    rows = []
+    for h in simulated.held:
+        word = {True: "holds", False: '<span class="no">does not hold</span>', None: "unproven"}[h.holds]
+        unit = LIMITS[h.name][1]
+        name = " ".join(h.name.split("_")[:-1]) + (f" [{unit}]" if unit else "")
+        t = "" if h.t_s is None else f"{h.t_s:.4g}"
+        place = ", ".join(f"{x:.4g}" for x in h.at) if h.worst > 0.0 else ""
+        rows.append([name, word, f"{h.limit:g}", f"{h.worst:.4g}", str(h.line or ""), t, place])
+    if not rows:
+        return ""
+    heads = ["limit", "", "at most", "worst", "line", "time [s]", "tip at x, y, z [mm]"]
+    return table(heads, rows, numbers=(2, 3, 4, 5))
+
+
+def _rigid(simulated: Simulated) -> str:
+    """What deflections leave out."""
+    if not simulated.rigid:
+        return ""
+    return f" Deflections are at least these: {escape(', '.join(simulated.rigid))} not stated and taken as rigid."
+
+
+def sections(simulated: Simulated, time_s: float, figures: dict[str, go.Figure]) -> list[str]:
     """The part of the page that shows chips and forces; figures are put among ``figures``."""
-    what, c = operation(simulated), simulated.removal.columns
+    what, c = operation(simulated, time_s), simulated.removal.columns
     force, torque, power = what["force_n"], what["torque_nm"], what["power_w"]
     sure = torque["mean_sd"] is not None
     rows = [
@@ -277,14 +327,19 @@ def sections(simulated: Simulated, figures: dict[str, go.Figure]) -> list[str]:
     rows += [["force on the surface that is left, along its normal [N]", "", f"{force['normal_max']:.4g}", ""]]
     rows += [["torque [N m]", _mean(torque), f"{torque['max']:.4g}", ""]]
     rows += [["power [W]", f"{power['mean']:.4g}", f"{power['max']:.4g}", ""]]
+    if what["form_error_um"]["points"]:
+        ends = (f"{what['form_error_um'][key]:.4g}" for key in ("greatest", "least"))
+        rows += [["form error of the part by giving way [\u00b5m]", "", *ends]]
+    rows += [["tool and work part by [\u00b5m]", "", f"{what['deflection_um']['max']:.4g}", ""]]
     body = [
         "<h2>Chips, force, torque, power</h2>",
         f"<p>{what['steps']} steps; {what['chip_volume_mm3']:.6g} mm\u00b3 of chips, stock less by "
-        f"{what['stock_removed_mm3']:.6g} mm\u00b3; {what['cutting_s']:.4g} s in cut, {what['air_cut_s']:.4g} s "
+        f"{what['removed_mm3']:.6g} mm\u00b3; {what['cutting_s']:.4g} s in cut, {what['air_cut_s']:.4g} s "
         f"in air; thickest chip {what['chip_mm']['max']:.4g} mm; in films too thin to be told from the tolerance "
         f"{what['films_mm3']:.2g} mm\u00b3.</p>",
         table(["", "mean", "greatest", "least"], rows, numbers=(1, 2, 3)),
-        f'<p class="note">{SURE if sure else UNSURE}</p>',
+        _limits(simulated),
+        f'<p class="note">{SURE if sure else UNSURE}{_rigid(simulated)}</p>',
         figure("loads", along(simulated), figures),
     ]
     piece = simulated.removal.piece

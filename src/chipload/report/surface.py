@@ -42,8 +42,11 @@ def worst(left: Difference, columns: Mapping[str, NDArray[Any]], kind: str) -> d
     }  # fmt: skip
 
 
-def numbers(left: Difference, columns: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
-    """Keys of an operation in summary.json."""
+def numbers(left: Difference | None, columns: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+    """Keys of an operation in summary.json; without a part nothing is known of gouges and excess."""
+    if left is None:
+        nothing = {"max": None, "line": 0, "at_mm": None, "t_s": None}
+        return dict.fromkeys(("gouge_mm", "excess_mm"), nothing)
     known = np.isfinite(left.distance)[left.over]
     return {
         "gouge_mm": worst(left, columns, "gouge"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import time
 from collections.abc import Sequence
@@ -13,10 +12,7 @@ import numpy as np
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named, read_catalogue
 from chipload.errors import InputError
-from chipload.geometry.revolve import Revolved
-from chipload.geometry.sections import Blade, checked, loft, read_meridian, read_sections
 from chipload.job import ImpellerJob, SectionalTable
-from chipload.job.impeller import SectionsTable, ShapeTable
 from chipload.job.tables import Table
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.sectional.answer import Answer, largest_cutters, one_cutter, one_cutter_of
@@ -24,12 +20,13 @@ from chipload.planning.sectional.compare import Compared, compared
 from chipload.planning.sectional.costs import Side, Terms
 from chipload.planning.sectional.impeller import Impeller
 from chipload.planning.sectional.missed import with_fits
-from chipload.planning.sectional.parametric import Shape, impeller_of
 from chipload.planning.sectional.surfaces import BODIES, Sampled, Surface, surface_of
 from chipload.planning.sectional.tables import IndexTable, index_table
 from chipload.progress import Progress, silent
 from chipload.report.impeller.outcome import Milled, OneCutter, Searched, said
-from chipload.run.impeller_paths import checked_programs
+from chipload.run.impeller_part import Part, read_part
+from chipload.run.impeller_paths import checked_programs, walls_of
+from chipload.run.impeller_rough import checked_roughing
 from chipload.run.provenance import hashes, title_of, versions
 from chipload.units import mm_s_from_mm_min
 
@@ -47,8 +44,10 @@ def run_impeller(job: ImpellerJob, progress: Progress = silent) -> Milled:
     Cancelled
         By ``progress``.
     """
-    machine, catalogue, impeller = _machine(job), _catalogue(job), _impeller(job)
+    machine, catalogue, part = _machine(job), _catalogue(job), read_part(job)
+    impeller = part.impeller
     _picked(job, catalogue)
+    _rougher(job, catalogue)
     op = job.operation
     table, surfaces = _tables(machine, op), _surfaces(job, impeller)
     done = []
@@ -61,18 +60,25 @@ def run_impeller(job: ImpellerJob, progress: Progress = silent) -> Milled:
     half = part_of(progress, 1, 2)
     ways = _ways(job, done, catalogue, impeller, part_of(half, 0, 2))
     milled = Milled(
-        title_of(job.path), impeller, catalogue, machine, tuple(done), one, ways, None, _settings(op),
-        job.table.impeller.outer_diameter_mm, _provenance(job, machine, catalogue),
+        title_of(job.path), impeller, catalogue, machine, tuple(done), one, ways, None, None, None, _settings(op),
+        job.table.impeller.outer_diameter_mm, _provenance(job, machine, catalogue, part),
     )  # fmt: skip
     if op.paths is None or milled.used is None:
         return milled
-    programs = checked_programs(
-        impeller, machine, table, milled.used, op, op.paths, _ahead(job), WORKERS, part_of(half, 1, 2)
-    )
-    return replace(milled, programs=programs)
+    roughs = None
+    if op.rough is not None:
+        roughs = checked_roughing(
+            impeller, machine, table, catalogue, _rougher(job, catalogue), op, op.paths, op.rough,
+            walls_of(impeller, _ahead(job)), _ahead(job), WORKERS, part_of(half, 2, 4),
+        )  # fmt: skip
+    programs, covered = checked_programs(
+        impeller, machine, table, milled.used, op, op.paths, _ahead(job), len(roughs or ()), WORKERS,
+        part_of(half, 3, 4) if roughs else part_of(half, 1, 2),
+    )  # fmt: skip
+    return replace(milled, programs=programs, covered=covered, roughs=roughs)
 
 
-def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue) -> dict[str, Any]:
+def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue, part: Part) -> dict[str, Any]:
     """Where the numbers come from."""
     files = {"job": job.path, **job.files}
     files |= {key: p for key, p in (("machine", job.machine), ("catalogue", job.catalogue)) if not isinstance(p, str)}
@@ -81,15 +87,18 @@ def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue) -> dic
         "overrides": list(job.overrides),
         "machine": f"{machine.name}: {machine.note}" if machine.note else machine.name,
         "catalogue": f"{catalogue.name}: {catalogue.note}" if catalogue.note else catalogue.name,
+        **({"faces": list(part.faces)} if part.faces else {}),
         "versions": versions(),
     }
 
 
 def look_at_impeller(job: ImpellerJob) -> tuple[list[str], bool]:
     """What the files of a job hold; nothing is searched."""
-    machine, catalogue, impeller = _machine(job), _catalogue(job), _impeller(job)
+    machine, catalogue, part = _machine(job), _catalogue(job), read_part(job)
+    impeller = part.impeller
     _picked(job, catalogue)
-    lines = [f"impeller: {impeller.blades} blades{' and as many splitters' if impeller.splitter else ''}"]
+    _rougher(job, catalogue)
+    lines = [f"impeller: {impeller.blades} blades{' and as many splitters' if impeller.splitter else ''}", *part.faces]
     table = _tables(machine, job.operation)
     angles = np.degrees(table.angle)
     lines.append(
@@ -153,13 +162,24 @@ def _picked(job: ImpellerJob, catalogue: Catalogue) -> CatalogueCutter | None:
     picked = job.operation.hand_picked
     if picked is None:
         return None
-    d, r = picked.diameter_mm, picked.corner_radius_mm
+    return _of_catalogue(catalogue, picked.diameter_mm, picked.corner_radius_mm, "hand_picked")
+
+
+def _rougher(job: ImpellerJob, catalogue: Catalogue) -> CatalogueCutter | None:
+    """The cutter of the catalogue that roughs; None: the largest that fits."""
+    rough = job.operation.rough
+    if rough is None or rough.diameter_mm is None or rough.corner_radius_mm is None:
+        return None
+    return _of_catalogue(catalogue, rough.diameter_mm, rough.corner_radius_mm, "rough")
+
+
+def _of_catalogue(catalogue: Catalogue, d: float, r: float, key: str) -> CatalogueCutter:
     for cutter in catalogue.cutters:
         if (cutter.diameter, cutter.corner_radius) == (d, r):
             return cutter
     near = min(catalogue.cutters, key=lambda c: abs(c.diameter - d) + abs(c.corner_radius - r))
     raise InputError(
-        f"operation.0.hand_picked: D {d:g} r {r:g} mm is not in catalogue {catalogue.name}: the nearest is "
+        f"operation.0.{key}: D {d:g} r {r:g} mm is not in catalogue {catalogue.name}: the nearest is "
         f"D {near.diameter:g} r {near.corner_radius:g} mm"
     )
 
@@ -200,7 +220,7 @@ def _surfaces(job: ImpellerJob, impeller: Impeller) -> list[Surface]:
 
 def _ahead(job: ImpellerJob) -> float:
     """How far the hub goes on ahead of the leading edge [mm]."""
-    given = job.table.impeller.sections
+    given = job.table.impeller.sections or job.table.impeller.step
     return given.hub_ahead_mm if given is not None else 0.0
 
 
@@ -210,38 +230,3 @@ def _machine(job: ImpellerJob) -> Machine:
 
 def _catalogue(job: ImpellerJob) -> Catalogue:
     return catalogue_named(job.catalogue) if isinstance(job.catalogue, str) else read_catalogue(job.catalogue)
-
-
-def _impeller(job: ImpellerJob) -> Impeller:
-    part = job.table.impeller
-    if part.sections is not None:
-        return _of_sections(job, part.sections, part.blades, part.outer_diameter_mm)
-    assert part.shape is not None
-    return _of_shape(part.shape, part.blades, part.outer_diameter_mm)
-
-
-def _of_shape(given: ShapeTable, blades: int, outer_diameter: float) -> Impeller:
-    shape = Shape(
-        blades, given.channel_mm, given.hub_radius_mm, 0.5 * outer_diameter, given.height_mm, given.blade_height_mm,
-        math.radians(given.wrap_deg), math.radians(given.lean_deg), given.outlet_height_mm,
-    )  # fmt: skip
-    return impeller_of(shape)
-
-
-def _of_sections(job: ImpellerJob, given: SectionsTable, blades: int, outer_diameter: float) -> Impeller:
-    folder, over = job.path.parent, given.flow_along_x
-
-    def blade(names: tuple[str, ...], key: str) -> Blade:
-        try:
-            found = read_sections([folder / name for name in names], given.unit, over, given.columns)
-            return loft(checked(found, outer_diameter))
-        except InputError as err:
-            raise InputError(f"impeller.sections.{key}: {err}") from None
-
-    main = blade(given.blade, "blade")
-    splitter = blade(given.splitter, "splitter") if given.splitter else None
-    hub, shroud = (
-        Revolved(read_meridian(folder / name, given.unit, over), side)
-        for name, side in ((given.hub, 1), (given.shroud, -1))
-    )
-    return Impeller(main, splitter, hub, shroud, blades)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,13 +18,13 @@ from chipload.planning.sectional.lines import Motion
 from chipload.planning.sectional.links import Link
 from chipload.planning.sectional.paths import Finish
 from chipload.planning.sectional.programs import pallet_rate, predicted_time, too_fast
-from chipload.planning.sectional.settings import Milling, Setting, channel_scene, settings_of
+from chipload.planning.sectional.settings import Finishing, Milling, Planned, channel_scene, planned
 from chipload.planning.sectional.surfaces import BODIES, Sampled
 from chipload.planning.sectional.tables import IndexTable
 from chipload.program.check import check_program
 from chipload.program.to_axes import to_axes
 from chipload.progress import Progress
-from chipload.report.impeller.outcome import Checked, Scallop
+from chipload.report.impeller.outcome import Checked, Covered, Scallop
 from chipload.simulation.channel.channel import Left, Wall, left_on, scallop_numbers, wall
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
@@ -32,19 +34,23 @@ _COARSE = (61, 25)
 _EDGE = 0.01
 #: how far the rays go above and below a surface [mm]
 _HEIGHT, _DEPTH = 1.0, 0.5
+#: distance of points of a whole surface on which what is left is measured [mm]
+_SPACING = 0.6
 #: grid lines across the passes of a patch on which the scallop is measured, points between two passes
 _FEW, _BETWEEN = 7, 14
 
 
 def checked_programs(
     impeller: Impeller, machine: Machine, table: IndexTable, way: Compared, op: SectionalTable, paths: PathsTable,
-    ahead: float, workers: int, progress: Progress,
-) -> tuple[Checked, ...]:  # fmt: skip
-    """A program for each setting of the way, each with what the check finds."""
+    ahead: float, tools: int, workers: int, progress: Progress,
+) -> tuple[tuple[Checked, ...], tuple[Covered, ...]]:  # fmt: skip
+    """A program for each setting of the way with what the check finds; what all of them leave on each surface.
+
+    ``tools`` : how many tool numbers are taken.
+    """
     assert way.divided is not None
     feed = mm_s_from_mm_min(op.feed_mm_min)
     motion = Motion(paths.chord_mm, feed, pallet_rate(machine), op.clearance_mm)
-    how = Finish(op.scallop_mm, motion)
     link = Link(
         paths.lift_mm, paths.margin_mm, paths.touch_mm, paths.near_mm, mm_s_from_mm_min(paths.link_feed_mm_min),
         paths.above_mm,
@@ -52,31 +58,59 @@ def checked_programs(
     scene = channel_scene(
         impeller, Sampled((0.0, 1.0), (0.0, 1.0), (2, 2), paths.check_mm, op.near_mm, op.around, ahead)
     )
-    settings = settings_of(
-        impeller, way.divided.patches, way.catalogue, scene, how, link, rad_s_from_rpm(op.speed_rpm), table, ahead,
-        workers, lambda done, what: progress(0.8 * done, what),
+    job = Finishing(
+        impeller, way.catalogue, scene, Finish(op.scallop_mm, motion, paths.overrun_mm), link,
+        rad_s_from_rpm(op.speed_rpm), table, ahead, workers, tools,
     )  # fmt: skip
-    walls = _walls(impeller, ahead)
-    out = []
-    for k, setting in enumerate(settings):
-        out.append(_checked(impeller, machine, setting, walls, op.scallop_mm, paths, ahead, workers))
-        progress(0.8 + 0.2 * (k + 1) / len(settings), f"check of {k + 1} programs")
-    return tuple(out)
+    plan = planned(job, way.divided.patches, progress=lambda done, what: progress(0.8 * done, what))
+    return _checked(job, machine, plan, paths, lambda done, what: progress(0.8 + 0.2 * done, what))
 
 
 def _checked(
-    impeller: Impeller, machine: Machine, setting: Setting, walls: Sequence[Wall], scallop: float, paths: PathsTable,
-    ahead: float, workers: int,
-) -> Checked:  # fmt: skip
-    program = setting.program
-    dense = [_dense(impeller, m, ahead) for m in setting.millings]
-    found = left_on([*walls, *dense], program, setting.cutter, _HEIGHT, _DEPTH, workers=workers)
-    scallops = tuple(_scallop(m, left, scallop) for m, left in zip(setting.millings, found[len(walls) :], strict=True))
-    commands, findings = to_axes(program, machine)
-    said = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
-    worst = max(found, key=lambda left: left.deepest[0])
-    seconds = predicted_time(program, machine, commands.position if len(commands) == len(program) else None)
-    return Checked(setting, worst.deepest[0], worst.says(), paths.gouge_mm, scallops, tuple(said), seconds)
+    job: Finishing, machine: Machine, plan: Planned, paths: PathsTable, progress: Progress
+) -> tuple[tuple[Checked, ...], tuple[Covered, ...]]:
+    impeller, asked, settings = job.impeller, job.how.scallop, plan.settings
+    millings = [m for s in settings for m in s.millings]
+    faces = list(dict.fromkeys((m.patch.body, m.patch.side) for m in millings))
+    dense = [_dense(impeller, m, job.ahead) for m in millings]
+    whole = [_whole(job, body, side, millings) for body, side in faces]
+    walls = [*walls_of(impeller, job.ahead), *dense, *whole]
+    found = []
+    for k, setting in enumerate(settings, 1):
+        found.append(left_on(walls, setting.program, setting.cutter, _HEIGHT, _DEPTH, workers=job.workers))
+        progress(k / len(settings), f"check of {k} programs")
+    # what is left is what no program takes
+    rest = [replace(same[0], rest=np.min([x.rest for x in same], axis=0)) for same in zip(*found, strict=True)]
+    crests = iter(rest[len(walls) - len(whole) - len(dense) :])
+    out = []
+    for setting, own in zip(settings, found, strict=True):
+        program = setting.program
+        scallops = tuple(_scallop(m, next(crests), asked) for m in setting.millings)
+        commands, findings = to_axes(program, machine)
+        said = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
+        worst = max(own, key=lambda left: left.deepest[0])
+        seconds = predicted_time(program, machine, commands.position if len(commands) == len(program) else None)
+        out.append(Checked(setting, worst.deepest[0], worst.says(), paths.gouge_mm, scallops, tuple(said), seconds))
+    covered = tuple(
+        Covered(face[0], face[1], left, asked, _SPACING, plan.unreached[face])
+        for face, left in zip(faces, rest[len(walls) - len(whole) :], strict=True)
+    )
+    return tuple(out), covered
+
+
+def _whole(job: Finishing, body: int, side: str, millings: Sequence[Milling]) -> Wall:
+    """Points of a surface as far as its patches go."""
+    surface = job.surface(body, side)
+    boxes = np.array([m.box for m in millings if (m.patch.body, m.patch.side) == (body, side)])
+    low, high = boxes[:, :, 0].min(axis=0), boxes[:, :, 1].max(axis=0)
+    grid = []
+    for k in (0, 1):
+        t = np.linspace(low[k], high[k], 41)
+        other = np.linspace(low[1 - k], high[1 - k], 5)
+        lines = [surface.at(t, q) if k == 0 else surface.at(q, t) for q in other]
+        size = max(float(np.linalg.norm(np.diff(x, axis=0), axis=1).sum()) for x in lines)
+        grid.append(np.linspace(low[k], high[k], max(3, math.ceil(size / _SPACING) + 1)))
+    return wall(f"{BODIES[body]} {side}", surface, grid[0], grid[1])
 
 
 def _scallop(milling: Milling, left: Left, asked: float) -> Scallop:
@@ -98,7 +132,7 @@ def _dense(impeller: Impeller, milling: Milling, ahead: float) -> Wall:
     return wall(f"{BODIES[milling.patch.body]} {milling.patch.side}", surface, u, v)
 
 
-def _walls(impeller: Impeller, ahead: float) -> list[Wall]:
+def walls_of(impeller: Impeller, ahead: float) -> list[Wall]:
     """Both sides of the bodies round the channels, and their floors."""
     u, v = np.linspace(_EDGE, 1.0 - _EDGE, _COARSE[0]), np.linspace(0.0, 1.0 - _EDGE, _COARSE[1])
     last = 1 + len(impeller.bodies)
@@ -106,6 +140,9 @@ def _walls(impeller: Impeller, ahead: float) -> list[Wall]:
     for k in range(-1, last):
         body = impeller.body(k)
         out += [wall(f"body {k} plus", body.plus, u, v), wall(f"body {k} minus", body.minus, u, v)]
+        if impeller.fillets:
+            inner = np.linspace(0.05, 0.95, _COARSE[1])
+            out += [wall(f"fillet {k} {n}", impeller.foot(k, w), u, inner) for n, w in (("plus", 1), ("minus", -1))]
     for index in range(len(impeller.bodies)):
         floor = patch_of(impeller, BODIES[index], "floor", ahead)
         turn = impeller.pitch

@@ -2,42 +2,41 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import shapely
-import trimesh
 from numpy.typing import NDArray
 
-from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named, read_material
-from chipload.errors import InputError
-from chipload.geometry.mesh import read_mesh
 from chipload.job import ProgramJob
-from chipload.job.tables import SimulateTable
-from chipload.machine.machine import machine_named, read_machine
+from chipload.job.tables import LOADS, SimulateTable
+from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.program import RAPID, Program
-from chipload.program.read import line_times, read_program, read_tools
+from chipload.program.read import Reading, line_times, read_program, read_tools
 from chipload.progress import Progress, silent
+from chipload.report.feeds import Fed
+from chipload.report.held import spindle_limits
 from chipload.report.reading import Read, verdict
 from chipload.report.simulated import Simulated
+from chipload.run.bodies import fixture_points, insides, part_body, stock_body, stock_points
+from chipload.run.feeds import Asked, changeable, read_as, straight, watching, with_new_feeds
+from chipload.run.formed import forming
 from chipload.run.provenance import hashes, sources, title_of, versions
-from chipload.simulation.chips import Resolution, remove
+from chipload.run.stiffness import deflecting, stiffness_of, watched, with_columns
+from chipload.simulation.chips import Resolution, counted, remove
+from chipload.simulation.loads import Cuts
 from chipload.simulation.pieces import remove_in_pieces
-from chipload.simulation.steps import StepBlocks
-from chipload.simulation.surface import MOST_POINTS, collisions, difference, fine, in_stock
+from chipload.simulation.steps import StepBlocks, steps_of
+from chipload.simulation.surface import collisions, difference, in_stock
 from chipload.simulation.unfinished import Unfinished
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min
 
-#: side of a tile of the stock in diameters of the largest cutter
-TILE = 4.0
 #: of a simulation, what one pass over its steps beside the removal takes
 SHARE = 0.2 / 3.0
-#: layers where no cutter comes are so many times as thick
-COARSE = 4.0
 
 
 def run_program(
@@ -58,23 +57,41 @@ def run_program(
     machine = machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
     table = job.table.program
     share = 0.1 if job.simulates else 1.0
-    reading = read_program(
-        job.program_file,
-        machine,
-        dialect=table.dialect,
-        tools=read_tools(job.tools_file) if job.tools_file is not None else None,
-        feed=mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None,
-        tolerance=table.tolerance_mm,
-        progress=lambda done, what: progress(share * done, what),
-    )
+    tools = read_tools(job.tools_file) if job.tools_file is not None else None
+
+    def read(text: str | None = None) -> Reading:
+        return read_program(
+            job.program_file,
+            machine,
+            dialect=table.dialect,
+            tools=tools,
+            feed=mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None,
+            tolerance=table.tolerance_mm,
+            text=text,
+            progress=lambda done, what: progress(share * done, what) if text is None else None,
+        )
+
+    reading = read()
     lines, seconds = line_times(reading, machine)
-    simulated = None
+    simulated, fed = None, None
     if job.simulates:
-        stock, material = _stock(job, reading.program), _material(job)
+        stock, material, begin = stock_body(job, reading.program), _material(job), share
+        wants_feeds = job.table.operation[0].feeds is not None
+        if wants_feeds:
+            own = changeable(job.program_file, machine, table.dialect)
+            straight(reading.program)
+            if simulate:
+                begin = 0.5 * (1.0 + share)
+                fed, reading = _fed(
+                    job, *own, reading, stock, material, machine, read, float(seconds.sum()),
+                    lambda done, what: progress(share + (begin - share) * done, what),
+                )  # fmt: skip
+                lines, seconds = line_times(reading, machine)
+                stock = stock_body(job, reading.program)
         if simulate:
             simulated = _simulated(
-                job, reading.program, stock, material, unfinished,
-                lambda done, what: progress(share + (1.0 - share) * done, what),
+                job, reading.program, stock, machine, material, unfinished,
+                lambda done, what: progress(begin + (1.0 - begin) * done, what),
             )  # fmt: skip
     files: dict[str, Path] = {"job": job.path, "program": job.program_file}
     named = {"machine": job.machine, "tools": job.tools_file, "material": job.material}
@@ -91,7 +108,10 @@ def run_program(
         **({"material": material_provenance(simulated.material)} if simulated is not None else {}),
         "versions": versions(),
     }
-    return Read(title_of(job.path), job.program_file.name, reading, lines, seconds, machine, provenance, simulated)
+    name = job.program_file.name
+    return Read(
+        title_of(job.path), name, reading, lines, seconds, machine, provenance, simulated, fed, job.cutters
+    )  # fmt: skip
 
 
 def look_at_program(job: ProgramJob) -> tuple[list[str], bool]:
@@ -101,34 +121,92 @@ def look_at_program(job: ProgramJob) -> tuple[list[str], bool]:
     return [*noticed, f"{job.path.name}: {verdict(done)[1]}"], not done.reading.broken
 
 
+def simulate_read(
+    job: ProgramJob,
+    reading: Reading,
+    machine: Machine,
+    material: Material,
+    stock: LayeredStock | None,
+    provenance: Mapping[str, Any],
+    progress: Progress = silent,
+) -> Read:
+    """Run a program that was read already through a stock.
+
+    Parameters
+    ----------
+    job : its operation, cutters, limits, part, fixtures and stiffness count
+    stock : which changes; None: that of the job
+    """
+    if stock is None:
+        stock = stock_body(job, reading.program)
+    lines, seconds = line_times(reading, machine)
+    done = _simulated(job, reading.program, stock, machine, material, None, progress)
+    name = job.program_file.name
+    return Read(
+        title_of(job.path), name, reading, lines, seconds, machine, provenance, done, cutters=job.cutters
+    )  # fmt: skip
+
+
+def _fed(
+    job: ProgramJob,
+    text: str,
+    dialect: str,
+    reading: Reading,
+    stock: LayeredStock,
+    material: Material,
+    machine: Machine,
+    read: Callable[[str], Reading],
+    seconds: float,
+    progress: Progress,
+) -> tuple[Fed, Reading]:
+    """The text with new feeds, from what the program cuts of a stock, which changes; and what it does then."""
+    op: SimulateTable = job.table.operation[0]
+    assert op.feeds is not None
+    fine = _resolution(job)
+    turning = np.unique(reading.program.spindle[reading.program.motion != RAPID])
+    limits = {name: limit for name, limit in job.limits.items() if name in LOADS} | spindle_limits(machine, turning)
+    gives = stiffness_of(job.table.stiffness, job.cutters)
+    bends = deflecting(gives, material)
+    asked = Asked(op.feeds, limits, fine.rotation, bends if "deflection_um" in limits else None)
+    program = _with_tool(reading.program, job)
+    steps = steps_of(program, op.step_mm, op.tolerance_mm)
+    allowed = watching(steps, asked, job.cutters, material, machine)
+    removal = remove(
+        program, stock, job.cutters, material, fine, interpolation=op.interpolation,
+        watch=lambda cuts: {**allowed(cuts), **bends(cuts)}, progress=progress,
+    )  # fmt: skip
+    removal = with_columns(removal, watched(gives))
+    return with_new_feeds(
+        text, dialect, reading, steps, removal, asked, job.cutters, machine, lambda new: read(read_as(new)), seconds
+    )
+
+
+def _resolution(job: ProgramJob) -> Resolution:
+    op: SimulateTable = job.table.operation[0]
+    smallest = min(c.radius for c in job.cutters.values())
+    return Resolution(op.step_mm, op.tolerance_mm, op.corner_slices, op.flank_mm or 0.5 * smallest)
+
+
 def _simulated(
     job: ProgramJob,
     program: Program,
     stock: LayeredStock,
+    machine: Machine,
     material: Material,
     unfinished: Unfinished | None,
     progress: Progress,
 ) -> Simulated:
     """The program, run through the stock of the job."""
     op: SimulateTable = job.table.operation[0]
-    smallest = min(c.radius for c in job.cutters.values())
-    fine = Resolution(op.step_mm, op.tolerance_mm, op.corner_slices, op.flank_mm or 0.5 * smallest)
-    points = _grid(stock, op.stock_points_mm) if op.stock_points_mm is not None else None
-    part, fixtures, before = _part(job), _fixtures(job), _insides(stock)
-
-    def removing(done: float, what: str) -> None:
-        progress(0.8 * done, what)
-
-    if unfinished is None:
-        removal = remove(
-            program, stock, job.cutters, material, fine, interpolation=op.interpolation, progress=removing
-        )  # fmt: skip
-    else:
-        removal = remove_in_pieces(
-            program, stock, job.cutters, material, fine, unfinished, interpolation=op.interpolation,
-            also=(versions(), sources()), progress=removing,
-        )  # fmt: skip
-    steps, count = StepBlocks(program, op.step_mm, op.tolerance_mm), len(removal.columns["line"])
+    program = _with_tool(program, job)
+    fine = _resolution(job)
+    points = stock_points(stock, op.stock_points_mm) if op.stock_points_mm is not None else None
+    part, fixtures, before = part_body(job), fixture_points(job), insides(stock)
+    stiffness = job.table.stiffness
+    gives = stiffness_of(stiffness, job.cutters)
+    watches = [deflecting(gives, material)]
+    steps = StepBlocks(program, op.step_mm, op.tolerance_mm)
+    count = counted(program, job.cutters, fine)
 
     def passing(share: float, what: str) -> Callable[[int], None]:
         return lambda done: progress(share + SHARE * done / count, what)
@@ -139,9 +217,31 @@ def _simulated(
         assert table is not None
         left = difference(
             steps, job.cutters, part, before, table.spacing_mm, table.look_mm, op.tolerance_mm,
-            passing(0.8, "distances to the part"),
+            passing(0.0, "distances to the part"),
         )  # fmt: skip
         solids["part"] = left.points
+    # costs as much as the chips, and says little where nothing is known to give way
+    forms = left is not None and (stiffness is not None or "form_error_um" in job.limits)
+    if left is not None and forms:
+        watches.append(forming(left, gives, material))
+
+    def watch(cuts: Cuts) -> dict[str, NDArray[np.float64]]:
+        return {name: values for each in watches for name, values in each(cuts).items()}
+
+    def removing(done: float, what: str) -> None:
+        progress(SHARE + 0.8 * done, what)
+
+    if unfinished is None:
+        removal = remove(
+            program, stock, job.cutters, material, fine, interpolation=op.interpolation, watch=watch, progress=removing
+        )  # fmt: skip
+    else:
+        formed = (left.points, left.faces, left.distance, left.step) if left is not None and forms else None
+        removal = remove_in_pieces(
+            program, stock, job.cutters, material, fine, unfinished, interpolation=op.interpolation, watch=watch,
+            also=(versions(), sources(), repr(stiffness), formed), progress=removing,
+        )  # fmt: skip
+    removal = with_columns(removal, watched(gives, formed=forms))
     touched = collisions(
         steps, job.cutters, solids, op.tolerance_mm, above_only=frozenset(["part"]),
         progress=passing(0.8 + SHARE, "collisions"),
@@ -153,51 +253,9 @@ def _simulated(
     settings = {k: v for k, v in op.model_dump().items() if v is not None}
     held_against = (*solids, *(["stock"] if points is not None else []))
     return Simulated(
-        removal, stock, material, job.limits, job.unchecked, settings, left, touched, held_against, _no_holder(job)
-    )
-
-
-def _part(job: ProgramJob) -> trimesh.Trimesh | None:
-    """The part that should come out."""
-    table = job.table.part
-    if table is None:
-        return None
-    return read_mesh(job.path.parent / table.file, unit=table.units, chord_mm=table.chord_mm, key="part.file")
-
-
-def _fixtures(job: ProgramJob) -> dict[str, NDArray[np.float64]]:
-    """Points of the fixtures by name."""
-    out = {}
-    for k, table in enumerate(job.table.fixture):
-        path, key = job.path.parent / table.file, f"fixture.{k}.file"
-        mesh = read_mesh(path, unit=table.units, chord_mm=table.chord_mm, key=key)
-        out[f"fixture {k}"] = fine(mesh, table.spacing_mm, f"fixture.{k}")[0]
-    return out
-
-
-def _grid(stock: LayeredStock, pitch: float) -> NDArray[np.float64]:
-    """Points [mm] of a grid that lie in the stock."""
-    low, high = (np.array([stock.xs[i], stock.ys[i], stock.bounds[i]]) for i in (0, -1))
-    x, y, z = (np.arange(a + 0.5 * pitch, b, pitch) for a, b in zip(low, high, strict=True))
-    if len(x) * len(y) * len(z) > MOST_POINTS:
-        raise InputError(f"operation.0.stock_points_mm = {pitch:g}: more than {MOST_POINTS} points: state a larger one")
-    grid = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
-    return grid[_insides(stock)(grid)]
-
-
-def _insides(stock: LayeredStock) -> Callable[[NDArray[np.float64]], NDArray[np.bool_]]:
-    """Which points [mm] lie in the stock as it is now."""
-    bounds, sections = np.asarray(stock.bounds), [stock.section(i) for i in range(stock.layers)]
-
-    def inside(points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        layer = np.searchsorted(bounds, points[:, 2], side="right") - 1
-        out = np.zeros(len(points), dtype=np.bool_)
-        for i in np.unique(layer[(layer >= 0) & (layer < len(sections))]).tolist():
-            own = layer == i
-            out[own] = shapely.contains_xy(sections[i], points[own, 0], points[own, 1])
-        return out
-
-    return inside
+        removal, stock, machine, material, job.limits, job.unchecked, settings, left, touched, held_against,
+        _no_holder(job), gives.unknown,
+    )  # fmt: skip
 
 
 def _no_holder(job: ProgramJob) -> tuple[int, ...]:
@@ -211,46 +269,18 @@ def _material(job: ProgramJob) -> Material:
     return material_named(job.material) if isinstance(job.material, str) else read_material(job.material)
 
 
-def _stock(job: ProgramJob, program: Program) -> LayeredStock:
-    """The stock that the job names: its layers as thin as stated where the cutters come, and some times as thick
-    elsewhere; they end where an upright cutter stands while it cuts level.
+def _with_tool(program: Program, job: ProgramJob) -> Program:
+    """The program without the rapids at its beginning that are made before a tool is in the spindle (T0), unless the
+    job says what is in it.
     """
-    table, folder = job.table.stock, job.path.parent
-    assert table is not None
-    if table.file is not None and table.file.lower().endswith(".npz"):
-        return LayeredStock.load(folder / table.file)
-    assert table.layer_mm is not None
-    tile = TILE * max(c.diameter for c in job.cutters.values())
-    if table.file is None:
-        assert table.low_mm is not None
-        assert table.high_mm is not None
-        stock = LayeredStock.block(table.low_mm, table.high_mm, COARSE * table.layer_mm, tile)
-    else:
-        mesh = read_mesh(folder / table.file, unit=table.units, chord_mm=table.chord_mm)
-        stock = LayeredStock.of_mesh(mesh, COARSE * table.layer_mm, tile)
-    top = float(stock.bounds[-1])
-    stock.refine(min(_lowest(program, job.cutters), top), top, table.layer_mm)
-    stock.refine_at(_levels(program))
-    return stock
-
-
-def _lowest(program: Program, cutters: Mapping[int, Cutter]) -> float:
-    """A height [mm] that no cutter comes below at a feed."""
-    feeds = np.flatnonzero(program.motion != RAPID)
-    if len(feeds) == 0:
-        return math.inf
-    rows = np.unique(np.concatenate([feeds, np.maximum(feeds - 1, 0)]))
-    widest = max(max(c.radius, float(c.radius_at([c.flute_length])[0])) for c in cutters.values())
-    lean = np.sqrt(np.clip(1.0 - np.asarray(program.axis)[rows, 2] ** 2, 0.0, None))
-    return float((np.asarray(program.p_work)[rows, 2] - widest * lean).min())
-
-
-def _levels(program: Program) -> NDArray[np.float64]:
-    """Heights [mm] at which an upright cutter moves level at a feed."""
-    p = np.asarray(program.p_work)
-    level = (np.abs(np.diff(p[:, 2], prepend=p[:1, 2])) < 1e-9) & (program.motion != RAPID)
-    upright = np.asarray(program.axis)[:, 2] > 1.0 - 1e-12
-    return np.unique(p[level & upright, 2].round(9))
+    if 0 in job.cutters:
+        return program
+    idle = (program.tool == 0) & (program.motion == RAPID)
+    first = len(program) if idle.all() else int(np.argmin(idle))
+    if first < 2:
+        return program
+    kept = {f.name: getattr(program, f.name)[first - 1 :] for f in fields(program) if f.name != "labels"}
+    return replace(program, **kept)
 
 
 def material_provenance(material: Material) -> dict[str, str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,15 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutting.material import beyond
+from chipload.errors import InputError
 from chipload.job import WallJob
 from chipload.machine.limits import limit_findings
 from chipload.machine.machine import Machine
+from chipload.planning.thinwall.correction import found
 from chipload.planning.thinwall.depth import largest_depths, normal_force
 from chipload.planning.thinwall.experiments import Proposal, propose_cuts
+from chipload.planning.thinwall.law import Law
 from chipload.planning.thinwall.passes import Plan
 from chipload.planning.thinwall.tours import Leg, Margins, tour
-from chipload.planning.thinwall.variants import NAMES, held_to, variants
 from chipload.planning.thinwall.variants import Variant as Planned
+from chipload.planning.thinwall.variants import even, held_to, unlimited
 from chipload.planning.thinwall.wall import SIDES
 from chipload.program.check import check_program
 from chipload.program.commands import Commands
@@ -29,19 +31,26 @@ from chipload.program.read import Reading, line_times
 from chipload.program.to_axes import to_axes
 from chipload.program.to_work import axes_of
 from chipload.progress import Progress, silent
-from chipload.report.wall.outcome import USED, Help, PassMap, Variant, Walled, verdict
+from chipload.report.wall.outcome import Help, PassMap, Variant, Walled, verdict
 from chipload.run.provenance import hashes, title_of, versions
 from chipload.run.wallinputs import WallInputs, read_wall
+from chipload.run.wallplaces import Places, places_of
 from chipload.run.wallproof import Proof, prove
 
 Floats = NDArray[np.float64]
 
-#: share of the work that planning is, for the progress
-PLANNING = 0.1
-#: plans of variable depths that are simulated at most, until one bends the wall no more than the constant depth does
-TRIES = 5
-#: the next one is held to this share of what would just do
+#: share of the work that reading and planning is, for the progress
+PLANNING = 0.05
+#: plans of variable depths that are corrected by the simulation of the one before, and simulated
+ROUNDS = 3
+#: simulated at most, where none of those bends the wall no more than the constant depth does
+TRIES = 6
+#: these are held to this share of what would just do
 HOLD = 0.97
+#: a plan is worth another simulation if it takes at most this share of the best one's time
+FASTER = 0.97
+#: constant depths that are simulated at most, until one holds
+CONSTANTS = 3
 #: safe height of the tip over the wall, in radii of the cutter
 SAFE = 1.5
 #: links sag by this share of their distance to the stock
@@ -61,44 +70,20 @@ def run_wall(job: WallJob, progress: Progress = silent) -> Walled:
         By ``progress``.
     """
     inputs = read_wall(job)
-    planned = dict(_planned(inputs, lambda done, what: progress(PLANNING * done, what)))
-    tours = {name: _tour(inputs, one.plan) for name, one in planned.items()}
-    work = {name: sum(len(leg.program) for leg in legs) for name, legs in tours.items()}
-    whole = sum(work.values()) + work[USED]  # the one in use may be cut again
-    made: dict[str, Variant] = {}
-    done = 0
-
-    def proved(name: str) -> None:
-        nonlocal done
-        low, share = PLANNING + (1.0 - PLANNING) * done / whole, (1.0 - PLANNING) * work[name] / whole
-        legs = tours[name]
-
-        def tell(part: float, what: str) -> None:
-            progress(min(low + share * part, 1.0), f"{name}: {what}")
-
-        proof = prove(inputs, planned[name].plan, legs, tell)
-        made[name] = _variant(inputs, name, planned[name], legs, proof)
-        done += work[name]
-
-    for name in ("constant", "unconstrained", USED):
-        proved(name)
-    tries = 1
-    while tries < TRIES and made["constant"].deflection < made[USED].deflection and inputs.experiments is None:
-        less = HOLD * made["constant"].deflection / made[USED].deflection * planned[USED].deflection
-        planned[USED] = _held(inputs, less)
-        tours[USED] = _tour(inputs, planned[USED].plan)
-        work[USED] = sum(len(leg.program) for leg in tours[USED])
-        done = whole - work[USED]
-        proved(USED)
-        tries += 1
-    made = {name: made[name] for name in NAMES}
+    _thick_enough(inputs)
+    tried = _Tried(places_of(inputs), progress)
+    free = tried.prove(_unlimited(tried.places), 0.25)
+    constant, corrections = _constant(tried, free)
+    variable = _variable(tried, constant, corrections)
+    made = {"variable": variable, "constant": constant, "unconstrained": free}
+    progress(1.0, "proved")
     body, finished = inputs.stock_mesh(), inputs.finished_mesh()
     text = inputs.finished_bears()
     settings: dict[str, Any] = {k: v for k, v in job.operation.model_dump().items() if v is not None}
     settings |= {
         "gouge_tolerance_mm": inputs.gouge_tolerance,
         "yield_mpa": job.table.workpiece.yield_mpa,
-        "simulated_tries": tries,
+        "simulated_tries": tried.variable,
     }
     return Walled(
         title=title_of(job.path),
@@ -122,18 +107,29 @@ def run_wall(job: WallJob, progress: Progress = silent) -> Walled:
     )
 
 
+def _thick_enough(inputs: WallInputs) -> None:
+    """Refuse a finished wall that is thinner than what is cut off it at once."""
+    thickness, deepest = inputs.shape.size()[2], min(inputs.law.limits.greatest, max(inputs.allowance))
+    if not thickness >= deepest:
+        raise InputError(
+            f"wall: {thickness:.4g} mm thick where it is thinnest, thinner than a cut of {deepest:g} mm: state less "
+            "operation.0.depth_max_mm, or a thicker wall"
+        )
+
+
 def look_at_wall(job: WallJob) -> tuple[list[str], bool]:
     """What the job names: the wall, its finite elements, the greatest threshold; nothing is planned."""
     inputs = read_wall(job)
+    _thick_enough(inputs)
     length, height, thickness = inputs.shape.size()
     nodes = len(inputs.wall.solid.grid.nodes)
-    found = inputs.finished_bears()
+    bearing = inputs.finished_bears()
     lines = [
         *_noticed(inputs),
         f"{job.path.name}: {inputs.shape.name}: {length:.4g} mm long, {height:.4g} mm high, at least "
         f"{thickness:.4g} mm thick; {len(inputs.wall.solid.grid.elements)} elements, {nodes} nodes",
-        f"threshold of the finished side {SIDES[inputs.side_numbers[0]]}, {found.source}: {found.force.min():.4g} to "
-        f"{found.force.max():.4g} N; normal force {inputs.law.forces[0]:.4g} N at {inputs.law.depths[0]:g} mm, "
+        f"threshold of the finished side {SIDES[inputs.side_numbers[0]]}, {bearing.source}: {bearing.force.min():.4g} "
+        f"to {bearing.force.max():.4g} N; normal force {inputs.law.forces[0]:.4g} N at {inputs.law.depths[0]:g} mm, "
         f"{inputs.law.forces[-1]:.4g} N at {inputs.law.depths[-1]:g} mm",
     ]
     return lines, True
@@ -164,38 +160,134 @@ def propose(
     )  # fmt: skip
 
 
-def _planned(inputs: WallInputs, progress: Progress) -> Mapping[str, Planned]:
-    surfaces = [inputs.coarse(s) for s in inputs.side_numbers]
-    return variants(
-        surfaces, inputs.bears, inputs.law, inputs.even_law, inputs.slope, inputs.deflection, inputs.factor, progress
-    )
+class _Tried:
+    """Plans that are simulated one after another; how far that is, is told on the way."""
+
+    def __init__(self, places: Places, progress: Progress) -> None:
+        self.places, self.progress = places, progress
+        self.done = PLANNING
+        self.variable = 0
+
+    def prove(self, planned: Planned, share: float) -> Variant:
+        """Write and simulate a plan, which takes this share of what is left to do."""
+        name, low = planned.plan.name, self.done
+        width = share * (1.0 - low)
+        self.variable += name == "variable"
+        legs = _tour(self.places.inputs, planned.plan, self.places.grid)
+        proof = prove(self.places, planned.plan, legs, lambda p, w: self.progress(low + width * p, f"{name}: {w}"))
+        self.done = low + width
+        return _variant(self.places, planned, legs, proof)
 
 
-def _held(inputs: WallInputs, deflection: float) -> Planned:
-    surfaces = [inputs.coarse(s) for s in inputs.side_numbers]
-    return held_to(surfaces, inputs.bears, inputs.law, inputs.slope, deflection)
+def _unlimited(places: Places) -> Planned:
+    inputs = places.inputs
+    return unlimited(places.surfaces, places.bears(inputs.deflection, inputs.factor), inputs.even_law)
 
 
-def _tour(inputs: WallInputs, plan: Plan) -> tuple[Leg, ...]:
+def _constant(tried: _Tried, free: Variant) -> tuple[Variant, tuple[Floats, ...]]:
+    """The constant depth that the simulation of the greatest one lets expect, corrected until it holds; and the
+    corrections of the force in even stock that the greatest one gave.
+    """
+    places = tried.places
+    inputs, law = places.inputs, places.inputs.even_law
+    bears = places.bears(inputs.deflection, inputs.factor)
+    at_most = _measured(places, free, law, tuple(np.ones(places.shape) for _ in places.surfaces))
+    corrections = at_most
+    for turn in range(CONSTANTS):
+        planned = even(places.surfaces, bears, law, inputs.deflection, corrections)
+        constant = tried.prove(planned, 0.4)
+        if not len(constant.over) or turn == CONSTANTS - 1 or _smallest(places, planned):
+            break
+        measured = _measured(places, constant, law, corrections)
+        corrections = tuple(np.maximum(c, m) for c, m in zip(corrections, measured, strict=True))
+    return constant, at_most
+
+
+def _smallest(places: Places, planned: Planned) -> bool:
+    """Whether the passes are as thin as they may be."""
+    return max(float(p.depth.max()) for p in planned.plan.passes) <= places.inputs.law.limits.smallest * (1.0 + 1e-9)
+
+
+def _variable(tried: _Tried, constant: Variant, corrections: tuple[Floats, ...]) -> Variant:
+    """Variable depths that bend the wall no more than the constant one: planned, simulated, corrected by what was
+    found. Of the plans that hold the fastest one; where none does, the one that exceeds least.
+
+    Parameters
+    ----------
+    corrections : of the law's forces, to begin with
+    """
+    places = tried.places
+    inputs = places.inputs
+    modelled = inputs.experiments is None
+    held = min(inputs.deflection, constant.deflection / inputs.factor) if modelled else inputs.deflection
+    best: Variant | None = None
+    least: tuple[float, Variant] | None = None
+    share = 1.0
+    for turn in range(TRIES):
+        bears = places.bears(share * held, inputs.factor) if modelled else places.bears(held, share * inputs.factor)
+        planned = held_to(places.surfaces, bears, inputs.law, inputs.slope, share * held, corrections)
+        if best is not None and _seconds(places, planned) > FASTER * best.seconds:
+            break
+        one = tried.prove(planned, 0.4)
+        over = float(one.columns["force_over_threshold"].max())
+        over = max(over, one.deflection / constant.deflection) if modelled else over
+        good = not len(one.over) and (not modelled or one.deflection <= constant.deflection)
+        if good:
+            best = one
+        elif least is None or over < least[0]:
+            least = (over, one)
+        if best is not None and turn >= ROUNDS - 1:
+            break
+        measured = _measured(places, one, inputs.law, corrections)
+        if not good:
+            measured = tuple(np.maximum(c, m) for c, m in zip(corrections, measured, strict=True))
+            share *= HOLD / over if turn >= ROUNDS - 1 else 1.0
+        corrections = measured
+    if best is not None:
+        return best
+    assert least is not None
+    return least[1]
+
+
+def _seconds(places: Places, planned: Planned) -> float:
+    """Time of a plan on the machine."""
+    legs = _tour(places.inputs, planned.plan, places.grid)
+    return _on_machine(places.inputs, Program.join([leg.program for leg in legs]))[2]
+
+
+def _measured(places: Places, one: Variant, law: Law, before: tuple[Floats, ...]) -> tuple[Floats, ...]:
+    """Corrections of the law by what a variant was found to do; where it did nothing, those before."""
+    c = one.columns
+    cut = (c["force_normal_n"] > 0.0) & (c["depth_mm"] >= law.limits.smallest * (1.0 - 1e-9))
+    out = []
+    for side, old in enumerate(before):
+        k = np.flatnonzero(cut & (c["side"] == side))
+        new = found(places.grid, c["u"][k], c["v"][k], c["force_normal_n"][k] / law.force(c["depth_mm"][k]))
+        out.append(np.where(np.isnan(new), old, new))
+    return tuple(out)
+
+
+def _tour(inputs: WallInputs, plan: Plan, places: tuple[Floats, Floats] | None = None) -> tuple[Leg, ...]:
+    """The way of a plan at these places, u and v; None: those of the elements."""
     sides = [inputs.fine(s) for s in inputs.side_numbers]
     cutter = inputs.cutter
     allowance = max(inputs.allowance)
     reach = math.sqrt(2.0 * cutter.corner_radius * allowance)
     sag = SAG * (inputs.going.clearance - allowance)
     margins = Margins(BEYOND + reach, inputs.top + SAFE * cutter.radius, sag)
-    return tour(plan.passes, sides, inputs.places, inputs.going, margins)
+    return tour(plan.passes, sides, places or inputs.places, inputs.going, margins)
 
 
-def _variant(inputs: WallInputs, name: str, planned: Planned, legs: tuple[Leg, ...], proof: Proof) -> Variant:
-    plan = planned.plan
+def _variant(places: Places, planned: Planned, legs: tuple[Leg, ...], proof: Proof) -> Variant:
+    plan, inputs = planned.plan, places.inputs
     program = Program.join([leg.program for leg in legs])
     commands, found, seconds = _on_machine(inputs, program)
     maps = tuple(
-        PassMap(p.side, inputs.coarse(inputs.side_numbers[p.side]).points, *inputs.places, p.depth, threshold)
+        PassMap(p.side, places.surfaces[p.side].points, *places.grid, p.depth, threshold)
         for p, threshold in zip(plan.passes, proof.thresholds, strict=True)
     )
     return Variant(
-        name,
+        plan.name,
         planned.order,
         planned.passes_otherwise,
         planned.deflection,
@@ -209,7 +301,7 @@ def _variant(inputs: WallInputs, name: str, planned: Planned, legs: tuple[Leg, .
         proof.shape,
         plan.force_max,
         plan.deflection_max,
-        _infeasible(inputs, plan, planned.deflection) if name == "variable" else (),
+        _infeasible(places, plan, planned.deflection) if plan.name == "variable" else (),
         proof.stress,
     )
 
@@ -226,10 +318,11 @@ def _on_machine(inputs: WallInputs, program: Program) -> tuple[Commands, tuple[s
     return commands, tuple(f.text for f in broken), float(seconds.sum())
 
 
-def _infeasible(inputs: WallInputs, plan: Plan, held: float) -> tuple[Help, ...]:
+def _infeasible(places: Places, plan: Plan, held: float) -> tuple[Help, ...]:
     """Places that bear not even the smallest depth in some pass under the limit itself, with what would help there."""
     if not plan.infeasible:
         return ()
+    inputs = places.inputs
     least: dict[tuple[int, int, int], float] = {}
     for p in plan.passes:
         force = p.threshold.force.reshape(p.low.shape)
@@ -243,22 +336,28 @@ def _infeasible(inputs: WallInputs, plan: Plan, held: float) -> tuple[Help, ...]
     share = plane / float(inputs.law.forces[0])  # what helps is asked of plane stock
     if inputs.experiments is None:  # the plan may be held to less than the limit
         least = {key: force * inputs.deflection / held for key, force in least.items()}
-    found = largest_depths(
-        inputs.posture, inputs.material, [share * least[k] for k in keys], limits, measure=inputs.measure
+    shares = [share / float(plan.corrections[side][i, j]) for side, i, j in keys]
+    asked = largest_depths(
+        inputs.posture,
+        inputs.material,
+        [s * least[k] for s, k in zip(shares, keys, strict=True)],
+        limits,
+        measure=inputs.measure,
     )
     out = []
-    for one in found.infeasible:
+    for one in asked.infeasible:
         side, i, j = keys[one.place]
-        x, y, z = inputs.coarse(inputs.side_numbers[side]).points[i, j].tolist()
-        out.append(Help(side, (x, y, z), one.threshold / share, one.force / share, one.feed_per_tooth, one.diameter))
+        x, y, z = places.surfaces[side].points[i, j].tolist()
+        s = shares[one.place]
+        out.append(Help(side, (x, y, z), one.threshold / s, one.force / s, one.feed_per_tooth, one.diameter))
     return tuple(out)
 
 
 def _noticed(inputs: WallInputs) -> tuple[str, ...]:
     """What asks more of the coefficients than they were measured for, and what the experiments' reader noticed."""
     speed = inputs.going.spindle * inputs.cutter.radius * math.sin(inputs.posture.beta)
-    found = beyond(inputs.material, inputs.posture.feed_per_tooth, speed)
-    return (*found, *(str(f) for f in inputs.noticed))
+    asked = beyond(inputs.material, inputs.posture.feed_per_tooth, speed)
+    return (*asked, *(str(f) for f in inputs.noticed))
 
 
 def _provenance(job: WallJob, inputs: WallInputs) -> dict[str, Any]:

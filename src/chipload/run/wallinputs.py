@@ -31,6 +31,7 @@ from chipload.planning.thinwall.threshold import Experiments, Threshold, calibra
 from chipload.planning.thinwall.tours import Side
 from chipload.planning.thinwall.wall import SIDES, Surface, Wall
 from chipload.run.provenance import title_of
+from chipload.run.wallfaces import wall_of_faces
 from chipload.structure.grid import from_map
 from chipload.structure.solid import Solid
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
@@ -237,6 +238,8 @@ def _shape(job: WallJob) -> ThinWall:
             math.radians(value["camber_deg"]),
             (math.radians(value["stagger_root_deg"]), math.radians(value["stagger_tip_deg"])),
         )
+    if w.shape == "step":
+        return wall_of_faces(job)
     assert w.unit is not None and w.edge_share is not None  # noqa: PT018
     made = loft(checked(read_sections(job.section_files, w.unit, columns=w.columns)))
     return through_sections(made, w.edge_share, w.span or (0.0, 1.0))

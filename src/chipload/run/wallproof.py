@@ -2,7 +2,7 @@
 
 Notation: F_n [N] greatest force along the normal of the surface that a pass leaves; C_nn [mm/N] normal compliance of
 the wall in the state of that pass, by finite elements; F_th [N] threshold. C_nn between places by cubics of its
-logarithm.
+logarithm, see :mod:`chipload.run.wallplaces`.
 """
 
 from __future__ import annotations
@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RectBivariateSpline
+from scipy.interpolate import RegularGridInterpolator
 
-from chipload.planning.thinwall.law import Law
 from chipload.planning.thinwall.passes import Plan
 from chipload.planning.thinwall.tours import Leg
 from chipload.planning.thinwall.wall import SIDES
@@ -23,6 +22,7 @@ from chipload.program.program import Program
 from chipload.progress import Progress
 from chipload.report.wall.outcome import Finish, Shape
 from chipload.run.wallinputs import WallInputs
+from chipload.run.wallplaces import Places, between
 from chipload.simulation.chips import Removal, Resolution, remove
 from chipload.simulation.deflection import form_error, step_deflections
 from chipload.simulation.finished import beside, nearest
@@ -64,8 +64,9 @@ class Proof:
     stress: float
 
 
-def prove(inputs: WallInputs, plan: Plan, legs: Sequence[Leg], progress: Progress) -> Proof:
-    """Run the passes of a plan through the stock."""
+def prove(places: Places, plan: Plan, legs: Sequence[Leg], progress: Progress) -> Proof:
+    """Run the passes of a plan at these places through the stock."""
+    inputs = places.inputs
     op, cutter = inputs.job.operation, inputs.cutter
     body = inputs.stock_mesh()
     low = inputs.foot_height - cutter.corner_radius
@@ -75,7 +76,7 @@ def prove(inputs: WallInputs, plan: Plan, legs: Sequence[Leg], progress: Progres
     fine = Resolution(max(longest, op.step_mm), op.tolerance_mm, op.corner_slices, 0.5 * cutter.radius)
     bars = {cutter.number: cutter_bars(cutter)}
     law = inputs.law if plan.name == "variable" else inputs.even_law
-    left = [np.full(inputs.wall.shape, inputs.allowance[s]) for s in inputs.side_numbers]
+    left = [np.full(places.shape, inputs.allowance[s]) for s in inputs.side_numbers]
     parts: list[dict[str, NDArray[Any]]] = []
     thresholds: list[Floats] = []
     finish: dict[int, Finish] = {}
@@ -92,28 +93,23 @@ def prove(inputs: WallInputs, plan: Plan, legs: Sequence[Leg], progress: Progres
         )
         left[p.side] = p.low
         number = inputs.side_numbers[p.side]
-        C = _compliance(inputs, left, number)
-        bearing = inputs.bears(inputs.deflection)(left, p.side)
-        F_th = (bearing.force / bearing.factor if inputs.experiments is None else bearing.force).reshape(C.shape)
+        C = places.compliance(left, p.side)
+        F_th = places.bears(inputs.deflection, 1.0)(left, p.side).force.reshape(places.shape)
         thresholds.append(F_th)
-        columns = _columns(inputs, removal, leg, C, F_th, bars, law)
+        columns = _columns(places, removal, leg, C, F_th, bars)
+        u, v = np.clip(columns["u"], 0.0, 1.0), np.clip(columns["v"], inputs.foot, 1.0)
+        share = RegularGridInterpolator(places.grid, plan.corrections[p.side])(np.column_stack([u, v]))
+        columns["planned_force_n"] = share * law.force(columns["depth_mm"])
         columns["t_s"] = columns["t_s"] + time
         columns["s_mm"] = columns["s_mm"] + way
         time, way = float(columns["t_s"][-1]), float(columns["s_mm"][-1])
         columns["pass"] = np.full(len(columns["t_s"]), leg.program.labels[0], dtype=object)
         parts.append(columns)
-        stress = max(stress, _stress(inputs, left, number, columns))
+        stress = max(stress, _stress(inputs, places.coarse(left), number, columns))
         if float(p.low.max()) <= 1e-9:
             finish[number] = _finish(inputs, removal, number, C, bars)
     whole = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(inputs, stock, legs), stress)
-
-
-def _compliance(inputs: WallInputs, left: Sequence[Floats], number: int) -> Floats:
-    """C_nn at the places of a side (n, m) [mm/N]."""
-    found = inputs.wall.bears(inputs.both(left), SIDES[number], 1.0).compliance
-    assert found is not None
-    return found.reshape(inputs.wall.shape)
 
 
 def _stress(inputs: WallInputs, left: Sequence[Floats], number: int, columns: Mapping[str, NDArray[Any]]) -> float:
@@ -139,17 +135,11 @@ def _rows(inputs: WallInputs, v: float) -> float:
     return float(np.interp(v, [0.0, inputs.foot, 1.0], [0.0, inputs.wall.foot + 1e-9, j]))
 
 
-def between(places: tuple[Floats, Floats], values: Floats, u: Floats, v: Floats) -> Floats:
-    """Values above 0 of places (n, m) at parameters (k,), by cubics of their logarithm."""
-    n, m = values.shape
-    spline = RectBivariateSpline(*places, np.log(values), kx=min(3, n - 1), ky=min(3, m - 1))
-    return np.asarray(np.exp(spline.ev(u, v)))
-
-
 def _columns(
-    inputs: WallInputs, removal: Removal, leg: Leg, C: Floats, F_th: Floats, bars: Mapping[int, Any], law: Law
+    places: Places, removal: Removal, leg: Leg, C: Floats, F_th: Floats, bars: Mapping[int, Any]
 ) -> dict[str, NDArray[Any]]:
     """Columns of a pass: those of the removal, and what its contact points feel."""
+    inputs = places.inputs
     columns = dict(removal.columns)
     columns.pop("label")
     n = len(columns["line"])
@@ -162,8 +152,9 @@ def _columns(
         np.column_stack([leg.place, leg.depth]),
     )
     u, v = np.clip(values[:, 0], 0.0, 1.0), np.clip(values[:, 1], inputs.foot, 1.0)
-    found = step_deflections(removal, inputs.material, place, work=between(inputs.places, C, u, v), bars=bars)
-    threshold = between(inputs.places, F_th, u, v)
+    gives = between(inputs.places, C, u, v)
+    found = step_deflections(removal, inputs.material, place, work=gives, bars=bars)
+    threshold = inputs.deflection / gives if inputs.experiments is None else between(places.grid, F_th, u, v)
     columns |= found
     at = place.step
     for name, given in (
@@ -171,7 +162,6 @@ def _columns(
         ("v", v),
         ("depth_mm", values[:, 2]),
         ("threshold_n", threshold),
-        ("planned_force_n", law.force(values[:, 2])),
         *((f"contact_{x}_mm", place.point[:, k]) for k, x in enumerate("xyz")),
     ):
         columns[name] = np.zeros(n)

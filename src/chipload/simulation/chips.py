@@ -26,6 +26,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import Slices, slices
 from chipload.cutting.band import deviations, mean_basis
 from chipload.cutting.material import Material
+from chipload.engagement.bites import with_runout
 from chipload.engagement.chips.move import Move
 from chipload.engagement.immersion.immersion import Section
 from chipload.errors import Finding, InputError
@@ -260,10 +261,11 @@ def remove_block(
     for number in sorted({int(steps.tool[c.step]) for c in bites}):
         own = [c for c in bites if steps.tool[c.step] == number]
         at, cutter, material = [c.step for c in own], setting.cutters[number], setting.material
-        bitten = bites_of_steps(own, cutter, setting.profiles[number])
+        plain = bites_of_steps(own, setting.profiles[number])
+        bitten = with_runout(plain, cutter)
         loads[at] = loads_of_steps(bitten, own, cutter, material, setting.resolution.rotation, steps.spindle[at])
         way = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
-        cut.append(Cuts(number, cutter, sums.steps + np.array(at), way, bitten))
+        cut.append(Cuts(number, cutter, sums.steps + np.array(at), way, bitten, plain, steps.spindle[at]))
         if setting.watch is not None:
             for name, values in setting.watch(cut[-1]).items():
                 watched.setdefault(name, np.zeros(len(steps)))[at] = values

@@ -34,7 +34,7 @@ surface.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -224,6 +224,51 @@ def step_deflections(
     return out
 
 
+def tip_deflections(
+    cuts: Cuts,
+    material: Material,
+    *,
+    bars: tuple[Bar, ...],
+    work: float | None = None,
+    rotation: float = math.radians(2.0),
+) -> dict[str, Floats]:
+    """How far the tip of one cutter and the work part in some steps, at most over a revolution.
+
+    With u the lateral motion of the tip under what all teeth cut and F the force on the cutter, the work with a
+    compliance c in every direction goes -c F, and they part by u + c F.
+
+    Parameters
+    ----------
+    cuts : of one cutter, as the watch of :func:`chipload.simulation.chips.remove` gets them
+    bars : of cutter, holder and spindle, from the tip upwards
+    work : c [mm/N]; None: the work counts as rigid
+    rotation : between two rotations that are looked at [rad]
+
+    Returns
+    -------
+    columns, (c,) each
+        ``deflection_cutter_um`` greatest size of u, with ``work`` also ``deflection_work_um`` c times that of F,
+        ``deflection_um`` greatest size of u + c F.
+    """
+    if work is not None and not 0.0 <= work < math.inf:
+        raise InputError(f"tip_deflections: work = {work:g} mm/N: a compliance must be at least 0")
+    pitch = math.tau if cuts.cutter.runout[0] > 0.0 else math.tau / cuts.cutter.flutes
+    m = max(math.ceil(pitch / rotation), 8)
+    theta = np.arange(m) * (pitch / m)
+    n = len(cuts)
+    moments = _bent(
+        cuts, np.repeat(np.arange(n), m), np.tile(theta, n), np.zeros(n * m), material, {cuts.tool: bars}
+    ).reshape(n, m, 5)
+    force, bent = moments[..., :3], moments[..., 3:]
+    out = {"deflection_cutter_um": 1e3 * np.linalg.norm(bent, axis=2).max(axis=1)}
+    if work is None:
+        return out | {"deflection_um": out["deflection_cutter_um"]}
+    apart = work * force
+    out["deflection_work_um"] = 1e3 * np.linalg.norm(apart, axis=2).max(axis=1)
+    apart[..., :2] += bent
+    return out | {"deflection_um": 1e3 * np.linalg.norm(apart, axis=2).max(axis=1)}
+
+
 def form_error(
     removal: Removal,
     material: Material,
@@ -260,6 +305,26 @@ def form_error(
     -----
     Every step that may win is looked at: those whose distance is within twice the greatest deflection of the least.
     """
+    return form_error_of(
+        _kept(removal), material, points, normals, work=work, bars=bars, near=near, facing=facing, reach=reach,
+        progress=progress,
+    )  # fmt: skip
+
+
+def form_error_of(
+    all_cuts: Sequence[Cuts],
+    material: Material,
+    points: ArrayLike,
+    normals: ArrayLike,
+    *,
+    work: ArrayLike | None,
+    bars: Mapping[int, tuple[Bar, ...]] | None,
+    near: float,
+    facing: float = FACING,
+    reach: float = REACH,
+    progress: Progress = silent,
+) -> FormError:
+    """:func:`form_error` by some of the cuts of a program; ``step`` counts as their ``step`` does."""
     q, n = (np.ascontiguousarray(np.atleast_2d(np.asarray(v, dtype=np.float64))) for v in (points, normals))
     if q.ndim != 2 or q.shape[1] != 3 or n.shape != q.shape or not (np.isfinite(q).all() and np.isfinite(n).all()):
         raise InputError(f"form_error: points {q.shape}, normals {n.shape}: need (p, 3) finite numbers, one of each")
@@ -268,7 +333,6 @@ def form_error(
     if not 0.0 < near < math.inf:
         raise InputError(f"form_error: near_mm = {near:g}: must be above 0")
     stiff = _work(work, n, "form_error")
-    all_cuts = _kept(removal)
     least = np.full(len(q), np.inf)
     for cuts in all_cuts:
         _kernels.least_gaps(q, n, cuts.way, _shape(cuts.cutter), near, facing, least)

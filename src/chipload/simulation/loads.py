@@ -7,7 +7,7 @@ as in :mod:`chipload.engagement.bites`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,8 @@ class Cuts:
     step : (c,) int, the steps that cut, rows of ``Removal.columns``
     way : (c, 12) float, tip at the start and the end [mm], axis at the start and the end
     bites : of those steps, in the middle of each, with frames
+    plain : the same without runout
+    spindle : (c,) float [rad/s], signed
     """
 
     tool: int
@@ -71,6 +73,8 @@ class Cuts:
     step: NDArray[np.int64]
     way: Floats
     bites: Bites
+    plain: Bites
+    spindle: Floats
 
     def __len__(self) -> int:
         return len(self.step)
@@ -78,13 +82,33 @@ class Cuts:
 
 def joined(cuts: list[Cuts]) -> Cuts:
     """Cuts of one cutter that follow one another as one."""
-    bites = [c.bites for c in cuts]
+    columns = (np.concatenate([getattr(c, name) for c in cuts]) for name in ("step", "way", "spindle"))
+    step, way, spindle = columns
+    bites = _joined([c.bites for c in cuts])
+    plain = bites if all(c.plain is c.bites for c in cuts) else _joined([c.plain for c in cuts])
+    return Cuts(cuts[0].tool, cuts[0].cutter, step, way, bites, plain, spindle)
+
+
+def _joined(bites: list[Bites]) -> Bites:
     start = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(b.start) for b in bites]))])
     rows, tooth, piece = (np.concatenate([getattr(b, name) for b in bites]) for name in ("rows", "tooth", "slice"))
     frame = np.concatenate([b.frame for b in bites if b.frame is not None])
-    whole = Bites(start, rows, tooth, piece, bites[0].slices, frame)
-    step, way = np.concatenate([c.step for c in cuts]), np.concatenate([c.way for c in cuts])
-    return Cuts(cuts[0].tool, cuts[0].cutter, step, way, whole)
+    return Bites(start, rows, tooth, piece, bites[0].slices, frame)
+
+
+def at_feeds(cuts: Cuts, factor: Floats) -> Cuts:
+    """What the teeth cut at other feeds: where they cut does not depend on the feed, how thick is proportional to it;
+    what runout adds is not.
+
+    Parameters
+    ----------
+    factor : (c,) float, above 0, the feed of each step over the one that it has
+    """
+    old = cuts.plain
+    rows = old.rows.copy()
+    rows[:, 4:] *= np.repeat(factor, np.diff(old.start))[:, None]
+    plain = Bites(old.start, rows, old.tooth, old.slice, old.slices, old.frame)
+    return replace(cuts, bites=with_runout(plain, cuts.cutter), plain=plain)
 
 
 def bite_of_step(steps: Steps, k: int, move: Move, cutter: Cutter, profile: Slices, section: Section) -> StepBite:
@@ -103,12 +127,34 @@ def bite_of_step(steps: Steps, k: int, move: Move, cutter: Cutter, profile: Slic
     return StepBite(k, frame, rows, owner)
 
 
-def bites_of_steps(cuts: list[StepBite], cutter: Cutter, profile: Slices) -> Bites:
-    """The bites of some steps of one cutter, with its runout."""
+def bites_of_steps(cuts: list[StepBite], profile: Slices) -> Bites:
+    """The bites of some steps of one cutter, without its runout."""
     start = np.cumsum([0, *(len(c.rows) for c in cuts)])
     rows, owner = np.concatenate([c.rows for c in cuts]), np.concatenate([c.owner for c in cuts])
     frame = np.array([c.frame for c in cuts])
-    return with_runout(Bites(start, rows, np.full(len(rows), -1), owner, profile.columns, frame), cutter)
+    return Bites(start, rows, np.full(len(rows), -1), owner, profile.columns, frame)
+
+
+def greatest_loads(cuts: Cuts, material: Material, rotation: float) -> dict[str, Floats]:
+    """Columns (c,) of :data:`LOADS` that limits hold: greatest force [N], greatest and mean torque [N m], mean power
+    [W], thickest chip [mm].
+    """
+    force, torque = _over_turn(cuts.bites, cuts.cutter, material, rotation)
+    _, mean = mean_forces(cuts.bites, cuts.cutter, material)
+    return {
+        "force_n": np.linalg.norm(force, axis=2).max(axis=1),
+        "torque_nm": torque.max(axis=1) / 1000.0,
+        "torque_mean_nm": mean / 1000.0,
+        "power_w": mean * np.abs(cuts.spindle) / 1000.0,
+        "chip_max_mm": cuts.bites.chip_max(),
+    }
+
+
+def _over_turn(bites: Bites, cutter: Cutter, material: Material, rotation: float) -> tuple[Floats, Floats]:
+    """Force and torque at rotations at most ``rotation`` apart."""
+    pitch = math.tau if cutter.runout[0] > 0.0 else math.tau / cutter.flutes
+    count = max(math.ceil(pitch / rotation), 8)
+    return forces_over_turn(bites, cutter, material, np.arange(count) * (pitch / count))
 
 
 def loads_of_steps(
@@ -116,9 +162,7 @@ def loads_of_steps(
 ) -> Floats:
     """(c, len(LOADS)) loads of steps."""
     assert bites.frame is not None
-    pitch = math.tau if cutter.runout[0] > 0.0 else math.tau / cutter.flutes
-    count = max(math.ceil(pitch / rotation), 8)
-    force, torque = forces_over_turn(bites, cutter, material, np.arange(count) * (pitch / count))
+    force, torque = _over_turn(bites, cutter, material, rotation)
     mean, torque_mean = mean_forces(bites, cutter, material)
     turned = in_work(force, bites.frame)
     left = _left(bites, cuts)

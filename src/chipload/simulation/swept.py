@@ -20,6 +20,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.engagement.chips.covered import covered_polygons
 from chipload.engagement.chips.move import LEAST_AXIS_Z, Move
 from chipload.errors import InputError
+from chipload.simulation.reach import reached
 from chipload.simulation.steps import Steps
 from chipload.stock.layers import LayeredStock
 
@@ -67,13 +68,11 @@ def swept_ahead(
         found: dict[int, Met] = {}
         ranges = {k: stock.layers_between(low[k, 2], high[k, 2]) for k in part if near[k]}
         ranges = {k: layers for k, layers in ranges.items() if layers}
-        for (k, layers), left in zip(
-            ranges.items(), _left(steps, ranges, low, high, cutters, stock, tolerance), strict=True
-        ):
+        for k, left in _left(steps, ranges, low, high, cutters, stock).items():
             # an axis that lies is refused in air too
             if left.any() or min(steps.a0[k, 2], steps.a1[k, 2]) < 2.0 * LEAST_AXIS_Z:
                 try:
-                    found[k] = _move(steps, k, interpolation), layers, left
+                    found[k] = _move(steps, k, interpolation), ranges[k], left
                 except InputError as err:
                     raise InputError(f"line {steps.line[k]}: {err}") from None
         out: dict[int, Swept] = {}
@@ -100,44 +99,35 @@ def _left(
     high: Floats,
     cutters: Mapping[int, Cutter],
     stock: LayeredStock,
-    tolerance: float,
-) -> list[NDArray[np.bool_]]:
-    """Which layers of each step still have material where the cutter may come in them.
+) -> dict[int, NDArray[np.bool_]]:
+    """Which layers of each step still have material where the cutter may come in them: in its box, and where it leans
+    in the figure of :mod:`chipload.simulation.reach`.
 
-    Asked ahead of the removal, so that more may be there than when the step comes, never less. In a layer the cutter
-    stays in the section of an endless cylinder about its axis: an ellipse whose box is known at both ends; between
-    them the middle of the ellipse leaves its chord by the product of the two motions, and by the turn of the axis.
+    Asked ahead of the removal, so that more may be there than when the step comes, never less.
     """
+    if not ranges:
+        return {}
+    of = list(ranges)
     counts = [len(layers) for layers in ranges.values()]
-    if not counts:
-        return []
-    step, layer = np.repeat(list(ranges), counts), np.concatenate([np.array(r) for r in ranges.values()])
-    z = stock.heights[layer]
-    wide = {n: max(c.radius, float(c.radius_at([c.flute_length])[0])) for n, c in cutters.items()}
-    own = np.array([wide[n] for n in steps.tool[step].tolist()])
-    middle, half, slope = [], [], []
-    for p, axis in ((steps.p0[step], steps.a0[step]), (steps.p1[step], steps.a1[step])):
-        slope.append(axis[:, :2] / np.maximum(axis[:, 2:], LEAST_AXIS_Z))
-        middle.append(p[:, :2] + (z - p[:, 2])[:, None] * slope[-1])
-        half.append(own[:, None] * np.sqrt(1.0 + slope[-1] ** 2))
-    turn = np.linalg.norm(steps.a1[step] - steps.a0[step], axis=1)
-    least = np.maximum(np.minimum(steps.a0[step, 2], steps.a1[step, 2]), LEAST_AXIS_Z)
-    climb = np.abs(steps.p1[step, 2] - steps.p0[step, 2])
-    far = np.maximum(np.abs(z - steps.p0[step, 2]), np.abs(z - steps.p1[step, 2])) + own
-    slack = 0.25 * climb * np.abs(slope[1] - slope[0]).max(axis=1) + 0.5 * far * turn**2 / least**3 + 4.0 * tolerance
-    a = np.maximum(np.minimum(middle[0] - half[0], middle[1] - half[1]) - slack[:, None], low[step, :2])
-    b = np.minimum(np.maximum(middle[0] + half[0], middle[1] + half[1]) + slack[:, None], high[step, :2])
-    left = np.zeros(len(step), dtype=np.bool_)
+    step, layer = np.repeat(of, counts), np.concatenate([np.array(r) for r in ranges.values()])
+    a, b = low[step, :2], high[step, :2]
     boxes = shapely.box(a[:, 0], a[:, 1], b[:, 0], b[:, 1])
     i0, j0 = np.searchsorted(stock.xs, a[:, 0], "right"), np.searchsorted(stock.ys, a[:, 1], "right")
     i1, j1 = np.searchsorted(stock.xs, b[:, 0], "left"), np.searchsorted(stock.ys, b[:, 1], "left")
     i0, j0 = np.maximum(i0 - 1, 0), np.maximum(j0 - 1, 0)
     i1, j1 = np.minimum(i1, len(stock.xs) - 1), np.minimum(j1, len(stock.ys) - 1)
+    left = np.zeros(len(step), dtype=np.bool_)
     for dj in range(int((j1 - j0).max(initial=0))):
         for di in range(int((i1 - i0).max(initial=0))):
             ask = np.flatnonzero(~left & (j0 + dj < j1) & (i0 + di < i1))
             left[ask] = shapely.intersects(boxes[ask], stock.tiles[layer[ask], j0[ask] + dj, i0[ask] + di])
-    return np.split(left, np.cumsum(counts)[:-1])
+    out = dict(zip(of, np.split(left, np.cumsum(counts)[:-1]), strict=True))
+    for tool in np.unique(steps.tool[of]).tolist():
+        lean = [k for k in of if steps.tool[k] == tool and out[k].any() and min(steps.a0[k, 2], steps.a1[k, 2]) < 1.0]
+        asked = [np.array(ranges[k])[out[k]] for k in lean]
+        for k, met in zip(lean, reached(steps, lean, asked, cutters[tool], stock), strict=True):
+            out[k] = np.isin(ranges[k], met)
+    return out
 
 
 def _covered(

@@ -16,7 +16,7 @@ Reference: [Altintas2012] ch. 2 and 4; [Schmitz2009] ch. 9 for the joint between
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -120,6 +120,39 @@ def cutter_bars(cutter: Cutter, joint: Joint = RIGID, fluted_factor: float = FLU
     """Fluted part and shank of a cutter, with the joint by which the holder grips it."""
     fluted, shank = flexibilities(cutter, fluted_factor)
     return Bar(cutter.flute_length, fluted), Bar(cutter.overhang - cutter.flute_length, shank, joint)
+
+
+def as_measured(bars: tuple[Bar, ...], compliance: float) -> tuple[Bar, ...]:
+    """The chain with what a measured tip has more than it, e.g. by holder and spindle that it leaves out.
+
+    The difference goes into the last joint as a translation: right at the tip whatever it comes from; loads higher up
+    are given as much of it, rather too much where holder and spindle tilt.
+
+    Parameters
+    ----------
+    bars : from the tip upwards
+    compliance : [mm/N] of the tip across the axis under a slow force, e.g. of
+        :func:`chipload.structure.receptance.static_compliance`
+
+    Raises
+    ------
+    InputError
+        The measured tip is stiffer than the chain by itself.
+
+    Examples
+    --------
+    >>> bars = as_measured((Bar(50.0, 0.0),), 1e-4)
+    >>> round(float(chain_compliance(bars, 0.0, 0.0)) * 1e6, 6)
+    100.0
+    """
+    own = float(chain_compliance(bars, 0.0, 0.0))
+    if not own <= compliance < math.inf:
+        raise InputError(
+            f"tip: measured compliance {1e3 * compliance:.4g} um/N: must be at least that of cutter and holder alone, "
+            f"{1e3 * own:.4g} um/N: check the calibration of hammer and sensor, or the overhang and modulus"
+        )
+    joint = bars[-1].joint
+    return (*bars[:-1], replace(bars[-1], joint=replace(joint, c_ff=joint.c_ff + compliance - own)))
 
 
 def chain_compliance(bars: tuple[Bar, ...], z_force: ArrayLike, z_point: ArrayLike) -> Array:

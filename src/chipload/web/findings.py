@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.report.held import LIMITS
 from chipload.report.outcome import WORDS
-from chipload.report.simulated import LIMITS
 from chipload.web.result import Result, Text, Track, released
 
 #: endings of names, and the unit they say

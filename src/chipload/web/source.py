@@ -1,8 +1,9 @@
 """The text of the program that a track ran, and the line of each row of its history.
 
-The text is the original where the opened folder has it (found by the hash that the result states), else the program
-that the result holds for the machine, else its CL data. Where the history does not count in the lines of that text,
-rows are followed along its motions: each row lies on the motion that is shown, within a tolerance.
+The text is the one with new feeds where the result holds one, else the original where the opened folder has it (found
+by the hash that the result states), else the program that the result holds for the machine, else its CL data. Where
+the history does not count in the lines of that text, rows are followed along its motions: each row lies on the motion
+that is shown, within a tolerance.
 """
 
 from __future__ import annotations
@@ -64,6 +65,9 @@ def source_of(result: Result, track: Track) -> Source | None:
     inputs = inputs.get("inputs", {}) if isinstance(inputs, dict) else {}
     wanted = inputs.get("program") if isinstance(inputs, dict) else None
     if track.line is not None and track.line.any() and isinstance(wanted, str):
+        fed = _with_new_feeds(result, track)
+        if fed is not None:
+            return Source(fed.name, _lines(fed), track.line, "with its new feeds")
         original = by_hash(result.root, wanted)
         if original is not None and original.stat().st_size <= LARGEST:
             return Source(original.name, _lines(original), track.line, "")
@@ -82,6 +86,21 @@ def source_of(result: Result, track: Track) -> Source | None:
         if program is not None:
             return Source(path.name, _lines(path), followed(track.place, program), note)
     return None
+
+
+def _with_new_feeds(result: Result, track: Track) -> Path | None:
+    """The program of the operation with other F words, line for line; None: it kept its feeds."""
+    operations = result.summary.get("operations")
+    of = operations[track.operation] if isinstance(operations, list) and track.operation < len(operations) else {}
+    feeds = of.get("feeds") if isinstance(of, dict) else None
+    name = feeds.get("program") if isinstance(feeds, dict) else None
+    if not isinstance(name, str):
+        return None
+    try:
+        path = result.file(name)
+        return path if path.stat().st_size <= LARGEST else None
+    except (ChiploadError, OSError):
+        return None
 
 
 def followed(place: Floats, program: Program) -> Ints:

@@ -12,14 +12,14 @@ from chipload.errors import InputError
 from chipload.job import load_job
 from chipload.planning.sectional.parametric import Shape, impeller_of
 from chipload.planning.sectional.surfaces import Sampled, hub_range, surface_of
-from chipload.run.impeller import _impeller
+from chipload.run.impeller_part import read_part
 
 HOW = Sampled((0.1, 0.9), (0.2, 0.95), (60, 40), 4.0, 2.0)
 
 
 @pytest.fixture(scope="module")
 def hecc():
-    return _impeller(load_job(Path(examples.__file__).parent / "hecc" / "job.toml"))
+    return read_part(load_job(Path(examples.__file__).parent / "hecc" / "job.toml")).impeller
 
 
 def test_the_area_of_a_side():

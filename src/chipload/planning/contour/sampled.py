@@ -6,7 +6,6 @@ All in the work frame.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +16,7 @@ from chipload.engagement.contact import Engagement, StockBoundary, engagement
 from chipload.geometry.contour import Contour
 from chipload.geometry.distance import distance
 from chipload.planning.contour.passes import Pass
+from chipload.planning.contour.wall import mirrored
 
 Floats = NDArray[np.float64]
 
@@ -118,15 +118,8 @@ def mirrored_pass(run: Pass, flip: bool) -> Pass:
     """The pass in the work frame: reflected in y where ``flip``."""
     if not flip:
         return run
-    from chipload.planning.contour.wall import mirrored
-
     parts = [None if c is None else mirrored(c) for c in (run.path, run.lead_in, run.lead_out)]
     seg = run.stock.segments * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0])
     seg = seg[:, [2, 3, 0, 1, 4, 5, 6]] * np.array([1, 1, 1, 1, 1, 1, -1.0])
     assert parts[0] is not None
     return Pass(run.name, parts[0], parts[1], parts[2], StockBoundary(seg), run.stopped)
-
-
-def rim_side(up: bool) -> float:
-    """Immersion [rad] where the wall is made: 0 in up milling, pi in down milling."""
-    return 0.0 if up else math.pi

@@ -30,6 +30,8 @@ def patch_of(impeller: Impeller, body: str, side: str, ahead: float = 0.0) -> Pa
     """
     index = BODIES.index(body)
     if side != "floor":
+        if side.endswith(" fillet"):
+            return impeller.foot(index, 1 if side.startswith("plus") else -1)
         blade = impeller.body(index)
         return blade.plus if side == "plus" else blade.minus
     low, high = hub_range(impeller, ahead)

@@ -3,7 +3,7 @@
 Notation: z axis of rotation, inlet above; theta angle about it, pitch = 2 pi / blades. Sides of a blade as in
 ``geometry/sections.py``: `plus` faces a growing theta. The channel of `plus` of a blade is bounded by `minus` of the
 next body round, a splitter where there is one. u along the blade from the leading edge, v from hub to shroud, both
-0..1.
+0..1. Where there are fillets between sides and hub, a side begins above its fillet, and the floor ends at it.
 """
 
 from __future__ import annotations
@@ -22,6 +22,13 @@ from chipload.planning.sectional.scene import Scene
 
 Floats = NDArray[np.float64]
 
+#: number of a fillet in a scene, over that of its side
+FILLET = 1000
+#: check points of fillets lie so deep in the metal [mm]: a corner of the fillet's own radius fits, though not its bits
+SUNK = 1e-3
+#: check points round the arc of a fillet
+ARC = 9
+
 
 @dataclass(frozen=True, eq=False)
 class Impeller:
@@ -32,6 +39,7 @@ class Impeller:
     blade, splitter : one of each, splitter None: there are none
     hub, shroud : of revolution, normals into the channel
     blades : how many of each, evenly round
+    fillets : of each body of :attr:`bodies`, the fillets of its sides; none: sides meet the hub
     """
 
     blade: Blade
@@ -39,6 +47,7 @@ class Impeller:
     hub: Revolved
     shroud: Revolved
     blades: int
+    fillets: tuple[Blade, ...] = ()
 
     def __post_init__(self) -> None:
         if self.blades < 2:
@@ -63,6 +72,14 @@ class Impeller:
         bodies = self.bodies
         return bodies[index % len(bodies)].turned(self.pitch * (index // len(bodies)))
 
+    def fillet(self, index: int) -> Blade:
+        """Fillets of the sides of a body, v from the hub; only where there are any."""
+        return self.fillets[index % len(self.fillets)].turned(self.pitch * (index // len(self.fillets)))
+
+    def foot(self, index: int, sign: int) -> Patch:
+        """What of a side of a body, ``sign`` 1 plus, -1 minus, stands on the hub at v = 0."""
+        return _side(self.fillet(index) if self.fillets else self.body(index), sign)
+
     def scene(
         self,
         body: int,
@@ -79,7 +96,7 @@ class Impeller:
         Parameters
         ----------
         body : 0 blade, 1 splitter
-        side : `plus` or `minus`
+        side : `plus` or `minus`, or that with ` fillet` for the fillet below it
         contact : u (a,), v (b,) of the contact points, which are a x b, v the faster
         check : how many along u and v on each side of a body
         near : as :class:`Scene`
@@ -88,9 +105,11 @@ class Impeller:
 
         Returns
         -------
-        Scene with the surfaces 0: the side milled, 1: the side that faces it, 2: the hub, 3 on: other sides.
+        Scene with the surfaces 0: the side milled, 1: the side that faces it, 2: the hub, 3 on: other sides; the fillet
+        of a side has :data:`FILLET` more. Check points of fillets lie :data:`SUNK` in the metal.
         """
-        if side not in ("plus", "minus") or not 0 <= body < len(self.bodies):
+        side, on_fillet = side.removesuffix(" fillet"), side.endswith(" fillet")
+        if side not in ("plus", "minus") or not 0 <= body < len(self.bodies) or (on_fillet and not self.fillets):
             raise InputError(f"body {body}, side {side!r}: must be 0..{len(self.bodies) - 1}, plus or minus")
         u, v = (np.asarray(x, dtype=np.float64) for x in contact)
         if (np.concatenate([u, v]) < 0.0).any() or (np.concatenate([u, v]) > 1.0).any():
@@ -98,23 +117,37 @@ class Impeller:
         U, V = (x.ravel() for x in np.meshgrid(u, v, indexing="ij"))
         a, b = (x.ravel() for x in np.meshgrid(np.linspace(0, 1, check[0]), np.linspace(0, 1, check[1]), indexing="ij"))
         step = 1 if side == "plus" else -1
-        own, facing = _side(self.body(body), step), _side(self.body(body + step), -step)
+        own = _side(self.body(body), step)
         first, last = -around, 1 + around
         floors = []
         for k in range(first, last):
             s = np.linspace(*hub_range, hub_points[0])
             theta = self.across(body + step * k, s, np.linspace(0.0, 1.0, hub_points[1]), step)
             floors.append(self.hub.at(np.repeat(s, hub_points[1]), theta.ravel()))
-        parts = [own.at(a, b), facing.at(a, b), np.concatenate(floors)]
+        sides = [(body, step), (body + step, -step)]
         if around:
-            parts += [_side(self.body(body), -step).at(a, b), _side(self.body(body + step), step).at(a, b)]
+            sides += [(body, -step), (body + step, step)]
             others = [*range(first, 0), *range(2, last + 1)]
-            parts += [_side(self.body(body + step * k), w).at(a, b) for k in others for w in (1, -1)]
-        surface = np.repeat(np.arange(len(parts)), [len(p) for p in parts])
+            sides += [(body + step * k, w) for k in others for w in (1, -1)]
+        parts = [_side(self.body(k), w).at(a, b) for k, w in sides]
+        parts.insert(2, np.concatenate(floors))
+        names = [*range(len(parts))]
+        if self.fillets:
+            parts += [self.fillet_points(k, w, check[0]) for k, w in sides]
+            names += [FILLET + n for n in range(len(parts)) if n != 2][: len(sides)]
+        milled = self.foot(body, step) if on_fillet else own
         return Scene(
-            own.at(U, V), own.normal(U, V), own.curvature(U, V), np.zeros(len(U), dtype=np.int64),
-            np.concatenate(parts), surface, near,
+            milled.at(U, V), milled.normal(U, V), milled.curvature(U, V), np.full(len(U), FILLET if on_fillet else 0),
+            np.concatenate(parts), np.repeat(names, [len(p) for p in parts]), near,
         )  # fmt: skip
+
+    def fillet_points(self, index: int, sign: int, along: int) -> Floats:
+        """Check points of a fillet, ``along`` places along it and :data:`ARC` from the hub up, none on its edges."""
+        patch = _side(self.fillet(index), sign)
+        u, v = np.linspace(0.0, 1.0, along), (np.arange(ARC) + 0.5) / ARC
+        U, V = (x.ravel() for x in np.meshgrid(u, v, indexing="ij"))
+        out: Floats = patch.at(U, V) - SUNK * patch.normal(U, V)
+        return out
 
     def across(self, index: int, s: ArrayLike, v: ArrayLike, step: int = 1) -> Floats:
         """Theta (a, b) [rad] on the hub at the shares v (b,) of a channel's width.
@@ -134,10 +167,10 @@ class Impeller:
         """Theta (a,) of a side's foot; a blade goes on straight beyond its edges, a splitter beside its blade."""
         at = np.asarray(s, dtype=np.float64)
         first = index - index % len(self.bodies)
-        places, theta = _theta_of(_side(self.body(index), side), self.hub)
+        places, theta = _theta_of(self.foot(index, side), self.hub)
         out: Floats = np.interp(at, places, theta)
         if index != first:
-            guide = _theta_of(_side(self.body(first), side), self.hub)
+            guide = _theta_of(self.foot(first, side), self.hub)
             out += np.interp(at, *guide) - np.interp(np.clip(at, places[0], places[-1]), *guide)
         return out
 

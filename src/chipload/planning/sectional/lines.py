@@ -155,10 +155,13 @@ class Lines:
             pallet[piece.first : piece.last] = piece.pallet
         return Line(q, at, S, N, K, d, pieces, pallet)
 
-    def border(self, Q: tuple[float, float]) -> Floats:
-        """Q at every station from Q[0] towards Q[1] where the cutter first reaches the surface, evened out."""
-        count = min(len(self.p), _KNOTS)
-        knots = np.unique(np.linspace(0, len(self.p) - 1, count).round().astype(int))
+    def border(self, Q: tuple[float, float], need: Flags | None = None) -> Floats:
+        """Q at every station from Q[0] towards Q[1] where the cutter first reaches the surface, evened out.
+
+        Looked at are the stations that are in ``need``.
+        """
+        among = np.arange(len(self.p)) if need is None else np.flatnonzero(need)
+        knots = among[np.unique(np.linspace(0, len(among) - 1, min(len(among), _KNOTS)).round().astype(int))]
         low, high = np.zeros(len(knots)), np.full(len(knots), np.nan)
         for f in np.concatenate([[0.0], np.geomspace(0.02, 0.6, 9)]):
             open_ = np.flatnonzero(np.isnan(high))
@@ -194,42 +197,59 @@ class Lines:
         got = self._valid(scene, np.arange(len(stations)), self.pallets)
         return np.array([len(r) > 0 for r in got])
 
-    def tracks(self, line: Line, use: Flags, number: int) -> tuple[list[Track], list[Missed]]:
-        """Tracks of the pieces of a line where it is in ``use``, and what is missed."""
+    def tracks(
+        self, line: Line, use: Flags, number: int, need: Flags | None = None
+    ) -> tuple[list[Track], list[Missed]]:
+        """Tracks of the pieces of a line where it is in ``use``, and what is missed of what they ``need`` to mill.
+
+        A piece that ends between two stations goes on from the last as far as the cutter does; where the next piece
+        begins so far back that they meet, nothing is missed.
+        """
         tracks: list[Track] = []
         missed: list[Missed] = []
+        need = use if need is None else use & need
         covered = np.zeros(len(use), dtype=np.bool_)
         ways = self.mender
-        ends: dict[tuple[int, bool], Floats] = {}  # where a track ends, by the first station that is not reached
-        for piece in line.pieces:
+        owner = np.full(len(use), -1)
+        for k, piece in enumerate(line.pieces):
+            owner[piece.first : piece.last] = k
+        gone: dict[tuple[int, int], float] = {}  # (first station, towards the next 1 or back -1): how far [share]
+        for mine, piece in enumerate(line.pieces):
             for a, b in runs(use[piece.first : piece.last]):
                 i, j = piece.first + a, piece.first + b
                 covered[i:j] = True
                 at, B = [*line.at[i:j]], [*piece.pallet[a:b]]
-                for k, there in ((0, i - 1), (len(at), j)):
-                    open_ = 0 <= there < len(use) and use[there] and not math.isfinite(line.pallet[there])
-                    end = at[0] if k == 0 else at[-1]
-                    more = ways.furthest(end, B[0 if k == 0 else -1], line.at[there]) if open_ else None
-                    if open_:
-                        ends[there, k > 0] = end if more is None else more[0]
+                for side, here, there in ((-1, i, i - 1), (1, j - 1, j)):
+                    if not (0 <= there < len(use) and use[there] and owner[there] != mine):
+                        continue
+                    more = ways.furthest(line.at[here], B[0 if side < 0 else -1], line.at[there])
+                    gone[here, side] = 0.0 if more is None else more[2]
                     if more is not None:
-                        at.insert(k and len(at), more[0])
-                        B.insert(k and len(B), more[1])
+                        k = 0 if side < 0 else len(at)
+                        at.insert(k, more[0])
+                        B.insert(k, more[1])
                 if len(at) < 2:
                     continue
                 parts, bad = ways.mended(ways.track(np.array(at), np.array(B), number))
                 tracks += parts
-                if len(bad):
-                    k = i + min(int(bad[0]), j - i - 1)
-                    missed.append(self._missed(number, line.at[k : min(k + 2, j)], "touches"))
-        for a, b in runs(use & ~covered):
-            first, last = ends.get((a, True)), ends.get((b - 1, False))
-            at = [*([] if first is None else [first]), *line.at[a:b], *([] if last is None else [last])]
-            missed.append(self._missed(number, np.array(at), "no pallet angle"))
-        joints = [x.last for x, y in zip(line.pieces[:-1], line.pieces[1:], strict=True) if x.last == y.first]
-        missed += [
-            self._missed(number, line.at[k - 1 : k + 1], "cannot follow") for k in joints if use[k - 1] and use[k]
-        ]
+                for row in bad[:1]:
+                    k = i + min(int(row), j - i - 1)
+                    if need[k]:
+                        missed.append(self._missed(number, line.at[k : min(k + 2, j)], "touches"))
+        for a, b in runs(need & ~covered):
+            ends = [*line.at[a:b]]
+            if a and use[a - 1]:
+                ends.insert(0, line.at[a - 1] + gone.get((a - 1, 1), 0.0) * (line.at[a] - line.at[a - 1]))
+            if b < len(use) and use[b]:
+                ends.append(line.at[b] + gone.get((b, -1), 0.0) * (line.at[b - 1] - line.at[b]))
+            missed.append(self._missed(number, np.array(ends), "no pallet angle"))
+        for k in range(1, len(use)):
+            if need[k - 1] and need[k] and covered[k - 1] and covered[k] and owner[k - 1] != owner[k]:
+                first, last = gone.get((k - 1, 1), 0.0), 1.0 - gone.get((k, -1), 0.0)
+                if first < last:
+                    step = line.at[k] - line.at[k - 1]
+                    between = line.at[k - 1] + np.array([[first], [last]]) * step
+                    missed.append(self._missed(number, between, "cannot follow"))
         return tracks, missed
 
     def _missed(self, number: int, at: Floats, reason: str) -> Missed:
@@ -299,6 +319,24 @@ def stations(surface: Patch, along: str, P: tuple[float, float], Q: tuple[float,
         if worst <= 0.5 * chord:
             return count
     raise InputError(f"finish.chord = {chord:g} mm: more than 513 points a line: raise it")
+
+
+def stretched(
+    surface: Patch, along: str, P: tuple[float, float], Q: tuple[float, float], count: int, overrun: float
+) -> Floats:
+    """Stations from P[0] to P[1], evenly, and beyond them by ``overrun`` [mm] where the surface goes so far."""
+    p = np.linspace(*P, count)
+    lines = np.linspace(*Q, 5)
+    size = np.linalg.norm(
+        [(surface.at(x, lines, 1, 0) if along == "u" else surface.at(lines, x, 0, 1)) for x in P], axis=2
+    ).min(axis=1)
+    out = [p]
+    for end, sign, mm in ((P[0], -1.0, size[0]), (P[1], 1.0, size[1])):
+        more = min(overrun / mm, end if sign < 0.0 else 1.0 - end)
+        if more > 1e-6:
+            steps = math.ceil(more / (p[1] - p[0]) - 1e-9)
+            out.append(end + sign * more * np.arange(1, steps + 1) / steps)
+    return np.sort(np.concatenate(out))
 
 
 def runs(flags: Flags) -> list[tuple[int, int]]:

@@ -5,8 +5,10 @@ nothing of the part lies, whatever the pallet angle: the part is within a body o
 z cos(alpha). With its tip above H the cutter is clear wherever it stands.
 
 The cutter leaves a track along N + T, T or N by the lift, and comes to one the same way back: on these it touches, so
-that they are looked at in small steps, and may be as deep as ``touch``. From there it goes straight to the lifted
-beginning of the next track where that is near and proved clear (``clear/``), else up along T to H, round, and down.
+that they are looked at in small steps, and may be as deep as ``touch``. Where a channel is too narrow for that it goes
+up along T to H at once, and may be as deep as ``touch`` all the way, which is proved. From a lift it goes straight to
+the lifted beginning of the next track where that is near and proved clear (``clear/``), else up along T to H, round,
+and down.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.planning.sectional.clear.clear import between, clearance, moves_clear
 from chipload.planning.sectional.closed import axis_at
-from chipload.planning.sectional.scene import Floats, Scene
+from chipload.planning.sectional.scene import Floats, Ints, Scene
 from chipload.planning.sectional.track import Track, pallet_of, written
 from chipload.program.program import LINE, RAPID
 
@@ -37,7 +39,7 @@ class Link:
     ----------
     lift : off the surface at the ends of a track [mm], > 0
     margin : that links keep from the part [mm], > 0, below the lift
-    touch : how deep a lift may be in the check points [mm], >= 0
+    touch : how deep a lift may be in the check points [mm], >= 0; above 0 a narrow channel can be left
     near : longest direct link [mm]
     feed : of links and lifts [mm/s]
     above : of the safe height over the part [mm], > 0
@@ -93,14 +95,16 @@ class Linked:
     Parameters
     ----------
     moves : from the safe height to it again
-    refused : (line, why) of tracks that the cutter cannot come to or leave: they are not in the moves
+    refused : (number of the track, why) of tracks that the cutter cannot come to or leave: they are not in the moves
     direct, retracts : how many links go straight and how many over the part
+    track : (n,) of each move the number of the track that it leads to, mills or leaves; -1: none
     """
 
     moves: Moves
     refused: tuple[tuple[int, str], ...]
     direct: int
     retracts: int
+    track: Ints
 
 
 def safe_height(points: Floats, table: float) -> float:
@@ -133,7 +137,7 @@ def linked(
     feed : in the tracks [mm/s]
     clear_of : clearance of neck, shank and holder [mm]
     rate : greatest of the pallet [rad/s]: rows on which it would be faster are fed more slowly
-    one_way : each track in its own direction, never from its end
+    one_way : each track in its own direction, never from its end; nothing but ways over the part is rapid
     outline : (k, 3) more points that the safe height is above, as of the blank
     """
     T = axis_at(table, 0.0)
@@ -141,47 +145,51 @@ def linked(
     top = safe_height(points, table) + how.above
     job = _Job(scene, cutter, table, how, clear_of, top)
     parts: list[Moves] = []
+    of: list[int] = []
     refused: list[tuple[int, str]] = []
     direct = retracts = 0
     away: tuple[Floats, Floats] | None = None  # lifted pose at the end of the last track
-    for given in tracks:
+
+    def add(number: int, *moves: Moves) -> None:
+        for move in moves:
+            parts.append(move)
+            of.extend([number] * len(move.tip))
+
+    for number, given in enumerate(tracks):
         track = given
         if away is not None and not one_way:
             ends = [float(np.linalg.norm(given.tip[k] - away[0])) for k in (0, -1)]
             track = given if ends[0] <= ends[1] else given.back()
-        begin, end = job.lifted(track, 0), job.lifted(track, -1)
+        begin, end = job.away(track, 0), job.away(track, -1)
         if begin is None or end is None:
-            refused.append((track.line, "no way off the surface at its " + ("beginning" if begin is None else "end")))
+            refused.append((number, "no way off the surface at its " + ("beginning" if begin is None else "end")))
             continue
-        over = job.over(begin[1], track.axis[0])
-        if over is None or job.over(end[1], track.axis[-1]) is None:
-            refused.append((track.line, "no way up along the axis"))
-            continue
-        there = begin[1]
+        there = begin[-1]
+        over = job.over(there, track.axis[0])
         short = None if away is None else job.direct(away, (there, track.axis[0]))
         if short is not None:
-            parts.append(Moves.of(LINE, short[0], short[1], how.feed, "link"))
+            add(number, Moves.of(LINE, short[0], short[1], how.feed, "link"))
             direct += 1
         else:
             if away is not None:
                 up = job.over(*away)
-                assert up is not None
-                parts.append(Moves.of(RAPID, up[None], away[1][None], 0.0, "link"))
-                parts.append(job.round((up, away[1]), (over, track.axis[0])))
+                add(of[-1], job.up(up, away[1], one_way))
+                add(number, job.round((up, away[1]), (over, track.axis[0])))
                 retracts += 1
             else:
-                parts.append(Moves.of(RAPID, over[None], track.axis[:1], 0.0, "link"))
-            parts.append(Moves.of(LINE, there[None], track.axis[:1], how.feed, "link"))
-        parts.append(Moves.of(LINE, track.tip[:1], track.axis[:1], feed, "lead"))
-        parts.append(Moves.of(LINE, track.tip[1:], track.axis[1:], feed, label))
-        parts.append(Moves.of(LINE, end[1][None], track.axis[-1:], feed, "lead"))
-        away = (end[1], track.axis[-1])
+                add(number, Moves.of(RAPID, over[None], track.axis[:1], 0.0, "link"))
+            add(number, Moves.of(LINE, there[None], track.axis[:1], how.feed, "link"))
+        add(number, *(Moves.of(LINE, p[None], track.axis[:1], how.feed, "link") for p in begin[-2::-1]))
+        add(number, Moves.of(LINE, track.tip[:1], track.axis[:1], feed, "lead"))
+        add(number, Moves.of(LINE, track.tip[1:], track.axis[1:], feed, label))
+        add(number, Moves.of(LINE, end[0][None], track.axis[-1:], feed, "lead"))
+        add(number, *(Moves.of(LINE, p[None], track.axis[-1:], how.feed, "link") for p in end[1:]))
+        away = (end[-1], track.axis[-1])
     if away is not None:
-        up = job.over(*away)
-        assert up is not None
-        parts.append(Moves.of(RAPID, up[None], away[1][None], 0.0, "link"))
-    moves = Moves.join(parts) if parts else Moves.of(RAPID, (top * T)[None], T[None], 0.0, "link")
-    return Linked(_within_rate(moves, rate), tuple(refused), direct, retracts)
+        add(of[-1], job.up(job.over(*away), away[1], one_way))
+    else:
+        add(-1, Moves.of(RAPID, (top * T)[None], T[None], 0.0, "link"))
+    return Linked(_within_rate(Moves.join(parts), rate), tuple(refused), direct, retracts, np.array(of))
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,8 +201,8 @@ class _Job:
     clear_of: float
     top: float
 
-    def lifted(self, track: Track, k: int) -> tuple[Floats, Floats] | None:
-        """Tip at the end ``k`` of a track and lifted off it, None: no way."""
+    def away(self, track: Track, k: int) -> tuple[Floats, ...] | None:
+        """Tips on the way off the end ``k`` of a track, the last with a clear way up; None: there is none."""
         p, T, N = track.tip[k], track.axis[k], track.normal[k]
         share = np.arange(1, _SMALL + 1)[:, None] / _SMALL
         for size in _LIFTS:
@@ -204,18 +212,31 @@ class _Job:
                 got, _ = clearance(
                     self.scene, self.cutter, tips, np.tile(T, (_SMALL, 1)), self.how.lift + 1.0, self.clear_of
                 )
-                if got.min() >= -self.how.touch and got[-1] > self.how.margin:
-                    return p, tips[-1]
-        return None
+                if got.min() < -self.how.touch or got[-1] <= self.how.margin:
+                    continue
+                if self._up(tips[-1], T, self.how.margin):
+                    return (tips[-1],)
+        # too narrow for a lift: up along the axis as it stands, where it may touch what it touches now
+        if not self._up(p, T, -self.how.touch):
+            return None
+        return p + min(self.how.lift, self._rise(p, T)) * T, self.over(p, T)
 
-    def over(self, tip: Floats, axis: Floats) -> Floats | None:
-        """Tip above the part along the axis, None: the way up is not clear."""
-        rise = self.top - float(tip @ axis)
-        if rise <= 0.0:
-            return tip
-        up: Floats = tip + rise * axis
-        ok = moves_clear(self.scene, self.cutter, [tip, up], [axis, axis], self.how.margin, self.clear_of)
-        return up if ok.all() else None
+    def _rise(self, tip: Floats, axis: Floats) -> float:
+        return max(self.top - float(tip @ axis), 0.0)
+
+    def _up(self, tip: Floats, axis: Floats, margin: float) -> bool:
+        tips = [tip, self.over(tip, axis)]
+        return bool(moves_clear(self.scene, self.cutter, tips, [axis, axis], margin, self.clear_of).all())
+
+    def over(self, tip: Floats, axis: Floats) -> Floats:
+        """Tip above the part along the axis."""
+        up: Floats = tip + self._rise(tip, axis) * axis
+        return up
+
+    def up(self, tip: Floats, axis: Floats, fed: bool) -> Moves:
+        """The way up along the axis, ``fed``: not in rapid, for the blank may stand there."""
+        motion, feed = (LINE, self.how.feed) if fed else (RAPID, 0.0)
+        return Moves.of(motion, tip[None], axis[None], feed, "link")
 
     def direct(self, a: tuple[Floats, Floats], b: tuple[Floats, Floats]) -> tuple[Floats, Floats] | None:
         """Tips and axes of a straight link, None: too far or not clear. The axis stays at the table angle."""

@@ -108,9 +108,14 @@ class Mender:
         near = np.clip(wanted, r[:, 0] + inset, r[:, 1] - inset)
         return float(near[np.abs(near - wanted).argmin()])
 
-    def furthest(self, inside: Floats, pallet: float, outside: Floats) -> tuple[Floats, float] | None:
-        """The last (u, v) between a reached and an unreached one that is reached, and B there; None: at once none."""
-        found: tuple[Floats, float] | None = None
+    def furthest(self, inside: Floats, pallet: float, outside: Floats) -> tuple[Floats, float, float] | None:
+        """The last (u, v) on the way from one point to another that is reached with B near that before it.
+
+        Returns
+        -------
+        (u, v), B there, the share of the way; None: at once none.
+        """
+        found: tuple[Floats, float, float] | None = None
         low, high, B = 0.0, 1.0, pallet
         for _ in range(_BISECT):
             mid = 0.5 * (low + high)
@@ -120,7 +125,7 @@ class Mender:
                 high = mid
             else:
                 low, B = mid, got
-                found = at, got
+                found = at, got, mid
         return found
 
 

@@ -25,7 +25,7 @@ from chipload.geometry.bspline import Patch
 from chipload.planning.sectional.closed import axis_at
 from chipload.planning.sectional.crest import crests, shares
 from chipload.planning.sectional.cusp import reaches
-from chipload.planning.sectional.lines import Line, Lines, Missed, Motion, Tracks, stations
+from chipload.planning.sectional.lines import Flags, Line, Lines, Missed, Motion, Tracks, stations, stretched
 from chipload.planning.sectional.ranges.ranges import FULL
 from chipload.planning.sectional.scene import Floats, Scene
 from chipload.planning.sectional.track import Track, posed
@@ -33,6 +33,7 @@ from chipload.progress import Progress, silent
 
 _MENDS, _ROUNDS, _FINE = 3, 12, 0.5
 _LINES = 5000
+_STILL = 5e-3  # share by which a step may still change
 
 
 @dataclass(frozen=True)
@@ -43,12 +44,14 @@ class Finish:
     ----------
     scallop : greatest height h [mm]
     motion : what the lines are milled with
+    overrun : how far the lines go on beyond the patch at their ends [mm], where the surface does and the cutter reaches
     aim : share of h that the step is laid out for; the rest is for what is not of second order
     """
 
     scallop: float
     motion: Motion
-    aim: float = 0.88
+    overrun: float = 0.0
+    aim: float = 0.9
 
     def __post_init__(self) -> None:
         if not (0.0 < self.scallop < math.inf and 0.0 < self.aim <= 1.0):
@@ -84,23 +87,24 @@ def finishing(
     P, Q = box if along == "u" else box[::-1]
     if not (0.0 <= P[0] < P[1] <= 1.0 and 0.0 <= Q[0] < Q[1] <= 1.0):
         raise InputError(f"box = {box}: must be ascending, within 0..1")
-    p = np.linspace(*P, stations(surface, along, P, Q, how.motion.chord))
+    p = stretched(surface, along, P, Q, stations(surface, along, P, Q, how.motion.chord), how.overrun)
+    need = (p >= P[0]) & (p <= P[1])
     job = Lines(surface, along, p, scene, number, cutter, table, how.motion, pallets, workers)
-    step = _Stepper(job, how.scallop, how.aim)
+    step = _Stepper(job, how.scallop, how.aim, need)
     tracks: list[Track] = []
     missed: list[Missed] = []
-    q = job.border(Q)
+    q = job.border(Q, need)
     line = job.line(q, np.full(len(p), np.nan))
     if (q > Q[0]).any():
         missed.append(job.strip(q, Q[0]))
     use = np.ones(len(p), dtype=np.bool_)
     for number_of in range(_LINES):
-        new, gone = job.tracks(line, use, number_of)
+        new, gone = job.tracks(line, use, number_of, need)
         tracks += new
         missed += gone
         progress(float(np.clip((line.q.min() - Q[0]) / (Q[1] - Q[0]), 0.0, 1.0)), f"{number_of + 1} lines")
         open_ = line.q < Q[1]
-        if not open_.any():
+        if not open_[need].any():
             return Tracks(tuple(tracks), tuple(missed), number_of + 1)
         line = step.next(line, Q[1])
         # where the line before has reached the border there is nothing left
@@ -112,11 +116,12 @@ def finishing(
 
 @dataclass(frozen=True, eq=False)
 class _Stepper:
-    """From line to line at the scallop asked, within ``aim`` of it."""
+    """From line to line at the scallop asked, within ``aim`` of it, at the stations that ``need`` it."""
 
     lines: Lines
     scallop: float
     aim: float
+    need: Flags
 
     def next(self, line: Line, end: float) -> Line:
         """The next line towards ``end``, so that the scallop between is as high as asked.
@@ -148,10 +153,14 @@ class _Stepper:
             ratio = np.clip(np.sqrt(aim / np.clip(crest, 0.1 * aim, None)), 0.6, 1.3)
             if not np.isfinite(ratio).any() or (np.nanmin(ratio) > 0.99 and np.nanmax(ratio) < 1.03):
                 break
-            w = np.minimum(
+            new = np.minimum(
                 self._even(np.where(np.isfinite(ratio), w * ratio, np.nan)),
                 self.lines.cutter.rho + self.lines.cutter.corner_radius,
             )
+            still = np.abs(new - w).max() < _STILL * w.max()
+            w = new
+            if still:
+                break
         return w
 
     def _crest(self, line: Line, q: Floats, pallet: Floats) -> Floats:
@@ -171,7 +180,8 @@ class _Stepper:
         )
         near = np.pad(np.where(np.isfinite(fine), fine, -np.inf), sub // 2, constant_values=-np.inf)
         worst = np.array([near[k * sub : k * sub + sub + 1].max() for k in range(n)])
-        return np.where(np.isfinite(line.pallet) & np.isfinite(pallet) & np.isfinite(worst), worst, np.nan)
+        both = np.isfinite(line.pallet) & np.isfinite(pallet) & np.isfinite(worst)
+        return np.where(both & self.need, worst, np.nan)
 
     def _poses(self, S: Floats, N: Floats, pallet: Floats) -> tuple[Floats, Floats]:
         known = np.isfinite(pallet)
@@ -181,7 +191,7 @@ class _Stepper:
     def _reach(self, line: Line) -> tuple[Floats, Floats]:
         """How far a line reaches towards a growing q and against it; nan where it has no pallet angle."""
         ahead, behind = np.full(len(line.q), np.nan), np.full(len(line.q), np.nan)
-        k = np.flatnonzero(np.isfinite(line.pallet))
+        k = np.flatnonzero(np.isfinite(line.pallet) & self.need)
         if len(k):
             T = axis_at(self.lines.table, line.pallet[k])
             a, b = reaches(

@@ -9,15 +9,17 @@ and goes to the inlet: the cutter comes to a row from outside, never from above 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.bspline import Patch
 from chipload.planning.sectional.floor import layer_of, meridian
-from chipload.planning.sectional.impeller import Impeller
+from chipload.planning.sectional.impeller import ARC, SUNK, Impeller
 from chipload.planning.sectional.lines import Lines, Missed, Motion, Tracks
 from chipload.planning.sectional.ranges.ranges import FULL
 from chipload.planning.sectional.scene import Floats, Scene
@@ -43,6 +45,7 @@ class Rough:
     motion : what the rows are milled with
     spacing : of the check points [mm]
     around : bodies beyond the channel's two on either side that are checked
+    over : how far the blank stands over the shroud [mm]; beside the channel it is uncut, and nothing may touch it there
     """
 
     depth: float
@@ -52,14 +55,15 @@ class Rough:
     motion: Motion
     spacing: float = 1.5
     around: int = 1
+    over: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("depth", "step", "spacing"):
             value = getattr(self, name)
             if not 0.0 < value < math.inf:
                 raise InputError(f"rough.{name}_mm = {value:g}: must be above 0")
-        if not (self.blades >= 0.0 and self.hub >= 0.0 and self.around >= 0):
-            raise InputError("rough: allowances and around must be at least 0")
+        if not (self.blades >= 0.0 and self.hub >= 0.0 and self.around >= 0 and self.over >= 0.0):
+            raise InputError("rough: allowances, around and over must be at least 0")
 
 
 def layers(impeller: Impeller, depth: float, allowance: float, ahead: float = 0.0) -> Floats:
@@ -82,6 +86,7 @@ def roughing(
     pallets: tuple[tuple[float, float], ...] = FULL,
     workers: int = 1,
     progress: Progress = silent,
+    before: Sequence[Track] = (),
 ) -> tuple[Tracks, Scene]:
     """Tracks of the channel on the plus side of a body, and the thickened walls that they keep clear of.
 
@@ -89,8 +94,11 @@ def roughing(
     ----------
     index : 0 blade, 1 splitter
     ahead : how far the hub goes on ahead of the leading edge [mm]
+    before : rows that are milled already, at another table angle: where they come as near as a row here is to its
+        neighbour, there is no row
     """
     scene = thickened(impeller, index, how, ahead)
+    done = cKDTree(np.concatenate([_places(t) for t in before])) if before else None
     tracks: list[Track] = []
     missed: list[Missed] = []
     number = 0
@@ -102,11 +110,14 @@ def roughing(
         first, last = lines.border((0.0, 1.0)), lines.border((1.0, 0.0))
         last = np.maximum(first, last)
         count = max(1, math.ceil(_width(patch, p, first, last) / how.step))
-        before = np.full(len(p), np.nan)
+        known = np.full(len(p), np.nan)
         for j in range(count + 1):
-            line = lines.line(first + (last - first) * (_INSET + (1.0 - 2.0 * _INSET) * j / count), before)
-            before = line.pallet
-            new, gone = lines.tracks(line, np.ones(len(p), dtype=np.bool_), number)
+            line = lines.line(first + (last - first) * (_INSET + (1.0 - 2.0 * _INSET) * j / count), known)
+            known = line.pallet
+            use = np.ones(len(p), dtype=np.bool_)
+            if done is not None:
+                use = done.query(line.S)[0] > 0.5 * how.step
+            new, gone = lines.tracks(line, use, number)
             tracks += [t.back() for t in new[::-1]]
             missed += gone
             number += 1
@@ -115,9 +126,47 @@ def roughing(
 
 
 def thickened(impeller: Impeller, index: int, how: Rough, ahead: float = 0.0) -> Scene:
-    """Check points of the channel's walls and those around, moved out by the allowances; the hub is surface 2."""
+    """Check points of the channel's walls and those around, moved out by the allowances; the hub is surface 2.
+
+    Surface 4 is the top of the blank beside the channel, which is uncut.
+    """
     out = (how.blades, how.blades, how.hub, how.blades)
-    return _walls(impeller, index, how.spacing, how.around, ahead, out, 2.0 * how.spacing)
+    top = uncut(impeller, index, how, ahead)
+    return _walls(impeller, index, how.spacing, how.around, ahead, out, 2.0 * how.spacing, top)
+
+
+def uncut(impeller: Impeller, index: int, how: Rough, ahead: float = 0.0, whole: bool = False) -> Floats:
+    """Points (n, 3) of the top of the blank, a pitch on either side of a channel; ``whole``: over the channel too."""
+    patch = layer_of(impeller, index, 1.0, how.hub, ahead)
+    count = _counts(patch, how.spacing)[0]
+    u = np.linspace(0.0, 1.0, count)
+    left, right = patch.at(u, 0.0), patch.at(u, 1.0)
+    where = hub_range(impeller, ahead)
+    s = where[0] + u * (where[1] - where[0])
+    low, high = (meridian(impeller, s, w, how.hub, where) for w in (0.0, 1.0))
+    m = high + how.over * (high - low) / np.linalg.norm(high - low, axis=1)[:, None]
+    a, b = (np.arctan2(x[:, 1], x[:, 0]) for x in (left, right))
+    b = a + (b - a) % math.tau
+    # the blades' own thickness stands there as well, less what the allowance hides of it
+    inset = how.blades / m[:, 0]
+    across = max(2, math.ceil(impeller.pitch * float(m[:, 0].max()) / how.spacing) + 1)
+    share = np.linspace(0.0, 1.0, across)
+    spans = [(a - impeller.pitch, a + inset), (b - inset, b + impeller.pitch)]
+    if whole:
+        spans = [(a - impeller.pitch, b + impeller.pitch)]
+    out = []
+    for first, last in spans:
+        theta = first[:, None] + share * (last - first)[:, None]
+        r, z = (np.repeat(m[:, k : k + 1], across, axis=1) for k in (0, 1))
+        out.append(np.stack([r * np.cos(theta), r * np.sin(theta), z], axis=-1).reshape(-1, 3))
+    return np.concatenate(out)
+
+
+def _places(track: Track) -> Floats:
+    """Contacts (n, 3) of a track, at most a millimetre apart."""
+    length = np.concatenate([[0.0], np.linalg.norm(np.diff(track.contact, axis=0), axis=1).cumsum()])
+    at = np.linspace(0.0, length[-1], max(2, math.ceil(length[-1]) + 1))
+    return np.column_stack([np.interp(at, length, track.contact[:, k]) for k in range(3)])
 
 
 def guarded(
@@ -141,7 +190,14 @@ def guarded(
 
 
 def _walls(
-    impeller: Impeller, index: int, spacing: float, around: int, ahead: float, out: tuple[float, ...], near: float
+    impeller: Impeller,
+    index: int,
+    spacing: float,
+    around: int,
+    ahead: float,
+    out: tuple[float, ...],
+    near: float,
+    more: Floats | None = None,
 ) -> Scene:
     parts: list[Floats] = []
     names: list[int] = []
@@ -155,6 +211,12 @@ def _walls(
             )
             names.append(0 if (k, side) == (0, 1) else 1 if (k, side) == (1, -1) else 3)
             parts.append(patch.at(u, v) + out[names[-1]] * patch.normal(u, v))
+    for k, side in ((k, side) for k in range(-around, 2 + around) for side in (1, -1) if impeller.fillets):
+        patch = impeller.foot(index + k, side)
+        v = (np.arange(ARC) + 0.5) / ARC
+        u, v = (x.ravel() for x in np.meshgrid(np.linspace(0, 1, _counts(patch, spacing)[0]), v, indexing="ij"))
+        parts.append(patch.at(u, v) + (out[3] - SUNK) * patch.normal(u, v))
+        names.append(3)
     low, high = hub_range(impeller, ahead)
     curve = impeller.hub.curve(np.linspace(low, high, 101))
     along = math.ceil(float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum()) / spacing) + 1
@@ -165,6 +227,9 @@ def _walls(
         S = np.repeat(s, len(v))
         parts.append(impeller.hub.at(S, theta) + out[2] * impeller.hub.normal(S, theta))
         names.append(2)
+    if more is not None:
+        parts.append(more)
+        names.append(4)
     surface = np.repeat(names, [len(p) for p in parts])
     one = parts[0][:1]
     return Scene(

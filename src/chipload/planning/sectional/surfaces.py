@@ -1,8 +1,9 @@
 """The surfaces of an impeller that are milled, each as a grid of contact points with its check points.
 
 Notation: a surface is named by a body and a side: `blade` or `splitter`, `plus` or `minus` as in ``sections.py`` of the
-geometry, or `floor`, the hub between the plus side of the body and the next body round. u along the surface from the
-leading edge, v up from the hub or, on a floor, across from the body's plus side, both 0..1.
+geometry, `plus fillet` or `minus fillet` between it and the hub, or `floor`, the hub between the plus side of the body
+and the next body round. u along the surface from the leading edge, v up from the hub or, on a floor, across from the
+body's plus side, both 0..1.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from chipload.errors import InputError
 from chipload.planning.sectional.impeller import Impeller
 from chipload.planning.sectional.scene import Floats, Scene
 
-BODIES, SIDES = ("blade", "splitter"), ("plus", "minus", "floor")
+BODIES, SIDES = ("blade", "splitter"), ("plus", "minus", "floor", "plus fillet", "minus fillet")
 _FINE = 201  # points of a curve whose length is measured
 
 
@@ -99,6 +100,8 @@ def surface_of(impeller: Impeller, body: str, side: str, how: Sampled) -> Surfac
     index = BODIES.index(body)
     if index >= len(impeller.bodies):
         raise InputError(f"surface {body} {side}: the impeller has no splitter: leave it out")
+    if side.endswith(" fillet") and not impeller.fillets:
+        raise InputError(f"surface {body} {side}: the impeller has no fillets: state fillet_mm, or leave it out")
     u, v = np.linspace(*how.along, how.points[0]), np.linspace(*how.up, how.points[1])
     check, hub = counts(impeller, how)
     where = hub_range(impeller, how.ahead)
@@ -116,7 +119,7 @@ def hub_range(impeller: Impeller, ahead: float) -> tuple[float, float]:
     """From where to where the hub counts: ``ahead`` [mm] of the blade's leading edge to its trailing edge."""
     s = np.linspace(0.0, 1.0, 20 * _FINE)
     length = np.concatenate([[0.0], np.linalg.norm(np.diff(impeller.hub.curve(s), axis=0), axis=1).cumsum()])
-    foot = np.concatenate([p.at([0.0, 1.0], 0.0) for p in (impeller.blade.plus, impeller.blade.minus)])
+    foot = np.concatenate([impeller.foot(0, w).at([0.0, 1.0], 0.0) for w in (1, -1)])
     at = impeller.hub.nearest(np.hypot(foot[:, 0], foot[:, 1]), foot[:, 2], len(s))
     first = np.interp(at.min(), s, length) - ahead
     return float(np.interp(max(first, 0.0), length, s)), float(at.max())

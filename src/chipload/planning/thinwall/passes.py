@@ -13,6 +13,9 @@ already: the softest state in which the pass is cut. The other side still has wh
 
 Constant depths: the least d of the first passes, in the fewest equal passes; unlimited: what the cutter takes.
 
+The force that a place is planned with is c F_n(d): c of a side, 1 where nothing is known, is what a simulation of an
+earlier plan found there over what the law says of the same depth.
+
 Reference: [Yan2018]. Differs from source: thresholds of each pass by the stiffness in its own state.
 """
 
@@ -53,7 +56,7 @@ class Pass:
     side : number of the side
     low, high : (n, m) float [mm], stock after and before it
     threshold : what the places bear in the state after it
-    force : (n, m) float [N], F_n of its depth; 0 where nothing is cut
+    force : (n, m) float [N], c F_n of its depth; 0 where nothing is cut
     exceeds : (n, m) bool, where that is above the threshold
     """
 
@@ -85,11 +88,13 @@ class Plan:
     name : ``variable``, ``constant`` or ``unconstrained``
     passes : in order
     infeasible : (side, i, j) of places that bear not even the smallest depth in some pass
+    corrections : c of each side, (n, m) float, that it was planned with
     """
 
     name: str
     passes: tuple[Pass, ...]
     infeasible: tuple[tuple[int, int, int], ...] = ()
+    corrections: tuple[Floats, ...] = ()
 
     @property
     def holds(self) -> bool:
@@ -108,9 +113,20 @@ class Plan:
         return max((float(x.max()) for x in known if x is not None), default=None)
 
 
-def _made(side: int, low: Floats, high: Floats, threshold: Threshold, law: Law) -> Pass:
+def _ones(surfaces: Sequence[Surface], corrections: Sequence[Floats] | None) -> tuple[Floats, ...]:
+    """Corrections of each side; 1 where none are given."""
+    shapes = [s.points.shape[:2] for s in surfaces]
+    if corrections is None:
+        return tuple(np.ones(shape) for shape in shapes)
+    for c, shape in zip(corrections, shapes, strict=True):
+        if c.shape != shape or not ((c > 0.0) & np.isfinite(c)).all():
+            raise InputError(f"passes: a correction {c.shape}: must be above 0 at all places {shape}")
+    return tuple(corrections)
+
+
+def _made(side: int, low: Floats, high: Floats, threshold: Threshold, law: Law, c: Floats) -> Pass:
     depth = high - low
-    force = np.where(depth > NOTHING, law.force(np.maximum(depth, NOTHING)), 0.0)
+    force = np.where(depth > NOTHING, c * law.force(np.maximum(depth, NOTHING)), 0.0)
     return Pass(side, low, high, threshold, force, force > threshold.force.reshape(low.shape) * (1.0 + 1e-9))
 
 
@@ -127,6 +143,7 @@ def variable(
     slope: float,
     *,
     order: Order = "alternately",
+    corrections: Sequence[Floats] | None = None,
     most: int = 200,
     progress: Progress = silent,
 ) -> Plan:
@@ -139,6 +156,7 @@ def variable(
     law : depth of a threshold
     slope : L > 0 of the offset function
     order : of the sides; one after the other: the first one whole while the second has all of its stock
+    corrections : c of each side, (n, m) float above 0; None: 1
     most : passes on a side before it is given up
 
     Raises
@@ -146,25 +164,25 @@ def variable(
     InputError
         The allowance is not covered in ``most`` passes.
     """
-    count = len(surfaces)
+    count, c = len(surfaces), _ones(surfaces, corrections)
     D = [np.zeros(s.points.shape[:2]) for s in surfaces]
     done: list[Pass] = []
     infeasible: set[tuple[int, int, int]] = set()
     for _ in range(most):
         open_sides = [s for s in reversed(range(count)) if (D[s] < surfaces[s].allowance - NOTHING).any()]
         if not open_sides:
-            return Plan("variable", tuple(reversed(done)), tuple(sorted(infeasible)))
+            return Plan("variable", tuple(reversed(done)), tuple(sorted(infeasible)), c)
         for side in open_sides if order == "alternately" else open_sides[:1]:
             a = surfaces[side].allowance
             threshold = bears(D, side)
             F = threshold.force.reshape(D[side].shape)
             open_ = D[side] < a - NOTHING
-            depth = law.depth(F)
+            depth = law.depth(F / c[side])
             weak = (depth == 0.0) & open_
             infeasible |= {(side, int(i), int(j)) for i, j in np.argwhere(weak)}
             depth = lower_envelope(surfaces[side].points, np.maximum(depth, law.limits.smallest), slope)
             high = _no_sliver(D[side], D[side] + depth, a, law.limits.smallest)
-            done.append(_made(side, D[side], high, threshold, law))
+            done.append(_made(side, D[side], high, threshold, law, c[side]))
             D[side] = high
             progress(
                 min(float(np.mean([(d / s.allowance).mean() for d, s in zip(D, surfaces, strict=True)])), 1.0), "passes"
@@ -176,10 +194,13 @@ def variable(
     )
 
 
-def least_first_depth(surfaces: Sequence[Surface], bears: Bears, law: Law) -> float:
+def least_first_depth(
+    surfaces: Sequence[Surface], bears: Bears, law: Law, corrections: Sequence[Floats] | None = None
+) -> float:
     """Least depth [mm] that all places of all sides bear in the last passes; 0: one bears none."""
     D = [np.zeros(s.points.shape[:2]) for s in surfaces]
-    return min(float(law.depth(bears(D, side).force).min()) for side in range(len(surfaces)))
+    c = _ones(surfaces, corrections)
+    return min(float(law.depth(bears(D, side).force / c[side].ravel()).min()) for side in range(len(surfaces)))
 
 
 def constant(
@@ -189,8 +210,9 @@ def constant(
     depth: float,
     name: str = "constant",
     order: Order = "alternately",
+    corrections: Sequence[Floats] | None = None,
 ) -> Plan:
-    """Equal passes of at most ``depth``, the fewest.
+    """Equal passes of at most ``depth``, the fewest; ``corrections`` as of :func:`variable`.
 
     Raises
     ------
@@ -206,10 +228,10 @@ def constant(
     turns = [(k, side) for side in reversed(range(len(surfaces))) for k in range(number[side])]
     if order == "alternately":
         turns.sort(key=lambda turn: turn[0])
-    D = [np.zeros(s.points.shape[:2]) for s in surfaces]
+    D, c = [np.zeros(s.points.shape[:2]) for s in surfaces], _ones(surfaces, corrections)
     done = []
     for k, side in turns:
         high = np.full_like(D[side], surfaces[side].allowance * (k + 1) / number[side])
-        done.append(_made(side, D[side], high, bears(D, side), law))
+        done.append(_made(side, D[side], high, bears(D, side), law, c[side]))
         D[side] = high
-    return Plan(name, tuple(reversed(done)))
+    return Plan(name, tuple(reversed(done)), (), c)

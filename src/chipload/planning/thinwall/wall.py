@@ -84,7 +84,10 @@ class Wall:
         if self.solid.grid.counts[2] != 1:
             raise InputError(f"wall: {self.solid.grid.counts[2]} layers of elements: must be 1 through the thickness")
         if self.density < 1 or min(self.allowance) < 0.0 or max(self.allowance) == 0.0:
-            raise InputError(f"wall: allowance_mm = {self.allowance}, density = {self.density}: need stock to cut")
+            raise InputError(
+                f"wall.allowance_mm = {list(self.allowance)}, density = {self.density}: must be at least 0, above 0 on "
+                "one side, and at least 1: state stock to cut"
+            )
         if not 0 <= self.foot < self.solid.grid.counts[1]:
             raise InputError(
                 f"wall: foot of {self.foot} rows of elements: must be from 0 to below {self.solid.grid.counts[1]}"

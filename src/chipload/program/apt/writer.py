@@ -39,7 +39,7 @@ def write_apt(
 
     Parameters
     ----------
-    cutters : cutter of each tool number; None: not known, no CUTTER is written
+    cutters : cutter of each tool number but 0, which is no tool; None: not known, no CUTTER is written
     title : of the part, in PARTNO
     verified : whether an independent simulation has found the program good
     chord_mm : greatest distance of a helical arc from its chords [mm], > 0
@@ -67,9 +67,9 @@ def write_apt(
     for k in range(len(program)):
         if program.tool[k] != tool:
             tool = int(program.tool[k])
-            if cutters is not None and tool not in cutters:
+            if cutters is not None and tool not in cutters and tool != 0:
                 raise InputError(f"program row {k}: tool {tool} has no cutter: give its [[cutter]]")
-            if cutters is not None:
+            if cutters is not None and tool in cutters:
                 out.append(cutter_statement(cutters[tool]))
             out.append(f"LOADTL/{tool}")
         if program.spindle[k] != spindle:

@@ -10,9 +10,11 @@ import plotly.graph_objects as go
 from chipload.planning.sectional.surfaces import BODIES
 from chipload.program.program import RAPID
 from chipload.report.figures import FONT, GRID, LIMIT
+from chipload.report.impeller.figures import styled
 from chipload.report.impeller.mesh import grid_faces
-from chipload.report.impeller.outcome import Milled
-from chipload.report.impeller.programs import program_name
+from chipload.report.impeller.outcome import Covered, Milled
+from chipload.report.impeller.programs import program_name, rough_names
+from chipload.report.impeller.roughed import rough_sections
 from chipload.report.impeller.ways import COLOURS
 from chipload.report.sheet import figure, table
 
@@ -26,20 +28,21 @@ def program_sections(milled: Milled, figures: dict[str, go.Figure]) -> list[str]
         return ["<h2>Programs</h2>", "<p>The job asks for none: state [operation.paths].</p>"]
     head = [
         "",
-        "cutter and table",
         "program",
         "rows",
         "path [mm]",
         "time [min]",
         "deepest gouge [mm]",
-        "not milled [mm]",
+        "missed by lines [mm]",
+        "rest passes",
     ]
     head += ["links direct + over", "check"]
     rows = [
         [
-            str(k), escape(p.name), f"<code>{escape(program_name(p, k))}</code>", str(len(p.setting.program)),
-            f"{sum(m.tracks.length for m in p.setting.millings):.1f}", f"{p.seconds / 60.0:.2f}", f"{p.gouge:.4f}",
-            f"{p.missed:.1f}", f"{p.setting.linked.direct} + {p.setting.linked.retracts}",
+            str(k), f"<code>{escape(program_name(milled, k))}</code>", str(len(p.setting.program)),
+            f"{p.setting.length:.1f}", f"{p.seconds / 60.0:.2f}", f"{p.gouge:.4f}",
+            f"{p.missed:.1f}", str(sum(len(r.tracks) for r in p.setting.rests)),
+            f"{p.setting.linked.direct} + {p.setting.linked.retracts}",
             '<span class="ok">verified</span>' if p.verified else '<span class="no">not verified</span>',
         ]
         for k, p in enumerate(milled.programs, 1)
@@ -63,15 +66,52 @@ def program_sections(milled: Milled, figures: dict[str, go.Figure]) -> list[str]
     ]
     scallop += ["crests", "of the patch within [%]"]
     turn = np.degrees(milled.impeller.pitch)
+    left = [
+        [
+            c.name, str(len(c.left.rest)), f"{c.asked:g}", f"{c.greatest[0]:.4f}", f"{100.0 * c.share:.2f}",
+            '<span class="no">left higher</span>' if c.fails else '<span class="ok">as asked</span>',
+        ]
+        for c in milled.covered or ()
+    ]  # fmt: skip
+    spacing = max((c.spacing for c in milled.covered or ()), default=0.0)
     return [
+        *rough_sections(milled.roughs, rough_names(milled)),
         "<h2>Programs</h2>",
         f'<p class="note">One for each cutter at each table angle, for one channel; the pallet turns by {turn:.6g} deg '
         "to the next. The check takes every part of the tool, holder too, through every row along rays on the true "
-        "surfaces and uses nothing of the planner. The programs finish: roughing is not planned.</p>",
-        table(head, rows, numbers=(3, 4, 5, 6, 7, 8)),
+        "surfaces and uses nothing of the planner. "
+        + ("" if milled.roughs is not None else "They finish: roughing is not asked for.")
+        + "</p>",
+        table(head, rows, numbers=(2, 3, 4, 5, 6, 7, 8)),
         table(scallop, patches, numbers=(0, 2, 3, 4, 5, 6, 7, 8)),
         figure("paths", paths_figure(milled), figures),
+        "<h2>What all programs leave</h2>",
+        f'<p class="note">Measured along rays on points of every surface, at most {spacing:g} mm apart, as far as its '
+        "patches go: the least that any of the programs leaves. Where lines miss, rest passes or a neighbour may have "
+        "milled; what is left higher than asked is red.</p>",
+        table(["surface", "points", "asked [mm]", "most left [mm]", "area within [%]", ""], left, numbers=(1, 2, 3, 4)),
+        *(figure(f"left{k}", left_figure(c), figures) for k, c in enumerate(milled.covered or ())),
     ]
+
+
+def left_figure(covered: Covered) -> go.Figure:
+    """What is left on a surface, unrolled."""
+    w = covered.left.wall
+    u, v = w.u.reshape(w.shape)[:, 0], w.v.reshape(w.shape)[0]
+    over = 2.0 * covered.asked
+    out = go.Figure(
+        go.Heatmap(
+            x=u.round(4), y=v.round(4), z=covered.left.rest.reshape(w.shape).T.round(4), zmin=0.0, zmax=over,
+            colorscale=[(0.0, "#f3f6f9"), (0.5, "#0072b2"), (0.5, LIMIT), (1.0, LIMIT)],
+            colorbar={"title": "left [mm]"}, hovertemplate="u %{x} v %{y}: %{z} mm<extra></extra>",
+        )
+    )  # fmt: skip
+    styled(out, 230)
+    out.update_layout(font=FONT, title={"text": covered.name, "font": {"size": 13}, "x": 0.01, "y": 0.98})
+    out.update_layout(margin={"l": 60, "r": 20, "t": 28, "b": 44})
+    out.update_xaxes(title="u", gridcolor=GRID)
+    out.update_yaxes(title="v")
+    return out
 
 
 def paths_figure(milled: Milled) -> go.Figure:

@@ -35,6 +35,9 @@ def body_meshes(impeller: Impeller, fine: tuple[int, int] = (33, 7)) -> list[tup
     for body, name in zip(impeller.bodies, ("blade", "splitter"), strict=False):
         parts = [(side.at(u, v), grid_faces(*fine)) for side in (body.plus, body.minus)]
         plus, minus = (p.reshape(*fine, 3) for p, _ in parts)
+        if impeller.fillets:
+            fillet = impeller.fillets[0 if name == "blade" else 1]
+            parts += [(side.at(u, v), grid_faces(*fine)) for side in (fillet.plus, fillet.minus)]
         parts += [_strip(plus[:, -1], minus[:, -1]), _strip(plus[0], minus[0]), _strip(plus[-1], minus[-1])]
         whole: list[tuple[Floats, Ints]] = []
         for k in range(impeller.blades):

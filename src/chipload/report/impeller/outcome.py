@@ -20,6 +20,8 @@ from chipload.planning.sectional.patch import Patch
 from chipload.planning.sectional.settings import Setting
 from chipload.planning.sectional.surfaces import BODIES, Surface
 from chipload.planning.sectional.tables import IndexTable
+from chipload.report.impeller.roughed import CheckedRough
+from chipload.simulation.channel.channel import Left
 
 Floats = NDArray[np.float64]
 
@@ -174,14 +176,9 @@ class Checked:
 
     @property
     def missed(self) -> float:
-        """Length of lines that are not milled [mm]."""
-        gone = {line for line, _ in self.setting.linked.refused}
-        short = math.fsum(x.length for m in self.setting.millings for x in m.tracks.missed)
-        return (
-            short + math.fsum(t.length for m in self.setting.millings for t in m.tracks.tracks if t.line in gone)
-            if gone
-            else short
-        )
+        """Length of lines that are not milled as they were laid out [mm]; rest passes may have done it."""
+        own = math.fsum(x.length for m in self.setting.millings for x in m.tracks.missed)
+        return own + math.fsum(self.setting.tracks[k].length for k, _ in self.setting.linked.refused)
 
     @property
     def name(self) -> str:
@@ -199,11 +196,60 @@ class Checked:
             if not s.holds:
                 where = f"{BODIES[m.patch.body]} {m.patch.side}"
                 out.append(f"{self.name}, {where}: {s.greatest:.4f} mm are left between passes: asked {s.asked:g}")
-        if self.missed > 0.0:
-            many = len(self.setting.linked.refused)
-            why = f", {many} lines have no way off the surface" if many else ""
-            out.append(f"{self.name}: {self.missed:.1f} mm of lines are not milled{why}")
         return tuple(out)
+
+
+@dataclass(frozen=True, eq=False)
+class Covered:
+    """What all programs together leave on a surface, as far as its patches go.
+
+    Parameters
+    ----------
+    body, side : of the surface
+    left : what the check finds on a grid of its points
+    asked : the scallop [mm]
+    spacing : most distance of the points [mm]
+    unreached : area [mm2] where the planner found no cutter and table angle for rest passes
+    """
+
+    body: int
+    side: str
+    left: Left
+    asked: float
+    spacing: float
+    unreached: float
+
+    @property
+    def name(self) -> str:
+        """`blade floor`."""
+        return f"{BODIES[self.body]} {self.side}"
+
+    @property
+    def share(self) -> float:
+        """Of the area, where no more than asked is left."""
+        return 1.0 - self.left.excess(self.asked)
+
+    @property
+    def greatest(self) -> tuple[float, int]:
+        """Most that is left [mm], at most the height of the rays, and its point."""
+        k = int(self.left.rest.argmax())
+        return float(self.left.rest[k]), k
+
+    @property
+    def fails(self) -> tuple[str, ...]:
+        """What does not hold."""
+        most, k = self.greatest
+        if most <= self.asked:
+            return ()
+        wall = self.left.wall
+        x, y, z = wall.points[k].tolist()
+        over = float(wall.area[self.left.rest > self.asked].sum())
+        least = f"{most:.3f} mm" if most < self.left.height else f"{most:g} mm or more"
+        lost = f", on {self.unreached:.1f} mm2 of it no cutter was found to go" if self.unreached > 0.0 else ""
+        return (
+            f"{self.name}: on {over:.1f} mm2, {100.0 * (1.0 - self.share):.2g} % of what is milled, more than "
+            f"{self.asked:g} mm is left: {least} at ({x:.2f}, {y:.2f}, {z:.2f}){lost}",
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,6 +264,8 @@ class Milled:
     one : the largest cutter for all surfaces at one table angle, and the index of that; None: there is none
     ways : the cutter picked by hand where one is stated, then one cutter, two, ...
     programs : of the way with the least time, checked; None: the job asks for none
+    covered : what the programs leave on each surface
+    roughs : roughing programs, before the others; None: the job asks for none
     settings : keys of the operation, as stated
     outer_diameter : as stated [mm]
     provenance : JSON values: hashes of the inputs, versions
@@ -231,6 +279,8 @@ class Milled:
     one: tuple[CatalogueCutter, int] | None
     ways: tuple[Compared, ...]
     programs: tuple[Checked, ...] | None
+    covered: tuple[Covered, ...] | None
+    roughs: tuple[CheckedRough, ...] | None
     settings: Mapping[str, Any]
     outer_diameter: float
     provenance: Mapping[str, Any]
@@ -298,13 +348,18 @@ def verdict(milled: Milled) -> tuple[bool, str]:
     text = f"Every contact point is reached and its largest cutter proved; {for_all(milled)}"
     if milled.programs is None:
         return True, f"{text}. No program is asked for."
-    return True, f"{text}. {len(milled.programs)} programs are verified: no gouge, holder included."
+    checked = "no gouge, holder included, and nothing is left higher than asked"
+    roughs = f"{len(milled.roughs)} roughing and " if milled.roughs is not None else ""
+    return True, f"{text}. {roughs}{len(milled.programs)} finishing programs are verified: {checked}."
 
 
 def fails(milled: Milled) -> tuple[str, ...]:
     """All that does not hold."""
     own = [f"{op.surface.name}: {f}" for op in milled.surfaces for f in failures(op)]
-    return (*own, *unmilled(milled), *(f for p in milled.programs or () for f in p.fails))
+    of_roughs = (f for p in milled.roughs or () for f in p.fails)
+    of_programs = (f for p in milled.programs or () for f in p.fails)
+    of_surfaces = (f for c in milled.covered or () for f in c.fails)
+    return (*own, *unmilled(milled), *of_roughs, *of_programs, *of_surfaces)
 
 
 def for_all(milled: Milled) -> str:

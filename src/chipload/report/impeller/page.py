@@ -8,6 +8,7 @@ from html import escape
 import numpy as np
 import plotly.graph_objects as go
 
+from chipload.planning.sectional.impeller import FILLET
 from chipload.report.impeller.checked import program_sections
 from chipload.report.impeller.figures import map_figure, ranges_figure, space_figure, table_figure
 from chipload.report.impeller.outcome import Milled, Searched, fails, failures, for_all, largest, said, verdict
@@ -163,6 +164,8 @@ def _named(op: Searched, check: int) -> str:
     if check < 0:
         return "own curvature at the contact"
     number = int(op.surface.scene.check_surface[check])
+    if number >= FILLET:
+        return "a fillet"
     own, far = ("hub", "wall beyond") if op.surface.side == "floor" else ("own side", "facing side")
     names = {0: own, 1: far, 2: "wall" if op.surface.side == "floor" else "hub", 3: "other side of the own body"}
     return names.get(number, "bodies beyond")

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from chipload.cutter.catalogue import CatalogueCutter
 from chipload.program.apt.writer import write_apt
 from chipload.program.gcode.writer import write_gcode
+from chipload.program.program import Program
 from chipload.report.impeller.outcome import Checked, Milled
+from chipload.report.impeller.roughed import CheckedRough
 from chipload.report.impeller.summary import proof_bytes
 from chipload.report.programs import ENDINGS
 
@@ -14,31 +19,52 @@ from chipload.report.programs import ENDINGS
 def program_files(milled: Milled) -> dict[str, bytes]:
     """Every further file by name."""
     out = {"proof.npz": proof_bytes(milled)}
-    for k, checked in enumerate(milled.programs or (), 1):
-        setting = checked.setting
-        if not len(setting.linked.moves.tip) or not any(m.tracks.tracks for m in setting.millings):
+    for stem, cutter, table, checked, program, empty in _programs(milled):
+        if empty:
             continue
+        number, title = int(stem.split("-")[0]), f"{milled.title}, {checked.name}"
         text = write_gcode(
-            setting.program, milled.machine, title=f"{milled.title}, {checked.name}", verified=checked.verified,
-            comments=_comments(milled, checked, k), number=100 + k,
+            program, milled.machine, title=title, verified=checked.verified,
+            comments=_comments(milled, checked, cutter, table, number), number=100 + number,
         )  # fmt: skip
-        stem = program_name(checked, k)
         out[f"{stem}.{ENDINGS[milled.machine.dialect]}"] = text.encode("ascii")
-        cl = write_apt(setting.program, None, title=f"{milled.title}, {checked.name}", verified=checked.verified)
+        cl = write_apt(program, None, title=title, verified=checked.verified)
         out[f"{stem}.apt"] = cl.encode("ascii")
     return out
 
 
-def program_name(checked: Checked, number: int) -> str:
-    """File name of a program without its ending."""
-    c = checked.setting.cutter
-    return f"{number}-D{c.diameter:g}r{c.corner_radius:g}-{np.degrees(checked.setting.table):.6g}deg"
+def _programs(
+    milled: Milled,
+) -> Iterator[tuple[str, CatalogueCutter, float, Checked | CheckedRough, Program, bool]]:
+    """Name, cutter, table angle, check and program of all, roughing first; whether there is nothing in it."""
+    for name, rough in zip(rough_names(milled), milled.roughs or (), strict=True):
+        yield name, rough.rough.cutter, rough.rough.table, rough, rough.rough.program, not rough.rough.milled
+    for k, p in enumerate(milled.programs or (), 1):
+        s = p.setting
+        yield program_name(milled, k), s.cutter, s.table, p, s.program, not s.milled
 
 
-def _comments(milled: Milled, checked: Checked, number: int) -> list[str]:
+def rough_names(milled: Milled) -> list[str]:
+    """File names of the roughing programs without their endings."""
+    return [f"{k}-rough-{_size(r.rough.cutter, r.rough.table)}" for k, r in enumerate(milled.roughs or (), 1)]
+
+
+def program_name(milled: Milled, k: int) -> str:
+    """File name of the k-th finishing program, from 1, without its ending; its first number is that of the tool."""
+    s = (milled.programs or ())[k - 1].setting
+    return f"{len(milled.roughs or ()) + k}-{_size(s.cutter, s.table)}"
+
+
+def _size(cutter: CatalogueCutter, table: float) -> str:
+    return f"D{cutter.diameter:g}r{cutter.corner_radius:g}-{np.degrees(table):.6g}deg"
+
+
+def _comments(
+    milled: Milled, checked: Checked | CheckedRough, c: CatalogueCutter, alpha: float, number: int
+) -> list[str]:
     """What the man at the machine must know."""
-    table, c = milled.surfaces[0].table, checked.setting.cutter
-    position = float(table.position[np.abs(table.angle - checked.setting.table).argmin()])
+    table = milled.surfaces[0].table
+    position = float(table.position[np.abs(table.angle - alpha).argmin()])
     out = [f"does not hold: {f}" for f in checked.fails[:3]]
     out.append(f"T{number}: D {c.diameter:g} r {c.corner_radius:g} mm, tool length 0: positions of the tip")
     out.append(

@@ -53,6 +53,8 @@ def operation(milled: Milled) -> dict[str, Any]:
         "hand_picked": None if picked is None else _picked(milled, picked),
         "ways": [way_of(milled, way) for way in milled.ways],
         "programs": None if milled.programs is None else [_program(p) for p in milled.programs],
+        "roughing": None if milled.roughs is None else _roughing(milled),
+        "finished": None if milled.covered is None else _finished(milled),
         "surfaces": rows,
         "settings": {k: list(v) if isinstance(v, tuple) else v for k, v in milled.settings.items()},
     }
@@ -103,13 +105,35 @@ def _program(p: Checked) -> dict[str, Any]:
         "holds": not p.fails,
         "fails": list(p.fails),
         "rows": len(p.setting.program),
-        "path_mm": float(sum(m.tracks.length for m in p.setting.millings)),
+        "path_mm": p.setting.length,
         "time_min": p.seconds / 60.0,
         "missed_mm": p.missed,
         "refused_lines": len(p.setting.linked.refused),
         "direct_links": p.setting.linked.direct,
         "retracts": p.setting.linked.retracts,
         "gouge_mm": p.gouge,
+        "rest_passes": [
+            {
+                "surface": f"{BODIES[r.body]} {r.side}",
+                "u": list(r.box[0]),
+                "v": list(r.box[1]),
+                "passes": len(r.tracks),
+                "path_mm": float(sum(t.length for t in r.tracks)),
+            }
+            for r in p.setting.rests
+        ],
+        "missed": [
+            {
+                "surface": f"{BODIES[m.patch.body]} {m.patch.side}",
+                "line": x.line,
+                "from": list(x.first),
+                "to": list(x.last),
+                "length_mm": x.length,
+                "reason": x.reason,
+            }
+            for m in p.setting.millings
+            for x in m.tracks.missed
+        ],
         "patches": [
             {
                 "surface": f"{BODIES[m.patch.body]} {m.patch.side}",
@@ -126,8 +150,61 @@ def _program(p: Checked) -> dict[str, Any]:
     }
 
 
+def _roughing(milled: Milled) -> dict[str, Any]:
+    """All roughing programs; of one channel, or of one on either side of a splitter."""
+    rows = [r.values() for r in milled.roughs or ()]
+    time = sum(row["time_min"] for row in rows)
+    return {
+        "holds": all(row["verified"] for row in rows),
+        "path_mm": sum(row["path_mm"] for row in rows),
+        "time_min": time,
+        "time_all_channels_min": time * milled.impeller.blades,
+        "programs": rows,
+    }
+
+
+def _finished(milled: Milled) -> dict[str, Any]:
+    """What all programs leave together."""
+    programs, covered = milled.programs or (), milled.covered or ()
+    scallops = [x for p in programs for x in p.scallops]
+    crests = sum(x.crests for x in scallops)
+    mean = sum(x.mean * x.crests for x in scallops) / crests if crests else None
+    return {
+        "path_mm": float(sum(p.setting.length for p in programs)),
+        "time_min": sum(p.seconds for p in programs) / 60.0,
+        "gouge_mm": max((p.gouge for p in programs), default=0.0),
+        "scallop_mean_mm": mean,
+        "scallop_mean_share": None if mean is None else mean / scallops[0].asked,
+        "surfaces": [
+            {
+                "surface": x.name,
+                "holds": not x.fails,
+                "points": len(x.left.rest),
+                "spacing_mm": x.spacing,
+                "within_share": x.share,
+                "greatest_mm": x.greatest[0],
+                "at_mm": x.left.wall.points[x.greatest[1]].tolist(),
+                "unreached_mm2": x.unreached,
+            }
+            for x in covered
+        ],
+    }
+
+
 def _picked(milled: Milled, way: Compared) -> dict[str, Any]:
-    return {**_size(way.catalogue.cutters[0]), **way_of(milled, way)}
+    first = way.divided.patches[0].table if way.divided is not None and way.divided.patches else None
+    tables = {p.table for p in way.divided.patches} if way.divided is not None else set()
+    return {
+        **_size(way.catalogue.cutters[0]),
+        "table_deg": _degrees(first) if first is not None and len(tables) == 1 else None,
+        "tables_deg": sorted(_degrees(t) for t in tables),
+        "cc_points": sum(len(op.place) for op in milled.surfaces),
+        "check_points": sum(len(op.surface.scene.check) for op in milled.surfaces),
+        "unreachable": way.unreachable,
+        "search_s": way.search_s,
+        "certified": way.certified,
+        **way_of(milled, way),
+    }
 
 
 def _size(cutter: CatalogueCutter) -> dict[str, float]:

@@ -43,8 +43,8 @@ def page_bytes(walled: Walled) -> bytes:
         figure("bars", _bars(walled), figures),
         "<h3>What each place bears</h3>",
         f"<p>{escape(walled.threshold_text[:1].upper() + walled.threshold_text[1:])}. The planner keeps "
-        f"{100.0 * walled.reserve:g} % below it, as its force is that of plane stock and the simulation's of the real "
-        f"one: where both are known, the simulated force is {_agreement(used)} of the planned one.</p>",
+        f"{100.0 * walled.reserve:g} % below it; its force is corrected, place by place, by what the simulation of "
+        f"the plan before found: where both are known, the simulated force is {_agreement(used)} of the planned one.</p>",
         figure("threshold", _thresholds(used), figures),
         "<h3>Depth of each pass</h3>",
         f'<p class="note">Variable, in the order of cutting; sides {escape(used.order)}.'

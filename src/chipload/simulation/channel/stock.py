@@ -89,9 +89,13 @@ def _quads(index: Ints) -> list[list[int]]:
 
 
 def taken_from(
-    blank: trimesh.Trimesh, program: Program, cutter: CatalogueCutter, pitch: float, progress: Progress = silent
+    blank: trimesh.Trimesh | TriDexel,
+    program: Program,
+    cutter: CatalogueCutter,
+    pitch: float,
+    progress: Progress = silent,
 ) -> Taken:
-    """What a program takes from a blank, with rays ``pitch`` [mm] apart.
+    """What a program takes from a blank, with rays ``pitch`` [mm] apart; of dexels, which it cuts, their own.
 
     Raises
     ------
@@ -100,7 +104,7 @@ def taken_from(
     """
     if is_arc(program).any():
         raise InputError("channel: the program has arcs: must be of straight rows")
-    stock = TriDexel.of_mesh(blank, pitch)
+    stock = blank if isinstance(blank, TriDexel) else TriDexel.of_mesh(blank, pitch)
     starts, shapes, kinds = tool_parts(cutter)
     n = len(program)
     rapid, above, part = np.zeros(n), np.zeros(n), np.full(n, -1)

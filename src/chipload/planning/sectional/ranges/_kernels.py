@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 
 from chipload.planning.sectional._kernels import domain, gaps, point_arcs
+from chipload.planning.sectional.arcs._kernels import radius_at, slack
 
 
 @njit(cache=True, nogil=True)
@@ -89,6 +90,100 @@ def collect(
 
 
 @njit(cache=True, nogil=True)
+def inside(
+    points: Any, own: Any, nodes: Any, spans: Any, leaves: int, cc: Any, cone: Any, r: float, near2: float, rho: float,
+    stages: Any, B: float,
+) -> int:  # fmt: skip
+    """The check point that is deepest in the cutter at B, by what :func:`slack` says; -1: none."""
+    Tx, Ty, Tz = cone[0] * math.cos(B), cone[0] * math.sin(B), cone[1]
+    n = cc[3] * Tx + cc[4] * Ty + cc[5] * Tz
+    s2 = 1.0 - n * n
+    if s2 < 1e-12:
+        return -1
+    s = math.sqrt(s2)
+    Vx, Vy, Vz = (cc[3] - n * Tx) / s, (cc[4] - n * Ty) / s, (cc[5] - n * Tz) / s
+    Cx, Cy, Cz = cc[0] + r * cc[3], cc[1] + r * cc[4], cc[2] + r * cc[5]
+    sid = int(cc[15])
+    deepest, who, top = 0.0, -1, 1
+    stack = np.empty(64, dtype=np.int64)
+    stack[0] = 0
+    while top > 0:
+        top -= 1
+        k = stack[top]
+        x, y, z, R = nodes[k, 0] - Cx, nodes[k, 1] - Cy, nodes[k, 2] - Cz, nodes[k, 3]
+        if R < 0.0:
+            continue
+        h = x * Tx + y * Ty + z * Tz
+        u, v, w = x - rho * Vx, y - rho * Vy, z - rho * Vz
+        P = widest(h - R, h + R, rho, r, stages) + R
+        if h + R < -r or u * u + v * v + w * w - h * h > P * P:
+            continue
+        if k < leaves:
+            stack[top], stack[top + 1] = 2 * k + 1, 2 * k + 2
+            top += 2
+            continue
+        for i in range(spans[k, 0], spans[k, 1]):
+            x, y, z = points[i, 0] - Cx, points[i, 1] - Cy, points[i, 2] - Cz
+            h = x * Tx + y * Ty + z * Tz
+            if h <= -r:
+                continue
+            P = radius_at(h, rho, r, stages) if h >= 0.0 else 0.0
+            if h >= 0.0 and P <= 0.0:
+                continue
+            yN = x * cc[3] + y * cc[4] + z * cc[5]
+            deep = slack(h < 0.0, h, n, s2, yN, x * x + y * y + z * z, rho, r, P)
+            if deep >= deepest:
+                continue
+            if own[i] == sid:
+                u, v, w = points[i, 0] - cc[0], points[i, 1] - cc[1], points[i, 2] - cc[2]
+                if u * u + v * v + w * w < near2:
+                    continue
+            deepest, who = deep, i
+    return who
+
+
+@njit(cache=True, nogil=True)
+def merged(cover: Any, number: int, arcs: Any, first: int, last: int) -> int:
+    """Puts the ``arcs`` first..last into ``cover``, ascending and apart; how many there are, -1: too many."""
+    for k in range(first, last):
+        lo, hi = arcs[k, 0], arcs[k, 1]
+        i = 0
+        while i < number and cover[i, 1] < lo:
+            i += 1
+        j = i
+        while j < number and cover[j, 0] <= hi:
+            lo, hi = min(lo, cover[j, 0]), max(hi, cover[j, 1])
+            j += 1
+        if j == i:
+            if number == len(cover):
+                return -1
+            for m in range(number, i, -1):
+                cover[m, 0], cover[m, 1] = cover[m - 1, 0], cover[m - 1, 1]
+            number += 1
+        elif j > i + 1:
+            for m in range(j, number):
+                cover[m - j + i + 1, 0], cover[m - j + i + 1, 1] = cover[m, 0], cover[m, 1]
+            number -= j - i - 1
+        cover[i, 0], cover[i, 1] = lo, hi
+    return number
+
+
+@njit(cache=True, nogil=True)
+def widest_gap(cover: Any, number: int, lo: float, hi: float, least: float) -> tuple[float, float]:
+    """The widest part of lo..hi that is not covered, (lo, lo): none is wider than ``least``."""
+    a, b, reached = lo, lo, lo
+    for k in range(number + 1):
+        left = hi if k == number else min(cover[k, 0], hi)
+        if left - reached > max(least, b - a):
+            a, b = reached, left
+        if k < number:
+            reached = max(reached, cover[k, 1])
+            if reached >= hi:
+                break
+    return a, b
+
+
+@njit(cache=True, nogil=True)
 def valid(
     points: Any, own: Any, nodes: Any, spans: Any, leaves: int, cc: Any, cone: Any, r: float, near2: float, rho: float,
     stages: Any, parts: Any, count: int, width: float, flat: float, least: float, hints: Any, seen: Any, stamp: int,
@@ -111,14 +206,30 @@ def valid(
             )
         owner[before:filled] = hints[j]
     near = np.empty(len(points), dtype=np.int64)
-    free, one = np.empty((64, 2)), np.empty((1, 2))
-    todo = np.empty((512, 2))
+    todo, cover = np.empty((512, 2)), np.empty((4096, 2))
     waiting = gaps(parts, count, arcs, filled, least, todo)
+    covered = merged(cover, 0, arcs, 0, filled)
     while waiting > 0:
         waiting -= 1
         lo, hi = todo[waiting, 0], todo[waiting, 1]
-        one[0, 0], one[0, 1] = lo, hi
-        if gaps(one, 1, arcs, filled, least, free) == 0:
+        a, b = widest_gap(cover, covered, lo, hi, least)
+        if b <= a:
+            continue
+        # one point that forbids the middle of the widest gap may spare all others
+        who = inside(points, own, nodes, spans, leaves, cc, cone, r, near2, rho, stages, 0.5 * (a + b))
+        if who >= 0 and seen[who] != stamp:
+            seen[who] = stamp
+            before = filled
+            for k in range(count):
+                filled = point_arcs(
+                    points, who, cc, cone, rho, r, stages, parts[k, 0], parts[k, 1], least, arcs, filled
+                )
+            owner[before:filled] = who
+            covered = merged(cover, covered, arcs, before, filled)
+            if filled + 32 > len(arcs) or covered < 0:
+                return 0, -1
+            todo[waiting, 0], todo[waiting, 1] = lo, hi
+            waiting += 1
             continue
         B, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
         n = cone[0] * (cc[3] * math.cos(B) + cc[4] * math.sin(B)) + cone[1] * cc[5]
@@ -129,6 +240,9 @@ def valid(
                 return 0, -1
             arcs[filled, 0], arcs[filled, 1], owner[filled] = lo, hi, -3
             filled += 1
+            covered = merged(cover, covered, arcs, filled - 1, filled)
+            if covered < 0:
+                return 0, -1
             continue
         if steep or hi - lo > width:
             if waiting + 2 > len(todo):
@@ -145,7 +259,8 @@ def valid(
                     points, near[j], cc, cone, rho, r, stages, parts[k, 0], parts[k, 1], least, arcs, filled
                 )
             owner[before:filled] = near[j]
-            if filled + 32 > len(arcs):
+            covered = merged(cover, covered, arcs, before, filled)
+            if filled + 32 > len(arcs) or covered < 0:
                 return 0, -1
     return gaps(parts, count, arcs, filled, least, out), filled
 

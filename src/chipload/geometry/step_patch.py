@@ -1,0 +1,322 @@
+"""A four-sided face of a STEP part as a B-spline patch of our own.
+
+Notation: face S(u, v) [mm] of the CAD kernel; its loop of edges as curves in (u, v). Where the loop is a box of
+parameter lines and S is polynomial, poles and knots are taken as they are, once, and the kernel is not asked again.
+Elsewhere (s, t) in 0..1 runs over the face: the four sides of its loop, each by its length, are blended to
+(u, v)(s, t), and a patch goes through the points of a grid, which is made finer until it keeps within the tolerance.
+Where the lines of equal u or v of a file lie more than :data:`UNEVEN` times closer in one place than in another, the
+patch is made anew over shares of length, for whoever goes over it in even steps of u and v.
+
+Reference: [Piegl1997] ch. 9, 10.6 (blended boundaries).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline, make_interp_spline
+
+from chipload.errors import InputError
+from chipload.geometry.bspline import Patch, basis, through
+from chipload.geometry.step_faces import Face
+
+Floats = NDArray[np.float64]
+
+#: a loop has a corner where two edges meet at more than this [rad]
+CORNER = np.radians(20.0)
+#: points of a grid that is fitted, along each side
+COUNTS = (17, 33, 65, 129)
+#: pieces of a span of knots that is put over lengths
+PIECES = (2, 4, 8, 16)
+#: greatest change of the distance of parameter lines that is kept
+UNEVEN = 2.0
+_SAMPLES = 201
+_POLYNOMIAL = ("plane", "b-spline", "Bezier", "of extrusion")
+
+
+@dataclass(frozen=True, eq=False)
+class Taken:
+    """What a face became.
+
+    Attributes
+    ----------
+    patch : normal out of the metal, where the part is a solid
+    kept : its poles and knots are those of the file
+    off : how far it or its rim leaves the face [mm], as far as was looked
+    """
+
+    patch: Patch
+    kept: bool
+    off: float
+
+    def __str__(self) -> str:
+        n, m = self.patch.control.shape[:2]
+        how = "poles and knots of the file" if self.kept else f"fitted by {n} x {m} poles"
+        return f"{how}, within {self.off:.2g} mm of the face"
+
+
+def patch_of(face: Face, key: str, fit: float) -> Taken:
+    """The patch of a face.
+
+    Parameters
+    ----------
+    key : who asks, for a message
+    fit : how far [mm] the patch may leave the face
+
+    Raises
+    ------
+    InputError
+        The face has holes, no four sides, or the fit leaves it by more.
+    """
+    from OCP.BRep import BRep_Tool
+    from OCP.TopAbs import TopAbs_REVERSED
+
+    if face.holes:
+        said = "a hole" if face.holes == 1 else f"{face.holes} holes"
+        raise InputError(f"{key}: face {face.number} has {said}: must be one piece without any")
+    surface = BRep_Tool.Surface_s(face.shape)
+    side = -1 if face.shape.Orientation() == TopAbs_REVERSED else 1
+    loop = _loop(face, surface)
+    rim, low, high = _box(loop, surface)
+    if rim <= fit and face.kind in _POLYNOMIAL:
+        kept = _kept(surface, low, high, side)
+        if kept is not None:
+            off = max(rim, _off(kept, lambda s, t: low + np.stack([s, t], axis=-1) * (high - low), surface, 17))
+            if off <= fit:
+                return _even(Taken(kept, True, off), face, key, fit)
+    return _fitted(face, surface, loop, side, key, fit)
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """An edge of a loop in the sense of the loop: (u, v) of its parameter; samples t, (u, v), points, length so far."""
+
+    at: Callable[[float], tuple[float, float]]
+    t: Floats
+    uv: Floats
+    points: Floats
+    length: Floats
+
+
+def _points(surface: Any, uv: Floats) -> Floats:
+    out = [surface.Value(float(u), float(v)) for u, v in uv.reshape(-1, 2)]
+    return np.array([(p.X(), p.Y(), p.Z()) for p in out]).reshape(*uv.shape[:-1], 3)
+
+
+def _loop(face: Face, surface: Any) -> list[_Piece]:
+    """The edges round the face, those without length left out."""
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepAdaptor import BRepAdaptor_Curve2d
+    from OCP.BRepTools import BRepTools, BRepTools_WireExplorer
+    from OCP.TopAbs import TopAbs_REVERSED
+
+    out: list[_Piece] = []
+    explorer = BRepTools_WireExplorer(BRepTools.OuterWire_s(face.shape), face.shape)
+    while explorer.More():
+        edge, turned = explorer.Current(), explorer.Orientation() == TopAbs_REVERSED
+        explorer.Next()
+        if BRep_Tool.Degenerated_s(edge):
+            continue
+        curve = BRepAdaptor_Curve2d(edge, face.shape)
+        ends = (curve.FirstParameter(), curve.LastParameter())
+        t = np.linspace(*(ends[::-1] if turned else ends), _SAMPLES)
+
+        def at(x: float, on: Any = curve) -> tuple[float, float]:
+            p = on.Value(x)
+            return p.X(), p.Y()
+
+        uv = np.array([at(float(x)) for x in t])
+        points = _points(surface, uv)
+        length = np.concatenate([[0.0], np.linalg.norm(np.diff(points, axis=0), axis=1).cumsum()])
+        if length[-1] > 0.0:
+            out.append(_Piece(at, t, uv, points, length))
+    return out
+
+
+def _box(loop: list[_Piece], surface: Any) -> tuple[float, Floats, Floats]:
+    """How far [mm] the loop is from the box of parameter lines round it, and the box."""
+    uv = np.concatenate([p.uv for p in loop])
+    low, high = uv.min(axis=0), uv.max(axis=0)
+    natural = np.array(surface.Bounds()).reshape(2, 2)
+    for end, bound in ((low, natural[:, 0]), (high, natural[:, 1])):
+        near = np.abs(end - bound) <= 1e-9 * (high - low)
+        end[near] = bound[near]
+    rim = 0.0
+    for p in loop:
+        away = []
+        for axis in (0, 1):
+            for value in (low[axis], high[axis]):
+                snapped = p.uv.copy()
+                snapped[:, axis] = value
+                away.append(np.linalg.norm(_points(surface, snapped) - p.points, axis=1).max())
+        rim = max(rim, float(min(away)))
+    return rim, low, high
+
+
+def _kept(surface: Any, low: Floats, high: Floats, side: int) -> Patch | None:
+    """Poles and knots of the kernel's surface within a box; None: it is rational."""
+    from OCP.Geom import Geom_RectangularTrimmedSurface
+    from OCP.GeomConvert import GeomConvert
+
+    cut = Geom_RectangularTrimmedSurface(surface, low[0], high[0], low[1], high[1])
+    b = GeomConvert.SurfaceToBSplineSurface_s(cut)
+    n, m = b.NbUPoles(), b.NbVPoles()
+    if b.IsURational() or b.IsVRational():
+        weights = [b.Weight(i, j) for i in range(1, n + 1) for j in range(1, m + 1)]
+        if max(weights) - min(weights) > 1e-12 * max(weights):
+            return None
+    poles = [[b.Pole(i, j) for j in range(1, m + 1)] for i in range(1, n + 1)]
+    control = np.array([[(p.X(), p.Y(), p.Z()) for p in row] for row in poles])
+    u = np.repeat([b.UKnot(i) for i in range(1, b.NbUKnots() + 1)], _mults(b.UMultiplicity, b.NbUKnots()))
+    v = np.repeat([b.VKnot(i) for i in range(1, b.NbVKnots() + 1)], _mults(b.VMultiplicity, b.NbVKnots()))
+    return Patch(_unit(u), _unit(v), control, side)
+
+
+def _mults(of: Callable[[int], int], count: int) -> list[int]:
+    return [of(i) for i in range(1, count + 1)]
+
+
+def _unit(knots: Floats) -> Floats:
+    out: Floats = (knots - knots[0]) / (knots[-1] - knots[0])
+    return out
+
+
+def _off(patch: Patch, uv_of: Callable[[Floats, Floats], Floats], surface: Any, count: int) -> float:
+    """Greatest distance [mm] of patch and surface at the middles between ``count`` places and along the sides."""
+    x = np.linspace(0.0, 1.0, 2 * count - 1)
+    s, t = np.meshgrid(x, x, indexing="ij")
+    points = _points(surface, uv_of(s, t))
+    return float(np.linalg.norm(patch.at(s.ravel(), t.ravel()).reshape(points.shape) - points, axis=2).max())
+
+
+def _fitted(face: Face, surface: Any, loop: list[_Piece], side: int, key: str, fit: float) -> Taken:
+    sides = [_side(pieces) for pieces in _four(face, loop, key)]
+    corners = np.array([s(np.zeros(1))[0] for s in sides])
+
+    def uv_of(s: Floats, t: Floats) -> Floats:
+        flat = [x.ravel() for x in (s, t)]
+        a, b = (x[:, None] for x in flat)
+        low, right, high, left = (
+            _at_shares(side_at, x)
+            for side_at, x in zip(sides, (flat[0], flat[1], 1.0 - flat[0], 1.0 - flat[1]), strict=True)
+        )
+        plane = (1 - b) * ((1 - a) * corners[0] + a * corners[1]) + b * (a * corners[2] + (1 - a) * corners[3])
+        out: Floats = ((1 - b) * low + b * high + (1 - a) * left + a * right - plane).reshape(*s.shape, 2)
+        return out
+
+    best = np.inf
+    for count in COUNTS:
+        x = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
+        x[0], x[-1] = 0.0, 1.0
+        s, t = np.meshgrid(x, x, indexing="ij")
+        uv = uv_of(s, t)
+        e, f = uv[1:, :-1] - uv[:-1, :-1], uv[:-1, 1:] - uv[:-1, :-1]
+        sense = e[..., 0] * f[..., 1] - e[..., 1] * f[..., 0]
+        if (sense <= 0.0).any() and (sense >= 0.0).any():
+            raise InputError(
+                f"{key}: face {face.number} folds between its four sides: state it in parts, or as sections"
+            )
+        patch = through(_points(surface, uv), x, x, side=int(np.sign(sense[0, 0])) * side)
+        middles = np.sort(np.concatenate([x, 0.5 * (x[1:] + x[:-1])]))
+        s, t = np.meshgrid(middles, middles, indexing="ij")
+        points = _points(surface, uv_of(s, t))
+        off = float(np.linalg.norm(patch.at(s.ravel(), t.ravel()).reshape(points.shape) - points, axis=2).max())
+        best = min(best, off)
+        if off <= fit:
+            return _even(Taken(patch, False, off), face, key, fit)
+    raise _left(face, key, best, fit)
+
+
+def _left(face: Face, key: str, best: float, fit: float) -> InputError:
+    return InputError(
+        f"{key}: face {face.number} is left by its fit by {best:.4g} mm: must be at most fit_mm = {fit:g}: state more, "
+        "or have the face written in smooth parts"
+    )
+
+
+def _even(taken: Taken, face: Face, key: str, fit: float) -> Taken:
+    """The same surface over shares of length, if its own parameters are uneven."""
+    out = taken
+    for _ in range(2):
+        out = _even_u(out, face, key, fit)
+        out = Taken(out.patch.swapped(), out.kept, out.off)
+    return out
+
+
+def _even_u(taken: Taken, face: Face, key: str, fit: float) -> Taken:
+    """The curves that go with the basis functions of v, each over shares of length instead of u."""
+    patch, x, few = taken.patch, np.linspace(0.0, 1.0, 2 * _SAMPLES), np.linspace(0.0, 1.0, 9)
+    grid = patch.at(*_mesh(x, few)).reshape(len(x), len(few), 3)
+    step = np.linalg.norm(np.diff(grid, axis=0), axis=2).mean(axis=1)
+    if step.max() <= UNEVEN * step.min():
+        return taken
+    u_of = CubicSpline(np.concatenate([[0.0], step.cumsum()]) / step.sum(), x)
+    s_of = CubicSpline(x, np.concatenate([[0.0], step.cumsum()]) / step.sum())
+    ends = np.clip(s_of(np.unique(patch.knots_u)), 0.0, 1.0)
+    degree = patch.degrees[0]
+    off = np.inf
+    for count in PIECES:
+        s = np.concatenate([np.linspace(a, b, count, endpoint=False) for a, b in pairwise(ends)] + [[1.0]])
+        first, N = basis(patch.knots_u, degree, np.clip(u_of(s), 0.0, 1.0))
+        curves = np.einsum("ki,kijd->kjd", N, patch.control[first[:, None] + np.arange(degree + 1)])
+        spline = make_interp_spline(s, curves, k=3)
+        made = Patch(spline.t, patch.knots_v, spline.c, patch.side)
+        S, V = _mesh(np.sort(np.concatenate([s, 0.5 * (s[1:] + s[:-1])])), few)
+        off = float(np.linalg.norm(made.at(S, V) - patch.at(np.clip(u_of(S), 0.0, 1.0), V), axis=1).max())
+        if taken.off + off <= fit:
+            return Taken(made, False, taken.off + off)
+    raise _left(face, key, taken.off + off, fit)
+
+
+def _mesh(u: Floats, v: Floats) -> tuple[Floats, Floats]:
+    a, b = np.meshgrid(u, v, indexing="ij")
+    return a.ravel(), b.ravel()
+
+
+def _at_shares(side: Callable[[Floats], Floats], shares: Floats) -> Floats:
+    """(u, v) (n, 2) at shares (n,), each different one asked for once."""
+    x, back = np.unique(shares, return_inverse=True)
+    return side(x)[back]
+
+
+def _four(face: Face, loop: list[_Piece], key: str) -> list[list[_Piece]]:
+    """The loop as four sides."""
+    if len(loop) == 4:
+        return [[p] for p in loop]
+    corner = []
+    for before, after in zip([loop[-1], *loop[:-1]], loop, strict=True):
+        a, b = before.points[-1] - before.points[-2], after.points[1] - after.points[0]
+        turn = np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)
+        corner.append(bool(turn > CORNER))
+    starts = np.flatnonzero(corner)
+    if len(starts) != 4:
+        raise InputError(
+            f"{key}: face {face.number} has {len(loop)} edges and {len(starts)} corners: must have four sides: hub, "
+            "shroud and two edges of a blade, or those of a wall"
+        )
+    ring = loop[starts[0] :] + loop[: starts[0]]
+    ends = [*(starts - starts[0]).tolist(), len(loop)]
+    return [ring[a:b] for a, b in pairwise(ends)]
+
+
+def _side(pieces: list[_Piece]) -> Callable[[Floats], Floats]:
+    """(u, v) (n, 2) of shares (n,) of the length of a side."""
+    ends = np.concatenate([[0.0], np.cumsum([p.length[-1] for p in pieces])])
+    inverse = [CubicSpline(p.length, p.t) for p in pieces]
+
+    def at(shares: Floats) -> Floats:
+        x = shares * ends[-1]
+        number = np.clip(np.searchsorted(ends, x, side="right") - 1, 0, len(pieces) - 1)
+        out = np.empty((len(x), 2))
+        for k, (n, length) in enumerate(zip(number.tolist(), x.tolist(), strict=True)):
+            p = pieces[n]
+            here = min(max(length - float(ends[n]), 0.0), float(p.length[-1]))
+            out[k] = p.at(float(np.clip(inverse[n](here), *sorted((p.t[0], p.t[-1])))))
+        return out
+
+    return at

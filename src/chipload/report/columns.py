@@ -1,0 +1,82 @@
+"""Any columns of a simulated program, one below the other, against time or path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+from plotly.subplots import make_subplots
+
+from chipload.errors import InputError
+from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS
+from chipload.report.held import LIMITS
+from chipload.report.shape import thinned
+from chipload.tables import nearest
+
+#: the columns that are drawn where none is named
+USUAL = ("force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um")
+#: axes that columns are drawn against, and their titles
+AGAINST = {"t_s": "time at the commanded feed [s]", "s_mm": "path [mm]"}
+#: columns whose size is held, whatever their sign
+SIGNED = ("form_error_um",)
+#: height of a row [px]
+ROW = 190
+
+
+def columns_figure(
+    columns: Mapping[str, NDArray[Any]],
+    limits: Mapping[str, float],
+    names: Sequence[str] = USUAL,
+    x: Literal["t_s", "s_mm"] = "t_s",
+) -> go.Figure:
+    """A row a column; limits are dashed, what exceeds one is marked.
+
+    Parameters
+    ----------
+    columns : (n,) each, those of a history
+    limits : by name, keys of :data:`chipload.report.held.LIMITS`
+
+    Raises
+    ------
+    InputError
+        A column is not known or holds no numbers.
+    """
+    if x not in AGAINST:
+        raise InputError(f"plot: x = {x!r}: must be one of {', '.join(AGAINST)}")
+    drawable = sorted(k for k, v in columns.items() if v.dtype.kind in "fiub")
+    for name in names:
+        if name not in drawable:
+            raise InputError(f"plot: column {name!r}: not known: the nearest is {nearest(name, drawable)}")
+    if not names:
+        raise InputError("plot: no column is named: name at least one, as force_n")
+    bound = {LIMITS[k][0]: v for k, v in limits.items() if k in LIMITS and not k.startswith("spindle")}
+    across = np.asarray(columns[x])
+    out = make_subplots(rows=len(names), cols=1, shared_xaxes=True, vertical_spacing=0.24 / (2 + 2 * len(names)))
+    for row, name in enumerate(names, start=1):
+        y = np.asarray(columns[name], dtype=np.float64)
+        keep = thinned(y, LINE_POINTS)
+        says = f"{name}: %{{y:.4g}}, line %{{customdata}}<extra></extra>"
+        given = {"x": across[keep], "y": y[keep], "customdata": columns["line"][keep], "hovertemplate": says}
+        out.add_trace(go.Scatter(**given, mode="lines", name=name, line={"color": INK, "width": 1.3}), row=row, col=1)
+        if name in bound:
+            for end in (bound[name], *((-bound[name],) if name in SIGNED else ())):
+                out.add_hline(y=end, line={"color": LIMIT, "width": 1.2, "dash": "dash"}, row=row, col=1)
+            size = np.abs(y[keep]) if name in SIGNED else y[keep]
+            over = keep[size > bound[name]]
+            if len(over):
+                given = {"x": across[over], "y": y[over], "customdata": columns["line"][over], "hovertemplate": says}
+                mark = {"color": LIMIT, "size": 5}
+                out.add_trace(go.Scatter(**given, mode="markers", name=f"{name} exceeds", marker=mark), row=row, col=1)
+        top = max(float(y.max(initial=0.0)), bound.get(name, 0.0))
+        low = min(float(y.min(initial=0.0)), -bound.get(name, 0.0) if name in SIGNED else 0.0)
+        room = 0.06 * (top - low) or 1.0
+        out.update_yaxes(title_text=name, range=[low - room, top + room], row=row, col=1)
+    out.update_xaxes(gridcolor=GRID, zeroline=False)
+    out.update_yaxes(gridcolor=GRID, zerolinecolor=GRID)
+    out.update_xaxes(title_text=AGAINST[x], row=len(names), col=1)
+    margin = {"l": 84, "r": 16, "t": 20, "b": 46}
+    out.update_layout(template="none", height=70 + ROW * len(names), font=FONT, showlegend=False, margin=margin)
+    return out

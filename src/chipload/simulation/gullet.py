@@ -1,0 +1,50 @@
+"""Whether the chips of a tooth find room before its flute: loose volume against the gullet.
+
+Notation: a tooth cuts V = sum over its bites of rho (b - a) integral of h dphi in a revolution; its chips lie loosely
+and fill q V (``chip_ratio``); between two teeth there is an area A across the axis (``gullet``), over the height H of
+the edge that cuts. The share that is filled is q V / (A H).
+
+A cut of a flat bottom alone has no height: how chips come up from a plunge is not judged, its share is 0.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.simulation.loads import Cuts
+
+Floats = NDArray[np.float64]
+
+
+def flute_fill(cuts: Cuts) -> Floats:
+    """Share of the gullet that a tooth's chips of one revolution fill, (c,), of the fullest tooth in each step.
+
+    Parameters
+    ----------
+    cuts : of a cutter whose ``gullet`` and ``chip_ratio`` are stated
+    """
+    cutter, bites = cuts.cutter, cuts.bites
+    assert cutter.gullet is not None
+    assert cutter.chip_ratio is not None
+    p, q, a, b, along, offset, across = bites.rows.T
+    rho, sine = bites.slices[bites.slice, 1], bites.slices[bites.slice, 3]
+    chip = along * (np.cos(p) - np.cos(q)) + across * (np.sin(q) - np.sin(p)) + offset * (q - p)
+    step = np.repeat(np.arange(len(cuts)), np.diff(bites.start))
+    # bites of all teeth alike are those of tooth 0; with runout each tooth has its own
+    own = step * cutter.flutes + np.maximum(bites.tooth, 0)
+    volume = np.bincount(own, rho * (b - a) * chip, len(cuts) * cutter.flutes)
+    height = _height(own, bites.slice, a, b, sine, len(cuts) * cutter.flutes)
+    share = np.divide(cutter.chip_ratio * volume, cutter.gullet * height, out=np.zeros(len(height)), where=height > 0.0)
+    return np.asarray(share.reshape(len(cuts), cutter.flutes).max(axis=1))
+
+
+def _height(own: NDArray[np.int64], piece: NDArray[np.int64], a: Floats, b: Floats, sine: Floats, n: int) -> Floats:
+    """(n,) height of the edge that cuts: of each slice the part from its lowest bite to its highest."""
+    key, back = np.unique(np.column_stack([own, piece]), axis=0, return_inverse=True)
+    low, high = np.full(len(key), np.inf), np.full(len(key), -np.inf)
+    np.minimum.at(low, back.ravel(), a)
+    np.maximum.at(high, back.ravel(), b)
+    slope = np.zeros(len(key))
+    slope[back.ravel()] = sine
+    return np.asarray(np.bincount(key[:, 0], (high - low) * slope, n), dtype=np.float64)
