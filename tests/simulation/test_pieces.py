@@ -20,7 +20,7 @@ from chipload.program.program import ARC_CCW, LINE, Program
 from chipload.simulation.chips import Removal, Resolution, remove
 from chipload.simulation.pieces import remove_in_pieces
 from chipload.simulation.steps import Steps, steps_in_blocks, steps_of
-from chipload.simulation.unfinished import LAST, Stored, Unfinished
+from chipload.simulation.unfinished import LAST, Stored, Unfinished, in_rows
 from chipload.stock.layers import LayeredStock
 from simulation.test_steps import five_axis
 
@@ -229,3 +229,27 @@ def test_refused_input_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cuts with the spindle at rest"):
         run(tmp_path / "u", resting)
     assert not (tmp_path / "u").exists()
+
+
+def test_a_run_that_was_killed_before_its_result_was_written_simulates_nothing(tmp_path: Path) -> None:
+    with Unfinished(tmp_path / "u", 0.0) as kept:
+        first = remove_in_pieces(some_rows(), block(), CUTTERS, MATERIAL, ROUGH, kept)
+        force = first.columns["force_n"]
+    stock, said = block(), list[str]()
+    with Unfinished(tmp_path / "u", notice=said.append) as kept:
+        again = remove_in_pieces(some_rows(), stock, CUTTERS, MATERIAL, ROUGH, kept)
+        assert np.array_equal(again.columns["force_n"], force)
+    assert (again.volume_after, stock.volume()) == (first.volume_after, first.volume_after)
+    assert said[0].startswith(f"goes on after step {len(force)} of {len(force)}")
+
+
+def test_rows_of_uneven_pieces(tmp_path: Path) -> None:
+    with Unfinished(tmp_path / "u") as kept:
+        kept.begin("key")
+        for first, count in ((0, 3), (3, 5), (8, 2)):
+            late = {"late": first + np.arange(count) + 0.5} if first else {}
+            kept.add({"line": first + np.arange(count), "rapid": np.arange(count) == 1, **late})
+        some = list(in_rows(kept.columns(), 4))
+    assert [s["line"].tolist() for s in some] == [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9]]
+    assert [s["late"].tolist() for s in some] == [[0.0, 0.0, 0.0, 3.5], [4.5, 5.5, 6.5, 7.5], [8.5, 9.5]]
+    assert [s["rapid"].dtype for s in some] == [np.bool_] * 3
