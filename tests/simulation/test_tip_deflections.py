@@ -97,6 +97,15 @@ def test_holder_joints_and_work_add_what_they_give() -> None:
     assert found["deflection_um"] == pytest.approx(1e3 * (cutter + work), rel=1e-6)
 
 
+def test_a_measured_tip_stands_for_grip_holder_and_spindle() -> None:
+    own = (12.0**3 / inertia(8.0) + (30.0**3 - 12.0**3) / inertia(10.0)) / (3.0 * 6e5)
+    found, _, gives = slot(replace(MILL, tip_stiffness=8e3), work_n_um=math.inf)
+    assert gives.unknown == ()
+    assert found["deflection_cutter_um"] == pytest.approx(1e3 * (bar() + LOAD * DEPTH * (1.0 / 8e3 - own)), rel=1e-6)
+    with pytest.raises(InputError, match=r"^tip: measured compliance .* must be at least that of cutter and holder"):
+        slot(replace(MILL, tip_stiffness=1e6))
+
+
 def test_what_is_stated_as_rigid_adds_nothing_and_leaves_nothing_open() -> None:
     rigid = dict.fromkeys(StiffnessTable.model_fields, math.inf)
     found, _, gives = slot(replace(MILL, holder=()), **rigid)

@@ -41,6 +41,7 @@ class Cutter:
     runout : (offset [mm], direction [rad] from tooth 0): the axis of the teeth beside that of the spindle
     shank_diameter : [mm]; None: as the diameter
     holder : (length, diameter) [mm] of its parts, upwards from the overhang; empty: not known
+    tip_stiffness : [N/mm] of the tip across the axis under a slow force, measured in the machine; None: not known
     gullet : area between two teeth in a section across the axis [mm^2]; None: not known
     chip_ratio : volume that chips fill over what they are cut from, >= 1; with ``gullet`` or not at all
     number : tool number, >= 0; 0: what is in the spindle where a program names no tool
@@ -66,6 +67,7 @@ class Cutter:
     runout: tuple[float, float] = (0.0, 0.0)
     shank_diameter: float | None = None
     holder: tuple[tuple[float, float], ...] = ()
+    tip_stiffness: float | None = None
     gullet: float | None = None
     chip_ratio: float | None = None
     number: int = 1
@@ -127,6 +129,8 @@ class Cutter:
         for k, part in enumerate(self.holder):
             for key, size in zip(("length", "diameter"), part, strict=True):
                 need(0.0 < size < math.inf, f"holder.{k}.{key}_mm", size, "must be above 0")
+        tip = self.tip_stiffness
+        need(tip is None or 0.0 < tip < math.inf, "tip_n_um", (tip or 0.0) / 1000.0, "must be above 0")
         if (self.gullet is None) != (self.chip_ratio is None):
             lacks, has = ("gullet_mm2", "chip_ratio") if self.gullet is None else ("chip_ratio", "gullet_mm2")
             raise InputError(f"cutter.{lacks} is missing: give it with {has} or leave both out")

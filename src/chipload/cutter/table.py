@@ -56,6 +56,9 @@ class CutterTable(BaseModel):
     holder_mm: Annotated[tuple[tuple[float, float], ...] | None, BeforeValidator(_rows)] = Field(
         None, description="length and diameter of the holder's parts, upwards from the overhang"
     )
+    tip_n_um: float | None = Field(
+        None, description="measured stiffness of the tip across the axis; in place of grip, holder and spindle"
+    )
     gullet_mm2: float | None = Field(None, description="area between two teeth in a section across the axis")
     chip_ratio: float | None = Field(None, description="volume that chips fill over what they are cut from")
     file: str | None = None
@@ -94,6 +97,7 @@ class CutterTable(BaseModel):
             runout=(values.get("runout_mm", 0.0), math.radians(values.get("runout_deg", 0.0))),
             shank_diameter=values.get("shank_diameter_mm"),
             holder=tuple(tuple(part) for part in values.get("holder_mm", ())),
+            tip_stiffness=1000.0 * values["tip_n_um"] if "tip_n_um" in values else None,
             gullet=values.get("gullet_mm2"),
             chip_ratio=values.get("chip_ratio"),
             number=values["number"],

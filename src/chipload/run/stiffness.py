@@ -22,7 +22,7 @@ from chipload.simulation.chips import Removal
 from chipload.simulation.deflection import tip_deflections
 from chipload.simulation.gullet import flute_fill
 from chipload.simulation.loads import Cuts, Floats
-from chipload.structure.spindle import RIGID, Bar, cutter_bars, springs, tube
+from chipload.structure.spindle import RIGID, Bar, cutter_bars, springs, tool_bars, tube
 
 #: N/mm in 1 N/um, N mm/rad in 1 N m/rad, MPa in 1 GPa
 PER = 1000.0
@@ -68,17 +68,19 @@ def stiffness_of(table: StiffnessTable | None, cutters: Mapping[int, Cutter]) ->
         raise InputError(
             f"stiffness.holder_gpa = {modulus:g}: must be from {MODULI[0]:g} to {MODULI[1]:g}, or inf for rigid holders"
         )
-    missing = [f"stiffness.{k}" for k in StiffnessTable.model_fields if k != "holder_gpa" and getattr(said, k) is None]
+    chains = {n: c for n, c in cutters.items() if c.tip_stiffness is None}
+    keys = [k for k in StiffnessTable.model_fields if k != "holder_gpa"] if chains else ["work_n_um"]
+    missing = [f"stiffness.{k}" for k in keys if getattr(said, k) is None]
     # a spindle that does not tilt feels no lever: the length of a rigid holder does not matter then
     matters = modulus is None or math.isfinite(modulus) or math.isfinite(said.spindle_nm_rad or 1.0)
-    bare = sorted(n for n, c in cutters.items() if not c.holder) if matters else []
-    if modulus is None and len(bare) < len(cutters):
+    bare = sorted(n for n, c in chains.items() if not c.holder) if matters else []
+    if modulus is None and len(bare) < len(chains):
         missing.append("stiffness.holder_gpa")
     missing += [f"holder_mm of cutter {n}" for n in bare]
     grip = springs(PER * (said.grip_n_um or math.inf), PER * (said.grip_nm_rad or math.inf))
     nose = springs(PER * (said.spindle_n_um or math.inf), PER * (said.spindle_nm_rad or math.inf))
-    bars = {}
-    for number, cutter in cutters.items():
+    bars = {n: tool_bars(c) for n, c in cutters.items() if n not in chains}
+    for number, cutter in chains.items():
         holder = [_part(length, diameter, modulus) for length, diameter in cutter.holder]
         bars[number] = (*cutter_bars(cutter, grip), *holder, Bar(0.0, 0.0, nose))
     work = None if said.work_n_um is None else 1.0 / (PER * said.work_n_um)

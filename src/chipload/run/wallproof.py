@@ -30,7 +30,7 @@ from chipload.simulation.touched import touched
 from chipload.stock.layers import LayeredStock
 from chipload.structure.places import normals_of, on_cut, on_side, weights
 from chipload.structure.solid import displacement, factorise
-from chipload.structure.spindle import cutter_bars
+from chipload.structure.spindle import tool_bars
 from chipload.structure.stress import greatest
 
 Floats = NDArray[np.float64]
@@ -74,7 +74,7 @@ def prove(places: Places, plan: Plan, legs: Sequence[Leg], progress: Progress) -
     stock.refine(max(low, float(stock.bounds[0])), float(stock.bounds[-1]), op.layer_mm)
     longest = max(float(np.linalg.norm(np.diff(leg.program.p_work, axis=0), axis=1).max()) for leg in legs)
     fine = Resolution(max(longest, op.step_mm), op.tolerance_mm, op.corner_slices, 0.5 * cutter.radius)
-    bars = {cutter.number: cutter_bars(cutter)}
+    bars = {cutter.number: tool_bars(cutter)}
     law = inputs.law if plan.name == "variable" else inputs.even_law
     left = [np.full(places.shape, inputs.allowance[s]) for s in inputs.side_numbers]
     parts: list[dict[str, NDArray[Any]]] = []

@@ -122,6 +122,18 @@ def cutter_bars(cutter: Cutter, joint: Joint = RIGID, fluted_factor: float = FLU
     return Bar(cutter.flute_length, fluted), Bar(cutter.overhang - cutter.flute_length, shank, joint)
 
 
+def tool_bars(cutter: Cutter) -> tuple[Bar, ...]:
+    """The cutter alone, or where its tip was measured with what the machine adds to it there.
+
+    Raises
+    ------
+    InputError
+        The measured tip is stiffer than the cutter alone.
+    """
+    bars = cutter_bars(cutter)
+    return bars if cutter.tip_stiffness is None else as_measured(bars, 1.0 / cutter.tip_stiffness)
+
+
 def as_measured(bars: tuple[Bar, ...], compliance: float) -> tuple[Bar, ...]:
     """The chain with what a measured tip has more than it, e.g. by holder and spindle that it leaves out.
 
