@@ -7,23 +7,21 @@ a limit or a status does not hold; 1 a fault of ours; 130 stopped by Ctrl-C. Imp
 from __future__ import annotations
 
 import math
-import os
 import signal
 import sys
-import traceback
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
 from chipload.errors import Cancelled, InputError
+from chipload.terminal import EXCEEDED, bar, guarded, say
+from chipload.units import mm_s_from_mm_min
 
 if TYPE_CHECKING:
     from chipload.machine.machine import Machine
 
-FAULT, WRONG, EXCEEDED, STOPPED = 1, 2, 3, 130
 #: [mm] where none is stated
 TOLERANCE_MM = 0.001
 #: [s] between two states of a simulation
@@ -98,9 +96,9 @@ def run(
         check_target(out)
         if not 0.0 <= keep_s < math.inf:
             raise InputError(f"--keep-s = {keep_s:g}: must be at least 0 s")
-        with Unfinished(unfinished_folder(out), keep_s, fresh=fresh, notice=_say) as kept:
+        with Unfinished(unfinished_folder(out), keep_s, fresh=fresh, notice=say) as kept:
             try:
-                with _bar() as progress:
+                with bar() as progress:
                     done = run_any(read, lambda part, what: progress(0.8 * part, what), kept)
                     target = write_result(done, out, lambda part, what: progress(0.8 + 0.2 * part, what))
                 holds, says = verdict(done)
@@ -116,7 +114,7 @@ def run(
         typer.echo(f"report: {target / 'report.html'}")
         return 0 if holds else EXCEEDED
 
-    _guarded(work, debug)
+    guarded(work, debug)
 
 
 @app.command()
@@ -152,7 +150,7 @@ def check(
                 raise InputError(f"--{option}: belongs to a program: in a job state it in the file")
         return _check_job(file, sets or ())
 
-    _guarded(work, debug)
+    guarded(work, debug)
 
 
 @app.command()
@@ -183,7 +181,7 @@ def convert(
         here = _machine(from_machine) if from_machine is not None else there
         table = read_tools(tools) if tools is not None else None
         lengths = table.lengths() if table is not None else {}
-        with _bar() as progress:
+        with bar() as progress:
             reading = read_program(
                 source, here, dialect=dialect, tools=table, feed=_mm_s(feed_mm_min), tolerance=tolerance_mm,
                 progress=progress,
@@ -198,7 +196,7 @@ def convert(
         typer.echo(f"written: {target}: {len(text.splitlines())} lines for machine {there.name}, not verified")
         return EXCEEDED if any(f.code.startswith("machine-") and f.code not in HARMLESS for f in findings) else 0
 
-    _guarded(work, debug)
+    guarded(work, debug)
 
 
 @app.command()
@@ -215,7 +213,7 @@ def fit(
 
         job = load_fit(file)
         check_fit_target(out)
-        with _bar() as progress:
+        with bar() as progress:
             done = run_fit(job, progress)
             target = write_fit(done, out)
         holds, says = verdict(done)
@@ -227,7 +225,7 @@ def fit(
         typer.echo(f"report: {target / 'report.html'}")
         return 0 if holds else EXCEEDED
 
-    _guarded(work, debug)
+    guarded(work, debug)
 
 
 @app.command()
@@ -255,7 +253,7 @@ def cuts(
         from chipload.planning.thinwall.table import write_cuts
         from chipload.run import propose
 
-        with _bar() as progress:
+        with bar() as progress:
             found = propose(read, sites, scatter_percent / 100.0, bracket, steps, repeats, progress)
         write_cuts(out, found)
         for f in found.findings:
@@ -267,7 +265,7 @@ def cuts(
         typer.echo(f'fill in and name it in the job: [threshold] file = "{out.name}"')
         return 0
 
-    _guarded(work, debug)
+    guarded(work, debug)
 
 
 @app.command()
@@ -290,7 +288,7 @@ def example(
         typer.echo(f"copied: chipload run {copy_example(name, folder) / 'job.toml'} --out result")
         return 0
 
-    _guarded(work, debug)
+    guarded(work, debug)
 
 
 @app.command()
@@ -308,7 +306,7 @@ def view(
         serve(path, port, open_browser, typer.echo)
         return 0
 
-    _guarded(work, debug)
+    guarded(work, debug)
 
 
 @app.command()
@@ -342,7 +340,7 @@ def hal(
         )
         return 0 if record.ended == "path" else EXCEEDED
 
-    _guarded(work, debug)
+    guarded(work, debug)
 
 
 @app.callback(invoke_without_command=True)
@@ -402,7 +400,7 @@ def _check_program(
     from chipload.program.read import line_times, read_program, read_tools
 
     on = _machine(machine)
-    with _bar() as progress:
+    with bar() as progress:
         reading = read_program(
             path, on, dialect=dialect, tools=read_tools(tools) if tools is not None else None, feed=_mm_s(feed_mm_min),
             tolerance=tolerance_mm, progress=progress,
@@ -442,55 +440,4 @@ def _mm_s(mm_min: float | None) -> float | None:
         return None
     if not 0.0 < mm_min < 1e9:
         raise InputError(f"--feed-mm-min = {mm_min:g}: must be above 0")
-    return mm_min / 60.0
-
-
-def _guarded(work: Callable[[], int], debug: bool) -> NoReturn:
-    """Run a command; every way it can end has its exit code and one line."""
-    try:
-        raise typer.Exit(work())
-    except InputError as err:
-        _say(str(err))
-        code = WRONG
-    except (KeyboardInterrupt, Cancelled) as err:
-        _say(f"stopped: {str(err) or 'nothing was written'}")
-        code = STOPPED
-    except (typer.Exit, BrokenPipeError):
-        raise
-    except Exception as err:
-        if debug:
-            traceback.print_exc()
-        _say(
-            f"a fault of chipload: {type(err).__name__}: {err}. Please report it with the job file and the output of "
-            "the same command with --debug"
-        )
-        code = FAULT
-    raise typer.Exit(code)
-
-
-def _say(text: str) -> None:
-    typer.echo(f"chipload: {' '.join(text.split())}", err=True)
-
-
-@contextmanager
-def _bar() -> Iterator[Callable[[float, str], None]]:
-    """A progress bar on stderr where that is a terminal, else nothing."""
-    if not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
-        yield lambda done, what: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeElapsedColumn(),
-        TextColumn("{task.description}"),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
-        task = bars.add_task("", total=1.0)
-
-        def show(done: float, what: str) -> None:
-            bars.update(task, completed=done, description=what)
-
-        yield show
+    return mm_s_from_mm_min(mm_min)
