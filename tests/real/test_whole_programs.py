@@ -114,7 +114,7 @@ def dexels_of_bear(pitch: float) -> float:
     low, high, ball = bear()
     stock = TriDexel.block(low, high, pitch, "z")
     for a, b in itertools.pairwise(words()[0]):
-        stock.remove_move(a, (0, 0, 1), b, (0, 0, 1), ball.apt, error_mm=0.002)
+        stock.remove_move(a, (0, 0, 1), b, (0, 0, 1), ball.apt, error_mm=0.005)
     return float(np.prod(np.subtract(high, low)) - stock.volume())
 
 
