@@ -289,10 +289,6 @@ def deepest(moves: Moves, scene: Scene, cutter: CatalogueCutter, above: float, p
     return float(got[k]), int(row[k])
 
 
-def reversed_tracks(tracks: tuple[Track, ...]) -> tuple[Track, ...]:
-    """The tracks the other way round, and the last first."""
-    return tuple(replace(t.back(), line=t.line) for t in tracks[::-1])
-
 
 def _turned(p: Floats, angle: float) -> Floats:
     c, s = math.cos(angle), math.sin(angle)
