@@ -4,12 +4,20 @@ import os
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from canonical import Refused, compare_commands, parse_canonical, run_canonical
 from chipload.errors import InputError
+from chipload.machine.machine import machine_named
+from chipload.program.commands import ARC as COMMAND_ARC
+from chipload.program.commands import LINE as COMMAND_LINE
+from chipload.program.commands import extents
 from chipload.program.gcode.reader import read_gcode
 from chipload.program.gcode.tools import read_tool_table
+from chipload.program.motions import lengths
+from chipload.program.program import ARC_CCW, ARC_CW, LINE
+from chipload.program.to_work import to_work
 from rs274 import MISSING, rs274_installed
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2].parent / "shared" / "data")) / "nc"
@@ -80,6 +88,23 @@ def test_real_program_against_rs274(path):
         motions, _ = parse_canonical(printed)
         # S of G96 is no spindle speed here
         compare_commands(motions, commands, spindle="G96" not in text)
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="no programs")
+@pytest.mark.parametrize("path", _programs(), ids=lambda x: str(x.relative_to(DATA)))
+def test_what_is_read_has_a_way_in_the_workpiece(path):
+    """As long as that of the axes where no rotary axis moves; LinuxCNC takes arcs whose radii differ by 1e-3."""
+    try:
+        commands, _ = _read(path, path.read_bytes().decode("utf-8", "replace"))[0]
+    except InputError:
+        return
+    others = commands.position[:, 3:]
+    if len(commands) == 0 or np.ptp(others, axis=0).any():
+        return
+    program, _ = to_work(commands, machine_named("vmc"))
+    at = np.isin(program.motion, (LINE, ARC_CW, ARC_CCW))
+    own = extents(commands)[np.isin(commands.motion, (COMMAND_LINE, COMMAND_ARC))].sum()
+    assert lengths(program)[at].sum() == pytest.approx(own, rel=1e-3, abs=1e-6)
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="no programs")
