@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 import signal
@@ -33,7 +34,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def start(place: Path, out: str, *more: str, before: tuple[str, ...] = ()) -> subprocess.Popen[str]:
     words = [*before, *COMMAND, "run", str(place / "job.toml"), "--out", str(place / out), *more]
-    return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    # what starts the tests in the background may have it ignore Ctrl-C, which is handed down
+    heard = functools.partial(signal.signal, signal.SIGINT, signal.default_int_handler)
+    return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heard)
 
 
 def ended(process: subprocess.Popen[str]) -> subprocess.CompletedProcess[str]:

@@ -100,7 +100,7 @@ def corner_step(corner: float, scallop: float) -> float:
     """Step [mm] at which a corner leaves the scallop on a plane; the least of any toroid.
 
     >>> round(corner_step(2.0, 0.1), 4)
-    1.2490
+    1.249
     """
     h = min(scallop, corner)
     return 2.0 * math.sqrt(max(h * (2.0 * corner - h), 0.0))
