@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from chipload import examples
 from chipload.cli import app
+from mill import MILL
 from rs274 import MISSING, canonical, rs274_installed
 
 SLOT = """%
@@ -29,7 +30,8 @@ N110 G0 Z5
 N120 M2
 %
 """
-JOB = """[program]
+JOB = (
+    """[program]
 file = "slot.ngc"
 [machine]
 name = "vmc"
@@ -39,15 +41,9 @@ high_mm = [50.0, 15.0, 0.0]
 layer_mm = 1.0
 [material]
 name = "al7075-t6"
-[[cutter]]
-number = 1
-diameter_mm = 10.0
-flutes = 2
-helix_deg = 30.0
-flute_length_mm = 20.0
-overhang_mm = 30.0
-modulus_gpa = 580.0
-holder_mm = [[30.0, 40.0]]
+"""
+    + MILL
+    + """holder_mm = [[30.0, 40.0]]
 [stiffness]
 holder_gpa = inf
 grip_n_um = inf
@@ -65,6 +61,7 @@ fastest_percent = 400.0
 force_n = 350.0
 deflection_um = 14.0
 """
+)
 
 
 def call(*words):

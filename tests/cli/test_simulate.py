@@ -14,6 +14,7 @@ from chipload import examples
 from chipload.cli import app
 from chipload.cutting.material import material_named
 from chipload.stock.layers import LayeredStock
+from mill import MILL
 
 SLOT = """G21 G90 G17 G94
 T1 M6
@@ -24,7 +25,8 @@ G1 X30 F600
 G0 Z5
 M2
 """
-JOB = """[program]
+JOB = (
+    """[program]
 file = "slot.ngc"
 [machine]
 name = "vmc"
@@ -34,20 +36,15 @@ high_mm = [50.0, 15.0, 0.0]
 layer_mm = 1.0
 [material]
 name = "al7075-t6"
-[[cutter]]
-number = 1
-diameter_mm = 10.0
-flutes = 2
-helix_deg = 30.0
-flute_length_mm = 20.0
-overhang_mm = 30.0
-modulus_gpa = 580.0
-[[operation]]
+"""
+    + MILL
+    + """[[operation]]
 kind = "simulate"
 step_mm = 2.0
 [limits]
 force_n = 1000.0
 """
+)
 
 
 def call(*words):

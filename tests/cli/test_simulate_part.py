@@ -10,9 +10,11 @@ import trimesh
 from typer.testing import CliRunner
 
 from chipload.cli import app
+from mill import MILL
 
 SLOT = "G21 G90 G17 G94\nT1 M6\nS3000 M3\nG0 X-10 Y0 Z5\nG0 Z-2.1\nG1 X25 F600\nG0 Z5\nM2\n"
-JOB = """[program]
+JOB = (
+    """[program]
 file = "slot.ngc"
 [machine]
 name = "vmc"
@@ -31,15 +33,9 @@ units = "mm"
 spacing_mm = 1.0
 [material]
 name = "al7075-t6"
-[[cutter]]
-number = 1
-diameter_mm = 10.0
-flutes = 2
-helix_deg = 30.0
-flute_length_mm = 20.0
-overhang_mm = 30.0
-modulus_gpa = 580.0
-holder_mm = [[40.0, 40.0]]
+"""
+    + MILL
+    + """holder_mm = [[40.0, 40.0]]
 [[operation]]
 kind = "simulate"
 step_mm = 2.0
@@ -49,6 +45,7 @@ force_n = 1000.0
 gouge_mm = 0.02
 excess_mm = 0.1
 """
+)
 
 
 def box(low, high):
