@@ -289,7 +289,6 @@ def deepest(moves: Moves, scene: Scene, cutter: CatalogueCutter, above: float, p
     return float(got[k]), int(row[k])
 
 
-
 def _turned(p: Floats, angle: float) -> Floats:
     c, s = math.cos(angle), math.sin(angle)
     out: Floats = np.array([c * p[0] - s * p[1], s * p[0] + c * p[1], p[2]])
