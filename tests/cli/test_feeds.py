@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from typer.testing import CliRunner
 
 from chipload import examples
-from chipload.cli import app
+from cli.test_simulate import call
 from mill import MILL
 from rs274 import MISSING, canonical, rs274_installed
 
@@ -62,11 +61,6 @@ force_n = 350.0
 deflection_um = 14.0
 """
 )
-
-
-def call(*words):
-    done = CliRunner().invoke(app, [str(w) for w in words])
-    return done.exit_code, done.stdout, done.stderr
 
 
 @pytest.fixture

@@ -7,9 +7,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import trimesh
-from typer.testing import CliRunner
 
-from chipload.cli import app
+from cli.test_simulate import call
 from mill import MILL
 
 SLOT = "G21 G90 G17 G94\nT1 M6\nS3000 M3\nG0 X-10 Y0 Z5\nG0 Z-2.1\nG1 X25 F600\nG0 Z5\nM2\n"
@@ -53,11 +52,6 @@ def box(low, high):
     mesh = trimesh.creation.box(extents=high - low)
     mesh.apply_translation(0.5 * (low + high))
     return mesh
-
-
-def call(*words):
-    done = CliRunner().invoke(app, [str(w) for w in words])
-    return done.exit_code, done.stdout, done.stderr
 
 
 @pytest.fixture

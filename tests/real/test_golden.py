@@ -12,7 +12,7 @@ from chipload.errors import InputError
 from chipload.machine.machine import machine_named
 from chipload.program.commands import ARC as COMMAND_ARC
 from chipload.program.commands import LINE as COMMAND_LINE
-from chipload.program.commands import extents
+from chipload.program.commands import extents, spirals
 from chipload.program.gcode.reader import read_gcode
 from chipload.program.gcode.tools import read_tool_table
 from chipload.program.motions import lengths
@@ -104,7 +104,8 @@ def test_what_is_read_has_a_way_in_the_workpiece(path):
     program, _ = to_work(commands, machine_named("vmc"))
     at = np.isin(program.motion, (LINE, ARC_CW, ARC_CCW))
     own = extents(commands)[np.isin(commands.motion, (COMMAND_LINE, COMMAND_ARC))].sum()
-    assert lengths(program)[at].sum() == pytest.approx(own, rel=1e-3, abs=1e-6)
+    # an arc with two radii is counted by its first one
+    assert lengths(program)[at].sum() == pytest.approx(own, rel=1e-3 if spirals(commands, 1e-6).any() else 1e-9)
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="no programs")
