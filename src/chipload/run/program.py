@@ -220,10 +220,10 @@ def _simulated(
             passing(0.0, "distances to the part"),
         )  # fmt: skip
         solids["part"] = left.points
-    # costs as much as the chips, and says little where nothing is known to give way
-    forms = left is not None and (stiffness is not None or "form_error_um" in job.limits)
-    if left is not None and forms:
-        watches.append(forming(left, gives, material))
+    # form error costs as much as the chips, and says little where nothing is known to give way
+    made = left if stiffness is not None or "form_error_um" in job.limits else None
+    if made is not None:
+        watches.append(forming(made, gives, material))
 
     def watch(cuts: Cuts) -> dict[str, NDArray[np.float64]]:
         return {name: values for each in watches for name, values in each(cuts).items()}
@@ -236,12 +236,12 @@ def _simulated(
             program, stock, job.cutters, material, fine, interpolation=op.interpolation, watch=watch, progress=removing
         )  # fmt: skip
     else:
-        formed = (left.points, left.faces, left.distance, left.step) if left is not None and forms else None
+        formed = None if made is None else (made.points, made.faces, made.distance, made.step)
         removal = remove_in_pieces(
             program, stock, job.cutters, material, fine, unfinished, interpolation=op.interpolation, watch=watch,
             also=(versions(), sources(), repr(stiffness), formed), progress=removing,
         )  # fmt: skip
-    removal = with_columns(removal, watched(gives, formed=forms))
+    removal = with_columns(removal, watched(gives, formed=made is not None))
     touched = collisions(
         steps, job.cutters, solids, op.tolerance_mm, above_only=frozenset(["part"]),
         progress=passing(0.8 + SHARE, "collisions"),
