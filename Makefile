@@ -1,4 +1,4 @@
-# make setup | test | demo | lock
+# make setup | test | demo | reference | lock
 SHELL := /bin/bash
 PYTHON ?= $(shell /usr/bin/python3 -c 'import sys; print("/usr/bin/python3" if sys.version_info >= (3, 11) else "python3")' 2>/dev/null || echo python3)
 VENV := .venv
@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.ready
 export NUMBA_CACHE_DIR := $(CURDIR)/$(VENV)/numba
 
-.PHONY: setup test demo lock
+.PHONY: setup test demo reference lock
 .DELETE_ON_ERROR:
 
 setup: $(STAMP)
@@ -31,6 +31,10 @@ demo: setup
 	  code=0; $(BIN)/chipload run examples/$$name/job.toml --out result/$$name || code=$$?; \
 	  if [ $$code -ne 0 ] && [ $$code -ne 3 ]; then exit $$code; fi; \
 	done
+
+# docs/summary.schema.json, docs/columns.md and docs/jobs.md, from the source
+reference: setup
+	$(BIN)/python tools/docs_reference.py
 
 # needs uv on the path or in .venv, nothing else here does
 UV ?= $(shell command -v uv || echo $(BIN)/uv)

@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 from numba import njit
 
-from chipload.control import _kernels
+from chipload.control import _fuzzy, _override
 from chipload.control.fuzzy import standard
-from chipload.control.override import Override, begin
+from chipload.control.override import Override, begin, sets_of
 from chipload.control.plant import Loop, Spindle, TorqueProfile, run
 
 LIMIT = 2000.0
@@ -31,21 +31,20 @@ def answers(error, change, output, rules, kind, x, y, strength):
     total = 0.0
     for k in range(len(x)):
         if kind == 0:
-            total += _kernels.mamdani(error, change, output, rules, False, x[k], y[k], strength)
+            total += _fuzzy.mamdani(error, change, output, rules, False, x[k], y[k], strength)
         elif kind == 1:
-            total += _kernels.product_sum(error, change, output, rules, x[k], y[k])
+            total += _fuzzy.product_sum(error, change, output, rules, x[k], y[k])
         else:
             total += min(max(x[k] + y[k], -1.0), 1.0)
     return total
 
 
 @njit(nogil=True)
-def steps(p, error, change, output, rules, strength, state, torque):
+def steps(rules, sets, state, torque):
     o = 0.3
     for k in range(len(torque)):
-        o, _ = _kernels.step(
-            p, error, change, output, rules, False, strength, state, torque[k] * o, True, 0.0, -1.0, o, 0.01
-        )
+        seen = _override.Observation(torque[k] * o, 0.01, True, o, 0.0, -1.0, False)
+        o, _ = _override.step(rules, sets, state, seen)
     return o
 
 
@@ -72,8 +71,8 @@ def main() -> None:
         print(f"{name:28s}{n / seconds:14.0f} answers/s")
     torque = 2500.0 + rng.normal(0.0, 50.0, n)
     for kind in ("mamdani", "product-sum", "pi"):
-        p = replace(RULES, kind=kind).numbers
-        seconds, _ = best(lambda p=p: steps(p, *arrays, strength, begin(RULES), torque))
+        rules = replace(RULES, kind=kind).numbers
+        seconds, _ = best(lambda rules=rules: steps(rules, sets_of(table), begin(RULES), torque))
         print(f"step, {kind:22s}{n / seconds:14.0f} steps/s")
     s = np.arange(0.0, 280.1, 0.25)
     depth = 1900.0 + 1000.0 * np.sign(np.sin(s / 20.0)) + 1000.0 * (s > 80.0) * (s < 110.0)

@@ -28,13 +28,13 @@ from plotly.subplots import make_subplots
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.sections import checked, loft, read_meridian, read_sections
-from chipload.planning.sectional.answer import largest_cutters
-from chipload.planning.sectional.compare import compared
-from chipload.planning.sectional.costs import Side, Terms
-from chipload.planning.sectional.impeller import Impeller
-from chipload.planning.sectional.parametric import Shape, impeller_of
-from chipload.planning.sectional.search import limits
-from chipload.planning.sectional.surfaces import Sampled, surface_of
+from chipload.planning.impeller.answer import largest_cutters
+from chipload.planning.impeller.compare import compared
+from chipload.planning.impeller.costs import ChannelSide, Terms
+from chipload.planning.impeller.impeller import Impeller
+from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
+from chipload.planning.impeller.search import limits
+from chipload.planning.impeller.surfaces import Sampling3, surface_of
 
 HECC = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[1].parent / "shared" / "data")) / "blades/nasa_hecc"
 HECC = HECC / "HECC_Vaned_Configuration/Coordinates"
@@ -120,7 +120,7 @@ def scene_of(contact, check, around=0):
     side = max(int(math.sqrt(contact)), 2)
     along = max(int(math.sqrt(check / 3.0)), 3)
     u, v = np.linspace(0.03, 0.97, side), np.linspace(0.30, 0.98, max(contact // side, 1))
-    return impeller_of(Shape()).scene(0, "plus", (u, v), (along, along), NEAR, around, (along, along))
+    return impeller_of(ImpellerShape()).scene(0, "plus", (u, v), (along, along), NEAR, around, (along, along))
 
 
 def timed(scene, tables, every):
@@ -220,7 +220,7 @@ def divide(title, impeller, catalogue, picked, tables, names, how, terms) -> Non
         answer = largest_cutters(surface.scene, catalogue, tables, 0.5, workers=2)
         unreached.append(f"{surface.name} {len(answer.unreachable)}")
         index = -1 if side == "floor" else ("blade", "splitter").index(body)
-        sides.append(Side(index, side, surface.scene, surface.u, surface.v, surface.area, answer, 0.5))
+        sides.append(ChannelSide(index, side, surface.scene, surface.u, surface.v, surface.area, answer, 0.5))
     print(f"\n{title}: {sum(len(s.area) for s in sides)} contact points, scallop {terms.scallop} mm; searched in "
           f"{time.perf_counter() - begun:.1f} s; not reached: {', '.join(unreached)}")  # fmt: skip
     begun = time.perf_counter()
@@ -248,18 +248,18 @@ def divide(title, impeller, catalogue, picked, tables, names, how, terms) -> Non
 
 def patches() -> None:
     wide, tall, flat = (0.03, 0.97), (0.30, 0.98), (0.15, 0.85)
-    how = Sampled(wide, tall, (10, 10), 2.0, 2.0)
+    how = Sampling3(wide, tall, (10, 10), 2.0, 2.0)
     names = [("blade", "plus", wide, tall), ("blade", "minus", wide, tall), ("blade", "floor", wide, flat)]
     catalogue = catalogue_named("wu2019")
     picked = next(k for k, c in enumerate(catalogue.cutters) if c.corner_radius == 1.5)
     # the source: 100 mm/min, 0.1 mm; the changes are ours
     terms = Terms(100.0 / 60.0, 0.1, 60.0, 30.0, 11)
-    divide("impeller by formula", impeller_of(Shape()), catalogue, picked, TABLES, names[:2], how, terms)
-    divide("with the floor", impeller_of(Shape()), catalogue, picked, TABLES, names, how, terms)
+    divide("impeller by formula", impeller_of(ImpellerShape()), catalogue, picked, TABLES, names[:2], how, terms)
+    divide("with the floor", impeller_of(ImpellerShape()), catalogue, picked, TABLES, names, how, terms)
     if not HECC.is_dir():
         return
     wide, tall = (0.05, 0.95), (0.20, 0.98)
-    how = Sampled(wide, tall, (7, 4), 5.0, 2.0, ahead=10.0)
+    how = Sampling3(wide, tall, (7, 4), 5.0, 2.0, ahead=10.0)
     names = [
         (b, s, wide, flat if s == "floor" else tall) for b in ("blade", "splitter") for s in ("plus", "minus", "floor")
     ]

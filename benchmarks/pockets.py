@@ -23,10 +23,10 @@ import numpy as np
 
 from chipload.geometry.contour import Contour, Region
 from chipload.geometry.dxf import read_dxf
-from chipload.planning.front.front import CUT, ENTRY, LIFT, clear_region
-from chipload.planning.front.leftover import leftover
-from chipload.planning.front.reach import centre_region
-from chipload.simulation.trail import Trail, rim_engagement
+from chipload.planning.pocket.clearing import CUT, ENTRY, LIFT, clear_region
+from chipload.planning.pocket.leftover import leftover
+from chipload.planning.pocket.reach import centre_region
+from chipload.simulation.centre_path import CentrePath, rim_engagement
 
 #: drawing -> radius of the cutter [mm]
 POCKETS = {
@@ -142,7 +142,7 @@ def measured(rows, seconds, reachable, radius, spacing, workers):
     points, kind = rows[:, 0:2], rows[1:, 2]
     steps = np.column_stack([points[:-1], points[1:], np.zeros((len(points) - 1, 3))])
     leg = np.hypot(*(points[1:] - points[:-1]).T)
-    trail = Trail(steps, radius, None, kind < RAISED)
+    trail = CentrePath(steps, radius, None, kind < RAISED)
     cut = np.flatnonzero((kind == CUTTING) & (leg > 1e-9))
     along = np.cumsum(leg[cut])
     asked = np.arange(0.5, along[-1] / (spacing * radius)) * spacing * radius
@@ -182,7 +182,7 @@ def table(results, wanted):
         ("reached", 100.0, ".2f"),
     ]
     for name, r in results.items():
-        both = [r["front"], r.get("adaptive")]
+        both = [r["pocket"], r.get("adaptive")]
         cells = [" / ".join(format(x[key] * k, how) if x else "-" for x in both) for key, k, how in columns]
         ratio = f"{both[0]['seconds'] / both[1]['seconds']:.1f}" if both[1] else f"{both[0]['seconds']:.1f} s"
         out.append(f"| {name} | {r['radius_mm']:g} | " + " | ".join(cells) + f" | {ratio} |")
@@ -214,11 +214,11 @@ def main() -> None:
     results = {}
     for name in asked.names or POCKETS:
         radius = POCKETS[name]
-        drawing = read_dxf(asked.data / f"{name}.dxf", units_if_unsaid="mm")
+        drawing = read_dxf(asked.data / f"{name}.dxf", units_if_unstated="mm")
         region = Region.of([c for c in drawing.contours if c.closed])
         reachable = centre_region(centre_region(region, radius), -radius)
         results[name] = {"radius_mm": radius}
-        found = {"front": front_path(region, radius)}
+        found = {"pocket": front_path(region, radius)}
         if program is not None:
             found["adaptive"] = adaptive_path(region, radius, program, asked.tolerance, asked.timeout)
         for who, path in found.items():

@@ -5,7 +5,7 @@
 The program is a three-axis finishing program as a CAM writes it: a ball nose of 8 mm in rows 0.4 mm apart over a wavy
 surface, short lines of 0.4 mm, rows there and back; the stock is a block in layers of 0.25 mm. Every move is a step:
 its chip, force, torque and power are calculated and kept. The length of a row stays, so that a longer program has more
-rows. Each length runs in a process of its own, with its columns in files (``remove_in_pieces``, as `chipload run` has
+rows. Each length runs in a process of its own, with its columns in files (``remove_in_chunks``, as `chipload run` has
 them) or, with ``--memory``, in memory (``remove``). Peak memory is the most that the process ever had in memory;
 "before" is what it had with libraries, program and stock, when the simulation began.
 """
@@ -27,9 +27,9 @@ import numpy as np
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import material_named
 from chipload.program.program import LINE, RAPID, Program
+from chipload.simulation.checkpoint import Checkpoint
 from chipload.simulation.chips import Resolution, remove
-from chipload.simulation.pieces import remove_in_pieces
-from chipload.simulation.unfinished import Unfinished
+from chipload.simulation.chunks import remove_in_chunks
 from chipload.stock.layers import LayeredStock
 
 BALL = Cutter(8.0, 2, math.radians(30.0), 20.0, 35.0, 6e5, corner_radius=4.0)
@@ -70,11 +70,11 @@ def one(moves: int, memory: bool) -> dict[str, float]:
     stock = block(program)
     before = peak()
     wall, own = time.perf_counter(), time.process_time()
-    with tempfile.TemporaryDirectory() as folder, Unfinished(Path(folder) / "unfinished") as kept:
+    with tempfile.TemporaryDirectory() as folder, Checkpoint(Path(folder) / "unfinished") as kept:
         if memory:
             removal = remove(program, stock, {1: BALL}, material, RESOLUTION)
         else:
-            removal = remove_in_pieces(program, stock, {1: BALL}, material, RESOLUTION, kept)
+            removal = remove_in_chunks(program, stock, {1: BALL}, material, RESOLUTION, kept)
         wall, own = time.perf_counter() - wall, time.process_time() - own
         after = peak()
         force = float(removal.columns["force_n"].max())

@@ -37,9 +37,9 @@ from chipload.structure.grid import from_map
 from chipload.structure.places import normals_of, on_side
 from chipload.structure.removal import cut, prepare, start
 from chipload.structure.rows import row_compliances
-from chipload.structure.solid import Solid, compliance, factorise, loads
-from chipload.structure.watched import compliance as corrected
-from chipload.structure.watched import watch
+from chipload.structure.solid import SolidWorkpiece, compliance, factorise, loads
+from chipload.structure.unit_loads import compliance as corrected
+from chipload.structure.unit_loads import watch
 
 PLACES = 61
 
@@ -56,13 +56,13 @@ def timed(call):
     return value, spent() - begun
 
 
-def wall(rows: int, layers: int = 2) -> Solid:
+def wall(rows: int, layers: int = 2) -> SolidWorkpiece:
     u, v = np.linspace(0.0, 120.0, 2 * rows + 1), np.linspace(0.0, 60.0, rows + 1)
     grid = from_map(u, v, [0.0, 2.0, 3.0] if layers == 2 else [0.0, 3.0], lambda p: p)
-    return Solid(grid, 1.14e5, 0.34, 4.43e-9, grid.side("j-"))
+    return SolidWorkpiece(grid, 1.14e5, 0.34, 4.43e-9, grid.side("j-"))
 
 
-def deck(solid: Solid, steps: int, F) -> str:
+def deck(solid: SolidWorkpiece, steps: int, F) -> str:
     """Text for ccx with the first forces, one a step."""
     grid = solid.grid
     lines = ["*NODE, NSET=ALL", *(f"{i + 1}, {x:.12e}, {y:.12e}, {z:.12e}" for i, (x, y, z) in enumerate(grid.nodes))]
@@ -81,26 +81,26 @@ def deck(solid: Solid, steps: int, F) -> str:
     return "\n".join([*lines, ""])
 
 
-def by_calculix(solid: Solid, F, steps: int) -> float:
+def by_calculix(solid: SolidWorkpiece, F, steps: int) -> float:
     with tempfile.TemporaryDirectory() as name:
         (Path(name) / "part.inp").write_text(deck(solid, steps, F))
         run = ["ccx", "part"]
         return timed(lambda: subprocess.run(run, cwd=name, check=True, stdout=subprocess.DEVNULL))[1]
 
 
-def calculix_times(solid: Solid, F) -> tuple[float, float]:
+def calculix_times(solid: SolidWorkpiece, F) -> tuple[float, float]:
     """Seconds of one force, and of each further one."""
     one, three = by_calculix(solid, F, 1), by_calculix(solid, F, 3)
     return one, (three - one) / 2.0
 
 
-def row(solid: Solid, below: int):
+def row(solid: SolidWorkpiece, below: int):
     """Stock of one row, counted from the free edge."""
     columns, rows, _ = solid.grid.counts
     return solid.grid.element(np.arange(columns), np.full(columns, rows - 1 - below), 1)
 
 
-def by_rows(name: str, solid: Solid, left: float, ccx: float) -> None:
+def by_rows(name: str, solid: SolidWorkpiece, left: float, ccx: float) -> None:
     """A line of the table of whole rows."""
     grid = solid.grid
     _, rows, layers = grid.counts

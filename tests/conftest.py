@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 
 from chipload.cutter.cutter import Cutter
+from chipload.errors import Finding
 from chipload.geometry.contour import Contour
+from chipload.jobs.contour.outcome import ContourResult, Operation, Verification
 from chipload.machine.machine import machine_named
-from chipload.planning.result import Event, LimitCheck, OperationResult, StrategyResult
+from chipload.planning.result import Event, OperationResult, StrategyResult
 from chipload.program.build import follow, plunge, rapid, retract
 from chipload.program.program import Program
-from chipload.report.outcome import Operation, Outcome, Proof
+from chipload.result import Provenance, Verdict
 
 EXAMPLES = Path(__file__).parents[1] / "src" / "chipload" / "examples"
 WALL = Contour.from_bulges([[0, 28], [0, 8], [8, 0], [28, 0]], [0, math.tan(math.pi / 8), 0, 0])
@@ -45,13 +47,11 @@ def made_strategy(name: str, rows: int = 900) -> StrategyResult:
         "force_y_n": np.concatenate([np.full(rows, 30.0), -force * T[:, 0]]),
         "force_xy_n": np.concatenate([np.full(rows, 95.0), force]),
         "torque_nm": np.concatenate([np.full(rows, 0.4), force / 300.0]),
-        "error_um": np.concatenate([np.zeros(rows), force / 8.0]),
+        "form_error_um": np.concatenate([np.zeros(rows), force / 8.0]),
     }
     start = np.array([*CENTRES.start, 5.0])
     parts = [rapid(start, 314.159, 1, "finish"), plunge([*CENTRES.start, -5.0], 10.0, 314.159, 1, "finish")]
     parts += [follow(CENTRES, -5.0, 10.0, 314.159, 1, "finish"), retract([*CENTRES.end, 5.0], 314.159, 1, "finish")]
-    k = rows + int(a.argmax())
-    at = (float(history["x_mm"][k]), float(history["y_mm"][k]))
     span = {
         c: {"min": float(v.min()), "max": float(v.max())} for c, v in (("engagement_deg", a), ("force_xy_n", force))
     }
@@ -59,35 +59,33 @@ def made_strategy(name: str, rows: int = 900) -> StrategyResult:
         name,
         Program.join(parts),
         history,
-        {**span, "torque_nm": span["force_xy_n"], "error_um": {"max": float(force.max() / 8.0)}, "time_s": 9.0},
+        {**span, "torque_nm": span["force_xy_n"], "form_error_um": {"max": float(force.max() / 8.0)}, "time_s": 9.0},
         (Event("lead-none", 5.0, 28.0, "no room to lead in"),),
-        (
-            LimitCheck("engagement_deg", 13.0, float(a.max()), at),
-            LimitCheck("force_xy_n", 200.0, float(force.max()), at),
-        ),
+        np.arange(two) >= rows,
         {"wall": (WALL,), "stock": (BEFORE,), "finish path": (CENTRES,)},
     )
 
 
-def made_outcome(use: str = "backward", status: str = "proved", rows: int = 900) -> Outcome:
-    """A whole run of one operation with three strategies."""
+def made_outcome(use: str = "backward", verdict: Verdict = Verdict.HOLDS, rows: int = 900) -> ContourResult:
+    """A whole run of one operation with three strategies; ``verdict`` is that of the simulation."""
     names = ("plain", "backward", "feed")
     result = OperationResult("contour", use, {n: made_strategy(n, rows) for n in names}, ("made by formula",))
     cutter = Cutter(10.0, 4, math.radians(30.0), 22.0, 35.0, 5.8e5)
-    proofs = {n: Proof(status, f"{status}: 1800 rows compared", {"gouge_mm": 0.0}) for n in names}
-    operation = Operation(result, {"kind": "contour", "use": use, "feed_mm_min": 600.0}, cutter, 0.0, 5.0, proofs)
-    return Outcome(
+    checks = {n: Verification(verdict, "1800 rows compared", {"gouge_mm": 0.0}) for n in names}
+    settings = {"kind": "contour", "use": use, "feed_mm_min": 600.0}
+    limits = {"engagement_deg": 13.0, "force_xy_n": 200.0}
+    return ContourResult(
         "corner",
-        (operation,),
+        (Operation(result, settings, cutter, 0.0, 5.0, checks, limits=limits),),
         machine_named("vmc"),
         ("torque_nm",),
-        ("operation.0.x: a finding",),
-        {"inputs": {"job": "x"}},
+        (Finding("made", 0, "operation.0.x: a finding"),),
+        Provenance({"job": "x"}, (), "vmc", {}, {}),
     )
 
 
 @pytest.fixture
-def outcome() -> Callable[..., Outcome]:
+def outcome() -> Callable[..., ContourResult]:
     """A maker of outcomes."""
     return made_outcome
 

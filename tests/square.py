@@ -1,13 +1,16 @@
 """A result written by hand: the cutter goes round a square, and every number of it is known."""
 
 import hashlib
-import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 import trimesh
+
+from chipload.errors import Finding, Severity
+from chipload.result import LimitCheck, Provenance, Result, Track, TrackKind, Verdict, in_memory
+from chipload.result.history import write_history
+from chipload.result.summary import summary_bytes
 
 ROWS = 200
 #: hand-made history: the cutter goes round a square of 40 mm, 0.1 s a step, one line of the program a side
@@ -28,17 +31,15 @@ CL = (
 )
 
 
-def make_result(folder: Path, job: str = "square", program: bytes = PROGRAM.encode(), scene: bool = True) -> Path:
-    """A result of a simulated program, written by hand."""
-    folder.mkdir(parents=True)
+def square_result(job: str = "square", program: bytes = PROGRAM.encode()) -> Result:
+    """The result of the program; its numbers are stated, not calculated from the history."""
     columns = {
-        "operation": np.zeros(ROWS, dtype=np.int32),
-        "strategy": pa.array(["program"] * ROWS),
-        "pass": pa.array(["square"] * ROWS),
+        "pass": np.array(["square"] * ROWS, dtype=object),
         "line": LINE,
         "tool": np.ones(ROWS, dtype=np.int64),
         "s_mm": 0.8 * np.arange(1, ROWS + 1),
         "t_s": T,
+        "duration_s": np.full(ROWS, 0.1),
         "x_mm": X,
         "y_mm": Y,
         "z_mm": np.full(ROWS, -2.0),
@@ -46,26 +47,56 @@ def make_result(folder: Path, job: str = "square", program: bytes = PROGRAM.enco
         "force_n": FORCE,
         "torque_nm": FORCE / 100.0,
     }
-    pq.write_table(pa.table(columns), folder / "history.parquet")
-    limits = [
-        {"name": "force_n", "limit": 800.0, "worst": 900.0, "line": 9, "at_mm": [23.2, 40.0, -2.0], "holds": False},
-        {"name": "torque_nm", "limit": 12.0, "worst": 9.0, "line": 9, "at_mm": [23.2, 40.0, -2.0], "holds": True},
-    ]
-    fails = ["force 900 N exceeds 800 N in line 9", "line 8: a rapid goes through material"]
-    summary = {
-        "holds": False,
-        "says": "Does not hold: force 900 N exceeds 800 N in line 9; and 1 more.",
-        "job": job,
-        "program": {"status": "failed"},
-        "operations": [
-            {"kind": "simulate", "holds": False, "fails": fails, "limits": limits, "unchecked": ["power_w"]}
-        ],
-        "findings": [{"code": "x", "line": 3, "text": "no tool table"}],
-        "provenance": {"inputs": {"program": f"square.ngc sha256 {hashlib.sha256(program).hexdigest()}"}},
-    }
-    (folder / "summary.json").write_text(json.dumps(summary))
+    at = (23.2, 40.0, -2.0)
+    limits = (
+        LimitCheck("force_n", 800.0, 900.0, Verdict.EXCEEDS, "program", 120, 9, at, 12.1),
+        LimitCheck("torque_nm", 12.0, 9.0, Verdict.HOLDS, "program", None, 9, at),
+    )
+    found = (Finding("rapid-in-stock", 8, "a rapid goes through material", Severity.EXCEEDS),)
+    track = Track(
+        "program", TrackKind.PROGRAM, True, 20.0, limits, found, ("0-program.apt",), blocks=in_memory(columns)
+    )  # fmt: skip
+    return Result(
+        "program",
+        job,
+        (track,),
+        ({"kind": "simulate"},),
+        (Finding("no-tool-table", 3, "no tool table"),),
+        ("limit power_w: not stated",),
+        Provenance({"program": f"square.ngc sha256 {hashlib.sha256(program).hexdigest()}"}, (), "vmc", {}, {}),
+    )
+
+
+def two_variants() -> Result:
+    """Two tracks: half the force in half the time is in use, the other exceeds its limit and has a finding."""
+    one = square_result()
+    columns = dict(one.tracks[0].columns)
+    half = {**columns, "force_n": FORCE / 2.0}
+    twice = {**columns, "t_s": 2.0 * T, "duration_s": np.full(ROWS, 0.2)}
+    at = (23.2, 40.0, -2.0)
+    holds = LimitCheck("force_n", 800.0, 450.0, Verdict.HOLDS, "variable", 120, 9, at, 12.1)
+    exceeds = LimitCheck("force_n", 800.0, 900.0, Verdict.EXCEEDS, "constant", 120, 9, at, 24.2)
+    found = (Finding("off-part", 8, "the path leaves the workpiece", Severity.EXCEEDS),)
+    kind, program = TrackKind.VARIANT, ("0-program.apt",)
+    constant = Track("constant", kind, False, 40.0, (exceeds,), found, program, 0, {"depth_mm": 1.0}, in_memory(twice))
+    variable = Track("variable", kind, True, 20.0, (holds,), (), program, 0, {"depth_mm": 2.0}, in_memory(half))
+    return replace(one, tracks=(variable, constant))
+
+
+def write_by_hand(result: Result, folder: Path) -> Path:
+    """Summary and history of a result, its CL data, and a report of one line."""
+    folder.mkdir(parents=True)
+    with (folder / "history.parquet").open("wb") as file:
+        rows = write_history(result, file)
+    (folder / "summary.json").write_bytes(summary_bytes(result, rows))
     (folder / "0-program.apt").write_text(CL)
     (folder / "report.html").write_text("<p>the report</p>")
+    return folder
+
+
+def make_result(folder: Path, job: str = "square", program: bytes = PROGRAM.encode(), scene: bool = True) -> Path:
+    """The folder of :func:`square_result`."""
+    write_by_hand(square_result(job, program), folder)
     if scene:
         box = trimesh.creation.box(extents=(60.0, 60.0, 10.0))
         box.apply_translation((20.0, 20.0, -7.0))

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from chipload.geometry.bspline import Patch
+from chipload.geometry.bspline import BSplinePatch
 from chipload.geometry.revolve import Revolved
 
 
-def surface(patch: Patch):
+def surface(patch: BSplinePatch):
     """The kernel's surface with the poles and knots of a patch."""
     from OCP.collections import Array1_double, Array1_int, Array2_gp_Pnt
     from OCP.Geom import Geom_BSplineSurface
@@ -31,7 +31,7 @@ def surface(patch: Patch):
     return Geom_BSplineSurface(poles, ku, kv, mu, mv, *patch.degrees)
 
 
-def face(patch: Patch):
+def face(patch: BSplinePatch):
     """The whole patch as a face."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 

@@ -3,16 +3,20 @@
 import contextlib
 import io
 import re
+import tomllib
 from pathlib import Path
 
 from chipload import examples
 
-README = (Path(__file__).parent.parent / "README.md").read_text()
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text()
+SOURCE_MAP = (ROOT / "docs" / "design" / "architecture.md").read_text()
 
 
 def test_examples(tmp_path, monkeypatch):
     """One after the other, as in one notebook."""
     examples.copy_example("notebooks", tmp_path / "my-notebooks")
+    examples.copy_example("contour", tmp_path / "my-job")
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
     blocks = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
@@ -26,9 +30,23 @@ def test_examples(tmp_path, monkeypatch):
         assert out.getvalue().strip() == shown
 
 
+def test_the_explained_job_is_the_example_but_for_its_defaults():
+    block = tomllib.loads(re.search(r"```toml\n(.*?)```", README, re.DOTALL)[1])
+    example = tomllib.loads((Path(examples.__file__).parent / "chips" / "job.toml").read_text())
+    for key, table in block.items():
+        for mine, theirs in zip(*([x] if isinstance(x, dict) else x for x in (table, example[key])), strict=True):
+            assert mine.items() <= theirs.items(), key
+
+
+def test_the_readme_is_short_and_its_links_lead_somewhere():
+    assert len(README.splitlines()) < 250
+    for target in re.findall(r"\]\(([^)#]+)\)", README):
+        assert (ROOT / target).exists(), target
+
+
 def test_files_of_the_table_exist():
-    root = Path(__file__).parent.parent / "src" / "chipload"
-    rows = re.findall(r"^\| [^|]*\? \| ([^|]*) \| ([^|]*) \|", README, re.MULTILINE)
+    root = ROOT / "src" / "chipload"
+    rows = re.findall(r"^\| [^|]*\? \| ([^|]*) \| ([^|]*) \|", SOURCE_MAP, re.MULTILINE)
     assert len(rows) >= 10
     for rooms, files in rows:
         for name in re.findall(r"`([a-z_]+\.py)`", files):

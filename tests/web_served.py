@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 class Served:
-    """A page that is served: its address, the folder, the process."""
+    """A page that is served: its address, its token, the folder, the process."""
 
     def __init__(self, folder: Path, *options: str) -> None:
         self.folder = folder
@@ -21,9 +21,9 @@ class Served:
         self.said = []
         for line in self.process.stdout:
             self.said.append(line)
-            if found := re.search(r"http://127\.0\.0\.1:(\d+)/", line):
-                self.port = int(found[1])
-                self.url = found[0]
+            if found := re.search(r"(http://127\.0\.0\.1:(\d+)/)\?token=(\S+)", line):
+                self.url, self.port, self.token = found[1], int(found[2]), found[3]
+                self.cookie = f"chipload-{self.port}={self.token}"
                 return
         raise AssertionError("".join(self.said))
 
@@ -37,3 +37,7 @@ class Served:
                 self.process.kill()
             assert self.process.stdout is not None
             self.process.stdout.close()
+
+    def address(self, rest: str = "") -> str:
+        """The address with its token, as the command prints it; ``rest`` is a query that begins with `?`."""
+        return f"{self.url}?token={self.token}{rest.replace('?', '&')}"

@@ -1,7 +1,8 @@
 """The command line: parse, call one function, show.
 
 Exit codes of every command: 0 done and every limit holds; 2 the input is wrong (one line, nothing written); 3 done, but
-a limit or a status does not hold; 1 a fault of ours; 130 stopped by Ctrl-C. Imports are late so that `--help` is quick.
+a limit or a status does not hold; 4 the result cannot be written, what is kept of the work stays; 1 a fault of ours;
+130 stopped by Ctrl-C. Imports are late so that `--help` is quick.
 """
 
 from __future__ import annotations
@@ -9,23 +10,26 @@ from __future__ import annotations
 import math
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from chipload.errors import Cancelled, InputError
-from chipload.terminal import EXCEEDED, bar, guarded, say
+from chipload.errors import Cancelled, InputError, Severity, worst_severity
+from chipload.terminal import EXCEEDED, bar, guarded, say, show
 from chipload.units import mm_s_from_mm_min
 
 if TYPE_CHECKING:
     from chipload.machine.machine import Machine
+    from chipload.program.setup import Setup
 
 #: [mm] where none is stated
 TOLERANCE_MM = 0.001
 #: [s] between two states of a simulation
 KEEP_S = 10.0
+#: machines that a program is read for where none is stated: the first that has its axes
+GENERIC = ("vmc", "xyzbc-trunnion", "xyzac-trunnion", "xyzbc-head-table")
 #: findings of a machine that break nothing
 HARMLESS = ("machine-singular", "machine-rewind", "machine-offset")
 
@@ -35,7 +39,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="Plans and proves CNC milling of the parts that are hard to mill.",
-    epilog="Exit codes: 0 every limit holds; 2 wrong input, nothing written; 3 a limit does not hold; 1 our fault.",
+    epilog="Exit codes: 0 every limit holds; 2 wrong input, nothing written; 3 a limit does not hold; 4 the result "
+    "cannot be written, kept work stays; 1 our fault.",
 )
 
 JobFile = Annotated[Path, typer.Argument(metavar="JOB", help="the job file (TOML)")]
@@ -55,7 +60,19 @@ DialectName = Annotated[
     str | None,
     typer.Option("--dialect", help="linuxcnc, fanuc, sinumerik, heidenhain or apt; else by the file's ending"),
 ]
-FeedIfUnsaid = Annotated[float | None, typer.Option("--feed-mm-min", help="feed of CL data that state none")]
+FeedIfUnsaid = Annotated[float | None, typer.Option("--feed-mm-min", help="feed of cuts before the program states one")]
+ParameterValues = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--parameter", metavar="NAME=VALUE", help="a value that the controller holds, as Q10=5 or '#100=2'; repeatable"
+    ),
+]
+WorkOffsets = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--work-offset", metavar="CODE=X,Y,Z", help="origin of a work offset in the machine, as G55=80,0,0; repeatable"
+    ),
+]
 ToleranceMm = Annotated[
     float,
     typer.Option("--tolerance-mm", help="how far the tip may leave its path where a move with rotary axes is cut up"),
@@ -86,22 +103,24 @@ def run(
     """
 
     def work() -> int:
-        from chipload.job import load_job
+        from chipload.jobs import load_job, run_job
 
-        read = load_job(job, sets or ())
-        from chipload.report.folder import check_target, unfinished_folder, verdict, write_result
-        from chipload.run import run as run_any
-        from chipload.simulation.unfinished import Unfinished
+        loaded = load_job(job, sets or ())
+        from chipload.report.folder import check_target, checkpoint_folder, write_finished
+        from chipload.simulation.checkpoint import Checkpoint
 
         check_target(out)
         if not 0.0 <= keep_s < math.inf:
             raise InputError(f"--keep-s = {keep_s:g}: must be at least 0 s")
-        with Unfinished(unfinished_folder(out), keep_s, fresh=fresh, notice=say) as kept:
+        if not loaded.capability.resumes:
+            say(f"a {loaded.capability.name} job does not resume: if it is stopped, it begins again")
+        with Checkpoint(checkpoint_folder(out), keep_s, fresh=fresh, notice=say) as kept:
             try:
                 with bar() as progress:
-                    done = run_any(read, lambda part, what: progress(0.8 * part, what), kept)
-                    target = write_result(done, out, lambda part, what: progress(0.8 + 0.2 * part, what))
-                holds, says = verdict(done)
+                    done = run_job(loaded, lambda part, what: progress(0.8 * part, what), kept)
+                    target = write_finished(
+                        done.result, done.presentation, out, lambda part, what: progress(0.8 + 0.2 * part, what)
+                    )
             except (KeyboardInterrupt, Cancelled):
                 if not kept.safe:
                     raise
@@ -110,9 +129,9 @@ def run(
                     "--fresh it begins again"
                 ) from None
             kept.discard()
-        typer.echo(says)
-        typer.echo(f"report: {target / 'report.html'}")
-        return 0 if holds else EXCEEDED
+        show(done.result.message)
+        show(f"report: {target / 'report.html'}")
+        return done.result.verdict.exit_code
 
     guarded(work, debug)
 
@@ -121,34 +140,48 @@ def run(
 def check(
     file: Annotated[
         Path,
-        typer.Argument(metavar="JOB|PROGRAM|MODEL", help="a job (TOML), a program (NC text, CL data) or a STEP file"),
+        typer.Argument(metavar="FILE", help="a job, or any file that a job names"),
     ],
     machine: MachineName = None,
     tools: Tools = None,
     dialect: DialectName = None,
     feed_mm_min: FeedIfUnsaid = None,
     tolerance_mm: ToleranceMm = TOLERANCE_MM,
+    parameters: ParameterValues = None,
+    work_offsets: WorkOffsets = None,
     sets: Sets = None,
     debug: Debug = False,
 ) -> None:
-    """Read a job and all that it names, a program as its controller does, or list a model's faces; write nothing."""
+    """Read any file as a run would and list all that is wrong; nothing is run or written.
+
+    A job with all that it names; a program as its controller does, on machine vmc (or one with the rotary axes that it
+    needs) where none is stated; a fit; the faces of a STEP file; a drawing, mesh, machine, material or tool table.
+    """
 
     def work() -> int:
-        if file.suffix.lower() in (".step", ".stp"):
-            return _check_model(file)
-        if file.suffix.lower() != ".toml":
-            if sets:
-                raise InputError("--set: belongs to a job: leave it out for a program")
-            return _check_program(file, machine, tools, dialect, feed_mm_min, tolerance_mm)
+        from chipload.jobs.inspection import BY_ENDING, inspect_file
+
+        job = file.suffix.lower() == ".toml"
+        if sets and not job:
+            raise InputError("--set: belongs to a job: leave it out for another file")
+        if not job and file.suffix.lower() not in BY_ENDING:
+            setup = _setup(parameters or (), work_offsets or ())
+            return _check_program(file, machine, tools, dialect, feed_mm_min, tolerance_mm, setup)
         for option, value in (
             ("machine", machine),
             ("tools", tools),
             ("dialect", dialect),
             ("feed-mm-min", feed_mm_min),
+            ("parameter", parameters or None),
+            ("work-offset", work_offsets or None),
         ):
             if value is not None:
                 raise InputError(f"--{option}: belongs to a program: in a job state it in the file")
-        return _check_job(file, sets or ())
+        found = inspect_file(file, sets or ())
+        lines, holds = found if found is not None else ([], True)
+        for text in lines:
+            show(text)
+        return 0 if holds else EXCEEDED
 
     guarded(work, debug)
 
@@ -187,14 +220,15 @@ def convert(
                 progress=progress,
             )  # fmt: skip
             text, findings = convert_program(
-                reading.program, reading.noticed, there, target.suffix, title=source.name,
+                reading.program, reading.findings, there, target.suffix, title=source.name,
                 tool_lengths=lengths, tcp=tcp, tolerance=tolerance_mm,
             )  # fmt: skip
             write_whole(target, text.encode("ascii"))
-        for f in (*reading.noticed, *findings):
-            typer.echo(str(f))
-        typer.echo(f"written: {target}: {len(text.splitlines())} lines for machine {there.name}, not verified")
-        return EXCEEDED if any(f.code.startswith("machine-") and f.code not in HARMLESS for f in findings) else 0
+        for f in (*reading.findings, *findings):
+            show(str(f))
+        show(f"written: {target}: {len(text.splitlines())} lines for machine {there.name}, not verified")
+        exceeded = any(f.code.startswith("machine-") and f.code not in HARMLESS for f in findings)
+        return EXCEEDED if exceeded or worst_severity(reading.findings) >= Severity.UNPROVEN else 0
 
     guarded(work, debug)
 
@@ -203,27 +237,28 @@ def convert(
 def fit(
     file: Annotated[Path, typer.Argument(metavar="FIT", help="the fit (TOML): measured cuts, cutter, engagement")],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="the result folder; appears whole or not at all")],
+    sets: Sets = None,
     debug: Debug = False,
 ) -> None:
     """Identify force coefficients from measured forces; write a material, its intervals and what it predicts."""
 
     def work() -> int:
-        from chipload.cutting.fit_job import load_fit, run_fit
-        from chipload.report.fit import check_fit_target, verdict, write_fit
+        from chipload.jobs import load_job, run_job
 
-        job = load_fit(file)
-        check_fit_target(out)
+        loaded = load_job(file, sets or ())
+        if loaded.capability.name != "fit":
+            raise InputError(f"{file.name}: has no [[measurement]]: give it to chipload run")
+        from chipload.report.folder import check_target, write_finished
+
+        check_target(out)
         with bar() as progress:
-            done = run_fit(job, progress)
-            target = write_fit(done, out)
-        holds, says = verdict(done)
-        for f in job.findings:
-            typer.echo(str(f))
-        for text in done.notes:
-            typer.echo(f"note: {text}")
-        typer.echo(says)
-        typer.echo(f"report: {target / 'report.html'}")
-        return 0 if holds else EXCEEDED
+            done = run_job(loaded, progress)
+            target = write_finished(done.result, done.presentation, out)
+        for f in done.result.findings:
+            show(str(f))
+        show(done.result.message)
+        show(f"report: {target / 'report.html'}")
+        return done.result.verdict.exit_code
 
     guarded(work, debug)
 
@@ -245,24 +280,25 @@ def cuts(
     """Propose calibration cuts for a job with a [wall]: what it bears, measured; [threshold] file reads the table."""
 
     def work() -> int:
-        from chipload.job import WallJob, load_job
+        from chipload.jobs import load_job
+        from chipload.jobs.thinwall.job import ThinWallJob
 
-        read = load_job(job, sets or ())
-        if not isinstance(read, WallJob):
+        read = load_job(job, sets or ()).job
+        if not isinstance(read, ThinWallJob):
             raise InputError(f"{job.name}: has no [wall]: calibration cuts are proposed for a thin wall")
+        from chipload.jobs.thinwall.run import propose
         from chipload.planning.thinwall.table import write_cuts
-        from chipload.run import propose
 
         with bar() as progress:
             found = propose(read, sites, scatter_percent / 100.0, bracket, steps, repeats, progress)
         write_cuts(out, found)
         for f in found.findings:
-            typer.echo(str(f))
-        typer.echo(
+            show(str(f))
+        show(
             f"{len(found.site)} cuts at {len(found.sites)} places: interpolation misses {100.0 * found.bias:.2g} %, "
             f"scatter brings {100.0 * found.noise:.2g} % (root mean square over the wall)"
         )
-        typer.echo(f'fill in and name it in the job: [threshold] file = "{out.name}"')
+        show(f'fill in and name it in the job: [threshold] file = "{out.name}"')
         return 0
 
     guarded(work, debug)
@@ -281,11 +317,11 @@ def example(
 
         if name is None:
             for key, title in example_titles().items():
-                typer.echo(f"{key:12} {title}")
+                show(f"{key:12} {title}")
             return 0
         if folder is None:
             raise InputError(f"example {name}: missing folder: chipload example {name} DIR")
-        typer.echo(f"copied: chipload run {copy_example(name, folder) / 'job.toml'} --out result")
+        show(f"copied: chipload run {copy_example(name, folder) / 'job.toml'} --out result")
         return 0
 
     guarded(work, debug)
@@ -303,7 +339,7 @@ def view(
     def work() -> int:
         from chipload.web.serve import serve
 
-        serve(path, port, open_browser, typer.echo)
+        serve(path, port, open_browser, show)
         return 0
 
     guarded(work, debug)
@@ -323,7 +359,7 @@ def hal(
 
     def work() -> int:
         from chipload.control.hal import control, load_hal, table_of
-        from chipload.control.linuxcnc.door import HalPins
+        from chipload.control.linuxcnc.hal_client import HalPins
         from chipload.files import write_whole
 
         job = load_hal(file)
@@ -331,10 +367,17 @@ def hal(
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda n, _: asked.append(n))
         with HalPins(name, python) as pins:
-            record = control(job, pins, stop=lambda: bool(asked))
+            record = control(
+                job,
+                pins,
+                stop=lambda: bool(asked),
+                notice=lambda reason, s: typer.echo(
+                    f"stopped the machine: {reason} at {s:.4g} mm: it stays stopped until this command ends", err=True
+                ),
+            )
         if out is not None:
             write_whole(out, table_of(record).encode("ascii"))
-        typer.echo(
+        show(
             f"{len(record.rows)} steps, ended: {record.ended}; greatest torque {1e-3 * record.torque_max:.4g} N m, "
             f"limit held {1e-3 * job.override.torque_ref:.4g} N m"
         )
@@ -349,7 +392,7 @@ def top(version: Annotated[bool, typer.Option("--version", help="show the versio
     if version:
         from importlib.metadata import version as installed
 
-        typer.echo(f"chipload {installed('chipload')}")
+        show(f"chipload {installed('chipload')}")
         raise typer.Exit
 
 
@@ -365,28 +408,6 @@ def _stop(_number: int, _frame: object) -> NoReturn:
     raise KeyboardInterrupt
 
 
-def _check_job(job: Path, sets: Sequence[str]) -> int:
-    """Check a job: say what it is and what was noticed."""
-    from chipload.job import load_job
-
-    read = load_job(job, sets)
-    from chipload.run import look
-
-    lines, holds = look(read)
-    for text in lines:
-        typer.echo(text)
-    return 0 if holds else EXCEEDED
-
-
-def _check_model(model: Path) -> int:
-    """List the faces of a STEP file, as jobs name them."""
-    from chipload.geometry.step_faces import read_faces
-
-    for text in read_faces(model, "model").lines():
-        typer.echo(text)
-    return 0
-
-
 def _check_program(
     path: Path,
     machine: str | None,
@@ -394,30 +415,67 @@ def _check_program(
     dialect: str | None,
     feed_mm_min: float | None,
     tolerance_mm: float,
+    setup: Setup,
 ) -> int:
-    """Check a program: findings by line, then what it is."""
+    """Check a program: what leaves it unproven, the other findings by line, then what it is."""
     from chipload.program.motions import lengths
     from chipload.program.read import line_times, read_program, read_tools
 
-    on = _machine(machine)
-    with bar() as progress:
-        reading = read_program(
-            path, on, dialect=dialect, tools=read_tools(tools) if tools is not None else None, feed=_mm_s(feed_mm_min),
-            tolerance=tolerance_mm, progress=progress,
-        )  # fmt: skip
-    broken = set(map(id, reading.broken))
-    for f in sorted((*reading.noticed, *reading.broken), key=lambda f: f.line):
-        typer.echo(f"{f}{' [does not hold]' if id(f) in broken else ''}")
+    table, feed = read_tools(tools) if tools is not None else None, _mm_s(feed_mm_min)
+    refused: InputError | None = None
+    for name in GENERIC if machine is None else (machine,):
+        on = _machine(name)
+        try:
+            with bar() as progress:
+                reading = read_program(
+                    path, on, dialect=dialect, tools=table, feed=feed, tolerance=tolerance_mm, setup=setup,
+                    progress=progress,
+                )  # fmt: skip
+            break
+        except InputError as err:
+            # the first refusal is told: that of the simplest machine
+            refused = refused or err
+    else:
+        assert refused is not None
+        raise refused
+    if machine is None:
+        show(f"no machine is stated: read for {on.name}; state yours with --machine, as its limits and times differ")
+    broken = set(map(id, reading.violations))
+    gaps = [f for f in reading.findings if f.severity >= Severity.UNPROVEN]
+    for f in gaps:
+        show(f"{f} [unproven]")
+    for f in sorted((*(f for f in reading.findings if f not in gaps), *reading.violations), key=lambda f: f.line):
+        show(f"{f}{' [does not hold]' if id(f) in broken else ''}")
     low, high = reading.program.p_work.min(axis=0), reading.program.p_work.max(axis=0)
     box = ", ".join(f"{x} {a:g} to {b:g}" for x, a, b in zip("XYZ", low, high, strict=True))
     _, seconds = line_times(reading, on)
-    typer.echo(
+    show(
         f"{path.name}: {len(reading.commands)} motions on machine {on.name}, {lengths(reading.program).sum():.6g} mm, "
         f"{seconds.sum() / 60.0:.4g} min; {box} mm"
     )
-    count = len(reading.broken)
-    typer.echo(f"{count} {'finding does' if count == 1 else 'findings do'} not hold" if count else "the limits hold")
-    return EXCEEDED if reading.broken else 0
+    count = len(reading.violations)
+    holds = "the limits hold" if not gaps else f"unproven: {gaps[0]}"
+    show(f"{count} {'finding does' if count == 1 else 'findings do'} not hold" if count else holds)
+    return EXCEEDED if reading.violations or gaps else 0
+
+
+def _setup(parameters: Sequence[str], work_offsets: Sequence[str]) -> Setup:
+    """What the controller holds, as options give it."""
+    from chipload.program.setup import Setup
+
+    def pairs(option: str, texts: Sequence[str]) -> Iterator[tuple[str, list[float]]]:
+        for text in texts:
+            name, _, values = text.rpartition("=")
+            try:
+                yield name.strip(), [float(value) for value in values.split(",")]
+            except ValueError:
+                raise InputError(f"--{option} {text}: must be a name, = and numbers") from None
+
+    given = dict(pairs("parameter", parameters))
+    for name, values in given.items():
+        if len(values) != 1:
+            raise InputError(f"--parameter {name}: {len(values)} numbers: must be one")
+    return Setup({name: values[0] for name, values in given.items()}, dict(pairs("work-offset", work_offsets)))
 
 
 def _machine(name: str | None) -> Machine:
@@ -430,7 +488,7 @@ def _machine(name: str | None) -> Machine:
     if name.lower().endswith(".ini"):
         machine, findings = read_ini(Path(name))
         for f in findings:
-            typer.echo(f"{name}: {f}")
+            show(f"{name}: {f}")
         return machine
     return read_machine(name) if name.lower().endswith(".toml") else machine_named(name)
 

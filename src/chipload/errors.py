@@ -1,7 +1,10 @@
-"""What can go wrong: one root error, refused input, and findings of a reader."""
+"""What can go wrong: one root error, refused input, output that cannot be written, and findings of a reader."""
 
 from __future__ import annotations
 
+import enum
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 
@@ -13,21 +16,70 @@ class InputError(ChiploadError):
     """Refused input; the message names the thing, its value, the limit and the remedy."""
 
 
+class InputErrors(InputError):
+    """Several errors of one input, a line each.
+
+    >>> str(InputErrors("a: missing", "b = 3: must be below 2")).splitlines()
+    ['a: missing', 'b = 3: must be below 2']
+    """
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.args))
+
+
+class OutputError(ChiploadError):
+    """What was asked for is right, but its result cannot be written; what is kept of the work stays."""
+
+
 class Cancelled(ChiploadError):
     """A long call was stopped by its ``progress`` callback."""
 
 
+class Severity(enum.IntEnum):
+    """What a finding does to a verdict, mildest first.
+
+    ``NOTE`` leaves it as it is; ``UNPROVEN``: the result does not show what the job asks, since something is missing,
+    assumed or left out; ``EXCEEDS``: a limit is exceeded. The severity of several findings is the ``max`` of theirs.
+    """
+
+    NOTE = 0
+    UNPROVEN = 1
+    EXCEEDS = 2
+
+
 @dataclass(frozen=True)
 class Finding:
-    """What a reader or a planner noticed and did not hide.
+    """What a reader, a planner or a check noticed and did not hide.
 
-    ``code`` is short and stable (``dxf-joined``), ``line`` the line in the source (0: none), ``text`` says what
-    and where in a sentence.
+    Parameters
+    ----------
+    code
+        Short and stable (``dxf-joined``).
+    line
+        Line in the source (0: none).
+    text
+        What and where, in a sentence.
+    severity
+        What the finding does to the verdict.
+    place
+        x, y and z [mm] in the workpiece, if the finding has a place.
+    row
+        Row of the program or of the history, if the finding has one.
     """
 
     code: str
     line: int
     text: str
+    severity: Severity = Severity.NOTE
+    place: tuple[float, float, float] | None = None
+    row: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse a place that is not three finite numbers and a row below zero."""
+        if self.place is not None and (len(self.place) != 3 or not all(map(math.isfinite, self.place))):
+            raise InputError(f"Finding {self.code}: place = {self.place}: must be three finite numbers x, y, z")
+        if self.row is not None and self.row < 0:
+            raise InputError(f"Finding {self.code}: row = {self.row}: must be at least 0; None if there is no row")
 
     def __str__(self) -> str:
         """The text with its line and its code.
@@ -36,3 +88,12 @@ class Finding:
         'line 12: a gap of 0.002 mm was closed (dxf-joined)'
         """
         return f"line {self.line}: {self.text} ({self.code})" if self.line else f"{self.text} ({self.code})"
+
+
+def worst_severity(findings: Iterable[Finding]) -> Severity:
+    """Greatest severity of the findings; ``NOTE`` without any.
+
+    >>> worst_severity([Finding("a", 1, "one"), Finding("b", 2, "two", Severity.UNPROVEN)]).name
+    'UNPROVEN'
+    """
+    return max((finding.severity for finding in findings), default=Severity.NOTE)

@@ -1,12 +1,129 @@
-"""A file appears whole or not at all."""
+"""Files: one that is read is a regular file of limited size; one that is written appears whole or not at all.
+
+Notation: what is being written lies beside its place under a name that begins with :data:`FRESH` and is locked as long
+as its writer lives. What lies there unlocked is of a writer that was killed: :func:`sweep` removes it.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
+import errno
+import hashlib
 import os
+import re
+import shutil
+import stat
+import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
-from chipload.errors import InputError
+from chipload.errors import InputError, OutputError
+
+if sys.platform != "win32":
+    import fcntl
+
+#: beginning of the name of what is being written
+FRESH = ".chipload-"
+_OURS = re.compile(r"\.chipload-[a-z0-9_]{8}")
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_KINDS = (
+    (stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISCHR, "a device"), (stat.S_ISBLK, "a device"),
+    (stat.S_ISSOCK, "a socket"),
+)  # fmt: skip
+
+
+def is_file(path: str | Path) -> bool:
+    """Whether there is a regular file; a name that no file can have is of none.
+
+    >>> is_file("a" * 5000), is_file("a" + chr(0))
+    (False, False)
+    """
+    try:
+        return stat.S_ISREG(os.stat(path).st_mode)
+    except (OSError, ValueError):
+        return False
+
+
+@contextmanager
+def open_regular(path: str | Path, label: str, most: int, remedy: str = "split it") -> Iterator[IO[bytes]]:
+    """A regular file of at most ``most`` bytes, opened to be read; a pipe or a device is not waited for.
+
+    Parameters
+    ----------
+    label : what a message calls the file
+    most : greatest size [bytes]; a file that grows while it is read is the reader's to limit
+    remedy : what to do with a larger one
+
+    Raises
+    ------
+    InputError
+        The file cannot be opened or read, is not a regular one, or is larger.
+    """
+    try:
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        with os.fdopen(handle, "rb") as file:
+            found = os.fstat(handle)
+            if not stat.S_ISREG(found.st_mode):
+                kind = next((name for test, name in _KINDS if test(found.st_mode)), "no file")
+                raise InputError(f"{label}: cannot be read: is {kind}: name a regular file")
+            if found.st_size > most:
+                raise InputError(f"{label}: {found.st_size} bytes: must be at most {most} bytes: {remedy}")
+            yield file
+    except OSError as err:
+        raise InputError(f"{label}: cannot be read: {err.strerror or err}") from None
+    except ValueError as err:
+        if "null" not in str(err):
+            raise
+        raise InputError(f"{label}: cannot be read: no file has a name with a zero byte in it") from None
+
+
+def read_regular(path: str | Path, label: str, most: int, remedy: str = "split it") -> bytes:
+    """The bytes of a regular file of at most ``most`` bytes; the parameters are those of :func:`open_regular`.
+
+    Raises
+    ------
+    InputError
+        As :func:`open_regular`.
+    """
+    with open_regular(path, label, most, remedy) as file:
+        data = file.read(most + 1)
+        if len(data) > most:
+            raise InputError(f"{label}: more than {most} bytes: must be at most {most} bytes: {remedy}")
+        return data
+
+
+def hash_of(path: str | Path) -> str:
+    """SHA-256 of a regular file, in hexadecimal digits.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read.
+    """
+    out = hashlib.sha256()
+    with open_regular(path, str(path), sys.maxsize) as file:
+        while block := file.read(1 << 20):
+            out.update(block)
+    return out.hexdigest()
+
+
+def is_full(err: OSError) -> bool:
+    """Whether it says that there is no space left."""
+    return err.errno in _FULL
+
+
+def cannot_write(target: str | Path, err: OSError) -> OutputError:
+    """What is said where ``target`` cannot be written.
+
+    >>> str(cannot_write("a.nc", OSError(errno.ENOSPC, "No space left on device")))
+    'a.nc: cannot be written: No space left on device: free space; the same command goes on'
+    """
+    remedy = "free space; the same command goes on" if is_full(err) else "name another place"
+    return OutputError(f"{target}: cannot be written: {err.strerror or err}: {remedy}")
 
 
 def write_whole(path: str | Path, data: bytes) -> None:
@@ -14,14 +131,15 @@ def write_whole(path: str | Path, data: bytes) -> None:
 
     Raises
     ------
-    InputError
+    OutputError
         The folder is missing or cannot be written, or the disk is full; nothing is left behind.
     """
     target = Path(path)
     fresh: str | None = None
     try:
-        handle, fresh = tempfile.mkstemp(prefix=".chipload-", dir=target.parent)
+        handle, fresh = tempfile.mkstemp(prefix=FRESH, dir=target.parent)
         with os.fdopen(handle, "wb") as file:
+            _lock(handle)
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
@@ -31,7 +149,90 @@ def write_whole(path: str | Path, data: bytes) -> None:
         Path(fresh).replace(target)
         fresh = None
     except OSError as err:
-        raise InputError(f"{target}: cannot be written: {err.strerror}: name another place") from None
+        raise cannot_write(target, err) from None
     finally:
         if fresh is not None:
             Path(fresh).unlink(missing_ok=True)
+
+
+@contextmanager
+def fresh_folder(above: Path) -> Iterator[Path]:
+    """A new hidden folder in ``above``, held by this process; what is left of it goes with the context.
+
+    Raises
+    ------
+    OSError
+        It cannot be made.
+    """
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=FRESH, dir=above))
+        handle = _held(folder)
+        if handle != _GONE:
+            break
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        if handle is not None:
+            os.close(handle)
+
+
+def sweep(above: Path) -> None:
+    """Remove from a folder what killed writers left there: hidden, ours by name and user, and held by no process."""
+    if sys.platform == "win32":
+        return
+    with contextlib.suppress(OSError):
+        for entry in list(os.scandir(above)):
+            with contextlib.suppress(OSError):
+                if not _OURS.fullmatch(entry.name) or entry.stat(follow_symlinks=False).st_uid != os.geteuid():
+                    continue
+                handle = os.open(entry.path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW)
+                try:
+                    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    if entry.is_dir(follow_symlinks=False):
+                        shutil.rmtree(entry.path, ignore_errors=True)
+                    elif entry.is_file(follow_symlinks=False):
+                        os.unlink(entry.path)
+                finally:
+                    os.close(handle)
+
+
+def exchanged(a: Path, b: Path) -> bool:
+    """Let two folders change names at one moment; False where the system cannot."""
+    if not sys.platform.startswith("linux"):
+        return False
+    change = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
+    here, swap = -100, 2  # AT_FDCWD, RENAME_EXCHANGE
+    return change is not None and change(here, os.fsencode(a), here, os.fsencode(b), swap) == 0
+
+
+_GONE = -1
+
+
+def _held(folder: Path) -> int | None:
+    """A handle that locks the folder; None: this file system has no locks; ``_GONE``: a sweep came first."""
+    if sys.platform == "win32":
+        return None
+    try:
+        handle = os.open(folder, os.O_RDONLY | os.O_NOFOLLOW)
+    except FileNotFoundError:
+        return _GONE
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if os.stat(folder).st_ino == os.fstat(handle).st_ino:
+            return handle
+    except (BlockingIOError, FileNotFoundError):
+        pass
+    except OSError as err:
+        if err.errno in (errno.ENOLCK, errno.ENOTSUP, errno.EBADF):
+            os.close(handle)
+            return None
+    os.close(handle)
+    return _GONE
+
+
+def _lock(handle: int) -> None:
+    """Mark a file as being written, where the file system has locks."""
+    if sys.platform != "win32":
+        with contextlib.suppress(OSError):
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -10,7 +10,16 @@ from pathlib import Path
 from typing import Any
 
 from chipload.errors import InputError
+from chipload.files import read_regular
 
+#: how alike a name must be to be suggested: another metal is no slip of the pen
+ALIKE = {"material": 0.6}
+#: [bytes]
+LARGEST_FILE = 10_000_000
+#: greatest whole number
+LARGEST = (1 << 63) - 1
+#: tables and lists within one another
+DEEPEST = 50
 #: what a message calls the table, and its values
 Labelled = tuple[str, dict[str, Any]]
 
@@ -23,11 +32,8 @@ def read_table(kind: str, path: str | Path) -> Labelled:
     InputError
         The file cannot be read or is not TOML.
     """
-    try:
-        data = Path(path).read_bytes()
-    except OSError as err:
-        raise InputError(f"{kind} {path}: cannot be read: {err.strerror}") from None
-    return _parsed(f"{kind} {path}", data)
+    label = f"{kind} {path}"
+    return label, parsed(label, read_regular(path, label, LARGEST_FILE, "not a table of chipload"))
 
 
 def shipped_names(kind: str) -> tuple[str, ...]:
@@ -41,14 +47,17 @@ def shipped_table(kind: str, name: str) -> Labelled:
     Raises
     ------
     InputError
-        There is none; the message names the nearest and all.
+        There is none; the message names those that are like it, and all.
     """
     shipped = _shipped(kind)
     if name not in shipped:
-        near = nearest(name, sorted(shipped))
-        known = ", ".join(sorted(shipped))
-        raise InputError(f"{kind} {name}: not known: the nearest is {near} (known: {known}), or give a file")
-    return _parsed(f"{kind} {name}", shipped[name].read_bytes())
+        names = sorted(shipped)
+        alike = [x for x in names if name.lower() in x.split("-")]
+        near = alike or difflib.get_close_matches(name, names, 1, ALIKE.get(kind, 0.0))
+        hint = f"the nearest {'are' if len(near) > 1 else 'is'} {', '.join(near)}" if near else "none is like it"
+        raise InputError(f"{kind} {name}: not known: {hint} (known: {', '.join(names)}), or give a file")
+    label = f"{kind} {name}"
+    return label, parsed(label, shipped[name].read_bytes())
 
 
 def nearest(name: str, known: list[str]) -> str:
@@ -65,8 +74,40 @@ def _shipped(kind: str) -> dict[str, Traversable]:
     return {x.name.removesuffix(".toml"): x for x in folder.iterdir() if x.name.endswith(".toml")}
 
 
-def _parsed(label: str, data: bytes) -> Labelled:
+def parsed(label: str, data: bytes) -> dict[str, Any]:
+    """The table of a TOML text in UTF-8; ``label`` is what a message calls it.
+
+    Raises
+    ------
+    InputError
+        It is not TOML, tables or lists are nested too deep, or an integer has more than 64 bits.
+    """
     try:
-        return label, tomllib.loads(data.decode("utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as err:
-        raise InputError(f"{label}: not a TOML file: {err}") from None
+        table = tomllib.loads(data.decode("utf-8"))
+    except RecursionError:
+        raise InputError(f"{label}: not a TOML file: lists or tables are nested too deep") from None
+    except ValueError as err:
+        raise InputError(f"{label}: not a TOML file: {str(err)[:200]}") from None
+    require_sound(label, table)
+    return table
+
+
+def require_sound(label: str, table: dict[str, Any]) -> None:
+    """Refuse values that no key can have: whole numbers of more than 64 bits, deep nesting.
+
+    Raises
+    ------
+    InputError
+        With the key and the limit.
+    """
+    waiting: list[tuple[str, Any, int]] = [("", table, 0)]
+    while waiting:
+        key, value, depth = waiting.pop()
+        if depth > DEEPEST:
+            raise InputError(f"{label}: {key[:60]}: nested deeper than {DEEPEST}")
+        if isinstance(value, dict):
+            waiting += [(f"{key}.{k}" if key else k, v, depth + 1) for k, v in value.items()]
+        elif isinstance(value, list):
+            waiting += [(f"{key}.{k}", v, depth + 1) for k, v in enumerate(value)]
+        elif isinstance(value, int) and not -LARGEST <= value <= LARGEST:
+            raise InputError(f"{label}: {key}: a number is too large: a whole number must be within {LARGEST}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 import traceback
@@ -11,37 +12,117 @@ from typing import NoReturn
 
 import typer
 
-from chipload.errors import Cancelled, InputError
+from chipload.errors import Cancelled, InputError, InputErrors, OutputError
+from chipload.files import cannot_write, is_full
 
-FAULT, WRONG, EXCEEDED, STOPPED = 1, 2, 3, 130
+FAULT, WRONG, EXCEEDED, UNWRITTEN, STOPPED = 1, 2, 3, 4, 130
 
 
 def guarded(work: Callable[[], int], debug: bool) -> NoReturn:
     """Run a command; every way it can end has its exit code and one line."""
     try:
         raise typer.Exit(work())
+    except InputErrors as err:
+        for text in err.args:
+            say(str(text))
+        code = WRONG
     except InputError as err:
         say(str(err))
         code = WRONG
+    except OutputError as err:
+        say(str(err))
+        code = UNWRITTEN
+    except BrokenPipeError:
+        _let_go_of_output()
+        code = UNWRITTEN
+    except OSError as err:
+        if is_full(err):
+            say(str(cannot_write(err.filename or "the disk", err)))
+            code = UNWRITTEN
+        else:
+            _fault(err, debug)
+            code = FAULT
     except (KeyboardInterrupt, Cancelled) as err:
         say(f"stopped: {str(err) or 'nothing was written'}")
         code = STOPPED
-    except (typer.Exit, BrokenPipeError):
-        raise
+    except typer.Exit as end:
+        code = end.exit_code if _flushed() else UNWRITTEN
     except Exception as err:
-        if debug:
-            traceback.print_exc()
-        say(
-            f"a fault of chipload: {type(err).__name__}: {err}. Please report it with the job file and the output of "
-            "the same command with --debug"
-        )
+        _fault(err, debug)
         code = FAULT
     raise typer.Exit(code)
 
 
+def _fault(err: Exception, debug: bool) -> None:
+    if debug:
+        traceback.print_exc()
+    say(
+        f"a fault of chipload: {type(err).__name__}: {err}. Please report it with the job file and the output of "
+        "the same command with --debug"
+    )
+
+
 def say(text: str) -> None:
-    """One line on stderr."""
-    typer.echo(f"chipload: {' '.join(text.split())}", err=True)
+    """One line on stderr; a reader of it that has gone is not waited for."""
+    with contextlib.suppress(OSError, ValueError):
+        typer.echo(f"chipload: {plain(' '.join(text.split()))}", err=True)
+
+
+def show(text: str) -> None:
+    """A line on stdout, without what would command the terminal.
+
+    Raises
+    ------
+    OutputError
+        Stdout takes no more, as on a full disk.
+    BrokenPipeError
+        Its reader has gone.
+    """
+    try:
+        typer.echo(plain(text))
+    except BrokenPipeError:
+        raise
+    except OSError as err:
+        _let_go_of_output()
+        raise cannot_write("stdout", err) from None
+
+
+def plain(text: str) -> str:
+    r"""The text with each control character, and each that turns the direction of writing, as its code.
+
+    >>> plain("M0 (\x1b[2Jgone\x07)\tend")
+    'M0 (\\x1b[2Jgone\\x07)\tend'
+    """
+    return "".join(c if c in "\n\t" or (c.isprintable() and c not in _TURNING) else _code(c) for c in text)
+
+
+#: characters that change the direction of writing
+_TURNING = frozenset("\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+
+
+def _code(c: str) -> str:
+    if c.isspace():
+        return " "
+    return f"\\x{ord(c):02x}" if ord(c) < 256 else f"\\u{ord(c):04x}"
+
+
+def _flushed() -> bool:
+    """Whether all that was said has left the process."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except (OSError, ValueError):
+        _let_go_of_output()
+        return False
+    return True
+
+
+def _let_go_of_output() -> None:
+    """Nobody reads stdout any more: what is left in it goes nowhere, so that the interpreter ends in silence."""
+    with contextlib.suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
 
 
 @contextmanager

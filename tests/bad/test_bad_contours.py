@@ -50,7 +50,7 @@ def refused(contours, diameter=10.0, **changes):
 def test_sharp_inside_corner():
     assert refused([SQUARE]) == (
         "cutter.diameter_mm = 10: does not reach the wall at (0.0000, 0.0000), leaves 2.071 mm: "
-        "no cutter fits a sharp inside corner: draw a fillet, or mill it with kind = front"
+        "no cutter fits a sharp inside corner: draw a fillet, or mill it with kind = pocket"
     )
 
 
@@ -97,4 +97,4 @@ def test_inside_of_a_straight_chain():
 
 def test_semifinish_pass_without_room():
     text = refused([rounded(8.0)], diameter=14.5, radial_depth=8.5, semifinish_depth=0.5)
-    assert "the passage is too narrow, take a smaller cutter or depth" in text
+    assert "the passage is too narrow, take a smaller cutter, radial_depth_mm or fewer passes" in text

@@ -116,7 +116,8 @@ def test_units_must_be_said(drawn):
         msp.add_circle((0, 0), 1)
 
     assert_refused(
-        drawn(add, units=0), "part.file = part.dxf: the header names no unit: state part.units_if_unsaid or part.units"
+        drawn(add, units=0),
+        "part.file = part.dxf: the header names no unit: state part.units_if_unstated or part.units",
     )
     assert_refused(drawn(add, units=3), "part.file = part.dxf: $INSUNITS = 3 is not read: state part.units")
     assert_refused(drawn(add), "part.units = 'mmm': must be one of um, mm, cm, m, inch, foot", units="mmm")

@@ -12,15 +12,14 @@ import pytest
 from chipload import examples
 from chipload.errors import InputError
 from chipload.examples import copy_example
-from chipload.geometry.bspline import Patch
+from chipload.geometry.bspline import BSplinePatch
 from chipload.geometry.revolve import Revolved
-from chipload.job import load_job
-from chipload.planning.sectional.parametric import Shape, impeller_of
-from chipload.run import look
+from chipload.jobs import check_job, load_job
+from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from step_files import face, turned, written
 
 EXAMPLES = Path(examples.__file__).parent
-IMPELLER = impeller_of(Shape())
+IMPELLER = impeller_of(ImpellerShape())
 STEP = """[impeller.step]
 file = "impeller.step"
 flow = "-z"
@@ -33,11 +32,11 @@ hub_ahead_mm = 0.0
 """
 
 
-def scaled(patch: Patch, by: float) -> Patch:
-    return Patch(patch.knots_u, patch.knots_v, by * patch.control, patch.side)
+def scaled(patch: BSplinePatch, by: float) -> BSplinePatch:
+    return BSplinePatch(patch.knots_u, patch.knots_v, by * patch.control, patch.side)
 
 
-def holed(patch: Patch):
+def holed(patch: BSplinePatch):
     """A face with a bored hole of radius 2 across its middle."""
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
@@ -82,7 +81,7 @@ def refused(path, old="", new=""):
     assert old in text
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(InputError) as caught:
-        look(load_job(path))
+        check_job(load_job(path))
     return str(caught.value).replace(str(path.parent) + "/", "")
 
 
@@ -165,9 +164,11 @@ def test_a_face_with_a_hole(job):
 
 def test_a_face_with_three_sides(job):
     written(job.parent / "impeller.step", three_sided(), *FACES[1:])
-    assert refused(job) == (
-        "impeller.step.plus: face 1 has 3 edges and 3 corners: must have four sides: hub, shroud and two edges of a "
-        "blade, or those of a wall"
+    said = refused(job)
+    assert said.startswith("impeller.step.plus: face 1 has 3 edges and 3 corners of more than 20 deg, at (")
+    assert said.endswith(
+        ") mm: must have four sides: hub, shroud and two edges of a blade, or those of a wall: cut the face in CAD "
+        "along the edge that is missing, or state sections instead of faces"
     )
 
 

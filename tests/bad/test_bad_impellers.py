@@ -8,8 +8,7 @@ import pytest
 
 from chipload import examples
 from chipload.errors import InputError
-from chipload.job import load_job
-from chipload.run import look, run
+from chipload.jobs import check_job, load_job, run_job
 
 EXAMPLES = Path(examples.__file__).parent
 
@@ -24,7 +23,7 @@ def formula(tmp_path):
     return Path(shutil.copytree(EXAMPLES / "impeller", tmp_path / "impeller")) / "job.toml"
 
 
-def refused(path, *sets, call=look):
+def refused(path, *sets, call=check_job):
     with pytest.raises(InputError) as caught:
         call(load_job(path, sets))
     return str(caught.value).replace(str(path.parent) + "/", "")
@@ -139,7 +138,7 @@ def test_a_catalogue_of_which_nothing_fits(formula):
     changed(formula, 'name = "wu2019"', 'file = "large.toml"')
     changed(formula, "diameter_mm = 14.0, corner_radius_mm = 1.5", "diameter_mm = 70.0, corner_radius_mm = 2.0")
     sets = ["surface.0.points=[2, 2]", "surface.0.along=[0.2, 0.4]", "surface.0.up=[0.3, 0.5]"]
-    text = refused(formula, *sets, call=run)
+    text = refused(formula, *sets, call=run_job)
     head = "surface.0: no cutter of catalogue large fits anywhere: contact point 0 at ("
     assert text.startswith(head)
     assert text.endswith(" r 2 mm would fit")

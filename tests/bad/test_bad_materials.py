@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from chipload.cutting.material import material_named, read_material
+from chipload.cutting.material import material_named, material_names, need_directions, read_material
 from chipload.errors import InputError
 
 GOOD = {
@@ -72,5 +72,31 @@ def test_unknown_name():
         material_named("al7057-t6")
     assert str(err.value) == (
         "material al7057-t6: not known: the nearest is al7075-t6 "
-        "(known: al6082-t6, al7075-carbide, al7075-hss, al7075-t6), or give a file"
+        f"(known: {', '.join(material_names())}), or give a file"
+    )
+
+
+@pytest.mark.parametrize("name", ["steel", "Steel", "ti6al4v", "1045", "inconel", "brass", "titanium"])
+def test_another_metal_is_no_slip_of_the_pen(name):
+    with pytest.raises(InputError) as err:
+        material_named(name)
+    hint = str(err.value).split(" (known: ")[0]
+    assert "al6082" not in hint
+    assert "al7075" not in hint
+    assert "aluminium" not in hint
+
+
+def test_a_part_of_the_name_is_enough():
+    with pytest.raises(InputError) as err:
+        material_named("steel")
+    assert str(err.value).startswith("material steel: not known: the nearest are group-2-steel, group-3-steel, group-6")
+
+
+def test_what_has_no_direction_says_so():
+    need_directions(material_named("al7075-t6"), "a thin wall")
+    with pytest.raises(InputError) as err:
+        need_directions(material_named("group-2-steel"), "a thin wall")
+    assert str(err.value) == (
+        "material group-2-steel: only its tangential force is known, a thin wall needs the radial and axial "
+        "coefficients too: give a material with all six, or fit them (chipload fit)"
     )

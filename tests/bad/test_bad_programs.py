@@ -36,7 +36,7 @@ BAD = [
     ("G0 XACOS[2]", 1, "ACOS[2]: the argument must be from -1 to 1"),
     ("G0 XATAN[1]", 1, "ATAN[y]: /[x] is missing after it"),
     ("G0 X[[0-8]**[1/3]]", 1, "-8 ** 0.333333: a negative number has whole powers only"),
-    ("G0 X#<a>", 1, "parameter #<a>: is read before it is set: assign it first"),
+    ("G0 X#<a>", 1, "parameter #<a>: is read before it is set: assign it first, or state it in program.parameters"),
     ("#0=5", 1, "parameter #0: the number must be from 1 to 5601"),
     ("#5420=1", 1, "parameter #5420: is the controller's own and cannot be assigned"),
     ("#1 5", 1, "#15: = is missing after it"),
@@ -79,7 +79,8 @@ BAD = [
     ("O1 foo", 1, "o1 foo: no keyword of an O-word follows the label"),
     ("O1 if 1", 1, "o1 if: [ is missing after it"),
     ("O1 endif", 1, "o1 endif: if is missing before it"),
-    ("G33 Z1 K1", 1, "G33: turns the spindle and the axes together: this reader does not take it; write its moves out"),
+    ("G33 Z1 K1", 1, "G33: the spindle does not turn: start it by M3 or M4"),
+    ("S5 M3\nG33.1 Z1", 2, "G33.1: K is missing: the distance for each revolution of the spindle"),
     ("G0 X1\n%", 2, "%: ends a text that begins with %, and this one does not: remove it"),
 ]
 

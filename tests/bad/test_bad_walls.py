@@ -11,17 +11,17 @@ from typer.testing import CliRunner
 from chipload.cli import app
 from chipload.errors import InputError
 from chipload.examples import copy_example
+from chipload.planning.thinwall.blank import Blank
 from chipload.planning.thinwall.table import read_cuts
 from chipload.planning.thinwall.threshold import Experiments, calibrated, modelled
-from chipload.planning.thinwall.wall import Wall
 from chipload.structure.grid import Grid, from_points, plate
-from chipload.structure.solid import Solid, factorise
+from chipload.structure.solid import SolidWorkpiece, factorise
 
 GRID = plate(30.0, 20.0, 2.0, (3, 2, 1))
 
 
-def clamped(grid: Grid = GRID, modulus: float = 1.14e5, **change) -> Solid:
-    return Solid(grid, modulus, 0.34, 4.43e-9, **({"fixed": grid.side("j-")} | change))
+def clamped(grid: Grid = GRID, modulus: float = 1.14e5, **change) -> SolidWorkpiece:
+    return SolidWorkpiece(grid, modulus, 0.34, 4.43e-9, **({"fixed": grid.side("j-")} | change))
 
 
 def said(call) -> str:
@@ -103,7 +103,7 @@ def test_a_modulus_in_another_unit(modulus: float, hint: str) -> None:
 
 
 def test_a_wall_thinner_than_what_is_cut_off_it() -> None:
-    assert said(lambda: Wall(clamped(), (1.0, 1.5))) == (
+    assert said(lambda: Blank(clamped(), (1.0, 1.5))) == (
         "wall: allowance_mm 1 and 1.5 leave no wall: it is 2 mm thick with its stock"
     )
 

@@ -14,15 +14,24 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from chipload import examples, run
+from chipload import examples, jobs
 from chipload.cli import app
-from chipload.job import Job
+from chipload.jobs import Capability, FinishedJob, LoadedJob
+from chipload.jobs.contour.outcome import ContourResult
 from chipload.progress import Progress
-from chipload.report.outcome import Outcome
-from chipload.simulation.unfinished import Unfinished
+from chipload.result import Verdict
+from chipload.simulation.checkpoint import Checkpoint
 
-Maker = Callable[..., Outcome]
+Maker = Callable[..., ContourResult]
+#: what a run says before it begins
+NOTICE = "chipload: a contour job does not resume: if it is stopped, it begins again\n"
 CHIPLOAD = [sys.executable, "-c", "from chipload.cli import main; main()"]
+
+
+def finished(capability: Capability, made: ContourResult) -> FinishedJob:
+    """What a run gives of an outcome that is made."""
+    result, figures = capability.module("result"), capability.module("figures")
+    return FinishedJob(result.result_of(made), figures.presentation_of(made), made)
 
 
 def call(*words: object) -> tuple[int, str, str]:
@@ -31,17 +40,17 @@ def call(*words: object) -> tuple[int, str, str]:
 
 
 @pytest.fixture
-def planned(monkeypatch: pytest.MonkeyPatch, outcome: Maker) -> Callable[[Outcome | BaseException], None]:
+def planned(monkeypatch: pytest.MonkeyPatch, outcome: Maker) -> Callable[[ContourResult | BaseException], None]:
     """Let `run` find an outcome, or an accident, in place of the planner."""
 
-    def put(made: Outcome | BaseException) -> None:
-        def stand_in(job: Job, progress: Progress, kept: Unfinished) -> Outcome:
+    def put(made: ContourResult | BaseException) -> None:
+        def stand_in(loaded: LoadedJob, progress: Progress, kept: Checkpoint) -> FinishedJob:
             progress(0.5, "half")
             if isinstance(made, BaseException):
                 raise made
-            return made
+            return finished(loaded.capability, made)
 
-        monkeypatch.setattr(run, "run", stand_in)
+        monkeypatch.setattr(jobs, "run_job", stand_in)
 
     put(outcome())
     return put
@@ -49,20 +58,33 @@ def planned(monkeypatch: pytest.MonkeyPatch, outcome: Maker) -> Callable[[Outcom
 
 def test_a_job_that_holds_ends_with_0(job_dir: Path, tmp_path: Path, planned: object) -> None:
     code, out, err = call("run", job_dir / "job.toml", "--out", tmp_path / "r")
-    assert (code, err) == (0, "")
-    assert out.splitlines()[0].startswith("Every stated limit holds")
+    assert (code, err) == (0, NOTICE)
+    assert out.splitlines()[0].startswith("Holds: engagement 12.68 of 13 deg, force across the axis ")
     assert out.splitlines()[1] == f"report: {tmp_path / 'r' / 'report.html'}"
 
 
-@pytest.mark.parametrize(("use", "status"), [("plain", "proved"), ("backward", "unproven"), ("backward", "failed")])
+@pytest.mark.parametrize(
+    ("use", "found", "verdict"),
+    [
+        ("plain", Verdict.HOLDS, "exceeds"),
+        ("backward", Verdict.UNPROVEN, "unproven"),
+        ("backward", Verdict.EXCEEDS, "exceeds"),
+    ],
+)
 def test_a_job_that_does_not_hold_ends_with_3_and_its_result(
-    job_dir: Path, tmp_path: Path, planned: Callable[[Outcome], None], outcome: Maker, use: str, status: str
+    job_dir: Path,
+    tmp_path: Path,
+    planned: Callable[[ContourResult], None],
+    outcome: Maker,
+    use: str,
+    found: Verdict,
+    verdict: str,
 ) -> None:
-    planned(outcome(use, status))
+    planned(outcome(use, found))
     code, out, err = call("run", job_dir / "job.toml", "--out", tmp_path / "r")
-    assert (code, err) == (3, "")
-    assert out.startswith("Does not hold: operation 0")
-    assert json.loads((tmp_path / "r" / "summary.json").read_bytes())["holds"] is False
+    assert (code, err) == (3, NOTICE)
+    assert out.startswith(f"{verdict.capitalize()}: ")
+    assert json.loads((tmp_path / "r" / "summary.json").read_bytes())["verdict"] == verdict
 
 
 def test_wrong_input_ends_with_2_and_one_line(job_dir: Path, tmp_path: Path) -> None:
@@ -87,7 +109,7 @@ def test_a_fault_of_ours_ends_with_1_and_says_how_to_report(
     words = ("run", job_dir / "job.toml", "--out", tmp_path / "r")
     code, _, err = call(*words)
     assert code == 1
-    assert err == (
+    assert err == NOTICE + (
         "chipload: a fault of chipload: ZeroDivisionError: division by zero. Please report it with the job file and "
         "the output of the same command with --debug\n"
     )
@@ -98,7 +120,7 @@ def test_a_fault_of_ours_ends_with_1_and_says_how_to_report(
 def test_a_stop_ends_with_130(job_dir: Path, tmp_path: Path, planned: Callable[..., None]) -> None:
     planned(KeyboardInterrupt())
     code, out, err = call("run", job_dir / "job.toml", "--out", tmp_path / "r")
-    assert (code, out, err) == (130, "", "chipload: stopped: nothing was written\n")
+    assert (code, out, err) == (130, "", f"{NOTICE}chipload: stopped: nothing was written\n")
 
 
 @pytest.mark.parametrize("words", [("run",), ("run", "job.toml"), ("nonsense",), ("check", "--sett", "a=1"), ()])
@@ -107,13 +129,15 @@ def test_wrong_usage_ends_with_2(words: tuple[str, ...]) -> None:
 
 
 def test_check_reads_and_plans_nothing(job_dir: Path) -> None:
-    code, out, err = call("check", job_dir / "job.toml", "--set", "operation.0.kind=front")
+    code, out, err = call("check", job_dir / "job.toml")
     assert (code, err) == (0, "")
-    assert out.splitlines()[:3] == [
+    assert out.splitlines()[:2] == [
         "job.toml: right: 0 closed and 1 open contours, machine vmc, material al7075-carbide",
-        "operation 0: front, cutter 1 of 10 mm",
-        "finding: operation.0.side: not used by kind = front",
+        "operation 0: contour, cutter 1 of 10 mm, 6 passes",
     ]
+    code, out, err = call("check", job_dir / "job.toml", "--set", "operation.0.kind=pocket")
+    assert (code, out) == (2, "")
+    assert "a closed contour is needed" in err
     assert sorted(p.name for p in job_dir.iterdir()) == ["README.md", "corner.dxf", "job.toml"]
 
 
@@ -123,7 +147,7 @@ def test_check_reads_and_plans_nothing(job_dir: Path) -> None:
         ("part.file=none.dxf", "none.dxf: no such file"),
         ("part.file=README.md", "part.file = README.md: must end in .dxf, .step or .stp"),
         ("machine.name=vmx", "machine vmx: not known: the nearest is vmc"),
-        ("material.name=al7075", "material al7075: not known: the nearest is al7075-"),
+        ("material.name=al7075", "material al7075: not known: the nearest are al7075-"),
         ("material.file=no.toml", "no.toml: cannot be read: No such file or directory"),
         ("operation.0.speed_rpm=20000", "operation.0.speed_rpm = 20000: machine vmc turns from 60 to 15000 rpm: state"),
     ],
@@ -196,12 +220,16 @@ def test_a_stopped_run_leaves_no_half_file(job_dir: Path, tmp_path: Path, number
         "from chipload.report import folder\n"
         "write = folder._write\n"
         "folder._write = lambda path, data: (write(path, data), time.sleep(60))\n"
-        "from chipload import run\n"
+        "from chipload import jobs\n"
         "from importlib.util import module_from_spec, spec_from_file_location\n"
         f"spec = spec_from_file_location('made', {str(Path(__file__).parents[1] / 'conftest.py')!r})\n"
         "made = module_from_spec(spec)\n"
         "spec.loader.exec_module(made)\n"
-        "run.run = lambda job, progress, kept: made.made_outcome()\n"
+        "from chipload.jobs.contour.figures import presentation_of\n"
+        "from chipload.jobs.contour.result import result_of\n"
+        "one = made.made_outcome()\n"
+        "done = jobs.FinishedJob(result_of(one), presentation_of(one), one)\n"
+        "jobs.run_job = lambda loaded, progress, kept: done\n"
         "main()\n"
     )
     words = [sys.executable, "-c", slow, "run", str(job_dir / "job.toml"), "--out", str(tmp_path / "r")]
@@ -215,7 +243,7 @@ def test_a_stopped_run_leaves_no_half_file(job_dir: Path, tmp_path: Path, number
             time.sleep(0.1)
         os.kill(process.pid, number)
         out, err = process.communicate(timeout=60)
-    assert (process.returncode, out, err) == (130, "", "chipload: stopped: nothing was written\n")
+    assert (process.returncode, out, err) == (130, "", f"{NOTICE}chipload: stopped: nothing was written\n")
     assert [p.name for p in tmp_path.iterdir()] == ["job"]
 
 

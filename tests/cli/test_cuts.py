@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 
 from chipload import examples
 from chipload.cli import app
-from chipload.job import load_job
+from chipload.jobs import load_job
+from chipload.jobs.thinwall.inputs import read_wall
 from chipload.planning.thinwall.table import read_cuts
-from chipload.run.wallinputs import read_wall
 
 
 def call(*words):
@@ -34,11 +34,11 @@ def test_proposed_filled_in_and_read_back(job: Path) -> None:
         rows = list(csv.DictReader(file))
     assert all(r["deflection_um"] == r["normal_force_n"] == r["too_much"] == "" for r in rows)
     # corners are always among the places
-    inputs = read_wall(load_job(job))
+    inputs = read_wall(load_job(job).job)
     corners = {(u, v) for u in (0.0, 1.0) for v in (inputs.foot, 1.0)}
     at = np.array([(float(r["u"]), float(r["v"])) for r in rows])
     assert all(np.abs(at - c).sum(axis=1).min() < 1e-6 for c in corners)
-    thresholds = inputs.finished_bears()
+    thresholds = inputs.finished_threshold()
     u, v = np.meshgrid(*inputs.places, indexing="ij")
     places = np.column_stack([u.ravel(), v.ravel()])
 

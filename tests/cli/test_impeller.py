@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from chipload import examples
 from chipload.cli import app
 from chipload.cutter.catalogue import catalogue_named
-from chipload.planning.sectional.closed import axis_at, contact_limit
+from chipload.planning.impeller.closed_form import axis_at, contact_limit
 
 EXAMPLES = Path(examples.__file__).parent
 #: fewer points than the example's, so that it is quick
@@ -87,12 +87,12 @@ def test_the_files_are_there(result):
     # the floor's edge is not reached: nothing is dropped, and the exit code says so
     assert done.exit_code == 3, done.output
     names = {p.name for p in out.iterdir()}
-    assert {"summary.json", "history.parquet", "scene.glb", "report.html", "proof.npz"} <= names
+    assert {"summary.json", "contact_points.parquet", "scene.glb", "report.html", "proof.npz"} <= names
 
 
 def test_every_point_is_counted(result, summary):
     (op,) = summary["operations"]
-    rows = pq.read_table(result[1] / "history.parquet").to_pylist()
+    rows = pq.read_table(result[1] / "contact_points.parquet").to_pylist()
     assert op["cc_points"] == len(rows) == 72
     missed = [r for r in rows if r["diameter_mm"] == 0.0]
     assert op["unreachable"] == len(missed) == sum(len(s["unreachable_points"]) for s in op["surfaces"]) > 0
@@ -101,12 +101,14 @@ def test_every_point_is_counted(result, summary):
     for s in op["surfaces"]:
         reached = sum(p["cc_points"] for p in s["pointwise"])
         assert reached + s["unreachable"] == s["cc_points"] == 24
-    assert "contact points" in summary["says"]
-    assert not summary["holds"]
+    assert "contact points" in summary["message"]
+    assert summary["verdict"] == "exceeds"
+    worst = {check["name"]: check["worst"] for check in summary["limits"]}
+    assert worst == {"unreached_points": len(missed), "uncertified_points": 0.0}
 
 
 def test_each_largest_cutter_is_clear_and_the_next_is_not(result, proof):
-    rows = pq.read_table(result[1] / "history.parquet").to_pylist()
+    rows = pq.read_table(result[1] / "contact_points.parquet").to_pylist()
     sizes = [c.diameter for c in catalogue_named("wu2019").family(2.0)]
     tables = np.radians(np.arange(20.0, 91.0, 5.0))
     for row in rows[::5]:
@@ -152,7 +154,7 @@ def test_patches_cover_what_is_reached_and_are_clear(summary, proof):
     names = [s["surface"] for s in op["surfaces"]]
     total = sum(s["area_mm2"] for s in op["surfaces"])
     reached = sum(p["area_share"] * s["area_mm2"] for s in op["surfaces"] for p in s["pointwise"]) / total
-    for way in (w for w in op["ways"] if w["way"] != "hand-picked"):
+    for way in (w for w in op["ways"] if w["name"] != "hand-picked"):
         assert sum(p["area_share"] for p in way["patches"]) == pytest.approx(reached, abs=1e-9)
         assert way["reached_share"] == pytest.approx(reached, abs=1e-9)
     for way in op["ways"]:
@@ -165,7 +167,7 @@ def test_patches_cover_what_is_reached_and_are_clear(summary, proof):
         assert way["gap"] == pytest.approx(way["time_min"] / way["least_time_min"] - 1.0)
     times = [w["time_min"] for w in op["ways"][1:]]
     assert times == sorted(times, reverse=True)
-    assert (op["time_min"], op["way"]) == (min(times), op["ways"][1 + times.index(min(times))]["way"])
+    assert (op["time_min"], op["name"]) == (min(times), op["ways"][1 + times.index(min(times))]["name"])
     assert op["hand_picked"]["diameter_mm"] == 14.0
     assert op["hand_picked"]["patches"] == op["ways"][0]["patches"]
     points = {(s["surface"], u["cc_point"]) for s in op["surfaces"] for u in s["unreachable_points"]}
@@ -195,7 +197,7 @@ def test_the_scene_has_the_surfaces(result):
 
 def test_the_page_says_what_is_not_proved(result):
     page = (result[1] / "report.html").read_text()
-    for text in ("What is not proved", "Between check points", "not reached", "Not reached", "The proof"):
+    for text in ("Not checked", "Between check points", "not reached", "Not reached", "The proof"):
         assert text in page
 
 
@@ -209,7 +211,7 @@ def test_the_same_bytes_again(result, tmp_path):
         for row in (op, op["hand_picked"], *op["surfaces"]):
             assert row.pop("search_s") > 0.0
     assert first == second
-    for name in ("history.parquet", "scene.glb", "proof.npz"):
+    for name in ("contact_points.parquet", "history.parquet", "scene.glb", "proof.npz"):
         assert (out / name).read_bytes() == (result[1] / name).read_bytes()
 
 

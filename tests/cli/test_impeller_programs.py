@@ -13,7 +13,7 @@ from chipload import examples
 from chipload.cli import app
 from chipload.machine.kinematics import forward
 from chipload.machine.machine import machine_named
-from chipload.planning.sectional.parametric import Shape, impeller_of
+from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 
 SURFACE = """[[surface]]
 body = "blade"
@@ -50,14 +50,18 @@ def result(tmp_path_factory):
 def test_exit_code_and_first_lines_say_whether_it_is_verified(result):
     done, out, summary = result
     (op,) = summary["operations"]
-    assert (done.exit_code == 0) == summary["holds"] == (not op["fails"])
+    assert (done.exit_code == 0) == (summary["verdict"] == "holds")
+    tracks = {track["name"]: track for track in summary["tracks"]}
+    assert all(track["in_use"] for track in tracks.values())
     texts = sorted(out.glob("*.ngc"))
     assert len(texts) == len(op["programs"]) > 0
     for text, program in zip(texts, op["programs"], strict=True):
+        assert text.stem == program["program"]
+        verified = tracks[text.stem]["verdict"] == "holds"
         first = text.read_text().splitlines()[0]
-        said = "(chipload: verified by independent simulation)" if program["verified"] else "NOT VERIFIED"
+        said = "(chipload: verified by independent simulation)" if verified else "NOT VERIFIED"
         assert said in first
-        assert program["verified"] == (
+        assert verified == (
             program["gouge_mm"] <= 0.05 and all(x["scallop_greatest_mm"] <= 0.1 for x in program["patches"])
         )
         assert text.with_suffix(".apt").is_file()
@@ -68,8 +72,8 @@ def test_the_surface_is_covered_or_the_verdict_says_where_not(result):
     (op,) = summary["operations"]
     (surface,) = op["finished"]["surfaces"]
     assert surface["spacing_mm"] <= 0.6
-    assert surface["holds"] == (surface["greatest_mm"] <= 0.1) == (surface["within_share"] == 1.0)
-    assert surface["holds"] == (not any("is left" in text for text in op["fails"]))
+    left = [f["text"] for f in summary["findings"] if f["code"] == "impeller-left"]
+    assert (not left) == (surface["greatest_mm"] <= 0.1) == (surface["within_share"] == 1.0)
     assert done.exit_code == 0
     assert op["finished"]["time_min"] == pytest.approx(sum(p["time_min"] for p in op["programs"]))
     assert 0.6 <= op["finished"]["scallop_mean_share"] <= 1.0
@@ -108,7 +112,7 @@ def test_the_scallop_is_as_asked(result):
 def test_the_axes_lead_the_cutter_along_the_blade(result):
     """The index table stands, and at the feed the cutter touches the blade: by distances to a fine cloud of it."""
     _, out, summary = result
-    machine, impeller = machine_named("horizontal-b"), impeller_of(Shape())
+    machine, impeller = machine_named("horizontal-b"), impeller_of(ImpellerShape())
     u, v = (x.ravel() for x in np.meshgrid(np.linspace(0.25, 0.5, 300), np.linspace(0.4, 0.8, 200), indexing="ij"))
     cloud = impeller.blade.plus.at(u, v)
     for text, program in zip(sorted(out.glob("*.ngc")), summary["operations"][0]["programs"], strict=True):
@@ -139,7 +143,8 @@ def test_roughing_comes_first_and_leaves_the_allowance(tmp_path):
     path = job(tmp_path / "one", rough=True, scallop_mm="0.3", depth_mm="60.0", step_mm="25.0", check_mm="4.0")
     done = CliRunner().invoke(app, ["run", str(path), "--out", str(tmp_path / "out")])
     assert done.exit_code in (0, 3), done.output
-    (op,) = json.loads((tmp_path / "out" / "summary.json").read_bytes())["operations"]
+    summary = json.loads((tmp_path / "out" / "summary.json").read_bytes())
+    (op,), tracks = summary["operations"], {track["name"]: track for track in summary["tracks"]}
     roughs = op["roughing"]["programs"]
     names = sorted(p.name for p in (tmp_path / "out").glob("*.ngc"))
     assert len(names) == len(roughs) + len(op["programs"])
@@ -149,7 +154,7 @@ def test_roughing_comes_first_and_leaves_the_allowance(tmp_path):
     for k, (name, rough) in enumerate(zip(names, roughs, strict=False), 1):
         text = (tmp_path / "out" / name).read_text()
         assert f"T{k} M6" in text
-        assert ("NOT VERIFIED" not in text.splitlines()[0]) == rough["verified"]
+        assert ("NOT VERIFIED" not in text.splitlines()[0]) == (tracks[name.removesuffix(".ngc")]["verdict"] == "holds")
         assert rough["rapids_take_mm3"] <= 2.0
         assert rough["above_takes_mm3"] <= 2.0
         assert rough["gouge_mm"] <= 0.05

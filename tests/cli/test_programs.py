@@ -81,7 +81,7 @@ def test_a_program_beyond_the_machine(files: Path):
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (["check", "a.ngc"], "--machine: missing: name a file (.toml, .ini) or one of "),
+        (["convert", "a.ngc", "b.ngc"], "--machine: missing: name a file (.toml, .ini) or one of "),
         (["check", "a.ngc", "--machine", "vcm"], "machine vcm: "),
         (["check", "a.xyz", "--machine", "vmc"], "a.xyz: the ending .xyz is not known: must be one of .ngc "),
         (["check", "none.ngc", "--machine", "vmc"], "none.ngc: cannot be read: "),
@@ -160,15 +160,15 @@ def test_a_job_with_a_program(files: Path):
     job.write_text('[program]\nfile = "a.ngc"\ntools = "t.tbl"\n[machine]\nname = "vmc"\n')
     code, out, err = call("run", job, "--out", files / "result")
     assert (code, err) == (3, "")
-    assert out.startswith("Unproven: the limits of machine vmc hold")
+    assert out.startswith("Unproven: what the cutter meets was not simulated")
     summary = json.loads((files / "result" / "summary.json").read_text())
-    assert summary["holds"] is False
-    assert summary["program"]["status"] == "unproven"
-    assert summary["program"]["cutting_mm"] == pytest.approx(6 + 60 + 20 * np.pi)
-    assert summary["program"]["rapid_mm"] == pytest.approx(6)
-    assert summary["broken"] == []
+    (operation,), (track,) = summary["operations"], summary["tracks"]
+    assert summary["verdict"] == track["verdict"] == "unproven"
+    assert operation["program"]["cutting_mm"] == pytest.approx(6 + 60 + 20 * np.pi)
+    assert operation["program"]["rapid_mm"] == pytest.approx(6)
+    assert [x["code"] for x in track["findings"]] == ["not-simulated"]
     history = pq.read_table(files / "result" / "history.parquet")
-    assert {"operation", "strategy", "pass", "line", "x_mm", "y_mm", "z_mm", "axis_z", "feed_mm_min", "t_s"} <= set(
+    assert {"operation", "track", "pass", "line", "x_mm", "y_mm", "z_mm", "axis_z", "feed_mm_min", "t_s"} <= set(
         history.column_names
     )
     assert list(dict.fromkeys(history["line"].to_pylist())) == [5, 7, 8, 9, 10, 11, 12, 13]
@@ -177,9 +177,9 @@ def test_a_job_with_a_program(files: Path):
     length = np.linalg.norm(np.diff(where, axis=0), axis=1).sum()
     assert length < history["s_mm"][-1].as_py() == pytest.approx(12 + 60 + 20 * np.pi)
     assert length == pytest.approx(12 + 60 + 20 * np.pi, rel=2e-4)
-    assert history["t_s"][-1].as_py() == pytest.approx(summary["program"]["time_s"])
+    assert history["t_s"][-1].as_py() == pytest.approx(track["time_s"]) == operation["program"]["time_s"]
     page = (files / "result" / "report.html").read_text()
-    assert "<b>Unproven</b>" in page
+    assert "<b>unproven</b>" in page
     assert sorted(p.name for p in (files / "result").iterdir()) == [
         "0-program.apt", "history.parquet", "report.html", "scene.glb", "summary.json"
     ]  # fmt: skip

@@ -53,13 +53,13 @@ def stop(place: Path, out: str, how: signal.Signals, *more: str) -> subprocess.C
     return ended(process)
 
 
-def same(place: Path, out: str) -> None:
+def same(place: Path, out: str, known: str = "whole") -> None:
     """The result has the bytes of the one that nobody disturbed, and nothing is left beside it."""
-    names = sorted(p.name for p in (place / "whole").iterdir())
+    names = sorted(p.name for p in (place / known).iterdir())
     assert names == sorted(p.name for p in (place / out).iterdir())
     assert "history.parquet" in names
     for name in names:
-        assert (place / out / name).read_bytes() == (place / "whole" / name).read_bytes(), name
+        assert (place / out / name).read_bytes() == (place / known / name).read_bytes(), name
     assert not (place / f"{out}.unfinished").exists()
 
 
@@ -74,6 +74,17 @@ def test_a_run_that_was_killed_goes_on_to_the_same_bytes(folder: Path) -> None:
     assert found is not None
     assert 0 < int(found[1]) < int(found[2])
     same(folder, "killed")
+
+
+def test_a_run_by_moves_that_was_killed_goes_on_to_the_same_bytes(folder: Path) -> None:
+    engine = ("--set", 'operation.0.engine="moves"')
+    assert ended(start(folder, "moves", *engine)).returncode == 0
+    killed = stop(folder, "killed-moves", signal.SIGKILL, *engine)
+    assert killed.returncode == -signal.SIGKILL
+    again = ended(start(folder, "killed-moves", *engine))
+    assert again.returncode == 0
+    assert re.match(r"chipload: goes on after step \d+ of \d+, kept in ", again.stderr)
+    same(folder, "killed-moves", "moves")
 
 
 def test_ctrl_c_says_what_is_kept_and_how_to_go_on(folder: Path) -> None:
@@ -92,7 +103,7 @@ def test_ctrl_c_says_what_is_kept_and_how_to_go_on(folder: Path) -> None:
 def test_another_input_does_not_go_on(folder: Path) -> None:
     stop(folder, "other", signal.SIGKILL)
     again = ended(start(folder, "other", "--set", "operation.0.tolerance_mm=0.002"))
-    assert again.stderr == "chipload: begins again: what was kept is of another input, or damaged\n"
+    assert again.stderr == "chipload: begins again: what was kept is of another input\n"
     other = (folder / "other" / "history.parquet").read_bytes()
     assert other != (folder / "whole" / "history.parquet").read_bytes()
 

@@ -1,6 +1,5 @@
 """A program held against the part, fixtures and its own stock, by the command line."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 import trimesh
 
-from cli.test_simulate import call
+from cli.test_simulate import call, states, summary_of
 from mill import MILL
 
 SLOT = "G21 G90 G17 G94\nT1 M6\nS3000 M3\nG0 X-10 Y0 Z5\nG0 Z-2.1\nG1 X25 F600\nG0 Z5\nM2\n"
@@ -25,7 +24,7 @@ layer_mm = 1.0
 file = "part.stl"
 units = "mm"
 spacing_mm = 1.0
-look_mm = 0.5
+excess_range_mm = 0.5
 [[fixture]]
 file = "clamp.stl"
 units = "mm"
@@ -72,23 +71,31 @@ def test_gouge_excess_and_collision(job: Path, tmp_path: Path) -> None:
     out = tmp_path / "r"
     code, said, _ = call("run", job, "--out", out)
     assert code == 3
-    op = json.loads((out / "summary.json").read_bytes())["operations"][0]
+    summary = summary_of(out)
+    op = summary["operations"][0]
     assert op["gouge_mm"]["max"] == pytest.approx(0.1, abs=2e-3)
     assert op["gouge_mm"]["line"] == 6
-    assert op["gouge_mm"]["at_mm"][2] == -2.0
+    assert op["gouge_mm"]["place"][2] == -2.0
     assert op["excess_mm"]["max"] == pytest.approx(0.06, abs=2e-3)
-    assert abs(op["excess_mm"]["at_mm"][1]) <= 5.0601
-    assert "gouge 0.1 mm exceeds 0.02 mm in line 6" in said
-    by = {x["name"]: x["holds"] for x in op["limits"]}
-    spindle = {"spindle_torque_nm": True, "spindle_power_w": True}
-    assert by == {"force_n": True, "gouge_mm": False, "excess_mm": True} | spindle
+    assert abs(op["excess_mm"]["place"][1]) <= 5.0601
+    assert said.startswith("Exceeds: line 6: shank or holder goes 2.1 mm into fixture 0; and 2 more.")
+    (gouge,) = (x for x in summary["limits"] if x["state"] == "exceeds")
+    assert (gouge["limit"], gouge["line"], gouge["worst"]) == (0.02, 6, op["gouge_mm"]["max"])
+    assert [x["code"] for x in summary["tracks"][0]["findings"]] == ["collision", "collision"]
+    by_default = (
+        "spindle_torque_nm", "spindle_power_w", "cutter_stress_mpa", "axial_overrun_mm", "deflection_share",
+    )  # fmt: skip
+    found = states(summary["limits"])
+    assert found == {"force_n": "holds", "gouge_mm": "exceeds", "excess_mm": "holds"} | dict.fromkeys(
+        by_default, "holds"
+    )
     # the tip goes to x = 25 and to z = -2.1, the holder to x = 45 and down to z = 27.9
     # on the way in, and where the way out begins
     hit, again = op["collisions"]
     assert (again["line"], again["depth_mm"]) == (7, pytest.approx(2.1, abs=0.01))
     assert (hit["what"], hit["into"], hit["line"], hit["tool"]) == ("shank or holder", "fixture 0", 6, 1)
     assert hit["depth_mm"] == pytest.approx(2.1, abs=0.01)
-    assert op["held_against"] == ["fixture 0", "part", "stock"]
+    assert op["compared_with"] == ["fixture 0", "part", "stock"]
     assert op["no_holder"] == []
     history = pq.read_table(out / "history.parquet")
     assert max(history["gouge_mm"].to_pylist()) == pytest.approx(op["gouge_mm"]["max"])
@@ -105,8 +112,9 @@ def test_what_is_not_stated_is_said_to_be_unchecked(job: Path, tmp_path: Path) -
     job.write_text(text.replace(text[text.index("[[fixture]]") : text.index("[material]")], ""))
     assert call("run", job, "--out", tmp_path / "r")[0] == 3
     page = (tmp_path / "r" / "report.html").read_text()
-    assert "Whether shank and holder run into the stock: stock_points_mm is not stated" in page
-    assert "fixtures: none is stated; holders of tools 1: not stated" in page
+    assert "shank and holder against the stock: stock_points_mm is not stated" in page
+    assert "fixtures: none is stated" in page
+    assert "holders of tools 1: not stated" in page
 
 
 def test_a_limit_of_a_part_that_is_not_stated(job: Path, tmp_path: Path) -> None:

@@ -12,9 +12,9 @@ import pytest
 
 from chipload.control.fuzzy import additive, standard, write_fuzzy
 from chipload.control.hal import HalJob, control, load_hal, write_hal
-from chipload.control.linuxcnc.beside import Load, advance, measure, turning
-from chipload.control.linuxcnc.door import HalPins, Seen
+from chipload.control.linuxcnc.hal_client import HalPins, PinValues
 from chipload.control.linuxcnc.path import locate, read_path, tool_path, write_path
+from chipload.control.linuxcnc.simulated_spindle import Load, advance, at_speed, measure
 from chipload.control.override import STATUS, Override, allowed, begin
 from chipload.control.plant import Loop, Spindle, run
 from chipload.errors import InputError
@@ -74,7 +74,7 @@ class Simulated:
         self.sent.append((feed, beat))
         self.said.append((torque, status, s))
         at = [float(np.interp(self.s, self.path.model.s, x)) for x in self.path.points.T]
-        return Seen(self.t, *at, self.v, self.torque, feed)
+        return PinValues(self.t, *at, self.v, self.torque, feed)
 
 
 def go(job=JOB, **more):
@@ -123,7 +123,7 @@ def test_a_path_through_its_file(tmp_path):
         read_path(file)
 
 
-def test_the_spindle_beside_follows_the_simulated_one():
+def test_the_spindle_of_a_real_machine_follows_the_simulated_one():
     """The same loads in time: torque and speed as in the compiled loop."""
     quiet = replace(SPINDLE, noise=0.0)
     loop = Loop(ACCELERATION, period=0.001)
@@ -132,7 +132,7 @@ def test_the_spindle_beside_follows_the_simulated_one():
     share = found.feed / FEED
     edge = np.interp(found.s, path.truth.s, path.truth.edge)
     cut = np.interp(found.s, path.truth.s, path.truth.cut) * share
-    wheel, speed, measured = turning(quiet), [], []
+    wheel, speed, measured = at_speed(quiet), [], []
     for k in range(1, len(found.t)):
         # a row of the loop has the torque of the step before it
         now = Load(float(edge[k] if share[k] > 0 else 0.0), float(cut[k]))
@@ -146,7 +146,7 @@ def test_the_spindle_beside_follows_the_simulated_one():
 
 def test_the_spindle_settles_at_the_torque():
     """Held speed: what is measured is the torque; what is expected is the model's."""
-    wheel, load, light = turning(SPINDLE), Load(300.0, 700.0), Load(200.0, 400.0)
+    wheel, load, light = at_speed(SPINDLE), Load(300.0, 700.0), Load(200.0, 400.0)
     for _ in range(1000):
         wheel, most = advance(SPINDLE, wheel, (load, load), (light, light), 0.01, 0.001)
         wheel = measure(SPINDLE, wheel, 0.0, 0.01)
@@ -241,18 +241,19 @@ def test_a_torque_from_a_pin():
     pin = replace(JOB, source="pin")
     lost, _ = go(pin, gone_after=150)
     status = lost.column("status")
-    assert STATUS[int(status[-1])] == "stopped"
+    assert STATUS[int(status[-1])] == "no-reading"
+    assert lost.ended == "no-reading"
     assert lost.column("override")[-1] == 0.0
     assert lost.column("override")[2:].max() <= RULES.lost_override
     heavy, _ = go(pin, gone_after=150, torque=5.0)
-    assert STATUS[int(heavy.column("status")[-1])] == "overload"
+    assert heavy.ended == STATUS[int(heavy.column("status")[-1])] == "overload"
     assert heavy.column("override")[-1] == 0.0
 
 
 def test_a_stop_on_request():
     machine = Simulated(PATH)
     found = control(JOB, machine, clock=lambda: machine.t, sleep=lambda _: None, stop=lambda: machine.t > 0.3)
-    assert found.ended == "stopped"
+    assert found.ended == "asked"
     assert len(found.rows) == pytest.approx(31, abs=1)
 
 
@@ -323,10 +324,10 @@ def test_a_job_written_and_read(tmp_path):
         np.testing.assert_array_equal(getattr(back.table, name), getattr(job.table, name))
     np.testing.assert_allclose(back.path.relief, relief, rtol=1e-8)
     np.testing.assert_allclose(back.path.truth.cut, PATH.truth.cut, rtol=1e-8)
-    np.testing.assert_allclose(back.path.told.cut, PATH.model.cut / relief, rtol=1e-8)
+    np.testing.assert_allclose(back.path.over_relief.cut, PATH.model.cut / relief, rtol=1e-8)
 
 
-def test_a_wall_that_bears_more_is_given_more():
+def test_a_wall_that_allows_more_is_given_more():
     """Twice the relief everywhere is twice the torque that is held: the same feeds as with twice the limit."""
     double = replace(JOB, path=replace(PATH, relief=np.full(len(PATH.points), 2.0)))
     heavy = replace(RULES, torque_ref=2.0 * RULES.torque_ref, overload=8000.0, torque_most=36e3, light=160.0)

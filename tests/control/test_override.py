@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from chipload.control.fuzzy import standard
-from chipload.control.override import KINDS, STATUS, Override, Reading, begin, step, trim
+from chipload.control.override import KINDS, STATUS, STOPS, Override, Reading, begin, step, trim
 from chipload.errors import InputError
 
 TABLE = standard()
@@ -130,7 +130,7 @@ def test_air_without_a_model():
     assert state[11] > 0.85
     peaks = []
     for steps in (100, 2000):
-        air, statuses, after = follow(RULES, [0.0] * steps, state)
+        air, statuses, after = follow(RULES, [float(k % 2) for k in range(steps)], state)
         assert statuses[-1] == "air"
         assert np.diff(air).max() <= 0.0
         assert air[-1] == pytest.approx(0.5, abs=0.011)
@@ -166,10 +166,10 @@ def test_a_reading_that_is_none(bad):
     assert sent[-1] == pytest.approx(0.2)
     assert int(np.flatnonzero(sent < 0.201)[0]) <= math.ceil(0.75 / (RULES.slew_down * DT))
     sent, statuses, after = follow(RULES, [bad] * 10 + [cut(500.0)] * 50, after)
-    assert statuses[-1] == "stopped"
+    assert statuses[-1] == "no-reading"
     assert sent[-1] == 0.0
     straight, statuses, _ = follow(replace(RULES, lost_override=0.0), [bad], state)
-    assert (straight[0], statuses[0]) == (0.0, "stopped")
+    assert (straight[0], statuses[0]) == (0.0, "no-reading")
 
 
 def test_a_short_loss_is_recovered_from_slowly():
@@ -187,16 +187,19 @@ def test_a_stuck_sensor():
     sent, statuses, _ = follow(RULES, [700.0] * 200, state)
     assert statuses[:10] == ["run"] * 10
     assert statuses[10] == "lost"
-    assert statuses[-1] == "stopped"
+    assert statuses[-1] == "no-reading"
     assert sent[109] <= 0.2 + 1e-12
 
 
 def test_a_dead_sensor_while_the_model_says_that_it_cuts():
-    """0 N mm where 800 are expected: not air, nothing rises."""
+    """0 N mm where 800 are expected: not air, nothing rises, then lost_override, then a stop."""
     state = begin(RULES, modelled=True)
     sent, statuses, _ = follow(RULES, [0.0] * 300, state, model=0.9, predicted=800.0)
-    assert set(statuses[5:]) == {"unknown"}
+    assert set(statuses[5:49]) == {"unknown"}
+    assert set(statuses[49:]) == {"low-reading"}
     assert sent.max() <= 0.4
+    assert sent[30] == pytest.approx(RULES.lost_override)
+    assert sent[49:].max() == 0.0
     there, statuses, _ = follow(RULES, [0.0] * 300, state, model=0.9, predicted=0.0)
     assert statuses[-1] == "air"
     assert there[-1] == pytest.approx(0.9)
@@ -271,7 +274,7 @@ def test_a_flood_of_bad_readings(kind, modelled):
             assert o / 0.01 == pytest.approx(round(o / 0.01), abs=1e-9)
             if stopped:
                 assert o == 0.0
-            stopped = stopped or status in ("overload", "stopped")
+            stopped = stopped or status in STOPS
             if not stopped:
                 assert o >= min(config.floor, config.lost_override) - 1e-12
                 assert o <= last + config.slew_up * dt + config.quantum + 1e-12

@@ -186,7 +186,7 @@ def test_sensor_faults_in_the_loop(kind):
     fault = Fault(kind, 4.0, 1e9, -500.0)
     found = go(RULES, model=TOY, fault=fault)
     assert not found.finished
-    assert found.ended == "stopped"
+    assert found.ended == "no-reading"
     after = found.t > 4.2
     assert np.diff(found.override[after]).max() <= 0.0
     assert found.feed[-1] == 0.0

@@ -85,6 +85,7 @@ def test_constant_lead(form):
     [
         ({"bottom_pieces": 0}, "slices: bottom_pieces = 0: must be at least 1"),
         ({"corner_pieces": 0}, "slices: corner_pieces = 0: must be at least 1"),
+        ({"grading": 0.5}, "slices: grading = 0.5: must be from 1 (evenly) to 3"),
         ({"flank_mm": 0.0}, "slices: flank_mm = 0: must be above 0, or None for one slice"),
     ],
 )
@@ -96,5 +97,5 @@ def test_refused(change, message):
 
 def test_refuses_columns_that_do_not_agree():
     with pytest.raises(InputError) as err:
-        Slices(*(np.zeros(2),) * 7, np.zeros(3))
+        Slices(*(np.zeros(2),) * 7, np.zeros(3), np.zeros(2))
     assert str(err.value) == "slices.rate of shape (3,): need (2,) finite numbers"

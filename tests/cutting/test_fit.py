@@ -14,7 +14,7 @@ import pytest
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.fit import NAMES, aligned, fit_average, predict, predicted
 from chipload.cutting.fit_turns import fit_instantaneous
-from chipload.cutting.turns import Cut, turns_of
+from chipload.cutting.turns import MeasuredCut, turns_of
 from chipload.errors import InputError
 
 X = np.array([850.0, 260.0, 140.0, 18.0, 22.0, -3.0])
@@ -67,7 +67,7 @@ def made(feeds, cutter, *, noise=4.0, seed=1, turns=20, per_turn=64, arc=(0.0, m
         known = sliced(fine, X, cutter, arc, depth, c)
         force = np.column_stack([np.interp(np.mod(theta, math.tau), fine, known[:, a]) for a in range(3)])
         force += rng.normal(0.0, noise, force.shape) + off
-        cuts.append(Cut(f"cut {k}", rate, force, c * cutter.flutes * SPEED / math.tau, SPEED, arc, depth))
+        cuts.append(MeasuredCut(f"cut {k}", rate, force, c * cutter.flutes * SPEED / math.tau, SPEED, arc, depth))
     return cuts
 
 
@@ -82,7 +82,7 @@ def test_average_against_the_textbook(arc):
     cuts = []
     for c in feeds:
         force = np.tile(textbook(X, arc, 4, 2.5, c), (640, 1))
-        cuts.append(Cut("c", 6400.0, force, c * 4 * SPEED / math.tau, SPEED, arc, 2.5))
+        cuts.append(MeasuredCut("c", 6400.0, force, c * 4 * SPEED / math.tau, SPEED, arc, 2.5))
     fit = fit_average(cuts, MILL)
     assert np.allclose(fit.values, X, rtol=1e-9)
     assert np.allclose(fit.r2, 1.0)

@@ -12,7 +12,7 @@ import pytest
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_along, forces_over_turn, greatest_forces, mean_forces
 from chipload.cutting.material import Material, material_named
-from chipload.engagement.bites import Bites, bites_of_arcs, tooth_radii
+from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs, tooth_radii
 from chipload.errors import InputError
 
 AL = material_named("al7075-t6")
@@ -64,7 +64,7 @@ def sliced(theta, arcs, feed, cutter, material, depth, slices):
 def test_closed_form_equals_two_thousand_slices(arcs, helix, flutes, depth):
     mill = replace(MILL, helix=math.radians(helix), flutes=flutes)
     ends = np.array([arcs])
-    bites = bites_of_arcs(ends[..., 0], ends[..., 1], 0.06, mill, depth)
+    bites = engagement_of_arcs(ends[..., 0], ends[..., 1], 0.06, mill, depth)
     theta = np.append(np.random.default_rng(1).uniform(0.0, math.tau, 8), arcs[0][0] + np.array([0.01, 0.1]))
     force, torque = forces_over_turn(bites, mill, AL, theta)
     ours = np.column_stack([force[0], torque[0]])
@@ -77,7 +77,7 @@ def test_closed_form_equals_two_thousand_slices(arcs, helix, flutes, depth):
 @pytest.mark.parametrize("runout", [(0.008, 0.0), (0.004, 0.7), (0.004, math.pi / 4), (0.02, 3.0)])
 def test_runout_equals_fine_slices(feed, runout):
     mill = replace(MILL, runout=runout)
-    bites = bites_of_arcs([0.2], [math.pi], feed, mill, 6.0)
+    bites = engagement_of_arcs([0.2], [math.pi], feed, mill, 6.0)
     theta = np.random.default_rng(2).uniform(0.0, math.tau, 8)
     force, torque = forces_over_turn(bites, mill, AL, theta)
     brute = np.array([sliced(t, [(0.2, math.pi)], feed, mill, AL, 6.0, 20000) for t in theta])
@@ -110,9 +110,9 @@ def test_down_milling_drives_the_cutter_forward_and_off_the_wall_up_milling_hold
     a = 0.3
     heading = [[1.0, 0.0]] * 2
     out = forces_along([math.pi - a, 0.0], [math.pi, a], 0.05, heading, MILL, AL, 5.0, spindle_speed=0.0)
-    assert out["force_mean_x_n"][0] > 0.0
-    assert out["force_mean_y_n"][0] > 0.0
-    assert out["force_mean_x_n"][1] < 0.0
+    assert out["force_x_mean_n"][0] > 0.0
+    assert out["force_y_mean_n"][0] > 0.0
+    assert out["force_x_mean_n"][1] < 0.0
 
 
 @pytest.mark.parametrize("arc", [(2.9, math.pi), (0.0, 0.35), (0.0, math.pi), (0.3, 1.1)])
@@ -139,7 +139,7 @@ def test_means_equal_the_textbook_closed_form(arc):
         )
     )
     fz = -bound(lambda p: d * (-k.Kac * feed * math.cos(p) + k.Kae * p))
-    bites = bites_of_arcs([s], [e], feed, MILL, depth)
+    bites = engagement_of_arcs([s], [e], feed, MILL, depth)
     force, _ = mean_forces(bites, MILL, AL)
     np.testing.assert_allclose(force[0], [fx, fy, fz], rtol=1e-12)
     theta = (np.arange(4000) + 0.5) * math.tau / 4000
@@ -152,7 +152,7 @@ def test_straight_teeth_are_at_their_worst_where_they_enter():
     """Helix 0, down milling: F = depth hypot(Ktc f sin a + Kte, Krc f sin a + Kre) at phi = pi - a."""
     mill = replace(MILL, helix=0.0)
     a, feed, depth = 0.33, 0.05, 5.0
-    bites = bites_of_arcs([math.pi - a], [math.pi], feed, mill, depth)
+    bites = engagement_of_arcs([math.pi - a], [math.pi], feed, mill, depth)
     peak = greatest_forces(bites, mill, AL)
     h = feed * math.sin(a)
     tangential = AL.Ktc * h + AL.Kte
@@ -166,7 +166,7 @@ def test_straight_teeth_are_at_their_worst_where_they_enter():
 def test_four_teeth_in_a_full_slot_are_steady(helix):
     """Sum of sin^2 over two teeth a quarter turn apart is 1, of sin cos is 0: F = depth f (-Krc, Ktc), never else."""
     mill = replace(MILL, helix=math.radians(helix))
-    bites = bites_of_arcs([0.0], [math.pi], 0.05, mill, 5.0)
+    bites = engagement_of_arcs([0.0], [math.pi], 0.05, mill, 5.0)
     force, _ = forces_over_turn(bites, mill, NO_EDGE, np.linspace(0.01, 6.0, 50))
     np.testing.assert_allclose(force[0, :, 0], -5.0 * 0.05 * NO_EDGE.Krc, rtol=1e-12)
     np.testing.assert_allclose(force[0, :, 1], 5.0 * 0.05 * NO_EDGE.Ktc, rtol=1e-12)
@@ -186,7 +186,7 @@ def test_greatest_is_no_accident_of_sampling(runout):
         low = float(rng.uniform(0.0, 2.5))
         high = float(rng.uniform(low + 0.02, math.pi))
         depth = float(rng.uniform(0.3, 25.0))
-        bites = bites_of_arcs([low], [high], 0.04, mill, depth)
+        bites = engagement_of_arcs([low], [high], 0.04, mill, depth)
         peak = greatest_forces(bites, mill, AL)
         theta = np.arange(36000) * math.tau / 36000
         force, torque = forces_over_turn(bites, mill, AL, theta)
@@ -200,8 +200,8 @@ def test_greatest_is_no_accident_of_sampling(runout):
 
 def test_two_arcs_add_up_where_the_teeth_are_far_apart():
     mill = replace(MILL, helix=0.2)
-    both = bites_of_arcs([[0.0, 2.6]], [[0.4, math.pi]], 0.05, mill, 4.0)
-    apart = bites_of_arcs([0.0, 2.6], [0.4, math.pi], 0.05, mill, 4.0)
+    both = engagement_of_arcs([[0.0, 2.6]], [[0.4, math.pi]], 0.05, mill, 4.0)
+    apart = engagement_of_arcs([0.0, 2.6], [0.4, math.pi], 0.05, mill, 4.0)
     theta = np.linspace(0.0, 6.0, 40)
     together, _ = forces_over_turn(both, mill, AL, theta)
     each, _ = forces_over_turn(apart, mill, AL, theta)
@@ -223,10 +223,10 @@ def test_padding_is_not_cut():
 
 def test_slices_of_a_cut_add_up_to_the_cut():
     """The interface of bites: a depth cut into slices is the same cut."""
-    whole = bites_of_arcs([2.7], [math.pi], 0.05, MILL, 6.0)
+    whole = engagement_of_arcs([2.7], [math.pi], 0.05, MILL, 6.0)
     heights = np.linspace(0.0, 6.0, 8)
     rows = [[2.7, math.pi, a, b, 0.05, 0.0, 0.0] for a, b in pairwise(heights)]
-    parts = Bites(np.array([0, 7]), np.array(rows), np.full(7, -1), np.zeros(7, dtype=int), whole.slices)
+    parts = ToothEngagement(np.array([0, 7]), np.array(rows), np.full(7, -1), np.zeros(7, dtype=int), whole.slices)
     theta = np.linspace(0.0, 6.0, 30)
     np.testing.assert_allclose(
         forces_over_turn(parts, MILL, AL, theta)[0], forces_over_turn(whole, MILL, AL, theta)[0], atol=1e-10

@@ -14,7 +14,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import slices
 from chipload.cutting.force import forces_over_turn, greatest_forces, in_work, mean_forces
 from chipload.cutting.material import Material, material_named
-from chipload.engagement.bites import Bites
+from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.errors import InputError
 
 AL = material_named("al7075-t6")
@@ -50,7 +50,7 @@ def feed_bites(cutter, feed, low, high, top, corner_pieces=16, flank_mm=None):
                 rows.append([a - back, b - back, *ends, along, offset, across])
                 own.append(k)
     table = np.reshape(rows, (-1, 7))
-    return Bites([0, len(rows)], table, np.full(len(rows), -1), np.array(own, dtype=int), edge.columns)
+    return ToothEngagement([0, len(rows)], table, np.full(len(rows), -1), np.array(own, dtype=int), edge.columns)
 
 
 def point_of(cutter, s):
@@ -207,7 +207,7 @@ def test_where_immersion_is_counted_from_does_not_matter():
     rows[:, :2] += shift
     rows[:, 4] = one.rows[:, 4] * math.cos(shift) + one.rows[:, 6] * math.sin(shift)
     rows[:, 6] = one.rows[:, 6] * math.cos(shift) - one.rows[:, 4] * math.sin(shift)
-    other = Bites(one.start, rows, one.tooth, one.slice, one.slices)
+    other = ToothEngagement(one.start, rows, one.tooth, one.slice, one.slices)
     np.testing.assert_allclose(other.chip_max(), one.chip_max(), rtol=1e-12)
     theta = np.linspace(0.1, 6.0, 30)
     first, torque = forces_over_turn(one, BALL, AL, theta)

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.force import forces_over_turn
 from chipload.cutting.material import Material, beyond, material_named, material_names, read_material
+from chipload.engagement.tooth_engagement import engagement_of_arcs
 from chipload.errors import InputError
 
 GOOD = (
@@ -22,7 +27,67 @@ PRINTED = {
 }
 
 
-@pytest.mark.parametrize("name", material_names())
+#: kc in MPa at chips of 0.02, 0.05 and 0.1 mm, of the printed kc1.1 and mc by hand
+GROUPS = {
+    "group-2-steel": (3547, 2899, 2489),
+    "group-3-steel": (4283, 3438, 2911),
+    "group-6-steel": (4539, 3643, 3085),
+    "group-8-steel": (4411, 3540, 2998),
+    "group-13-stainless": (4264, 3517, 3041),
+    "group-14-stainless": (4701, 3914, 3408),
+    "group-15-grey-iron": (2515, 2094, 1823),
+    "group-18-nodular-iron": (4037, 3123, 2572),
+    "group-22-aluminium": (2127, 1692, 1423),
+    "group-27-brass": (2013, 1572, 1303),
+    "group-34-nickel": (8439, 6773, 5735),
+}
+
+
+def test_every_shipped_material_says_how_sure_it_is():
+    assert {n for n in material_names() if not n.startswith("group-")} == set(PRINTED)
+    assert set(GROUPS) <= set(material_names())
+    for name in material_names():
+        own = material_named(name)
+        assert own.spread == (0.2 if own.tangential else 0.25)
+        assert own.has_band
+        assert own.tangential == name.startswith("group-")
+        if own.tangential:
+            assert own.chip == (0.05, 1.0)
+            assert name.split("-")[1] in own.workpiece
+            assert "VDI 3323" in own.source
+
+
+@pytest.mark.parametrize("name", GROUPS)
+def test_specific_cutting_force_of_a_group(name):
+    own = material_named(name)
+    mill = Cutter(10.0, 1, 0.0, 20.0, 30.0, 6e5)
+    for h, kc in zip((0.02, 0.05, 0.1), GROUPS[name], strict=True):
+        bites = engagement_of_arcs([0.0], [math.pi], h, mill, 1.0)
+        force, torque = forces_over_turn(bites, mill, own, [math.pi / 2])
+        assert torque[0, 0] / (5.0 * h) == pytest.approx(kc, abs=0.51 + 1e-6 * kc)
+        assert np.linalg.norm(force[0, 0]) == pytest.approx(kc * h, rel=1e-3)
+
+
+def test_a_spread_covers_the_second_copy_of_al7075_t6():
+    own = material_named("al7075-t6")
+    assert "796.1" in own.conditions
+    for ours, other in ((own.Ktc, 796.1), (own.Kre, 30.8)):
+        assert abs(other - ours) < own.spread * ours
+    assert "doubtful" in material_named("al7075-carbide").conditions
+
+
+def test_without_radial_and_axial_coefficients_only_the_tangential_force_is_known(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('name = "mine"\nktc_mpa = 700\nkte_n_mm = 5.0\nsource = "spindle power"\n')
+    own = read_material(path)
+    assert own.tangential
+    assert own.coefficients == (700.0, 0.0, 0.0, 5.0, 0.0, 0.0)
+    assert not own.has_band
+    path.write_text(GOOD)
+    assert not read_material(path).tangential
+
+
+@pytest.mark.parametrize("name", PRINTED)
 def test_shipped_as_printed(name):
     row, numbers = PRINTED[name]
     material = material_named(name)
@@ -32,7 +97,7 @@ def test_shipped_as_printed(name):
     assert "10.1186/s10033-021-00536-9" in material.source
     assert material.conditions
     assert material.chip is None
-    assert material.spread is None
+    assert material.spread == 0.25
 
 
 def test_reads_what_is_optional(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 
 from chipload.cutting import measured
 from chipload.cutting.measured import read_forces
-from chipload.cutting.turns import Cut, turns_of
+from chipload.cutting.turns import MeasuredCut, turns_of
 from chipload.errors import InputError
 
 HEAD = "DynoWare,Version 2.5.1.2\nPath:,C:\\m\\\nSampling rate [Hz]:,1000\nCycle No:,1\nTime,Fx,Fy,Fz\ns,N,N,N\n"
@@ -116,7 +116,7 @@ def test_turns_of_a_known_signal():
     wave = 30.0 + 40.0 * np.cos(speed * t + 0.3) + 10.0 * np.cos(2.0 * speed * t - 1.0)
     force = np.column_stack([wave, -wave, 0.5 * wave]) + noise
     force[:, 2] = np.nan
-    got = turns_of(Cut("c", 10_000.0, force, 10.0, 100.0 * math.tau, (0.0, math.pi), 1.0), 4)
+    got = turns_of(MeasuredCut("c", 10_000.0, force, 10.0, 100.0 * math.tau, (0.0, math.pi), 1.0), 4)
     assert abs(got.speed / math.tau - 100.37) < 0.005
     c = got.amplitude[:, 0]
     assert np.allclose([c[0], 2.0 * c[1], 2.0 * c[2]], [30.0, 40.0 * np.exp(0.3j), 10.0 * np.exp(-1.0j)], atol=0.4)
@@ -142,11 +142,11 @@ def test_turns_of_a_known_signal():
 def test_bad_cuts(changes, says):
     given = {"name": "c", "rate": 1e4, "force": np.zeros((500, 3)), "feed": 1.0, "speed": 100.0 * math.tau}
     with pytest.raises(InputError) as err:
-        Cut(**{**given, "arc": (0.0, math.pi), "depth": 1.0, **changes})
+        MeasuredCut(**{**given, "arc": (0.0, math.pi), "depth": 1.0, **changes})
     assert says in str(err.value)
 
 
 def test_too_many_harmonics():
-    cut = Cut("c", 1e4, np.zeros((500, 3)), 1.0, 100.0 * math.tau, (0.0, math.pi), 1.0)
+    cut = MeasuredCut("c", 1e4, np.zeros((500, 3)), 1.0, 100.0 * math.tau, (0.0, math.pi), 1.0)
     with pytest.raises(InputError, match="60 harmonics: must be from 1 to 49"):
         turns_of(cut, 60)

@@ -13,8 +13,8 @@ from scipy.special import gamma
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_over_turn, greatest_forces, mean_forces
 from chipload.cutting.material import Material
-from chipload.cutting.wall import wall_profile
-from chipload.engagement.bites import Bites, bites_of_arcs
+from chipload.cutting.wall_error import wall_profile
+from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
 from chipload.structure.beam import compliance
 
 KIENZLE = Material("kienzle", 1500.0, 500.0, 200.0, 8.0, 6.0, 3.0, source="made up", exponents=(0.26, 0.4, 0.1))
@@ -50,7 +50,7 @@ def vector(phi, h, kappa, rho, material):
 def one(bite, kappa, rate, rho=4.0):
     low, high, along, offset, across = bite
     edge = [[0.0, rho, 0.0, math.sin(kappa), math.cos(kappa), 0.2, rate]]
-    return Bites([0, 1], [[low, high, 1.0, 4.0, along, offset, across]], [0], [0], edge)
+    return ToothEngagement([0, 1], [[low, high, 1.0, 4.0, along, offset, across]], [0], [0], edge)
 
 
 def thick(bite, phi):
@@ -95,13 +95,13 @@ def test_mean_torque_of_a_full_slot_is_a_beta_function():
     """integral of sin^(1 - m) over 0 .. pi = sqrt(pi) Gamma(1 - m/2) / Gamma(3/2 - m/2)."""
     m, f = 0.26, 0.05
     material = replace(KIENZLE, Kte=0.0)
-    _, torque = mean_forces(bites_of_arcs([0.0], [math.pi], f, MILL, 5.0), MILL, material)
+    _, torque = mean_forces(engagement_of_arcs([0.0], [math.pi], f, MILL, 5.0), MILL, material)
     integral = math.sqrt(math.pi) * gamma(1.0 - m / 2) / gamma(1.5 - m / 2)
     assert torque[0] == pytest.approx(4 * 5.0 * 5.0 * 1500.0 * f ** (1 - m) * integral / math.tau, rel=1e-8)
 
 
 def test_exponents_go_to_zero_as_the_linear_law():
-    bites = bites_of_arcs([0.3, 2.0], [2.5, math.pi], 0.05, MILL, 8.0)
+    bites = engagement_of_arcs([0.3, 2.0], [2.5, math.pi], 0.05, MILL, 8.0)
     plain = replace(KIENZLE, exponents=(0.0, 0.0, 0.0))
     near = replace(KIENZLE, exponents=(1e-10, 1e-10, 1e-10))
     theta = np.linspace(0.0, 6.0, 25)
@@ -116,7 +116,9 @@ def test_exponents_go_to_zero_as_the_linear_law():
 def test_thin_chips_ask_for_more():
     """Halving the feed lessens the mean torque by less than half: by 2^(1 - m) without an edge force."""
     material = replace(KIENZLE, Kte=0.0)
-    torque = [mean_forces(bites_of_arcs([2.6], [math.pi], f, MILL, 5.0), MILL, material)[1][0] for f in (0.04, 0.08)]
+    torque = [
+        mean_forces(engagement_of_arcs([2.6], [math.pi], f, MILL, 5.0), MILL, material)[1][0] for f in (0.04, 0.08)
+    ]
     assert torque[1] / torque[0] == pytest.approx(2.0 ** (1.0 - 0.26), rel=1e-12)
 
 
@@ -125,7 +127,7 @@ def test_the_wall_without_helix_up_milling_feels_the_size_effect():
     pi/2 the normal force of a mm is Kc f^(1 - m) + Kte there and -Kre at the wall.
     """
     mill = replace(MILL, helix=0.0)
-    bites = bites_of_arcs([0.0], [2.0], 0.05, mill, 4.0)
+    bites = engagement_of_arcs([0.0], [2.0], 0.05, mill, 4.0)
     z = np.array([1.0, 3.0])
     ours = wall_profile(bites, mill, KIENZLE, z, milling="up", work_compliance=1e-3)[0]
     normal = 1500.0 * 0.05 ** (1 - 0.26) + 8.0 - 6.0

@@ -57,10 +57,10 @@ def test_units_are_overridden_with_a_finding_and_taken_where_unsaid(draw):
     assert [(f.code, f.text) for f in over.findings] == [
         ("dxf-units", "the header says mm; read as inch, as part.units says")
     ]
-    unsaid = draw(fill, header=0, units_if_unsaid="cm")
+    unsaid = draw(fill, header=0, units_if_unstated="cm")
     assert unsaid.contours[0].radii[0] == pytest.approx(10.0)
     assert [f.text for f in unsaid.findings] == ["the header names no unit: read as cm"]
-    assert draw(fill, header=4, units_if_unsaid="cm").contours[0].radii[0] == 1.0
+    assert draw(fill, header=4, units_if_unstated="cm").contours[0].radii[0] == 1.0
 
 
 def test_what_is_seen_from_below_is_mirrored(draw):

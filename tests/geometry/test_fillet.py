@@ -7,17 +7,17 @@ import pytest
 from scipy.spatial import cKDTree
 
 from chipload.errors import InputError
-from chipload.geometry.bspline import Patch, through
+from chipload.geometry.bspline import BSplinePatch, through
 from chipload.geometry.fillet import FIT, filleted, from_hub
 from chipload.geometry.revolve import Revolved
-from chipload.planning.sectional.parametric import Shape, impeller_of
+from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 
 PLANE = Revolved(np.array([[10.0, 0.0], [100.0, 0.0]]), 1)
 SHAFT = Revolved(np.array([[30.0, 80.0], [30.0, -10.0]]), 1)
 U, V = (x.ravel() for x in np.meshgrid(np.linspace(0, 1, 31), np.linspace(0, 1, 17), indexing="ij"))
 
 
-def wall(lean: float) -> Patch:
+def wall(lean: float) -> BSplinePatch:
     """A plane through the line y = 0 on the plane hub, its normal towards -y, leaning by an angle over it."""
     top = 30.0 * np.array([0.0, -math.sin(lean), math.cos(lean)])
     low = np.array([[20.0, 0.0, 0.0], [80.0, 0.0, 0.0]])
@@ -49,7 +49,7 @@ def test_planes(lean, radius):
     assert found.fillet.principal(U, V)[:, 1] == pytest.approx(1.0 / radius, rel=5e-4)
 
 
-def fin() -> Patch:
+def fin() -> BSplinePatch:
     """The side y = 1 of a fin that stands on a shaft of radius 30, up to radius 50."""
     z, r = np.linspace(0.0, 60.0, 5), np.linspace(30.0, 50.0, 9)
     x = np.sqrt(r**2 - 1.0)
@@ -119,7 +119,7 @@ def TopExp_kind():
 @pytest.mark.parametrize("key", ["plus", "minus"])
 def test_a_ball_on_a_twisted_blade(key):
     """Dense points of side and hub: the ball comes to both within a hair and goes into neither."""
-    impeller, a = impeller_of(Shape(lean=0.15)), 3.0
+    impeller, a = impeller_of(ImpellerShape(lean=0.15)), 3.0
     side = getattr(impeller.blade, key)
     found = filleted(side, impeller.hub, a)
     u = np.linspace(0.02, 0.98, 25)
@@ -141,8 +141,8 @@ def test_a_ball_on_a_twisted_blade(key):
 
 
 def test_above_its_fillet_the_side_is_the_same():
-    side = impeller_of(Shape()).blade.plus
-    found = filleted(side, impeller_of(Shape()).hub, 3.0)
+    side = impeller_of(ImpellerShape()).blade.plus
+    found = filleted(side, impeller_of(ImpellerShape()).hub, 3.0)
     p, n = found.side.at(U, V), found.side.normal(U, V)
     x, y = np.linspace(0, 1, 801), np.linspace(0, 1, 401)
     grid = side.at(np.repeat(x, 401), np.tile(y, 801))

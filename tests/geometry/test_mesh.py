@@ -144,7 +144,12 @@ def test_a_random_body_is_cut_as_brute_force_says():
         ("a.stl", b"solid", {}, "STL has no unit: state unit as one of um, mm, cm, m, inch, foot"),
         ("a.stl", b"solid", {"unit": "furlong"}, "STL has no unit"),
         ("a.stl", b"solid\nfacet", {"unit": "mm"}, "a.stl: "),
-        ("a.stl", bytes(80) + struct.pack("<I", 9) + bytes(60), {"unit": "mm"}, "a.stl: no triangles in it, damaged"),
+        (
+            "a.stl",
+            bytes(80) + struct.pack("<I", 9) + bytes(60),
+            {"unit": "mm"},
+            "its head says 9 triangles, which are 534 bytes, and it has 144",
+        ),
         ("a.step", b"hello", {"chord_mm": 0.1}, "a.step: not a STEP file"),
         ("a.step", b"hello", {}, "state how far a triangle may leave a surface"),
         ("a.obj", b"", {}, "must be .stl, .stp or .step"),

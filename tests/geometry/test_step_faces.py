@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from chipload.geometry.bspline import Patch, through
+from chipload.geometry.bspline import BSplinePatch, through
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.step_faces import read_faces
 from chipload.geometry.step_meridian import meridian_of
 from chipload.geometry.step_patch import patch_of
-from chipload.planning.sectional.parametric import Shape, impeller_of
+from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from step_files import face, surface, turned, written
 
-IMPELLER = impeller_of(Shape())
+IMPELLER = impeller_of(ImpellerShape())
 U, V = (x.ravel() for x in np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 1, 21), indexing="ij"))
 
 
@@ -115,7 +115,7 @@ def test_a_side_of_several_edges(tmp_path):
         polygon.Add(gp_Pnt(x, 3, z))
     polygon.Close()
     model = read_faces(written(tmp_path / "plate.step", BRepBuilderAPI_MakeFace(polygon.Wire()).Face()))
-    taken = patch_of(model.faces[0], "front", 1e-6)
+    taken = patch_of(model.faces[0], "pocket", 1e-6)
     p = taken.patch.at([0, 0, 1, 1, 0.5], [0, 1, 0, 1, 0.5])
     assert {(round(x, 9), round(y, 9), round(z, 9)) for x, y, z in p[:4]} == {
         (0, 3, 0),
@@ -136,7 +136,7 @@ def test_uneven_parameters_are_put_over_lengths(tmp_path):
     uneven = through(grid, u, [0.0, 1.0])
     gap = np.linalg.norm(np.diff(uneven.at(np.linspace(0, 1, 41), 0.5), axis=0), axis=1)
     assert gap.max() > 10.0 * gap.min()
-    model = read_faces(written(tmp_path / "uneven.step", face(uneven), face(Patch(uneven.knots_v, uneven.knots_u,
+    model = read_faces(written(tmp_path / "uneven.step", face(uneven), face(BSplinePatch(uneven.knots_v, uneven.knots_u,
                        np.swapaxes(uneven.control, 0, 1)))))  # fmt: skip
     for k, (a, b) in enumerate(((np.linspace(0, 1, 41), np.full(41, 0.5)), (np.full(41, 0.5), np.linspace(0, 1, 41)))):
         taken = patch_of(model.faces[k], "side", 1e-4)

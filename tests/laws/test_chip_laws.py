@@ -22,10 +22,10 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import slices
 from chipload.cutting.force import forces_over_turn
 from chipload.cutting.material import Material, material_named
-from chipload.engagement.bites import Bites
 from chipload.engagement.chips.covered import covered_areas
 from chipload.engagement.chips.move import Move
 from chipload.engagement.immersion.immersion import Section, immersed, tool_frame
+from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.geometry.contour import Contour
 from chipload.machine.machine import machine_named
 from chipload.planning.contour.plan import Finishing, plan_contour
@@ -235,19 +235,15 @@ def slot(cutter: Cutter, axis: Floats, depth: float, layer: float, resolution: R
 
 @pytest.mark.parametrize("lean", [(0.0, 0.0), (0.2, 0.3)], ids=["upright", "leaning"])
 def test_a_slot_of_a_ball_nose_costs_what_the_double_sum_says(lean: tuple[float, float]) -> None:
-    """To 4e-3 of the force with layers of 0.05 mm; the error is of first order in dz, without it 1e-3."""
+    """To 5e-4 of the force, with layers of 0.5 mm as with 0.1 mm: contact is judged where the
+    cutter's surface meets the sections, so that the thickness of the layers does not enter where they end at the top.
+    """
     axis = np.array([*lean, 1.0]) / math.hypot(*lean, 1.0)
-    found = []
-    for layer in (0.1, 0.05):
+    for layer in (0.5, 0.1):
         loads, top = slot(BALL, axis, 3.0, layer, Resolution(10.0, 1e-4, 120, 0.1))
-        found.append(loads)
-    exact = slot_forces(BALL, axis, math.tau * 20.0 / (2 * 100.0), top, material_named("al7075-t6"))
-    size = np.array([*[np.linalg.norm(exact[:3])] * 3, exact[3]])
-    coarse, fine = ((loads - exact) / size for loads in found)
-    assert np.abs(fine[:3]).max() < 4e-3
-    assert abs(fine[3]) < 6e-3
-    assert np.abs(fine).max() < 0.65 * np.abs(coarse).max()
-    assert np.abs(2.0 * fine - coarse).max() < 1.5e-3
+        exact = slot_forces(BALL, axis, math.tau * 20.0 / (2 * 100.0), top, material_named("al7075-t6"))
+        size = np.array([*[np.linalg.norm(exact[:3])] * 3, exact[3]])
+        assert np.abs((loads - exact) / size).max() < 5e-4, layer
 
 
 @pytest.mark.parametrize("lean", [(0.3, 0.0), (0.2, 0.2), (0.0, 0.3)])
@@ -277,7 +273,7 @@ def test_upright_the_chip_is_the_feed_times_the_sine() -> None:
     # one straight tooth at any rotation, against the textbook
     mill = Cutter(10.0, 1, 0.0, 20.0, 30.0, 6e5)
     start = np.array([0, len(rows)])
-    bites = Bites(start, rows, np.full(len(rows), -1), owner, slices(mill).columns, frame[None])
+    bites = ToothEngagement(start, rows, np.full(len(rows), -1), owner, slices(mill).columns, frame[None])
     al, phi = material_named("al7075-t6"), np.linspace(0.05, math.pi - 0.05, 41)
     force, torque = forces_over_turn(bites, mill, al, phi)
     ft, fr = (depth * (K * f_z * np.sin(phi) + E) for K, E in ((al.Ktc, al.Kte), (al.Krc, al.Kre)))
@@ -311,7 +307,7 @@ def test_exact_arcs_and_chips_tell_the_same_force_of_a_finish_pass() -> None:
     s = (c["s_mm"] - 0.5 * np.diff(c["s_mm"], prepend=0.0))[ours]
     s += told["s_mm"][theirs][-1] - c["s_mm"][ours][-1]
     assert ours.sum() > 80
-    pairs = [*((f, f"force_mean_{f[6]}_n") for f in FORCES), ("torque_mean_nm", "torque_mean_nm")]
+    pairs = [*((f, f"force_{f[6]}_mean_n") for f in FORCES), ("torque_mean_nm", "torque_mean_nm")]
     for name, other in pairs:
         want = np.interp(s, told["s_mm"][theirs], told[other][theirs])
         off = (c[name][ours] - want) / np.abs(told[other][theirs]).max()

@@ -13,14 +13,14 @@ from tests.rs274 import MISSING, canonical, rs274_installed
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.machine.kinematics import forward
 from chipload.machine.machine import machine_named
-from chipload.planning.sectional.lines import Motion
-from chipload.planning.sectional.links import Link, linked
-from chipload.planning.sectional.parametric import Shape, impeller_of
-from chipload.planning.sectional.paths import Finish, finishing
-from chipload.planning.sectional.programs import pallet_rate, program_of
-from chipload.planning.sectional.rough_settings import roughed
-from chipload.planning.sectional.roughing import Rough
-from chipload.planning.sectional.tables import index_table
+from chipload.planning.impeller.lines import LineMotion
+from chipload.planning.impeller.links import Link, linked
+from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
+from chipload.planning.impeller.paths import PatchFinish, finishing
+from chipload.planning.impeller.programs import pallet_rate, program_of
+from chipload.planning.impeller.rough_settings import roughed
+from chipload.planning.impeller.roughing import RoughingSettings
+from chipload.planning.impeller.tables import index_table
 from chipload.program.gcode.writer import write_gcode
 from chipload.program.program import RAPID
 
@@ -31,7 +31,7 @@ RATE = pallet_rate(MACHINE)
 
 @pytest.fixture(scope="module")
 def impeller():
-    return impeller_of(Shape())
+    return impeller_of(ImpellerShape())
 
 
 def finished(impeller):
@@ -39,7 +39,7 @@ def finished(impeller):
     table = math.radians(55.0)
     tracks = finishing(
         impeller.blade.plus, "u", ((0.3, 0.45), (0.5, 0.6)), scene, 0, CUTTER, table,
-        Finish(0.1, Motion(0.005, 100.0 / 60.0, RATE, 0.5), 1.0), workers=2,
+        PatchFinish(0.1, LineMotion(0.005, 100.0 / 60.0, RATE, 0.5), 1.0), workers=2,
     )  # fmt: skip
     link = Link(lift=2.0, margin=0.5, touch=0.01, near=4.0, feed=20.0, above=5.0)
     moves = linked(tracks.tracks, scene, CUTTER, table, 100.0 / 60.0, link, 0.5, rate=RATE).moves
@@ -47,7 +47,7 @@ def finished(impeller):
 
 
 def rough(impeller):
-    how = Rough(60.0, 25.0, 0.5, 0.5, Motion(0.1, 5.0, RATE, 0.5), spacing=4.0, around=0, over=1.0)
+    how = RoughingSettings(60.0, 25.0, 0.5, 0.5, LineMotion(0.1, 5.0, RATE, 0.5), spacing=4.0, around=0, over=1.0)
     table = index_table(MACHINE).at([math.radians(55.0)])
     (plan,) = roughed(
         impeller, Catalogue("own", (CUTTER,)), CUTTER, how, Link(2.0, 0.3, 0.1, 0.0, 20.0, 5.0), 90.0, table, 0.9

@@ -10,12 +10,12 @@ from tests.rs274 import MISSING, canonical, rs274_installed
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.machine.kinematics import forward
 from chipload.machine.machine import machine_named
-from chipload.planning.sectional.covered import between_lines
-from chipload.planning.sectional.lines import Motion
-from chipload.planning.sectional.links import Link, linked, safe_height
-from chipload.planning.sectional.parametric import Shape, impeller_of
-from chipload.planning.sectional.paths import Finish, finishing
-from chipload.planning.sectional.programs import pallet_rate, pallet_speed, program_of, table_stands, too_fast
+from chipload.planning.impeller.coverage import between_lines
+from chipload.planning.impeller.lines import LineMotion
+from chipload.planning.impeller.links import Link, linked, safe_height
+from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
+from chipload.planning.impeller.paths import PatchFinish, finishing
+from chipload.planning.impeller.programs import pallet_rate, pallet_speed, program_of, table_stands, too_fast
 from chipload.program.gcode.writer import write_gcode
 from chipload.program.program import RAPID
 from chipload.program.to_axes import to_axes
@@ -29,7 +29,7 @@ BOX = ((0.3, 0.45), (0.5, 0.7))
 
 @pytest.fixture(scope="module")
 def impeller():
-    return impeller_of(Shape())
+    return impeller_of(ImpellerShape())
 
 
 @pytest.fixture(scope="module")
@@ -38,18 +38,18 @@ def scene(impeller):
 
 
 @pytest.fixture(scope="module", params=["u", "v"])
-def milled(request, impeller, scene):
-    motion = Motion(CHORD, 100.0 / 60.0, pallet_rate(MACHINE), 0.5)
+def machined(request, impeller, scene):
+    motion = LineMotion(CHORD, 100.0 / 60.0, pallet_rate(MACHINE), 0.5)
     tracks = finishing(
-        impeller.blade.plus, request.param, BOX, scene, 0, CUTTER, TABLE, Finish(SCALLOP, motion), workers=2
+        impeller.blade.plus, request.param, BOX, scene, 0, CUTTER, TABLE, PatchFinish(SCALLOP, motion), workers=2
     )
     link = Link(lift=2.0, margin=0.5, touch=0.01, near=6.0, feed=20.0, above=5.0)
     way = linked(tracks.tracks, scene, CUTTER, TABLE, 100.0 / 60.0, link, 0.5, rate=pallet_rate(MACHINE))
     return request.param, tracks, way, program_of(way.moves, 90.0, 1)
 
 
-def test_no_gouge_and_scallop_as_asked(impeller, milled):
-    along, tracks, way, program = milled
+def test_no_gouge_and_scallop_as_asked(impeller, machined):
+    along, tracks, way, program = machined
     assert not tracks.missed
     assert not way.refused
     fine, few = np.linspace(0.0, 1.0, 401), np.linspace(0.05, 0.95, 9)
@@ -66,19 +66,19 @@ def test_no_gouge_and_scallop_as_asked(impeller, milled):
     hub = type(own)("hub", impeller.hub.at(s, low), impeller.hub.normal(s, low), s, theta, np.ones(len(s)), (41, 15))
     found = left_on([own, *others, hub], program, CUTTER, 1.0, 1.0, workers=2)
     # two surfaces are approximated by straight rows: a chord each
-    assert max(x.deepest[0] for x in found) <= 2.0 * CHORD, [x.says() for x in found]
+    assert max(x.deepest[0] for x in found) <= 2.0 * CHORD, [x.message() for x in found]
     at = np.column_stack([own.u, own.v])
     within = between_lines(tracks.tracks, along, at)
     assert within.mean() > 0.95
     assert found[0].rest[within].max() <= SCALLOP
-    crests = found[0].crests("v" if along == "u" else "u", within)
-    assert len(crests) >= 9 * (tracks.lines - 2)
-    assert 0.6 * SCALLOP <= crests.mean() <= SCALLOP
+    scallops = found[0].scallops("v" if along == "u" else "u", within)
+    assert len(scallops) >= 9 * (tracks.lines - 2)
+    assert 0.6 * SCALLOP <= scallops.mean() <= SCALLOP
 
 
-def test_steps_are_those_of_the_cutter(milled):
+def test_steps_are_those_of_the_cutter(machined):
     # no step is needlessly fine: along u the corner alone, 2 sqrt(2 r h), is the least that a step may be
-    along, tracks, _, _ = milled
+    along, tracks, _, _ = machined
     if along == "u":
         least = 2.0 * math.sqrt(2.0 * 2.0 * SCALLOP * 0.8)
         p = [t.contact[np.abs(t.at[:, 0] - 0.37).argmin()] for t in tracks.tracks]
@@ -86,8 +86,8 @@ def test_steps_are_those_of_the_cutter(milled):
         assert (steps[:-1] > least).all()
 
 
-def test_pallet_keeps_its_rate_and_the_table_stands(milled, scene):
-    _, _, way, program = milled
+def test_pallet_keeps_its_rate_and_the_table_stands(machined, scene):
+    _, _, way, program = machined
     assert table_stands(program)
     assert pallet_speed(program).max() <= pallet_rate(MACHINE)
     assert too_fast(program, MACHINE) == ()
@@ -100,9 +100,9 @@ def test_pallet_keeps_its_rate_and_the_table_stands(milled, scene):
     assert too_fast(quick, MACHINE)
 
 
-def test_written_axes_lead_to_the_path(milled):
+def test_written_axes_lead_to_the_path(machined):
     """Positions as they stand in the text, by the chain of the machine, against the CL path."""
-    _, tracks, _, program = milled
+    _, tracks, _, program = machined
     text = write_gcode(program, MACHINE, title="finish", verified=False)
     q, rows = np.zeros(9), []
     for line in text.splitlines():
@@ -125,8 +125,8 @@ def test_written_axes_lead_to_the_path(milled):
 
 
 @pytest.mark.skipif(not rs274_installed(), reason=MISSING)
-def test_linuxcnc_reads_it(milled):
-    *_, program = milled
+def test_linuxcnc_reads_it(machined):
+    *_, program = machined
     calls = canonical(write_gcode(program, MACHINE, title="finish", verified=False))
     ends = [w for name, w in calls if name in ("STRAIGHT_FEED", "STRAIGHT_TRAVERSE")]
     commands, _ = to_axes(program, MACHINE)

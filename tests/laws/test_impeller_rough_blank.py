@@ -8,27 +8,27 @@ import pytest
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.errors import InputError
+from chipload.jobs.impeller.roughing import blank_of, without_touch
 from chipload.machine.machine import machine_named
-from chipload.planning.sectional.lines import Motion
-from chipload.planning.sectional.links import Link
-from chipload.planning.sectional.parametric import Shape, impeller_of
-from chipload.planning.sectional.rough_settings import roughed
-from chipload.planning.sectional.roughing import Rough, uncut
-from chipload.planning.sectional.tables import index_table
-from chipload.run.impeller_rough import blank_of, without_touch
+from chipload.planning.impeller.lines import LineMotion
+from chipload.planning.impeller.links import Link
+from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
+from chipload.planning.impeller.rough_settings import roughed
+from chipload.planning.impeller.roughing import RoughingSettings, uncut
+from chipload.planning.impeller.tables import index_table
 from chipload.simulation.channel.stock import taken_from
 from chipload.stock.dexel import TriDexel
 
 #: its holder is wider than the channel and near: it may not come down beside the blades
 SHORT = CatalogueCutter(12.0, 2.0, cutting_length=30.0, reach=44.0, holder_diameter=30.0)
-HOW = Rough(20.0, 14.0, 0.5, 0.5, Motion(0.1, 5.0, 2.0, 0.5), spacing=3.0, around=0, over=1.0)
+HOW = RoughingSettings(20.0, 14.0, 0.5, 0.5, LineMotion(0.1, 5.0, 2.0, 0.5), spacing=3.0, around=0, over=1.0)
 LINK = Link(2.0, 0.3, 0.1, 0.0, 20.0, 5.0)
 TABLE = index_table(machine_named("horizontal-b"))
 
 
 @pytest.fixture(scope="module")
 def impeller():
-    return impeller_of(Shape())
+    return impeller_of(ImpellerShape())
 
 
 def plans(impeller, cutters, stated, tables=(55.0,), share=0.9):
@@ -46,7 +46,7 @@ def test_nothing_above_the_cutting_part_touches_the_uncut_blank(impeller):
     safe, taken, left = without_touch(plan, blank, 2.5, 1.0)
     assert blank.volume() == volume
     assert len(safe.stopped) + len(safe.tracks.tracks) == len(plan.tracks.tracks)
-    assert len(safe.milled) > 4
+    assert len(safe.machined) > 4
     # counted again, on a blank of its own
     again = taken_from(blank_of(impeller, 0, HOW, 0.0), safe.program, SHORT, 2.5)
     assert again.above.max() <= 1.0
@@ -58,7 +58,7 @@ def test_nothing_above_the_cutting_part_touches_the_uncut_blank(impeller):
 
 def test_top_of_the_blank_is_beside_the_channel_only(impeller):
     p = uncut(impeller, 0, HOW)
-    s = Shape()
+    s = ImpellerShape()
     theta, r = np.arctan2(p[:, 1], p[:, 0]), np.hypot(p[:, 0], p[:, 1])
     # at the inlet the channel is narrowest: its width less both allowances is free of points
     inlet = p[:, 2] > p[:, 2].max() - 1e-6
@@ -86,8 +86,8 @@ def test_a_second_table_angle_mills_only_what_the_first_does_not(impeller):
     if len(both) == 1:
         pytest.skip("one table angle does all")
     first, second = both
-    assert sum(t.length for t in second.milled) < 0.5 * sum(t.length for t in first.milled)
-    done = np.concatenate([t.contact for t in first.milled])
-    for track in second.milled:
+    assert sum(t.length for t in second.machined) < 0.5 * sum(t.length for t in first.machined)
+    done = np.concatenate([t.contact for t in first.machined])
+    for track in second.machined:
         away = [np.linalg.norm(done - p, axis=1).min() for p in track.contact[1:-1]]
         assert min(away, default=math.inf) > 0.3 * HOW.step

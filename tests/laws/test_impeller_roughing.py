@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.planning.sectional.floor import layer_of, patch_of
-from chipload.planning.sectional.lines import Motion
-from chipload.planning.sectional.links import Link, linked
-from chipload.planning.sectional.parametric import Shape, impeller_of
-from chipload.planning.sectional.programs import program_of
-from chipload.planning.sectional.roughing import Rough, guarded, layers, roughing
+from chipload.planning.impeller.floor import layer_of, patch_of
+from chipload.planning.impeller.lines import LineMotion
+from chipload.planning.impeller.links import Link, linked
+from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
+from chipload.planning.impeller.programs import program_of
+from chipload.planning.impeller.roughing import RoughingSettings, guarded, layers, roughing
 from chipload.simulation.channel.channel import left_on, wall
 
 CUTTER = CatalogueCutter(12.0, 2.0, cutting_length=45.0, reach=60.0, holder_diameter=30.0)
 TABLE = math.radians(55.0)
-HOW = Rough(20.0, 12.0, 0.5, 0.4, Motion(0.05, 2.0, 2.0, 0.5), spacing=2.5, around=0)
+HOW = RoughingSettings(20.0, 12.0, 0.5, 0.4, LineMotion(0.05, 2.0, 2.0, 0.5), spacing=2.5, around=0)
 
 
 @pytest.fixture(scope="module")
 def impeller():
-    return impeller_of(Shape())
+    return impeller_of(ImpellerShape())
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def test_floor_is_the_hub(impeller):
     u, v = (x.ravel() for x in np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 1, 9), indexing="ij"))
     p = patch.at(u, v)
     # the hub by its formula: a quarter of an ellipse
-    s = Shape()
+    s = ImpellerShape()
     r, z = np.hypot(p[:, 0], p[:, 1]), p[:, 2]
     x = (s.outer_radius - r) / (s.outer_radius - s.hub_radius)
     assert np.abs(x**2 + (1.0 - z / s.height) ** 2 - 1.0).max() < 1e-3
@@ -46,7 +46,7 @@ def test_floor_is_the_hub(impeller):
 
 
 def test_guarded_walls_stand_out_by_the_sag_and_the_milled_one_does_not(impeller):
-    s = Shape()
+    s = ImpellerShape()
     for milled in (0, 2):
         scene = guarded(impeller, 0, milled, 2.0, 2.0, around=0)
         p = scene.check[scene.check_surface == 2]
@@ -89,4 +89,4 @@ def test_nothing_comes_into_the_allowance_and_rows_begin_outside(impeller, rough
         assert got.excess(5.9) < 0.6
     start = [t.tip[0] for t in tracks.tracks if t.at[0, 0] > 0.99]
     assert len(start) == tracks.lines
-    assert min(math.hypot(p[0], p[1]) for p in start) > Shape().outer_radius
+    assert min(math.hypot(p[0], p[1]) for p in start) > ImpellerShape().outer_radius

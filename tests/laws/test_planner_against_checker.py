@@ -12,7 +12,7 @@ import shapely
 
 from chipload.engagement.contact import StockBoundary, engagement
 from chipload.geometry.contour import Contour
-from chipload.simulation.trail import Trail, rim_engagement
+from chipload.simulation.centre_path import CentrePath, rim_engagement
 
 R = 5.0
 
@@ -96,7 +96,7 @@ def test_three_ways_agree(seed, outside, sense):
     material = old if outside else old.reversed()
     if sense < 0:
         paths = [c.reversed() for c in paths]
-    trail = Trail(np.vstack([c.segments for c in paths]), R)
+    trail = CentrePath(np.vstack([c.segments for c in paths]), R)
     # the last turn's beginning is in its own trail: look at the first 80 per cent of it
     n = len(old.segments)
     where = np.sort(rng.uniform(3 * R, 0.8 * paths[1].length, 200))

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from chipload.cutting.material import material_named
-from chipload.job import load_job
+from chipload.jobs import load_job
+from chipload.jobs.torque.cut import Place, cut, off_centre, shell_stock, true_loads
 from chipload.program.build import helix, plunge, rapid
 from chipload.program.program import Program
-from chipload.run.shell_cut import Place, cut, off_centre, shell_stock, true_loads
 from chipload.structure import beam
 
 JOB = """
@@ -70,6 +70,8 @@ most_current_a = 40.0
 sensor_lag_s = 0.01
 smoothing_s = 0.02
 noise_a = 0.03
+current_step_a = 0.005
+idle_error_share = 0.01
 [control.override]
 hold = 0.9
 overload_nm = 2.0
@@ -90,8 +92,9 @@ step_mm = 2.0
 layer_mm = 0.5
 tolerance_mm = 0.002
 [limits]
-deflection_um = 60.0
+form_error_um = 60.0
 strength_share = 0.6
+torque_over_percent = 5.0
 """
 FEED, SPEED, DEPTH, R, FINISHED = 30.0, 628.3185307, 2.0, 5.0, 21.0
 MATERIAL = material_named("al6082-t6")
@@ -102,7 +105,7 @@ CENTRE = FINISHED + R
 def job(tmp_path_factory):
     file = tmp_path_factory.mktemp("law") / "job.toml"
     file.write_text(JOB)
-    return load_job(file)
+    return load_job(file).job
 
 
 @pytest.fixture(scope="module")

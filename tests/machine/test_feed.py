@@ -78,6 +78,24 @@ def test_no_way_out_is_said():
     assert np.isinf(t[1:]).all()
 
 
+def test_between_samples_the_machine_speeds_up_and_slows_down():
+    """From rest to rest over 1 mm at 10 mm/s^2: 2 sqrt(L / a); at most 2 mm/s: L / v + v / a; from 1 to 1 mm/s over
+    1 mm: the peak is sqrt(a L + 1); a piece that speeds up all along: as without."""
+    _, t = limited_speed([0, 1, 2, 4], [0, 0, 0, 5], 10.0, end_speed=9.0, between=[100.0, 2.0, 7.0])
+    np.testing.assert_allclose(np.diff(t)[:2], [2.0 * math.sqrt(0.1), 0.5 + 0.2])
+    peak = math.sqrt(10.0 * 2.0 + 12.5)
+    assert np.diff(t)[2] == pytest.approx((2.0 * peak - 5.0) / 10.0)
+    _, t = limited_speed([0, 1], [1, 1], 10.0, 1.0, 1.0, between=9.0)
+    assert t[1] == pytest.approx(2.0 * (math.sqrt(11.0) - 1.0) / 10.0)
+    same = limited_speed([0, 1, 2], [0, 9, 9], 10.0, end_speed=9.0)[1]
+    np.testing.assert_allclose(limited_speed([0, 1, 2], [0, 9, 9], 10.0, end_speed=9.0, between=9.0)[1], same)
+
+
+def test_trapezoid_between_two_speeds():
+    """From 2 to 1 over 10 mm at 1 mm/s^2, at most 3 mm/s: 1 s up over 2.5 mm, 2 s down over 4 mm, 3.5 mm at 3 mm/s."""
+    assert move_time(10.0, 3.0, 1.0, 2.0, 1.0) == pytest.approx(1.0 + 2.0 + 3.5 / 3.0)
+
+
 def test_curve_and_corner():
     np.testing.assert_allclose(curvature_speed([0.1, -0.4, 0.0], 1000.0), [100.0, 50.0, np.inf])
     theta = np.array([0.0, 1e-4, 0.1, math.pi / 2, 3.0, math.pi])
@@ -95,6 +113,7 @@ def test_curve_and_corner():
         (([0, 1], [1], 1.0), "limited_speed: s (2,) and wanted (1,): must be (n,) and (n,), n >= 1"),
         (([0, -1], [1, 1], 1.0), "limited_speed: s must be finite and never fall"),
         (([0, 1], [1, np.nan], 1.0), "limited_speed: a speed is negative or not a number"),
+        (([0, 1], [1, 1], 1.0, 0, 0, 0.0), "limited_speed: between must be above 0 mm/s"),
         (([0, 1], [1, 1], 0.0), "limited_speed: acceleration must be finite and above 0 mm/s^2"),
     ],
 )

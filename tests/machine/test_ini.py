@@ -8,6 +8,7 @@ import pytest
 from chipload.errors import InputError
 from chipload.machine.ini import read_ini
 from chipload.machine.kinematics import forward
+from chipload.machine.trajectory import TrajectoryPlanner
 
 TRT = """\
 # a comment
@@ -82,7 +83,6 @@ def test_a_trunnion_in_inches(tmp_path):
         "LIB:basic_sim.tcl is not read: only .hal files beside the .ini are",
         "xyzac-trt-kins.y-rot-point is not set to a number: 0 is taken",
         "xyzac-trt-kins.z-rot-point is not set to a number: 0 is taken",
-        "a corner tolerance is not part of a configuration: 0, every corner a stop",
     ]
 
 
@@ -128,7 +128,6 @@ def test_trivial_kinematics_say_what_is_not_said(tmp_path):
     assert (machine.name, machine.rapid, machine.spindle_max) == ("mine", 50.0, math.inf)
     assert sorted(f.code for f in findings) == [
         *["ini-acceleration"] * 3,
-        "ini-corner",
         "ini-kinematics",
         *["ini-limit"] * 3,
         "ini-spindle",
@@ -179,7 +178,7 @@ def test_not_a_configuration(tmp_path):
     with pytest.raises(InputError, match=r"no \[section\]: must be a configuration of LinuxCNC"):
         read_ini(path)
     path.write_bytes(b"[A]\n" + b"#" * (1 << 20))
-    with pytest.raises(InputError, match="larger than 1048576 bytes"):
+    with pytest.raises(InputError, match="must be at most 1048576 bytes"):
         read_ini(path)
     with pytest.raises(InputError, match="cannot be read: No such file"):
         read_ini(tmp_path / "none.ini")
@@ -199,3 +198,16 @@ def test_no_file_outside_the_folder_is_opened(tmp_path):
         "link.hal",
         "/etc/passwd",
     ]
+
+
+def test_settings_of_the_trajectory_planner(tmp_path):
+    """Defaults of LinuxCNC, then what the configuration says."""
+    assert read_ini(written(tmp_path, TRIVIAL))[0].planner == TrajectoryPlanner()
+    more = TRIVIAL.replace(
+        "[TRAJ]\n",
+        "[EMCMOT]\nSERVO_PERIOD = 2000000\n[DISPLAY]\nMAX_FEED_OVERRIDE = 1.5\n[TRAJ]\nARC_BLEND_ENABLE = 0\n"
+        "ARC_BLEND_OPTIMIZATION_DEPTH = 80\nARC_BLEND_GAP_CYCLES = 3\nARC_BLEND_RAMP_FREQ = 50\n"
+        "ARC_BLEND_KINK_RATIO = 0.2\n",
+    )
+    wanted = TrajectoryPlanner(2e-3, False, 80, 3.0, 50.0, 0.2, 1.5)
+    assert read_ini(written(tmp_path, more))[0].planner == wanted

@@ -15,7 +15,7 @@ from chipload.geometry.contour import Contour
 from chipload.geometry.offset import offset
 from chipload.machine.machine import machine_named
 from chipload.planning.contour.backward import concave_kinks, leading_curve
-from chipload.planning.contour.ease import clothoid_length, eased
+from chipload.planning.contour.blend import clothoid_length, eased
 from chipload.planning.contour.forward import forward_pass
 from chipload.planning.contour.plan import Finishing, plan_contour
 
@@ -105,7 +105,7 @@ def test_backward_sharp_stays_in_the_papers_band(sharp):
     assert 12.85 <= a.max() <= 12.92
 
 
-@pytest.mark.parametrize("column", ["force_xy_n", "torque_nm", "error_um"])
+@pytest.mark.parametrize("column", ["force_xy_n", "torque_nm", "form_error_um"])
 def test_range_less_by_75_to_84_percent(sharp, column):
     before, after = (np.ptp(finish(sharp[name], column)) for name in ("plain", "backward"))
     assert 0.75 <= 1.0 - after / before <= 0.84
@@ -115,7 +115,7 @@ def test_greatest_error_at_the_corners_entry(sharp):
     """The paper saw its greatest error at the entry; so far as the path is reshaped that is where the joint is."""
     h = sharp["backward"].history
     rows = h["pass"] == "finish"
-    k = np.flatnonzero(rows)[np.argmax(h["error_um"][rows])]
+    k = np.flatnonzero(rows)[np.argmax(h["form_error_um"][rows])]
     assert (h["x_mm"][k], h["y_mm"][k]) == pytest.approx((20.0, 5.0), abs=0.1)
 
 

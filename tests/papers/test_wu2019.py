@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from chipload.cutter.catalogue import catalogue_named
-from chipload.planning.sectional.answer import largest_cutters, one_cutter
-from chipload.planning.sectional.closed import axis_at, contact_limit, rho_limits
-from chipload.planning.sectional.parametric import Shape, impeller_of
+from chipload.planning.impeller.answer import largest_cutters, one_cutter
+from chipload.planning.impeller.closed_form import axis_at, contact_limit, rho_limits
+from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 
 TABLES = np.radians(np.arange(20.0, 91.0, 5.0))
 GRID = np.radians(np.arange(0.0, 360.0, 1.0))
@@ -32,14 +32,14 @@ def gouges(s, k, diameter, r, T):
 
 @pytest.fixture(scope="module")
 def found():
-    scene = impeller_of(Shape()).scene(
+    scene = impeller_of(ImpellerShape()).scene(
         0, "plus", (np.linspace(0.03, 0.97, 10), np.linspace(0.30, 0.98, 10)), (31, 31), 2.0, 0, (31, 31)
     )
     return scene, largest_cutters(scene, catalogue_named("wu2019"), TABLES, 0.0)
 
 
 def test_the_channel_is_as_narrow_as_the_paper_says():
-    shape, made = Shape(), impeller_of(Shape())
+    shape, made = ImpellerShape(), impeller_of(ImpellerShape())
     u = np.linspace(0.0, 1.0, 41)
     foot = [made.body(0).plus.at(u, 0.0), made.body(1).minus.at(u, 0.0)]
     theta = [np.unwrap(np.arctan2(p[:, 1], p[:, 0])) for p in foot]

@@ -11,20 +11,20 @@ from numpy.testing import assert_allclose
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
-from chipload.planning.thinwall.depth import Limits, normal_force
-from chipload.planning.thinwall.engaged import Posture
-from chipload.planning.thinwall.law import law_of
+from chipload.planning.thinwall.blank import SIDES, Blank
+from chipload.planning.thinwall.depth import DepthRange, normal_force
+from chipload.planning.thinwall.force_table import law_of
 from chipload.planning.thinwall.passes import constant, least_first_depth, variable
-from chipload.planning.thinwall.paths import Going, gouges, pass_programs, rows_of, seconds
-from chipload.planning.thinwall.wall import SIDES, Wall
+from chipload.planning.thinwall.paths import PassMotion, gouges, pass_programs, rows_of, seconds
+from chipload.planning.thinwall.plane_stock import CutterPose
 from chipload.structure.grid import plate
-from chipload.structure.places import Places, normals_of, on_cut, on_side
-from chipload.structure.solid import Solid, factorise, full_compliance
+from chipload.structure.places import MeshPlaces, normals_of, on_cut, on_side
+from chipload.structure.solid import SolidWorkpiece, factorise, full_compliance
 
 TITANIUM = Material("titanium", 1900.0, 600.0, 300.0, 24.0, 20.0, 5.0, source="made up, of the usual size")
 BALL = Cutter(8.0, 2, math.radians(30.0), 20.0, 30.0, 6e5, corner_radius=4.0)
-POSTURE = Posture(BALL, 0.05, -0.4, math.radians(15.0))
-GOING = Going(POSTURE, 10.0, 100.0, 800.0, 2.0)
+POSTURE = CutterPose(BALL, 0.05, -0.4, math.radians(15.0))
+GOING = PassMotion(POSTURE, 10.0, 100.0, 800.0, 2.0)
 DEFLECTION = 0.1
 
 
@@ -32,12 +32,12 @@ DEFLECTION = 0.1
 def plans():
     """Wall of 100 x 60 x 3 mm with 1 mm of stock on both sides."""
     grid = plate(100.0, 60.0, 5.0, (20, 12, 1))
-    wall = Wall(Solid(grid, 114000.0, 0.34, 4.43e-9, grid.side("j-"), rule=8), (1.0, 1.0))
+    wall = Blank(SolidWorkpiece(grid, 114000.0, 0.34, 4.43e-9, grid.side("j-"), rule=8), (1.0, 1.0))
     surfaces = [wall.surface(s) for s in wall.sides()]
-    law = law_of(POSTURE, TITANIUM, Limits(0.01, 1.0), measure="greatest")
+    law = law_of(POSTURE, TITANIUM, DepthRange(0.01, 1.0), measure="greatest")
 
     def bears(limit):
-        return lambda left, side: wall.bears(left, SIDES[side], limit)
+        return lambda left, side: wall.threshold(left, SIDES[side], limit)
 
     allowed = bears(DEFLECTION)
     even = constant(surfaces, allowed, law, least_first_depth(surfaces, allowed, law))
@@ -75,7 +75,7 @@ def test_every_pass_in_its_own_state(plans):
         side = SIDES[p.side]
         places = on_cut(on_side(solid.grid, side, u, v), solid.kept, side)
         n = normals_of(solid.grid, places, side)
-        C = np.einsum("pi,pij,pj->p", n, full_compliance(factorise(solid), Places(places.element, places.local)), n)
+        C = np.einsum("pi,pij,pj->p", n, full_compliance(factorise(solid), MeshPlaces(places.element, places.local)), n)
         at = (20 * u).astype(int), (12 * v).astype(int)
         force = normal_force(POSTURE, TITANIUM, p.depth[at], measure="greatest")
         assert_allclose(p.deflection[at], force * C, rtol=0.01)

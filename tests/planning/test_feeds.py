@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from chipload.errors import InputError
-from chipload.planning.feeds import KEPT, SLOWEST, Touch, calmed, greatest_factor, line_feeds
+from chipload.planning.feeds import KEPT, SLOWEST, StepContact, calmed, greatest_factor, line_feeds
 
 
 def rising(rng, n):
@@ -77,7 +77,7 @@ def test_a_line_is_as_fast_as_its_worst_step():
         own = np.flatnonzero(line == number)
         does = max(touch[own].tolist())
         assert found.touch[k] == does
-        if does == Touch.FILM:
+        if does == StepContact.FILM:
             expected = (1.0, KEPT)
         elif np.isnan(most[own]).any():
             expected = (least[own].max(), SLOWEST)

@@ -11,7 +11,9 @@ from chipload.machine.feed import corner_speed, curvature_speed, limited_speed
 from chipload.machine.machine import machine_named
 from chipload.program.build import dwell, follow, helix, plunge, rapid
 from chipload.program.check import check_program
+from chipload.program.path_mode import PathControl
 from chipload.program.program import Program
+from chipload.program.read import read_program, times_of
 from chipload.program.time import peak_speed, program_time
 
 VMC = machine_named("vmc")
@@ -124,3 +126,50 @@ def test_asking_no_more_than_the_peak_changes_no_time_and_less_does():
         assert program_time(slower, VMC).sum() > whole.sum() * (1.0 + 1e-9)
     rapids = np.flatnonzero(~feeds)
     assert (peak[rapids] <= VMC.rapid).all()
+
+
+def with_mode(program, control, tolerance=0.0):
+    mode = np.tile([float(control), tolerance, tolerance], (len(program), 1))
+    return replace(program, path_mode=mode)
+
+
+def test_path_modes_on_another_controller():
+    """G61.1 stops at every joint, G61 at corners, G64 P rounds them off by P, G64 by the machine's own tolerance."""
+    corner = cut([[0, 0, 0], [25, 0, 0], [50, 0, 0], [50, 50, 0]])
+    own = program_time(corner, VMC)
+    stop = 40 / 3000
+    times = {c: program_time(with_mode(corner, c), VMC) for c in PathControl}
+    np.testing.assert_allclose(times[PathControl.MACHINE], own)
+    np.testing.assert_allclose(times[PathControl.CONTINUOUS], own)
+    np.testing.assert_allclose(times[PathControl.EXACT_PATH].sum(), 100 / 40 + 2 * stop)
+    np.testing.assert_allclose(times[PathControl.EXACT_STOP][1:], [25 / 40 + stop, 25 / 40 + stop, 50 / 40 + stop])
+    wide = program_time(with_mode(corner, PathControl.CONTINUOUS, 0.02), VMC)
+    np.testing.assert_allclose(wide, program_time(corner, replace(VMC, corner_tolerance=0.02)))
+    assert wide.sum() < own.sum()
+
+
+def test_a_corner_takes_half_of_a_short_row_at_most():
+    """Chords of 1 mm of a circle of 5 mm, rounded off by up to 1 mm: sqrt(a r) at joints, little more between."""
+    a = np.arange(0.0, 20.0, 0.2)
+    points = np.column_stack([5 * np.cos(a), 5 * np.sin(a), 0 * a])
+    program = with_mode(cut(points, feed=190.0), PathControl.CONTINUOUS, 1.0)
+    v = math.sqrt(3000.0 * 5.0)
+    length = 99 * 10.0 * math.sin(0.1)
+    mean = length / (program_time(program, VMC).sum() - v / 3000.0)
+    assert 0.99 * v < mean < 1.1 * v
+
+
+def test_the_mode_of_a_text_reaches_its_program(tmp_path):
+    text = "G21 G90\nG0 X0 Y0\nG1 X1 F100\nG61.1\nX2\nG64 P0.02 Q0.01\nX3\nG20 G64 P0.01\nX1\nG61\nX2\nG64\nX3\nM2\n"
+    (tmp_path / "p.ngc").write_text(text)
+    modes = read_program(tmp_path / "p.ngc", VMC).program.path_mode
+    wanted = [[4, 0, 0], [3, 0, 0], [1, 0, 0], [3, 0.02, 0.01], [3, 0.254, 0.254], [2, 0, 0], [3, 0, 0]]
+    np.testing.assert_allclose(modes, wanted)
+
+
+def test_rapids_from_nowhere_take_no_time(tmp_path):
+    """X and Y first, then Z: where they come from is not known. What follows counts."""
+    (tmp_path / "p.ngc").write_text("G21 G90\nG0 X30 Y20\nZ50\nG0 X75\nG1 Z40 F1200\nM2\n")
+    reading = read_program(tmp_path / "p.ngc", VMC)
+    wanted = [0.0, 0.0, 2 * math.sqrt(45 / 3000), 10 / 20 + 20 / 2500]
+    np.testing.assert_allclose(times_of(reading, VMC), wanted)

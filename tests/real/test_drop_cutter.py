@@ -42,7 +42,7 @@ layer_mm = 0.1
 file = "part.stl"
 units = "mm"
 spacing_mm = 0.4
-look_mm = 0.5
+excess_range_mm = 0.5
 [material]
 name = "al7075-t6"
 [[cutter]]

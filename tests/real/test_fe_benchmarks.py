@@ -13,7 +13,7 @@ from chipload.structure.grid import plate
 from chipload.structure.modes import modes
 from chipload.structure.places import on_side
 from chipload.structure.receptance import Receptance, static_compliance
-from chipload.structure.solid import Solid, displacement, factorise, loads
+from chipload.structure.solid import SolidWorkpiece, displacement, factorise, loads
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[3] / "shared" / "data"))
 TABLE = DATA / "tables" / "fe_benchmarks.json"
@@ -37,7 +37,7 @@ def test_numbers_of_the_table():
 @pytest.mark.parametrize("rule", [8, 27])
 def test_cantilever_square_plate(rule):
     """FV16, and Barton's factors of the same plate."""
-    f, _ = modes(factorise(Solid(GRID, E, NU, RHO, GRID.side("j-"), rule=rule)), 6)
+    f, _ = modes(factorise(SolidWorkpiece(GRID, E, NU, RHO, GRID.side("j-"), rule=rule)), 6)
     np.testing.assert_allclose(f, CASES["NAFEMS_FV16_cantilever_square_plate"]["freq_hz"], rtol=0.01)
     factor = 2.0 * np.pi * A**2 / np.sqrt(E * T**2 / (12.0 * RHO * (1.0 - NU**2)))
     np.testing.assert_allclose(f * factor, CASES["Barton_1951_cantilever_square_plate"]["lambda2"], rtol=0.01)
@@ -48,14 +48,14 @@ def test_simply_supported_square_plate():
     held = np.zeros((len(GRID.nodes), 3), dtype=bool)
     for side, along in (("i-", 1), ("i+", 1), ("j-", 0), ("j+", 0)):
         held[GRID.side(side)[:, None], [along, 2]] = True
-    f, _ = modes(factorise(Solid(GRID, E, NU, RHO, held, rule=8)), 8)
+    f, _ = modes(factorise(SolidWorkpiece(GRID, E, NU, RHO, held, rule=8)), 8)
     np.testing.assert_allclose(f, CASES["simply_supported_square_plate"]["freq_hz"], rtol=0.01)
 
 
 @needs_table
 def test_free_square_plate():
     """Six motions without frequency, then Barton's; his 19.79 is 0.98 % above the 19.596 of later, finer work."""
-    free = Solid(GRID, E, NU, RHO, np.zeros(0, dtype=np.int64))
+    free = SolidWorkpiece(GRID, E, NU, RHO, np.zeros(0, dtype=np.int64))
     f, _ = modes(free, 11, shift=(2.0 * np.pi) ** 2)
     assert (f[:6] < 1e-3 * f[6]).all()
     factor = 2.0 * np.pi * A**2 / np.sqrt(E * T**2 / (12.0 * RHO * (1.0 - NU**2)))
@@ -69,7 +69,7 @@ def test_straight_cantilever():
     """6 x 0.2 x 0.1, E 1e7 (here 1e5: it only scales)."""
     case = CASES["MacNeal_Harder_straight_cantilever"]
     grid = plate(6.0, 0.2, 0.1, (24, 2, 1))
-    f = factorise(Solid(grid, 1e5, 0.3, 1e-9, grid.side("i-"), rule=8))
+    f = factorise(SolidWorkpiece(grid, 1e5, 0.3, 1e-9, grid.side("i-"), rule=8))
     u, v = (np.indices((12, 12)).reshape(2, -1) + 0.5) / 12.0
     face = on_side(grid, "i+", u, v)
     tip = grid.side("i+")

@@ -51,7 +51,7 @@ fastest_percent = 300.0
 air_mm_min = 3000.0
 [limits]
 force_n = {force}
-chip_mm = 0.12
+chip_max_mm = 0.12
 """
 #: the program, its job, its time [s] and greatest force [N] before and after
 PROGRAMS = {
@@ -59,13 +59,13 @@ PROGRAMS = {
         "linuxcnc_3axis/cds.ngc",
         {"dialect": "linuxcnc", "low": [0.0, 0.0, 0.0], "high": [101.6, 101.6, 50.8], "layer": 1.0, "diameter": 6.35,
          "flute": 25.0, "material": "al7075-t6", "force": 480.0},
-        (686.9, 646.5, 572.4, 480.0),
+        (686.6, 2108.0, 572.4, 421.6),
     ),
     "compass": (
         "camotics/compass/top.ngc",
         {"dialect": "fanuc", "low": [-5.0, -5.0, -12.7], "high": [62.0, 85.0, 0.0], "layer": 1.0, "diameter": 3.175,
          "flute": 12.0, "material": "al6082-t6", "force": 200.0},
-        (313.6, 228.0, 168.9, 200.0),
+        (313.3, 1533.9, 231.0, 113.9),
     ),
 }  # fmt: skip
 
@@ -96,16 +96,24 @@ def test_a_real_program_keeps_its_limit_and_its_path(name: str, tmp_path: Path) 
     shutil.copy(source, tmp_path)
     (tmp_path / "job.toml").write_text(JOB.format(file=source.name, **values))
     done = CliRunner().invoke(app, ["run", str(tmp_path / "job.toml"), "--out", str(tmp_path / "r")])
-    assert done.exit_code == 0, done.stderr
-    op = json.loads((tmp_path / "r" / "summary.json").read_text())["operations"][0]
+    summary = json.loads((tmp_path / "r" / "summary.json").read_text())
+    # these long cutters bend by more than their chips, where the rigid model does not hold, and that is stated
+    assert (done.exit_code, summary["verdict"]) == (3, "unproven"), done.stderr
+    unproven = [c["name"] for t in summary["tracks"] for c in t["limits"] if t["in_use"] and c["state"] == "unproven"]
+    assert "deflection_share" in unproven
+    op = summary["operations"][0]
     feeds, c = op["feeds"], pq.read_table(tmp_path / "r" / "history.parquet").to_pydict()
-    assert feeds["verified"]
-    assert max(c["force_n"]) <= values["force"]
-    assert max(c["chip_max_mm"]) <= 0.12
-    found = (feeds["time_before_s"], feeds["time_after_s"], max(c["force_before_n"]), max(c["force_n"]))
+    force = [f for f, track in zip(c["force_n"], c["track"], strict=True) if track == "optimised"]
+    assert max(force) == feeds["after"]["force_n"] <= values["force"]
+    assert feeds["after"]["chip_max_mm"] <= 0.12
+    found = (feeds["time_before_s"], feeds["time_after_s"], feeds["before"]["force_n"], feeds["after"]["force_n"])
+    # layers of 1 mm are coarse for these cutters: what the force is known to is kept free, which costs time
     assert found == pytest.approx(numbers, rel=0.01)
     old, new = source.read_text(), (tmp_path / "r" / f"0-feeds{source.suffix}").read_text()
-    assert stripped(old) == stripped(new)
+    # an unproven program says so in its first comment
+    assert new.count("(NOT VERIFIED: Unproven: ") == 1
+    new = re.sub(r" \(NOT VERIFIED: [^)]*\)", "", new)
+    assert stripped(new) == stripped(old)
     changed = sum(a != b for a, b in zip(old.split("\n"), new.split("\n"), strict=True))
     assert 0.1 * feeds["lines"] < changed <= feeds["lines"]
     if not rs274_installed():

@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 from chipload.cutting.fit import fit_average
-from chipload.cutting.fit_job import load_fit, run_fit
 from chipload.cutting.measured import read_forces
+from chipload.jobs import load_job
+from chipload.jobs.fit.run import read_cuts, run
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2].parent / "shared" / "data"))
 FOLDER = DATA / "measured" / "li_flat_slotting"
@@ -62,7 +63,7 @@ def job(tmp_path, diameter=25.0, helix=30.0):
         text += MORE.format(folder=FOLDER, feed=feed, use=use)
     path = tmp_path / "fit.toml"
     path.write_text(text)
-    return load_fit(path)
+    return load_job(path).job
 
 
 def test_header():
@@ -78,7 +79,7 @@ def test_signs_and_teeth(tmp_path):
     spindle's own frequency, which equal teeth would not show, is almost as strong at the least feed: runout.
     """
     read = job(tmp_path)
-    for cut in read.cuts:
+    for cut in read_cuts(read)[0]:
         t, n, _ = cut.force.mean(axis=0)
         assert t < 0.0 < n
         spectrum = np.abs(np.fft.rfft(cut.force[:10_000, 1]))
@@ -88,12 +89,12 @@ def test_signs_and_teeth(tmp_path):
 
 
 def test_means_of_the_third_feed(tmp_path):
-    done = run_fit(job(tmp_path))
+    done = run(job(tmp_path))
     assert done.fit.converged
     third = next(c for c in done.comparisons if c.use == "predict")
     assert np.all(np.abs(third.mean_percent) < 5.0), third.mean_percent
     # the measured mean lies in the band
-    assert np.all(np.abs(third.said.mean - third.mean) < third.said.half[0])
+    assert np.all(np.abs(third.predicted.mean - third.mean) < third.predicted.half[0])
     # at 300 mm/min the second tooth is all but out of the cut: 2 e close to f_z = 0.025 mm
     assert 0.011 < done.fit.cutter.runout[0] < 0.013
     assert math.isclose(done.fit.turns[0].speed * 60.0 / math.tau, 6000.0, rel_tol=1e-4)
@@ -106,9 +107,10 @@ def test_means_of_the_third_feed(tmp_path):
 def test_means_without_runout_are_no_straight_line(tmp_path):
     """The average method cannot know that a tooth is out of the cut: along the feed it misses by a sixth."""
     read = job(tmp_path)
-    fit = fit_average([c for c, use in zip(read.cuts, read.uses, strict=True) if use == "fit"], read.cutter)
-    third = read.cuts[1].force[:10_000].mean(axis=0)
-    line = 0.5 * (read.cuts[0].force[:10_000].mean(axis=0) + read.cuts[2].force[:10_000].mean(axis=0))
+    cuts, _ = read_cuts(read)
+    fit = fit_average([cuts[0], cuts[2]], read.cutter)
+    third = cuts[1].force[:10_000].mean(axis=0)
+    line = 0.5 * (cuts[0].force[:10_000].mean(axis=0) + cuts[2].force[:10_000].mean(axis=0))
     c = 900.0 / 12_000.0
     n = 2 * 3.0 / 4 * fit.values[0] * c + 2 * 3.0 / math.pi * fit.values[3]
     assert math.isclose(n, line[1], rel_tol=1e-3)
@@ -120,5 +122,5 @@ def test_means_without_runout_are_no_straight_line(tmp_path):
 
 @pytest.mark.parametrize(("diameter", "helix"), [(25.0, 0.0), (25.0, 45.0), (16.0, 30.0)])
 def test_what_is_inferred_hardly_matters(tmp_path, diameter, helix):
-    third = next(c for c in run_fit(job(tmp_path, diameter, helix)).comparisons if c.use == "predict")
+    third = next(c for c in run(job(tmp_path, diameter, helix)).comparisons if c.use == "predict")
     assert np.all(np.abs(third.mean_percent) < 6.0), third.mean_percent

@@ -12,9 +12,9 @@ from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.sections import checked, loft, read_meridian, read_sections
-from chipload.planning.sectional.answer import largest_cutters
-from chipload.planning.sectional.closed import axis_at
-from chipload.planning.sectional.impeller import Impeller
+from chipload.planning.impeller.answer import largest_cutters
+from chipload.planning.impeller.closed_form import axis_at
+from chipload.planning.impeller.impeller import Impeller
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2].parent / "shared" / "data"))
 FOLDER = DATA / "blades/nasa_hecc/HECC_Vaned_Configuration/Coordinates"

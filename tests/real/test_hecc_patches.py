@@ -10,10 +10,10 @@ import pytest
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.sections import checked, loft, read_meridian, read_sections
-from chipload.planning.sectional.answer import largest_cutters
-from chipload.planning.sectional.compare import compared, gouges
-from chipload.planning.sectional.costs import Side, Terms
-from chipload.planning.sectional.impeller import Impeller
+from chipload.planning.impeller.answer import largest_cutters
+from chipload.planning.impeller.compare import compared, gouges
+from chipload.planning.impeller.costs import ChannelSide, Terms
+from chipload.planning.impeller.impeller import Impeller
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2].parent / "shared" / "data"))
 FOLDER = DATA / "blades/nasa_hecc/HECC_Vaned_Configuration/Coordinates"
@@ -41,7 +41,7 @@ def test_patches_of_blade_and_splitter():
         grid = scene.contact.reshape(6, 4, 3)
         area = np.linalg.norm(np.cross(np.gradient(grid, axis=0), np.gradient(grid, axis=1)), axis=2).ravel()
         answer = largest_cutters(scene, Catalogue("long", tuple(LONG)), TABLES, 0.5)
-        sides.append(Side(body, side, scene, u, v, area, answer, 0.5))
+        sides.append(ChannelSide(body, side, scene, u, v, area, answer, 0.5))
     ways = compared(sides, Terms(10.0, 0.05, 60.0, 30.0, 15), 0, (1, 2))
     totals = [w.divided.total for w in ways]
     # the hand-picked one reaches the same points here, and is one of the catalogue

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from chipload.control.linuxcnc.door import HalPins
+from chipload.control.linuxcnc.hal_client import HalPins
 
 TUBE = Path(__file__).parents[2] / "src" / "chipload" / "examples" / "tube"
 

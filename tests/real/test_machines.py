@@ -96,7 +96,7 @@ def test_configurations_are_the_shipped_machines(path, shipped):
         for key in ("direction", "pivot", "low", "high", "rate", "acceleration"):
             assert getattr(read, key) == pytest.approx(getattr(copied, key), rel=1e-12), key
     assert machine.rapid == pytest.approx(ours.rapid)
-    assert {"ini-spindle", "ini-corner", "ini-hal"} <= {f.code for f in findings}
+    assert {"ini-spindle", "ini-hal"} <= {f.code for f in findings}
 
 
 def test_dual_rotary_table():

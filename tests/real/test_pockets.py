@@ -7,12 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import material_named
 from chipload.geometry.contour import Region
 from chipload.geometry.dxf import read_dxf
-from chipload.planning.front.front import CUT, clear_region
-from chipload.simulation.trail import Trail, rim_engagement
+from chipload.machine.feed import move_time
+from chipload.machine.machine import machine_named
+from chipload.planning.pocket.clearing import CUT, clear_region
+from chipload.planning.pocket.plan import Clearing, plan_pocket
+from chipload.simulation.centre_path import CentrePath, rim_engagement
 
-DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[3] / "shared" / "data")) / "cad" / "dxf_hsm_nibbler"
+CAD = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[3] / "shared" / "data")) / "cad"
+DATA = CAD / "dxf_hsm_nibbler"
+SEAHORSE = CAD / "dxf_camotics" / "locket" / "seahorse.dxf"
 #: drawing -> cutter radius [mm]; the radial depth is a fifth of it
 POCKETS = {
     "arcs": 4.0,
@@ -36,7 +43,7 @@ POCKETS = {
 @pytest.mark.skipif(not DATA.is_dir(), reason="no real drawings: set CHIPLOAD_DATA")
 @pytest.mark.parametrize("name", POCKETS)
 def test_pocket(name):
-    drawing = read_dxf(DATA / f"{name}.dxf", units_if_unsaid="mm")
+    drawing = read_dxf(DATA / f"{name}.dxf", units_if_unstated="mm")
     region = Region.of([c for c in drawing.contours if c.closed])
     radius = POCKETS[name]
     wanted = math.acos(1.0 - 0.2)
@@ -45,7 +52,27 @@ def test_pocket(name):
     assert path.engagement_max[path.kind == CUT].max() <= wanted + 1e-4
     points = np.column_stack([path.x, path.y])
     steps = np.column_stack([points[:-1], points[1:], np.zeros((len(points) - 1, 3))])
-    trail = Trail(steps, radius, None, path.kind[1:] < 3)
+    trail = CentrePath(steps, radius, None, path.kind[1:] < 3)
     cut = np.flatnonzero(path.kind[1:] == CUT)[::40]
     rim = rim_engagement(trail, cut, np.full(len(cut), 0.5), workers=2)
     assert np.degrees(rim.angle).max() <= math.degrees(wanted) + 0.06
+
+
+@pytest.mark.skipif(not SEAHORSE.is_file(), reason="no real drawings: set CHIPLOAD_DATA")
+def test_outline_of_862_pieces_has_a_finite_time():
+    """Passes of one short step between two stops: the time lies between those at the feed alone and with every step
+    run from rest to rest.
+    """
+    machine, feed = machine_named("vmc"), 20.0
+    asked = Clearing("down", 0.45, 1.0, feed, 838.0, 0.0, 5.0, 0.2)
+    cutter = Cutter(1.5, 3, math.radians(35.0), 20.0, 30.0, 580e3)
+    contours = read_dxf(SEAHORSE, units_if_unstated="mm").contours
+    result = plan_pocket(contours, asked, cutter, material_named("al7075-carbide"), machine, {}).strategies["pocket"]
+    h = result.history
+    legs = np.diff(h["s_mm"])
+    moving = legs > 0.0
+    took = np.diff(h["t_s"])[moving]
+    rest_to_rest = move_time(legs[moving], feed, machine.acceleration_xy, 0.0, 0.0)
+    assert (took >= legs[moving] / feed * (1.0 - 1e-6)).all()
+    assert (took <= rest_to_rest * (1.0 + 1e-6)).all()
+    assert result.summary["time_s"] == h["t_s"][-1] >= took.sum()

@@ -39,9 +39,9 @@ def regions(drawing):
 def test_it_is_read_or_refused_and_its_inset_is_that_of_shapely(path):
     if NOT_READ.get(path.name) == path.parent.name:
         with pytest.raises(InputError, match=r"no lines or arcs; layers there are: "):
-            read_dxf(path, units_if_unsaid="mm")
+            read_dxf(path, units_if_unstated="mm")
         return
-    drawing = read_dxf(path, units_if_unsaid="mm")
+    drawing = read_dxf(path, units_if_unstated="mm")
     assert len(drawing.contours) == len(drawing.layers) > 0
     for region in regions(drawing):
         inset = offset_region(region, 1.0)

@@ -10,11 +10,10 @@ from scipy.spatial import cKDTree
 
 from chipload.examples import copy_example
 from chipload.geometry.sections import checked, loft
-from chipload.geometry.wall import through_sections
-from chipload.job import load_job
-from chipload.run import look, run
-from chipload.run.impeller_part import AGAINST_Z, read_part
-from chipload.run.wallfaces import wall_of_faces
+from chipload.geometry.thin_wall import through_sections
+from chipload.jobs import check_job, load_job, run_job
+from chipload.jobs.impeller.part import AGAINST_Z, read_part
+from chipload.jobs.thinwall.faces import wall_of_faces
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2].parent / "shared" / "data"))
 ROTOR = DATA / "cad" / "tblade3_rotor"
@@ -87,7 +86,7 @@ def nearest(patches, points):
 
 def test_the_blade_is_that_of_its_sections(job):
     """21 sections of 241 points, from T-Blade3's own output: the CAD lofted them through fewer poles, and says so."""
-    part = read_part(load_job(job))
+    part = read_part(load_job(job).job)
     rows = np.loadtxt(ROTOR / "blade3d.Case7-28-8.dat", skiprows=1).reshape(21, 241, 3)
     points = (rows[::4, ::5].reshape(-1, 3)) @ AGAINST_Z["+x"].T
     away = nearest((part.impeller.blade.plus, part.impeller.blade.minus), points)
@@ -96,17 +95,18 @@ def test_the_blade_is_that_of_its_sections(job):
 
 
 def test_what_check_says(job):
-    lines, holds = look(load_job(job))
+    lines, holds = check_job(load_job(job))
     assert holds
     assert lines[3].startswith("plus: face 1: b-spline, 4876.5 mm2, 4 edges")
     assert lines[3].endswith("fitted by 241 x 21 poles, within 4.5e-05 mm of the face")
 
 
 def test_its_side_is_searched(job):
-    found = run(load_job(job))
+    found = run_job(load_job(job)).outcome
     assert (found.surfaces[0].answer.cutter >= 0).all()
     assert found.one is not None
-    assert [text[:5] for text in found.provenance["faces"]] == ["hub: ", "shrou", "plus:", "minus", "blade"]
+    faces = [text[:5] for key, text in found.provenance.inputs.items() if key.startswith("face ")]
+    assert faces == ["hub: ", "shrou", "plus:", "minus", "blade"]
 
 
 WALL = """# a blade as a wall
@@ -130,7 +130,7 @@ def test_the_blade_as_a_wall(tmp_path):
     shutil.copy(ROTOR / "Case_7-28-8_Rotor.step", path.parent / "rotor.step")
     text = path.read_text()
     path.write_text(WALL + text[text.index("[workpiece]") :])
-    found = wall_of_faces(load_job(path))
+    found = wall_of_faces(load_job(path).job)
     rows = np.loadtxt(ROTOR / "blade3d.Case7-28-8.dat", skiprows=1).reshape(21, 241, 3)
     given = through_sections(loft(checked(tuple(rows @ AGAINST_Z["+x"].T))), 0.15)
     # the two have other parameters along the blade: what they share is the distance from one side to the other

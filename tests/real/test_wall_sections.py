@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from chipload.examples import copy_example
-from chipload.job import load_job
+from chipload.jobs import load_job
+from chipload.jobs.thinwall.inputs import read_wall
+from chipload.jobs.thinwall.run import _linked, _on_machine
 from chipload.planning.thinwall.passes import constant
-from chipload.run.wall import _on_machine, _tour
-from chipload.run.wallinputs import read_wall
-from chipload.simulation.finished import nearest
+from chipload.simulation.section_deviation import nearest
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2].parent / "shared" / "data"))
 PROFILE = DATA / "blades" / "turbogrid_rotor37" / "profile.curve"
@@ -36,7 +36,7 @@ def inputs(tmp_path_factory):
     path = copy_example("blade", tmp_path_factory.mktemp("r37") / "job") / "job.toml"
     text = path.read_text()
     path.write_text(WALL + text[text.index("[workpiece]") :])
-    return read_wall(load_job(path, ["operation.0.step_mm=4.0"]))
+    return read_wall(load_job(path, ["operation.0.step_mm=4.0"]).job)
 
 
 def test_shape(inputs):
@@ -50,20 +50,20 @@ def test_shape(inputs):
 
 def test_bears_least_at_the_tip(inputs):
     none = [np.zeros(inputs.wall.shape)] * 2
-    force = inputs.bears(inputs.deflection)(none, 0).force.reshape(inputs.wall.shape)
+    force = inputs.threshold(inputs.deflection)(none, 0).force.reshape(inputs.wall.shape)
     assert np.unravel_index(force.argmin(), force.shape)[1] == force.shape[1] - 1
     assert force[:, 0].min() > 20.0 * force[:, -1].max()
 
 
 def test_a_pass_is_reached_and_does_not_gouge(inputs):
     surfaces = [inputs.coarse(s) for s in inputs.side_numbers]
-    plan = constant(surfaces, inputs.bears(inputs.deflection), inputs.even_law, 0.3)
-    legs = _tour(inputs, plan)
+    plan = constant(surfaces, inputs.threshold(inputs.deflection), inputs.even_law, 0.3)
+    legs = _linked(inputs, plan)
     u, v = np.meshgrid(np.linspace(0.0, 1.0, 161), np.linspace(0.0, 1.0, 201), indexing="ij")
     cloud = np.concatenate([p.reshape(-1, 3) for p in inputs.shape.sides(u, v)])
     for leg in legs:
         gap = nearest(leg.program, inputs.cutter, cloud)
         assert gap.distance > -0.02
-    _, beyond, seconds = _on_machine(inputs, legs[-1].program)
-    assert beyond == ()
-    assert seconds > 60.0
+    moved = _on_machine(inputs, legs[-1].program)
+    assert moved.exceeding == ()
+    assert moved.times.sum() > 60.0

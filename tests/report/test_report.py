@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,116 +16,207 @@ import pyarrow.parquet as pq
 import pytest
 import trimesh
 
+from chipload.errors import Finding, InputError, Severity
 from chipload.geometry.contour import Contour
-from chipload.planning.result import Event
+from chipload.jobs.contour.figures import presentation_of
+from chipload.jobs.contour.outcome import ContourResult, Operation
+from chipload.jobs.contour.programs import program_files
+from chipload.jobs.contour.result import result_of
+from chipload.jobs.contour.scene import scene_bytes
+from chipload.planning.result import Event, StrategyResult
 from chipload.report.folder import write_result
-from chipload.report.history import history_bytes
-from chipload.report.outcome import Outcome, verdict
 from chipload.report.page import page_bytes
-from chipload.report.programs import program_files
-from chipload.report.scene import scene_bytes
 from chipload.report.shape import pieces, slab, thinned
-from chipload.report.summary import summary_bytes
+from chipload.result import Verdict
+from chipload.result.history import write_history
+from chipload.result.load import load_result
+from chipload.result.summary import summary_bytes
 
-Maker = Callable[..., Outcome]
+Maker = Callable[..., ContourResult]
+
+
+def report(outcome: ContourResult) -> bytes:
+    """report.html of an outcome."""
+    return page_bytes(result_of(outcome), presentation_of(outcome))
+
+
+def summary(outcome: ContourResult) -> bytes:
+    """summary.json of an outcome."""
+    return summary_bytes(result_of(outcome), dict.fromkeys(("plain", "backward", "feed"), 1800))
+
+
+def history(outcome: ContourResult) -> bytes:
+    """history.parquet of an outcome."""
+    sink = io.BytesIO()
+    write_history(result_of(outcome), sink)
+    return sink.getvalue()
+
+
+def with_operation(outcome: ContourResult, **changes: Any) -> ContourResult:
+    """The outcome with another first operation."""
+    operation: Operation = replace(outcome.operations[0], **changes)
+    return replace(outcome, operations=(operation,))
+
+
+def with_strategies(outcome: ContourResult, change: Callable[[StrategyResult], StrategyResult]) -> ContourResult:
+    """The outcome with every strategy changed."""
+    result = outcome.operations[0].result
+    strategies = {n: change(s) for n, s in result.strategies.items()}
+    return with_operation(outcome, result=replace(result, strategies=strategies))
+
+
+def verdict(outcome: ContourResult) -> tuple[Verdict, str]:
+    """Verdict and message of an outcome."""
+    result = result_of(outcome)
+    return result.verdict, result.message
 
 
 def test_the_verdict_stands_on_the_strategy_in_use(outcome: Maker) -> None:
+    # the engagement counts where the wall is made, the force everywhere: the semi-finish pass has 95 N
     assert verdict(outcome("backward")) == (
-        True,
-        "Every stated limit holds and the simulation agrees (contour, backward: engagement 12.68 of 13 deg, "
-        "force 50.71 of 200 N).",
+        Verdict.HOLDS,
+        "Holds: engagement 12.68 of 13 deg, force across the axis 95 of 200 N. The simulation agrees with the plan.",
     )
     assert verdict(outcome("plain")) == (
-        False,
-        "Does not hold: operation 0 (contour, plain): engagement 18.74 deg exceeds 13 deg at (5.000, 7.957).",
+        Verdict.EXCEEDS,
+        "Exceeds: engagement 18.74 deg exceeds 13 deg at (5, 7.957, -5).",
     )
 
 
-@pytest.mark.parametrize("status", ["failed", "unproven"])
-def test_what_is_not_proved_does_not_hold(outcome: Maker, status: str) -> None:
-    assert verdict(outcome("backward", status)) == (
-        False,
-        f"Does not hold: operation 0 (contour, backward): simulation: {status}: 1800 rows compared.",
+@pytest.mark.parametrize("state", [Verdict.EXCEEDS, Verdict.UNPROVEN])
+def test_what_the_simulation_does_not_confirm_does_not_hold(outcome: Maker, state: Verdict) -> None:
+    assert verdict(outcome("backward", state)) == (
+        state,
+        f"{state.value.capitalize()}: simulation: 1800 rows compared.",
     )
 
 
-def test_what_was_not_simulated_does_not_hold(outcome: Maker) -> None:
-    made = outcome()
-    bare = replace(made, operations=(replace(made.operations[0], proofs={}),))
-    assert verdict(bare)[1].endswith("the program was not checked by the simulation.")
+def test_what_was_not_simulated_is_unproven(outcome: Maker) -> None:
+    assert verdict(with_operation(outcome(), verifications={})) == (
+        Verdict.UNPROVEN,
+        "Unproven: the program was not checked by the simulation.",
+    )
 
 
 def test_what_the_machine_cannot_do_does_not_hold(outcome: Maker) -> None:
-    made = outcome()
-    far = replace(made.operations[0], beyond={"backward": ("row 1: X = 401 mm",), "plain": ()})
-    assert verdict(replace(made, operations=(far,))) == (
-        False,
-        "Does not hold: operation 0 (contour, backward): row 1: X = 401 mm.",
-    )
+    far = Finding("travel", 0, "row 1: X = 401 mm", Severity.EXCEEDS)
+    made = with_operation(outcome(), machine_findings={"backward": (far,), "plain": ()})
+    assert verdict(made) == (Verdict.EXCEEDS, "Exceeds: row 1: X = 401 mm.")
 
 
-def test_summary_says_the_verdict_first_and_every_strategy(outcome: Maker) -> None:
-    told = json.loads(summary_bytes(outcome("plain")))
-    assert list(told)[:2] == ["holds", "says"]
-    assert told["holds"] is False
-    strategies = told["operations"][0]["strategies"]
-    assert list(strategies) == ["plain", "backward", "feed"]
-    plain = strategies["plain"]
-    assert plain["engagement_deg"]["max"] == pytest.approx(18.738)
+def test_summary_states_the_verdict_first_and_every_strategy(outcome: Maker) -> None:
+    stated = json.loads(summary(outcome("plain")))
+    assert list(stated)[:5] == ["schema_version", "capability", "job", "verdict", "message"]
+    assert stated["verdict"] == "exceeds"
+    assert [(t["name"], t["in_use"], t["verdict"]) for t in stated["tracks"]] == [
+        ("plain", True, "exceeds"),
+        ("backward", False, "holds"),
+        ("feed", False, "exceeds"),
+    ]
+    plain = stated["tracks"][0]
     assert plain["limits"][0] == {
         "name": "engagement_deg",
+        "column": "engagement_deg",
+        "unit": "deg",
         "limit": 13.0,
         "worst": pytest.approx(18.738),
-        "at_mm": pytest.approx([5.0, 7.957], abs=1e-3),
-        "holds": False,
+        "state": "exceeds",
+        "track": "plain",
+        "row": 900 + int(np.argmax(outcome().operations[0].result.strategies["plain"].history["engagement_deg"][900:])),
+        "line": 0,
+        "place": pytest.approx([5.0, 7.957, -5.0], abs=1e-3),
+        "t_s": pytest.approx(plain["limits"][0]["row"] * 9.0 / 1799),
+        "resolution_error": 0.0,
+        "reason": "",
     }
-    assert plain["events"][0]["code"] == "lead-none"
-    assert plain["verification"]["status"] == "proved"
-    assert plain["fails"] == ["engagement 18.74 deg exceeds 13 deg at (5.000, 7.957)"]
-    assert told["unchecked"] == ["torque_nm"]
+    assert plain["time_s"] == 9.0
+    assert [(f["code"], f["severity"]) for f in plain["findings"]] == [("lead-none", "note")]
+    strategies = stated["operations"][0]["strategies"]
+    assert list(strategies) == ["plain", "backward", "feed"]
+    assert strategies["plain"]["engagement_deg"]["max"] == pytest.approx(18.738)
+    assert strategies["plain"]["verification"]["verdict"] == "holds"
+    assert stated["limits"] == plain["limits"]
+    assert stated["unchecked"] == ["default checks: no coefficients", "limit torque_nm: not stated"]
 
 
-def test_a_number_that_is_none_is_a_fault(outcome: Maker) -> None:
-    made = outcome()
-    op = made.operations[0]
-    bad = replace(op.result.strategies["feed"], summary={"time_s": float("nan")})
-    op = replace(op, result=replace(op.result, strategies={**op.result.strategies, "feed": bad}))
-    with pytest.raises(ValueError, match="not JSON compliant"):
-        summary_bytes(replace(made, operations=(op,)))
+@pytest.mark.parametrize("bad", [{"time_s": math.nan}, {"time_s": 9.0, "torque_nm": {"max": math.inf}}])
+def test_a_number_that_is_none_is_a_fault(outcome: Maker, bad: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match="must be finite"):
+        with_strategies(outcome(), lambda s: replace(s, summary=bad))
+    # nor does one of another capability reach summary.json
+    result = replace(result_of(outcome()), operations=(bad,))
+    with pytest.raises(ValueError, match="should be a finite number"):
+        summary_bytes(result, {})
 
 
 def test_history_has_a_row_a_step(outcome: Maker) -> None:
-    table = pq.read_table(io.BytesIO(history_bytes(outcome())))
+    table = pq.read_table(io.BytesIO(history(outcome())))
     assert table.num_rows == 3 * 1800
-    need = "operation strategy pass x_mm y_mm z_mm engagement_deg feed_mm_min force_x_n force_y_n torque_nm error_um"
+    need = "operation track pass x_mm y_mm z_mm engagement_deg feed_mm_min force_x_n force_y_n torque_nm form_error_um"
     assert set(need.split()) <= set(table.column_names)
-    assert table.column_names[:3] == ["operation", "strategy", "pass"]
+    assert table.column_names[:3] == ["operation", "track", "pass"]
     rows = table.to_pydict()
-    assert sorted(set(rows["strategy"])) == ["backward", "feed", "plain"]
-    plain = [a for a, n, p in zip(rows["engagement_deg"], rows["strategy"], rows["pass"], strict=True)
+    # the track in use comes first, and each has a time of its own
+    assert [rows["track"][k] for k in (0, 1800, 3600)] == ["backward", "plain", "feed"]
+    t = np.array(rows["t_s"]).reshape(3, 1800)
+    assert t[:, 0].tolist() == [0.0] * 3
+    assert (np.diff(t) > 0.0).all()
+    plain = [a for a, n, p in zip(rows["engagement_deg"], rows["track"], rows["pass"], strict=True)
              if (n, p) == ("plain", "finish")]  # fmt: skip
     assert max(plain) == pytest.approx(18.738)
 
 
-def test_history_of_operations_with_other_columns_has_nulls(outcome: Maker) -> None:
-    made = outcome()
-    op = made.operations[0]
-    plain = op.result.strategies["plain"]
-    wide = replace(plain, history={**plain.history, "arcs": np.ones(1800, dtype=np.int64)})
-    op = replace(op, result=replace(op.result, strategies={**op.result.strategies, "plain": wide}))
-    table = pq.read_table(io.BytesIO(history_bytes(replace(made, operations=(op,)))))
-    assert table["arcs"].null_count == 2 * 1800
+def test_history_of_tracks_with_other_columns_has_nulls(outcome: Maker) -> None:
+    def wider(s: StrategyResult) -> StrategyResult:
+        return replace(s, history={**s.history, "line": np.ones(1800, dtype=np.int64)}) if s.name == "plain" else s
+
+    table = pq.read_table(io.BytesIO(history(with_strategies(outcome(), wider))))
+    assert table["line"].null_count == 2 * 1800
+
+
+def test_a_result_read_back_is_the_result(outcome: Maker, tmp_path: Path) -> None:
+    made = outcome("plain")
+    write_result(result_of(made), presentation_of(made), tmp_path / "r")
+    ours, again = result_of(made), load_result(tmp_path / "r")
+    assert (again.verdict, again.message) == (ours.verdict, ours.message)
+    for a, b in zip(again.tracks, ours.tracks, strict=True):
+        assert (a.name, a.in_use, a.time_s, a.limits, a.findings) == (b.name, b.in_use, b.time_s, b.limits, b.findings)
+        for name, values in b.columns.items():
+            np.testing.assert_array_equal(a.columns[name], values)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"verdict": "exceeds"', '"verdict": "holds"', "verdict holds does not follow from its limits and findings"),
+        ('"name": "force_xy_n"', '"name": "<b>"', "limit <b>: not known: no column of a history has this name"),
+        ('"worst": 95.0', '"worst": null', "without a value it can only be unproven"),
+        ('"limit": 13.0', '"limit": 14.0', "limits differ from those of the tracks in use"),
+        ('"schema_version": 1', '"schema_version": 2', "is no result of schema version 1"),
+        ('"name": "feed"', '"name": "plain"', "must differ"),
+    ],
+)
+def test_a_summary_that_contradicts_itself_is_refused(
+    outcome: Maker, tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    made = outcome("plain")
+    write_result(result_of(made), presentation_of(made), tmp_path / "r")
+    path = tmp_path / "r" / "summary.json"
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError, match=re.escape(message)):
+        load_result(tmp_path / "r")
 
 
 def test_the_same_outcome_gives_the_same_bytes(outcome: Maker) -> None:
-    for make in (summary_bytes, history_bytes, page_bytes, scene_bytes):
+    for make in (summary, history, report, scene_bytes):
         assert make(outcome()) == make(outcome()), make.__name__
     assert program_files(outcome()) == program_files(outcome())
 
 
 def test_the_page_loads_nothing_from_elsewhere(outcome: Maker) -> None:
-    html = page_bytes(outcome()).decode()
+    html = report(outcome()).decode()
     # what a page loads stands in its own elements and styles; the library's text is data to it
     own = re.sub(r"<script>.*?</script>", "", html, flags=re.S)
     assert "http" not in own.replace("application/json", "")
@@ -132,40 +224,63 @@ def test_the_page_loads_nothing_from_elsewhere(outcome: Maker) -> None:
     assert html.count("<script") == 3
 
 
-def test_the_page_says_the_verdict_before_all_else(outcome: Maker) -> None:
-    html = page_bytes(outcome("plain")).decode()
+def test_the_page_states_the_verdict_before_all_else(outcome: Maker) -> None:
+    html = report(outcome("plain")).decode()
     body = html[html.index("<main>") :]
-    order = ["Does not hold", "What does not hold", "Strategies side by side", "Limits", "Along the finish pass",
-             "From above", "In space", "Findings", "What was not checked", "Where the numbers come from"]  # fmt: skip
+    order = [
+        "<b>exceeds</b>",
+        "engagement 18.74 deg exceeds 13 deg",
+        "<h2>Limits",
+        "<h2>Strategies",
+        "<h2>Operation 0",
+        "Along the finish pass",
+        "Plan view",
+        "Path",
+        "<h2>Findings",
+        "<h2>Not checked",
+        "<h2>Provenance",
+    ]
     places = [body.index(x) for x in order]
     assert places == sorted(places)
-    assert "torque: the job states no limit" in body
+    assert "limit torque_nm: not stated" in body
     assert "operation.0.x: a finding" in body
 
 
+def test_the_table_of_limits_has_the_numbers_of_the_result(outcome: Maker) -> None:
+    made = outcome("plain")
+    html = report(made).decode()
+    table = html[html.index("<h2>Limits</h2>") :]
+    rows = re.findall(r"<tr.*?</tr>", table[: table.index("</table>")])[1:]
+    cells = [[re.sub("<[^>]*>", "", c) for c in re.findall(r"<td[^>]*>(.*?)</td>", row)] for row in rows]
+    wanted = {(t.name, c.column.title, c.state.value, f"{c.limit:g}", f"{c.worst:.4g}")
+              for t in result_of(made).tracks for c in t.limits}  # fmt: skip
+    assert {(c[0].removesuffix(" in use"), *c[1:5]) for c in cells} == wanted
+    assert len(cells) == 6
+    # the track in use first, its worst state first
+    assert [c[0] for c in cells[:2]] == ["plain in use"] * 2
+    assert [c[2] for c in cells[:2]] == ["exceeds", "holds"]
+
+
 def test_a_pass_that_never_cut_is_still_shown(outcome: Maker) -> None:
-    made = outcome()
-    op = made.operations[0]
-    air = {n: replace(s, history={k: v if v.dtype == object else 0.0 * v for k, v in s.history.items()})
-           for n, s in op.result.strategies.items()}  # fmt: skip
-    made = replace(made, operations=(replace(op, result=replace(op.result, strategies=air)),))
-    assert b"Along the finish pass" in page_bytes(made)
+    def air(s: StrategyResult) -> StrategyResult:
+        return replace(s, history={k: v if v.dtype == object else 0.0 * v for k, v in s.history.items()})
+
+    made = with_strategies(outcome(), air)
+    assert b"Along the finish pass" in report(made)
     assert scene_bytes(made)
 
 
 def test_names_from_outside_cannot_become_markup(outcome: Maker) -> None:
     evil = "</script><script>alert(1)</script>"
-    made = outcome()
-    op = made.operations[0]
     event = Event("x", 1.0, 1.0, evil)
-    strategies = {n: replace(s, events=(event,)) for n, s in op.result.strategies.items()}
-    op = replace(op, result=replace(op.result, strategies=strategies))
-    html = page_bytes(replace(made, title=evil, findings=(evil,), operations=(op,))).decode()
+    made = with_strategies(outcome(), lambda s: replace(s, events=(event,)))
+    html = report(replace(made, title=evil, findings=(Finding("x", 0, evil),))).decode()
     assert evil not in html
+    assert "&lt;script&gt;alert(1)" in html
 
 
 def test_a_long_history_stays_small_and_keeps_its_extremes(outcome: Maker) -> None:
-    html = page_bytes(outcome(rows=60_000))
+    html = report(outcome(rows=60_000))
     assert len(html) < 12e6
 
 
@@ -221,12 +336,13 @@ def test_only_the_program_in_use_that_holds_is_called_verified(outcome: Maker) -
     assert sorted(files) == [f"0-{n}.{e}" for n in ("backward", "feed", "plain") for e in ("apt", "ngc")]
     verified = {n for n, data in files.items() if b"NOT VERIFIED" not in data}
     assert verified == {"0-backward.ngc", "0-backward.apt"}
-    for made in (outcome("plain"), outcome("backward", "unproven")):
+    for made in (outcome("plain"), outcome("backward", Verdict.UNPROVEN)):
         assert all(b"NOT VERIFIED" in data for data in program_files(made).values())
 
 
 def test_the_folder_holds_everything(outcome: Maker, tmp_path: Path) -> None:
-    target = write_result(outcome(), tmp_path / "a" / "result")
+    made = outcome()
+    target = write_result(result_of(made), presentation_of(made), tmp_path / "a" / "result")
     names = sorted(p.name for p in target.iterdir())
     assert names == sorted(["summary.json", "history.parquet", "report.html", "scene.glb",
                             *program_files(outcome())])  # fmt: skip

@@ -30,7 +30,7 @@ def test_scallop_of_a_ball_between_parallel_passes():
     ys = np.arange(0.0, 20.1, w)
     (got,) = left_on([grid], over(ys), BALL, 1.0, 0.5, step=1.0, tol=1e-9)
     h = 4.0 - math.sqrt(16.0 - 1.0)
-    crests = got.crests("v")
+    crests = got.scallops("v")
     assert len(crests) == 5 * 10
     assert np.abs(crests - h).max() < 1e-6
     y = grid.points[:, 1]
@@ -48,7 +48,7 @@ def test_depth_and_place_of_a_gouge():
     assert deep == pytest.approx(0.3, abs=1e-6)
     assert grid.points[k, 1] == pytest.approx(6.0)
     assert int(got.row[k]) == 2
-    assert "cutting part comes 0.3000 mm below" in got.says()
+    assert "cutting part comes 0.3000 mm below" in got.message()
     # half the width of the gouge: sqrt(R^2 - (R - 0.3)^2)
     cut = np.abs(grid.points[got.gouge > 1e-9, 1] - 6.0).max()
     assert cut == pytest.approx(math.sqrt(16.0 - 3.7**2), abs=0.1)

@@ -72,9 +72,9 @@ def test_a_wall_costs_what_the_exact_arcs_say(spindle: str) -> None:
     )  # fmt: skip
     row = int(np.flatnonzero(c["x_mm"] > 20.0)[0])
     for ours, theirs in (
-        ("force_x_mean_n", "force_mean_x_n"),
-        ("force_y_mean_n", "force_mean_y_n"),
-        ("force_z_mean_n", "force_mean_z_n"),
+        ("force_x_mean_n", "force_x_mean_n"),
+        ("force_y_mean_n", "force_y_mean_n"),
+        ("force_z_mean_n", "force_z_mean_n"),
         ("torque_mean_nm", "torque_mean_nm"),
         ("power_w", "power_w"),
         ("chip_max_mm", "chip_max_mm"),

@@ -11,8 +11,8 @@ import pytest
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_over_turn, in_work
 from chipload.cutting.material import Material, material_named
-from chipload.cutting.wall import wall_profile
-from chipload.engagement.bites import bites_of_arcs
+from chipload.cutting.wall_error import wall_profile
+from chipload.engagement.tooth_engagement import engagement_of_arcs
 from chipload.errors import InputError
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
@@ -21,7 +21,7 @@ from chipload.simulation.deflection import contacts, form_error, step_deflection
 from chipload.stock.layers import LayeredStock
 from chipload.structure.grid import from_map
 from chipload.structure.places import locate, normals_of
-from chipload.structure.solid import Solid, compliance, factorise, full_compliance
+from chipload.structure.solid import SolidWorkpiece, compliance, factorise, full_compliance
 from chipload.structure.spindle import Bar, Joint, cutter_bars
 from simulation.test_steps import five_axis
 
@@ -89,7 +89,7 @@ def test_it_is_the_wall_of_the_closed_form(milling: str, helix: float) -> None:
     found = form_error(removal, AL, p, n, work=np.full(len(p), work), bars={1: cutter_bars(mill)}, near=0.1)
     a = math.acos(1.0 - width / 5.0)
     arc = (math.pi - a, math.pi) if milling == "down" else (0.0, a)
-    bites = bites_of_arcs([arc[0]], [arc[1]], math.tau * 20.0 / (4 * 300.0), mill, depth)
+    bites = engagement_of_arcs([arc[0]], [arc[1]], math.tau * 20.0 / (4 * 300.0), mill, depth)
     closed = wall_profile(bites, mill, AL, z, milling=milling, work_compliance=work)[0]
     assert abs(closed).max() > 1e-4
     np.testing.assert_allclose(found.error, closed, rtol=0.0, atol=1e-5 * abs(closed).max())
@@ -259,7 +259,7 @@ def test_a_cantilever_wall_yields_by_the_beam_formula_under_the_force_of_the_edg
     length, high, thick, modulus = 8.0, 30.0, 2.0, 7e4
     u, v = np.linspace(0.0, length, 5).tolist(), np.linspace(-high, 0.0, 16).tolist()
     grid = from_map(u, v, [0.0, thick], lambda p: p[:, [0, 2, 1]] * [1.0, -1.0, 1.0])
-    part = factorise(Solid(grid, modulus, 0.0, 2.7e-9, grid.side("j-")))
+    part = factorise(SolidWorkpiece(grid, modulus, 0.0, 2.7e-9, grid.side("j-")))
     point, normal = np.array([[4.0, 0.0, -1.0]]), np.array([[0.0, 1.0, 0.0]])
     at = locate(grid, "k-", point, 1e-6)
     np.testing.assert_allclose(normals_of(grid, at, "k-"), normal, atol=1e-12)
@@ -282,7 +282,9 @@ def test_steps_kept_in_blocks_are_the_same_steps(monkeypatch: pytest.MonkeyPatch
     (a,), (b,) = whole.cuts, parts.cuts
     assert len(a) > 14
     assert a.step.tolist() == b.step.tolist()
-    for name in ("start", "rows", "tooth", "slice", "frame"):
+    for name in ("start", "rows", "tooth", "frame"):
         assert np.array_equal(getattr(a.bites, name), getattr(b.bites, name)), name
+    # each block numbers its own slices
+    assert np.array_equal(a.bites.slices[a.bites.slice], b.bites.slices[b.bites.slice])
     assert np.array_equal(a.way, b.way)
     assert (np.linalg.norm(a.way[:, 3:6] - a.way[:, :3], axis=1) <= 0.5 + 1e-9).all()

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from chipload.errors import InputError
-from chipload.program.build import plunge, rapid, rows
+from chipload.program.build import dwell, plunge, rapid, rows
 from chipload.program.program import ARC_CCW, DWELL, LINE, Program
-from chipload.simulation.steps import steps_of
+from chipload.simulation.steps import steps_in_blocks, steps_of
 
 
 def five_axis(p: list[list[float]], a: list[list[float]], feed: float = 10.0, motion: int = LINE) -> Program:
@@ -67,3 +67,18 @@ def test_a_dwell_and_a_rapid() -> None:
 def test_a_step_of_no_length_is_refused() -> None:
     with pytest.raises(InputError, match="step_mm = 0: must be above 0"):
         steps_of(Program.join([rapid([0, 0, 0], 0, 1, "a"), plunge([9, 0, 0], 3.0, 80.0, 1, "b")]), 0.0, 0.01)
+
+
+def test_times_of_rows_are_shared_by_their_steps():
+    """Shares by length; what takes time without a motion goes to the step before it, the start to the first row."""
+    cuts = plunge([14, 0, 0], 2.0, 80.0, 1, "b")
+    parts = [rapid([[0, 0, 0], [10, 0, 0]], 0.0, 1, "a"), dwell([10, 0, 0], 0.5, 0.0, 1, "a"), cuts]
+    program = Program.join(parts)
+    times = np.array([0.25, 1.0, 0.5, 3.0])
+    steps = steps_of(program, 5.0, 0.01, times=times)
+    assert steps.duration.tolist() == pytest.approx([0.5, 0.5 + 0.25 + 0.5, 3.0])
+    assert steps.seconds.tolist() == pytest.approx([0.0, 0.0, 2.0])
+    some = list(steps_in_blocks(program, 5.0, 0.01, size=2, times=times))
+    assert np.concatenate([s.duration for s in some]).tolist() == steps.duration.tolist()
+    with pytest.raises(InputError, match=r"steps: times \(3,\): must be \(4,\)"):
+        steps_of(program, 5.0, 0.01, times=times[1:])

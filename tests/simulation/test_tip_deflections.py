@@ -17,10 +17,10 @@ import pytest
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.errors import InputError
-from chipload.job.tables import StiffnessTable
+from chipload.jobs.program.stiffness import deflecting, stiffness_of
+from chipload.jobs.program.tables import StiffnessTable
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
-from chipload.run.stiffness import deflecting, stiffness_of
 from chipload.simulation.chips import Resolution, remove
 from chipload.stock.layers import LayeredStock
 
@@ -65,7 +65,7 @@ def test_a_cutter_alone_is_a_cantilever_and_all_else_is_named() -> None:
     found, columns, gives = slot()
     assert found["deflection_cutter_um"] == pytest.approx(1e3 * bar(), rel=1e-6)
     assert found["deflection_um"] == found["deflection_cutter_um"]
-    assert "deflection_work_um" not in found
+    assert "deflection_workpiece_um" not in found
     assert columns["force_n"].max() == pytest.approx(LOAD * DEPTH, rel=1e-6)
     chip = math.tau * FEED / (2 * SPEED)
     assert columns["torque_nm"].max() == pytest.approx(5.0 * DEPTH * (900.0 * chip + 12.0) / 1000.0, rel=1e-6)
@@ -92,7 +92,7 @@ def test_holder_joints_and_work_add_what_they_give() -> None:
     cutter = bar() + holder + joint(80.0, 2e4, 30.0) + joint(40.0, 1e5, 90.0)
     work = force / 25e3
     assert found["deflection_cutter_um"] == pytest.approx(1e3 * cutter, rel=1e-6)
-    assert found["deflection_work_um"] == pytest.approx(1e3 * work, rel=1e-6)
+    assert found["deflection_workpiece_um"] == pytest.approx(1e3 * work, rel=1e-6)
     # one straight tooth cuts, so that cutter and work part along one line
     assert found["deflection_um"] == pytest.approx(1e3 * (cutter + work), rel=1e-6)
 
@@ -111,7 +111,7 @@ def test_what_is_stated_as_rigid_adds_nothing_and_leaves_nothing_open() -> None:
     found, _, gives = slot(replace(MILL, holder=()), **rigid)
     assert gives.unknown == ()
     assert found["deflection_cutter_um"] == pytest.approx(1e3 * bar(), rel=1e-6)
-    assert found["deflection_work_um"] == 0.0
+    assert found["deflection_workpiece_um"] == 0.0
     assert found["deflection_um"] == found["deflection_cutter_um"]
 
 

@@ -195,7 +195,7 @@ def test_stopped_or_not_comparable_is_unproven():
 
     rows = finish_rows()
     assert verify(plan(), rows, progress=stop).verdict == "unproven"
-    assert verify(plan(), rows, passes=["front"]).reasons == ("no row of the history was compared",)
+    assert verify(plan(), rows, passes=["pocket"]).reasons == ("no row of the history was compared",)
     ramp = program([(RAPID, 0, 0, SAFE, 0, 0), (LINE, 10, 0, Z, 0, 0), (LINE, 20, 0, Z, 0, 0)])
     one = {k: c[:1].copy() for k, c in rows.items()}
     one["x_mm"][0], one["y_mm"][0], one["z_mm"][0] = 8.0, 0.0, SAFE + 0.8 * (Z - SAFE)
@@ -223,7 +223,7 @@ def test_a_row_at_a_kink_is_held_against_both_headings():
             "y_mm": np.array([0.0, 0.0, 20.0]),
             "z_mm": np.full(3, Z),
             "engagement_deg": np.array([180.0, angle, 180.0]),
-            "pass": np.full(3, "front", dtype=object),
+            "pass": np.full(3, "pocket", dtype=object),
         }
 
     def check(angle):

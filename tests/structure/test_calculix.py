@@ -10,7 +10,7 @@ import pytest
 
 from chipload.structure.grid import from_map
 from chipload.structure.modes import modes
-from chipload.structure.solid import Solid, displacement, factorise
+from chipload.structure.solid import SolidWorkpiece, displacement, factorise
 
 pytestmark = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
 
@@ -49,7 +49,7 @@ def run(text, folder):
 @pytest.mark.parametrize(("kind", "rule"), [("C3D20", 27), ("C3D20R", 8)])
 def test_displacements(tmp_path, kind, rule):
     grid = twisted()
-    solid = Solid(grid, E, NU, RHO, grid.side("j-"), rule=rule)
+    solid = SolidWorkpiece(grid, E, NU, RHO, grid.side("j-"), rule=rule)
     tip = grid.side("j+")
     force = np.zeros(grid.nodes.shape)
     force[tip] = np.random.default_rng(1).standard_normal((len(tip), 3))
@@ -69,5 +69,5 @@ def test_frequencies(tmp_path):
     rows = [line.split() for line in text.split("P A R T I C I P A T I O N")[0].splitlines()]
     theirs = [float(r[3]) for r in rows if len(r) == 5 and r[0].isdigit()]
     assert len(theirs) == 6
-    ours, _ = modes(factorise(Solid(grid, E, NU, RHO, grid.side("j-"))), 6)
+    ours, _ = modes(factorise(SolidWorkpiece(grid, E, NU, RHO, grid.side("j-"))), 6)
     np.testing.assert_allclose(ours, theirs, rtol=1e-5)

@@ -8,7 +8,7 @@ import pytest
 from chipload.errors import InputError
 from chipload.structure.grid import from_half_grid, from_map, from_points, plate
 from chipload.structure.hexa import NODES, mass
-from chipload.structure.places import Places, locate, normals_of, on_cut, on_side, points_of, weights
+from chipload.structure.places import MeshPlaces, locate, normals_of, on_cut, on_side, points_of, weights
 
 
 def ring(p):
@@ -78,6 +78,14 @@ def test_places_on_a_curved_side():
     np.testing.assert_allclose(weights(grid, places) @ grid.nodes, points, atol=1e-12)
 
 
+def test_a_point_beyond_the_edge_is_located_on_it():
+    """0.02 mm beyond both edges of a plate of 10 x 8 mm: the corner itself."""
+    grid = plate(10.0, 8.0, 2.0, (4, 3, 1))
+    corner = points_of(grid, on_side(grid, "k+", [1.0], [1.0]))
+    places = locate(grid, "k+", corner + np.array([0.02, 0.02, 0.0]), 0.05)
+    np.testing.assert_allclose(points_of(grid, places), corner, atol=1e-12)
+
+
 @pytest.mark.parametrize("side", ["i-", "i+", "j-", "j+", "k-", "k+"])
 def test_located_where_they_were_put(side):
     grid = tube(5)
@@ -122,4 +130,4 @@ def test_refused():
         grid.side("top")
     with pytest.raises(InputError, match=r"side k\+: a place along j is outside 0 .. 1"):
         on_side(grid, "k+", 0.5, 1.1)
-    assert len(Places(np.zeros(2, dtype=np.int64), np.zeros((2, 3)))) == 2
+    assert len(MeshPlaces(np.zeros(2, dtype=np.int64), np.zeros((2, 3)))) == 2

@@ -10,7 +10,7 @@ import pytest
 from chipload.errors import InputError
 from chipload.structure.grid import from_map, plate
 from chipload.structure.hexa import NODES, gauss, mass, shape, shape_gradient, stiffness
-from chipload.structure.solid import Solid, assemble
+from chipload.structure.solid import SolidWorkpiece, assemble
 
 RNG = np.random.default_rng(5)
 E, NU = 1.1e5, 0.31
@@ -84,7 +84,7 @@ def test_only_rigid_motions_are_free(rule):
 def test_patch(rule):
     """Boundary moved by a linear field: inner nodes follow it, reactions are those of a constant stress."""
     grid = crooked((3, 3, 2))
-    solid = Solid(grid, E, NU, 4.43e-9, np.zeros(0, dtype=np.int64), rule=rule)
+    solid = SolidWorkpiece(grid, E, NU, 4.43e-9, np.zeros(0, dtype=np.int64), rule=rule)
     K = assemble(solid)
     strain = np.array([[1.0, 0.4, -0.2], [0.1, -0.6, 0.3], [0.5, -0.1, 0.8]]) * 1e-3
     u = (grid.nodes @ strain.T).ravel()

@@ -8,7 +8,7 @@ import pytest
 from chipload.errors import InputError
 from chipload.structure.grid import from_map, plate
 from chipload.structure.modes import modes
-from chipload.structure.solid import Solid, factorise
+from chipload.structure.solid import SolidWorkpiece, factorise
 
 E, NU, RHO = 1.1e5, 0.34, 4.43e-9
 SIZE = np.array([30.0, 20.0, 10.0])
@@ -28,7 +28,7 @@ def box(n):
     for c, sides in enumerate((("i-", "i+"), ("j-", "j+"), ("k-", "k+"))):
         for side in sides:
             held[grid.side(side), c] = True
-    return factorise(Solid(grid, E, NU, RHO, held))
+    return factorise(SolidWorkpiece(grid, E, NU, RHO, held))
 
 
 def test_shear_wave_and_order_of_convergence():
@@ -43,7 +43,7 @@ def test_shear_wave_and_order_of_convergence():
 
 def test_free_plate_has_six_rigid_motions():
     grid = plate(100.0, 80.0, 3.0, (6, 5, 1))
-    free = Solid(grid, E, NU, RHO, np.zeros(0, dtype=np.int64))
+    free = SolidWorkpiece(grid, E, NU, RHO, np.zeros(0, dtype=np.int64))
     f, shapes = modes(free, 8, shift=(2.0 * np.pi * 500.0) ** 2)
     assert (f[:6] < 1e-3 * f[6]).all()
     assert f[6] > 100.0
@@ -60,8 +60,8 @@ def test_a_heavier_wall_without_its_top():
     grid = plate(20.0, 100.0, 2.0, (2, 10, 1))
     kept = np.tile([0.0, 1.0], (20, 1))
     kept[grid.element(*np.meshgrid(np.arange(2), np.arange(5, 10), [0])).ravel()] = 0.0
-    full = modes(factorise(Solid(grid, E, 0.0, RHO, grid.side("j-"), rule=8)), 1)[0][0]
-    half = modes(factorise(Solid(grid, E, 0.0, RHO, grid.side("j-"), kept=kept, rule=8)), 1)[0][0]
+    full = modes(factorise(SolidWorkpiece(grid, E, 0.0, RHO, grid.side("j-"), rule=8)), 1)[0][0]
+    half = modes(factorise(SolidWorkpiece(grid, E, 0.0, RHO, grid.side("j-"), kept=kept, rule=8)), 1)[0][0]
     beam = 1.8751**2 / (2 * np.pi * 100.0**2) * np.sqrt(E * 4.0 / 12.0 / RHO)
     assert full == pytest.approx(beam, rel=0.005)
     assert half / full == pytest.approx(4.0, rel=0.01)
@@ -69,7 +69,7 @@ def test_a_heavier_wall_without_its_top():
 
 def test_refused():
     grid = plate(10.0, 10.0, 1.0, (1, 1, 1))
-    free = Solid(grid, E, NU, RHO, np.zeros(0, dtype=np.int64))
+    free = SolidWorkpiece(grid, E, NU, RHO, np.zeros(0, dtype=np.int64))
     with pytest.raises(InputError, match="modes: shift = 0 needs a factored part"):
         modes(free, 3)
     with pytest.raises(InputError, match="modes: count = 60: must be from 1 to 59"):

@@ -7,19 +7,19 @@ import pytest
 
 from chipload.errors import InputError
 from chipload.structure.grid import from_map, plate
-from chipload.structure.places import Places, normals_of, on_cut, on_side
+from chipload.structure.places import MeshPlaces, normals_of, on_cut, on_side
 from chipload.structure.removal import cut, prepare, start
-from chipload.structure.solid import Solid, factorise
+from chipload.structure.solid import SolidWorkpiece, factorise
 from chipload.structure.solid import compliance as solved
 from chipload.structure.solid import full_compliance as solved_full
-from chipload.structure.watched import alive, compliance, cut_compliance, watch
+from chipload.structure.unit_loads import alive, compliance, cut_compliance, watch
 
 E, NU, RHO = 1.14e5, 0.34, 4.43e-9
 
 
 def wall(layers=2):
     grid = plate(60.0, 40.0, 4.0, (6, 5, layers))
-    return Solid(grid, E, NU, RHO, grid.side("j-"))
+    return SolidWorkpiece(grid, E, NU, RHO, grid.side("j-"))
 
 
 def blade():
@@ -36,7 +36,7 @@ def blade():
         ]
 
     grid = from_map(np.linspace(0, 1, 6), np.linspace(0, 1, 6), np.linspace(0, 1, 4), place)
-    return Solid(grid, E, NU, RHO, grid.side("j-"))
+    return SolidWorkpiece(grid, E, NU, RHO, grid.side("j-"))
 
 
 def seen(solid, side="k-", n=7):
@@ -96,7 +96,7 @@ def test_on_the_cut_faces():
     elements = row(solid.grid, 4, 0)
     state = cut(start(solid, limit=10**6), elements, (0.0, 0.4))
     outer, n = seen(solid, "k+", 5)
-    outer = Places(np.sort(elements)[:5], outer.local)
+    outer = MeshPlaces(np.sort(elements)[:5], outer.local)
     cutted = on_cut(outer, state.solid.kept, "k+")
     anew = factorise(state.solid)
     np.testing.assert_allclose(cut_compliance(state, cutted, n), solved(anew, cutted, n), rtol=1e-9)
@@ -107,7 +107,7 @@ def test_on_the_cut_faces():
     watched = watch(state, places, normals)
     np.testing.assert_allclose(compliance(state, watched), solved(anew, places, normals), rtol=1e-9)
     with pytest.raises(InputError, match="element 0 was not cut since the last factorisation: watch the place instead"):
-        cut_compliance(state, Places(np.array([0]), np.zeros((1, 3))), [[0.0, 0.0, 1.0]])
+        cut_compliance(state, MeshPlaces(np.array([0]), np.zeros((1, 3))), [[0.0, 0.0, 1.0]])
 
 
 def test_prepared_columns_serve_every_cut():
@@ -149,7 +149,7 @@ def test_forces_on_what_is_gone():
     np.testing.assert_array_equal(living, np.linspace(0.99, 0.35, 7) <= 0.8)
     with pytest.raises(InputError, match="compliance: place 0 is on material that is gone: leave it out"):
         compliance(state, watched)
-    kept = Places(places.element[living], places.local[living])
+    kept = MeshPlaces(places.element[living], places.local[living])
     np.testing.assert_allclose(
         compliance(state, watch(state, kept, n[living])), solved(factorise(state.solid), kept, n[living]), rtol=1e-9
     )

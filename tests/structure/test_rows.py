@@ -9,12 +9,12 @@ import pytest
 
 from chipload.errors import InputError
 from chipload.structure.grid import from_map
-from chipload.structure.places import Places, normals_of, on_cut, on_side
+from chipload.structure.places import MeshPlaces, normals_of, on_cut, on_side
 from chipload.structure.rows import row_compliances
-from chipload.structure.solid import Solid, compliance, factorise, full_compliance
+from chipload.structure.solid import SolidWorkpiece, compliance, factorise, full_compliance
 
 
-def twisted(layers: int) -> Solid:
+def twisted(layers: int) -> SolidWorkpiece:
     """A crooked plate, clamped below: 5 columns, 4 rows."""
 
     def place(p: np.ndarray) -> np.ndarray:
@@ -23,16 +23,16 @@ def twisted(layers: int) -> Solid:
 
     breaks = [0.0, 2.0, 3.0] if layers == 2 else [0.0, 3.0]
     grid = from_map(np.linspace(0.0, 20.0, 6).tolist(), [0.0, 2.0, 5.0, 8.0, 12.0], breaks, place)
-    return Solid(grid, 1.14e5, 0.34, 4.43e-9, grid.side("j-"))
+    return SolidWorkpiece(grid, 1.14e5, 0.34, 4.43e-9, grid.side("j-"))
 
 
-def rows_of(solid: Solid, axis: int) -> np.ndarray:
+def rows_of(solid: SolidWorkpiece, axis: int) -> np.ndarray:
     """Elements (rows, .) along an axis."""
     numbers = np.arange(len(solid.grid.elements)).reshape(solid.grid.counts)
     return np.moveaxis(numbers, axis, 0).reshape(solid.grid.counts[axis], -1)
 
 
-def state(solid: Solid, after: np.ndarray, axis: int, end: int, cut: int) -> Solid:
+def state(solid: SolidWorkpiece, after: np.ndarray, axis: int, end: int, cut: int) -> SolidWorkpiece:
     rows = rows_of(solid, axis)
     rows = rows[::-1] if end else rows
     kept = solid.kept.copy()
@@ -68,7 +68,7 @@ def test_thinned_rows_and_places_on_the_face_that_is_cut() -> None:
         now = state(solid, after, 1, 1, c)
         local = np.where((row >= 4 - c)[:, None], later.local, places.local)
         np.testing.assert_allclose(
-            found[c], full_compliance(factorise(now), Places(places.element, local)), rtol=1e-9, atol=1e-15
+            found[c], full_compliance(factorise(now), MeshPlaces(places.element, local)), rtol=1e-9, atol=1e-15
         )
     some = row_compliances(solid, after, places, side="j+", places_after=later, cut=[1, 3])
     np.testing.assert_allclose(some, found[[1, 3]], rtol=1e-12)

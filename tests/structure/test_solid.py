@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from chipload.errors import InputError
 from chipload.structure.grid import from_map, plate
 from chipload.structure.places import locate, normals_of, on_side
-from chipload.structure.solid import Solid, compliance, displacement, factorise, full_compliance, loads
+from chipload.structure.solid import SolidWorkpiece, compliance, displacement, factorise, full_compliance, loads
 
 E, NU, RHO = 2e5, 0.3, 7.85e-9
 
@@ -26,7 +26,7 @@ def thin(breaks, rows, t, symmetric=False):
     held[grid.side("j-")] = True
     if symmetric:
         held[grid.side("i-"), 0] = True
-    return factorise(Solid(grid, E, NU, RHO, held, rule=8))
+    return factorise(SolidWorkpiece(grid, E, NU, RHO, held, rule=8))
 
 
 def plate_stiffness(t):
@@ -49,7 +49,7 @@ def kirchhoff_strip(x):
 def test_cantilever_beam():
     """Tip force at the middle of the section: a^3 / (3 E I), shear 0.02 % of it."""
     grid = plate(100.0, 2.0, 2.0, (20, 2, 2))
-    f = factorise(Solid(grid, E, NU, RHO, grid.side("i-"), rule=8))
+    f = factorise(SolidWorkpiece(grid, E, NU, RHO, grid.side("i-"), rule=8))
     tip = on_side(grid, "i+", 0.5, 0.5)
     C = full_compliance(f, tip)[0]
     bending = 100.0**3 / (3.0 * E * 2.0**4 / 12.0)
@@ -58,7 +58,7 @@ def test_cantilever_beam():
     assert compliance(f, tip, [[0.0, 0.6, 0.8]])[0] == pytest.approx(
         0.36 * C[1, 1] + 0.96 * C[1, 2] + 0.64 * C[2, 2], rel=1e-9
     )
-    f = factorise(Solid(grid, E, NU, RHO, grid.side("i-")))
+    f = factorise(SolidWorkpiece(grid, E, NU, RHO, grid.side("i-")))
     force = np.zeros(grid.nodes.shape)
     face = loads(f, tip, np.array([[1.0, 0.0, 0.0]]))
     force.ravel()[f.free] = 50.0 * face.toarray()[:, 0]
@@ -93,7 +93,7 @@ def test_long_strip():
 
 
 def test_map_of_a_wall():
-    """Half height bears about 14 times what the corner bears, mid-span."""
+    """Half height bears about 14 times what the corner threshold_of, mid-span."""
     f = thin(100.0 * np.linspace(0.0, 1.0, 17), towards_the_clamp(10), 1.0)
     places = locate(f.solid.grid, "k+", [[50.0, 50.0, 1.0], [0.0, 100.0, 1.0], [50.0, 100.0, 1.0]], 1e-6)
     half, corner, middle = compliance(f, places, normals_of(f.solid.grid, places, "k+"))
@@ -110,7 +110,7 @@ def test_curved_wall_by_two_meshes():
             return np.stack([r * np.sin(a), 30.0 * p[:, 1], r * np.cos(a)], axis=1)
 
         grid = from_map(np.linspace(0, 1, 2 * n + 1), np.linspace(0, 1, n + 1) ** 1.5, [0.0, 1.0], place)
-        f = factorise(Solid(grid, E, NU, RHO, grid.side("j-"), rule=8))
+        f = factorise(SolidWorkpiece(grid, E, NU, RHO, grid.side("j-"), rule=8))
         places = on_side(grid, "k-", [0.2, 0.5, 0.8], [0.9, 0.9, 0.9])
         F = loads(f, places, normals_of(grid, places, "k-")).toarray()
         return F.T @ f.solve(F)
@@ -127,8 +127,8 @@ def test_thinned_plate_is_the_thinner_mesh():
     places = on_side(exact, side, [0.1, 0.5, 0.93], [0.9, 1.0, 0.4])
     n = normals_of(exact, places, side)
     kept = np.tile([0.0, 0.675], (24, 1))
-    cut = factorise(Solid(thick, E, NU, RHO, thick.side("j-"), kept=kept))
-    other = factorise(Solid(exact, E, NU, RHO, exact.side("j-")))
+    cut = factorise(SolidWorkpiece(thick, E, NU, RHO, thick.side("j-"), kept=kept))
+    other = factorise(SolidWorkpiece(exact, E, NU, RHO, exact.side("j-")))
     np.testing.assert_allclose(compliance(cut, places, n), compliance(other, places, n), rtol=1e-9)
 
 
@@ -137,8 +137,8 @@ def test_elements_that_are_gone():
     long, short = plate(60.0, 40.0, 2.0, (6, 4, 1)), plate(60.0, 20.0, 2.0, (6, 2, 1))
     kept = np.tile([0.0, 1.0], (24, 1))
     kept[long.element(*np.meshgrid(np.arange(6), [2, 3], [0])).ravel()] = 0.0
-    a = factorise(Solid(long, E, NU, RHO, long.side("j-"), kept=kept))
-    b = factorise(Solid(short, E, NU, RHO, short.side("j-")))
+    a = factorise(SolidWorkpiece(long, E, NU, RHO, long.side("j-"), kept=kept))
+    b = factorise(SolidWorkpiece(short, E, NU, RHO, short.side("j-")))
     at = [[13.0, 18.0, 2.0], [60.0, 20.0, 2.0]]
     values = []
     for f in (a, b):
@@ -162,7 +162,7 @@ def test_a_mechanism_is_named(fixed, motions):
     if len(fixed) == 1:
         fixed = [int(np.argmin(np.linalg.norm(GRID.nodes - GRID.nodes.mean(axis=0), axis=1)))]
     with pytest.raises(InputError) as err:
-        factorise(Solid(GRID, E, NU, RHO, np.array(fixed, dtype=np.int64)))
+        factorise(SolidWorkpiece(GRID, E, NU, RHO, np.array(fixed, dtype=np.int64)))
     assert str(err.value).startswith("workpiece: not held against motion ")
     if len(fixed) != 1:
         assert motions in str(err.value)
@@ -173,7 +173,7 @@ def test_a_loose_piece_is_named():
     kept = np.tile([0.0, 1.0], (6, 1))
     kept[GRID.element(1, np.arange(2), 0)] = 0.0
     with pytest.raises(InputError, match="the piece of element 4: not held against motion along x, along y"):
-        factorise(Solid(GRID, E, NU, RHO, GRID.side("i-"), kept=kept))
+        factorise(SolidWorkpiece(GRID, E, NU, RHO, GRID.side("i-"), kept=kept))
 
 
 @pytest.mark.parametrize(
@@ -193,11 +193,11 @@ def test_a_loose_piece_is_named():
 def test_refused(change, message):
     given = {"modulus": E, "poisson": NU, "density": RHO, "fixed": GRID.side("j-"), **change}
     with pytest.raises(InputError, match=message):
-        Solid(GRID, **given)
+        SolidWorkpiece(GRID, **given)
 
 
 def test_refused_forces():
-    f = factorise(Solid(GRID, E, NU, RHO, GRID.side("j-")))
+    f = factorise(SolidWorkpiece(GRID, E, NU, RHO, GRID.side("j-")))
     places = on_side(GRID, "k+", 0.5, 0.5)
     with pytest.raises(InputError, match=r"normals of shape \(1, 3\): must be unit vectors"):
         compliance(f, places, [[0.0, 0.0, 2.0]])

@@ -5,7 +5,7 @@ import pytest
 
 from chipload.structure.grid import plate
 from chipload.structure.places import on_side, weights
-from chipload.structure.solid import Solid, displacement, factorise
+from chipload.structure.solid import SolidWorkpiece, displacement, factorise
 from chipload.structure.stress import greatest, mises, stresses
 
 
@@ -14,7 +14,7 @@ def test_cantilever():
     integration, drawn out to the faces."""
     b, a, t, F = 2.0, 40.0, 1.0, 10.0
     grid = plate(b, a, t, (1, 20, 1))
-    solid = Solid(grid, 2e5, 0.0, 7.8e-9, grid.side("j-"))
+    solid = SolidWorkpiece(grid, 2e5, 0.0, 7.8e-9, grid.side("j-"))
     places = on_side(grid, "k+", [0.5], [1.0])
     u = displacement(factorise(solid), weights(grid, places).T @ [[0.0, 0.0, F]])
     first = np.array([0])

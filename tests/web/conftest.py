@@ -24,12 +24,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (root / "square.ngc").write_text(PROGRAM)
     make_result(root / "square")
     make_result(root / "bare", job="<img src=x onerror='window.hacked=1'>", scene=False)
-    hostile = json.loads((root / "bare" / "summary.json").read_text())
-    hostile["says"] = "Does not hold: <script>window.hacked=1</script>"
-    hostile["operations"][0]["limits"][0]["name"] = "</td><img src=x onerror='window.hacked=1'>"
-    hostile["operations"][0]["fails"].append("<img src=x onerror='window.hacked=1'> in line 8")
+    path = root / "bare" / "summary.json"
+    hostile = json.loads(path.read_text())
+    track = hostile["tracks"][0]
+    track["findings"][0]["text"] = "<script>window.hacked=1</script>"
+    track["findings"].append({**track["findings"][0], "text": "<img src=x onerror='window.hacked=1'> in line 8"})
+    track["parameters"] = {"<img src=x onerror='window.hacked=1'>": 1.0}
+    hostile["unchecked"] = ["</td><img src=x onerror='window.hacked=1'>"]
     hostile["provenance"]["inputs"]["program"] = "<svg onload='window.hacked=1'> sha256 00"
-    (root / "bare" / "summary.json").write_text(json.dumps(hostile))
+    path.write_text(json.dumps(hostile))
     (root / "bare" / "report.html").write_text("<script>fetch('/')</script>")
     shutil.copytree(EXAMPLES / "contour", root / "contour")
     job = root / "contour" / "job.toml"
@@ -85,7 +88,7 @@ class Windows:
         page.on("pageerror", lambda e: self.wrong.append(str(e)))
         page.on("console", lambda m: self.wrong.append(m.text) if m.type == "error" else None)
         self.opened.append(page)
-        page.goto(self.served.url + address)
+        page.goto(self.served.address(address))
         return page
 
     def close(self) -> None:

@@ -3,6 +3,7 @@
 import json
 import math
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,21 +12,24 @@ import pyarrow.parquet as pq
 import pytest
 
 from chipload.cutter.cutter import Cutter
-from chipload.errors import InputError
+from chipload.errors import Finding, InputError
+from chipload.jobs.contour.figures import presentation_of
+from chipload.jobs.contour.result import result_of
 from chipload.program.apt.reader import read_apt
 from chipload.report.folder import write_result
+from chipload.result import Track, TrackKind, Verdict, in_memory
 from chipload.web import plots, scene
+from chipload.web.asset_cache import CAPACITY, AssetCache
+from chipload.web.checks import bound_of, findings, limits, row_of
 from chipload.web.cutters import UNKNOWN, cutters_of
-from chipload.web.findings import bound_of, failures, limits
+from chipload.web.folder_access import find_by_hash, list_folder, open_path, resolve_name
 from chipload.web.glb import Shape, glb_bytes
-from chipload.web.inside import by_hash, inside, listed, open_path
 from chipload.web.page import target_in
-from chipload.web.panels.space import frame, legend
-from chipload.web.panels.tables import finding_list, limit_table
-from chipload.web.result import Text, load_result
-from chipload.web.shelf import ROOM, Shelf
+from chipload.web.panels.limits import finding_list, limit_table
+from chipload.web.panels.scene import frame, legend
+from chipload.web.result import TextColumn, open_result
 from chipload.web.source import followed, source_of
-from square import CL, FEED, FORCE, LINE, PROGRAM, ROWS, X, Y, make_result
+from square import CL, FEED, FORCE, LINE, PROGRAM, ROWS, X, Y, make_result, square_result, two_variants, write_by_hand
 
 
 @pytest.fixture
@@ -57,7 +61,7 @@ def column_of(tree: dict, blob: bytes, k: int) -> np.ndarray:
 
 
 def test_a_path_keeps_its_places_and_its_red(root: Path) -> None:
-    r = load_result(root, "r")
+    r = open_result(root, "r")
     glb, scale = scene.path_glb(r, r.tracks[0], "force_n")
     assert (scale.low, scale.high, scale.limit) == (FORCE.min(), FORCE.max(), 800.0)
     tree, blob = parsed(glb)
@@ -97,7 +101,7 @@ def test_a_cutter_is_its_profile_turned() -> None:
 
 
 def test_the_cutter_comes_from_the_cl_data_else_a_pointer_stands_for_it(root: Path) -> None:
-    r = load_result(root, "r")
+    r = open_result(root, "r")
     made, unknown = cutters_of(r, r.tracks[0], 25.0)
     tree, blob = parsed(made[0])
     p = column_of(tree, blob, 0)
@@ -109,32 +113,38 @@ def test_the_cutter_comes_from_the_cl_data_else_a_pointer_stands_for_it(root: Pa
     assert list(made) == [0]
 
 
-def test_the_cutter_and_the_title_of_a_planned_result(outcome, tmp_path: Path) -> None:
-    write_result(outcome(), tmp_path / "p")
-    r = load_result(tmp_path, "p")
-    assert [t.title for t in r.tracks] == ["0: contour, backward", "0: contour, plain", "0: contour, feed"]
+def test_the_tracks_of_a_planned_result(outcome, tmp_path: Path) -> None:
+    made = outcome()
+    write_result(result_of(made), presentation_of(made), tmp_path / "p")
+    r = open_result(tmp_path, "p")
+    assert [t.title for t in r.tracks] == ["backward, in use", "plain", "feed"]
+    assert [(float(t.t[0]), float(t.t[-1]), len(t)) for t in r.tracks] == [(0.0, 9.0, 1800)] * 3
     plain = r.tracks[1]
-    # the limit was not held against the semi-finish pass, whose engagement of 25 degrees lies above the worst
+    # the limit does not count in the semi-finish pass, whose engagement of 25 degrees lies above the worst
     bound = bound_of(r, plain, "engagement_deg")
     values, passes = r.column(plain, "engagement_deg"), r.column(plain, "pass")
-    assert isinstance(passes, Text)
+    assert isinstance(passes, TextColumn)
     finish = np.array([passes.words[k] == "finish" for k in passes.codes])
-    assert bound.free == ("semifinish",)
     assert (bound.above == (finish & (values > 13.0))).all()
-    held = limits(r, plain)
-    assert [(h.name, h.state) for h in held] == [("engagement", "does not hold"), ("force", "holds")]
-    # the row is the one in the middle of the corner, in the finish pass
-    assert finish[held[0].row]
-    assert values[held[0].row] == pytest.approx(held[0].worst)
-    assert "plain is not released: the job uses backward" in [f.text for f in failures(r, plain)]
-    names = {b.name for b in scene.bodies(r)[0]}
-    assert names == {"0-wall", "0-stock"}
+    checks = limits(plain)
+    assert [(c.name, c.state) for c in checks] == [
+        ("engagement_deg", Verdict.EXCEEDS),
+        ("force_xy_n", Verdict.HOLDS),
+    ]
+    # the row is in the corner, in the finish pass
+    row = row_of(plain, checks[0])
+    assert finish[row]
+    assert values[row] == pytest.approx(checks[0].worst)
+    found = [f.text for f in findings(r, plain)]
+    assert "plain is not in use" in found
+    assert "not checked: limit torque_nm: not stated" in found
+    assert {b.name for b in scene.bodies(r)[0]} == {"0-wall", "0-stock"}
     # the path jumps from the end of one pass to the beginning of the next, as its length shows
     assert np.flatnonzero(plain.apart).tolist() == [900]
 
 
 def test_rows_follow_the_lines_of_a_text_that_numbers_otherwise(root: Path) -> None:
-    r = load_result(root, "r")
+    r = open_result(root, "r")
     track = r.tracks[0]
     own = source_of(r, track)
     assert (own.name, own.note) == ("square.ngc", "")
@@ -152,33 +162,53 @@ def test_rows_follow_the_lines_of_a_text_that_numbers_otherwise(root: Path) -> N
 
 
 def test_a_text_with_new_feeds_is_shown_in_the_place_of_the_old_one(root: Path) -> None:
-    r = load_result(root, "r")
+    path = root / "r" / "summary.json"
+    text = path.read_text()
     (root / "r" / "0-feeds.ngc").write_text(PROGRAM.replace("F", "F1"))
-    summary = json.loads((root / "r" / "summary.json").read_text())
-    for name, shown in (("0-feeds.ngc", "0-feeds.ngc"), ("../square.ngc", "square.ngc"), ("../../x", "square.ngc")):
-        summary["operations"][0]["feeds"] = {"program": name}
-        (root / "r" / "summary.json").write_text(json.dumps(summary))
-        r = load_result(root, "r")
+    (root / "outside.ngc").write_text(PROGRAM)
+    for name, shown, note in (
+        ("0-feeds.ngc", "0-feeds.ngc", "with its new feeds"),
+        ("../outside.ngc", "square.ngc", ""),
+        ("../../x", "square.ngc", ""),
+    ):
+        path.write_text(text.replace('"0-program.apt"', f'"{name}"'))
+        r = open_result(root, "r")
         own = source_of(r, r.tracks[0])
-        assert own.name == shown
+        assert (own.name, own.note) == (shown, note)
         assert own.of_row.tolist() == LINE.tolist()
-    summary["operations"][0]["feeds"] = {"program": "0-feeds.ngc"}
-    (root / "r" / "summary.json").write_text(json.dumps(summary))
-    r = load_result(root, "r")
-    assert source_of(r, r.tracks[0]).note == "with its new feeds"
 
 
-def test_of_two_rows_at_a_place_the_worse_one_is_meant(tmp_path: Path) -> None:
-    folder = tmp_path / "twice"
-    folder.mkdir()
-    there = np.array([0.0, 1.0, 2.0, 3.0, 2.0, 1.0, 0.0])
-    force = np.array([10.0, 20.0, 30.0, 40.0, 90.0, 25.0, 15.0])
-    table = {"x_mm": there, "y_mm": np.zeros(7), "z_mm": np.zeros(7), "force_n": force}
-    pq.write_table(pa.table(table), folder / "history.parquet")
-    limit = {"name": "force_n", "limit": 50.0, "worst": 90.0, "at_mm": [2.0, 0.0, 0.0], "holds": False}
-    (folder / "summary.json").write_text(json.dumps({"holds": False, "operations": [{"limits": [limit]}]}))
-    r = load_result(tmp_path, "twice")
-    assert [h.row for h in limits(r, r.tracks[0])] == [4]
+def test_a_check_without_a_row_leads_to_the_nearest_on_its_line(root: Path) -> None:
+    r = open_result(root, "r")
+    track = r.tracks[0]
+    force, torque = limits(track)
+    assert (force.row, row_of(track, force)) == (120, 120)
+    assert (torque.row, row_of(track, torque)) == (None, 120)
+    assert row_of(track, Finding("x", 9, "at its line")) == 100
+    assert row_of(track, Finding("x", 3, "a line that does not move leads to the next that does")) == 0
+    assert row_of(track, Finding("x", 0, "a place", place=(40.0, 0.8, -2.0))) == 50
+    assert row_of(track, Finding("x", 11, "after the last line")) is None
+    assert row_of(track, Finding("x", 0, "nowhere")) is None
+
+
+def test_two_tracks_keep_their_own_time_and_the_one_in_use_comes_first(tmp_path: Path) -> None:
+    write_by_hand(two_variants(), tmp_path / "two")
+    r = open_result(tmp_path, "two")
+    assert [t.title for t in r.tracks] == ["variable (depth_mm 2), in use", "constant (depth_mm 1)"]
+    used, other = r.tracks
+    assert (len(used), len(other)) == (ROWS, ROWS)
+    assert (float(used.t[-1]), float(other.t[-1])) == pytest.approx((20.0, 40.0))
+    assert (np.diff(used.t) > 0.0).all()
+    assert (np.diff(other.t) > 0.0).all()
+    assert r.column(used, "force_n").max() == pytest.approx(450.0)
+    assert r.column(other, "force_n").max() == pytest.approx(900.0)
+    # each track has its own checks, the one that fails shows it
+    assert [(c.name, c.state.value, c.worst) for c in limits(used)] == [("force_n", "holds", 450.0)]
+    assert [(c.name, c.state.value, c.worst) for c in limits(other)] == [("force_n", "exceeds", 900.0)]
+    assert bound_of(r, used, "force_n").above.sum() == 0
+    assert bound_of(r, other, "force_n").above.sum() == (FORCE > 800.0).sum()
+    assert findings(r, other)[0].text == "line 8: the path leaves the workpiece"
+    assert r.result.verdict is Verdict.HOLDS
 
 
 def test_an_arc_and_a_path_that_comes_back_are_followed() -> None:
@@ -204,13 +234,11 @@ def test_a_million_rows_keep_their_extremes(tmp_path: Path) -> None:
     values = np.full(n, 100.0)
     values[[123_456, 777_777]] = (5000.0, -70.0)
     values[500_000:600_000] = np.nan
-    folder = tmp_path / "big"
-    folder.mkdir()
-    (folder / "summary.json").write_text('{"holds": true, "says": "Holds"}')
     t = np.arange(n) * 0.01
-    table = {"t_s": t, "x_mm": t, "y_mm": np.sin(t), "z_mm": np.zeros(n), "force_n": values}
-    pq.write_table(pa.table(table), folder / "history.parquet")
-    r = load_result(tmp_path, "big")
+    table = {"t_s": t, "s_mm": t, "x_mm": t, "y_mm": np.sin(t), "z_mm": np.zeros(n), "force_n": values}
+    track = Track("program", TrackKind.PROGRAM, True, float(t[-1]), blocks=in_memory(table))
+    write_by_hand(replace(square_result(), tracks=(track,)), tmp_path / "big")
+    r = open_result(tmp_path, "big")
     track = r.tracks[0]
     drawn = plots.plots(r, track, {"force_n": None}, "time", 0)["data"][0]
     assert len(drawn["x"]) < 3 * plots.POINTS
@@ -231,52 +259,52 @@ def test_what_is_in_the_folder_and_what_is_not(root: Path, tmp_path_factory: pyt
     (root / "job.toml").write_text('[program]\nfile = "square.ngc"\n')
     (root / ".hidden").mkdir()
     (root / ".hidden" / "job.toml").write_text("[program]\n")
-    assert [(f.kind, f.name, f.word) for f in listed(root)[0]] == [
+    assert [(f.kind, f.name, f.word) for f in list_folder(root)[0]] == [
         ("job", "job.toml", ""),
-        ("result", "r", "Does not hold"),
+        ("result", "r", "exceeds"),
     ]
-    assert inside(root, "r/summary.json") == root / "r" / "summary.json"
+    assert resolve_name(root, "r/summary.json") == root / "r" / "summary.json"
     for name in ("away", "../x", "/etc/passwd", "r/../r", "r\0", "summary-away/summary.json", "none"):
         with pytest.raises(InputError, match="opened folder"):
-            inside(root, name)
+            resolve_name(root, name)
     assert open_path(root / "r").first == "."
     assert open_path(root / "job.toml").first == "job.toml"
     assert open_path(root).first is None
-    assert by_hash(root, "square.ngc sha256 00") is None
+    assert find_by_hash(root, "square.ngc sha256 00") is None
     for out in ("", ".", "../x", "/x", "away/x", "a\\b"):
         with pytest.raises(InputError, match="must be the name of a folder in the opened one"):
             target_in(root, out)
     assert target_in(root, "new/deep") == root / "new" / "deep"
 
 
-EMPTY = pa.table({c: pa.array([], pa.float64()) for c in ("x_mm", "y_mm", "z_mm")})
+EMPTY = pa.table({c: pa.array([], pa.float64()) for c in ("t_s", "s_mm", "x_mm", "y_mm", "z_mm")})
 
 
 @pytest.mark.parametrize(
-    ("spoil", "said"),
+    ("spoil", "message"),
     [
-        (lambda f: (f / "summary.json").write_text("[]"), "is no result of chipload"),
+        (lambda f: (f / "summary.json").write_text("[]"), "is no result of schema version 1"),
         (lambda f: (f / "history.parquet").write_bytes(b"PAR1"), "cannot be read: run the job again"),
         (lambda f: (f / "history.parquet").unlink(), "is not in the opened folder"),
         (lambda f: pq.write_table(pa.table({"x_mm": [0.0]}), f / "history.parquet"), "no y_mm: nothing to show"),
         (lambda f: pq.write_table(EMPTY, f / "history.parquet"), "no row: nothing to show"),
     ],
 )
-def test_a_result_that_cannot_be_shown_says_why(root: Path, spoil, said: str) -> None:
+def test_a_result_that_cannot_be_shown_says_why(root: Path, spoil, message: str) -> None:
     spoil(root / "r")
-    with pytest.raises(InputError, match=said):
-        load_result(root, "r")
+    with pytest.raises(InputError, match=message):
+        open_result(root, "r")
 
 
 def test_a_scene_that_cannot_be_read_is_said(root: Path) -> None:
     (root / "r" / "scene.glb").write_bytes(b"glTF nothing")
-    assert scene.bodies(load_result(root, "r")) == ((), "scene.glb cannot be read: only the path is shown.")
+    assert scene.bodies(open_result(root, "r")) == ((), "scene.glb cannot be read: only the path is shown.")
     (root / "r" / "scene.glb").unlink()
-    assert scene.bodies(load_result(root, "r"))[1] == "This result has no scene: only its path is shown."
+    assert scene.bodies(open_result(root, "r"))[1] == "This result has no scene: only its path is shown."
 
 
 def test_of_a_box_its_twelve_edges_are_left(root: Path) -> None:
-    body = scene.bodies(load_result(root, "r"))[0][0]
+    body = scene.bodies(open_result(root, "r"))[0][0]
     tree, blob = parsed(scene.edges_glb(body))
     primitive = tree["meshes"][0]["primitives"][0]
     p = column_of(tree, blob, primitive["attributes"]["POSITION"])
@@ -287,17 +315,18 @@ def test_of_a_box_its_twelve_edges_are_left(root: Path) -> None:
 
 
 def test_texts_are_escaped(root: Path) -> None:
-    summary = json.loads((root / "r" / "summary.json").read_text())
-    summary["operations"][0]["limits"][0]["name"] = "<b>x"
-    summary["operations"][0]["fails"] = ["<img src=x onerror=alert(1)>"]
-    (root / "r" / "summary.json").write_text(json.dumps(summary))
-    r = load_result(root, "r")
-    html = limit_table(limits(r, r.tracks[0])) + finding_list(failures(r, r.tracks[0]))
+    path = root / "r" / "summary.json"
+    summary = json.loads(path.read_text())
+    summary["tracks"][0]["findings"][0]["text"] = "<img src=x onerror=alert(1)>"
+    summary["unchecked"] = ["<b>x"]
+    for checks in (summary["limits"], summary["tracks"][0]["limits"]):
+        checks[1] |= {"state": "unproven", "reason": "<s>"}
+    path.write_text(json.dumps(summary))
+    r = open_result(root, "r")
+    html = limit_table(r.tracks[0]) + finding_list(findings(r, r.tracks[0]))
     html += legend("<i>_n", scene.Scale(0.0, 1.0, None, (("<u>", "#000000"),)))
-    assert "<b>" not in html
-    assert "<img" not in html
-    assert "<i>" not in html
-    assert "<u>" not in html
+    for tag in ("<b>", "<img", "<i>", "<u>", "<s>"):
+        assert tag not in html
     assert "&lt;img src=x" in html
 
 
@@ -310,16 +339,16 @@ def test_the_frame_of_an_axis_is_a_rotation() -> None:
         assert R[:, 2] == pytest.approx(axis / np.linalg.norm(axis))
 
 
-def test_the_shelf_forgets_the_oldest() -> None:
-    shelf = Shelf()
-    first = shelf.put(b"a" * (ROOM // 2))
-    second = shelf.put(b"b" * (ROOM // 2))
+def test_the_asset_cache_forgets_the_oldest() -> None:
+    assets = AssetCache()
+    first = assets.put(b"a" * (CAPACITY // 2))
+    second = assets.put(b"b" * (CAPACITY // 2))
     key = first.removeprefix("/shape/").removesuffix(".glb")
-    assert shelf.get(key) is not None
-    shelf.put(b"c")
-    assert shelf.get(key) is None
-    assert shelf.get(second.removeprefix("/shape/").removesuffix(".glb")) is not None
-    assert shelf.get("../../etc/passwd") is None
+    assert assets.get(key) is not None
+    assets.put(b"c")
+    assert assets.get(key) is None
+    assert assets.get(second.removeprefix("/shape/").removesuffix(".glb")) is not None
+    assert assets.get("../../etc/passwd") is None
 
 
 def test_opacity_and_lines_of_a_file() -> None:

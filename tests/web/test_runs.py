@@ -40,14 +40,14 @@ def test_a_job_is_refused_run_shown_and_stopped(window, folder) -> None:
     page = window("")
     job = folder / "contour" / "job.toml"
     # where its result may not go
-    for out, said in (
+    for out, message in (
         ("../elsewhere", "must be the name of a folder in the opened one"),
         ("/elsewhere", "must be the name of a folder in the opened one"),
         ("leaves/r", "must be the name of a folder in the opened one"),
         ("contour", "holds files that are no result of chipload"),
     ):
         start(page, "contour/job.toml", out)
-        page.locator(".cl-dialog .cl-no").get_by_text(said).wait_for()
+        page.locator(".cl-dialog .cl-no").get_by_text(message).wait_for()
         page.keyboard.press("Escape")
         page.wait_for_selector(".cl-dialog", state="hidden")
     assert workers(job) == []
@@ -59,8 +59,9 @@ def test_a_job_is_refused_run_shown_and_stopped(window, folder) -> None:
     page.wait_for_selector(".cl-limits", state="visible", timeout=300_000)
     page.wait_for_function("document.querySelector('.cl-word').textContent != ''")
     summary = json.loads((folder / "contour" / "result" / "summary.json").read_text())
-    assert page.inner_text(".cl-word") == ("Holds" if summary["holds"] else "Does not hold")
-    first = summary["operations"][0]["strategies"]["backward"]["limits"][0]
+    assert page.inner_text(".cl-word") == summary["verdict"]
+    assert page.inner_text(".cl-message") == summary["message"]
+    first = next(x for x in summary["limits"] if x["name"] == "engagement_deg")
     row = page.locator(".cl-limits tbody tr", has_text="engagement")
     assert f"{first['worst']:.4g}" in row.inner_text()
     page.wait_for_selector(".cl-now")
@@ -93,7 +94,7 @@ def test_a_wrong_job_says_why(window, folder) -> None:
 def test_ctrl_c_ends_the_page_and_its_run(browser, folder) -> None:
     served = Served(folder / "contour" / "job.toml")
     page = browser.new_page()
-    page.goto(served.url)
+    page.goto(served.address())
     job = folder / "contour" / "job.toml"
     page.get_by_text("plans, proves and writes a result").wait_for()
     assert "radial_depth_mm" in page.inner_text(".cl-job")

@@ -1,1 +1,38 @@
 """What the feed override does while the program runs: spindle, controller, plant."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from chipload.lazy import attach
+
+if TYPE_CHECKING:
+    from chipload.control.fuzzy import FuzzyTable
+    from chipload.control.hal import HalJob, load_hal
+    from chipload.control.linuxcnc.path import ToolPath, tool_path, write_path
+    from chipload.control.override import Override
+    from chipload.control.plant import Loop, Spindle, TorqueProfile
+
+__all__ = [
+    "FuzzyTable",
+    "HalJob",
+    "Loop",
+    "Override",
+    "Spindle",
+    "ToolPath",
+    "TorqueProfile",
+    "load_hal",
+    "tool_path",
+    "write_path",
+]
+
+__getattr__, __dir__ = attach(
+    __name__,
+    {
+        "plant": "Loop Spindle TorqueProfile",
+        "override": "Override",
+        "fuzzy": "FuzzyTable",
+        "hal": "HalJob load_hal",
+        "linuxcnc.path": "ToolPath tool_path write_path",
+    },
+)

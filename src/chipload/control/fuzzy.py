@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipload.control import _kernels
+from chipload.control import _fuzzy
 from chipload.errors import InputError
 from chipload.tables import nearest, read_table
 
@@ -190,9 +190,7 @@ def mamdani(table: FuzzyTable, error: ArrayLike, change: ArrayLike) -> Floats:
     out = np.empty(e.size)
     strength = np.empty(len(table.output))
     for k, (x, y) in enumerate(zip(e.ravel(), d.ravel(), strict=True)):
-        out[k] = _kernels.mamdani(
-            table.error, table.change, table.output, table.rules, table.whole_ends, x, y, strength
-        )
+        out[k] = _fuzzy.mamdani(table.error, table.change, table.output, table.rules, table.whole_ends, x, y, strength)
     return out.reshape(e.shape)
 
 
@@ -218,7 +216,7 @@ def product_sum(table: FuzzyTable, error: ArrayLike, change: ArrayLike) -> Float
     e, d = _inputs(error, change)
     out = np.empty(e.size)
     for k, (x, y) in enumerate(zip(e.ravel(), d.ravel(), strict=True)):
-        out[k] = _kernels.product_sum(table.error, table.change, table.output, table.rules, x, y)
+        out[k] = _fuzzy.product_sum(table.error, table.change, table.output, table.rules, x, y)
     return out.reshape(e.shape)
 
 
@@ -248,11 +246,11 @@ def _list(label: str, key: str, value: Any) -> list[Any]:
 
 
 def _number(label: str, key: str, value: Any) -> float:
-    if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
-        return float(value)
     try:
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+            return float(value)
         if isinstance(value, str) and len(value) <= 20:
             return float(Fraction(value))
-    except (ValueError, ZeroDivisionError):
+    except (ValueError, ArithmeticError):
         pass
     raise InputError(f"{label}: {key}: {value!r}: must be a number or a fraction")

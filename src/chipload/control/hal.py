@@ -1,10 +1,14 @@
-"""The controller beside LinuxCNC: where the machine is, what the torque is, which override it is sent.
+"""The controller of a LinuxCNC that runs: where the machine is, what the torque is, which override it is sent.
 
     pins (x, y, z, velocity, torque)  ->  s on the path, torque  ->  override.step  ->  pin `feed`, pin `beat`
 
 The torque is that of a pin, or of a simulated spindle and cut that follow the machine's real place and velocity. The
-pin `beat` changes with every step; HAL watches it and takes the feed away from a controller that has stopped
-(examples/tube/linuxcnc). The time is that of the machine's pins, so a step that comes late is a long step.
+pin `beat` changes with every step; HAL watches it and takes the feed away from a controller that does not beat
+(examples/tube/linuxcnc). The time is that of the machine's pins, so a step that comes late is a long step, and one
+longer than `gap_s` is a start: spindle and controller begin anew.
+
+The torque of the model is predicted in every case, with feed-forward or without, and readings are held against it. A
+controller that has stopped goes on sending 0, and beats, until it is asked to end: its end is the reason of the stop.
 """
 
 from __future__ import annotations
@@ -20,11 +24,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.control.fuzzy import FuzzyTable, read_fuzzy, standard
-from chipload.control.linuxcnc.beside import Load, advance, measure, turning
-from chipload.control.linuxcnc.door import Machine, Seen
+from chipload.control.linuxcnc.hal_client import ControlledMachine, PinValues
 from chipload.control.linuxcnc.path import ToolPath, locate, read_path
-from chipload.control.override import STATUS, Override, Reading, allowed, begin, step
-from chipload.control.plant import Spindle, TorqueProfile
+from chipload.control.linuxcnc.simulated_spindle import Load, SpindleState, advance, at_speed, measure
+from chipload.control.override import STATUS, STOPS, Override, Reading, Status, allowed, begin, step, stopped
+from chipload.control.plant import Ended, Spindle, TorqueProfile
+from chipload.control.resolution import check_light
 from chipload.errors import InputError
 from chipload.tables import nearest, read_table
 from chipload.units import rad_s_from_rpm
@@ -44,7 +49,8 @@ _SCALED = {
     "light_nm": ("light", 1e3), "inertia_kg_m2": ("inertia", 1e3), "torque_constant_nm_a": ("torque_constant", 1e3),
     "speed_rpm": ("speed", rad_s_from_rpm(1.0)), "idle_a": ("idle", 1.0), "stiffness_a_s": ("stiffness", 1.0),
     "reset_a": ("reset", 1.0), "most_current_a": ("most_current", 1.0), "sensor_lag_s": ("sensor_lag", 1.0),
-    "smoothing_s": ("smoothing", 1.0), "noise_a": ("noise", 1.0), "gain_up_per_s": ("gain_up", 1.0),
+    "smoothing_s": ("smoothing", 1.0), "noise_a": ("noise", 1.0), "current_step_a": ("current_step", 1.0),
+    "idle_error_share": ("idle_error", 1.0), "gain_up_per_s": ("gain_up", 1.0),
     "gain_down_per_s": ("gain_down", 1.0), "slew_up_per_s": ("slew_up", 1.0), "slew_down_per_s": ("slew_down", 1.0),
     "pi_rate_per_s": ("pi_rate", 1.0),
 }  # fmt: skip
@@ -52,7 +58,7 @@ _SCALED = {
 
 @dataclass(frozen=True, eq=False)
 class HalJob:
-    """A controller beside a machine.
+    """A controller and the machine that it controls.
 
     Parameters
     ----------
@@ -88,6 +94,7 @@ class HalJob:
                 raise InputError(f"hal.{name} = {getattr(self, name):g}: must be above 0")
         if not 0.0 <= self.latency <= 10.0:
             raise InputError(f"hal.latency = {self.latency:g} s: must be from 0 to 10")
+        check_light(self.spindle, self.period, self.override.light)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,12 +104,12 @@ class Record:
     Parameters
     ----------
     rows : (n, 10) float, ``COLUMNS``, a row a step
-    ended : ``path`` its end was reached, ``gone`` HAL has left, ``stopped`` it was asked to
+    ended : ``path``: its end was reached; the reason of a stop; ``gone``: HAL has left; ``asked``: it was asked to end
     torque_max : greatest torque, between steps too [N mm]
     """
 
     rows: Floats
-    ended: str
+    ended: Ended
     torque_max: float
 
     def column(self, name: str) -> Floats:
@@ -184,73 +191,109 @@ def _toml(value: Any, factor: float) -> str:
     return repr(value) if isinstance(value, int) else repr(float(value) / factor)
 
 
+@dataclass(eq=False)
+class _Cut:
+    """The simulated spindle, and where it was at the last step."""
+
+    spindle: Spindle
+    state: SpindleState
+    greatest: float = 0.0
+    last: tuple[float, Load, Load] | None = None
+
+    def follow(self, at: float, true: Load, model: Load, noise: float, gap: float) -> float:
+        """Go on to a time [s] with the loads there; returns the time since the last step, 0 for the first."""
+        seconds = at - self.last[0] if self.last is not None else 0.0
+        if seconds > gap:
+            self.state = at_speed(self.spindle)
+        elif self.last is not None and seconds > 0.0:
+            loads = (self.last[1], true), (self.last[2], model)
+            self.state, most = advance(self.spindle, self.state, *loads, seconds, SUBSTEP)
+            self.greatest = max(self.greatest, most)
+            self.state = measure(self.spindle, self.state, noise, seconds)
+        self.last = (at, true, model)
+        return seconds
+
+
 def control(
     job: HalJob,
-    machine: Machine,
+    machine: ControlledMachine,
     clock: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
     stop: Callable[[], bool] = lambda: False,
     seed: int = 0,
+    notice: Callable[[Status, float], None] = lambda status, s: None,
 ) -> Record:
     """Control a machine until its path ends, it is gone, or it is asked to stop.
 
     Parameters
     ----------
     job : what is controlled, and how
-    machine : takes the override, says where it is
+    machine : takes the override, reports where it is
     clock, sleep : of the period
     stop : whether to stop
     seed : of the noise of the simulated current
+    notice : called once when the controller stops the machine, with the reason and the place on the path [mm]
     """
-    path, spindle, config = job.path, job.spindle, job.override
-    told = path.told
+    path, config = job.path, job.override
+    told = path.over_relief
     model = (told.s, told.feed, told.edge, told.cut)
-    noise = np.random.default_rng(seed).normal(0.0, spindle.noise, 65_536)
-    state, wheel = begin(config, job.modelled), turning(spindle)
-    s, row, greatest, beat = float(path.model.s[0]), 0, 0.0, False
-    sent, status, ended, on = 0.0, 0, "stopped", False
-    last: tuple[Seen, Load, Load] | None = None
+    noise = np.random.default_rng(seed).normal(0.0, job.spindle.noise, 65_536)
+    state, cut = begin(config, job.modelled), _Cut(job.spindle, at_speed(job.spindle))
+    s, row, beat, on, due = float(path.model.s[0]), 0, False, False, clock()
+    sent, status, ended = 0.0, Status.RUN, Ended.ASKED
     rows: list[tuple[float, ...]] = []
-    due = clock()
     while not stop():
-        seen = machine.exchange(sent, beat, 1e-3 * wheel.filtered, status, s)
+        seen = machine.exchange(sent, beat, 1e-3 * cut.state.filtered, STATUS.index(status), s)
         beat = not beat
         if seen is None:
-            ended = "gone"
+            ended = Ended.GONE
             break
-        found, away = locate(path, (seen.x, seen.y, seen.z), s, job.window if on else math.inf)
-        on = away <= job.away
-        s = found if on else s
-        row = row if model[0][row] <= s else 0
-        programmed = float(np.interp(s, path.model.s, path.model.feed))
-        actual = seen.velocity / programmed if on else 0.0
-        true, believed = (_load(p, s, actual) for p in (path.truth, path.model))
-        seconds = seen.time - last[0].time if last is not None else 0.0
-        if last is not None and seconds > 0.0:
-            wheel, most = advance(spindle, wheel, (last[1], true), (last[2], believed), seconds, SUBSTEP)
-            greatest = max(greatest, most)
-            wheel = measure(spindle, wheel, float(noise[len(rows) % len(noise)]), seconds)
-        last = (seen, true, believed)
-        torque = wheel.filtered if job.source == "plant" else 1e3 * seen.torque
-        most_allowed = None
-        if job.modelled:
-            known = job.latency + job.period
-            most_allowed, row = allowed(config, state, model, s, actual, known, job.acceleration, row)
-        borne = float(np.interp(s, path.model.s, path.relief))
-        reading = Reading(torque / borne, seconds, True, actual, wheel.expected / borne, most_allowed)
-        sent, said, state = step(config, job.table, state, reading)
-        status = STATUS.index(said)
-        rows.append((seen.time, s, seen.velocity, sent, seen.feed, true.edge + true.cut, torque, status, away, borne))
-        if s >= path.model.s[-1] - 1e-3 and seen.velocity == 0.0:
-            ended = "path"
-            break
+        before = status
+        if _wrong(seen, cut):
+            state = stopped(state, Status.MACHINE_DATA) if status not in STOPS else state
+            sent, status = 0.0, Status.MACHINE_DATA if status not in STOPS else status
+            unknown = (math.nan, math.nan, float(STATUS.index(status)), math.nan, math.nan)
+            rows.append((seen.time, s, seen.velocity, 0.0, seen.feed, *unknown))
+        else:
+            found, away = locate(path, (seen.x, seen.y, seen.z), s, job.window if on else math.inf)
+            on = away <= job.away
+            s = found if on else s
+            row = row if model[0][row] <= s else 0
+            actual = seen.velocity / float(np.interp(s, path.model.s, path.model.feed))
+            true, believed = (_load(p, s, actual if on else 0.0) for p in (path.truth, path.model))
+            seconds = cut.follow(seen.time, true, believed, float(noise[len(rows) % len(noise)]), config.gap_s)
+            torque = cut.state.filtered if job.source == "plant" else 1e3 * seen.torque
+            most_allowed = None
+            if job.modelled:
+                known = job.latency + job.period
+                most_allowed, row = allowed(config, state, model, s, actual, known, job.acceleration, row)
+            relief = float(np.interp(s, path.model.s, path.relief))
+            reading = Reading(torque / relief, seconds, True, actual, cut.state.expected / relief, most_allowed, not on)
+            sent, status, state = step(config, job.table, state, reading)
+            rows.append((seen.time, s, seen.velocity, sent, seen.feed, true.edge + true.cut, torque,
+                         STATUS.index(status), away, relief))  # fmt: skip
+            if s >= path.model.s[-1] - 1e-3 and seen.velocity == 0.0 and status not in STOPS:
+                ended = Ended.PATH
+                break
+        if status in STOPS and before not in STOPS:
+            notice(status, s)
         due += job.period
         late = due - clock()
         if late > 0.0:
             sleep(late)
         else:
             due -= late
-    return Record(np.array(rows).reshape(-1, len(COLUMNS)), ended, greatest)
+    return Record(
+        np.array(rows).reshape(-1, len(COLUMNS)),
+        Ended(status.value) if status in STOPS else ended,
+        cut.greatest,
+    )
+
+
+def _wrong(seen: PinValues, cut: _Cut) -> bool:
+    """Whether time, place or velocity is not a number, or the time runs backwards."""
+    numbers = (seen.time, seen.x, seen.y, seen.z, seen.velocity)
+    return not all(map(math.isfinite, numbers)) or (cut.last is not None and seen.time < cut.last[0])
 
 
 def table_of(record: Record) -> str:

@@ -1,4 +1,4 @@
-"""Which torque a thin wall bears.
+"""The torque that a thin wall allows.
 
 Notation: s [mm] place along the wall; C_w, C_t [mm/N] compliances of the wall and of the cutter along the wall's
 normal; d [mm] deflection that is allowed, S [MPa] stress that is; F_r, F_t [N] radial and tangential force on the
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class WallLimit:
-    """What a wall bears at places along it.
+    """The force that a wall allows at places along it.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class WallLimit:
 
     @property
     def force(self) -> Floats:
-        """(k,) float [N], the radial force that is borne."""
+        """(k,) float [N], the allowable radial force."""
         return np.minimum(self.by_deflection, self.by_strength)
 
 
@@ -58,7 +58,7 @@ def wall_limit(
     length: float,
     width: float,
 ) -> WallLimit:
-    """Radial force that the wall bears with the cutter at ``s``.
+    """Allowable radial force on the wall with the cutter at ``s``.
 
     Parameters
     ----------

@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, InputError
+from chipload.files import read_regular
 from chipload.tables import nearest, read_table
 
 Floats = NDArray[np.float64]
@@ -86,13 +87,7 @@ def read_log(path: str | Path, columns: dict[str, Any] | str | Path) -> tuple[Lo
     """
     label = f"log {path}"
     wanted, sample = _wanted(columns)
-    try:
-        with Path(path).open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
-    except OSError as err:
-        raise InputError(f"{label}: cannot be read: {err.strerror}") from None
-    if len(data) > MOST_BYTES:
-        raise InputError(f"{label}: larger than {MOST_BYTES} bytes: cut it into parts")
+    data = read_regular(path, label, MOST_BYTES, "cut it into parts")
     rows = csv.reader(io.StringIO(data.decode("utf-8-sig", "replace"), newline=""))
     try:
         names = [name.strip() for name in next(rows, [])]

@@ -11,34 +11,65 @@ torque above T_ref counts at once. The fuzzy answer moves q by q f gain dt.
 
 The rules, in the order in which they act:
 
-1. a stop is final until the controller is begun anew; 2. a reading that is none (not a number, below -light, above
-`torque_most`, the same value `stuck_steps` times) lowers the override to `lost_override` and stops after `lost_s`;
-3. torque above `overload` for `overload_steps` stops; 4. the override rises only on a load that is known: a trusted
-reading, heavier than `light` (or light where the model says so), `settle_steps` readings after a start or a loss;
-5. it falls at `slew_down` and rises at `slew_up`, at most a third of it; 6. it stays from `floor` to `cap`, and `cap`
-is at most 1 unless `above_programmed`; 7. what is sent is rounded down to whole `quantum`.
+1. a stop is final until the controller is begun anew, and its status names the reason;
+2. a reading that is none (not a number, below -light, above `torque_most`, the same value `stuck_steps` times; exactly
+   0 counts as such a value while the machine moves and nothing is predicted) lowers the override to `lost_override` and
+   stops after `lost_s`: ``no-reading``;
+3. torque above `overload` for `overload_steps` stops: ``overload``;
+4. off the path nothing rises and the override falls to `start`; a torque above `light` there while the machine moves,
+   beyond what dies away behind a cut, for `off_path_steps` stops: ``off-path``;
+5. where the model predicts a cut, a reading below `low_share` of the prediction, by more than `light`, is not believed:
+   after `air_steps` of them nothing rises, after `stuck_steps` the override falls to `lost_override`, after `low_steps`
+   it stops: ``low-reading``. A count above `stuck_steps` is taken back by a reading in the cut alone;
+6. the override rises only on a load that is known: a trusted reading, heavier than `light` (or light where the model
+   predicts so), `settle_steps` readings after a start or a loss;
+7. it falls at `slew_down` and rises at `slew_up`, at most a third of it;
+8. it stays from `floor` to `cap`, and `cap` is at most 1 unless `above_programmed`;
+9. what is sent is rounded down to whole `quantum`.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from enum import StrEnum
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.control import _kernels
+from chipload.control import _override
+from chipload.control._override import Observation, Rules, Sets
 from chipload.control.fuzzy import FuzzyTable
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
 
 KINDS = ("fixed", "pi", "mamdani", "product-sum")
-#: names of the numbers that a step returns
-STATUS = ("run", "settling", "air", "unknown", "lost", "overload", "stopped")
+#: longest gap_s: after it the simulated spindle begins anew [s]
+LONGEST_GAP_S = 10.0
 #: falling is at least so many times faster than rising
 FALL_OVER_RISE = 3.0
+
+
+class Status(StrEnum):
+    """What a step of the controller was about, in the order of their codes; from OVERLOAD on it has stopped."""
+
+    RUN = "run"
+    SETTLING = "settling"
+    AIR = "air"
+    UNKNOWN = "unknown"
+    LOST = "lost"
+    OVERLOAD = "overload"
+    NO_READING = "no-reading"
+    LOW_READING = "low-reading"
+    OFF_PATH = "off-path"
+    MACHINE_DATA = "machine-data"
+
+
+STATUS = tuple(Status)
+#: statuses that are final
+STOPS = frozenset(STATUS[_override.OVERLOAD :])
 
 
 @dataclass(frozen=True)
@@ -63,7 +94,9 @@ class Override:
     error_span, change_span : e and d at which the sets end
     pi_gain, pi_rate : dq = pi_gain d + pi_rate e dt; pi_rate [1/s]
     overload_steps, stuck_steps, air_steps, settle_steps : in steps
-    gap_s : a longer time between steps counts as a start [s]
+    low_share, low_steps : a reading below that share of the prediction is not believed, and so many of them stop
+    off_path_steps : a load off the path stops after so many
+    gap_s : a longer time between steps counts as a start [s], at most 10
     quantum : step of the override that the controller takes; 0: any value
     trim_least, trim_most : of q with a model
 
@@ -97,6 +130,9 @@ class Override:
     stuck_steps: int = 10
     air_steps: int = 3
     settle_steps: int = 5
+    low_share: float = 0.5
+    low_steps: int = 50
+    off_path_steps: int = 10
     gap_s: float = 0.5
     quantum: float = 0.01
     trim_least: float = 0.2
@@ -133,7 +169,10 @@ class Override:
             ("stuck_steps", 2, math.inf, True),
             ("air_steps", 1, math.inf, True),
             ("settle_steps", 1, math.inf, True),
-            ("gap_s", 0.0, math.inf, False),
+            ("low_share", 0.0, 1.0 / self.trim_most, True),
+            ("low_steps", self.stuck_steps, math.inf, False),
+            ("off_path_steps", 1, math.inf, True),
+            ("gap_s", 0.0, LONGEST_GAP_S, False),
             ("quantum", 0.0, self.floor, True),
             ("trim_least", 0.0, 1.0, False),
             ("trim_most", 1.0, math.inf, True),
@@ -151,15 +190,10 @@ class Override:
                 raise InputError(f"override.{name} = {value:g}: must be {bound}{upper}{why}")
 
     @property
-    def numbers(self) -> Floats:
-        """The values in the order in which the kernels take them."""
-        names = (
-            "torque_ref", "cap", "floor", "start", "air_override", "lost_override", "slew_up", "slew_down", "gain_up",
-            "gain_down", "error_span", "change_span", "light", "overload", "overload_steps", "torque_most",
-            "stuck_steps", "air_steps", "settle_steps", "lost_s", "gap_s", "quantum", "pi_gain", "pi_rate",
-            "trim_least", "trim_most",
-        )  # fmt: skip
-        return np.array([KINDS.index(self.kind), *(getattr(self, name) for name in names)], dtype=np.float64)
+    def numbers(self) -> Rules:
+        """The values as the compiled step takes them."""
+        values = {name: float(getattr(self, name)) for name in Rules._fields if name != "kind"}
+        return Rules(kind=KINDS.index(self.kind), **values)
 
 
 @dataclass(frozen=True)
@@ -172,29 +206,47 @@ class Reading:
     dt : time since the last step [s]
     trusted : the estimator believes it (speed in its range, ...)
     actual : override at which the axes move
-    predicted : what the model expects to be measured now [N mm]
-    model : override that the model allows here with the trim of the state (:func:`trim`); None: there is no model
+    predicted : what is expected to be measured now [N mm]; not a number: nothing is known
+    model : override that the model allows here with the trim of the state (:func:`trim`); None: no feed-forward
+    off_path : the machine is not on the path
     """
 
     torque: float
     dt: float
     trusted: bool = True
     actual: float = 1.0
-    predicted: float = 0.0
+    predicted: float = math.nan
     model: float | None = None
+    off_path: bool = False
 
 
 def begin(config: Override, modelled: bool = False) -> Floats:
     """The state before the first step, and after every stop."""
-    state = np.zeros(_kernels.STATE)
-    state[0] = state[10] = state[11] = config.start
-    state[1] = 1.0 if modelled else config.start
+    state = np.zeros(_override.STATE)
+    state[_override.OVERRIDE] = state[_override.WANTED] = state[_override.SENT] = config.start
+    state[_override.TRIM] = 1.0 if modelled else config.start
     return state
+
+
+def stopped(state: Floats, reason: Status) -> Floats:
+    """The state after a stop for a reason that is not in the readings.
+
+    Raises
+    ------
+    InputError
+        ``reason`` is not one of ``STOPS``.
+    """
+    if reason not in STOPS:
+        raise InputError(f"override.stopped: reason = {reason}: must be one of {', '.join(sorted(STOPS))}")
+    new = state.copy()
+    new[_override.FINAL] = STATUS.index(reason)
+    new[_override.OVERRIDE] = new[_override.SENT] = 0.0
+    return new
 
 
 def trim(state: Floats) -> float:
     """Trim q of a state: with a model the share of torque_ref that may be planned with."""
-    return float(state[1])
+    return float(state[_override.TRIM])
 
 
 def allowed(
@@ -230,17 +282,22 @@ def allowed(
     """
     at, feed, edge, cut = profile
     programmed = float(np.interp(s, at, feed))
-    soon = max(actual, min(config.cap, float(state[0]) + config.slew_up * latency))
+    soon = max(actual, min(config.cap, float(state[_override.OVERRIDE]) + config.slew_up * latency))
     if not soon > 0.0:
         raise InputError(f"override.allowed: latency = {latency:g} s: must be above 0 while nothing moves")
-    most, row = _kernels.allowed(
+    most, row = _override.allowed(
         s, at, feed, edge, cut, config.torque_ref * trim(state), latency, soon,
         min(config.slew_down, acceleration / programmed), config.cap, first,
     )  # fmt: skip
     return float(most), int(row)
 
 
-def step(config: Override, table: FuzzyTable, state: Floats, reading: Reading) -> tuple[float, str, Floats]:
+def sets_of(table: FuzzyTable) -> Sets:
+    """The arrays of a table as the compiled step takes them, with room for its sums."""
+    return Sets(table.error, table.change, table.output, table.rules, table.whole_ends, np.empty(len(table.output)))
+
+
+def step(config: Override, table: FuzzyTable, state: Floats, reading: Reading) -> tuple[float, Status, Floats]:
     """One step.
 
     Parameters
@@ -251,23 +308,17 @@ def step(config: Override, table: FuzzyTable, state: Floats, reading: Reading) -
 
     Returns
     -------
-    The override to send, its status (one of ``STATUS``) and the new state.
+    The override to send, its status and the new state.
     """
     new = state.copy()
-    sent, status = _kernels.step(
-        config.numbers,
-        table.error,
-        table.change,
-        table.output,
-        table.rules,
-        table.whole_ends,
-        np.empty(len(table.output)),
-        new,
-        float(reading.torque),
-        reading.trusted,
-        float(reading.predicted),
-        -1.0 if reading.model is None else float(reading.model),
-        float(reading.actual),
-        float(reading.dt),
+    seen = Observation(
+        torque=float(reading.torque),
+        dt=float(reading.dt),
+        trusted=reading.trusted,
+        actual=float(reading.actual),
+        predicted=float(reading.predicted),
+        model=-1.0 if reading.model is None else float(reading.model),
+        off_path=reading.off_path,
     )
+    sent, status = _override.step(config.numbers, sets_of(table), new, seen)
     return float(sent), STATUS[status], new

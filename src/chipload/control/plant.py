@@ -7,10 +7,10 @@ K_T [N mm/A], I current [A].
 
     J dw/dt = K_T (I - I_idle(w)) - T,   I_idle = i_0 + i_1 w,
     I = K_P (w_0 - w) + K_I integral of (w_0 - w), within the drive's current,
-    T_measured = lag of [K_T (I - I_idle) - J dw/dt] + K_T noise, smoothed.
+    T_measured = lag of [K_T (I - I_idle) - J dw/dt] + K_T noise, read in whole steps of the current, smoothed.
 
-Where the wall bears more than what is held, the controller is told the torque over its relief (T and T_model alike): it
-holds the same share of what is borne everywhere.
+Where the wall allows more than what is held, the controller is told the torque over its relief (T and T_model alike):
+it holds the same share of what is allowed everywhere.
 
 What the controller believes (the model) and what is true (its columns with surprises) are two sets of columns. The axes
 accelerate within their limit; the override acts after its latency. Teeth are below the bandwidth and are not in it.
@@ -20,23 +20,37 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipload.control import _kernels
+from chipload.control import _plant
 from chipload.control.fuzzy import FuzzyTable
-from chipload.control.override import STATUS, Override, begin
+from chipload.control.override import STATUS, Override, begin, sets_of
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
 
-FAULTS = ("none", "nan", "stuck", "value")
-#: how a run ends
-ENDS = ("finished", "stopped", "time", "stalled")
+FAULTS = ("none", "nan", "stuck", "value", "scaled")
 #: share of its speed below which the spindle counts as stalled
 STALL = 0.5
+
+
+class Ended(StrEnum):
+    """How a run ends: at the end of the path, or why not."""
+
+    PATH = "path"
+    GONE = "gone"
+    ASKED = "asked"
+    TIME = "time"
+    STALLED = "stalled"
+    OVERLOAD = "overload"
+    NO_READING = "no-reading"
+    LOW_READING = "low-reading"
+    OFF_PATH = "off-path"
+    MACHINE_DATA = "machine-data"
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +161,8 @@ class Spindle:
     sensor_lag : time constant [s]
     smoothing : time constant of the filter behind it [s], about a revolution
     noise : standard deviation of a reading of the current [A]
+    current_step : quantisation of a reading of the current [A]; 0: none
+    idle_error : share by which the idle current may differ from ``idle`` (temperature, lubricant)
     """
 
     speed: float
@@ -159,12 +175,14 @@ class Spindle:
     sensor_lag: float
     smoothing: float
     noise: float
+    current_step: float = 0.0
+    idle_error: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("speed", "inertia", "torque_constant", "stiffness", "most_current"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise InputError(f"spindle.{name} = {getattr(self, name):g}: must be above 0")
-        for name in ("reset", "sensor_lag", "smoothing", "noise"):
+        for name in ("reset", "sensor_lag", "smoothing", "noise", "current_step", "idle_error"):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise InputError(f"spindle.{name} = {getattr(self, name):g}: must be at least 0")
 
@@ -202,9 +220,12 @@ class Loop:
 
 @dataclass(frozen=True)
 class Fault:
-    """What happens to the sensor from ``begin`` to ``end`` [s]: ``nan``, ``stuck`` (its last reading) or ``value``."""
+    """What happens to the sensor from ``begin`` to ``end`` [s].
 
-    kind: Literal["none", "nan", "stuck", "value"] = "none"
+    ``nan``; ``stuck``: its last reading; ``value``: always ``value`` [N mm]; ``scaled``: ``value`` times what it was.
+    """
+
+    kind: Literal["none", "nan", "stuck", "value", "scaled"] = "none"
     begin: float = 0.0
     end: float = 0.0
     value: float = 0.0
@@ -221,7 +242,7 @@ class Outcome:
     Parameters
     ----------
     finished : the end of the path was reached
-    ended : ``finished``; ``overload`` or ``stopped`` by the controller; ``time``: longest_s; ``stalled``: the spindle
+    ended : ``path``; ``time``: longest_s; ``stalled``: the spindle; else the reason for which the controller stopped
     time : [s]
     torque_max : greatest true torque [N mm]
     load_max : greatest true torque over its relief [N mm]
@@ -232,7 +253,7 @@ class Outcome:
     """
 
     finished: bool
-    ended: str
+    ended: Ended
     time: float
     torque_max: float
     load_max: float
@@ -258,6 +279,7 @@ def run(
     fault: Fault | None = None,
     every_row: int = 1,
     relief: Floats | None = None,
+    monitor: TorqueProfile | None = None,
 ) -> Outcome:
     """Run a controller along a path.
 
@@ -270,49 +292,53 @@ def run(
     limit : torque for ``time_over`` [N mm]
     fault : of the sensor
     every_row : keep every so many steps of the controller
-    relief : (n,) float, above 0, at the rows of ``truth``: what is borne there over what is held; the
+    relief : (n,) float, above 0, at the rows of ``truth``: what is allowed there over what is held; the
         controller is told the torque over it; None: 1 everywhere
+    monitor : model that readings are held against where there is no feed-forward; None: ``model``
 
     Raises
     ------
     InputError
         The model covers another path than the truth, or the relief is not one number above 0 a row.
     """
-    believed, rows_s = truth, truth.s
-    borne = np.ones(len(rows_s)) if relief is None else np.asarray(relief, dtype=np.float64)
-    if borne.shape != rows_s.shape or not ((borne > 0.0) & np.isfinite(borne)).all():
+    rows_s, expected = truth.s, model if model is not None else monitor
+    share = np.ones(len(rows_s)) if relief is None else np.asarray(relief, dtype=np.float64)
+    if share.shape != rows_s.shape or not ((share > 0.0) & np.isfinite(share)).all():
         raise InputError(f"plant.relief: must be {len(rows_s)} numbers above 0, one for each row of the truth")
-    if model is not None:
-        if (model.s[0], model.s[-1]) != (truth.s[0], truth.s[-1]):
+    believed = truth
+    if expected is not None:
+        if (expected.s[0], expected.s[-1]) != (truth.s[0], truth.s[-1]):
             raise InputError(
-                f"plant.model: from s = {model.s[0]:g} to {model.s[-1]:g} mm: must cover the path, "
+                f"plant.model: from s = {expected.s[0]:g} to {expected.s[-1]:g} mm: must cover the path, "
                 f"{truth.s[0]:g} to {truth.s[-1]:g}"
             )
-        believed = _on_rows(model, truth.s)
+        believed = _on_rows(expected, truth.s)
         truth = _on_rows(truth, believed.s)
-    borne = np.interp(truth.s, rows_s, borne)
-    every = max(round(loop.period / loop.substep), 1)
-    delay = round(loop.latency / loop.period)
-    noise = np.random.default_rng(loop.seed).normal(0.0, spindle.noise, 65_536)
-    state = begin(controller, model is not None)
+    share = np.interp(truth.s, rows_s, share)
+    every, delay = max(round(loop.period / loop.substep), 1), round(loop.latency / loop.period)
     rows = math.ceil(loop.longest_s / loop.period / every_row) + 3
     out = np.empty((min(rows, 2_000_000), 8))
     fault = fault or Fault()
-    filled, ended, time, greatest, load, over = _kernels.run(
-        truth.s, truth.feed, truth.edge, truth.cut, believed.edge / borne, believed.cut / borne, borne,
+    filled, ended, time, greatest, load, over = _plant.run(
+        _plant.Columns(truth.s, truth.feed, truth.edge, truth.cut, believed.edge / share, believed.cut / share, share),
         model is not None,
-        controller.numbers, table.error, table.change, table.output, table.rules, table.whole_ends,
-        np.empty(len(table.output)), state, delay * loop.period,
-        np.array([loop.period / every, loop.acceleration, loop.longest_s, STALL]),
-        np.array([spindle.inertia, spindle.torque_constant, *spindle.idle, spindle.stiffness, spindle.reset,
-                  spindle.most_current, spindle.speed, spindle.sensor_lag, spindle.smoothing]),
-        np.array([FAULTS.index(fault.kind), fault.begin, fault.end, fault.value], dtype=np.float64),
-        noise, every, delay, limit, every_row, out,
-    )  # fmt: skip
+        expected is not None,
+        controller.numbers,
+        sets_of(table),
+        begin(controller, model is not None),
+        _plant.Axes(loop.period / every, every, delay, delay * loop.period, loop.acceleration, loop.longest_s, STALL),
+        _drive(spindle),
+        _plant.SensorFault(FAULTS.index(fault.kind), float(fault.begin), float(fault.end), float(fault.value)),
+        np.random.default_rng(loop.seed).normal(0.0, spindle.noise, 65_536),
+        limit,
+        every_row,
+        out,
+    )
     t, s, feed, torque, measured, sent, status, speed = np.ascontiguousarray(out[:filled].T)
+    ends = {_plant.FINISHED: Ended.PATH, _plant.TIMED_OUT: Ended.TIME, _plant.STALLED: Ended.STALLED}
     return Outcome(
-        finished=ENDS[ended] == "finished",
-        ended=STATUS[int(status[-1])] if ENDS[ended] == "stopped" else ENDS[ended],
+        finished=ended == _plant.FINISHED,
+        ended=Ended(STATUS[int(status[-1])]) if ended == _plant.STOPPED else ends[ended],
         time=time,
         torque_max=greatest,
         load_max=load,
@@ -325,6 +351,22 @@ def run(
         override=sent,
         speed=speed,
         status=status.astype(np.int64),
+    )
+
+
+def _drive(spindle: Spindle) -> _plant.SpindleDrive:
+    return _plant.SpindleDrive(
+        speed=float(spindle.speed),
+        inertia=float(spindle.inertia),
+        torque_constant=float(spindle.torque_constant),
+        idle_constant=float(spindle.idle[0]),
+        idle_slope=float(spindle.idle[1]),
+        stiffness=float(spindle.stiffness),
+        reset=float(spindle.reset),
+        most_current=float(spindle.most_current),
+        current_step=float(spindle.current_step),
+        sensor_lag=float(spindle.sensor_lag),
+        smoothing=float(spindle.smoothing),
     )
 
 

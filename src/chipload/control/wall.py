@@ -1,4 +1,4 @@
-"""What a torque along a path does to a thin wall, and which torque the wall bears at each place of the path.
+"""Deflection of a thin wall under a torque along a path, and the allowable torque at each place of the path.
 
 Notation: k a step of the path; s_k [mm] the middle of its depth of cut along the wall, b_k its length there, f_k the
 end of it that is nearer to the wall's free end; C_w [mm/N] the normal displacement of the wall at f_k under a unit
@@ -9,10 +9,11 @@ and a part that goes with the feed per tooth, o the override, w_0 / w the droop 
     T(o) = T_e + T_c o w_0 / w      mean torque over a revolution,
     F(o) = F_e + F_c o w_0 / w      greatest force of a revolution on the surface that is left, along its normal.
 
-F is convex in o, so between 0 and 1 the straight line lies above it, never below. The wall gives way by F (C_w + C_t);
-it bears F_lim = min(d / (C_w + C_t), S / g), which is reached at o_lim = (F_lim - F_e) / F_c, at a torque of T(o_lim):
-the limit of torque is the least of these over the steps where o_lim is at most 1, or where it is least if it nowhere
-is. Where a light cut bears less torque than that, it is because so little of the round is cut: its feed is not limited.
+F is convex in o, so between 0 and 1 the straight line lies above it, never below. The wall deflects by F (C_w + C_t);
+its allowable force is F_lim = min(d / (C_w + C_t), S / g), which is reached at o_lim = (F_lim - F_e) / F_c, at a
+torque of T(o_lim): the limit of torque is the least of these over the steps where o_lim is at most 1, or where it is
+least if it nowhere is. Where a light cut allows less torque than that, so little of the round is cut: its feed is not
+limited.
 """
 
 from __future__ import annotations
@@ -75,8 +76,8 @@ def two_parts(torque: Floats, force: Floats, little_torque: Floats, little_force
 
 
 @dataclass(frozen=True, eq=False)
-class Bearing:
-    """What a wall does under a unit force at n steps; steps beside the wall have 0.
+class UnitResponse:
+    """Deflection and stress of a wall under a unit force at n steps; steps beside the wall have 0.
 
     Parameters
     ----------
@@ -88,7 +89,7 @@ class Bearing:
     stress: Floats
 
 
-def bearing(modes: Ritz, near: Floats, far: Floats, width: float, tool: Floats) -> Bearing:
+def unit_response(modes: Ritz, near: Floats, far: Floats, width: float, tool: Floats) -> UnitResponse:
     """Compliance and stress for depths of cut along a wall.
 
     Parameters
@@ -111,12 +112,12 @@ def bearing(modes: Ritz, near: Floats, far: Floats, width: float, tool: Floats) 
             strained[k] = max(greatest_stress(modes, middle, b - a, width))
     place = place.ravel()
     on = bounds[:, 1] > bounds[:, 0]
-    return Bearing(np.where(on, wall[place] + tool, 0.0), strained[place])
+    return UnitResponse(np.where(on, wall[place] + tool, 0.0), strained[place])
 
 
 @dataclass(frozen=True, eq=False)
 class PathLimit:
-    """The torque that the wall bears along a path.
+    """The allowable torque along a path.
 
     Parameters
     ----------
@@ -134,7 +135,7 @@ class PathLimit:
     each: Floats
 
 
-def path_limit(loads: Loads, wall: Bearing, deflection: float, stress: float) -> PathLimit:
+def path_limit(loads: Loads, wall: UnitResponse, deflection: float, stress: float) -> PathLimit:
     """The limit of torque; see the head of this file.
 
     Parameters
@@ -188,7 +189,7 @@ class WallPath:
 
 
 def wall_error(path: WallPath, programmed: TorqueProfile, outcome: Outcome, speed: float) -> Floats:
-    """How far wall and cutter give way, together, at each row of an outcome.
+    """Deflection of wall and cutter, together, at each row of an outcome.
 
     Parameters
     ----------

@@ -1,1 +1,44 @@
 """Cutters: their shape, and the files that describe them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from chipload.lazy import attach
+
+if TYPE_CHECKING:
+    from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named, read_catalogue
+    from chipload.cutter.cutter import Cutter
+    from chipload.cutter.fctb import read_fctb
+    from chipload.cutter.slices import Slices
+    from chipload.cutter.strength import ToolMaterial, ToolStrength
+    from chipload.cutter.table import CutterTable, cutter_from_table
+    from chipload.cutter.tooltable import read_tool_table
+
+__all__ = [
+    "Catalogue",
+    "CatalogueCutter",
+    "Cutter",
+    "CutterTable",
+    "Slices",
+    "ToolMaterial",
+    "ToolStrength",
+    "catalogue_named",
+    "cutter_from_table",
+    "read_catalogue",
+    "read_fctb",
+    "read_tool_table",
+]
+
+__getattr__, __dir__ = attach(
+    __name__,
+    {
+        "cutter": "Cutter",
+        "table": "CutterTable cutter_from_table",
+        "catalogue": "Catalogue CatalogueCutter catalogue_named read_catalogue",
+        "slices": "Slices",
+        "strength": "ToolMaterial ToolStrength",
+        "fctb": "read_fctb",
+        "tooltable": "read_tool_table",
+    },
+)

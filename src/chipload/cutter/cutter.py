@@ -18,7 +18,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chipload.cutter.strength import ToolStrength, check_material
 from chipload.errors import InputError
+
+#: a cutter of which nothing is stated but its modulus
+ORDINARY = ToolStrength()
+#: equivalent diameter of the fluted part over the cutter's diameter [Kops1990]
+FLUTED_FACTOR = 0.8
+#: of a cutter: diameters [mm], overhang [mm], teeth
+THINNEST, WIDEST, LONGEST, MOST_FLUTES = 0.01, 1000.0, 3000.0, 200
 
 
 @dataclass(frozen=True)
@@ -44,6 +52,8 @@ class Cutter:
     tip_stiffness : [N/mm] of the tip across the axis under a slow force, measured in the machine; None: not known
     gullet : area between two teeth in a section across the axis [mm^2]; None: not known
     chip_ratio : volume that chips fill over what they are cut from, >= 1; with ``gullet`` or not at all
+    fluted_factor : equivalent diameter of the fluted part over the diameter, in bending and torsion, (0, 1]
+    strength : what its material carries
     number : tool number, >= 0; 0: what is in the spindle where a program names no tool
     name : as the shop calls it
 
@@ -70,6 +80,8 @@ class Cutter:
     tip_stiffness: float | None = None
     gullet: float | None = None
     chip_ratio: float | None = None
+    fluted_factor: float = FLUTED_FACTOR
+    strength: ToolStrength = ORDINARY
     number: int = 1
     name: str = ""
 
@@ -84,7 +96,14 @@ class Cutter:
         if not all(math.isfinite(x) for x in (*numbers, *more)):
             raise InputError("cutter: a number is not finite")
         need(self.diameter > 0.0, "diameter_mm", self.diameter, "must be above 0")
+        need(
+            THINNEST <= self.diameter <= WIDEST,
+            "diameter_mm",
+            self.diameter,
+            f"must be from {THINNEST:g} to {WIDEST:g}",
+        )
         need(self.flutes >= 1, "flutes", self.flutes, "must be at least 1")
+        need(self.flutes <= MOST_FLUTES, "flutes", self.flutes, f"must be at most {MOST_FLUTES}")
         need(
             0.0 <= self.helix < math.radians(80.0), "helix_deg", math.degrees(self.helix), "must be from 0 to below 80"
         )
@@ -95,6 +114,7 @@ class Cutter:
             self.overhang,
             f"must be at least flute_length_mm = {self.flute_length:g}",
         )
+        need(self.overhang <= LONGEST, "overhang_mm", self.overhang, f"must be at most {LONGEST:g}")
         need(
             1e4 <= self.modulus <= 1e6,
             "modulus_gpa",
@@ -139,6 +159,9 @@ class Cutter:
         need(self.gullet is None or 0.0 < self.gullet < room, "gullet_mm2", self.gullet or 0.0, limit)
         ratio = self.chip_ratio
         need(ratio is None or 1.0 <= ratio < math.inf, "chip_ratio", ratio or 0.0, "must be at least 1")
+        factor = self.fluted_factor
+        need(0.0 < factor <= 1.0, "fluted_factor", factor, "must be above 0 and at most 1 (0.8 is usual for end mills)")
+        check_material(self.strength, self.modulus)
         need(self.number >= 0, "number", self.number, "must be at least 0")
 
     @property

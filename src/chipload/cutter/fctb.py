@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from chipload.errors import InputError
+from chipload.files import read_regular
 
 #: shape file -> what it is
 SHAPES = {"endmill": "flat", "ballend": "ball", "torus": "bull", "bullnose": "bull"}
@@ -18,6 +19,7 @@ _MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3,
 _LENGTH = re.compile(r"^([0-9]+(?:[.,][0-9]+)?)(?:\s*/\s*([0-9]+))?\s*([^\s0-9]+)$")
 _MIXED = re.compile(r"^([0-9]+)[\s+-]+([0-9]+)\s*/\s*([0-9]+)\s*([^\s0-9]+)$")
 _LARGEST_FILE = 1_000_000
+_LONGEST = 60
 
 
 def read_fctb(path: str | Path) -> dict[str, Any]:
@@ -33,12 +35,9 @@ def read_fctb(path: str | Path) -> dict[str, Any]:
     """
     path = Path(path)
     label = f"cutter.file {path}"
+    text = read_regular(path, label, _LARGEST_FILE, "not a tool bit")
     try:
-        if path.stat().st_size > _LARGEST_FILE:
-            raise InputError(f"{label}: more than {_LARGEST_FILE} bytes: not a tool bit")
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as err:
-        raise InputError(f"{label}: cannot be read: {err.strerror}") from None
+        data = json.loads(text.decode("utf-8"))
     except (ValueError, RecursionError):
         raise InputError(f"{label}: not a FreeCAD tool bit: must be JSON") from None
     if not isinstance(data, dict) or not isinstance(data.get("parameter"), dict) or "shape" not in data:
@@ -82,6 +81,8 @@ def read_fctb(path: str | Path) -> dict[str, Any]:
 
 def _length(label: str, text: object) -> float:
     """A length with its unit in mm."""
+    if len(str(text)) > _LONGEST:
+        raise InputError(f"{label}: {len(str(text))} characters: must be a length with its unit, as 6,0 mm or 1/4 in")
     plain = str(text).strip().replace("\N{NO-BREAK SPACE}", " ")
     value, unit = None, ""
     if hit := _MIXED.match(plain):

@@ -28,6 +28,8 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
+#: nodes of s, then of each slice between them: rho at the middle, lower z, sine, cosine, radius of the arc
+Part = tuple[Floats, Floats, Floats, Floats, Floats, Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +44,7 @@ class Slices:
     sin_kappa, cos_kappa : at the middle
     lag : at ``s_from`` [rad]
     rate : of the lag [rad/mm]
+    radius : of the profile's arc [mm]; 0 on a straight piece
     """
 
     s_from: Floats
@@ -52,6 +55,7 @@ class Slices:
     cos_kappa: Floats
     lag: Floats
     rate: Floats
+    radius: Floats
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -65,6 +69,23 @@ class Slices:
         return len(self.s_from)
 
     @property
+    def z_middle(self) -> Floats:
+        """(k,) float [mm], height at the middle of the profile's piece, where ``rho`` is taken: the point (rho, z) lies
+        on the profile; the mean of the ends of an arc would lie inside it, by r cos(kappa) (1 - cos(half its angle)).
+
+        >>> ball = slices(Cutter(12.0, 2, 0.0, 20.0, 30.0, 6e5, corner_radius=6.0), corner_pieces=3)
+        >>> (np.hypot(ball.rho, 6.0 - ball.z_middle)[:3]).round(12).tolist()
+        [6.0, 6.0, 6.0]
+        """
+        half = 0.5 * (self.s_to - self.s_from)
+        bent = self.radius > 0.0
+        r = np.where(bent, self.radius, 1.0)
+        kappa = np.arctan2(self.sin_kappa, self.cos_kappa)
+        return np.asarray(
+            self.z + np.where(bent, r * (np.cos(kappa - half / r) - self.cos_kappa), half * self.sin_kappa)
+        )
+
+    @property
     def columns(self) -> Floats:
         """(k, 7) float: s_from, rho, z, sin(kappa), cos(kappa), lag, rate; what a bite and the force need."""
         return np.column_stack([self.s_from, self.rho, self.z, self.sin_kappa, self.cos_kappa, self.lag, self.rate])
@@ -75,14 +96,23 @@ def edge_lag(cutter: Cutter) -> float:
     return math.tan(cutter.helix) / cutter.radius
 
 
-def slices(cutter: Cutter, *, bottom_pieces: int = 4, corner_pieces: int = 16, flank_mm: float | None = None) -> Slices:
+def slices(
+    cutter: Cutter,
+    *,
+    bottom_pieces: int = 4,
+    corner_pieces: int = 16,
+    flank_mm: float | None = None,
+    grading: float = 1.0,
+) -> Slices:
     """The profile from the axis to the end of the flutes in slices.
 
     Parameters
     ----------
     cutter : any
     bottom_pieces : slices of the bottom line, where there is one; one at least
-    corner_pieces : slices of the corner of even kappa, where there is one; one at least
+    corner_pieces : slices of the corner, where there is one; one at least
+    grading : the bounds of those in kappa are spaced as (j / n)^grading, from 1 (evenly) to 3; above 1 they are narrow
+        near the bottom, where shallow cuts lie
     flank_mm : greatest length of a slice of the flank [mm], above 0; None: the flank is one slice (with a taper its rho
         is then that of its middle)
 
@@ -102,24 +132,27 @@ def slices(cutter: Cutter, *, bottom_pieces: int = 4, corner_pieces: int = 16, f
     for name, number in (("bottom_pieces", bottom_pieces), ("corner_pieces", corner_pieces)):
         if number < 1:
             raise InputError(f"slices: {name} = {number}: must be at least 1")
+    if not 1.0 <= grading <= 3.0:
+        raise InputError(f"slices: grading = {grading:g}: must be from 1 (evenly) to 3")
     if flank_mm is not None and not flank_mm > 0.0:
         raise InputError(f"slices: flank_mm = {flank_mm:g}: must be above 0, or None for one slice")
     _, r, e, f, alpha, beta, height = cutter.apt
     tiny = 1e-9 * cutter.diameter
     low, high = f - r * math.cos(alpha), f - r * math.sin(beta)
     end = e + r * math.sin(alpha)
-    parts: list[tuple[Floats, Floats, Floats, Floats, Floats]] = []
+    parts: list[Part] = []
     if end > tiny:
         rho = np.linspace(0.0, end, bottom_pieces + 1)
         s = (rho - end) / math.cos(alpha)
         parts.append(_line(s, rho, rho * math.tan(alpha), alpha))
     reach = 0.0
     if r > tiny:
-        kappa = np.linspace(alpha, 0.5 * math.pi - beta, corner_pieces + 1)
+        share = np.linspace(0.0, 1.0, corner_pieces + 1)
+        kappa = alpha + (0.5 * math.pi - beta - alpha) * (share if grading == 1.0 else share**grading)
         mid = 0.5 * (kappa[:-1] + kappa[1:])
         s = r * (kappa - alpha)
         reach = float(s[-1])
-        parts.append((s, e + r * np.sin(mid), f - r * np.cos(kappa[:-1]), np.sin(mid), np.cos(mid)))
+        parts.append((s, e + r * np.sin(mid), f - r * np.cos(kappa[:-1]), np.sin(mid), np.cos(mid), r + 0.0 * mid))
     else:
         high = low
     if height > high + tiny:
@@ -132,13 +165,13 @@ def slices(cutter: Cutter, *, bottom_pieces: int = 4, corner_pieces: int = 16, f
         )
     s_from = np.concatenate([p[0][:-1] for p in parts])
     s_to = np.concatenate([p[0][1:] for p in parts])
-    rho, z, sin, cos = (np.concatenate([p[i] for p in parts]) for i in range(1, 5))
+    rho, z, sin, cos, bend = (np.concatenate([p[i] for p in parts]) for i in range(1, 6))
     lead = edge_lag(cutter)
-    return Slices(s_from, s_to, rho, z, sin, cos, lead * z, lead * sin)
+    return Slices(s_from, s_to, rho, z, sin, cos, lead * z, lead * sin, bend)
 
 
-def _line(s: Floats, rho: Floats, z: Floats, kappa: float) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Slices of a straight piece of the profile between nodes: nodes of s, middle rho, lower z, sine, cosine."""
+def _line(s: Floats, rho: Floats, z: Floats, kappa: float) -> Part:
+    """Slices of a straight piece of the profile between nodes: nodes of s, middle rho, lower z, sine, cosine, 0."""
     one = np.ones(len(s) - 1)
     cosine = 0.0 if kappa == 0.5 * math.pi else math.cos(kappa)
-    return s, 0.5 * (rho[:-1] + rho[1:]), z[:-1], math.sin(kappa) * one, cosine * one
+    return s, 0.5 * (rho[:-1] + rho[1:]), z[:-1], math.sin(kappa) * one, cosine * one, 0.0 * one

@@ -13,10 +13,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from chipload.cutter.cutter import Cutter
+from chipload.cutter.cutter import FLUTED_FACTOR, LONGEST, MOST_FLUTES, THINNEST, WIDEST, Cutter
 from chipload.cutter.fctb import read_fctb
+from chipload.cutter.strength import ToolMaterial, ToolStrength
 from chipload.cutter.tooltable import read_tool_table
-from chipload.errors import InputError
+from chipload.errors import InputError, InputErrors
 from chipload.tables import nearest
 
 #: keys that a cutter cannot be without
@@ -39,11 +40,11 @@ class CutterTable(BaseModel):
 
     number: int | None = Field(None, ge=0)
     name: str | None = None
-    diameter_mm: float | None = None
-    flutes: int | None = None
+    diameter_mm: float | None = Field(None, description=f"from {THINNEST:g} to {WIDEST:g}")
+    flutes: int | None = Field(None, description=f"at most {MOST_FLUTES}")
     helix_deg: float | None = None
     flute_length_mm: float | None = None
-    overhang_mm: float | None = None
+    overhang_mm: float | None = Field(None, description=f"at most {LONGEST:g}")
     modulus_gpa: float | None = None
     corner_radius_mm: float | None = None
     corner_e_mm: float | None = None
@@ -61,6 +62,11 @@ class CutterTable(BaseModel):
     )
     gullet_mm2: float | None = Field(None, description="area between two teeth in a section across the axis")
     chip_ratio: float | None = Field(None, description="volume that chips fill over what they are cut from")
+    fluted_factor: float | None = Field(None, description="equivalent diameter of the fluted part over diameter_mm")
+    tool_material: Literal["carbide", "hss"] | None = Field(None, description="none: by modulus_gpa, steel below 350")
+    strength_mpa: float | None = Field(None, description="rupture strength of carbide, yield strength of steel")
+    safety_factor: float | None = Field(None, description="strength over the stress that is allowed")
+    stress_concentration: float | None = Field(None, description="stress at a notch over that of a smooth bar")
     file: str | None = None
     tool: int | None = None
     file_unit: Literal["mm", "inch"] | None = None
@@ -75,10 +81,14 @@ class CutterTable(BaseModel):
         """
         given = self.model_dump(exclude_none=True)
         values = {**self._from_file(Path(folder)), **given}
-        for key in NEEDED:
-            if key not in values:
-                where = f": {self.file} does not say it" if self.file else ""
-                raise InputError(f"cutter.{key} is missing{where}: must be given, a cutter is never guessed")
+        where = f": {self.file} does not say it" if self.file else ""
+        missing = [
+            f"cutter.{key} is missing{where}: must be given, a cutter is never guessed"
+            for key in NEEDED
+            if key not in values
+        ]
+        if missing:
+            raise InputErrors(*missing) if len(missing) > 1 else InputError(missing[0])
         if ("runout_mm" in values) != ("runout_deg" in values):
             lacks, has = ("runout_deg", "runout_mm") if "runout_mm" in values else ("runout_mm", "runout_deg")
             raise InputError(f"cutter.{lacks} is missing: give it with {has} or leave both out")
@@ -100,6 +110,8 @@ class CutterTable(BaseModel):
             tip_stiffness=1000.0 * values["tip_n_um"] if "tip_n_um" in values else None,
             gullet=values.get("gullet_mm2"),
             chip_ratio=values.get("chip_ratio"),
+            fluted_factor=values.get("fluted_factor", FLUTED_FACTOR),
+            strength=_strength(values),
             number=values["number"],
             name=values.get("name", ""),
         )
@@ -125,6 +137,14 @@ class CutterTable(BaseModel):
                 raise InputError(f"cutter.file_unit is missing: {self.file} does not say its unit: give mm or inch")
             return dict(read_tool_table(path, self.tool, self.file_unit))
         raise InputError(f"cutter.file = {self.file}: must end in .fctb (FreeCAD) or .tbl (LinuxCNC)")
+
+
+def _strength(values: Mapping[str, Any]) -> ToolStrength:
+    """What is stated of the cutter's strength; what is not has the values of :class:`ToolStrength`."""
+    names = {"strength_mpa": "mpa", "safety_factor": "safety_factor", "stress_concentration": "concentration"}
+    stated = {field: values[key] for key, field in names.items() if key in values}
+    material = ToolMaterial(values["tool_material"]) if "tool_material" in values else None
+    return ToolStrength(material, **stated)
 
 
 def cutter_from_table(table: Mapping[str, Any], folder: str | Path = ".") -> Cutter:
@@ -160,7 +180,7 @@ def _first(err: ValidationError, table: Mapping[str, Any]) -> str:
         "finite_number": "must be a finite number",
         "int_type": "must be a whole number",
         "string_type": "must be a text",
-        "literal_error": "must be mm or inch",
+        "literal_error": "must be " + str(row.get("ctx", {}).get("expected", "")).replace("'", ""),
         "greater_than_equal": f"must be at least {row.get('ctx', {}).get('ge')}",
     }
     value = table[str(row["loc"][0])]

@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from chipload.errors import InputError
+from chipload.files import read_regular
 from chipload.units import MM_PER
 
 _WORD = re.compile(r"([A-Za-z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?=\s|[A-Za-z]|$)")
 _LARGEST_FILE = 1_000_000
+_LARGEST_NUMBER = 1e9
 
 
 def read_tool_table(path: str | Path, tool: int, unit: str) -> dict[str, Any]:
@@ -31,12 +33,7 @@ def read_tool_table(path: str | Path, tool: int, unit: str) -> dict[str, Any]:
     """
     path = Path(path)
     label = f"cutter.file {path}"
-    try:
-        if path.stat().st_size > _LARGEST_FILE:
-            raise InputError(f"{label}: more than {_LARGEST_FILE} bytes: not a tool table")
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError as err:
-        raise InputError(f"{label}: cannot be read: {err.strerror}") from None
+    text = read_regular(path, label, _LARGEST_FILE, "not a tool table").decode("utf-8", "replace")
     found: dict[int, tuple[int, dict[str, float], str]] = {}
     known: list[int] = []
     for k, line in enumerate(text.splitlines(), 1):
@@ -46,6 +43,8 @@ def read_tool_table(path: str | Path, tool: int, unit: str) -> dict[str, Any]:
         words = {letter.upper(): float(number) for letter, number in _WORD.findall(body)}
         if "T" not in words or _WORD.sub("", body).strip():
             raise InputError(f"{label} line {k}: not a tool: must be words as T1 P1 D10")
+        if not all(abs(number) < _LARGEST_NUMBER for number in words.values()):
+            raise InputError(f"{label} line {k}: a number is too large: must be below {_LARGEST_NUMBER:g}")
         number = int(words["T"])
         if number == tool and tool in found:
             raise InputError(f"{label}: tool {tool} stands twice, in lines {found[tool][0]} and {k}: keep one")

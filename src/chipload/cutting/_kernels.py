@@ -1,6 +1,7 @@
 """Compiled loops of the force; arrays and scalars only.
 
-Notation as in :mod:`chipload.engagement.bites` and :mod:`chipload.cutting.force`: theta [rad] rotation of tooth 0 at
+Notation as in :mod:`chipload.engagement.tooth_engagement` and :mod:`chipload.cutting.force`: theta [rad] rotation of
+tooth 0 at
 the tip, c = (Ktc, Krc, Kac, Kte, Kre, Kae, m_t, m_r, m_a), a bite row = (phi from, phi to, s from, s to, along, offset,
 across), a slice = (s from, rho, z, sin(kappa), cos(kappa), lag, rate of the lag), ``piece`` the slice of each row.
 Oracles: slice summation and quadrature in tests/cutting.
@@ -175,6 +176,18 @@ def turn_of(start, rows, tooth, piece, slices, theta, teeth, c, out):
             out[i, k, 1] = fn
             out[i, k, 2] = fa
             out[i, k, 3] = mt
+
+
+@njit(cache=True, nogil=True)
+def bases_at(start, rows, tooth, piece, slices, theta, teeth, laws, out):
+    """Loads of every step at a rotation of its own, for each of some laws: out (n, 4, laws)."""
+    for i in range(len(start) - 1):
+        for k in range(len(laws)):
+            ft, fn, fa, mt = load(theta[i], rows, tooth, piece, slices, start[i], start[i + 1], teeth, laws[k])
+            out[i, 0, k] = ft
+            out[i, 1, k] = fn
+            out[i, 2, k] = fa
+            out[i, 3, k] = mt
 
 
 @njit(cache=True, nogil=True)

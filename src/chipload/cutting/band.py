@@ -17,13 +17,13 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting import _kernels
 from chipload.cutting.force import in_work
 from chipload.cutting.material import Material
-from chipload.engagement.bites import Bites
+from chipload.engagement.tooth_engagement import ToothEngagement
 
 Floats = NDArray[np.float64]
 
 
 def mean_band(
-    bites: Bites, cutter: Cutter, material: Material, frame: ArrayLike | None = None
+    bites: ToothEngagement, cutter: Cutter, material: Material, frame: ArrayLike | None = None
 ) -> tuple[Floats, Floats]:
     """Standard deviation of the mean force and torque.
 
@@ -47,10 +47,10 @@ def mean_band(
     A full slot with two teeth, N depth Ktc f_z / 4 = 100 N across the feed, from a Ktc that is known to 10 %.
 
     >>> import math
-    >>> from chipload.engagement.bites import bites_of_arcs
+    >>> from chipload.engagement.tooth_engagement import engagement_of_arcs
     >>> mill = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5)
     >>> plain = Material("plain", 1000.0, 0.0, 0.0, 0.0, 0.0, 0.0, source="made up for this example", spread=0.1)
-    >>> force, torque = mean_band(bites_of_arcs([0.0], [math.pi], 0.1, mill, 2.0), mill, plain)
+    >>> force, torque = mean_band(engagement_of_arcs([0.0], [math.pi], 0.1, mill, 2.0), mill, plain)
     >>> force[0].round(9).tolist()
     [0.0, 10.0, 0.0]
     """
@@ -58,7 +58,7 @@ def mean_band(
     return deviation[:, :3], deviation[:, 3]
 
 
-def mean_basis(bites: Bites, cutter: Cutter, material: Material, frame: ArrayLike | None = None) -> Floats:
+def mean_basis(bites: ToothEngagement, cutter: Cutter, material: Material, frame: ArrayLike | None = None) -> Floats:
     """B of the mean loads, (n, 4, 6): force and torque for 1 of each coefficient; for the band of a sum add B first."""
     basis = np.zeros((len(bites), 4, 6))
     for k, law in enumerate(_unit_laws(material)):
@@ -75,7 +75,7 @@ def deviations(basis: Floats, material: Material) -> Floats:
 
 
 def band_over_turn(
-    bites: Bites, cutter: Cutter, material: Material, theta: ArrayLike, frame: ArrayLike | None = None
+    bites: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike, frame: ArrayLike | None = None
 ) -> tuple[Floats, Floats]:
     """Standard deviation of force and torque at given rotations.
 
@@ -98,6 +98,54 @@ def band_over_turn(
         basis[..., k] = out
     deviation = deviations(basis if frame is None else _turned(basis, frame), material)
     return deviation[..., :3], deviation[..., 3]
+
+
+def peak_band(
+    bites: ToothEngagement, cutter: Cutter, material: Material, at_force: ArrayLike, at_torque: ArrayLike
+) -> tuple[Floats, Floats]:
+    """Standard deviation of the size of the force, and of the torque, at a rotation of each step.
+
+    With F = B K at the rotation and e = F / |F|, that of |F| is sqrt(b C b') with b = e B: of first order in the errors
+    of K, exact where they keep the direction of F.
+
+    Parameters
+    ----------
+    bites, cutter, material : the material with a spread or a covariance
+    at_force, at_torque : (n,) float [rad], rotation of tooth 0 at which each is asked, as where it is greatest
+
+    Returns
+    -------
+    force : (n,) float [N]
+    torque : (n,) float [N mm]
+
+    Examples
+    --------
+    >>> import math
+    >>> from chipload.engagement.tooth_engagement import engagement_of_arcs
+    >>> mill = Cutter(10.0, 1, 0.0, 20.0, 30.0, 6e5)
+    >>> plain = Material("plain", 1000.0, 0.0, 0.0, 0.0, 0.0, 0.0, source="made up for this example", spread=0.1)
+    >>> slot = engagement_of_arcs([0.0], [math.pi], 0.1, mill, 2.0)
+    >>> [x.round(9).tolist() for x in peak_band(slot, mill, plain, [math.pi / 2], [math.pi / 2])]
+    [[20.0], [100.0]]
+    """
+    loads = _bases_at(bites, cutter, material, at_force)
+    force = loads[:, :3] @ np.array(material.coefficients)
+    size = np.linalg.norm(force, axis=1)
+    along = np.divide(force, size[:, None], out=np.zeros_like(force), where=size[:, None] > 0.0)
+    b = np.einsum("ni,nik->nk", along, loads[:, :3])
+    C = material.variances
+    torque = _bases_at(bites, cutter, material, at_torque)[:, 3]
+    sure = [np.sqrt(np.clip(np.einsum("nk,kl,nl->n", x, C, x), 0.0, None)) for x in (b, torque)]
+    return sure[0], sure[1]
+
+
+def _bases_at(bites: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike) -> Floats:
+    """B of every step at a rotation of its own, (n, 4, 6)."""
+    out = np.zeros((len(bites), 4, 6))
+    angles = np.ascontiguousarray(theta, dtype=np.float64)
+    rows = (bites.start, bites.rows, bites.tooth, bites.slice, bites.slices)
+    _kernels.bases_at(*rows, angles, cutter.flutes, _unit_laws(material), out)
+    return out
 
 
 def _unit_laws(material: Material) -> Floats:

@@ -29,8 +29,8 @@ from scipy.stats import t as student
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_over_turn, mean_forces
 from chipload.cutting.material import Material
-from chipload.cutting.turns import Cut, Turns, turns_of
-from chipload.engagement.bites import bites_of_arcs
+from chipload.cutting.turns import MeasuredCut, Turns, turns_of
+from chipload.engagement.tooth_engagement import engagement_of_arcs
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -79,7 +79,7 @@ class Fit:
     covariance: Floats
     interval: Floats
     cutter: Cutter
-    cuts: tuple[Cut, ...]
+    cuts: tuple[MeasuredCut, ...]
     turns: tuple[Turns, ...]
     phase: Floats
     zero: Floats
@@ -125,15 +125,15 @@ class Prediction:
 
 
 # -- the model --------------------------------------------------------------------------------------------------
-def unit_forces(cut: Cut, cutter: Cutter, theta: Floats) -> Floats:
+def unit_forces(cut: MeasuredCut, cutter: Cutter, theta: Floats) -> Floats:
     """Forces on the cutter that belong to unit coefficients, (m, 3, 6) float: force = unit_forces @ x."""
-    bites = bites_of_arcs([cut.arc[0]], [cut.arc[1]], cut.feed_per_tooth(cutter.flutes), cutter, cut.depth)
+    bites = engagement_of_arcs([cut.arc[0]], [cut.arc[1]], cut.feed_per_tooth(cutter.flutes), cutter, cut.depth)
     return _columns(lambda material: forces_over_turn(bites, cutter, material, theta)[0][0])
 
 
-def unit_means(cut: Cut, cutter: Cutter) -> Floats:
+def unit_means(cut: MeasuredCut, cutter: Cutter) -> Floats:
     """As :func:`unit_forces`, averaged over the turn in closed form: (3, 6) float."""
-    bites = bites_of_arcs([cut.arc[0]], [cut.arc[1]], cut.feed_per_tooth(cutter.flutes), cutter, cut.depth)
+    bites = engagement_of_arcs([cut.arc[0]], [cut.arc[1]], cut.feed_per_tooth(cutter.flutes), cutter, cut.depth)
     return _columns(lambda material: mean_forces(bites, cutter, material)[0][0])
 
 
@@ -143,7 +143,7 @@ def _columns(force: Callable[[Material], Floats]) -> Floats:
     return np.stack([(force(more) - plain) / step for more, step in zip(_MORE, _STEPS, strict=True)], axis=-1)
 
 
-def unit_harmonics(cut: Cut, cutter: Cutter, harmonics: int) -> Complexes:
+def unit_harmonics(cut: MeasuredCut, cutter: Cutter, harmonics: int) -> Complexes:
     """B_k, (H + 1, 3, 6) complex; the zeroth is the closed form."""
     theta = np.linspace(0.0, math.tau, TURN, endpoint=False)
     out = np.fft.rfft(unit_forces(cut, cutter, theta), axis=0)[: harmonics + 1] / TURN
@@ -167,7 +167,7 @@ def as_real(amplitude: Complexes) -> Floats:
 
 
 # -- the average method -----------------------------------------------------------------------------------------
-def fit_average(cuts: Sequence[Cut], cutter: Cutter) -> Fit:
+def fit_average(cuts: Sequence[MeasuredCut], cutter: Cutter) -> Fit:
     """Coefficients from mean forces over whole turns.
 
     Parameters
@@ -234,7 +234,7 @@ def solved(a: Floats, y: Floats) -> tuple[Floats, NDArray[np.bool_], NDArray[np.
 
 
 # -- what comes out ---------------------------------------------------------------------------------------------
-def _turns(cuts: Sequence[Cut], harmonics: int) -> tuple[Turns, ...]:
+def _turns(cuts: Sequence[MeasuredCut], harmonics: int) -> tuple[Turns, ...]:
     if not cuts:
         raise InputError("fit: no cut to fit: name at least one measurement with use = fit")
     return tuple(turns_of(cut, harmonics) for cut in cuts)
@@ -255,7 +255,7 @@ def padded(spread: Floats, more: int) -> Floats:
 
 def concluded(
     method: str,
-    cuts: Sequence[Cut],
+    cuts: Sequence[MeasuredCut],
     turns: tuple[Turns, ...],
     cutter: Cutter,
     linear: Floats,
@@ -293,14 +293,14 @@ def _student(freedom: int) -> float:
     return float(student.ppf(0.975, freedom)) if freedom > 0 else math.nan
 
 
-def predicted(fit: Fit, cut: Cut, theta: Floats, resonance: Floats | None = None) -> Floats:
+def predicted(fit: Fit, cut: MeasuredCut, theta: Floats, resonance: Floats | None = None) -> Floats:
     """Forces that the coefficients give over a turn of a cut, as the dynamometer shows them: (m, 3) float [N] on the
     cutter at the rotations theta (m,); ``resonance`` None: that of the fit.
     """
     return _turned(fit, cut, fit.parameters, theta, None, fit.resonance if resonance is None else resonance)
 
 
-def _turned(fit: Fit, cut: Cut, p: Floats, theta: Floats, harmonics: int | None, resonance: Floats) -> Floats:
+def _turned(fit: Fit, cut: MeasuredCut, p: Floats, theta: Floats, harmonics: int | None, resonance: Floats) -> Floats:
     """As :func:`predicted` for any runout and coefficients p, of the first harmonics or of all."""
     cutter = replace(fit.cutter, runout=(math.hypot(p[0], p[1]), math.atan2(p[1], p[0])))
     rings = np.isfinite(resonance[:, 0])
@@ -316,12 +316,12 @@ def _turned(fit: Fit, cut: Cut, p: Floats, theta: Floats, harmonics: int | None,
     return np.asarray(np.where(fit.known, force, np.nan))
 
 
-def predicted_mean(fit: Fit, cut: Cut) -> tuple[Floats, Floats]:
+def predicted_mean(fit: Fit, cut: MeasuredCut) -> tuple[Floats, Floats]:
     """Mean force over the turn and the half width of its band, (3,) float [N] each: as in :func:`predict`, alone."""
     return _banded(fit, lambda p: _mean(fit, cut, p))
 
 
-def _mean(fit: Fit, cut: Cut, p: Floats) -> Floats:
+def _mean(fit: Fit, cut: MeasuredCut, p: Floats) -> Floats:
     cutter = replace(fit.cutter, runout=(math.hypot(p[0], p[1]), math.atan2(p[1], p[0])))
     return np.asarray(np.where(fit.known, unit_means(cut, cutter) @ p[2:], np.nan))
 
@@ -338,7 +338,7 @@ def _banded(fit: Fit, said: Callable[[Floats], Floats]) -> tuple[Floats, Floats]
     return values, _student(fit.freedom) * np.sqrt(np.einsum("...j,jk,...k->...", slopes, fit.spread, slopes))
 
 
-def predict(fit: Fit, cut: Cut) -> Prediction:
+def predict(fit: Fit, cut: MeasuredCut) -> Prediction:
     """Mean and extremes of a cut that was not fitted, with their bands from the covariance of runout and x."""
     theta = np.linspace(0.0, math.tau, TURN, endpoint=False)
 
@@ -354,7 +354,7 @@ def predict(fit: Fit, cut: Cut) -> Prediction:
     )
 
 
-def aligned(fit: Fit, cut: Cut, turns: Turns, parts: int = 720) -> float:
+def aligned(fit: Fit, cut: MeasuredCut, turns: Turns, parts: int = 720) -> float:
     """theta_0 of a cut at which its harmonics lie nearest to those that the fit says, of ``parts`` tried [rad]."""
     k = np.arange(len(turns.amplitude), dtype=np.float64)
     said = (unit_harmonics(cut, fit.cutter, len(k) - 1) @ fit.linear) * dynamometer(fit.resonance, k * cut.speed)

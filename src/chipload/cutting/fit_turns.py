@@ -41,7 +41,7 @@ from chipload.cutting.fit import (
     solved,
     unit_harmonics,
 )
-from chipload.cutting.turns import Cut, Turns, turns_of
+from chipload.cutting.turns import MeasuredCut, Turns, turns_of
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -59,7 +59,7 @@ SIZES = (0.2, 0.45, 0.7)
 class _Problem:
     """Amplitudes, what they weigh, and what is sought. q = theta_0 of each cut, then the runout (u, v) or u or none."""
 
-    cuts: tuple[Cut, ...]
+    cuts: tuple[MeasuredCut, ...]
     turns: tuple[Turns, ...]
     cutter: Cutter
     harmonics: int
@@ -138,7 +138,7 @@ class _Problem:
 
 
 def fit_instantaneous(
-    cuts: Sequence[Cut],
+    cuts: Sequence[MeasuredCut],
     cutter: Cutter,
     *,
     band: float,
@@ -164,15 +164,7 @@ def fit_instantaneous(
     """
     if not cuts:
         raise InputError("fit: no cut to fit: name at least one measurement with use = fit")
-    slowest = max(cut.speed for cut in cuts)
-    harmonics = math.floor(band / slowest * (1.0 + 1e-9))
-    if harmonics < 1:
-        raise InputError(
-            f"band_hz = {band / math.tau:g}: must be at least the spindle's {slowest / math.tau:g} Hz, better twice "
-            "the tooth-passing frequency"
-        )
-    full = [max(harmonics, math.floor(0.8 * math.pi * cut.rate / cut.speed)) for cut in cuts]
-    turns = tuple(turns_of(cut, h) for cut, h in zip(cuts, full, strict=True))
+    harmonics, turns = turns_in_band(cuts, band)
     resonance = np.full((3, 2), np.nan)
     for c, w in enumerate(ringing):
         if w is not None:
@@ -184,6 +176,25 @@ def fit_instantaneous(
             problem = replace(problem, resonance=_rung(problem, q), kept={})
             q, converged = _refined(problem, q)
     return _concluded(problem, q, converged)
+
+
+def turns_in_band(cuts: Sequence[MeasuredCut], band: float) -> tuple[int, tuple[Turns, ...]]:
+    """The harmonics of the fastest spindle in the band [rad/s], and the turns of all cuts with at least as many.
+
+    Raises
+    ------
+    InputError
+        There is none in it, or a cut is sampled too slowly or is too short.
+    """
+    slowest = max(cut.speed for cut in cuts)
+    harmonics = math.floor(band / slowest * (1.0 + 1e-9))
+    if harmonics < 1:
+        raise InputError(
+            f"band_hz = {band / math.tau:g}: must be at least the spindle's {slowest / math.tau:g} Hz, better twice "
+            "the tooth-passing frequency"
+        )
+    full = [max(harmonics, math.floor(0.8 * math.pi * cut.rate / cut.speed)) for cut in cuts]
+    return harmonics, tuple(turns_of(cut, h) for cut, h in zip(cuts, full, strict=True))
 
 
 def _searched(problem: _Problem) -> tuple[Floats, bool]:

@@ -2,7 +2,8 @@
 
 Notation: A the axis from the tip to the holder, T the direction that immersion is counted from less pi/2 (that of the
 feed where the feed is normal to A), n = Rot(+90 deg about A) T; phi immersion, h chip thickness, s length along the
-profile, rho, kappa, u, nu and bites as in :mod:`chipload.engagement.bites`; theta rotation of tooth 0 at the tip,
+profile, rho, kappa, u, nu and bites as in :mod:`chipload.engagement.tooth_engagement`; theta rotation of tooth 0 at
+the tip,
 counted as phi; the edge at s lags as :mod:`chipload.cutter.slices` says. Ft, Fr, Fa and their coefficients as in
 :mod:`chipload.cutting.material`.
 
@@ -36,7 +37,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutting import _kernels
 from chipload.cutting.material import Material
-from chipload.engagement.bites import Bites, bites_of_arcs
+from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -49,15 +50,17 @@ SAMPLE_STEP = math.radians(1.0)
 EXACT_ROWS = 24
 
 
-def _arrays(bites: Bites, cutter: Cutter) -> tuple[Any, ...]:
-    """Bites as the kernels take them, after a check that the cutter has their teeth."""
+def _arrays(bites: ToothEngagement, cutter: Cutter) -> tuple[Any, ...]:
+    """Tooth engagement as the kernels take them, after a check that the cutter has their teeth."""
     top = int(bites.tooth.max(initial=-1))
     if top >= cutter.flutes:
         raise InputError(f"bites: tooth {top}: must be below cutter.flutes = {cutter.flutes}")
     return bites.start, bites.rows, bites.tooth, bites.slice, bites.slices
 
 
-def forces_over_turn(bites: Bites, cutter: Cutter, material: Material, theta: ArrayLike) -> tuple[Floats, Floats]:
+def forces_over_turn(
+    bites: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike
+) -> tuple[Floats, Floats]:
     """Force on the cutter and torque at given rotations.
 
     Parameters
@@ -78,7 +81,7 @@ def forces_over_turn(bites: Bites, cutter: Cutter, material: Material, theta: Ar
 
     >>> mill = Cutter(10.0, 1, 0.0, 20.0, 30.0, 6e5)
     >>> plain = Material("plain", 1000.0, 300.0, 0.0, 10.0, 5.0, 0.0, source="made up for this example")
-    >>> bites = bites_of_arcs([0.0], [math.pi], 0.1, mill, 2.0)
+    >>> bites = engagement_of_arcs([0.0], [math.pi], 0.1, mill, 2.0)
     >>> force, torque = forces_over_turn(bites, mill, plain, [math.pi / 2])
     >>> force[0, 0].round(9).tolist(), torque.round(9).tolist()
     ([-70.0, 220.0, 0.0], [[1100.0]])
@@ -89,7 +92,7 @@ def forces_over_turn(bites: Bites, cutter: Cutter, material: Material, theta: Ar
     return out[..., :3], out[..., 3]
 
 
-def mean_forces(bites: Bites, cutter: Cutter, material: Material) -> tuple[Floats, Floats]:
+def mean_forces(bites: ToothEngagement, cutter: Cutter, material: Material) -> tuple[Floats, Floats]:
     """Force on the cutter and torque averaged over a revolution; the lag of the edge does not enter.
 
     Returns
@@ -105,7 +108,7 @@ def mean_forces(bites: Bites, cutter: Cutter, material: Material) -> tuple[Float
 
 
 def greatest_forces(
-    bites: Bites,
+    bites: ToothEngagement,
     cutter: Cutter,
     material: Material,
     sample_step: float = SAMPLE_STEP,
@@ -140,7 +143,8 @@ def in_work(force: ArrayLike, frame: ArrayLike) -> Floats:
     Parameters
     ----------
     force : (n, 3) or (n, m, 3) float [N]
-    frame : (n, 3, 3) float, rows T, n (mirrored where the spindle is counter-clockwise) and A; ``Bites.frame``
+    frame : (n, 3, 3) float, rows T, n (mirrored where the spindle is counter-clockwise) and A;
+    ``ToothEngagement.frame``
 
     Returns
     -------
@@ -194,7 +198,7 @@ def forces_along(
     -------
     columns, (n,) float each
         ``force_x_n``, ``force_y_n`` on the cutter in the work frame where the in-plane resultant over the revolution is
-        greatest, ``force_xy_n`` that resultant; ``force_mean_x_n``, ``force_mean_y_n``, ``force_mean_z_n`` over the
+        greatest, ``force_xy_n`` that resultant; ``force_x_mean_n``, ``force_y_mean_n``, ``force_z_mean_n`` over the
         revolution; ``force_z_n`` the axial force of greatest size, below 0 where the cutter is pulled out of its
         holder; ``torque_nm`` the greatest, ``torque_mean_nm``; ``power_w`` the mean; ``chip_max_mm`` the thickest
         chip. Where nothing is cut all are 0.
@@ -202,7 +206,8 @@ def forces_along(
     Raises
     ------
     InputError
-        As :func:`chipload.engagement.bites.bites_of_arcs`; T is not (n, 2) of unit vectors; a speed below 0.
+        As :func:`chipload.engagement.tooth_engagement.engagement_of_arcs`; T is not (n, 2) of unit vectors; a speed
+        below 0.
 
     Examples
     --------
@@ -211,13 +216,15 @@ def forces_along(
     >>> mill = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5)
     >>> plain = Material("plain", 1000.0, 0.0, 0.0, 0.0, 0.0, 0.0, source="made up for this example")
     >>> slot = forces_along([0.0], [math.pi], 0.1, [[1.0, 0.0]], mill, plain, 2.0, spindle_speed=100.0)
-    >>> float(slot["force_mean_y_n"][0].round(9))
+    >>> float(slot["force_y_mean_n"][0].round(9))
     100.0
     """
     if spindle not in ("cw", "ccw"):
         raise InputError(f"spindle = {spindle!r}: must be cw or ccw")
     heading = np.asarray(T, dtype=np.float64)
-    bites = bites_of_arcs(phi_in, phi_out, feed_per_tooth, cutter, axial_depth, count=count, clockwise=spindle == "cw")
+    bites = engagement_of_arcs(
+        phi_in, phi_out, feed_per_tooth, cutter, axial_depth, count=count, clockwise=spindle == "cw"
+    )
     n = len(bites)
     if heading.shape != (n, 2) or not np.all(np.abs(np.hypot(heading[:, 0], heading[:, 1]) - 1.0) < 1e-6):
         raise InputError(f"T of shape {heading.shape}: need ({n}, 2) unit vectors, one a step")
@@ -234,9 +241,9 @@ def forces_along(
         "force_x_n": plane[:, 0],
         "force_y_n": plane[:, 1],
         "force_xy_n": np.hypot(peak["force_t"], peak["force_n"]),
-        "force_mean_x_n": mean_plane[:, 0],
-        "force_mean_y_n": mean_plane[:, 1],
-        "force_mean_z_n": mean[:, 2],
+        "force_x_mean_n": mean_plane[:, 0],
+        "force_y_mean_n": mean_plane[:, 1],
+        "force_z_mean_n": mean[:, 2],
         "force_z_n": peak["force_axis"],
         "torque_nm": peak["torque"] / 1000.0,
         "torque_mean_nm": torque_mean / 1000.0,

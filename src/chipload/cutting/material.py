@@ -30,6 +30,8 @@ _NUMBERS = {
     "kre_n_mm": ("Kre", -1e3, 1e3),
     "kae_n_mm": ("Kae", -1e3, 1e3),
 }
+#: keys that a material of which only the tangential force is known leaves out, all of them
+_DIRECTIONS = ("krc_mpa", "kac_mpa", "kre_n_mm", "kae_n_mm")
 _TEXTS = ("name", "source", "conditions", "workpiece", "cutter")
 _EXPONENTS = ("exponent_t", "exponent_r", "exponent_a")
 _RANGES = {"chip": ("chip_min_mm", "chip_max_mm"), "speed": ("speed_min_m_min", "speed_max_m_min")}
@@ -57,6 +59,8 @@ class Material:
     exponents : (m_t, m_r, m_a) of the size effect, from 0 to below 1; 0: none, the linear law
     cutter : what they were measured with: form, diameter, teeth, helix, rake, substrate
     speed : (lowest, highest) cutting speed they hold for [mm/s]; None: the source does not say
+    tangential : only the tangential force is known; the other coefficients are 0 and mean nothing: torque and power can
+        be proved, directions and sizes of forces, deflections and stability cannot
     covariance : (6, 6), of (Ktc, Krc, Kac, Kte, Kre, Kae) in products of MPa and N/mm, from a fit; instead of
         ``spread``; None: not known
 
@@ -82,6 +86,7 @@ class Material:
     cutter: str = ""
     speed: tuple[float, float] | None = None
     covariance: Covariance | None = None
+    tangential: bool = False
 
     def __post_init__(self) -> None:
         for key, (name, low, high) in _NUMBERS.items():
@@ -112,6 +117,8 @@ class Material:
             )
         if self.covariance is not None:
             self._check_covariance()
+        if self.tangential and any((self.Krc, self.Kac, self.Kre, self.Kae)):
+            raise InputError("material: tangential with radial or axial coefficients: leave them at 0")
 
     def _check_covariance(self) -> None:
         """Refuse what is no covariance; keep it as a tuple of rows."""
@@ -145,6 +152,11 @@ class Material:
                 "cannot be said: give spread, or fit them"
             )
         return np.diag((self.spread * np.array(self.coefficients)) ** 2)
+
+    @property
+    def has_band(self) -> bool:
+        """Whether it says how sure its coefficients are."""
+        return self.spread is not None or self.covariance is not None
 
     @property
     def law(self) -> tuple[float, ...]:
@@ -187,13 +199,15 @@ def _from_table(label: str, table: dict[str, Any]) -> Material:
         if key not in _KEYS:
             near = nearest(key, list(_KEYS))
             raise InputError(f"{label}: unknown key {key}: the nearest known one is {near}")
+    tangential = not any(key in table for key in _DIRECTIONS)
     for key in ("name", *_NUMBERS):
-        if key not in table:
+        if key not in table and not (tangential and key in _DIRECTIONS):
             raise InputError(f"{label}: {key} is missing: must be given, coefficients are never invented")
     for key in _TEXTS:
         if not isinstance(table.get(key, ""), str):
             raise InputError(f"{label}: {key} = {table[key]!r}: must be a text")
-    numbers: dict[str, Any] = {name: _number(label, key, table[key]) for key, (name, _, _) in _NUMBERS.items()}
+    numbers: dict[str, Any] = {n: _number(label, key, table.get(key, 0.0)) for key, (n, _, _) in _NUMBERS.items()}
+    numbers["tangential"] = tangential
     ranges: dict[str, Any] = {name: _range(label, table, *keys) for name, keys in _RANGES.items()}
     if (speed := ranges["speed"]) is not None:
         ranges["speed"] = (mm_s_from_mm_min(1000.0 * speed[0]), mm_s_from_mm_min(1000.0 * speed[1]))
@@ -211,9 +225,9 @@ def read_material(path: str | Path) -> Material:
     """Read a material from a TOML file.
 
     Keys: ``name``, ``ktc_mpa``, ``krc_mpa``, ``kac_mpa``, ``kte_n_mm``, ``kre_n_mm``, ``kae_n_mm`` (N per mm of
-    depth), ``source``; optional ``workpiece``, ``conditions``, ``cutter``, ``chip_min_mm`` with ``chip_max_mm``,
-    ``speed_min_m_min`` with ``speed_max_m_min``, ``exponent_t``, ``exponent_r``, ``exponent_a``, and ``spread`` or
-    ``covariance`` (6 rows of 6).
+    depth), ``source``; without all four radial and axial ones only the tangential force is known; optional
+    ``workpiece``, ``conditions``, ``cutter``, ``chip_min_mm`` with ``chip_max_mm``, ``speed_min_m_min`` with
+    ``speed_max_m_min``, ``exponent_t``, ``exponent_r``, ``exponent_a``, and ``spread`` or ``covariance`` (6 rows of 6).
 
     Raises
     ------
@@ -223,13 +237,14 @@ def read_material(path: str | Path) -> Material:
     return _from_table(*read_table("material", path))
 
 
-def beyond(material: Material, chip_mm: float, speed_mm_s: float) -> tuple[str, ...]:
+def beyond(material: Material, chip_max_mm: float, speed_mm_s: float) -> tuple[str, ...]:
     """What a cut asks of the coefficients outside the range they were measured in, as texts; none: nothing, or unknown.
 
     Parameters
     ----------
     material : with its ranges
-    chip_mm : thickest chip [mm]; one below the range is no news, every chip ends thin
+    chip_max_mm : thickest chip [mm] of a step: every chip ends thin, but where the thickest is below the range all of
+        it is
     speed_mm_s : cutting speed at the rim [mm/s]
 
     Examples
@@ -239,20 +254,35 @@ def beyond(material: Material, chip_mm: float, speed_mm_s: float) -> tuple[str, 
     ('material steel: a chip of 0.15 mm: its coefficients were measured from 0.01 to 0.1 mm',)
     """
     out = []
-    if material.chip is not None and chip_mm > material.chip[1]:
+    if material.chip is not None and not material.chip[0] <= chip_max_mm <= material.chip[1]:
         low, high = material.chip
-        out.append(f"a chip of {chip_mm:g} mm: its coefficients were measured from {low:g} to {high:g} mm")
+        out.append(f"a chip of {chip_max_mm:g} mm: its coefficients were measured from {low:g} to {high:g} mm")
     if material.speed is not None and not material.speed[0] <= speed_mm_s <= material.speed[1]:
         low, high, speed = (mm_min_from_mm_s(v) / 1000.0 for v in (*material.speed, speed_mm_s))
         out.append(f"a speed of {speed:g} m/min: its coefficients were measured from {low:g} to {high:g} m/min")
     return tuple(f"material {material.name}: {text}" for text in out)
 
 
+def need_directions(material: Material, what: str) -> None:
+    """Refuse a material of which only the tangential force is known where ``what`` needs its direction too.
+
+    Raises
+    ------
+    InputError
+        It is one.
+    """
+    if material.tangential:
+        raise InputError(
+            f"material {material.name}: only its tangential force is known, {what} needs the radial and axial "
+            "coefficients too: give a material with all six, or fit them (chipload fit)"
+        )
+
+
 def material_names() -> tuple[str, ...]:
     """Names of the materials that come with chipload, sorted.
 
-    >>> material_names()
-    ('al6082-t6', 'al7075-carbide', 'al7075-hss', 'al7075-t6')
+    >>> material_names()[:5]
+    ('al6082-t6', 'al7075-carbide', 'al7075-hss', 'al7075-t6', 'group-13-stainless')
     """
     return shipped_names("material")
 

@@ -11,15 +11,18 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from array import array
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, InputError
+from chipload.files import open_regular
 
 Floats = NDArray[np.float64]
 
@@ -28,6 +31,9 @@ FORCE_UNITS = {"n": 1.0, "kn": 1000.0, "mn": 0.001, "lbf": 4.4482216152605}
 TIME_UNITS = {"s": 1.0, "ms": 0.001, "us": 1e-6}
 #: most samples that are kept, lines of a header, characters of a line
 SAMPLES, HEADER, LINE = 5_000_000, 200, 10_000
+#: of a force file, and of what is read of it at once [bytes]
+LARGEST_FILE, BLOCK = 1 << 34, 1 << 20
+_ENDS = re.compile(rb"\r\n|\r|\n")
 #: part of a sampling interval that a time stamp may be off
 JITTER = 0.2
 #: equal extreme samples in a row that are called clipped
@@ -140,27 +146,41 @@ def read_forces(path: str | Path, window: tuple[float, float] | None = None) -> 
 
 def _lines(path: Path, label: str) -> Iterator[tuple[int, str]]:
     """Numbered lines without their ends; latin-1 where the text is not UTF-8."""
-    try:
-        with path.open("rb") as file:
-            number = 0
-            while raw := file.readline(LINE + 1):
-                number += 1
-                if len(raw) > LINE:
-                    raise InputError(f"{label}: line {number}: longer than {LINE} characters: this is no force file")
-                try:
-                    text = raw.decode("utf-8-sig" if number == 1 else "utf-8")
-                except UnicodeDecodeError:
-                    text = raw.decode("latin-1")
-                if "\x00" in text:
-                    raise InputError(f"{label}: line {number}: is not text: export the forces as CSV")
-                yield number, text.rstrip("\r\n")
-    except OSError as err:
-        raise InputError(f"{label}: cannot be read: {err.strerror}") from None
+    with open_regular(path, label, LARGEST_FILE, "cut it into parts") as file:
+        for number, raw in enumerate(_raw_lines(file), 1):
+            if len(raw) > LINE:
+                raise InputError(f"{label}: line {number}: longer than {LINE} characters: this is no force file")
+            try:
+                text = raw.decode("utf-8-sig" if number == 1 else "utf-8")
+            except UnicodeDecodeError:
+                text = raw.decode("latin-1")
+            if "\x00" in text:
+                raise InputError(f"{label}: line {number}: is not text: export the forces as CSV")
+            yield number, text
+
+
+def _raw_lines(file: IO[bytes]) -> Iterator[bytes]:
+    """Lines without their ends, LF, CR LF or CR; of one that is too long the first ``LINE + 1`` bytes."""
+    rest = b""
+    while block := file.read(BLOCK):
+        rest += block
+        # a CR at the end may belong to an LF that comes
+        whole = rest.removesuffix(b"\r")
+        parts = _ENDS.split(whole)
+        rest = parts.pop() + rest[len(whole) :]
+        yield from parts
+        if len(rest) > LINE:
+            yield rest[: LINE + 1]
+            return
+    yield from _ENDS.split(rest) if rest else ()
 
 
 def _split(text: str) -> list[str]:
     mark = next((m for m in (",", ";", "\t") if m in text), ",")
-    return [x.strip() for x in next(csv.reader([text], delimiter=mark), [])]
+    try:
+        return [x.strip() for x in next(csv.reader([text], delimiter=mark), [])]
+    except csv.Error as err:
+        raise InputError(f"forces: {text[:40]!r}: not a line of a CSV file: {err}") from None
 
 
 def _rows(first: tuple[int, list[str]] | None, lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, list[str]]]:

@@ -22,7 +22,7 @@ Complexes = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class Cut:
+class MeasuredCut:
     """A steady cut that was measured.
 
     Parameters
@@ -78,7 +78,7 @@ class Cut:
     def feed_per_tooth(self, flutes: int) -> float:
         """f_z [mm] = feed / (Omega / (2 pi) N).
 
-        >>> cut = Cut("c", 100.0, np.zeros((200, 3)), 10.0, math.tau * 5.0, (0.0, math.pi), 1.0)
+        >>> cut = MeasuredCut("c", 100.0, np.zeros((200, 3)), 10.0, math.tau * 5.0, (0.0, math.pi), 1.0)
         >>> cut.feed_per_tooth(2)
         1.0
         """
@@ -103,7 +103,7 @@ class Turns:
     scatter: Floats
 
 
-def turns_of(cut: Cut, harmonics: int, search: float = 0.01, seek: int = 8) -> Turns:
+def turns_of(cut: MeasuredCut, harmonics: int, search: float = 0.01, seek: int = 8) -> Turns:
     """Spindle speed, harmonics and extremes of the whole turns of a cut.
 
     Parameters

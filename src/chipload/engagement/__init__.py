@@ -1,1 +1,37 @@
 """What the cutter touches: contact arcs of the rim."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from chipload.lazy import attach
+
+if TYPE_CHECKING:
+    from chipload.engagement.chips.covered import covered
+    from chipload.engagement.chips.move import Move
+    from chipload.engagement.contact import Engagement, StockBoundary
+    from chipload.engagement.immersion.immersion import Section, immersed
+    from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs, with_runout
+
+__all__ = [
+    "Engagement",
+    "Move",
+    "Section",
+    "StockBoundary",
+    "ToothEngagement",
+    "covered",
+    "engagement_of_arcs",
+    "immersed",
+    "with_runout",
+]
+
+__getattr__, __dir__ = attach(
+    __name__,
+    {
+        "tooth_engagement": "ToothEngagement engagement_of_arcs with_runout",
+        "contact": "Engagement StockBoundary",
+        "chips.move": "Move",
+        "chips.covered": "covered",
+        "immersion.immersion": "Section immersed",
+    },
+)

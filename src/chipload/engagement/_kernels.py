@@ -1,8 +1,8 @@
 """Compiled loops of the engagement of a cutter circle with line-and-arc stock, and of runout; arrays and scalars only.
 
 Notation: segments as in :mod:`chipload.geometry.contour`, with the MATERIAL ON THE LEFT of every segment. The rim is
-the circle about (ox, oy) of radius r; rim angles are counter-clockwise from +x [rad]. Bites
-as in :mod:`chipload.engagement.bites`.
+the circle about (ox, oy) of radius r; rim angles are counter-clockwise from +x [rad]. ToothEngagement
+as in :mod:`chipload.engagement.tooth_engagement`.
 """
 
 from __future__ import annotations
@@ -269,8 +269,9 @@ def engage(centres, headings, r, seg, box, first, last, angle, count, phi):
 
 
 @njit(cache=True, nogil=True)
-def runout_bites(whole, every, sine, radii, sizes, rows, tooth, fill):
-    """Bites of each tooth for teeth of unlike radii. With g the thickness of a bite of every tooth: the lower envelope
+def runout_engagement(whole, every, sine, radii, sizes, rows, tooth, fill):
+    """Tooth engagement of each tooth for teeth of unlike radii. With g the thickness of a bite of every tooth: the
+    lower envelope
     of N lines in g, where positive, and then the immersions at which g lies between its corners.
 
     ``whole`` (b, 7) and ``every`` (b,) the bites and their teeth, ``sine`` (b,) sin(kappa), ``radii`` (N,) [mm]. First

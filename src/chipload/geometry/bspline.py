@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Patch:
+class BSplinePatch:
     """A B-spline surface over the unit square.
 
     Parameters
@@ -109,27 +109,27 @@ class Patch:
         mean, spread = 0.5 * (k11 + k22), np.hypot(0.5 * (k11 - k22), k12)
         return np.stack([mean - spread, mean + spread], axis=-1)
 
-    def turned(self, angle: float) -> Patch:
+    def turned(self, angle: float) -> BSplinePatch:
         """The patch turned about z by an angle [rad]."""
         c, s = np.cos(angle), np.sin(angle)
         return replace(self, control=self.control @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
 
-    def rotated(self, R: Floats) -> Patch:
+    def rotated(self, R: Floats) -> BSplinePatch:
         """The patch turned by a rotation (3, 3)."""
         return replace(self, control=self.control @ R.T)
 
-    def swapped(self) -> Patch:
+    def swapped(self) -> BSplinePatch:
         """The same surface with u and v changed, its normal kept."""
-        return Patch(self.knots_v, self.knots_u, np.swapaxes(self.control, 0, 1), -self.side)
+        return BSplinePatch(self.knots_v, self.knots_u, np.swapaxes(self.control, 0, 1), -self.side)
 
-    def reversed(self, u: bool, v: bool) -> Patch:
+    def reversed(self, u: bool, v: bool) -> BSplinePatch:
         """The same surface with u, v or both counted from their other ends, its normal kept.
 
         >>> flat = through([[[0, 0, 0], [0, 2, 0]], [[3, 0, 0], [3, 2, 0]]], [0, 1], [0, 1])
         >>> flat.reversed(True, False).at(0.0, 1.0).tolist()
         [[3.0, 2.0, 0.0]]
         """
-        return Patch(
+        return BSplinePatch(
             1.0 - self.knots_u[::-1] if u else self.knots_u,
             1.0 - self.knots_v[::-1] if v else self.knots_v,
             self.control[:: -1 if u else 1, :: -1 if v else 1],
@@ -164,7 +164,9 @@ def basis(knots: Floats, degree: int, x: Floats, derivative: int = 0) -> tuple[N
     return span - degree, values if derivative <= degree else np.zeros_like(values)
 
 
-def through(points: ArrayLike, u: ArrayLike, v: ArrayLike, degrees: tuple[int, int] = (3, 3), side: int = 1) -> Patch:
+def through(
+    points: ArrayLike, u: ArrayLike, v: ArrayLike, degrees: tuple[int, int] = (3, 3), side: int = 1
+) -> BSplinePatch:
     """The patch through a grid of points (n, m, 3) [mm] at the parameters u (n,), v (m,), each from 0 to 1.
 
     A degree is lowered to the number of points less one.
@@ -184,4 +186,4 @@ def through(points: ArrayLike, u: ArrayLike, v: ArrayLike, degrees: tuple[int, i
     first = make_interp_spline(a, grid, k=p, axis=0)
     second = make_interp_spline(b, first.c, k=q, axis=1)
     # of the coefficients the axis of v comes first
-    return Patch(first.t, second.t, np.swapaxes(second.c, 0, 1), side)
+    return BSplinePatch(first.t, second.t, np.swapaxes(second.c, 0, 1), side)

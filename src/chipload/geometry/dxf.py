@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from chipload.errors import Finding, InputError
+from chipload.files import is_file, open_regular
 from chipload.geometry.biarc import arcs_along
 from chipload.geometry.chains import Drawing, chained
 from chipload.geometry.contour import JOIN_MM, Contour, Floats
@@ -25,6 +26,8 @@ from chipload.units import MM_PER
 
 #: $INSUNITS of the header
 INSUNITS = {1: "inch", 2: "foot", 4: "mm", 5: "cm", 6: "m", 13: "um"}
+#: [bytes]
+LARGEST_FILE = 500_000_000
 #: entities that are drawn lines, all others are dropped and reported
 DRAWN = ("LINE", "ARC", "CIRCLE", "LWPOLYLINE", "POLYLINE", "SPLINE", "ELLIPSE")
 #: an entity is flat if its z stays within this [units of the drawing]
@@ -40,7 +43,7 @@ def read_dxf(
     path: str | Path,
     *,
     units: str | None = None,
-    units_if_unsaid: str | None = None,
+    units_if_unstated: str | None = None,
     layers: Sequence[str] | None = None,
     join_mm: float = 0.01,
     tolerance_mm: float = 0.001,
@@ -52,7 +55,7 @@ def read_dxf(
     ----------
     path : the file, text or binary DXF
     units : unit of the numbers (``mm``, ``inch`` ...), whatever the header says; a disagreement is a finding
-    units_if_unsaid : unit where the header names none
+    units_if_unstated : unit where the header names none
     layers : names of the layers to read, case ignored; all by default
     join_mm : widest gap [mm] that is closed
     tolerance_mm : how far [mm] arcs may leave a spline or an ellipse
@@ -71,20 +74,20 @@ def read_dxf(
     file = Path(path)
     if not (np.isfinite(tolerance_mm) and tolerance_mm > 0.0):
         raise InputError(f"part.tolerance_mm = {tolerance_mm:g}: must be a finite number above 0")
-    for key, value in (("part.units", units), ("part.units_if_unsaid", units_if_unsaid)):
+    for key, value in (("part.units", units), ("part.units_if_unstated", units_if_unstated)):
         if value is not None and value not in MM_PER:
             raise InputError(f"{key} = {value!r}: must be one of {', '.join(MM_PER)}")
     _scan(file, max_entities)
     findings: list[Finding] = []
     doc = _load(file, findings)
-    unit = _unit(doc, file, units, units_if_unsaid, findings)
+    unit = _unit(doc, file, units, units_if_unstated, findings)
 
     skipped: Counter[str] = Counter()
     parts: dict[str, list[Floats]] = {}
-    known = {layer.dxf.name for layer in doc.layers}
+    known = {str(layer.dxf.get("name", "0")) for layer in _sound(doc.layers, findings)}
     wanted = None if layers is None else {name.casefold() for name in layers}
     drawn = _Reader(file, MM_PER[unit], tolerance_mm)
-    for count, (entity, layer) in enumerate(_entities(doc.modelspace(), None)):
+    for count, (entity, layer) in enumerate(_entities(_modelspace(doc, file), None, findings)):
         if count >= max_entities:
             raise InputError(_too_many(file, f"more than {max_entities}", max_entities))
         known.add(layer)
@@ -113,7 +116,8 @@ def read_dxf(
         findings += seen
     if not contours:
         on = "" if layers is None else f" on {', '.join(layers)}"
-        sheets = [layout.name for layout in doc.layouts if layout.name != "Model" and len(layout) > 1]
+        layouts = _sound(doc.layouts, findings)
+        sheets = [layout.name for layout in layouts if layout.name != "Model" and len(layout) > 1]
         also = f"; the sheets {', '.join(sheets)} are not read, only the model space" if sheets else ""
         raise InputError(f"part.file = {file.name}: no lines or arcs{on}; layers there are: {names}{also}")
     return Drawing(tuple(contours), tuple(owner), unit, tuple(findings))
@@ -125,29 +129,26 @@ def _too_many(file: Path, count: str, most: int, what: str = "entities") -> str:
 
 def _scan(file: Path, max_entities: int) -> None:
     """Refuse by the bytes alone what is missing, is no DXF or is too large."""
-    if not file.is_file():
+    if not is_file(file):
         raise InputError(f"part.file = {file}: no such file")
     entities = points = 0
     started = False
     tail = b""
-    try:
-        with file.open("rb") as stream:
-            while block := stream.read(1 << 22):
-                data = tail + block
-                if not started:
-                    if data[:18] == b"AutoCAD Binary DXF":
-                        return
-                    if b"SECTION" not in data or b"\0" in data[:4096]:
-                        raise InputError(f"part.file = {file.name}: not a DXF drawing")
-                    started = True
-                # what lies across two blocks is counted with the later one
-                cut = data.rfind(b"\n", 0, max(len(data) - 64, 0)) if len(block) == 1 << 22 else len(data)
-                cut = len(data) if cut < 0 else cut
-                entities += sum(1 for m in _ENTITY.finditer(data) if m.start() < cut)
-                points += sum(1 for m in _POINT.finditer(data) if m.start() < cut)
-                tail = data[cut:]
-    except OSError as err:
-        raise InputError(f"part.file = {file}: cannot be read: {err.strerror}") from err
+    with open_regular(file, f"part.file = {file.name}", LARGEST_FILE, "keep only the part there") as stream:
+        while block := stream.read(1 << 22):
+            data = tail + block
+            if not started:
+                if data[:18] == b"AutoCAD Binary DXF":
+                    return
+                if b"SECTION" not in data or b"\0" in data[:4096]:
+                    raise InputError(f"part.file = {file.name}: not a DXF drawing")
+                started = True
+            # what lies across two blocks is counted with the later one
+            cut = data.rfind(b"\n", 0, max(len(data) - 64, 0)) if len(block) == 1 << 22 else len(data)
+            cut = len(data) if cut < 0 else cut
+            entities += sum(1 for m in _ENTITY.finditer(data) if m.start() < cut)
+            points += sum(1 for m in _POINT.finditer(data) if m.start() < cut)
+            tail = data[cut:]
     if not started:
         raise InputError(f"part.file = {file.name}: the file is empty")
     if entities > max_entities:
@@ -176,13 +177,23 @@ def _load(file: Path, findings: list[Finding]) -> Any:
     return doc
 
 
+def _modelspace(doc: Any, file: Path) -> Any:
+    try:
+        return doc.modelspace()
+    except Exception as err:  # of the parser's own classes too
+        raise InputError(f"part.file = {file.name}: damaged: no model space: {_line(err)}") from None
+
+
 def _line(err: Exception) -> str:
     text = " ".join(str(err).split()) or type(err).__name__
     return text[:120].rstrip(".")
 
 
 def _unit(doc: Any, file: Path, units: str | None, if_unsaid: str | None, findings: list[Finding]) -> str:
-    code = int(doc.header.get("$INSUNITS", 0) or 0)
+    try:
+        code = int(doc.header.get("$INSUNITS", 0) or 0)
+    except Exception:  # of the parser's own classes too
+        code = 0
     said = INSUNITS.get(code)
     if units is not None:
         if said is not None and said != units:
@@ -193,25 +204,47 @@ def _unit(doc: Any, file: Path, units: str | None, if_unsaid: str | None, findin
     if code != 0:
         raise InputError(f"part.file = {file.name}: $INSUNITS = {code} is not read: state part.units")
     if if_unsaid is None:
-        raise InputError(f"part.file = {file.name}: the header names no unit: state part.units_if_unsaid or part.units")
+        raise InputError(
+            f"part.file = {file.name}: the header names no unit: state part.units_if_unstated or part.units"
+        )
     findings.append(Finding("dxf-units", 0, f"the header names no unit: read as {if_unsaid}"))
     return if_unsaid
 
 
-def _entities(space: Any, inside: str | None, depth: int = 0) -> Iterator[tuple[Any, str]]:
+def _entities(space: Any, inside: str | None, findings: list[Finding], depth: int = 0) -> Iterator[tuple[Any, str]]:
     """Entities with their layer, None for a reference to a block, so that references are counted too.
 
     What a block has on layer 0 lies on the layer of its reference.
     """
-    for entity in space:
-        layer = str(entity.dxf.get("layer", "0"))
-        layer = inside if inside is not None and layer == "0" else layer
-        if entity.dxftype() == "INSERT" and depth < 16:
-            for reference in entity.multi_insert() if entity.mcount > 1 else (entity,):
+    for entity in _sound(space, findings):
+        try:
+            layer = str(entity.dxf.get("layer", "0"))
+            layer = inside if inside is not None and layer == "0" else layer
+            several = entity.dxftype() == "INSERT" and depth < 16
+            repeated = entity.multi_insert() if several and entity.mcount > 1 else (entity,)
+        except Exception as err:
+            findings.append(Finding("dxf-skipped", 0, f"an entity is damaged, dropped: {_line(err)}"))
+            continue
+        if several:
+            for reference in _sound(repeated, findings):
                 yield None, layer
-                yield from _entities(reference.virtual_entities(), layer, depth + 1)
+                yield from _entities(reference.virtual_entities(), layer, findings, depth + 1)
         else:
             yield entity, layer
+
+
+def _sound(entities: Any, findings: list[Finding]) -> Iterator[Any]:
+    """Entities until the parser fails on one: what comes after it in a block is lost, and said."""
+    left = iter(entities)
+    while True:
+        try:
+            entity = next(left)
+        except StopIteration:
+            return
+        except Exception as err:
+            findings.append(Finding("dxf-skipped", 0, f"a block is damaged, its rest is dropped: {_line(err)}"))
+            return
+        yield entity
 
 
 class _Reader:
@@ -230,7 +263,7 @@ class _Reader:
             made = getattr(self, "_" + kind.lower())(entity, what)
         except InputError:
             raise
-        except (ArithmeticError, ValueError, IndexError, TypeError, AttributeError) as err:
+        except Exception as err:  # of the parser's own classes too, and what damaged values make of them
             findings.append(Finding("dxf-skipped", 0, f"{kind} on layer {layer!r} is damaged, dropped: {_line(err)}"))
             return np.zeros((0, 7))
         if made is None:

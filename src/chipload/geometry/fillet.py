@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.geometry.bspline import Patch, through
+from chipload.geometry.bspline import BSplinePatch, through
 from chipload.geometry.revolve import Revolved
 
 Floats = NDArray[np.float64]
@@ -48,13 +48,13 @@ class Filleted:
     off : how far the patches leave the exact surfaces [mm], as far as was looked
     """
 
-    side: Patch
-    fillet: Patch
+    side: BSplinePatch
+    fillet: BSplinePatch
     height: float
     off: float
 
 
-def filleted(side: Patch, hub: Revolved, radius: float) -> Filleted:
+def filleted(side: BSplinePatch, hub: Revolved, radius: float) -> Filleted:
     """A side with a fillet of a radius [mm] at the hub.
 
     Raises
@@ -73,7 +73,7 @@ def filleted(side: Patch, hub: Revolved, radius: float) -> Filleted:
     raise InputError(f"the fillet of {radius:g} mm is left by its patches by {off:.4g} mm: must be at most {FIT:g} mm")
 
 
-def _made(side: Patch, hub: Revolved, radius: float, u: Floats) -> tuple[Filleted, Floats]:
+def _made(side: BSplinePatch, hub: Revolved, radius: float, u: Floats) -> tuple[Filleted, Floats]:
     """Through what is exact at the places u (n,), and how far that is left between them (n - 1,) [mm]."""
     middle = 0.5 * (u[1:] + u[:-1])
     v, between = (_touched(side, hub, radius, x) for x in (u, middle))
@@ -95,12 +95,12 @@ def _made(side: Patch, hub: Revolved, radius: float, u: Floats) -> tuple[Fillete
     return Filleted(above, made, height, float(away.max())), away
 
 
-def _grid(patch: Patch, u: Floats, v: Floats) -> Floats:
+def _grid(patch: BSplinePatch, u: Floats, v: Floats) -> Floats:
     """(n, m, 3) points at u (n,) and v (m,)."""
     return _between(patch, u, np.repeat(v[:, None], len(u), axis=1))
 
 
-def _between(patch: Patch, u: Floats, v: Floats) -> Floats:
+def _between(patch: BSplinePatch, u: Floats, v: Floats) -> Floats:
     """(n, m, 3) points at u (n,), each with its own v (m, n)."""
     return patch.at(np.repeat(u, len(v)), v.T.ravel()).reshape(len(u), len(v), 3)
 
@@ -122,12 +122,12 @@ def from_hub(hub: Revolved, points: Floats) -> tuple[Floats, Floats]:
     return ((p - hub.curve(s)) * n).sum(axis=1), normal
 
 
-def _centre(side: Patch, radius: float, u: Floats, v: Floats) -> Floats:
+def _centre(side: BSplinePatch, radius: float, u: Floats, v: Floats) -> Floats:
     out: Floats = side.at(u, v) + radius * side.normal(u, v)
     return out
 
 
-def _touched(side: Patch, hub: Revolved, radius: float, u: Floats | list[float]) -> Floats:
+def _touched(side: BSplinePatch, hub: Revolved, radius: float, u: Floats | list[float]) -> Floats:
     """v* (n,): the lowest place of a side at which the ball touches the hub too."""
     at = np.asarray(u, dtype=np.float64)
 
@@ -164,7 +164,7 @@ def _touched(side: Patch, hub: Revolved, radius: float, u: Floats | list[float])
     return out
 
 
-def _arcs(side: Patch, hub: Revolved, radius: float, u: Floats, v: Floats, w: Floats) -> Floats:
+def _arcs(side: BSplinePatch, hub: Revolved, radius: float, u: Floats, v: Floats, w: Floats) -> Floats:
     """(n, m, 3) points of the fillet at u (n,), its v* (n,), w (m,)."""
     C, N = _centre(side, radius, u, v), side.normal(u, v)
     _, M = from_hub(hub, C)
@@ -174,7 +174,7 @@ def _arcs(side: Patch, hub: Revolved, radius: float, u: Floats, v: Floats, w: Fl
     return out
 
 
-def _above(side: Patch, u: Floats, v: Floats) -> Patch:
+def _above(side: BSplinePatch, u: Floats, v: Floats) -> BSplinePatch:
     """The side above v* at u, through as many points up it as keep within a tenth of what it may leave it."""
     made = side
     for count in _UP:

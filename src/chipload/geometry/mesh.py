@@ -19,8 +19,13 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from chipload.errors import InputError
+from chipload.files import is_file
 from chipload.geometry.step import step_triangles
+from chipload.geometry.stl import read_stl
 from chipload.units import MM_PER
+
+#: coordinates are at most this [mm]
+FARTHEST = 1e6
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -45,7 +50,7 @@ def read_mesh(
         The file is missing, of another kind or damaged, the unit or the chord is not stated, or the mesh is not closed.
     """
     file = Path(path)
-    if not file.is_file():
+    if not is_file(file):
         raise InputError(f"{key} = {file}: no such file")
     kind = file.suffix.lower()
     if kind in (".stp", ".step"):
@@ -55,16 +60,16 @@ def read_mesh(
     elif kind == ".stl":
         if unit not in MM_PER:
             raise InputError(f"{key} = {file.name}: STL has no unit: state unit as one of {', '.join(MM_PER)}")
-        try:
-            with file.open("rb") as stream:
-                read = trimesh.load_mesh(stream, file_type="stl", process=False)
-        except (ValueError, IndexError, KeyError, TypeError, UnicodeError):
-            raise InputError(f"{key} = {file.name}: not an STL file, or damaged") from None
-        vertices, faces = np.asarray(read.vertices, dtype=np.float64) * MM_PER[unit], np.asarray(read.faces)
+        corners = read_stl(file, key) * MM_PER[unit]
+        vertices, faces = corners.reshape(-1, 3), np.arange(3 * len(corners), dtype=np.int64).reshape(-1, 3)
     else:
         raise InputError(f"{key} = {file.name}: must be .stl, .stp or .step")
-    if len(faces) == 0 or not np.isfinite(vertices).all():
-        raise InputError(f"{key} = {file.name}: no triangles in it, damaged, or a number is not finite")
+    far = float(np.abs(vertices).max(initial=0.0))
+    if not far <= FARTHEST:
+        raise InputError(
+            f"{key} = {file.name}: a vertex is {far:.4g} mm from the origin: must be at most {FARTHEST:g} mm: check "
+            "the unit, or export it again"
+        )
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     mesh.update_faces(mesh.nondegenerate_faces())
@@ -99,7 +104,7 @@ def require_closed(mesh: trimesh.Trimesh, name: str) -> None:
 def sections(mesh: trimesh.Trimesh, heights: Sequence[float] | Floats) -> list[MultiPolygon]:
     """Sections of a closed mesh by the planes z = ``heights`` [mm]; where faces lie in the plane, that just below it.
 
-    Overlapping bodies are joined; a ring that crosses itself is mended by counting its crossings even and odd.
+    Overlapping bodies are joined; a ring that crosses itself is refined by counting its crossings even and odd.
 
     Examples
     --------

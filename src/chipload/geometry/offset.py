@@ -426,7 +426,7 @@ def _chained(raw: _Raw, pieces: _Pieces, d: float, tol: float) -> tuple[Contour,
         arc = seg[:, 6:7] != 0.0
         along = np.where(arc, np.sign(seg[:, 6:7]) * _left(v), seg[:, 2:4] - seg[:, 0:2])
         heading.append(np.arctan2(along[:, 1], along[:, 0]))
-        bend.append(np.where(arc[:, 0], np.sign(seg[:, 6]) / np.hypot(*v.T), 0.0))
+        bend.append(np.sign(seg[:, 6]) / np.where(arc[:, 0], np.hypot(*v.T), 1.0))
     leaving: dict[int, list[int]] = defaultdict(list)
     arriving = np.bincount(pieces.node[:, 1], minlength=len(pieces.place)) if len(seg) else np.zeros(0)
     for k, node in enumerate(pieces.node[:, 0]):

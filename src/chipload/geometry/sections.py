@@ -11,6 +11,7 @@ two is along the axis. Files say no unit: it is asked for.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,7 +23,8 @@ from scipy.interpolate import BSpline, make_interp_spline
 from scipy.optimize import minimize_scalar
 
 from chipload.errors import InputError
-from chipload.geometry.bspline import Patch, through
+from chipload.files import read_regular
+from chipload.geometry.bspline import BSplinePatch, through
 from chipload.units import MM_PER
 
 Floats = NDArray[np.float64]
@@ -30,6 +32,8 @@ Floats = NDArray[np.float64]
 _Half = tuple[BSpline, float, float]
 
 _LARGEST_FILE = 20_000_000
+#: coordinates are at most this [mm]
+FARTHEST = 1e6
 _LEAST_POINTS = 12
 _EDGE = 0.03  # of its length: a profile that begins so near an end begins at that edge
 _OUTER = 0.02  # the outer diameter may differ from the stated one by this share
@@ -39,8 +43,8 @@ _OUTER = 0.02  # the outer diameter may differ from the stated one by this share
 class Blade:
     """The two sides of a blade, normals out of the metal."""
 
-    plus: Patch
-    minus: Patch
+    plus: BSplinePatch
+    minus: BSplinePatch
 
     def turned(self, angle: float) -> Blade:
         """The blade turned about z by an angle [rad]."""
@@ -77,7 +81,9 @@ def read_meridian(path: str | Path, unit: str, over: bool = False) -> Floats:
     """(n, 2) float [mm] r and z of a hub or shroud: two columns `x r`, or TurboGrid's x y z with z along the axis."""
     scale = _scale(unit)
     rows = [row for block in _blocks(Path(path)) for row in block[1]]
-    p = np.array(rows) * scale
+    if len({len(row) for row in rows}) > 1:
+        raise InputError(f"{path}: blocks of 2 and of 3 columns: must be as many in every block")
+    p = _finite(np.array(rows) * scale, Path(path))
     if p.shape[1] == 3:
         p = np.stack([p[:, 2], np.hypot(p[:, 0], p[:, 1])], axis=-1)
     return np.stack([p[:, 1], -p[:, 0] if over else p[:, 0]], axis=-1)
@@ -105,7 +111,7 @@ def checked(sections: tuple[Floats, ...], outer_diameter: float | None = None) -
             raise InputError(f"section {k}: a number is not finite")
         if _crossing(p):
             raise InputError(f"section {k}: crosses itself: its points must go once round the profile")
-    centre = np.array([p.mean(axis=0) for p in sections])
+    centre = np.array([_centre(p) for p in sections])
     step = np.diff(centre, axis=0)
     back = (step[1:] * step[:-1]).sum(axis=1) <= 0.0
     if back.any():
@@ -151,11 +157,11 @@ def loft(sections: tuple[Floats, ...], count: int = 61) -> Blade:
     return Blade(_side(plus, u, v, 1.0), _side(minus, u, v, -1.0))
 
 
-def _side(grid: Floats, u: Floats, v: Floats, sign: float) -> Patch:
+def _side(grid: Floats, u: Floats, v: Floats, sign: float) -> BSplinePatch:
     return facing(through(np.swapaxes(grid, 0, 1), u, v), sign)
 
 
-def facing(patch: Patch, sign: float) -> Patch:
+def facing(patch: BSplinePatch, sign: float) -> BSplinePatch:
     """The patch with its normal towards a growing theta (sign 1) or a falling one (-1)."""
     at = patch.at(0.5, 0.5)[0]
     towards = sign * np.array([-at[1], at[0], 0.0])
@@ -176,6 +182,9 @@ def _halves(p: Floats) -> tuple[_Half, _Half]:
         j = i
     ring = np.concatenate([ring, ring[:1]])
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
+    if not (np.diff(s) > 0.0).all():
+        row = int((np.diff(s) <= 0.0).argmax()) + 1
+        raise InputError(f"sections: point {row} of a section comes twice, one after the other: leave one out")
     curve = make_interp_spline(s, ring, k=3)
     last = len(s) - 2
     found = minimize_scalar(
@@ -205,6 +214,14 @@ def _crossing(p: Floats) -> bool:
     return not any(shapely.LinearRing(view).is_simple for view in views)
 
 
+def _centre(p: Floats) -> Floats:
+    """Centre [mm] of the closed line round a section, whatever the distances of its points."""
+    ring = np.concatenate([p, p[:1]])
+    length = np.linalg.norm(np.diff(ring, axis=0), axis=1)
+    out: Floats = (length[:, None] * 0.5 * (ring[1:] + ring[:-1])).sum(axis=0) / length.sum()
+    return out
+
+
 def _scale(unit: str) -> float:
     if unit not in MM_PER:
         raise InputError(f"unit = {unit!r}: must be one of {', '.join(MM_PER)}")
@@ -224,26 +241,30 @@ def _sections_of(path: Path, scale: float, columns: str | None) -> list[Floats]:
         if columns is not None and found != columns:
             raise InputError(f"{path}: columns {found}: must be {columns} as stated")
         if found == "X Y Z":
-            out.append(p * scale)
+            out.append(_finite(p * scale, path))
             continue
         if found == "X R*THETA R":
+            if (p[:, 2] <= 0.0).any():
+                raise InputError(f"{path}: row {int((p[:, 2] <= 0.0).argmax()) + 1}: R must be above 0")
             x, r, theta = p[:, 0], p[:, 2], p[:, 1] / p[:, 2]
         elif found == "X R THETA_DEG":
             x, r, theta = p[:, 0], p[:, 1], np.radians(p[:, 2])
         else:
             raise InputError(f"{path}: columns {found}: must be X R*THETA R, X R THETA_DEG or X Y Z")
-        out.append(scale * np.stack([r * np.cos(theta), r * np.sin(theta), x], axis=-1))
+        out.append(_finite(scale * np.stack([r * np.cos(theta), r * np.sin(theta), x], axis=-1), path))
     return out
+
+
+def _finite(p: Floats, path: Path) -> Floats:
+    far = float(np.abs(p).max())
+    if not far <= FARTHEST:
+        raise InputError(f"{path}: a coordinate is {far:.4g} mm: must be at most {FARTHEST:g}: check the unit")
+    return p
 
 
 def _blocks(path: Path) -> list[tuple[list[str], list[list[float]]]]:
     """(names of the columns, rows) of each block of a file."""
-    try:
-        if path.stat().st_size > _LARGEST_FILE:
-            raise InputError(f"{path}: more than {_LARGEST_FILE} bytes: not a table of points")
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError as err:
-        raise InputError(f"{path}: cannot be read: {err.strerror}") from None
+    text = read_regular(path, str(path), _LARGEST_FILE, "not a table of points").decode("utf-8", "replace")
     blocks: list[tuple[list[str], list[list[float]]]] = [([], [])]
     for k, line in enumerate(text.splitlines(), 1):
         words = line.replace(",", " ").split()
@@ -259,6 +280,8 @@ def _blocks(path: Path) -> list[tuple[list[str], list[list[float]]]]:
                 raise InputError(f"{path} line {k}: not numbers: {line.strip()[:40]!r}") from None
             blocks[-1] = ([w.upper() for w in words], [])
             continue
+        if not all(map(math.isfinite, row)):
+            raise InputError(f"{path} line {k}: a number is not finite: {line.strip()[:40]!r}")
         if len(row) not in (2, 3) or (blocks[-1][1] and len(row) != len(blocks[-1][1][0])):
             raise InputError(f"{path} line {k}: {len(row)} numbers: must be as many in every line, 2 or 3")
         blocks[-1][1].append(row)

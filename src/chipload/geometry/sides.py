@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.geometry.bspline import Patch
+from chipload.geometry.bspline import BSplinePatch
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.sections import Blade, facing
 
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 _FEW = np.linspace(0.0, 1.0, 17)
 
 
-def blade_of(plus: Patch, minus: Patch, hub: Revolved, shroud: Revolved, pitch: float) -> Blade:
+def blade_of(plus: BSplinePatch, minus: BSplinePatch, hub: Revolved, shroud: Revolved, pitch: float) -> Blade:
     """The blade that two patches are the sides of.
 
     Parameters
@@ -51,7 +51,7 @@ def blade_of(plus: Patch, minus: Patch, hub: Revolved, shroud: Revolved, pitch: 
     return Blade(facing(plus, 1.0), facing(minus, -1.0))
 
 
-def wall_of(front: Patch, back: Patch, clamp: Callable[[Floats], float]) -> Blade:
+def wall_of(front: BSplinePatch, back: BSplinePatch, clamp: Callable[[Floats], float]) -> Blade:
     """The sides of a wall, front as `plus`, with v from what is clamped and points of equal u, v opposite each other.
 
     Parameters
@@ -59,10 +59,10 @@ def wall_of(front: Patch, back: Patch, clamp: Callable[[Floats], float]) -> Blad
     front, back : u and v in any sense
     clamp : distance [mm] of points (n, 3) from what is clamped
     """
-    front = min(_ways(front), key=lambda p: clamp(p.at(_FEW, 0.0)))
+    front = min(_orientations(front), key=lambda p: clamp(p.at(_FEW, 0.0)))
     u, v = (x.ravel() for x in np.meshgrid(_FEW, _FEW, indexing="ij"))
     p = front.at(u, v)
-    ways = [q for way in _ways(back) for q in (way, way.reversed(True, False))]
+    ways = [q for way in _orientations(back) for q in (way, way.reversed(True, False))]
     back = min(ways, key=lambda q: float(np.linalg.norm(q.at(u, v) - p, axis=1).mean()))
     along, up = (front.at(*b) - front.at(*a) for a, b in (((0.0, 0.5), (1.0, 0.5)), ((0.5, 0.0), (0.5, 1.0))))
     towards = (p - back.at(u, v)).mean(axis=0)
@@ -71,7 +71,7 @@ def wall_of(front: Patch, back: Patch, clamp: Callable[[Floats], float]) -> Blad
     return Blade(front.reversed(True, False), back.reversed(True, False))
 
 
-def foot_off(patch: Patch, hub: Revolved) -> float:
+def foot_off(patch: BSplinePatch, hub: Revolved) -> float:
     """Greatest distance [mm] of a side's foot from the hub in the meridional plane."""
     foot = patch.at(np.linspace(0.0, 1.0, 101), 0.0)
     return float(_distance(foot, hub).max())
@@ -95,15 +95,15 @@ def _distance(points: Floats, surface: Revolved) -> Floats:
     return out
 
 
-def _along_the_flow(patch: Patch, hub: Revolved, shroud: Revolved) -> Patch:
+def _along_the_flow(patch: BSplinePatch, hub: Revolved, shroud: Revolved) -> BSplinePatch:
     """V from hub to shroud, u from the end of greater z."""
-    ways = _ways(patch)
+    ways = _orientations(patch)
     off = [float(_distance(p.at(_FEW, 0.0), hub).mean() + _distance(p.at(_FEW, 1.0), shroud).mean()) for p in ways]
     best = ways[int(np.argmin(off))]
     ahead = best.at(0.0, _FEW)[:, 2].mean() >= best.at(1.0, _FEW)[:, 2].mean()
     return best if ahead else best.reversed(True, False)
 
 
-def _ways(patch: Patch) -> list[Patch]:
+def _orientations(patch: BSplinePatch) -> list[BSplinePatch]:
     """The patch with each of its four sides as v = 0."""
     return [p.reversed(False, back) for p in (patch, patch.swapped()) for back in (False, True)]

@@ -1,7 +1,8 @@
 """A planar horizontal face of a STEP part becomes contours of lines and arcs in mm; the whole part triangles.
 
 Notation: z [mm] the height of a face whose normal is along Z. Lines and circles stay what they are, other edges become
-biarcs. The CAD kernel converts the file's unit to mm; it is imported when a file is read.
+biarcs. The CAD kernel converts the file's unit to mm; it runs in a process of its own, see
+:mod:`chipload.geometry.isolated`: functions that begin with a :class:`Part` are executed there.
 """
 
 from __future__ import annotations
@@ -14,12 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, InputError
+from chipload.files import is_file, open_regular
 from chipload.geometry.biarc import arcs_along
 from chipload.geometry.chains import Drawing, chained
 from chipload.geometry.contour import Contour, Floats
+from chipload.geometry.isolated import Isolated
 
 #: a plane is horizontal if its normal leaves Z by less [rad], and two heights are one within the same [mm]
 LEVEL = 1e-6
+#: [bytes]
+LARGEST_FILE = 200_000_000
 
 
 def read_step_face(
@@ -46,19 +51,20 @@ def read_step_face(
     file = Path(path)
     if z_mm is not None and not np.isfinite(z_mm):
         raise InputError(f"part.z_mm = {z_mm:g}: must be a finite number")
-    faces = list(_level_faces(read_shape(file)))
-    if not faces:
-        raise InputError(f"part.file = {file.name}: no horizontal planar face in the part: turn it, or state a DXF")
-    heights = sorted({round(z, 3) + 0.0 for z, _ in faces})
-    level = max(z for z, _ in faces) if z_mm is None else z_mm
-    chosen = [face for z, face in faces if abs(z - level) <= 1e-3]
+    with opened(file, "part.file") as part:
+        found: list[float] = part.call("step.levels")
+        if not found:
+            raise InputError(f"part.file = {file.name}: no horizontal planar face in the part: turn it, or state a DXF")
+        heights = sorted({round(z, 3) + 0.0 for z in found})
+        level = max(found) if z_mm is None else z_mm
+        chosen: list[list[Floats]] = part.call("step.edges_at", level, tolerance_mm)
     if not chosen:
         named = ", ".join(f"{z:g}" for z in heights)
         raise InputError(f"part.z_mm = {level:g}: no horizontal planar face there; faces are at {named} mm")
     findings: list[Finding] = []
     contours: list[Contour] = []
-    for face in chosen:
-        made, seen = chained(list(_edges(face, tolerance_mm)), join_mm, f"face at z = {level:g}: ")
+    for edges in chosen:
+        made, seen = chained(edges, join_mm, f"face at z = {level:g}: ")
         contours += made
         findings += seen
     if z_mm is None and len(heights) > 1:
@@ -87,23 +93,78 @@ def step_triangles(
     InputError
         The file is missing or no STEP file, or has no faces.
     """
+    with opened(Path(path), key) as part:
+        points, corners = part.call("step.triangles", chord_mm, angle)
+    if not len(corners):
+        raise InputError(f"{key} = {Path(path).name}: no faces in this STEP file")
+    return points, corners
+
+
+def opened(file: Path, key: str = "part.file") -> Isolated:
+    """A STEP file whose part is asked for in a process of its own; it is read when it is first asked.
+
+    Raises
+    ------
+    InputError
+        The file is missing, too large or no STEP file.
+    """
+    if not is_file(file):
+        raise InputError(f"{key} = {file}: no such file")
+    with open_regular(file, f"{key} = {file.name}", LARGEST_FILE, "write the part alone") as stream:
+        if b"ISO-10303-21" not in stream.read(4096):
+            raise InputError(f"{key} = {file.name}: not a STEP file")
+    return Isolated(file, key, "step.read_part")
+
+
+# -- in the process of the CAD kernel ---------------------------------------------------------------------------
+class Part:
+    """A shape of the CAD kernel, in mm, and its faces in the order of the file."""
+
+    def __init__(self, shape: Any) -> None:
+        from OCP.TopAbs import TopAbs_FACE
+        from OCP.TopExp import TopExp_Explorer
+        from OCP.TopoDS import TopoDS
+
+        self.shape, self.faces = shape, list[Any]()
+        explorer = TopExp_Explorer(shape, TopAbs_FACE)
+        while explorer.More():
+            self.faces.append(TopoDS.Face(explorer.Current()))
+            explorer.Next()
+
+
+def read_part(path: str, key: str) -> Part:
+    """The part of a file.
+
+    Raises
+    ------
+    InputError
+        The kernel cannot read it.
+    """
+    import OCP.IFSelect
+    from OCP.Message import Message, Message_Fail
+    from OCP.STEPControl import STEPControl_Reader
+
+    for printer in Message.DefaultMessenger_s().Printers():
+        printer.SetTraceLevel(Message_Fail)
+    reader = STEPControl_Reader()
+    if reader.ReadFile(path) != OCP.IFSelect.IFSelect_RetDone or reader.TransferRoots() == 0:
+        raise InputError(f"{key} = {Path(path).name}: the CAD kernel cannot read this STEP file")
+    return Part(reader.OneShape())
+
+
+def triangles(part: Part, chord_mm: float, angle: float) -> tuple[Floats, NDArray[np.int64]]:
+    """What :func:`step_triangles` gives; none: no face has any."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
-    from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED
-    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopAbs import TopAbs_REVERSED
     from OCP.TopLoc import TopLoc_Location
-    from OCP.TopoDS import TopoDS
 
-    file = Path(path)
-    shape = read_shape(file, key)
-    BRepMesh_IncrementalMesh(shape, chord_mm, False, angle, False)
+    BRepMesh_IncrementalMesh(part.shape, chord_mm, False, angle, False)
     points: list[Floats] = []
     corners: list[NDArray[np.int64]] = []
     count = 0
-    explorer = TopExp_Explorer(shape, TopAbs_FACE)
-    while explorer.More():
-        face, place = TopoDS.Face(explorer.Current()), TopLoc_Location()
-        explorer.Next()
+    for face in part.faces:
+        place = TopLoc_Location()
         made = BRep_Tool.Triangulation_s(face, place)
         if made is None:
             continue
@@ -114,52 +175,31 @@ def step_triangles(
         corners.append(count - 1 + (numbers[:, ::-1] if face.Orientation() == TopAbs_REVERSED else numbers))
         count += len(nodes)
     if not points:
-        raise InputError(f"{key} = {file.name}: no faces in this STEP file")
+        return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
     return np.vstack(points), np.vstack(corners)
 
 
-def read_shape(file: Path, key: str = "part.file") -> Any:
-    """The part as one shape of the CAD kernel, in mm.
-
-    Raises
-    ------
-    InputError
-        The file is missing or no STEP file.
-    """
-    if not file.is_file():
-        raise InputError(f"{key} = {file}: no such file")
-    with file.open("rb") as stream:
-        if b"ISO-10303-21" not in stream.read(4096):
-            raise InputError(f"{key} = {file.name}: not a STEP file")
-    import OCP.IFSelect
-    from OCP.Message import Message, Message_Fail
-    from OCP.STEPControl import STEPControl_Reader
-
-    for printer in Message.DefaultMessenger_s().Printers():
-        printer.SetTraceLevel(Message_Fail)
-    reader = STEPControl_Reader()
-    if reader.ReadFile(str(file)) != OCP.IFSelect.IFSelect_RetDone or reader.TransferRoots() == 0:
-        raise InputError(f"{key} = {file.name}: the CAD kernel cannot read this STEP file")
-    return reader.OneShape()
+def levels(part: Part) -> list[float]:
+    """Height [mm] of every horizontal planar face."""
+    return [z for z, _ in _level_faces(part)]
 
 
-def _level_faces(shape: Any) -> Iterator[tuple[float, Any]]:
+def edges_at(part: Part, level: float, tolerance_mm: float) -> list[list[Floats]]:
+    """(n, 7) segments [mm] of each edge of each horizontal face at a height."""
+    return [list(_edges(face, tolerance_mm)) for z, face in _level_faces(part) if abs(z - level) <= 1e-3]
+
+
+def _level_faces(part: Part) -> Iterator[tuple[float, Any]]:
     """Height [mm] and face of every horizontal plane."""
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomAbs import GeomAbs_Plane
-    from OCP.TopAbs import TopAbs_FACE
-    from OCP.TopExp import TopExp_Explorer
-    from OCP.TopoDS import TopoDS
 
-    explorer = TopExp_Explorer(shape, TopAbs_FACE)
-    while explorer.More():
-        face = TopoDS.Face(explorer.Current())
+    for face in part.faces:
         surface = BRepAdaptor_Surface(face)
         if surface.GetType() == GeomAbs_Plane:
             axis = surface.Plane().Axis().Direction()
             if np.hypot(axis.X(), axis.Y()) < LEVEL:
                 yield float(surface.Plane().Location().Z()), face
-        explorer.Next()
 
 
 def _edges(face: Any, tolerance_mm: float) -> Iterator[Floats]:

@@ -2,7 +2,7 @@
 
 Notation: a face is a piece of a surface S(u, v) [mm] of the CAD kernel, trimmed by loops of edges; its first loop goes
 round it, others are holes. Faces are numbered from 1 in the order of the file. The kernel converts the file's unit to
-mm and is imported when a file is read.
+mm; it runs in a process of its own: functions that begin with a :class:`Part` are executed there.
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.geometry.step import read_shape
+from chipload.files import read_regular
+from chipload.geometry.isolated import Isolated
+from chipload.geometry.step import LARGEST_FILE, Part, opened
 
 Floats = NDArray[np.float64]
 
@@ -25,8 +27,6 @@ Name = int | tuple[float, float, float]
 
 #: a point names a face if it is nearer to it than this [mm]
 ON = 0.01
-_LARGEST_FILE = 500_000_000
-_LISTED = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Face:
     area : [mm^2]
     low, high : (3,) corners of its box [mm]
     holes, edges : how many
-    shape : of the CAD kernel
+    part : the process of the CAD kernel that holds it
     """
 
     number: int
@@ -50,7 +50,7 @@ class Face:
     high: Floats
     holes: int
     edges: int
-    shape: Any = field(repr=False)
+    part: Isolated = field(repr=False)
 
     def __str__(self) -> str:
         corners = np.stack([self.low, self.high]).round(4) + 0.0
@@ -60,12 +60,7 @@ class Face:
 
     def distance(self, point: Sequence[float]) -> float:
         """From a point [mm]."""
-        from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
-        from OCP.BRepExtrema import BRepExtrema_DistShapeShape
-        from OCP.gp import gp_Pnt
-
-        vertex = BRepBuilderAPI_MakeVertex(gp_Pnt(*(float(x) for x in point))).Vertex()
-        return float(BRepExtrema_DistShapeShape(vertex, self.shape).Value())
+        return float(self.part.call("step_faces.distances", [self.number], [float(x) for x in point])[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,28 +89,29 @@ class Model:
         said = f"{key} = [{', '.join(f'{x:g}' for x in name)}]"
         p = np.asarray(name, dtype=np.float64)
         near = [f for f in self.faces if (p >= f.low - ON).all() and (p <= f.high + ON).all()]
-        away = {f.number: f.distance(name) for f in near}
+        away = self._away(near, name)
         on = [number for number, d in away.items() if d <= ON]
         if len(on) == 1:
             return self.faces[on[0] - 1]
         if on:
             faces = " and ".join(str(n) for n in on)
             raise InputError(f"{said}: lies on faces {faces}: take a point within one of them")
-        away = {f.number: f.distance(name) for f in self.faces}
+        away = self._away(self.faces, name)
         number = min(away, key=lambda n: away[n])
         raise InputError(
             f"{said}: lies {away[number]:.4g} mm off the nearest face, {number}: must be within {ON:g} mm of a face "
             "(mm, in the frame of the file)"
         )
 
+    def _away(self, faces: Sequence[Face], point: Sequence[float]) -> dict[int, float]:
+        """Distance [mm] of a point from each face, by number."""
+        numbers = [f.number for f in faces]
+        found = self.faces[0].part.call("step_faces.distances", numbers, [float(x) for x in point]) if numbers else ()
+        return dict(zip(numbers, found, strict=True))
+
     def lines(self) -> list[str]:
-        """What the faces are, a line for each of the first."""
-        more = len(self.faces) - _LISTED
-        return [
-            f"{self.file.name}: {len(self.faces)} faces",
-            *(str(f) for f in self.faces[:_LISTED]),
-            *([f"and {more} more"] if more > 0 else []),
-        ]
+        """What the faces are, a line for each."""
+        return [f"{self.file.name}: {len(self.faces)} faces", *(str(f) for f in self.faces)]
 
 
 def read_faces(path: str | Path, key: str = "part.file") -> Model:
@@ -130,34 +126,69 @@ def read_faces(path: str | Path, key: str = "part.file") -> Model:
     InputError
         The file is missing or no STEP file, states no unit of length, or has no faces.
     """
-    from OCP.Bnd import Bnd_Box
+    file = Path(path)
+    part = opened(file, key)
+    try:
+        rows, solid = part.call("step_faces.listed")
+    except BaseException:
+        part.close()
+        raise
+    if b"LENGTH_UNIT" not in read_regular(file, f"{key} = {file.name}", LARGEST_FILE):
+        raise InputError(f"{key} = {file.name}: states no unit of length: write it again with its unit")
+    if not rows:
+        raise InputError(f"{key} = {file.name}: no faces in this STEP file")
+    return Model(file, tuple(Face(*(*row, part)) for row in rows), solid)
+
+
+# -- in the process of the CAD kernel ---------------------------------------------------------------------------
+@dataclass(frozen=True, eq=False)
+class Inside:
+    """A face as the kernel has it: its number, the kind of its surface, how many holes, the shape."""
+
+    number: int
+    kind: str
+    holes: int
+    shape: Any
+
+
+def inside(part: Part, number: int) -> Inside:
+    """A face by its number."""
     from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.TopAbs import TopAbs_WIRE
+
+    shape = part.faces[number - 1]
+    kind = _KINDS.get(BRepAdaptor_Surface(shape).GetType().name, "other surface")
+    return Inside(number, kind, len(_all(shape, TopAbs_WIRE)) - 1, shape)
+
+
+def listed(part: Part) -> tuple[list[list[Any]], bool]:
+    """Number, kind, area, corners of the box, holes and edges of each face; whether all faces bound solids."""
+    from OCP.Bnd import Bnd_Box
     from OCP.BRepBndLib import BRepBndLib
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
-    from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID, TopAbs_WIRE
-    from OCP.TopoDS import TopoDS
+    from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID
 
-    file = Path(path)
-    if file.is_file() and file.stat().st_size > _LARGEST_FILE:
-        raise InputError(f"{key} = {file.name}: more than {_LARGEST_FILE} bytes: write the part alone")
-    shape = read_shape(file, key)
-    if b"LENGTH_UNIT" not in file.read_bytes():
-        raise InputError(f"{key} = {file.name}: states no unit of length: write it again with its unit")
-    out: list[Face] = []
-    for k, found in enumerate(_all(shape, TopAbs_FACE), 1):
-        face = TopoDS.Face(found)
+    out: list[list[Any]] = []
+    for k, face in enumerate(part.faces, 1):
         properties, box = GProp_GProps(), Bnd_Box()
         BRepGProp.SurfaceProperties_s(face, properties)
         BRepBndLib.AddOptimal_s(face, box, False, False)
         low, high = (np.array([p.X(), p.Y(), p.Z()]) for p in (box.CornerMin(), box.CornerMax()))
-        kind = _KINDS.get(BRepAdaptor_Surface(face).GetType().name, "other surface")
-        wires, edges = (len(_all(face, what)) for what in (TopAbs_WIRE, TopAbs_EDGE))
-        out.append(Face(k, kind, float(properties.Mass()), low, high, wires - 1, edges, face))
-    if not out:
-        raise InputError(f"{key} = {file.name}: no faces in this STEP file")
-    bounding = sum(len(_all(body, TopAbs_FACE)) for body in _all(shape, TopAbs_SOLID))
-    return Model(file, tuple(out), bounding == len(out))
+        has = inside(part, k)
+        out.append([k, has.kind, float(properties.Mass()), low, high, has.holes, len(_all(face, TopAbs_EDGE))])
+    bounding = sum(len(_all(body, TopAbs_FACE)) for body in _all(part.shape, TopAbs_SOLID))
+    return out, bounding == len(out)
+
+
+def distances(part: Part, numbers: list[int], point: list[float]) -> list[float]:
+    """Distance [mm] of a point from each face."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
+    from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+    from OCP.gp import gp_Pnt
+
+    vertex = BRepBuilderAPI_MakeVertex(gp_Pnt(*point)).Vertex()
+    return [float(BRepExtrema_DistShapeShape(vertex, part.faces[n - 1]).Value()) for n in numbers]
 
 
 def _all(shape: Any, what: Any) -> list[Any]:

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.geometry.step_faces import Face
+from chipload.geometry.step import Part
+from chipload.geometry.step_faces import Face, Inside, inside
 
 Floats = NDArray[np.float64]
 
@@ -45,8 +46,15 @@ def meridian_of(faces: Sequence[Face], R: Floats, key: str) -> Floats:
     InputError
         A face is not of revolution about the axis, or they do not go on smoothly one after another.
     """
-    left = [_meridian(f, R, key) for f in faces]
-    rest = list(faces)
+    out: Floats = faces[0].part.call("step_meridian.joined", [f.number for f in faces], R, key)
+    return out
+
+
+# -- in the process of the CAD kernel ---------------------------------------------------------------------------
+def joined(part: Part, numbers: Sequence[int], R: Floats, key: str) -> Floats:
+    """What :func:`meridian_of` gives of the faces of these numbers."""
+    rest = [inside(part, number) for number in numbers]
+    left = [_meridian(f, R, key) for f in rest]
     # begin with the piece that has the first of all ends
     ends = [max(_first(p[0]), _first(p[-1])) for p in left]
     k = int(np.argmax(ends))
@@ -79,7 +87,7 @@ def _first(p: Floats) -> float:
     return float(p[1] - p[0])
 
 
-def _meridian(face: Face, R: Floats, key: str) -> Floats:
+def _meridian(face: Inside, R: Floats, key: str) -> Floats:
     """(n, 2) r and z of one face, in either sense."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepTools import BRepTools
@@ -110,7 +118,7 @@ def _meridian(face: Face, R: Floats, key: str) -> Floats:
     return rz(u, np.full(COUNT, v[0]))
 
 
-def _across(face: Face, R: Floats) -> Floats:
+def _across(face: Inside, R: Floats) -> Floats:
     """Of a plane across the axis: from its least to its greatest radius along its edges."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve
     from OCP.TopAbs import TopAbs_EDGE

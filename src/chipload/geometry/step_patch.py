@@ -5,7 +5,8 @@ parameter lines and S is polynomial, poles and knots are taken as they are, once
 Elsewhere (s, t) in 0..1 runs over the face: the four sides of its loop, each by its length, are blended to
 (u, v)(s, t), and a patch goes through the points of a grid, which is made finer until it keeps within the tolerance.
 Where the lines of equal u or v of a file lie more than :data:`UNEVEN` times closer in one place than in another, the
-patch is made anew over shares of length, for whoever goes over it in even steps of u and v.
+patch is made anew over shares of length, for whoever goes over it in even steps of u and v. Patches are made in the
+process of the CAD kernel.
 
 Reference: [Piegl1997] ch. 9, 10.6 (blended boundaries).
 """
@@ -22,8 +23,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, make_interp_spline
 
 from chipload.errors import InputError
-from chipload.geometry.bspline import Patch, basis, through
-from chipload.geometry.step_faces import Face
+from chipload.geometry.bspline import BSplinePatch, basis, through
+from chipload.geometry.step import Part
+from chipload.geometry.step_faces import Face, Inside, inside
 
 Floats = NDArray[np.float64]
 
@@ -40,7 +42,7 @@ _POLYNOMIAL = ("plane", "b-spline", "Bezier", "of extrusion")
 
 
 @dataclass(frozen=True, eq=False)
-class Taken:
+class ReadFace:
     """What a face became.
 
     Attributes
@@ -50,7 +52,7 @@ class Taken:
     off : how far it or its rim leaves the face [mm], as far as was looked
     """
 
-    patch: Patch
+    patch: BSplinePatch
     kept: bool
     off: float
 
@@ -60,7 +62,7 @@ class Taken:
         return f"{how}, within {self.off:.2g} mm of the face"
 
 
-def patch_of(face: Face, key: str, fit: float) -> Taken:
+def patch_of(face: Face, key: str, fit: float) -> ReadFace:
     """The patch of a face.
 
     Parameters
@@ -73,6 +75,18 @@ def patch_of(face: Face, key: str, fit: float) -> Taken:
     InputError
         The face has holes, no four sides, or the fit leaves it by more.
     """
+    knots_u, knots_v, control, side, kept, off = face.part.call("step_patch.taken", face.number, key, fit)
+    return ReadFace(BSplinePatch(knots_u, knots_v, control, side), kept, off)
+
+
+# -- in the process of the CAD kernel ---------------------------------------------------------------------------
+def taken(part: Part, number: int, key: str, fit: float) -> tuple[Floats, Floats, Floats, int, bool, float]:
+    """Knots, poles and side of the patch of a face, whether they are those of the file, and how far it leaves it."""
+    made = _taken(inside(part, number), key, fit)
+    return made.patch.knots_u, made.patch.knots_v, made.patch.control, made.patch.side, made.kept, made.off
+
+
+def _taken(face: Inside, key: str, fit: float) -> ReadFace:
     from OCP.BRep import BRep_Tool
     from OCP.TopAbs import TopAbs_REVERSED
 
@@ -88,7 +102,7 @@ def patch_of(face: Face, key: str, fit: float) -> Taken:
         if kept is not None:
             off = max(rim, _off(kept, lambda s, t: low + np.stack([s, t], axis=-1) * (high - low), surface, 17))
             if off <= fit:
-                return _even(Taken(kept, True, off), face, key, fit)
+                return _even(ReadFace(kept, True, off), face, key, fit)
     return _fitted(face, surface, loop, side, key, fit)
 
 
@@ -108,7 +122,7 @@ def _points(surface: Any, uv: Floats) -> Floats:
     return np.array([(p.X(), p.Y(), p.Z()) for p in out]).reshape(*uv.shape[:-1], 3)
 
 
-def _loop(face: Face, surface: Any) -> list[_Piece]:
+def _loop(face: Inside, surface: Any) -> list[_Piece]:
     """The edges round the face, those without length left out."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Curve2d
@@ -158,7 +172,7 @@ def _box(loop: list[_Piece], surface: Any) -> tuple[float, Floats, Floats]:
     return rim, low, high
 
 
-def _kept(surface: Any, low: Floats, high: Floats, side: int) -> Patch | None:
+def _kept(surface: Any, low: Floats, high: Floats, side: int) -> BSplinePatch | None:
     """Poles and knots of the kernel's surface within a box; None: it is rational."""
     from OCP.Geom import Geom_RectangularTrimmedSurface
     from OCP.GeomConvert import GeomConvert
@@ -174,7 +188,7 @@ def _kept(surface: Any, low: Floats, high: Floats, side: int) -> Patch | None:
     control = np.array([[(p.X(), p.Y(), p.Z()) for p in row] for row in poles])
     u = np.repeat([b.UKnot(i) for i in range(1, b.NbUKnots() + 1)], _mults(b.UMultiplicity, b.NbUKnots()))
     v = np.repeat([b.VKnot(i) for i in range(1, b.NbVKnots() + 1)], _mults(b.VMultiplicity, b.NbVKnots()))
-    return Patch(_unit(u), _unit(v), control, side)
+    return BSplinePatch(_unit(u), _unit(v), control, side)
 
 
 def _mults(of: Callable[[int], int], count: int) -> list[int]:
@@ -186,7 +200,7 @@ def _unit(knots: Floats) -> Floats:
     return out
 
 
-def _off(patch: Patch, uv_of: Callable[[Floats, Floats], Floats], surface: Any, count: int) -> float:
+def _off(patch: BSplinePatch, uv_of: Callable[[Floats, Floats], Floats], surface: Any, count: int) -> float:
     """Greatest distance [mm] of patch and surface at the middles between ``count`` places and along the sides."""
     x = np.linspace(0.0, 1.0, 2 * count - 1)
     s, t = np.meshgrid(x, x, indexing="ij")
@@ -194,7 +208,7 @@ def _off(patch: Patch, uv_of: Callable[[Floats, Floats], Floats], surface: Any, 
     return float(np.linalg.norm(patch.at(s.ravel(), t.ravel()).reshape(points.shape) - points, axis=2).max())
 
 
-def _fitted(face: Face, surface: Any, loop: list[_Piece], side: int, key: str, fit: float) -> Taken:
+def _fitted(face: Inside, surface: Any, loop: list[_Piece], side: int, key: str, fit: float) -> ReadFace:
     sides = [_side(pieces) for pieces in _four(face, loop, key)]
     corners = np.array([s(np.zeros(1))[0] for s in sides])
 
@@ -228,27 +242,27 @@ def _fitted(face: Face, surface: Any, loop: list[_Piece], side: int, key: str, f
         off = float(np.linalg.norm(patch.at(s.ravel(), t.ravel()).reshape(points.shape) - points, axis=2).max())
         best = min(best, off)
         if off <= fit:
-            return _even(Taken(patch, False, off), face, key, fit)
+            return _even(ReadFace(patch, False, off), face, key, fit)
     raise _left(face, key, best, fit)
 
 
-def _left(face: Face, key: str, best: float, fit: float) -> InputError:
+def _left(face: Inside, key: str, best: float, fit: float) -> InputError:
     return InputError(
         f"{key}: face {face.number} is left by its fit by {best:.4g} mm: must be at most fit_mm = {fit:g}: state more, "
         "or have the face written in smooth parts"
     )
 
 
-def _even(taken: Taken, face: Face, key: str, fit: float) -> Taken:
+def _even(taken: ReadFace, face: Inside, key: str, fit: float) -> ReadFace:
     """The same surface over shares of length, if its own parameters are uneven."""
     out = taken
     for _ in range(2):
         out = _even_u(out, face, key, fit)
-        out = Taken(out.patch.swapped(), out.kept, out.off)
+        out = ReadFace(out.patch.swapped(), out.kept, out.off)
     return out
 
 
-def _even_u(taken: Taken, face: Face, key: str, fit: float) -> Taken:
+def _even_u(taken: ReadFace, face: Inside, key: str, fit: float) -> ReadFace:
     """The curves that go with the basis functions of v, each over shares of length instead of u."""
     patch, x, few = taken.patch, np.linspace(0.0, 1.0, 2 * _SAMPLES), np.linspace(0.0, 1.0, 9)
     grid = patch.at(*_mesh(x, few)).reshape(len(x), len(few), 3)
@@ -265,11 +279,11 @@ def _even_u(taken: Taken, face: Face, key: str, fit: float) -> Taken:
         first, N = basis(patch.knots_u, degree, np.clip(u_of(s), 0.0, 1.0))
         curves = np.einsum("ki,kijd->kjd", N, patch.control[first[:, None] + np.arange(degree + 1)])
         spline = make_interp_spline(s, curves, k=3)
-        made = Patch(spline.t, patch.knots_v, spline.c, patch.side)
+        made = BSplinePatch(spline.t, patch.knots_v, spline.c, patch.side)
         S, V = _mesh(np.sort(np.concatenate([s, 0.5 * (s[1:] + s[:-1])])), few)
         off = float(np.linalg.norm(made.at(S, V) - patch.at(np.clip(u_of(S), 0.0, 1.0), V), axis=1).max())
         if taken.off + off <= fit:
-            return Taken(made, False, taken.off + off)
+            return ReadFace(made, False, taken.off + off)
     raise _left(face, key, taken.off + off, fit)
 
 
@@ -284,7 +298,7 @@ def _at_shares(side: Callable[[Floats], Floats], shares: Floats) -> Floats:
     return side(x)[back]
 
 
-def _four(face: Face, loop: list[_Piece], key: str) -> list[list[_Piece]]:
+def _four(face: Inside, loop: list[_Piece], key: str) -> list[list[_Piece]]:
     """The loop as four sides."""
     if len(loop) == 4:
         return [[p] for p in loop]
@@ -295,9 +309,12 @@ def _four(face: Face, loop: list[_Piece], key: str) -> list[list[_Piece]]:
         corner.append(bool(turn > CORNER))
     starts = np.flatnonzero(corner)
     if len(starts) != 4:
+        at = ", ".join("(" + ", ".join(f"{x:.4g}" for x in loop[k].points[0]) + ")" for k in starts.tolist()[:6])
         raise InputError(
-            f"{key}: face {face.number} has {len(loop)} edges and {len(starts)} corners: must have four sides: hub, "
-            "shroud and two edges of a blade, or those of a wall"
+            f"{key}: face {face.number} has {len(loop)} edges and {len(starts)} corners of more than "
+            f"{np.degrees(CORNER):.0f} deg{f', at {at} mm' if at else ''}: must have four sides: hub, shroud and two "
+            "edges of a blade, or those of a wall: cut the face in CAD along the edge that is missing, or state "
+            "sections instead of faces"
         )
     ring = loop[starts[0] :] + loop[: starts[0]]
     ends = [*(starts - starts[0]).tolist(), len(loop)]

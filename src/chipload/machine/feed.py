@@ -26,7 +26,12 @@ TANGENT = 1e-3
 
 
 def limited_speed(
-    s: ArrayLike, wanted: ArrayLike, acceleration: ArrayLike, start_speed: float = 0.0, end_speed: float = 0.0
+    s: ArrayLike,
+    wanted: ArrayLike,
+    acceleration: ArrayLike,
+    start_speed: float = 0.0,
+    end_speed: float = 0.0,
+    between: ArrayLike | None = None,
 ) -> tuple[Floats, Floats]:
     """Fastest speed along a path that never exceeds ``wanted`` and whose acceleration stays within the limit.
 
@@ -42,11 +47,14 @@ def limited_speed(
         Greatest |dv/dt|, > 0, or that of each piece between samples.
     start_speed, end_speed : float [mm/s]
         Speed at the ends, >= 0; lowered where ``wanted`` or the acceleration does not allow it.
+    between : float or (n - 1,) float [mm/s], > 0
+        Greatest speed within each piece, which is then run as :func:`move_time` does: up from the speed at its
+        beginning and down to that at its end. None: the acceleration within a piece is constant.
 
     Returns
     -------
-    v : (n,) float [mm/s], t : (n,) float [s] from 0; inf from where the path cannot be left (v = 0 at both ends of
-    a piece that has length).
+    v : (n,) float [mm/s], t : (n,) float [s] from 0; without ``between``, inf from where the path cannot be left
+    (v = 0 at both ends of a piece that has length).
 
     Raises
     ------
@@ -62,6 +70,8 @@ def limited_speed(
     [0.0, 10.0, 0.0]
     >>> s = np.linspace(0.0, 10.0, 2001)
     >>> round(float(limited_speed(s, np.full(2001, 10.0), 100.0)[1][-1]), 6)
+    1.1
+    >>> float(limited_speed([0.0, 10.0], [10.0, 10.0], 100.0, between=10.0)[1][-1])
     1.1
     """
     s, wanted = np.asarray(s, dtype=np.float64), np.asarray(wanted, dtype=np.float64)
@@ -85,6 +95,11 @@ def limited_speed(
     moving = step > 0.0
     with np.errstate(divide="ignore"):
         dt = np.where(moving, 2.0 * step / np.where(moving, total, 1.0), 0.0)
+    if between is not None:
+        most = np.broadcast_to(np.asarray(between, dtype=np.float64), (n - 1,))
+        if not (most > 0.0).all():
+            raise InputError("limited_speed: between must be above 0 mm/s")
+        dt = np.where(moving, move_time(step, most, a, v[:-1], v[1:]), 0.0)
     return v, np.concatenate([[0.0], np.cumsum(dt)])
 
 
@@ -99,7 +114,7 @@ def curvature_speed(kappa: ArrayLike, acceleration: float) -> Floats:
         return np.asarray(np.sqrt(acceleration / kappa))
 
 
-def corner_speed(theta: ArrayLike, acceleration: ArrayLike, tolerance: float) -> Floats:
+def corner_speed(theta: ArrayLike, acceleration: ArrayLike, tolerance: ArrayLike) -> Floats:
     """Speed through a corner that turns by theta [rad], rounded off by at most ``tolerance`` [mm].
 
     The arc that touches both sides and leaves the corner by delta has the radius
@@ -113,7 +128,7 @@ def corner_speed(theta: ArrayLike, acceleration: ArrayLike, tolerance: float) ->
     half = np.clip(np.cos(0.5 * theta), 0.0, 1.0)
     smooth = theta < TANGENT
     flare = np.where(smooth, 1.0, 2.0 * np.sin(0.25 * theta) ** 2)
-    speed = np.sqrt(np.asarray(acceleration) * tolerance * half / flare)
+    speed = np.sqrt(np.asarray(acceleration) * np.asarray(tolerance) * half / flare)
     return np.where(smooth, np.inf, np.where(theta >= math.pi - 1e-9, 0.0, speed))
 
 

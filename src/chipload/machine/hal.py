@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from chipload.errors import Finding, InputError
+from chipload.files import read_regular
 
 #: of a file that is read [bytes]
 MOST_BYTES = 1 << 20
@@ -97,11 +98,4 @@ def _put(values: dict[str, float], key: str, text: str) -> None:
 
 
 def _text(label: str, path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
-    except OSError as err:
-        raise InputError(f"{label}: cannot be read: {err.strerror}") from None
-    if len(data) > MOST_BYTES:
-        raise InputError(f"{label}: larger than {MOST_BYTES} bytes: must be a text of a configuration")
-    return data.decode("utf-8", "replace")
+    return read_regular(path, label, MOST_BYTES, "must be a text of a configuration").decode("utf-8", "replace")

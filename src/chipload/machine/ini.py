@@ -6,6 +6,7 @@ otherwise the joints are the machine's axes and `[AXIS_X]` limits a coordinate o
 What is looked at: `[EMC] MACHINE`; `[TRAJ] LINEAR_UNITS`, `ANGULAR_UNITS`, `COORDINATES`, `MAX_LINEAR_VELOCITY`,
 `MAX_ANGULAR_VELOCITY`, `MAX_LINEAR_ACCELERATION`, `MAX_ANGULAR_ACCELERATION`; `[KINS] KINEMATICS`; `MIN_LIMIT`,
 `MAX_LIMIT`, `MAX_VELOCITY`, `MAX_ACCELERATION`, `WRAPPED_ROTARY` of `[AXIS_<letter>]` and `[JOINT_<number>]`;
+`[EMCMOT] SERVO_PERIOD`, `[DISPLAY] MAX_FEED_OVERRIDE` and `[TRAJ] ARC_BLEND_*` of the trajectory planner;
 `[SPINDLE_0] MIN_FORWARD_VELOCITY`, `MAX_FORWARD_VELOCITY`; `setp`, `sets` and `net` in `[HAL] HALCMD` and in the files
 of `HALFILE` and `POSTGUI_HALFILE` that lie beside the `.ini`. What is not said is a finding; what is not supported is
 refused. The geometry of each kinematics module follows its documentation, "5-Axis Kinematics".
@@ -22,6 +23,7 @@ from chipload.machine.axis import LETTERS, Axis, Vector
 from chipload.machine.chain import Chain
 from chipload.machine.hal import Ini, hal_pins, read_sections
 from chipload.machine.machine import Machine
+from chipload.machine.trajectory import TrajectoryPlanner
 from chipload.units import MM_PER, rad_s_from_rpm
 
 _RAD_PER = {"deg": math.pi / 180.0, "degree": math.pi / 180.0, "rad": 1.0, "radian": 1.0, "grad": math.pi / 200.0}
@@ -53,8 +55,8 @@ _PIVOT_LENGTH = 250.0  # what 5axiskins takes where nothing sets the pin, in uni
 def read_ini(path: str | Path) -> tuple[Machine, tuple[Finding, ...]]:
     """The machine of a LinuxCNC configuration, and what the configuration does not say.
 
-    Codes of findings: ``ini-limit``, ``ini-velocity``, ``ini-acceleration``, ``ini-spindle``, ``ini-corner``,
-    ``ini-kinematics`` (geometry that is taken, not given), ``ini-hal`` and ``ini-include`` (files not read).
+    Codes of findings: ``ini-limit``, ``ini-velocity``, ``ini-acceleration``, ``ini-spindle``, ``ini-kinematics``
+    (geometry that is taken, not given), ``ini-hal`` and ``ini-include`` (files not read).
     No file outside the folder of ``path`` is opened.
 
     Raises
@@ -119,9 +121,6 @@ def _machine(ini: Ini, findings: list[Finding], path: Path) -> Machine:
         findings.append(
             Finding("ini-spindle", 0, "[SPINDLE_0] MAX_FORWARD_VELOCITY is missing: no greatest speed is known")
         )
-    findings.append(
-        Finding("ini-corner", 0, "a corner tolerance is not part of a configuration: 0, every corner a stop")
-    )
     return Machine(
         name=ini.value("EMC", "MACHINE") or path.stem,
         chain=Chain(tuple(axes), nose=nose),
@@ -133,6 +132,28 @@ def _machine(ini: Ini, findings: list[Finding], path: Path) -> Machine:
         dialect="linuxcnc",
         decimals=6,
         note=f"Read from the configuration {path.name}.",
+        planner=_planner(ini),
+    )
+
+
+def _planner(ini: Ini) -> TrajectoryPlanner:
+    """Settings of the trajectory planner; what is left out is LinuxCNC's own default."""
+    default = TrajectoryPlanner()
+    period = _number(ini, "EMCMOT", "SERVO_PERIOD")
+    depth = _number(ini, "TRAJ", "ARC_BLEND_OPTIMIZATION_DEPTH")
+    numbers = {
+        "gap_cycles": _number(ini, "TRAJ", "ARC_BLEND_GAP_CYCLES"),
+        "ramp_frequency": _number(ini, "TRAJ", "ARC_BLEND_RAMP_FREQ"),
+        "kink_ratio": _number(ini, "TRAJ", "ARC_BLEND_KINK_RATIO"),
+        "override": _number(ini, "DISPLAY", "MAX_FEED_OVERRIDE"),
+    }
+    given = {key: value for key, value in numbers.items() if value is not None}
+    given["override"] = max(given.get("override", 1.0), 1.0)
+    return TrajectoryPlanner(
+        cycle=default.cycle if period is None else 1e-9 * period,
+        blend_arcs=_number(ini, "TRAJ", "ARC_BLEND_ENABLE") != 0.0,
+        lookahead=default.lookahead if depth is None else int(depth),
+        **given,
     )
 
 

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipload.errors import InputError
 from chipload.machine.chain import Chain
 from chipload.machine.schema import Row, chain_from_table, checked
+from chipload.machine.trajectory import TrajectoryPlanner
 from chipload.tables import read_table, shipped_names, shipped_table
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm, rpm_from_rad_s
 
@@ -43,6 +44,7 @@ class Machine:
     torque_curve : (speed [rad/s], torque [N mm]) of the spindle, rising speeds that hold its range, straight between
         them; empty: not known
     note : where its numbers come from and which are assumed
+    planner : settings of LinuxCNC's trajectory planner; None: another controller, judged by its corner tolerance
     tcp_words : blocks that begin and end tool centre point control, ``{tool}`` for the tool's number; None: it has none
 
     Raises
@@ -65,6 +67,7 @@ class Machine:
     note: str = ""
     tcp_words: tuple[str, str] | None = None
     torque_curve: tuple[tuple[float, float], ...] = ()
+    planner: TrajectoryPlanner | None = None
 
     def __post_init__(self) -> None:
         def need(ok: bool, key: str, value: object, limit: str) -> None:
@@ -161,10 +164,25 @@ def _from_table(label: str, table: Row) -> Machine:
             note=top.get("note", ""),
             torque_curve=tuple((rad_s_from_rpm(n), 1e3 * t) for n, t in spindle.get("torque_curve", ())),
             tcp_words=_tcp_words(top),
+            planner=_planner(label, top),
         )
     except InputError as err:
         text = str(err)
         raise InputError(text if text.startswith(label) else f"{label}: {text}") from None
+
+
+def _planner(label: str, top: Row) -> TrajectoryPlanner | None:
+    """The settings of `[trajectory_planner]`; what is left out is LinuxCNC's own default."""
+    if "trajectory_planner" not in top:
+        return None
+    given = checked(label, top["trajectory_planner"], "trajectory_planner")
+    names = ("blend_arcs", "lookahead", "gap_cycles", "kink_ratio")
+    values = {name: given[name] for name in names if name in given}
+    if "ramp_frequency_hz" in given:
+        values["ramp_frequency"] = float(given["ramp_frequency_hz"])
+    if "override_max" in given:
+        values["override"] = float(given["override_max"])
+    return TrajectoryPlanner(cycle=1e-3 * given["cycle_ms"], **values)
 
 
 def _tcp_words(top: Row) -> tuple[str, str] | None:
@@ -188,6 +206,10 @@ def read_machine(path: str | Path) -> Machine:
     ``rate_mm_min`` (else the rapid rate), ``direction`` (else the letter's own), ``side`` (`table` or `head`, else
     head), ``indexed``, ``step_mm``. In ``[axis.a]``, b, c: ``side``, ``direction``, ``pivot_mm``, ``min_deg`` and
     ``max_deg`` or ``endless = true``, ``rate_deg_min``, ``acceleration_deg_s2``, optional ``indexed``, ``step_deg``.
+
+    In ``[trajectory_planner]``, for a machine under LinuxCNC: ``cycle_ms`` (period of the servo thread), optional
+    ``blend_arcs``, ``lookahead``, ``gap_cycles``, ``ramp_frequency_hz``, ``kink_ratio``, ``override_max``. Without the
+    table corners are passed by ``corner_tolerance_mm``.
 
     In ``[spindle]``: ``min_rpm``, ``max_rpm``, optional ``power_w``, ``torque_nm``, ``torque_curve`` (pairs of rpm and
     N m), ``direction`` (from the tip to the spindle; else +Z), and ``nose_mm`` or ``gauge_mm``: the nose is so far from

@@ -38,6 +38,15 @@ _SPINDLE = {
     "nose_mm?": _VECTOR,
     "gauge_mm?": _NUMBER,
 }
+_PLANNER = {
+    "cycle_ms": _NUMBER,
+    "blend_arcs?": _FLAG,
+    "lookahead?": _WHOLE,
+    "gap_cycles?": _NUMBER,
+    "ramp_frequency_hz?": _NUMBER,
+    "kink_ratio?": _NUMBER,
+    "override_max?": _NUMBER,
+}
 _WORK = {"zero_mm?": _VECTOR, "x_axis?": _VECTOR, "z_axis?": _VECTOR}
 _LINEAR = {
     "min_mm": _NUMBER,
@@ -62,7 +71,7 @@ _ROTARY = {
     "step_deg?": _NUMBER,
 }
 #: tables in the file's top: "?" may be left out
-_TABLES = ("axis", "spindle", "work?")
+_TABLES = ("axis", "spindle", "work?", "trajectory_planner?")
 
 
 def _is(kind: str, value: object) -> bool:
@@ -94,8 +103,8 @@ def checked(label: str, data: Row, where: str, letters: str = "XYZ") -> Row:
         keys, tables = _MACHINE, _TABLES
     elif where == "axis":
         keys, tables = {}, tuple(letters.lower())
-    elif where in ("spindle", "work"):
-        keys = _SPINDLE if where == "spindle" else _WORK
+    elif where in ("spindle", "work", "trajectory_planner"):
+        keys = {"spindle": _SPINDLE, "work": _WORK, "trajectory_planner": _PLANNER}[where]
     else:
         keys = _ROTARY if where[-1] in "abc" else _LINEAR
     known = [key.rstrip("?") for key in (*keys, *tables)]

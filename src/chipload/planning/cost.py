@@ -7,7 +7,7 @@ Notation: v [mm/s] speed of the cutter's centre, f_z = 2 pi v / (N omega) [mm] f
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,31 +17,38 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_along
 from chipload.cutting.material import Material
-from chipload.cutting.wall import Milling, wall_error_along
+from chipload.cutting.rigid import OF_DEPTH, OF_FEED, deflection_share
+from chipload.cutting.strength import cutter_stress
+from chipload.cutting.wall_error import Milling, wall_error_along
 from chipload.engagement.contact import PIECES, Engagement
-from chipload.planning.result import Columns, LimitCheck, worst
+from chipload.engagement.tooth_engagement import engagement_of_arcs, with_runout
+from chipload.planning.result import Columns
+from chipload.structure.spindle import chain_compliance, tool_bars
 from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
 
-#: limits a job may state: the column each one is held against, and whether only where the wall is made
-LIMITS: Mapping[str, tuple[str, bool]] = {
-    "engagement_deg": ("engagement_deg", True),
-    "error_um": ("error_um", True),
-    "force_xy_n": ("force_xy_n", False),
-    "torque_nm": ("torque_nm", False),
-}
-
 
 @dataclass(frozen=True)
-class Cut:
-    """What stays the same over an operation: cutter, material, depth of cut [mm], spindle speed [rad/s], sense."""
+class CutConditions:
+    """What stays the same over an operation.
+
+    Parameters
+    ----------
+    cutter, material : of the operation
+    axial_depth : [mm]
+    spindle_speed : [rad/s]
+    milling : ``down`` or ``up``
+    of_feed, of_depth : deflection over feed per tooth and over radial depth up to which the rigid model holds
+    """
 
     cutter: Cutter
     material: Material
     axial_depth: float
     spindle_speed: float
     milling: Milling
+    of_feed: float = OF_FEED
+    of_depth: float = OF_DEPTH
 
     def feed_per_tooth(self, speed: Floats) -> Floats:
         """f_z = 2 pi v / (N omega) [mm] at the speed v [mm/s] of the centre."""
@@ -49,7 +56,8 @@ class Cut:
 
 
 def cost(
-    cut: Cut, zone: NDArray[Any], s: Floats, t: Floats, centre: Floats, heading: Floats, z: float, met: Engagement,
+    cut: CutConditions, zone: NDArray[Any], s: Floats, t: Floats, centre: Floats, heading: Floats, z: float, met:
+    Engagement,
     speed: Floats, makes_wall: NDArray[np.bool_],
 ) -> Columns:  # fmt: skip
     """History columns of the steps of one pass, forces from the one force model.
@@ -91,7 +99,7 @@ def cost(
             milling=cut.milling,
             count=count[makes_wall],
         )
-        error[makes_wall], signed[makes_wall] = wall["error_um"], wall["error_signed_um"]
+        error[makes_wall], signed[makes_wall] = wall["form_error_um"], wall["form_error_signed_um"]
     return {
         "pass": zone,
         "s_mm": s,
@@ -103,8 +111,25 @@ def cost(
         "arcs": met.count.astype(np.int64),
         "feed_mm_min": mm_min_from_mm_s(1.0) * speed,
         **load,
-        "error_um": error,
-        "error_signed_um": signed,
+        **_bent(cut, phi_in, phi_out, f_z, count, load["force_xy_n"]),
+        "form_error_um": error,
+        "form_error_signed_um": signed,
+    }
+
+
+def _bent(
+    cut: CutConditions, phi_in: Floats, phi_out: Floats, f_z: Floats, count: NDArray[np.int64], force: Floats
+) -> Columns:
+    """Stress of the cutter, its deflection as if the whole force acted at the tip (an upper bound), and that over the
+    greatest with which the rigid model holds.
+    """
+    plain = engagement_of_arcs(phi_in, phi_out, f_z, cut.cutter, cut.axial_depth, count=count)
+    tip = float(chain_compliance(tool_bars(cut.cutter), 0.0, 0.0))
+    deflection = 1000.0 * tip * force
+    return {
+        "cutter_stress_mpa": cutter_stress(with_runout(plain, cut.cutter), cut.cutter, cut.material),
+        "deflection_cutter_um": deflection,
+        "deflection_share": deflection_share(plain, deflection, cut.of_feed, cut.of_depth),
     }
 
 
@@ -116,14 +141,3 @@ def stacked(parts: Iterable[Columns]) -> Columns:
         start = np.cumsum([0.0] + [float(r[name][-1]) for r in rows[:-1]])
         out[name] = np.concatenate([r[name] + a for r, a in zip(rows, start, strict=True)])
     return out
-
-
-def check_limits(limits: Mapping[str, float], history: Columns, wall_pass: NDArray[np.bool_]) -> tuple[LimitCheck, ...]:
-    """Every stated limit against its worst row: engagement and wall error on the wall, the others anywhere."""
-    out = []
-    for name, limit in limits.items():
-        column, on_wall = LIMITS[name]
-        where = wall_pass if on_wall else np.ones(len(history[column]), dtype=bool)
-        value, at = worst(history, column, where)
-        out.append(LimitCheck(name, limit, value, at))
-    return tuple(out)

@@ -35,7 +35,7 @@ NARROW = 1e-7
 SECANTS = 12
 
 
-class Touch(IntEnum):
+class StepContact(IntEnum):
     """What a step does to the stock."""
 
     AIR = 0
@@ -50,7 +50,7 @@ class LineFeeds:
     Parameters
     ----------
     line : (m,) int, rising
-    touch : (m,) int, the most that a step of the line does, :class:`Touch`
+    touch : (m,) int, the most that a step of the line does, :class:`StepContact`
     least, allowed : (m,) float, the least factor that is wanted, the greatest that every step allows
     by : (m,) int, what holds it, as ``line_feeds`` was told; :data:`SLOWEST` where a limit asks for less than the least
     """
@@ -122,7 +122,7 @@ def line_feeds(line: ArrayLike, touch: ArrayLike, least: ArrayLike, most: ArrayL
     Parameters
     ----------
     line : (n,) int, of each step that moves at a feed
-    touch : (n,) int, :class:`Touch`
+    touch : (n,) int, :class:`StepContact`
     least : (n,) float, the least factor that is wanted of each
     most : (n,) float, the greatest factor of each; nan: a limit asks for less than the least
     by : (n,) int, what holds each, at least 0
@@ -142,7 +142,7 @@ def line_feeds(line: ArrayLike, touch: ArrayLike, least: ArrayLike, most: ArrayL
     np.maximum.at(does, of, np.asarray(touch, dtype=np.int64))
     np.maximum.at(floor, of, low)
     allowed = np.where(none[first], floor, high[first])
-    film = does == Touch.FILM
+    film = does == StepContact.FILM
     holds = np.where(none[first], SLOWEST, code[first])
     return LineFeeds(lines, does, np.where(film, 1.0, floor), np.where(film, 1.0, allowed), np.where(film, KEPT, holds))
 

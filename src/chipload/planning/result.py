@@ -5,6 +5,7 @@ Reference: HOUSE rule "what a calculation finds is a status in the result".
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.errors import InputError
 from chipload.geometry.contour import Contour
 from chipload.program.program import Program
 
@@ -34,24 +36,6 @@ class Event:
     failure: bool = False
 
 
-@dataclass(frozen=True)
-class LimitCheck:
-    """One limit of the job against the worst value found: ``holds`` is ``worst <= limit``.
-
-    ``at`` is the place (x, y) [mm] of the worst value.
-    """
-
-    name: str
-    limit: float
-    worst: float
-    at: tuple[float, float]
-
-    @property
-    def holds(self) -> bool:
-        """Whether the limit is kept."""
-        return self.worst <= self.limit
-
-
 @dataclass(frozen=True, eq=False)
 class StrategyResult:
     """One strategy of one operation.
@@ -61,14 +45,19 @@ class StrategyResult:
     name : `plain`, `backward`, `feed`, `forward` or `front`
     program : the motions, leads and links included
     history : a row a step; at least `pass`, `x_mm`, `y_mm`, `z_mm`, `s_mm` (path length), `t_s`, `engagement_deg`,
-        `feed_mm_min`, `force_x_n`, `force_y_n`, `force_xy_n`, `torque_nm`, `error_um`. `pass` is `semifinish`,
+        `feed_mm_min`, `force_x_n`, `force_y_n`, `force_xy_n`, `torque_nm`, `form_error_um`. `pass` is `semifinish`,
         `finish` or `front`; cutting that belongs to none of them is `lead` (run-on, run-off), `closing` (a closed
         pass meets its own beginning), `link`, `entry`.
     summary : JSON values, as `engagement_deg: {min, max}`; merged into summary.json
     events : in the order of the path
-    limits : the job's limits against this strategy
+    wall_rows : (n,) rows that make the wall: there the limits of engagement and form error count
     drawn : contours by name. The check needs `wall` (the part on the right of travel) and `stock before` (closed, what
         the first motion meets); `stock`, `semifinish path`, `finish path`, `leftover` ... are shown
+
+    Raises
+    ------
+    InputError
+        A number of the history, the summary or a limit is infinite or NaN.
     """
 
     name: str
@@ -76,13 +65,31 @@ class StrategyResult:
     history: Columns
     summary: Mapping[str, Any]
     events: tuple[Event, ...] = ()
-    limits: tuple[LimitCheck, ...] = ()
+    wall_rows: NDArray[np.bool_] | None = None
     drawn: Mapping[str, tuple[Contour, ...]] = field(default_factory=dict)
 
-    @property
-    def holds(self) -> bool:
-        """Whether every limit holds and no event is a failure."""
-        return all(x.holds for x in self.limits) and not any(e.failure for e in self.events)
+    def __post_init__(self) -> None:
+        for column, values in self.history.items():
+            if values.dtype.kind == "f" and not np.isfinite(values).all():
+                k = int(np.flatnonzero(~np.isfinite(values))[0])
+                x, y = float(self.history["x_mm"][k]), float(self.history["y_mm"][k])
+                raise InputError(
+                    f"strategy {self.name}: history.{column} = {values[k]} in row {k} at ({x:.6g}, {y:.6g}): must be "
+                    "finite: this is a fault of the planner, please report the job"
+                )
+        _check_finite(f"strategy {self.name}: summary", self.summary)
+
+
+def _check_finite(name: str, value: object) -> None:
+    """Refuse an infinite number or NaN anywhere in a tree of JSON values."""
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            _check_finite(f"{name}.{key}", inner)
+    elif isinstance(value, (list, tuple)):
+        for k, inner in enumerate(value):
+            _check_finite(f"{name}.{k}", inner)
+    elif isinstance(value, (float, np.floating)) and not math.isfinite(value):
+        raise InputError(f"{name} = {value}: must be finite: this is a fault of the planner, please report the job")
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,14 +100,3 @@ class OperationResult:
     use: str
     strategies: Mapping[str, StrategyResult]
     findings: tuple[str, ...] = ()
-
-    @property
-    def holds(self) -> bool:
-        """Whether the released strategy holds every limit."""
-        return self.strategies[self.use].holds
-
-
-def worst(columns: Columns, name: str, where: NDArray[np.bool_]) -> tuple[float, tuple[float, float]]:
-    """Greatest value of a column among the rows ``where``, and its place (x, y) [mm]."""
-    k = int(np.flatnonzero(where)[np.argmax(columns[name][where])])
-    return float(columns[name][k]), (float(columns["x_mm"][k]), float(columns["y_mm"][k]))

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
+from chipload.program.path_mode import mode_column
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -118,6 +119,8 @@ class Commands:
         Index into ``labels``.
     frames : tuple of Frame
     labels : tuple of str
+    path_mode : (n, 3) float
+        How the joint at the end of the motion is passed, see :mod:`~chipload.program.path_mode`; None: not stated.
 
     Raises
     ------
@@ -139,13 +142,15 @@ class Commands:
     label: Ints
     frames: tuple[Frame, ...]
     labels: tuple[str, ...]
+    path_mode: Floats = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         n = len(self.motion)
         kinds = {"position": np.float64, "centre": np.float64, "feed": np.float64, "spindle": np.float64, "tcp": bool}
         shapes = {"position": (n, 9), "centre": (n, 2)}
+        object.__setattr__(self, "path_mode", mode_column("commands", self.path_mode, n))
         for f in fields(self):
-            if f.name in ("frames", "labels"):
+            if f.name in ("frames", "labels", "path_mode"):
                 continue
             column = np.array(getattr(self, f.name), dtype=kinds.get(f.name, np.int64))
             if column.shape != shapes.get(f.name, (n,)):

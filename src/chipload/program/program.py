@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
+from chipload.program.path_mode import mode_column
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -58,6 +59,8 @@ class Program:
         Line of the source that the motion comes from; 0 where there is none.
     label : (n,) int
         Index into ``labels``.
+    path_mode : (n, 3) float
+        How the joint at the end of the motion is passed, see :mod:`~chipload.program.path_mode`; None: not stated.
     labels : tuple of str
         What the motions belong to, as `finish`, `lead`, `link`.
 
@@ -80,11 +83,13 @@ class Program:
     line: Ints
     label: Ints
     labels: tuple[str, ...]
+    path_mode: Floats = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         n = len(self.motion)
+        object.__setattr__(self, "path_mode", mode_column("program", self.path_mode, n))
         for f in fields(self):
-            if f.name == "labels":
+            if f.name in ("labels", "path_mode"):
                 continue
             kind = np.float64 if f.name in (*_VECTORS, "feed", "spindle") else np.int64
             column = np.array(getattr(self, f.name), dtype=kind)

@@ -1,34 +1,38 @@
 """Any program file: who reads it, what it does on a machine, what is wrong with it there.
 
 Notation: a **source** is a text of axes (RS-274, conversational: Commands) or of the tip (APT: Program). With a machine
-each leads to the other, so that a :class:`Reading` always has both.
+each leads to the other, so that a :class:`ProgramReading` always has both.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.errors import Finding, InputError
-from chipload.machine.feed import row_time_limited
+from chipload.errors import Finding, InputError, Severity
+from chipload.files import read_regular
 from chipload.machine.limits import limit_findings
 from chipload.machine.machine import Machine
-from chipload.program.apt.reader import read_apt_file
+from chipload.program.apt.cutters import read_cutters
+from chipload.program.apt.reader import apt_text, read_apt
 from chipload.program.check import check_program
 from chipload.program.commands import Commands
-from chipload.program.gcode.reader import read_gcode, read_gcode_file
+from chipload.program.gcode.reader import gcode_text, read_gcode
 from chipload.program.gcode.tools import ToolTable, read_tool_table
 from chipload.program.heidenhain.reader import read_heidenhain_file
 from chipload.program.program import Program
-from chipload.program.time import program_time
+from chipload.program.reconcile import agree, tool_comments
+from chipload.program.setup import Setup
+from chipload.program.time import row_times
 from chipload.program.to_axes import LIMITS, to_axes
 from chipload.program.to_work import TOLERANCE_MM, axes_of, to_work, work_frame
 from chipload.progress import Progress, silent
+from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -36,17 +40,23 @@ Dialect = Literal["linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"]
 
 #: dialect by the ending of a file; None: that of the machine
 ENDINGS: dict[str, Dialect | None] = {
-    **dict.fromkeys((".ngc", ".nc", ".gcode", ".tap", ".cnc", ".txt", ".iso", ".eia", ".ptp"), None),
+    **dict.fromkeys(
+        (".ngc", ".nc", ".gcode", ".gc", ".g", ".gco", ".gcd", ".tap", ".cnc", ".txt", ".iso", ".eia", ".ptp", ".din"),
+        None,
+    ),
+    **dict.fromkeys((".fnc", ".fan"), "fanuc"),
     **dict.fromkeys((".mpf", ".spf"), "sinumerik"),
     **dict.fromkeys((".h", ".hnc"), "heidenhain"),
-    **dict.fromkeys((".apt", ".cls", ".cl", ".clt", ".cldata"), "apt"),
+    **dict.fromkeys((".apt", ".cls", ".cl", ".clt", ".cldata", ".aptsource", ".ncl"), "apt"),
 }
+#: findings that leave a result unproven where the machine has rotary axes, whose place depends on the tool's length
+OF_LENGTHS = ("nc-length-unknown", "heidenhain-tool-unknown")
 #: largest tool table [bytes]
 LARGEST_TABLE = 10_000_000
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class ProgramReading:
     """A program on a machine.
 
     Parameters
@@ -54,15 +64,15 @@ class Reading:
     commands : motions of the machine's axes
     program : motions of the tip in the work frame; rows on which a rotary axis moves may be several here
     axes : (n, 9) float [mm, rad], the machine's own axes at the end of each row of ``commands``
-    noticed : by the reader
-    broken : what the program asks of the machine that it does not give
+    findings : by the reader
+    violations : what the program asks of the machine that it does not give
     """
 
     commands: Commands
     program: Program
     axes: Floats
-    noticed: tuple[Finding, ...]
-    broken: tuple[Finding, ...]
+    findings: tuple[Finding, ...]
+    violations: tuple[Finding, ...]
 
 
 def read_program(
@@ -74,43 +84,63 @@ def read_program(
     feed: float | None = None,
     tolerance: float = TOLERANCE_MM,
     text: str | None = None,
+    setup: Setup | None = None,
+    comments: bool = True,
+    strict: bool = False,
     progress: Progress = silent,
-) -> Reading:
+) -> ProgramReading:
     """Read a program for a machine.
+
+    What a controller would refuse and what is not read is a finding of the severity UNPROVEN as far as the rest can be
+    read, unless ``strict``.
 
     Parameters
     ----------
     text : an NC text that stands for that of the file; None: the file is read
     dialect : None: by the ending of the file, for NC texts that of the machine
     tools : diameters and lengths; without it they count as 0
-    feed : [mm/s] of CL data that state none
+    feed : [mm/s] of cuts before the text states a feed
+    setup : what the controller knows before the program, and the cutters of the job
+    comments : the comments of NC text are held against the cutters of the job
+    strict : NC text that LinuxCNC would refuse is refused
     tolerance : of rows on which a rotary axis moves [mm]
 
     Raises
     ------
     InputError
-        The file cannot be read, its controller would refuse it, the machine has not the axes that it moves.
+        The file cannot be read, what it asks for can't be carried out, the machine has not the axes that it moves, or
+        what is stated about a cutter contradicts the job's.
     """
-    path = Path(path)
+    path, setup = Path(path), setup or Setup()
     kind = dialect_of(path, machine, dialect)
+    values, origins, placed = setup.values(kind), setup.origins(kind), setup.placed(kind)
     if kind == "apt":
         lengths = tools.lengths() if tools is not None else {}
-        program, noticed = read_apt_file(path, feed=feed)
+        text = apt_text(path)
+        shapes = read_cutters(text)[0] if setup.cutters else {}
+        agreed = agree(path.name, setup.cutters, tools=tools, shapes=shapes)
+        program, findings = read_apt(text, name=path.stem, feed=feed)
         commands, found = to_axes(program, machine, tool_lengths=lengths, tolerance=tolerance)
         more = tuple(f for f in found if f.code not in LIMITS)
     else:
         if kind == "heidenhain":
-            commands, noticed = read_heidenhain_file(path)
-        elif text is None:
-            commands, noticed = read_gcode_file(path, dialect=kind, tools=tools, progress=progress)
+            agreed = agree(path.name, setup.cutters, tools=tools)
+            commands, findings = read_heidenhain_file(path, {int(k): v for k, v in values.items()})
         else:
-            commands, noticed = read_gcode(
-                text, name=path.name, folder=path.parent, dialect=kind, tools=tools, progress=progress
-            )
+            text = gcode_text(path) if text is None else text
+            stated = tool_comments(text) if setup.cutters and comments else {}
+            agreed = agree(path.name, setup.cutters, tools=tools, comments=stated)
+            commands, findings = read_gcode(
+                text, name=path.name, folder=path.parent, dialect=kind, tools=tools, parameters=values,
+                origins=origins, diameters=setup.diameters(), feed=None if feed is None else mm_min_from_mm_s(feed),
+                lenient=not strict, progress=progress,
+            )  # fmt: skip
         if len(commands) == 0:
             raise InputError(f"{path.name}: no motion: nothing to check")
-        program, more = to_work(commands, machine, tolerance=tolerance)
-    return _held(commands, program, machine, noticed, more)
+        program, more = to_work(commands, machine, tolerance=tolerance, placed=placed)
+        if machine.chain.rotary:
+            findings = tuple(replace(f, severity=Severity.UNPROVEN) if f.code in OF_LENGTHS else f for f in findings)
+    return _held(commands, program, machine, (*agreed, *findings), more, placed)
 
 
 def reading_of(
@@ -119,7 +149,7 @@ def reading_of(
     *,
     tool_lengths: Mapping[int, float] | None = None,
     tolerance: float = TOLERANCE_MM,
-) -> Reading:
+) -> ProgramReading:
     """What the axes of a machine do for a program that comes from no file, and what is wrong with it there.
 
     Parameters
@@ -142,37 +172,59 @@ def _held(
     commands: Commands,
     program: Program,
     machine: Machine,
-    noticed: tuple[Finding, ...],
+    findings: tuple[Finding, ...],
     more: tuple[Finding, ...],
-) -> Reading:
+    placed: int | None = None,
+) -> ProgramReading:
     """A program held against the limits of a machine."""
-    axes = axes_of(commands, machine)
-    broken = [*check_program(program, machine)]
+    axes = axes_of(commands, machine, placed)
+    violations = [*check_program(program, machine)]
     if machine.chain.rotary:
-        found = limit_findings(machine, axes, commands.line, placed=bool(work_frame(commands).offset.any()))
-        broken += [f for f in found if f.code != "machine-offset"]
+        found = limit_findings(machine, axes, commands.line, placed=bool(work_frame(commands, placed).offset.any()))
+        violations += [f for f in found if f.code != "machine-offset"]
         more += tuple(f for f in found if f.code == "machine-offset")
     problems = ("machine-reach", "machine-linear")
-    broken += [f for f in more if f.code in problems]
-    noticed += tuple(f for f in more if f.code not in problems)
-    return Reading(commands, program, axes, noticed, tuple(broken))
+    violations += [f for f in more if f.code in problems]
+    findings += tuple(f for f in more if f.code not in problems)
+    return ProgramReading(commands, program, axes, findings, tuple(violations))
 
 
-def line_times(reading: Reading, machine: Machine) -> tuple[Ints, Floats]:
-    """Lines of the source that move, (m,) rising, and their times (m,) [s].
+def times_of(reading: ProgramReading, machine: Machine) -> Floats:
+    """(n,) time of each row of the tip [s], see :mod:`chipload.program.time`."""
+    return row_times(reading.program, machine, reading.commands, reading.axes)
 
-    The time of the path (feeds, rapid rate, accelerations, see :mod:`chipload.program.time`), and where a rotary axis
-    moves at least what the rates of all axes need.
+
+def command_times(commands: Commands, machine: Machine) -> Floats:
+    """(m,) time of each command [s], written as a block of its own."""
+    blocks = replace(commands, line=np.arange(len(commands)))
+    tips, _ = to_work(blocks, machine)
+    seconds = row_times(tips, machine, blocks, axes_of(blocks, machine))
+    return _summed(tips.line, seconds, len(commands))
+
+
+def times_on(program: Program, machine: Machine, tool_lengths: Mapping[int, float] | None = None) -> Floats:
+    """(n,) time of each row of a program that comes from no file [s], as its text takes it.
+
+    Parameters
+    ----------
+    tool_lengths : [mm] of each tool; one that is not named has 0
     """
-    program, commands = reading.program, reading.commands
-    lines = np.unique(np.concatenate([program.line, commands.line]))
+    commands, _ = to_axes(replace(program, line=np.arange(len(program))), machine, tool_lengths=tool_lengths)
+    return _summed(commands.line, command_times(commands, machine), len(program))
+
+
+def _summed(row: Ints, seconds: Floats, n: int) -> Floats:
+    """(n,) sums of times by row."""
+    out = np.zeros(n)
+    np.add.at(out, row, seconds)
+    return out
+
+
+def line_times(reading: ProgramReading, machine: Machine) -> tuple[Ints, Floats]:
+    """Lines of the source that move, (m,) rising, and their times (m,) [s]: sums of :func:`times_of`."""
+    lines = np.unique(np.concatenate([reading.program.line, reading.commands.line]))
     seconds = np.zeros(len(lines))
-    np.add.at(seconds, np.searchsorted(lines, program.line), program_time(program, machine))
-    if machine.chain.rotary:
-        least = np.concatenate([[0.0], row_time_limited(machine, reading.axes)])[: len(commands)]
-        by_axes = np.zeros(len(lines))
-        np.add.at(by_axes, np.searchsorted(lines, commands.line), least)
-        seconds = np.maximum(seconds, by_axes)
+    np.add.at(seconds, np.searchsorted(lines, reading.program.line), times_of(reading, machine))
     return lines, seconds
 
 
@@ -185,12 +237,7 @@ def read_tools(path: str | Path) -> ToolTable:
         The file cannot be read or an entry is wrong.
     """
     path = Path(path)
-    try:
-        if path.stat().st_size > LARGEST_TABLE:
-            raise InputError(f"{path.name}: must be at most {LARGEST_TABLE} bytes")
-        text = path.read_bytes().decode("utf-8", "replace")
-    except OSError as err:
-        raise InputError(f"{path.name}: cannot be read: {err.strerror}") from None
+    text = read_regular(path, path.name, LARGEST_TABLE, "not a tool table").decode("utf-8", "replace")
     return read_tool_table(text, name=path.name)[0]
 
 

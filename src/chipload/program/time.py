@@ -1,29 +1,39 @@
-"""How long a machine takes for a program, row by row.
+"""How long a machine takes for a program, row by row: the one clock of the product.
 
 Notation: L [mm] length of a row, v [mm/s] its feed or the rapid rate, a [mm/s^2], u unit direction of travel, theta
-[rad] the angle between the end of a row and the start of the next, delta [mm] the machine's corner tolerance.
+[rad] the angle between the end of a row and the start of the next, delta [mm] how far the corner between them may be
+rounded off.
 
-The rule: a row runs at min(v, sqrt(a_n r)) on an arc of radius r, with the acceleration along the path that its axes
+A machine under LinuxCNC is judged by its trajectory planner (:mod:`chipload.program.trajectory`). The rule for every
+other: a row runs at min(v, sqrt(a_n r)) on an arc of radius r, with the acceleration along the path that its axes
 can give together, a = min over axes of a_i / |u_i|, |u_i| the greatest anywhere on an arc; a_n = min of a_i / the share
 of axis i in the arc's plane. Rows pass into one another at `corner_speed(theta, a, delta)`: a tangent joint without
-slowing, a corner as fast as an arc that rounds it off by delta allows. Between a rapid and a feed, at a dwell, a change
-of tool or of spindle, and at both ends, the machine stands. Acceleration is constant in pieces (no jerk limit), and to
-change the tool or to run up the spindle takes no time.
+slowing, a corner as fast as an arc that rounds it off by delta, and takes at most half of either row, allows. delta is
+that of G64 P; without it the machine's corner tolerance; 0 for G61; under G61.1 every joint is a stop. Between a rapid
+and a feed, at a dwell, a change of tool or of spindle, and at both ends, the machine stands. Acceleration is constant
+in pieces (no jerk limit), and to change the tool or to run up the spindle takes no time.
+
+Where a rotary axis moves, the rows of a line of the text take together at least what the rates of all axes need.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.machine.feed import corner_speed, limited_speed, move_time
+from chipload.machine.feed import corner_speed, limited_speed, move_time, row_time_limited
 from chipload.machine.machine import Machine
+from chipload.program.commands import ARC, PLANE_AXES, Commands, spirals
 from chipload.program.motions import bases, directions, is_arc, lengths, radii, sweeps
-from chipload.program.program import DWELL, RAPID, Program
+from chipload.program.path_mode import PathControl, resolved
+from chipload.program.program import ARC_CCW, ARC_CW, ARC_SKEW_MM, DWELL, LINE, RAPID, Program
+from chipload.program.trajectory import planned_times
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 class _Speeds(NamedTuple):
@@ -39,12 +49,12 @@ class _Speeds(NamedTuple):
 
 
 def program_time(program: Program, machine: Machine) -> Floats:
-    """Time of each row.
+    """Time of each row along the path of the tip.
 
     Returns
     -------
     (n,) float [s]
-        Row 0 and rows without length take none, a dwell its own.
+        Row 0, rows without length and rapids that send an axis for the first time take none, a dwell its own.
 
     Examples
     --------
@@ -56,11 +66,73 @@ def program_time(program: Program, machine: Machine) -> Floats:
     >>> program_time(p, machine_named("vmc")).round(6).tolist()
     [0.0, 2.263333]
     """
+    unplaced = program.path_mode[:, 0] == PathControl.UNPLACED
+    program = replace(program, path_mode=resolved(program.path_mode, machine.corner_tolerance))
+    if machine.planner is not None:
+        return np.where(unplaced, 0.0, planned_times(program, machine, machine.planner))
     out = np.where(program.motion == DWELL, program.feed, 0.0)
     if (lengths(program) > 0.0).any():
         row, length, most, a, v = _speeds(program, machine)
         out[row] = move_time(length, most, a, v[:-1], v[1:])
-    return out
+    return np.where(unplaced, 0.0, out)
+
+
+def row_times(
+    program: Program, machine: Machine, commands: Commands | None = None, axes: Floats | None = None
+) -> Floats:
+    """Time of each row on the machine; row k runs from ``cumsum(t)[k - 1]`` to ``cumsum(t)[k]``.
+
+    Parameters
+    ----------
+    commands, axes : what the machine's axes do for the program, and (m, 9) where they stand after each row of it [mm,
+        rad]; needed where rotary axes move. Rows belong together by their line.
+
+    Returns
+    -------
+    (n,) float [s]
+        The rows of a line share what its axes need beyond the path's own time.
+    """
+    own = program_time(program, machine)
+    if commands is None or axes is None or not machine.chain.rotary or len(program) == 0:
+        return own
+    lines = np.unique(np.concatenate([program.line, commands.line]))
+    at = np.searchsorted(lines, program.line)
+    whole, count, needed = (np.zeros(len(lines)) for _ in range(3))
+    np.add.at(whole, at, own)
+    np.add.at(count, at, 1.0)
+    if machine.planner is None:
+        least = np.concatenate([[0.0], row_time_limited(machine, axes)])[: len(commands)]
+    else:
+        least = _axis_path_times(commands, machine)
+    least = np.where(commands.path_mode[:, 0] == PathControl.UNPLACED, 0.0, least)
+    np.add.at(needed, np.searchsorted(lines, commands.line), least)
+    total = np.maximum(whole, needed) if machine.planner is None else needed
+    share = np.where(whole[at] > 0.0, own / np.where(whole[at] > 0.0, whole[at], 1.0), 1.0 / count[at])
+    return np.asarray(own + (total - whole)[at] * share)
+
+
+def _axis_path_times(commands: Commands, machine: Machine) -> Floats:
+    """(m,) time of each row of commands as LinuxCNC's planner sees it: a path of X Y Z with angles beside."""
+    assert machine.planner is not None
+    position = commands.machine()
+    arc = (commands.motion == ARC) & ~spirals(commands, ARC_SKEW_MM)
+    pair = np.array(PLANE_AXES)[commands.plane]
+    shift = position - commands.position
+    n = len(commands)
+    centre, normal = np.zeros((n, 3)), np.tile([0.0, 0.0, 1.0], (n, 1))
+    rows = np.flatnonzero(arc)
+    for k in (0, 1):
+        centre[rows, pair[rows, k]] = commands.centre[rows, k] + shift[rows, pair[rows, k]]
+    normal[rows] = np.eye(3)[pair[rows, 2]]
+    motion = np.array([RAPID, LINE, LINE, DWELL, LINE])[commands.motion]
+    flat = Program(
+        motion=np.where(arc, np.where(commands.turns > 0, ARC_CCW, ARC_CW), motion),
+        p_work=position[:, :3], axis=np.tile([0.0, 0.0, 1.0], (n, 1)), centre=centre, normal=normal,
+        turns=np.where(arc, np.abs(commands.turns) - 1, 0), feed=commands.feed, spindle=commands.spindle,
+        tool=commands.tool, line=commands.line, label=commands.label, labels=commands.labels,
+        path_mode=resolved(commands.path_mode, machine.corner_tolerance),
+    )  # fmt: skip
+    return planned_times(flat, machine, machine.planner, position[:, 3:])
 
 
 def peak_speed(program: Program, machine: Machine) -> Floats:
@@ -69,7 +141,7 @@ def peak_speed(program: Program, machine: Machine) -> Floats:
     Returns
     -------
     (n,) float [mm/s]
-        0 in rows without length.
+        0 in rows without length. Under LinuxCNC's planner what the row is asked for.
 
     Examples
     --------
@@ -81,6 +153,9 @@ def peak_speed(program: Program, machine: Machine) -> Floats:
     >>> peak_speed(p, machine_named("vmc")).round(6).tolist()
     [0.0, 30.0]
     """
+    if machine.planner is not None:
+        asked = np.where(program.motion == RAPID, machine.rapid, np.minimum(program.feed, machine.feed_max))
+        return np.where((lengths(program) > 0.0) & (program.motion != DWELL), asked, 0.0)
     out = np.zeros(len(program))
     if (lengths(program) > 0.0).any():
         row, length, most, a, v = _speeds(program, machine)
@@ -114,7 +189,15 @@ def _speeds(program: Program, machine: Machine) -> _Speeds:
     here, there = row[:-1], row[1:]
     cos = (last[here] * first[there]).sum(axis=1)
     sin = np.linalg.norm(np.cross(last[here], first[there]), axis=1)
-    joint = corner_speed(np.arctan2(sin, cos), np.minimum(a[here], a[there]), machine.corner_tolerance)
+    mode = resolved(program.path_mode, machine.corner_tolerance)[here]
+    stated = np.where(mode[:, 1] > 0.0, mode[:, 1], machine.corner_tolerance)
+    tolerance = np.where(mode[:, 0] == PathControl.CONTINUOUS, stated, 0.0)
+    theta, least = np.arctan2(sin, cos), np.minimum(a[here], a[there])
+    joint = corner_speed(theta, least, tolerance)
+    half = 0.5 * np.minimum(length[here], length[there])
+    with np.errstate(divide="ignore"):
+        joint = np.where(joint < np.inf, np.minimum(joint, np.sqrt(least * half / np.tan(0.5 * theta))), joint)
+    joint = np.where(mode[:, 0] == PathControl.EXACT_STOP, 0.0, joint)
     joint = np.minimum(joint, np.minimum(speed[here], speed[there]))
     rest = (program.motion[here] == RAPID) != (program.motion[there] == RAPID)
     rest |= (program.tool[here] != program.tool[there]) | (program.spindle[here] != program.spindle[there])

@@ -122,6 +122,7 @@ def _commands(
         label=program.label,
         frames=frames,
         labels=program.labels,
+        path_mode=program.path_mode,
     )
 
 

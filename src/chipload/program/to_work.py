@@ -45,18 +45,39 @@ _ROTARY = slice(3, 6)
 _STILL = 1e-12  # [rad] a rotary axis that moves less stands
 
 
-def work_frame(commands: Commands) -> Frame:
-    """The work offset that the motions are in: the first that is not the machine's own."""
-    used = [commands.frames[k] for k in dict.fromkeys(commands.frame.tolist())]
-    return next((f for f in used if f.number > 0), Frame())
+def work_frame(commands: Commands, number: int | None = None) -> Frame:
+    """The work offset whose coordinates are those of the workpiece.
+
+    Parameters
+    ----------
+    number : of the work offset; None: the first of the motions that is not the machine's own
+
+    Raises
+    ------
+    InputError
+        No motion is in the work offset of that number.
+    """
+    used: list[Frame] = [commands.frames[k] for k in dict.fromkeys(commands.frame.tolist())]
+    if number is None:
+        return next((f for f in used if f.number > 0), Frame())
+    found = next((f for f in used if f.number == number), None)
+    if found is None:
+        known = ", ".join(dict.fromkeys(_offset_name(f.number) for f in used if f.number > 0)) or "none"
+        raise InputError(f"program.placed_in: no motion is in {_offset_name(number)}: must be one of {known}")
+    return found
 
 
-def axes_of(commands: Commands, machine: Machine) -> Floats:
+def _offset_name(number: int) -> str:
+    return f"G{53 + number}" if number < 7 else f"G59.{number - 6}" if number < 10 else f"work offset {number}"
+
+
+def axes_of(commands: Commands, machine: Machine, placed: int | None = None) -> Floats:
     """(n, 9) where the machine's own axes stand at the end of each row [mm, rad]; O(n).
 
-    Where the work offset is not known, the work's zero is where the machine's file puts it.
+    Where the work offset is not known, the work's zero is where the machine's file puts it. ``placed`` as in
+    :func:`to_work`.
     """
-    base = work_frame(commands)
+    base = work_frame(commands, placed)
     zero, shift = _work_zero(machine, base, bool(base.offset.any()))
     axes = commands.machine() + shift
     if not (machine.chain.rotary and commands.tcp.any()):
@@ -68,7 +89,7 @@ def axes_of(commands: Commands, machine: Machine) -> Floats:
 
 
 def to_work(
-    commands: Commands, machine: Machine, *, tolerance: float = TOLERANCE_MM
+    commands: Commands, machine: Machine, *, tolerance: float = TOLERANCE_MM, placed: int | None = None
 ) -> tuple[Program, tuple[Finding, ...]]:
     """What the commands do to the workpiece: tip and tool's axis in the work frame; O(n).
 
@@ -77,6 +98,7 @@ def to_work(
     commands : motions of the machine's axes, or of the tip where ``tcp``
     machine : whose chain leads from the axes to the tip
     tolerance : greatest distance [mm] of the tip's path from the pieces of a row on which a rotary axis moves
+    placed : number of the work offset whose coordinates are those of the workpiece; None: the first that is used
 
     Raises
     ------
@@ -84,7 +106,7 @@ def to_work(
         An axis moves that the machine has not; the work offset is turned and the machine has rotary axes.
     """
     findings = _strangers(commands, machine)
-    base = work_frame(commands)
+    base = work_frame(commands, placed)
     known = bool(base.offset.any())
     zero, shift = _work_zero(machine, base, known)
     commands = chorded(commands, _turning(commands) | spirals(commands, 0.999 * ARC_SKEW_MM), tolerance)
@@ -109,6 +131,7 @@ def to_work(
         "tool": commands.tool,
         "line": commands.line,
         "label": commands.label,
+        "path_mode": commands.path_mode,
         **_arcs_to_work(commands, machine, axes, tool, zero, base),
     }
     arcs = np.where(commands.turns > 0, ARC_CCW, ARC_CW)

@@ -12,14 +12,14 @@ from plotly.subplots import make_subplots
 
 from chipload.errors import InputError
 from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS
-from chipload.report.held import LIMITS
 from chipload.report.shape import thinned
+from chipload.result import column_of
 from chipload.tables import nearest
 
 #: the columns that are drawn where none is named
 USUAL = ("force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um")
 #: axes that columns are drawn against, and their titles
-AGAINST = {"t_s": "time at the commanded feed [s]", "s_mm": "path [mm]"}
+AGAINST = {"t_s": "time [s]", "s_mm": "path [mm]"}
 #: columns whose size is held, whatever their sign
 SIGNED = ("form_error_um",)
 #: height of a row [px]
@@ -37,7 +37,7 @@ def columns_figure(
     Parameters
     ----------
     columns : (n,) each, those of a history
-    limits : by name, keys of :data:`chipload.report.held.LIMITS`
+    limits : by name
 
     Raises
     ------
@@ -52,7 +52,7 @@ def columns_figure(
             raise InputError(f"plot: column {name!r}: not known: the nearest is {nearest(name, drawable)}")
     if not names:
         raise InputError("plot: no column is named: name at least one, as force_n")
-    bound = {LIMITS[k][0]: v for k, v in limits.items() if k in LIMITS and not k.startswith("spindle")}
+    bound = {column_of(k).name: v for k, v in limits.items() if not k.startswith("spindle")}
     across = np.asarray(columns[x])
     out = make_subplots(rows=len(names), cols=1, shared_xaxes=True, vertical_spacing=0.24 / (2 + 2 * len(names)))
     for row, name in enumerate(names, start=1):

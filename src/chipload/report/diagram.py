@@ -16,7 +16,7 @@ from plotly.subplots import make_subplots
 
 from chipload.cutter.cutter import Cutter
 from chipload.engagement.chips.chips import chips
-from chipload.engagement.chips.covered import Covered
+from chipload.engagement.chips.covered import CoveredArea
 from chipload.engagement.chips.diagram import diagram
 from chipload.engagement.chips.move import Move
 from chipload.engagement.chips.ring import Origin, Ring
@@ -44,7 +44,7 @@ def diagram_figure(
     height: float,
     stock_polygon: shapely.Polygon | shapely.MultiPolygon | None = None,
     title: str = "",
-    before: Covered | shapely.Polygon | shapely.MultiPolygon | None = None,
+    before: CoveredArea | shapely.Polygon | shapely.MultiPolygon | None = None,
     tolerance: float = 1e-3,
 ) -> go.Figure:
     """The diagram of a move on a layer (left) and what it covers, or its chip (right).

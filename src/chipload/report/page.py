@@ -1,178 +1,131 @@
-"""report.html: one file that opens without a network and prints; the verdict first, then what does not hold and where.
+"""report.html: one skeleton for every capability.
 
-Order of the page: verdict, what does not hold, and for each operation its strategies side by side, the pass along its
-length, the plan, the view in space; then findings, what was not checked, where the numbers come from.
+The verdict and its message come first, then the limits, the tracks, the sections of the capability, findings, what was
+not checked, and where the numbers come from.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable
+from dataclasses import asdict
 from html import escape
 
 import plotly.graph_objects as go
 
-from chipload.planning.result import StrategyResult
-from chipload.report.figures import COLOURS, along, plan, space
-from chipload.report.outcome import REFUSED, WORDS, Operation, Outcome, failures, released, verdict
-from chipload.report.sheet import definitions, figure, framed, heading, items, said, table
-from chipload.report.summary import program_name
+from chipload.errors import Finding, Severity
+from chipload.report.presentation import Presentation
+from chipload.report.sheet import definitions, framed, heading, items, table
+from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict
+
+#: findings and limits that the report lists
+LISTED = 300
+#: classes of the banner and of a cell by state
+BANNERS = {Verdict.HOLDS: "good", Verdict.UNPROVEN: "open", Verdict.EXCEEDS: "bad"}
+CELLS = {Verdict.HOLDS: "ok", Verdict.UNPROVEN: "may", Verdict.EXCEEDS: "no"}
+#: headings of the table of tracks
+HEADINGS = {
+    TrackKind.STRATEGY: "Strategies",
+    TrackKind.VARIANT: "Variants",
+    TrackKind.CONTROLLER: "Controllers",
+    TrackKind.PROGRAM: "Programs",
+    TrackKind.MEASUREMENT: "Measurements",
+}
 
 
-def page_bytes(outcome: Outcome) -> bytes:
+def page_bytes(result: Result, presentation: Presentation) -> bytes:
     """report.html."""
-    holds, says = verdict(outcome)
     figures: dict[str, go.Figure] = {}
+    verdict = result.verdict
     body = [
-        *heading(outcome.title, holds, "Holds" if holds else "Does not hold", says.removeprefix(REFUSED)),
-        *_failed(outcome),
+        *heading(result.title, BANNERS[verdict], verdict.value, result.message),
+        "<h2>Limits</h2>",
+        *limits_table(result.tracks),
+        *tracks_table(result.tracks),
+        *presentation.sections(figures),
+        *findings_table("Findings", _findings(result)),
+        "<h2>Not checked</h2>",
+        items(result.unchecked) if result.unchecked else "<p>Every limit and check is stated.</p>",
+        "<h2>Provenance</h2>",
+        definitions(asdict(result.provenance)),
     ]
-    for k, op in enumerate(outcome.operations):
-        body += _operation(k, op, figures)
-    body += _rest(outcome)
-    return framed(outcome.title, "holds" if holds else "does not hold", body, figures)
+    return framed(result.title, verdict.value, body, figures)
 
 
-def _failed(outcome: Outcome) -> list[str]:
-    rows = [
-        [str(k), escape(f"{op.result.kind}, {op.result.use}"), escape(f.text), _place(f.at)]
-        for k, op in enumerate(outcome.operations)
-        for f in failures(op, op.result.use)
-    ]
-    head = ["operation", "strategy", "what does not hold", "place x, y [mm]"]
-    return ["<h3>What does not hold</h3>", table(head, rows, numbers=(3,))] if rows else []
-
-
-def _operation(k: int, op: Operation, figures: dict[str, go.Figure]) -> list[str]:
-    result, c = op.result, op.cutter
-    settings = ", ".join(f"{key} {said(value)}" for key, value in op.settings.items() if key not in ("kind", "use"))
-    out = [
-        f"<h2>Operation {k}: {escape(result.kind)}</h2>",
-        f"<p>Released: <b>{escape(result.use)}</b>. Cutter {c.number}: D {c.diameter:g} mm, {c.flutes} flutes, "
-        f"helix {_degrees(c.helix)} deg, overhang {c.overhang:g} mm.</p>",
-        f'<p class="note">{escape(settings)}</p>',
-        "<h3>Strategies side by side</h3>",
-        _strategies(k, op),
-        "<h3>Limits</h3>",
-        _limits(op),
-        f"<h3>Along the {'pass' if result.kind != 'contour' else 'finish pass'}</h3>",
-        figure(f"along-{k}", along(op), figures),
-        "<h3>From above</h3>",
-        '<p class="note">The pass is coloured by engagement, dashed lines are passes before it, diamonds are events, '
-        "crosses do not hold. Click a name to show or hide it.</p>",
-        figure(f"plan-{k}", plan(op), figures),
-        "<h3>In space</h3>",
-        figure(f"space-{k}", space(op), figures),
-    ]
-    events = [
-        [_name(n), escape(e.code), escape(e.text), _place((e.x, e.y))]
-        for n, s in result.strategies.items()
-        for e in s.events
-    ]
-    if events:
-        shown = events[:200]
-        out += [
-            "<h3>Events</h3>",
-            table(["strategy", "code", "what happened", "place x, y [mm]"], shown, numbers=(3,)),
-        ]
-        if len(events) > len(shown):
-            out.append(f'<p class="note">{len(events) - len(shown)} more in summary.json.</p>')
-    return out + (["<h3>Findings of the planner</h3>", items(result.findings)] if result.findings else [])
-
-
-def _strategies(k: int, op: Operation) -> str:
-    head = ["strategy", "engagement [deg]", "force in the plane [N]", "torque [N m]", "wall error [um]", "time [s]"]
-    head += ["limits", "simulation", "program"]
-    rows = []
-    for name, s in op.result.strategies.items():
-        bad = [_word(c.name) for c in s.limits if not c.holds] + [e.code for e in s.events if e.failure]
-        proof = op.proofs.get(name)
-        status = "not checked" if proof is None else proof.status
-        good = status == "proved"
-        rows.append(
-            [
-                _name(name) + (" <b>in use</b>" if name == op.result.use else ""),
-                _span(s, "engagement_deg"),
-                _span(s, "force_xy_n"),
-                _span(s, "torque_nm"),
-                _most(s, "error_um"),
-                _most(s, "time_s"),
-                f'<span class="no">{escape(", ".join(dict.fromkeys(bad)))}</span>'
-                if bad
-                else '<span class="ok">hold</span>',
-                f'<span class="{"ok" if good else "no"}" title="{escape(proof.says if proof else "")}">{status}</span>',
-                f"<code>{program_name(k, name)}</code>" + (" verified" if released(op, name) else ""),
-            ]
-        )
-    used = [name == op.result.use for name in op.result.strategies]
-    return table(head, rows, numbers=(1, 2, 3, 4, 5), used=used)
-
-
-def _limits(op: Operation) -> str:
-    """Every limit and strategy; those that do not hold first."""
-    checks = [(not c.holds, name, c) for name, s in op.result.strategies.items() for c in s.limits]
-    checks.sort(key=lambda x: not x[0])
+def limits_table(tracks: Iterable[Track]) -> list[str]:
+    """Every limit of every track; those of tracks in use first, within them the worst state first."""
+    checks = [(track, check) for track in tracks for check in track.limits]
+    order = list(Verdict)
+    checks.sort(key=lambda x: (not x[0].in_use, -order.index(x[1].state)))
+    if not checks:
+        return ["<p>No limit was checked.</p>"]
     rows = [
         [
-            _name(name),
-            escape(" ".join(WORDS[c.name]) if c.name in WORDS else c.name),
-            f"{c.limit:g}",
-            f"{c.worst:.4g}",
-            _place(c.at),
-            '<span class="no">does not hold</span>' if bad else '<span class="ok">holds</span>',
+            escape(track.name) + (" <b>in use</b>" if track.in_use else ""),
+            escape(check.column.title),
+            state_cell(check.state),
+            f"{check.limit:g}",
+            "not known" if check.worst is None else f"{check.worst:.4g}",
+            f"{100.0 * check.resolution_error:.2g} %" if check.resolution_error else "",
+            str(check.line or ""),
+            "" if check.t_s is None else f"{check.t_s:.4g}",
+            place_cell(check),
+            escape(check.reason),
         ]
-        for bad, name, c in checks
+        for track, check in checks[:LISTED]
     ]
-    return table(["strategy", "limit", "at most", "worst", "place x, y [mm]", "status"], rows, numbers=(2, 3, 4))
+    head = ["track", "limit", "state", "at most", "worst", "resolution", "line", "time [s]", "place [mm]", "reason"]
+    return [table(head, rows, numbers=(3, 4, 5, 6, 7), used=[t.in_use for t, _ in checks[:LISTED]])]
 
 
-def _rest(outcome: Outcome) -> list[str]:
-    out = []
-    if outcome.findings:
-        out += ["<h2>Findings</h2>", items(outcome.findings)]
-    out.append("<h2>What was not checked</h2>")
-    unchecked = [f"{_word(name)}: the job states no limit" for name in outcome.unchecked]
-    unchecked += [
-        f"operation {k}, {name}: {proof.says}"
-        for k, op in enumerate(outcome.operations)
-        for name, proof in op.proofs.items()
-        if proof.status == "unproven"
+def tracks_table(tracks: tuple[Track, ...]) -> list[str]:
+    """Tracks side by side; nothing where there is one without a program."""
+    if len(tracks) < 2 and not any(track.programs for track in tracks):
+        return []
+    rows = [
+        [
+            escape(track.name) + (" <b>in use</b>" if track.in_use else ""),
+            escape(
+                ", ".join(f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in track.parameters.items())
+            ),
+            state_cell(track.verdict),
+            "" if track.time_s is None else f"{track.time_s:.5g}",
+            ", ".join(f"<code>{escape(name)}</code>" for name in track.programs),
+        ]
+        for track in tracks
     ]
-    unchecked += [
-        f"operation {k}, {name}: engagement of {proof.numbers['rows_not_compared']} steps down into the stock"
-        for k, op in enumerate(outcome.operations)
-        for name, proof in op.proofs.items()
-        if proof.numbers.get("rows_not_compared")
+    kind = tracks[0].kind
+    head = [kind.value, "parameters", "verdict", "time [s]", "programs"]
+    return [f"<h2>{HEADINGS[kind]}</h2>", table(head, rows, numbers=(3,), used=[t.in_use for t in tracks])]
+
+
+def findings_table(title: str, findings: tuple[Finding, ...]) -> list[str]:
+    """Findings, the worst first; nothing where there is none."""
+    if not findings:
+        return []
+    ordered = sorted(findings, key=lambda f: -f.severity)
+    rows = [
+        [state_cell(Verdict.of_finding(f)) if f.severity else "note", str(f.line or ""), escape(f.text), escape(f.code)]
+        for f in ordered[:LISTED]
     ]
-    out.append(items(unchecked) if unchecked else "<p>Every limit that chipload knows is stated and was checked.</p>")
-    return [*out, "<h2>Where the numbers come from</h2>", definitions(outcome.provenance)]
+    more = [f'<p class="note">{len(ordered) - LISTED} more in summary.json.</p>'] if len(ordered) > LISTED else []
+    return [f"<h2>{title}</h2>", table(["state", "line", "finding", "code"], rows, numbers=(1,)), *more]
 
 
-# -- parts ------------------------------------------------------------------------------------------------------
-def _word(limit: str) -> str:
-    return WORDS[limit][0] if limit in WORDS else limit
+def state_cell(state: Verdict) -> str:
+    """A state in its colour."""
+    return f'<span class="{CELLS[state]}">{state.value}</span>'
 
 
-def _degrees(angle: float) -> str:
-    return f"{angle * 57.29577951308232:.4g}"
+def place_cell(check: LimitCheck) -> str:
+    """Place of a check; empty where it is not known."""
+    return check.place_text.replace(", ", ",&nbsp;")
 
 
-def _name(strategy: str) -> str:
-    return f'<span class="dot" style="background:{COLOURS[strategy]}"></span>{escape(strategy)}'
-
-
-def _place(at: tuple[float, float] | None) -> str:
-    return "" if at is None else f"{at[0]:.3f}, {at[1]:.3f}"
-
-
-def _span(s: StrategyResult, key: str) -> str:
-    """`min to max` of a summary value."""
-    v = s.summary.get(key)
-    return (
-        f"{v['min']:.4g} to {v['max']:.4g}" if isinstance(v, Mapping) and "min" in v and "max" in v else _most(s, key)
-    )
-
-
-def _most(s: StrategyResult, key: str) -> str:
-    v = s.summary.get(key)
-    v = v.get("max") if isinstance(v, Mapping) else v
-    return f"{v:.4g}" if isinstance(v, (int, float)) else "not known"
+def _findings(result: Result) -> tuple[Finding, ...]:
+    """Findings of the result and of its tracks; those of a track that is not in use do not count as more than notes."""
+    own = [
+        f if track.in_use else Finding(f.code, f.line, f"{track.name}: {f.text}", Severity.NOTE, f.place, f.row)
+        for track in result.tracks
+        for f in track.findings
+    ]
+    return tuple(dict.fromkeys((*result.findings, *own)))

@@ -1,44 +1,15 @@
-"""The programs of a result as text, RS-274 and APT CL data, both headed by whether they were verified."""
+"""Names of program files."""
 
 from __future__ import annotations
-
-from chipload.program.apt.writer import write_apt
-from chipload.program.gcode.writer import write_gcode
-from chipload.report.outcome import Operation, Outcome, failures, released
-from chipload.report.summary import program_name
 
 #: ending of a program file by the dialect of the machine
 ENDINGS = {"linuxcnc": "ngc", "fanuc": "nc"}
 
 
-def program_files(outcome: Outcome) -> dict[str, bytes]:
-    """Every program by file name: each strategy of each operation for the controller and as CL data."""
-    out: dict[str, bytes] = {}
-    ending = ENDINGS[outcome.machine.dialect]
-    for k, op in enumerate(outcome.operations):
-        for name, strategy in op.result.strategies.items():
-            stem, verified = program_name(k, name), released(op, name)
-            title = f"{outcome.title}, operation {k}, {op.result.kind}, {name}"
-            text = write_gcode(
-                strategy.program,
-                outcome.machine,
-                title=title,
-                verified=verified,
-                comments=_comments(outcome, op, name),
-                number=min(9999, 100 * (k + 1) + list(op.result.strategies).index(name)),
-            )
-            out[f"{stem}.{ending}"] = text.encode("ascii")
-            cl = write_apt(strategy.program, {op.cutter.number: op.cutter}, title=title, verified=verified)
-            out[f"{stem}.apt"] = cl.encode("ascii")
-    return out
+def program_name(operation: int, track: str) -> str:
+    """File name of a program without its ending.
 
-
-def _comments(outcome: Outcome, op: Operation, name: str) -> list[str]:
-    """What the man at the machine must know: why not to run it, the tool, the zero."""
-    c = op.cutter
-    bad = failures(op, name)
-    out = [] if name == op.result.use else [f"not released: the job uses {op.result.use}"]
-    out += [f"does not hold: {bad[0]}"] if bad else []
-    out.append(f"T{c.number}: D {c.diameter:g} mm, {c.flutes} flutes, overhang {c.overhang:g} mm")
-    out.append(f"Z 0 as in the job: top of stock {op.top:g} mm; machine {outcome.machine.name}")
-    return out
+    >>> program_name(0, "backward")
+    '0-backward'
+    """
+    return f"{operation}-{track}"

@@ -11,7 +11,8 @@ import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
 _STYLE = """
-:root { --ink: #1f2933; --soft: #5f6b7a; --line: #d9dde2; --good: #0b6b4f; --bad: #b3261e; --paper: #ffffff; }
+:root { --ink: #1f2933; --soft: #5f6b7a; --line: #d9dde2; --good: #0b6b4f; --bad: #b3261e; --may: #8a5a00;
+  --paper: #ffffff; }
 * { box-sizing: border-box; }
 body { margin: 0; background: #f4f5f7; color: var(--ink);
   font: 14px/1.5 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; }
@@ -24,6 +25,7 @@ p { margin: 4px 0 8px; max-width: 92ch; }
 .verdict b { display: block; font-size: 21px; }
 .good { color: var(--good); border-color: var(--good); background: #eef7f3; }
 .bad { color: var(--bad); border-color: var(--bad); background: #fcf1f0; }
+.open { color: var(--may); border-color: #d19a1f; background: #fdf3dc; }
 .verdict span { color: var(--ink); }
 .note { color: var(--soft); font-size: 13px; }
 td code { white-space: nowrap; }
@@ -34,6 +36,7 @@ td.n, th.n { text-align: right; white-space: nowrap; }
 td:first-child { white-space: nowrap; }
 tr.used td { background: #f1f7f6; }
 .ok { color: var(--good); } .no { color: var(--bad); font-weight: 600; }
+.may { color: var(--may); font-weight: 600; }
 .dot { display: inline-block; width: 10px; height: 10px; border-radius: 5px; margin-right: 7px; }
 ul { margin: 4px 0 10px; padding-left: 20px; } li { margin: 2px 0; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: 2px 18px; margin: 6px 0; }
@@ -76,11 +79,11 @@ def framed(title: str, word: str, body: Sequence[str], figures: Mapping[str, go.
     return html.encode()
 
 
-def heading(title: str, holds: bool, word: str, says: str) -> list[str]:
-    """The first lines of a page: what it is about, and the verdict."""
+def heading(title: str, banner: str, word: str, message: str) -> list[str]:
+    """The first lines of a page: what it is about, and the verdict; ``banner`` is `good`, `open` or `bad`."""
     return [
         f"<h1>chipload &middot; {escape(title)}</h1>",
-        f'<div class="verdict {"good" if holds else "bad"}"><b>{word}</b><span>{escape(says)}</span></div>',
+        f'<div class="verdict {banner}"><b>{word}</b><span>{escape(message)}</span></div>',
     ]
 
 
@@ -120,9 +123,9 @@ def _flat(values: Mapping[str, Any], prefix: str) -> Iterable[tuple[str, str]]:
         if isinstance(value, Mapping):
             yield from _flat(value, f"{prefix}{key} ")
         else:
-            yield prefix + str(key), said(value)
+            yield prefix + str(key), value_text(value)
 
 
-def said(value: Any) -> str:
+def value_text(value: Any) -> str:
     """A value as text, a list with commas."""
     return ", ".join(str(v) for v in value) if isinstance(value, (list, tuple)) else str(value)

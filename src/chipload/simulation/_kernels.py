@@ -290,7 +290,7 @@ def rim(k, w, centre, heading, radius, reach, sample, precision, mot, grid, rows
 
 
 @njit(cache=True, nogil=True)
-def trail_distance(points, radius, slack, mot, active, grid, out):
+def centre_path_distance(points, radius, slack, mot, active, grid, out):
     """Distance from each point (m, 2) to the whole trail: exact where it is above ``radius + slack``, else at most
     ``slack`` above the least.
     """

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -26,17 +26,31 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import Slices, slices
 from chipload.cutting.band import deviations, mean_basis
 from chipload.cutting.material import Material
-from chipload.engagement.bites import with_runout
 from chipload.engagement.chips.move import Move
 from chipload.engagement.immersion.immersion import Section
+from chipload.engagement.tooth_engagement import with_runout
 from chipload.errors import Finding, InputError
+from chipload.program.motions import lengths
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
-from chipload.simulation.loads import LOADS, Cuts, StepBite, bite_of_step, bites_of_steps, joined, loads_of_steps
-from chipload.simulation.steps import BLOCK, ROWS, Steps, steps_in_blocks
-from chipload.simulation.swept import TOGETHER, Interpolation, swept_ahead
+from chipload.simulation.accuracy import energy_balance, layers_again, moves_again, resolution_error
+from chipload.simulation.loads import (
+    LOADS,
+    Cuts,
+    StepEngagement,
+    bands_of_steps,
+    engagement_of_step,
+    engagement_of_steps,
+    joined,
+    loads_of_steps,
+    over_turn,
+)
+from chipload.simulation.moves import Engine, HandOver, MoveRun, moved, run_by_moves
+from chipload.simulation.shank import axial_overrun
+from chipload.simulation.steps import BLOCK, ROWS, StepBlocks, Steps, steps_in_blocks
+from chipload.simulation.swept_area import TOGETHER, Interpolation, swept_ahead
 from chipload.stock.layers import LayeredStock
-from chipload.stock.tiles import polygons
+from chipload.stock.tile_grid import polygons
 from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
@@ -45,8 +59,23 @@ Columns = Mapping[str, NDArray[Any]]
 #: more columns of steps that cut
 Watch = Callable[[Cuts], Mapping[str, Floats]]
 
+#: columns that have a band, and the column of its standard deviation; linear in the force are those of ``force_sd_n``
+BANDED = {
+    "force_n": "force_sd_n",
+    "torque_nm": "torque_sd_nm",
+    "torque_mean_nm": "torque_mean_sd_nm",
+    "power_w": "power_sd_w",
+    "deflection_um": "force_sd_n",
+    "form_error_um": "force_sd_n",
+    "cutter_stress_mpa": "force_sd_n",
+}
+
+#: most steps of a simulation
+MOST_STEPS = 50_000_000
 #: a piece of a chip narrower than so many tolerances is a film left by chords, no piece
 FILM = 4.0
+#: blocks of steps that go together by moves
+MOVES = 8
 
 
 @dataclass(frozen=True)
@@ -60,6 +89,8 @@ class Resolution:
     corner_pieces : slices of a corner radius
     flank_mm : length of a slice along the flank [mm]
     rotation : between two rotations at which the force is looked at [rad]
+    grading : of the slices of a corner, see :func:`chipload.cutter.slices.slices`
+    bottom_pieces : slices of the bottom line
     """
 
     step_mm: float
@@ -67,10 +98,12 @@ class Resolution:
     corner_pieces: int
     flank_mm: float
     rotation: float = math.radians(1.0)
+    grading: float = 1.0
+    bottom_pieces: int = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class ChipPieces:
     """The chip of one step on one layer: the one with most pieces, of those the one whose pieces are most alike.
 
     Parameters
@@ -101,24 +134,48 @@ class Removal:
     mean_band : (4,) standard deviation of the mean force x, y, z [N] and torque [N m] over the time in cut, from that
         of the coefficients; None: the material does not say how sure they are
     piece : the chip with most pieces that are most alike; None where nothing was cut
-    findings : rapids that cut
+    findings : rapids that cut, and whether the run was handed over to the layers
     labels : of the program, `label` of the columns counts in them
     cuts : what the teeth cut, one a cutter that cut; empty unless it was asked for
+    energy_balance : work over the specific energy of the volume removed, less 1, by tool number; empty where nothing
+        was cut or it was not asked for
+    resolution_error : relative error of the worst value of a column, by its name; empty unless it was asked for; both
+        as :mod:`chipload.simulation.accuracy` says
     """
 
     columns: Columns
     volume_before: float
     volume_after: float
     mean_band: tuple[float, ...] | None
-    piece: Piece | None
+    piece: ChipPieces | None
     findings: tuple[Finding, ...]
     labels: tuple[str, ...]
     cuts: tuple[Cuts, ...] = ()
+    energy_balance: Mapping[int, float] = field(default_factory=dict)
+    resolution_error: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def band_error(self) -> dict[str, float]:
+        """Standard deviation over the value, by column, at the greatest value of the column: what the spread of the
+        coefficients makes of it. Empty where the material does not say how sure they are.
+
+        Deflection and stress are linear in the force of one rotation: theirs is that of the force.
+        """
+        out: dict[str, float] = {}
+        for name, band in BANDED.items():
+            if band in self.columns and name in self.columns:
+                k = int(np.argmax(np.abs(self.columns[name])))
+                base = self.columns["force_n" if band == "force_sd_n" else name]
+                if base[k] > 0.0:
+                    out[name] = float(self.columns[band][k] / base[k])
+        return out
 
 
 @dataclass(frozen=True, eq=False)
-class Setting:
-    """What a run keeps to, step after step: see :func:`remove`; ``profiles`` are slices of the cutters."""
+class RunSettings:
+    """What a run keeps to, step after step: see :func:`remove`; ``profiles`` are slices of the cutters;
+    ``moves`` the run by moves, None where it goes by layers.
+    """
 
     cutters: Mapping[int, Cutter]
     profiles: Mapping[int, Slices]
@@ -127,10 +184,11 @@ class Setting:
     interpolation: Interpolation
     watch: Watch | None
     workers: int
+    moves: MoveRun | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class Sums:
+class RunningSums:
     """What is known after some steps and goes on in the next.
 
     Parameters
@@ -141,6 +199,7 @@ class Sums:
     basis : (4, 6) integral over the time in cut of what the coefficients are multiplied with
     rapids : lines with rapids that cut
     piece : as in :class:`Removal`
+    handed : line and reason for which the run was handed over from moves to layers
     """
 
     before: float
@@ -150,7 +209,8 @@ class Sums:
     cut_s: float = 0.0
     basis: Floats = field(default_factory=lambda: np.zeros((4, 6)))
     rapids: tuple[int, ...] = ()
-    piece: Piece | None = None
+    piece: ChipPieces | None = None
+    handed: tuple[int, str] | None = None
 
 
 def remove(
@@ -163,12 +223,15 @@ def remove(
     interpolation: Interpolation = "slerp",
     keep: bool = False,
     watch: Watch | None = None,
+    times: Floats | None = None,
+    accuracy: bool = True,
     workers: int = 2,
+    engine: Engine = "layers",
     progress: Progress = silent,
 ) -> Removal:
     """Take what the program cuts from ``stock``, which changes, and say what it costs.
 
-    All columns are kept in memory; :func:`chipload.simulation.pieces.remove_in_pieces` keeps them in files and goes on
+    All columns are kept in memory; :func:`chipload.simulation.chunks.remove_in_chunks` keeps them in files and goes on
     where it was stopped.
 
     Parameters
@@ -179,19 +242,27 @@ def remove(
     keep : keep what the teeth cut in every step, for :mod:`chipload.simulation.deflection`; some kB a step
     watch : called with what one cutter cut in some hundred steps; gives more columns, a value for each of them; they
         are 0 in steps that do not cut
+    times : (n,) float [s], time of each row of the program on the machine (:mod:`chipload.program.time`), for ``t_s``
+        and ``duration_s``; None: at the commanded feed, rapids take none
+    accuracy : find ``energy_balance`` and ``resolution_error``, which costs some steps once more
     workers : threads that find areas ahead of the removal; the result does not depend on it
+    engine : ``layers`` or ``moves``; ``auto``: by moves what goes by moves, see :mod:`chipload.simulation.moves`, and
+        else the whole program by layers, with a finding ``handed-over``
 
     Returns
     -------
     Removal
-        With the columns ``line``, ``tool``, ``label``, ``rapid``, ``s_mm``, ``t_s``, ``seconds``, ``x_mm``,
-    ``y_mm``, ``z_mm``, ``axis_x..z``, ``feed_mm_min``, ``chip_volume_mm3``, ``chip_pieces`` (most on one layer),
+        With the columns ``line``, ``tool``, ``label``, ``rapid``, ``s_mm``, ``t_s``, ``duration_s`` (on the
+    machine), ``seconds`` (at the commanded feed, which chips and loads go by), ``x_mm``, ``y_mm``, ``z_mm``,
+    ``axis_x..z``, ``feed_mm_min``, ``axial_overrun_mm`` (height of the shank that stands in material above the flutes
+    when the step ends), ``chip_volume_mm3``, ``chip_pieces`` (most on one layer),
     ``chip_layers`` (layers that lost something; where all of it is films, narrower than a few tolerances, there are no
     pieces and no loads), ``chip_max_mm`` (thickest),
     ``force_{x,y,z}_{mean,max,min}_n`` over the revolution, ``force_n`` (greatest size), ``torque_mean_nm``,
     ``torque_nm`` (greatest), ``power_w`` (mean),
     ``force_normal_n`` (greatest force that presses on the surface that the step leaves, along its normal; 0 where it
-    leaves two that face each other, as in a slot)
+    leaves two that face each other, as in a slot), ``engaged_volume_mm3`` (what the engaged edge sweeps in the step, if
+    it goes on as in its middle), ``cutting_work_j`` (of the torque without the edge coefficients, likewise)
 
     Raises
     ------
@@ -204,16 +275,81 @@ def remove(
     """
     count = counted(program, cutters, resolution)
     setting = setting_of(cutters, material, resolution, interpolation, watch, workers)
-    sums, kept, columns = Sums(stock.volume()), dict[int, list[Cuts]](), list[Columns]()
-    for steps in steps_in_blocks(program, resolution.step_mm, resolution.tolerance, size=BLOCK):
-        progress(sums.steps / count, "removing")
-        sums, some, cuts = remove_block(steps, stock, sums, setting)
-        columns.append(some)
-        for bite in cuts if keep else ():
-            kept.setdefault(bite.tool, []).append(bite)
+    setting, handed = with_engine(engine, setting, program, stock)
+    before = stock.copied() if accuracy else None
+    while True:
+        sums, kept, columns = RunningSums(stock.volume(), handed=handed), dict[int, list[Cuts]](), list[Columns]()
+        blocks = steps_in_blocks(
+            program, resolution.step_mm, resolution.tolerance, size=block_of(setting), times=times
+        )  # fmt: skip
+        try:
+            for steps in blocks:
+                progress(sums.steps / count, "removing")
+                sums, some, cuts = remove_block(steps, stock, sums, setting)
+                columns.append(some)
+                for bite in cuts if keep else ():
+                    kept.setdefault(bite.tool, []).append(bite)
+            break
+        except HandOver as found:
+            setting, handed = by_layers(engine, setting, found)
     progress(1.0, "removed")
     cut = tuple(joined(kept[number]) for number in sorted(kept))
-    return removal_of(program, stock, material, sums, stacked(columns), cut)
+    if setting.moves is not None:
+        setting.moves.finish(stock)
+    return with_accuracy(removal_of(program, stock, material, sums, stacked(columns), cut), program, before, setting)
+
+
+def block_of(setting: RunSettings) -> int:
+    """Steps that are simulated together: by moves some more, of which each costs less."""
+    return BLOCK if setting.moves is None else MOVES * BLOCK
+
+
+def with_engine(
+    engine: Engine, setting: RunSettings, program: Program, stock: LayeredStock
+) -> tuple[RunSettings, tuple[int, str] | None]:
+    """The setting with its engine, and why the program was handed over to the layers.
+
+    Raises
+    ------
+    InputError
+        The moves were asked for and cannot simulate the program.
+    """
+    if engine == "layers":
+        return setting, None
+    fine = setting.resolution
+    try:
+        run = run_by_moves(
+            program, stock, setting.cutters, fine.step_mm, fine.tolerance, fine.corner_pieces, fine.flank_mm
+        )
+    except HandOver as found:
+        return by_layers(engine, setting, found)
+    return replace(setting, moves=run), None
+
+
+def by_layers(engine: Engine, setting: RunSettings, found: HandOver) -> tuple[RunSettings, tuple[int, str]]:
+    """The setting of the run from its beginning by layers."""
+    if engine == "moves":
+        place = f"line {found.line}" if found.line else "stock"
+        raise InputError(f'{place}: {found.why}: state engine = "layers" or "auto"')
+    return replace(setting, moves=None), (found.line, found.why)
+
+
+def with_accuracy(removal: Removal, program: Program, before: LayeredStock | None, setting: RunSettings) -> Removal:
+    """A removal with its energy balance and resolution error; ``before`` the stock before it, None: as it is."""
+    if before is None:
+        return removal
+    blocks = StepBlocks(program, setting.resolution.step_mm, setting.resolution.tolerance)
+    if setting.moves is None:
+        again = layers_again(
+            before, setting, lambda steps, stock, to: remove_block(steps, stock, RunningSums(0.0), to)[1]
+        )
+    else:
+        again = moves_again(setting, setting.moves)
+    return replace(
+        removal,
+        energy_balance=energy_balance(removal.columns, setting.material.Ktc),
+        resolution_error=resolution_error(blocks, before, removal.columns, setting, again),
+    )
 
 
 def setting_of(
@@ -223,11 +359,38 @@ def setting_of(
     interpolation: Interpolation,
     watch: Watch | None,
     workers: int,
-) -> Setting:
+) -> RunSettings:
     """What a run keeps to."""
-    pieces, flank = resolution.corner_pieces, resolution.flank_mm
-    profiles = {n: slices(c, corner_pieces=pieces, flank_mm=flank) for n, c in cutters.items()}
-    return Setting(cutters, profiles, material, resolution, interpolation, watch, workers)
+    profiles = {n: profile_of(c, resolution) for n, c in cutters.items()}
+    return RunSettings(cutters, profiles, material, resolution, interpolation, watch, workers)
+
+
+def profile_of(cutter: Cutter, resolution: Resolution) -> Slices:
+    """The slices of a cutter at a resolution."""
+    return slices(
+        cutter,
+        bottom_pieces=resolution.bottom_pieces,
+        corner_pieces=resolution.corner_pieces,
+        flank_mm=resolution.flank_mm,
+        grading=resolution.grading,
+    )
+
+
+def require_steps(program: Program, step_mm: float) -> float:
+    """The least number of steps of a program, if that many can be simulated.
+
+    Raises
+    ------
+    InputError
+        There are more than ``MOST_STEPS``.
+    """
+    least = float(np.sum(lengths(program))) / step_mm
+    if not least <= MOST_STEPS:
+        raise InputError(
+            f"operation.0.step_mm = {step_mm:g}: {least:.4g} steps: must be at most {MOST_STEPS}: state a longer one, "
+            "or split the program"
+        )
+    return least
 
 
 def counted(program: Program, cutters: Mapping[int, Cutter], resolution: Resolution) -> int:
@@ -236,8 +399,9 @@ def counted(program: Program, cutters: Mapping[int, Cutter], resolution: Resolut
     Raises
     ------
     InputError
-        One has none, or there is no step.
+        One has none, there is no step, or there are too many.
     """
+    require_steps(program, resolution.step_mm)
     count = 0
     for steps in steps_in_blocks(program, resolution.step_mm, resolution.tolerance, size=ROWS):
         count += len(steps)
@@ -252,57 +416,90 @@ def counted(program: Program, cutters: Mapping[int, Cutter], resolution: Resolut
 
 
 def remove_block(
-    steps: Steps, stock: LayeredStock, sums: Sums, setting: Setting
-) -> tuple[Sums, dict[str, NDArray[Any]], list[Cuts]]:
+    steps: Steps, stock: LayeredStock, sums: RunningSums, setting: RunSettings
+) -> tuple[RunningSums, dict[str, NDArray[Any]], list[Cuts]]:
     """Take what some steps cut from the stock: the sums after them, their columns, what the teeth cut in them."""
+    if setting.moves is not None:
+        return _moved_block(steps, setting.moves, sums, setting)
     removed, bites, piece = _removed(steps, stock, sums, setting)
     loads, basis, cut = np.zeros((len(steps), len(LOADS))), sums.basis, list[Cuts]()
     watched: dict[str, Floats] = {}
     for number in sorted({int(steps.tool[c.step]) for c in bites}):
         own = [c for c in bites if steps.tool[c.step] == number]
         at, cutter, material = [c.step for c in own], setting.cutters[number], setting.material
-        plain = bites_of_steps(own, setting.profiles[number])
+        plain = engagement_of_steps(own, setting.profiles[number])
         bitten = with_runout(plain, cutter)
-        loads[at] = loads_of_steps(bitten, own, cutter, material, setting.resolution.rotation, steps.spindle[at])
+        turn = over_turn(bitten, cutter, material, setting.resolution.rotation)
+        loads[at] = loads_of_steps(bitten, own, cutter, material, turn, steps.spindle[at], steps.seconds[at])
         way = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
         cut.append(Cuts(number, cutter, sums.steps + np.array(at), way, bitten, plain, steps.spindle[at]))
         if setting.watch is not None:
             for name, values in setting.watch(cut[-1]).items():
                 watched.setdefault(name, np.zeros(len(steps)))[at] = values
-        if _sure(material):
+        for name, values in bands_of_steps(bitten, cutter, material, turn, steps.spindle[at]).items():
+            watched.setdefault(name, np.zeros(len(steps)))[at] = values
+        if material.has_band:
             each = mean_basis(bitten, cutter, material, bitten.frame)
             basis = basis + np.tensordot(steps.seconds[at], each, 1)
     columns = {**_columns(steps, removed, loads, sums), **watched}
+    return _after(sums, steps, removed, columns, basis, piece), columns, cut
+
+
+def _moved_block(
+    steps: Steps, run: MoveRun, sums: RunningSums, setting: RunSettings
+) -> tuple[RunningSums, dict[str, NDArray[Any]], list[Cuts]]:
+    """:func:`remove_block` by moves."""
+    found = moved(steps, run, sums.steps, setting.cutters, setting.material, setting.resolution.rotation)
+    watched: dict[str, Floats] = dict(found.bands)
+    for cut in found.cuts if setting.watch is not None else ():
+        assert setting.watch is not None
+        for name, values in setting.watch(cut).items():
+            watched.setdefault(name, np.zeros(len(steps)))[cut.step - sums.steps] = values
+    columns = {**_columns(steps, found.removed, found.loads, sums), **watched}
+    return _after(sums, steps, found.removed, columns, sums.basis + found.basis, sums.piece), columns, found.cuts
+
+
+def _after(
+    sums: RunningSums,
+    steps: Steps,
+    removed: Floats,
+    columns: Columns,
+    basis: Floats,
+    piece: ChipPieces | None,
+) -> RunningSums:
+    """The sums after some steps."""
     cuts = (removed[:, 0] > 0.0) & ~steps.rapid
     lines = steps.line[steps.rapid & (removed[:, 1] > 0.0)].tolist()
-    after = Sums(
-        sums.before,
-        sums.steps + len(steps),
-        float(columns["s_mm"][-1]),
-        float(columns["t_s"][-1]),
-        sums.cut_s + float(steps.seconds[cuts].sum()),
-        basis,
-        tuple(dict.fromkeys((*sums.rapids, *lines))),
-        piece,
+    return replace(
+        sums,
+        steps=sums.steps + len(steps),
+        s_mm=float(columns["s_mm"][-1]),
+        t_s=float(columns["t_s"][-1]),
+        cut_s=sums.cut_s + float(steps.seconds[cuts].sum()),
+        basis=basis,
+        rapids=tuple(dict.fromkeys((*sums.rapids, *lines))),
+        piece=piece,
     )
-    return after, columns, cut
 
 
 def removal_of(
     program: Program,
     stock: LayeredStock,
     material: Material,
-    sums: Sums,
+    sums: RunningSums,
     columns: Columns,
     cuts: tuple[Cuts, ...] = (),
 ) -> Removal:
     """What was removed when all steps are done."""
     band = None
-    if _sure(material):
+    if material.has_band:
         sd = deviations(sums.basis / sums.cut_s, material) if sums.cut_s > 0.0 else np.zeros(4)
         band = (*sd[:3].tolist(), float(sd[3]) / 1000.0)
     # rapids that cut more than films
     found = tuple(Finding("rapid-cuts", line, "a rapid goes through material") for line in sums.rapids)
+    if sums.handed is not None:
+        line, why = sums.handed
+        found += (Finding("handed-over", line, f"the whole program is simulated by layers: {why}"),)
     return Removal(columns, sums.before, stock.volume(), band, sums.piece, found, program.labels, cuts)
 
 
@@ -316,19 +513,21 @@ def stacked(blocks: Sequence[Columns]) -> dict[str, NDArray[Any]]:
 
 
 def _removed(
-    steps: Steps, stock: LayeredStock, sums: Sums, setting: Setting
-) -> tuple[Floats, list[StepBite], Piece | None]:
-    """(n, 3) volume, pieces and layers of each chip; what the teeth cut; the chip of most pieces so far."""
+    steps: Steps, stock: LayeredStock, sums: RunningSums, setting: RunSettings
+) -> tuple[Floats, list[StepEngagement], ChipPieces | None]:
+    """(n, 4) volume, pieces and layers of each chip, contact of the shank; what the teeth cut; the chip of most pieces
+    so far.
+    """
     thickness, tolerance, best = stock.thickness, setting.resolution.tolerance, sums.piece
     rank = _rank(best.chips) if best is not None else (0, 0.0)
-    removed = np.zeros((len(steps), 3))
+    removed = np.zeros((len(steps), 4))
     cutting: list[tuple[int, Move, Section]] = []
-    waiting: list[Future[list[StepBite]]] = []
+    waiting: list[Future[list[StepEngagement]]] = []
 
-    def bites(those: list[tuple[int, Move, Section]]) -> list[StepBite]:
+    def bites(those: list[tuple[int, Move, Section]]) -> list[StepEngagement]:
         tools = [int(steps.tool[k]) for k, _, _ in those]
         return [
-            bite_of_step(steps, k, move, setting.cutters[n], setting.profiles[n], there)
+            engagement_of_step(steps, k, move, setting.cutters[n], setting.profiles[n], there, tolerance)
             for n, (k, move, there) in zip(tools, those, strict=True)
         ]
 
@@ -336,20 +535,23 @@ def _removed(
     with ThreadPoolExecutor(1) as beside:
         for k, swept in ahead:
             met, low, high = swept.met, swept.low[:2], swept.high[:2]
-            # a face that looks down is held against the layer below
-            layers = range(max(swept.layers.start - 1, 0), swept.layers.stop)
+            # a point below the lowest section of the box is held against the section below it
+            layers = range(max(swept.layers.start - 1, 0), min(swept.layers.stop + 1, stock.layers))
             there = Section(*stock.edges(layers, low, high))
             tidied = stock.tidied
             taken = stock.remove_many([i for i, _ in met], [shape for _, shape in met], 0.5 * tolerance)
             removed[k, 0] = tidied - stock.tidied
             for i, pieces, area, whole in _chips(met, taken, tolerance):
-                removed[k] += (area * thickness[i], 0.0, 1.0)
+                removed[k, [0, 2]] += (area * thickness[i], 1.0)
                 removed[k, 1] = max(removed[k, 1], len(whole))
                 if whole and rank < (len(whole), 1.0 / len(whole)) and _rank(whole) > rank:
                     rank = _rank(whole)
                     near = polygons(stock.section(i).union(MultiPolygon(pieces)).intersection(box(*low, *high)))
                     cutter, z = setting.cutters[int(steps.tool[k])], float(stock.heights[i])
-                    best = Piece(sums.steps + k, swept.move, cutter, z, MultiPolygon(near), tuple(whole))
+                    best = ChipPieces(sums.steps + k, swept.move, cutter, z, MultiPolygon(near), tuple(whole))
+            if removed[k, 1] > 0.0:
+                cutter = setting.cutters[int(steps.tool[k])]
+                removed[k, 3] = axial_overrun(stock, cutter, steps.p1[k], steps.a1[k], FILM * tolerance)
             # what is thinner than the tolerance can tell is no cut
             if removed[k, 1] > 0.0 and not steps.rapid[k]:
                 cutting.append((k, swept.move, there))
@@ -358,11 +560,6 @@ def _removed(
                 cutting = []
         waiting.append(beside.submit(bites, cutting))
         return removed, [bite for several in waiting for bite in several.result()], best
-
-
-def _sure(material: Material) -> bool:
-    """Whether the material says how sure its coefficients are."""
-    return material.spread is not None or material.covariance is not None
 
 
 def _rank(whole: Sequence[Polygon]) -> tuple[int, float]:
@@ -387,7 +584,7 @@ def _chips(
             at = b
 
 
-def _columns(steps: Steps, removed: Floats, loads: Floats, sums: Sums) -> dict[str, NDArray[Any]]:
+def _columns(steps: Steps, removed: Floats, loads: Floats, sums: RunningSums) -> dict[str, NDArray[Any]]:
     length = np.linalg.norm(steps.p1 - steps.p0, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         feed = np.where(steps.seconds > 0.0, mm_min_from_mm_s(1.0) * length / steps.seconds, 0.0)
@@ -397,7 +594,8 @@ def _columns(steps: Steps, removed: Floats, loads: Floats, sums: Sums) -> dict[s
         "label": steps.label,
         "rapid": steps.rapid,
         "s_mm": np.cumsum([sums.s_mm, *length])[1:],
-        "t_s": np.cumsum([sums.t_s, *steps.seconds])[1:],
+        "t_s": np.cumsum([sums.t_s, *steps.duration])[1:],
+        "duration_s": steps.duration,
         "seconds": steps.seconds,
         **{f"{x}_mm": steps.p1[:, i] for i, x in enumerate("xyz")},
         **{f"axis_{x}": steps.a1[:, i] for i, x in enumerate("xyz")},
@@ -405,5 +603,6 @@ def _columns(steps: Steps, removed: Floats, loads: Floats, sums: Sums) -> dict[s
         "chip_volume_mm3": removed[:, 0],
         "chip_pieces": removed[:, 1].astype(np.int64),
         "chip_layers": removed[:, 2].astype(np.int64),
+        "axial_overrun_mm": removed[:, 3],
         **{name: loads[:, i] for i, name in enumerate(LOADS)},
     }

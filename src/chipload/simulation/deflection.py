@@ -2,7 +2,8 @@
 
 Notation: q point of the wanted surface, n its unit normal out of the part; p, A tip and axis of the cutter, T, n_c, A
 its frame; s length along its profile, phi immersion, theta rotation of tooth 0, lag(s) of its edge, bites as in
-:mod:`chipload.engagement.bites`; F [N] force ON THE CUTTER, that on the work is -F; C (3, 3) [mm/N] compliance of the
+:mod:`chipload.engagement.tooth_engagement`; F [N] force ON THE CUTTER, that on the work is -F; C (3, 3) [mm/N]
+compliance of the
 work at q, C_nn = n . C n; C_b(z', z) that of the bars of cutter, holder and spindle.
 
 The rigid cutter passes q at a distance d_k in step k, least at a moment when the normal of its surface at the foot of q
@@ -21,7 +22,7 @@ cutter leaves there (cusps, and stock where the program leaves any). Steps that 
 would take again after a deflection is not known.
 
 Without helix a tooth leaves all of its bite at once: the moment just before counts, as in
-:mod:`chipload.cutting.wall`.
+:mod:`chipload.cutting.wall_error`.
 
 The load is that of the rigid model in the middle of the step: bending does not thin the chip. The work gives way at q
 under the whole force as if it acted there. The cutter is stiff along its axis, and q is that of the feed's envelope:
@@ -44,7 +45,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_over_turn, in_work
 from chipload.cutting.material import Material
-from chipload.engagement.bites import tooth_radii
+from chipload.engagement.tooth_engagement import tooth_radii
 from chipload.errors import InputError
 from chipload.progress import Progress, silent
 from chipload.simulation.bending import _kernels
@@ -247,7 +248,7 @@ def tip_deflections(
     Returns
     -------
     columns, (c,) each
-        ``deflection_cutter_um`` greatest size of u, with ``work`` also ``deflection_work_um`` c times that of F,
+        ``deflection_cutter_um`` greatest size of u, with ``work`` also ``deflection_workpiece_um`` c times that of F,
         ``deflection_um`` greatest size of u + c F.
     """
     if work is not None and not 0.0 <= work < math.inf:
@@ -264,7 +265,7 @@ def tip_deflections(
     if work is None:
         return out | {"deflection_um": out["deflection_cutter_um"]}
     apart = work * force
-    out["deflection_work_um"] = 1e3 * np.linalg.norm(apart, axis=2).max(axis=1)
+    out["deflection_workpiece_um"] = 1e3 * np.linalg.norm(apart, axis=2).max(axis=1)
     apart[..., :2] += bent
     return out | {"deflection_um": 1e3 * np.linalg.norm(apart, axis=2).max(axis=1)}
 
@@ -385,7 +386,9 @@ def _made_by(
     for j in range(cuts.cutter.flutes if cuts.cutter.runout[0] > 0.0 else 1):
         there, made = np.empty(count), np.empty(count, dtype=np.bool_)
         b = cuts.bites
-        _kernels.inside_bites(k, s, phi, b.start, b.rows, b.tooth, b.slice, b.slices, j, model.reach, there, made)
+        _kernels.points_in_engagement(
+            k, s, phi, b.start, b.rows, b.tooth, b.slice, b.slices, j, model.reach, there, made
+        )
         if lag > 0.0:
             there = phi
         theta = there + lag * z + math.tau * j / cuts.cutter.flutes

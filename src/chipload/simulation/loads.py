@@ -1,7 +1,7 @@
 """What the teeth cut in the middle of a step, and the loads that this costs over a revolution.
 
 Notation: t in 0..1 within a step; T, n, A the frame of the cutter, nu the outward normal of its surface, phi immersion
-as in :mod:`chipload.engagement.bites`.
+as in :mod:`chipload.engagement.tooth_engagement`.
 """
 
 from __future__ import annotations
@@ -14,16 +14,21 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import Slices
+from chipload.cutting.band import mean_band, peak_band
 from chipload.cutting.force import forces_over_turn, in_work, mean_forces
 from chipload.cutting.material import Material
-from chipload.engagement.bites import Bites, with_runout
 from chipload.engagement.chips._kernels import state
 from chipload.engagement.chips.move import Move
 from chipload.engagement.immersion.immersion import Section, immersed, tool_frame
+from chipload.engagement.tooth_engagement import ToothEngagement, with_runout
 from chipload.errors import InputError
 from chipload.simulation.steps import Steps
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: force (n, m, 3) [N] along T, n and the axis, torque (n, m) [N mm], rotations (m,) [rad]
+OverTurn = tuple[Floats, Floats, Floats]
 
 #: columns of loads, in their order
 LOADS = (
@@ -36,7 +41,13 @@ LOADS = (
     "power_w",
     "chip_max_mm",
     "force_normal_n",
+    "engaged_volume_mm3",
+    "cutting_work_j",
 )
+#: columns of how sure they are, one standard deviation; where the material says how sure its coefficients are
+BANDS = ("force_sd_n", "torque_sd_nm", "torque_mean_sd_nm", "power_sd_w")
+#: the front is at least so many tolerances ahead of the one that the step before left
+AHEAD = 20.0
 #: a bite ends where h = 0 if h is at most this share of its greatest
 GRAZES = 1e-6
 #: a mean normal shorter than this stands for surfaces that face each other
@@ -44,7 +55,7 @@ ONE_SIDE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class StepBite:
+class StepEngagement:
     """Rows of one step."""
 
     step: int
@@ -72,8 +83,8 @@ class Cuts:
     cutter: Cutter
     step: NDArray[np.int64]
     way: Floats
-    bites: Bites
-    plain: Bites
+    bites: ToothEngagement
+    plain: ToothEngagement
     spindle: Floats
 
     def __len__(self) -> int:
@@ -89,11 +100,16 @@ def joined(cuts: list[Cuts]) -> Cuts:
     return Cuts(cuts[0].tool, cuts[0].cutter, step, way, bites, plain, spindle)
 
 
-def _joined(bites: list[Bites]) -> Bites:
+def _joined(bites: list[ToothEngagement]) -> ToothEngagement:
     start = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(b.start) for b in bites]))])
-    rows, tooth, piece = (np.concatenate([getattr(b, name) for b in bites]) for name in ("rows", "tooth", "slice"))
+    rows, tooth = (np.concatenate([getattr(b, name) for b in bites]) for name in ("rows", "tooth"))
     frame = np.concatenate([b.frame for b in bites if b.frame is not None])
-    return Bites(start, rows, tooth, piece, bites[0].slices, frame)
+    if all(b.slices is bites[0].slices or np.array_equal(b.slices, bites[0].slices) for b in bites):
+        return ToothEngagement(start, rows, tooth, np.concatenate([b.slice for b in bites]), bites[0].slices, frame)
+    # each has slices of its own
+    before = np.cumsum([0, *(len(b.slices) for b in bites)])
+    piece = np.concatenate([b.slice + n for b, n in zip(bites, before, strict=False)])
+    return ToothEngagement(start, rows, tooth, piece, np.concatenate([b.slices for b in bites]), frame)
 
 
 def at_feeds(cuts: Cuts, factor: Floats) -> Cuts:
@@ -107,12 +123,19 @@ def at_feeds(cuts: Cuts, factor: Floats) -> Cuts:
     old = cuts.plain
     rows = old.rows.copy()
     rows[:, 4:] *= np.repeat(factor, np.diff(old.start))[:, None]
-    plain = Bites(old.start, rows, old.tooth, old.slice, old.slices, old.frame)
+    plain = ToothEngagement(old.start, rows, old.tooth, old.slice, old.slices, old.frame)
     return replace(cuts, bites=with_runout(plain, cuts.cutter), plain=plain)
 
 
-def bite_of_step(steps: Steps, k: int, move: Move, cutter: Cutter, profile: Slices, section: Section) -> StepBite:
-    """What the teeth cut at the middle of a step."""
+def engagement_of_step(
+    steps: Steps, k: int, move: Move, cutter: Cutter, profile: Slices, section: Section, tolerance: float
+) -> StepEngagement:
+    """What the teeth cut at the middle of a step.
+
+    The front that the step before it left is half a step behind, and its edges are known to ``tolerance`` [mm] only.
+    Where half a step is less than :data:`AHEAD` of those, contact is judged for the cutter moved on along its feed by
+    what lacks: along walls that run with the feed that changes nothing, and the front is found whatever the step.
+    """
     if steps.spindle[k] == 0.0:
         raise InputError(f"line {steps.line[k]}: cuts with the spindle at rest: start it (M3 S) before the cut")
     S = np.empty(27)
@@ -123,23 +146,53 @@ def bite_of_step(steps: Steps, k: int, move: Move, cutter: Cutter, profile: Slic
     turn = np.array([b * z - c * y, c * x - a * z, a * y - b * x])
     middle = speed + 0.5 * cutter.flute_length * swing
     frame = tool_frame(axis, speed if speed.any() else middle, bool(steps.spindle[k] > 0.0))
-    rows, owner = immersed(tip, frame, speed * tooth, turn * tooth, profile, section)
-    return StepBite(k, frame, rows, owner)
+    way = float(np.linalg.norm(speed))
+    ahead = max(AHEAD * tolerance / way - 0.5, 0.0) if way > 0.0 else 0.0
+    rows, owner = immersed(tip + ahead * speed, frame, speed * tooth, turn * tooth, profile, section)
+    return StepEngagement(k, frame, rows, owner)
 
 
-def bites_of_steps(cuts: list[StepBite], profile: Slices) -> Bites:
+def engagement_of_steps(cuts: list[StepEngagement], profile: Slices) -> ToothEngagement:
     """The bites of some steps of one cutter, without its runout."""
     start = np.cumsum([0, *(len(c.rows) for c in cuts)])
     rows, owner = np.concatenate([c.rows for c in cuts]), np.concatenate([c.owner for c in cuts])
     frame = np.array([c.frame for c in cuts])
-    return Bites(start, rows, np.full(len(rows), -1), owner, profile.columns, frame)
+    owner, table = _with_parts(rows, owner, profile)
+    return ToothEngagement(start, rows, np.full(len(rows), -1), owner, table, frame)
 
 
-def greatest_loads(cuts: Cuts, material: Material, rotation: float) -> dict[str, Floats]:
-    """Columns (c,) of :data:`LOADS` that limits hold: greatest force [N], greatest and mean torque [N m], mean power
-    [W], thickest chip [mm].
+def _with_parts(rows: Floats, owner: Ints, profile: Slices) -> tuple[Ints, Floats]:
+    """Slices of bites, and the columns of the profile followed by those of parts of its arcs.
+
+    A bite that ends within a slice of an arc has the radius and the normal of its own middle, not of the slice's: in a
+    shallow cut by a ball nose the uppermost slice holds much of the torque.
     """
-    force, torque = _over_turn(cuts.bites, cuts.cutter, material, rotation)
+    s, part = rows[:, 2:4], profile.radius[owner] > 0.0
+    part &= (s[:, 0] != profile.s_from[owner]) | (s[:, 1] != profile.s_to[owner])
+    if not part.any():
+        return owner, profile.columns
+    keys, which = np.unique(np.column_stack([owner[part], s[part]]), axis=0, return_inverse=True)
+    of = keys[:, 0].astype(np.int64)
+    middle, r = 0.5 * (profile.s_from[of] + profile.s_to[of]), profile.radius[of]
+    kappa = np.arctan2(profile.sin_kappa[of], profile.cos_kappa[of])
+    own = kappa + (0.5 * (keys[:, 1] + keys[:, 2]) - middle) / r
+    z = profile.z_middle[of] + r * (profile.cos_kappa[of] - np.cos(kappa + (keys[:, 1] - middle) / r))
+    rho = profile.rho[of] + r * (np.sin(own) - profile.sin_kappa[of])
+    lead = profile.rate[of] / profile.sin_kappa[of]
+    z = np.maximum(z, 0.0)
+    parts = np.column_stack([keys[:, 1], rho, z, np.sin(own), np.cos(own), lead * z, lead * np.sin(own)])
+    out = owner.copy()
+    out[part] = len(profile) + which.ravel()
+    return out, np.vstack([profile.columns, parts])
+
+
+def greatest_loads(cuts: Cuts, material: Material, rotation: float, bands: bool = False) -> dict[str, Floats]:
+    """Columns (c,) of :data:`LOADS` that limits hold: greatest force [N], greatest and mean torque [N m], mean power
+    [W], thickest chip [mm]; with ``bands`` those of :data:`BANDS` too.
+    """
+    turn = over_turn(cuts.bites, cuts.cutter, material, rotation)
+    force, torque, _ = turn
+    sure = bands_of_steps(cuts.bites, cuts.cutter, material, turn, cuts.spindle) if bands else {}
     _, mean = mean_forces(cuts.bites, cuts.cutter, material)
     return {
         "force_n": np.linalg.norm(force, axis=2).max(axis=1),
@@ -147,25 +200,50 @@ def greatest_loads(cuts: Cuts, material: Material, rotation: float) -> dict[str,
         "torque_mean_nm": mean / 1000.0,
         "power_w": mean * np.abs(cuts.spindle) / 1000.0,
         "chip_max_mm": cuts.bites.chip_max(),
+        **sure,
     }
 
 
-def _over_turn(bites: Bites, cutter: Cutter, material: Material, rotation: float) -> tuple[Floats, Floats]:
-    """Force and torque at rotations at most ``rotation`` apart."""
+def bands_of_steps(
+    bites: ToothEngagement, cutter: Cutter, material: Material, turn: OverTurn, spindle: Floats
+) -> dict[str, Floats]:
+    """Columns (c,) of :data:`BANDS` from :func:`over_turn` of the steps: standard deviation of greatest force [N],
+    greatest and mean torque [N m] and power [W] by that of the coefficients; none where the material does not say it.
+    """
+    if not material.has_band:
+        return {}
+    force, torque, theta = turn
+    at_force = theta[np.linalg.norm(force, axis=2).argmax(axis=1)]
+    force_sd, torque_sd = peak_band(bites, cutter, material, at_force, theta[torque.argmax(axis=1)])
+    mean_sd = mean_band(bites, cutter, material)[1]
+    values = (force_sd, torque_sd / 1000.0, mean_sd / 1000.0, mean_sd * np.abs(spindle) / 1000.0)
+    return dict(zip(BANDS, values, strict=True))
+
+
+def over_turn(bites: ToothEngagement, cutter: Cutter, material: Material, rotation: float) -> OverTurn:
+    """Force and torque at rotations at most ``rotation`` apart, and these rotations [rad]."""
     pitch = math.tau if cutter.runout[0] > 0.0 else math.tau / cutter.flutes
     count = max(math.ceil(pitch / rotation), 8)
-    return forces_over_turn(bites, cutter, material, np.arange(count) * (pitch / count))
+    theta = np.asarray(np.arange(count) * (pitch / count), dtype=np.float64)
+    return *forces_over_turn(bites, cutter, material, theta), theta
 
 
 def loads_of_steps(
-    bites: Bites, cuts: list[StepBite], cutter: Cutter, material: Material, rotation: float, spindle: Floats
+    bites: ToothEngagement,
+    cuts: list[StepEngagement],
+    cutter: Cutter,
+    material: Material,
+    turn: OverTurn,
+    spindle: Floats,
+    seconds: Floats,
 ) -> Floats:
-    """(c, len(LOADS)) loads of steps."""
+    """(c, len(LOADS)) loads of steps that take ``seconds`` (c,), from :func:`over_turn` of them."""
     assert bites.frame is not None
-    force, torque = _over_turn(bites, cutter, material, rotation)
+    force, torque, _ = turn
     mean, torque_mean = mean_forces(bites, cutter, material)
     turned = in_work(force, bites.frame)
     left = _left(bites, cuts)
+    volume, work = engaged_work(bites, cutter, material, np.abs(spindle) * seconds)
     return np.column_stack(
         [
             in_work(mean, bites.frame),
@@ -177,11 +255,28 @@ def loads_of_steps(
             torque_mean * np.abs(spindle) / 1000.0,
             bites.chip_max(),
             -np.einsum("nmi,ni->nm", turned, left).min(axis=1).clip(None, 0.0),
+            volume,
+            work / 1000.0,
         ]
     )
 
 
-def _left(bites: Bites, cuts: list[StepBite]) -> Floats:
+def engaged_work(bites: ToothEngagement, cutter: Cutter, material: Material, turned: Floats) -> tuple[Floats, Floats]:
+    """(c,) volume [mm^3] that the engaged edge sweeps while the spindle turns by ``turned`` (c,) [rad], and (c,) work
+    [N mm] of the torque without the edge coefficients.
+
+    With h the thickness used, rho the distance from the axis and N teeth they are N / (2 pi) times ``turned`` times the
+    integrals over phi and s of rho h and of rho Ktc h^(1 - m): the work is Ktc times the volume where m = 0, and where
+    the material has a size effect the quotient is the mean of Ktc h^(-m) over the volume.
+    """
+    plain = replace(material, Kte=0.0, Kre=0.0, Kae=0.0, covariance=None)
+    work = mean_forces(bites, cutter, plain)[1] * turned
+    if material.exponents[0] == 0.0:
+        return work / material.Ktc, work
+    return mean_forces(bites, cutter, replace(plain, exponents=(0.0, 0.0, 0.0)))[1] * turned / material.Ktc, work
+
+
+def _left(bites: ToothEngagement, cuts: list[StepEngagement]) -> Floats:
     """(c, 3) outward normal of the cutter, in the work frame, where it leaves a surface behind: nu averaged over the
     ends of bites at which h = 0, by their length along the profile; 0 where no surface or two that face each other are
     left.

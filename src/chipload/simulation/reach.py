@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.simulation.steps import Steps
 from chipload.stock.layers import LayeredStock
-from chipload.stock.tiles import span
+from chipload.stock.tile_grid import span
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

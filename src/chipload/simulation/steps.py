@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,10 +34,12 @@ class Steps:
     ----------
     p0, p1 : (n, 3) float [mm], tip at the start and the end
     a0, a1 : (n, 3) float, unit axis there
-    seconds : (n,) float, at the commanded feed; 0 for a rapid
+    seconds : (n,) float, at the commanded feed; 0 for a rapid. What chips and loads go by
     rapid : (n,) bool
     spindle : (n,) float [rad/s], signed as in the Program
     tool, line, label : (n,) int
+    duration : (n,) float [s], on the machine: rapids, accelerations and, in the step before it, a dwell included; None:
+        as ``seconds``
     """
 
     p0: Floats
@@ -50,12 +52,19 @@ class Steps:
     tool: Ints
     line: Ints
     label: Ints
+    duration: Floats = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        if self.duration is None:
+            object.__setattr__(self, "duration", self.seconds)
 
     def __len__(self) -> int:
         return len(self.tool)
 
 
-def steps_of(program: Program, step_mm: float, chord_mm: float, turn: float = TURN) -> Steps:
+def steps_of(
+    program: Program, step_mm: float, chord_mm: float, turn: float = TURN, times: Floats | None = None
+) -> Steps:
     """Cut a program into steps; O(n).
 
     Parameters
@@ -63,6 +72,8 @@ def steps_of(program: Program, step_mm: float, chord_mm: float, turn: float = TU
     step_mm : longest step of the tip [mm]
     chord_mm : how far the chords of an arc may leave it [mm]
     turn : most that the axis turns in a step [rad]
+    times : (n,) float [s], time of each row on the machine, which its steps share by length; None: at
+        the commanded feed
 
     Examples
     --------
@@ -72,12 +83,18 @@ def steps_of(program: Program, step_mm: float, chord_mm: float, turn: float = TU
     >>> steps.p1[:, 0].round(9).tolist(), steps.seconds.round(9).tolist()
     ([3.0, 6.0, 9.0], [1.0, 1.0, 1.0])
     """
-    moves = _moves(program, step_mm, chord_mm, turn)
+    moves = _moves(program, step_mm, chord_mm, turn, None if times is None else _on_moves(program, times))
     return _cut(moves, 0, int(moves.end[-1]) if len(moves.end) else 0)
 
 
 def steps_in_blocks(
-    program: Program, step_mm: float, chord_mm: float, turn: float = TURN, size: int = BLOCK, first: int = 0
+    program: Program,
+    step_mm: float,
+    chord_mm: float,
+    turn: float = TURN,
+    size: int = BLOCK,
+    first: int = 0,
+    times: Floats | None = None,
 ) -> Iterator[Steps]:
     """The steps of :func:`steps_of` from step ``first`` on, ``size`` at a time and the rest.
 
@@ -85,8 +102,10 @@ def steps_in_blocks(
     """
     kept: list[Steps] = []
     count, skip = 0, first
+    timed = None if times is None else _on_moves(program, times)
     for row in range(1, len(program), ROWS):
-        moves = _moves(_rows(program, row - 1, row + ROWS), step_mm, chord_mm, turn)
+        part = None if timed is None else timed[row - 1 : row + ROWS]
+        moves = _moves(_rows(program, row - 1, row + ROWS), step_mm, chord_mm, turn, part)
         whole = int(moves.end[-1]) if len(moves.end) else 0
         at = min(skip, whole)
         skip -= at
@@ -131,6 +150,7 @@ class _Moves:
     parts, end : (m,) int, steps of each, and of all up to it
     angle : (n,) float [rad], by which the axis turns in each row of ``chords``
     span : (n,) float [mm or rad], what the feed of each row is counted along
+    timed : (n, 2) float [s], time of each row of ``chords`` on the machine and the wait after it; None: not known
     """
 
     chords: Program
@@ -139,9 +159,52 @@ class _Moves:
     end: Ints
     angle: Floats
     span: Floats
+    timed: Floats | None
 
 
-def _moves(program: Program, step_mm: float, chord_mm: float, turn: float) -> _Moves:
+def _on_moves(program: Program, times: Floats) -> Floats:
+    """(n, 2) times of rows that move, and waits after them: times of rows that do not go to the row before.
+
+    Where there is none they go to the first that moves.
+    """
+    if times.shape != (len(program),):
+        raise InputError(f"steps: times {times.shape}: must be ({len(program)},), one for each row of the program")
+    moving = _moving(program)
+    where = np.flatnonzero(moving)
+    out = np.zeros((len(program), 2))
+    if len(where):
+        out[where, 0] = times[where]
+        idle = np.flatnonzero(~moving)
+        to = where[np.maximum(np.searchsorted(where, idle) - 1, 0)]
+        np.add.at(out[:, 1], to, times[idle])
+    return out
+
+
+def _moving(program: Program) -> NDArray[np.bool_]:
+    """(n,) whether each row gives steps."""
+    moving = (program.motion != DWELL) & ((lengths(program) > 0.0) | (_angles(program) > 0.0))
+    moving[:1] = False
+    return np.asarray(moving)
+
+
+def _angles(program: Program) -> Floats:
+    """(n,) angle that the axis turns by in each row [rad]."""
+    angle = 2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(np.diff(program.axis, axis=0), axis=1), 1.0))
+    return np.concatenate([np.zeros(min(len(program), 1)), angle])
+
+
+def _chord_times(program: Program, chords: Program, most: Floats, timed: Floats) -> Floats:
+    """(m, 2) times and waits of chords, from those of the rows (n, 2) that they are of."""
+    row = straightened(replace(program, line=np.arange(len(program))), most).line
+    span, turned = lengths(chords), _angles(chords)
+    weight = np.where(np.bincount(row, span, len(program))[row] > 0.0, span, turned)
+    whole = np.bincount(row, weight, len(program))[row]
+    last = np.append(row[1:] != row[:-1], True)
+    share = np.where(whole > 0.0, weight / np.where(whole > 0.0, whole, 1.0), 0.0)
+    return np.column_stack([timed[row, 0] * share, np.where(last, timed[row, 1], 0.0)])
+
+
+def _moves(program: Program, step_mm: float, chord_mm: float, turn: float, timed: Floats | None) -> _Moves:
     for name, value in (("step_mm", step_mm), ("chord_mm", chord_mm), ("turn", turn)):
         if not 0.0 < value < math.inf:
             raise InputError(f"steps: {name} = {value:g}: must be above 0")
@@ -150,14 +213,12 @@ def _moves(program: Program, step_mm: float, chord_mm: float, turn: float) -> _M
     bent = is_arc(program) & (r > 0.0)
     most[bent] = np.maximum(2.0 * np.arccos(1.0 - np.minimum(chord_mm / r[bent], 1.0)), 1e-3)
     chords = straightened(program, most)
-    length = lengths(chords)
-    angle = 2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(np.diff(chords.axis, axis=0), axis=1), 1.0))
-    angle = np.concatenate([np.zeros(min(len(chords), 1)), angle])
-    moving = (chords.motion != DWELL) & ((length > 0.0) | (angle > 0.0))
-    moving[:1] = False
-    row = np.flatnonzero(moving)
+    length, angle = lengths(chords), _angles(chords)
+    row = np.flatnonzero(_moving(chords))
+    if timed is not None:
+        timed = _chord_times(program, chords, most, timed)
     parts = np.maximum(np.ceil(length / step_mm - 1e-9), np.ceil(angle / turn - 1e-9)).astype(np.int64).clip(1)[row]
-    return _Moves(chords, row, parts, np.cumsum(parts), angle, spans(chords))
+    return _Moves(chords, row, parts, np.cumsum(parts), angle, spans(chords), timed)
 
 
 def _cut(moves: _Moves, first: int, end: int) -> Steps:
@@ -172,6 +233,9 @@ def _cut(moves: _Moves, first: int, end: int) -> Steps:
     rapid = chords.motion[at] == RAPID
     with np.errstate(divide="ignore", invalid="ignore"):
         seconds = np.where(rapid, 0.0, moves.span[at] / chords.feed[at])
+    duration = seconds / parts
+    if moves.timed is not None:
+        duration = moves.timed[at, 0] / parts + np.where(k == parts - 1, moves.timed[at, 1], 0.0)
     return Steps(
         _line(p0, p1, u0),
         _line(p0, p1, u1),
@@ -183,6 +247,7 @@ def _cut(moves: _Moves, first: int, end: int) -> Steps:
         chords.tool[at],
         chords.line[at],
         chords.label[at],
+        duration,
     )
 
 

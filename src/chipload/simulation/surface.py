@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.simulation.clearance.body import above_cutting, cutting_part
-from chipload.simulation.clearance.clearance import NEVER, Nearness
+from chipload.simulation.clearance.clearance import NEVER, LeastDistance
 from chipload.simulation.steps import Steps, blocks_of
 
 Floats = NDArray[np.float64]
@@ -67,6 +67,22 @@ class Collision:
     at: tuple[float, float, float]
 
 
+def require_points(mesh: trimesh.Trimesh, spacing: float, name: str) -> None:
+    """Refuse a spacing that :func:`fine` cannot make of a mesh.
+
+    Raises
+    ------
+    InputError
+        The points would be too many.
+    """
+    sides = np.asarray(mesh.edges_unique_length)
+    guess = float(np.asarray(mesh.area)) / (0.25 * spacing * spacing) + len(sides)
+    if guess > MOST_POINTS:
+        raise InputError(
+            f"{name}: spacing_mm = {spacing:g}: gives about {guess:.0g} points, more than {MOST_POINTS}: state more"
+        )
+
+
 def fine(mesh: trimesh.Trimesh, spacing: float, name: str) -> tuple[Floats, Ints]:
     """Points (p, 3) and triangles (f, 3) of a mesh whose sides are at most ``spacing`` [mm].
 
@@ -75,12 +91,7 @@ def fine(mesh: trimesh.Trimesh, spacing: float, name: str) -> tuple[Floats, Ints
     InputError
         They would be too many.
     """
-    sides = np.asarray(mesh.edges_unique_length)
-    guess = float(np.asarray(mesh.area)) / (0.25 * spacing * spacing) + len(sides)
-    if guess > MOST_POINTS:
-        raise InputError(
-            f"{name}: spacing_mm = {spacing:g}: gives about {guess:.0g} points, more than {MOST_POINTS}: state more"
-        )
+    require_points(mesh, spacing, name)
     vertices, faces = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, spacing, max_iter=30)
     points, back = np.unique(np.asarray(vertices).round(9), axis=0, return_inverse=True)
     return points, back.ravel()[np.asarray(faces)]
@@ -108,7 +119,7 @@ def difference(
     points, faces = fine(part, spacing, "part")
     normals = np.asarray(trimesh.Trimesh(points, faces, process=False).vertex_normals)
     over = in_stock(points + OVER * tolerance * normals)
-    near = Nearness({n: cutting_part(c) for n, c in cutters.items()}, points, look, tolerance)
+    near = LeastDistance({n: cutting_part(c) for n, c in cutters.items()}, points, look, tolerance)
     deepest = [np.empty(0)]
     for block in blocks_of(steps):
         progress(near.done)
@@ -135,12 +146,12 @@ def collisions(
     above_only : names of solids that the cutting part may touch, as the part
     progress : is told how many steps are done
     """
-    held: list[tuple[str, str, Nearness, dict[int, Collision]]] = []
+    held: list[tuple[str, str, LeastDistance, dict[int, Collision]]] = []
     for name, points in solids.items():
         for what, body in ((ABOVE, above_cutting), ("cutting part", cutting_part)):
             if what == ABOVE or name not in above_only:
                 bodies = {n: body(c) for n, c in cutters.items()}
-                held.append((what, name, Nearness(bodies, points, tolerance, tolerance), {}))
+                held.append((what, name, LeastDistance(bodies, points, tolerance, tolerance), {}))
     for block in blocks_of(steps) if held else ():
         progress(held[0][2].done)
         for what, name, near, best in held:
@@ -167,8 +178,8 @@ def in_stock(
     points : (p, 3) float [mm] of a grid in the stock
     progress : is told how many steps are done
     """
-    cut = Nearness({n: cutting_part(c) for n, c in cutters.items()}, points, tolerance, tolerance)
-    hit = Nearness({n: above_cutting(c) for n, c in cutters.items()}, points, tolerance, tolerance)
+    cut = LeastDistance({n: cutting_part(c) for n, c in cutters.items()}, points, tolerance, tolerance)
+    hit = LeastDistance({n: above_cutting(c) for n, c in cutters.items()}, points, tolerance, tolerance)
     for block in blocks_of(steps):
         progress(cut.done)
         cut.take(block)

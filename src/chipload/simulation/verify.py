@@ -18,8 +18,8 @@ from chipload.geometry.contour import Contour, Region
 from chipload.program.program import ARC_CCW, ARC_CW, LINE, RAPID, Program
 from chipload.progress import Progress, silent
 from chipload.simulation import _kernels
-from chipload.simulation.trail import LEVEL_MM, Trail, flat_motions, motion_rows, rim_engagement
-from chipload.simulation.walls import Worst, excess, gouge
+from chipload.simulation.centre_path import LEVEL_MM, CentrePath, flat_motions, motion_rows, rim_engagement
+from chipload.simulation.wall_distance import GreatestDistance, excess, gouge
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -71,7 +71,7 @@ class _Level:
 
     z: float
     top: float
-    trail: Trail
+    trail: CentrePath
 
 
 def verify_contour(
@@ -132,7 +132,11 @@ def verify_contour(
         raise InputError("verify: the stock has no contour: pass None for material everywhere")
     failed: list[str] = []
     open_: list[str] = []
-    difference, cleft, remains = Worst(0.0, (0.0, 0.0), 0), Worst(0.0, (0.0, 0.0), 0), Worst(0.0, (0.0, 0.0), 0)
+    difference, cleft, remains = (
+        GreatestDistance(0.0, (0.0, 0.0), 0),
+        GreatestDistance(0.0, (0.0, 0.0), 0),
+        GreatestDistance(0.0, (0.0, 0.0), 0),
+    )
     hits: list[Place] = []
     compared = samples = 0
     try:
@@ -191,7 +195,7 @@ def verify_contour(
     )
 
 
-def _exceeds(what: str, worst: Worst, unit: str, limit: float) -> str:
+def _exceeds(what: str, worst: GreatestDistance, unit: str, limit: float) -> str:
     x, y = worst.at
     return f"{what} {worst.value_mm:.6g} {unit} at ({x:.4f}, {y:.4f}): limit {limit:g} {unit}"
 
@@ -224,7 +228,7 @@ def _levels(program: Program, radius: float, stock: Region | None, top: float) -
         if not heights or heights[-1] - z > LEVEL_MM:
             heights.append(float(z))
     tops = [top, *heights[:-1]]
-    return [_Level(z, t, Trail.of_program(program, radius, stock, z)) for z, t in zip(heights, tops, strict=True)]
+    return [_Level(z, t, CentrePath.of_program(program, radius, stock, z)) for z, t in zip(heights, tops, strict=True)]
 
 
 def _rapids(program: Program, level: _Level, step: float) -> tuple[list[Place], int]:
@@ -241,7 +245,7 @@ def _rapids(program: Program, level: _Level, step: float) -> tuple[list[Place], 
     asked = 0
     if not len(at):
         return hits, asked
-    trail, path = level.trail, Trail(flat_motions(program), level.trail.radius)
+    trail, path = level.trail, CentrePath(flat_motions(program), level.trail.radius)
     reach = trail.radius - RAPID_MM
     front = np.linspace(0.0, np.pi, 181)
     around = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
@@ -280,7 +284,7 @@ def _compare(
     progress: Progress,
     failed: list[str],
     open_: list[str],
-) -> tuple[Worst, int]:
+) -> tuple[GreatestDistance, int]:
     """Greatest difference of the engagement [deg] with its centre, and the number of rows compared."""
     x, y, z = columns["x_mm"], columns["y_mm"], columns["z_mm"]
     points = np.ascontiguousarray(np.column_stack([x, y]))
@@ -293,7 +297,7 @@ def _compare(
         failed.append(f"history row {found} at ({x[found]:.4f}, {y[found]:.4f}, {z[found]:.4f}) is not on the path")
     wanted = np.ones(m, dtype=np.bool_) if passes is None else np.isin(columns["pass"].astype(str), list(passes))
     wanted[found:] = False
-    length = Trail(flat_motions(program), 1.0).lengths
+    length = CentrePath(flat_motions(program), 1.0).lengths
     joint_k, joint_w = _other_side(k, w, length)
     done = np.zeros(m, dtype=np.bool_)
     air = wanted & (z >= top - LEVEL_MM)
@@ -337,12 +341,12 @@ def _compare(
         )
     if not done.any():
         open_.append("no row of the history was compared")
-        return Worst(0.0, (0.0, 0.0), 0), 0
+        return GreatestDistance(0.0, (0.0, 0.0), 0), 0
     i = int(np.argmax(np.where(done, gap, -1.0)))
-    return Worst(float(gap[i]), (float(x[i]), float(y[i])), int(done.sum())), int(done.sum())
+    return GreatestDistance(float(gap[i]), (float(x[i]), float(y[i])), int(done.sum())), int(done.sum())
 
 
-def _degrees(trail: Trail, k: Ints, w: Floats, step_deg: float, workers: int) -> Floats:
+def _degrees(trail: CentrePath, k: Ints, w: Floats, step_deg: float, workers: int) -> Floats:
     return np.degrees(rim_engagement(trail, k, w, step_deg=step_deg, workers=workers).angle)
 
 

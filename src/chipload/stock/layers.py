@@ -27,9 +27,11 @@ from chipload.geometry.mesh import require_closed
 from chipload.stock.edges._kernels import ring_edges
 from chipload.stock.shapes import read_shapes, shape_bytes
 from chipload.stock.solid import glb, prisms
-from chipload.stock.tiles import (
+from chipload.stock.tile_grid import (
+    LAYER_LIMIT,
     MULTIPOLYGON,
     POLYGON,
+    areas_alone,
     borders_of,
     bounds_of,
     boxes_of,
@@ -255,7 +257,13 @@ class LayeredStock:
         if not layer_mm > 0.0:
             raise InputError(f"stock.layer_mm = {layer_mm:g}: must be above 0")
         levels: list[float] = []
-        for i in self.layers_between(z0, z1):
+        split = self.layers_between(z0, z1)
+        count = float(self.thickness[split.start : split.stop].sum()) / layer_mm
+        if count > LAYER_LIMIT:
+            raise InputError(
+                f"stock.layer_mm = {layer_mm:g}: {count:.4g} layers: must be at most {LAYER_LIMIT}: state thicker ones"
+            )
+        for i in split:
             parts = math.ceil(self.thickness[i] / layer_mm * (1.0 - 1e-12))
             levels += np.linspace(self.bounds[i], self.bounds[i + 1], parts + 1)[1:-1].tolist()
         self._split(np.array(levels))
@@ -281,6 +289,30 @@ class LayeredStock:
         self.tiles = self.tiles[parents]
         if self.part is not None:
             self.tiles[again] = cut_up(self.part, heights[again], boxes)
+
+    def copied(self) -> LayeredStock:
+        """The stock as it is now, as a stock of its own; polygons are shared."""
+        out = LayeredStock(self.bounds, self.xs, self.ys, self.tiles.copy(), self.part)
+        out.cut, out.room, out.tidied = self.cut.copy(), self.room.copy(), self.tidied
+        return out
+
+    def cropped(self, low: ArrayLike, high: ArrayLike) -> LayeredStock | None:
+        """The tiles under a rectangle between ``low`` and ``high`` (2,) [mm], cut to it, as a stock of its own; None:
+        it has none there.
+        """
+        (x0, y0), (x1, y1) = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+        x0, y0 = max(x0, float(self.xs[0])), max(y0, float(self.ys[0]))
+        x1, y1 = min(x1, float(self.xs[-1])), min(y1, float(self.ys[-1]))
+        if not (x1 > x0 and y1 > y0):
+            return None
+        i, j = span(self.xs.tolist(), x0, x1), span(self.ys.tolist(), y0, y1)
+        some = self.tiles[:, j.start : j.stop, i.start : i.stop]
+        flat = shapely.union_all(shapely.intersection(some.reshape(len(some), -1), shapely.box(x0, y0, x1, y1)), axis=1)
+        tiles = np.empty((len(some), 1, 1), dtype=object)
+        tiles[:, 0, 0] = [MultiPolygon(polygons(shape)) for shape in flat.tolist()]
+        out = LayeredStock(self.bounds, np.array([x0, x1]), np.array([y0, y1]), tiles, self.part)
+        out.cut = self.cut.copy()
+        return out
 
     def mesh(self) -> trimesh.Trimesh:
         """What is left as one closed mesh [mm], the prism of each layer by itself, z up."""
@@ -310,7 +342,7 @@ class LayeredStock:
         faces = np.zeros((0, 3), dtype=np.int64) if part is None else np.asarray(part.faces, dtype=np.int64)
         arrays = {"bounds": self.bounds, "xs": self.xs, "ys": self.ys, "cut": self.cut}
         arrays |= {"room": self.room.ravel(), "tidied": np.array([self.tidied])}
-        return shape_bytes(KIND, arrays | {"vertices": vertices, "faces": faces}, self.tiles.ravel())
+        return shape_bytes(KIND, arrays | {"vertices": vertices, "faces": faces}, areas_alone(self.tiles.ravel()))
 
     @classmethod
     def load(cls, path: str | Path) -> LayeredStock:
@@ -372,7 +404,7 @@ class LayeredStock:
         for n, part in zip(pair[solid].tolist(), parts[solid].tolist(), strict=True):
             pieces[n].append(part)
         hit = [n for n, found in enumerate(pieces) if found]
-        left = dict(zip(hit, shapely.difference(old[hit], new[hit]).tolist(), strict=True))
+        left = dict(zip(hit, areas_alone(shapely.difference(old[hit], new[hit])).tolist(), strict=True))
         cut = [(at, n) for at, n in zip(which, same, strict=True) if n in left]
         for (_, row, j, i), n in cut:
             self.tiles[row, j, i] = left[n]
@@ -401,7 +433,7 @@ class LayeredStock:
         alike: dict[int, int] = {}
         same = np.array([alike.setdefault(id(tile), len(alike)) for tile in old], dtype=np.int64)
         first = np.unique(same, return_index=True)[1]
-        new = shapely.simplify(old[first], tidy, preserve_topology=True)[same]
+        new = areas_alone(shapely.simplify(old[first], tidy, preserve_topology=True))[same]
         self.tiles[layer, j, i] = new
         self.room[layer, j, i] = np.maximum(2 * shapely.get_num_coordinates(new), ROOM)
         self.tidied += float(((shapely.area(new) - shapely.area(old)) * self.thickness[layer]).sum())

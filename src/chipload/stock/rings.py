@@ -18,7 +18,7 @@ from shapely import MultiPolygon, Point, Polygon, box
 
 from chipload.errors import InputError
 from chipload.stock.layers import LayeredStock
-from chipload.stock.tiles import polygons
+from chipload.stock.tile_grid import polygons
 
 Floats = NDArray[np.float64]
 

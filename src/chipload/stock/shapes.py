@@ -7,6 +7,7 @@ Notation: geometries are well-known binary (WKB, little-endian), one after the o
 from __future__ import annotations
 
 import io
+import math
 import struct
 import tokenize
 import zipfile
@@ -19,7 +20,10 @@ import shapely
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
+from chipload.files import is_file, open_regular
 
+#: of a file, and of what it holds unpacked [bytes]
+LARGEST_FILE = LARGEST = 1 << 30
 #: what a damaged archive, array or its header makes the readers raise
 UNREADABLE = (
     *(ValueError, TypeError, KeyError, AttributeError, EOFError, OSError, RuntimeError, SyntaxError),
@@ -42,6 +46,22 @@ def shape_bytes(kind: str, arrays: dict[str, NDArray[Any]], shapes: NDArray[np.o
     return out.getvalue()
 
 
+def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    """An array of numbers of an archive; its head must say as many bytes as follow."""
+    data = archive.read(f"{name}.npy")
+    stream = io.BytesIO(data)
+    if np.lib.format.read_magic(stream) != (1, 0):
+        raise ValueError(name)
+    shape, turned, dtype = np.lib.format.read_array_header_1_0(stream)
+    if dtype.kind not in "biuf" or min(shape, default=0) < 0:
+        raise ValueError(name)
+    count = math.prod(shape)
+    if count * dtype.itemsize != len(data) - stream.tell():
+        raise ValueError(name)
+    out = np.frombuffer(data, dtype=dtype, count=count, offset=stream.tell())
+    return out.reshape(shape, order="F" if turned else "C").copy()
+
+
 def read_shapes(
     path: str | Path, kind: str, names: dict[str, int]
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.object_]]:
@@ -53,17 +73,25 @@ def read_shapes(
         The file is missing, damaged, of another kind, or holds other than numbers, polygons and multipolygons.
     """
     file = Path(path)
-    if not file.is_file():
+    if not is_file(file):
         raise InputError(f"stock.file = {file}: no such file")
     damaged = InputError(f"stock.file = {file.name}: damaged: save the stock again")
     try:
-        with np.load(io.BytesIO(file.read_bytes()), allow_pickle=False) as data:
-            if not isinstance(data, np.lib.npyio.NpzFile):
-                raise damaged
-            if "kind" not in data or data["kind"].dtype != np.uint8 or data["kind"].tobytes() != kind.encode():
+        with (
+            open_regular(file, f"stock.file = {file.name}", LARGEST_FILE, "take larger layers or tiles") as stream,
+            zipfile.ZipFile(stream) as archive,
+        ):
+            size = sum(archive.getinfo(f"{key}.npy").file_size for key in (*names, "kind", "wkb", "ends"))
+            if size > LARGEST:
+                raise InputError(
+                    f"stock.file = {file.name}: holds {size} bytes unpacked: must be at most {LARGEST}: take larger "
+                    "layers or tiles"
+                )
+            said = _array(archive, "kind")
+            if said.dtype != np.uint8 or said.tobytes() != kind.encode():
                 raise InputError(f"stock.file = {file.name}: not a file of the kind '{kind}'")
-            arrays = {key: np.asarray(data[key]) for key in names}
-            wkb, ends = data["wkb"], data["ends"]
+            arrays = {key: _array(archive, key) for key in names}
+            wkb, ends = _array(archive, "wkb"), _array(archive, "ends")
     except UNREADABLE:
         raise damaged from None
     numbers = all(arrays[key].ndim == n and arrays[key].dtype.kind in "biuf" for key, n in names.items())

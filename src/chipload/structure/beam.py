@@ -1,7 +1,7 @@
 """How far the cutter bends: a stepped cantilever, clamped at the holder.
 
 Notation: z [mm] height above the tip; l overhang and l_f flute length [mm]; d diameter; E modulus [MPa];
-I = pi D^4 / 64 [mm^4] with D = fluted_factor d in the fluted part, the shank's diameter above it.
+I = pi D^4 / 64 [mm^4] with D = fluted_factor d (0.8 d unless stated) in the fluted part, the shank's diameter above it.
 
 Valid for bending of slender cutters (l > 4 d, or so): shear, the holder and its clamping are taken as rigid.
 
@@ -18,18 +18,17 @@ from numpy.typing import ArrayLike, NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 
-#: equivalent diameter of the fluted part over the cutter's diameter [Kops1990]
-FLUTED_FACTOR = 0.8
 
-
-def flexibilities(cutter: Cutter, fluted_factor: float = FLUTED_FACTOR) -> tuple[float, float]:
-    """1 / (E I) of the fluted part and of the shank, 1/(N mm^2).
+def flexibilities(cutter: Cutter, fluted_factor: float | None = None) -> tuple[float, float]:
+    """1 / (E I) of the fluted part and of the shank, 1/(N mm^2); a factor of None is the cutter's own.
 
     Raises
     ------
     InputError
         ``fluted_factor`` is not in (0, 1].
     """
+    if fluted_factor is None:
+        fluted_factor = cutter.fluted_factor
     if not 0.0 < fluted_factor <= 1.0:
         raise InputError(
             f"cutter.fluted_factor = {fluted_factor:g}: must be above 0 and at most 1 (0.8 is usual for end mills)"
@@ -43,7 +42,7 @@ def flexibilities(cutter: Cutter, fluted_factor: float = FLUTED_FACTOR) -> tuple
 
 
 def compliance(
-    cutter: Cutter, z_force: ArrayLike, z_point: ArrayLike, fluted_factor: float = FLUTED_FACTOR
+    cutter: Cutter, z_force: ArrayLike, z_point: ArrayLike, fluted_factor: float | None = None
 ) -> NDArray[np.float64]:
     """Lateral deflection at one height under a unit lateral force at another.
 
@@ -54,7 +53,7 @@ def compliance(
     ----------
     cutter : its overhang, flute length, diameters and modulus are used
     z_force, z_point : float [mm], any shapes that broadcast, heights above the tip, 0 .. overhang
-    fluted_factor : equivalent diameter of the fluted part over the diameter, (0, 1]
+    fluted_factor : equivalent diameter of the fluted part over the diameter, (0, 1]; None: the cutter's own
 
     Returns
     -------

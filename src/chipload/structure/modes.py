@@ -14,10 +14,10 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from chipload.errors import InputError
 from chipload.structure.factors import factor
 from chipload.structure.hexa import Array
-from chipload.structure.solid import Factored, Solid, assemble, assemble_mass, free_dofs
+from chipload.structure.solid import Factored, SolidWorkpiece, assemble, assemble_mass, free_dofs
 
 
-def modes(part: Solid | Factored, count: int, shift: float = 0.0) -> tuple[Array, Array]:
+def modes(part: SolidWorkpiece | Factored, count: int, shift: float = 0.0) -> tuple[Array, Array]:
     """Lowest natural frequencies and their shapes.
 
     One factorisation (none if ``part`` is factored and ``shift`` is 0), then about 3 ``count`` solutions.

@@ -18,7 +18,7 @@ from chipload.structure.hexa import NODES, Array, shape, shape_gradient
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class MeshPlaces:
     """Places on a mesh.
 
     Attributes
@@ -38,7 +38,7 @@ class Places:
         return len(self.element)
 
 
-def on_side(grid: Grid, side: str, u: ArrayLike, v: ArrayLike) -> Places:
+def on_side(grid: Grid, side: str, u: ArrayLike, v: ArrayLike) -> MeshPlaces:
     """Places of a side by how far along it they lie.
 
     Parameters
@@ -64,10 +64,10 @@ def on_side(grid: Grid, side: str, u: ArrayLike, v: ArrayLike) -> Places:
         scaled = t * grid.counts[c]
         index[:, c] = np.minimum(scaled.astype(np.int64), grid.counts[c] - 1)
         local[:, c] = 2.0 * (scaled - index[:, c]) - 1.0
-    return Places(grid.element(*index.T), local)
+    return MeshPlaces(grid.element(*index.T), local)
 
 
-def locate(grid: Grid, side: str, points: ArrayLike, tolerance: float) -> Places:
+def locate(grid: Grid, side: str, points: ArrayLike, tolerance: float) -> MeshPlaces:
     """Nearest places of a side to given points, by Newton steps inside the nearest faces.
 
     Parameters
@@ -115,10 +115,10 @@ def locate(grid: Grid, side: str, points: ArrayLike, tolerance: float) -> Places
             f"point {far} ({x[far, 0]:g}, {x[far, 1]:g}, {x[far, 2]:g}) lies {best[far]:g} mm from side {side}: must "
             f"be within {tolerance:g} mm"
         )
-    return Places(element, local)
+    return MeshPlaces(element, local)
 
 
-def on_cut(places: Places, kept: Array, side: str) -> Places:
+def on_cut(places: MeshPlaces, kept: Array, side: str) -> MeshPlaces:
     """The same places on the faces that a cut left, along the thickness.
 
     Parameters
@@ -139,15 +139,15 @@ def on_cut(places: Places, kept: Array, side: str) -> Places:
         raise InputError(f"on_cut: element {gone[0]} is gone")
     local = places.local.copy()
     local[:, 2] = 2.0 * part[:, 1 if side == "k+" else 0] - 1.0
-    return Places(places.element, local)
+    return MeshPlaces(places.element, local)
 
 
-def points_of(grid: Grid, places: Places) -> Array:
+def points_of(grid: Grid, places: MeshPlaces) -> Array:
     """Points (p, 3) [mm] of places."""
     return np.asarray(np.einsum("pn,pnc->pc", shape(places.local), grid.nodes[grid.elements[places.element]]))
 
 
-def normals_of(grid: Grid, places: Places, side: str) -> Array:
+def normals_of(grid: Grid, places: MeshPlaces, side: str) -> Array:
     """Unit normals (p, 3) of the faces in which places lie, out of the body.
 
     Examples
@@ -163,7 +163,7 @@ def normals_of(grid: Grid, places: Places, side: str) -> Array:
     return np.asarray(n / np.linalg.norm(n, axis=1)[:, None])
 
 
-def weights(grid: Grid, places: Places) -> csr_array:
+def weights(grid: Grid, places: MeshPlaces) -> csr_array:
     """Sparse (p, n): how a force at each place goes to the nodes, and how their motion moves the place."""
     N = shape(places.local)
     rows = np.repeat(np.arange(len(places)), 20)

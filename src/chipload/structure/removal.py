@@ -40,7 +40,7 @@ from chipload.progress import Progress, silent
 from chipload.structure.factors import Factors, factor
 from chipload.structure.grid import Indices
 from chipload.structure.hexa import Array, stiffness
-from chipload.structure.solid import Factored, Solid, check_held, element_dofs, factorise
+from chipload.structure.solid import Factored, SolidWorkpiece, check_clamped, element_dofs, factorise
 
 #: rank at which the workpiece is factored again, over sqrt(f); see benchmarks/structure.py
 LIMIT_FACTOR = 5.0
@@ -50,7 +50,7 @@ SMALLEST_PIVOT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
+class SolvedColumns:
     """Columns of K^-1 that were solved, at the rows of interest.
 
     Attributes
@@ -68,7 +68,7 @@ class Columns:
 
 
 @dataclass(frozen=True, eq=False)
-class Inside:
+class CutElements:
     """The cut elements in themselves.
 
     Attributes
@@ -92,7 +92,7 @@ class Inside:
 
 
 @dataclass(frozen=True, eq=False)
-class Removal:
+class StructureRemoval:
     """A workpiece in one state of its removal.
 
     Attributes
@@ -109,14 +109,14 @@ class Removal:
     factorisations : how many there were
     """
 
-    solid: Solid
+    solid: SolidWorkpiece
     base: Factored
     region: Indices
-    columns: Columns
+    columns: SolvedColumns
     B: Indices
     D: Array
     lu: tuple[Array, NDArray[np.int32]]
-    inside: Inside
+    inside: CutElements
     limit: int
     factorisations: int = 1
 
@@ -130,7 +130,9 @@ class Removal:
         return len(self.B)
 
 
-def start(solid: Solid | Factored, region: ArrayLike | None = None, limit: int | None = None) -> Removal:
+def start(
+    solid: SolidWorkpiece | Factored, region: ArrayLike | None = None, limit: int | None = None
+) -> StructureRemoval:
     """Begin with a workpiece as it stands.
 
     Parameters
@@ -154,12 +156,12 @@ def start(solid: Solid | Factored, region: ArrayLike | None = None, limit: int |
     return _fresh(base, chosen, limit, 1)
 
 
-def _fresh(base: Factored, region: Indices, limit: int, factorisations: int) -> Removal:
+def _fresh(base: Factored, region: Indices, limit: int, factorisations: int) -> StructureRemoval:
     rows = _rows(base, region)
-    columns = Columns(rows, np.zeros(0, np.int64), np.full(len(rows), -1), np.zeros((0, len(rows))))
+    columns = SolvedColumns(rows, np.zeros(0, np.int64), np.full(len(rows), -1), np.zeros((0, len(rows))))
     none = np.zeros(0, dtype=np.int64)
-    inside = Inside(none, none, none, csc_array((0, 0)), None)
-    return Removal(
+    inside = CutElements(none, none, none, csc_array((0, 0)), None)
+    return StructureRemoval(
         base.solid,
         base,
         region,
@@ -181,14 +183,18 @@ def _rows(base: Factored, elements: Indices) -> Indices:
     return found[found >= 0]
 
 
-def prepare(state: Removal, elements: ArrayLike | None = None, progress: Progress = silent) -> Removal:
+def prepare(
+    state: StructureRemoval, elements: ArrayLike | None = None, progress: Progress = silent
+) -> StructureRemoval:
     """Solve the columns of elements ahead of their cutting; None: of the whole region."""
     chosen = state.region if elements is None else np.asarray(elements, dtype=np.int64)
     wanted = np.searchsorted(state.columns.rows, _rows(state.base, chosen))
     return replace(state, columns=_with_columns(state.columns, state.base, wanted, progress))
 
 
-def _with_columns(columns: Columns, base: Factored, wanted: Indices, progress: Progress = silent) -> Columns:
+def _with_columns(
+    columns: SolvedColumns, base: Factored, wanted: Indices, progress: Progress = silent
+) -> SolvedColumns:
     new = wanted[columns.place[wanted] < 0]
     if not len(new):
         return columns
@@ -201,10 +207,12 @@ def _with_columns(columns: Columns, base: Factored, wanted: Indices, progress: P
         progress(min(1.0, (at + 64) / len(new)), "columns of the compliance")
     place = columns.place.copy()
     place[new] = len(columns.known) + np.arange(len(new))
-    return Columns(columns.rows, np.concatenate([columns.known, new]), place, np.concatenate([columns.W, W]))
+    return SolvedColumns(columns.rows, np.concatenate([columns.known, new]), place, np.concatenate([columns.W, W]))
 
 
-def cut(state: Removal, elements: ArrayLike, kept: ArrayLike = (0.0, 0.0), progress: Progress = silent) -> Removal:
+def cut(
+    state: StructureRemoval, elements: ArrayLike, kept: ArrayLike = (0.0, 0.0), progress: Progress = silent
+) -> StructureRemoval:
     """Take material from elements.
 
     Parameters
@@ -235,7 +243,7 @@ def cut(state: Removal, elements: ArrayLike, kept: ArrayLike = (0.0, 0.0), progr
         )
     now[e] = np.where(empty[:, None], 0.0, new)
     solid = replace(state.solid, kept=now)
-    check_held(solid)
+    check_clamped(solid)
     touched, rest, before, after = _cut_elements(state.base, solid)
     B, A = np.flatnonzero(rest), np.flatnonzero(~rest)
     if len(B) > state.limit or len(A) > 0.5 * len(state.base.free):
@@ -246,7 +254,7 @@ def cut(state: Removal, elements: ArrayLike, kept: ArrayLike = (0.0, 0.0), progr
     if len(A):
         D += before[B][:, A] @ factor(before[A][:, A].tocsc()).solve(before[A][:, B].toarray())
     K_BA = after[B][:, live].tocsc()
-    inside = Inside(
+    inside = CutElements(
         touched[live],
         touched[A[gone]],
         np.flatnonzero((now != state.base.solid.kept).any(axis=1)),
@@ -271,7 +279,7 @@ def cut(state: Removal, elements: ArrayLike, kept: ArrayLike = (0.0, 0.0), progr
     return replace(state, solid=solid, columns=columns, B=at, D=D, lu=lu, inside=inside)
 
 
-def _cut_elements(base: Factored, solid: Solid) -> tuple[Indices, NDArray[np.bool_], csc_array, csc_array]:
+def _cut_elements(base: Factored, solid: SolidWorkpiece) -> tuple[Indices, NDArray[np.bool_], csc_array, csc_array]:
     """Cut elements: their free degrees of freedom, which other elements share, stiffness before and after."""
     assert base.solid.kept is not None
     assert solid.kept is not None

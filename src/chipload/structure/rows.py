@@ -34,12 +34,12 @@ from chipload.progress import Progress, silent
 from chipload.structure.factors import SMALLEST_PIVOT
 from chipload.structure.grid import Indices, side_axis
 from chipload.structure.hexa import Array, shape, stiffness
-from chipload.structure.places import Places
-from chipload.structure.solid import Solid, check_held, checked_normals, element_dofs
+from chipload.structure.places import MeshPlaces
+from chipload.structure.solid import SolidWorkpiece, check_clamped, checked_normals, element_dofs
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class CondensedPart:
     """The rows on one side of a plane, condensed on it.
 
     Attributes
@@ -57,14 +57,14 @@ class Part:
 
 
 def row_compliances(
-    before: Solid,
+    before: SolidWorkpiece,
     after: ArrayLike,
-    places: Places,
+    places: MeshPlaces,
     normals: ArrayLike | None = None,
     *,
     side: str,
     cut: ArrayLike | None = None,
-    places_after: Places | None = None,
+    places_after: MeshPlaces | None = None,
     progress: Progress = silent,
 ) -> Array:
     """Compliance of places in the states of a pass that takes row after row.
@@ -108,7 +108,7 @@ def row_compliances(
     planes = J - states
     low, high = int(planes.min()), int(planes.max())
     total = high + J - low
-    above: dict[int, Part] = {}
+    above: dict[int, CondensedPart] = {}
     for count, (plane, part) in enumerate(_parts(done, later, directions, lattice[::-1], numbers[::-1], J - low)):
         progress(count / max(total, 1), "rows from above")
         if J - plane in planes:
@@ -121,7 +121,7 @@ def row_compliances(
     return out[:, :, 0, 0] if normals is not None else out
 
 
-def _check(before: Solid, done: Solid) -> None:
+def _check(before: SolidWorkpiece, done: SolidWorkpiece) -> None:
     assert before.kept is not None
     assert done.kept is not None
     empty = done.kept[:, 0] >= done.kept[:, 1]
@@ -133,17 +133,17 @@ def _check(before: Solid, done: Solid) -> None:
             f"{before.kept[e].tolist()}: material cannot come back"
         )
     for solid in (before, done):
-        check_held(solid)
+        check_clamped(solid)
 
 
 def _parts(
-    solid: Solid, places: Places, directions: Array, lattice: Indices, numbers: Indices, last: int
-) -> Iterator[tuple[int, Part]]:
+    solid: SolidWorkpiece, places: MeshPlaces, directions: Array, lattice: Indices, numbers: Indices, last: int
+) -> Iterator[tuple[int, CondensedPart]]:
     """Rows 0, 1, .. on top of one another, condensed on planes 0, 1, .. ``last``."""
     p, d = directions.shape[:2]
     row_of = np.empty(numbers.size, dtype=np.int64)
     row_of[numbers.ravel()] = np.repeat(np.arange(len(numbers)), numbers.shape[1])
-    part = Part(np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros((0, p * d)), np.zeros((p, d, d)))
+    part = CondensedPart(np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros((0, p * d)), np.zeros((p, d, d)))
     yield 0, part
     for row in range(last):
         part = _eliminated(solid, part, lattice[2 * row + 2], numbers[row], places, directions, row_of == row)
@@ -151,8 +151,14 @@ def _parts(
 
 
 def _eliminated(
-    solid: Solid, part: Part, plane: Indices, row: Indices, places: Places, directions: Array, here: NDArray[np.bool_]
-) -> Part:
+    solid: SolidWorkpiece,
+    part: CondensedPart,
+    plane: Indices,
+    row: Indices,
+    places: MeshPlaces,
+    directions: Array,
+    here: NDArray[np.bool_],
+) -> CondensedPart:
     """The part with one row more, condensed on the next plane."""
     assert solid.kept is not None
     grid = solid.grid
@@ -185,11 +191,11 @@ def _eliminated(
         Y = solve_triangular(lower, K[:e, e:], lower=True, check_finite=False, overwrite_b=True)
         y = solve_triangular(lower, f[:e], lower=True, check_finite=False)
         own += _blocks(y, p, d)
-        return Part(dofs[e:], K[e:, e:] - _square(Y), f[e:] - Y.T @ y, own)
-    return Part(dofs, K, f, own)
+        return CondensedPart(dofs[e:], K[e:, e:] - _square(Y), f[e:] - Y.T @ y, own)
+    return CondensedPart(dofs, K, f, own)
 
 
-def _joined(below: Part, above: Part) -> Array:
+def _joined(below: CondensedPart, above: CondensedPart) -> Array:
     """Compliance (p, d, d) of both parts on their plane."""
     dofs = np.union1d(below.dofs, above.dofs)
     K, g = np.zeros((len(dofs), len(dofs))), np.zeros((len(dofs), below.g.shape[1]))
@@ -234,7 +240,7 @@ def _factor(K: Array, element: int | None) -> Array:
     return np.asarray(lower)
 
 
-def _dense(solid: Solid, elements: Indices, at: Indices, size: int) -> Array:
+def _dense(solid: SolidWorkpiece, elements: Indices, at: Indices, size: int) -> Array:
     """Stiffness (size, size) of elements; ``at`` (m, 60) int the rows of their degrees of freedom, -1: held."""
     assert solid.kept is not None
     xyz = solid.grid.nodes[solid.grid.elements[elements]]

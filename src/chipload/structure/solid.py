@@ -24,7 +24,7 @@ from chipload.progress import Progress, silent
 from chipload.structure.factors import Factors, factor
 from chipload.structure.grid import Grid, Indices
 from chipload.structure.hexa import Array, mass, stiffness
-from chipload.structure.places import Places, weights
+from chipload.structure.places import MeshPlaces, weights
 
 #: Young's modulus that a workpiece may have [MPa]
 MODULUS_RANGE = (100.0, 2e6)
@@ -34,7 +34,7 @@ RIGID_MOTIONS = ("along x", "along y", "along z", "about x", "about y", "about z
 
 
 @dataclass(frozen=True, eq=False)
-class Solid:
+class SolidWorkpiece:
     """A workpiece: mesh, material, what holds it, and what is left of it.
 
     Parameters
@@ -121,7 +121,7 @@ def _sum(blocks: Array, dofs: Indices, size: int) -> csc_array:
     return coo_array((blocks.ravel(), (rows, columns)), shape=(size, size)).tocsc()
 
 
-def assemble(solid: Solid) -> csc_array:
+def assemble(solid: SolidWorkpiece) -> csc_array:
     """Stiffness (3 n, 3 n) [N/mm] of the workpiece as if nothing held it."""
     assert solid.kept is not None
     e = solid.there
@@ -130,7 +130,7 @@ def assemble(solid: Solid) -> csc_array:
     return _sum(K, element_dofs(elements), 3 * len(solid.grid.nodes))
 
 
-def assemble_mass(solid: Solid) -> csc_array:
+def assemble_mass(solid: SolidWorkpiece) -> csc_array:
     """Consistent mass (3 n, 3 n) [tonne]."""
     assert solid.kept is not None
     e = solid.there
@@ -144,14 +144,14 @@ def assemble_mass(solid: Solid) -> csc_array:
     return coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)).tocsc()
 
 
-def free_dofs(solid: Solid) -> Indices:
+def free_dofs(solid: SolidWorkpiece) -> Indices:
     """Degrees of freedom that are neither held nor of a node without an element."""
     used = np.zeros(len(solid.grid.nodes), dtype=np.bool_)
     used[solid.grid.elements[solid.there]] = True
     return np.flatnonzero((used[:, None] & ~solid.held).ravel())
 
 
-def check_held(solid: Solid) -> None:
+def check_clamped(solid: SolidWorkpiece) -> None:
     """Refuse a workpiece, or a piece of it, that can move as a rigid body.
 
     Raises
@@ -215,7 +215,7 @@ class Factored:
     factors : of that
     """
 
-    solid: Solid
+    solid: SolidWorkpiece
     free: Indices
     stiffness: csc_array
     factors: Factors
@@ -225,7 +225,7 @@ class Factored:
         return self.factors.solve(force, rows)
 
 
-def factorise(solid: Solid) -> Factored:
+def factorise(solid: SolidWorkpiece) -> Factored:
     """Assemble and factor; O(f^1.5) for a plate.
 
     Raises
@@ -233,13 +233,13 @@ def factorise(solid: Solid) -> Factored:
     InputError
         The workpiece can move as a rigid body, or an element is inverted.
     """
-    check_held(solid)
+    check_clamped(solid)
     free = free_dofs(solid)
     K = assemble(solid)[free][:, free].tocsc()
     return Factored(solid, free, K, factor(K))
 
 
-def loads(factored: Factored, places: Places, directions: Array) -> csc_array:
+def loads(factored: Factored, places: MeshPlaces, directions: Array) -> csc_array:
     """Unit forces at places as columns (f, p) over the free degrees of freedom.
 
     ``directions`` is (p, 3) float.
@@ -262,7 +262,7 @@ def displacement(factored: Factored, force: ArrayLike) -> Array:
     return out.reshape(f.shape)
 
 
-def checked_normals(places: Places, normals: ArrayLike) -> Array:
+def checked_normals(places: MeshPlaces, normals: ArrayLike) -> Array:
     """Normals as an array, refused unless they are unit vectors, one a place."""
     n = np.asarray(normals, dtype=np.float64)
     if n.shape != (len(places), 3) or not np.isclose(np.linalg.norm(n, axis=1), 1.0, rtol=0.0, atol=1e-6).all():
@@ -270,7 +270,7 @@ def checked_normals(places: Places, normals: ArrayLike) -> Array:
     return n
 
 
-def compliance(factored: Factored, places: Places, normals: ArrayLike, progress: Progress = silent) -> Array:
+def compliance(factored: Factored, places: MeshPlaces, normals: ArrayLike, progress: Progress = silent) -> Array:
     """Normal compliance C_nn (p,) [mm/N] at places: normal displacement under a unit normal force.
 
     One solution a place. ``normals`` is (p, 3) float, unit vectors.
@@ -290,7 +290,7 @@ def compliance(factored: Factored, places: Places, normals: ArrayLike, progress:
     return out
 
 
-def full_compliance(factored: Factored, places: Places, progress: Progress = silent) -> Array:
+def full_compliance(factored: Factored, places: MeshPlaces, progress: Progress = silent) -> Array:
     """Compliance C_p (p, 3, 3) [mm/N] at places: displacement (first axis) under unit forces (second). Symmetric."""
     F = [loads(factored, places, np.tile(axis, (len(places), 1))) for axis in np.eye(3)]
     out = np.empty((len(places), 3, 3))

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
-from chipload.structure.beam import FLUTED_FACTOR, flexibilities
+from chipload.structure.beam import flexibilities
 from chipload.structure.hexa import Array
 
 
@@ -116,7 +116,7 @@ def tube(length: float, outer: float, modulus: float, inner: float = 0.0, joint:
     return Bar(length, 64.0 / (math.pi * modulus * (outer**4 - inner**4)), joint)
 
 
-def cutter_bars(cutter: Cutter, joint: Joint = RIGID, fluted_factor: float = FLUTED_FACTOR) -> tuple[Bar, ...]:
+def cutter_bars(cutter: Cutter, joint: Joint = RIGID, fluted_factor: float | None = None) -> tuple[Bar, ...]:
     """Fluted part and shank of a cutter, with the joint by which the holder grips it."""
     fluted, shank = flexibilities(cutter, fluted_factor)
     return Bar(cutter.flute_length, fluted), Bar(cutter.overhang - cutter.flute_length, shank, joint)

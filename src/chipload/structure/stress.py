@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike
 
 from chipload.structure.grid import Indices
 from chipload.structure.hexa import Array, gradients, lame
-from chipload.structure.solid import Solid
+from chipload.structure.solid import SolidWorkpiece
 
 
-def stresses(solid: Solid, u: ArrayLike, elements: Indices) -> Array:
+def stresses(solid: SolidWorkpiece, u: ArrayLike, elements: Indices) -> Array:
     """Stress (m, 27, 3, 3) [MPa] at the points of integration of elements (m,), by displacements u (n, 3) [mm]."""
     assert solid.kept is not None
     nodes = solid.grid.elements[elements]
@@ -38,7 +38,7 @@ def mises(sigma: Array) -> Array:
     return np.asarray(np.sqrt(1.5 * (s * s).sum(axis=(-2, -1))))
 
 
-def greatest(solid: Solid, u: ArrayLike, elements: Indices) -> float:
+def greatest(solid: SolidWorkpiece, u: ArrayLike, elements: Indices) -> float:
     """Greatest equivalent stress [MPa] of elements, at their faces through the thickness."""
     sigma = stresses(solid, u, elements).reshape(len(elements), 9, 3, 3, 3)
     low, middle, high = sigma[:, :, 0], sigma[:, :, 1], sigma[:, :, 2]

@@ -17,7 +17,7 @@ from chipload.errors import InputError
 from chipload.structure.grid import from_map
 from chipload.structure.places import locate, normals_of
 from chipload.structure.shell import Shell
-from chipload.structure.solid import Factored, Solid, factorise, loads
+from chipload.structure.solid import Factored, SolidWorkpiece, factorise, loads
 
 Floats = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ def wall_solid(shell: Shell, counts: tuple[int, int, int] = (28, 24, 1), growth:
     fixed[grid.side("j-")] = True
     for side in ("i-", "i+"):
         fixed[grid.side(side), 1] = True
-    return WallSolid(shell, factorise(Solid(grid, shell.modulus, shell.poisson, DENSITY, fixed)))
+    return WallSolid(shell, factorise(SolidWorkpiece(grid, shell.modulus, shell.poisson, DENSITY, fixed)))
 
 
 def normal_compliance(wall: WallSolid, s_force: float, s_point: float, length: float, width: float) -> float:

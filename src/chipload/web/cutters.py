@@ -13,17 +13,17 @@ from typing import Any
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import ChiploadError, InputError
-from chipload.job import load_job
+from chipload.jobs import load_job
 from chipload.program.apt.cutters import read_cutters
 from chipload.program.read import ENDINGS
-from chipload.web.inside import by_hash
-from chipload.web.result import Result, Track
+from chipload.web.folder_access import find_by_hash
+from chipload.web.result import PageResult, PageTrack
 from chipload.web.scene import cutter_glb, needle_glb, outline_glb
 
 UNKNOWN = "A pointer stands for the cutter: no job in the opened folder and no CL data of this result say its shape."
 
 
-def cutters_of(result: Result, track: Track, size: float) -> tuple[dict[int, bytes], str]:
+def cutters_of(result: PageResult, track: PageTrack, size: float) -> tuple[dict[int, bytes], str]:
     """GLB of the cutter of each tool number of a track (number 0: of every other), and what is not known.
 
     Parameters
@@ -43,45 +43,42 @@ def cutters_of(result: Result, track: Track, size: float) -> tuple[dict[int, byt
     return {0: needle_glb(size), **made}, UNKNOWN
 
 
-def _numbers(result: Result, track: Track) -> set[int]:
+def _numbers(result: PageResult, track: PageTrack) -> set[int]:
     """Tool numbers that a track uses, as far as the result says it."""
     if track.tool is not None:
         return {int(n) for n in set(track.tool.tolist())}
-    some = result.summary.get("operations")
-    operation: Any = some[track.operation] if isinstance(some, list) and track.operation < len(some) else {}
-    settings = operation.get("settings") if isinstance(operation, dict) else None
+    operations = result.result.operations
+    operation: Any = operations[track.operation] if track.operation < len(operations) else {}
+    settings = operation.get("settings")
     number = settings.get("cutter") if isinstance(settings, dict) else None
     return {number} if isinstance(number, int) else set()
 
 
-def _input(result: Result, name: str) -> Path | None:
+def _input(result: PageResult, name: str) -> Path | None:
     """A file that the result was made from, where the opened folder has it."""
-    provenance = result.summary.get("provenance")
-    inputs = provenance.get("inputs") if isinstance(provenance, dict) else None
-    wanted = inputs.get(name) if isinstance(inputs, dict) else None
-    return by_hash(result.root, wanted) if isinstance(wanted, str) else None
+    wanted = result.result.provenance.inputs.get(name)
+    return None if wanted is None else find_by_hash(result.root, wanted)
 
 
-def _of_job(result: Result) -> dict[int, Cutter]:
+def _of_job(result: PageResult) -> dict[int, Cutter]:
     path = _input(result, "job")
-    provenance = result.summary.get("provenance")
-    overrides = provenance.get("overrides", []) if isinstance(provenance, dict) else []
-    if path is None or not isinstance(overrides, list):
+    if path is None:
         return {}
     try:
-        job = load_job(path, [str(o) for o in overrides])
+        job = load_job(path, result.result.provenance.overrides).job
     except ChiploadError:
         return {}
     found = getattr(job, "cutters", {})
     return dict(found) if isinstance(found, dict) else {}
 
 
-def _of_apt(result: Result, track: Track, size: float) -> dict[int, bytes]:
+def _of_apt(result: PageResult, track: PageTrack, size: float) -> dict[int, bytes]:
     program = _input(result, "program")
-    with contextlib.suppress(InputError):
-        own = result.file(f"{track.operation}-{track.strategy or 'program'}.apt")
-        if shapes := _shapes(own, size):
-            return shapes
+    others = [t for t in result.result.tracks if t.operation == track.operation and t is not track.own]
+    for name in (n for t in (track.own, *others) for n in t.programs):
+        with contextlib.suppress(InputError):
+            if name.endswith(".apt") and (shapes := _shapes(result.file(name), size)):
+                return shapes
     return _shapes(program, size) if program is not None and ENDINGS.get(program.suffix.lower()) == "apt" else {}
 
 

@@ -1,14 +1,20 @@
-"""Who may talk to the page: browsers of this computer that show this page.
+"""Access to the page: only browsers of this computer that were given its address, and only from this page.
 
-A page of another site may make a browser send requests to 127.0.0.1, also under a name of its own that leads here. So
-every request must name this host and this port, a websocket must come from this very page, nothing but GET and HEAD is
-heard beside the websocket, and what is shown may ask no other host for anything.
+A page of another site may make a browser send requests to 127.0.0.1, also under a host name of its own that resolves to
+this computer. So every request must name this host and this port, a websocket must come from this page, nothing but GET
+and HEAD is accepted beside the websocket, and what is shown may ask no other host for anything.
+
+Another user of this computer can connect to the port. So the address that is printed carries a random token; the first
+visit turns it into a cookie, and a request without this cookie is refused.
 """
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Awaitable, Callable, MutableMapping
+from http.cookies import CookieError, SimpleCookie
 from typing import Any
+from urllib.parse import parse_qsl, urlencode
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -37,21 +43,35 @@ HEADERS = (
 
 
 class Guard:
-    """The door before the application; ``port`` is the one that it listens on."""
+    """Accepts or refuses each request before the application sees it.
 
-    def __init__(self, app: App, port: int) -> None:
-        self.app, self.port = app, port
+    Parameters
+    ----------
+    port : that the application listens on
+    token : that the address of the page carries
+    """
+
+    def __init__(self, app: App, port: int, token: str) -> None:
+        self.app, self.port, self.token = app, port, token
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let a request through, or refuse it."""
+        """Pass a request on, or refuse it."""
         if scope["type"] not in ("http", "websocket"):
             await self.app(scope, receive, send)
             return
-        why = refusal(scope["type"], scope.get("method", "GET"), scope["headers"], self.port)
-        if why is None:
+        headers = scope["headers"]
+        refused = refusal(scope["type"], scope.get("method", "GET"), headers, self.port)
+        if refused is None and scope["type"] == "http" and scope["path"] == "/":
+            query = parse_qsl(scope.get("query_string", b"").decode("latin-1"))
+            if any(key == "token" and _equal(value, self.token) for key, value in query):
+                await self._admit(query, send)
+                return
+        if refused is None and not _has_cookie(headers, self.port, self.token):
+            refused = 403, "refused: open the address that `chipload view` printed, with its token\n"
+        if refused is None:
             await self.app(scope, receive, _with_headers(send))
         elif scope["type"] == "http":
-            status, text = why
+            status, text = refused
             head = [(b"content-type", b"text/plain; charset=utf-8"), *HEADERS]
             await send({"type": "http.response.start", "status": status, "headers": head})
             await send({"type": "http.response.body", "body": text.encode()})
@@ -59,9 +79,48 @@ class Guard:
             await receive()
             await send({"type": "websocket.close", "code": 1008})
 
+    async def _admit(self, query: list[tuple[str, str]], send: Send) -> None:
+        """Set the cookie and lead to the same address without the token, so that no history keeps it."""
+        rest = urlencode([(key, value) for key, value in query if key != "token"])
+        cookie = f"{cookie_name(self.port)}={self.token}; Path=/; HttpOnly; SameSite=Lax"
+        head = [
+            (b"location", f"/{'?' if rest else ''}{rest}".encode("ascii")),
+            (b"set-cookie", cookie.encode("ascii")),
+            (b"cache-control", b"no-store"),
+            *HEADERS,
+        ]
+        await send({"type": "http.response.start", "status": 303, "headers": head})
+        await send({"type": "http.response.body", "body": b""})
+
+
+def cookie_name(port: int) -> str:
+    """Name of the cookie: browsers keep cookies by host, and two pages may be open on two ports.
+
+    >>> cookie_name(8170)
+    'chipload-8170'
+    """
+    return f"chipload-{port}"
+
+
+def _has_cookie(headers: list[tuple[bytes, bytes]], port: int, token: str) -> bool:
+    """Whether a request carries the token in its cookie."""
+    for key, value in headers:
+        if key.lower() == b"cookie":
+            try:
+                found = SimpleCookie(value.decode("latin-1")).get(cookie_name(port))
+            except CookieError:
+                continue
+            if found is not None and _equal(found.value, token):
+                return True
+    return False
+
+
+def _equal(value: str, token: str) -> bool:
+    return secrets.compare_digest(value.encode(), token.encode())
+
 
 def refusal(kind: str, method: str, headers: list[tuple[bytes, bytes]], port: int) -> tuple[int, str] | None:
-    """Status and reason of a request that is not heard; None: it is.
+    """Status and reason of a request that is refused for its host, origin or method; None: it is not.
 
     >>> refusal("http", "GET", [(b"host", b"localhost:8170")], 8170)
     >>> refusal("http", "GET", [(b"host", b"evil.example:8170")], 8170)[0]

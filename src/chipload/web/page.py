@@ -11,14 +11,15 @@ from urllib.parse import quote
 
 from nicegui import background_tasks, ui
 
-from chipload.errors import InputError
+from chipload.errors import InputError, OutputError
 from chipload.report.folder import check_target
-from chipload.web.inside import ENTRIES, Found, Opened, inside, is_job, listed
+from chipload.result import Verdict
+from chipload.web.asset_cache import AssetCache
+from chipload.web.folder_access import ENTRIES, FolderEntry, OpenedFolder, is_job, list_folder, resolve_name
 from chipload.web.panels import RELEASE
-from chipload.web.result import Result, load_result
+from chipload.web.result import PageResult, open_result
+from chipload.web.result_view import VERDICTS, ResultView
 from chipload.web.runs import Run
-from chipload.web.shelf import Shelf
-from chipload.web.view import VERDICTS, View
 
 KEYS = (
     ("\u2190 \u2192", "one step back or on; with Shift twenty"),
@@ -49,9 +50,9 @@ class Runs:
 class Page:
     """One window."""
 
-    def __init__(self, opened: Opened, runs: Runs, shelf: Shelf) -> None:
-        self.opened, self.runs, self.shelf = opened, runs, shelf
-        self.result: Result | None = None
+    def __init__(self, opened: OpenedFolder, runs: Runs, assets: AssetCache) -> None:
+        self.opened, self.runs, self.assets = opened, runs, assets
+        self.result: PageResult | None = None
         self.own: Run | None = None
         self.seen: Run | None = runs.now if runs.now is not None and runs.now.over else None
         ui.add_css(resources.files(__package__).joinpath("page.css").read_text("utf-8"))
@@ -61,7 +62,7 @@ class Page:
             self._bar()
             self.home = ui.element("div").classes("cl-home")
             with ui.element("div").classes("cl-view") as self.stage:
-                self.view = View(shelf)
+                self.view = ResultView(assets)
         self.opening, self.list = self._dialog("Open")
         self.running, self.ask = self._dialog("Run")
         self._help()
@@ -76,7 +77,7 @@ class Page:
             await self._home()
             return
         try:
-            path = inside(self.opened.root, first)
+            path = resolve_name(self.opened.root, first)
             if path.is_file():
                 await self._home(first)
             else:
@@ -90,11 +91,11 @@ class Page:
         self.opening.close()
         self.busy.set_visibility(True)
         try:
-            result = await asyncio.to_thread(load_result, self.opened.root, name)
+            result = await asyncio.to_thread(open_result, self.opened.root, name)
             self.result = result
             self.home.set_visibility(False)
             self.stage.set_visibility(True)
-            title = str(result.summary.get("job", "")) or "result"
+            title = result.result.title or "result"
             self.title.set_text(title)
             self.name.set_text(self._called(name))
             options = {k: t.title for k, t in enumerate(result.tracks)}
@@ -153,9 +154,9 @@ class Page:
         with ui.dialog() as self.help, ui.card().classes("cl-dialog").mark("keys"):
             ui.label("Keys").classes("cl-dialog-title")
             with ui.element("div").classes("cl-keys"):
-                for key, says in KEYS:
+                for key, meaning in KEYS:
                     ui.label(key).classes("cl-key")
-                    ui.label(says)
+                    ui.label(meaning)
             ui.label(
                 "Click a plot, a line of the program, a limit or a finding to go there. Drag in the 3D view turns it, "
                 "the wheel zooms, the right button shifts. Drag in a plot zooms it, a double click undoes that."
@@ -163,7 +164,7 @@ class Page:
 
     # -- opening ------------------------------------------------------------------------------------------------
     async def _open(self) -> None:
-        found, all_seen = await asyncio.to_thread(listed, self.opened.root)
+        found, all_seen = await asyncio.to_thread(list_folder, self.opened.root)
         self.list.clear()
         with self.list:
             self._listed(found, all_seen)
@@ -172,7 +173,7 @@ class Page:
     async def _home(self, job: str | None = None) -> None:
         """What the folder holds, where no result is shown."""
         self.result = None
-        found, all_seen = await asyncio.to_thread(listed, self.opened.root)
+        found, all_seen = await asyncio.to_thread(list_folder, self.opened.root)
         self.stage.set_visibility(False)
         self.home.set_visibility(True)
         self.home.clear()
@@ -190,7 +191,7 @@ class Page:
             ui.label("Results and jobs in this folder").classes("cl-dialog-title")
             self._listed(found, all_seen)
 
-    def _listed(self, found: list[Found], all_seen: bool) -> None:
+    def _listed(self, found: list[FolderEntry], all_seen: bool) -> None:
         if not all_seen:
             ui.label(f"The folder holds more than {ENTRIES} files: only so many were looked at.").classes("cl-note")
         if not found:
@@ -200,7 +201,7 @@ class Page:
                 ui.icon("analytics" if f.kind == "result" else "description").classes("cl-icon")
                 ui.label(self._called(f.name)).classes("cl-what")
                 if f.kind == "result":
-                    ui.label(f.word).classes(f"cl-pill cl-{VERDICTS[f.word]}")
+                    ui.label(f.word).classes(f"cl-pill cl-{VERDICTS[Verdict(f.word)]}")
                     _button("Show", lambda n=f.name: self.show(n)).mark(f"show-{f.name}")
                 else:
                     ui.label("job").classes("cl-pill")
@@ -216,7 +217,7 @@ class Page:
         return self.opened.root.name if name == "." else name
 
     def _text(self, job: str) -> str:
-        lines = inside(self.opened.root, job).read_text("utf-8", "replace").splitlines()
+        lines = resolve_name(self.opened.root, job).read_text("utf-8", "replace").splitlines()
         return "".join(f'<div class="cl-line"><i>{k}</i>{escape(t) or " "}</div>' for k, t in enumerate(lines, 1))
 
     # -- running ------------------------------------------------------------------------------------------------
@@ -229,27 +230,27 @@ class Page:
         with self.ask:
             ui.label(f"{self._called(job)}: its result goes into this folder of the opened one:").classes("cl-note")
             where = ui.input(value=out).props("dense outlined").classes("cl-out").mark("out")
-            said = ui.label("").classes("cl-no")
+            message = ui.label("").classes("cl-no")
             with ui.element("div").classes("cl-entry"):
-                _button("Run", lambda: self._run(job, str(where.value), said), "play_arrow").props(
+                _button("Run", lambda: self._run(job, str(where.value), message), "play_arrow").props(
                     "unelevated color=primary"
                 ).props(remove="flat").mark("start")
                 _button("Cancel", self.running.close)
         self.running.open()
 
-    def _run(self, job: str, out: str, said: Any) -> None:
+    def _run(self, job: str, out: str, message: Any) -> None:
         """Start a run, unless one runs or its folder cannot be written."""
         root = self.opened.root
         try:
             if self.runs.now is not None and not self.runs.now.over:
                 raise InputError("a job runs already: stop it first")
-            path = inside(root, job)
+            path = resolve_name(root, job)
             if not is_job(path):
                 raise InputError(f"{job}: is no job any more")
             target = target_in(root, out)
             check_target(target)
-        except InputError as err:
-            said.set_text(str(err).replace(f"--out {root}/", ""))
+        except (InputError, OutputError) as err:
+            message.set_text(str(err).replace(f"--out {root}/", ""))
             return
         self.running.close()
         self.runs.now = now = Run(job, target.relative_to(root).as_posix())
@@ -266,14 +267,14 @@ class Page:
         self.bar_line.set_visibility(not now.over)
         self.bar_stop.set_visibility(now.state == "running")
         self.bar_close.set_visibility(now.over)
-        said = {
+        message = {
             "running": f"{now.job}: {100.0 * now.done:.0f} % \u00b7 {now.what}",
             "stopping": f"{now.job}: stopping",
-            "done": f"{now.job}: done. {now.says}",
-            "stopped": f"{now.job}: stopped, {now.says.removeprefix('stopped: ') or 'nothing was written'}",
-            "failed": f"{now.job}: {now.says}",
+            "done": f"{now.job}: done. {now.message}",
+            "stopped": f"{now.job}: stopped, {now.message.removeprefix('stopped: ') or 'nothing was written'}",
+            "failed": f"{now.job}: {now.message}",
         }[now.state]
-        self.bar_text.set_text(said)
+        self.bar_text.set_text(message)
         if now.over:
             self.seen = now
             if now.state == "done" and now is self.own:
@@ -306,13 +307,13 @@ class Page:
         elif key.name == " " and not event.action.repeat:
             self.view.toggle()
         elif key.name in ("1", "2", "3", "4"):
-            self.view.space.look(("iso", "top", "front", "side")[int(key.name) - 1])
+            self.view.scene.view_from(("iso", "top", "front", "side")[int(key.name) - 1])
         elif key.name == "t":
             self.tracks.set_value((int(self.tracks.value or 0) + 1) % len(self.result.tracks))
 
 
 def target_in(root: Any, out: str) -> Any:
-    """The folder of a result that a person named, in the opened folder.
+    """The folder of a result that a person names, in the opened folder.
 
     Raises
     ------
@@ -329,9 +330,9 @@ def target_in(root: Any, out: str) -> Any:
     return target
 
 
-def _button(text: str, act: Any, icon: str | None = None, says: str = "") -> Any:
+def _button(text: str, act: Any, icon: str | None = None, tip: str = "") -> Any:
     button = ui.button(text, on_click=act, icon=icon).props("flat dense no-caps size=md").on("mousedown.prevent")
-    if says:
+    if tip:
         with button:
-            ui.tooltip(says)
+            ui.tooltip(tip)
     return button

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from chipload.report.figures import FONT, GRID, INK, LIMIT
 from chipload.report.shape import thinned
-from chipload.web.findings import Bound, bound_of, named
-from chipload.web.result import Result, Text, Track
+from chipload.web.checks import Bound, bound_of, label_and_unit
+from chipload.web.result import PageResult, PageTrack, TextColumn
 
 Floats = NDArray[np.float64]
 
@@ -25,12 +25,14 @@ CURSOR = "#b3261e"
 FAR = 1.8
 
 
-def bounds(result: Result, track: Track, columns: Sequence[str]) -> dict[str, Bound | None]:
+def bounds_of(result: PageResult, track: PageTrack, columns: Sequence[str]) -> dict[str, Bound | None]:
     """The stated limit of each column."""
     return {c: bound_of(result, track, c) for c in columns}
 
 
-def plots(result: Result, track: Track, held: Mapping[str, Bound | None], against: str, row: int) -> dict[str, Any]:
+def plots(
+    result: PageResult, track: PageTrack, bounds: Mapping[str, Bound | None], against: str, row: int
+) -> dict[str, Any]:
     """The figure (plotly, plain values) of columns and their limits with the cursor at a row."""
     x = abscissa(track, against)
     at = float(x[row])
@@ -38,14 +40,14 @@ def plots(result: Result, track: Track, held: Mapping[str, Bound | None], agains
     axes: dict[str, Any] = {}
     notes: list[dict[str, Any]] = []
     shapes: list[dict[str, Any]] = [cursor(at)]
-    count = max(len(held), 1)
+    count = max(len(bounds), 1)
     gap = 0.05 if count > 1 else 0.0
     height = (1.0 - gap * (count - 1)) / count
-    for k, (column, bound) in enumerate(held.items()):
+    for k, (column, bound) in enumerate(bounds.items()):
         values = result.column(track, column)
-        y = values.codes.astype(np.float64) if isinstance(values, Text) else values
+        y = values.codes.astype(np.float64) if isinstance(values, TextColumn) else values
         rows = drawn_rows(y)
-        unit = escape(named(column)[1])
+        unit = escape(label_and_unit(column)[1])
         colour = COLOURS[k % len(COLOURS)]
         axis = "" if k == 0 else str(k + 1)
         top = 1.0 - k * (height + gap)
@@ -63,7 +65,7 @@ def plots(result: Result, track: Track, held: Mapping[str, Bound | None], agains
             "nticks": 4,
             "tickfont": {"size": 10, "color": "#5f6b7a"},
             "automargin": False,
-            **(_words(values) if isinstance(values, Text) else {}),
+            **(_words(values) if isinstance(values, TextColumn) else {}),
         }
         data.append(
             {
@@ -75,7 +77,7 @@ def plots(result: Result, track: Track, held: Mapping[str, Bound | None], agains
         )  # fmt: skip
         notes.append(
             {
-                "text": noted(result, track, column, row, bound), "x": 0.004, "y": top,
+                "text": annotation(result, track, column, row, bound), "x": 0.004, "y": top,
                 "xref": "paper", "yref": "paper", "xanchor": "left", "yanchor": "top", "showarrow": False,
                 "font": {"size": 11, "color": colour},
                 "bgcolor": "rgba(255,255,255,0.85)", "borderpad": 1,
@@ -88,7 +90,7 @@ def plots(result: Result, track: Track, held: Mapping[str, Bound | None], agains
                     "line": {"color": LIMIT, "width": 1, "dash": "dash"},
                 }
             )  # fmt: skip
-    title = {"time": "time [s]" if track.timed else "row", "path": "path [mm]"}[against]
+    title = {"time": "time [s]", "path": "path [mm]"}[against]
     layout = {
         "font": {**FONT, "size": 11, "color": INK},
         "margin": {"l": 52, "r": 10, "t": 4, "b": 32},
@@ -115,22 +117,21 @@ def plots(result: Result, track: Track, held: Mapping[str, Bound | None], agains
     return {"data": data, "layout": layout, "config": config}
 
 
-def abscissa(track: Track, against: str) -> Floats:
+def abscissa(track: PageTrack, against: str) -> Floats:
     """(n,) time or path of each row."""
     return track.t if against == "time" else track.s
 
 
-def noted(result: Result, track: Track, column: str, row: int, bound: Bound | None) -> str:
+def annotation(result: PageResult, track: PageTrack, column: str, row: int, bound: Bound | None) -> str:
     """Name of a column, its value at a row, and its limit."""
-    word, unit = named(column)
+    word, unit = label_and_unit(column)
     values = result.column(track, column)
-    code = int(values.codes[row]) if isinstance(values, Text) else -1
-    value = f"{values[row]:.5g}" if not isinstance(values, Text) else values.words[code] if code >= 0 else ""
-    said = ""
+    code = int(values.codes[row]) if isinstance(values, TextColumn) else -1
+    value = f"{values[row]:.5g}" if not isinstance(values, TextColumn) else values.words[code] if code >= 0 else ""
+    limit = ""
     if bound is not None:
-        but = f", not for {', '.join(bound.free)}" if bound.free else ""
-        said = f'  <span style="color:{LIMIT}">limit {bound.limit:g}{escape(but)}</span>'
-    return f"{escape(word)} <b>{escape(value)}</b> {escape(unit)}{said}"
+        limit = f'  <span style="color:{LIMIT}">limit {bound.limit:g}</span>'
+    return f"{escape(word)} <b>{escape(value)}</b> {escape(unit)}{limit}"
 
 
 def cursor(at: float) -> dict[str, Any]:
@@ -150,6 +151,6 @@ def drawn_rows(values: Floats) -> NDArray[np.int64]:
     return some[thinned(values[some], POINTS)]
 
 
-def _words(values: Text) -> dict[str, Any]:
+def _words(values: TextColumn) -> dict[str, Any]:
     short = [escape(w if len(w) <= 8 else w[:7] + "\u2026") for w in values.words[:40]]
     return {"tickvals": list(range(len(short))), "ticktext": short}

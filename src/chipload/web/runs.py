@@ -25,14 +25,14 @@ State = Literal["running", "stopping", "done", "stopped", "failed"]
 
 
 class Run:
-    """One run: its ``state``, the share ``done``, ``what`` it does; at its end its ``code`` and what it ``says``."""
+    """One run: its ``state``, the share ``done``, ``what`` it does; at its end its ``code`` and its ``message``."""
 
     def __init__(self, job: str, out: str) -> None:
         self.job, self.out = job, out
         self.state: State = "running"
         self.done, self.what = 0.0, "starting"
         self.code: int | None = None
-        self.says = ""
+        self.message = ""
         self._process: asyncio.subprocess.Process | None = None
 
     @property
@@ -49,20 +49,22 @@ class Run:
                 *words, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
             )
         except OSError as err:
-            self.state, self.code, self.says = "failed", 1, f"no process could be started: {err.strerror}"
+            self.state, self.code, self.message = "failed", 1, f"no process could be started: {err.strerror}"
             return
         self._process = process
         assert process.stdout is not None
         assert process.stderr is not None
         faults = asyncio.create_task(_tail(process.stderr))
         async for line in process.stdout:
-            self._heard(line)
+            self._take(line)
         code = await process.wait()
         fault = await faults
         stopped = self.state == "stopping"
         if self.code is None:
             self.code = code
-            self.says = "stopped: nothing was written" if stopped else f"the run ended without a word: {fault or code}"
+            self.message = (
+                "stopped: nothing was written" if stopped else f"the run ended without a word: {fault or code}"
+            )
         finished = self.code in (0, 3)  # it may have been done before the stop came
         self.state = "done" if finished else "stopped" if stopped or self.code == 130 else "failed"
 
@@ -78,13 +80,13 @@ class Run:
         except TimeoutError:
             _signal(process.pid, signal.SIGKILL)
 
-    def _heard(self, line: bytes) -> None:
+    def _take(self, line: bytes) -> None:
         with contextlib.suppress(ValueError, TypeError, AttributeError):
-            said = json.loads(line)
-            if "code" in said:
-                self.code, self.says = int(said["code"]), str(said["says"])
+            values = json.loads(line)
+            if "code" in values:
+                self.code, self.message = int(values["code"]), str(values["says"])
             else:
-                self.done, self.what = float(said["done"]), str(said["what"])
+                self.done, self.what = float(values["done"]), str(values["what"])
 
 
 def _signal(pid: int, number: int) -> None:

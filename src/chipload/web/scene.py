@@ -20,9 +20,9 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.report.figures import SCALE
 from chipload.report.shape import thinned
-from chipload.web.findings import bound_of
+from chipload.web.checks import bound_of
 from chipload.web.glb import Shape, glb_bytes
-from chipload.web.result import SCENE, Result, Text, Track
+from chipload.web.result import SCENE, PageResult, PageTrack, TextColumn
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -68,7 +68,7 @@ class Scale:
     words: tuple[tuple[str, str], ...] = ()
 
 
-def bodies(result: Result) -> tuple[tuple[Body, ...], str]:
+def bodies(result: PageResult) -> tuple[tuple[Body, ...], str]:
     """The bodies of scene.glb beside path and cutter, and a sentence where there are none."""
     try:
         path = result.file(SCENE)
@@ -94,11 +94,11 @@ def edges_glb(body: Body) -> bytes:
     return glb_bytes([Shape(np.asarray(mesh.vertices, dtype=np.float64), lines, colour, lit=False)])
 
 
-def path_glb(result: Result, track: Track, column: str) -> tuple[bytes, Scale]:
+def path_glb(result: PageResult, track: PageTrack, column: str) -> tuple[bytes, Scale]:
     """The path of a track coloured by a column, and what the colours mean."""
     values = result.column(track, column)
     rows = shown_rows(track, values)
-    if isinstance(values, Text):
+    if isinstance(values, TextColumn):
         own = [(*_rgb(c), 255) for c in WORDS]
         table = np.array([*(own[k % len(own)] for k in range(len(values.words))), NONE], dtype=np.uint8)
         colours = table[np.where(values.codes[rows] < 0, len(values.words), values.codes[rows])]
@@ -132,12 +132,12 @@ def shades(values: Floats, scale: Scale, above: NDArray[np.bool_]) -> NDArray[np
     return out
 
 
-def shown_rows(track: Track, values: Floats | Text) -> Ints:
+def shown_rows(track: PageTrack, values: Floats | TextColumn) -> Ints:
     """(m,) rows that a drawn path goes through: extremes of place and value, and where it breaks or a word changes."""
     n = len(track)
     if n <= POINTS:
         return np.arange(n)
-    worth = values.codes.astype(np.float64) if isinstance(values, Text) else values
+    worth = values.codes.astype(np.float64) if isinstance(values, TextColumn) else values
     filled = np.where(np.isfinite(worth), worth, 0.0)
     keep = [thinned(track.place[:, k], POINTS // 4) for k in range(3)] + [thinned(filled, POINTS // 4)]
     gaps = np.flatnonzero(track.apart)
@@ -146,7 +146,7 @@ def shown_rows(track: Track, values: Floats | Text) -> Ints:
     return np.unique(np.concatenate(keep))
 
 
-def radius(track: Track) -> float:
+def radius(track: PageTrack) -> float:
     """Radius of the drawn tube [mm]: thinner where the path is so long that it would hide itself."""
     size = float(np.linalg.norm(np.ptp(track.place, axis=0)))
     return max(min(THICK * size, DENSE * size * size / max(float(track.s[-1] - track.s[0]), size)), 1e-3)
@@ -264,7 +264,7 @@ def _revolved(profile: Floats, colour: tuple[int, int, int, int]) -> Shape:
     return Shape(points, np.vstack(faces), np.array(colour, dtype=np.uint8))
 
 
-def _apart(track: Track, rows: Ints) -> NDArray[np.bool_]:
+def _apart(track: PageTrack, rows: Ints) -> NDArray[np.bool_]:
     """Whether a gap lies between each of the chosen rows and the one before it."""
     count = np.cumsum(track.apart)[rows]
     return np.asarray(np.diff(count, prepend=count[:1]) > 0)

@@ -6,28 +6,30 @@ import asyncio
 import contextlib
 import logging
 import os
+import secrets
 import socket
 import tempfile
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from html import escape
 from pathlib import Path
 from typing import Any
 
 from chipload.errors import InputError
-from chipload.web.inside import Opened, inside, open_path
+from chipload.web.folder_access import OpenedFolder, open_path, resolve_name
 
 #: the only address that is listened on, and the port that is tried first where none is asked for
 HOST, PORT = "127.0.0.1", 8170
 
 
-def serve(path: str | Path, port: int | None, show: bool, say: Callable[[str], None]) -> None:
+def serve(path: str | Path, port: int | None, show: bool, show_line: Callable[[str], None]) -> None:
     """Serve until Ctrl-C.
 
     Parameters
     ----------
     port : None: :data:`PORT`, or a free one where that is taken
     show : whether the browser is opened
-    say : takes lines for the person at the terminal
+    show_line : takes lines for the terminal; one has the address with its token
 
     Raises
     ------
@@ -38,29 +40,32 @@ def serve(path: str | Path, port: int | None, show: bool, say: Callable[[str], N
     listener, taken = listen(port)
     own = int(listener.getsockname()[1])
     if taken:
-        say(f"port {PORT} is taken: using {own}")
-    address = f"http://{HOST}:{own}/"
+        show_line(f"port {PORT} is taken: using {own}")
+    token = secrets.token_urlsafe(24)
+    address = f"http://{HOST}:{own}/?token={token}"
     # the library would read a file of settings in the working directory
     os.environ["NICEGUI_STORAGE_PATH"] = str(Path(tempfile.gettempdir()) / "chipload-keeps-nothing")
     import uvicorn
 
-    application = _application(opened, own)
+    application = _application(opened, own, token)
     config = uvicorn.Config(
         application, log_level="error", access_log=False, timeout_graceful_shutdown=1, ws_max_size=4_000_000
     )
     server = uvicorn.Server(config)
 
     async def work() -> None:
-        started = asyncio.create_task(_told(server, lambda: say(f"{opened.root}: {address} (Ctrl-C ends it)")))
+        started = asyncio.create_task(
+            _when_started(server, lambda: show_line(f"{opened.root}: {address} (Ctrl-C ends it)"))
+        )
         if show:
             loop = asyncio.get_running_loop()
-            started.add_done_callback(lambda _: loop.run_in_executor(None, webbrowser.open, address))
+            started.add_done_callback(lambda _: loop.run_in_executor(None, webbrowser.open, first.as_uri()))
         try:
             await server.serve(sockets=[listener])
         finally:
             started.cancel()
 
-    with contextlib.suppress(KeyboardInterrupt, asyncio.CancelledError):
+    with _redirect(address) as first, contextlib.suppress(KeyboardInterrupt, asyncio.CancelledError):
         asyncio.run(work())
 
 
@@ -88,30 +93,39 @@ def listen(port: int | None) -> tuple[socket.socket, bool]:
     raise InputError("no port is free on 127.0.0.1")
 
 
-async def _told(server: Any, tell: Callable[[], None]) -> None:
+@contextlib.contextmanager
+def _redirect(address: str) -> Iterator[Path]:
+    """A file that leads a browser to an address: the words of a command, unlike the file, are open to every user."""
+    with tempfile.TemporaryDirectory(prefix="chipload-") as folder:
+        path = Path(folder) / "chipload.html"
+        path.write_text(f'<!doctype html><meta http-equiv="refresh" content="0; url={escape(address)}">\n', "utf-8")
+        yield path
+
+
+async def _when_started(server: Any, act: Callable[[], None]) -> None:
     while not server.started:
         await asyncio.sleep(0.02)
-    tell()
+    act()
 
 
-def _application(opened: Opened, port: int) -> Any:
+def _application(opened: OpenedFolder, port: int, token: str) -> Any:
     """The application behind its guard; its runs end with it."""
     from fastapi import FastAPI
     from nicegui import app, ui
     from starlette.responses import FileResponse, PlainTextResponse, Response
 
+    from chipload.web.asset_cache import AssetCache
     from chipload.web.guard import SANDBOX, Guard
     from chipload.web.page import Page, Runs
     from chipload.web.result import REPORT
-    from chipload.web.shelf import Shelf
 
     # what is on its way to a window that was closed is no news for the terminal
     logging.getLogger("nicegui").setLevel(logging.ERROR)
-    runs, shelf = Runs(), Shelf()
+    runs, assets = Runs(), AssetCache()
 
     @app.get("/shape/{key}.glb")
     def shape(key: str) -> Response:
-        data = shelf.get(key)
+        data = assets.get(key)
         if data is None:
             return PlainTextResponse("not here\n", status_code=404)
         return Response(data, media_type="model/gltf-binary", headers={"cache-control": "no-store"})
@@ -119,7 +133,7 @@ def _application(opened: Opened, port: int) -> Any:
     @app.get("/report")
     def report(name: str) -> Response:
         try:
-            path = inside(opened.root, f"{name}/{REPORT}")
+            path = resolve_name(opened.root, f"{name}/{REPORT}")
         except InputError as err:
             return PlainTextResponse(f"{err}\n", status_code=404)
         headers = {"content-security-policy": SANDBOX, "cache-control": "no-store"}
@@ -127,7 +141,7 @@ def _application(opened: Opened, port: int) -> Any:
 
     @ui.page("/", title="chipload", response_timeout=30.0)
     async def index(show: str | None = None) -> None:
-        page, window = Page(opened, runs, shelf), ui.context.client
+        page, window = Page(opened, runs, assets), ui.context.client
         with contextlib.suppress(TimeoutError):
             await window.connected()
             if window.has_socket_connection:
@@ -137,4 +151,4 @@ def _application(opened: Opened, port: int) -> Any:
     app.config.socket_io_js_transports = ["websocket"]
     outer = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     ui.run_with(outer, title="chipload", tailwind=False, show_welcome_message=False, reconnect_timeout=30.0)
-    return Guard(outer, port)
+    return Guard(outer, port, token)

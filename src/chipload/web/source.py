@@ -21,8 +21,8 @@ from chipload.program.apt.reader import read_apt_file
 from chipload.program.motions import is_arc, straightened
 from chipload.program.program import Program
 from chipload.program.read import read_program
-from chipload.web.inside import by_hash
-from chipload.web.result import Result, Track
+from chipload.web.folder_access import find_by_hash
+from chipload.web.result import PageResult, PageTrack
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -59,28 +59,23 @@ class Source:
         return k if len(later) and later[k] < np.iinfo(np.int64).max else None
 
 
-def source_of(result: Result, track: Track) -> Source | None:
+def source_of(result: PageResult, track: PageTrack) -> Source | None:
     """The text of a track; None where the result holds none that can be read."""
-    inputs = result.summary.get("provenance", {})
-    inputs = inputs.get("inputs", {}) if isinstance(inputs, dict) else {}
-    wanted = inputs.get("program") if isinstance(inputs, dict) else None
-    if track.line is not None and track.line.any() and isinstance(wanted, str):
-        fed = _with_new_feeds(result, track)
-        if fed is not None:
-            return Source(fed.name, _lines(fed), track.line, "with its new feeds")
-        original = by_hash(result.root, wanted)
+    wanted, note = result.result.provenance.inputs.get("program"), ""
+    if track.line is not None and track.line.any() and wanted is not None:
+        own = _with_new_feeds(result, track)
+        if own is not None:
+            return Source(own.name, _lines(own), track.line, "with its new feeds")
+        original = find_by_hash(result.root, wanted)
         if original is not None and original.stat().st_size <= LARGEST:
             return Source(original.name, _lines(original), track.line, "")
         note = f"CL data of {wanted.rsplit(' sha256 ', 1)[0]}, whose own text is not in the opened folder"
-    else:
-        note = ""
-    stem = f"{track.operation}-{track.strategy or 'program'}"
-    for ending in ("ngc", "nc", "apt"):
+    for name in track.own.programs:
         try:
-            path = result.file(f"{stem}.{ending}")
+            path = result.file(name)
             if path.stat().st_size > LARGEST:
                 continue
-            program = read_apt_file(path)[0] if ending == "apt" else _read_axes(path, result)
+            program = read_apt_file(path)[0] if path.suffix == ".apt" else _read_axes(path, result)
         except (ChiploadError, OSError):
             continue
         if program is not None:
@@ -88,19 +83,17 @@ def source_of(result: Result, track: Track) -> Source | None:
     return None
 
 
-def _with_new_feeds(result: Result, track: Track) -> Path | None:
-    """The program of the operation with other F words, line for line; None: it kept its feeds."""
-    operations = result.summary.get("operations")
-    of = operations[track.operation] if isinstance(operations, list) and track.operation < len(operations) else {}
-    feeds = of.get("feeds") if isinstance(of, dict) else None
-    name = feeds.get("program") if isinstance(feeds, dict) else None
-    if not isinstance(name, str):
-        return None
-    try:
-        path = result.file(name)
-        return path if path.stat().st_size <= LARGEST else None
-    except (ChiploadError, OSError):
-        return None
+def _with_new_feeds(result: PageResult, track: PageTrack) -> Path | None:
+    """The program with other F words, line for line, where the track has one; None: it kept its feeds."""
+    for name in track.own.programs:
+        if Path(name).suffix == ".apt":
+            continue
+        try:
+            path = result.file(name)
+            return path if path.stat().st_size <= LARGEST else None
+        except (ChiploadError, OSError):
+            return None
+    return None
 
 
 def followed(place: Floats, program: Program) -> Ints:
@@ -132,11 +125,10 @@ def followed(place: Floats, program: Program) -> Ints:
     return out[np.searchsorted(rows, np.arange(n), side="right") - 1]
 
 
-def _read_axes(path: Path, result: Result) -> Program | None:
+def _read_axes(path: Path, result: PageResult) -> Program | None:
     """The program of a shipped machine that moves straight axes only."""
-    provenance = result.summary.get("provenance", {})
-    name = provenance.get("machine") if isinstance(provenance, dict) else None
-    if not isinstance(name, str) or name not in machine_names():
+    name = result.result.provenance.machine
+    if name not in machine_names():
         return None
     return read_program(path, machine_named(name)).program
 

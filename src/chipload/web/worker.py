@@ -10,7 +10,8 @@ import threading
 import time
 from typing import Any, NoReturn
 
-from chipload.errors import Cancelled, InputError
+from chipload.errors import Cancelled, InputError, OutputError
+from chipload.files import cannot_write, is_full
 
 #: seconds between two lines of progress
 BREATH = 0.1
@@ -22,31 +23,38 @@ def work(job: str, out: str) -> dict[str, Any]:
     """Run the job and write its result; the exit code that `chipload run` has, and what it says."""
     safe = 0
     try:
-        from chipload.job import load_job
-        from chipload.report.folder import check_target, unfinished_folder, verdict, write_result
-        from chipload.run import run
-        from chipload.simulation.unfinished import Unfinished
+        from chipload.jobs import load_job, run_job
+        from chipload.report.folder import check_target, checkpoint_folder, write_finished
+        from chipload.simulation.checkpoint import Checkpoint
 
         tell = Teller()
         tell(0.0, "reading")
         read = load_job(job)
         check_target(out)
-        with Unfinished(unfinished_folder(out)) as kept:
+        with Checkpoint(checkpoint_folder(out)) as kept:
             try:
-                done = run(read, lambda part, what: tell(0.85 * part, what), kept)
-                write_result(done, out, lambda part, what: tell(0.85 + 0.15 * part, what))
-                holds, says = verdict(done)
+                done = run_job(read, lambda part, what: tell(0.85 * part, what), kept)
+                write_finished(done.result, done.presentation, out, lambda part, what: tell(0.85 + 0.15 * part, what))
             finally:
                 safe = kept.safe
             kept.discard()
-        return {"code": 0 if holds else 3, "says": says}
+        return {"code": done.result.verdict.exit_code, "says": done.result.message}
     except InputError as err:
         return {"code": 2, "says": str(err)}
+    except OutputError as err:
+        return {"code": 4, "says": str(err)}
+    except OSError as err:
+        known = is_full(err)
+        return {"code": 4 if known else 1, "says": str(cannot_write("the disk", err)) if known else _fault(err)}
     except (KeyboardInterrupt, Cancelled):
         why = f"{safe} steps are kept: the next run goes on from there" if safe else "nothing was written"
         return {"code": 130, "says": f"stopped: {why}"}
     except Exception as err:
-        return {"code": 1, "says": f"a fault of chipload: {type(err).__name__}: {err}"}
+        return {"code": 1, "says": _fault(err)}
+
+
+def _fault(err: Exception) -> str:
+    return f"a fault of chipload: {type(err).__name__}: {err}"
 
 
 class Teller:
@@ -76,8 +84,13 @@ def _stop(_number: int, _frame: object) -> NoReturn:
 
 
 def _watch() -> None:
-    """End with the page: its end of our input closes when it goes."""
-    sys.stdin.buffer.read()
+    """End with the page: its end of our input closes when it goes.
+
+    Read from the descriptor: a thread that waits within ``sys.stdin`` holds its lock when the interpreter ends, which
+    then aborts.
+    """
+    while os.read(0, 4096):
+        pass
     os.kill(os.getpid(), signal.SIGTERM)
 
 

@@ -9,9 +9,13 @@ import pytest
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import material_named
 from chipload.geometry.contour import Contour, Region
+from chipload.jobs.contour.outcome import Operation
+from chipload.jobs.contour.result import limits_of
 from chipload.machine.machine import machine_named
 from chipload.planning.contour.plan import Finishing, plan_contour
+from chipload.planning.result import OperationResult
 from chipload.program.gcode.writer import write_gcode
+from chipload.result import Verdict
 from chipload.simulation.verify import verify_contour
 from rs274 import MISSING, assert_same_motions, rs274_installed, run_rs274
 
@@ -113,14 +117,18 @@ def test_closing_piece_meets_what_the_lead_in_left():
 
 
 def test_limits_and_their_places():
-    results = plan([CORNER], limits={"engagement_deg": 13.0, "force_xy_n": 1.0})
-    plain = {x.name: x for x in results["plain"].limits}
-    assert not plain["engagement_deg"].holds
+    results = plan([CORNER])
+    asked = {"engagement_deg": 13.0, "force_xy_n": 1.0}
+    operation = Operation(OperationResult("contour", "backward", results), {}, MILL, 0.0, 5.0, {}, limits=asked)
+    checks = {name: {x.name: x for x in limits_of(MACHINE, operation, one, name)} for name, one in results.items()}
+    plain = checks["plain"]
+    assert plain["engagement_deg"].state is Verdict.EXCEEDS
     assert plain["engagement_deg"].worst == pytest.approx(18.7375, abs=1e-3)
-    x, y = plain["engagement_deg"].at
+    x, y, _ = plain["engagement_deg"].place
     assert 20.0 <= x <= 23.0
     assert 5.0 <= y <= 8.0
-    assert {x.name: x.holds for x in results["backward"].limits} == {"engagement_deg": True, "force_xy_n": False}
+    states = {name: check.state for name, check in checks["backward"].items()}
+    assert states == {"engagement_deg": Verdict.HOLDS, "force_xy_n": Verdict.EXCEEDS}
 
 
 def test_same_input_same_history():

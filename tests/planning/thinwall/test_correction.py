@@ -5,18 +5,18 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chipload.errors import InputError
+from chipload.planning.thinwall.blank import FinishSurface
 from chipload.planning.thinwall.correction import found
-from chipload.planning.thinwall.depth import Limits
-from chipload.planning.thinwall.law import Law
+from chipload.planning.thinwall.depth import DepthRange
+from chipload.planning.thinwall.force_table import ForceTable
 from chipload.planning.thinwall.passes import constant, least_first_depth, variable
 from chipload.planning.thinwall.threshold import modelled
-from chipload.planning.thinwall.wall import Surface
 
 #: F = 100 N/mm d from 0.01 to 1 mm
-STRAIGHT = Law(Limits(0.01, 1.0), np.array([0.01, 1.0]), np.array([1.0, 100.0]))
+STRAIGHT = ForceTable(DepthRange(0.01, 1.0), np.array([0.01, 1.0]), np.array([1.0, 100.0]))
 X, Y = np.meshgrid(np.linspace(0.0, 4.0, 9), np.linspace(0.0, 2.0, 5), indexing="ij")
 POINTS = np.stack([X, Y, 0.0 * X], axis=-1)
-SURFACE = Surface(POINTS, np.broadcast_to([0.0, 0.0, 1.0], POINTS.shape), 0.6)
+SURFACE = FinishSurface(POINTS, np.broadcast_to([0.0, 0.0, 1.0], POINTS.shape), 0.6)
 
 
 def bears(left, side):

@@ -10,11 +10,11 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import slices
 from chipload.cutting.force import mean_forces
 from chipload.cutting.material import Material
-from chipload.engagement.bites import Bites
 from chipload.engagement.immersion.immersion import Section, immersed
+from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.errors import InputError
-from chipload.planning.thinwall.depth import DEEPEST, INFEASIBLE, THRESHOLD, Limits, largest_depths, normal_force
-from chipload.planning.thinwall.engaged import Posture
+from chipload.planning.thinwall.depth import DEEPEST, INFEASIBLE, THRESHOLD, DepthRange, largest_depths, normal_force
+from chipload.planning.thinwall.plane_stock import CutterPose
 
 BALL = Cutter(10.0, 4, 0.0, 20.0, 30.0, 6e5, corner_radius=5.0)
 HELICAL = Cutter(10.0, 2, math.radians(30.0), 20.0, 30.0, 6e5, corner_radius=5.0)
@@ -23,7 +23,7 @@ RADIAL = Material("radial", 1500.0, 600.0, 0.0, 20.0, 15.0, 0.0, source="made up
 FULL = Material("full", 1500.0, 600.0, 250.0, 20.0, 15.0, 5.0, source="made up")
 
 
-def summed(posture: Posture, material: Material, d: float, n: int = 1000) -> float:
+def summed(posture: CutterPose, material: Material, d: float, n: int = 1000) -> float:
     """Mean normal force of a ball: every piece of its sphere that faces forward in uncut stock, over one revolution."""
     R, c, b = posture.cutter.radius, math.cos(posture.lead), posture.step
     A = np.array([math.sin(posture.lead), math.sin(posture.tilt) * c, math.cos(posture.tilt) * c])
@@ -52,7 +52,7 @@ def summed(posture: Posture, material: Material, d: float, n: int = 1000) -> flo
 def test_closed_form_of_the_slot():
     """d of thresholds 20, 50, 100 N, from the quadratic of q = sqrt(2 R d - d^2)."""
     found = largest_depths(
-        Posture(BALL, 0.05, None), RADIAL, [20.0, 50.0, 100.0], Limits(1e-3, 2.0, 1e-8), measure="mean"
+        CutterPose(BALL, 0.05, None), RADIAL, [20.0, 50.0, 100.0], DepthRange(1e-3, 2.0, 1e-8), measure="mean"
     )
     A, B, R = 4 * 600 * 0.05 / (math.tau * 5.0), 4 * 15 / 2, 5.0
     q = np.array([(-B + math.sqrt(B * B + 4 * A * F)) / (2 * A) for F in (20.0, 50.0, 100.0)])
@@ -67,7 +67,7 @@ def test_closed_form_of_the_slot():
     [(0.0, 0.0, 0.5), (17.0, 0.0, 0.5), (17.0, 23.0, 0.5), (17.0, 23.0, -0.5), (-10.0, 5.0, 0.8), (4.0, 0.0, None)],
 )
 def test_mean_against_the_sphere(lead, tilt, step, depth):
-    posture = Posture(BALL, 0.05, step, math.radians(lead), math.radians(tilt))
+    posture = CutterPose(BALL, 0.05, step, math.radians(lead), math.radians(tilt))
     found = normal_force(posture, FULL, [depth], measure="mean")[0]
     assert found == pytest.approx(summed(posture, FULL, depth), rel=2e-3)
 
@@ -76,7 +76,7 @@ def test_mean_against_the_sphere(lead, tilt, step, depth):
 def test_mean_against_layers(cutter, lead, step):
     """The immersion of the simulation in thin layers of the stock that the row before has left."""
     d, layer = 0.3, 0.0005
-    posture = Posture(cutter, 0.05, step, math.radians(lead), math.radians(6.0))
+    posture = CutterPose(cutter, 0.05, step, math.radians(lead), math.radians(6.0))
     bounds = np.arange(-4.0 * layer, d + 0.5 * layer, layer)
     y = np.linspace(-6.0, 6.0, 240001)
     hollow = posture.outline(y + step)
@@ -93,15 +93,15 @@ def test_mean_against_layers(cutter, lead, step):
     rows, owner = immersed(
         tip, posture.frame, [0.05, 0.0, 0.0], [0.0, 0.0, 0.0], profile, Section(bounds, start, np.array(edges))
     )
-    bites = Bites([0, len(rows)], rows, np.full(len(rows), -1), owner, profile.columns)
+    bites = ToothEngagement([0, len(rows)], rows, np.full(len(rows), -1), owner, profile.columns)
     layered = abs(float(mean_forces(bites, cutter, FULL)[0][0] @ posture.frame[:, 2]))
     assert normal_force(posture, FULL, [d], measure="mean")[0] == pytest.approx(layered, rel=0.01)
 
 
 def test_force_stays_below_the_threshold():
-    posture = Posture(HELICAL, 0.05, 0.4, math.radians(15.0), 0.0)
+    posture = CutterPose(HELICAL, 0.05, 0.4, math.radians(15.0), 0.0)
     F = np.linspace(6.0, 60.0, 12)
-    limits = Limits(0.01, 1.5, 1e-6)
+    limits = DepthRange(0.01, 1.5, 1e-6)
     found = largest_depths(posture, FULL, F, limits, measure="greatest")
     again = normal_force(posture, FULL, found.depth, measure="greatest")
     assert (again <= F * (1.0 + 1e-12)).all()
@@ -114,8 +114,8 @@ def test_force_stays_below_the_threshold():
 
 def test_what_makes_a_place_feasible():
     """With a threshold between edge and whole force a feed, below that of the edge a cutter."""
-    posture = Posture(BALL, 0.05, None)
-    limits = Limits(0.1, 1.0)
+    posture = CutterPose(BALL, 0.05, None)
+    limits = DepthRange(0.1, 1.0)
     edge = 4 * 15 * math.sqrt(2 * 5 * 0.1 - 0.01) / 2
     whole = edge + 4 * 600 * 0.05 * (0.2 - 0.002) / math.tau
     found = largest_depths(posture, RADIAL, [0.5 * (edge + whole), 0.5 * edge], limits, measure="mean")
@@ -133,13 +133,15 @@ def test_what_makes_a_place_feasible():
 
 def test_refused():
     with pytest.raises(InputError, match=r"corner_radius_mm = 0: must be above 0"):
-        Posture(Cutter(10.0, 4, 0.0, 20.0, 30.0, 6e5), 0.05, None)
+        CutterPose(Cutter(10.0, 4, 0.0, 20.0, 30.0, 6e5), 0.05, None)
     with pytest.raises(InputError, match=r"depth_max_mm = 4: must be at most 2\.5"):
-        largest_depths(Posture(BALL, 0.05, None, math.radians(30.0)), RADIAL, [5.0], Limits(0.1, 4.0), measure="mean")
+        largest_depths(
+            CutterPose(BALL, 0.05, None, math.radians(30.0)), RADIAL, [5.0], DepthRange(0.1, 4.0), measure="mean"
+        )
     with pytest.raises(InputError, match="depth_min_mm = 0"):
-        Limits(0.0, 1.0)
+        DepthRange(0.0, 1.0)
     with pytest.raises(InputError, match="threshold: a place has none above 0"):
-        largest_depths(Posture(BALL, 0.05, None), RADIAL, [0.0], Limits(0.1, 1.0), measure="mean")
+        largest_depths(CutterPose(BALL, 0.05, None), RADIAL, [0.0], DepthRange(0.1, 1.0), measure="mean")
 
 
 @pytest.mark.parametrize(("Krc", "Kre", "power"), [(600.0, 0.0, 1.0), (0.0, 15.0, 2.0)])
@@ -147,5 +149,5 @@ def test_depth_grows_as_a_power_of_the_threshold(Krc, Kre, power):
     """Shallow slot: the chip's force grows as d, the edge's as sqrt(d)."""
     material = Material("one", 1500.0, Krc, 0.0, 20.0, Kre, 0.0, source="made up")
     F = np.array([2.0, 2.2]) * (0.1 if Kre == 0.0 else 1.0)
-    found = largest_depths(Posture(BALL, 0.05, None), material, F, Limits(1e-5, 1.0, 1e-10), measure="mean")
+    found = largest_depths(CutterPose(BALL, 0.05, None), material, F, DepthRange(1e-5, 1.0, 1e-10), measure="mean")
     assert np.diff(np.log(found.depth))[0] / math.log(1.1) == pytest.approx(power, rel=2e-3)

@@ -13,14 +13,14 @@ import pytest
 from scipy.interpolate import LinearNDInterpolator
 
 from chipload.errors import InputError
-from chipload.planning.thinwall.depth import Limits
+from chipload.planning.thinwall.depth import DepthRange
 from chipload.planning.thinwall.experiments import Proposal, expected_misses, propose_cuts, propose_sites
-from chipload.planning.thinwall.law import Law
+from chipload.planning.thinwall.force_table import ForceTable
 from chipload.planning.thinwall.table import FILLED, GIVEN, cuts_bytes, read_cuts, write_cuts
 from chipload.planning.thinwall.threshold import calibrated, scatter
 
 #: F = 100 d, from 0.05 to 2 mm
-LAW = Law(Limits(0.05, 2.0), np.array([0.05, 2.0]), np.array([5.0, 200.0]))
+LAW = ForceTable(DepthRange(0.05, 2.0), np.array([0.05, 2.0]), np.array([5.0, 200.0]))
 
 
 def grid(n: int, m: int) -> np.ndarray:

@@ -7,36 +7,36 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chipload.errors import InputError
-from chipload.planning.thinwall.depth import Limits
-from chipload.planning.thinwall.law import Law
+from chipload.planning.thinwall.blank import SIDES, Blank, FinishSurface
+from chipload.planning.thinwall.depth import DepthRange
+from chipload.planning.thinwall.force_table import ForceTable
 from chipload.planning.thinwall.passes import constant, least_first_depth, variable
 from chipload.planning.thinwall.threshold import modelled
-from chipload.planning.thinwall.wall import SIDES, Surface, Wall
 from chipload.structure.grid import plate
 from chipload.structure.places import normals_of, on_side
-from chipload.structure.solid import Solid, compliance, factorise
+from chipload.structure.solid import SolidWorkpiece, compliance, factorise
 
 #: F = 100 N/mm d from 0.01 to 1 mm
-STRAIGHT = Law(Limits(0.01, 1.0), np.array([0.01, 1.0]), np.array([1.0, 100.0]))
+STRAIGHT = ForceTable(DepthRange(0.01, 1.0), np.array([0.01, 1.0]), np.array([1.0, 100.0]))
 
 
-def made(thickness: float) -> Solid:
+def made(thickness: float) -> SolidWorkpiece:
     grid = plate(60.0, 40.0, thickness, (6, 5, 1))
-    return Solid(grid, 114000.0, 0.34, 4.43e-9, grid.side("j-"))
+    return SolidWorkpiece(grid, 114000.0, 0.34, 4.43e-9, grid.side("j-"))
 
 
 def test_state_is_the_thinner_plate():
-    wall = Wall(made(5.0), (1.0, 1.5), 2)
+    wall = Blank(made(5.0), (1.0, 1.5), 2)
     left = (np.full(wall.shape, 0.3), np.full(wall.shape, 0.8))
     thin = made(2.5 + 0.3 + 0.8)
     places = on_side(thin.grid, "k+", [0.5, 1.0, 0.25], [1.0, 1.0, 0.5])
     C = compliance(factorise(thin), places, normals_of(thin.grid, places, "k+"))
-    found = wall.bears(left, "k+", 0.05).force.reshape(wall.shape)
+    found = wall.threshold(left, "k+", 0.05).force.reshape(wall.shape)
     assert_allclose([found[6, 10], found[12, 10], found[3, 5]], 0.05 / C, rtol=1e-7)
 
 
 def test_surfaces():
-    wall = Wall(made(5.0), (1.0, 1.5))
+    wall = Blank(made(5.0), (1.0, 1.5))
     low, high = (wall.surface(s) for s in SIDES)
     assert_allclose(low.points[..., 2], 1.0, atol=1e-12)
     assert_allclose(high.points[..., 2], 3.5, atol=1e-12)
@@ -46,7 +46,7 @@ def test_surfaces():
 
 def test_softest_place_of_an_element():
     """One place without stock makes the elements around it thin, no others."""
-    wall = Wall(made(5.0), (1.0, 1.0), 2)
+    wall = Blank(made(5.0), (1.0, 1.0), 2)
     D = np.full(wall.shape, 1.0)
     D[4, 3] = 0.0
     kept = wall.state((np.ones(wall.shape), D)).kept.reshape(6, 5, 2)
@@ -55,10 +55,10 @@ def test_softest_place_of_an_element():
     assert_allclose(kept[thin][:, 1], 0.8)
 
 
-def line(allowance: float, n: int = 41) -> Surface:
+def line(allowance: float, n: int = 41) -> FinishSurface:
     x, y = np.meshgrid(np.linspace(0.0, 4.0, n), [0.0, 1.0], indexing="ij")
     points = np.stack([x, y, 0.0 * x], axis=-1)
-    return Surface(points, np.broadcast_to([0.0, 0.0, 1.0], points.shape), allowance)
+    return FinishSurface(points, np.broadcast_to([0.0, 0.0, 1.0], points.shape), allowance)
 
 
 def test_offset_function():
@@ -139,7 +139,7 @@ def test_places_that_bear_nothing_are_listed():
 
 def test_refused():
     with pytest.raises(InputError, match="leave no wall"):
-        Wall(made(2.0), (1.0, 1.0))
+        Blank(made(2.0), (1.0, 1.0))
     with pytest.raises(InputError, match="constant depth_mm = 0: must be above 0"):
         constant([line(1.0)], lambda left, side: modelled([1.0], 0.05), STRAIGHT, 0.0)
     assert math.isclose(float(STRAIGHT.depth(50.0)), 0.5)

@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
-from chipload.planning.thinwall.engaged import Posture
-from chipload.planning.thinwall.passes import Pass
+from chipload.planning.thinwall.blank import FinishSurface
+from chipload.planning.thinwall.passes import WallPass
 from chipload.planning.thinwall.paths import (
-    Going,
+    PassMotion,
     gouges,
     offset_normals,
     pass_programs,
@@ -20,18 +20,18 @@ from chipload.planning.thinwall.paths import (
     rows_of,
     seconds,
 )
+from chipload.planning.thinwall.plane_stock import CutterPose
 from chipload.planning.thinwall.threshold import modelled
-from chipload.planning.thinwall.wall import Surface
 from chipload.program.program import RAPID
 
 BALL = Cutter(8.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=4.0)
 BULL = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5, corner_radius=1.5)
 
 
-def flat(side: float = 1.0, n: int = 21, m: int = 13) -> Surface:
+def flat(side: float = 1.0, n: int = 21, m: int = 13) -> FinishSurface:
     x, y = np.meshgrid(np.linspace(0.0, 20.0, n), np.linspace(0.0, 12.0, m), indexing="ij")
     p = np.stack([x, y, 0.0 * x], axis=-1)
-    return Surface(p, np.broadcast_to([0.0, 0.0, side], p.shape), 1.0)
+    return FinishSurface(p, np.broadcast_to([0.0, 0.0, side], p.shape), 1.0)
 
 
 def sphere_like(cutter: Cutter) -> tuple[np.ndarray, np.ndarray]:
@@ -56,7 +56,7 @@ def test_cutter_touches_the_offset_plane(cutter, lead, tilt, step, side):
     """Every point of the cutter's envelope lies above the plane, the contact point lies on it."""
     s = flat(side)
     D = 1.0 + 0.1 * s.points[..., 0] - 0.05 * s.points[..., 1]
-    posture = Posture(cutter, 0.05, step, math.radians(lead), math.radians(tilt))
+    posture = CutterPose(cutter, 0.05, step, math.radians(lead), math.radians(tilt))
     rows = rows_of(s, D, D + 0.2, posture)
     tip, axis, _ = placed(rows, posture)
     n = np.array([-0.1, 0.05, side]) / math.sqrt(1.0 + 0.0125)
@@ -84,19 +84,19 @@ def test_only_stock_is_cut_and_timed():
     s = flat()
     low = np.zeros(s.points.shape[:2])
     high = np.where(s.points[..., 0] >= 10.0, 0.3, 0.0)
-    posture = Posture(BALL, 0.05, -0.5, 0.2)
-    going = Going(posture, 10.0, 100.0, 800.0, 2.0)
-    program = program_of(rows_of(s, low, high, posture), going, "one")
+    posture = CutterPose(BALL, 0.05, -0.5, 0.2)
+    pass_motion = PassMotion(posture, 10.0, 100.0, 800.0, 2.0)
+    program = program_of(rows_of(s, low, high, posture), pass_motion, "one")
     assert (program.motion == RAPID).sum() == 2 * 25
     links = 24 * math.hypot(11.0, 12.0 / 24.0) + 25 * 2.0
     assert seconds(program, 100.0) == pytest.approx(25 * (11.0 + 2.0) / 10.0 + links / 100.0, rel=1e-9)
     threshold = modelled(np.full(low.size, 0.01), 0.1)
-    one = Pass(0, low, high, threshold, low, low > 1.0)
-    (again,) = pass_programs([one], [s], going)
+    one = WallPass(0, low, high, threshold, low, low > 1.0)
+    (again,) = pass_programs([one], [s], pass_motion)
     assert_allclose(again.p_work, program.p_work)
     assert again.labels == ("pass 1 side 1",)
     with pytest.raises(InputError, match="finds no stock"):
-        program_of(rows_of(s, low, low, posture), going, "none")
+        program_of(rows_of(s, low, low, posture), pass_motion, "none")
 
 
 def test_ball_in_a_hollow():
@@ -104,16 +104,16 @@ def test_ball_in_a_hollow():
     a, y = np.meshgrid(np.linspace(-1.0, 1.0, 81), np.linspace(0.0, 3.0, 5), indexing="ij")
     p = np.stack([5.0 * np.sin(a), y, -5.0 * np.cos(a)], axis=-1)
     n = np.stack([-np.sin(a), 0.0 * a, np.cos(a)], axis=-1)
-    s = Surface(p, n, 0.5)
+    s = FinishSurface(p, n, 0.5)
     none = np.zeros(a.shape)
     for radius, fits in ((4.0, True), (6.0, False)):
-        posture = Posture(Cutter(2 * radius, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=radius), 0.05, 0.5)
+        posture = CutterPose(Cutter(2 * radius, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=radius), 0.05, 0.5)
         found = gouges(rows_of(s, none, none + 0.1, posture), s, none, posture, 0.01)
         assert (len(found) == 0) == fits
 
 
 def test_refused():
     with pytest.raises(InputError, match="step_over_mm is missing"):
-        Going(Posture(BALL, 0.05, None), 10.0, 100.0, 800.0, 2.0)
+        PassMotion(CutterPose(BALL, 0.05, None), 10.0, 100.0, 800.0, 2.0)
     with pytest.raises(InputError, match=r"paths\.feed = 0: must be above 0"):
-        Going(Posture(BALL, 0.05, 0.5), 0.0, 100.0, 800.0, 2.0)
+        PassMotion(CutterPose(BALL, 0.05, 0.5), 0.0, 100.0, 800.0, 2.0)

@@ -11,20 +11,20 @@ from chipload.planning.thinwall.threshold import Experiments, calibrated, from_d
 from chipload.structure.grid import from_map
 from chipload.structure.places import normals_of, on_side
 from chipload.structure.removal import cut, start
-from chipload.structure.solid import Solid
-from chipload.structure.watched import watch
+from chipload.structure.solid import SolidWorkpiece
+from chipload.structure.unit_loads import watch
 
 E, NU = 114000.0, 0.3
 
 
-def wall(width: float, thickness: float, columns: int) -> Solid:
+def wall(width: float, thickness: float, columns: int) -> SolidWorkpiece:
     """Clamped along y = 0, 60 mm high; rows denser towards the clamp."""
     v = 60.0 * np.linspace(0.0, 1.0, 13) ** 2
     grid = from_map(np.linspace(0.0, width, columns + 1).tolist(), v.tolist(), [0.0, thickness], lambda p: p)
-    return Solid(grid, E, NU, 4.43e-9, grid.side("j-"), rule=8)
+    return SolidWorkpiece(grid, E, NU, 4.43e-9, grid.side("j-"), rule=8)
 
 
-def borne(solid: Solid, u, v, removed: float = 0.0):
+def borne(solid: SolidWorkpiece, u, v, removed: float = 0.0):
     state = start(solid, limit=10**6)
     if removed:
         state = cut(state, np.arange(len(solid.grid.elements)), (0.0, 1.0 - removed))

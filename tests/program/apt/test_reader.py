@@ -245,14 +245,13 @@ def test_tap_turns_back():
 @pytest.mark.parametrize(
     ("body", "message"),
     [
-        ("CYCLE/MILL,5\nGOTO/0,0,0", "line 6: CYCLE/MILL,5: unknown cycle: must be DRILL, FACE, CSINK"),
         ("CYCLE/DRILL,FEDTO,5\nGOTO/0,0,0", "line 6: CYCLE/DRILL,FEDTO,5: must say how deep"),
         ("CYCLE/DEEP,FEDTO,5,RAPTO,1,STEP,0", "pecks must be above 0"),
         ("CYCLE/DEEP,FEDTO,5,RAPTO,1,STEP,1E-6", "makes more than 10000 pecks"),
         ("GOTO/1,2", "line 6: GOTO/1,2: has 2 numbers: must have 3 or 6"),
         ("GOTO/1,2,1E10", "'1E10' must be a number of at most 1e\\+09"),
         ("GOTO/1,2,3,0,0,0", "must have a length above 0"),
-        ("GOFWD/C1", "line 6: GOFWD/C1: moves the tool or the coordinates in a way that is not read"),
+        ("TRACUT/M1", "line 6: TRACUT/M1: changes the coordinates or the order in a way that is not read"),
         ("FEDRAT/INVERS,3", "line 6: FEDRAT/INVERS,3: must have one number"),
         ("SPINDL/300,SFM,CLW", "must have one number and RPM"),
         ("LOADTL/1.5", "must be a whole number"),
@@ -280,7 +279,7 @@ def test_a_missing_feed_is_not_guessed():
 def test_no_point_and_no_file(tmp_path):
     with pytest.raises(InputError, match="x: no point: CL data must have at least one GOTO"):
         read_apt("PARTNO/1\nFINI", name="x")
-    with pytest.raises(InputError, match=r"none\.apt: No such file or directory"):
+    with pytest.raises(InputError, match=r"none\.apt: cannot be read: No such file or directory"):
         read_apt_file(tmp_path / "none.apt")
     (tmp_path / "one.apt").write_bytes((HEAD + "FINI").encode())
     assert read_apt_file(tmp_path / "one.apt")[0].labels == ("one",)

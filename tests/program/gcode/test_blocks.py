@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from chipload.errors import InputError
+from chipload.errors import InputError, Severity
 from chipload.program.gcode.expression import DEEPEST, read_value
 from chipload.program.gcode.parameters import Parameters
 from chipload.program.gcode.reader import read_gcode
@@ -131,9 +131,10 @@ def test_start_and_parameters():
 
 
 def test_lenient_reading_keeps_unknown_words_as_findings():
-    commands, findings = read_gcode("G0 X1\nG12.3 X5\nM777\nX2", lenient=True)
+    commands, findings = read_gcode("G0 X1\nG12.3 X5\nM777\nG0 X2", lenient=True)
     assert commands.position[:, 0].tolist() == [1.0, 2.0]
     assert [x.code for x in findings] == ["nc-unknown-word", "nc-unknown-word", "nc-no-end"]
+    assert {x.severity for x in findings} == {Severity.UNPROVEN}
 
 
 def test_what_does_not_concern_the_path_is_noted_once():

@@ -1,9 +1,12 @@
 """Fanuc's and Sinumerik's dialects where they differ from LinuxCNC's."""
 
+import math
+
+import numpy as np
 import pytest
 
-from chipload.errors import InputError
-from chipload.program.commands import DWELL
+from chipload.errors import InputError, Severity
+from chipload.program.commands import DWELL, LINE
 from chipload.program.gcode.reader import read_gcode
 
 
@@ -30,7 +33,7 @@ def test_a_fanuc_program():
     # two calls of O7, each a step of 1 along X from 2
     assert commands.position[-2:, 0].tolist() == [3.0, 4.0]
     assert commands.position[3:7, 2].tolist() == [2.0, -3.0, 5.0, 5.0]
-    assert codes(findings) == ["nc-tool-unknown", "nc-coolant"]
+    assert codes(findings) == ["nc-tool-unknown", "nc-coolant", "nc-length-unknown"]
 
 
 def test_fanuc_repeats_by_k_and_pauses_in_ms():
@@ -51,14 +54,17 @@ def test_fanuc_tip_control_and_look_ahead():
 
 
 def test_a_number_without_a_point_is_noted():
-    _, findings = fanuc("G0 X1.\n(X1)\nG0 Y100\nM30")
-    assert [(x.code, x.line) for x in findings] == [("nc-no-point", 3)]
+    """It may be 100 mm or 0.1 mm; 0 is 0."""
+    _, findings = fanuc("G0 X1.\n(X1)\nG0 X0\nG0 Y100\nM30")
+    assert [(x.code, x.line, x.severity) for x in findings] == [("nc-no-point", 4, Severity.UNPROVEN)]
 
 
 def test_an_unknown_code_is_kept_and_its_block_does_not_move():
-    commands, findings = fanuc("G0 X1.\nG123 X5.\nM777\nX2.\nM30")
-    assert commands.position[:, 0].tolist() == [1.0, 2.0]
-    assert codes(findings) == ["nc-unknown-word", "nc-unknown-word"]
+    """Nor does a block that goes on with it; a code of motion ends it."""
+    commands, findings = fanuc("G0 X1.\nG123 X5.\nM777\nX2.\nG1 X3. F60.\nX4.\nM30")
+    assert commands.position[:, 0].tolist() == [1.0, 3.0, 4.0]
+    assert codes(findings) == ["nc-unknown-word"] * 3
+    assert [(f.line, f.severity.name) for f in findings] == [(2, "UNPROVEN"), (3, "NOTE"), (4, "UNPROVEN")]
 
 
 @pytest.mark.parametrize(
@@ -117,14 +123,14 @@ def test_a_sinumerik_program():
         ),
         ("TRANS X10", "TRANS: turned or shifted frames are not read: post in the coordinates of the work offset"),
         ("ATRANS X10", "ATRANS: turned or shifted frames are not read: post in the coordinates of the work offset"),
-        ("CYCLE83(1,2,3)", "CYCLE83(...): cycles and calls are not read: write the moves out"),
+        ("CYCLE83(1,2,3)", "CYCLE83: RTP, RFP and DP or DPR must be given"),
         (
             "G1 X1 A3=0 B3=0 C3=1",
             "A3: tool directions as vectors or angles to the surface are not read: post with axes",
         ),
         ("IF R1>0 GOTOF END", "IF: jumps, loops and calls are not read: write out what they do"),
         ("L100", "L100: calls a subroutine: not read; write its blocks out"),
-        ("G33 Z10 K1", "G33: is not read: write the moves out"),
+        ("G33 Z10 K1", "G33: the spindle does not turn: start it by M3 or M4"),
     ],
 )
 def test_sinumerik_refuses(block, message):
@@ -137,3 +143,65 @@ def test_sinumerik_keeps_unknown_words():
     commands, findings = sinumerik("G0 X1\nFOO=5 X2\nBAR\nCYCLE800()\nM30")
     assert commands.position[:, 0].tolist() == [1.0, 2.0]
     assert codes(findings) == ["nc-unknown-word", "nc-unknown-word", "nc-ignored"]
+
+
+def heights(commands):
+    """Z without repeats."""
+    z = commands.position[:, 2].round(9).tolist()
+    return [a for a, b in zip(z, [None, *z], strict=False) if a != b]
+
+
+def test_sinumerik_drilling_cycles():
+    """By hand: RFP 0, SDIS 2, RTP 10, bottom -9."""
+    head = "G0 X0 Y0 Z20\nF60 S600 M3\n"
+    commands, findings = sinumerik(head + "CYCLE81(10,0,2,-9)\nG0 X5\nM30")
+    assert heights(commands) == [20, 2, -9, 2, 10]
+    assert commands.position[commands.motion == LINE].tolist() == [[0, 0, -9, *[0] * 6]]
+    assert Severity.UNPROVEN not in [f.severity for f in findings]
+    commands, _ = sinumerik(head + "MCALL CYCLE82(10,0,2,,9,0.5)\nX5\nX7\nMCALL\nX9\nM30")
+    assert heights(commands) == [20, 2, -9, 2, 10, 2, -9, 2, 10]
+    assert commands.feed[commands.motion == DWELL].tolist() == [0.5, 0.5]
+    commands, _ = sinumerik(head + "CYCLE83(10,0,2,-9,,-5,,0,0,0,1,1)\nM30")
+    back = 5.0 - 0.254
+    assert heights(commands) == [20, 2, -5, 2, -back, -9, 2, 10]
+
+
+def test_sinumerik_tapping():
+    head = "G0 X0 Y0 Z2\n"
+    for text in (
+        "S600\nG331 Z-9 K1.25\nG332 Z2 K1.25",
+        "CYCLE84(2,0,2,-9,,0,5,,1.25,0,600,600)",
+        "CYCLE84(2,0,2,-9,,0,5,8,,0,600,600)",
+    ):
+        commands, _ = sinumerik(head + text + "\nM30")
+        fed = commands.motion == LINE
+        assert commands.position[fed, 2].tolist() == [-9.0, 2.0]
+        # ten turns a second of 1.25 mm
+        assert commands.feed[fed].tolist() == pytest.approx([12.5, 12.5])
+        assert commands.spindle[fed].tolist() == pytest.approx([20 * math.pi, -20 * math.pi])
+
+
+def test_what_sinumerik_programs_ask_for_and_is_not_read_is_left_out():
+    commands, findings = sinumerik("G0 X1\nCIP X5 Y5 I1=3\nX6\nPOCKET4(1,2)\nG1 X7 F60\nM30")
+    assert commands.position[:, 0].tolist() == [1.0, 7.0]
+    assert [f.line for f in findings if f.severity is Severity.UNPROVEN] == [2, 3, 4]
+
+
+def test_fanuc_rigid_tapping_starts_its_spindle():
+    for text in ("S600 M29\nG98 G84 Z-9. R2. F750.", "S600\nG84.2 Z-9. R2. F750."):
+        commands, _ = fanuc(f"G0 X0. Y0. Z10.\n{text}\nX5.\nG80\nM30")
+        fed = commands.motion == LINE
+        assert commands.position[fed, 2].tolist() == [-9.0, 10.0, -9.0, 10.0]
+        assert commands.feed[fed].tolist() == pytest.approx([12.5] * 4)
+        assert np.sign(commands.spindle[fed]).tolist() == [1.0, -1.0, 1.0, -1.0]
+
+
+def test_fanuc_fine_boring_and_what_is_left_out():
+    commands, findings = fanuc("G0 X0. Y0. Z10.\nS600 M3 F60.\nG99 G76 Z-9. R2. Q0.3 P500\nX5. Q0.3\nG80\nM30")
+    fed = commands.motion == LINE
+    assert commands.position[fed, 2].tolist() == [-9.0, -9.0]
+    assert commands.feed[commands.motion == DWELL].tolist() == [0.5, 0.5]
+    assert codes(findings) == ["nc-fine-boring"]
+    commands, findings = fanuc("G0 X1.\nG33 Z-5. F1.\nZ-6.\nG6.2 X4. K1.\nG0 X2.\nM30")
+    assert commands.position[:, 0].tolist() == [1.0, 2.0]
+    assert [f.line for f in findings if f.severity is Severity.UNPROVEN] == [2, 3, 4]

@@ -1,13 +1,14 @@
 """Conversational blocks against what they mean by hand, loops against plain Python."""
 
 import math
+import re
 
 import numpy as np
 import pytest
 
-from chipload.errors import InputError
+from chipload.errors import InputError, Severity
 from chipload.program.commands import ARC, DWELL, LINE, RAPID, arc_sweeps
-from chipload.program.heidenhain.formula import Parameters
+from chipload.program.heidenhain.formula import QParameters
 from chipload.program.heidenhain.reader import read_heidenhain
 
 
@@ -97,7 +98,7 @@ def test_loops_jumps_and_calls_against_python():
 
 
 def test_formulas_against_python():
-    q = Parameters({1: 2.5, 7: -4.0})
+    q = QParameters({1: 2.5, 7: -4.0})
     for text, value in {
         "Q1 * ( Q7 - 1 ) / 3 ^ 2": 2.5 * (-5) / 9,
         "2 - Q7 ^ 2": 2.0 - 16.0,
@@ -110,7 +111,7 @@ def test_formulas_against_python():
 
 def test_what_the_controller_knows_may_be_given():
     blocks = ["FN18: SYSREAD Q3 = ID270 NR1 IDX3", "L X+0 Y+0 Z+Q3 FMAX"]
-    with pytest.raises(InputError, match=r"line 3: Q3 comes from the controller and is not known here: give it"):
+    with pytest.raises(InputError, match=r"line 3: Q3 comes from the controller and is not known here: state it in"):
         read(*blocks)
     assert read(*blocks, parameters={3: 7.5})[0].position[0, 2] == 7.5
 
@@ -125,7 +126,7 @@ def test_what_the_controller_knows_may_be_given():
         ("L X+1 F0", "F0: must be above 0 and below 1e+06"),
         ("L IX+1 F10", "IX: where the axis stands is not known: give X first"),
         ("C X+1 Y+1 DR+ F10", "an arc begins where the tool stands, which is not known: move there first"),
-        ("CYCL DEF 208 BORE", "CYCL DEF 208: is not read: write its motions"),
+        ("CYCL DEF 221 PATTERN", "CYCL DEF 221: is not read: write its motions"),
         ("CYCL DEF 19.1 A+10", "CYCL DEF 19: a tilted working plane is not read: state the program in the work frame"),
         ("CALL LBL 4", "LBL 4 is not there"),
         ("Q1 = Q2", "Q2 is read before it is set: set it"),
@@ -148,3 +149,50 @@ def test_a_loop_without_end_is_stopped(monkeypatch):
         read("LBL 1", "FN9: IF 1 EQU 1 GOTO LBL 1")
     with pytest.raises(InputError, match="more than 20 calls inside one another"):
         read("LBL 1", "CALL LBL 1")
+
+
+HOLE = (
+    "CYCL DEF 200 DRILLING ~\nQ200=2 ;SET-UP CLEARANCE ~\nQ201=-9 ;DEPTH ~\nQ206=60 ~\nQ202=5 ~\nQ210=0.5 ~\nQ203=+1 ~"
+    "\nQ204=20 ~\nQ211=0.25"
+)
+
+
+def test_drilling_with_q_parameters():
+    """By hand: surface 1, clearance 2 above it, plunges to -4 and -8, second clearance 20 above."""
+    commands, findings = read("L X+0 Y+0 Z+50 FMAX", *HOLE.split("\n"), "L X+5 FMAX M99", "L X+7 FMAX")
+    assert commands.position[1:, 2].tolist() == [50, 3, -4, 3, 3, -2, -8, -8, 21, 21]
+    assert commands.motion[2:].tolist() == [RAPID, LINE, RAPID, DWELL, RAPID, LINE, DWELL, RAPID, RAPID]
+    assert commands.feed[commands.motion == LINE].tolist() == [1.0, 1.0]
+    assert commands.feed[commands.motion == DWELL].tolist() == [0.5, 0.25]
+    assert findings == ()
+    one = " ".join(re.sub(";.*|~", "", line) for line in HOLE.split("\n"))
+    again, _ = read("L X+0 Y+0 Z+50 FMAX", one, "L X+5 FMAX M99", "L X+7 FMAX")
+    np.testing.assert_array_equal(again.position, commands.position)
+
+
+def test_rigid_tapping_and_reaming_with_q_parameters():
+    tap = "CYCL DEF 207 RIGID TAPPING Q200=2 Q201=-9 Q239=+1.25 Q203=+0 Q204=2"
+    commands, _ = read(
+        "TOOL DEF 1 L+0 R+4", "TOOL CALL 1 Z S600", "L X+0 Y+0 Z+2 FMAX M3", tap, "CYCL CALL", "L X+1 FMAX"
+    )
+    fed = commands.motion == LINE
+    assert commands.position[fed, 2].tolist() == [-9.0, 2.0]
+    # ten turns a second of 1.25 mm
+    assert commands.feed[fed].tolist() == pytest.approx([12.5, 12.5])
+    assert np.sign(commands.spindle[fed]).tolist() == [1.0, -1.0]
+    assert commands.spindle[-1] > 0.0
+    ream = "CYCL DEF 201 REAMING Q200=2 Q201=-9 Q206=120 Q211=0 Q208=240 Q203=+0 Q204=0"
+    commands, _ = read("L X+0 Y+0 Z+2 FMAX", ream, "CYCL CALL")
+    assert commands.feed[commands.motion == LINE].tolist() == [2.0, 4.0]
+
+
+def test_a_cycle_that_is_not_read_is_left_out_where_it_is_called():
+    commands, findings = read(
+        "L X+0 Y+0 Z+2 FMAX", "CYCL DEF 262 THREAD MLLNG Q335=10 Q239=1.5", "L X+5 FMAX M99", "L X+9 FMAX"
+    )
+    assert commands.position[:, 0].tolist() == [0.0, 5.0, 9.0]
+    assert [(f.code, f.line, f.severity) for f in findings] == [("heidenhain-cycle", 4, Severity.UNPROVEN)]
+    with pytest.raises(InputError, match="CYCL DEF 10: is not read"):
+        read("CYCL DEF 10.0 ROTATION")
+    with pytest.raises(InputError, match="Q206 is read before it is set"):
+        read("L X+0 Y+0 Z+2 FMAX", "CYCL DEF 201 REAMING Q200=2 Q201=-9 Q203=+0", "CYCL CALL")

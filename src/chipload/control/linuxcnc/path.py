@@ -1,4 +1,4 @@
-"""Where the machine is on the path, and what the model and the truth say of the torque there.
+"""Where the machine is on the path, and the torque there, by the model and in truth.
 
 Notation: p_k points of the path [mm], s_k their distance along it; p position of the machine; of the pieces within a
 window about the last s the one nearest to p is taken,
@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.control.plant import TorqueProfile
 from chipload.errors import InputError
+from chipload.files import read_regular
 from chipload.units import mm_min_from_mm_s, mm_s_from_mm_min
 
 Floats = NDArray[np.float64]
@@ -41,8 +42,8 @@ class ToolPath:
     points : (n, 3) float [mm], in the coordinates of the machine's pins
     model : rows at the points
     truth : rows at the points; the model itself where nothing else is known
-    relief : (n,) float, above 0, what is borne at the points over what is held; the controller is told the torque over
-        it
+    relief : (n,) float, above 0, torque that is allowed at the points over what is held; the controller
+        is told the torque over it
 
     Raises
     ------
@@ -69,7 +70,7 @@ class ToolPath:
             object.__setattr__(self, name, column)
 
     @property
-    def told(self) -> TorqueProfile:
+    def over_relief(self) -> TorqueProfile:
         """The model as the controller is told it, over the relief."""
         return replace(self.model, edge=self.model.edge / self.relief, cut=self.model.cut / self.relief)
 
@@ -89,8 +90,8 @@ def tool_path(
     believed = np.asarray(model, dtype=np.float64)
     real = believed if truth is None else np.asarray(truth, dtype=np.float64)
     f = np.asarray(feed, dtype=np.float64)
-    borne = np.ones(len(p)) if relief is None else np.asarray(relief, dtype=np.float64)
-    return ToolPath(p, TorqueProfile(s, f, *believed.T), TorqueProfile(s, f, *real.T), borne)
+    share = np.ones(len(p)) if relief is None else np.asarray(relief, dtype=np.float64)
+    return ToolPath(p, TorqueProfile(s, f, *believed.T), TorqueProfile(s, f, *real.T), share)
 
 
 def read_path(file: str | File) -> ToolPath:
@@ -103,14 +104,13 @@ def read_path(file: str | File) -> ToolPath:
     """
     label = f"path {file}"
     try:
-        if File(file).stat().st_size > MOST_BYTES:
-            raise InputError(f"{label}: must be at most {MOST_BYTES} bytes")
-        text = File(file).read_bytes().decode("utf-8")
-    except OSError as err:
-        raise InputError(f"{label}: cannot be read: {err.strerror}") from None
+        text = read_regular(file, label, MOST_BYTES).decode("utf-8")
     except UnicodeDecodeError:
         raise InputError(f"{label}: not a text in UTF-8") from None
-    rows = list(csv.reader(io.StringIO(text)))
+    try:
+        rows = list(csv.reader(io.StringIO(text, newline="")))
+    except csv.Error as err:
+        raise InputError(f"{label}: not a CSV file: {err}") from None
     head = [x.strip() for x in rows[0]] if rows else []
     for name in COLUMNS:
         if name not in head:

@@ -1,6 +1,7 @@
 """Compiled loops of the wall error; arrays and scalars only.
 
-Notation as in :mod:`chipload.cutting.wall`: theta [rad] rotation of tooth 0 at the tip, lag [rad/mm] = tan(helix) / R,
+Notation as in :mod:`chipload.cutting.wall_error`: theta [rad] rotation of tooth 0 at the tip, lag [rad/mm] =
+tan(helix) / R,
 c = (Ktc, Krc, Kac, Kte, Kre, Kae, m_t, m_r, m_a), a bite row = (phi from, phi to, z from, z to, along, offset, across).
 Oracles: slice summation and quadrature in tests/cutting.
 """

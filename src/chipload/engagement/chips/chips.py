@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from chipload.engagement.chips.covered import Covered
+from chipload.engagement.chips.covered import CoveredArea
 from chipload.engagement.chips.ring import Origin, Ring, rings_of_polygons
 
 Floats = NDArray[np.float64]
@@ -43,9 +43,9 @@ class Chip:
 
 
 def chips(
-    covered: Covered,
+    covered: CoveredArea,
     stock_polygon: shapely.Polygon | shapely.MultiPolygon,
-    before: Covered | shapely.Polygon | shapely.MultiPolygon | None = None,
+    before: CoveredArea | shapely.Polygon | shapely.MultiPolygon | None = None,
     slivers: bool = False,
 ) -> tuple[Chip, ...]:
     """Pieces of stock that a move takes from a layer, the largest first.
@@ -72,7 +72,7 @@ def chips(
     >>> round(chips(covers(move, mill, 1.0, 1e-4), shapely.box(-9, 0, 99, 99))[0].area, 5)
     49.26991
     """
-    old = before.polygon if isinstance(before, Covered) else before
+    old = before.polygon if isinstance(before, CoveredArea) else before
     left = stock_polygon if old is None else shapely.difference(stock_polygon, old)
     cut = shapely.intersection(left, covered.polygon)
     parts = [p for p in shapely.get_parts(cut) if p.geom_type == "Polygon" and not p.is_empty]
@@ -81,7 +81,7 @@ def chips(
     if not parts:
         return ()
     tables = [_old_edges(stock_polygon)]
-    if isinstance(before, Covered):
+    if isinstance(before, CoveredArea):
         tables += [_edges(ring, old=True) for ring in before.rings]
     elif before is not None:
         tables.append(_old_edges(before))

@@ -57,7 +57,7 @@ _GRID = 1e-5  # of the tolerance: nearer than this two points are one when piece
 
 
 @dataclass(frozen=True, eq=False)
-class Covered:
+class CoveredArea:
     """What a move covers of a layer.
 
     Parameters
@@ -94,7 +94,7 @@ class Covered:
         return cast(Shape, made[0] if len(made) == 1 else shapely.MultiPolygon(made))
 
 
-def covered(move: Move, cutter: Cutter, height: float, tolerance: float) -> Covered | None:
+def covered(move: Move, cutter: Cutter, height: float, tolerance: float) -> CoveredArea | None:
     """What the move covers of the layer z = height; None where the open cutter is never in it.
 
     Parameters
@@ -119,7 +119,7 @@ def covered(move: Move, cutter: Cutter, height: float, tolerance: float) -> Cove
     return covered_areas(move, cutter, [height], tolerance)[0]
 
 
-def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], tolerance: float) -> list[Covered | None]:
+def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], tolerance: float) -> list[CoveredArea | None]:
     """``covered`` of many layers."""
     K, levels = cutter_numbers(cutter), np.array([float(h) for h in heights])
     along = _along(move, K, tolerance)
@@ -127,7 +127,7 @@ def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], toleranc
         return [_standing(*along, h, tolerance) for h in levels.tolist()]
     buffer, count, knots, whole = _loops([move], K, levels, np.array([0, len(levels)]), tolerance)
     start = np.cumsum([0, *count.clip(0)])
-    out: list[Covered | None] = []
+    out: list[CoveredArea | None] = []
     for i, h in enumerate(levels.tolist()):
         if count[i] == NOTHING:
             out.append(None)
@@ -138,14 +138,15 @@ def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], toleranc
             rings: tuple[Ring, ...] = (ring_of_edges(edges),)
             if not whole[i]:
                 rings = _without_slivers(rings_of_polygons(_untangled(shapely.Polygon(edges[:, :2])), edges), tolerance)
-            out.append(Covered(rings, h, tolerance, True))
+            out.append(CoveredArea(rings, h, tolerance, True))
     return out
 
 
 def covered_polygons(
     moves: Sequence[Move], cutter: Cutter, heights: Sequence[Floats], tolerance: float
 ) -> list[list[Shape | None]]:
-    """``Covered.polygon`` of many layers of many moves: ``heights[m]`` of move m; None where it is never in the layer.
+    """``CoveredArea.polygon`` of many layers of many moves: ``heights[m]`` of move m; None where it is never in the
+    layer.
 
     One loop over all of them without the interpreter: in threads it costs no more than the areas do.
     """
@@ -185,12 +186,12 @@ def _along(move: Move, K: Floats, tolerance: float) -> tuple[Move, Floats] | Non
     return Move((move.tip[0] - abs(half) * axis)[None], axis[None]), longer
 
 
-def _standing(move: Move, K: Floats, h: float, tolerance: float) -> Covered | None:
+def _standing(move: Move, K: Floats, h: float, tolerance: float) -> CoveredArea | None:
     """What a cutter that stands covers of a layer: its section."""
     if not 0.0 < tolerance < math.inf:
         raise InputError(f"covered: tolerance = {tolerance:g} mm: must be above 0")
     edges = whole_section(move, K, h, 0.0, tolerance)
-    return Covered((ring_of_edges(edges),), h, tolerance, True) if len(edges) else None
+    return CoveredArea((ring_of_edges(edges),), h, tolerance, True) if len(edges) else None
 
 
 def _polygons(
@@ -308,7 +309,7 @@ def whole_section(move: Move, K: Floats, h: float, t: float, tolerance: float) -
     return buffer[:n].copy()
 
 
-def _noded(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> Covered | None:
+def _noded(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> CoveredArea | None:
     """The general case: faces between all pieces, those kept that some section covers."""
     edges = _pieces(move, K, h, tolerance, knots)
     if len(edges) == 0:
@@ -327,7 +328,7 @@ def _noded(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> Cov
         return None
     whole = shapely.unary_union(found[inside])
     rings = rings_of_polygons(whole, edges)
-    return Covered(_without_slivers(rings, tolerance), h, tolerance, False)
+    return CoveredArea(_without_slivers(rings, tolerance), h, tolerance, False)
 
 
 def _without_slivers(rings: tuple[Ring, ...], tolerance: float) -> tuple[Ring, ...]:
@@ -340,4 +341,4 @@ def _without_slivers(rings: tuple[Ring, ...], tolerance: float) -> tuple[Ring, .
     return tuple(kept)
 
 
-__all__ = ["Covered", "Origin", "candidates", "covered", "covered_areas", "covered_polygons", "whole_section"]
+__all__ = ["CoveredArea", "Origin", "candidates", "covered", "covered_areas", "covered_polygons", "whole_section"]

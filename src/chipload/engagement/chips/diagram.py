@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.engagement.chips import _kernels
-from chipload.engagement.chips.covered import Covered, candidates, covered
+from chipload.engagement.chips.covered import CoveredArea, candidates, covered
 from chipload.engagement.chips.move import Move
 from chipload.engagement.chips.section import cutter_numbers
 
@@ -35,7 +35,7 @@ class Diagram:
     """
 
     edges: Floats
-    covered: Covered | None
+    covered: CoveredArea | None
     theta: Floats
     t: Floats
     V: Floats

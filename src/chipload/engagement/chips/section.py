@@ -39,7 +39,7 @@ def cutter_numbers(cutter: Cutter) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
+class SectionEdge:
     """Points of the edge of a section.
 
     ``points`` (n, 2) [mm], ``V`` (n,) [mm per unit of t] outward speed of the edge, ``normal`` (n, 2) outward unit,
@@ -53,7 +53,7 @@ class Section:
     piece: NDArray[np.int64]
 
 
-def section(move: Move, cutter: Cutter, height: float, t: float, theta: ArrayLike) -> Section | None:
+def section(move: Move, cutter: Cutter, height: float, t: float, theta: ArrayLike) -> SectionEdge | None:
     """The edge of the section at t at the angles theta (n,) [rad]; None where the layer doesn't cut the open cutter.
 
     >>> mill = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
@@ -70,7 +70,7 @@ def section(move: Move, cutter: Cutter, height: float, t: float, theta: ArrayLik
     rows, V = np.empty((len(angles), 7)), np.empty(len(angles))
     for i, angle in enumerate(angles):
         V[i] = _kernels.point(S, K, angle, rows[i])
-    return Section(angles, rows[:, :2], V, rows[:, 4:6], rows[:, 6].astype(np.int64))
+    return SectionEdge(angles, rows[:, :2], V, rows[:, 4:6], rows[:, 6].astype(np.int64))
 
 
 def depth(move: Move, cutter: Cutter, height: float, t: float, points: ArrayLike) -> Floats:

@@ -1,7 +1,9 @@
 """Compiled loops of the immersion; arrays and scalars only.
 
 Notation as in :mod:`chipload.engagement.immersion.immersion`: phi immersion, u = cos(phi) n + sin(phi) T, a sinusoid
-a cos(phi) + b sin(phi) + c is written (a, b, c).
+a cos(phi) + b sin(phi) + c is written (a, b, c); p a point of the edge, q the point of the cutter's surface uphill or
+downhill of it at the height of a section. ``slices`` (k, 9): s from, s to, rho, z at the middle, sin kappa, cos kappa,
+z at s from and to, radius of the arc (0: straight).
 """
 
 from __future__ import annotations
@@ -18,6 +20,11 @@ SHORT = 1e-9
 ALONG = 1e-9
 #: a slice is level where its heights differ by less than this [mm]
 LEVEL = 1e-9
+#: the axis is upright where its part in the plane is less than this
+UPRIGHT = 1e-12
+#: samples of immersion in a revolution, and halvings between two of them, where the axis leans
+SAMPLES = 96
+HALVINGS = 20
 
 
 @njit(cache=True, nogil=True)
@@ -88,121 +95,349 @@ def layer_of(z, bounds):
 
 
 @njit(cache=True, nogil=True)
-def immersed(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner):
-    """Bites of one step: fills ``rows`` (m, 7) and ``owner`` (m,), returns their number, -1 where they are too few.
+def below(z, bounds):
+    """The layer whose section lies next below z, the lowest one where there is none; -1 outside the layers."""
+    l = layer_of(z, bounds)
+    if l > 0 and z < 0.5 * (bounds[l] + bounds[l + 1]):
+        l -= 1
+    return l
 
-    ``frame`` rows T, n, A; ``speed`` (3,) of the tip and ``turn`` (3,) of the axis over one tooth period; ``slices``
-    (k, 8) s from, s to, rho, z at mid, sin kappa, cos kappa, z at s from and to; the layers between ``bounds`` have the
-    edges start[l] .. start[l + 1] - 1.
-    """
-    T = frame[0]
-    n = frame[1]
-    A = frame[2]
+
+@njit(cache=True, nogil=True)
+def thickness(rho, z, sk, ck, frame, speed, turn, out):
+    """The sinusoid of the chip thickness at a point of the profile: cosine, sine, constant into ``out``; the way."""
+    T, n, A = frame[0], frame[1], frame[2]
     swing = np.cross(A, turn)
     lever = np.cross(turn, A)
+    out[:] = 0.0
+    for i in range(3):
+        w = sk * (speed[i] + z * lever[i]) - rho * ck * swing[i]
+        out[0] += w * n[i]
+        out[1] += w * T[i]
+        out[2] -= ck * speed[i] * A[i]
+    return math.sqrt(speed @ speed) + math.sqrt(turn @ turn) * (abs(z) + rho)
+
+
+@njit(cache=True, nogil=True)
+def add_row(rows, owner, total, p, q, s_from, s_to, h, k):
+    """Write a bite; the number of bites after it, -1 where there is no room."""
+    if total == len(rows):
+        return -1
+    first = p % TAU
+    rows[total, 0] = first
+    rows[total, 1] = first + (q - p)
+    rows[total, 2] = s_from
+    rows[total, 3] = s_to
+    rows[total, 4] = h[1]
+    rows[total, 5] = h[2]
+    rows[total, 6] = h[0]
+    owner[total] = k
+    return total + 1
+
+
+@njit(cache=True, nogil=True)
+def at_height(slice_, z, out):
+    """The place of a rising slice at the height z on the tip: s, rho, sin kappa, cos kappa into ``out``."""
+    r = slice_[8]
+    middle = 0.5 * (slice_[0] + slice_[1])
+    if r > 0.0:
+        ck = min(max(slice_[5] - (z - slice_[3]) / r, -1.0), 1.0)
+        kappa = math.acos(ck)
+        out[0] = middle + r * (kappa - math.atan2(slice_[4], slice_[5]))
+        out[2] = math.sin(kappa)
+        out[3] = ck
+        out[1] = slice_[2] + r * (out[2] - slice_[4])
+    else:
+        out[0] = middle + (z - slice_[3]) / slice_[4]
+        out[1] = slice_[2] + (out[0] - middle) * slice_[5]
+        out[2] = slice_[4]
+        out[3] = slice_[5]
+
+
+@njit(cache=True, nogil=True)
+def on_surface(dz, rho, sk, ck, r, widest, out):
+    """The circle of an upright cutter dz [mm] above one of its circles: rho, sin and cos kappa; False: it has none."""
+    if r > 0.0:
+        cosine = ck - dz / r
+        if cosine >= 1.0:
+            return False
+        out[2] = max(cosine, 0.0)
+        out[1] = math.sqrt(1.0 - out[2] * out[2])
+        out[0] = rho + r * (out[1] - sk)
+    else:
+        out[1] = sk
+        out[2] = ck
+        out[0] = min(rho + dz * ck / sk, widest)
+    return out[0] > 0.0
+
+
+@njit(cache=True, nogil=True)
+def band(
+    tip,
+    frame,
+    speed,
+    turn,
+    slice_,
+    k,
+    layer,
+    place,
+    s_from,
+    s_to,
+    widest,
+    bounds,
+    start,
+    edges,
+    breaks,
+    rows,
+    owner,
+    total,
+):
+    """Tooth engagement of one slice of an upright cutter between two bounds of layers, ``place``: s, rho, sine,
+    cosine there.
+    """
+    h = np.empty(3)
+    hq = np.empty(3)
+    q = np.empty(3)
+    mid = tip[:2]
     flat = np.empty((2, 2))
-    flat[0, 0] = n[0]
-    flat[0, 1] = n[1]
-    flat[1, 0] = T[0]
-    flat[1, 1] = T[1]
-    mid = np.empty(2)
-    breaks = np.empty(2 * len(edges) + 2 * len(bounds) + 8)
+    flat[0, 0], flat[0, 1] = frame[1, 0], frame[1, 1]
+    flat[1, 0], flat[1, 1] = frame[0, 0], frame[0, 1]
+    rho, sk, ck = place[1], place[2], place[3]
+    r = slice_[8]
+    z = slice_[3] + (r * (slice_[5] - ck) if r > 0.0 else (place[0] - 0.5 * (slice_[0] + slice_[1])) * slice_[4])
+    least = ALONG * thickness(rho, z, sk, ck, frame, speed, turn, h)
+    if math.hypot(h[0], h[1]) + h[2] <= least:
+        return total
+    height = tip[2] + z
+    middle = 0.5 * (bounds[layer] + bounds[layer + 1])
+    under = below(height, bounds)
+    steep = slice_[7] - slice_[6] > LEVEL
+    has = steep and on_surface(middle - height, rho, sk, ck, r, widest, q)
+    always = False
+    count = roots(h[0], h[1], h[2] - least, breaks, 0)
+    if has:
+        thickness(q[0], z + middle - height, q[1], q[2], frame, speed, turn, hq)
+        always = hq[2] == 0.0 and h[2] == 0.0 and turn[0] == 0.0 and turn[1] == 0.0 and turn[2] == 0.0
+        count = crossings(mid, flat, q[0], edges, start[layer], start[layer + 1], breaks, count)
+        if not always:
+            count = roots(hq[0], hq[1], hq[2], breaks, count)
+    if not always:
+        count = crossings(mid, flat, rho, edges, start[under], start[under + 1], breaks, count)
+    if count == 0:
+        breaks[0] = 0.0
+        count = 1
+    breaks[:count].sort()
+    opened = -1
+    for b in range(count):
+        p = breaks[b]
+        to = breaks[b + 1] if b + 1 < count else breaks[0] + TAU
+        if to - p < SHORT:
+            continue
+        phi = 0.5 * (p + to)
+        co, si = math.cos(phi), math.sin(phi)
+        kept = h[1] * si + h[0] * co + h[2] > least
+        if kept:
+            onto = has and (always or hq[1] * si + hq[0] * co + hq[2] > 0.0)
+            wide = q[0] if onto else rho
+            l = layer if onto else under
+            x = mid[0] + wide * (co * flat[0, 0] + si * flat[1, 0])
+            y = mid[1] + wide * (co * flat[0, 1] + si * flat[1, 1])
+            kept = inside(x, y, edges, start[l], start[l + 1])
+        if not kept:
+            opened = -1
+            continue
+        if opened >= 0 and p - rows[opened, 1] < SHORT:
+            rows[opened, 1] = to
+            continue
+        total = add_row(rows, owner, total, p, to, s_from, s_to, h, k)
+        if total < 0:
+            return -1
+        opened = total - 1
+    return total
+
+
+@njit(cache=True, nogil=True)
+def upright(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner):
+    """Tooth engagement of a step of an upright cutter, see :func:`immersed`."""
+    breaks = np.empty(4 * len(edges) + 16)
+    place = np.empty(4)
+    low, high = np.empty(4), np.empty(4)
+    widest = slices[:, 2].max()
     total = 0
     for k in range(len(slices)):
-        rho = slices[k, 2]
-        z = slices[k, 3]
-        sk = slices[k, 4]
-        ck = slices[k, 5]
-        along = 0.0
-        across = 0.0
-        offset = 0.0
-        for i in range(3):
-            w = speed[i] + z * lever[i]
-            along += (sk * w - rho * ck * swing[i]) * T[i]
-            across += (sk * w - rho * ck * swing[i]) * n[i]
-            offset -= ck * speed[i] * A[i]
-        way = math.sqrt(speed @ speed) + math.sqrt(turn @ turn) * (abs(z) + rho)
-        least = ALONG * way
-        if math.hypot(along, across) + offset <= least:
-            continue
-        mid[0] = tip[0] + z * A[0]
-        mid[1] = tip[1] + z * A[1]
-        height = tip[2] + z * A[2]
-        at = layer_of(height, bounds)
-        if at < 0:
-            at = 0 if height < bounds[0] else len(bounds) - 2
-        # a face that looks down cuts the layer whose middle is next below it
-        half = 0.5 * (bounds[at + 1] - bounds[at])
-        look = height - ck * A[2] * half
-        rise = rho + sk * half
-        low = look - rise * math.hypot(n[2], T[2])
-        high = look + rise * math.hypot(n[2], T[2])
-        level = high - low < LEVEL
-        # the circles of a level slice lie in layers of their own
-        upright = level and (slices[k, 7] - slices[k, 6]) * A[2] > LEVEL
-        if upright:
-            low = tip[2] + (slices[k, 6] - ck * half) * A[2]
-            high = tip[2] + (slices[k, 7] - ck * half) * A[2]
-        bottom = max(int(np.searchsorted(bounds, low, side="right")) - 1, 0)
-        top = min(int(np.searchsorted(bounds, high, side="left")), len(bounds) - 1)
-        if level and not upright:
-            bottom = layer_of(look, bounds)
-            top = bottom + 1 if bottom >= 0 else -1
-        parts = top - bottom if upright else 1
-        for part in range(parts):
-            first = bottom + part if upright else bottom
-            last = first + 1 if upright else top
-            if last <= first or start[first] == start[last]:
-                continue
-            s_from = slices[k, 0]
-            s_to = slices[k, 1]
-            if upright:
-                s_from = max(s_from, s_from + (bounds[first] - low) / (sk * A[2]))
-                s_to = min(s_to, s_to - (high - bounds[first + 1]) / (sk * A[2]))
-                if s_to <= s_from:
-                    continue
-            count = roots(across, along, offset - least, breaks, 0)
-            if not level:
-                for l in range(first, last + 1):
-                    count = roots(rise * n[2], rise * T[2], look - bounds[l], breaks, count)
-            count = crossings(mid, flat, rho, edges, start[first], start[last], breaks, count)
-            if count == 0:
-                breaks[0] = 0.0
-                count = 1
-            breaks[:count].sort()
-            open_row = -1
-            for b in range(count):
-                p = breaks[b]
-                q = breaks[b + 1] if b + 1 < count else breaks[0] + TAU
-                if q - p < SHORT:
-                    continue
-                phi = 0.5 * (p + q)
-                co = math.cos(phi)
-                si = math.sin(phi)
-                kept = along * si + across * co + offset > least
-                if kept:
-                    l = first
-                    if not level:
-                        l = layer_of(look + rise * (n[2] * co + T[2] * si), bounds)
-                    x = mid[0] + rho * (co * n[0] + si * T[0])
-                    y = mid[1] + rho * (co * n[1] + si * T[1])
-                    kept = l >= 0 and inside(x, y, edges, start[l], start[l + 1])
-                if not kept:
-                    open_row = -1
-                    continue
-                if open_row >= 0 and p - rows[open_row, 1] < SHORT:
-                    rows[open_row, 1] = q
-                    continue
-                if total == len(rows):
+        bottom = tip[2] + slices[k, 6]
+        top = tip[2] + slices[k, 7]
+        if slices[k, 7] - slices[k, 6] <= LEVEL:
+            place[0] = 0.5 * (slices[k, 0] + slices[k, 1])
+            place[1], place[2], place[3] = slices[k, 2], slices[k, 4], slices[k, 5]
+            l = layer_of(bottom, bounds)
+            if l >= 0:
+                s_from, s_to = slices[k, 0], slices[k, 1]
+                total = band(
+                    tip,
+                    frame,
+                    speed,
+                    turn,
+                    slices[k],
+                    k,
+                    l,
+                    place,
+                    s_from,
+                    s_to,
+                    widest,
+                    bounds,
+                    start,
+                    edges,
+                    breaks,
+                    rows,
+                    owner,
+                    total,
+                )
+                if total < 0:
                     return -1
-                rows[total, 0] = p
-                rows[total, 1] = q
-                rows[total, 2] = s_from
-                rows[total, 3] = s_to
-                rows[total, 4] = along
-                rows[total, 5] = offset
-                rows[total, 6] = across
-                owner[total] = k
-                open_row = total
-                total += 1
+            continue
+        first = max(int(np.searchsorted(bounds, bottom, side="right")) - 1, 0)
+        last = min(int(np.searchsorted(bounds, top, side="left")), len(bounds) - 1)
+        for l in range(first, last):
+            at_height(slices[k], max(bounds[l], bottom) - tip[2], low)
+            at_height(slices[k], min(bounds[l + 1], top) - tip[2], high)
+            s_from = slices[k, 0] if bottom >= bounds[l] else low[0]
+            s_to = slices[k, 1] if top <= bounds[l + 1] else high[0]
+            if s_to - s_from <= 0.0:
+                continue
+            r = slices[k, 8]
+            place[0] = 0.5 * (s_from + s_to)
+            if r > 0.0:
+                kappa = math.atan2(slices[k, 4], slices[k, 5]) + (place[0] - 0.5 * (slices[k, 0] + slices[k, 1])) / r
+                place[2], place[3] = math.sin(kappa), math.cos(kappa)
+                place[1] = slices[k, 2] + r * (place[2] - slices[k, 4])
+            else:
+                place[2], place[3] = slices[k, 4], slices[k, 5]
+                place[1] = slices[k, 2] + (place[0] - 0.5 * (slices[k, 0] + slices[k, 1])) * place[3]
+            total = band(
+                tip,
+                frame,
+                speed,
+                turn,
+                slices[k],
+                k,
+                l,
+                place,
+                s_from,
+                s_to,
+                widest,
+                bounds,
+                start,
+                edges,
+                breaks,
+                rows,
+                owner,
+                total,
+            )
+            if total < 0:
+                return -1
     return total
+
+
+@njit(cache=True, nogil=True)
+def meets(phi, tip, frame, speed, turn, slice_, bounds, start, edges):
+    """Whether the point of a slice of a leaning cutter at phi is in material."""
+    rho, z, sk, ck, r = slice_[2], slice_[3], slice_[4], slice_[5], slice_[8]
+    co, si = math.cos(phi), math.sin(phi)
+    p = np.empty(3)
+    nu = np.empty(3)
+    for i in range(3):
+        u = co * frame[1, i] + si * frame[0, i]
+        p[i] = z * frame[2, i] + rho * u
+        nu[i] = sk * u - ck * frame[2, i]
+    v = speed + np.cross(turn, p)
+    height = tip[2] + p[2]
+    l = layer_of(height, bounds)
+    if l < 0:
+        return False
+    dz = 0.5 * (bounds[l] + bounds[l + 1]) - height
+    x, y = tip[0] + p[0], tip[1] + p[1]
+    flat = math.hypot(nu[0], nu[1])
+    found = False
+    if flat > 0.0:
+        if r > 0.0:
+            cosine = -nu[2] - dz / r
+            if abs(cosine) < 1.0:
+                sine = math.sqrt(1.0 - cosine * cosine)
+                found = (sine * (v[0] * nu[0] + v[1] * nu[1]) / flat - cosine * v[2]) > 0.0
+                shift = r * (sine - flat)
+        else:
+            shift = -dz * nu[2] / flat
+            found = abs(shift) < 0.5 * rho
+        if found:
+            x += shift * nu[0] / flat
+            y += shift * nu[1] / flat
+            return inside(x, y, edges, start[l], start[l + 1])
+    l = below(height, bounds)
+    return inside(x, y, edges, start[l], start[l + 1])
+
+
+@njit(cache=True, nogil=True)
+def changed(a, b, state, tip, frame, speed, turn, slice_, bounds, start, edges):
+    """Where between a and b the state changes that is ``state`` at a."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (a + b)
+        if meets(middle, tip, frame, speed, turn, slice_, bounds, start, edges) == state:
+            a = middle
+        else:
+            b = middle
+    return 0.5 * (a + b)
+
+
+@njit(cache=True, nogil=True)
+def leaning(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner):
+    """Tooth engagement of a step of a leaning cutter, see :func:`immersed`: sampled over phi, each change bisected."""
+    h = np.empty(3)
+    total = 0
+    for k in range(len(slices)):
+        one = slices[k]
+        least = ALONG * thickness(one[2], one[3], one[4], one[5], frame, speed, turn, h)
+        size, c = math.hypot(h[0], h[1]), h[2] - least
+        if size + c <= 0.0:
+            continue
+        reach = one[2] * math.hypot(frame[0, 2], frame[1, 2])
+        height = tip[2] + one[3] * frame[2, 2]
+        if height - reach >= bounds[-1] or height + reach < bounds[0]:
+            continue
+        middle = math.atan2(h[1], h[0])
+        half = math.pi if c >= size else math.acos(-c / size)
+        number = max(8, math.ceil(half / math.pi * SAMPLES))
+        pitch = 2.0 * half / number
+        begin = middle - half
+        before = meets(begin + 0.5 * pitch, tip, frame, speed, turn, one, bounds, start, edges)
+        opened = begin
+        for i in range(1, number + 1):
+            a = begin + (i - 0.5) * pitch
+            now = before
+            if i < number:
+                now = meets(a + pitch, tip, frame, speed, turn, one, bounds, start, edges)
+            if i < number and now == before:
+                continue
+            end = begin + 2.0 * half
+            if i < number:
+                end = changed(a, a + pitch, before, tip, frame, speed, turn, one, bounds, start, edges)
+            if before and end - opened > SHORT:
+                total = add_row(rows, owner, total, opened, end, one[0], one[1], h, k)
+                if total < 0:
+                    return -1
+            opened = end
+            before = now
+    return total
+
+
+@njit(cache=True, nogil=True)
+def immersed(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner):
+    """Tooth engagement of one step: fills ``rows`` (m, 7) and ``owner`` (m,), returns their number, -1 where they are
+    too few.
+
+    ``frame`` rows T, n, A; ``speed`` (3,) of the tip and ``turn`` (3,) of the axis over one tooth period; the layers
+    between ``bounds`` have the edges start[l] .. start[l + 1] - 1.
+    """
+    if math.hypot(frame[2, 0], frame[2, 1]) < UPRIGHT:
+        return upright(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner)
+    return leaning(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner)

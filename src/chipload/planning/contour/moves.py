@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from chipload.machine.feed import corner_speed, curvature_speed, limited_speed
 from chipload.machine.machine import Machine
-from chipload.planning.contour.passes import Pass
-from chipload.planning.contour.sampled import Sampled
+from chipload.planning.contour.passes import ContourPass
+from chipload.planning.contour.sampled import SampledPass
 from chipload.program.build import follow, plunge, rapid, retract
 from chipload.program.program import Program
 
@@ -38,7 +38,7 @@ class Speeds:
     time: Floats
 
 
-def speeds(steps: Sampled, feed: float, machine: Machine, wanted: float | None) -> Speeds:
+def speeds(steps: SampledPass, feed: float, machine: Machine, wanted: float | None) -> Speeds:
     """Programmed and reached speed of every step; ``wanted`` a_line [rad]: the feed schedule, None: f0 throughout.
 
     The pass begins and ends at rest.
@@ -50,13 +50,15 @@ def speeds(steps: Sampled, feed: float, machine: Machine, wanted: float | None) 
         share = np.floor(math.sin(wanted) / np.sin(a) / FEED_SHARE + 1e-9) * FEED_SHARE
         programmed = feed * np.maximum(share, FEED_SHARE)
     acceleration = machine.acceleration_xy
-    limit = np.minimum(programmed, curvature_speed(steps.curvature, acceleration))
+    curve = curvature_speed(steps.curvature, acceleration)
+    limit = np.minimum(programmed, curve)
     limit = np.minimum(limit, corner_speed(_kinks(steps), acceleration, machine.corner_tolerance))
-    reached, time = limited_speed(steps.s, limit, acceleration)
+    within = np.minimum(np.minimum(programmed[:-1], programmed[1:]), curve[:-1])
+    reached, time = limited_speed(steps.s, limit, acceleration, between=within)
     return Speeds(programmed, reached, time)
 
 
-def _kinks(steps: Sampled) -> Floats:
+def _kinks(steps: SampledPass) -> Floats:
     """(n,) change of direction [rad] at each step that the curvature of the path does not account for."""
     t, ds = steps.heading, np.diff(steps.s)
     turn = np.arctan2(t[:-1, 0] * t[1:, 1] - t[:-1, 1] * t[1:, 0], (t[:-1] * t[1:]).sum(axis=1))
@@ -65,7 +67,7 @@ def _kinks(steps: Sampled) -> Floats:
 
 
 def pass_program(
-    run: Pass, steps: Sampled, programmed: Floats, z: float, safe_z: float, spindle: float, tool: int
+    run: ContourPass, steps: SampledPass, programmed: Floats, z: float, safe_z: float, spindle: float, tool: int
 ) -> Program:
     """Rapid over the start, down in the clear, lead-in, path, lead-out, up.
 

@@ -18,12 +18,12 @@ from chipload.geometry.contour import Contour, Region
 from chipload.geometry.distance import distance
 from chipload.geometry.offset import offset
 from chipload.planning.contour.backward import pass_before
-from chipload.planning.contour.wall import Walls
+from chipload.planning.contour.offsets import Walls
 from chipload.planning.result import Event
 
 
 @dataclass(frozen=True, eq=False)
-class Pass:
+class ContourPass:
     """One pass round one wall.
 
     ``path`` the centre path that makes the wall, ``lead_in`` and ``lead_out`` its ways in and out (None where there is
@@ -44,24 +44,30 @@ def surface(paths: Sequence[Contour], radius: float) -> tuple[Contour, ...]:
 
 
 def semifinish_paths(
-    finish: Sequence[Contour], walls: Walls, radius: float, depth: float, engagement: float | None
+    after: Sequence[Contour], walls: Walls, radius: float, stock: float, engagement: float | None
 ) -> tuple[Contour, ...]:
-    """Centre paths of the semi-finish pass: parallel to the walls at R + ``depth``, or, with an ``engagement``,
-    the backward method's O*.
+    """Centre paths of one semi-finish pass.
+
+    Parameters
+    ----------
+    after : centre paths of the pass that follows
+    walls, radius : the walls, and R [mm]
+    stock : what the pass leaves on the walls [mm]: it is parallel to them at R + ``stock``
+    engagement : a* [rad] of the pass that follows: O* of the backward method in place of the parallel
 
     Raises
     ------
     InputError
-        The pass vanishes somewhere, so that the finish pass would meet more than it should.
+        The pass vanishes somewhere, so that the one that follows would meet more than it should.
     """
     if engagement is None:
-        paths = offset(walls.extended, radius + depth)
+        paths = offset(walls.extended, radius + stock)
     else:
-        paths = tuple(c for path in finish for c in pass_before(path, radius, engagement))
-    if len(paths) != len(finish):
+        paths = tuple(c for path in after for c in pass_before(path, radius, engagement))
+    if len(paths) != len(after):
         raise InputError(
-            f"operation.radial_depth_mm = {depth:g}: the semi-finish pass falls into {len(paths)} pieces where the "
-            f"finish pass has {len(finish)}: the passage is too narrow, take a smaller cutter or depth"
+            f"operation: the semi-finish pass that leaves {stock:g} mm falls into {len(paths)} pieces where the next "
+            f"pass has {len(after)}: the passage is too narrow, take a smaller cutter, radial_depth_mm or fewer passes"
         )
     return paths
 
@@ -108,23 +114,41 @@ def start_at_widest(path: Contour) -> Contour:
     return path.started_at(0.5 * (path.knots[k] + path.knots[k + 1]))
 
 
-def with_leads(name: str, path: Contour, stock: StockBoundary, walls: Walls, radius: float, lead: float) -> Pass:
+def run_on_length(radius: float, lead: float, passes: int) -> float:
+    """Length [mm] by which open walls are extended for ``passes`` passes before the last one.
+
+    Each pass runs on by 2 R more than the pass that follows it (:func:`with_leads`); the rim of the first one, on its
+    quarter circle, reaches up to ``lead`` + R beyond that.
+    """
+    return 2.0 * lead + (2.0 * passes + 1.0) * radius
+
+
+def with_leads(
+    name: str,
+    path: Contour,
+    stock: StockBoundary,
+    walls: Walls,
+    radius: float,
+    lead: float,
+    later: int = 0,
+    ahead: float = 0.0,
+) -> ContourPass:
     """A pass with its ways in and out: quarter circles tangent to the path on the free side.
 
     The path of an open chain is that over the extended one; between its quarter circles and the chain it runs on
-    along the end tangents by ``lead`` mm, a semi-finish pass by 2 R more, so that the finish pass never meets where
-    it ends.
+    along the end tangents by ``lead`` mm, and by 2 R more for each of the ``later`` passes that follow, so that no
+    pass meets the ends of the one before it. By the backward method both ends of an open path lie ``ahead`` mm (R sin
+    a* for each later pass) further along than those of the last one: the parts are measured from where those lie.
     """
     if path.closed:
-        return Pass(
+        return ContourPass(
             name, path, _quarter(path, walls, radius, lead, 0.0), _quarter(path, walls, radius, lead, None), stock
         )
-    total = path.length
-    end = walls.run_on - lead - (2.0 * radius if name == "semifinish" else 0.0)
-    path, begins, ends = (path.part(*x) for x in ((walls.run_on, total - walls.run_on), (end, walls.run_on),
-                                                  (total - walls.run_on, total - end)))  # fmt: skip
+    on = lead + 2.0 * later * radius
+    first, last = walls.run_on - ahead, path.length - walls.run_on - ahead
+    path, begins, ends = path.part(first, last), path.part(first - on, first), path.part(last, last + on)
     way_in, way_out = _quarter(begins, walls, radius, lead, 0.0), _quarter(ends, walls, radius, lead, None)
-    return Pass(
+    return ContourPass(
         name,
         path,
         begins if way_in is None else Contour.join([way_in, begins]),

@@ -17,29 +17,33 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
-from chipload.cutting.wall import Milling
+from chipload.cutting.rigid import OF_DEPTH, OF_FEED
+from chipload.cutting.wall_error import Milling
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.geometry.distance import distance
 from chipload.geometry.offset import offset
 from chipload.machine.machine import Machine
 from chipload.planning.contour.backward import concave_kinks, leading_curve
-from chipload.planning.contour.ease import eased
+from chipload.planning.contour.blend import eased
 from chipload.planning.contour.forward import forward_pass
-from chipload.planning.contour.moves import pass_program, speeds
+from chipload.planning.contour.moves import Speeds, pass_program, speeds
+from chipload.planning.contour.offsets import Walls, centre_paths, mirrored, run_on, walls_of
 from chipload.planning.contour.passes import (
-    Pass,
+    ContourPass,
     boundary,
     rough_stock,
+    run_on_length,
     semifinish_paths,
     start_at_widest,
     surface,
     with_leads,
 )
-from chipload.planning.contour.sampled import mirrored_pass, sampled, stations
-from chipload.planning.contour.wall import Walls, centre_paths, mirrored, run_on, walls_of
-from chipload.planning.cost import Cut, check_limits, cost, stacked
+from chipload.planning.contour.sampled import SampledPass, mirrored_pass, sampled, stations
+from chipload.planning.cost import CutConditions, cost, stacked
+from chipload.planning.link_rows import row_ends, with_links
 from chipload.planning.result import Columns, Event, OperationResult, StrategyResult
+from chipload.program.motions import lengths
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
 
@@ -47,6 +51,8 @@ from chipload.progress import Progress, silent
 STRATEGIES = ("plain", "backward", "feed")
 #: stock that the cutter leaves in a joint is reported from this on [mm]
 OVERSHOOT_MM = 1e-4
+#: engagement of a semi-finish pass above a* that is reported [deg]
+OVERSHOOT_DEG = 0.05
 
 
 @dataclass(frozen=True)
@@ -70,6 +76,7 @@ class Finishing:
     step : of the history, and of the forward method
     lead : radius of the quarter circles in and out, length of run-on and run-off of open chains
     top, clearance : z of the stock's top, height of rapids above it
+    rigid : deflection over feed per tooth and over radial depth up to which the rigid model holds
     """
 
     side: str
@@ -88,6 +95,7 @@ class Finishing:
     lead: float
     top: float
     clearance: float
+    rigid: tuple[float, float] = (OF_FEED, OF_DEPTH)
 
     def engagement(self, radius: float) -> float:
         """a* [rad] for a cutter of radius R.
@@ -110,7 +118,7 @@ class _Job:
     """What all strategies of one operation share."""
 
     setting: Finishing
-    cut: Cut
+    cut: CutConditions
     machine: Machine
     limits: Mapping[str, float]
     walls: Walls
@@ -143,13 +151,51 @@ def plan_contour(
     InputError
         The contour, the cutter and the depths do not go together; the message says where and what would.
     """
+    job = _prepared(contours, setting, cutter, material, machine, limits)
+    a = setting.engagement(cutter.radius)
+    if setting.strategies == ("forward",):
+        return OperationResult("forward", "forward", {"forward": _strategy(job, "forward", _forward_passes(job, a))})
+    results = {}
+    for k, name in enumerate(setting.strategies):
+        progress(k / len(setting.strategies), f"contour, {name}")
+        results[name] = _strategy(job, name, _passes(job, a if name == "backward" else None))
+    progress(1.0, "contour")
+    return OperationResult("contour", setting.use, results)
+
+
+def check_contour(
+    contours: Sequence[Contour], setting: Finishing, cutter: Cutter, material: Material, machine: Machine
+) -> int:
+    """Lay out the passes as :func:`plan_contour` does, without sampling them: how many passes there are.
+
+    Raises
+    ------
+    InputError
+        As :func:`plan_contour`.
+    """
+    job = _prepared(contours, setting, cutter, material, machine, {})
+    _stock(job)
+    if setting.strategies == ("forward",):
+        return len(job.walls.walls) * setting.passes
+    a = setting.engagement(cutter.radius)
+    return sum(len(_passes(job, a if name == "backward" else None)) for name in setting.strategies)
+
+
+def _prepared(
+    contours: Sequence[Contour],
+    setting: Finishing,
+    cutter: Cutter,
+    material: Material,
+    machine: Machine,
+    limits: Mapping[str, float],
+) -> _Job:
+    """The walls and the finish path of an operation."""
     radius = cutter.radius
     a = setting.engagement(radius)
-    cut = Cut(cutter, material, setting.axial_depth, setting.spindle_speed, setting.milling)
-    walls = walls_of(contours, setting.side, setting.milling, setting.lead + 3.0 * radius)
+    cut = CutConditions(cutter, material, setting.axial_depth, setting.spindle_speed, setting.milling, *setting.rigid)
+    walls = walls_of(contours, setting.side, setting.milling, run_on_length(radius, setting.lead, setting.passes))
     if setting.strategies == ("forward",):
-        job = _Job(setting, cut, machine, limits, walls, (), 0.0, ())
-        return OperationResult("forward", "forward", {"forward": _strategy(job, "forward", _forward_passes(job, a))})
+        return _Job(setting, cut, machine, limits, walls, (), 0.0, ())
     finish = tuple(start_at_widest(p) for p in centre_paths(walls, radius, setting.tolerance))
     deviation, events = 0.0, []
     if setting.joint == "clothoid":
@@ -157,13 +203,7 @@ def plan_contour(
         finish = tuple(start_at_widest(e.path) for e in easings)
         deviation = max(e.deviation_mm for e in easings)
         events = [x for e in easings for x in e.events]
-    job = _Job(setting, cut, machine, limits, walls, finish, deviation, tuple(events))
-    results = {}
-    for k, name in enumerate(setting.strategies):
-        progress(k / len(setting.strategies), f"contour, {name}")
-        results[name] = _strategy(job, name, _passes(job, a if name == "backward" else None))
-    progress(1.0, "contour")
-    return OperationResult("contour", setting.use, results)
+    return _Job(setting, cut, machine, limits, walls, finish, deviation, tuple(events))
 
 
 def _rough(job: _Job) -> tuple[Contour, ...]:
@@ -179,44 +219,49 @@ def _stock(job: _Job) -> Region:
     return Region(tuple(_back(c, job.flip) for c in rough_stock(job.walls, rough, behind).contours))
 
 
-def _passes(job: _Job, a: float | None) -> list[Pass]:
+def _passes(job: _Job, a: float | None) -> list[ContourPass]:
     """Semi-finish passes and the finish pass, outermost first; ``a``: by the backward method, else parallel."""
     setting, radius = job.setting, job.radius
     paths = [job.finish]
-    for _ in range(setting.passes):
-        before = semifinish_paths(paths[0], job.walls, radius, setting.radial_depth, a)
+    for k in range(1, setting.passes + 1):
+        before = semifinish_paths(paths[0], job.walls, radius, k * setting.radial_depth, a)
         paths.insert(0, tuple(start_at_widest(p) for p in before))
     stock = boundary(_rough(job))
     out = []
     for k, group in enumerate(paths):
-        name = "finish" if k == len(paths) - 1 else "semifinish"
-        out += [with_leads(name, path, stock, job.walls, radius, setting.lead) for path in group]
+        later = setting.passes - k
+        name = "semifinish" if later else "finish"
+        ahead = 0.0 if a is None else later * radius * math.sin(a)
+        out += [with_leads(name, path, stock, job.walls, radius, setting.lead, later, ahead) for path in group]
         if name != "finish":
             stock = boundary(surface(group, radius))
     return out
 
 
-def _forward_passes(job: _Job, a: float) -> list[Pass]:
+def _forward_passes(job: _Job, a: float) -> list[ContourPass]:
     """Passes into the material from the drawn contours, each on the surface of the one before."""
     setting, radius = job.setting, job.radius
     out = []
     for wall in job.walls.extended:
         old = start_at_widest(wall)
-        for _ in range(setting.passes):
+        for k in range(setting.passes):
             run = forward_pass(old, radius, a, setting.step)
             stock = boundary([old])
             old = run.surface()
             path = run.path()
             if run.event is not None:
-                out.append(Pass("forward", path, None, None, stock, run.event))
+                out.append(ContourPass("forward", path, None, None, stock, run.event))
                 break
-            out.append(
-                with_leads("forward", path, stock, Walls((old,), (old,), job.walls.run_on), radius, setting.lead)
-            )
+            later, behind = (
+                setting.passes - 1 - k,
+                k * radius * math.sin(a),
+            )  # each pass starts R sin a* before the last
+            around = Walls((old,), (old,), job.walls.run_on)
+            out.append(with_leads("forward", path, stock, around, radius, setting.lead, later, -behind))
     return out
 
 
-def _strategy(job: _Job, name: str, planar: list[Pass]) -> StrategyResult:
+def _strategy(job: _Job, name: str, planar: list[ContourPass]) -> StrategyResult:
     """Sample, cost and program the passes of one strategy."""
     setting = job.setting
     runs = [mirrored_pass(p, job.flip) for p in planar]
@@ -224,20 +269,26 @@ def _strategy(job: _Job, name: str, planar: list[Pass]) -> StrategyResult:
     wanted = setting.engagement(job.radius)
     histories: list[Columns] = []
     programs: list[Program] = []
+    clocks: list[tuple[SampledPass, Speeds]] = []
     for run in runs:
         steps = sampled(run, job.radius, setting.step)
         speed = speeds(steps, setting.feed, job.machine, wanted if name == "feed" and run.name == "finish" else None)
         makes_wall = (steps.zone == run.name) | (steps.zone == "closing")
-        histories.append(
-            cost(job.cut, steps.zone, steps.s, speed.time, steps.centre, steps.heading, z, steps.engagement,
-                 speed.reached, makes_wall)
+        own = cost(
+            job.cut, steps.zone, steps.s, speed.time, steps.centre, steps.heading, z, steps.engagement, speed.reached,
+            makes_wall,
         )  # fmt: skip
+        histories.append(with_links(own, safe_z))
+        clocks.append((steps, speed))
         programs.append(
             pass_program(run, steps, speed.programmed, z, safe_z, setting.spindle_speed, job.cut.cutter.number)
         )
-    history = stacked(histories)
+    program = Program.join(programs)
+    history = {**stacked(histories), "t_s": _pass_times(programs, clocks, row_ends(program, job.machine))}
     on_wall = np.isin(history["pass"], ["finish", "forward"])
     events = (*job.events, *_events(job, runs, history, name))
+    if name == "backward":
+        events = (*events, *_semifinish_overshoots(job, histories))
     drawn = {
         "stock before": _stock(job).contours,
         "wall" if job.finish else "old surface": tuple(_back(w, job.flip) for w in job.walls.walls),
@@ -247,13 +298,32 @@ def _strategy(job: _Job, name: str, planar: list[Pass]) -> StrategyResult:
     }
     return StrategyResult(
         name,
-        Program.join(programs),
+        program,
         history,
         _summary(job, name, history, on_wall),
         events,
-        check_limits(job.limits, history, on_wall),
+        on_wall,
         drawn,
     )
+
+
+def _pass_times(
+    programs: list[Program], clocks: list[tuple[SampledPass, Speeds]], ends: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(n,) time [s] of the steps of all passes and their link rows, from that at the ends of the program's rows.
+
+    A pass is a rapid, the way down, its path, and the way up. Within a row of the path time goes as the speed that the
+    step was planned with.
+    """
+    out, first = [], 0
+    for program, (steps, speed) in zip(programs, clocks, strict=True):
+        last = first + len(program) - 1
+        way = np.concatenate([[0.0], np.cumsum(lengths(program)[2:-1])])
+        own = np.interp(way, steps.s, speed.time)
+        clock = ends[first + 1 : last]
+        out.append(np.concatenate([clock[:1], np.interp(speed.time, own, clock), ends[last : last + 1]]))
+        first = last + 1
+    return np.concatenate(out)
 
 
 def _back(contour: Contour, flip: bool) -> Contour:
@@ -273,17 +343,17 @@ def _summary(job: _Job, name: str, history: Columns, on_wall: NDArray[np.bool_])
 
     wanted = math.degrees(job.setting.engagement(job.radius))
     finish = np.isin(history["pass"], ["finish", "forward", "closing"])
-    error = history["error_signed_um"][on_wall]
+    error = history["form_error_signed_um"][on_wall]
     return {
         "engagement_deg": {**span("engagement_deg"), "wanted": wanted},
         "force_xy_n": span("force_xy_n"),
-        "force_mean_xy_n": {
-            "min": float(np.hypot(history["force_mean_x_n"], history["force_mean_y_n"])[on_wall].min()),
-            "max": float(np.hypot(history["force_mean_x_n"], history["force_mean_y_n"])[on_wall].max()),
+        "force_xy_mean_n": {
+            "min": float(np.hypot(history["force_x_mean_n"], history["force_y_mean_n"])[on_wall].min()),
+            "max": float(np.hypot(history["force_x_mean_n"], history["force_y_mean_n"])[on_wall].max()),
         },
         "torque_nm": span("torque_nm"),
-        "error_um": {
-            "max": float(history["error_um"][on_wall].max()),
+        "form_error_um": {
+            "max": float(history["form_error_um"][on_wall].max()),
             "signed_min": float(error.min()),
             "signed_max": float(error.max()),
         },
@@ -300,7 +370,7 @@ def _elapsed(history: Columns, where: NDArray[np.bool_]) -> float:
     return float(np.diff(history["t_s"], prepend=0.0)[where].sum())
 
 
-def _events(job: _Job, runs: list[Pass], history: Columns, name: str) -> list[Event]:
+def _events(job: _Job, runs: list[ContourPass], history: Columns, name: str) -> list[Event]:
     """What the passes could not keep: no room for leads, stock too thin for the method, broken boundaries."""
     out = [r.stopped for r in runs if r.stopped is not None]
     for r in runs:
@@ -322,7 +392,7 @@ def _events(job: _Job, runs: list[Pass], history: Columns, name: str) -> list[Ev
     return out + (_thin_stock(job, runs) + _overshoots(job, runs) if name == "backward" else [])
 
 
-def _overshoots(job: _Job, runs: list[Pass]) -> list[Event]:
+def _overshoots(job: _Job, runs: list[ContourPass]) -> list[Event]:
     """Joints of the finish path where the cutter cannot make the surface that constant engagement asks for."""
     out = []
     wanted = job.setting.engagement(job.radius)
@@ -347,25 +417,51 @@ def _overshoots(job: _Job, runs: list[Pass]) -> list[Event]:
     return out
 
 
-def _thin_stock(job: _Job, runs: list[Pass]) -> list[Event]:
-    """Where the reshaped surface lies outside the stock that roughing left, so that the finish pass meets less."""
-    rough = job.setting.passes * job.setting.radial_depth + job.setting.semifinish_depth
-    wall = np.vstack([_back(run_on(w, job.walls.run_on), job.flip).segments for w in job.walls.extended])
-    for r in runs:
-        if r.name != "finish":
+def _semifinish_overshoots(job: _Job, histories: list[Columns]) -> list[Event]:
+    """The greatest engagement of every semi-finish pass but the first that rises above a*, one event a pass.
+
+    Each pass back raises the curvature of O*, until a cutter of radius R cannot make the surface it asks for. The
+    finish pass has its own events.
+    """
+    wanted = math.degrees(job.setting.engagement(job.radius))
+    out = []
+    for number, h in enumerate(histories, start=1):
+        at = np.flatnonzero(h["pass"] == "semifinish")
+        if number <= len(job.finish) or not len(at):
             continue
+        k = at[h["engagement_deg"][at].argmax()]
+        highest = float(h["engagement_deg"][k])
+        if highest > wanted + OVERSHOOT_DEG:
+            text = (
+                f"semi-finish pass {number} of {len(histories) - len(job.finish)}: the engagement rises to "
+                f"{highest:.4g} deg here, {wanted:.4g} deg are wanted: the cutter cannot make the surface that "
+                "constant engagement asks of the pass before"
+            )
+            out.append(Event("semifinish-overshoot", float(h["x_mm"][k]), float(h["y_mm"][k]), text))
+    return out
+
+
+def _thin_stock(job: _Job, runs: list[ContourPass]) -> list[Event]:
+    """Where a reshaped surface lies outside the stock that roughing left, so that the pass after it meets less."""
+    rough = job.setting.passes * job.setting.radial_depth + job.setting.semifinish_depth
+    beyond = job.setting.passes * job.radius  # P* of an open chain runs ahead of it by R sin a* a pass
+    made = (run_on(c, beyond) for c in surface(job.finish, job.radius))
+    wall = np.vstack([_back(c, job.flip).segments for c in made])
+    worst, place = 0.0, (0.0, 0.0)
+    for r in runs[len(job.finish) :]:
         points = np.vstack([c.at(stations(c, job.setting.step))[0] for c in _chains(r.stock.segments)])
         depth = distance(wall, points)
         k = int(depth.argmax())
-        if depth[k] > rough + 1e-6:
-            return [
-                Event(
-                    "stock-thin",
-                    float(points[k, 0]),
-                    float(points[k, 1]),
-                    f"constant engagement asks for {depth[k]:.4g} mm of stock on the wall here, roughing leaves "
-                    f"{rough:.4g} mm: raise semifinish_depth_mm by {depth[k] - rough:.4g}",
-                    failure=True,
-                )
-            ]
-    return []
+        if depth[k] > worst:
+            worst, place = float(depth[k]), (float(points[k, 0]), float(points[k, 1]))
+    if worst <= rough + 1e-6:
+        return []
+    return [
+        Event(
+            "stock-thin",
+            *place,
+            f"constant engagement asks for {worst:.4g} mm of stock on the wall here, roughing leaves {rough:.4g} mm: "
+            f"raise semifinish_depth_mm by {worst - rough:.4g}",
+            failure=True,
+        )
+    ]

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from chipload.engagement.contact import Engagement, StockBoundary, engagement
 from chipload.geometry.contour import Contour
 from chipload.geometry.distance import distance
-from chipload.planning.contour.passes import Pass
-from chipload.planning.contour.wall import mirrored
+from chipload.planning.contour.offsets import mirrored
+from chipload.planning.contour.passes import ContourPass
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ HALVINGS = 40
 
 
 @dataclass(frozen=True, eq=False)
-class Sampled:
+class SampledPass:
     """Rows along one pass: ``zone`` (n,) is `lead`, the pass's name, or `closing`."""
 
     zone: NDArray[Any]
@@ -36,7 +36,7 @@ class Sampled:
     engagement: Engagement
 
 
-def sampled(run: Pass, radius: float, step: float) -> Sampled:
+def sampled(run: ContourPass, radius: float, step: float) -> SampledPass:
     """The pass in steps of at most ``step`` mm, the joints of the path among them.
 
     The exact engagement is taken against the stock before the pass; the last piece of a closed pass, where the rim
@@ -58,7 +58,7 @@ def sampled(run: Pass, radius: float, step: float) -> Sampled:
     met = engagement(run.stock, o, t, radius)
     if run.path.closed:
         named, met = _closing(run, radius, named, s, o, t, met)
-    return Sampled(named, s, o, t, kappa, met)
+    return SampledPass(named, s, o, t, kappa, met)
 
 
 def stations(path: Contour, step: float) -> Floats:
@@ -71,7 +71,7 @@ def stations(path: Contour, step: float) -> Floats:
 
 
 def _closing(
-    run: Pass, radius: float, zone: NDArray[Any], s: Floats, o: Floats, t: Floats, met: Engagement
+    run: ContourPass, radius: float, zone: NDArray[Any], s: Floats, o: Floats, t: Floats, met: Engagement
 ) -> tuple[NDArray[Any], Engagement]:
     """Take what the beginning of a closed pass has cut away from the engagement of its end.
 
@@ -114,7 +114,7 @@ def _cut(o: Floats, t: Floats, phi: Floats, radius: float, early: Floats) -> NDA
     return np.asarray(distance(early, rim) < radius * (1.0 - 1e-12))
 
 
-def mirrored_pass(run: Pass, flip: bool) -> Pass:
+def mirrored_pass(run: ContourPass, flip: bool) -> ContourPass:
     """The pass in the work frame: reflected in y where ``flip``."""
     if not flip:
         return run
@@ -122,4 +122,4 @@ def mirrored_pass(run: Pass, flip: bool) -> Pass:
     seg = run.stock.segments * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0])
     seg = seg[:, [2, 3, 0, 1, 4, 5, 6]] * np.array([1, 1, 1, 1, 1, 1, -1.0])
     assert parts[0] is not None
-    return Pass(run.name, parts[0], parts[1], parts[2], StockBoundary(seg), run.stopped)
+    return ContourPass(run.name, parts[0], parts[1], parts[2], StockBoundary(seg), run.stopped)

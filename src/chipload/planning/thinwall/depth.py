@@ -1,7 +1,8 @@
 """Largest depth of cut whose force normal to the surface stays at or below a threshold.
 
 Notation: d [mm] depth of cut; F_n [N] force along the surface normal over a revolution of the spindle, by the one force
-model on the bites of :mod:`chipload.planning.thinwall.engaged`: its greatest size, or the size of its mean; F_th [N]
+model on the bites of :mod:`chipload.planning.thinwall.plane_stock`: its greatest size, or the size of its mean; F_th
+[N]
 threshold; f_z [mm] feed per tooth.
 
 F_n(d) is looked at from d_min to d_max; the depth is the greatest d up to which F_n <= F_th everywhere, found to
@@ -23,9 +24,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutting.force import forces_over_turn, mean_forces
 from chipload.cutting.material import Material
-from chipload.engagement.bites import with_runout
+from chipload.engagement.tooth_engagement import with_runout
 from chipload.errors import InputError
-from chipload.planning.thinwall.engaged import Posture, bites_of_depths
+from chipload.planning.thinwall.plane_stock import CutterPose, engagement_of_depths
 from chipload.progress import Progress, silent
 
 Floats = NDArray[np.float64]
@@ -42,7 +43,7 @@ BLOCK = 256
 
 
 @dataclass(frozen=True)
-class Limits:
+class DepthRange:
     """Smallest and greatest depth [mm], and how near the solution must come [mm]."""
 
     smallest: float
@@ -97,7 +98,7 @@ class Depths:
 
 
 def normal_force(
-    posture: Posture,
+    posture: CutterPose,
     material: Material,
     depths: ArrayLike,
     *,
@@ -110,7 +111,8 @@ def normal_force(
     Parameters
     ----------
     measure : ``greatest`` size over the revolution, sampled ``step_deg`` apart, or the size of the ``mean``
-    nodes : as of :func:`chipload.planning.thinwall.engaged.bites_of_depths`; None: 8 of a mean (1e-4 of a ball's),
+    nodes : as of :func:`chipload.planning.thinwall.plane_stock.engagement_of_depths`; None: 8 of a mean (1e-4 of a
+    ball's),
         16 of the greatest (1 to 4 %: bites come and go at once, which makes it rather too great)
 
     Examples
@@ -120,7 +122,7 @@ def normal_force(
     >>> from chipload.cutter.cutter import Cutter
     >>> ball = Cutter(10.0, 4, 0.0, 20.0, 30.0, 6e5, corner_radius=5.0)
     >>> plain = Material("plain", 1500.0, 600.0, 0.0, 0.0, 0.0, 0.0, source="made up for this example")
-    >>> normal_force(Posture(ball, 0.05, None), plain, [0.5], measure="mean").round(4).tolist()
+    >>> normal_force(CutterPose(ball, 0.05, None), plain, [0.5], measure="mean").round(4).tolist()
     [18.1437]
     >>> round(4 * 600 * 0.05 * 0.95 / math.tau, 4)
     18.1437
@@ -134,7 +136,7 @@ def normal_force(
     turn = math.tau / (1 if cutter.runout[0] > 0.0 else cutter.flutes)
     theta = np.linspace(0.0, turn, max(8, math.ceil(math.degrees(turn) / step_deg)), endpoint=False)
     for at in range(0, len(d), BLOCK):
-        bites = bites_of_depths(posture, d[at : at + BLOCK], nodes or (8 if measure == "mean" else 16))
+        bites = engagement_of_depths(posture, d[at : at + BLOCK], nodes or (8 if measure == "mean" else 16))
         if measure == "mean":
             out[at : at + BLOCK] = np.abs(mean_forces(bites, cutter, material)[0] @ N)
         else:
@@ -144,10 +146,10 @@ def normal_force(
 
 
 def largest_depths(
-    posture: Posture,
+    posture: CutterPose,
     material: Material,
     thresholds: ArrayLike,
-    limits: Limits,
+    limits: DepthRange,
     *,
     measure: Measure,
     progress: Progress = silent,
@@ -231,7 +233,7 @@ def _below(
 
 
 def _helps(
-    posture: Posture, material: Material, threshold: float, depth: float, measure: Measure
+    posture: CutterPose, material: Material, threshold: float, depth: float, measure: Measure
 ) -> tuple[float, float | None, float | None]:
     """Force of the edge alone, feed per tooth and diameter that bring the force of ``depth`` to the threshold."""
 
@@ -253,7 +255,7 @@ def _helps(
     return edge, None, _bisect(at_diameter, threshold, smallest, posture.cutter.diameter)
 
 
-def _scaled(posture: Posture, diameter: float) -> Posture:
+def _scaled(posture: CutterPose, diameter: float) -> CutterPose:
     cutter = posture.cutter
     corner = cutter.corner_radius * diameter / cutter.diameter
     other = replace(cutter, diameter=diameter, corner_radius=corner, corner_e=None, corner_f=None, shank_diameter=None)

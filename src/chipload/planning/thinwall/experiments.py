@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, Delaunay, QhullError, cKDTree
 
 from chipload.errors import Finding, InputError
-from chipload.planning.thinwall.law import Law
+from chipload.planning.thinwall.force_table import ForceTable
 from chipload.progress import Progress, silent
 
 Floats = NDArray[np.float64]
@@ -216,7 +216,7 @@ def propose_cuts(
     places: ArrayLike,
     points: ArrayLike,
     modelled: ArrayLike,
-    law: Law,
+    law: ForceTable,
     count: int,
     scatter: float,
     *,

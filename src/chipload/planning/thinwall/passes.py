@@ -30,15 +30,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
+from chipload.planning.thinwall.blank import FinishSurface
 from chipload.planning.thinwall.envelope import lower_envelope
-from chipload.planning.thinwall.law import Law
+from chipload.planning.thinwall.force_table import ForceTable
 from chipload.planning.thinwall.threshold import Threshold
-from chipload.planning.thinwall.wall import Surface
 from chipload.progress import Progress, silent
 
 Floats = NDArray[np.float64]
 #: what the places of a side bear, ``(left on each side, side) -> threshold``
-Bears = Callable[[Sequence[Floats], int], Threshold]
+ThresholdOf = Callable[[Sequence[Floats], int], Threshold]
 
 #: in which order the sides are cut
 Order = Literal["alternately", "one after the other"]
@@ -48,7 +48,7 @@ NOTHING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Pass:
+class WallPass:
     """One pass over one side.
 
     Attributes
@@ -92,7 +92,7 @@ class Plan:
     """
 
     name: str
-    passes: tuple[Pass, ...]
+    passes: tuple[WallPass, ...]
     infeasible: tuple[tuple[int, int, int], ...] = ()
     corrections: tuple[Floats, ...] = ()
 
@@ -113,7 +113,7 @@ class Plan:
         return max((float(x.max()) for x in known if x is not None), default=None)
 
 
-def _ones(surfaces: Sequence[Surface], corrections: Sequence[Floats] | None) -> tuple[Floats, ...]:
+def _ones(surfaces: Sequence[FinishSurface], corrections: Sequence[Floats] | None) -> tuple[Floats, ...]:
     """Corrections of each side; 1 where none are given."""
     shapes = [s.points.shape[:2] for s in surfaces]
     if corrections is None:
@@ -124,10 +124,10 @@ def _ones(surfaces: Sequence[Surface], corrections: Sequence[Floats] | None) -> 
     return tuple(corrections)
 
 
-def _made(side: int, low: Floats, high: Floats, threshold: Threshold, law: Law, c: Floats) -> Pass:
+def _made(side: int, low: Floats, high: Floats, threshold: Threshold, law: ForceTable, c: Floats) -> WallPass:
     depth = high - low
     force = np.where(depth > NOTHING, c * law.force(np.maximum(depth, NOTHING)), 0.0)
-    return Pass(side, low, high, threshold, force, force > threshold.force.reshape(low.shape) * (1.0 + 1e-9))
+    return WallPass(side, low, high, threshold, force, force > threshold.force.reshape(low.shape) * (1.0 + 1e-9))
 
 
 def _no_sliver(low: Floats, high: Floats, allowance: float, smallest: float) -> Floats:
@@ -137,9 +137,9 @@ def _no_sliver(low: Floats, high: Floats, allowance: float, smallest: float) -> 
 
 
 def variable(
-    surfaces: Sequence[Surface],
-    bears: Bears,
-    law: Law,
+    surfaces: Sequence[FinishSurface],
+    threshold_of: ThresholdOf,
+    law: ForceTable,
     slope: float,
     *,
     order: Order = "alternately",
@@ -152,7 +152,7 @@ def variable(
     Parameters
     ----------
     surfaces : one or two sides, A first
-    bears : threshold of a side in a state; the stock left is that of all sides, in their order
+    threshold_of : threshold of a side in a state; the stock left is that of all sides, in their order
     law : depth of a threshold
     slope : L > 0 of the offset function
     order : of the sides; one after the other: the first one whole while the second has all of its stock
@@ -166,7 +166,7 @@ def variable(
     """
     count, c = len(surfaces), _ones(surfaces, corrections)
     D = [np.zeros(s.points.shape[:2]) for s in surfaces]
-    done: list[Pass] = []
+    done: list[WallPass] = []
     infeasible: set[tuple[int, int, int]] = set()
     for _ in range(most):
         open_sides = [s for s in reversed(range(count)) if (D[s] < surfaces[s].allowance - NOTHING).any()]
@@ -174,7 +174,7 @@ def variable(
             return Plan("variable", tuple(reversed(done)), tuple(sorted(infeasible)), c)
         for side in open_sides if order == "alternately" else open_sides[:1]:
             a = surfaces[side].allowance
-            threshold = bears(D, side)
+            threshold = threshold_of(D, side)
             F = threshold.force.reshape(D[side].shape)
             open_ = D[side] < a - NOTHING
             depth = law.depth(F / c[side])
@@ -195,18 +195,21 @@ def variable(
 
 
 def least_first_depth(
-    surfaces: Sequence[Surface], bears: Bears, law: Law, corrections: Sequence[Floats] | None = None
+    surfaces: Sequence[FinishSurface],
+    threshold_of: ThresholdOf,
+    law: ForceTable,
+    corrections: Sequence[Floats] | None = None,
 ) -> float:
     """Least depth [mm] that all places of all sides bear in the last passes; 0: one bears none."""
     D = [np.zeros(s.points.shape[:2]) for s in surfaces]
     c = _ones(surfaces, corrections)
-    return min(float(law.depth(bears(D, side).force / c[side].ravel()).min()) for side in range(len(surfaces)))
+    return min(float(law.depth(threshold_of(D, side).force / c[side].ravel()).min()) for side in range(len(surfaces)))
 
 
 def constant(
-    surfaces: Sequence[Surface],
-    bears: Bears,
-    law: Law,
+    surfaces: Sequence[FinishSurface],
+    threshold_of: ThresholdOf,
+    law: ForceTable,
     depth: float,
     name: str = "constant",
     order: Order = "alternately",
@@ -232,6 +235,6 @@ def constant(
     done = []
     for k, side in turns:
         high = np.full_like(D[side], surfaces[side].allowance * (k + 1) / number[side])
-        done.append(_made(side, D[side], high, bears(D, side), law, c[side]))
+        done.append(_made(side, D[side], high, threshold_of(D, side), law, c[side]))
         D[side] = high
     return Plan(name, tuple(reversed(done)), (), c)

@@ -3,7 +3,7 @@
 Notation: p finish surface, N its normal, D [mm] stock that the pass leaves; q = p + D N; n = N - grad D (normed) the
 normal of q, here of the sampled surface itself, so that curvature counts too; t direction of the feed along i,
 l = n x t to its left. The cutter touches q at a point of a row, its axis leans by lead and tilt in (t, l, n) as
-:mod:`chipload.planning.thinwall.engaged` says; its tip is where that puts it.
+:mod:`chipload.planning.thinwall.plane_stock` says; its tip is where that puts it.
 
 Rows run along i, from the free edge towards the clamp, so that the wall below still carries stock; all in one sense,
 that which has the row before on the side that the posture says. A row is cut where the pass finds stock; between pieces
@@ -23,16 +23,16 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from chipload.errors import InputError
-from chipload.planning.thinwall.engaged import Posture
-from chipload.planning.thinwall.passes import NOTHING, Pass
-from chipload.planning.thinwall.wall import Surface
+from chipload.planning.thinwall.blank import FinishSurface
+from chipload.planning.thinwall.passes import NOTHING, WallPass
+from chipload.planning.thinwall.plane_stock import CutterPose
 from chipload.program.program import LINE, RAPID, Program
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Going:
+class PassMotion:
     """How the rows are gone along.
 
     Parameters
@@ -44,7 +44,7 @@ class Going:
     clearance : [mm] along the normal, between pieces
     """
 
-    posture: Posture
+    posture: CutterPose
     feed: float
     rapid: float
     spindle: float
@@ -85,7 +85,7 @@ def offset_normals(points: Floats, normals: Floats) -> Floats:
     return _unit(n * side)
 
 
-def rows_of(surface: Surface, low: Floats, high: Floats, posture: Posture) -> Rows:
+def rows_of(surface: FinishSurface, low: Floats, high: Floats, posture: CutterPose) -> Rows:
     """Rows over the surface that is left at ``low``, stock before at ``high`` (n, m) [mm].
 
     Between the places of the surface points and normals are interpolated straight.
@@ -121,7 +121,7 @@ def rows_of(surface: Surface, low: Floats, high: Floats, posture: Posture) -> Ro
     return Rows(contact, normal, _unit(t - (t * normal).sum(axis=2, keepdims=True) * normal), cut)
 
 
-def placed(rows: Rows, posture: Posture) -> tuple[Floats, Floats, Floats]:
+def placed(rows: Rows, posture: CutterPose) -> tuple[Floats, Floats, Floats]:
     """Tip [mm], axis and middle C of the corner circle's centres [mm] at the contact points, (r, s, 3) float each."""
     frame = np.stack([rows.feed, np.cross(rows.normal, rows.feed), rows.normal], axis=2)
     axis = np.einsum("k,rskc->rsc", posture.axis, frame)
@@ -129,7 +129,7 @@ def placed(rows: Rows, posture: Posture) -> tuple[Floats, Floats, Floats]:
     return C - posture.cutter.apt[3] * axis, _unit(axis), C
 
 
-def program_of(rows: Rows, going: Going, label: str) -> Program:
+def program_of(rows: Rows, pass_motion: PassMotion, label: str) -> Program:
     """Motions of the rows; the first is a rapid.
 
     Raises
@@ -137,7 +137,7 @@ def program_of(rows: Rows, going: Going, label: str) -> Program:
     InputError
         Nothing is cut.
     """
-    tip, axis, _ = placed(rows, going.posture)
+    tip, axis, _ = placed(rows, pass_motion.posture)
     points: list[Floats] = []
     axes: list[Floats] = []
     motion: list[int] = []
@@ -145,13 +145,13 @@ def program_of(rows: Rows, going: Going, label: str) -> Program:
         on = np.concatenate([[0], rows.cut[r].astype(np.int64), [0]])
         for a, b in zip(np.flatnonzero(np.diff(on) == 1), np.flatnonzero(np.diff(on) == -1), strict=True):
             first, last = max(int(a) - 1, 0), min(int(b), tip.shape[1] - 1)
-            above = [tip[r, k] + going.clearance * rows.normal[r, k] for k in (first, last)]
+            above = [tip[r, k] + pass_motion.clearance * rows.normal[r, k] for k in (first, last)]
             points += [above[0], *tip[r, first : last + 1], above[1]]
             axes += [axis[r, first], *axis[r, first : last + 1], axis[r, last]]
             motion += [RAPID, *[LINE] * (last + 1 - first), RAPID]
     if not points:
         raise InputError("paths: the pass finds no stock")
-    count, tool = len(points), going.posture.cutter.number
+    count, tool = len(points), pass_motion.posture.cutter.number
     kind = np.array(motion)
     zero, up = np.zeros((count, 3)), np.tile([0.0, 0.0, 1.0], (count, 1))
     none = np.zeros(count, dtype=np.int64)
@@ -162,8 +162,8 @@ def program_of(rows: Rows, going: Going, label: str) -> Program:
         centre=zero,
         normal=up,
         turns=none,
-        feed=np.where(kind == LINE, going.feed, 0.0),
-        spindle=np.full(count, going.spindle if going.posture.clockwise else -going.spindle),
+        feed=np.where(kind == LINE, pass_motion.feed, 0.0),
+        spindle=np.full(count, pass_motion.spindle if pass_motion.posture.clockwise else -pass_motion.spindle),
         tool=np.full(count, tool),
         line=none,
         label=none,
@@ -178,15 +178,21 @@ def seconds(program: Program, rapid: float) -> float:
     return float((length[cuts] / program.feed[1:][cuts]).sum() + length[~cuts].sum() / rapid)
 
 
-def pass_programs(passes: Sequence[Pass], surfaces: Sequence[Surface], going: Going) -> tuple[Program, ...]:
+def pass_programs(
+    passes: Sequence[WallPass], surfaces: Sequence[FinishSurface], pass_motion: PassMotion
+) -> tuple[Program, ...]:
     """A program a pass, in order."""
     return tuple(
-        program_of(rows_of(surfaces[p.side], p.low, p.high, going.posture), going, f"pass {k + 1} side {p.side + 1}")
+        program_of(
+            rows_of(surfaces[p.side], p.low, p.high, pass_motion.posture),
+            pass_motion,
+            f"pass {k + 1} side {p.side + 1}",
+        )
         for k, p in enumerate(passes)
     )
 
 
-def gouges(rows: Rows, surface: Surface, low: Floats, posture: Posture, tolerance: float) -> NDArray[np.int64]:
+def gouges(rows: Rows, surface: FinishSurface, low: Floats, posture: CutterPose, tolerance: float) -> NDArray[np.int64]:
     """Contact points (g, 2), row and number, where the corner of the cutter is too great for a concave surface.
 
     A point of the surface that lies nearer to the disk of the corner circle's centres than r - ``tolerance`` [mm].

@@ -21,9 +21,10 @@ from pathlib import Path
 import numpy as np
 
 from chipload.errors import Finding, InputError
-from chipload.files import write_whole
+from chipload.files import read_regular, write_whole
 from chipload.planning.thinwall.experiments import Proposal
 from chipload.planning.thinwall.threshold import Experiments
+from chipload.tables import LARGEST_FILE
 
 #: columns of the table; the last three are filled in at the machine
 GIVEN = ("cut", "site", "repeat", "u", "v", "x_mm", "y_mm", "z_mm", "depth_mm", "expected_normal_force_n")
@@ -89,9 +90,9 @@ def read_cuts(path: str | Path, deflection: float) -> tuple[Experiments, tuple[F
         raise InputError(f"threshold.deflection_mm = {deflection:g}: must be above 0")
     label = f"experiments {Path(path).name}"
     try:
-        text = Path(path).read_text("utf-8-sig")
-    except (OSError, UnicodeDecodeError) as err:
-        raise InputError(f"{label}: cannot be read: {getattr(err, 'strerror', None) or 'not UTF-8 text'}") from None
+        text = read_regular(path, label, LARGEST_FILE, "keep the cuts alone").decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{label}: cannot be read: not UTF-8 text") from None
     rows, findings = _rows(text, label)
     place: list[tuple[float, float]] = []
     force: list[float] = []
@@ -104,7 +105,7 @@ def read_cuts(path: str | Path, deflection: float) -> tuple[Experiments, tuple[F
             series.setdefault(row.series, []).append(row)
     for key, cuts in series.items():
         place.append(key[:2])
-        force.append(_borne(cuts, label, findings))
+        force.append(_allowable_force(cuts, label, findings))
     if len(set(place)) < 3:
         raise InputError(
             f"{label}: {len(set(place))} places filled in: must be at least 3, not on a line: fill in deflection_um, "
@@ -113,7 +114,7 @@ def read_cuts(path: str | Path, deflection: float) -> tuple[Experiments, tuple[F
     return Experiments(np.array(place), np.array(force)), tuple(findings)
 
 
-def _borne(cuts: list[_Row], label: str, findings: list[Finding]) -> float:
+def _allowable_force(cuts: list[_Row], label: str, findings: list[Finding]) -> float:
     """Greatest force of a series that was borne below the least one that was too much."""
     failed = [c.force for c in cuts if c.too_much]
     least = min(failed, default=math.inf)

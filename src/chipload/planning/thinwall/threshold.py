@@ -29,8 +29,8 @@ from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import Delaunay, QhullError
 
 from chipload.errors import InputError
-from chipload.structure.removal import Removal
-from chipload.structure.watched import Watched, compliance
+from chipload.structure.removal import StructureRemoval
+from chipload.structure.unit_loads import UnitLoads, compliance
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -86,8 +86,8 @@ def modelled(C_nn: ArrayLike, deflection: float, factor: float = 1.0) -> Thresho
     return Threshold(factor * deflection / C, "modelled", factor, np.zeros(len(C), dtype=np.bool_), C, text)
 
 
-def of_state(state: Removal, watched: Watched, deflection: float, factor: float = 1.0) -> Threshold:
-    """Threshold of watched places in one state of the removal; see :func:`chipload.structure.watched.watch`.
+def of_state(state: StructureRemoval, watched: UnitLoads, deflection: float, factor: float = 1.0) -> Threshold:
+    """Threshold of watched places in one state of the removal; see :func:`chipload.structure.unit_loads.watch`.
 
     Raises
     ------

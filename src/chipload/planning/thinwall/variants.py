@@ -19,9 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.planning.thinwall.law import Law
-from chipload.planning.thinwall.passes import Bears, Order, Plan, constant, least_first_depth, variable
-from chipload.planning.thinwall.wall import Surface
+from chipload.planning.thinwall.blank import FinishSurface
+from chipload.planning.thinwall.force_table import ForceTable
+from chipload.planning.thinwall.passes import Order, Plan, ThresholdOf, constant, least_first_depth, variable
 
 Corrections = Sequence[NDArray[np.float64]] | None
 
@@ -29,7 +29,7 @@ NAMES = ("variable", "constant", "unconstrained")
 
 
 @dataclass(frozen=True, eq=False)
-class Variant:
+class PlannedVariant:
     """A plan and what it was planned under.
 
     Attributes
@@ -46,53 +46,59 @@ class Variant:
     passes_otherwise: int | None
 
 
-def unlimited(surfaces: Sequence[Surface], bears: Bears, law: Law) -> Variant:
+def unlimited(surfaces: Sequence[FinishSurface], threshold_of: ThresholdOf, law: ForceTable) -> PlannedVariant:
     """Passes of the greatest depth of the law, whatever the wall bears."""
     deepest = law.limits.greatest
-    return _better(surfaces, lambda order: constant(surfaces, bears, law, deepest, "unconstrained", order), math.inf)
+    return _better(
+        surfaces, lambda order: constant(surfaces, threshold_of, law, deepest, "unconstrained", order), math.inf
+    )
 
 
 def even(
-    surfaces: Sequence[Surface], bears: Bears, law: Law, deflection: float, corrections: Corrections = None
-) -> Variant:
+    surfaces: Sequence[FinishSurface],
+    threshold_of: ThresholdOf,
+    law: ForceTable,
+    deflection: float,
+    corrections: Corrections = None,
+) -> PlannedVariant:
     """Equal passes of the depth that every place bears in the last ones, at least the smallest of the law.
 
     Parameters
     ----------
     surfaces : one or two sides
-    bears : thresholds that allow ``deflection`` [mm]
+    threshold_of : thresholds that allow ``deflection`` [mm]
     law : of even stock
     corrections : of its forces, side by side
     """
-    least = max(least_first_depth(surfaces, bears, law, corrections), law.limits.smallest)
+    least = max(least_first_depth(surfaces, threshold_of, law, corrections), law.limits.smallest)
     return _better(
         surfaces,
-        lambda order: constant(surfaces, bears, law, least, order=order, corrections=corrections),
+        lambda order: constant(surfaces, threshold_of, law, least, order=order, corrections=corrections),
         deflection,
     )
 
 
-def held_to(
-    surfaces: Sequence[Surface],
-    bears: Bears,
-    law: Law,
+def limited_to(
+    surfaces: Sequence[FinishSurface],
+    threshold_of: ThresholdOf,
+    law: ForceTable,
     slope: float,
     deflection: float,
     corrections: Corrections = None,
-) -> Variant:
+) -> PlannedVariant:
     """Variable depths under thresholds that allow ``deflection`` [mm]; ``corrections`` of the law's forces."""
     return _better(
         surfaces,
-        lambda order: variable(surfaces, bears, law, slope, order=order, corrections=corrections),
+        lambda order: variable(surfaces, threshold_of, law, slope, order=order, corrections=corrections),
         deflection,
     )
 
 
-def _better(surfaces: Sequence[Surface], made: Callable[[Order], Plan], deflection: float) -> Variant:
+def _better(surfaces: Sequence[FinishSurface], made: Callable[[Order], Plan], deflection: float) -> PlannedVariant:
     one = made("alternately")
     if len(surfaces) == 1:
-        return Variant(one, deflection, "alternately", None)
+        return PlannedVariant(one, deflection, "alternately", None)
     other = made("one after the other")
     if (len(other.passes), other.force_max) < (len(one.passes), one.force_max) and other.holds >= one.holds:
-        return Variant(other, deflection, "one after the other", len(one.passes))
-    return Variant(one, deflection, "alternately", len(other.passes))
+        return PlannedVariant(other, deflection, "one after the other", len(one.passes))
+    return PlannedVariant(one, deflection, "alternately", len(other.passes))

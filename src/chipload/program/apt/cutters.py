@@ -10,7 +10,7 @@ import math
 from typing import Literal
 
 from chipload.errors import Finding
-from chipload.program.apt.records import Record, records
+from chipload.program.apt.records import AptRecord, records
 from chipload.units import MM_PER
 
 Shape = tuple[float, float, float, float, float, float, float]
@@ -41,7 +41,7 @@ def read_cutters(text: str, *, units: Literal["mm", "inch"] = "mm") -> tuple[dic
     {3: (10.0, 1.0, 4.0, 1.0, 0.0, 0.0, 0.0)}
     """
     mm, tool = MM_PER[units], 0
-    pending: tuple[Shape, Record] | None = None
+    pending: tuple[Shape, AptRecord] | None = None
     out: dict[int, Shape] = {}
     findings: list[Finding] = []
 
@@ -67,7 +67,7 @@ def read_cutters(text: str, *, units: Literal["mm", "inch"] = "mm") -> tuple[dic
     return out, tuple(findings)
 
 
-def shape(record: Record, mm: float) -> Shape:
+def shape(record: AptRecord, mm: float) -> Shape:
     """The seven numbers of a CUTTER record; ``mm`` in one unit of its lengths."""
     v = record.numbers(1, 2, 3, 4, 5, 6, 7)
     d, r = v[0] * mm, (v[1] * mm if len(v) > 1 else 0.0)
@@ -76,7 +76,7 @@ def shape(record: Record, mm: float) -> Shape:
     return (d, r, e, f, math.radians(alpha), math.radians(beta), h * mm)
 
 
-def length_unit(record: Record) -> str:
+def length_unit(record: AptRecord) -> str:
     """The unit that a UNITS record names."""
     said = UNITS.get(",".join(record.args))
     if said is None:
@@ -84,7 +84,7 @@ def length_unit(record: Record) -> str:
     return said
 
 
-def tool_number(record: Record) -> int:
+def tool_number(record: AptRecord) -> int:
     """The tool that LOAD/TOOL,n, LOADTL/n, TOOLNO/n or TURRET/n names."""
     value = record.number(1 if record.args[:1] == ("TOOL",) else 0)
     if not (0.0 <= value <= LARGEST_TOOL and value == int(value)):

@@ -5,10 +5,11 @@ rtrcto h [mm] are counted from there along it. A step is ``(kind, height, value)
 surface (a depth is negative), DWELL of a time [s], SPIN to the sense of the spindle, 1 as it was or -1 reversed.
 
 CYCLE/kind,word,number,... with FEDTO or DEPTH d (the sign does not count), RAPTO or CLEAR c, RTRCTO or RETURN h (AUTO
-or none: h = c), a feed MMPM, MMPR, IPM, IPR, PERMIN or PERREV, DWELL in seconds, pecks STEP, or 1STPECK and then
-SUBPECK. Each GOTO until CYCLE/OFF is a hole. The tool rises to h if it is lower, moves over the hole, goes in as told
-and ends at h. A peck of DEEP leaves the hole up to c and comes back to ``RETURN_MM`` above where it was; one of BRKCHP
-goes up by ``RETURN_MM``. Where RAPTO comes with CLEAR, it leads from CLEAR on towards the hole.
+or none: h = c), a feed MMPM, MMPR, IPM, IPR, PERMIN or PERREV, DWELL in seconds, pecks STEP or INCR, or 1STPECK and
+then SUBPECK; or CYCLE/kind,d[,INCR,step],unit,feed,c,... with the feed before or behind its unit. Each GOTO until
+CYCLE/OFF is a hole. The tool rises to h if it is lower, moves over the hole, goes in as told and ends at h. A peck of
+DEEP leaves the hole up to c and comes back to ``RETURN_MM`` above where it was; one of BRKCHP goes up by ``RETURN_MM``.
+Where RAPTO comes with CLEAR, it leads from CLEAR on towards the hole.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from chipload.program.apt.records import Record, number
+from chipload.program.apt.records import AptRecord, number
 from chipload.program.apt.track import MINUTE, TURN
 from chipload.program.program import DWELL, LINE, RAPID
 from chipload.units import MM_PER
@@ -28,8 +29,11 @@ MOST_PECKS = 10_000
 RETURN_MM = 0.254
 
 #: cycles that cut straight to the depth, and whether they come out at the feed
-PLAIN = {"DRILL": False, "FACE": False, "CSINK": False, "REAM": True, "BORE": True, "TAP": True}
-PECKS = ("DEEP", "DEEP2", "BRKCHP")
+PLAIN = {
+    **dict.fromkeys(("DRILL", "FACE", "CSINK", "CBORE", "CDRILL"), False),
+    **dict.fromkeys(("REAM", "BORE", "TAP"), True),
+}
+PECKS = ("DEEP", "DEEP2", "DEEPHL", "BRKCHP")
 _LENGTHS = {
     "FEDTO": "depth",
     "DEPTH": "depth",
@@ -38,6 +42,7 @@ _LENGTHS = {
     "RTRCTO": "rtrcto",
     "RETURN": "rtrcto",
     "STEP": "step",
+    "INCR": "step",
     "1STPECK": "first",
     "SUBPECK": "step",
 }
@@ -93,21 +98,28 @@ class Cycle:
         yield LINE, -self.depth, 0.0
 
 
-def read_cycle(record: Record, mm: float) -> Cycle:
-    """The cycle that a record defines; ``mm`` in one unit of the text.
+def read_cycle(record: AptRecord, mm: float) -> tuple[Cycle, tuple[str, ...]] | None:
+    """The cycle that a record defines and the words of it that are not read; None: the cycle is not known.
+
+    Parameters
+    ----------
+    mm : in one unit of the text
 
     Raises
     ------
     InputError
-        The cycle or a word of it is unknown, a number is missing or out of range.
+        A number is missing or out of range, a word stands twice.
     """
-    words = [word for arg in record.args for word in arg.split(" ")]
+    words = [word for arg in record.args for word in arg.split(" ") if word]
     kind = words[0] if words else ""
     if kind not in PLAIN and kind not in PECKS:
-        raise record.error(f"unknown cycle: must be {', '.join((*PLAIN, *PECKS))} or OFF")
+        return None
     if words[1:2] in (["G98"], ["G99"]):
-        return _in_places(record, words, mm)
+        return _in_places(record, words, mm), ()
+    if len(words) > 1 and number(words[1]) is not None:
+        words = _named(words)
     values: dict[str, float] = {}
+    unread: list[str] = []
     feed: tuple[float, str] | None = None
     k = 1
     while k < len(words):
@@ -116,25 +128,51 @@ def read_cycle(record: Record, mm: float) -> Cycle:
             k += 2
             continue
         value = number(words[k + 1]) if k + 1 < len(words) else None
+        if word not in FEEDS and word != "DWELL" and word not in _LENGTHS:
+            unread.append(word if value is None else f"{word},{words[k + 1]}")
+            k += 1 if value is None else 2
+            continue
         if value is None:
             raise record.error(f"{word} must be followed by a number")
         if word in FEEDS:
             feed = _feed(word, value, mm)
         elif word == "DWELL":
             values["dwell"] = value
-        elif word in _LENGTHS and _LENGTHS[word] not in values:
+        elif _LENGTHS[word] not in values:
             values[_LENGTHS[word]] = value * mm
         else:
-            raise record.error(f"{word} is not known in a cycle or said twice: take it out")
+            raise record.error(f"{word} is said twice: take one out")
         k += 2
     clear = values.pop("clear", None)
     if clear is not None:
         values["rapto"] = clear - abs(values["rapto"]) if "rapto" in values else clear
         values.setdefault("rtrcto", clear)
-    return _checked(record, kind, values, feed)
+    return _checked(record, kind, values, feed), tuple(unread)
 
 
-def _in_places(record: Record, words: list[str], mm: float) -> Cycle:
+def _named(words: list[str]) -> list[str]:
+    """kind,d[,INCR,step],unit,feed,c,... with the words that name its numbers; a feed may stand before its unit.
+
+    >>> _named(["DEEP", "20", "INCR", "5", "MMPM", "100", "2", "RAPTO", "1"])
+    ['DEEP', 'DEPTH', '20', 'INCR', '5', 'MMPM', '100', 'CLEAR', '2', 'RAPTO', '1']
+    """
+    out, k, clear = [words[0], "DEPTH", words[1]], 2, False
+    while k < len(words):
+        more = words[k + 1 : k + 2]
+        if number(words[k]) is None:
+            pair = bool(more) and number(more[0]) is not None
+            out += words[k : k + 2] if pair else words[k : k + 1]
+            k += 2 if pair else 1
+        elif more and more[0] in FEEDS:
+            out += [more[0], words[k]]
+            k += 2
+        else:
+            out += ["SHIFT" if clear else "CLEAR", words[k]]
+            clear, k = True, k + 1
+    return out
+
+
+def _in_places(record: AptRecord, words: list[str], mm: float) -> Cycle:
     """kind,G98,depth,PECKING,first,step,unit,feed,rapto,rtrcto,...,DWELL,time as one CAM system writes it."""
     numbers = [number(word) for word in words]
     layout = [word if value is None else "#" for word, value in zip(words, numbers, strict=True)]
@@ -157,7 +195,7 @@ def _feed(word: str, value: float, mm: float) -> tuple[float, str]:
     return value * (mm if scale is None else scale), counts
 
 
-def _checked(record: Record, kind: str, values: dict[str, float], feed: tuple[float, str] | None) -> Cycle:
+def _checked(record: AptRecord, kind: str, values: dict[str, float], feed: tuple[float, str] | None) -> Cycle:
     if "depth" not in values or "rapto" not in values:
         raise record.error("must say how deep, by FEDTO or DEPTH, and from where, by RAPTO or CLEAR")
     values["depth"] = abs(values["depth"])

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.program.apt.records import Record
+from chipload.program.apt.records import AptRecord
 
 Floats = NDArray[np.float64]
 
@@ -122,7 +122,7 @@ class Coordinates:
             )
         return _rotation(k, own)
 
-    def csys(self, record: Record, mm: float) -> Coordinates:
+    def csys(self, record: AptRecord, mm: float) -> Coordinates:
         """After a CSYS record of 12 numbers; ``mm`` in one unit of the text."""
         m = np.array(record.numbers(12)).reshape(3, 4)
         A = m[:, :3]
@@ -133,14 +133,14 @@ class Coordinates:
         exact = A if np.abs(A - near).max() < 1e-12 else near
         return replace(self, A=exact, t=m[:, 3] * mm, line=record.line)
 
-    def trntyp(self, record: Record) -> Coordinates:
+    def trntyp(self, record: AptRecord) -> Coordinates:
         """After a TRNTYP record."""
         given = {"WORLD": "work", "LOCAL": "csys"}.get(record.args[0] if record.args else "")
         if given is None or any(record.number(k) for k in range(1, len(record.args))):
             raise record.error("must be TRNTYP/WORLD or TRNTYP/LOCAL, its numbers 0")
         return replace(self, given=given)
 
-    def rotabl(self, record: Record) -> Coordinates:
+    def rotabl(self, record: AptRecord) -> Coordinates:
         """After a ROTABL record; angles are those that the table has then, not added up."""
         about = [_ABOUT[word] for word in record.args if word in _ABOUT]
         words = {"TABLE", "CLW", "CCLW", "ATANGL", *_ABOUT}
@@ -152,12 +152,12 @@ class Coordinates:
         turned[about[0]] = sign * angles[0]
         return replace(self, turned=(turned[0], turned[1], turned[2]), line=record.line)
 
-    def tool_axis(self, record: Record) -> Coordinates:
+    def tool_axis(self, record: AptRecord) -> Coordinates:
         """After a TLAXIS record."""
         return replace(self, tlaxis=unit(record, record.numbers(3))[0])
 
 
-def unit(record: Record, a: tuple[float, ...]) -> tuple[tuple[float, float, float], float]:
+def unit(record: AptRecord, a: tuple[float, ...]) -> tuple[tuple[float, float, float], float]:
     """A direction as a unit vector, and the length that it had."""
     length = math.hypot(*a)
     if length < 1e-6:

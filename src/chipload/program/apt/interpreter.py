@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding
+from chipload.program.apt.arcs import SWEEP, Circle, read_circle, read_tlon, sweep_of
 from chipload.program.apt.cutters import Shape, length_unit, shape, tool_number
 from chipload.program.apt.cycles import FEEDS, Cycle, read_cycle
 from chipload.program.apt.frames import Coordinates, unit
-from chipload.program.apt.records import NOTE, Record
-from chipload.program.apt.track import DEGREES, MINUTE, Point, Track
+from chipload.program.apt.records import NOTE, AptRecord
+from chipload.program.apt.track import DEGREES, MINUTE, AptRows, Point
 from chipload.program.program import DWELL, LINE, RAPID, Program
 from chipload.units import MM_PER, rad_s_from_rpm
 
@@ -29,23 +30,24 @@ UNIT_AXIS = 1e-3
 #: how far the radius that a CIRCLE gives may be from its arc [mm] without a finding
 RADIUS_MM = 1e-2
 
-#: records that move the tool or the coordinates in a way that is not read
-REFUSED = re.compile(
-    "TRACUT|COPY|INDEX|TRANS|ORIGIN|CALL|MACRO|TERMAC|LOOPST|LOOPND|JUMPTO|IF|MOVARC|ARC|GOHOME|RETRCT|THREAD|POCKET|"
-    "INDIRV|INDIRP|TLLFT|TLRGT|TLON|GOLFT|GORGT|GOFWD|GOBACK|GOUP|GODOWN|GO|PSIS|CLEARP|PROBE|MIRROR|TMARK"
+#: records that change the coordinates or the order of the records in a way that is not read
+REFUSED = re.compile("TRACUT|COPY|INDEX|TRANS|CALL|MACRO|TERMAC|LOOPST|LOOPND|JUMPTO|IF|MIRROR|TMARK")
+#: records that move the tool in a way that is not read: they are left out, and the program is unproven
+LEFT_OUT = re.compile(
+    "ARC|GOHOME|RETRCT|THREAD|POCKET|INDIRP|TLLFT|TLRGT|TLON|GOLFT|GORGT|GOFWD|GOBACK|GOUP|GODOWN|GO|PSIS|PROBE"
 )
 #: records that a Program does not hold
 UNUSED = re.compile(
     "COOLNT|STOP|OPSTOP|SELECT|SELCTL|OPSKIP|SEQNO|MACHIN|CUTCOM|INTOL|OUTTOL|TOLER|PREFUN|AUXFUN|CLAMP|MODE|DISPLY|"
-    "TPRINT|REMARK|LETTER|OPFEATEND|REWIND"
+    "TPRINT|REMARK|LETTER|OPFEATEND|REWIND|CLEARP|AUTOPS"
 )
 _SILENT = frozenset({"PARTNO"})
 
 
-class Interpreter:
+class AptInterpreter:
     """Modal state between records; ``ended`` is the record that ends the text, once it is read."""
 
-    def __init__(self, track: Track, mm: float, coordinates: Coordinates) -> None:
+    def __init__(self, track: AptRows, mm: float, coordinates: Coordinates) -> None:
         self.track, self.mm, self.ended = track, mm, ""
         self._units_said = False
         self._in = coordinates
@@ -53,20 +55,26 @@ class Interpreter:
         self._axis: Point | None = None  # of the text, None: that of the coordinates
         self._programmed: Point | None = None  # the last point of the text, in the work frame
         self._rapid = False
-        self._circle: tuple[Point, Point, float | None, Record] | None = None
+        self._circle: Circle | None = None
+        self._direction: Point | None = None  # of INDIRV
         self._cycle: Cycle | None = None
+        self._unread: AptRecord | None = None  # the CYCLE that is not read
         self._drilling = False
         self._shape: Shape | None = None  # of the last CUTTER
-        self._changed: Record | None = None  # the CUTTER that changed it since the last point
+        self._changed: AptRecord | None = None  # the CUTTER that changed it since the last point
         self._loaded = False  # whether a tool was loaded since then
         self._sense = -1.0 if track.spindle < 0.0 else 1.0
         self._speed = abs(track.spindle)
         self._counts: tuple[str, float | None] = (MINUTE, None)
-        self._do: dict[str, Callable[[Record], None]] = {
+        self._do: dict[str, Callable[[AptRecord], None]] = {
             "GOTO": self._goto,
             "FROM": self._from,
             "GODLTA": self._godlta,
             "CIRCLE": self._circle_record,
+            "MOVARC": self._circle_record,
+            "INDIRV": self._indirv,
+            "ORIGIN": self._origin,
+            "TLON,GOFWD": self._tlon,
             "RAPID": self._rapid_record,
             "CYCLE": self._cycle_record,
             "DELAY": self._delay,
@@ -90,7 +98,7 @@ class Interpreter:
             "OPFEATSTART": self._label,
         }
 
-    def read(self, record: Record) -> None:
+    def read(self, record: AptRecord) -> None:
         """One record."""
         word, track = record.word, self.track
         if word in self._do:
@@ -98,7 +106,11 @@ class Interpreter:
         elif word in ("FINI", "END"):
             self.ended = word
         elif REFUSED.fullmatch(word) or (word == "MSYS" and track.at is not None):
-            raise record.error("moves the tool or the coordinates in a way that is not read: write plain GOTO instead")
+            raise record.error(
+                "changes the coordinates or the order in a way that is not read: write plain GOTO instead"
+            )
+        elif LEFT_OUT.fullmatch(word.partition(",")[0]):
+            track.gap("apt-left-out", record.line, f"{record}: moves the tool in a way that is not read: left out")
         elif word == "CUTCOM" and record.args != ("OFF",):
             track.note_once("apt-cutcom", record.line, f"{record}: points are taken as of the tool's own tip")
         elif UNUSED.fullmatch(word):
@@ -109,16 +121,18 @@ class Interpreter:
     def done(self) -> tuple[Program, tuple[Finding, ...]]:
         """The program."""
         if self._circle is not None:
-            self.track.note("apt-circle", self._circle[3].line, "CIRCLE without a GOTO after it is left out")
+            self.track.note("apt-circle", self._circle.record.line, "CIRCLE without a GOTO after it is left out")
         if not self.ended:
-            self.track.note("apt-end", 0, "the text does not end with FINI: it may have been cut off")
+            self.track.gap("apt-end", 0, "the text does not end with FINI: it may have been cut off")
         return self.track.program()
 
     # ------------------------------------------------------------------------------------------------ motions
 
-    def _goto(self, record: Record) -> None:
+    def _goto(self, record: AptRecord) -> None:
         p, b = self._point(record)
-        if self._drilling:
+        if self._unread is not None:
+            self.track.gap("apt-cycle", record.line, f"{self._unread} is not read: its hole at {record} is left out")
+        elif self._drilling:
             self._hole(p, b, record)
         elif self._circle is not None:
             self._arc(p, b, record)
@@ -128,14 +142,14 @@ class Interpreter:
             self.track.straight(p, b, record.line)
         self._rapid, self._programmed = False, p
 
-    def _from(self, record: Record) -> None:
+    def _from(self, record: AptRecord) -> None:
         p, b = self._point(record)
         if self.track.at is not None and (self.track.at, self.track.axis) != (p, b):
             self.track.note("apt-from", record.line, f"{record}: a rapid leads there")
         self.track.rapid(p, b, record.line)
         self._programmed = p
 
-    def _godlta(self, record: Record) -> None:
+    def _godlta(self, record: AptRecord) -> None:
         d = record.numbers(1, 3)
         if self._programmed is None or self._drilling or self._circle is not None:
             raise record.error("must come after a point, and not in a cycle or after CIRCLE")
@@ -146,7 +160,7 @@ class Interpreter:
         (self.track.rapid if self._rapid else self.track.straight)(p, b, record.line)
         self._rapid, self._programmed = False, p
 
-    def _point(self, record: Record) -> tuple[Point, Point]:
+    def _point(self, record: AptRecord) -> tuple[Point, Point]:
         """The point and the axis of a GOTO in the work frame."""
         v = record.numbers(3, 6)
         if self._changed is not None and not self._loaded and self.track.at is not None:
@@ -176,48 +190,91 @@ class Interpreter:
             self._resolved = self._in.resolved()
         return self._resolved
 
-    def _rapid_record(self, record: Record) -> None:
+    def _rapid_record(self, record: AptRecord) -> None:
         self._rapid = True
 
-    def _circle_record(self, record: Record) -> None:
-        v = [record.number(k) for k in range(6)]
-        words = [word for word in record.args[6:] if word in ("CLOCKWISE", "COUNTERCLOCKWISE")]
-        n, _ = unit(record, tuple(v[3:6]))
-        if words == ["CLOCKWISE"]:
-            n = (-n[0] + 0.0, -n[1] + 0.0, -n[2] + 0.0)
-        r = record.number(6) * self.mm if len(record.args) > 6 and record.args[6] not in words else None
-        if len(record.args) - len(words) > 7:
-            self.track.note_once("apt-circle", record.line, f"{record}: only its first seven numbers are read")
+    def _circle_record(self, record: AptRecord) -> None:
         if self._circle is not None:
-            self.track.note("apt-circle", self._circle[3].line, "CIRCLE without a GOTO after it is left out")
-        self._circle = ((v[0], v[1], v[2]), n, r, record)
+            self.track.note("apt-circle", self._circle.record.line, "CIRCLE without a GOTO after it is left out")
+        circle = read_circle(record)
+        if isinstance(circle, str):
+            self.track.gap("apt-circle", record.line, f"{record}: {circle}: a straight line leads to the next point")
+            self._circle = None
+            return
+        if circle.unread:
+            self.track.note_once("apt-circle", record.line, f"{record}: {circle.unread} is not read")
+        self._circle = circle
 
-    def _arc(self, p: Point, b: Point, record: Record) -> None:
+    def _indirv(self, record: AptRecord) -> None:
+        self._direction = unit(record, record.numbers(3))[0]
+
+    def _tlon(self, record: AptRecord) -> None:
+        """An arc from where the tool stands, in the direction of INDIRV."""
+        at, direction, b = self._programmed, self._direction, self.track.axis
+        self._direction = None
+        if at is None or direction is None or self._drilling or self._circle is not None:
+            self.track.gap("apt-left-out", record.line, f"{record}: needs a point and INDIRV before it: left out")
+            return
+        R, t, _ = self._frame()
+        start = _tuple((R.T @ at + t) / self.mm)
+        found = read_tlon(record, start, direction)
+        if isinstance(found, str):
+            self.track.gap("apt-left-out", record.line, f"{record}: {found}: left out")
+            return
+        self._circle, end = found
+        p = _tuple(R @ (np.multiply(end, self.mm) - t))
+        self._arc(p, b, record)
+        self._rapid, self._programmed = False, p
+
+    def _origin(self, record: AptRecord) -> None:
+        if any(record.numbers()[:3]):
+            text = f"{record}: is not read: points are taken as they stand"
+            self.track.gap("apt-origin", record.line, text)
+        else:
+            self.track.note("apt-unused", record.line, str(record))
+
+    def _arc(self, p: Point, b: Point, record: AptRecord) -> None:
         assert self._circle is not None
-        c, n, r, circle = self._circle
-        self._circle = None
+        circle, self._circle = self._circle, None
         if self._rapid:
             self.track.note("apt-arc", record.line, "RAPID before an arc: it is cut at the feed in force")
         R, t, _ = self._frame()
-        centre, normal = _tuple(R @ (np.multiply(c, self.mm) - t)), _tuple(R @ n)
+        centre, normal = _tuple(R @ (np.multiply(circle.centre, self.mm) - t)), _tuple(R @ circle.normal)
+        start = self.track.at
         self.track.arc(p, b, centre, normal, record.line)
         off = np.subtract(p, centre)
         own = float(np.linalg.norm(off - (off @ normal) * np.array(normal)))
-        if r is not None and abs(own - r) > RADIUS_MM:
-            self.track.note("apt-arc", circle.line, f"{circle}: the GOTO after it gives the radius {own:.6g} mm")
+        if circle.radius is not None and abs(own - circle.radius * self.mm) > RADIUS_MM:
+            text = f"{circle.record}: the GOTO after it gives the radius {own:.6g} mm"
+            self.track.note("apt-arc", circle.record.line, text)
+        if circle.sweep is not None and start is not None:
+            sweep = sweep_of(start, p, centre, normal)
+            if abs(sweep - circle.sweep) > SWEEP:
+                text = (
+                    f"{circle.record}: the GOTO after it gives a sweep of {math.degrees(sweep):.4g} deg, which is cut"
+                )
+                self.track.gap("apt-arc", circle.record.line, text)
 
     # ------------------------------------------------------------------------------------------------ holes
 
-    def _cycle_record(self, record: Record) -> None:
+    def _cycle_record(self, record: AptRecord) -> None:
         word = record.args[0] if record.args else ""
+        if word not in ("ON", "INIT", "CLEAR"):
+            self._unread = None
         if word in ("OFF", "NOMORE"):
             self._drilling = False
         elif word == "ON":
             self._drilling = self._cycle is not None
         elif word not in ("INIT", "CLEAR"):
-            self._cycle, self._drilling = read_cycle(record, self.mm), True
+            found = read_cycle(record, self.mm)
+            if found is None:
+                self._cycle, self._drilling, self._unread = None, False, record
+                return
+            self._cycle, self._drilling = found[0], True
+            if found[1]:
+                self.track.gap("apt-cycle", record.line, f"{record}: {', '.join(found[1])} is not read in a cycle")
 
-    def _hole(self, p: Point, b: Point, record: Record) -> None:
+    def _hole(self, p: Point, b: Point, record: AptRecord) -> None:
         """A hole at p against the axis b."""
         cycle, track, line = self._cycle, self.track, record.line
         assert cycle is not None
@@ -249,7 +306,7 @@ class Interpreter:
                 track.spindle = value * turning
         track.stated = stated
 
-    def _delay(self, record: Record) -> None:
+    def _delay(self, record: AptRecord) -> None:
         turns = record.args[1:] == ("REV",)
         value = record.number(0)
         if value < 0.0 or (len(record.args) > 1 and not turns):
@@ -260,7 +317,7 @@ class Interpreter:
 
     # ------------------------------------------------------------------------------------------------ what holds
 
-    def _fedrat(self, record: Record) -> None:
+    def _fedrat(self, record: AptRecord) -> None:
         values = [k for k, word in enumerate(record.args) if word not in FEEDS and word != "DPM"]
         words = [word for word in record.args if word in FEEDS or word == "DPM"]
         if len(values) != 1 or len(words) > 1:
@@ -270,7 +327,7 @@ class Interpreter:
         counts, scale = self._counts
         self.track.stated = (record.number(values[0]) * (self.mm if scale is None else scale), counts)
 
-    def _spindl(self, record: Record) -> None:
+    def _spindl(self, record: AptRecord) -> None:
         words = [word for word in record.args if word in ("RPM", "CLW", "CCLW", "ON", "OFF")]
         values = [k for k, word in enumerate(record.args) if word not in words]
         if len(values) > 1 or not record.args:
@@ -283,18 +340,18 @@ class Interpreter:
                 raise record.error("must be at least 0: CCLW turns it the other way")
         self.track.spindle = 0.0 if "OFF" in words else self._sense * self._speed + 0.0
 
-    def _units(self, record: Record) -> None:
+    def _units(self, record: AptRecord) -> None:
         self.mm, self._units_said = MM_PER[length_unit(record)], True
 
-    def _load(self, record: Record) -> None:
+    def _load(self, record: AptRecord) -> None:
         self.track.tool, self._loaded = tool_number(record), True
 
-    def _multax(self, record: Record) -> None:
+    def _multax(self, record: AptRecord) -> None:
         if record.args not in ((), ("ON",), ("OFF",)):
             raise record.error("must be ON or OFF")
         self._axis = None if record.args == ("OFF",) else self._axis
 
-    def _coordinates(self, record: Record) -> None:
+    def _coordinates(self, record: AptRecord) -> None:
         self._resolved = self._axis = None
         if record.word == "CSYS":
             self._in = self._in.csys(record, self.mm)
@@ -305,12 +362,12 @@ class Interpreter:
         else:
             self._in = self._in.tool_axis(record)
 
-    def _cutter(self, record: Record) -> None:
+    def _cutter(self, record: AptRecord) -> None:
         said = shape(record, self.mm)
         if said != self._shape:
             self._shape, self._changed = said, record
 
-    def _label(self, record: Record) -> None:
+    def _label(self, record: AptRecord) -> None:
         text = record.args[0]
         if record.word == "INSERT":
             self.track.note("apt-unused", record.line, str(record))

@@ -12,7 +12,7 @@ from typing import Literal
 from chipload.errors import Finding, InputError
 from chipload.program.apt.interpreter import UNIT_AXIS
 from chipload.program.apt.records import LONGEST_TEXT, number
-from chipload.program.apt.track import Point, Track
+from chipload.program.apt.track import AptRows, Point
 from chipload.program.program import Program
 from chipload.units import MM_PER
 
@@ -52,7 +52,7 @@ def read_cl_points(
         raise InputError(f"units = {units!r}: must be mm or inch")
     if len(text) > LONGEST_TEXT:
         raise InputError(f"{name}: {len(text)} characters: must be at most {LONGEST_TEXT}: split it")
-    track, columns, mm = Track(name, feed, spindle, tool, name), 0, MM_PER[units]
+    track, columns, mm = AptRows(name, feed, spindle, tool, name), 0, MM_PER[units]
     for line, said in enumerate(text.splitlines(), start=1):
         words = said.replace(",", " ").split()
         if not words or words[0][0] in "#%":
@@ -72,7 +72,7 @@ def read_cl_points(
     return track.program()
 
 
-def _axis(v: list[float], line: int, track: Track) -> Point:
+def _axis(v: list[float], line: int, track: AptRows) -> Point:
     if not v:
         return (0.0, 0.0, 1.0)
     length = math.hypot(*v)

@@ -21,10 +21,11 @@ from pathlib import Path
 from typing import Literal
 
 from chipload.errors import Finding, InputError
+from chipload.files import read_regular
 from chipload.program.apt.frames import Coordinates
-from chipload.program.apt.interpreter import Interpreter
+from chipload.program.apt.interpreter import AptInterpreter
 from chipload.program.apt.records import LONGEST_TEXT, records
-from chipload.program.apt.track import Track
+from chipload.program.apt.track import AptRows
 from chipload.program.program import Program
 from chipload.units import MM_PER
 
@@ -67,7 +68,7 @@ def read_apt(
         raise InputError(f"csys = {csys!r}: must be work or csys")
     if feed is not None and not 0.0 < feed < math.inf:
         raise InputError(f"feed = {feed:g} mm/s: must be above 0")
-    reader = Interpreter(Track(name, feed, spindle, tool, name), MM_PER[units], Coordinates(given=csys))
+    reader = AptInterpreter(AptRows(name, feed, spindle, tool, name), MM_PER[units], Coordinates(given=csys))
     for record in records(text):
         if reader.ended:
             reader.track.note(
@@ -80,10 +81,15 @@ def read_apt(
 
 def read_apt_file(path: Path, **options: object) -> tuple[Program, tuple[Finding, ...]]:
     """As :func:`read_apt`, of a file; its name is that of the program."""
-    try:
-        if path.stat().st_size > LONGEST_TEXT:
-            raise InputError(f"{path.name}: larger than {LONGEST_TEXT} bytes: split it")
-        text = path.read_bytes().decode("utf-8", "replace")
-    except OSError as err:
-        raise InputError(f"{path.name}: {err.strerror}: must be a readable file") from None
-    return read_apt(text, **{"name": path.stem, **options})  # type: ignore[arg-type]
+    return read_apt(apt_text(path), **{"name": path.stem, **options})  # type: ignore[arg-type]
+
+
+def apt_text(path: Path) -> str:
+    """The text of a file of CL data.
+
+    Raises
+    ------
+    InputError
+        It cannot be read or is too large.
+    """
+    return read_regular(path, path.name, LONGEST_TEXT).decode("utf-8", "replace")

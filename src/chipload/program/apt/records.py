@@ -32,7 +32,7 @@ _SHOWN = 80
 
 
 @dataclass(frozen=True)
-class Record:
+class AptRecord:
     """One record: ``word`` in capitals, ``args`` in capitals without blanks (or the one text), ``line`` from 1."""
 
     word: str
@@ -75,7 +75,7 @@ def number(text: str) -> float | None:
     return value if math.isfinite(value) and abs(value) <= LARGEST_NUMBER else None
 
 
-def records(text: str) -> Iterator[Record]:
+def records(text: str) -> Iterator[AptRecord]:
     r"""The records of a text, in order.
 
     Raises
@@ -92,12 +92,12 @@ def records(text: str) -> Iterator[Record]:
     for line, whole in enumerate(text.splitlines(), start=1):
         if noted or (not begun and whole.lstrip().startswith(NOTE)):
             if not noted:
-                yield Record(NOTE, (whole.strip()[len(NOTE) :].strip(),), line)
+                yield AptRecord(NOTE, (whole.strip()[len(NOTE) :].strip(),), line)
             noted = whole.rstrip().endswith("$")
             continue
         as_text = None if begun else _TEXT.fullmatch(whole)
         if as_text is not None:
-            yield Record(as_text[1].upper(), (as_text[2].strip(),), line)
+            yield AptRecord(as_text[1].upper(), (as_text[2].strip(),), line)
             continue
         said, comment, _ = whole.partition("$$")
         said, more, _ = said.partition("$")
@@ -116,7 +116,7 @@ def records(text: str) -> Iterator[Record]:
         yield record
 
 
-def _record(text: str, line: int) -> Record | None:
+def _record(text: str, line: int) -> AptRecord | None:
     word, slash, rest = text.upper().partition("/")
     word = "".join(word.split())
     if not word and not slash:
@@ -124,4 +124,4 @@ def _record(text: str, line: int) -> Record | None:
     args = [" ".join(arg.split()) for arg in rest.split(",")]
     while args and not args[-1]:
         args.pop()
-    return Record(word, tuple(args), line)
+    return AptRecord(word, tuple(args), line)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from chipload.errors import Finding, InputError
+from chipload.errors import Finding, InputError, Severity
 from chipload.geometry.contour import JOIN_MM
 from chipload.program.program import ARC_CCW, ARC_CW, ARC_SKEW_MM, DWELL, LINE, RAPID, Program
 from chipload.units import mm_s_from_mm_min
@@ -32,7 +32,7 @@ _UP: Point = (0.0, 0.0, 1.0)
 
 
 @dataclass
-class Track:
+class AptRows:
     """Rows so far and what the next one is made with.
 
     Parameters
@@ -56,13 +56,19 @@ class Track:
     _labels: dict[str, int] = field(default_factory=dict)
     _once: set[str] = field(default_factory=set)
     _left: int = 0
+    _left_severity: Severity = Severity.NOTE
 
-    def note(self, code: str, line: int, text: str) -> None:
+    def note(self, code: str, line: int, text: str, severity: Severity = Severity.NOTE) -> None:
         """A finding, unless too many are listed."""
         if len(self.findings) < LISTED:
-            self.findings.append(Finding(code, line, text))
+            self.findings.append(Finding(code, line, text, severity))
         else:
             self._left += 1
+            self._left_severity = max(self._left_severity, severity)
+
+    def gap(self, code: str, line: int, text: str) -> None:
+        """A finding on something that is left out, so that the result is unproven."""
+        self.note(code, line, text, Severity.UNPROVEN)
 
     def note_once(self, code: str, line: int, text: str) -> None:
         """A finding, the first of its code alone."""
@@ -164,7 +170,9 @@ class Track:
         if not self._rows:
             raise InputError(f"{self.name}: no point: CL data must have at least one GOTO")
         if self._left:
-            self.findings.append(Finding("apt-more-findings", 0, f"{self._left} more findings are not listed"))
+            self.findings.append(
+                Finding("apt-more-findings", 0, f"{self._left} more findings are not listed", self._left_severity)
+            )
         motion, p, axis, centre, normal, feed, spindle, tool, line, label = zip(*self._rows, strict=True)
         whole = Program(
             motion=np.array(motion),

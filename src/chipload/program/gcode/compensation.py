@@ -27,7 +27,7 @@ from chipload.program.commands import ARC, DWELL, PLANE_AXES, RAPID, YZ
 SMOOTH = 0.05
 
 
-class Move(NamedTuple):
+class CentreMove(NamedTuple):
     """One motion of the tool's centre.
 
     ``motion`` RAPID, LINE, ARC or DWELL; ``end`` (9) [mm, rad]; ``centre`` (2) [mm] and ``turns`` of an arc as in
@@ -93,7 +93,7 @@ class Compensation:
         self._shift = complex(*shift)
         self._slack = slack
         self._programmed = self._centre = tuple(start)
-        self._held: list[Move] = []
+        self._held: list[CentreMove] = []
         self._front: _Offset | None = None
         self._from = 0j
 
@@ -107,11 +107,11 @@ class Compensation:
         """(9,) end of the last motion beside the contour, as long as no corner shortens it [mm, rad]."""
         return self._centre if self._front is None else self._with(self._centre, self._flat(self._centre) + self._shift)
 
-    def line(self, motion: int, end: Sequence[float], payload: object) -> list[Move]:
+    def line(self, motion: int, end: Sequence[float], payload: object) -> list[CentreMove]:
         """Motions that are final once a straight motion, RAPID or LINE, to ``end`` (9) is known."""
         a, b, r = self._flat(self._programmed), self._flat(end), self._radius
         if r == 0.0:
-            return self._pass(Move(motion, tuple(end), (0.0, 0.0), 0, payload))
+            return self._pass(CentreMove(motion, tuple(end), (0.0, 0.0), 0, payload))
         length = abs(b - a)
         if self._front is None:
             if length <= r:
@@ -121,17 +121,17 @@ class Compensation:
             return self._append(_Offset(motion, a + normal, u, b + normal, entry=True), end, payload)
         if a == b:
             self._programmed, self._centre = tuple(end), self._with(end, self._flat(self._centre))
-            self._held.append(Move(motion, self._centre, (0.0, 0.0), 0, payload))
+            self._held.append(CentreMove(motion, self._centre, (0.0, 0.0), 0, payload))
             return []
         u = (b - a) / length
         normal = self._side * 1j * r * u
         return self._corner(_Offset(motion, a + normal, u, b + normal), a, end, payload)
 
-    def arc(self, end: Sequence[float], centre: tuple[float, float], turns: int, payload: object) -> list[Move]:
+    def arc(self, end: Sequence[float], centre: tuple[float, float], turns: int, payload: object) -> list[CentreMove]:
         """Motions that are final once an arc to ``end`` (9) about ``centre`` (2), in the plane's axes, is known."""
         a, b, o, r = self._flat(self._programmed), self._flat(end), complex(*centre), self._radius
         if r == 0.0:
-            return self._pass(Move(ARC, tuple(end), centre, turns, payload))
+            return self._pass(CentreMove(ARC, tuple(end), centre, turns, payload))
         inside = self._side * turns > 0
         size = min(abs(a - o), abs(b - o))
         if size <= (r if inside else 0.0):
@@ -152,22 +152,22 @@ class Compensation:
         m = a + (-r if inside else r) * radial
         return self._corner(_Offset(ARC, m, math.copysign(1.0, turns) * 1j * radial, e, o, turns), a, end, payload)
 
-    def pause(self, payload: object) -> list[Move]:
+    def pause(self, payload: object) -> list[CentreMove]:
         """Motions that are final; a pause (DWELL) keeps its place among them."""
-        self._held.append(Move(DWELL, self._centre, (0.0, 0.0), 0, payload))
+        self._held.append(CentreMove(DWELL, self._centre, (0.0, 0.0), 0, payload))
         return self._release() if self._front is None else []
 
-    def finish(self) -> list[Move]:
+    def finish(self) -> list[CentreMove]:
         """The motions that were held back (G40)."""
         self._check()
         return self._release()
 
-    def _release(self) -> list[Move]:
+    def _release(self) -> list[CentreMove]:
         """What was held back, as commanded."""
         done, self._held = [self._out(move) for move in self._held], []
         return done
 
-    def _corner(self, new: _Offset, corner: complex, end: Sequence[float], payload: object) -> list[Move]:
+    def _corner(self, new: _Offset, corner: complex, end: Sequence[float], payload: object) -> list[CentreMove]:
         """Join ``new`` to the front; what is final."""
         front, c = self._front, self._flat(self._centre)
         assert front is not None
@@ -190,7 +190,7 @@ class Compensation:
         around = self._with(end, new.m, along=self._centre[self._along])
         rapid = new.motion == RAPID
         centre = (0.0, 0.0) if rapid else (corner.real, corner.imag)
-        move = Move(RAPID if rapid else ARC, around, centre, 0 if rapid else -self._side, payload)
+        move = CentreMove(RAPID if rapid else ARC, around, centre, 0 if rapid else -self._side, payload)
         done = [*self._release(), self._out(move)]
         self._centre = around
         return [*done, *self._append(new, end, payload)]
@@ -249,17 +249,17 @@ class Compensation:
         elif ((at - self._from) * front.u.conjugate()).real < 0.0:
             raise self._gouge("a line between two corners", "use a smaller tool or a longer line")
 
-    def _pass(self, move: Move) -> list[Move]:
+    def _pass(self, move: CentreMove) -> list[CentreMove]:
         """With a radius of 0 the contour is the path."""
         self._programmed = self._centre = move.end
         return [self._out(move)]
 
-    def _append(self, new: _Offset, end: Sequence[float], payload: object) -> list[Move]:
+    def _append(self, new: _Offset, end: Sequence[float], payload: object) -> list[CentreMove]:
         """Hold ``new``; what was held before is final."""
         done = self._release()
         self._front, self._from = new, self._flat(self._centre)
         self._programmed, self._centre = tuple(end), self._with(end, new.e)
-        self._held = [Move(new.motion, self._centre, (new.o.real, new.o.imag), new.turns, payload)]
+        self._held = [CentreMove(new.motion, self._centre, (new.o.real, new.o.imag), new.turns, payload)]
         return done
 
     def _flat(self, position: Sequence[float]) -> complex:
@@ -272,7 +272,7 @@ class Compensation:
             out[self._along] = along
         return tuple(out)
 
-    def _out(self, move: Move) -> Move:
+    def _out(self, move: CentreMove) -> CentreMove:
         """Shifted from the tool's centre to the point that is commanded."""
         end = self._with(move.end, self._flat(move.end) + self._shift)
         centre = complex(*move.centre) + (self._shift if move.turns else 0j)

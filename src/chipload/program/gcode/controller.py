@@ -6,18 +6,19 @@ Notation: positions are nine numbers X Y Z A B C U V W [mm, deg]; F is a speed p
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import cast
 
-from chipload.errors import InputError
+from chipload.errors import InputError, Severity
 from chipload.program.commands import ARC, DWELL, PLANE_AXES, RAPID, XY, YZ, ZX
 from chipload.program.gcode import arcs
-from chipload.program.gcode.compensation import Compensation, Move
+from chipload.program.gcode.compensation import CentreMove, Compensation
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.parameters import Parameters
-from chipload.program.gcode.state import AXES, LINEAR, ZERO, Datum, Nine, State, nine
+from chipload.program.gcode.state import AXES, LINEAR, NO_MOTION, ZERO, Datum, Nine, State, nine
 from chipload.program.gcode.tools import Tool, ToolTable
-from chipload.program.gcode.track import Context, Findings, Track
+from chipload.program.gcode.track import Context, Findings, MotionRows
+from chipload.program.path_mode import PathControl
 from chipload.units import MM_PER
 
 PLANES = {170: XY, 180: ZX, 190: YZ, 171: XY, 181: ZX, 191: YZ}
@@ -41,51 +42,88 @@ class Controller:
     units, machine_units : mm in a unit of the text at its start, and of the machine (of parameters and offsets)
     start : (9,) position of the axes at the start [mm, deg]
     most_rows : rows that the text may make
-    strict : a tool that is not in the table is refused
+    strict : what LinuxCNC refuses is refused; without it, it is a finding as far as the rest can be read
+    dialect : name of the dialect
+    origins : (9,) [mm, deg] and rotation [deg] of work offsets, by number
+    diameters : [mm] of the cutters by tool, for compensation where the table states none
+    feed : [mm/min] of cuts before the text states one; None: such a cut is refused
     """
 
     def __init__(
         self,
         *,
         tools: ToolTable | None = None,
-        parameters: Mapping[int, float] | None = None,
+        parameters: Mapping[int | str, float] | None = None,
         units: str = "mm",
         machine_units: str = "mm",
         start: Nine = ZERO,
         most_rows: int = 10_000_000,
         strict: bool = True,
+        dialect: str = "linuxcnc",
+        origins: Mapping[int, tuple[Nine, float]] | None = None,
+        diameters: Mapping[int, float] | None = None,
+        feed: float | None = None,
     ):
         self.state = State(scale=MM_PER[units])
+        self.dialect, self.feed = dialect, feed
+        self.origins, self.diameters = dict(origins or {}), dict(diameters or {})
         self.machine_scale = MM_PER[machine_units]
         self.tools: dict[int, Tool] | None = None if tools is None else dict(tools.tools)
         self.strict = strict
+        self.strict_tools = dialect == "linuxcnc"
         self.findings = Findings()
-        self.track = Track(most_rows)
+        self.track = MotionRows(most_rows)
         self.parameters = Parameters(parameters, self._noted)
         self.line = 0
         self.label = 0
         self.returned = (0.0, 0.0)
+        #: codes of a motion that is not read and lasts; empty: none
+        self.unread = ""
+        #: Fanuc: tapping starts the spindle (M29), and the cycle that lasts is fine boring (G76)
+        self.rigid = self.fine = False
+        #: Sinumerik: the drilling cycle behind each block (MCALL), its name and its arguments
+        self.modal_hole: tuple[str, list[float | None]] | None = None
+        #: Sinumerik: whether the spindle of the tapping block that is read turns against K; None: no such block
+        self.reversed: bool | None = None
         self.named_tools: dict[str, int] = {}
         self.level = 0
         self._contexts: dict[int, int] = {}
+        #: linear axes that have been sent somewhere; whether the block sends another, before any feed
+        self.placed: set[int] = set()
+        self.unplaced = False
         self._beside: Compensation | None = None
         self._framed: Datum | None = None
         self._frame = 0
-        self.known_offsets = {1} | {
+        #: work offsets that the parameters state or the text sets, and unset ones that the text selects
+        self.stated_offsets = {
             n for n in range(1, 10) if any(5201 + 20 * n + k in self.parameters.numbered for k in range(10))
-        }
+        } | set(self.origins)
+        self.unset_offsets: dict[int, tuple[int, str]] = {}
+        for number, (at, turn) in self.origins.items():
+            if number < 10:
+                self.store(5201 + 20 * number, at)
+                self.parameters.numbered[5210 + 20 * number] = turn
         self._start(start)
 
     def _noted(self, code: str, text: str) -> None:
-        self.findings.once(code, self.line, text)
+        self.findings.once(code, self.line, text, Severity.UNPROVEN)
 
     def note(self, code: str, text: str) -> None:
         """A finding on the line that is read."""
         self.findings.add(code, self.line, text)
 
-    def once(self, code: str, text: str) -> None:
+    def once(self, code: str, text: str, severity: Severity = Severity.NOTE) -> None:
         """A finding that is made a single time."""
-        self.findings.once(code, self.line, text)
+        self.findings.once(code, self.line, text, severity)
+
+    def gap(self, code: str, text: str) -> None:
+        """A finding on something that is left out or assumed, so that the result is unproven."""
+        self.findings.add(code, self.line, text, Severity.UNPROVEN)
+
+    def refused(self, code: str, text: str) -> None:
+        """A finding on what LinuxCNC refuses and other controllers take."""
+        severity = Severity.UNPROVEN if self.dialect == "linuxcnc" else Severity.NOTE
+        self.findings.add(code, self.line, text, severity)
 
     # -- offsets ---------------------------------------------------------------------------------------------------
 
@@ -101,6 +139,8 @@ class Controller:
 
     def work_offset(self, number: int) -> tuple[Nine, float]:
         """Origin and rotation of a work offset."""
+        if number > 9:
+            return self.origins[number]
         return self.stored(5201 + 20 * number), self.parameters.numbered.get(5210 + 20 * number, 0.0)
 
     def _start(self, start: Nine) -> None:
@@ -130,11 +170,44 @@ class Controller:
             return tool
         if number < 0:
             raise InputError(f"{what}{number}: must be 0 or more")
-        if self.tools is not None and self.strict:
+        if self.tools is not None and self.strict_tools:
             raise InputError(f"{what}{number}: tool {number} is not in the tool table: add it there")
         where = "is not in the tool table" if self.tools is not None else "is used and no tool table is given"
-        self.once("nc-tool-unknown", f"tool {number} {where}: its length and diameter count as 0")
+        counts = "length counts" if number in self.diameters else "length and diameter count"
+        self.once("nc-tool-unknown", f"tool {number} {where}: its {counts} as 0")
         return Tool(number)
+
+    def compensation_diameter(self, name: str, number: int, stated: float) -> float:
+        """Diameter [mm] that G41 and G42 compensate for: of the table, else of the job's cutter of that tool.
+
+        Parameters
+        ----------
+        name, number : code and D word
+        stated : diameter of the table's entry, 0 where it has none or there is no entry
+        """
+        if stated != 0.0 or number == 0:
+            return stated
+        known = number if number in self.diameters else self.state.tool
+        if known not in self.diameters:
+            self.gap(
+                "nc-diameter-unknown",
+                f"{name} D{number}: no diameter is known, the path is compensated by 0: state D of tool {number} in a "
+                f"tool table (program.tools), or a [[cutter]] with number = {number}",
+            )
+            return 0.0
+        diameter = self.diameters[known]
+        taken = f"the {diameter:g} mm of cutter {known} are taken"
+        if number in (self.tools or {}):
+            self.gap(
+                "nc-diameter-missing",
+                f"{name} D{number}: the tool table states no D for tool {number}, with it the controller compensates "
+                f"by 0: {taken}: write D{diameter:g} in the table",
+            )
+        elif known != number and self.dialect == "linuxcnc":
+            self.gap("nc-diameter-unknown", f"{name} D{number}: no diameter of tool {number} is known: {taken}")
+        else:
+            self.once("nc-diameter-of-cutter", f"{name} D{number}: {taken}")
+        return diameter
 
     # -- compensation ----------------------------------------------------------------------------------------------
 
@@ -167,7 +240,8 @@ class Controller:
             if number < 0:
                 raise InputError(f"{name}: D{number}: must be the number of a tool")
             tool = self.find_tool(number, "D")
-            radius, turned = 0.5 * tool.diameter, tool.orientation
+            radius = 0.5 * self.compensation_diameter(name, number, tool.diameter)
+            turned = tool.orientation
             if turned and state.plane != 180:
                 raise InputError(f"{name}: tool {number} has an orientation for turning: it goes with G18")
         if not 0 <= turned <= 9:
@@ -183,7 +257,7 @@ class Controller:
         )
         state.compensation = code
 
-    def _emit(self, moves: list[Move]) -> None:
+    def _emit(self, moves: list[CentreMove]) -> None:
         """Rows of motions beside the contour."""
         for move in moves:
             context, line = cast(tuple[int, int], move.payload)
@@ -194,6 +268,15 @@ class Controller:
                 self.track.rows.append(row)
 
     # -- rows ------------------------------------------------------------------------------------------------------
+
+    def place(self, axes: Iterable[int], motion: int) -> None:
+        """Note which linear axes a block sends somewhere; ``motion`` its code, in tenths."""
+        new = {k for k in axes if k < 3} - self.placed
+        unplaced = motion == 0 and bool(new)
+        self.placed = {0, 1, 2} if motion > 0 and motion != NO_MOTION else self.placed | new
+        if unplaced != self.unplaced:
+            self.unplaced = unplaced
+            self.changed()
 
     def changed(self) -> None:
         """Something that rows carry has changed."""
@@ -213,7 +296,8 @@ class Controller:
         if state.datum is not self._framed:
             self._framed, self._frame = state.datum, self.track.frame(state.datum)
         frame = self._frame
-        return feed, spindle, state.tool, state.tcp, frame, PLANES[state.plane], self.label
+        mode = (float(PathControl.UNPLACED), 0.0, 0.0) if self.unplaced and feed == 0.0 else state.path_mode
+        return feed, spindle, state.tool, state.tcp, frame, PLANES[state.plane], self.label, mode
 
     def _feed(self, kind: int) -> float:
         if kind == 0:

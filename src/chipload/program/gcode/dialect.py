@@ -11,11 +11,15 @@ from dataclasses import dataclass
 from chipload.errors import InputError
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.expression import integer_of
-from chipload.program.gcode.modal import GROUP_OF, M_GROUP_OF, USER_M, shown
+from chipload.program.gcode.modal import COVET, GROUP_OF, M_GROUP_OF, USER_M, axes_given, shown
 from chipload.program.gcode.words import Block, bare, read_block
 
 #: calls of a subroutine by one M98
 MOST_CALLS = 1_000_000_000
+#: codes of LinuxCNC that are not carried out: threading cycles of a lathe
+UNREAD = frozenset({760})
+#: stands for a motion that is not read and that the dialect made a finding of
+NOTED = 9999
 
 
 @dataclass(frozen=True)
@@ -50,15 +54,29 @@ class Dialect:
         return str(integer_of(words["p"], "P")), times
 
 
-def lenient(block: Block, c: Controller) -> Block:
-    """Unknown codes become findings; a block with an unknown G does not move."""
-    bad = [code for code in block.g if code not in GROUP_OF]
-    for code in bad:
-        c.note("nc-unknown-word", f"{shown(code)}: is not known: its block does not move")
+def lenient(block: Block, c: Controller, unread: frozenset[int] = UNREAD) -> Block:
+    """Codes that are not read become findings, and the result unproven; a block with such a G does not move.
+
+    Nor do the blocks after it that give axes and no code of motion: they go on with the motion that is not read.
+
+    Parameters
+    ----------
+    unread : known codes that are not carried out
+    """
+    bad = [code for code in block.g if code not in GROUP_OF or code in unread]
     if bad:
-        block.g = [code for code in block.g if code in GROUP_OF and GROUP_OF[code] not in ("motion", "once")]
+        names = ", ".join(shown(code) for code in bad if code != NOTED) or "a motion"
+        if bad != [NOTED]:
+            c.gap("nc-unknown-word", f"{names}: is not read: its block does not move")
+        c.unread = names if axes_given(block) else c.unread
+        block.g = [code for code in block.g if code not in bad and GROUP_OF[code] not in ("motion", "once")]
+        block.words = {x: value for x, value in block.words.items() if x in "fst"}
+    elif any(GROUP_OF[code] in ("motion", "none") for code in block.g):
+        c.unread = ""
+    elif c.unread and axes_given(block) and COVET.isdisjoint(block.g):
+        c.gap("nc-unknown-word", f"{c.unread}, which is not read, goes on here: the block does not move")
         block.words = {x: value for x, value in block.words.items() if x in "fst"}
     for m in [m for m in block.m if m not in M_GROUP_OF and m not in USER_M]:
-        c.note("nc-unknown-word", f"M{m}: is not known and does nothing here")
+        c.refused("nc-unknown-word", f"M{m}: is not known and does nothing here")
         block.m.remove(m)
     return block

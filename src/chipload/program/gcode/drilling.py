@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from chipload.errors import InputError
+from chipload.errors import InputError, Severity
 from chipload.program.commands import DWELL, LINE, PLANE_AXES, RAPID
 from chipload.program.gcode import cycles
 from chipload.program.gcode.controller import PLANES, Controller
@@ -59,7 +59,8 @@ class Drilling:
         if state.feed_mode == 930:
             raise InputError(f"{shown(code)}: a cycle has no inverse time: write G94 and F")
         if state.feed_mode == 950 and state.speed == 0.0 and state.feed != 0.0:
-            self.c.once("nc-feed-unknown", f"{shown(code)}: feed per revolution (G95) and no spindle speed")
+            said = f"{shown(code)}: feed per revolution (G95) and no spindle speed"
+            c.once("nc-feed-unknown", said, Severity.UNPROVEN)
         else:
             rate(self.c, block, shown(code))
         first, second, along = PLANE_AXES[PLANES[state.plane]]

@@ -33,6 +33,8 @@ _STEP.update(dict.fromkeys(("eq", "ne", "gt", "ge", "lt", "le"), 2))
 
 def integer_of(value: float, what: str) -> int:
     """A value that has to be whole, within 0.0001."""
+    if not math.isfinite(value):
+        raise InputError(f"{what}: must be a whole number, it is {value:g}")
     whole = round(value)
     if abs(value - whole) > 1e-4:
         raise InputError(f"{what} {value:g}: must be a whole number")

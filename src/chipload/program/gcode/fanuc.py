@@ -1,7 +1,9 @@
 """Fanuc's dialect where it differs from LinuxCNC's in what matters.
 
 Notation: codes of G are in tenths. P of a dwell is in ms, X and U of G4 in s; K of a cycle repeats it; a series of
-cycles returns to the level where it began (G98) until told otherwise; M98 P51234 calls O1234 five times.
+cycles returns to the level where it began (G98) until told otherwise; M98 P51234 calls O1234 five times. After M29,
+and in G84.2 and G84.3, tapping starts the spindle itself. Fine boring (G76) is carried out without its shift in the
+bottom of the hole.
 
 Refused: macros (G65, G66, IF, WHILE, GOTO), turned and scaled coordinates (G16, G51, G68), tilted planes (G68.2), tool
 vectors (G43.5), G10 L20. Noted and left out: smoothing and look-ahead (G5.1, G8), tool offsets by G10 L10 to L13.
@@ -10,19 +12,20 @@ vectors (G43.5), G10 L20. Noted and left out: smoothing and look-ahead (G5.1, G8
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from chipload.errors import InputError
+from chipload.errors import InputError, Severity
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.cycles import CYCLES
-from chipload.program.gcode.dialect import Dialect, lenient
-from chipload.program.gcode.modal import shown
-from chipload.program.gcode.state import ZERO
+from chipload.program.gcode.dialect import UNREAD, Dialect, lenient
+from chipload.program.gcode.modal import GROUP_OF, shown
+from chipload.program.gcode.offsets import choose
 from chipload.program.gcode.words import Block, bare, read_block
 
 _MACRO = re.compile(r"(?:/[1-9]?)?(?:n[0-9]+)?(if\[|while\[|goto|end[1-9]|do[1-9]|popen|pclos|dprnt|bprnt|setvn)")
 _SKIP = re.compile(r"^/[1-9]")
-_NO_POINT = re.compile(r"[XYZIJKR][ \t]*[-+]?[0-9]+(?![0-9.])(?=[^\n(]*)", re.IGNORECASE)
+#: a whole number that is not 0: with 0 the point makes no difference
+_NO_POINT = re.compile(r"[XYZIJKR][ \t]*[-+]?0*[1-9][0-9]*(?![0-9.])(?=[^\n(]*)", re.IGNORECASE)
 _COMMENT = re.compile(r"\([^()\n]*\)")
 
 REFUSED = {
@@ -42,12 +45,12 @@ REFUSED = {
     121: "polar interpolation",
     1120: "polar interpolation",
     310: "a skip by a signal",
-    760: "fine boring",
-    870: "back boring",
-    330: "threading",
-    61: "involutes",
-    62: "splines",
 }
+#: motions that are left out: back boring, threading, involutes, splines
+LEFT_OUT = frozenset({870, 330, 61, 62})
+#: tapping: LinuxCNC's code and the M code that starts its spindle
+TAPPING = {840: (840, 3), 740: (740, 4), 842: (840, 3), 843: (740, 4)}
+FINE_BORING, BORING = 760, 860
 #: end of what is not on, or what does not concern the path
 IDLE = frozenset(
     {50, 51, 80, 81, 90, 110, 130, 131, 150, 220, 230, 250, 260, 270, 491, 495, 500, 501, 600, 620, 630, 641, 670}
@@ -67,7 +70,7 @@ class Fanuc(Dialect):
         found = _NO_POINT.search(plain)
         if found is not None:
             said = f"{found[0]!r} has no decimal point: taken as a whole unit, not as the least increment"
-            c.findings.add("nc-no-point", 1 + plain.count("\n", 0, found.start()), said)
+            c.findings.add("nc-no-point", 1 + plain.count("\n", 0, found.start()), said, Severity.UNPROVEN)
 
     def read(self, raw: str, c: Controller) -> Block | None:
         """The block of a line, in LinuxCNC's words."""
@@ -81,10 +84,11 @@ class Fanuc(Dialect):
             if code in REFUSED:
                 raise InputError(f"{shown(code)}: {REFUSED[code]}: not read; write the moves out")
         self._adapt(block, c)
-        return lenient(block, c)
+        return lenient(block, c, UNREAD | LEFT_OUT)
 
     def _adapt(self, block: Block, c: Controller) -> None:
         words, g = block.words, block.g
+        self._holes(block, c)
         idle = [code for code in g if code in IDLE]
         if 50 in idle and not (words.get("p", 0.0) >= 1000.0 or "x" not in words):
             raise InputError("G5: splines are not read: write the moves out")
@@ -117,14 +121,41 @@ class Fanuc(Dialect):
             if "p" in words and 40 not in g and 98 not in block.m:
                 words["p"] /= 1000.0
 
+    def _holes(self, block: Block, c: Controller) -> None:
+        """Tapping and fine boring in LinuxCNC's words."""
+        words, g = block.words, block.g
+        if 29 in block.m:
+            block.m.remove(29)
+            c.rigid = True
+        for code in [code for code in g if code in TAPPING]:
+            own, starts = TAPPING[code]
+            g[g.index(code)] = own
+            if c.state.sense == 0 and (c.rigid or code != own) and not {3, 4} & set(block.m):
+                block.m.append(starts)
+        if FINE_BORING in g or (c.fine and c.state.motion == BORING and not self._moves(g)):
+            c.fine = True
+            if FINE_BORING in g:
+                g[g.index(FINE_BORING)] = BORING
+                words.setdefault("p", 0.0)
+                c.once("nc-fine-boring", "G76: the shift in the bottom of the hole is left out")
+            for letter in "qij":
+                words.pop(letter, None)
+        elif self._moves(g):
+            c.fine = False
+            c.rigid = c.rigid and 800 not in g
+
+    @staticmethod
+    def _moves(g: list[int]) -> bool:
+        """Whether a code of motion or G80 stands among the codes."""
+        return any(GROUP_OF.get(code) in ("motion", "none") for code in g)
+
     def _extended(self, block: Block, c: Controller) -> None:
         """G54.1 P: a work offset whose origin is not known here."""
         number = block.words.pop("p", 0.0)
         if number != int(number) or not 1 <= number <= 300:
             raise InputError(f"G54.1 P{number:g}: P must be from 1 to 300")
         block.g = [code for code in block.g if code not in (EXTENDED, 540)]
-        c.once("nc-offset-unset", f"G54.1 P{number:g}: its origin is not known here and counts as the machine's")
-        c.rebase(replace(c.state.datum, number=9 + int(number), offset=ZERO, rotation=0.0))
+        choose(c, f"G54.1 P{number:g}", 9 + int(number))
 
     def call(self, words: dict[str, float]) -> tuple[str, int]:
         """M98 P1234 L5 or M98 P51234."""

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from chipload.errors import InputError
+from chipload.files import is_file, read_regular
 from chipload.program.gcode.dialect import Dialect
 from chipload.program.gcode.expression import integer_of, read_value
-from chipload.program.gcode.interpreter import Interpreter
+from chipload.program.gcode.interpreter import BlockInterpreter
 from chipload.program.gcode.parameters import LOCAL
 from chipload.program.gcode.plain import run_plain
 from chipload.program.gcode.source import KEYWORDS, OWord, Source, read_source
@@ -57,7 +58,7 @@ class Flow:
 
     def __init__(
         self,
-        interpreter: Interpreter,
+        interpreter: BlockInterpreter,
         source: Source,
         dialect: Dialect,
         folder: Path | None,
@@ -128,16 +129,22 @@ class Flow:
             self.line += 1
             return True
         if stripped == "%":
-            if self._opened or not self.dialect.strict:
-                self.i.finish()
-                return False
-            raise InputError("%: ends a text that begins with %, and this one does not: remove it")
+            if not self._opened:
+                said = "%: ends a text that begins with %, and this one does not"
+                if self.dialect.strict:
+                    raise InputError(f"{said}: remove it")
+                self.c.refused("nc-percent", f"{said}: the text ends here: remove it")
+            self.i.finish()
+            return False
         self._check_length(raw)
         return self._block(raw)
 
     def _check_length(self, raw: str) -> None:
-        if self.dialect.strict and len(raw.rstrip("\r")) > LONGEST_LINE:
-            raise InputError(f"{len(raw)} characters: a line has at most {LONGEST_LINE}")
+        if self.c.dialect == "linuxcnc" and len(raw.rstrip("\r")) > LONGEST_LINE:
+            said = f"{len(raw)} characters: a line has at most {LONGEST_LINE}"
+            if self.dialect.strict:
+                raise InputError(said)
+            self.c.gap("nc-long-line", said)
 
     def _block(self, raw: str) -> bool:
         block = self.dialect.read(raw, self.c)
@@ -147,6 +154,8 @@ class Flow:
         for key, value in block.sets:
             self.c.parameters.assign(key, value)
         ends = self.i.execute(block)
+        for more in block.after:
+            self.i.execute(more)
         self.line += 1
         if ends:
             return False
@@ -163,7 +172,7 @@ class Flow:
             raise InputError(f"the text ends within o{self._calls[-1].label}: endsub or M99 is missing")
         if self.dialect.strict:
             raise InputError("the text ends without M2, M30 or %: write M2 as its last block")
-        self.c.note("nc-no-end", "the text ends without M2 or M30")
+        self.c.gap("nc-no-end", "the text ends without M2 or M30: it may have been cut off")
         self.i.finish()
         return False
 
@@ -320,10 +329,9 @@ class Flow:
                 raise InputError(f"more than {MOST_FILES} files are called")
             root = self.folder.resolve()
             path = (root / f"{label}.ngc").resolve()
-            found = path.parent == root and path.is_file()
-            if found and path.stat().st_size > LARGEST_FILE:
-                raise InputError(f"{path.name}: is larger than {LARGEST_FILE} bytes")
-            text = path.read_bytes().decode("utf-8", "replace").replace("\r\n", "\n") if found else ""
+            found = path.parent == root and is_file(path)
+            data = read_regular(path, path.name, LARGEST_FILE) if found else b""
+            text = data.decode("utf-8", "replace").replace("\r\n", "\n")
             self._files[label] = read_source(text, path.name) if found else None
         return self._files[label]
 

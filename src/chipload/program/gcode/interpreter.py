@@ -20,9 +20,10 @@ from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.mirror import mirror
 from chipload.program.gcode.modal import USER_M, check_codes, motion_of, shown, unused
-from chipload.program.gcode.motion import Motion
+from chipload.program.gcode.motion import ControllerMotion
 from chipload.program.gcode.state import State
 from chipload.program.gcode.words import Block
+from chipload.program.path_mode import PathControl, PathMode
 
 _MESSAGE = re.compile(r"\s*(msg|debug|print)\s*,(.*)", re.IGNORECASE | re.DOTALL)
 _OTHER = re.compile(
@@ -44,18 +45,31 @@ _IGNORED = {
     **dict.fromkeys((62, 63, 64, 65, 67, 68), ("nc-output", "an output")),
 }
 _SAVED = (
-    "scale", "plane", "feed_mode", "path", "absolute", "absolute_centre", "old_level", "diameter", "feed",
+    "scale", "plane", "feed_mode", "path", "path_mode", "absolute", "absolute_centre", "old_level", "diameter", "feed",
     "feed_turning", "speed", "sense", "surface", "flood", "mist",
 )  # fmt: skip
 
 
-class Interpreter:
+def path_mode(code: int, words: dict[str, float], scale: float) -> PathMode:
+    """What G61, G61.1 or G64 asks for at joints; without Q the naive tolerance is P.
+
+    >>> path_mode(640, {"p": 0.01}, 1.0), path_mode(611, {}, 1.0)
+    ((3.0, 0.01, 0.01), (1.0, 0.0, 0.0))
+    """
+    if code != 640:
+        return float(PathControl.EXACT_STOP if code == 611 else PathControl.EXACT_PATH), 0.0, 0.0
+    tolerance = max(words.get("p", 0.0), 0.0) * scale
+    naive = max(words["q"], 0.0) * scale if "q" in words else tolerance
+    return float(PathControl.CONTINUOUS), tolerance, naive
+
+
+class BlockInterpreter:
     """Carries out blocks on a controller."""
 
     def __init__(self, controller: Controller):
         self.c = controller
         mirror(controller)
-        self.motion = Motion(controller)
+        self.motion = ControllerMotion(controller)
         #: state saved by M70 or M73, one for each level of call; True: M73
         self.saved: dict[int, tuple[bool, State]] = {}
 
@@ -71,7 +85,7 @@ class Interpreter:
             said = f"{letter.upper()}{block.words[letter]:g}: no code of the block uses it"
             if c.strict:
                 raise InputError(f"{said}: remove it")
-            c.note("nc-unused-word", said)
+            c.refused("nc-unused-word", said)
             del block.words[letter]
         if codes.get("once") == 40 and motion in (20, 30) and "p" in block.words:
             raise InputError(f"G4 with {shown(motion)}: both use P: write two blocks")
@@ -85,6 +99,7 @@ class Interpreter:
         once = codes.get("once", -1)
         self._once(block, once, axes)
         if motion >= 0:
+            c.place(axes, motion)
             self.motion.move(block, motion, once == 530)
         return self._stop(block)
 
@@ -202,7 +217,7 @@ class Interpreter:
                 raise InputError("M66: P and E: one input at a time")
             if "e" in words and words.get("l", 0.0) != 0.0:
                 raise InputError("M66: an analogue input is read at once: L must be 0")
-            self.c.note("nc-input", "M66: an input of the machine is not known here: #5399 counts as 0")
+            self.c.gap("nc-input", "M66: an input of the machine is not known here: #5399 counts as 0")
             self.c.parameters.numbered[5399] = 0.0
 
     def _machine(self, block: Block) -> None:
@@ -288,6 +303,8 @@ class Interpreter:
         if "path" in codes:
             c.not_compensated("a change of path control")
             state.path = codes["path"]
+            state.path_mode = path_mode(state.path, words, state.scale)
+            c.changed()
             said = "".join(f" {x.upper()}{words[x]:g}" for x in "pqr" if x in words and state.path == 640)
             c.note("nc-path-mode", f"{shown(state.path)}{said}")
         if "distance" in codes:

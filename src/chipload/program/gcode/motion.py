@@ -17,8 +17,10 @@ from chipload.program.gcode.cycles import CYCLES
 from chipload.program.gcode.drilling import Drilling
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.modal import shown
+from chipload.program.gcode.offsets import note_machine_coordinates
 from chipload.program.gcode.splines import Splines
 from chipload.program.gcode.state import LINEAR, NO_MOTION, put
+from chipload.program.gcode.synchronised import synchronised
 from chipload.program.gcode.targets import axes, end, rate
 from chipload.program.gcode.words import Block
 
@@ -27,7 +29,7 @@ LEAST_PROBE = 0.254
 MOST_TURNS = 100_000
 
 
-class Motion:
+class ControllerMotion:
     """The motions of one controller, with what lasts between their blocks."""
 
     def __init__(self, controller: Controller):
@@ -60,9 +62,10 @@ class Motion:
             self.drilling.move(block, code)
         elif 382 <= code <= 385:
             self._probe(block, code)
+        elif code in (330, 331):
+            synchronised(self.c, block, code)
         elif code != NO_MOTION:
-            said = "turns the spindle and the axes together: this reader does not take it; write its moves out"
-            raise InputError(f"{shown(code)}: {said}")
+            raise InputError(f"{shown(code)}: threading cycles of a lathe are not read: write the moves out")
         state.motion = code
 
     # -- lines and arcs --------------------------------------------------------------------------------------------
@@ -74,6 +77,7 @@ class Motion:
             if not state.absolute:
                 raise InputError("G53: goes with G90 only")
             c.not_compensated("G53")
+            note_machine_coordinates(c, "G53")
             target = put(state.datum.to_machine(state.at), axes(self.c, block))
             to = state.datum.from_machine(target)
         else:

@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from chipload.errors import InputError
+from chipload.errors import InputError, Severity
 from chipload.program.commands import RAPID
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.expression import integer_of
@@ -28,19 +28,47 @@ def select(c: Controller, code: int) -> None:
     number = (code - 530) // 10 if code < 591 else 6 + code % 10
     datum = c.state.datum
     if number == datum.number:
-        if number not in c.known_offsets:
-            _unset(c, code, number)
+        _stated(c, shown(code), number)
         return
     c.not_compensated(shown(code))
-    if number not in c.known_offsets:
-        _unset(c, code, number)
-    offset, rotation = c.work_offset(number)
-    c.rebase(replace(datum, number=number, offset=offset, rotation=rotation))
+    choose(c, shown(code), number)
 
 
-def _unset(c: Controller, code: int, number: int) -> None:
-    said = "its origin is not known here and counts as the machine's"
-    c.once("nc-offset-unset", f"{shown(code)}: {said}: give parameters #{5201 + 20 * number} on")
+def choose(c: Controller, name: str, number: int) -> None:
+    """The coordinates of a work offset of any number; one whose origin is not stated counts as the machine's."""
+    _stated(c, name, number)
+    offset, rotation = c.work_offset(number) if 1 <= number < 10 or number in c.origins else (ZERO, 0.0)
+    c.rebase(replace(c.state.datum, number=number, offset=offset, rotation=rotation))
+
+
+def _stated(c: Controller, name: str, number: int) -> None:
+    if number > 1 and number not in c.stated_offsets:
+        c.unset_offsets.setdefault(number, (c.line, name))
+
+
+def note_unset_offsets(c: Controller) -> None:
+    """Findings on the work offsets without an origin: where several are used, nothing says how they lie."""
+    used = {frame.number for frame in c.track.used_frames() if frame.number > 0}
+    severity = Severity.UNPROVEN if len(used) > 1 else Severity.NOTE
+    for line, name in c.unset_offsets.values():
+        said = "its origin is not known here and counts as the machine's: state it in program.work_offsets"
+        c.findings.once("nc-offset-unset", line, f"{name}: {said}", severity)
+
+
+def note_machine_coordinates(c: Controller, name: str) -> None:
+    """A finding on a motion in the machine's coordinates under a work offset without an origin."""
+    number = c.state.datum.number
+    if number > 0 and number not in c.stated_offsets:
+        c.once(
+            "nc-machine-coordinates",
+            f"{name}: moves in the machine's coordinates, and where {_offset_name(number)} lies in them is not known: "
+            f"it counts as the machine's origin: state it in program.work_offsets",
+            Severity.UNPROVEN,
+        )
+
+
+def _offset_name(number: int) -> str:
+    return f"G{53 + number}" if number < 7 else f"G59.{number - 6}" if number < 10 else f"work offset {number}"
 
 
 def set_data(c: Controller, block: Block, axes: Axes) -> None:
@@ -84,7 +112,7 @@ def _set_work_offset(c: Controller, block: Block, axes: Axes, kind: int) -> None
     else:
         offset = put(offset, dict(axes))
         rotation = words.get("r", rotation)
-    c.known_offsets.add(number)
+    c.stated_offsets.add(number)
     c.store(5201 + 20 * number, offset)
     c.parameters.numbered[5210 + 20 * number] = rotation
     if active:
@@ -122,7 +150,7 @@ def _set_tool(c: Controller, block: Block, axes: Axes, kind: int) -> None:
         changed = replace(changed, orientation=orientation)
     if c.tools is None:
         c.tools = {}
-        c.strict = False
+        c.strict_tools = False
     c.tools[number] = changed
 
 
@@ -150,9 +178,28 @@ def length_offset(c: Controller, block: Block, code: int, axes: Axes) -> None:
         if number == 0 and code == 430:
             number = state.tool
         tool = c.find_tool(number, "H")
+        _check_length(c, code, number)
         length = nine([math.degrees(x) if 3 <= k < 6 else x for k, x in enumerate(tool.offset)])
         new = nine([a + b for a, b in zip(old, length, strict=True)]) if code == 432 else length
     c.rebase(replace(state.datum, length=new))
+
+
+def _check_length(c: Controller, code: int, number: int) -> None:
+    """Findings on a length that is not known or is another tool's."""
+    if number == 0:
+        return
+    if number not in (c.tools or {}):
+        c.once(
+            "nc-length-unknown",
+            f"{shown(code)} H{number}: no length of tool {number} is known, it counts as 0: state Z of tool {number} "
+            "in a tool table (program.tools)",
+        )
+    elif code == 430 and c.dialect == "linuxcnc" and number != c.state.tool:
+        c.once(
+            "nc-length-of-another-tool",
+            f"G43 H{number}: tool {c.state.tool} is in the spindle: the length of tool {number} is taken for it",
+            Severity.UNPROVEN,
+        )
 
 
 def shift(c: Controller, code: int, axes: Axes) -> None:
@@ -186,7 +233,12 @@ def go_home(c: Controller, code: int, axes: Axes, end: Nine) -> None:
     c.not_compensated(shown(code))
     first = 5161 if code == 280 else 5181
     if not any(first + k in c.parameters.numbered for k in range(9)):
-        c.once("nc-point-unset", f"{shown(code)}: parameters #{first} on are not set: it goes to the machine's origin")
+        c.once(
+            "nc-point-unset",
+            f"{shown(code)}: parameters #{first} to #{first + 8} are not set: it goes to the machine's origin: state "
+            "them in program.parameters",
+        )
+    note_machine_coordinates(c, shown(code))
     c.straight(RAPID, end)
     home = state.datum.from_machine(c.stored(first))
     c.straight(RAPID, put(end, {k: home[k] for k in (axes or range(9))}))

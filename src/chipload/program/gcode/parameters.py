@@ -27,18 +27,21 @@ class Parameters:
 
     Parameters
     ----------
-    numbered : values that stand before the program starts
+    given : values that stand before the program starts, by number or name
     noted : called with (code, text) when a number is read that nobody has set
     """
 
-    def __init__(self, numbered: Mapping[int, float] | None = None, noted: Noted | None = None):
+    def __init__(self, given: Mapping[int | str, float] | None = None, noted: Noted | None = None):
         self.numbered: dict[int, float] = {}
-        for number, value in (numbered or {}).items():
-            if not 1 <= number <= HIGHEST:
-                raise InputError(f"parameter #{number}: the number must be from 1 to {HIGHEST}")
-            self.numbered[int(number)] = float(value)
         self.shared: dict[str, float] = {}
         self.local: dict[str, float] = {}
+        for key, value in (given or {}).items():
+            if isinstance(key, str):
+                (self.shared if key.startswith("_") else self.local)[key] = float(value)
+                continue
+            if not 1 <= key <= HIGHEST:
+                raise InputError(f"parameter #{key}: the number must be from 1 to {HIGHEST}")
+            self.numbered[int(key)] = float(value)
         #: read by a call, never assigned
         self.live: dict[int | str, Callable[[], float]] = {}
         self.noted = noted
@@ -54,12 +57,14 @@ class Parameters:
             value = self.numbered.get(key)
             if value is None:
                 if self.noted is not None and (key < 5000):
-                    self.noted("nc-parameter-unset", f"#{key} is read before it is set: it counts as 0")
+                    said = f"#{key} is read before it is set: it counts as 0: state it in program.parameters"
+                    self.noted("nc-parameter-unset", said)
                 return 0.0
             return value
         space = self.shared if key.startswith("_") else self.local
         if key not in space:
-            raise InputError(f"parameter #<{key}>: is read before it is set: assign it first")
+            said = "is read before it is set: assign it first, or state it in program.parameters"
+            raise InputError(f"parameter #<{key}>: {said}")
         return space[key]
 
     def exists(self, key: int | str) -> bool:

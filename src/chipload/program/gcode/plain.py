@@ -11,7 +11,7 @@ import re
 from chipload.program.commands import ARC, LINE, RAPID
 from chipload.program.gcode.arcs import check_centre
 from chipload.program.gcode.controller import Controller
-from chipload.program.gcode.motion import Motion
+from chipload.program.gcode.motion import ControllerMotion
 
 #: blocks in one go
 PIECE = 8192
@@ -24,7 +24,7 @@ _match = re.compile(rf"{_HEAD}{_AXES}(?:[Ff][ \t]*{_NUMBER}[ \t]*)?\r?\Z").match
 _CODE = {"0": 0, "1": 10, "2": 20, "3": 30}
 
 
-def run_plain(c: Controller, motion: Motion, lines: list[str], line: int) -> tuple[int, int]:
+def run_plain(c: Controller, motion: ControllerMotion, lines: list[str], line: int) -> tuple[int, int]:
     """Carry out plain blocks from ``line`` on; the line of the first other block, and how many were carried out."""
     state = c.state
     if not (
@@ -34,9 +34,17 @@ def run_plain(c: Controller, motion: Motion, lines: list[str], line: int) -> tup
         and not state.diameter
         and state.compensation == 400
         and motion.splines.spline is None
+        and not c.unread
+        and c.modal_hole is None
         and state.motion in (0, 10, 20, 30, 800)
     ):
         return line, 0
+    if len(c.placed) < 3:
+        # which axes have been sent somewhere is noted block by block
+        return line, 0
+    if c.unplaced:
+        c.unplaced = False
+        c.changed()
     match = _match
     scale, inch, flat = state.scale, state.scale != 1.0, state.plane == 170
     x, y, z, a, b, cc, u, v, w = state.at

@@ -12,12 +12,14 @@ from pathlib import Path
 from typing import Literal
 
 from chipload.errors import Finding, InputError
+from chipload.files import read_regular
 from chipload.program.commands import Commands
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.dialect import Dialect
 from chipload.program.gcode.fanuc import Fanuc
 from chipload.program.gcode.flow import Flow
-from chipload.program.gcode.interpreter import Interpreter
+from chipload.program.gcode.interpreter import BlockInterpreter
+from chipload.program.gcode.offsets import note_unset_offsets
 from chipload.program.gcode.sinumerik import Sinumerik
 from chipload.program.gcode.source import read_source
 from chipload.program.gcode.state import nine
@@ -28,6 +30,8 @@ from chipload.progress import Progress, silent
 LARGEST_FILE = 500_000_000
 #: motions of one program
 MOST_ROWS = 20_000_000
+#: blocks that loops and calls may carry out again: about ten seconds
+MOST_REPEATED = 400_000
 
 
 def read_gcode(
@@ -40,8 +44,11 @@ def read_gcode(
     units: Literal["mm", "inch"] = "mm",
     machine_units: Literal["mm", "inch"] | None = None,
     start: Sequence[float] = (0.0,) * 9,
-    parameters: Mapping[int, float] | None = None,
-    most_blocks: int = 5_000_000,
+    parameters: Mapping[int | str, float] | None = None,
+    origins: Mapping[int, tuple[Sequence[float], float]] | None = None,
+    diameters: Mapping[int, float] | None = None,
+    feed: float | None = None,
+    most_blocks: int | None = None,
     lenient: bool = False,
     progress: Progress = silent,
 ) -> tuple[Commands, tuple[Finding, ...]]:
@@ -57,9 +64,13 @@ def read_gcode(
     units : of lengths before the text says G20 or G21
     machine_units : of numbered parameters of coordinates; None: as ``units``
     start : (9,) float [mm, rad], machine's axes before the first block
-    parameters : numbered parameters before the first block, such as work offsets (5221 on)
-    most_blocks : blocks that may be carried out, repeated ones each time
-    lenient : in the dialect of LinuxCNC, unknown codes and a missing end are findings
+    parameters : parameters before the first block by number, such as work offsets (5221 on), or by name
+    origins : (9,) [mm, deg] and rotation [deg] of work offsets by number, 1 for G54
+    diameters : [mm] of the cutters by tool, for compensation (G41, G42) where ``tools`` states none
+    feed : [mm/min] of cuts before the text states one; None: such a cut is refused
+    most_blocks : blocks that may be carried out, repeated ones each time; None: ``MOST_REPEATED`` more than the text
+        has lines
+    lenient : in the dialect of LinuxCNC, what is not read or refused is a finding as far as the rest can be read
     progress : called with the part that is done
 
     Raises
@@ -81,6 +92,8 @@ def read_gcode(
     if len(at) != 9 or not all(math.isfinite(x) for x in at):
         raise InputError("start: must be nine finite numbers, X Y Z A B C U V W")
     at[3:6] = [math.degrees(x) for x in at[3:6]]
+    if most_blocks is None:
+        most_blocks = text.count("\n") + text.count("\r") + MOST_REPEATED
     if most_blocks < 1:
         raise InputError(f"most_blocks = {most_blocks}: must be 1 or more")
     rule = Dialect(strict=not lenient) if dialect == "linuxcnc" else rules[dialect](strict=False)
@@ -92,23 +105,32 @@ def read_gcode(
         start=nine(at),
         most_rows=min(2 * most_blocks + 100_000, MOST_ROWS),
         strict=dialect == "linuxcnc" and not lenient,
+        dialect=dialect,
+        origins={number: (nine(list(map(float, at))), turn) for number, (at, turn) in (origins or {}).items()},
+        diameters=diameters,
+        feed=feed,
     )
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     rule.begin(controller, text)
     source = read_source(text, name)
-    Flow(Interpreter(controller), source, rule, folder, most_blocks, progress).run()
+    Flow(BlockInterpreter(controller), source, rule, folder, most_blocks, progress).run()
+    note_unset_offsets(controller)
     return controller.track.commands(), controller.findings.all()
 
 
 def read_gcode_file(path: Path, **options: object) -> tuple[Commands, tuple[Finding, ...]]:
     """A program from a file; the files that it calls lie beside it. ``options`` are those of :func:`read_gcode`."""
     path = Path(path)
-    try:
-        size = path.stat().st_size
-        if size > LARGEST_FILE:
-            raise InputError(f"{path.name}: {size} bytes: must be at most {LARGEST_FILE}")
-        text = path.read_bytes().decode("utf-8", "replace")
-    except OSError as error:
-        raise InputError(f"{path.name}: cannot be read: {error.strerror}") from None
     given = {"name": path.name, "folder": path.parent, **options}
-    return read_gcode(text, **given)  # type: ignore[arg-type]
+    return read_gcode(gcode_text(path), **given)  # type: ignore[arg-type]
+
+
+def gcode_text(path: Path) -> str:
+    """The text of a program's file.
+
+    Raises
+    ------
+    InputError
+        It cannot be read or is too large.
+    """
+    return read_regular(path, path.name, LARGEST_FILE).decode("utf-8", "replace")

@@ -4,20 +4,25 @@ Notation: ``X=10``, ``X=IC(5)`` and ``I=AC(3)`` give values; ``CR=`` the radius 
 ``R1=..`` sets a parameter, kept as #1. TRAORI begins and TRAFOOF ends tip control. G70 and G700 are inches, G71 and
 G710 mm.
 
-Refused: frames (TRANS, ROT, CYCLE800 ...), cycles, tool vectors (A3 B3 C3), jumps and loops, calls. Noted and left out:
-what does not concern the path.
+CYCLE81 to CYCLE86, with MCALL too, are carried out (:mod:`~chipload.program.gcode.sinumerik_cycles`).
+
+Refused: frames (TRANS, ROT, CYCLE800 ...), tool vectors (A3 B3 C3), jumps and loops, calls by L. Left out, so that the
+result is unproven: cycles that are not drilling, calls of other programs, curves (CIP, CT, splines). Noted and left
+out: what does not concern the path. G331 and G332 are G33 with the spindle one way and back.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from chipload.errors import InputError
 from chipload.program.gcode.controller import Controller
-from chipload.program.gcode.dialect import Dialect, lenient
+from chipload.program.gcode.dialect import NOTED, Dialect, lenient
 from chipload.program.gcode.expression import integer_of, read_value
-from chipload.program.gcode.state import AXES, LINEAR, ZERO
+from chipload.program.gcode.offsets import choose
+from chipload.program.gcode.sinumerik_cycles import CYCLES, NORMAL, hole_blocks
+from chipload.program.gcode.state import AXES, LINEAR
 from chipload.program.gcode.words import LONGEST, Block
 
 _TOKEN = re.compile(
@@ -40,7 +45,7 @@ FRAMES = frozenset(
 )
 JUMPS = frozenset(
     """
-    CALL CASE DEF DEFINE ELSE ENDFOR ENDIF ENDLOOP ENDWHILE EXTCALL FOR GOTO GOTOB GOTOC GOTOF IF LOOP MCALL
+    CALL CASE DEF DEFINE ELSE ENDFOR ENDIF ENDLOOP ENDWHILE EXTCALL FOR GOTO GOTOB GOTOC GOTOF IF LOOP
     REPEAT REPEATB UNTIL WHILE
     """.split()  # noqa: SIM905
 )
@@ -63,6 +68,8 @@ SAME = {60: 610, 64: 640, 641: 640, 642: 640, 643: 640, 644: 640, 645: 640, 70: 
         153: 530, 53: 530, 9: 0}  # fmt: skip
 PLAIN = frozenset({0, 1, 2, 3, 4, 17, 18, 19, 40, 41, 42, 54, 55, 56, 57, 90, 91, 93, 94, 95, 96, 97})
 NO_MEANING = frozenset({9, 25, 26, 450, 451, 460, 461, 462, 601, 602, 603, 621, 810, 820, 930, 931, 94})
+#: G33 and tapping: LinuxCNC's code, and whether the spindle turns against K
+SYNCHRONISED = {33: None, 331: False, 332: True}
 _WORDS = frozenset("XYZABCUVWIJKFSTDH")
 
 
@@ -101,7 +108,18 @@ class Sinumerik(Dialect):
             elif not found["colon"]:
                 _keyword(block, c, found["word"])
         self._resolve(block, c, values)
+        self._holes(block, c)
         return lenient(block, c)
+
+    def _holes(self, block: Block, c: Controller) -> None:
+        """A drilling cycle where the tool stands, or, after MCALL, behind each block that moves in the plane."""
+        moves = {"x", "y", "z"} - {NORMAL.get(c.state.plane, "z")}
+        if block.modal:
+            c.modal_hole = block.hole
+        elif block.hole is not None:
+            block.after = hole_blocks(*block.hole, c)
+        elif c.modal_hole is not None and not moves.isdisjoint(block.words):
+            block.after = hole_blocks(*c.modal_hole, c)
 
     def _resolve(self, block: Block, c: Controller, values: list[tuple[str, str, float]]) -> None:
         """AC and IC, in the way that the block gives values."""
@@ -113,6 +131,10 @@ class Sinumerik(Dialect):
                 words["p"] = words.pop("f")
             elif "s" in words:
                 raise InputError("G4 S: a dwell by turns of the spindle is not read: give F in seconds")
+        if 330 in block.g and c.reversed is not None:
+            clockwise = (words.get("k", 1.0) > 0.0) != c.reversed
+            block.m = [m for m in block.m if m not in (3, 4, 5)] + [3 if clockwise else 4]
+            c.reversed = None
         for letter, way, value in values:
             k = AXES.find(letter) if letter in AXES else "ijk".find(letter)
             here = state.at[k] / (scale if k in LINEAR else 1.0)
@@ -127,8 +149,9 @@ class Sinumerik(Dialect):
         if 6 in block.m and c.tools is not None and not {430, 490} & set(block.g):
             block.g.append(430)
             words.setdefault("h", 0.0)
+        # D is an edge of the tool in the spindle, so that compensation takes that tool's diameter
         for letter in "dh":
-            if letter in words and not {410, 420, 430} & set(block.g):
+            if letter in words and not (letter == "h" and {430, 490} & set(block.g)):
                 del words[letter]
                 c.once("nc-ignored", f"{letter.upper()}: edges of tools and auxiliary functions are left out")
 
@@ -188,11 +211,16 @@ def _code(block: Block, c: Controller, code: int) -> None:
     elif code in PLAIN:
         block.g.append(10 * code)
     elif code == 500 or 505 <= code <= 599:
-        c.once("nc-offset-unset", f"G{code}: its origin is not known here and counts as the machine's")
-        c.rebase(replace(c.state.datum, number=0 if code == 500 else code - 500, offset=ZERO, rotation=0.0))
+        choose(c, f"G{code}", 0 if code == 500 else code - 500)
     elif code in NO_MEANING:
         c.once("nc-ignored", f"G{code}: does not concern the path")
-    elif code in (33, 34, 35, 63, 331, 332, 58, 59, 74, 75, 110, 111, 112, *range(140, 149), 247, 248, 347, 348):
+    elif code in SYNCHRONISED:
+        block.g.append(330)
+        if SYNCHRONISED[code] is not None:
+            c.reversed = SYNCHRONISED[code]
+    elif code == 63:
+        block.g.append(10)
+    elif code in (34, 35, 58, 59, 74, 75, 110, 111, 112, *range(140, 149), 247, 248, 347, 348):
         raise InputError(f"G{code}: is not read: write the moves out")
     else:
         # the dialect's reader makes a finding of it
@@ -208,7 +236,8 @@ def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple
         _put(block, "t", float(number))
         return
     if name in CURVES:
-        raise InputError(f"{name}: is not read: write the moves out")
+        _left_out(block, c, name)
+        return
     if text.startswith('"') or name.startswith("$") or name in IDLE:
         c.once("nc-ignored", f"{name}: does not concern the path and is left out")
         return
@@ -234,6 +263,13 @@ def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple
         c.note("nc-unknown-word", f"{name}={text[:40]}: is not known")
 
 
+def _left_out(block: Block, c: Controller, word: str) -> None:
+    """A word whose motion is not read: its block does not move."""
+    c.gap("nc-unknown-word", f"{word}: is not read: its block does not move")
+    if NOTED not in block.g:
+        block.g.append(NOTED)
+
+
 def _called(block: Block, c: Controller, name: str, arguments: str) -> None:
     if name == "MSG":
         c.note("nc-message", arguments.strip().strip('"')[:200])
@@ -243,18 +279,22 @@ def _called(block: Block, c: Controller, name: str, arguments: str) -> None:
         c.once("nc-ignored", "CYCLE800(): resets a swivel that is not on")
     elif name in FRAMES or name == "CYCLE800":
         raise InputError(f"{name}: turned or shifted frames are not read: post in the coordinates of the work offset")
+    elif name in CYCLES:
+        block.hole = (name, [_value(x, c) if x.strip() else None for x in arguments.split(",")])
     elif name in JUMPS:
         _keyword(block, c, name)
     elif name in IDLE:
         c.once("nc-ignored", f"{name}: does not concern the path and is left out")
     else:
-        raise InputError(f"{name}(...): cycles and calls are not read: write the moves out")
+        c.gap("nc-call", f"{name}({arguments.strip()[:60]}): cycles and calls are not read: left out")
 
 
 def _keyword(block: Block, c: Controller, word: str) -> None:
     if word in ("TRAORI", "TRAFOOF"):
         c.state.tcp = word == "TRAORI"
         c.changed()
+    elif word == "MCALL":
+        block.modal = True
     elif word == "SUPA":
         block.g.append(530)
     elif word == "RET":
@@ -265,7 +305,7 @@ def _keyword(block: Block, c: Controller, word: str) -> None:
     elif word in JUMPS:
         raise InputError(f"{word}: jumps, loops and calls are not read: write out what they do")
     elif word in CURVES or word.startswith(("CYCLE", "POCKET", "SLOT", "HOLES")):
-        raise InputError(f"{word}: is not read: write the moves out")
+        _left_out(block, c, word)
     elif word in IDLE:
         c.once("nc-ignored", f"{word}: does not concern the path and is left out")
     else:

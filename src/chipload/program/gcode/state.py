@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from chipload.program.commands import Floats, Frame
+from chipload.program.path_mode import FREE, PathMode
 
 Nine = tuple[float, float, float, float, float, float, float, float, float]
 ZERO: Nine = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -100,6 +101,7 @@ class State:
     speed, sense : S [rpm] and the sense of rotation, 1 clockwise
     surface : S is a speed of the cutting edge (G96)
     tool, selected : in the spindle, and named by T
+    path_mode : what ``path`` and its words ask for at joints
     tcp, tcp_by_length : X Y Z are the tip in the workpiece; G43.4 made it so, and another length ends it
     """
 
@@ -110,6 +112,7 @@ class State:
     plane: int = 170
     feed_mode: int = 940
     path: int = 640
+    path_mode: PathMode = FREE
     absolute: bool = True
     absolute_centre: bool = False
     old_level: bool = False

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from chipload.errors import InputError
+from chipload.errors import InputError, Severity
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.state import AXES, LINEAR, Nine, put
 from chipload.program.gcode.words import Block
@@ -66,10 +66,15 @@ def rate(c: Controller, block: Block, what: str) -> float | None:
             raise InputError(f"{what}: each feed by inverse time (G93) needs its own F")
         return block.words["f"]
     if state.feed == 0.0:
-        raise InputError(f"{what}: the feed is 0 or was never set: give F")
+        if c.feed is None:
+            raise InputError(f"{what}: the feed is 0 or was never set: give F")
+        c.once("nc-feed-given", f"{what}: no F before it: feed_mm_min = {c.feed:g} is taken")
+        state.feed = state.feed_turning = c.feed
+        c.changed()
     if state.feed_mode == 950:
         if state.surface:
-            c.once("nc-feed-unknown", "feed per revolution (G95) with G96: the spindle speed is not known here")
+            said = "feed per revolution (G95) with G96: the spindle speed is not known here"
+            c.once("nc-feed-unknown", said, Severity.UNPROVEN)
         elif state.speed == 0.0:
             raise InputError(f"{what}: feed per revolution (G95) and no spindle speed: give S")
     return None

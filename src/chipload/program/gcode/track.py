@@ -1,8 +1,8 @@
 """The rows of Commands while a text is read, and what was noticed.
 
 Notation: a row is ``(motion, x, y, z, a, b, c, u, v, w, context, line)`` in mm and degrees; a context is ``(feed,
-spindle, tool, tcp, frame, plane, label)``, kept once and named by its number. Rows wait in a list and go to columns in
-pieces, so that a long text does not hold a tuple for each.
+spindle, tool, tcp, frame, plane, label, path mode)``, kept once and named by its number. Rows wait in a list and go to
+columns in pieces, so that a long text does not hold a tuple for each.
 """
 
 from __future__ import annotations
@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.errors import Finding, InputError
+from chipload.errors import Finding, InputError, Severity
 from chipload.program.commands import ARC, Commands, Frame
 from chipload.program.gcode.state import Datum
+from chipload.program.path_mode import UNSTATED, PathMode
 
 #: rows that wait
 PIECE = 1 << 15
@@ -22,42 +23,45 @@ MOST_FINDINGS = 2000
 MOST_FRAMES = 100_000
 
 Row = tuple[int, float, float, float, float, float, float, float, float, float, int, int]
-Context = tuple[float, float, int, bool, int, int, int]
+Context = tuple[float, float, int, bool, int, int, int, PathMode]
 
 
 class Findings:
     """Findings, each text once for a code and line."""
 
     def __init__(self) -> None:
-        self._kept: dict[tuple[str, int, str], None] = {}
+        self._kept: dict[tuple[str, int, str], Severity] = {}
         self._once: set[tuple[str, str]] = set()
         self._left = 0
+        self._left_severity = Severity.NOTE
 
-    def add(self, code: str, line: int, text: str) -> None:
+    def add(self, code: str, line: int, text: str, severity: Severity = Severity.NOTE) -> None:
         """Keep a finding."""
         key = (code, line, text)
         if key in self._kept:
             return
         if len(self._kept) < MOST_FINDINGS:
-            self._kept[key] = None
+            self._kept[key] = severity
         else:
             self._left += 1
+            self._left_severity = max(self._left_severity, severity)
 
-    def once(self, code: str, line: int, text: str) -> None:
+    def once(self, code: str, line: int, text: str, severity: Severity = Severity.NOTE) -> None:
         """Keep a finding whose text has not been seen on any line."""
         if (code, text) not in self._once and len(self._once) <= MOST_FINDINGS:
             self._once.add((code, text))
-            self.add(code, line, text)
+            self.add(code, line, text, severity)
 
     def all(self) -> tuple[Finding, ...]:
         """The findings in the order in which they were made."""
-        kept = [Finding(*key) for key in self._kept]
+        kept = [Finding(*key, severity) for key, severity in self._kept.items()]
         if self._left:
-            kept.append(Finding("nc-more-findings", 0, f"{self._left} more findings are not listed"))
+            text = f"{self._left} more findings are not listed"
+            kept.append(Finding("nc-more-findings", 0, text, self._left_severity))
         return tuple(kept)
 
 
-class Track:
+class MotionRows:
     """Rows in the order in which they are made.
 
     Parameters
@@ -97,6 +101,10 @@ class Track:
         self._arcs.append((self.count + len(self.rows), first, second, turns))
         self.rows.append(row)
 
+    def used_frames(self) -> tuple[Datum, ...]:
+        """The datums that rows were made in."""
+        return tuple(self._frames)
+
     def spill(self) -> None:
         """Move rows to columns when many wait."""
         if len(self.rows) >= PIECE:
@@ -117,7 +125,7 @@ class Track:
         self._pieces.clear()
         n = len(table)
         which = table[:, 10].astype(np.int64)
-        columns = list(zip(*self._contexts, strict=True)) if self._contexts else [(0,)] * 7
+        columns = list(zip(*self._contexts, strict=True)) if self._contexts else [(0,)] * 7 + [(UNSTATED,)]
         centre, turns = np.zeros((n, 2)), np.zeros(n, dtype=np.int64)
         if self._arcs:
             arcs = np.array(self._arcs, dtype=np.float64)
@@ -142,4 +150,5 @@ class Track:
             label=np.array(columns[6], dtype=np.int64)[which],
             frames=tuple(datum.frame() for datum in self._frames) or (Frame(),),
             labels=tuple(self._labels),
+            path_mode=np.array(columns[7], dtype=np.float64)[which],
         )

@@ -36,6 +36,8 @@ class Block:
     sets : (parameter, value)
     comments : text of each
     number : N word, -1 without
+    after : blocks that are carried out behind it
+    hole : Sinumerik's drilling cycle, its name and its arguments; ``modal``: MCALL stands before it
     """
 
     words: dict[str, float] = field(default_factory=dict)
@@ -44,6 +46,9 @@ class Block:
     sets: list[tuple[int | str, float]] = field(default_factory=list)
     comments: list[str] = field(default_factory=list)
     number: int = -1
+    after: list[Block] = field(default_factory=list)
+    hole: tuple[str, list[float | None]] | None = None
+    modal: bool = False
 
 
 def bare(line: str) -> tuple[str, list[str]]:

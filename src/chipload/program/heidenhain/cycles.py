@@ -10,6 +10,7 @@ import re
 
 from chipload.errors import InputError
 from chipload.program.commands import DWELL, LINE, RAPID
+from chipload.program.heidenhain.q_cycles import CYCLES, LEFT_OUT
 from chipload.units import mm_s_from_mm_min
 
 #: plunges of one hole
@@ -50,6 +51,9 @@ class Cycles:
             else:
                 value = self._value(number, body)
                 self.values[part] = value if part == 4 else value * scale
+            return None
+        if number in CYCLES or number in LEFT_OUT:
+            self.number, self.values, self.modal = number, {}, False
             return None
         if number not in SILENT:
             raise InputError(f"CYCL DEF {number}: is not read: write its motions")

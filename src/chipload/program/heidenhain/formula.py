@@ -43,7 +43,7 @@ FUNCTIONS: Mapping[str, Callable[[float], float]] = {
 }
 
 
-class Parameters:
+class QParameters:
     """Q parameters by number; ``given`` are those that are known before the program runs, SYSREAD included."""
 
     def __init__(self, given: Mapping[int, float]) -> None:
@@ -56,7 +56,9 @@ class Parameters:
             raise InputError(f"Q{number} is read before it is set: set it")
         value = self.values[number]
         if value is None:
-            raise InputError(f"Q{number} comes from the controller and is not known here: give it in parameters")
+            raise InputError(
+                f"Q{number} comes from the controller and is not known here: state it in program.parameters"
+            )
         return value
 
     def set(self, number: int, value: float | None) -> None:
@@ -68,7 +70,7 @@ class Parameters:
     def formula(self, text: str) -> float:
         """The value of a formula.
 
-        >>> q = Parameters({4: 10.0})
+        >>> q = QParameters({4: 10.0})
         >>> q.formula("( Q4 - 2.5 ) / 2.5"), q.formula("-Q4 + 3 * 2 ^ 2"), q.formula("INT -3.7")
         (3.0, 2.0, -3.0)
         """
@@ -90,7 +92,7 @@ class Parameters:
 class _Formula:
     """Recursive descent: sums of products of powers of signed values."""
 
-    def __init__(self, tokens: list[re.Match[str]], parameters: Parameters) -> None:
+    def __init__(self, tokens: list[re.Match[str]], parameters: QParameters) -> None:
         self.tokens, self.parameters, self.at = tokens, parameters, 0
 
     def _next(self, signs: str) -> str | None:

@@ -1,7 +1,8 @@
 """Heidenhain conversational programs to Commands: the part of the language that CAM systems and shop programs use.
 
 Notation: a block is a line; X Y Z [mm], A B C [rad]. L lines, CC and C arcs about a pole, CP helices, CYCL DEF 1
-(pecking), 7 (datum shift), 9 (dwell), 19 (working plane, untilted only), TOOL DEF and TOOL CALL, labels, Q parameters
+(pecking), 7 (datum shift), 9 (dwell), 19 (working plane, untilted only), 200 (drilling), 201 (reaming), 206 and 207
+(tapping), TOOL DEF and TOOL CALL, labels, Q parameters
 and jumps. What else a block says is a finding where it does not move anything, else it is refused with its line.
 
 A motion in the machine's own coordinates (M91) is left out and said: where they lie in the work is not known.
@@ -14,13 +15,16 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from chipload.errors import Finding, InputError
+from chipload.errors import Finding, InputError, Severity
+from chipload.files import read_regular
 from chipload.program.commands import ARC, DWELL, LINE, RAPID, XY, Commands, Frame, Row, commands_from_rows
 from chipload.program.heidenhain.cycles import Cycles
-from chipload.program.heidenhain.formula import Parameters
+from chipload.program.heidenhain.formula import QParameters
+from chipload.program.heidenhain.q_cycles import CYCLES, LEFT_OUT, SPIN, q_cycle_steps
 from chipload.units import MM_PER, mm_s_from_mm_min, rad_s_from_rpm
 
 #: largest text [characters], blocks that may be carried out, calls inside one another, findings that are kept
+TOOL_DIGITS = 9
 LONGEST_TEXT, MOST_BLOCKS, NESTED, KEPT = 100_000_000, 2_000_000, 20, 2000
 #: largest coordinate [mm or deg]
 FARTHEST = 1e6
@@ -31,6 +35,7 @@ _M = re.compile(r"\bM\s*(\d+)\b")
 _SIDE = re.compile(r"\bR([LR0])\b")
 _TURN = re.compile(r"\bDR([-+])")
 _LABEL = re.compile(r"^LBL\s*(\d+)$")
+_Q_VALUE = re.compile(r"Q\s*(\d+)\s*=\s*([-+]?\s*(?:Q\s*\d+|\d+\.?\d*|\.\d+))")
 _SHIFT = re.compile(r"^(I?)([XYZABC])\s*(.+)$")
 
 
@@ -69,12 +74,7 @@ def read_heidenhain_file(
 ) -> tuple[Commands, tuple[Finding, ...]]:
     """As :func:`read_heidenhain`, of a file."""
     path = Path(path)
-    try:
-        if path.stat().st_size > LONGEST_TEXT:
-            raise InputError(f"{path.name}: must be at most {LONGEST_TEXT} bytes")
-        text = path.read_bytes().decode("utf-8", "replace")
-    except OSError as err:
-        raise InputError(f"{path.name}: cannot be read: {err.strerror}") from None
+    text = read_regular(path, path.name, LONGEST_TEXT).decode("utf-8", "replace")
     return read_heidenhain(text, name=path.name, parameters=parameters)
 
 
@@ -84,7 +84,7 @@ class _Run:
     def __init__(self, text: str, name: str, parameters: Mapping[int, float]) -> None:
         self.blocks = [_bare(raw) for raw in text.splitlines()]
         self.name, self.line = name, 0
-        self.q = Parameters(parameters)
+        self.q = QParameters(parameters)
         self.cycles = Cycles()
         self.rows: list[Row] = []
         self.findings: list[Finding] = []
@@ -113,7 +113,7 @@ class _Run:
         at = 0
         for _ in range(MOST_BLOCKS):
             if at >= len(self.blocks):
-                self.note("heidenhain-no-end", "the text does not end with END PGM: it may have been cut off")
+                self.gap("heidenhain-no-end", "the text does not end with END PGM: it may have been cut off")
                 return
             self.line = at + 1
             at = self.block(self.blocks[at], at)
@@ -244,6 +244,8 @@ class _Run:
             return
         if re.search(r"\b[XY]\b", text[found.end() :]):
             raise InputError(f"{text!r}: the spindle along X or Y is not read: must be along Z")
+        if len(found[2]) > TOOL_DIGITS:
+            raise InputError(f"TOOL CALL {found[2][:20]}...: must be at most {'9' * TOOL_DIGITS}")
         self.tool, self.sense = int(found[2]), 0.0
         if self.tool not in self.lengths:
             self.note("heidenhain-tool-unknown", f"tool {self.tool} has no TOOL DEF: its length counts as 0")
@@ -271,6 +273,8 @@ class _Run:
                 self.shift[k] = value
                 self._frame()
             return
+        for key, value in _Q_VALUE.findall(body):
+            self.q.set(int(key), self.q.formula(value))
         dwell = self.cycles.define(number, part, body, self.scale)
         if dwell is not None:
             self._row(DWELL, self.at, feed=dwell)
@@ -414,12 +418,40 @@ class _Run:
         """The drilling cycle where the tool stands."""
         if self.unknown:
             raise InputError("a cycle is called where the tool stands, which is not known: move there first")
+        number = self.cycles.number
+        if number in LEFT_OUT:
+            self.gap("heidenhain-cycle", f"CYCL DEF {number}: is not read: what it cuts here is left out")
+            return
+        if number in CYCLES:
+            self._q_cycle(number)
+            return
         for motion, z, value in self.cycles.call(self.at[2]):
             end = list(self.at)
             if motion != DWELL:
                 end[2] = z
                 self.at = end
             self._row(motion, end, feed=value)
+
+    def _q_cycle(self, number: int) -> None:
+        """A cycle that takes Q parameters, where the tool stands."""
+
+        def q(key: int, else_: float | None) -> float:
+            return else_ if else_ is not None and key not in self.q.values else self.q.read(key)
+
+        sense = self.sense
+        if number in (206, 207) and sense == 0.0:
+            # tapping starts the spindle itself
+            sense = 1.0
+        before, self.sense = self.sense, sense
+        for kind, z, value in q_cycle_steps(number, q, self.speed / math.tau, self.scale):
+            if kind == SPIN:
+                self.sense = value * sense
+                continue
+            end = list(self.at)
+            end[2] = z
+            self.at = end
+            self._row(kind, end, feed=value)
+        self.sense = before
 
     # -- switches ---------------------------------------------------------------------------------------------
     def _functions(self, text: str) -> None:
@@ -458,10 +490,14 @@ class _Run:
         if 99 in codes:
             self.cycles.modal = False
 
-    def note(self, code: str, text: str) -> None:
+    def gap(self, code: str, text: str) -> None:
+        """Keep a finding on something that is left out, so that the program is unproven."""
+        self.note(code, text, Severity.UNPROVEN)
+
+    def note(self, code: str, text: str, severity: Severity = Severity.NOTE) -> None:
         """Keep a finding; one that was there is not repeated."""
-        if len(self.findings) < KEPT:
-            found = Finding(code, self.line, text)
+        if len(self.findings) < KEPT or severity > Severity.NOTE:
+            found = Finding(code, self.line, text, severity)
             if found not in self.findings[-50:]:
                 self.findings.append(found)
 
@@ -482,7 +518,8 @@ class _Run:
 
 def _bare(raw: str) -> str:
     """A block without number, comment and needless blanks, in capitals."""
-    text = raw.split(";", 1)[0].upper()
+    # ~ says that the block goes on in the next line, where Q parameters stand by themselves
+    text = raw.split(";", 1)[0].replace("~", " ").upper()
     return re.sub(r"^\d+ ?(?=[A-Z]|$)", "", re.sub(r"\s+", " ", text).strip())
 
 

@@ -4,7 +4,7 @@ Notation as in :mod:`chipload.simulation.deflection`: q point of the surface, n 
 from q to the cutter, (rho, z) its foot on the profile, s the length along it; theta rotation of tooth 0 at the tip. A
 ``shape`` is (r, e, f, alpha, beta, h, rho where the bottom line ends), a bar (length, 1 / (E I), c_ff, c_mm, c_fm), a
 row of ``steps`` (p0, p1, a0, a1), 12 numbers; bites and slices as in :mod:`chipload.cutting._kernels`.
-Oracles: closed forms, the wall of :mod:`chipload.cutting.wall` and sums over slices in tests/simulation.
+Oracles: closed forms, the wall of :mod:`chipload.cutting.wall_error` and sums over slices in tests/simulation.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ def contacts(points, normals, steps, shape, most, facing, owner, moment):
 
 
 @njit(cache=True, nogil=True)
-def inside_bite(s, phi, rows, tooth, piece, slices, lo, hi, j, reach):
+def point_in_engagement(s, phi, rows, tooth, piece, slices, lo, hi, j, reach):
     """The immersion phi moved just inside the nearest bite of tooth j at s, and whether its end is within ``reach``
     along the circle of its slice.
     """
@@ -281,8 +281,10 @@ def bent_many(step, theta, z, start, rows, tooth, piece, slices, teeth, c, bars,
 
 
 @njit(cache=True, nogil=True)
-def inside_bites(step, s, phi, start, rows, tooth, piece, slices, j, reach, out, made):
-    """``inside_bite`` of many moments (m,), for tooth j."""
+def points_in_engagement(step, s, phi, start, rows, tooth, piece, slices, j, reach, out, made):
+    """``point_in_engagement`` of many moments (m,), for tooth j."""
     for m in range(len(step)):
         i = step[m]
-        out[m], made[m] = inside_bite(s[m], phi[m], rows, tooth, piece, slices, start[i], start[i + 1], j, reach)
+        out[m], made[m] = point_in_engagement(
+            s[m], phi[m], rows, tooth, piece, slices, start[i], start[i + 1], j, reach
+        )

@@ -23,7 +23,7 @@ from scipy.signal import find_peaks
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
-from chipload.geometry.bspline import Patch
+from chipload.geometry.bspline import BSplinePatch
 from chipload.program.motions import is_arc
 from chipload.program.program import LINE, Program
 from chipload.progress import Progress, silent
@@ -42,7 +42,7 @@ _BLOCK = 512
 
 
 @dataclass(frozen=True, eq=False)
-class Wall:
+class SurfacePoints:
     """Points on a surface, a grid of ``shape`` (a, b) with u the slower, their normals, u, v and area [mm2] of each."""
 
     name: str
@@ -54,7 +54,7 @@ class Wall:
     shape: tuple[int, int]
 
 
-def wall(name: str, surface: Patch, u: Floats, v: Floats) -> Wall:
+def wall(name: str, surface: BSplinePatch, u: Floats, v: Floats) -> SurfacePoints:
     """The grid u x v (a,), (b,) on a surface.
 
     Keep off the edges of the metal, as the tip of a blade: a ray inwards from there lies in the face beside it, which a
@@ -68,7 +68,7 @@ def wall(name: str, surface: Patch, u: Floats, v: Floats) -> Wall:
     U, V = (x.ravel() for x in np.meshgrid(u, v, indexing="ij"))
     size = np.linalg.norm(np.cross(surface.at(U, V, 1, 0), surface.at(U, V, 0, 1)), axis=1)
     share = np.outer(_weights(u), _weights(v)).ravel()
-    return Wall(name, surface.at(U, V), surface.normal(U, V), U, V, size * share, (len(u), len(v)))
+    return SurfacePoints(name, surface.at(U, V), surface.normal(U, V), U, V, size * share, (len(u), len(v)))
 
 
 def _weights(x: Floats) -> Floats:
@@ -78,7 +78,7 @@ def _weights(x: Floats) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Left:
+class Remainder:
     """What a program leaves on a wall, and where it gouges.
 
     Parameters
@@ -90,7 +90,7 @@ class Left:
     height, depth : how far the rays go
     """
 
-    wall: Wall
+    wall: SurfacePoints
     rest: Floats
     gouge: Floats
     row: Ints
@@ -104,7 +104,7 @@ class Left:
         k = int(self.gouge.argmax())
         return float(self.gouge[k]), k
 
-    def says(self) -> str:
+    def message(self) -> str:
         """Where the deepest gouge is, in words."""
         deep, k = self.deepest
         if self.row[k] < 0:
@@ -115,7 +115,7 @@ class Left:
             f"({x:.2f}, {y:.2f}, {z:.2f}) in row {int(self.row[k])}"
         )
 
-    def crests(self, across: str, within: NDArray[np.bool_] | None = None, prominence: float = 1e-3) -> Floats:
+    def scallops(self, across: str, within: NDArray[np.bool_] | None = None, prominence: float = 1e-3) -> Floats:
         """Heights [mm] of the scallops: of the highest points between two passes, along every grid line.
 
         Parameters
@@ -161,7 +161,7 @@ def tool_parts(cutter: CatalogueCutter) -> tuple[Floats, Floats, Ints]:
 
 
 def left_on(
-    walls: Sequence[Wall],
+    walls: Sequence[SurfacePoints],
     program: Program,
     cutter: CatalogueCutter,
     height: float,
@@ -170,7 +170,7 @@ def left_on(
     tol: float = 1e-5,
     workers: int = 1,
     progress: Progress = silent,
-) -> tuple[Left, ...]:
+) -> tuple[Remainder, ...]:
     """What the program leaves on each wall.
 
     Parameters
@@ -201,7 +201,7 @@ def left_on(
         rest_row, row, part = np.full(n, -1), np.full(n, -1), np.full(n, -1)
 
         def block(
-            first: int, w: Wall = w, frames: Floats = frames, rest: Floats = rest, rest_row: Ints = rest_row,
+            first: int, w: SurfacePoints = w, frames: Floats = frames, rest: Floats = rest, rest_row: Ints = rest_row,
             gouge: Floats = gouge, row: Ints = row, part: Ints = part,
         ) -> None:  # fmt: skip
             _kernels.left(
@@ -214,7 +214,7 @@ def left_on(
                 progress((done + min(k * _BLOCK, n)) / total, w.name)
         done += n
         row = np.where(row >= 0, of[np.maximum(row, 0)], -1)
-        out.append(Left(w, rest, gouge, row, np.where(part >= 0, kinds[np.maximum(part, 0)], -1), height, depth))
+        out.append(Remainder(w, rest, gouge, row, np.where(part >= 0, kinds[np.maximum(part, 0)], -1), height, depth))
     return tuple(out)
 
 

@@ -26,7 +26,7 @@ Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Taken:
+class ChannelRemoval:
     """What a program takes from a blank.
 
     Parameters
@@ -94,7 +94,7 @@ def taken_from(
     cutter: CatalogueCutter,
     pitch: float,
     progress: Progress = silent,
-) -> Taken:
+) -> ChannelRemoval:
     """What a program takes from a blank, with rays ``pitch`` [mm] apart; of dexels, which it cuts, their own.
 
     Raises
@@ -123,4 +123,4 @@ def taken_from(
             elif j == 0 and program.motion[k] == RAPID:
                 rapid[k] = lost
         progress(k / n, "blank")
-    return Taken(before, volume, rapid, above, part)
+    return ChannelRemoval(before, volume, rapid, above, part)

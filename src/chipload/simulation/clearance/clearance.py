@@ -53,7 +53,7 @@ class Clearance:
     deepest: Floats
 
 
-class Nearness:
+class LeastDistance:
     """The least distance of points from a tool so far; :meth:`take` lowers it by some steps.
 
     Parameters
@@ -140,7 +140,7 @@ def clearance(
     InputError
         ``far`` or ``tolerance`` is not above 0.
     """
-    near = Nearness(bodies, points, far, tolerance, workers)
+    near = LeastDistance(bodies, points, far, tolerance, workers)
     deepest = near.take(steps, some)
     return Clearance(near.distance, near.step, np.minimum(near.first, len(steps)), deepest)
 

@@ -1,0 +1,125 @@
+"""The client of HAL: a process of the system's Python that owns the pins, and one line there and back each exchange.
+
+LinuxCNC's modules are built for one Python, which is seldom the one that chipload runs in. So nothing of them is
+imported here: :mod:`chipload.control.linuxcnc.pins` is run by that Python, and numbers go through its pipes.
+"""
+
+from __future__ import annotations
+
+import json
+import select
+import subprocess
+from importlib import resources
+from types import TracebackType
+from typing import NamedTuple, Protocol
+
+from chipload.errors import InputError
+
+#: name, type, direction of the pins; lengths in machine units, which must be mm, torque in N m, velocity in mm/s
+PINS: tuple[tuple[str, str, str], ...] = (
+    ("feed", "float", "out"),
+    ("beat", "bit", "out"),
+    ("torque", "float", "out"),
+    ("status", "s32", "out"),
+    ("s", "float", "out"),
+    ("x", "float", "in"),
+    ("y", "float", "in"),
+    ("z", "float", "in"),
+    ("velocity", "float", "in"),
+    ("torque-in", "float", "in"),
+    ("feed-in", "float", "in"),
+)
+#: pins that each have a signal of the name `<component>-<pin>`
+SIGNALS = ("feed", "beat", "x", "y", "z", "velocity", "torque-in", "feed-in")
+
+
+class PinValues(NamedTuple):
+    """What the in pins read: time [s], position [mm], velocity on the path [mm/s], torque [N m], override in force."""
+
+    time: float
+    x: float
+    y: float
+    z: float
+    velocity: float
+    torque: float
+    feed: float
+
+
+class ControlledMachine(Protocol):
+    """Whatever takes an override and says where it is."""
+
+    def exchange(self, feed: float, beat: bool, torque: float, status: int, s: float) -> PinValues | None:
+        """Set the out pins, read the in pins; None: the machine is gone."""
+
+
+class HalPins:
+    """The component in HAL, to be used in a ``with``.
+
+    Parameters
+    ----------
+    name : of the component
+    python : interpreter that has the module `hal`
+    answer_s : longest wait for an answer [s]
+
+    Raises
+    ------
+    InputError
+        There is no such interpreter, it has no `hal`, or HAL does not take the component.
+    """
+
+    def __init__(self, name: str, python: str = "/usr/bin/python3", answer_s: float = 5.0) -> None:
+        script = resources.files("chipload.control.linuxcnc") / "pins.py"
+        self._answer_s = answer_s
+        try:
+            self._process = subprocess.Popen(
+                [python, "-I", str(script)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                text=True, bufsize=1, start_new_session=True,
+            )  # fmt: skip
+        except OSError as err:
+            raise InputError(f"--python = {python}: cannot be run: {err.strerror}") from None
+        signals = {pin: f"{name}-{pin}" for pin in SIGNALS}
+        answer = self._line(json.dumps({"name": name, "pins": PINS, "signals": signals}))
+        if answer != "ready":
+            self._process.kill()
+            why = (self._process.communicate()[1].strip().splitlines() or ["no answer"])[-1]
+            raise InputError(f"hal component {name}: not taken: {why}: start LinuxCNC first, with its own Python")
+
+    def exchange(self, feed: float, beat: bool, torque: float, status: int, s: float) -> PinValues | None:
+        """Set the out pins, read the in pins; None: the component is gone."""
+        answer = self._line(f"{feed!r} {int(beat)} {torque!r} {status} {s!r}")
+        words = answer.split() if answer is not None else []
+        return PinValues(*map(float, words)) if len(words) == len(PinValues._fields) else None
+
+    def _line(self, text: str) -> str | None:
+        stdin, stdout = self._process.stdin, self._process.stdout
+        assert stdin is not None
+        assert stdout is not None
+        try:
+            stdin.write(text + "\n")
+            stdin.flush()
+        except OSError:
+            return None
+        if not select.select([stdout], [], [], self._answer_s)[0]:
+            return None
+        return stdout.readline().rstrip("\n") or None
+
+    def __enter__(self) -> HalPins:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        process = self._process
+        try:
+            if process.stdin is not None:
+                process.stdin.close()
+        except OSError:
+            pass
+        try:
+            process.wait(5.0)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        for stream in (process.stdout, process.stderr):
+            if stream is not None:
+                stream.close()

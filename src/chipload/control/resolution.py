@@ -1,0 +1,117 @@
+"""Which torque a spindle can tell from none, and which limit of torque it can therefore hold.
+
+Notation: K_T torque constant [N mm/A]; n [A] standard deviation of a reading of the current, q [A] its step; p time
+between two readings [s], t time constant of the filter [s], g = min(p / t, 1) its gain; I_0 [A] current of the free
+spindle at its speed, c the share by which it may differ from its map. The error that an estimate must be granted is
+
+    R = K_T (2 n sqrt(g / (2 - g)) + q / 2 + c I_0),
+
+two standard deviations of the noise behind the filter, half a step and the error of the idle map. A reading below R is
+not told from air. A torque that is held may in truth be R greater, so a limit T with a share h held and an excess of x
+granted needs R <= (1 + x - h) T.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from chipload.control.plant import Spindle
+from chipload.errors import InputError
+
+#: standard deviations of the noise that an estimate is granted
+DEVIATIONS = 2.0
+
+
+@dataclass(frozen=True)
+class TorqueResolution:
+    """The parts of R [N mm]: noise, quantisation, idle map."""
+
+    noise: float
+    quantisation: float
+    idle: float
+
+    @property
+    def total(self) -> float:
+        """R [N mm]."""
+        return self.noise + self.quantisation + self.idle
+
+    def __str__(self) -> str:
+        return (
+            f"{1e-3 * self.total:.3g} N m (noise {1e-3 * self.noise:.2g}, quantisation {1e-3 * self.quantisation:.2g}, "
+            f"idle map {1e-3 * self.idle:.2g})"
+        )
+
+
+def torque_resolution(spindle: Spindle, period: float) -> TorqueResolution:
+    """R of a spindle whose current is read every ``period`` [s].
+
+    Examples
+    --------
+    0.3 N m/A, 0.05 A of noise behind a gain of 1/2 is 2 x 15 x 0.577 N mm; a step of 0.02 A is 3 N mm; 2 % of the
+    4.5 A that run it free are 27 N mm.
+
+    >>> spindle = Spindle(625.0, 5.0, 300.0, (2.0, 0.004), 0.5, 5.0, 60.0, 0.01, 0.02, 0.05, 0.02, 0.02)
+    >>> print(torque_resolution(spindle, 0.01))
+    0.0473 N m (noise 0.017, quantisation 0.003, idle map 0.027)
+    """
+    if not 0.0 < period < math.inf:
+        raise InputError(f"torque_resolution: period = {period:g} s: must be above 0")
+    gain = min(period / spindle.smoothing, 1.0) if spindle.smoothing > 0.0 else 1.0
+    idle = abs(spindle.idle[0] + spindle.idle[1] * spindle.speed)
+    return TorqueResolution(
+        noise=DEVIATIONS * spindle.torque_constant * spindle.noise * math.sqrt(gain / (2.0 - gain)),
+        quantisation=0.5 * spindle.torque_constant * spindle.current_step,
+        idle=spindle.torque_constant * spindle.idle_error * idle,
+    )
+
+
+def check_light(spindle: Spindle, period: float, light: float) -> None:
+    """Refuse a torque below which readings count as air [N mm] that the spindle does not resolve.
+
+    Raises
+    ------
+    InputError
+        ``light`` is below R.
+    """
+    found = torque_resolution(spindle, period)
+    if light < found.total:
+        raise InputError(
+            f"override.light = {1e-3 * light:g} N m: below the resolution of the spindle, {found}: air cannot be told "
+            f"from a cut: {_remedy(found)}, or light at least {1e-3 * found.total:.3g} N m"
+        )
+
+
+def check_limit(spindle: Spindle, period: float, limit: float, hold: float, excess: float) -> None:
+    """Refuse a limit of torque [N mm] that the spindle cannot hold.
+
+    Parameters
+    ----------
+    spindle, period : that measure it
+    limit : T [N mm]
+    hold : h, share of it that is held
+    excess : x, share of it by which it may be exceeded
+
+    Raises
+    ------
+    InputError
+        The resolution is above (1 + x - h) T.
+    """
+    found, granted = torque_resolution(spindle, period), 1.0 + excess - hold
+    if found.total > granted * limit:
+        lower = 1.0 + excess - found.total / limit
+        held = f", or hold at most {lower:.2g}" if lower > 0.5 else ""
+        raise InputError(
+            f"spindle: it resolves {found}, the limit is {1e-3 * limit:.4g} N m: must be at most "
+            f"{1e-3 * granted * limit:.3g} N m, the share of the limit that is neither held nor allowed in excess: "
+            f"{_remedy(found)}{held}; this spindle holds limits from {1e-3 * found.total / granted:.3g} N m"
+        )
+
+
+def _remedy(found: TorqueResolution) -> str:
+    worst = max(
+        (found.noise, "less noise_a or a longer smoothing_s"),
+        (found.quantisation, "a smaller current_step_a"),
+        (found.idle, "a smaller idle_error_share (an air run before each job) or a smaller spindle"),
+    )[1]
+    return f"state a spindle with {worst}"

@@ -1,0 +1,88 @@
+"""Compiled loop of the loads in sections of a cutter; arrays and scalars only.
+
+Notation as in :mod:`chipload.cutting.strength` and :mod:`chipload.cutting._kernels`. Oracles: closed forms and a sum
+over slices in tests/cutting/test_strength.py.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from chipload.cutting._kernels import TAU, edge
+
+#: Gauss-Legendre on [-1, 1], five points
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
+#: longest piece of immersion that five points integrate to rounding [rad]
+PIECE = 0.6
+
+
+@njit(cache=True, nogil=True)
+def in_sections(theta, rows, tooth, piece, slices, lo, hi, teeth, c, heights, out):
+    """What the teeth below each height load its section with at one rotation: out (h, 4) = lever along T and n [N mm],
+    axial force [N], torque [N mm]. ``heights`` rise.
+    """
+    out[:] = 0.0
+    for r in range(lo, hi):
+        p = rows[r, 0]
+        q = rows[r, 1]
+        k = piece[r]
+        rate = slices[k, 6]
+        rho = slices[k, 1]
+        sine = slices[k, 3]
+        base = slices[k, 5] - rate * slices[k, 0]
+        first = base + rate * rows[r, 2]
+        last = base + rate * rows[r, 3]
+        one = tooth[r] >= 0
+        for i in range(1 if one else teeth):
+            j = tooth[r] if one else i
+            turn = theta - TAU * j / teeth
+            turn -= TAU * math.floor(turn / TAU)
+            if turn - first < p:
+                turn += TAU * math.ceil((p + first - turn) / TAU)
+            while turn - last <= q:
+                s1 = rows[r, 2]
+                s2 = rows[r, 3]
+                if rate > 0.0:
+                    s1 = max(s1, (turn - base - q) / rate)
+                    s2 = min(s2, (turn - base - p) / rate)
+                elif turn - first >= q:
+                    s2 = s1
+                # pieces between neighbouring sections load those above them
+                b1 = s1
+                for e in range(len(heights)):
+                    if b1 >= s2:
+                        break
+                    high = slices[k, 0] + (heights[e] - slices[k, 2]) / sine if sine > 0.0 else s2
+                    if sine <= 0.0 and slices[k, 2] > heights[e]:
+                        continue
+                    b2 = min(s2, high)
+                    if b2 <= b1:
+                        continue
+                    parts = max(math.ceil(rate * (b2 - b1) / PIECE), 1)
+                    h = (b2 - b1) / parts
+                    for part in range(parts):
+                        for g in range(5):
+                            s = b1 + h * (part + 0.5 + 0.5 * NODES[g])
+                            phi = turn - base - rate * s
+                            t, n, a, m = edge(phi, 0.0, rows[r, 4], rows[r, 5], rows[r, 6], sine, slices[k, 4], c)
+                            w = 0.5 * h * WEIGHTS[g]
+                            z = slices[k, 2] + sine * (s - slices[k, 0])
+                            for f in range(e, len(heights)):
+                                lever = heights[f] - z
+                                out[f, 0] += w * (lever * t + rho * a * math.sin(phi))
+                                out[f, 1] += w * (lever * n + rho * a * math.cos(phi))
+                                out[f, 2] += w * a
+                                out[f, 3] += w * rho * m
+                    b1 = b2
+                turn += TAU
+
+
+@njit(cache=True, nogil=True)
+def in_sections_over_turn(start, rows, tooth, piece, slices, theta, teeth, c, heights, out):
+    """``in_sections`` of every step at every rotation: out (n, m, h, 4)."""
+    for i in range(len(start) - 1):
+        for k in range(len(theta)):
+            in_sections(theta[k], rows, tooth, piece, slices, start[i], start[i + 1], teeth, c, heights, out[i, k])

@@ -1,0 +1,1 @@
+"""Loads over a revolution, all rotations of a step at once."""

@@ -1,0 +1,88 @@
+"""Loads of steps over a revolution of the spindle, in one compiled call.
+
+Notation as in :mod:`chipload.cutting.force`; ``left`` the unit normal of the surface that a step leaves, out of the
+cutter, 0 where it leaves none.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.force import forces_over_turn, in_work, mean_forces
+from chipload.cutting.material import Material
+from chipload.cutting.revolution import _kernels
+from chipload.engagement.tooth_engagement import ToothEngagement
+
+Floats = NDArray[np.float64]
+
+#: columns of loads; the mean power is that of the caller, who knows the speed
+COLUMNS = 15
+
+
+def rotations(cutter: Cutter, rotation: float) -> int:
+    """Number of rotations, at most ``rotation`` [rad] apart, over the pitch of the teeth, or over the revolution where
+    they have runout.
+    """
+    pitch = math.tau if cutter.runout[0] > 0.0 else math.tau / cutter.flutes
+    return max(math.ceil(pitch / rotation), 8)
+
+
+def loads_over_turn(
+    bites: ToothEngagement, cutter: Cutter, material: Material, rotation: float, left: ArrayLike
+) -> tuple[Floats, Floats]:
+    """(n, 15) mean, greatest and least force x, y, z [N] on the cutter in the frame of the work, greatest size of the
+    force, mean and greatest torque [N mm], 0, thickest chip [mm], greatest force against ``left`` [N]; and (n, 2)
+    rotations [rad] at which the size of the force and the torque are greatest.
+
+    Parameters
+    ----------
+    bites : of n steps, with frames
+    left : (n, 3) float
+    """
+    assert bites.frame is not None
+    away = np.ascontiguousarray(left, dtype=np.float64)
+    count = rotations(cutter, rotation)
+    alike = cutter.runout[0] == 0.0
+    teeth = cutter.flutes if alike else 1
+    if any(material.exponents) or (alike and bool((bites.tooth >= 0).any())):
+        out = _one_by_one(bites, cutter, material, count, away)
+    else:
+        out = np.empty((len(bites), COLUMNS + 2))
+        theta = np.arange(count * teeth) * (math.tau / (count * teeth))
+        table = np.vstack([np.cos(theta), np.sin(theta)])
+        _kernels.over_turn(
+            bites.start, bites.rows, bites.tooth, bites.slice, bites.slices, table, bites.frame, cutter.flutes, count,
+            alike, np.array(material.law), away, out,
+        )  # fmt: skip
+        mean, torque = mean_forces(bites, cutter, material)
+        out[:, :3] = in_work(mean, bites.frame)
+        out[:, 10] = torque
+    return out[:, :COLUMNS], out[:, COLUMNS:] * (math.tau / teeth / count)
+
+
+def _one_by_one(bites: ToothEngagement, cutter: Cutter, material: Material, count: int, left: Floats) -> Floats:
+    """(n, 17) the same by the loads at each rotation, for any law; the last two are numbers of rotations."""
+    assert bites.frame is not None
+    pitch = math.tau if cutter.runout[0] > 0.0 else math.tau / cutter.flutes
+    force, torque = forces_over_turn(bites, cutter, material, np.arange(count) * (pitch / count))
+    mean, torque_mean = mean_forces(bites, cutter, material)
+    turned, size = in_work(force, bites.frame), np.linalg.norm(force, axis=2)
+    return np.column_stack(
+        [
+            in_work(mean, bites.frame),
+            turned.max(axis=1),
+            turned.min(axis=1),
+            size.max(axis=1),
+            torque_mean,
+            torque.max(axis=1),
+            np.zeros(len(bites)),
+            bites.chip_max(),
+            -np.einsum("nmi,ni->nm", turned, left).min(axis=1).clip(None, 0.0),
+            size.argmax(axis=1),
+            torque.argmax(axis=1),
+        ]
+    )

@@ -1,0 +1,214 @@
+"""What the bending cutter leaves on the wall, or takes too much of.
+
+Notation: phi immersion, theta rotation, bites as in :mod:`chipload.engagement.tooth_engagement`; z [mm] height above
+the tip;
+C(z', z) [mm/N] the beam's compliance; e(z) [mm] error of the wall, positive where material is left on it (the cutter
+was pushed away), negative where it is cut away.
+
+A tooth makes the wall at height z at the moment when its edge passes there at phi = 0 (up milling) or pi (down
+milling), that is at theta = phi_wall + z tan(helix) / R. The load of all teeth at that moment bends the cutter:
+
+    e(z) = integral over z' of f_n(z') [C(z', z) + c_w] dz',
+
+f_n(z') the force on the cutter for each mm of depth, along the normal of the wall and away from it, each slice with its
+own height; c_w a compliance of the work normal to the wall. With zero helix and down milling h = 0 where the wall is
+made, so that the edge force alone shows. With runout the wall is made by the tooth of greatest radius, which takes its
+excess r_j - R away: e(z) lessened by it.
+
+The load is that of the rigid model: bending does not thin the chip. A straight flank only: another bite is refused.
+
+Reference: [Uddin2007]; [Altintas2012] ch. 2.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutter.slices import edge_lag
+from chipload.cutting.bending import _kernels
+from chipload.cutting.force import Spindle
+from chipload.cutting.material import Material
+from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs, tooth_radii
+from chipload.errors import InputError
+from chipload.structure.beam import flexibilities
+
+Floats = NDArray[np.float64]
+Milling = Literal["up", "down"]
+
+#: how near to 0 or pi an engaged arc must come to make the wall [rad]
+REACH = 1e-3
+
+
+def _wall_immersion(milling: Milling) -> float:
+    """Immersion where the wall is made [rad], counted in the sense of the spindle."""
+    if milling not in ("up", "down"):
+        raise InputError(f"milling = {milling!r}: must be up or down")
+    return 0.0 if milling == "up" else math.pi
+
+
+def _makes_wall(bites: ToothEngagement, phi_wall: float, reach: float) -> NDArray[np.bool_]:
+    """Whether a bite of the step comes within ``reach`` of the wall, (n,) bool."""
+    made = np.zeros(len(bites), dtype=np.bool_)
+    near = np.abs(bites.rows[:, 0 if phi_wall == 0.0 else 1] - phi_wall) <= reach
+    np.logical_or.at(made, np.repeat(np.arange(len(bites)), np.diff(bites.start)), near)
+    return made
+
+
+def _straight(bites: ToothEngagement, cutter: Cutter) -> Floats:
+    """Rows with heights in place of lengths along the profile, (b, 7); other bites than a straight flank's refused."""
+    own = bites.slices[bites.slice]
+    bad = np.flatnonzero(~((np.abs(own[:, 3] - 1.0) <= 1e-12) & (np.abs(own[:, 1] - cutter.radius) <= 1e-9)))
+    if len(bad):
+        raise InputError(
+            f"bites: row {bad[0]}: rho = {own[bad[0], 1]:g} mm, sin(kappa) = {own[bad[0], 3]:g}: the wall's error is "
+            f"known for a straight flank only, rho = {cutter.radius:g} mm and sin(kappa) = 1"
+        )
+    rows = bites.rows.copy()
+    rows[:, 2:4] += (own[:, 2] - own[:, 0])[:, None]
+    return rows
+
+
+def _beam(cutter: Cutter, fluted_factor: float | None) -> Floats:
+    """Overhang, flute length and the two flexibilities, as the kernels take them."""
+    return np.array([cutter.overhang, cutter.flute_length, *flexibilities(cutter, fluted_factor)])
+
+
+def _check_work(work_compliance: float) -> None:
+    if not 0.0 <= work_compliance < math.inf:
+        raise InputError(f"work_compliance = {work_compliance:g} mm/N: must be at least 0 (0 is rigid)")
+
+
+def wall_profile(
+    bites: ToothEngagement,
+    cutter: Cutter,
+    material: Material,
+    z: ArrayLike,
+    *,
+    milling: Milling,
+    work_compliance: float = 0.0,
+    fluted_factor: float | None = None,
+    reach: float = REACH,
+) -> Floats:
+    """Error of the wall over its height, for every step.
+
+    Parameters
+    ----------
+    bites : of n steps
+    cutter, material : as for the force
+    z : (p,) float [mm], heights above the tip, 0 .. overhang
+    milling : ``up`` or ``down``: which wall
+    work_compliance : c_w [mm/N], of the work normal to the wall, the same at every height; 0: rigid
+    fluted_factor : see :func:`chipload.structure.beam.compliance`
+    reach : [rad], how near to the wall the engaged arc must come
+
+    Returns
+    -------
+    (n, p) float [mm], positive where material is left; 0 for a step that makes no wall.
+    """
+    heights = np.ascontiguousarray(z, dtype=np.float64)
+    if heights.ndim != 1 or not ((heights >= 0.0) & (heights <= cutter.overhang)).all():
+        raise InputError(f"z: must be heights from 0 to cutter.overhang_mm = {cutter.overhang:g}")
+    _check_work(work_compliance)
+    phi_wall = _wall_immersion(milling)
+    out = np.zeros((len(bites), len(heights)))
+    _kernels.wall_profiles(
+        bites.start,
+        _straight(bites, cutter),
+        bites.tooth,
+        phi_wall,
+        edge_lag(cutter),
+        cutter.flutes,
+        tooth_radii(cutter),
+        np.array(material.law),
+        heights,
+        _beam(cutter, fluted_factor),
+        work_compliance,
+        _makes_wall(bites, phi_wall, reach),
+        out,
+    )
+    return out
+
+
+def wall_error_along(
+    phi_in: ArrayLike,
+    phi_out: ArrayLike,
+    feed_per_tooth: ArrayLike,
+    cutter: Cutter,
+    material: Material,
+    axial_depth: float,
+    *,
+    milling: Milling,
+    spindle: Spindle = "cw",
+    count: ArrayLike | None = None,
+    heights: int = 17,
+    work_compliance: float = 0.0,
+    fluted_factor: float | None = None,
+    reach: float = REACH,
+) -> dict[str, NDArray[Any]]:
+    """Error of the wall of greatest size over the depth, for every step of a pass.
+
+    Parameters
+    ----------
+    phi_in, phi_out, feed_per_tooth, cutter, material, axial_depth, spindle, count
+        as :func:`chipload.cutting.force.forces_along`
+    milling : ``up`` or ``down``: which wall
+    heights : samples over the depth, besides those where a tooth enters or leaves; the greatest is refined between
+    work_compliance, fluted_factor, reach : as :func:`wall_profile`
+
+    Returns
+    -------
+    columns, (n,) each
+        ``form_error_um`` float, the greatest |e(z)|; ``form_error_signed_um`` float, that value with its sign
+        (positive: material is left); ``error_z_mm`` float, its height; ``wall_made`` bool, False where no tooth
+        reaches the wall and the others are 0.
+
+    Examples
+    --------
+    No helix, down milling: the edge force alone, Kre * depth = 10 * 0.01 N near the tip of a bar with l^3/(3 E I).
+
+    >>> bar = Cutter(10.0, 2, 0.0, 30.0, 30.0, 6e5)
+    >>> plain = Material("plain", 1000.0, 300.0, 0.0, 0.0, 10.0, 0.0, source="made up for this example")
+    >>> wall = wall_error_along([2.9], [math.pi], 0.05, bar, plain, 0.01, milling="down", fluted_factor=1.0)
+    >>> float(wall["form_error_um"][0].round(4)), round(0.1 * 30.5577e-3, 4)
+    (0.0031, 0.0031)
+    """
+    if spindle not in ("cw", "ccw"):
+        raise InputError(f"spindle = {spindle!r}: must be cw or ccw")
+    if heights < 3:
+        raise InputError(f"heights = {heights}: must be at least 3")
+    _check_work(work_compliance)
+    phi_wall = _wall_immersion(milling)
+    bites = engagement_of_arcs(
+        phi_in, phi_out, feed_per_tooth, cutter, axial_depth, count=count, clockwise=spindle == "cw"
+    )
+    made = _makes_wall(bites, phi_wall, reach)
+    out = np.zeros((len(bites), 2))
+    _kernels.wall_worst(
+        bites.start,
+        bites.rows,
+        bites.tooth,
+        bites.slice,
+        bites.slices,
+        phi_wall,
+        edge_lag(cutter),
+        cutter.flutes,
+        tooth_radii(cutter),
+        np.array(material.law),
+        heights,
+        axial_depth,
+        _beam(cutter, fluted_factor),
+        work_compliance,
+        made,
+        out,
+    )
+    return {
+        "form_error_um": 1000.0 * np.abs(out[:, 0]),
+        "form_error_signed_um": 1000.0 * out[:, 0],
+        "error_z_mm": out[:, 1],
+        "wall_made": made,
+    }

@@ -1,0 +1,70 @@
+"""How far a step engages: height of the contact, feed per tooth, radial depth, from what the teeth cut.
+
+Notation as in :mod:`chipload.engagement.tooth_engagement`: a bite from phi p to q, s a to b, with the chip thickness
+h = along sin(phi) + across cos(phi) + offset; kappa the angle of the profile. The feed per tooth has the parts
+hypot(along, across) / sin(kappa) across the axis and offset / cos(kappa) along it. Where the feed is not normal to a
+surface of the cutter, that surface says nothing of it; the greatest over the bites is taken.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.engagement.tooth_engagement import ToothEngagement
+
+Floats = NDArray[np.float64]
+
+#: a sine or cosine of kappa below which a surface says nothing of that part of the feed
+FLAT = 1e-3
+
+
+def contact_height(bites: ToothEngagement) -> Floats:
+    """Height of the highest point of the edge that cuts above the tip, (n,) [mm]; 0 where nothing is cut."""
+    s0, _, z0, sine = bites.slices[bites.slice, :4].T
+    return _greatest(bites, z0 + sine * (bites.rows[:, 3] - s0))
+
+
+def tooth_feed(bites: ToothEngagement) -> Floats:
+    """Feed per tooth, (n,) [mm], of bites without runout; 0 where nothing is cut.
+
+    Examples
+    --------
+    >>> import math
+    >>> from chipload.cutter.cutter import Cutter
+    >>> from chipload.engagement.tooth_engagement import engagement_of_arcs
+    >>> slot = engagement_of_arcs([0.0], [math.pi], 0.1, Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5), 2.0)
+    >>> tooth_feed(slot).tolist(), radial_depth(slot).round(9).tolist(), contact_height(slot).tolist()
+    ([0.1], [10.0], [2.0])
+    """
+    sine, cosine = np.abs(bites.slices[bites.slice, 3:5].T)
+    along, offset, across = bites.rows[:, 4:].T
+    lateral = np.divide(np.hypot(along, across), sine, out=np.zeros(len(sine)), where=sine > FLAT)
+    axial = np.divide(np.abs(offset), cosine, out=np.zeros(len(sine)), where=cosine > FLAT)
+    return np.hypot(_greatest(bites, lateral), _greatest(bites, axial))
+
+
+def radial_depth(bites: ToothEngagement) -> Floats:
+    """Width of the contact across the feed, (n,) [mm]: of all bites, seen along T; 0 where nothing is cut."""
+    p, q = bites.rows[:, :2].T
+    rho = bites.slices[bites.slice, 1]
+    # across = rho cos(phi): its ends, and its extremes at 0 (or 2 pi) and pi where the arc holds them
+    ends = rho * np.cos([p, q])
+    high, low = ends.max(axis=0, initial=-np.inf), ends.min(axis=0, initial=np.inf)
+    high = np.where((q >= 2.0 * np.pi) | (p == 0.0), rho, high)
+    low = np.where(((p <= np.pi) & (q >= np.pi)) | (q >= 3.0 * np.pi), -rho, low)
+    top, bottom = np.full(len(bites), -np.inf), np.full(len(bites), np.inf)
+    owner = _owner(bites)
+    np.maximum.at(top, owner, high)
+    np.minimum.at(bottom, owner, low)
+    return np.asarray(np.where(np.isfinite(top), top - bottom, 0.0))
+
+
+def _owner(bites: ToothEngagement) -> NDArray[np.int64]:
+    return np.repeat(np.arange(len(bites)), np.diff(bites.start))
+
+
+def _greatest(bites: ToothEngagement, values: Floats) -> Floats:
+    out = np.zeros(len(bites))
+    np.maximum.at(out, _owner(bites), values)
+    return out

@@ -1,0 +1,356 @@
+"""Compiled loops of swept volumes and of the index of moves; arrays and scalars only.
+
+Notation: a move is a row (x, y, z, ux, uy, uz) of the tip at its start and of what it goes [mm]; a cutter is a row of
+:func:`chipload.engagement.moves.stock.cutter_rows`; g(rho) [mm] is the height of the cutter's surface above its tip at
+the distance rho from its axis. The axis stands along z. With d(t) the distance of a point (x, y, z) from the axis and
+w(t) its height above the tip at the time t, the point was swept if F(t) = g(d(t)) - w(t) is below 0 somewhere in 0..1;
+g rises and is convex, so that F is convex. A cell of the index is a square of the plan: above ``ceil`` is air, from
+``base`` to ``floor`` is material, between them the moves kept in the cell and the initial stock decide.
+Oracles: minimum of F over many t, height field, in tests/engagement/moves.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+#: a point this near to a swept volume counts as swept [mm]: rounding, so that a second pass removes nothing
+EPS = 1e-8
+#: columns of a cutter: kind, corner radius r, e, f, tan(alpha), tan(beta), end of bottom (rho, z), end of corner
+#: (rho, z), greatest radius, flute length
+KIND, CORNER, E, F, TA, TB, RHO1, Z1, RHO2, Z2, WIDE, FLUTE = range(12)
+BALL, FLAT = 0.0, 1.0
+#: what a point is in beside the number of a move that swept it
+MATERIAL, AIR = -2, -1
+#: a list is gone through for moves that no longer count when it is this much longer than after the last time
+SLACK = 8
+
+_F1, _F2, _I2 = "float64[::1]", "float64[:,::1]", "int64[:,::1]"
+
+
+@njit(cache=True, nogil=True)
+def profile(c, rho):
+    """g(rho): height of the cutter's surface above its tip; infinite beyond its greatest radius."""
+    if rho <= c[RHO1]:
+        return rho * c[TA]
+    if rho <= c[RHO2]:
+        gap = c[CORNER] * c[CORNER] - (rho - c[E]) ** 2
+        return c[F] - (math.sqrt(gap) if gap > 0.0 else 0.0)
+    if rho <= c[WIDE] and c[TB] > 0.0:
+        return c[Z2] + (rho - c[RHO2]) / c[TB]
+    return math.inf
+
+
+@njit(cache=True, nogil=True)
+def slope(c, rho):
+    """g'(rho); infinite where the surface is upright."""
+    if rho <= c[RHO1]:
+        return c[TA]
+    if rho < c[RHO2]:
+        gap = c[CORNER] * c[CORNER] - (rho - c[E]) ** 2
+        return (rho - c[E]) / math.sqrt(gap) if gap > 0.0 else math.inf
+    return 1.0 / c[TB] if c[TB] > 0.0 else math.inf
+
+
+@njit(cache=True, nogil=True)
+def within(qx, qy, ux, uy, h2, along, radius):
+    """Part of 0..1 in which the axis is nearer than ``radius`` to a point: its ends, the first above the second where
+    it never is.
+    """
+    c = qx * qx + qy * qy - radius * radius
+    if h2 == 0.0:
+        return (0.0, 1.0) if c < 0.0 else (1.0, 0.0)
+    disc = along * along - h2 * c
+    if disc <= 0.0:
+        return 1.0, 0.0
+    root = math.sqrt(disc)
+    return max((along - root) / h2, 0.0), min((along + root) / h2, 1.0)
+
+
+@njit(cache=True, nogil=True)
+def swept(m, c, x, y, z):
+    """Whether a point is in the volume that a move sweeps."""
+    qx = x - m[0]
+    qy = y - m[1]
+    w = z - m[2]
+    ux = m[3]
+    uy = m[4]
+    uz = m[5]
+    h2 = ux * ux + uy * uy
+    along = qx * ux + qy * uy
+    if c[KIND] == BALL:
+        w -= c[CORNER]
+        far = (c[CORNER] + EPS) ** 2
+        l2 = h2 + uz * uz
+        t = (along + w * uz) / l2 if l2 > 0.0 else 0.0
+        t = min(max(t, 0.0), 1.0)
+        dx = qx - t * ux
+        dy = qy - t * uy
+        dz = w - t * uz
+        if dx * dx + dy * dy + dz * dz < far:
+            return True
+        if w < min(0.0, uz):
+            return False
+        t = along / h2 if h2 > 0.0 else (0.0 if uz > 0.0 else 1.0)
+        t = min(max(t, 0.0), 1.0)
+        dx = qx - t * ux
+        dy = qy - t * uy
+        return dx * dx + dy * dy < far and w > t * uz - EPS
+    if h2 == 0.0 or uz == 0.0:
+        t = along / h2 if h2 > 0.0 else 0.0
+        t = min(max(t, 0.0), 1.0)
+        dx = qx - t * ux
+        dy = qy - t * uy
+        rho = max(math.sqrt(dx * dx + dy * dy) - EPS, 0.0)
+        return profile(c, rho) < w - min(uz, 0.0) + EPS
+    first, last = within(qx, qy, ux, uy, h2, along, c[WIDE] + EPS)
+    if first > last:
+        return False
+    if c[KIND] == FLAT:
+        return w - (first if uz > 0.0 else last) * uz + EPS > 0.0
+    return below(c, qx, qy, w + EPS, ux, uy, uz, h2, along, first, last)
+
+
+@njit(cache=True, nogil=True)
+def below(c, qx, qy, w, ux, uy, uz, h2, along, first, last):
+    """Whether the convex F is below 0 somewhere between two times: tangents from both ends bound it from below."""
+    value = np.empty(2)
+    rate = np.empty(2)
+    ends = (first, last)
+    for i in range(2):
+        t = ends[i]
+        rho = min(max(math.hypot(qx - t * ux, qy - t * uy) - EPS, 0.0), c[WIDE])
+        value[i] = profile(c, rho) - w + t * uz
+        if value[i] < 0.0:
+            return True
+        turn = (t * h2 - along) / rho if rho > EPS else 0.0
+        rate[i] = uz if turn == 0.0 else slope(c, rho) * turn + uz
+    if rate[0] >= 0.0 or rate[1] <= 0.0:
+        return False
+    for n in range(80):
+        t = 0.5 * (first + last)
+        fall = rate[1] - rate[0]
+        if fall < math.inf and n % 3 < 2:
+            t = (value[0] - value[1] + rate[1] * last - rate[0] * first) / fall
+            if value[0] + rate[0] * (t - first) >= 0.0:
+                return False
+            if not first < t < last:
+                t = 0.5 * (first + last)
+        if not first < t < last:
+            return False
+        rho = min(max(math.hypot(qx - t * ux, qy - t * uy) - EPS, 0.0), c[WIDE])
+        v = profile(c, rho) - w + t * uz
+        if v < 0.0:
+            return True
+        turn = (t * h2 - along) / rho if rho > EPS else 0.0
+        r = uz if turn == 0.0 else slope(c, rho) * turn + uz
+        if r == 0.0:
+            return False
+        if r < 0.0:
+            first = t
+            value[0] = v
+            rate[0] = r
+        else:
+            last = t
+            value[1] = v
+            rate[1] = r
+    return False
+
+
+@njit(cache=True, nogil=True)
+def in_solid(x, y, z, low, high, first, ids, faces, cell):
+    """Whether a point is in the initial stock: the block, or the mesh by what a ray along +z meets in its cell."""
+    if len(faces) == 0:
+        return low[0] <= x <= high[0] and low[1] <= y <= high[1] and low[2] <= z < high[2]
+    odd = False
+    for k in range(first[cell], first[cell + 1]):
+        f = faces[ids[k]]
+        over = False
+        for i in range(3):
+            a = 3 * i
+            b = 3 * ((i + 1) % 3)
+            if (f[a + 1] > y) != (f[b + 1] > y):
+                # the same edge in the same order in both of its faces
+                if f[a + 1] > f[b + 1]:
+                    a, b = b, a
+                if f[a] + (y - f[a + 1]) / (f[b + 1] - f[a + 1]) * (f[b] - f[a]) > x:
+                    over = not over
+        if over and f[2] - (f[9] * (x - f[0]) + f[10] * (y - f[1])) / f[11] > z:
+            odd = not odd
+    return odd
+
+
+@njit(cache=True, nogil=True)
+def place(x, y, grid, shape):
+    """The cell of a point, -1 outside the index."""
+    i = math.floor((x - grid[0]) / grid[2])
+    j = math.floor((y - grid[1]) / grid[3])
+    # a point on the far border is in the last cell
+    if i == shape[0] and x <= grid[0] + grid[2] * shape[0]:
+        i -= 1
+    if j == shape[1] and y <= grid[1] + grid[3] * shape[1]:
+        j -= 1
+    if i < 0 or j < 0 or i >= shape[0] or j >= shape[1]:
+        return -1
+    return i * shape[1] + j
+
+
+@njit(cache=True, nogil=True)
+def what_is(x, y, z, index, hint):
+    """MATERIAL, AIR, or the number of a move that swept the point; ``hint`` is asked first.
+
+    ``index``: grid, shape, level, list_at, kept, reach, moves, cutter of each, cutters, and of the initial stock low,
+    high, first, ids, faces.
+    """
+    level = index[2]
+    cell = place(x, y, index[0], index[1])
+    if cell < 0 or z >= level[cell, 1] - EPS:
+        return AIR
+    if level[cell, 2] <= z < level[cell, 0] - EPS:
+        return MATERIAL
+    moves = index[6]
+    of = index[7]
+    cutters = index[8]
+    if hint >= 0 and swept(moves[hint], cutters[of[hint]], x, y, z):
+        return hint
+    kept = index[4]
+    reach = index[5]
+    at = index[3][cell, 0]
+    for k in range(at + index[3][cell, 1] - 1, at - 1, -1):
+        if z > reach[k] - EPS:
+            e = kept[k]
+            if e != hint and swept(moves[e], cutters[of[e]], x, y, z):
+                return e
+    return MATERIAL if in_solid(x, y, z, index[9], index[10], index[11], index[12], index[13], cell) else AIR
+
+
+@njit(cache=True, nogil=True)
+def keep(q, m, c, grid, shape, level, list_at, kept, reach, used):
+    """Enter a move into the cells that it may shape; False where ``kept`` has no room: then call again."""
+    gx = grid[2]
+    gy = grid[3]
+    half = 0.5 * math.hypot(gx, gy)
+    ux = m[3]
+    uy = m[4]
+    uz = m[5]
+    h2 = ux * ux + uy * uy
+    length = math.sqrt(h2)
+    wide = c[WIDE]
+    far = wide + half
+    lowest = m[2] + min(uz, 0.0)
+    j0 = max(0, math.floor((m[1] + min(uy, 0.0) - wide - grid[1]) / gy))
+    j1 = min(shape[1] - 1, math.floor((m[1] + max(uy, 0.0) + wide - grid[1]) / gy))
+    i0 = max(0, math.floor((m[0] + min(ux, 0.0) - wide - grid[0]) / gx))
+    i1 = min(shape[0] - 1, math.floor((m[0] + max(ux, 0.0) + wide - grid[0]) / gx))
+    spread = far / length if length > 0.0 else 1.0
+    for i in range(i0, i1 + 1):
+        qx = grid[0] + (i + 0.5) * gx - m[0]
+        aside = max(min(ux, 0.0) - qx, qx - max(ux, 0.0), 0.0)
+        if aside >= far:
+            continue
+        room = math.sqrt(far * far - aside * aside)
+        a = max(j0, math.floor((m[1] + min(uy, 0.0) - room - grid[1]) / gy))
+        b = min(j1, math.floor((m[1] + max(uy, 0.0) + room - grid[1]) / gy))
+        if ux != 0.0:
+            # the part of the move near this row of cells
+            t0 = (qx - far) / ux
+            t1 = (qx + far) / ux
+            if t0 > t1:
+                t0, t1 = t1, t0
+            t0 = min(max(t0, 0.0), 1.0)
+            t1 = min(max(t1, 0.0), 1.0)
+            y0 = m[1] + min(t0 * uy, t1 * uy) - room
+            y1 = m[1] + max(t0 * uy, t1 * uy) + room
+            a = max(a, math.floor((y0 - grid[1]) / gy))
+            b = min(b, math.floor((y1 - grid[1]) / gy))
+        for j in range(a, b + 1):
+            cell = i * shape[1] + j
+            if level[cell, 1] <= lowest:
+                continue
+            qy = grid[1] + (j + 0.5) * gy - m[1]
+            t = (qx * ux + qy * uy) / h2 if h2 > 0.0 else (0.0 if uz > 0.0 else 1.0)
+            t = min(max(t, 0.0), 1.0)
+            d2 = (qx - t * ux) ** 2 + (qy - t * uy) ** 2
+            if d2 >= far * far:
+                continue
+            d = math.sqrt(d2)
+            bottom = m[2] + t * uz
+            least = lowest
+            if uz != 0.0 and h2 > 0.0:
+                s = max(t - spread, 0.0) if uz > 0.0 else min(t + spread, 1.0)
+                least = m[2] + s * uz
+            least += profile(c, max(d - half, 0.0))
+            if least >= level[cell, 1]:
+                continue
+            if least < level[cell, 0]:
+                level[cell, 0] = least
+            most = bottom + profile(c, d + half)
+            if most < level[cell, 1]:
+                level[cell, 1] = most
+                if level[cell, 0] >= most:
+                    # level floor: nothing in the cell reaches below it
+                    list_at[cell, 1] = 0
+                    list_at[cell, 3] = 0
+                if least >= most:
+                    continue
+            at = list_at[cell, 0]
+            count = list_at[cell, 1]
+            if count > 0 and kept[at + count - 1] == q:
+                continue
+            if count == list_at[cell, 2] or count >= 2 * list_at[cell, 3] + SLACK:
+                count = thinned(at, count, level[cell, 1], kept, reach)
+                list_at[cell, 1] = count
+                list_at[cell, 3] = count
+            if count == list_at[cell, 2]:
+                size = max(2 * count, 4)
+                if used[0] + size > len(kept):
+                    return False
+                to = used[0]
+                for k in range(count):
+                    kept[to + k] = kept[at + k]
+                    reach[to + k] = reach[at + k]
+                used[0] += size
+                list_at[cell, 0] = to
+                list_at[cell, 2] = size
+                at = to
+            kept[at + count] = q
+            reach[at + count] = least
+            list_at[cell, 1] = count + 1
+    return True
+
+
+@njit(cache=True, nogil=True)
+def thinned(at, count, ceil, kept, reach):
+    """Drop the moves of a list that do not come below ``ceil``; how many stay."""
+    to = at
+    for k in range(at, at + count):
+        if reach[k] < ceil:
+            kept[to] = kept[k]
+            reach[to] = reach[k]
+            to += 1
+    return to - at
+
+
+@njit(
+    f"int64({_I2}, int32[::1], {_F1}, int32[::1], {_F1}, {_F2})",
+    cache=True,
+    nogil=True,
+)
+def packed(list_at, kept, reach, new_kept, new_reach, level):
+    """Copy the lists close together into new arrays; the room that they take."""
+    used = 0
+    for cell in range(len(list_at)):
+        at = list_at[cell, 0]
+        count = thinned(at, list_at[cell, 1], level[cell, 1], kept, reach)
+        for k in range(count):
+            new_kept[used + k] = kept[at + k]
+            new_reach[used + k] = reach[at + k]
+        room = 0 if count == 0 else count + count // 2 + 2
+        list_at[cell, 0] = used
+        list_at[cell, 1] = count
+        list_at[cell, 2] = room
+        list_at[cell, 3] = count
+        used += room
+    return used

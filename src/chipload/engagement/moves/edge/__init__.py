@@ -1,0 +1,1 @@
+"""Slices of the part of the edge that may be in material."""

@@ -1,0 +1,1 @@
+"""Compiled search of the engaged part of the cutting edge."""

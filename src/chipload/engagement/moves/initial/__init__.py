@@ -1,0 +1,1 @@
+"""Compiled loops over the faces of the initial body."""

@@ -1,0 +1,1 @@
+"""Compiled outlines of what moves swept at a height."""

@@ -1,0 +1,146 @@
+"""Compiled outlines of what moves swept at a height; arrays and scalars only.
+
+Notation: nodes (i, j) of a net over the plan, the outermost beside the body and not swept; a border lies on the side of
+a square between two nodes of which one was swept, at the point where that changes. Side 2 (i m + j) goes from node
+(i, j) to (i + 1, j), the one after it to (i, j + 1); m nodes in y. The swept area is left of the outline.
+Oracle: shapely unions of the swept sections, in tests/engagement/moves.
+"""
+
+from __future__ import annotations
+
+from numba import njit, types
+
+from chipload.engagement.moves._kernels import place, swept
+from chipload.engagement.moves.front._kernels import INDEX
+
+#: halvings of a side
+HALVINGS = 14
+
+
+@njit(cache=True, nogil=True)
+def was_swept(x, y, z, index, tops):
+    """Whether a move swept a point of the body's box."""
+    cell = place(x, y, index[0], index[1])
+    if cell < 0:
+        return False
+    ceil = index[2][cell, 1]
+    if z >= ceil:
+        return ceil < tops[cell]
+    at = index[3][cell, 0]
+    for k in range(at + index[3][cell, 1] - 1, at - 1, -1):
+        e = index[4][k]
+        if z > index[5][k] and swept(index[6][e], index[8][index[7][e]], x, y, z):
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def turning(case):
+    """Sides (from, to) of a square that its outlines go through: bottom 0, right 1, top 2, left 3; -1: none. Bits of
+    ``case``: corners (0, 0), (1, 0), (1, 1), (0, 1).
+    """
+    a = -1
+    b = -1
+    c = -1
+    d = -1
+    if case == 1:
+        a, b = 0, 3
+    elif case == 2:
+        a, b = 1, 0
+    elif case == 3:
+        a, b = 1, 3
+    elif case == 4:
+        a, b = 2, 1
+    elif case == 5:
+        a, b, c, d = 0, 3, 2, 1
+    elif case == 6:
+        a, b = 2, 0
+    elif case == 7:
+        a, b = 2, 3
+    elif case == 8:
+        a, b = 3, 2
+    elif case == 9:
+        a, b = 0, 2
+    elif case == 10:
+        a, b, c, d = 1, 0, 3, 2
+    elif case == 11:
+        a, b = 1, 2
+    elif case == 12:
+        a, b = 3, 1
+    elif case == 13:
+        a, b = 0, 1
+    elif case == 14:
+        a, b = 3, 0
+    return a, b, c, d
+
+
+_F1, _F2, _I1 = types.float64[::1], types.float64[:, ::1], types.int64[::1]
+
+
+@njit(
+    types.int64(types.float64, _F1, _F1, INDEX, _F1, types.boolean[:, ::1], _I1, _F2, _I1),
+    cache=True,
+    nogil=True,
+)
+def outlines(z, xs, ys, index, tops, inside, onward, points, first):
+    """Rings around what was swept at a height: their points and where each begins; how many, -1 where there is no room.
+
+    ``xs``, ``ys``: nodes, the outermost beside the body; ``inside`` and ``onward`` room for a mark a node and a number
+    a side.
+    """
+    n = len(xs)
+    m = len(ys)
+    inside[:] = False
+    for i in range(1, n - 1):
+        for j in range(1, m - 1):
+            inside[i, j] = was_swept(xs[i], ys[j], z, index, tops)
+    onward[:] = -1
+    for i in range(n - 1):
+        for j in range(m - 1):
+            case = 1 * inside[i, j] + 2 * inside[i + 1, j] + 4 * inside[i + 1, j + 1] + 8 * inside[i, j + 1]
+            if case == 0 or case == 15:
+                continue
+            side = (2 * (i * m + j), 2 * ((i + 1) * m + j) + 1, 2 * (i * m + j + 1), 2 * (i * m + j) + 1)
+            a, b, c, d = turning(case)
+            onward[side[a]] = side[b]
+            if c >= 0:
+                onward[side[c]] = side[d]
+    rings = 0
+    count = 0
+    for begin in range(len(onward)):
+        if onward[begin] < 0:
+            continue
+        if rings + 1 == len(first):
+            return -1
+        first[rings] = count
+        at = begin
+        while onward[at] >= 0:
+            if count == len(points):
+                return -1
+            i = at // 2 // m
+            j = at // 2 % m
+            k = i + 1 - at % 2
+            l = j + at % 2
+            lx, ly, hx, hy = xs[i], ys[j], xs[k], ys[l]
+            if inside[k, l]:
+                lx, ly, hx, hy = hx, hy, lx, ly
+            # lx, ly was swept
+            border = i == 0 or j == 0 or k == n - 1 or l == m - 1
+            for _ in range(0 if border else HALVINGS):
+                x = 0.5 * (lx + hx)
+                y = 0.5 * (ly + hy)
+                if was_swept(x, y, z, index, tops):
+                    lx = x
+                    ly = y
+                else:
+                    hx = x
+                    hy = y
+            points[count, 0] = 0.5 * (lx + hx)
+            points[count, 1] = 0.5 * (ly + hy)
+            count += 1
+            to = onward[at]
+            onward[at] = -1
+            at = to
+        rings += 1
+        first[rings] = count
+    return rings

@@ -1,0 +1,287 @@
+"""The stock as the moves that cut it: an initial body less the volumes that earlier moves swept.
+
+Notation: as in :mod:`chipload.engagement.moves._kernels`. A cell of the index is ``CELL`` of the smallest cutter radius
+wide, or as much wider as memory asks for; it decides which moves are asked about a point and what that costs, not the
+answer. The axis stands along z; a cutter is open above: what lies above its flutes counts as swept, and a step with
+material there is reported.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+import trimesh
+from numpy.typing import NDArray
+from shapely import MultiPolygon
+
+from chipload.cutter.cutter import Cutter
+from chipload.engagement.moves import _kernels
+from chipload.engagement.moves.front import _kernels as front
+from chipload.engagement.moves.initial import _kernels as initial
+from chipload.engagement.moves.outline import _kernels as outline
+from chipload.stock.tile_grid import polygons
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: side of a cell over the smallest cutter radius, and most cells
+CELL, CELLS = 0.1, 4_000_000
+#: a step is looked at once every so many cutter radii, at its middle at least
+INSTANT = 0.25
+#: most nodes of the net of outlines
+NODES = 1_000_000
+
+
+def cutter_row(cutter: Cutter) -> Floats:
+    """(12,) kind, r, e, f, tan(alpha), tan(beta), rho and z at the end of the bottom and of the corner, greatest radius
+    and the flute length.
+
+    >>> cutter_row(Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=1.0)).round(9).tolist()
+    [2.0, 1.0, 4.0, 1.0, 0.0, 0.0, 4.0, 0.0, 5.0, 1.0, 5.0, 20.0]
+    """
+    _, r, e, f, alpha, beta, height = cutter.apt
+    tiny = 1e-9 * cutter.diameter
+    kind = 2.0
+    if alpha == 0.0 and beta == 0.0:
+        kind = 0.0 if e <= tiny else (1.0 if r <= tiny else 2.0)
+    if kind == 0.0:
+        r, e, f = cutter.radius, 0.0, cutter.radius
+    end, out = e + r * math.sin(alpha), e + r * math.cos(beta)
+    if beta == 0.0:
+        out = cutter.radius
+    wide = max(float(cutter.radius_at([height])[0]), out) if beta > 0.0 else out
+    heights = (f - r * math.cos(alpha), f - r * math.sin(beta))
+    row = [kind, r, e, f, math.tan(alpha), math.tan(beta), end, heights[0], out, heights[1], wide, height]
+    return np.array(row)
+
+
+@dataclass(frozen=True, eq=False)
+class Engaged:
+    """What some steps engage, an entry an instant that cuts.
+
+    Parameters
+    ----------
+    step, instant, instants : (m,) int, the step, which of its instants, and how many it has
+    start : (m + 1,) int, rows of each entry
+    span : (b, 2) float [rad], psi from and to, from the motion counter-clockwise
+    slice : (b,) int, row of ``slices``
+    slices : (k, 6) float: s from, s to, rho, z from, sin(kappa), cos(kappa)
+    volume : (m,) float [mm^3], of the step if it cut all over as at the instant
+    pieces : (m,) int, of the engaged surface
+    z : (m, 2) float [mm], least and greatest height of what is engaged
+    left : (m, 3) sum of the outward normals where the front leaves a surface, times their length along the edge [mm]
+    left_mm : (m,) float, that length
+    edge_mm : (m,) float, length of the profile that is engaged
+    above : (m,) bool, material above the flutes
+    """
+
+    step: Ints
+    instant: Ints
+    instants: Ints
+    start: Ints
+    span: Floats
+    slice: Ints
+    slices: Floats
+    volume: Floats
+    pieces: Ints
+    z: Floats
+    left: Floats
+    left_mm: Floats
+    edge_mm: Floats
+    above: NDArray[np.bool_]
+
+
+class MoveStock:
+    """An initial body and the moves that were made in it.
+
+    Parameters
+    ----------
+    low, high : (3,) float [mm], of the body
+    cutters : by tool number
+    body : closed mesh; None: the block from ``low`` to ``high``
+
+    Examples
+    --------
+    A slot of 10 x 2 mm, 1 mm of the way: 20 mm^3.
+
+    >>> mill = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5)
+    >>> stock = MoveStock(np.array([0.0, -20.0, -9.0]), np.array([40.0, 20.0, 0.0]), {1: mill})
+    >>> p = np.array([[-6.0, 0.0, -2.0], [10.0, 0.0, -2.0], [11.0, 0.0, -2.0]])
+    >>> found = stock.take(p[:-1], p[1:], np.array([1, 1]), corner_pieces=12, flank_mm={1: 9.0})
+    >>> float(found.volume[found.step == 1].round(6)[0])
+    20.0
+    """
+
+    def __init__(
+        self, low: Floats, high: Floats, cutters: Mapping[int, Cutter], body: trimesh.Trimesh | None = None
+    ) -> None:
+        self.low, self.high = np.array(low, dtype=np.float64), np.array(high, dtype=np.float64)
+        self.table = dict(cutters)
+        self.tools = {n: i for i, n in enumerate(sorted(cutters))}
+        self.cutters = np.array([cutter_row(cutters[n]) for n in self.tools])
+        size = self.high - self.low
+        side = max(CELL * float(self.cutters[:, 8].min()), math.sqrt(size[0] * size[1] / CELLS))
+        count = np.maximum(np.ceil(size[:2] / side - 1e-9), 1.0)
+        self.shape = count.astype(np.int64)
+        self.grid = np.array([*self.low[:2], *(size[:2] / count)])
+        cells = int(self.shape.prod())
+        self.level = np.empty((cells, 3))
+        self.level[:] = (self.high[2], self.high[2], self.low[2])
+        self.lists = np.zeros((cells, 4), dtype=np.int64)
+        self.kept, self.reach = np.empty(1 << 16, dtype=np.int32), np.empty(1 << 16)
+        self.used = np.zeros(1, dtype=np.int64)
+        self.moves, self.of, self.count = np.empty((1024, 6)), np.empty(1024, dtype=np.int64), 0
+        self.body = body
+        self.first, self.ids = np.zeros(cells + 1, dtype=np.int64), np.empty(0, dtype=np.int32)
+        self.faces = np.empty((0, 12))
+        if body is not None:
+            self._body(body)
+        self.tops = self.level[:, 1].copy()
+
+    def cropped(self, low: Floats, high: Floats) -> MoveStock | None:
+        """The initial body in a box, in which no move was made; None where it does not reach into it.
+
+        Parameters
+        ----------
+        low, high : (3,) float [mm], of the box; above and below it the body stays
+        """
+        a, b = self.low.copy(), self.high.copy()
+        a[:2], b[:2] = np.maximum(a[:2], low[:2]), np.minimum(b[:2], high[:2])
+        if not (a < b).all():
+            return None
+        return MoveStock(a, b, self.table, self.body)
+
+    def _body(self, body: trimesh.Trimesh) -> None:
+        """Faces over each cell, and what they leave open there."""
+        corners = np.asarray(body.vertices, dtype=np.float64)[np.asarray(body.faces)]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        seen = np.abs(normal[:, 2]) > 1e-12 * np.linalg.norm(normal, axis=1)
+        self.faces = np.ascontiguousarray(np.hstack([corners[seen].reshape(-1, 9), normal[seen]]))
+        initial.over(self.faces, self.grid, self.shape, self.first, self.ids)
+        self.ids = np.empty(int(self.first[-1]), dtype=np.int32)
+        initial.over(self.faces, self.grid, self.shape, self.first, self.ids)
+        initial.levels(self.faces, self.grid, self.shape, self.first, self.ids, self.level)
+
+    def _index(self) -> tuple[NDArray[np.generic], ...]:
+        body = (self.low, self.high, self.first, self.ids, self.faces)
+        lists = (self.level, self.lists, self.kept, self.reach)
+        return (self.grid, self.shape, *lists, self.moves, self.of, self.cutters, *body)
+
+    def _enter(self, p0: Floats, p1: Floats, tool: Ints) -> None:
+        while self.count + len(p0) > len(self.moves):
+            self.moves = np.concatenate([self.moves, np.empty_like(self.moves)])
+            self.of = np.concatenate([self.of, np.empty_like(self.of)])
+        end = self.count + len(p0)
+        self.moves[self.count : end] = np.hstack([p0, p1 - p0])
+        numbers, at = np.unique(tool, return_inverse=True)
+        self.of[self.count : end] = np.array([self.tools[n] for n in numbers.tolist()], dtype=np.int64)[at.ravel()]
+        self.count = end
+
+    def _grow(self) -> None:
+        """Twice the room for lists, less what is no longer needed."""
+        need = 2 * int(self.lists[:, 1].sum()) + 4 * len(self.kept) // 2
+        kept, reach = np.empty(need, dtype=np.int32), np.empty(need)
+        self.used[0] = _kernels.packed(self.lists, self.kept, self.reach, kept, reach, self.level)
+        self.kept, self.reach = kept, reach
+
+    def instants(self, p0: Floats, p1: Floats, tool: Ints) -> Ints:
+        """(n,) at how many times each step is looked at: an odd number, so that the middle is one of them."""
+        radius = np.array([self.cutters[self.tools[n], 8] for n in tool.tolist()]).reshape(len(p0))
+        length = np.linalg.norm(p1 - p0, axis=1)
+        more = np.maximum(0.5 * (length / (INSTANT * radius) - 1.0), 0.0)
+        return np.asarray(2 * np.ceil(more - 1e-9).astype(np.int64) + 1)
+
+    def skip(self, p0: Floats, p1: Floats, tool: Ints) -> None:
+        """Make steps without looking at what they cut."""
+        self._run(p0, p1, tool, np.zeros(len(p0), dtype=np.int64), 1, dict.fromkeys(self.tools, 1.0))
+
+    def take(self, p0: Floats, p1: Floats, tool: Ints, *, corner_pieces: int, flank_mm: Mapping[int, float]) -> Engaged:
+        """Make steps, one after the other, and find what each engages.
+
+        Parameters
+        ----------
+        p0, p1 : (n, 3) float [mm], tip at the start and the end of each
+        tool : (n,) int
+        corner_pieces : slices of the engaged part of a corner
+        flank_mm : longest slice of the flank by tool number [mm]
+        """
+        return self._run(p0, p1, tool, self.instants(p0, p1, tool), corner_pieces, flank_mm)
+
+    def _run(
+        self, p0: Floats, p1: Floats, tool: Ints, instants: Ints, pieces: int, flank_mm: Mapping[int, float]
+    ) -> Engaged:
+        begin = self.count
+        self._enter(p0, p1, tool)
+        u = p1 - p0
+        size = np.hypot(u[:, 0], u[:, 1])
+        upright = size <= 1e-12 * np.abs(u[:, 2])
+        frame = np.where(upright[:, None], [[1.0, 0.0]], u[:, :2] / np.where(upright, 1.0, size)[:, None])
+        frame = np.ascontiguousarray(frame)
+        flank = np.array([flank_mm[n] for n in self.tools])
+        many = 16 * max(int(instants.sum()), 1) + 256
+        slices, rows, owner = np.empty((many, 6)), np.empty((2 * many, 2)), np.empty(2 * many, dtype=np.int64)
+        entries = int(instants.sum()) + 1
+        entry, out = np.empty((entries, 3), dtype=np.int64), np.empty((entries, 10))
+        state = np.array([begin, 0, 0, 0, 0])
+        at = 0
+        while True:
+            at = int(
+                front.run(
+                    at, frame, instants, state, self._index(), pieces, flank, slices, rows, owner, entry, out, self.used
+                )
+            )
+            if at == len(p0):
+                break
+            if state[1] == 1:
+                self._grow()
+            else:
+                slices = np.concatenate([slices, np.empty_like(slices)])
+                rows, owner = np.concatenate([rows, np.empty_like(rows)]), np.concatenate([owner, np.empty_like(owner)])
+        _, _, b, k, m = state.tolist()
+        step, out = entry[:m, 0], out[:m]
+        return Engaged(
+            step.copy(), entry[:m, 1].copy(), instants[step], np.append(entry[:m, 2], b), rows[:b], owner[:b],
+            slices[:k], out[:, 0], out[:, 1].astype(np.int64), out[:, 2:4], out[:, 4:7], out[:, 7], out[:, 9],
+            out[:, 8] > 0.0,
+        )  # fmt: skip
+
+    def lowest(self) -> float:
+        """A height [mm] below which nothing was cut."""
+        cut = self.level[:, 1] > -math.inf
+        return float(np.where(cut, self.level[:, 0], math.inf).min()) if self.body is None else float(self.low[2])
+
+    def outlines(self, z: float, tolerance: float) -> MultiPolygon:
+        """What was swept at a height, within the box of the body and a little beyond.
+
+        Borders are found where they cross the sides of a net; between them they are chords, within ``tolerance`` of the
+        smallest cutter's circle unless the net would have more than ``NODES`` nodes. Corners are cut off by a chord.
+        ``tolerance`` [mm]: by which the outline is made simpler.
+        """
+        size = self.high[:2] - self.low[:2]
+        # chords of the smallest cutter's circle within the tolerance
+        pitch = min(float(self.grid[2:].min()), math.sqrt(8.0 * tolerance * float(self.cutters[:, 8].min())))
+        pitch = max(pitch, math.sqrt(size[0] * size[1] / NODES))
+        axes = []
+        for a, b in zip(self.low[:2], self.high[:2], strict=True):
+            inner = np.linspace(a, b, max(math.ceil((b - a) / pitch), 1) + 1)
+            axes.append(np.concatenate([[a - pitch], inner, [b + pitch]]))
+        xs, ys = axes
+        inside = np.empty((len(xs), len(ys)), dtype=np.bool_)
+        onward = np.empty(2 * inside.size, dtype=np.int64)
+        room = 4096
+        while True:
+            points, first = np.empty((room, 2)), np.empty(room, dtype=np.int64)
+            rings = int(outline.outlines(z, xs, ys, self._index(), self.tops, inside, onward, points, first))
+            if rings >= 0:
+                break
+            room *= 4
+        lines = [
+            np.vstack([points[a:b], points[a : a + 1]]) for a, b in itertools.pairwise(first[: rings + 1].tolist())
+        ]
+        area = shapely.build_area(shapely.GeometryCollection([shapely.LinearRing(line) for line in lines]))
+        return MultiPolygon(polygons(shapely.make_valid(shapely.simplify(area, tolerance))))

@@ -1,0 +1,245 @@
+"""What each tooth cuts, from where to where, how thick: the one interface between engagement and force.
+
+Notation: A the cutter's axis from the tip to the holder; T unit direction normal to A, that of the feed where the feed
+is normal to the axis; n = Rot(+90 deg about A) T, mirrored where the spindle runs counter-clockwise; phi [rad]
+immersion, counted in the sense of the spindle from n, so that pi/2 is T (up milling 0 .. a, down milling pi - a .. pi);
+u = cos(phi) n + sin(phi) T the radial direction; s [mm] along the cutter's profile and kappa the angle of its outward
+normal nu = sin(kappa) u - cos(kappa) A with the downward axis, as in :mod:`chipload.cutter.slices`; f_z [mm] feed per
+tooth; N teeth; j tooth, each a pitch 2 pi / N behind the one before it; r_j = R + e cos(lambda - 2 pi j / N) its radius
+with the runout (e, lambda), lambda counted from tooth 0 towards tooth 1; h [mm] chip thickness along nu.
+
+A bite is a range of immersion and of the profile in which h = along sin(phi) + across cos(phi) + offset, at least 0. A
+motion f a tooth of the point on the edge gives along = sin(kappa) f.T, across = sin(kappa) f.n and
+offset = -cos(kappa) f.A: a plunge is an offset on the bottom.
+
+Reference: [Altintas2012] ch. 2 for h = f_z sin(phi); [Kline1983] for runout: a tooth cuts what the N teeth before it
+left over, h_j = min over m = 1 .. N of m h + (r_j - r_(j-m)) sin(kappa), where positive; else it does not touch.
+Differs from source: the phase of the offset does not lag with the helix, a tooth has one radius over its depth.
+The volume a revolution removes does not depend on runout: sum over j of h_j = N h.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutter.slices import edge_lag
+from chipload.engagement import _kernels
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: how far beyond its range an end of an arc or of a bite may lie [rad]; rounding, not a setting
+_SLACK = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class ToothEngagement:
+    """Tooth engagement of n steps, sorted by step.
+
+    Parameters
+    ----------
+    start : (n + 1,) int; the bites of step i are the rows start[i] .. start[i + 1] - 1
+    rows : (b, 7) float: phi from, phi to [rad; 0 <= from <= 2 pi, from <= to <= from + 2 pi], s from, s to [mm], along,
+        offset, across [mm]; those of one tooth at one place of the profile are disjoint; h >= 0 in each
+    tooth : (b,) int; which tooth; -1: every tooth
+    slice : (b,) int; the row of ``slices`` in which the bite's s lies
+    slices : (k, 7) float: s from [mm], rho [mm], z at s from [mm], sin(kappa), cos(kappa), lag at s from [rad], rate of
+        the lag [rad/mm]; ``Slices.columns``
+    frame : (n, 3, 3) float: rows T, n, A in the frame of the work; None: nobody asks
+    """
+
+    start: Ints
+    rows: Floats
+    tooth: Ints
+    slice: Ints
+    slices: Floats
+    frame: Floats | None = None
+
+    def __post_init__(self) -> None:
+        start = np.ascontiguousarray(self.start, dtype=np.int64)
+        rows = np.ascontiguousarray(self.rows, dtype=np.float64)
+        tooth = np.ascontiguousarray(self.tooth, dtype=np.int64)
+        piece = np.ascontiguousarray(self.slice, dtype=np.int64)
+        slices = np.ascontiguousarray(self.slices, dtype=np.float64)
+        if rows.ndim != 2 or rows.shape[1] != 7 or not np.isfinite(rows).all():
+            raise InputError(f"bites: rows of shape {rows.shape}: need (b, 7) finite numbers")
+        if slices.ndim != 2 or slices.shape[1] != 7 or not np.isfinite(slices).all():
+            raise InputError(f"bites: slices of shape {slices.shape}: need (k, 7) finite numbers")
+        if len(tooth) != len(rows) or start[0] != 0 or start[-1] != len(rows) or (np.diff(start) < 0).any():
+            raise InputError(f"bites: {len(rows)} rows, {len(tooth)} teeth, start up to {start[-1]}: must agree")
+        if piece.shape != (len(rows),) or not ((piece >= 0) & (piece < len(slices))).all():
+            raise InputError(f"bites: slice of shape {piece.shape}: need ({len(rows)},) from 0 to {len(slices) - 1}")
+        bad = np.flatnonzero(~(slices[:, [1, 5, 6]] >= 0.0).all(axis=1))
+        if len(bad):
+            rho, lag, rate = slices[bad[0], [1, 5, 6]]
+            raise InputError(
+                f"bites: slice {bad[0]}: rho = {rho:g}, lag = {lag:g}, rate = {rate:g}: must be at least 0"
+            )
+        low, turn, high = rows[:, 0], rows[:, 1] - rows[:, 0], math.tau + _SLACK
+        bad = np.flatnonzero(~((low >= 0.0) & (low <= math.tau) & (turn >= 0.0) & (turn <= high)))
+        if len(bad):
+            ends = f"{rows[bad[0], 0]:g} to {rows[bad[0], 1]:g} rad"
+            raise InputError(f"bites: row {bad[0]}: {ends}: must begin within 0 to 2 pi and rise by at most 2 pi")
+        bad = np.flatnonzero(~(rows[:, 2] <= rows[:, 3]))
+        if len(bad):
+            ends = f"s from {rows[bad[0], 2]:g} to {rows[bad[0], 3]:g} mm"
+            raise InputError(f"bites: row {bad[0]}: {ends}: must rise")
+        checked = {"start": start, "rows": rows, "tooth": tooth, "slice": piece, "slices": slices}
+        if self.frame is not None:
+            frame = np.ascontiguousarray(self.frame, dtype=np.float64)
+            if frame.shape != (len(start) - 1, 3, 3) or not np.isfinite(frame).all():
+                raise InputError(f"bites: frame of shape {frame.shape}: need ({len(start) - 1}, 3, 3) finite numbers")
+            checked["frame"] = frame
+        for name, value in checked.items():
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    def __len__(self) -> int:
+        return len(self.start) - 1
+
+    def chip_max(self) -> Floats:
+        """Greatest chip thickness of each step, (n,) float [mm]; 0 where nothing is cut."""
+        low, high, _, _, along, offset, across = self.rows.T
+        crest = np.arctan2(along, across)
+        crest = crest + math.tau * np.ceil((low - crest) / math.tau)
+        ends = np.maximum(along * np.sin(low) + across * np.cos(low), along * np.sin(high) + across * np.cos(high))
+        h = np.where(crest <= high, np.hypot(along, across), ends) + offset
+        out = np.zeros(len(self))
+        np.maximum.at(out, np.repeat(np.arange(len(self)), np.diff(self.start)), h)
+        return out
+
+
+def tooth_radii(cutter: Cutter) -> Floats:
+    """r_j - R = e cos(lambda - 2 pi j / N), (N,) float [mm].
+
+    >>> tooth_radii(Cutter(10.0, 2, 0.0, 20.0, 30.0, 6e5, runout=(0.01, 0.0))).round(6).tolist()
+    [0.01, -0.01]
+    """
+    offset, direction = cutter.runout
+    j = np.arange(cutter.flutes)
+    return np.asarray(offset * np.cos(direction - math.tau * j / cutter.flutes))
+
+
+def with_runout(bites: ToothEngagement, cutter: Cutter) -> ToothEngagement:
+    """The bites of every tooth by itself, as the cutter's runout makes them; those of one tooth stay.
+
+    Each bite of every tooth, with the thickness h that it would have without runout, becomes for tooth j the ranges of
+    immersion in which one of the lines m h + (r_j - r_(j-m)) sin(kappa) is the lowest, and positive.
+
+    Returns
+    -------
+    ToothEngagement
+        ``bites`` itself where there is no runout.
+
+    Examples
+    --------
+    Two teeth, their radii 0.01 mm apart, 0.01 mm a tooth: the shorter one does not touch.
+
+    >>> slot = engagement_of_arcs([0.0], [math.pi], 0.01, Cutter(10.0, 2, 0.0, 20.0, 30.0, 6e5), 1.0)
+    >>> each = with_runout(slot, Cutter(10.0, 2, 0.0, 20.0, 30.0, 6e5, runout=(0.005, 0.0)))
+    >>> each.tooth.tolist(), each.rows[:, 4:].tolist()
+    ([0], [[0.02, 0.0, 0.0]])
+    """
+    if cutter.runout[0] == 0.0 or cutter.flutes == 1:
+        return bites
+    radii = tooth_radii(cutter)
+    sine = bites.slices[bites.slice, 3]
+    sizes = np.zeros(len(bites.rows), dtype=np.int64)
+    none = np.empty((0, 7))
+    _kernels.runout_engagement(bites.rows, bites.tooth, sine, radii, sizes, none, np.empty(0, np.int64), False)
+    rows = np.empty((int(sizes.sum()), 7))
+    tooth = np.empty(len(rows), dtype=np.int64)
+    _kernels.runout_engagement(bites.rows, bites.tooth, sine, radii, sizes, rows, tooth, True)
+    start = np.concatenate([[0], np.cumsum(sizes)])[bites.start]
+    return ToothEngagement(start, rows, tooth, np.repeat(bites.slice, sizes), bites.slices, bites.frame)
+
+
+def engagement_of_arcs(
+    phi_in: ArrayLike,
+    phi_out: ArrayLike,
+    feed_per_tooth: ArrayLike,
+    cutter: Cutter,
+    axial_depth: float,
+    *,
+    count: ArrayLike | None = None,
+    clockwise: bool = True,
+) -> ToothEngagement:
+    """Tooth engagement of a straight flank whose engaged arcs are the same over the whole depth.
+
+    Parameters
+    ----------
+    phi_in, phi_out : (n,) or (n, k) float [rad], ends of the disjoint engaged arcs, 0 <= phi_in <= phi_out <= pi,
+        counted CLOCKWISE from n = Rot(+90 deg) T, as :mod:`chipload.engagement.contact` gives them
+    feed_per_tooth : () or (n,) float [mm], >= 0; at 0 nothing is cut
+    cutter : a straight flank: no corner radius, no taper, a flat bottom
+    axial_depth : [mm], above 0, at most the flute length
+    count : (n,) int, how many of the k arcs of each step hold; None: all k (an arc of no length cuts nothing)
+    clockwise : sense of the spindle seen from above (M3); False mirrors: phi is then counted the other way
+
+    Returns
+    -------
+    ToothEngagement
+        Of one slice, the flank, on which s is the height above the tip; without frames.
+
+    Raises
+    ------
+    InputError
+        A number is out of range, shapes disagree, or the cutter has no straight flank.
+
+    Examples
+    --------
+    >>> mill = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
+    >>> engagement_of_arcs([0.0], [1.0], 0.05, mill, 5.0).rows.tolist()
+    [[0.0, 1.0, 0.0, 5.0, 0.05, 0.0, 0.0]]
+    """
+    _check_cutter(cutter, axial_depth)
+    a = np.asarray(phi_in, dtype=np.float64)
+    b = np.asarray(phi_out, dtype=np.float64)
+    if a.shape != b.shape or a.ndim not in (1, 2):
+        raise InputError(f"phi_in {a.shape} and phi_out {b.shape}: must have one shape, (n,) or (n, k)")
+    n = len(a)
+    a = a.reshape(n, -1)
+    b = b.reshape(n, -1)
+    feed = np.broadcast_to(np.asarray(feed_per_tooth, dtype=np.float64), (n,))
+    if not ((feed >= 0.0) & np.isfinite(feed)).all():
+        i = int(np.flatnonzero(~((feed >= 0.0) & np.isfinite(feed)))[0])
+        raise InputError(f"feed_per_tooth[{i}] = {feed[i]:g} mm: must be at least 0")
+    number = np.full(n, a.shape[1]) if count is None else np.asarray(count, dtype=np.int64)
+    if number.shape != (n,) or ((number < 0) | (number > a.shape[1])).any():
+        raise InputError(f"count: must be ({n},) integers from 0 to {a.shape[1]}, the number of arcs kept a step")
+    real = np.arange(a.shape[1]) < number[:, None]
+    if not np.all(((a >= -_SLACK) & (a <= b) & (b <= math.pi + _SLACK))[real]):
+        i, k = np.argwhere(~((a >= -_SLACK) & (a <= b) & (b <= math.pi + _SLACK)) & real)[0]
+        raise InputError(f"arc {k} of step {i}: {a[i, k]:g} to {b[i, k]:g} rad: must rise within 0 to pi")
+    low, high = (a, b) if clockwise else (math.pi - b, math.pi - a)
+    low = np.clip(low, 0.0, math.pi)
+    high = np.clip(high, 0.0, math.pi)
+    real = real & (high > low) & (feed > 0.0)[:, None]
+    step, arc = np.nonzero(real)
+    full = np.full(len(step), axial_depth)
+    none = 0.0 * full
+    rows = np.column_stack([low[step, arc], high[step, arc], none, full, feed[step], none, none])
+    start = np.concatenate([[0], np.cumsum(np.bincount(step, minlength=n))])
+    flank = np.array([[0.0, cutter.radius, 0.0, 1.0, 0.0, 0.0, edge_lag(cutter)]])
+    zero = np.zeros(len(step), dtype=np.int64)
+    return with_runout(ToothEngagement(start, rows, zero - 1, zero, flank), cutter)
+
+
+def _check_cutter(cutter: Cutter, axial_depth: float) -> None:
+    """Refuse what a straight flank does not cover."""
+    for key, value in (("corner_radius_mm", cutter.corner_radius), ("taper", cutter.taper), ("bottom", cutter.bottom)):
+        if value != 0.0:
+            raise InputError(
+                f"cutter.{key} = {value:g}: forces are known for a straight flank only; choose a flat end mill"
+            )
+    if not 0.0 < axial_depth <= cutter.flute_length:
+        raise InputError(
+            f"axial_depth_mm = {axial_depth:g}: must be above 0 and at most cutter.flute_length_mm = "
+            f"{cutter.flute_length:g}"
+        )

@@ -1,0 +1,290 @@
+"""A file that native code reads is read in a process of its own, with limits of time and memory.
+
+The CAD kernel ends the process, or never ends, on some damaged files. What is asked of it is therefore done in a child:
+the same interpreter, which reads one file and answers calls on it until it is closed. Its death is an ``InputError``.
+
+Notation: a message is a JSON value and the arrays in it, ``length | JSON | length | npy | ...``; an array stands in the
+JSON as ``{"array": number}``. Neither side executes what the other sends: functions are named by the parent alone and
+are those of :data:`SERVED`, and arrays hold numbers.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import io
+import json
+import os
+import selectors
+import signal
+import struct
+import subprocess
+import sys
+import time
+import weakref
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from chipload.errors import InputError
+
+#: modules whose functions a child may be asked for, each a function of the shape and of plain values
+SERVED = ("step", "step_faces", "step_meridian", "step_patch")
+#: time of the processor [s] for each call, and more for each MB of the file
+CALL_S, MB_S = 10.0, 10.0
+#: a call may take so many times as long by the clock, for the processor may be shared
+PATIENCE = 8.0
+#: address space of a child [bytes]
+MEMORY = 4 << 30
+#: largest message [bytes]
+LARGEST = 1 << 30
+_END = struct.Struct("<Q")
+
+
+class Isolated:
+    """A child that has read one file, or will when it is first asked.
+
+    Parameters
+    ----------
+    file : the file
+    key : what a message calls it, as ``part.file``
+    reader : ``module.function`` of :data:`SERVED` that reads it
+    """
+
+    def __init__(self, file: Path, key: str, reader: str) -> None:
+        self.file, self.key, self.reader = file, key, reader
+        self._process: subprocess.Popen[bytes] | None = None
+        self._seconds = CALL_S + MB_S * 1e-6 * file.stat().st_size
+
+    def __enter__(self) -> Isolated:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the child."""
+        if self._process is not None:
+            _kill(self._process)
+            self._process = None
+
+    def call(self, function: str, *values: Any) -> Any:
+        """What a function, ``module.name``, says of the file; ``values`` and the answer are plain, or arrays.
+
+        Raises
+        ------
+        InputError
+            That of the function; or the child has ended, took too long or too much memory.
+        """
+        try:
+            if self._process is None:
+                self._process = _start()
+                weakref.finalize(self, _kill, self._process)
+                self._ask([self.reader, str(self.file), self.key])
+            return self._ask([function, *values])
+        except BaseException:
+            self.close()
+            raise
+
+    def _ask(self, values: list[Any]) -> Any:
+        assert self._process is not None
+        pipe_in, pipe_out = self._process.stdin, self._process.stdout
+        assert pipe_in is not None
+        assert pipe_out is not None
+        try:
+            pipe_in.write(packed([self._seconds, values]))
+            pipe_in.flush()
+            kind, answer = unpacked(_Timed(pipe_out, time.monotonic() + PATIENCE * self._seconds))
+        except (OSError, EOFError):
+            raise InputError(f"{self.key} = {self.file.name}: {self._why()}") from None
+        if kind == "refused":
+            raise InputError(str(answer))
+        if kind == "memory":
+            raise InputError(f"{self.key} = {self.file.name}: {_TOO_LARGE}")
+        if kind == "fault":
+            raise InputError(f"{self.key} = {self.file.name}: damaged: the CAD kernel fails on it: {answer}")
+        return answer
+
+    def _why(self) -> str:
+        """How the child ended, in words."""
+        assert self._process is not None
+        try:
+            code = self._process.wait(0.5)
+        except subprocess.TimeoutExpired:
+            return self._slow()
+        if code == -getattr(signal, "SIGXCPU", 0):
+            return self._slow()
+        if code == -getattr(signal, "SIGKILL", 0):
+            return _TOO_LARGE
+        return "damaged: it ends the CAD kernel: write it again from CAD, or check it there"
+
+    def _slow(self) -> str:
+        return f"the CAD kernel is not done with it in {self._seconds:.0f} s: write the part alone, or check it in CAD"
+
+
+_TOO_LARGE = (
+    f"the CAD kernel needs more than {MEMORY >> 30} GiB for it: write the part alone, or take a larger chord_mm"
+)
+
+
+class _Timed:
+    """Reads from a pipe until a moment of the monotonic clock."""
+
+    def __init__(self, pipe: IO[bytes], until: float) -> None:
+        self.pipe, self.until = pipe, until
+
+    def read(self, count: int) -> bytes:
+        """``count`` bytes; TimeoutError where they do not come, EOFError where the other side has ended."""
+        out = bytearray()
+        with selectors.DefaultSelector() as ready:
+            ready.register(self.pipe, selectors.EVENT_READ)
+            while len(out) < count:
+                if not ready.select(self.until - time.monotonic()):
+                    raise TimeoutError
+                some = os.read(self.pipe.fileno(), min(count - len(out), 1 << 20))
+                if not some:
+                    raise EOFError
+                out += some
+        return bytes(out)
+
+
+def packed(value: Any) -> bytes:
+    """A message of a value: None, numbers, texts, arrays, and lists and mappings of them."""
+    arrays: list[bytes] = []
+
+    def plain(held: Any) -> Any:
+        if isinstance(held, np.ndarray):
+            out = io.BytesIO()
+            np.save(out, np.ascontiguousarray(held), allow_pickle=False)
+            arrays.append(out.getvalue())
+            return {"array": len(arrays) - 1}
+        if isinstance(held, np.generic):
+            return held.item()
+        if isinstance(held, dict):
+            return {"mapping": [[plain(k), plain(v)] for k, v in held.items()]}
+        return [plain(x) for x in held] if isinstance(held, (list, tuple)) else held
+
+    text = json.dumps(plain(value)).encode()
+    parts = [text, *arrays]
+    return b"".join([_END.pack(len(parts)), *(_END.pack(len(p)) + p for p in parts)])
+
+
+def unpacked(source: Any) -> Any:
+    """The value of a message that ``source.read(count)`` gives; tuples come back as lists.
+
+    >>> unpacked(io.BytesIO(packed([1, (2.5, "a"), {"x": np.arange(2)}, None])))
+    [1, [2.5, 'a'], {'x': array([0, 1])}, None]
+    """
+
+    def number() -> int:
+        data = source.read(_END.size)
+        if len(data) < _END.size:
+            raise EOFError
+        return int(_END.unpack(data)[0])
+
+    parts, room = [], LARGEST
+    for _ in range(number()):
+        size = number()
+        room -= size
+        if room < 0:
+            raise OSError("a message is too large")
+        parts.append(source.read(size))
+    arrays = [np.load(io.BytesIO(p), allow_pickle=False) for p in parts[1:]]
+
+    def whole(held: Any) -> Any:
+        if isinstance(held, dict):
+            if "array" in held:
+                return arrays[held["array"]]
+            return {whole(k): whole(v) for k, v in held["mapping"]}
+        return [whole(x) for x in held] if isinstance(held, list) else held
+
+    return whole(json.loads(parts[0]))
+
+
+def _start() -> subprocess.Popen[bytes]:
+    """A child in a session of its own, so that Ctrl-C is its parent's to pass on."""
+    words = [sys.executable, "-P", "-m", "chipload.geometry.isolated"]
+    pipe = subprocess.PIPE
+    # one thread of the linear algebra: a pool would take address space that is limited
+    threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    try:
+        return subprocess.Popen(
+            words, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, start_new_session=True,
+            env={**os.environ, **threads, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+        )  # fmt: skip
+    except OSError as err:
+        raise InputError(f"no process can be started to read the file: {err.strerror}: free memory") from None
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    with contextlib.suppress(OSError):
+        process.kill()
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            with contextlib.suppress(OSError):
+                pipe.close()
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(5.0)
+
+
+def _limit() -> None:
+    if sys.platform != "win32":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+
+
+def _allow(seconds: float) -> None:
+    """Let this process have so much more time of the processor."""
+    if sys.platform != "win32":
+        import resource
+
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
+        resource.setrlimit(resource.RLIMIT_CPU, (int(used.ru_utime + used.ru_stime + seconds) + 1, hard))
+
+
+def _function(name: Any) -> Any:
+    module, _, function = str(name).partition(".")
+    if module not in SERVED:
+        raise ValueError(f"{name}: is not served")
+    return getattr(importlib.import_module(f"chipload.geometry.{module}"), function)
+
+
+def _serve() -> None:
+    """Answer the parent until it goes: the first call reads the file, later ones get what was read before their values.
+
+    What the kernel prints goes nowhere: the pipe is the parent's.
+    """
+    source, target = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    os.dup2(nowhere, 0)
+    os.dup2(nowhere, 1)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _limit()
+    read: list[Any] = []
+    while True:
+        try:
+            seconds, (name, *values) = unpacked(source)
+        except EOFError:
+            return
+        _allow(float(seconds))
+        try:
+            answer = _function(name)(*read, *values)
+            if not read:
+                read, answer = [answer], None
+            data = packed(["done", answer])
+        except InputError as err:
+            data = packed(["refused", str(err)])
+        except MemoryError:
+            data = packed(["memory", None])
+        except Exception as err:
+            data = packed(["fault", " ".join(f"{type(err).__name__} {err}".split())[:120]])
+        target.write(data)
+        target.flush()
+
+
+if __name__ == "__main__":
+    _serve()

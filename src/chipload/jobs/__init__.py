@@ -1,0 +1,239 @@
+"""Jobs: one folder for each capability, from the job file to its result.
+
+Each folder holds ``tables`` (the keys of its job file), ``job`` (the tables checked against one another), ``run`` (from
+the job to its outcome, and the check of all that it names), ``result`` (the outcome as a :class:`Result`) and
+``figures`` (its part of the report). A new capability is one folder and one line in :data:`CAPABILITIES`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from importlib import import_module
+from pathlib import Path, PurePath
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import BaseModel, ValidationError
+
+from chipload.errors import InputError
+from chipload.files import read_regular
+from chipload.jobs.messages import Errors, left_missing, table_errors
+from chipload.jobs.override import override
+from chipload.jobs.sources import cutter_errors, source_errors
+from chipload.progress import Progress, silent
+from chipload.tables import LARGEST_FILE, parsed, require_sound
+
+if TYPE_CHECKING:
+    from chipload.report.presentation import Presentation
+    from chipload.result import Result
+    from chipload.simulation.checkpoint import Checkpoint
+
+
+@dataclass(frozen=True)
+class Capability:
+    """A capability.
+
+    Parameters
+    ----------
+    name : of its folder and in results
+    key : the table that only its job files have
+    table : name of the table of the whole file, in ``tables``
+    resumes : whether a run that was stopped goes on from its checkpoint
+    """
+
+    name: str
+    key: str
+    table: str
+    resumes: bool = False
+
+    def module(self, part: str) -> ModuleType:
+        """A file of its folder, imported when it is needed."""
+        return import_module(f"chipload.jobs.{self.name}.{part}")
+
+    @property
+    def root(self) -> Any:
+        """The pydantic model of its job file."""
+        return getattr(self.module("tables"), self.table)
+
+
+#: every capability; a job file belongs to the first whose table it has
+CAPABILITIES = (
+    Capability("torque", "shell", "TorqueJobTable"),
+    Capability("program", "program", "ProgramJobTable", resumes=True),
+    Capability("impeller", "impeller", "ImpellerJobTable"),
+    Capability("thinwall", "wall", "ThinWallJobTable"),
+    Capability("fit", "measurement", "FitJobTable"),
+    Capability("contour", "part", "ContourJobTable"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedJob:
+    """A job that was read and whose tables agree.
+
+    Parameters
+    ----------
+    capability : that it belongs to
+    job : of the capability's own type
+    source : name and hash of its file, or of the values that it was made of
+    """
+
+    capability: Capability
+    job: Any
+    source: str
+
+
+@dataclass(frozen=True, eq=False)
+class FinishedJob:
+    """What a run gives: the result, how it is presented, and the outcome in the capability's own type."""
+
+    result: Result
+    presentation: Presentation
+    outcome: Any
+
+    def __repr__(self) -> str:
+        return f"FinishedJob({self.result.title}: {self.result.message})"
+
+    def save(self, out: str | Path) -> Path:
+        """Write the folder that ``chipload run`` writes and return it.
+
+        Raises
+        ------
+        InputError
+            The folder holds something else than an older result.
+        OutputError
+            It cannot be written.
+        """
+        from chipload.report.folder import write_result
+
+        return write_result(self.result, self.presentation, out)
+
+
+def load_job(path: str | Path, overrides: Sequence[str] = ()) -> LoadedJob:
+    """Read a job file and apply ``key.path=value`` overrides; all that is wrong in it is refused at once.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, a key is unknown or missing, a value is out of range: one line that names it.
+    """
+    path = Path(path).absolute()
+    data = read_regular(path, str(path), LARGEST_FILE, "not a job")
+    raw = parsed(path.name, data)
+    return _loaded(_capability_of(raw), path, raw, overrides, data)
+
+
+def job_of(
+    values: Mapping[str, Any], folder: str | Path = ".", overrides: Sequence[str] = (), capability: str | None = None
+) -> LoadedJob:
+    """A job of values, those of a job file by the same keys: no file is read but those that they name.
+
+    Parameters
+    ----------
+    values : tables and lists of tables; a cutter may be a :class:`chipload.Cutter`, a file name a ``Path``
+    folder : that the file names in ``values`` are relative to
+    capability : name of the capability; None: by the tables
+
+    Raises
+    ------
+    InputError
+        As :func:`load_job`.
+    """
+    raw = plain(values)
+    own = next((c for c in CAPABILITIES if c.name == capability), None) or _capability_of(raw)
+    data = json.dumps(raw, sort_keys=True).encode()
+    return _loaded(own, Path(folder).absolute() / own.name, raw, overrides, data)
+
+
+def _capability_of(raw: Mapping[str, Any]) -> Capability:
+    """The first capability whose table a job has."""
+    return next((c for c in CAPABILITIES if c.key in raw), CAPABILITIES[-1])
+
+
+def plain(value: Any) -> Any:
+    """Values as a TOML file holds them: models as tables, tuples and arrays as lists, paths as text."""
+    if isinstance(value, BaseModel):
+        return plain(value.model_dump(exclude_none=True))
+    if isinstance(value, Mapping):
+        return {str(key): plain(v) for key, v in value.items() if v is not None}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [plain(v) for v in value]
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, PurePath):
+        return str(value)
+    if isinstance(value, (str, bool, int, float)):
+        return value
+    raise InputError(f"{type(value).__name__}: is no value of a job: give numbers, texts, lists and tables")
+
+
+def _loaded(
+    capability: Capability, path: Path, raw: dict[str, Any], overrides: Sequence[str], data: bytes
+) -> LoadedJob:
+    """The job of a table that was read.
+
+    Parameters
+    ----------
+    path : of the file; of values the folder that they are relative to, and the name of the capability
+    data : what was read, for its hash
+    """
+    label, root = path.name, capability.root
+    for text in overrides:
+        override(raw, text, root)
+    require_sound(label, raw)
+    errors, module = Errors(), capability.module("job")
+    try:
+        with errors.collect():
+            job = module.load(path, root.model_validate(raw), tuple(overrides))
+            return LoadedJob(capability, job, f"{label} sha256 {sha256(data).hexdigest()}")
+    except ValidationError as err:
+        others = [c.root for c in CAPABILITIES if c is not capability]
+        errors.texts += table_errors(err, root, others)
+        # what one table alone cannot see is looked for in those that are right by themselves
+        misspelt = left_missing(err, root)
+        for text in (*module.missing(raw), *source_errors(raw, root), *cutter_errors(raw, path.parent)):
+            if text.split(": ")[0] not in misspelt:
+                errors.add(text)
+    except OverflowError:
+        errors.add("a number is too large: write it below 1e300")
+    errors.refuse(f"{label}: ")
+    raise AssertionError("a job is loaded or refused")
+
+
+def run_job(loaded: LoadedJob, progress: Progress = silent, checkpoint: Checkpoint | None = None) -> FinishedJob:
+    """Run a job; nothing is written.
+
+    Parameters
+    ----------
+    checkpoint : keeps what is finished, so that a stopped run goes on; used by the capabilities that can resume
+
+    Raises
+    ------
+    InputError
+        A file that it names cannot be used, or its values together.
+    Cancelled
+        By ``progress``.
+    """
+    capability = loaded.capability
+    kept = {"checkpoint": checkpoint} if capability.resumes else {}
+    outcome = capability.module("run").run(loaded.job, progress, **kept)
+    result: Result = capability.module("result").result_of(outcome)
+    inputs = {"job": loaded.source, **result.provenance.inputs}
+    result = replace(result, provenance=replace(result.provenance, inputs=inputs))
+    return FinishedJob(result, capability.module("figures").presentation_of(outcome), outcome)
+
+
+def check_job(loaded: LoadedJob) -> tuple[list[str], bool]:
+    """Read all that a job names without running it: a line for each thing that was found, and whether it holds.
+
+    Raises
+    ------
+    InputError
+        As :func:`run_job`.
+    """
+    lines, holds = loaded.capability.module("run").check(loaded.job)
+    return lines, holds

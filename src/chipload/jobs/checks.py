@@ -1,0 +1,262 @@
+"""Checks that every capability makes unless the job switches them off: their columns and their limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material
+from chipload.cutting.rigid import deflection_share
+from chipload.cutting.strength import allowed_stress, cutter_stress
+from chipload.errors import Finding, InputError, Severity
+from chipload.jobs.tables import ChecksTable
+from chipload.machine.machine import Machine
+from chipload.result import LimitCheck, Verdict, check_limit
+from chipload.result.limits import Columns
+from chipload.simulation.chip_space import flute_fill
+from chipload.simulation.chips import BANDED
+from chipload.simulation.loads import Cuts, Floats
+
+#: columns that these checks add to those of the simulation
+CHECK_COLUMNS = ("cutter_stress_mpa", "deflection_share")
+
+
+#: steps with less than this share of the greatest load are not judged by their deflection: the cutter only touches
+#: there, and what the deflection changes stays far below the greatest load
+LOADED = 0.1
+#: the columns that tell this, the first that a track has
+LOADS = ("force_n", "force_xy_n", "force_normal_n", "torque_mean_nm")
+#: loads whose direction is not known where the material has a tangential force alone
+DIRECTED = ("force_n", "deflection_um", "form_error_um", "cutter_stress_mpa", "deflection_share")
+
+
+@dataclass(frozen=True, eq=False)
+class DefaultChecks:
+    """What is checked beside the limits that the job states.
+
+    Parameters
+    ----------
+    cutters : by tool number
+    material : whose coefficients the loads have
+    off : names of checks that the job switches off, keys of ``[checks]``
+    sigma : limits of loads are checked at the value plus so many standard deviations
+    """
+
+    cutters: Mapping[int, Cutter]
+    material: Material
+    off: tuple[str, ...] = ()
+    sigma: float = 0.0
+
+    @property
+    def unknown_direction(self) -> str:
+        """Why forces and what they bend are unproven; empty: they are not."""
+        return f"{self.material.name} states the tangential force only" if self.material.tangential else ""
+
+    def allowed_stress(self, tools: ArrayLike) -> NDArray[np.float64]:
+        """Stress that the cutter of each row may have [MPa]; inf where it is not known."""
+        own = {n: allowed_stress(c) for n, c in self.cutters.items()}
+        numbers, of = np.unique(np.asarray(tools), return_inverse=True)
+        return np.array([own.get(int(n), math.inf) for n in numbers.tolist()])[of]
+
+
+def default_checks(
+    table: ChecksTable, cutters: Mapping[int, Cutter], material: Material, confidence: float
+) -> DefaultChecks:
+    """What is checked beside the stated limits.
+
+    Parameters
+    ----------
+    confidence : one-sided, from 0.5 (limits of loads are held at the mean) to below 1
+
+    Raises
+    ------
+    InputError
+        More than the mean is asked of a material that does not say how sure its coefficients are.
+    """
+    sigma = NormalDist().inv_cdf(confidence)
+    if sigma > 0.0 and not material.has_band:
+        raise InputError(
+            f"operation.0.confidence = {confidence:g}: material {material.name} states neither spread nor covariance: "
+            "state one (spread = 0.25 for a table value), or leave confidence out"
+        )
+    return DefaultChecks(cutters, material, table.off, max(sigma, 0.0))
+
+
+def with_checks(
+    table: ChecksTable, material: Material, bends: Callable[[Cuts], Mapping[str, Floats]]
+) -> Callable[[Cuts], dict[str, Floats]]:
+    """Columns of ``bends``, which has the deflection, and :data:`CHECK_COLUMNS`."""
+
+    def columns(cuts: Cuts) -> dict[str, Floats]:
+        found = dict(bends(cuts))
+        found["cutter_stress_mpa"] = cutter_stress(cuts.bites, cuts.cutter, material)
+        found["deflection_share"] = deflection_share(
+            cuts.plain, found["deflection_um"], table.deflection_of_feed, table.deflection_of_depth
+        )
+        return found
+
+    return columns
+
+
+def check_columns(
+    table: ChecksTable, cuts: Sequence[Cuts], material: Material, deflection_um: Floats
+) -> dict[str, Floats]:
+    """:data:`CHECK_COLUMNS` of a removal that kept its cuts, and ``flute_fill`` where a gullet is stated.
+
+    Parameters
+    ----------
+    cuts : one a cutter that cut
+    deflection_um : (n,) float, a row a step of the removal, by which cutter and workpiece part
+
+    Returns
+    -------
+    columns, (n,) float each; 0 where nothing is cut
+    """
+    room = any(c.cutter.gullet is not None for c in cuts)
+    out = {name: np.zeros(len(deflection_um)) for name in (*CHECK_COLUMNS, *(["flute_fill"] if room else []))}
+    for c in cuts:
+        out["cutter_stress_mpa"][c.step] = cutter_stress(c.bites, c.cutter, material)
+        out["deflection_share"][c.step] = deflection_share(
+            c.plain, deflection_um[c.step], table.deflection_of_feed, table.deflection_of_depth
+        )
+        if c.cutter.gullet is not None:
+            out["flute_fill"][c.step] = flute_fill(c)
+    return out
+
+
+def unchecked_checks(checks: DefaultChecks) -> tuple[str, ...]:
+    """Checks that are switched off, and cutters whose chip space is not stated."""
+    out = [f"check {name}: switched off by the job" for name in checks.off]
+    roomless = [n for n, c in sorted(checks.cutters.items()) if c.gullet is None]
+    if roomless:
+        out.append(f"chip space of tools {', '.join(map(str, roomless))}: gullet_mm2 is not stated")
+    return tuple(out)
+
+
+def chip_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...]:
+    """Chips that are thicker than those that the coefficients were measured with, and steps where all are thinner.
+
+    Parameters
+    ----------
+    columns : of a track, a row a step; ``chip_max_mm`` among them
+    """
+    material, thick = checks.material, columns["chip_max_mm"]
+    chip = material.chip
+    if chip is None or "chip_range" in checks.off or len(thick) == 0:
+        return ()
+    out = []
+    k = int(np.argmax(thick))
+    if thick[k] > chip[1] * (1.0 + 1e-9):
+        text = (
+            f"chips are up to {thick[k]:.4g} mm thick: the coefficients of {material.name} hold up to {chip[1]:g} mm, "
+            "the loads beyond it are not known"
+        )
+        out.append(_at_step("chip-beyond-coefficients", columns, k, text))
+    thin = np.flatnonzero((thick > 0.0) & (thick < chip[0] * (1.0 - 1e-9)))
+    if len(thin):
+        text = (
+            f"the chips of {len(thin)} steps are thinner than {chip[0]:g} mm: the coefficients of {material.name} "
+            "hold from there, the loads below it are not known"
+        )
+        out.append(_at_step("chip-below-coefficients", columns, int(thin[0]), text))
+    return tuple(out)
+
+
+def _at_step(code: str, c: Columns, k: int, text: str) -> Finding:
+    """A finding that leaves the result unproven, at a step."""
+    place = (float(c["x_mm"][k]), float(c["y_mm"][k]), float(c["z_mm"][k]))
+    return Finding(code, int(c["line"][k]) if "line" in c else 0, text, Severity.UNPROVEN, place, k)
+
+
+def default_limits(
+    checks: DefaultChecks, machine: Machine, columns: Columns, track: str, errors: Mapping[str, float]
+) -> tuple[LimitCheck, ...]:
+    """Spindle torque and power, chip space, cutter stress, flute length, and whether the rigid model holds.
+
+    Parameters
+    ----------
+    columns : of the track, a row a step
+    track : its name
+    errors : relative error of columns by the resolution
+    """
+    out: list[LimitCheck] = []
+    upper = upper_loads(columns, checks.sigma)
+    if "spindle" not in checks.off:
+        out += _spindle(machine, upper, track, errors)
+    if "flute_fill" in columns and "chip_space" not in checks.off:
+        out.append(check_limit("flute_fill", 1.0, columns, track=track))
+    direction = checks.unknown_direction
+    if "cutter_strength" not in checks.off and "cutter_stress_mpa" in columns:
+        allowed = checks.allowed_stress(columns["tool"])
+        k = int(np.argmax(upper["cutter_stress_mpa"] / allowed))
+        if np.isfinite(allowed[k]):
+            rows, error = np.arange(len(allowed)) == k, load_error(errors, "cutter_stress_mpa")
+            limit = float(allowed[k])
+            out.append(
+                check_limit("cutter_stress_mpa", limit, upper, track=track, rows=rows, error=error, reason=direction)
+            )
+    if "flute_length" not in checks.off and "axial_overrun_mm" in columns:
+        out.append(check_limit("axial_overrun_mm", 0.0, columns, track=track))
+    if "rigid_model" not in checks.off and "deflection_share" in columns:
+        load = np.asarray(columns[next(c for c in LOADS if c in columns)])
+        loaded = load >= LOADED * load.max(initial=0.0)
+        check = check_limit("deflection_share", 1.0, columns, track=track, rows=loaded, reason=direction)
+        out.append(_rigid(check))
+    return tuple(out)
+
+
+def _rigid(check: LimitCheck) -> LimitCheck:
+    """A deflection beyond the rigid model makes loads unknown; it is no limit that is exceeded."""
+    if check.state is not Verdict.EXCEEDS:
+        return check
+    return replace(
+        check, state=Verdict.UNPROVEN, reason="the deflection changes the chip: the rigid model does not hold"
+    )
+
+
+def _spindle(machine: Machine, columns: Columns, track: str, errors: Mapping[str, float]) -> list[LimitCheck]:
+    """Torque and power of the spindle; its torque depends on the speed, so the step with the greatest share counts."""
+    out = []
+    torque, power = np.asarray(columns["torque_mean_nm"]), np.asarray(columns["power_w"])
+    speed = np.divide(power, torque, out=np.zeros(len(power)), where=torque > 0.0)
+    able = machine.torque_at(speed) / 1000.0
+    k = int(np.argmax(torque / able))
+    if np.isfinite(able[k]):
+        rows, error = np.arange(len(torque)) == k, load_error(errors, "torque_mean_nm")
+        limit = float(able[k])
+        out.append(check_limit("spindle_torque_nm", limit, columns, track=track, rows=rows, error=error))
+    if machine.power_w is not None:
+        error = load_error(errors, "power_w")
+        out.append(check_limit("spindle_power_w", machine.power_w, columns, track=track, error=error))
+    return out
+
+
+def load_error(errors: Mapping[str, float], column: str) -> float:
+    """Relative error of a column by the resolution; the stress of the cutter has that of the force.
+
+    >>> load_error({"force_n": 0.02}, "cutter_stress_mpa"), load_error({"force_n": 0.02}, "power_w")
+    (0.02, 0.0)
+    """
+    return errors.get("force_n" if column == "cutter_stress_mpa" else column, 0.0)
+
+
+def upper_loads(columns: Columns, sigma: float) -> dict[str, NDArray[np.float64]]:
+    """The columns with ``sigma`` standard deviations added to those that have a band."""
+    if sigma == 0.0:
+        return dict(columns)
+    return {name: _upper(name, columns, sigma) if name in BANDED else values for name, values in columns.items()}
+
+
+def _upper(name: str, columns: Columns, sigma: float) -> NDArray[np.float64]:
+    """(n,) size of a column with ``sigma`` standard deviations added."""
+    size, band = np.abs(np.asarray(columns[name], dtype=np.float64)), BANDED[name]
+    if band not in columns:
+        return size
+    base = np.asarray(columns["force_n"] if band == "force_sd_n" else columns[name])
+    return np.asarray(size + sigma * size * np.divide(columns[band], base, out=np.zeros(len(size)), where=base > 0.0))

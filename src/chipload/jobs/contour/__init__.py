@@ -1,0 +1,1 @@
+"""Contours and pockets in the plane: planned, written and checked."""

@@ -1,0 +1,95 @@
+"""How the result of contours and pockets is presented: sections of the report, scene, programs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from html import escape
+
+import plotly.graph_objects as go
+
+from chipload.jobs.contour.outcome import ContourResult, Operation
+from chipload.jobs.contour.pass_figures import COLOURS, along, plan, space
+from chipload.jobs.contour.programs import program_files
+from chipload.jobs.contour.scene import scene_bytes
+from chipload.machine.machine import Machine
+from chipload.planning.result import StrategyResult
+from chipload.report.page import state_cell
+from chipload.report.presentation import Presentation
+from chipload.report.sheet import figure, items, table, value_text
+
+
+def presentation_of(outcome: ContourResult) -> Presentation:
+    """The presentation of planned operations."""
+    return Presentation(partial(_sections, outcome), partial(scene_bytes, outcome), partial(program_files, outcome))
+
+
+def _sections(outcome: ContourResult, figures: dict[str, go.Figure]) -> list[str]:
+    return [html for k, op in enumerate(outcome.operations) for html in _operation(outcome.machine, k, op, figures)]
+
+
+def _operation(machine: Machine, k: int, op: Operation, figures: dict[str, go.Figure]) -> list[str]:
+    result, c = op.result, op.cutter
+    settings = ", ".join(
+        f"{key} {value_text(value)}" for key, value in op.settings.items() if key not in ("kind", "use")
+    )
+    out = [
+        f"<h2>Operation {k}: {escape(result.kind)}</h2>",
+        f"<p>Released: <b>{escape(result.use)}</b>. Cutter {c.number}: D {c.diameter:g} mm, {c.flutes} flutes, "
+        f"helix {_degrees(c.helix)} deg, overhang {c.overhang:g} mm.</p>",
+        f'<p class="note">{escape(settings)}</p>',
+        "<h3>Strategies</h3>",
+        _strategies(op),
+        f"<h3>Along the {'pass' if result.kind != 'contour' else 'finish pass'}</h3>",
+        figure(f"along-{k}", along(op), figures),
+        "<h3>Plan view</h3>",
+        '<p class="note">The pass is coloured by engagement, dashed lines are passes before it, diamonds are events, '
+        "crosses exceed a limit. Click a name to show or hide it.</p>",
+        figure(f"plan-{k}", plan(machine, op), figures),
+        "<h3>Path</h3>",
+        figure(f"space-{k}", space(op), figures),
+    ]
+    return out + (["<h3>Findings of the planner</h3>", items(result.findings)] if result.findings else [])
+
+
+def _strategies(op: Operation) -> str:
+    """Strategies side by side in numbers."""
+    head = ["strategy", "engagement [deg]", "force [N]", "torque [N m]", "form error [µm]", "time [s]", "simulation"]
+    rows = []
+    for name, s in op.result.strategies.items():
+        check = op.verifications.get(name)
+        rows.append(
+            [
+                _name(name) + (" <b>in use</b>" if name == op.result.use else ""),
+                _span(s, "engagement_deg"),
+                _span(s, "force_xy_n"),
+                _span(s, "torque_nm"),
+                _most(s, "form_error_um"),
+                _most(s, "time_s"),
+                "not checked" if check is None else state_cell(check.verdict),
+            ]
+        )
+    used = [name == op.result.use for name in op.result.strategies]
+    return table(head, rows, numbers=(1, 2, 3, 4, 5), used=used)
+
+
+def _degrees(angle: float) -> str:
+    return f"{angle * 57.29577951308232:.4g}"
+
+
+def _name(strategy: str) -> str:
+    return f'<span class="dot" style="background:{COLOURS[strategy]}"></span>{escape(strategy)}'
+
+
+def _span(s: StrategyResult, key: str) -> str:
+    """`min to max` of a summary value."""
+    v = s.summary.get(key)
+    return (
+        f"{v['min']:.4g} to {v['max']:.4g}" if isinstance(v, Mapping) and "min" in v and "max" in v else _most(s, key)
+    )
+
+
+def _most(s: StrategyResult, key: str) -> str:
+    v = s.summary.get(key)
+    v = v.get("max") if isinstance(v, Mapping) else v
+    return f"{v:.4g}" if isinstance(v, (int, float)) else "not known"

@@ -1,0 +1,125 @@
+"""A job whose program is planned in the plane: a drawing, what is cut from it and how."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from chipload.cutter.cutter import Cutter
+from chipload.jobs.contour.tables import ALWAYS, MAY, NEEDS, ContourJobTable, ContourLimitsTable, OperationTable
+from chipload.jobs.messages import Errors
+from chipload.jobs.sources import Limited, cutters, entries_of, sources_of
+
+
+@dataclass(frozen=True)
+class ContourJob(Limited):
+    """A job that was read and found whole; paths are absolute.
+
+    Parameters
+    ----------
+    path : the job file
+    table : its values
+    cutters : by number
+    part_file : the drawing or model
+    machine, material : a shipped name or a file
+    findings : what was noticed and does not stop the job
+    overrides : the `--set` texts that were applied
+    """
+
+    path: Path
+    table: ContourJobTable
+    cutters: Mapping[int, Cutter]
+    part_file: Path
+    machine: str | Path
+    material: str | Path
+    findings: tuple[str, ...]
+    overrides: tuple[str, ...]
+
+    @property
+    def operations(self) -> tuple[OperationTable, ...]:
+        """The operations in their order."""
+        return self.table.operation
+
+
+def load(path: Path, table: ContourJobTable, overrides: Sequence[str]) -> ContourJob:
+    """The job of a table that was read.
+
+    Raises
+    ------
+    InputError
+        Keys do not go together.
+    """
+    folder, errors = path.parent, Errors()
+    errors.texts += missing(table.model_dump(exclude_none=True))
+    sources: dict[str, str | Path] = {}
+    tools: dict[int, Cutter] = {}
+    with errors.collect():
+        sources = sources_of(table, folder, "machine", "material")
+    with errors.collect():
+        tools = cutters(table.cutter, folder)
+    errors.texts += _contradictions(table, tools)
+    errors.refuse()
+    return ContourJob(
+        path, table, tools, folder / table.part.file, sources["machine"], sources["material"], _unused(table),
+        tuple(overrides),
+    )  # fmt: skip
+
+
+def missing(values: Mapping[str, Any]) -> list[str]:
+    """The keys that an operation lacks by its kind; ``values`` are those of the file."""
+    return [
+        f"operation.{k}.{key}: missing: state it (kind = {op['kind']} needs it)"
+        for k, op in entries_of(values, "operation")
+        for key in NEEDS.get(str(op.get("kind")), ())
+        if key not in op
+    ]
+
+
+def _contradictions(table: ContourJobTable, cutters: Mapping[int, Cutter]) -> Iterator[str]:
+    """What an operation's values and its cutter contradict, and that nothing is checked at all."""
+    for k, op in enumerate(table.operation):
+        at = f"operation.{k}"
+        if op.kind == "contour" and op.strategies is not None:
+            yield from _wrong_strategies(at, op)
+        if cutters and op.cutter not in cutters:
+            known = ", ".join(str(n) for n in sorted(cutters))
+            yield f"{at}.cutter = {op.cutter}: no [[cutter]] has this number: state one of {known}"
+        cutter = cutters.get(op.cutter)
+        if cutter is not None and op.radial_depth_mm >= cutter.diameter:
+            yield (
+                f"{at}.radial_depth_mm = {op.radial_depth_mm:g}: must be below the cutter's diameter_mm = "
+                f"{cutter.diameter:g}: take several passes or a larger cutter"
+            )
+        if cutter is not None and op.axial_depth_mm > cutter.flute_length:
+            yield (
+                f"{at}.axial_depth_mm = {op.axial_depth_mm:g}: must be at most the cutter's flute_length_mm = "
+                f"{cutter.flute_length:g}: take several depths or a longer cutter"
+            )
+    if not table.limits.stated:
+        names = ", ".join(ContourLimitsTable.model_fields)
+        yield f"limits: none is stated, so nothing would be checked: state at least one of {names}"
+
+
+def _wrong_strategies(at: str, op: OperationTable) -> Iterator[str]:
+    listed = op.strategies or ()
+    if not listed:
+        yield f"{at}.strategies = []: must name at least one of plain, backward, feed"
+        return
+    if len(set(listed)) < len(listed):
+        yield f"{at}.strategies = {list(listed)}: a strategy is listed twice: list each once"
+    if op.use is None and len(listed) > 1:
+        yield f"{at}.use: missing: state which of {', '.join(listed)} is released"
+    if op.use is not None and op.use not in listed:
+        yield f"{at}.use = '{op.use}': must be one of {at}.strategies = {', '.join(listed)}"
+
+
+def _unused(table: ContourJobTable) -> tuple[str, ...]:
+    """Keys that are stated but mean nothing to the kind of their operation."""
+    out = []
+    for k, op in enumerate(table.operation):
+        known = {*ALWAYS, "clearance_mm", *NEEDS[op.kind], *MAY[op.kind]}
+        stated = [key for key in type(op).model_fields if getattr(op, key) is not None]
+        out += [f"operation.{k}.{key}: not used by kind = {op.kind}" for key in stated if key not in known]
+    return tuple(out)

@@ -1,0 +1,79 @@
+"""What planning contours and pockets gives: strategies of each operation, and what the simulation found in each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from chipload.cutter.cutter import Cutter
+from chipload.errors import Finding
+from chipload.jobs.checks import DefaultChecks
+from chipload.machine.machine import Machine
+from chipload.planning.result import OperationResult
+from chipload.result import Provenance, Verdict
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What the simulation, which knows no planner, finds of one strategy.
+
+    Parameters
+    ----------
+    verdict : ``holds``: it agrees with the planner's history, and finds no gouge
+    text : one sentence
+    numbers : JSON values
+    """
+
+    verdict: Verdict
+    text: str
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Operation:
+    """One operation with what is needed to show it.
+
+    Parameters
+    ----------
+    result : of the planner
+    settings : the keys of the job, as stated
+    cutter : the tool
+    top, depth : z of the stock's top, depth of cut [mm]
+    verifications : by strategy
+    machine_findings : by strategy, what its program asks of the machine that it does not give
+    limits : of the job, by name
+    checks : what is checked beside the limits; None: nothing
+    """
+
+    result: OperationResult
+    settings: Mapping[str, Any]
+    cutter: Cutter
+    top: float
+    depth: float
+    verifications: Mapping[str, Verification]
+    machine_findings: Mapping[str, tuple[Finding, ...]] = field(default_factory=dict)
+    limits: Mapping[str, float] = field(default_factory=dict)
+    checks: DefaultChecks | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ContourResult:
+    """A whole run.
+
+    Parameters
+    ----------
+    title : name of the job
+    operations : in their order
+    machine : that the programs are written for
+    unchecked : limits that the job does not state
+    findings : of the job and of its readers
+    provenance : where the numbers come from
+    """
+
+    title: str
+    operations: tuple[Operation, ...]
+    machine: Machine
+    unchecked: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    provenance: Provenance

@@ -1,0 +1,284 @@
+"""A job from beginning to end: its files are read, each operation planned, each program checked by the simulation.
+
+Nothing is written here: the outcome is a value, and the report room writes it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material, material_named, need_directions, read_material
+from chipload.errors import Finding, InputError, Severity
+from chipload.geometry.contour import Contour, Region
+from chipload.geometry.dxf import read_dxf
+from chipload.geometry.step import read_step_face
+from chipload.jobs.checks import default_checks
+from chipload.jobs.contour.job import ContourJob
+from chipload.jobs.contour.outcome import ContourResult, Operation, Verification
+from chipload.jobs.contour.tables import OperationTable
+from chipload.jobs.provenance import provenance_of, title_of
+from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.planning.contour.plan import Finishing, check_contour, plan_contour
+from chipload.planning.pocket.plan import Clearing, check_pocket, plan_pocket
+from chipload.planning.result import OperationResult, StrategyResult
+from chipload.program.check import check_program
+from chipload.progress import Progress, silent
+from chipload.result import Provenance, Verdict
+from chipload.simulation.verify import verify_contour
+from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
+
+#: what the simulation may find and still call a program proved
+ENGAGEMENT_DEG, GOUGE_MM, CHORDS_MM = 0.05, 1e-4, 1e-3
+#: passes that descend, whose engagement the simulation in the plane cannot compare; their path it does follow
+NOT_LEVEL = ("entry",)
+VERDICTS = {"proved": Verdict.HOLDS, "failed": Verdict.EXCEEDS, "unproven": Verdict.UNPROVEN}
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """What a job names, read: contours [mm], machine, material, and what the readers noticed."""
+
+    contours: tuple[Contour, ...]
+    machine: Machine
+    material: Material
+    findings: tuple[Finding, ...]
+
+
+def read_inputs(job: ContourJob) -> Inputs:
+    """Read every file that the job names.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read or holds nothing that can be used.
+    """
+    machine = machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
+    material = material_named(job.material) if isinstance(job.material, str) else read_material(job.material)
+    for name in ("force_xy_n", "form_error_um"):
+        if name in job.limits:
+            need_directions(material, f"limits.{name}")
+    contours, findings = _read_part(job)
+    for k, op in enumerate(job.operations):
+        speed = rad_s_from_rpm(op.speed_rpm)
+        if not machine.spindle_min * (1.0 - 1e-9) <= speed <= machine.spindle_max * (1.0 + 1e-9):
+            low, high = (x / rad_s_from_rpm(1.0) for x in (machine.spindle_min, machine.spindle_max))
+            raise InputError(
+                f"{job.path.name}: operation.{k}.speed_rpm = {op.speed_rpm:g}: machine {machine.name} turns from "
+                f"{low:g} to {high:g} rpm: state a speed between them"
+            )
+    return Inputs(contours, machine, material, findings)
+
+
+def run(job: ContourJob, progress: Progress = silent) -> ContourResult:
+    """Plan and check every operation of a job.
+
+    Raises
+    ------
+    InputError
+        A file, or the contours, the cutter and the depths together, cannot be used.
+    """
+    progress(0.0, "reading")
+    inputs = read_inputs(job)
+    operations = []
+    for k, op in enumerate(job.operations):
+        share = 1.0 / len(job.operations)
+
+        def part(done: float, what: str, start: float = k * share, share: float = share) -> None:
+            progress(start + share * done, what)
+
+        operations.append(_operation(job, inputs, op, part))
+    progress(1.0, "done")
+    return ContourResult(
+        title=title_of(job.path),
+        operations=tuple(operations),
+        machine=inputs.machine,
+        unchecked=job.unchecked,
+        findings=(*(Finding("job-key-unused", 0, text) for text in job.findings), *inputs.findings),
+        provenance=_provenance(job, inputs),
+    )
+
+
+def check(job: ContourJob) -> tuple[list[str], bool]:
+    """What the files of a job hold, and whether each operation can be planned; nothing is simulated.
+
+    Raises
+    ------
+    InputError
+        As :func:`run`.
+    """
+    inputs = read_inputs(job)
+    closed = sum(c.closed for c in inputs.contours)
+    lines = [
+        f"{job.path.name}: right: {closed} closed and {len(inputs.contours) - closed} open contours, "
+        f"machine {inputs.machine.name}, material {inputs.material.name}"
+    ]
+    for k, op in enumerate(job.operations):
+        cutter, setting = job.cutters[op.cutter], _setting(job, op)
+        if isinstance(setting, Clearing):
+            what = f"{check_pocket(inputs.contours, setting, cutter):.6g} mm2"
+        else:
+            count = check_contour(inputs.contours, setting, cutter, inputs.material, inputs.machine)
+            what = f"{count} pass{'es' if count > 1 else ''}"
+        lines.append(f"operation {k}: {op.kind}, cutter {op.cutter} of {cutter.diameter:g} mm, {what}")
+    lines += [f"finding: {text}" for text in (*job.findings, *inputs.findings)]
+    if job.unchecked:
+        lines.append(f"not checked, no limit stated: {', '.join(job.unchecked)}")
+    return lines, True
+
+
+def _operation(job: ContourJob, inputs: Inputs, op: OperationTable, progress: Progress) -> Operation:
+    cutter = job.cutters[op.cutter]
+    result = _plan(job, inputs, op, cutter, lambda done, what: progress(0.5 * done, what))
+    verifications, machine_findings = {}, {}
+    for k, (name, strategy) in enumerate(result.strategies.items()):
+        start = 0.5 + 0.5 * k / len(result.strategies)
+
+        def part(done: float, what: str, start: float = start) -> None:
+            progress(start + 0.5 * done / len(result.strategies), f"simulation: {what}")
+
+        verifications[name] = verify(strategy, op, cutter, job.table.stock.top_mm, part)
+        machine_findings[name] = tuple(
+            replace(f, severity=Severity.EXCEEDS) for f in check_program(strategy.program, inputs.machine)
+        )
+    settings = {k: v for k, v in op.model_dump().items() if v is not None}
+    checks = default_checks(job.table.checks, {cutter.number: cutter}, inputs.material, 0.5)
+    return Operation(
+        result, settings, cutter, job.table.stock.top_mm, op.axial_depth_mm, verifications, machine_findings,
+        job.limits, checks,
+    )  # fmt: skip
+
+
+def _plan(job: ContourJob, inputs: Inputs, op: OperationTable, cutter: Cutter, progress: Progress) -> OperationResult:
+    """Call the planner of the operation's kind."""
+    setting = _setting(job, op)
+    if isinstance(setting, Clearing):
+        return plan_pocket(
+            inputs.contours, setting, cutter, inputs.material, inputs.machine, limits=job.limits, progress=progress
+        )
+    return plan_contour(
+        inputs.contours, setting, cutter, inputs.material, inputs.machine, limits=job.limits, progress=progress
+    )
+
+
+def _setting(job: ContourJob, op: OperationTable) -> Finishing | Clearing:
+    """What an operation asks of its planner."""
+    rigid = (job.table.checks.deflection_of_feed, job.table.checks.deflection_of_depth)
+    if op.kind == "pocket":
+        return Clearing(
+            milling=op.milling,
+            radial_depth=op.radial_depth_mm,
+            axial_depth=op.axial_depth_mm,
+            feed=mm_s_from_mm_min(op.feed_mm_min),
+            spindle_speed=rad_s_from_rpm(op.speed_rpm),
+            top=job.table.stock.top_mm,
+            clearance=op.clearance_mm,
+            step=op.step_mm,
+            allowance=op.allowance_mm or 0.0,
+            rigid=rigid,
+        )
+    forward = op.kind == "forward"
+    strategies: tuple[str, ...] = ("forward",) if forward else tuple(op.strategies or ())
+    return Finishing(
+        side=str(op.side),
+        milling=op.milling,
+        strategies=strategies,
+        use=op.use if op.use is not None and not forward else strategies[0],
+        joint=op.joint or "sharp",
+        radial_depth=op.radial_depth_mm,
+        axial_depth=op.axial_depth_mm,
+        semifinish_depth=op.semifinish_depth_mm or 0.0,
+        passes=op.passes or 1,
+        feed=mm_s_from_mm_min(op.feed_mm_min),
+        spindle_speed=rad_s_from_rpm(op.speed_rpm),
+        tolerance=op.tolerance_mm or 0.0,
+        step=op.step_mm,
+        lead=op.lead_mm or 0.0,
+        top=job.table.stock.top_mm,
+        clearance=op.clearance_mm,
+        rigid=rigid,
+    )
+
+
+def verify(
+    strategy: StrategyResult, op: OperationTable, cutter: Cutter, top: float, progress: Progress
+) -> Verification:
+    """Let the simulation, which knows no planner, hold the program of one strategy against its history.
+
+    The planner says in ``drawn`` what the program starts from (`stock before`, closed contours; a front starts in the
+    solid) and the `wall`, whose travel has the part on its right.
+    """
+    before = strategy.drawn.get("stock before", ())
+    if not before and op.kind != "pocket":
+        return Verification(Verdict.UNPROVEN, "the planner does not say what stock the program starts from")
+    # eased joints may leave the drawn wall to either side, a cutter may leave stock in a corner; the path of a front is
+    # made of chords, and what it leaves over is judged by its area, which the planner reports
+    leave = op.tolerance_mm or 0.0
+    gouge = leave if op.joint == "clothoid" else 0.0
+    if op.kind == "pocket":
+        leave, gouge = op.radial_depth_mm, CHORDS_MM
+    names = np.asarray(strategy.history["pass"]).astype(str)
+    left_out = int(np.isin(names, NOT_LEVEL).sum())
+    told = verify_contour(
+        strategy.program,
+        cutter.radius,
+        strategy.history,
+        stock=Region(tuple(before)) if before else None,
+        stock_top_mm=top,
+        wall=strategy.drawn.get("wall", ()),
+        material="right",
+        engagement_tolerance_deg=ENGAGEMENT_DEG,
+        gouge_tolerance_mm=max(GOUGE_MM, gouge),
+        excess_tolerance_mm=max(GOUGE_MM, leave),
+        passes=sorted(set(names.tolist()) - set(NOT_LEVEL)),
+        workers=2,
+        progress=progress,
+    )
+    return Verification(
+        VERDICTS[told.verdict],
+        "; ".join((told.text, *told.reasons)),
+        {
+            "engagement_difference_deg": told.engagement_difference_deg,
+            "engagement_at_mm": list(told.engagement_at),
+            "gouge_mm": told.gouge_mm,
+            "gouge_at_mm": list(told.gouge_at),
+            "excess_mm": told.excess_mm,
+            "excess_at_mm": list(told.excess_at),
+            "rapids_through_stock": [list(p) for p in told.rapids],
+            "rows_compared": told.compared,
+            "rows_not_compared": left_out,
+        },
+    )
+
+
+# -- reading ----------------------------------------------------------------------------------------------------
+def _read_part(job: ContourJob) -> tuple[tuple[Contour, ...], tuple[Finding, ...]]:
+    """Contours of the drawing or of the planar face, and what its reader noticed."""
+    part = job.table.part
+    ending = job.part_file.suffix.lower()
+    if ending == ".dxf":
+        drawing = read_dxf(
+            job.part_file,
+            units=part.units,
+            units_if_unstated=part.units_if_unstated,
+            layers=part.layers or None,
+            join_mm=part.join_mm,
+            tolerance_mm=part.tolerance_mm,
+        )
+    elif ending in (".step", ".stp"):
+        drawing = read_step_face(
+            job.part_file, z_mm=part.face_z_mm, join_mm=part.join_mm, tolerance_mm=part.tolerance_mm
+        )
+    else:
+        raise InputError(f"part.file = {part.file}: must end in .dxf, .step or .stp")
+    return drawing.contours, tuple(replace(f, text=f"part: {f.text}") for f in drawing.findings)
+
+
+def _provenance(job: ContourJob, inputs: Inputs) -> Provenance:
+    files: dict[str, Path] = {"part": job.part_file}
+    files |= {k: v for k, v in (("machine", job.machine), ("material", job.material)) if isinstance(v, Path)}
+    files |= {f"cutter {k}": job.path.parent / c.file for k, c in enumerate(job.table.cutter) if c.file is not None}
+    return provenance_of(files, job.overrides, inputs.machine, (inputs.material,))

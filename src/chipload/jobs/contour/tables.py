@@ -1,0 +1,103 @@
+"""The tables of a job that plans contours and pockets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+from pydantic import Field
+
+from chipload.cutter.table import CutterTable
+from chipload.jobs.tables import (
+    ChecksTable,
+    Count,
+    Limits,
+    NotNegative,
+    Number,
+    Positive,
+    SourceTable,
+    Table,
+    Text,
+    Unit,
+)
+
+Strategy = Literal["plain", "backward", "feed"]
+
+
+class PartTable(Table):
+    """What is to be made: a drawing (DXF) or a model (STEP)."""
+
+    file: Text
+    units: Unit | None = Field(None, description="overrides the units of the drawing")
+    units_if_unstated: Unit | None = Field(None, description="units of a drawing that names none")
+    layers: tuple[Text, ...] = Field((), description="layers that are read; none: all")
+    join_mm: NotNegative = Field(0.01, le=10.0, description="gaps up to this are closed and reported")
+    tolerance_mm: Positive = Field(0.001, le=1.0, description="how far arcs may leave splines and ellipses")
+    face_z_mm: Number | None = Field(None, description="height of the planar face of a STEP file")
+
+
+class StockTable(Table):
+    """What it is made from."""
+
+    top_mm: Number = Field(description="z of the top of the stock")
+
+
+class OperationTable(Table):
+    """One operation; which keys it needs depends on its kind, see :data:`NEEDS`."""
+
+    kind: Literal["contour", "forward", "pocket"]
+    cutter: Count = Field(description="number of a [[cutter]]")
+    milling: Literal["down", "up"]
+    radial_depth_mm: Positive = Field(description="depth of cut across the wall")
+    axial_depth_mm: Positive = Field(description="depth of cut along the axis")
+    feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's centre")
+    speed_rpm: Positive = Field(le=1e6, description="spindle speed")
+    step_mm: Positive = Field(le=10.0, description="step of the history")
+    clearance_mm: Positive = Field(description="height of rapids above the top of the stock")
+    side: Literal["inside", "outside", "left", "right"] | None = None
+    strategies: tuple[Strategy, ...] | None = None
+    use: Strategy | None = Field(None, description="the strategy whose program is released")
+    joint: Literal["sharp", "clothoid"] | None = None
+    semifinish_depth_mm: Positive | None = Field(None, description="radial depth of the first pass on a straight wall")
+    passes: Count | None = Field(None, description="passes before the finish pass, or passes of forward")
+    tolerance_mm: Positive | None = Field(None, le=1.0, description="how far eased joints may leave the drawing")
+    lead_mm: Positive | None = Field(None, description="radius of the lead-in")
+    allowance_mm: NotNegative | None = Field(None, description="left on the wall")
+
+
+class ContourLimitsTable(Limits):
+    """What a planned program must not exceed."""
+
+    engagement_deg: Positive | None = Field(None, le=180.0)
+    force_xy_n: Positive | None = None
+    torque_nm: Positive | None = None
+    form_error_um: Positive | None = None
+
+
+class ContourJobTable(Table):
+    """The whole file of a job that is planned."""
+
+    part: PartTable
+    stock: StockTable
+    machine: SourceTable
+    material: SourceTable
+    cutter: tuple[CutterTable, ...] = Field(min_length=1)
+    operation: tuple[OperationTable, ...] = Field(min_length=1)
+    limits: ContourLimitsTable = Field(default_factory=ContourLimitsTable.model_construct)
+    checks: ChecksTable = Field(default_factory=ChecksTable.model_construct)
+
+
+#: keys that every planned operation needs
+ALWAYS = {"kind", "cutter", "milling", "radial_depth_mm", "axial_depth_mm", "feed_mm_min", "speed_rpm", "step_mm"}
+
+
+#: keys that each kind needs beside those that all need
+NEEDS: Mapping[str, tuple[str, ...]] = {
+    "contour": ("side", "strategies", "joint", "semifinish_depth_mm", "tolerance_mm", "lead_mm"),
+    "forward": ("side", "lead_mm"),
+    "pocket": (),
+}
+
+
+#: keys that each kind also understands
+MAY: Mapping[str, tuple[str, ...]] = {"contour": ("use", "passes"), "forward": ("passes",), "pocket": ("allowance_mm",)}

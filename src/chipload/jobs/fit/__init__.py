@@ -1,0 +1,1 @@
+"""Force coefficients from measured forces."""

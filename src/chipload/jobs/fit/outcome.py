@@ -1,0 +1,75 @@
+"""What a fit ends with.
+
+Peaks are means over the turns of the greatest and the least of each turn. The error of a peak is taken of that of the
+two that is larger in size; a measured 0 has no error in percent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutting.fit import Fit, Prediction
+from chipload.cutting.material import Material
+from chipload.cutting.turns import MeasuredCut, Turns
+from chipload.errors import Finding
+from chipload.jobs.fit.job import FitJob
+from chipload.result import Provenance
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A cut beside its prediction.
+
+    ``mean``, ``high``, ``low``, ``band_high``, ``band_low`` (3,) [N] measured, as in the prediction; errors in percent
+    of the measured, (3,): ``mean_percent``, and ``peak_percent`` of the larger peak; ``plane`` greatest in-plane force
+    measured [N]; ``phase`` rotation of tooth 0 at the first sample [rad].
+    """
+
+    cut: MeasuredCut
+    use: str
+    turns: Turns
+    predicted: Prediction
+    mean: Floats
+    high: Floats
+    low: Floats
+    band_high: Floats
+    band_low: Floats
+    plane: float
+    phase: float
+    mean_percent: Floats
+    peak_percent: Floats
+
+    def measured(self, theta: Floats) -> Floats:
+        """(m, 3) float [N] mean turn of the measured forces, within the harmonics, at rotations (m,) of tooth 0."""
+        k = np.arange(1, len(self.turns.amplitude))
+        wave = np.exp(1j * np.outer(np.asarray(theta) - self.phase, k))
+        return np.asarray(self.turns.amplitude[0].real + 2.0 * (wave @ self.turns.amplitude[1:]).real)
+
+
+@dataclass(frozen=True, eq=False)
+class FitResult:
+    """What a fit ends with.
+
+    Parameters
+    ----------
+    job : that was run
+    title : of the result
+    fit : coefficients, runout, dynamometer
+    comparisons : every measurement beside its prediction, in the order of the job
+    material : None where it cannot be written
+    findings : of the force files, of the fit, and why there is no material
+    provenance : where the numbers come from
+    """
+
+    job: FitJob
+    title: str
+    fit: Fit
+    comparisons: tuple[Comparison, ...]
+    material: Material | None
+    findings: tuple[Finding, ...]
+    provenance: Provenance

@@ -1,0 +1,146 @@
+"""The result of a fit: a track for each measurement, the errors of the predicted ones against their limits."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutting.fit import NAMES, TURN, predicted
+from chipload.jobs.fit.job import CHANNELS
+from chipload.jobs.fit.outcome import Comparison, FitResult
+from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, in_memory, state_of
+from chipload.result.limits import Columns
+from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
+
+Floats = NDArray[np.float64]
+
+#: file of the material that is made
+MATERIAL = "material.toml"
+UNITS = ("MPa", "MPa", "MPa", "N/mm", "N/mm", "N/mm")
+
+
+def result_of(done: FitResult) -> Result:
+    """The result of a fit; the measurements that are predicted are in use."""
+    names = Counter(c.cut.name for c in done.comparisons)
+    tracks = tuple(
+        _track(done, c, c.cut.name if names[c.cut.name] == 1 else f"{c.cut.name} {k}")
+        for k, c in enumerate(done.comparisons)
+    )
+    ktc, krc = done.fit.values[:2]
+    return Result(
+        capability="fit",
+        title=done.title,
+        tracks=tuple(sorted(tracks, key=lambda t: not t.in_use)),
+        operations=({"kind": "fit", **numbers(done)},),
+        findings=done.findings,
+        unchecked=tuple(f"limit {name}: not stated" for name in done.job.unchecked),
+        provenance=done.provenance,
+        note=f"Ktc {ktc:.4g} MPa, Krc {krc:.4g} MPa." if np.isfinite([ktc, krc]).all() else "",
+    )
+
+
+def history(done: FitResult, c: Comparison) -> Columns:
+    """One turn of a measurement: measured and predicted forces on the cutter, a row a rotation."""
+    theta = np.linspace(0.0, math.tau, TURN, endpoint=False)
+    measured, model = c.measured(theta), predicted(done.fit, c.cut, theta)
+    out: dict[str, NDArray[Any]] = {"t_s": theta / c.turns.speed, "rotation_deg": np.degrees(theta)}
+    for k in np.flatnonzero(c.cut.measured):
+        out[f"force_{CHANNELS[k]}_measured_n"] = measured[:, k]
+        out[f"force_{CHANNELS[k]}_n"] = model[:, k]
+    return out
+
+
+def _track(done: FitResult, c: Comparison, name: str) -> Track:
+    in_use = c.use == "predict"
+    errors = {"mean_percent": c.mean_percent, "peak_percent": c.peak_percent}
+    limits = tuple(_check(c, name, key, limit, errors[key]) for key, limit in done.job.limits.items()) if in_use else ()
+    settings: dict[str, float | str] = {
+        "use": c.use,
+        "feed_mm_min": mm_min_from_mm_s(c.cut.feed),
+        "speed_rpm": rpm_from_rad_s(c.turns.speed),
+    }
+    return Track(
+        name, TrackKind.MEASUREMENT, in_use, None, limits, parameters=settings, blocks=in_memory(history(done, c))
+    )
+
+
+def _check(c: Comparison, track: str, name: str, limit: float, errors: Floats) -> LimitCheck:
+    """The greatest error of the channels that were measured; one that has none leaves the limit unproven."""
+    known = np.isfinite(errors)
+    lost = [CHANNELS[k] for k in np.flatnonzero(c.cut.measured & ~known)]
+    reason = f"{', '.join(lost)}: no error is known" if lost else ""
+    if not known.any():
+        return LimitCheck(name, limit, None, Verdict.UNPROVEN, track, reason=reason or "no channel was measured")
+    worst = float(np.abs(errors[known]).max())
+    state, why = state_of(worst, limit, reason=reason)
+    return LimitCheck(name, limit, worst, state, track, reason=why)
+
+
+# -- numbers ----------------------------------------------------------------------------------------------------
+def numbers(done: FitResult) -> dict[str, Any]:
+    """The numbers of the fit as JSON values; what is not known is null."""
+    fit = done.fit
+    size, direction = fit.cutter.runout
+    return {
+        "material": done.job.table.name,
+        "written": done.material is not None,
+        "method": fit.method,
+        "coefficients": {
+            f"{name.lower()}_{unit.lower().replace('/', '_')}": {
+                "value": _number(fit.values[k]),
+                "identified": bool(fit.identified[k]),
+                "low_95": _number(fit.interval[k, 0]),
+                "high_95": _number(fit.interval[k, 1]),
+                "sd": _number(math.sqrt(fit.covariance[k, k]) if fit.covariance[k, k] >= 0.0 else math.nan),
+            }
+            for k, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True))
+        },
+        "covariance": [[_number(v) for v in row] for row in fit.covariance],
+        "degrees_of_freedom": fit.freedom,
+        "harmonics": fit.harmonics,
+        "runout_mm": _number(size),
+        "runout_deg": _number(math.degrees(direction)) if fit.cutter.flutes > 2 else None,
+        "residual_sd_n": _named(fit.residual),
+        "r2": _named(fit.r2),
+        "dynamometer_hz": _named(fit.resonance[:, 0] / math.tau),
+        "dynamometer_damping": _named(fit.resonance[:, 1]),
+        "measurements": [_measurement(c) for c in done.comparisons],
+    }
+
+
+def _measurement(c: Comparison) -> dict[str, Any]:
+    model = c.predicted
+    rows = {
+        "mean": (c.mean, model.mean, model.half[0]),
+        "high": (c.high, model.high, model.half[1]),
+        "low": (c.low, model.low, model.half[2]),
+        "band_high": (c.band_high, model.band_high, model.half[3]),
+        "band_low": (c.band_low, model.band_low, model.half[4]),
+    }
+    return {
+        "file": c.cut.name,
+        "use": c.use,
+        "feed_mm_min": mm_min_from_mm_s(c.cut.feed),
+        "speed_rpm": rpm_from_rad_s(c.turns.speed),
+        "turns": len(c.turns.mean),
+        "scatter_n": _named(c.turns.scatter),
+        **{
+            f"{key}_n": {"measured": _named(seen), "model": _named(says), "half_95": _named(half)}
+            for key, (seen, says, half) in rows.items()
+        },
+        "plane_max_n": {"measured": _number(c.plane), "model": _number(model.resultant)},
+        "mean_error_percent": _named(c.mean_percent),
+        "peak_error_percent": _named(c.peak_percent),
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _named(values: Floats) -> dict[str, float | None]:
+    return {key: _number(v) for key, v in zip(CHANNELS, values, strict=True)}

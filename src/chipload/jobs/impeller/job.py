@@ -1,0 +1,148 @@
+"""A job that mills an impeller: its tables checked against one another, its files found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from chipload.jobs.impeller.tables import (
+    ImpellerJobTable,
+    ImpellerOperationTable,
+    ImpellerTable,
+    SectionsTable,
+    StepTable,
+    SurfaceTable,
+)
+from chipload.jobs.messages import Errors
+from chipload.jobs.sources import sources_of
+
+
+@dataclass(frozen=True)
+class ImpellerJob:
+    """A job that mills an impeller; paths are absolute.
+
+    Parameters
+    ----------
+    path : the job file
+    table : its values
+    machine, catalogue : a shipped name or a file
+    files : what the part is read from, by what it is
+    overrides : the `--set` texts that were applied
+    """
+
+    path: Path
+    table: ImpellerJobTable
+    machine: str | Path
+    catalogue: str | Path
+    files: dict[str, Path]
+    overrides: tuple[str, ...]
+
+    @property
+    def operation(self) -> ImpellerOperationTable:
+        """The operation."""
+        return self.table.operation[0]
+
+
+def load(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) -> ImpellerJob:
+    """The job of a table that was read.
+
+    Raises
+    ------
+    InputError
+        Keys do not go together.
+    """
+    folder, part, errors = path.parent, table.impeller, Errors()
+    sources: dict[str, str | Path] = {}
+    errors.texts += missing(table.model_dump(exclude_none=True))
+    with errors.collect():
+        sources = sources_of(table, folder, "machine", "catalogue")
+    for k, surface in enumerate(table.surface):
+        errors.texts += _wrong_surface(f"surface.{k}", surface, part)
+        if any((s.body, s.side) == (surface.body, surface.side) for s in table.surface[:k]):
+            errors.add(f"surface.{k}: {surface.body} {surface.side} stands twice: list each surface once")
+    errors.texts += _wrong_paths(table.operation[0])
+    if part.sections is not None:
+        errors.texts += _wrong_sections(part.sections)
+    if part.step is not None:
+        errors.texts += _wrong_step(part.step)
+    errors.refuse()
+    return ImpellerJob(
+        path, table, sources["machine"], sources["catalogue"], _files(part, folder), tuple(overrides)
+    )  # fmt: skip
+
+
+def missing(values: Mapping[str, Any]) -> list[str]:
+    """What a part lacks or has twice; ``values`` are those of the file."""
+    part = values.get("impeller")
+    if not isinstance(part, Mapping):
+        return []
+    stated = [key for key in ("shape", "sections", "step") if key in part]
+    if len(stated) == 1:
+        return []
+    said = f"{' and '.join(stated)} are" if stated else "none is"
+    return [f"impeller: {said} stated: state one of [impeller.shape], [impeller.sections], [impeller.step]"]
+
+
+def _wrong_paths(op: ImpellerOperationTable) -> Iterator[str]:
+    paths, rough = op.paths, op.rough
+    if paths is not None and not paths.touch_mm < paths.margin_mm < paths.lift_mm:
+        yield (
+            f"operation.0.paths.margin_mm = {paths.margin_mm:g}: must be above touch_mm = {paths.touch_mm:g} and below "
+            f"lift_mm = {paths.lift_mm:g}"
+        )
+    if rough is not None and paths is None:
+        yield "operation.0.rough: takes its links from [operation.paths]: state that too"
+    if rough is not None and (rough.diameter_mm is None) != (rough.corner_radius_mm is None):
+        yield "operation.0.rough: state both diameter_mm and corner_radius_mm, or neither for the largest that fits"
+
+
+def _wrong_sections(given: SectionsTable) -> Iterator[str]:
+    for name in (*given.blade, *given.splitter, given.hub, given.shroud):
+        if name.lower().endswith((".stp", ".step")):
+            yield f"impeller.sections: {name}: is a STEP file: name its faces in [impeller.step]"
+
+
+def _files(part: ImpellerTable, folder: Path) -> dict[str, Path]:
+    """What the part is read from, by what it is."""
+    if part.step is not None:
+        points = {key: folder / name for key, name in _point_files(part.step).items()}
+        return {"step": folder / part.step.file} | points
+    if part.sections is None:
+        return {}
+    given = part.sections
+    files = {f"blade {k}": folder / name for k, name in enumerate(given.blade, 1)}
+    files |= {f"splitter {k}": folder / name for k, name in enumerate(given.splitter, 1)}
+    return files | {"hub": folder / given.hub, "shroud": folder / given.shroud}
+
+
+def _point_files(given: StepTable) -> dict[str, str]:
+    """Hub and shroud where they are files of points."""
+    return {key: name for key in ("hub", "shroud") if isinstance(name := getattr(given, key), str)}
+
+
+def _wrong_step(given: StepTable) -> Iterator[str]:
+    if (given.splitter_plus is None) != (given.splitter_minus is None):
+        missing = "plus" if given.splitter_plus is None else "minus"
+        yield f"impeller.step.splitter_{missing}: missing: state both sides of the splitter or neither"
+    points = _point_files(given)
+    for key in ("hub", "shroud"):
+        if not getattr(given, key):
+            yield f"impeller.step.{key} = []: must name at least one face, or a file of points"
+    if bool(points) == (given.unit is None):
+        said = "missing: state it for the points of " + " and ".join(points) if points else "of no file: leave it out"
+        yield f"impeller.step.unit: {said}"
+
+
+def _wrong_surface(at: str, surface: SurfaceTable, part: ImpellerTable) -> Iterator[str]:
+    for key in ("along", "up"):
+        low, high = getattr(surface, key)
+        if low >= high:
+            yield f"{at}.{key} = [{low:g}, {high:g}]: must ascend within 0 to 1"
+    if min(surface.points) < 2:
+        yield f"{at}.points = {list(surface.points)}: must be at least 2 each"
+    if surface.side.endswith(" fillet") and part.fillet_mm is None:
+        yield f"{at}.side = {surface.side!r}: the impeller has no fillets: state impeller.fillet_mm"
+    if surface.body == "splitter" and not part.has_splitter:
+        yield f"{at}.body = 'splitter': the impeller has no splitter: leave it out"

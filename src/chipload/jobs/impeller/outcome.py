@@ -1,0 +1,343 @@
+"""What a job that mills an impeller hands to the report, and the verdict over it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.catalogue import Catalogue, CatalogueCutter
+from chipload.jobs.impeller.roughing_check import CheckedRough
+from chipload.machine.machine import Machine
+from chipload.planning.impeller.answer import Answer, Unreachable
+from chipload.planning.impeller.compare import Partition
+from chipload.planning.impeller.impeller import Impeller
+from chipload.planning.impeller.patch import Patch
+from chipload.planning.impeller.settings import CutterSetting
+from chipload.planning.impeller.surfaces import BODIES, ContactSurface
+from chipload.planning.impeller.tables import IndexTable
+from chipload.result import Provenance
+from chipload.simulation.channel.channel import Remainder
+
+Floats = NDArray[np.float64]
+
+#: name of the way of the cutter picked by hand
+PICKED = "hand-picked"
+#: why a contact point is not reached, in words
+REASONS: Mapping[str, str] = {
+    "turned away": "no table angle faces it",
+    "curvature": "every corner radius of the catalogue is larger than its radius of curvature",
+    "cutting part": "the smallest cutters of the catalogue meet other walls",
+    "above": "neck, shank or holder meet other walls",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class OneCutter:
+    """A cutter and a table angle for a whole surface.
+
+    Parameters
+    ----------
+    cutter : the cutter
+    table : index of its table angle
+    points : (k,) contact points that it mills: the reachable ones
+    ranges : for each of them (j, 2) pallet angles [rad]
+    """
+
+    cutter: CatalogueCutter
+    table: int
+    points: NDArray[np.int64]
+    ranges: tuple[Floats, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """One surface with what was found.
+
+    Parameters
+    ----------
+    settings : keys of the operation and of the surface, as stated
+    surface, answer : contact points, and the largest cutter at each
+    table : the machine's table angles that were searched
+    one : the largest cutter for all of it; None: there is none
+    clearance : of neck, shank and holder [mm]
+    search_s : time of the search [s]
+    """
+
+    settings: Mapping[str, Any]
+    surface: ContactSurface
+    answer: Answer
+    table: IndexTable
+    one: OneCutter | None
+    clearance: float
+    search_s: float
+
+    @property
+    def place(self) -> Floats:
+        """Contact points (c, 3) [mm]."""
+        return self.surface.scene.contact
+
+    @cached_property
+    def limiting(self) -> tuple[Limiting, ...]:
+        """For each corner radius and table angle what keeps one cutter from being larger."""
+        out = []
+        reached = np.flatnonzero(self.answer.cutter >= 0)
+        for f in self.answer.families if len(reached) else ():
+            sizes = [c.diameter for c in self.answer.catalogue.family(f.corner_radius)]
+            for t in range(len(f.tables)):
+                k = int(reached[f.bound[reached, t].argmin()])
+                rho = float(f.bound[k, t])
+                most = 2.0 * (rho + f.corner_radius) if rho > -np.inf else None
+                fits = [d for d in sizes if most is not None and 0.5 * d - f.corner_radius <= max(f.rho[k, t], -1.0)]
+                who = f.blockers[k, t]
+                out.append(
+                    Limiting(
+                        f.corner_radius, t, k, most, max(fits, default=None),
+                        bool(f.certified[reached, t].all()), rho >= f.cap, tuple(int(i) for i in who[who != -1]),
+                    )
+                )  # fmt: skip
+        return tuple(out)
+
+
+@dataclass(frozen=True)
+class Limiting:
+    """What keeps one cutter for a whole surface from being larger at a table angle.
+
+    Parameters
+    ----------
+    corner_radius : [mm]
+    table : index of the table angle
+    point : the contact point whose limit is least
+    most : diameter [mm] that no cutter of that corner radius exceeds there; None: it is turned away
+    size : largest of the catalogue below, by the cutting part alone; None: none
+    certified : proved for every reachable contact point
+    capped : the search ended at the largest of the catalogue
+    blockers : check points that prove it
+    """
+
+    corner_radius: float
+    table: int
+    point: int
+    most: float | None
+    size: float | None
+    certified: bool
+    capped: bool
+    blockers: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Scallop:
+    """What the check measures on a patch: ``asked``, greatest rest between two passes, mean height of the crests [mm],
+    how many crests, the share of the patch on which no more than asked is left.
+    """
+
+    asked: float
+    greatest: float
+    mean: float
+    crests: int
+    covered: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing between two passes is higher than asked."""
+        return self.greatest <= self.asked
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """A program of one setting with what the simulation found.
+
+    Parameters
+    ----------
+    setting : cutter, table angle, patches, moves
+    gouge : deepest that any part of the tool comes below a surface [mm], where it is: ``says``
+    allowed : what of it is allowed [mm]
+    scallops : of each patch
+    findings : what the program asks of the machine that it does not give
+    seconds : predicted time of one channel [s]
+    """
+
+    setting: CutterSetting
+    gouge: float
+    message: str
+    allowed: float
+    scallops: tuple[Scallop, ...]
+    findings: tuple[str, ...]
+    seconds: float
+
+    @property
+    def verified(self) -> bool:
+        """No gouge, nothing beyond the machine, no scallop higher than asked."""
+        return self.gouge <= self.allowed and not self.findings and all(s.holds for s in self.scallops)
+
+    @property
+    def missed(self) -> float:
+        """Length of lines that are not milled as they were laid out [mm]; rest passes may have done it."""
+        own = math.fsum(x.length for m in self.setting.millings for x in m.tracks.missed)
+        return own + math.fsum(self.setting.tracks[k].length for k, _ in self.setting.linked.refused)
+
+    @property
+    def name(self) -> str:
+        """`D 12 r 2 mm at 45 deg`."""
+        c = self.setting.cutter
+        return f"D {c.diameter:g} r {c.corner_radius:g} mm at {np.degrees(self.setting.table):.6g} deg"
+
+    @property
+    def fails(self) -> tuple[str, ...]:
+        """What does not hold."""
+        out = [f"{self.name}: {f}" for f in self.findings]
+        if self.gouge > self.allowed:
+            out.append(f"{self.name}: {self.message}: gouge_mm = {self.allowed:g} is allowed")
+        for m, s in zip(self.setting.millings, self.scallops, strict=True):
+            if not s.holds:
+                where = f"{BODIES[m.patch.body]} {m.patch.side}"
+                out.append(f"{self.name}, {where}: {s.greatest:.4f} mm are left between passes: asked {s.asked:g}")
+        return tuple(out)
+
+
+@dataclass(frozen=True, eq=False)
+class Covered:
+    """What all programs together leave on a surface, as far as its patches go.
+
+    Parameters
+    ----------
+    body, side : of the surface
+    left : what the check finds on a grid of its points
+    asked : the scallop [mm]
+    spacing : most distance of the points [mm]
+    unreached : area [mm2] where the planner found no cutter and table angle for rest passes
+    """
+
+    body: int
+    side: str
+    left: Remainder
+    asked: float
+    spacing: float
+    unreached: float
+
+    @property
+    def name(self) -> str:
+        """`blade floor`."""
+        return f"{BODIES[self.body]} {self.side}"
+
+    @property
+    def share(self) -> float:
+        """Of the area, where no more than asked is left."""
+        return 1.0 - self.left.excess(self.asked)
+
+    @property
+    def greatest(self) -> tuple[float, int]:
+        """Most that is left [mm], at most the height of the rays, and its point."""
+        k = int(self.left.rest.argmax())
+        return float(self.left.rest[k]), k
+
+    @property
+    def fails(self) -> tuple[str, ...]:
+        """What does not hold."""
+        most, k = self.greatest
+        if most <= self.asked:
+            return ()
+        wall = self.left.wall
+        x, y, z = wall.points[k].tolist()
+        over = float(wall.area[self.left.rest > self.asked].sum())
+        least = f"{most:.3f} mm" if most < self.left.height else f"{most:g} mm or more"
+        lost = f", on {self.unreached:.1f} mm2 of it no cutter was found to go" if self.unreached > 0.0 else ""
+        return (
+            f"{self.name}: on {over:.1f} mm2, {100.0 * (1.0 - self.share):.2g} % of what is milled, more than "
+            f"{self.asked:g} mm is left: {least} at ({x:.2f}, {y:.2f}, {z:.2f}){lost}",
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ImpellerResult:
+    """A whole run.
+
+    Parameters
+    ----------
+    title : name of the job
+    impeller, catalogue, machine : what is milled, with what, where
+    surfaces : in their order
+    one : the largest cutter for all surfaces at one table angle, and the index of that; None: there is none
+    partitions : the cutter picked by hand where one is stated, then one cutter, two, ...
+    programs : of the way with the least time, checked; None: the job asks for none
+    covered : what the programs leave on each surface
+    roughs : roughing programs, before the others; None: the job asks for none
+    settings : keys of the operation, as stated
+    outer_diameter : as stated [mm]
+    provenance : where the numbers come from
+    """
+
+    title: str
+    impeller: Impeller
+    catalogue: Catalogue
+    machine: Machine
+    surfaces: tuple[Searched, ...]
+    one: tuple[CatalogueCutter, int] | None
+    partitions: tuple[Partition, ...]
+    programs: tuple[Checked, ...] | None
+    covered: tuple[Covered, ...] | None
+    roughs: tuple[CheckedRough, ...] | None
+    settings: Mapping[str, Any]
+    outer_diameter: float
+    provenance: Provenance
+
+    @property
+    def picked(self) -> Partition | None:
+        """The way of the cutter picked by hand."""
+        return next((way for way in self.partitions if way.name == PICKED), None)
+
+    @property
+    def used(self) -> Partition | None:
+        """The way with the least time; of equal ones that with fewer cutters. None: nothing mills all."""
+        able = [way for way in self.partitions if way.name != PICKED and way.divided is not None]
+        return min(able, key=lambda way: way.divided.total if way.divided else math.inf, default=None)
+
+    @property
+    def area(self) -> float:
+        """Of all surfaces [mm^2], one channel."""
+        return float(sum(op.surface.area.sum() for op in self.surfaces))
+
+    def searched(self, patch: Patch) -> Searched:
+        """The surface of a patch."""
+        return next(
+            op for op in self.surfaces if (BODIES.index(op.surface.body), op.surface.side) == (patch.body, patch.side)
+        )
+
+
+def unreached_text(op: Searched, missed: Unreachable) -> str:
+    """`contact point 37 at (1.0, 2.0, 3.0): ...: D 8.300 r 2 mm would fit`."""
+    x, y, z = op.place[missed.point]
+    would = f"D {missed.fits:.3f} r {missed.fits_corner:g} mm would fit" if missed.fits > 0.0 else ""
+    would = would or ("none of these corner radii fits" if missed.reason == "cutting part" else "no diameter would fit")
+    return f"contact point {missed.point} at ({x:.3f}, {y:.3f}, {z:.3f}): {REASONS[missed.reason]}: {would}"
+
+
+def unmilled(milled: ImpellerResult) -> tuple[str, ...]:
+    """What the patches leave open."""
+    if milled.used is None:
+        return (f"not {milled.partitions[-1].name} of the catalogue mill all that can be reached",)
+    divided = milled.used.divided
+    untold = divided.untold if divided else 0
+    return (f"{untold} ranges of pallet angles had too many arcs to tell: they count as closed",) if untold else ()
+
+
+def for_all(milled: ImpellerResult) -> str:
+    """`one cutter for all: D 16 r 2 mm at 40 deg`."""
+    if milled.one is not None:
+        c, alpha = milled.one[0], np.degrees(milled.surfaces[0].table.angle[milled.one[1]])
+        return f"the largest one cutter for all: D {c.diameter:g} r {c.corner_radius:g} mm at {alpha:.6g} deg"
+    return "no one cutter mills all of it at one table angle"
+
+
+def largest(op: Searched) -> str:
+    """`D 20 r 2 at 45 deg for all`, or the range of diameters."""
+    if op.one is not None:
+        c, alpha = op.one.cutter, np.degrees(op.table.angle[op.one.table])
+        return f"D {c.diameter:g} r {c.corner_radius:g} mm at {alpha:.6g} deg for all of it"
+    d = op.answer.diameter[op.answer.cutter >= 0]
+    return f"no cutter mills all of it at one table angle, D {d.min():g} to {d.max():g} mm point by point"

@@ -1,0 +1,148 @@
+"""The impeller of a job: by formula, through sections of points, or from faces of a STEP file.
+
+Notation: see ``planning/impeller/impeller.py``; z axis of rotation, the flow comes in against it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import InputError
+from chipload.geometry.bspline import BSplinePatch
+from chipload.geometry.revolve import Revolved
+from chipload.geometry.sections import Blade, checked, checked_diameter, loft, read_meridian, read_sections
+from chipload.geometry.sides import blade_of, foot_off, radius_of
+from chipload.geometry.step_faces import Model, Name, read_faces
+from chipload.geometry.step_meridian import meridian_of
+from chipload.geometry.step_patch import patch_of
+from chipload.jobs.impeller.job import ImpellerJob
+from chipload.jobs.impeller.tables import SectionsTable, ShapeTable, StepTable
+from chipload.planning.impeller.fillets import with_fillets
+from chipload.planning.impeller.impeller import Impeller
+from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
+from chipload.planning.impeller.surfaces import BODIES
+
+Floats = NDArray[np.float64]
+
+_CYCLE = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+_OVER = np.diag([1.0, -1.0, -1.0])
+#: rotation from a file's frame to that whose axis is z, by the way the flow comes in; +x as sections with flow_along_x
+AGAINST_Z = {"-z": np.eye(3), "-x": _CYCLE, "-y": _CYCLE @ _CYCLE}
+AGAINST_Z |= {key.replace("-", "+"): _OVER @ R for key, R in AGAINST_Z.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """An impeller, and what its faces became and its fillets take, a line each."""
+
+    impeller: Impeller
+    faces: tuple[str, ...] = ()
+
+
+def read_part(job: ImpellerJob) -> Part:
+    """The impeller of a job.
+
+    Raises
+    ------
+    InputError
+        A file cannot be used, or its numbers are not those of an impeller.
+    """
+    part = job.table.impeller
+    plain = _without_fillets(job)
+    if part.fillet_mm is None:
+        return plain
+    made, said = with_fillets(plain.impeller, part.fillet_mm)
+    milled = {(s.body, s.side) for s in job.table.surface}
+    names = [(b, f"{k} fillet") for b in BODIES[: len(made.bodies)] for k in ("plus", "minus")]
+    left = [" ".join(name) for name in names if name not in milled]
+    not_milled = (f"not milled, for no [[surface]] names it: {', '.join(left)}",) if left else ()
+    return Part(made, (*plain.faces, *said, *not_milled))
+
+
+def _without_fillets(job: ImpellerJob) -> Part:
+    part = job.table.impeller
+    if part.step is not None:
+        return _of_step(job.files, part.step, part.blades, part.outer_diameter_mm)
+    if part.sections is not None:
+        return Part(_of_sections(job.path.parent, part.sections, part.blades, part.outer_diameter_mm))
+    assert part.shape is not None
+    return Part(_of_shape(part.shape, part.blades, part.outer_diameter_mm))
+
+
+def _of_shape(given: ShapeTable, blades: int, outer_diameter: float) -> Impeller:
+    shape = ImpellerShape(
+        blades, given.channel_mm, given.hub_radius_mm, 0.5 * outer_diameter, given.height_mm, given.blade_height_mm,
+        math.radians(given.wrap_deg), math.radians(given.lean_deg), given.outlet_height_mm,
+    )  # fmt: skip
+    return impeller_of(shape)
+
+
+def _of_sections(folder: Path, given: SectionsTable, blades: int, outer_diameter: float) -> Impeller:
+    over = given.flow_along_x
+
+    def blade(names: tuple[str, ...], key: str) -> Blade:
+        try:
+            found = read_sections([folder / name for name in names], given.unit, over, given.columns)
+            return loft(checked(found, outer_diameter))
+        except InputError as err:
+            raise InputError(f"impeller.sections.{key}: {err}") from None
+
+    main = blade(given.blade, "blade")
+    splitter = blade(given.splitter, "splitter") if given.splitter else None
+    hub, shroud = (
+        Revolved(read_meridian(folder / name, given.unit, over), side)
+        for name, side in ((given.hub, 1), (given.shroud, -1))
+    )
+    return Impeller(main, splitter, hub, shroud, blades)
+
+
+def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diameter: float) -> Part:
+    model, R = read_faces(files["step"], "impeller.step.file"), AGAINST_Z[given.flow]
+    said: list[str] = []
+
+    def revolved(key: str, side: int) -> Revolved:
+        names = getattr(given, key)
+        if isinstance(names, str):
+            assert given.unit is not None
+            return Revolved(read_meridian(files[key], given.unit, given.flow.startswith("+")), side)
+        at = f"impeller.step.{key}"
+        faces = [model.face(name, at) for name in names]
+        numbers = [f.number for f in faces]
+        for k, number in enumerate(numbers):
+            if number in numbers[:k]:
+                raise InputError(f"{at}: face {number} stands twice: name each face once")
+        found = meridian_of(faces, R, at)
+        (r0, z0), (r1, z1) = found[0], found[-1]
+        said.append(f"{key}: {'; '.join(map(str, faces))}: r {r0:.6g}, z {z0:.6g} to r {r1:.6g}, z {z1:.6g} mm")
+        return Revolved(found, side)
+
+    hub, shroud = revolved("hub", 1), revolved("shroud", -1)
+
+    def blade(plus: Name, minus: Name, prefix: str) -> Blade:
+        sides = [_side(model, name, f"impeller.step.{prefix}{key}", given.fit_mm, R, said)
+                 for key, name in (("plus", plus), ("minus", minus))]  # fmt: skip
+        try:
+            made = blade_of(sides[0], sides[1], hub, shroud, math.tau / blades)
+            checked_diameter(2.0 * radius_of(made), outer_diameter, "faces")
+        except InputError as err:
+            raise InputError(f"impeller.step.{prefix}plus and {prefix}minus: {err}") from None
+        off = max(foot_off(made.plus, hub), foot_off(made.minus, hub))
+        said.append(f"{'splitter' if prefix else 'blade'}: its foot leaves the hub by at most {off:.3g} mm")
+        return made
+
+    main, splitter = blade(given.plus, given.minus, ""), None
+    if given.splitter_plus is not None and given.splitter_minus is not None:
+        splitter = blade(given.splitter_plus, given.splitter_minus, "splitter_")
+    return Part(Impeller(main, splitter, hub, shroud, blades), tuple(said))
+
+
+def _side(model: Model, name: Name, key: str, fit: float, R: Floats, said: list[str]) -> BSplinePatch:
+    face = model.face(name, key)
+    taken = patch_of(face, key, fit)
+    said.append(f"{key.removeprefix('impeller.step.')}: {face}: {taken}")
+    return taken.patch.rotated(R)

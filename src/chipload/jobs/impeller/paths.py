@@ -1,0 +1,152 @@
+"""The finishing programs of an impeller: planned patch by patch, then checked by the simulation of the channel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from chipload.jobs.impeller.outcome import Checked, Covered, Scallop
+from chipload.jobs.impeller.tables import ImpellerOperationTable, PathsTable
+from chipload.machine.machine import Machine
+from chipload.planning.impeller.compare import Partition
+from chipload.planning.impeller.coverage import between_lines
+from chipload.planning.impeller.floor import patch_of
+from chipload.planning.impeller.impeller import Impeller
+from chipload.planning.impeller.lines import LineMotion
+from chipload.planning.impeller.links import Link
+from chipload.planning.impeller.paths import PatchFinish
+from chipload.planning.impeller.programs import pallet_rate, too_fast
+from chipload.planning.impeller.settings import FinishSettings, Milling, PlannedSettings, channel_scene, planned
+from chipload.planning.impeller.surfaces import BODIES, ContactSampling
+from chipload.planning.impeller.tables import IndexTable
+from chipload.program.check import check_program
+from chipload.program.read import times_on
+from chipload.program.to_axes import to_axes
+from chipload.progress import Progress
+from chipload.simulation.channel.channel import Remainder, SurfacePoints, left_on, scallop_numbers, wall
+from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
+
+#: points of the walls that are looked for gouges, along and up
+_COARSE = (61, 25)
+#: not at the very edges of a blade: there a ray into the metal leaves it again
+_EDGE = 0.01
+#: how far the rays go above and below a surface [mm]
+_HEIGHT, _DEPTH = 1.0, 0.5
+#: distance of points of a whole surface on which what is left is measured [mm]
+_SPACING = 0.6
+#: grid lines across the passes of a patch on which the scallop is measured, points between two passes
+_FEW, _BETWEEN = 7, 14
+
+
+def checked_programs(
+    impeller: Impeller, machine: Machine, table: IndexTable, way: Partition,
+    op: ImpellerOperationTable, paths: PathsTable,
+    ahead: float, tools: int, workers: int, progress: Progress,
+) -> tuple[tuple[Checked, ...], tuple[Covered, ...]]:  # fmt: skip
+    """A program for each setting of the way with what the check finds; what all of them leave on each surface.
+
+    ``tools`` : how many tool numbers are taken.
+    """
+    assert way.divided is not None
+    feed = mm_s_from_mm_min(op.feed_mm_min)
+    motion = LineMotion(paths.chord_mm, feed, pallet_rate(machine), op.clearance_mm)
+    link = Link(
+        paths.lift_mm, paths.margin_mm, paths.touch_mm, paths.near_mm, mm_s_from_mm_min(paths.link_feed_mm_min),
+        paths.above_mm,
+    )  # fmt: skip
+    scene = channel_scene(
+        impeller, ContactSampling((0.0, 1.0), (0.0, 1.0), (2, 2), paths.check_mm, op.near_mm, op.around, ahead)
+    )
+    job = FinishSettings(
+        impeller, way.catalogue, scene, PatchFinish(op.scallop_mm, motion, paths.overrun_mm), link,
+        rad_s_from_rpm(op.speed_rpm), table, ahead, workers, tools,
+    )  # fmt: skip
+    plan = planned(job, way.divided.patches, progress=lambda done, what: progress(0.8 * done, what))
+    return _checked(job, machine, plan, paths, lambda done, what: progress(0.8 + 0.2 * done, what))
+
+
+def _checked(
+    job: FinishSettings, machine: Machine, plan: PlannedSettings, paths: PathsTable, progress: Progress
+) -> tuple[tuple[Checked, ...], tuple[Covered, ...]]:
+    impeller, asked, settings = job.impeller, job.how.scallop, plan.settings
+    millings = [m for s in settings for m in s.millings]
+    faces = list(dict.fromkeys((m.patch.body, m.patch.side) for m in millings))
+    dense = [_dense(impeller, m, job.ahead) for m in millings]
+    whole = [_whole(job, body, side, millings) for body, side in faces]
+    walls = [*walls_of(impeller, job.ahead), *dense, *whole]
+    found = []
+    for k, setting in enumerate(settings, 1):
+        found.append(left_on(walls, setting.program, setting.cutter, _HEIGHT, _DEPTH, workers=job.workers))
+        progress(k / len(settings), f"check of {k} programs")
+    # what is left is what no program takes
+    rest = [replace(same[0], rest=np.min([x.rest for x in same], axis=0)) for same in zip(*found, strict=True)]
+    crests = iter(rest[len(walls) - len(whole) - len(dense) :])
+    out = []
+    for setting, own in zip(settings, found, strict=True):
+        program = setting.program
+        scallops = tuple(_scallop(m, next(crests), asked) for m in setting.millings)
+        _, findings = to_axes(program, machine)
+        said = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
+        worst = max(own, key=lambda left: left.deepest[0])
+        seconds = float(times_on(program, machine).sum())
+        out.append(Checked(setting, worst.deepest[0], worst.message(), paths.gouge_mm, scallops, tuple(said), seconds))
+    covered = tuple(
+        Covered(face[0], face[1], left, asked, _SPACING, plan.unreached[face])
+        for face, left in zip(faces, rest[len(walls) - len(whole) :], strict=True)
+    )
+    return tuple(out), covered
+
+
+def _whole(job: FinishSettings, body: int, side: str, millings: Sequence[Milling]) -> SurfacePoints:
+    """Points of a surface as far as its patches go."""
+    surface = job.surface(body, side)
+    boxes = np.array([m.box for m in millings if (m.patch.body, m.patch.side) == (body, side)])
+    low, high = boxes[:, :, 0].min(axis=0), boxes[:, :, 1].max(axis=0)
+    grid = []
+    for k in (0, 1):
+        t = np.linspace(low[k], high[k], 41)
+        other = np.linspace(low[1 - k], high[1 - k], 5)
+        lines = [surface.at(t, q) if k == 0 else surface.at(q, t) for q in other]
+        size = max(float(np.linalg.norm(np.diff(x, axis=0), axis=1).sum()) for x in lines)
+        grid.append(np.linspace(low[k], high[k], max(3, math.ceil(size / _SPACING) + 1)))
+    return wall(f"{BODIES[body]} {side}", surface, grid[0], grid[1])
+
+
+def _scallop(milling: Milling, left: Remainder, asked: float) -> Scallop:
+    """The scallop of a patch where passes lie on both sides."""
+    within = between_lines(milling.tracks.tracks, milling.along, np.column_stack([left.wall.u, left.wall.v]))
+    numbers = scallop_numbers(left.scallops("v" if milling.along == "u" else "u", within), asked)
+    most = float(left.rest[within].max()) if within.any() else 0.0
+    covered = float(left.wall.area[left.rest <= asked].sum() / left.wall.area.sum())
+    return Scallop(asked, most, numbers["mean_mm"], int(numbers["count"]), covered)
+
+
+def _dense(impeller: Impeller, milling: Milling, ahead: float) -> SurfacePoints:
+    """Points of a patch, fine across its passes."""
+    surface = patch_of(impeller, BODIES[milling.patch.body], milling.patch.side, ahead)
+    fine = np.linspace(0.0, 1.0, min(max(milling.tracks.lines, 2) * _BETWEEN, 1200) + 1)
+    few = np.linspace(0.06, 0.94, _FEW)
+    share = (few, fine) if milling.along == "u" else (fine, few)
+    u, v = (low + x * (high - low) for x, (low, high) in zip(share, milling.box, strict=True))
+    return wall(f"{BODIES[milling.patch.body]} {milling.patch.side}", surface, u, v)
+
+
+def walls_of(impeller: Impeller, ahead: float) -> list[SurfacePoints]:
+    """Both sides of the bodies round the channels, and their floors."""
+    u, v = np.linspace(_EDGE, 1.0 - _EDGE, _COARSE[0]), np.linspace(0.0, 1.0 - _EDGE, _COARSE[1])
+    last = 1 + len(impeller.bodies)
+    out = []
+    for k in range(-1, last):
+        body = impeller.body(k)
+        out += [wall(f"body {k} plus", body.plus, u, v), wall(f"body {k} minus", body.minus, u, v)]
+        if impeller.fillets:
+            inner = np.linspace(0.05, 0.95, _COARSE[1])
+            out += [wall(f"fillet {k} {n}", impeller.foot(k, w), u, inner) for n, w in (("plus", 1), ("minus", -1))]
+    for index in range(len(impeller.bodies)):
+        floor = patch_of(impeller, BODIES[index], "floor", ahead)
+        turn = impeller.pitch
+        out += [wall(f"floor {index}", floor, u, v), wall(f"floor {index} behind", floor.turned(-turn), u, v)]
+    return out

@@ -1,0 +1,61 @@
+"""Files of an impeller: the proof, the contact points, and a program for each cutter at each table angle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.jobs.impeller.names import program_name, rough_names
+from chipload.jobs.impeller.outcome import Checked, ImpellerResult
+from chipload.jobs.impeller.proof import contact_points_bytes, proof_bytes
+from chipload.jobs.impeller.roughing_check import CheckedRough
+from chipload.program.apt.writer import write_apt
+from chipload.program.gcode.writer import write_gcode
+from chipload.program.program import Program
+from chipload.report.programs import ENDINGS
+
+
+def program_files(milled: ImpellerResult) -> dict[str, bytes]:
+    """Every further file by name."""
+    out = {"proof.npz": proof_bytes(milled), "contact_points.parquet": contact_points_bytes(milled)}
+    for stem, cutter, table, checked, program, empty in _programs(milled):
+        if empty:
+            continue
+        number, title = int(stem.split("-")[0]), f"{milled.title}, {checked.name}"
+        text = write_gcode(
+            program, milled.machine, title=title, verified=checked.verified,
+            comments=_comments(milled, checked, cutter, table, number), number=100 + number,
+        )  # fmt: skip
+        out[f"{stem}.{ENDINGS[milled.machine.dialect]}"] = text.encode("ascii")
+        cl = write_apt(program, None, title=title, verified=checked.verified)
+        out[f"{stem}.apt"] = cl.encode("ascii")
+    return out
+
+
+def _programs(
+    milled: ImpellerResult,
+) -> Iterator[tuple[str, CatalogueCutter, float, Checked | CheckedRough, Program, bool]]:
+    """Name, cutter, table angle, check and program of all, roughing first; whether there is nothing in it."""
+    for name, rough in zip(rough_names(milled), milled.roughs or (), strict=True):
+        yield name, rough.rough.cutter, rough.rough.table, rough, rough.rough.program, not rough.rough.machined
+    for k, p in enumerate(milled.programs or (), 1):
+        s = p.setting
+        yield program_name(milled, k), s.cutter, s.table, p, s.program, not s.machined
+
+
+def _comments(
+    milled: ImpellerResult, checked: Checked | CheckedRough, c: CatalogueCutter, alpha: float, number: int
+) -> list[str]:
+    """What the man at the machine must know."""
+    table = milled.surfaces[0].table
+    position = float(table.position[np.abs(table.angle - alpha).argmin()])
+    out = [f"not verified: {f}" for f in checked.fails[:3]]
+    out.append(f"T{number}: D {c.diameter:g} r {c.corner_radius:g} mm, tool length 0: positions of the tip")
+    out.append(
+        f"index table {table.index} {np.degrees(position):.6g} deg before the start, table angle of {checked.name}"
+    )
+    turn = np.degrees(milled.impeller.pitch)
+    out.append(f"one channel: the others by a pallet offset of {turn:.6f} deg each, {milled.impeller.blades} in all")
+    return out

@@ -1,0 +1,142 @@
+"""The result of an impeller: a track for the search and one for each program, limits, findings."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from chipload.errors import Finding, Severity
+from chipload.jobs.impeller.names import program_name, rough_names
+from chipload.jobs.impeller.numbers import operation_numbers
+from chipload.jobs.impeller.outcome import Checked, Covered, ImpellerResult, Searched, for_all, unmilled, unreached_text
+from chipload.jobs.impeller.roughing_check import CheckedRough
+from chipload.program.program import Program
+from chipload.report.programs import ENDINGS
+from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, state_of
+from chipload.result.motions import motion_blocks
+
+#: name of the track of the search, which has no program
+SEARCH = "search"
+
+
+def result_of(milled: ImpellerResult) -> Result:
+    """The result of an impeller: the search, roughing programs, finishing programs."""
+    return Result(
+        capability="impeller",
+        title=milled.title,
+        tracks=(_search(milled), *_roughing(milled), *_finishing(milled)),
+        operations=(operation_numbers(milled),),
+        findings=tuple(f for c in milled.covered or () for f in _left(c)),
+        unchecked=_unchecked(milled),
+        provenance=milled.provenance,
+        note=f"{for_all(milled)[:1].upper()}{for_all(milled)[1:]}.",
+    )
+
+
+def failures_of(op: Searched) -> tuple[str, ...]:
+    """What keeps the search of a surface from holding."""
+    return tuple(f.text for f in _surface_findings(op))
+
+
+def _search(milled: ImpellerResult) -> Track:
+    unreached = sum(len(op.answer.unreachable) for op in milled.surfaces)
+    unproved = sum(int((~op.answer.certified).sum()) for op in milled.surfaces)
+    findings = [f for op in milled.surfaces for f in _surface_findings(op)]
+    findings += [Finding("impeller-partition", 0, text, Severity.EXCEEDS) for text in unmilled(milled)]
+    limits = (_count("unreached_points", unreached), _count("uncertified_points", unproved))
+    return Track(SEARCH, TrackKind.PROGRAM, True, None, limits, tuple(findings))
+
+
+def _count(name: str, count: int) -> LimitCheck:
+    return LimitCheck(name, 0.0, float(count), Verdict.EXCEEDS if count else Verdict.HOLDS, SEARCH)
+
+
+def _surface_findings(op: Searched) -> tuple[Finding, ...]:
+    """Contact points that no cutter reaches, and those whose largest cutter is not certified."""
+    out = []
+    missed = op.answer.unreachable
+    if missed:
+        share = op.surface.area[[u.point for u in missed]].sum() / op.surface.area.sum()
+        text = (
+            f"{op.surface.name}: {len(missed)} of {len(op.place)} contact points, {100.0 * share:.3g} % of the area, "
+            f"are not reached; {unreached_text(op, missed[0])}"
+        )
+        x, y, z = (float(v) for v in op.place[missed[0].point])
+        out.append(Finding("impeller-unreached", 0, text, Severity.EXCEEDS, (x, y, z)))
+    count = int((~op.answer.certified).sum())
+    if count:
+        text = f"{op.surface.name}: the largest cutter of {count} contact points is not certified"
+        out.append(Finding("impeller-uncertified", 0, text, Severity.UNPROVEN))
+    return tuple(out)
+
+
+def _roughing(milled: ImpellerResult) -> list[Track]:
+    names = rough_names(milled)
+    return [
+        _track(milled, name, r.rough.program, r.seconds, (_gouge(name, r),), _rough_findings(r), not r.rough.machined)
+        for name, r in zip(names, milled.roughs or (), strict=True)
+    ]
+
+
+def _finishing(milled: ImpellerResult) -> list[Track]:
+    out = []
+    for k, p in enumerate(milled.programs or (), 1):
+        name = program_name(milled, k)
+        findings = tuple(Finding("machine", 0, text, Severity.EXCEEDS) for text in p.findings)
+        limits = (_gouge(name, p), *_scallops(name, p))
+        out.append(_track(milled, name, p.setting.program, p.seconds, limits, findings, not p.setting.machined))
+    return out
+
+
+def _track(
+    milled: ImpellerResult,
+    name: str,
+    program: Program,
+    time_s: float,
+    limits: tuple[LimitCheck, ...],
+    findings: tuple[Finding, ...],
+    empty: bool,
+) -> Track:
+    files = () if empty else (f"{name}.{ENDINGS[milled.machine.dialect]}", f"{name}.apt")
+    blocks = partial(motion_blocks, program, milled.machine)
+    return Track(name, TrackKind.PROGRAM, True, time_s, limits, findings, files, blocks=blocks)
+
+
+def _gouge(track: str, checked: Checked | CheckedRough) -> LimitCheck:
+    worst = max(checked.gouge, 0.0)
+    return LimitCheck("gouge_mm", checked.allowed, worst, state_of(worst, checked.allowed)[0], track)
+
+
+def _scallops(track: str, p: Checked) -> tuple[LimitCheck, ...]:
+    """The patch with the highest scallop."""
+    if not p.scallops:
+        return ()
+    k = int(np.argmax([s.greatest / s.asked for s in p.scallops]))
+    s = p.scallops[k]
+    state = state_of(s.greatest, s.asked)[0]
+    return (LimitCheck("scallop_mm", s.asked, s.greatest, state, track),)
+
+
+def _rough_findings(r: CheckedRough) -> tuple[Finding, ...]:
+    texts = [*r.findings, *(f"{p}: touch_mm3 = {r.touch:g} is allowed" for p in r.taken.problems(r.touch))]
+    if not r.rough.machined:
+        texts.append("no row can be milled")
+    return tuple(Finding("impeller-roughing", 0, text, Severity.EXCEEDS) for text in texts)
+
+
+def _left(c: Covered) -> tuple[Finding, ...]:
+    """More material than the scallop height after all programs."""
+    k = c.greatest[1]
+    x, y, z = (float(v) for v in c.left.wall.points[k])
+    return tuple(Finding("impeller-left", 0, text, Severity.EXCEEDS, (x, y, z)) for text in c.fails)
+
+
+def _unchecked(milled: ImpellerResult) -> tuple[str, ...]:
+    out = [
+        "forces, torque, deflection and chatter: not calculated",
+        "fixtures, pallet and linear axes: no collision check",
+    ]
+    if milled.programs is None:
+        out.append("programs: none is asked for")
+    return tuple(out)

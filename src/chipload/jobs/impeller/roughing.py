@@ -1,0 +1,146 @@
+"""The roughing programs of an impeller: planned channel by channel, then checked on surfaces and on the blank."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from chipload.cutter.catalogue import Catalogue, CatalogueCutter
+from chipload.jobs.impeller.roughing_check import CheckedRough
+from chipload.jobs.impeller.tables import ImpellerOperationTable, PathsTable, RoughTable
+from chipload.machine.machine import Machine
+from chipload.planning.impeller.floor import meridian
+from chipload.planning.impeller.impeller import Impeller
+from chipload.planning.impeller.lines import LineMotion
+from chipload.planning.impeller.links import Link
+from chipload.planning.impeller.programs import pallet_rate, too_fast
+from chipload.planning.impeller.rough_settings import RoughingSetting, roughed
+from chipload.planning.impeller.roughing import RoughingSettings, uncut
+from chipload.planning.impeller.surfaces import hub_range
+from chipload.planning.impeller.tables import IndexTable
+from chipload.program.check import check_program
+from chipload.program.read import times_on
+from chipload.program.to_axes import to_axes
+from chipload.progress import Progress
+from chipload.simulation.channel.channel import SurfacePoints, left_on
+from chipload.simulation.channel.stock import ChannelRemoval, sector, taken_from
+from chipload.stock.dexel import TriDexel
+from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
+
+#: instants of a row [mm], how far the rays go above and below a surface [mm]
+_STEP, _HEIGHT, _DEPTH = 1.0, 3.0, 0.5
+#: points of the blank's meridian; how far it goes on under the hub [mm]; how far beside the channel, in pitches
+_MERIDIAN, _UNDER, _BESIDE = 61, 1.0, 0.8
+#: how often rows are left out before a program counts as not verified
+_ROUNDS = 8
+#: share of the blank that a further table angle must take
+_LEAST = 1e-3
+
+
+def checked_roughing(
+    impeller: Impeller, machine: Machine, table: IndexTable, catalogue: Catalogue, stated: CatalogueCutter | None,
+    op: ImpellerOperationTable, paths: PathsTable, rough: RoughTable, walls: Sequence[SurfacePoints],
+    ahead: float, workers:
+    int,
+    progress: Progress,
+) -> tuple[CheckedRough, ...]:  # fmt: skip
+    """A roughing program for each channel and table angle, each with what the checks find.
+
+    Parameters
+    ----------
+    stated : the cutter; None: the largest that fits
+    walls : points of the finished surfaces
+    """
+    motion = LineMotion(
+        paths.chord_mm * rough.coarser, mm_s_from_mm_min(rough.feed_mm_min), pallet_rate(machine), op.clearance_mm
+    )
+    how = RoughingSettings(
+        rough.depth_mm, rough.step_mm, rough.blades_mm, rough.hub_mm, motion, rough.check_mm, op.around, rough.over_mm
+    )
+    link = Link(
+        paths.lift_mm, paths.margin_mm, paths.touch_mm, 0.0, mm_s_from_mm_min(paths.link_feed_mm_min), paths.above_mm
+    )
+    plans = roughed(
+        impeller, catalogue, stated, how, link, rad_s_from_rpm(rough.speed_rpm), table, rough.share, ahead, workers,
+        lambda done, what: progress(0.6 * done, what),
+    )  # fmt: skip
+    out: list[CheckedRough] = []
+    stock: dict[int, TriDexel] = {}
+    for k, plan in enumerate(plans):
+        if plan.index not in stock:
+            stock[plan.index] = TriDexel.of_mesh(blank_of(impeller, plan.index, how, ahead), rough.grid_mm)
+        safe, taken, left = without_touch(plan, stock[plan.index], rough.grid_mm, rough.touch_mm3)
+        first = not any(r.rough.index == plan.index for r in out)
+        # a further table angle that takes nothing that is left is no program
+        if first or taken.before - taken.after > _LEAST * taken.before:
+            stock[plan.index] = left
+            out.append(_checked(machine, safe.numbered(len(out) + 1), taken, rough.touch_mm3, paths, walls, workers))
+        progress(0.6 + 0.4 * (k + 1) / len(plans), f"check of {k + 1} roughing programs")
+    return tuple(out)
+
+
+def without_touch(
+    plan: RoughingSetting, stock: TriDexel, grid: float, touch: float
+) -> tuple[RoughingSetting, ChannelRemoval, TriDexel]:
+    """The plan less the rows on which what is above the cutting part takes of the blank; what it takes, what is left.
+
+    A row that is left out leaves more for those after it, so that all is simulated again until nothing is taken.
+    """
+    for turn in itertools.count():
+        left = copy.deepcopy(stock)
+        taken = taken_from(left, plan.program, plan.cutter, grid)
+        bad = np.unique(plan.linked.track[taken.above > touch])
+        if not len(bad) or bad[0] < 0 or turn == _ROUNDS:
+            break
+        plan = plan.without(bad.tolist())
+    return plan, taken, left
+
+
+def _checked(
+    machine: Machine, plan: RoughingSetting, taken: ChannelRemoval, touch: float, paths: PathsTable, walls:
+    Sequence[SurfacePoints],
+    workers: int,
+) -> CheckedRough:  # fmt: skip
+    program = plan.program
+    found = left_on(walls, program, plan.cutter, _HEIGHT, _DEPTH, step=_STEP, workers=workers)
+    worst = max(found, key=lambda left: left.deepest[0])
+    stands: list[float | None] = []
+    for hub in (False, True):
+        least = min(float(x.rest.min()) for x in found if x.wall.name.startswith("floor") == hub)
+        stands.append(least if least < _HEIGHT else None)
+    _, findings = to_axes(program, machine)
+    said = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
+    seconds = float(times_on(program, machine).sum())
+    return CheckedRough(
+        plan, worst.deepest[0], worst.message(), paths.gouge_mm, (stands[0], stands[1]), taken, touch,
+        tuple(said), seconds,
+    )  # fmt: skip
+
+
+def blank_of(impeller: Impeller, index: int, how: RoughingSettings, ahead: float) -> trimesh.Trimesh:
+    """The blank of a channel with a part of its neighbours: from under the hub to above the shroud."""
+    where = hub_range(impeller, ahead)
+    s = np.linspace(*where, _MERIDIAN)
+    n = impeller.hub.normal(s, np.zeros(len(s)))[:, [0, 2]]
+    inner = impeller.hub.curve(s) - _UNDER * n
+    low, high = (meridian(impeller, s, w, how.hub, where) for w in (0.0, 1.0))
+    outer = high + how.over * (high - low) / np.linalg.norm(high - low, axis=1)[:, None]
+    top = uncut(impeller, index, how, ahead, whole=True)
+    first, last = _between(np.arctan2(top[:, 1], top[:, 0]))
+    edge = (1.0 - _BESIDE) * impeller.pitch
+    return sector(inner, outer, first + edge, last - edge)
+
+
+def _between(theta: NDArray[np.float64]) -> tuple[float, float]:
+    """First and last of angles that stand close together [rad]: all but their widest gap."""
+    around = np.sort(theta % math.tau)
+    gap = np.diff(around, append=around[0] + math.tau)
+    k = int(gap.argmax())
+    first = float(around[(k + 1) % len(around)])
+    return first, first + math.tau - float(gap[k])

@@ -1,0 +1,132 @@
+"""Roughing programs of an impeller with what the simulation found: their verdict, their numbers, their table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from chipload.planning.impeller.rough_settings import RoughingSetting
+from chipload.report.sheet import table
+from chipload.simulation.channel.channel import PARTS
+from chipload.simulation.channel.stock import ChannelRemoval
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedRough:
+    """A roughing program with what the simulation found.
+
+    Parameters
+    ----------
+    rough : cutter, table angle, rows, moves
+    gouge : deepest that any part of the tool comes below a finished surface [mm], where it is: ``says``
+    allowed : what of it is allowed [mm]
+    stands : least that is left on the blades and on the hub where rows were milled [mm]; None: nowhere within reach
+    taken : from the blank as the programs before it leave it, row by row
+    touch : [mm3] that a rapid, and what is above the cutting part, may take in one row
+    findings : what the program asks of the machine that it does not give
+    seconds : predicted time of one channel [s]
+    """
+
+    rough: RoughingSetting
+    gouge: float
+    message: str
+    allowed: float
+    stands: tuple[float | None, float | None]
+    taken: ChannelRemoval
+    touch: float
+    findings: tuple[str, ...]
+    seconds: float
+
+    @property
+    def name(self) -> str:
+        """`roughing D 12 r 2 mm at 45 deg`."""
+        c = self.rough.cutter
+        of = " beside the splitter" if self.rough.index else ""
+        return f"roughing{of}: D {c.diameter:g} r {c.corner_radius:g} mm at {np.degrees(self.rough.table):.6g} deg"
+
+    @property
+    def verified(self) -> bool:
+        """No gouge, nothing beyond the machine, nothing taken by rapids or above the cutting part."""
+        return not self.fails
+
+    @property
+    def missed(self) -> float:
+        """Length of rows that are not milled [mm]."""
+        gone = {k for k, _ in self.rough.linked.refused}
+        tracks = self.rough.tracks
+        stopped = sum(t.length for t in self.rough.stopped)
+        return sum(x.length for x in tracks.missed) + sum(tracks.tracks[k].length for k in gone) + stopped
+
+    @property
+    def length(self) -> float:
+        """Of the rows [mm]."""
+        return sum(t.length for t in self.rough.machined)
+
+    @property
+    def fails(self) -> tuple[str, ...]:
+        """What does not hold."""
+        out = [f"{self.name}: {f}" for f in self.findings]
+        if self.gouge > self.allowed:
+            out.append(f"{self.name}: {self.message}: gouge_mm = {self.allowed:g} is allowed")
+        out += [f"{self.name}: {p}: touch_mm3 = {self.touch:g} is allowed" for p in self.taken.problems(self.touch)]
+        if not self.rough.machined:
+            out.append(f"{self.name}: no row can be milled")
+        return tuple(out)
+
+    def values(self) -> dict[str, Any]:
+        """For summary.json; volumes are those of one channel in a blank with uncut neighbours."""
+        c, rough = self.rough.cutter, self.rough
+        worst = int(self.taken.above.argmax())
+        return {
+            "channel": rough.index,
+            "diameter_mm": c.diameter,
+            "corner_radius_mm": c.corner_radius,
+            "table_deg": round(float(np.degrees(rough.table)), 9),
+            "verified": self.verified,
+            "fails": list(self.fails),
+            "layers": rough.layers,
+            "rows": len(rough.program),
+            "path_mm": self.length,
+            "time_min": self.seconds / 60.0,
+            "missed_mm": self.missed,
+            "refused_rows": len(rough.linked.refused),
+            "stopped_rows": len(rough.stopped),
+            "gouge_mm": self.gouge,
+            "stands_on_blades_mm": self.stands[0],
+            "stands_on_hub_mm": self.stands[1],
+            "taken_mm3": self.taken.before - self.taken.after,
+            "rapids_take_mm3": float(self.taken.rapid.max(initial=0.0)),
+            "above_takes_mm3": float(self.taken.above.max(initial=0.0)),
+            "above": PARTS[int(self.taken.part[worst])] if self.taken.part[worst] >= 0 else None,
+        }
+
+
+def rough_sections(roughs: tuple[CheckedRough, ...] | None, names: list[str]) -> list[str]:
+    """The part of the page about roughing; none where the job asks for none."""
+    if roughs is None:
+        return []
+    head = ["program", "layers", "rows", "path [mm]", "time [min]", "taken [cm3]", "left [mm]"]
+    head += ["gouge [mm]", "not by cutting [mm3]", "missed [mm]", "check"]
+    rows = []
+    for r, name in zip(roughs, names, strict=True):
+        v = r.values()
+        stands = ", ".join("-" if x is None else f"{x:.2f}" for x in r.stands)
+        rows.append(
+            [
+                f"<code>{escape(name)}</code>", str(v["layers"]), str(v["rows"]), f"{v['path_mm']:.0f}",
+                f"{v['time_min']:.2f}", f"{v['taken_mm3'] / 1e3:.2f}", stands, f"{v['gouge_mm']:.3f}",
+                f"{v['rapids_take_mm3']:.2f}, {v['above_takes_mm3']:.2f}", f"{v['missed_mm']:.0f}",
+                '<span class="ok">verified</span>' if r.verified else '<span class="no">not verified</span>',
+            ]
+        )  # fmt: skip
+    return [
+        "<h2>Roughing</h2>",
+        '<p class="note">Rows in layers from the shroud down to the hub, each from outside inwards. The blank is a '
+        "body of revolution that stands over the shroud, its neighbour channels uncut; what every part of the tool "
+        "takes of it is counted row by row, program after program: not by cutting is what rapids, and what neck, shank "
+        "and holder take at most in a row. Left is the least on the blades, and on the hub.</p>",
+        table(head, rows, numbers=(1, 2, 3, 4, 5, 6, 7, 8, 9)),
+    ]

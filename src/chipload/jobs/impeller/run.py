@@ -1,0 +1,229 @@
+"""A job that mills an impeller: read, its surfaces searched for the largest cutters."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named, read_catalogue
+from chipload.errors import InputError
+from chipload.jobs.impeller.job import ImpellerJob
+from chipload.jobs.impeller.outcome import ImpellerResult, OneCutter, Searched, unreached_text
+from chipload.jobs.impeller.part import Part, read_part
+from chipload.jobs.impeller.paths import checked_programs, walls_of
+from chipload.jobs.impeller.roughing import checked_roughing
+from chipload.jobs.impeller.tables import ImpellerOperationTable
+from chipload.jobs.provenance import provenance_of, title_of
+from chipload.jobs.tables import Table
+from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.planning.impeller.answer import Answer, largest_cutters, one_cutter, one_cutter_of
+from chipload.planning.impeller.compare import Partition, compared
+from chipload.planning.impeller.costs import ChannelSide, Terms
+from chipload.planning.impeller.impeller import Impeller
+from chipload.planning.impeller.surfaces import BODIES, ContactSampling, ContactSurface, surface_of
+from chipload.planning.impeller.tables import IndexTable, index_table
+from chipload.planning.impeller.unreached import with_fits
+from chipload.progress import Progress, silent
+from chipload.result import Provenance
+from chipload.units import mm_s_from_mm_min
+
+#: threads of the search; its answer does not depend on them
+WORKERS = len(os.sched_getaffinity(0))
+
+
+def run(job: ImpellerJob, progress: Progress = silent) -> ImpellerResult:
+    """The largest cutters of every surface that the job names.
+
+    Raises
+    ------
+    InputError
+        A file cannot be used, or no cutter of the catalogue reaches any point of a surface.
+    Cancelled
+        By ``progress``.
+    """
+    machine, catalogue, part = _machine(job), _catalogue(job), read_part(job)
+    impeller = part.impeller
+    _picked(job, catalogue)
+    _rougher(job, catalogue)
+    op = job.operation
+    table, surfaces = _tables(machine, op), _surfaces(job, impeller)
+    done = []
+    for k, surface in enumerate(surfaces):
+        done.append(_searched(job, k, surface, table, catalogue, part_of(part_of(progress, 0, 2), k, len(surfaces))))
+        _reached(k, done[-1])
+    pairs = [(found.surface.scene, found.answer) for found in done]
+    whole = one_cutter_of(pairs, op.clearance_mm, table.spans, WORKERS)
+    one = None if whole is None else (catalogue.cutters[whole[0]], whole[1])
+    half = part_of(progress, 1, 2)
+    partitions = _partitions(job, done, catalogue, impeller, part_of(half, 0, 2))
+    milled = ImpellerResult(
+        title_of(job.path), impeller, catalogue, machine, tuple(done), one, partitions, None, None, None, _settings(op),
+        job.table.impeller.outer_diameter_mm, _provenance(job, machine, catalogue, part),
+    )  # fmt: skip
+    if op.paths is None or milled.used is None:
+        return milled
+    roughs = None
+    if op.rough is not None:
+        roughs = checked_roughing(
+            impeller, machine, table, catalogue, _rougher(job, catalogue), op, op.paths, op.rough,
+            walls_of(impeller, _ahead(job)), _ahead(job), WORKERS, part_of(half, 2, 4),
+        )  # fmt: skip
+    programs, covered = checked_programs(
+        impeller, machine, table, milled.used, op, op.paths, _ahead(job), len(roughs or ()), WORKERS,
+        part_of(half, 3, 4) if roughs else part_of(half, 1, 2),
+    )  # fmt: skip
+    return replace(milled, programs=programs, covered=covered, roughs=roughs)
+
+
+def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue, part: Part) -> Provenance:
+    files = dict(job.files)
+    files |= {key: p for key, p in (("machine", job.machine), ("catalogue", job.catalogue)) if not isinstance(p, str)}
+    own = provenance_of(files, job.overrides, machine)
+    cutters = f"{catalogue.name}: {catalogue.note}" if catalogue.note else catalogue.name
+    faces = {f"face {k}": line for k, line in enumerate(part.faces)}
+    return replace(own, inputs={**own.inputs, "catalogue name": cutters, **faces})
+
+
+def check(job: ImpellerJob) -> tuple[list[str], bool]:
+    """What the files of a job hold; nothing is searched."""
+    machine, catalogue, part = _machine(job), _catalogue(job), read_part(job)
+    impeller = part.impeller
+    _picked(job, catalogue)
+    _rougher(job, catalogue)
+    lines = [f"impeller: {impeller.blades} blades{' and as many splitters' if impeller.splitter else ''}", *part.faces]
+    table = _tables(machine, job.operation)
+    angles = np.degrees(table.angle)
+    lines.append(
+        f"machine {machine.name}: {len(angles)} table angles from {angles.min():.6g} to {angles.max():.6g} deg"
+    )
+    for k, surface in enumerate(_surfaces(job, impeller)):
+        s = surface.scene
+        lines.append(f"surface {k}: {surface.name}: {len(s.contact)} contact points, {len(s.check)} check points")
+    corners = ", ".join(f"{r:g}" for r in catalogue.families)
+    lines.append(f"catalogue {catalogue.name}: {len(catalogue.cutters)} cutters, corner radii {corners} mm")
+    return lines, True
+
+
+def part_of(progress: Progress, k: int, n: int) -> Progress:
+    """Progress of the k-th of n like parts."""
+    return lambda done, what: progress((k + done) / n, what)
+
+
+def _searched(
+    job: ImpellerJob, k: int, surface: ContactSurface, table: IndexTable, catalogue: Catalogue, progress: Progress
+) -> Searched:
+    """The largest cutters of a surface."""
+    op = job.operation
+    begin = time.perf_counter()
+    answer = largest_cutters(
+        surface.scene, catalogue, table.angle, op.clearance_mm, pallets=table.spans, workers=WORKERS, progress=progress
+    )
+    answer = replace(answer, unreachable=with_fits(surface.scene, answer, table.spans, WORKERS))
+    one = one_cutter(surface.scene, answer, op.clearance_mm, table.spans, WORKERS)
+    took = time.perf_counter() - begin
+    best = None
+    if one is not None:
+        reached = np.flatnonzero(answer.cutter >= 0)
+        best = OneCutter(catalogue.cutters[one[0]], one[1], reached, one[2])
+    settings = _settings(op) | _settings(job.table.surface[k])
+    return Searched(settings, surface, answer, table, best, op.clearance_mm, took)
+
+
+def _partitions(
+    job: ImpellerJob, done: Sequence[Searched], catalogue: Catalogue, impeller: Impeller, progress: Progress
+) -> tuple[Partition, ...]:
+    """The cutter picked by hand where one is stated, then one cutter, two, ..."""
+    op = job.operation
+    terms = Terms(
+        mm_s_from_mm_min(op.feed_mm_min), op.scallop_mm, op.cutter_change_s, op.table_change_s, impeller.blades
+    )
+    picked = _picked(job, catalogue)
+    index = None if picked is None else catalogue.cutters.index(picked)
+    sides = [_side(x, x.answer) for x in done]
+    return compared(sides, terms, index, range(1, op.most_cutters + 1), WORKERS, progress)
+
+
+def _side(op: Searched, answer: Answer) -> ChannelSide:
+    s = op.surface
+    body = BODIES.index(s.body)
+    return ChannelSide(body, s.side, s.scene, s.u, s.v, s.area, answer, op.clearance, op.table.spans)
+
+
+def _picked(job: ImpellerJob, catalogue: Catalogue) -> CatalogueCutter | None:
+    """The cutter of the catalogue that is picked by hand."""
+    picked = job.operation.hand_picked
+    if picked is None:
+        return None
+    return _of_catalogue(catalogue, picked.diameter_mm, picked.corner_radius_mm, "hand_picked")
+
+
+def _rougher(job: ImpellerJob, catalogue: Catalogue) -> CatalogueCutter | None:
+    """The cutter of the catalogue that roughs; None: the largest that fits."""
+    rough = job.operation.rough
+    if rough is None or rough.diameter_mm is None or rough.corner_radius_mm is None:
+        return None
+    return _of_catalogue(catalogue, rough.diameter_mm, rough.corner_radius_mm, "rough")
+
+
+def _of_catalogue(catalogue: Catalogue, d: float, r: float, key: str) -> CatalogueCutter:
+    for cutter in catalogue.cutters:
+        if (cutter.diameter, cutter.corner_radius) == (d, r):
+            return cutter
+    near = min(catalogue.cutters, key=lambda c: abs(c.diameter - d) + abs(c.corner_radius - r))
+    raise InputError(
+        f"operation.0.{key}: D {d:g} r {r:g} mm is not in catalogue {catalogue.name}: the nearest is "
+        f"D {near.diameter:g} r {near.corner_radius:g} mm"
+    )
+
+
+def _settings(table: Table) -> dict[str, Any]:
+    """The keys that are stated."""
+    return {k: v for k, v in table.model_dump().items() if v is not None}
+
+
+def _reached(k: int, op: Searched) -> None:
+    """Refuse a catalogue that reaches nothing of a surface."""
+    if (op.answer.cutter < 0).all():
+        first = unreached_text(op, op.answer.unreachable[0])
+        raise InputError(f"surface.{k}: no cutter of catalogue {op.answer.catalogue.name} fits anywhere: {first}")
+
+
+def _tables(machine: Machine, op: ImpellerOperationTable) -> IndexTable:
+    table = index_table(machine)
+    if op.table_deg is None:
+        return table
+    try:
+        return table.at(np.radians(op.table_deg))
+    except InputError as err:
+        raise InputError(f"operation.0.table_deg: {err}") from None
+
+
+def _surfaces(job: ImpellerJob, impeller: Impeller) -> list[ContactSurface]:
+    op, ahead = job.operation, _ahead(job)
+    out = []
+    for k, s in enumerate(job.table.surface):
+        how = ContactSampling(s.along, s.up, s.points, op.check_mm, op.near_mm, op.around, ahead)
+        try:
+            out.append(surface_of(impeller, s.body, s.side, how))
+        except InputError as err:
+            raise InputError(f"surface.{k}: {err}") from None
+    return out
+
+
+def _ahead(job: ImpellerJob) -> float:
+    """How far the hub goes on ahead of the leading edge [mm]."""
+    given = job.table.impeller.sections or job.table.impeller.step
+    return given.hub_ahead_mm if given is not None else 0.0
+
+
+def _machine(job: ImpellerJob) -> Machine:
+    return machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
+
+
+def _catalogue(job: ImpellerJob) -> Catalogue:
+    return catalogue_named(job.catalogue) if isinstance(job.catalogue, str) else read_catalogue(job.catalogue)

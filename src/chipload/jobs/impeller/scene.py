@@ -1,0 +1,68 @@
+"""scene.glb of an impeller: the surfaces coloured by their largest diameter, the other blades and the hub beside them.
+
+Lengths are mm, Z is up, as the extras say.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from chipload.jobs.impeller.mesh import OFF, body_meshes, surface_mesh
+from chipload.jobs.impeller.outcome import ImpellerResult, Searched
+from chipload.jobs.impeller.partitions import patch_grid, shade_of
+from chipload.planning.impeller.compare import Partition
+from chipload.report.scene import engagement_colours
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MISSED = (179, 38, 30, 255)
+
+
+def scene_bytes(milled: ImpellerResult) -> bytes:
+    """scene.glb."""
+    scene = trimesh.Scene()
+    for name, (points, faces), colour in body_meshes(milled.impeller):
+        _add(scene, name, points, faces, np.tile(np.array(colour, dtype=np.uint8), (len(points), 1)))
+    most = max(float(op.answer.diameter.max()) for op in milled.surfaces)
+    for k, op in enumerate(milled.surfaces):
+        points, faces = surface_mesh(op)
+        colours = engagement_colours(op.answer.diameter, most)
+        colours[op.answer.cutter < 0] = MISSED
+        _add(scene, f"{k}-largest", points, faces, colours)
+        if milled.used is not None:
+            _add(
+                scene, f"{k}-patches", points + OFF * op.surface.scene.normal, faces, _patches(milled, milled.used, op)
+            )
+    for k, p in enumerate(milled.programs or (), 1):
+        n = len(p.setting.program)
+        if n > 1:
+            colour = np.array((34, 120, 132, 255), dtype=np.uint8)
+            line = trimesh.path.entities.Line(np.arange(n), color=colour)
+            path = trimesh.path.Path3D(entities=[line], vertices=p.setting.program.p_work, process=False)
+            scene.add_geometry(path, node_name=f"path-{k}", geom_name=f"path-{k}")
+    glb: bytes = scene.export(file_type="glb", extension_webp=False, tree_postprocessor=_declare_units)
+    return glb
+
+
+def _patches(milled: ImpellerResult, way: Partition, op: Searched) -> NDArray[np.uint8]:
+    """(c, 4) colours of the contact points by patch."""
+    grid = patch_grid(milled, way, op).ravel()
+    out = np.tile(np.array(MISSED, dtype=np.uint8), (len(grid), 1))
+    for n, p in enumerate(way.divided.patches if way.divided is not None else ()):
+        out[grid == n, :3] = shade_of(way, p)
+    return out
+
+
+def _add(scene: Any, name: str, points: Floats, faces: Ints, colours: NDArray[np.uint8]) -> None:
+    both = np.concatenate([faces, faces[:, ::-1]])
+    mesh = trimesh.Trimesh(points, both, vertex_colors=colours, process=False)
+    scene.add_geometry(mesh, node_name=name, geom_name=name)
+
+
+def _declare_units(tree: dict[str, Any]) -> None:
+    tree["asset"]["extras"] = {"units": "mm", "up": "Z"}

@@ -1,0 +1,163 @@
+"""A job that mills an impeller in sections: its blades, the cutters there are, the machine with its index table."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from chipload.jobs.tables import Count, FaceName, NotNegative, Number, Positive, SourceTable, Table, Text, Unit
+
+Share = Annotated[Number, Field(ge=0.0, le=1.0)]
+Span = tuple[Share, Share]
+
+
+class ShapeTable(Table):
+    """An impeller by formula, see ``planning/impeller/parametric.py``."""
+
+    channel_mm: Positive = Field(description="narrowest width of a channel, round the axis at the inlet")
+    hub_radius_mm: Positive = Field(description="of the hub at the inlet")
+    height_mm: Positive = Field(description="of the hub from outlet to inlet")
+    blade_height_mm: Positive = Field(description="at the inlet")
+    outlet_height_mm: Positive = Field(description="of the blades at the outlet")
+    wrap_deg: Number = Field(description="turn of a blade from inlet to outlet")
+    lean_deg: Number = Field(0.0, description="turn of a blade from hub to shroud")
+
+
+class SectionsTable(Table):
+    """Blades by points: closed profiles from hub to shroud, and the curves of hub and shroud."""
+
+    blade: tuple[Text, ...] = Field(min_length=1, description="files in the order hub to shroud")
+    splitter: tuple[Text, ...] = Field((), description="likewise; none: there are no splitters")
+    hub: Text
+    shroud: Text
+    unit: Unit = Field(description="of the files, which do not say it")
+    columns: Literal["X R*THETA R", "X R THETA_DEG", "X Y Z"] | None = Field(
+        None, description="of files that do not name them"
+    )
+    flow_along_x: bool = Field(description="true: the flow comes along +X of the files, and the part is turned over")
+    hub_ahead_mm: NotNegative = Field(description="how far the hub goes on ahead of the leading edge")
+
+
+class StepTable(Table):
+    """Blades by faces of a STEP file; a face is named by its number or by a point [mm] on it, in the file's frame."""
+
+    file: Text = Field(description="`chipload check FILE` lists its faces")
+    flow: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = Field(
+        description="which way along the axis of rotation the flow comes in; the axis goes through the origin"
+    )
+    plus: FaceName = Field(description="side that faces a growing angle about the axis, seen against the flow")
+    minus: FaceName = Field(description="side that faces a falling angle, of the same blade or of another")
+    splitter_plus: FaceName | None = Field(None, description="likewise of a splitter; none: there are no splitters")
+    splitter_minus: FaceName | None = None
+    hub: tuple[FaceName, ...] | Text = Field(description="faces of revolution, or a file of points as of sections")
+    shroud: tuple[FaceName, ...] | Text = Field(description="likewise; the tip of one blade is a face of it")
+    unit: Unit | None = Field(None, description="of hub and shroud where they are files of points")
+    fit_mm: Positive = Field(0.001, le=0.1, description="how far a patch may leave its face where it is fitted")
+    hub_ahead_mm: NotNegative = Field(description="how far the hub goes on ahead of the leading edge")
+
+
+class ImpellerTable(Table):
+    """The part."""
+
+    blades: Annotated[Count, Field(ge=2)] = Field(description="how many, evenly round; as many splitters")
+    outer_diameter_mm: Positive = Field(description="over the blades, as the drawing states it")
+    shape: ShapeTable | None = None
+    sections: SectionsTable | None = None
+    step: StepTable | None = None
+    fillet_mm: Positive | None = Field(
+        None, description="fillets between sides and hub, which meet without them; sides begin above theirs"
+    )
+
+    @property
+    def has_splitter(self) -> bool:
+        """Whether splitters stand between the blades."""
+        by_points = self.sections is not None and bool(self.sections.splitter)
+        return by_points or (self.step is not None and self.step.splitter_plus is not None)
+
+
+class SurfaceTable(Table):
+    """One surface that is milled, and where on it."""
+
+    body: Literal["blade", "splitter"]
+    side: Literal["plus", "minus", "floor", "plus fillet", "minus fillet"] = Field(
+        description="plus faces a growing angle; floor: the hub beyond it; fillet: between the side and the hub"
+    )
+    along: Span = Field(description="from where to where along the surface, 0 to 1")
+    up: Span = Field(description="from where to where up from the hub, across on a floor, 0 to 1")
+    points: tuple[Count, Count] = Field(description="contact points along and up")
+
+
+class PickedTable(Table):
+    """A cutter of the catalogue that a programmer would take."""
+
+    diameter_mm: Positive
+    corner_radius_mm: NotNegative
+
+
+class PathsTable(Table):
+    """Finishing programs of the patches in the least time, checked by simulation."""
+
+    check_mm: Positive = Field(description="most distance of check points of the paths")
+    chord_mm: Positive = Field(le=1.0, description="how far the tip may leave its path between two rows")
+    overrun_mm: NotNegative = Field(1.0, description="of lines beyond the ends of their patch, where they can")
+    lift_mm: Positive = Field(description="off the surface at the ends of a line")
+    margin_mm: Positive = Field(description="that links keep from the part")
+    touch_mm: NotNegative = Field(description="how deep a lift may touch the check points")
+    near_mm: NotNegative = Field(description="longest direct link")
+    above_mm: Positive = Field(description="of the safe height above the part")
+    link_feed_mm_min: Positive = Field(le=1e5, description="feed of lifts and links")
+    gouge_mm: Positive = Field(le=1.0, description="deepest that the check may find a program below a surface")
+
+
+class RoughTable(Table):
+    """Roughing programs of the channels by layers, before the finishing ones; links are those of the paths."""
+
+    diameter_mm: Positive | None = Field(None, description="of a cutter of the catalogue; none: the largest that fits")
+    corner_radius_mm: NotNegative | None = Field(None, description="of that cutter")
+    share: Annotated[Number, Field(gt=0.0, le=1.0)] = Field(
+        0.9, description="of the points of the channels at which the largest cutter that fits must go"
+    )
+    depth_mm: Positive = Field(description="greatest thickness of a layer")
+    step_mm: Positive = Field(description="greatest distance of rows")
+    blades_mm: NotNegative = Field(description="allowance on blades and splitters")
+    hub_mm: NotNegative = Field(description="allowance on the hub")
+    over_mm: NotNegative = Field(description="how far the blank stands over the shroud")
+    feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's tip")
+    speed_rpm: Positive = Field(le=1e6, description="spindle speed")
+    check_mm: Positive = Field(description="most distance of check points")
+    coarser: Annotated[Number, Field(ge=1.0, le=100.0)] = Field(
+        10.0, description="how many times paths.chord_mm the tip may leave its path"
+    )
+    grid_mm: Positive = Field(description="distance of the lines by which the blank is simulated")
+    touch_mm3: NotNegative = Field(description="what a rapid, or parts above the cutting part, may take in one row")
+
+
+class ImpellerOperationTable(Table):
+    """The search for the largest cutters of all surfaces."""
+
+    kind: Literal["sectional"]
+    check_mm: Positive = Field(description="most distance of check points")
+    near_mm: Positive = Field(description="nearer on the own surface its curvature stands for check points")
+    around: Annotated[int, Field(ge=0, le=20)] = Field(1, description="bodies beyond the channel that are checked")
+    table_deg: tuple[Number, ...] | None = Field(None, min_length=1, description="table angles; none: all")
+    clearance_mm: NotNegative = Field(description="of neck, shank and holder")
+    scallop_mm: Positive = Field(le=5.0, description="greatest height between two passes")
+    feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's tip")
+    speed_rpm: Positive = Field(le=1e6, description="spindle speed")
+    most_cutters: Annotated[Count, Field(le=6)] = Field(description="different cutters at most; fewer are compared")
+    cutter_change_s: NotNegative = Field(description="time of a cutter change")
+    table_change_s: NotNegative = Field(description="time of setting the index table to another angle")
+    paths: PathsTable | None = Field(None, description="none: the search and the patches alone, no programs")
+    rough: RoughTable | None = Field(None, description="none: the programs finish only")
+    hand_picked: PickedTable | None = Field(None, description="the cutter that is compared with")
+
+
+class ImpellerJobTable(Table):
+    """The whole file."""
+
+    impeller: ImpellerTable
+    surface: tuple[SurfaceTable, ...] = Field(min_length=1)
+    catalogue: SourceTable
+    machine: SourceTable
+    operation: tuple[ImpellerOperationTable, ...] = Field(min_length=1, max_length=1)

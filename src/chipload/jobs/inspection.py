@@ -1,0 +1,155 @@
+"""What any file that chipload reads holds: a job, or one of the files that they name; nothing is run.
+
+A TOML file is told by the tables and keys that only its kind has, another file by its ending.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chipload.files import read_regular
+from chipload.jobs import CAPABILITIES, check_job, load_job
+from chipload.tables import LARGEST_FILE, parsed
+
+#: lines about a file, and whether what it holds can be used as it is
+Inspected = tuple[list[str], bool]
+
+
+def inspect_file(path: Path, overrides: Sequence[str] = ()) -> Inspected | None:
+    """What a file holds; None: it is none of the kinds, so that it is read as a program.
+
+    Parameters
+    ----------
+    overrides : ``key.path=value`` of a job
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or would be refused where it is used: a line for each error of a job.
+    """
+    ending = path.suffix.lower()
+    if ending == ".toml":
+        kind = _toml_kind(path)
+        return check_job(load_job(path, overrides)) if kind is None else (kind(path), True)
+    reader = BY_ENDING.get(ending)
+    return None if reader is None else (reader(path), True)
+
+
+def _toml_kind(path: Path) -> Callable[[Path], list[str]] | None:
+    """How a TOML file is read that is no job; None: it is one."""
+    values = parsed(path.name, read_regular(path, str(path), LARGEST_FILE, "not a file of chipload"))
+    if any(c.key in values for c in CAPABILITIES):
+        return None
+    return next((reader for keys, reader in BY_KEYS if keys <= set(values)), None)
+
+
+def _material(path: Path) -> list[str]:
+    from chipload.cutting.material import read_material
+
+    made = read_material(path)
+    names = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")
+    values = ", ".join(f"{name} {v:g}" for name, v in zip(names, made.coefficients, strict=True))
+    return [f"{path.name}: material {made.name}: {values} (MPa, N/mm)", f"source: {made.source}"]
+
+
+def _machine(path: Path) -> list[str]:
+    from chipload.machine.machine import read_machine
+
+    return [_machine_line(path, read_machine(path))]
+
+
+def _ini(path: Path) -> list[str]:
+    from chipload.machine.ini import read_ini
+
+    made, findings = read_ini(path)
+    return [*(f"finding: {f}" for f in findings), _machine_line(path, made)]
+
+
+def _machine_line(path: Path, machine: Any) -> str:
+    axes = ", ".join(f"{a.letter} {a.low:g} to {a.high:g}" for a in machine.chain.axes if a.letter in "XYZ")
+    turning = "".join(a.letter for a in machine.chain.axes if a.letter not in "XYZ")
+    return f"{path.name}: machine {machine.name}: {axes} mm{f', rotary axes {turning}' if turning else ''}"
+
+
+def _catalogue(path: Path) -> list[str]:
+    from chipload.cutter.catalogue import read_catalogue
+
+    made = read_catalogue(path)
+    sizes = sorted({c.diameter for c in made.cutters})
+    return [f"{path.name}: catalogue {made.name}: {len(made.cutters)} cutters, {sizes[0]:g} to {sizes[-1]:g} mm"]
+
+
+def _hal(path: Path) -> list[str]:
+    from chipload.control.hal import load_hal
+
+    job = load_hal(path)
+    return [f"{path.name}: a controller for chipload hal, torque held {1e-3 * job.override.torque_ref:.4g} N m"]
+
+
+def _fuzzy(path: Path) -> list[str]:
+    from chipload.control.fuzzy import read_fuzzy
+
+    return [f"{path.name}: rules of a fuzzy controller: {read_fuzzy(path).name}"]
+
+
+def _model(path: Path) -> list[str]:
+    from chipload.geometry.step_faces import read_faces
+
+    return list(read_faces(path, "model").lines())
+
+
+def _mesh(path: Path) -> list[str]:
+    from chipload.geometry.mesh import read_mesh
+
+    mesh = read_mesh(path, unit="mm", key="model")
+    return [
+        f"{path.name}: a closed mesh of {len(mesh.faces)} triangles, {float(mesh.volume):.6g} mm3; {_box(mesh.bounds)}",
+        "the file does not state its unit: mm here; a job states it (units)",
+    ]
+
+
+def _drawing(path: Path) -> list[str]:
+    from chipload.geometry.dxf import read_dxf
+
+    drawing = read_dxf(path, units_if_unstated="mm")
+    closed = sum(c.closed for c in drawing.contours)
+    low, high = np.array([c.bounds for c in drawing.contours]).reshape(-1, 2, 2).transpose(1, 0, 2)
+    box = _box(np.array([low.min(axis=0), high.max(axis=0)]))
+    said = f"{closed} closed and {len(drawing.contours) - closed} open contours; {box}"
+    return [*(f"finding: {f}" for f in drawing.findings), f"{path.name}: {said}"]
+
+
+def _tools(path: Path) -> list[str]:
+    from chipload.program.read import read_tools
+
+    return [f"{path.name}: a tool table of {len(read_tools(path).lengths())} tools"]
+
+
+def _tool_bit(path: Path) -> list[str]:
+    from chipload.cutter.fctb import read_fctb
+
+    return [f"{path.name}: a tool bit: " + ", ".join(f"{k} = {v}" for k, v in read_fctb(path).items())]
+
+
+def _box(bounds: Any) -> str:
+    return (
+        ", ".join(f"{x} {a:g} to {b:g}" for x, a, b in zip("xyz", *np.asarray(bounds).tolist(), strict=False)) + " mm"
+    )
+
+
+#: keys that only one kind of TOML file has, and how it is read
+BY_KEYS: tuple[tuple[set[str], Callable[[Path], list[str]]], ...] = (
+    ({"override", "path"}, _hal),
+    ({"rules", "error"}, _fuzzy),
+    ({"ktc_mpa"}, _material),
+    ({"axis", "rapid_mm_min"}, _machine),
+    ({"name", "cutter"}, _catalogue),
+)
+#: how files are read that are no TOML, by their ending
+BY_ENDING: dict[str, Callable[[Path], list[str]]] = {
+    ".step": _model, ".stp": _model, ".stl": _mesh, ".dxf": _drawing, ".ini": _ini, ".tbl": _tools, ".fctb": _tool_bit,
+}  # fmt: skip

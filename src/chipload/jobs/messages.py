@@ -1,0 +1,158 @@
+"""A line for each error of a job file: the dotted key, the value, the limit and what to do."""
+
+from __future__ import annotations
+
+import difflib
+import types
+import typing
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from chipload.errors import InputError, InputErrors
+
+
+class Errors:
+    """Collects the errors of an input, so that all of them are refused at once."""
+
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+
+    def add(self, text: str) -> None:
+        """One more error; the same text counts once."""
+        if text not in self.texts:
+            self.texts.append(text)
+
+    @contextmanager
+    def collect(self, prefix: str = "") -> Iterator[None]:
+        """Keep the :class:`InputError` of the block instead of raising it; ``prefix`` stands before its text."""
+        try:
+            yield
+        except InputError as err:
+            for text in err.args:
+                self.add(f"{prefix}{text}")
+
+    def refuse(self, prefix: str = "") -> None:
+        """Raise what was collected.
+
+        Raises
+        ------
+        InputError
+            Something was; :class:`InputErrors` where there are several.
+        """
+        texts = [f"{prefix}{text}" for text in self.texts]
+        if texts:
+            raise InputErrors(*texts) if len(texts) > 1 else InputError(texts[0])
+
+
+def table_errors(err: ValidationError, root: type[BaseModel], others: Sequence[type[BaseModel]] = ()) -> list[str]:
+    """A line for each error: misspelt keys first; a key that one of them leaves missing is not repeated.
+
+    Parameters
+    ----------
+    others : tables of the other kinds of jobs, whose keys are named as such
+    """
+    found = err.errors(include_url=False)
+    # a list whose entry is refused is also called too short: the entry says more
+    errors = [e for e in found if not any(o["loc"][: len(e["loc"])] == e["loc"] and o is not e for o in found)]
+    unknown = [e for e in errors if e["type"] == "extra_forbidden"]
+    top: list[str] = [str(e["loc"][0]) for e in unknown if len(e["loc"]) == 1]
+    foreign = {key for key in top if "program" in root.model_fields and any(key in o.model_fields for o in others)}
+    wrong = [e for e in errors if e["type"] != "extra_forbidden"]
+    meant = {(*e["loc"][:-1], nearest_key(str(e["loc"][-1]), keys_at(e["loc"][:-1], root))) for e in unknown}
+    rest = unknown + [e for e in wrong if not (e["type"] == "missing" and e["loc"] in meant)]
+    return list(dict.fromkeys(_line(e, root, foreign) for e in rest))
+
+
+def left_missing(err: ValidationError, root: type[BaseModel]) -> set[str]:
+    """The keys that a misspelt key leaves missing, and the tables that it stands in."""
+    out: set[str] = set()
+    for e in err.errors(include_url=False):
+        if e["type"] == "extra_forbidden":
+            table = e["loc"][:-1]
+            meant = (*table, nearest_key(str(e["loc"][-1]), keys_at(table, root)))
+            out |= {".".join(map(str, table)), ".".join(map(str, meant))}
+    return out
+
+
+def _line(e: Any, root: type[BaseModel], foreign: Collection[str] = ()) -> str:
+    """`cutter.0.diameter_mm = -5: must be above 0`; ``foreign`` are tables of other kinds of jobs."""
+    loc, kind, context = e["loc"], e["type"], e.get("ctx", {})
+    # a union or a validator may add words of its own to the place: keep keys and indices of the file only
+    key = ".".join(str(x) for x in loc if isinstance(x, int) or str(x).isidentifier())
+    if kind == "extra_forbidden" and key in foreign:
+        return f"{key}: not used where a [program] is run: leave it out"
+    if kind == "extra_forbidden":
+        known = keys_at(loc[:-1], root)
+        return f"{key}: unknown key; did you mean {nearest_key(str(loc[-1]), known)}?"
+    if kind == "missing":
+        return f"{key}: missing: state it{_meaning(loc, root)}"
+    value = _short(e["input"])
+    bounds = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "at least")}
+    bounds |= {"less_than": ("lt", "below"), "less_than_equal": ("le", "at most")}
+    if kind in bounds:
+        name, word = bounds[kind]
+        return f"{key} = {value}: must be {word} {context[name]:g}{_meaning(loc, root)}"
+    if kind == "finite_number":
+        return f"{key} = {value}: must be a finite number{_meaning(loc, root)}"
+    if kind == "literal_error":
+        return f"{key} = {value}: must be one of {str(context['expected']).replace(' or ', ', ')}"
+    if kind in ("value_error", "assertion_error"):
+        return f"{key} = {value}: {context['error']}{_meaning(loc, root)}"
+    if kind == "too_short":
+        return f"{key}: has no entry: state at least one [[{key}]]"
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        return f"{key} = {value}: must be a table, [{key}]"
+    words = {
+        "string_type": "must be a text",
+        "string_too_short": "must not be empty",
+        "tuple_type": f"must be a list, as [{value}]",
+        "float_type": "must be a number",
+        "int_type": "must be a whole number",
+    }
+    return f"{key} = {value}: {words.get(kind, e['msg'])}"
+
+
+def _short(value: Any) -> str:
+    text = f"{value:g}" if isinstance(value, float) else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _meaning(loc: tuple[int | str, ...], root: type[BaseModel]) -> str:
+    """The description of a key in brackets, where it has one."""
+    model = _model_at(loc[:-1], root)
+    field = model.model_fields.get(str(loc[-1])) if model is not None else None
+    return f" ({field.description})" if field is not None and field.description else ""
+
+
+def _model_at(loc: Iterable[int | str], root: type[BaseModel]) -> type[BaseModel] | None:
+    """The model of the table at a place in the file."""
+    model: type[BaseModel] | None = root
+    for key in loc:
+        if isinstance(key, int):
+            continue
+        field = model.model_fields.get(key) if model is not None else None
+        model = None if field is None else _model_in(field.annotation)
+    return model
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and not isinstance(annotation, types.GenericAlias):
+        return annotation if issubclass(annotation, BaseModel) else None
+    found = [m for m in map(_model_in, typing.get_args(annotation)) if m is not None]
+    return found[0] if found else None
+
+
+def keys_at(loc: Iterable[int | str], root: type[BaseModel]) -> tuple[str, ...]:
+    """The keys of the table at a place in the file."""
+    model = _model_at(loc, root)
+    return tuple(model.model_fields) if model is not None else ()
+
+
+def nearest_key(key: str, known: Sequence[str]) -> str:
+    """The known key with the same first word (so that a wrong unit finds its key), else the nearest in spelling."""
+    word = key.split("_")[0]
+    same = [k for k in known if k.split("_")[0] == word]
+    return (difflib.get_close_matches(key, same or list(known), 1, 0.0) or ["none: this is no table"])[0]

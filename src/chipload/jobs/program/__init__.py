@@ -1,0 +1,1 @@
+"""A program that exists: read, simulated, its feeds optimised."""

@@ -1,0 +1,135 @@
+"""The part of the report about new feeds, and the text of the program with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from chipload.jobs.program.numbers import COMPARED, exceeding, feed_numbers
+from chipload.jobs.program.outcome import FeedResult, SimulationResult
+from chipload.report.figures import FONT, GRID, LIMIT, LINE_POINTS
+from chipload.report.shape import thinned
+from chipload.report.sheet import figure, table
+from chipload.result import COLUMNS, LimitCheck
+
+#: colours of the program as it was, and with its new feeds
+BEFORE, AFTER = "#c9821a", "#3457a6"
+#: what limits the feed of a line, beside limits of loads
+CAUSES = {
+    "fastest": "the greatest feed that the job allows",
+    "machine": "the acceleration and the rates of the machine",
+    "air": "the feed in air",
+    "programmed": "programmed feed kept: the line cuts nothing, or films only",
+    "slowest": "the least feed that the job allows, although a limit asks for less",
+}
+#: lines that the report lists
+LISTED = 60
+
+
+def feed_sections(
+    feeds: FeedResult,
+    simulation: SimulationResult,
+    checks: Sequence[LimitCheck],
+    time_s: float,
+    program: str,
+    figures: dict[str, go.Figure],
+) -> list[str]:
+    """The sections of the report about new feeds; figures are put among ``figures``."""
+    what = feed_numbers(feeds, simulation, checks, time_s, program)
+    before, after = what["before"], what["after"]
+    gain = 100.0 * (1.0 - time_s / feeds.seconds_before) if feeds.seconds_before > 0.0 else 0.0
+    rows = [["time of the program [s]", f"{feeds.seconds_before:.5g}", f"{time_s:.5g}", ""]]
+    if before["feed_mm_min"] is not None:
+        spans = (f"{x['feed_mm_min']['min']:.4g} to {x['feed_mm_min']['max']:.4g}" for x in (before, after))
+        rows.append(["feeds that cut [mm/min]", *spans, ""])
+    bounds = {check.column.name: f"{check.limit:g}" for check in checks}
+    for name in COMPARED:
+        cells = [f"{before[name]:.4g}", f"{after[name]:.4g}", bounds.get(name, "")]
+        rows.append([escape(f"greatest {COLUMNS[name].title}"), *cells])
+    body = [
+        "<h2>Feeds</h2>",
+        f"<p>{what['lines_changed']} of {what['lines']} lines with a feed have a new one: {what['lines_slower']} are "
+        f"slower, {what['lines_faster']} faster. The program takes {abs(gain):.3g} % "
+        f"{'less' if gain >= 0.0 else 'more'} time. "
+        f"<b>{escape(program)}</b> is its text; it was read again and simulated from fresh stock.</p>",
+        table(["", "before", "after", "limit"], rows, numbers=(1, 2, 3)),
+        figure("feeds", along(feeds, simulation, checks), figures),
+    ]
+    counts = [[escape(CAUSES.get(k, f"limit {k}")), str(n)] for k, n in what["by"].items()]
+    body += ["<h3>What limits the feed of the lines</h3>", table(["cause", "lines"], counts, numbers=(1,))]
+    listed = exceeding(feeds, simulation, checks)
+    if listed:
+        cells_of = [
+            [
+                str(x["line"]), escape(f"{x['limit']} {x['allowed']:g}"), f"{x['before']:.4g}", f"{x['worst']:.4g}",
+                f"{x['feed_mm_min']:.4g}", "slowest" if x["slowest"] else "", ", ".join(f"{v:.4g}" for v in x["place"]),
+            ]
+            for x in sorted(listed, key=lambda x: -x["worst"] / x["allowed"])[:LISTED]
+        ]  # fmt: skip
+        head = ["line", "limit", "before", "after", "feed [mm/min]", "", "place [mm]"]
+        body += ["<h3>Lines that still exceed a limit</h3>", table(head, cells_of, numbers=(2, 3, 4))]
+        if len(listed) > LISTED:
+            body.append(f'<p class="note">{len(listed) - LISTED} more in summary.json.</p>')
+    return body
+
+
+def along(feeds: FeedResult, simulation: SimulationResult, checks: Sequence[LimitCheck]) -> go.Figure:
+    """Feed, and what is limited, before and after, along the path."""
+    c = simulation.removal.columns
+    s = np.asarray(c["s_mm"])
+    rows: list[tuple[str, str, float | None]] = [("feed_mm_min", "feed [mm/min]", None)]
+    rows += [(check.name, check.column.title, check.limit) for check in checks if check.name in COMPARED]
+    if len(rows) == 1:
+        rows.append(("force_n", "force [N]", None))
+    out = make_subplots(rows=len(rows), cols=1, shared_xaxes=True, vertical_spacing=0.04)
+    at_feed = ~np.asarray(c["rapid"])
+    for k, (column, title, most) in enumerate(rows, start=1):
+        for values, name, colour in ((feeds.before.columns, "before", BEFORE), (c, "after", AFTER)):
+            y = np.where(at_feed, np.asarray(values[column], dtype=np.float64), 0.0)
+            keep = thinned(y, LINE_POINTS)
+            out.add_trace(
+                go.Scatter(
+                    x=s[keep].astype(np.float32), y=y[keep].astype(np.float32), name=name, mode="lines",
+                    line={"color": colour, "width": 1.2, "shape": "vh"}, customdata=c["line"][keep],
+                    hovertemplate=f"{name}: %{{y:.4g}}, line %{{customdata}}<extra>{title}</extra>",
+                    showlegend=k == 1,
+                ),
+                row=k, col=1,
+            )  # fmt: skip
+        if most is not None:
+            out.add_hline(
+                y=most, line={"color": LIMIT, "width": 1.2, "dash": "dash"}, row=k, col=1,
+                annotation={"text": f"limit {most:g}", "font": {"color": LIMIT, "size": 11}},
+                annotation_position="top left",
+            )  # fmt: skip
+        out.update_yaxes(title_text=title, row=k, col=1, rangemode="tozero")
+    out.update_xaxes(gridcolor=GRID, zeroline=False)
+    out.update_yaxes(gridcolor=GRID, zerolinecolor=GRID)
+    out.update_xaxes(title_text="path [mm]", row=len(rows), col=1)
+    out.update_layout(
+        template="none", height=210 * len(rows) + 60, font=FONT, margin={"l": 74, "r": 16, "t": 30, "b": 46},
+        legend={"orientation": "h", "y": 1.01, "yanchor": "bottom", "x": 0.0},
+    )  # fmt: skip
+    return out
+
+
+def program_text(feeds: FeedResult, unless: str | None) -> str:
+    """The text; where it does not hold, ``unless`` says why behind the words of its first line; no line is added.
+
+    A line of ``%`` alone is passed over, and Sinumerik's paths.
+    """
+    if unless is None:
+        return feeds.text
+    plain = "".join(ch if ch.isascii() and ch.isprintable() and ch not in "()" else "_" for ch in unless)
+    said = f"; NOT VERIFIED: {plain}" if feeds.dialect == "sinumerik" else f"(NOT VERIFIED: {plain})"
+    lines = feeds.text.split("\n")
+    for k, line in enumerate(lines):
+        body = line.rstrip()
+        if body and not body.startswith(("%", ";$")):
+            lines[k] = f"{body} {said}{line[len(body) :]}"
+            break
+    return "\n".join(lines)

@@ -1,0 +1,340 @@
+"""New feeds for a program that exists: from what its steps cut to its own text with other F words.
+
+Notation: a factor is the new feed over the programmed one, see :mod:`chipload.planning.feeds`. The loads of a step at
+other feeds are those of the same bites, thicker or thinner; runout is added after that. The new text is read again, and
+motion by motion it must be the old program at the wanted feeds; what then holds is said by simulating it from fresh
+stock, which is done by the caller.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material
+from chipload.cutting.strength import allowed_stress, cutter_stress
+from chipload.errors import InputError
+from chipload.files import read_regular
+from chipload.jobs.checks import DefaultChecks, load_error, upper_loads
+from chipload.jobs.program.outcome import FeedResult
+from chipload.jobs.program.tables import FeedsTable
+from chipload.machine.feed import row_time_limited
+from chipload.machine.machine import Machine
+from chipload.planning.feeds import KEPT, SLOWEST, LineFeeds, StepContact, calmed, greatest_factor, line_feeds
+from chipload.program.gcode.feed_words import DIGITS, with_feeds
+from chipload.program.gcode.reader import LARGEST_FILE
+from chipload.program.program import DWELL, RAPID, Program
+from chipload.program.read import ProgramReading, dialect_of
+from chipload.program.time import peak_speed, program_time
+from chipload.result import column_of
+from chipload.simulation.chips import Removal, Watch
+from chipload.simulation.loads import Cuts, at_feeds, greatest_loads
+from chipload.simulation.steps import Steps
+from chipload.units import mm_s_from_mm_min
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: what holds a line beside limits, whose codes follow
+FASTEST, MACHINE, AIR, LIMITED = 0, 1, 2, 3
+#: dialects whose texts take new F words
+WORDS = ("linuxcnc", "fanuc", "sinumerik")
+#: the limit, and the column, of the stress of a cutter
+STRESS = "cutter_stress_mpa"
+#: columns of the removal in which a watch says what each step allows
+_FACTOR, _BY = "feed_factor", "feed_by"
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What the job asks of feeds.
+
+    Parameters
+    ----------
+    table : keys of the job
+    limits : by name, those that the feed changes
+    rotation : between two rotations at which the force is looked at [rad]
+    checks : made by default; the stress of the cutters is a limit unless it is switched off
+    errors : relative error of loads by the resolution of the simulation, by column; a load is held at most at its limit
+        over 1 + error, so that the limit holds whatever the error is within that
+    more : columns of what a cutter cut beside its greatest loads; None: none
+    """
+
+    table: FeedsTable
+    limits: Mapping[str, float]
+    rotation: float
+    checks: DefaultChecks
+    errors: Mapping[str, float] = field(default_factory=dict)
+    more: Watch | None = None
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        """Names of the limits that hold the feed: ``limits``, then the stress of the cutter."""
+        return (*self.limits, *(() if "cutter_strength" in self.checks.off else (STRESS,)))
+
+    def error(self, limit: str) -> float:
+        """Relative error of the column that a limit bounds; 0 where it is not finite: then nothing has this load."""
+        error = load_error(self.errors, column_of(limit).name)
+        return error if math.isfinite(error) else 0.0
+
+
+def changeable(path: Path, machine: Machine, dialect: str | None) -> tuple[str, str]:
+    """The text of a program whose feeds can be changed, byte by byte as in the file, and its dialect.
+
+    Raises
+    ------
+    InputError
+        Its feeds cannot be changed in the text; the message says what to do.
+    """
+    kind = dialect_of(path, machine, dialect)
+    if kind not in WORDS:
+        raise InputError(
+            f"operation.0.feeds: {path.name} is {kind}: feeds are changed in NC texts of LinuxCNC, Fanuc or Sinumerik: "
+            "convert it first (chipload convert)"
+        )
+    text = read_regular(path, path.name, LARGEST_FILE).decode("utf-8", "surrogateescape")
+    lone = text.replace("\r\n", "\n").find("\r")
+    if lone >= 0:
+        raise InputError(f"{path.name}: a line ends with CR alone: write LF or CR LF to change its feeds")
+    with_feeds(text, {})
+    return text, kind
+
+
+def read_as(text: str) -> str:
+    """The text as a reader of the file gets it."""
+    return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+
+
+def straight(program: Program) -> None:
+    """Refuse what runs a line twice: it has one feed word.
+
+    Raises
+    ------
+    InputError
+        A line comes again after another one.
+    """
+    back = np.flatnonzero(np.diff(program.line[program.line > 0]) < 0)
+    if len(back):
+        line = int(program.line[program.line > 0][back[0]])
+        raise InputError(
+            f"line {line}: the program goes back behind it: feeds are changed only in a text that runs straight "
+            "through: convert it first (chipload convert)"
+        )
+
+
+def watching(steps: Steps, asked: Asked, cutters: Mapping[int, Cutter], material: Material, machine: Machine) -> Watch:
+    """A watch that says of each step that cuts the greatest factor within the limits and what holds it."""
+    least, most, by = _bounds(steps, asked.table, cutters, machine)
+
+    def watch(cuts: Cuts) -> dict[str, Floats]:
+        low, high = least[cuts.step], most[cuts.step]
+
+        def ratios(factor: Floats) -> Floats:
+            moved = at_feeds(cuts, factor)
+            loads: dict[str, Floats] = greatest_loads(moved, material, asked.rotation, asked.checks.sigma > 0.0)
+            if asked.more is not None:
+                loads |= asked.more(moved)
+            if STRESS in asked.held and STRESS not in loads:
+                loads[STRESS] = cutter_stress(moved.bites, moved.cutter, material)
+            upper = upper_loads(loads, asked.checks.sigma)
+            limits = {**asked.limits, STRESS: allowed_stress(moved.cutter)}
+            return np.array(
+                [upper[column_of(name).name] * (1.0 + asked.error(name)) / limits[name] for name in asked.held]
+            )
+
+        factor = greatest_factor(lambda k: np.asarray(ratios(k).max(axis=0)), low, high)
+        worst = LIMITED + ratios(np.where(np.isnan(factor), low, factor)).argmax(axis=0)
+        return {_FACTOR: factor, _BY: np.where(factor == high, by[cuts.step], worst).astype(np.float64)}
+
+    return watch
+
+
+def with_new_feeds(
+    text: str,
+    dialect: str,
+    reading: ProgramReading,
+    steps: Steps,
+    before: Removal,
+    allowed: Mapping[str, NDArray[Any]],
+    asked: Asked,
+    cutters: Mapping[int, Cutter],
+    machine: Machine,
+    read: Callable[[str], ProgramReading],
+    seconds: float,
+) -> tuple[FeedResult, ProgramReading]:
+    """The text with other feeds, and what it does.
+
+    Parameters
+    ----------
+    text, dialect : see :func:`changeable`
+    reading : of it
+    steps, before : of its program, and what they remove
+    allowed : columns of a removal seen by :func:`watching`
+    read : reads a text
+    seconds : time of the program as it is [s]
+
+    Raises
+    ------
+    InputError
+        The feeds cannot be changed in the text: the line is named.
+    """
+    c = before.columns
+    feeds, touch = ~steps.rapid, np.where(c["chip_layers"] > 0, StepContact.FILM, StepContact.AIR)
+    touch[c["chip_pieces"] > 0] = StepContact.CUT
+    least, most, by = _bounds(steps, asked.table, cutters, machine)
+    cuts = feeds & (touch == StepContact.CUT)
+    if cuts.any():
+        most, by = np.where(cuts, allowed[_FACTOR], most), np.where(cuts, allowed[_BY].astype(np.int64), by)
+    lines = line_feeds(*(x[feeds] for x in (steps.line, touch, least, most, by)))
+    lines = _in_air(lines, steps, feeds, asked.table, machine)
+    factor, useful = _wanted(lines, reading, machine, asked.table)
+    new = with_feeds(text, dict(zip(lines.line.tolist(), factor.tolist(), strict=True)))
+    after = read(new)
+    _same(reading.program, after.program, lines.line, factor)
+    names = {FASTEST: "fastest", MACHINE: "machine", AIR: "air", SLOWEST: "slowest", KEPT: "programmed"}
+    names |= {LIMITED + k: name for k, name in enumerate(asked.held)}
+    held = np.where((useful < lines.allowed) & (lines.by != SLOWEST), MACHINE, lines.by)
+    fed = FeedResult(
+        text=new,
+        dialect=dialect,
+        line=lines.line,
+        factor=factor,
+        by=tuple(names[k] for k in held.tolist()),
+        before=before,
+        rubs=_rubs(lines, factor, steps, cuts, asked.table, cutters),
+        tooth_feed_least=asked.table.tooth_feed_least_mm,
+        seconds_before=seconds,
+    )
+    return fed, after
+
+
+def _bounds(
+    steps: Steps, table: FeedsTable, cutters: Mapping[int, Cutter], machine: Machine
+) -> tuple[Floats, Floats, Ints]:
+    """The least and the greatest factor of each step that the job and the machine allow, and what holds the latter."""
+    speed = _speed(steps)
+    n = len(steps)
+    most, by = np.full(n, 0.01 * table.fastest_percent), np.full(n, FASTEST)
+    with np.errstate(divide="ignore"):
+        if table.fastest_mm_min is not None:
+            most = np.minimum(most, mm_s_from_mm_min(table.fastest_mm_min) / speed)
+        able = machine.feed_max / speed
+        by, most = np.where(able < most, MACHINE, by), np.minimum(able, most)
+        least = np.full(n, 0.01 * table.slowest_percent)
+        if table.tooth_feed_least_mm is not None:
+            least = np.maximum(least, table.tooth_feed_least_mm / _tooth_feed(steps, cutters))
+    return np.minimum(least, most), most, by
+
+
+def _speed(steps: Steps) -> Floats:
+    """(n,) speed of the tip [mm/s]; 0 where it stands and in rapids."""
+    length = np.linalg.norm(steps.p1 - steps.p0, axis=1)
+    moves = steps.seconds > 0.0
+    return np.asarray(np.where(moves, length / np.where(moves, steps.seconds, 1.0), 0.0))
+
+
+def _tooth_feed(steps: Steps, cutters: Mapping[int, Cutter]) -> Floats:
+    """(n,) feed per tooth [mm]; inf where the spindle stands or the tip does."""
+    flutes = np.ones(len(steps))
+    for number in np.unique(steps.tool).tolist():
+        if number in cutters:
+            flutes[steps.tool == number] = cutters[number].flutes
+    speed = _speed(steps)
+    turns = (speed > 0.0) & (steps.spindle != 0.0)
+    return np.asarray(np.where(turns, math.tau * speed / np.where(turns, flutes * np.abs(steps.spindle), 1.0), np.inf))
+
+
+def _in_air(lines: LineFeeds, steps: Steps, feeds: NDArray[np.bool_], table: FeedsTable, machine: Machine) -> LineFeeds:
+    """Lines that touch nothing get the feed for it, if theirs is slower; else they keep theirs."""
+    air = lines.touch == StepContact.AIR
+    allowed, by = np.where(air, 1.0, lines.allowed), np.where(air, KEPT, lines.by)
+    if table.air_mm_min is not None:
+        asked, fastest = mm_s_from_mm_min(table.air_mm_min), np.zeros(len(lines.line))
+        np.maximum.at(fastest, np.searchsorted(lines.line, steps.line[feeds]), _speed(steps)[feeds])
+        faster = air & (fastest > 0.0) & (fastest < min(asked, machine.feed_max))
+        allowed = np.where(faster, min(asked, machine.feed_max) / np.where(faster, fastest, 1.0), allowed)
+        by = np.where(faster, MACHINE if asked > machine.feed_max else AIR, by)
+    return replace(lines, least=np.where(air, 1.0, lines.least), allowed=allowed, by=by)
+
+
+def _wanted(lines: LineFeeds, reading: ProgramReading, machine: Machine, table: FeedsTable) -> tuple[Floats, Floats]:
+    """(m,) factors that are written, and those beyond which the machine is no faster; at least 1 or what is allowed."""
+    program = reading.program
+    row = np.flatnonzero(np.isin(program.line, lines.line) & (program.motion != RAPID) & (program.motion != DWELL))
+    of, m = np.searchsorted(lines.line, program.line[row]), len(lines.line)
+    feed = np.array(program.feed)
+    feed[row] *= lines.allowed[of]
+    peak, old = peak_speed(replace(program, feed=feed), machine)[row], program.feed[row]
+    moves = peak > 0.0
+    reach, slow, fast = np.zeros(m), np.full(m, np.inf), np.zeros(m)
+    np.maximum.at(reach, of[moves], peak[moves] / old[moves])
+    np.minimum.at(slow, of[moves], old[moves])
+    np.maximum.at(fast, of[moves], old[moves])
+    reach = np.where(fast > 0.0, reach, np.inf)
+    if machine.chain.rotary:
+        reach = np.minimum(reach, _by_rates(lines, reading, machine))
+    useful = np.minimum(lines.allowed, np.maximum(reach, 1.0))
+    # a line whose feed changes within it (a rotary axis moves) is no neighbour of others
+    one = (fast > 0.0) & (fast - slow <= 1e-9 * fast)
+    out = useful.copy()
+    was = fast[one]
+    most, enough, least = (was * x[one] for x in (lines.allowed, useful, lines.least))
+    out[one] = calmed(most, enough, least, was, 0.01 * table.change_least_percent) / was
+    # rounding must not pass for a change
+    return np.where(np.abs(out - 1.0) < 10.0 ** -(DIGITS + 4), 1.0, out), useful
+
+
+def _by_rates(lines: LineFeeds, reading: ProgramReading, machine: Machine) -> Floats:
+    """(m,) factor at which each line takes the time that the rates of its axes need."""
+    least = np.concatenate([[0.0], row_time_limited(machine, reading.axes)])[: len(reading.commands)]
+    own = np.concatenate([[0.0], program_time(reading.program, machine)[1:]])
+    rates, path = np.zeros(len(lines.line)), np.zeros(len(lines.line))
+    for total, line, seconds in ((rates, reading.commands.line, least), (path, reading.program.line, own)):
+        known = np.isin(line, lines.line)
+        np.add.at(total, np.searchsorted(lines.line, line[known]), seconds[known])
+    return np.asarray(np.where(rates > 0.0, path / np.where(rates > 0.0, rates, 1.0), np.inf))
+
+
+def _same(old: Program, new: Program, line: Ints, factor: Floats) -> None:
+    """Refuse a new text that is not the old program at the wanted feeds, which rounding makes slower by a digit."""
+    at, wrong = 0, len(old) != len(new)
+    if not wrong:
+        off = np.zeros(len(old), dtype=np.bool_)
+        for name in ("motion", "p_work", "axis", "centre", "normal", "turns", "spindle", "tool", "line"):
+            differs = np.asarray(getattr(old, name)) != np.asarray(getattr(new, name))
+            off |= differs if differs.ndim == 1 else differs.any(axis=1)
+        off |= (old.motion == DWELL) & (old.feed != new.feed)
+        moves = np.isin(old.line, line) & (old.motion != RAPID) & (old.motion != DWELL)
+        wanted = old.feed[moves] * factor[np.searchsorted(line, old.line[moves])]
+        rounded = 1.0 - 1.01 * 10.0 ** (1 - DIGITS)
+        off[moves] |= (new.feed[moves] > wanted * (1.0 + 1e-9)) | (new.feed[moves] < wanted * rounded)
+        wrong, at = bool(off.any()), int(old.line[np.argmax(off)])
+    if wrong:
+        where = f"line {at}: " if at else ""
+        raise InputError(f"{where}its feed cannot be set by a word of its own: convert the program first")
+
+
+def _rubs(
+    lines: LineFeeds,
+    factor: Floats,
+    steps: Steps,
+    cuts: NDArray[np.bool_],
+    table: FeedsTable,
+    cutters: Mapping[int, Cutter],
+) -> tuple[tuple[int, float], ...]:
+    """Lines that cut below the least feed per tooth, and their feeds per tooth [mm]."""
+    if table.tooth_feed_least_mm is None:
+        return ()
+    new = _tooth_feed(steps, cutters)[cuts] * factor[np.searchsorted(lines.line, steps.line[cuts])]
+    low = new < table.tooth_feed_least_mm * (1.0 - 2.0 * 10.0 ** (1 - DIGITS))
+    worst: dict[int, float] = {}
+    for line, feed in zip(steps.line[cuts][low].tolist(), new[low].tolist(), strict=True):
+        worst[line] = min(worst.get(line, math.inf), feed)
+    return tuple(sorted(worst.items()))

@@ -1,0 +1,67 @@
+"""Form error of a stated part, step by step while it is cut: what tool and work that give way leave on its surface.
+
+Notation: a point of the part is made by the step whose tool comes nearest to it; the error there is that of
+:mod:`chipload.simulation.deflection`, at the moment when an edge makes the point, positive where material is left.
+
+Only points count that had stock over them, that the rigid tool leaves within ``NEAR`` of the part (over the others
+there is a later operation's stock, or a gouge), and that lie on a smooth piece of the surface. A point is looked for
+among the cuts of the block of steps that its nearest step is in, so that nothing of earlier blocks has to be kept.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from chipload.cutting.material import Material
+from chipload.jobs.program.stiffness import Stiffness
+from chipload.simulation.deflection import form_error_of
+from chipload.simulation.loads import Cuts
+from chipload.simulation.surface import Difference
+
+Floats = NDArray[np.float64]
+
+#: a point that the rigid tool leaves farther from the part [mm] is not finished
+NEAR = 0.05
+#: greatest angle between the normal at a point and those of the triangles round it: no edge of the part [rad]
+SMOOTH = math.radians(15.0)
+
+
+def forming(left: Difference, stiffness: Stiffness, material: Material) -> Callable[[Cuts], dict[str, Floats]]:
+    """Columns of a simulation: ``form_error_um`` of greatest size, with its sign, and how many points it is of.
+
+    Parameters
+    ----------
+    left : what the rigid tool leaves on the part
+    """
+    mesh = trimesh.Trimesh(left.points, left.faces, process=False)
+    normals = np.asarray(mesh.vertex_normals)
+    least, flat = np.ones(len(left.points)), np.asarray(mesh.face_normals)
+    for corner in left.faces.T:
+        np.minimum.at(least, corner, np.einsum("fj,fj->f", flat, normals[corner]))
+    counts = left.over & (np.abs(left.distance) <= NEAR) & (least >= math.cos(SMOOTH))
+    at = np.flatnonzero(counts)
+    at = at[np.argsort(left.step[at], kind="stable")]
+    step = left.step[at]
+
+    def columns(cuts: Cuts) -> dict[str, Floats]:
+        error, made = np.zeros(len(cuts)), np.zeros(len(cuts))
+        some = at[np.searchsorted(step, cuts.step[0]) : np.searchsorted(step, cuts.step[-1], "right")]
+        if len(some):
+            work = None if stiffness.work is None else np.full(len(some), stiffness.work)
+            bars = {cuts.tool: stiffness.bars[cuts.tool]}
+            found = form_error_of(
+                [cuts], material, left.points[some], normals[some], work=work, bars=bars, near=2.0 * NEAR
+            )
+            own = np.flatnonzero(found.made & found.at_edge)
+            row = np.searchsorted(cuts.step, found.step[own])
+            np.add.at(made, row, 1.0)
+            order = np.argsort(np.abs(found.error[own]), kind="stable")
+            error[row[order]] = 1e3 * found.error[own][order]
+        return {"form_error_um": error, "form_points": made}
+
+    return columns

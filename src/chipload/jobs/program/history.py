@@ -1,0 +1,151 @@
+"""What a simulation gives back in Python: columns, pictures, numbers, and the files of a result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import InputError
+from chipload.jobs.program.outcome import ProgramResult
+from chipload.jobs.program.result import result_of
+from chipload.result import Result, Verdict
+from chipload.stock.layers import LayeredStock
+
+if TYPE_CHECKING:
+    import pandas
+    import plotly.graph_objects as go
+
+#: colours of the verdicts
+COLOURS = {Verdict.HOLDS: "#0b6b4f", Verdict.UNPROVEN: "#8a6100", Verdict.EXCEEDS: "#b3261e"}
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """A program that was run through a stock, a row a step.
+
+    Parameters
+    ----------
+    program : the program, its machine and what the simulation found
+    """
+
+    program: ProgramResult
+
+    def __len__(self) -> int:
+        return len(self.columns["line"])
+
+    def __repr__(self) -> str:
+        return f"History({self.program.name} on {self.program.machine.name}, {len(self)} steps: {self.verdict})"
+
+    def __getitem__(self, column: str) -> NDArray[Any]:
+        """(n,) values of a column, as ``history["force_n"]``."""
+        if column not in self.columns:
+            raise InputError(f"history: no column {column!r}: it has {', '.join(self.columns)}")
+        return self.columns[column]
+
+    @cached_property
+    def result(self) -> Result:
+        """Verdict, limits and findings, as :func:`chipload.load_result` gives them of a folder."""
+        return result_of(self.program)
+
+    @cached_property
+    def columns(self) -> Mapping[str, NDArray[Any]]:
+        """(n,) arrays by name, those of history.parquet: see :data:`chipload.result.COLUMNS`."""
+        return self.result.in_use[0].columns
+
+    @property
+    def stock(self) -> LayeredStock:
+        """The stock that is left."""
+        if self.program.simulated is None:
+            raise InputError(f"{self.program.name}: was read, not simulated: there is no stock")
+        return self.program.simulated.stock
+
+    @property
+    def energy_balance(self) -> Mapping[int, float]:
+        """Work over the specific energy of the volume removed, less 1, by tool number."""
+        return {} if self.program.simulated is None else self.program.simulated.removal.energy_balance
+
+    @property
+    def resolution_error(self) -> Mapping[str, float]:
+        """Stated error of the greatest value of a column, as a share of it."""
+        return {} if self.program.simulated is None else self.program.simulated.removal.resolution_error
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the program holds the limits of its machine and of the job."""
+        return self.result.verdict
+
+    @property
+    def message(self) -> str:
+        """The verdict in a sentence."""
+        return self.result.message
+
+    @property
+    def numbers(self) -> Mapping[str, Any]:
+        """The operation in numbers, as in summary.json: ``force_n``, ``torque_nm``, ``removed_mm3``, ``collisions``."""
+        return self.result.operations[0]
+
+    def plot(self, *columns: str, x: Literal["t_s", "s_mm"] = "t_s") -> go.Figure:
+        """Columns one below the other against time or path, with their limits; none named: the loads.
+
+        Raises
+        ------
+        InputError
+            A column is not known.
+        """
+        from chipload.report.columns import USUAL, columns_figure
+
+        limits = {check.name: check.limit for check in self.result.limits}
+        return columns_figure(self.columns, limits, columns or USUAL, x)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The columns as a table of pandas, which is to be installed: ``pip install chipload[notebook]``."""
+        try:
+            import pandas
+        except ImportError:
+            raise InputError("to_pandas: pandas is not installed: pip install 'chipload[notebook]'") from None
+        return pandas.DataFrame({name: np.array(values) for name, values in self.columns.items()})
+
+    def save(self, out: str | Path) -> Path:
+        """Write the folder that ``chipload run`` writes: report, summary, history, scene, stock."""
+        from chipload.jobs.program.figures import presentation_of
+        from chipload.report.folder import write_result
+
+        return write_result(self.result, presentation_of(self.program), out)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        rows = "".join(
+            f"<tr><td>{escape(name)}</td><td style='text-align:right'>{escape(value)}</td></tr>"
+            for name, value in _rows(self.numbers)
+        )
+        colour = COLOURS[self.verdict]
+        return (
+            f"<div style='border-left:5px solid {colour};padding:4px 12px;color:{colour}'>{escape(self.message)}</div>"
+            f"<table>{rows}</table>"
+        )
+
+
+def _rows(numbers: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Names and values that a notebook shows."""
+    shown = (
+        ("time [s]", numbers["time_s"]),
+        ("in air [s]", numbers["air_cut_s"]),
+        ("removed [mm\u00b3]", numbers["removed_mm3"]),
+        ("greatest force [N]", numbers["force_n"]["max"]),
+        ("greatest torque [N m]", numbers["torque_nm"]["max"]),
+        ("greatest power [W]", numbers["power_w"]["max"]),
+        ("greatest chip thickness [mm]", numbers["chip_max_mm"]["max"]),
+        ("greatest deflection [\u00b5m]", numbers["deflection_um"]["max"]),
+        ("form error [\u00b5m]", numbers["form_error_um"]["max"]),
+        ("deepest gouge [mm]", numbers["gouge_mm"]["max"]),
+        ("highest excess [mm]", numbers["excess_mm"]["max"]),
+    )
+    out = [(name, f"{value:.4g}") for name, value in shown if value is not None]
+    return [*out, ("steps", str(numbers["steps"])), ("collisions", str(len(numbers["collisions"])))]

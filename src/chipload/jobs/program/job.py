@@ -1,0 +1,118 @@
+"""A job that runs a program which exists: read, and with an operation run through a stock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import trimesh
+
+from chipload.cutter.cutter import Cutter
+from chipload.jobs.messages import Errors
+from chipload.jobs.program.tables import LOADS, ProgramJobTable, ProgramLimitsTable
+from chipload.jobs.sources import Limited, cutters, sources_of
+
+
+@dataclass(frozen=True)
+class ProgramJob(Limited):
+    """A job that runs a program; paths are absolute.
+
+    Parameters
+    ----------
+    path : the job file
+    table : its values
+    program_file : NC text or CL data
+    tools_file : tool table; None: none
+    machine : a shipped name or a file
+    overrides : the `--set` texts that were applied
+    cutters : by number; empty where the program is not simulated
+    material : a shipped name or a file; None where the program is not simulated
+    meshes : what stands for the files of ``stock``, ``part``, ``fixture 0`` and so on
+    """
+
+    path: Path
+    table: ProgramJobTable
+    program_file: Path
+    tools_file: Path | None
+    machine: str | Path
+    overrides: tuple[str, ...]
+    cutters: Mapping[int, Cutter]
+    material: str | Path | None
+    meshes: Mapping[str, trimesh.Trimesh] = field(default_factory=dict)
+
+    @property
+    def simulates(self) -> bool:
+        """Whether the program is run through a stock."""
+        return bool(self.table.operation)
+
+
+def load(path: Path, table: ProgramJobTable, overrides: Sequence[str]) -> ProgramJob:
+    """The job of a table that was read.
+
+    Raises
+    ------
+    InputError
+        Keys do not go together.
+    """
+    folder, errors = path.parent, Errors()
+    named = [key for key in ("machine", "material") if getattr(table, key) is not None]
+    sources: dict[str, str | Path] = {}
+    tools: dict[int, Cutter] = {}
+    errors.texts += missing(table.model_dump(exclude_none=True))
+    with errors.collect():
+        sources = sources_of(table, folder, *named)
+    if table.operation:
+        errors.texts += _contradictions(table)
+        with errors.collect():
+            tools = cutters(table.cutter, folder)
+    else:
+        errors.texts += [
+            f'{key}: not used where a program is only read: add an [[operation]] with kind = "simulate" or leave it out'
+            for key in ("stock", "part", "fixture", "material", "cutter", "stiffness")
+            if getattr(table, key)
+        ]
+    errors.refuse()
+    tool_table = table.program.tools
+    return ProgramJob(
+        path,
+        table,
+        folder / table.program.file,
+        None if tool_table is None else folder / tool_table,
+        sources["machine"],
+        tuple(overrides),
+        tools,
+        sources.get("material"),
+    )
+
+
+def missing(values: Mapping[str, Any]) -> list[str]:
+    """The tables that a simulation lacks; ``values`` are those of the file."""
+    if not values.get("operation"):
+        return []
+    needs = ("stock", "material", "cutter")
+    return [f"{key}: missing: state it (kind = simulate needs it)" for key in needs if not values.get(key)]
+
+
+def _contradictions(table: ProgramJobTable) -> Iterator[str]:
+    """What values of a simulation contradict, and that nothing is checked at all."""
+    stock = table.stock
+    if stock is not None:
+        block = (stock.low_mm is not None, stock.high_mm is not None)
+        if any(block) == (stock.file is not None) or any(block) != all(block):
+            yield "stock: state either low_mm and high_mm of a block, or a file"
+        saved = stock.file is not None and stock.file.lower().endswith(".npz")
+        if saved and stock.layer_mm is not None:
+            yield "stock.layer_mm: leave it out: the layers of an earlier result stay"
+    for key in ("form_error_um", "gouge_mm", "excess_mm"):
+        if table.part is None and getattr(table.limits, key) is not None:
+            yield f"limits.{key}: needs the part that should come out: state [part] or leave it out"
+    if table.operation[0].feeds is not None and not any(getattr(table.limits, name) is not None for name in LOADS):
+        yield (
+            f"operation.0.feeds: no limit of a load is stated, so nothing would hold them: state at least one of "
+            f"{', '.join(LOADS)} in [limits]"
+        )
+    if not table.limits.stated:
+        names = ", ".join(ProgramLimitsTable.model_fields)
+        yield f"limits: none is stated, so nothing would be checked: state at least one of {names}"

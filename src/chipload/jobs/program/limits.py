@@ -1,0 +1,78 @@
+"""Limits of a simulated program: those of the job, and those that are checked by default."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from chipload.jobs.checks import DIRECTED, default_limits, load_error, upper_loads
+from chipload.jobs.program.outcome import SimulationResult
+from chipload.machine.machine import Machine
+from chipload.result import LimitCheck, Verdict, check_limit, column_of, state_of
+from chipload.result.limits import Columns
+from chipload.simulation.surface import Difference
+
+#: columns that deflection falsifies where a stiffness is not stated
+BY_STIFFNESS = ("deflection_um", "form_error_um")
+
+
+def program_limits(simulation: SimulationResult, columns: Columns, track: str) -> tuple[LimitCheck, ...]:
+    """Every limit of the job, then those that are checked by default.
+
+    Parameters
+    ----------
+    columns : of the track, a row a step
+    track : its name
+    """
+    upper = upper_loads(columns, simulation.checks.sigma)
+    return (
+        *(_stated(simulation, upper, track, name, limit) for name, limit in simulation.limits.items()),
+        *default_limits(simulation.checks, simulation.machine, columns, track, simulation.errors),
+    )
+
+
+def spindle_limits(machine: Machine, speeds: ArrayLike = ()) -> dict[str, float]:
+    """What the spindle of a machine gives at every one of some speeds [rad/s], by name of the limit; empty where its
+    file does not say it.
+    """
+    torque = float(machine.torque_at(speeds).min(initial=math.inf if machine.torque is None else machine.torque))
+    stated = {"spindle_torque_nm": torque / 1000.0, "spindle_power_w": machine.power_w}
+    return {name: limit for name, limit in stated.items() if limit is not None and limit < math.inf}
+
+
+def greatest_difference(left: Difference, name: str) -> tuple[float, int, tuple[float, float, float] | None]:
+    """Deepest gouge (``gouge_mm``) or highest excess (``excess_mm``) [mm], the step that left it, and its place."""
+    sign = -1.0 if name == "gouge_mm" else 1.0
+    counts = np.isfinite(left.distance) & (left.over | (left.distance < 0.0))
+    value = np.where(counts, sign * left.distance, -np.inf)
+    k = int(np.argmax(value))
+    if not value[k] > 0.0:
+        return 0.0, 0, None
+    x, y, z = (float(v) for v in left.points[k])
+    return float(value[k]), int(left.step[k]), (x, y, z)
+
+
+def _stated(simulation: SimulationResult, columns: Columns, track: str, name: str, limit: float) -> LimitCheck:
+    reason = simulation.checks.unknown_direction if name in DIRECTED else ""
+    if not reason and name in BY_STIFFNESS and simulation.rigid:
+        reason = f"{', '.join(simulation.rigid)} {'is' if len(simulation.rigid) == 1 else 'are'} not stated"
+    if name in ("gouge_mm", "excess_mm"):
+        return _difference(simulation, columns, track, name, limit)
+    if name == "form_error_um" and "form_points" in columns and not np.asarray(columns["form_points"]).any():
+        reason = "no point of the part is finished"
+    error = load_error(simulation.errors, column_of(name).name)
+    return check_limit(name, limit, columns, track=track, error=error, reason=reason)
+
+
+def _difference(simulation: SimulationResult, columns: Columns, track: str, name: str, limit: float) -> LimitCheck:
+    """The part against the cutter's path; points of the part are what is compared, so the step is that of a point."""
+    if simulation.left is None:
+        return LimitCheck(name, limit, None, Verdict.UNPROVEN, track, reason="no [part] is stated")
+    worst, k, place = greatest_difference(simulation.left, name)
+    if place is None:
+        return LimitCheck(name, limit, worst, Verdict.HOLDS, track)
+    line, t = int(columns["line"][k]), float(columns["t_s"][k])
+    state, why = state_of(worst, limit)
+    return LimitCheck(name, limit, worst, state, track, k, line, place, t, 0.0, why)

@@ -1,0 +1,124 @@
+"""What the simulation of a program needs before its first step: read, checked, and the same for a check and a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from chipload.cutting.material import Material, material_named, read_material
+from chipload.jobs.checks import DefaultChecks, default_checks
+from chipload.jobs.program.job import ProgramJob
+from chipload.jobs.program.stiffness import Stiffness, stiffness_of
+from chipload.jobs.program.tables import SimulateTable
+from chipload.jobs.program.workpiece import fixture_points, part_body, stock_points
+from chipload.machine.machine import Machine
+from chipload.program.program import RAPID, Program
+from chipload.program.read import ProgramReading, times_of
+from chipload.simulation.chips import Resolution, counted, require_steps
+from chipload.simulation.steps import StepBlocks
+from chipload.simulation.surface import require_points
+from chipload.simulation.swept_area import require_upright
+from chipload.stock.layers import LayeredStock
+
+#: slices of a corner radius where none are stated, and how they narrow towards the bottom
+CORNER, GRADING = 24, 2.0
+#: where the axis leans: length of a slice of the flank in smallest radii, slices of the bottom
+LEANING_FLANK, LEANING_BOTTOM = 0.1, 12
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """What a simulation starts from, beside the program and the stock.
+
+    Parameters
+    ----------
+    program, times : from the first tool on, and the time of each row [s]
+    resolution : how fine it looks
+    stock_points : points of the stock that shank and holder are held against; None: they are not
+    part : that should come out
+    fixtures : their points by name
+    stiffness : of cutters, holders, spindle and work
+    checks : made by default
+    steps : how many there are
+    """
+
+    program: Program
+    times: NDArray[np.float64]
+    resolution: Resolution
+    stock_points: NDArray[np.float64] | None
+    part: trimesh.Trimesh | None
+    fixtures: dict[str, NDArray[np.float64]]
+    stiffness: Stiffness
+    checks: DefaultChecks
+    steps: int
+
+
+def bodies_of(
+    job: ProgramJob, reading: ProgramReading, stock: LayeredStock, machine: Machine, material: Material
+) -> Bodies:
+    """Read what a simulation needs and refuse what it could not use: the check of a job and its run both begin so.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, a tool has no cutter, there are too many steps or points, or values do not go together.
+    """
+    op: SimulateTable = job.table.operation[0]
+    require_steps(reading.program, op.step_mm)
+    checks = default_checks(job.table.checks, job.cutters, material, op.confidence)
+    stiffness = stiffness_of(job.table.stiffness, job.cutters)
+    program, times = timed(reading, job, machine)
+    fine = resolution_of(job, program)
+    count = counted(program, job.cutters, fine)
+    for steps in StepBlocks(program, op.step_mm, op.tolerance_mm):
+        require_upright(steps, stock, job.cutters, op.interpolation)
+    points = stock_points(stock, op.stock_points_mm) if op.stock_points_mm is not None else None
+    part = part_body(job)
+    if part is not None and job.table.part is not None:
+        require_points(part, job.table.part.spacing_mm, "part")
+    return Bodies(program, times, fine, points, part, fixture_points(job), stiffness, checks, count)
+
+
+def material_of(job: ProgramJob) -> Material:
+    """The coefficients that the job names."""
+    assert job.material is not None
+    return material_named(job.material) if isinstance(job.material, str) else read_material(job.material)
+
+
+def resolution_of(job: ProgramJob, program: Program) -> Resolution:
+    """What the job states. Where it does not: slices of an upright cutter end where the layers do, and are narrow near
+    the bottom; those of a leaning one do not and are more, of equal angle, for it may cut with any of them.
+    """
+    op: SimulateTable = job.table.operation[0]
+    smallest = min(c.radius for c in job.cutters.values())
+    flank = op.flank_mm or 0.5 * smallest
+    if op.corner_slices is not None:
+        return Resolution(op.step_mm, op.tolerance_mm, op.corner_slices, flank)
+    if (np.asarray(program.axis)[:, 2] > 1.0 - 1e-12).all():
+        return Resolution(op.step_mm, op.tolerance_mm, CORNER, flank, grading=GRADING)
+    flank = op.flank_mm or LEANING_FLANK * smallest
+    return Resolution(op.step_mm, op.tolerance_mm, 2 * CORNER, flank, bottom_pieces=LEANING_BOTTOM)
+
+
+def timed(reading: ProgramReading, job: ProgramJob, machine: Machine) -> tuple[Program, NDArray[np.float64]]:
+    """The program from its first tool on, and the time of each row; what is left out counts with the first row."""
+    program, times = _with_tool(reading.program, job), times_of(reading, machine)
+    first = len(times) - len(program)
+    return program, np.concatenate([[times[: first + 1].sum()], times[first + 1 :]])
+
+
+def _with_tool(program: Program, job: ProgramJob) -> Program:
+    """The program without the rapids at its beginning that are made before a tool is in the spindle (T0), unless the
+    job says what is in it.
+    """
+    if 0 in job.cutters:
+        return program
+    idle = (program.tool == 0) & (program.motion == RAPID)
+    first = len(program) if idle.all() else int(np.argmin(idle))
+    if first < 2:
+        return program
+    kept = {f.name: getattr(program, f.name)[first - 1 :] for f in fields(program) if f.name != "labels"}
+    return replace(program, **kept)

@@ -1,0 +1,40 @@
+"""Rows of the history of a program: a row a step of its simulation, or a row a motion where it was only read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.jobs.program.outcome import ProgramResult, SimulationResult
+from chipload.program.read import times_of
+from chipload.result.limits import Columns
+from chipload.result.motions import motion_columns
+from chipload.simulation.checkpoint import in_rows
+from chipload.simulation.chips import Removal
+
+Floats = NDArray[np.float64]
+
+#: rows of history.parquet that are held in memory together
+HISTORY_ROWS = 65_536
+
+
+def step_rows(simulation: SimulationResult, removal: Removal | None = None) -> Iterator[dict[str, NDArray[Any]]]:
+    """A row a step, some ten thousand rows at a time; ``removal`` None: that of the simulation."""
+    own = removal or simulation.removal
+    names = np.array([label or "program" for label in own.labels], dtype=object)
+    at = 0
+    for columns in in_rows(own.columns, HISTORY_ROWS):
+        count = len(columns["label"])
+        if removal is None and simulation.left is not None:
+            columns["gouge_mm"] = np.maximum(-simulation.left.deepest[at : at + count], 0.0)
+        columns["cutting_s"] = columns.pop("seconds")
+        yield {"pass": names[columns.pop("label")], **columns}
+        at += count
+
+
+def motion_rows(read: ProgramResult) -> Columns:
+    """A row a motion of the tip, or a chord of an arc, columns by name."""
+    return motion_columns(read.reading.program, times_of(read.reading, read.machine))

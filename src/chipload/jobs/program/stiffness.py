@@ -1,0 +1,125 @@
+"""What gives way under a cutter of a job: its own bars, holder, spindle and work, as far as they are stated.
+
+Notation: a stiffness that is not stated counts as infinite, so that every deflection is then a lower bound; what was
+taken so is named.
+
+Reference: [Altintas2012] ch. 2; [Schmitz2009] ch. 9 for the joints.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material
+from chipload.errors import InputError
+from chipload.jobs.program.tables import StiffnessTable
+from chipload.simulation.chip_space import flute_fill
+from chipload.simulation.chips import Removal
+from chipload.simulation.deflection import tip_deflections
+from chipload.simulation.loads import Cuts, Floats
+from chipload.structure.spindle import RIGID, Bar, cutter_bars, springs, tool_bars, tube
+
+#: N/mm in 1 N/um, N mm/rad in 1 N m/rad, MPa in 1 GPa
+PER = 1000.0
+#: moduli of holders that are believed [GPa]
+MODULI = (50.0, 1000.0)
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """What gives way.
+
+    Parameters
+    ----------
+    bars : by tool number, from the tip to the spindle
+    work : compliance of the work [mm/N]; None: not stated
+    room : whether the room for chips is stated of a cutter
+    unknown : what was not stated and counts as rigid
+    """
+
+    bars: Mapping[int, tuple[Bar, ...]]
+    work: float | None
+    room: bool
+    unknown: tuple[str, ...]
+
+
+def stiffness_of(table: StiffnessTable | None, cutters: Mapping[int, Cutter]) -> Stiffness:
+    """Bars and joints of every cutter.
+
+    Raises
+    ------
+    InputError
+        The modulus of the holders is none of a metal.
+
+    Examples
+    --------
+    >>> mill = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
+    >>> stiffness_of(StiffnessTable.model_validate({"spindle_n_um": 50.0}), {1: mill}).unknown[:2]
+    ('stiffness.grip_n_um', 'stiffness.grip_nm_rad')
+    """
+    said = table or StiffnessTable.model_validate({})
+    modulus = said.holder_gpa
+    if modulus is not None and math.isfinite(modulus) and not MODULI[0] <= modulus <= MODULI[1]:
+        raise InputError(
+            f"stiffness.holder_gpa = {modulus:g}: must be from {MODULI[0]:g} to {MODULI[1]:g}, or inf for rigid holders"
+        )
+    chains = {n: c for n, c in cutters.items() if c.tip_stiffness is None}
+    keys = [k for k in StiffnessTable.model_fields if k != "holder_gpa"] if chains else ["work_n_um"]
+    missing = [f"stiffness.{k}" for k in keys if getattr(said, k) is None]
+    # a spindle that does not tilt feels no lever: the length of a rigid holder does not matter then
+    matters = modulus is None or math.isfinite(modulus) or math.isfinite(said.spindle_nm_rad or 1.0)
+    bare = sorted(n for n, c in chains.items() if not c.holder) if matters else []
+    if modulus is None and len(bare) < len(chains):
+        missing.append("stiffness.holder_gpa")
+    missing += [f"holder_mm of cutter {n}" for n in bare]
+    grip = springs(PER * (said.grip_n_um or math.inf), PER * (said.grip_nm_rad or math.inf))
+    nose = springs(PER * (said.spindle_n_um or math.inf), PER * (said.spindle_nm_rad or math.inf))
+    bars = {n: tool_bars(c) for n, c in cutters.items() if n not in chains}
+    for number, cutter in chains.items():
+        holder = [_part(length, diameter, modulus) for length, diameter in cutter.holder]
+        bars[number] = (*cutter_bars(cutter, grip), *holder, Bar(0.0, 0.0, nose))
+    work = None if said.work_n_um is None else 1.0 / (PER * said.work_n_um)
+    return Stiffness(bars, work, any(c.gullet is not None for c in cutters.values()), tuple(missing))
+
+
+def _part(length: float, diameter: float, modulus: float | None) -> Bar:
+    """A part of a holder, as a solid bar [mm, GPa]."""
+    if modulus is None or math.isinf(modulus):
+        return Bar(length, 0.0, RIGID)
+    return tube(length, diameter, PER * modulus)
+
+
+def deflecting(stiffness: Stiffness, material: Material) -> Callable[[Cuts], dict[str, Floats]]:
+    """More columns of a simulation: how far tool and work give way in the steps of one cutter, and how full its flutes
+    are where their room is stated.
+    """
+
+    def columns(cuts: Cuts) -> dict[str, Floats]:
+        found = tip_deflections(cuts, material, bars=stiffness.bars[cuts.tool], work=stiffness.work)
+        return found if cuts.cutter.gullet is None else found | {"flute_fill": flute_fill(cuts)}
+
+    return columns
+
+
+def watched(stiffness: Stiffness, *, formed: bool = False) -> tuple[str, ...]:
+    """Names of the columns that are watched; ``formed``: also those of the form error."""
+    work = () if stiffness.work is None else ("deflection_workpiece_um",)
+    room = ("flute_fill",) if stiffness.room else ()
+    return (
+        "deflection_cutter_um",
+        *work,
+        "deflection_um",
+        *room,
+        *(("form_error_um", "form_points") if formed else ()),
+    )
+
+
+def with_columns(removal: Removal, names: tuple[str, ...]) -> Removal:
+    """The same with these columns also where no step cut at all."""
+    still = {name: np.zeros(len(removal.columns["line"])) for name in names if name not in removal.columns}
+    return replace(removal, columns={**removal.columns, **still}) if still else removal

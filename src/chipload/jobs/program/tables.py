@@ -1,0 +1,180 @@
+"""The tables of a job that runs a program: read, simulated, its feeds optimised."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from chipload.cutter.table import CutterTable
+from chipload.jobs.tables import (
+    ChecksTable,
+    Count,
+    Limits,
+    NotNegative,
+    Number,
+    Point,
+    Positive,
+    SourceTable,
+    Table,
+    Text,
+    Unit,
+)
+
+
+class ProgramTable(Table):
+    """A program that exists: NC text or CL data."""
+
+    file: Text
+    dialect: Literal["linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"] | None = None
+    tools: Text | None = Field(None, description="LinuxCNC tool table")
+    feed_mm_min: Positive | None = Field(None, le=1e5, description="feed of cuts before the program states one")
+    tolerance_mm: Positive = Field(
+        0.001, le=1.0, description="how far the tip may leave its path where a move is cut up"
+    )
+    parameters: dict[str, Number] = Field(
+        default_factory=dict, description='values that the controller holds, as "#100" = 2.5, "#<depth>", R10 or Q10'
+    )
+    work_offsets: dict[str, tuple[Number, ...]] = Field(
+        default_factory=dict,
+        description="origins of work offsets in the machine, X Y Z A B C U V W in mm and degrees, as G55 = [80, 0, 0]",
+    )
+    placed_in: Text | None = Field(
+        None, description="work offset in whose coordinates stock and part are; none: the first of the program"
+    )
+    tool_comments: bool = Field(True, description="hold the diameters in the program's comments against the cutters")
+
+
+class SolidTable(Table):
+    """What a program starts from: a block, a mesh (STL), a model (STEP), or what an earlier run left."""
+
+    low_mm: Point | None = Field(None, description="lower corner of a block")
+    high_mm: Point | None = Field(None, description="upper corner of a block")
+    file: Text | None = Field(None, description=".stl, .step or an earlier result's .npz")
+    units: Unit | None = Field(None, description="unit of an STL file, which does not say it")
+    chord_mm: Positive = Field(0.01, le=1.0, description="how far facets may leave a model's faces")
+    layer_mm: Positive | None = Field(
+        None,
+        description="thickness of the layers; none: from depths of cut and the smallest cutter, at most 400 layers; an "
+        "earlier result has its own",
+    )
+
+
+class TargetTable(Table):
+    """The part that the program should leave: what is cut into it is a gouge, what stands over it is excess."""
+
+    file: Text = Field(description=".stl or .step, closed")
+    units: Unit | None = Field(None, description="unit of an STL file, which does not say it")
+    chord_mm: Positive = Field(0.01, le=1.0, description="how far facets may leave a model's faces")
+    spacing_mm: Positive = Field(description="longest side of the triangles whose corners are looked at")
+    excess_range_mm: Positive = Field(1.0, description="material over the part is measured up to this")
+
+
+class FixtureTable(Table):
+    """What no part of a tool may touch."""
+
+    file: Text = Field(description=".stl or .step, closed")
+    units: Unit | None = Field(None, description="unit of an STL file, which does not say it")
+    chord_mm: Positive = Field(0.1, le=1.0, description="how far facets may leave a model's faces")
+    spacing_mm: Positive = Field(description="longest side of the triangles whose corners are looked at")
+
+
+class FeedsTable(Table):
+    """New feeds for the lines of the program, as fast as the stated limits of loads allow; the path stays."""
+
+    slowest_percent: Positive = Field(le=100.0, description="least feed of a line that cuts, of the programmed one")
+    fastest_percent: Positive = Field(ge=100.0, le=1e4, description="greatest feed of a line that cuts, likewise")
+    fastest_mm_min: Positive | None = Field(None, le=1e6, description="greatest feed of a line that cuts")
+    tooth_feed_least_mm: Positive | None = Field(
+        None, description="least feed per tooth of a line that cuts, so that it does not rub"
+    )
+    air_mm_min: Positive | None = Field(
+        None, le=1e6, description="feed of a line that touches nothing, if it is slower; none: it keeps its own"
+    )
+    change_least_percent: NotNegative = Field(
+        5.0, lt=100.0, description="a feed that could rise by less than this stays that of the line before"
+    )
+
+
+class SimulateTable(Table):
+    """Run the program through the stock: chips, forces, torque, power."""
+
+    kind: Literal["simulate"]
+    step_mm: Positive = Field(le=100.0, description="longest step of the tip")
+    tolerance_mm: Positive = Field(0.001, le=0.1, description="how far chords may leave the edges of chips")
+    interpolation: Literal["slerp", "lerp"] = Field("slerp", description="how the axis turns within a step")
+    engine: Literal["auto", "moves", "layers"] = Field(
+        "layers", description="moves: exact, upright axis; layers: any axis; auto: moves where they can do it"
+    )
+    corner_slices: Count | None = Field(
+        None,
+        le=200,
+        description="slices of a corner radius, of equal angle; none: 24, narrower near the "
+        "bottom; 48 alike where the axis leans",
+    )
+    flank_mm: Positive | None = Field(
+        None, description="length of a slice of the flank; none: half the radius, a tenth where the axis leans"
+    )
+    stock_points_mm: Positive | None = Field(
+        None, description="pitch of the points of the stock that shank and holder are held against; none: they are not"
+    )
+    feeds: FeedsTable | None = Field(None, description="new feeds for the lines of the program; none: they stay")
+    confidence: Number = Field(
+        0.5, ge=0.5, lt=1.0, description="one-sided confidence at which limits of loads are held; 0.5: their mean"
+    )
+
+
+class ProgramLimitsTable(Limits):
+    """What the simulated loads must not exceed."""
+
+    force_n: Positive | None = None
+    torque_nm: Positive | None = None
+    power_w: Positive | None = None
+    chip_max_mm: Positive | None = None
+    deflection_um: Positive | None = Field(None, description="how far tool and work part, see [stiffness]")
+    form_error_um: Positive | None = Field(None, description="what giving way leaves on, or takes from, the [part]")
+    gouge_mm: Positive | None = Field(None, description="deepest cut into the [part]")
+    excess_mm: Positive | None = Field(None, description="most material over the [part] where the tool came near it")
+
+
+#: limits that feeds can hold
+LOADS = ("force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um")
+
+
+def _stiff(value: Any) -> Any:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or math.isnan(value):
+        raise ValueError("must be a number, or inf where it is rigid")
+    return float(value)
+
+
+Stiff = Annotated[float, BeforeValidator(_stiff), Field(gt=0.0)]
+
+
+class StiffnessTable(Table):
+    """What gives way beside the cutter; inf: rigid. What is not stated counts as rigid and leaves deflections
+    unproven.
+    """
+
+    holder_gpa: Stiff | None = Field(None, description="Young's modulus of the holders, solid parts of holder_mm")
+    grip_n_um: Stiff | None = Field(None, description="cutter in its holder, across the axis")
+    grip_nm_rad: Stiff | None = Field(None, description="cutter in its holder, against tilting")
+    spindle_n_um: Stiff | None = Field(None, description="end of the spindle, across the axis")
+    spindle_nm_rad: Stiff | None = Field(None, description="end of the spindle, against tilting")
+    work_n_um: Stiff | None = Field(None, description="work where it is cut, the same in every direction")
+
+
+class ProgramJobTable(Table):
+    """The whole file of a job that runs a program instead of a plan; with an operation it is simulated."""
+
+    program: ProgramTable
+    machine: SourceTable
+    stock: SolidTable | None = None
+    part: TargetTable | None = None
+    fixture: tuple[FixtureTable, ...] = ()
+    material: SourceTable | None = None
+    cutter: tuple[CutterTable, ...] = ()
+    stiffness: StiffnessTable | None = None
+    checks: ChecksTable = Field(default_factory=ChecksTable.model_construct)
+    operation: tuple[SimulateTable, ...] = Field((), max_length=1)
+    limits: ProgramLimitsTable = Field(default_factory=ProgramLimitsTable.model_construct)

@@ -1,0 +1,221 @@
+"""Every key of every kind of job, as a page: made from the tables that read the file, so that it cannot differ."""
+
+from __future__ import annotations
+
+import types
+import typing
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from chipload.cutter.table import NEEDED, CutterTable
+from chipload.jobs import CAPABILITIES
+from chipload.jobs.tables import SourceTable
+
+HEAD = """# The job file
+
+A job is one TOML file: what is made, of what, on which machine, with which cutters, and the limits. Every key carries
+its unit in its name. Unknown keys are refused with the nearest known one. Paths are relative to the job file.
+
+`chipload check job.toml` lists all that is wrong in a job and in the files that it names. `--set key.path=value`
+changes a key for one run. The commonest job runs a program through a stock:
+
+```toml
+[program]
+file = "part.ngc"
+
+[machine]
+name = "vmc"                    # a built-in name, or file = "mine.toml"
+
+[stock]
+low_mm = [0.0, 0.0, -20.0]
+high_mm = [60.0, 40.0, 0.0]
+
+[material]
+name = "al7075-t6"              # a built-in name, or file = "mine.toml"
+
+[[cutter]]
+number = 1
+diameter_mm = 10.0
+flutes = 3
+helix_deg = 30.0
+flute_length_mm = 26.0
+overhang_mm = 40.0
+modulus_gpa = 580.0
+
+[[operation]]
+kind = "simulate"
+step_mm = 0.5
+
+[limits]
+force_n = 1500.0
+```
+
+In the tables below a key is *required*, has a *default*, or is *optional*. Some keys are required by a kind or a
+shape only; their description, or the message of `chipload check`, says so. The values under *example* show how a
+value is written; they are no recommendation.
+"""
+#: kinds of jobs, commonest first, and what each is for
+KINDS = {
+    "program": "Jobs that run a program: simulate it, optimise its feeds",
+    "contour": "Jobs that plan contours and pockets",
+    "thinwall": "Jobs that cut a thin wall",
+    "impeller": "Jobs that mill an impeller",
+    "torque": "Jobs that hold the torque on a thin tube or cone",
+    "fit": "Jobs that fit force coefficients to measured forces",
+}
+#: how a value is written, by the key or by the table and the key
+EXAMPLES = {
+    "window_s": "[0.5, 1.5]", "measurement.file": '"slot-900.csv"',
+    "program.file": '"part.ngc"', "part.file": '"part.dxf"', "stock.file": '"stock.stl"',
+    "fixture.file": '"vice.stl"', "cutter.file": '"tools.tbl"', "machine.file": '"mine.toml"',
+    "material.file": '"mine.toml"', "catalogue.file": '"cutters.toml"', "threshold.file": '"cuts.csv"',
+    "control.file": '"rules.toml"', "wall.file": '"blade.step"', "machine.name": '"vmc"',
+    "material.name": '"al7075-t6"', "catalogue.name": '"wu2019"', "cutter.name": '"end mill 10"',
+    "workpiece.name": '"Ti-6Al-4V"', "tools": '"shop.tbl"', "parameters": '{ "#100" = 2.5 }',
+    "work_offsets": "{ G55 = [80.0, 0.0, 0.0] }", "placed_in": '"G54"', "low_mm": "[0.0, 0.0, -20.0]",
+    "high_mm": "[60.0, 40.0, 0.0]", "holder_mm": "[[20.0, 25.0], [30.0, 40.0]]", "layers": '["WALL"]',
+    "strategies": '["plain", "backward"]', "allowance_mm": "0.2", "wall.allowance_mm": "[0.3, 0.3]",
+    "elements": "[8, 8]", "files": '["section_1.txt", "section_2.txt"]', "columns": '"X Y Z"', "span": "[0.1, 1.0]",
+    "front": "3", "back": "[10.0, 0.0, 15.0]", "clamp": "5", "sections.blade": '["main_01.txt", "main_02.txt"]',
+    "sections.splitter": '["splitter_01.txt"]', "hub": '"hub.txt"', "shroud": '"shroud.txt"',
+    "step.file": '"impeller.step"', "step.plus": "4", "step.minus": "[40.0, 2.0, 10.0]", "step.splitter_plus": "12",
+    "step.splitter_minus": "13", "step.hub": "[1, 2]", "step.shroud": "[7]", "along": "[0.05, 0.95]",
+    "up": "[0.0, 1.0]", "points": "[20, 10]", "table_deg": "[40.0, 60.0]", "idle_a": "[2.0, 0.004]",
+    "modulus_gpa": "580.0", "workpiece.modulus_gpa": "114.0", "shell.modulus_gpa": "70.0", "poisson": "0.33",
+    "density_kg_m3": "4430.0", "diameter_mm": "10.0", "flutes": "4", "helix_deg": "30.0", "feed_mm_min": "600.0",
+    "speed_rpm": "6000.0", "overhang_mm": "40.0", "flute_length_mm": "22.0", "axial_depth_mm": "5.0",
+    "radial_depth_mm": "0.5", "step_mm": "0.5", "layer_mm": "0.5", "force_n": "800.0", "torque_nm": "4.0",
+    "power_w": "3000.0", "number": "1", "cutter": "1", "confidence": "0.95", "fastest_percent": "200.0",
+    "fit_mm": "0.001", "reserve": "0.1", "override_step": "0.01", "spacing_mm": "0.5",
+}  # fmt: skip
+#: of a number by the unit at the end of its key, where none is stated above
+BY_UNIT = {
+    "um": "10.0", "mm": "1.0", "mm2": "8.0", "mm3": "1.0", "deg": "30.0", "n": "100.0", "nm": "2.0", "mpa": "900.0",
+    "gpa": "210.0", "s": "1.0", "ms": "10.0", "a": "0.05", "percent": "50.0", "share": "0.5", "min": "2000.0",
+    "s2": "500.0", "rad": "5000.0",
+}  # fmt: skip
+_NAMES = {float: "number", int: "whole number", str: "text", bool: "true or false", type(None): ""}
+_BOUNDS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
+
+
+def reference() -> str:
+    """The page, in Markdown."""
+    out = [HEAD]
+    by_name = {c.name: c for c in CAPABILITIES}
+    for capability in (by_name[name] for name in KINDS):
+        root = capability.root
+        out.append(f"\n## {KINDS[capability.name]}\n")
+        many = "tuple" in str(root.model_fields[capability.key].annotation)
+        out.append(f"Such a job has a table `{f'[[{capability.key}]]' if many else f'[{capability.key}]'}`.")
+        out.append(_summary(root) + "\n")
+        if any(_table_in(field.annotation) is None for field in root.model_fields.values()):
+            out += ["\n### Keys before the first table\n", *_rows(root, "", tables=False)]
+        for name, field in root.model_fields.items():
+            table = _table_in(field.annotation)
+            if table is None:
+                continue
+            many = "tuple" in str(field.annotation)
+            heading = f"[[{name}]]" if many else f"[{name}]"
+            out += [f"\n### `{heading}`\n", _summary(table) + "\n", *_rows(table, name)]
+    return "\n".join(out) + "\n"
+
+
+def _rows(table: type[BaseModel], name: str, prefix: str = "", tables: bool = True) -> Iterator[str]:
+    """The keys of a table; those of tables within it behind their name, unless ``tables`` is false."""
+    if not prefix:
+        yield "| key | value | required | example | meaning |"
+        yield "|---|---|---|---|---|"
+    for key, field in table.model_fields.items():
+        inner = _table_in(field.annotation)
+        if inner is not None:
+            if tables:
+                yield from _rows(inner, key, f"{prefix}{key}.")
+            continue
+        needed = field.is_required() or (table is CutterTable and key in NEEDED)
+        need = "required" if needed else "name or file" if issubclass(table, SourceTable) else _default(field)
+        meaning = _meaning(table, key, field).replace("|", "/")
+        yield f"| `{prefix}{key}` | {_value(field)} | {need} | `{_example(name, key, field)}` | {meaning} |"
+
+
+def _meaning(table: type[BaseModel], key: str, field: FieldInfo) -> str:
+    if issubclass(table, SourceTable):
+        return "a built-in name; or `file`" if key == "name" else "path of a file of your own; or `name`"
+    return field.description or ""
+
+
+def _example(name: str, key: str, field: FieldInfo) -> str:
+    """How the value of a key is written."""
+    stated = EXAMPLES.get(f"{name}.{key}") or EXAMPLES.get(key)
+    if stated is not None:
+        return stated
+    default = field.get_default(call_default_factory=True, validated_data={})
+    if isinstance(default, bool):
+        return str(not default).lower()
+    if isinstance(default, (int, float)):
+        return f"{default}"
+    if isinstance(default, str) and default:
+        return f'"{default}"'
+    words = _text_of(field.annotation, [])
+    if words.startswith("`"):
+        return f'"{words.split("`")[1]}"'
+    if words in ("number", "whole number"):
+        return BY_UNIT.get(key.split("_")[-1], "1.0") if words == "number" else "3"
+    return "true" if words == "true or false" else "[...]" if words.startswith("list") else '"..."'
+
+
+def _summary(table: type[BaseModel]) -> str:
+    return " ".join((table.__doc__ or "").split("\n\n")[0].split())
+
+
+def _default(field: FieldInfo) -> str:
+    value = field.get_default(call_default_factory=True, validated_data={})
+    if isinstance(value, bool):
+        return f"default {str(value).lower()}"
+    return "optional" if value is None or value in ((), {}) else f"default {value}"
+
+
+def _value(field: FieldInfo) -> str:
+    bounds: list[str] = []
+    words = _text_of(field.annotation, bounds)
+    bounds += _limits(field.metadata)
+    return ", ".join([words, *dict.fromkeys(bounds)])
+
+
+def _limits(metadata: list[Any] | tuple[Any, ...]) -> list[str]:
+    return [
+        f"{word} {getattr(m, name):g}"
+        for m in metadata
+        for name, word in _BOUNDS.items()
+        if isinstance(getattr(m, name, None), (int, float))
+    ]
+
+
+def _text_of(annotation: Any, bounds: list[str]) -> str:
+    """A type in words; bounds that stand in it are collected."""
+    if annotation in _NAMES:
+        return _NAMES[annotation]
+    origin, args = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin is typing.Annotated:
+        for m in args[1:]:
+            bounds += _limits(getattr(m, "metadata", None) or [m])
+        return _text_of(args[0], bounds)
+    if origin is typing.Literal:
+        return ", ".join(f"`{a}`" for a in args)
+    if origin in (typing.Union, types.UnionType):
+        return " or ".join(w for w in (_text_of(a, bounds) for a in args) if w)
+    if origin is dict:
+        return f"table of {_text_of(args[1], bounds)} by name"
+    if origin is tuple:
+        if args[-1:] == (Ellipsis,):
+            return f"list of {_text_of(args[0], bounds)}"
+        return f"[{', '.join(_text_of(a, bounds) for a in args)}]"
+    return getattr(annotation, "__name__", str(annotation))
+
+
+def _table_in(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and not isinstance(annotation, types.GenericAlias):
+        return annotation if issubclass(annotation, BaseModel) else None
+    return next((t for t in map(_table_in, typing.get_args(annotation)) if t is not None), None)

@@ -1,0 +1,121 @@
+"""What every kind of job names: a shipped thing or a file of one's own, and cutters by number."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutter.table import CutterTable
+from chipload.errors import InputError
+from chipload.jobs.messages import Errors
+from chipload.jobs.tables import SourceTable
+
+
+def source(key: str, table: SourceTable, folder: Path) -> str | Path:
+    """The shipped name or the file, whichever is stated.
+
+    Raises
+    ------
+    InputError
+        Neither is, or both are.
+    """
+    if (table.name is None) == (table.file is None):
+        raise InputError(_one_source(key, table.name is not None))
+    return table.name if table.name is not None else folder / str(table.file)
+
+
+def _one_source(key: str, both: bool) -> str:
+    return f"{key}: {'both are' if both else 'none is'} stated: state either {key}.name or {key}.file"
+
+
+def sources_of(table: Any, folder: Path, *keys: str) -> dict[str, str | Path]:
+    """The shipped name or the file of several tables of a job.
+
+    Raises
+    ------
+    InputError
+        As :func:`source`, a line for each.
+    """
+    errors, out = Errors(), dict[str, str | Path]()
+    for key in keys:
+        with errors.collect():
+            out[key] = source(key, getattr(table, key), folder)
+    errors.refuse()
+    return out
+
+
+def entries_of(values: Mapping[str, Any], key: str) -> Iterator[tuple[int, Mapping[str, Any]]]:
+    """The tables of a list in a file, with their number; what is no table is left out."""
+    found = values.get(key)
+    for k, entry in enumerate(found if isinstance(found, (list, tuple)) else ()):
+        if isinstance(entry, Mapping):
+            yield k, entry
+
+
+def cutters(entries: Sequence[CutterTable], folder: Path) -> dict[int, Cutter]:
+    """The cutters of a job by number.
+
+    Raises
+    ------
+    InputError
+        Two have one number, or one cannot be used: a line for each.
+    """
+    out: dict[int, Cutter] = {}
+    errors = Errors()
+    for k, entry in enumerate(entries):
+        try:
+            cutter = entry.cutter(folder)
+        except InputError as err:
+            errors.texts += [str(text).replace("cutter", f"cutter.{k}", 1) for text in err.args]
+            continue
+        if cutter.number in out:
+            errors.add(f"cutter.{k}.number = {cutter.number}: is taken by another cutter: give each its own")
+        out[cutter.number] = cutter
+    errors.refuse()
+    return out
+
+
+def cutter_errors(raw: Mapping[str, Any], folder: Path) -> list[str]:
+    """What is wrong with those cutters of a file whose values are right one by one."""
+    entries = raw.get("cutter")
+    found = []
+    for k, entry in enumerate(entries if isinstance(entries, list) else []):
+        try:
+            CutterTable.model_validate(entry).cutter(folder)
+        except ValidationError:
+            continue
+        except InputError as err:
+            found += [str(text).replace("cutter", f"cutter.{k}", 1) for text in err.args]
+    return found
+
+
+def source_errors(raw: Mapping[str, Any], root: type[BaseModel]) -> list[str]:
+    """Tables of a file that name neither a shipped thing nor a file, or both."""
+    found = []
+    for key, field in root.model_fields.items():
+        table = raw.get(key)
+        if SourceTable in (field.annotation, *get_args(field.annotation)) and isinstance(table, dict):
+            stated = [name for name in ("name", "file") if name in table]
+            if len(stated) != 1:
+                found.append(_one_source(key, bool(stated)))
+    return found
+
+
+class Limited:
+    """A job whose table has limits."""
+
+    table: Any
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """The limits that are stated, by name."""
+        return dict(self.table.limits.stated)
+
+    @property
+    def unchecked(self) -> tuple[str, ...]:
+        """Names of the limits that are not stated, so that nothing holds the job against them."""
+        return tuple(self.table.limits.unstated)

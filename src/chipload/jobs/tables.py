@@ -1,0 +1,106 @@
+"""The tables of a job file: which keys there are, their units and their ranges.
+
+Every key carries its unit in its name. Nothing that matters is guessed: a feed, a tool, a side or a limit that is not
+stated is asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+
+def _only_number(value: Any) -> Any:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ValueError("must be a number")
+    if not math.isfinite(value):
+        raise ValueError("must be a finite number")
+    return value
+
+
+def _only_count(value: Any) -> Any:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise ValueError("must be a whole number")
+    return value
+
+
+def _only_face(value: Any) -> Any:
+    if isinstance(value, int) and not isinstance(value, bool):
+        if not 1 <= value <= 1_000_000:
+            raise ValueError("must be from 1")
+        return value
+    if isinstance(value, (list, tuple)) and len(value) == 3:
+        return tuple(float(_only_number(x)) for x in value)
+    raise ValueError("must be the number of a face or a point [x, y, z] on it, in mm")
+
+
+Number = Annotated[float, BeforeValidator(_only_number), Field(allow_inf_nan=False)]
+
+
+Positive = Annotated[Number, Field(gt=0.0)]
+
+
+NotNegative = Annotated[Number, Field(ge=0.0)]
+
+
+Point = Annotated[tuple[Number, Number, Number], Field()]
+
+
+Count = Annotated[int, BeforeValidator(_only_count), Field(ge=1, le=1000)]
+
+
+#: a face of a STEP file, by its number or by a point [mm] on it
+FaceName = Annotated[int | tuple[float, float, float], BeforeValidator(_only_face)]
+
+
+Text = Annotated[str, Field(min_length=1)]
+
+
+Unit = Literal["um", "mm", "cm", "m", "inch", "foot"]
+
+
+class Table(BaseModel):
+    """A table of the file: unknown keys are refused, values do not change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)
+
+
+class SourceTable(Table):
+    """A shipped thing by name, or a file of one's own."""
+
+    name: Text | None = None
+    file: Text | None = None
+
+
+class Limits(Table):
+    """Limits by name; what is not stated is not checked, and the report says so."""
+
+    @property
+    def stated(self) -> dict[str, float]:
+        """The limits that are stated, by name."""
+        return {k: v for k, v in self.model_dump().items() if v is not None}
+
+    @property
+    def unstated(self) -> tuple[str, ...]:
+        """Names of the others, so that nothing holds the job against them."""
+        return tuple(k for k, v in self.model_dump().items() if v is None)
+
+
+class ChecksTable(Table):
+    """Checks that are made unless a key says false; the report lists what is switched off."""
+
+    cutter_strength: bool = Field(True, strict=True, description="stress of the cutter against its strength")
+    flute_length: bool = Field(True, strict=True, description="no shank in material above the flutes")
+    chip_space: bool = Field(True, strict=True, description="room for chips, where gullet_mm2 is stated")
+    chip_range: bool = Field(True, strict=True, description="chip thickness within the range of the coefficients")
+    spindle: bool = Field(True, strict=True, description="torque and power of the machine's spindle")
+    rigid_model: bool = Field(True, strict=True, description="deflection against feed per tooth and radial depth")
+    deflection_of_feed: Positive = Field(2.0, description="greatest deflection over the feed per tooth")
+    deflection_of_depth: Positive = Field(0.25, description="greatest deflection over the radial depth")
+
+    @property
+    def off(self) -> tuple[str, ...]:
+        """Names of the checks that are switched off."""
+        return tuple(name for name, value in self.model_dump().items() if value is False)

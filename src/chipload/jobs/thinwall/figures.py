@@ -1,0 +1,44 @@
+"""How the result of a thin wall is presented: sections of the report, scene, programs."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from chipload.jobs.thinwall.outcome import USED, ThinWallResult
+from chipload.jobs.thinwall.result import failures_of
+from chipload.jobs.thinwall.scene import scene_bytes
+from chipload.jobs.thinwall.sections import sections_of
+from chipload.program.apt.writer import write_apt
+from chipload.program.gcode.writer import write_commands
+from chipload.report.presentation import Presentation
+from chipload.report.programs import ENDINGS, program_name
+
+
+def presentation_of(walled: ThinWallResult) -> Presentation:
+    """The presentation of a thin wall."""
+    return Presentation(partial(sections_of, walled), partial(scene_bytes, walled), partial(program_files, walled))
+
+
+def program_files(walled: ThinWallResult) -> dict[str, bytes]:
+    """The program of each variant for the machine and as CL data; verified only the one in use, where it holds."""
+    out: dict[str, bytes] = {}
+    c = walled.cutter
+    for k, (name, one) in enumerate(walled.variants.items()):
+        bad = failures_of(walled, one)
+        released = name == USED and not bad
+        title = f"{walled.title}, operation 0, thinwall, {name}"
+        said = [] if name == USED else [f"not released: the job uses {USED}"]
+        said += [f"does not hold: {bad[0]}"] if bad else []
+        said += [
+            f"T{c.number}: D {c.diameter:g} mm, corner {c.corner_radius:g} mm, {c.flutes} flutes, overhang "
+            f"{c.overhang:g} mm",
+            f"Z 0 is the clamp, X along the wall, its sides towards Y+ and Y-; machine {walled.machine.name}",
+            f"G43 H{c.number} must be the overhang of {c.overhang:g} mm: the rotary axes turn about it",
+        ]
+        text = write_commands(
+            one.commands, walled.machine, title=title, verified=released, comments=said, number=100 + k
+        )
+        stem = program_name(0, name)
+        out[f"{stem}.{ENDINGS[walled.machine.dialect]}"] = text.encode("ascii")
+        out[f"{stem}.apt"] = write_apt(one.program, {c.number: c}, title=title, verified=released).encode("ascii")
+    return out

@@ -1,0 +1,289 @@
+"""What a thin wall's job comes to: its shape with stock, finite elements, cutter, force law and thresholds.
+
+Notation: u, v parameters of a side; i, j elements along the wall and up it; delta [mm] deflection that is allowed, r
+the reserve: the planner uses the share 1 - r of a threshold.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material, material_named, need_directions, read_material
+from chipload.errors import Finding, InputError
+from chipload.geometry.sections import checked, loft, read_sections
+from chipload.geometry.thin_wall import ThinWall, blade, plate, through_sections
+from chipload.jobs.provenance import title_of
+from chipload.jobs.thinwall.faces import wall_of_faces
+from chipload.jobs.thinwall.job import ThinWallJob
+from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.planning.thinwall.blank import SIDES, Blank, FinishSurface
+from chipload.planning.thinwall.depth import DepthRange, Measure
+from chipload.planning.thinwall.force_table import ForceTable, law_on_stock
+from chipload.planning.thinwall.linking import FineSide
+from chipload.planning.thinwall.passes import ThresholdOf
+from chipload.planning.thinwall.paths import PassMotion
+from chipload.planning.thinwall.plane_stock import CutterPose
+from chipload.planning.thinwall.table import read_cuts
+from chipload.planning.thinwall.threshold import Experiments, Threshold, calibrated
+from chipload.structure.grid import from_map
+from chipload.structure.solid import SolidWorkpiece
+from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
+
+Floats = NDArray[np.float64]
+
+#: pieces of the meshes of stock and finished wall, along and up
+FACETS = (96, 64)
+#: the finished wall may be cut into by the chord of its rows and by so much [mm], for those of chips and facets
+GOUGE = 0.003
+
+
+@dataclass(frozen=True, eq=False)
+class WallInputs:
+    """Everything that planning and proof need, in mm, s, rad, N.
+
+    Attributes
+    ----------
+    side_numbers : of the sides that have stock, 0 for k-, 1 for k+
+    foot : share of v that keeps its stock
+    places : u (n,) and v (m,) of the wall's places
+    law, even_law : F_n of depths on stock with the slope, and on even stock, both with cusps of ``scallop`` [mm]
+    experiments : None: thresholds are modelled
+    findings : while they were read
+    """
+
+    job: ThinWallJob
+    title: str
+    shape: ThinWall
+    allowance: tuple[float, float]
+    side_numbers: tuple[int, ...]
+    foot: float
+    wall: Blank
+    places: tuple[Floats, Floats]
+    cutter: Cutter
+    material: Material
+    machine: Machine
+    posture: CutterPose
+    pass_motion: PassMotion
+    step_over: float
+    law: ForceTable
+    even_law: ForceTable
+    scallop: float
+    measure: Measure
+    slope: float
+    deflection: float
+    factor: float
+    experiments: Experiments | None
+    findings: tuple[Finding, ...]
+
+    @property
+    def top(self) -> float:
+        """Height of the wall [mm]."""
+        minus, plus = self.shape.sides(np.linspace(0.0, 1.0, 65), 1.0)
+        return float(max(minus[:, 2].max(), plus[:, 2].max()))
+
+    @property
+    def gouge_tolerance(self) -> float:
+        """How deep the finished wall may be cut into [mm]."""
+        return self.job.operation.chord_mm + GOUGE
+
+    @property
+    def foot_height(self) -> float:
+        """Highest point of the foot [mm]."""
+        minus, plus = self.shape.sides(np.linspace(0.0, 1.0, 65), self.foot)
+        return float(max(minus[:, 2].max(), plus[:, 2].max()))
+
+    def coarse(self, side: int) -> FinishSurface:
+        """Finish surface at the places."""
+        return self._surface(side, *self.places)
+
+    def fine(self, side: int) -> FineSide:
+        """Finish surface at contact points: a step apart along the wall, a row apart up it."""
+        u, v = np.linspace(0.0, 1.0, 65), np.linspace(self.foot, 1.0, 33)
+        p = self._surface(side, u, v).points
+        along = np.linalg.norm(np.diff(p, axis=0), axis=2).sum(axis=0).max()
+        up = np.linalg.norm(np.diff(p, axis=1), axis=2).sum(axis=1).max()
+        n = max(math.ceil(along / self.job.operation.step_mm), self._pieces(side), 2) + 1
+        m = math.ceil(up / abs(self.step_over)) + 1
+        u, v = np.linspace(0.0, 1.0, n), np.linspace(self.foot, 1.0, m)
+        return FineSide(self._surface(side, u, v), u, v)
+
+    def _pieces(self, side: int) -> int:
+        """Straight pieces along a row that stay within the chord's tolerance: the sag of one falls as its square."""
+        u, v = np.meshgrid(np.linspace(0.0, 1.0, 65), np.linspace(self.foot, 1.0, 17), indexing="ij")
+        p = self.shape.sides(u, v)[side]
+        a, b = p[:-1], p[1:]
+        middle = self.shape.sides(0.5 * (u[:-1] + u[1:]), v[1:])[side]
+        along = (b - a) / np.linalg.norm(b - a, axis=-1, keepdims=True)
+        off = middle - a - ((middle - a) * along).sum(axis=-1, keepdims=True) * along
+        sag = float(np.linalg.norm(off, axis=-1).max())
+        return math.ceil(64 * math.sqrt(sag / self.job.operation.chord_mm))
+
+    def _surface(self, side: int, u: Floats, v: Floats) -> FinishSurface:
+        a, b = np.meshgrid(u, v, indexing="ij")
+        return FinishSurface(self.shape.sides(a, b)[side], self.shape.normals(a, b)[side], self.allowance[side])
+
+    def threshold(self, deflection: float) -> ThresholdOf:
+        """Thresholds of the sides with stock under a deflection that is allowed [mm]."""
+
+        def modelled(left: Sequence[Floats], side: int) -> Threshold:
+            return self.wall.threshold(self.both(left), SIDES[self.side_numbers[side]], deflection, self.factor)
+
+        def measured(left: Sequence[Floats], side: int) -> Threshold:
+            assert self.experiments is not None
+            assert self.job.table.threshold is not None
+            u, v = np.meshgrid(*self.places, indexing="ij")
+            place = np.stack([u.ravel(), v.ravel()], axis=1)
+            return calibrated(self.experiments, place, self.job.table.threshold.deviations)
+
+        return modelled if self.experiments is None else measured
+
+    def finished_threshold(self) -> Threshold:
+        """Thresholds of the first side with stock when the wall is finished."""
+        return self.threshold(self.deflection)([np.zeros(self.wall.shape) for _ in self.side_numbers], 0)
+
+    def both(self, left: Sequence[Floats]) -> list[Floats]:
+        """Stock on k- and k+ of stock on the sides that have any."""
+        out = [np.zeros(self.wall.shape), np.zeros(self.wall.shape)]
+        for number, D in zip(self.side_numbers, left, strict=True):
+            out[number] = D
+        return out
+
+    def stock_mesh(self) -> trimesh.Trimesh:
+        """The workpiece before it is cut."""
+        return self.shape.mesh(FACETS, self.allowance)
+
+    def finished_mesh(self) -> trimesh.Trimesh:
+        """The finished wall, from the clamp up."""
+        return self.shape.mesh(FACETS, (0.0, 0.0))
+
+
+def read_wall(job: ThinWallJob) -> WallInputs:
+    """Read what a job names and make the finite elements and the force law.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, or values do not go together.
+    """
+    op, table = job.operation, job.table
+    shape = _shape(job)
+    machine = machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
+    material = material_named(job.material) if isinstance(job.material, str) else read_material(job.material)
+    need_directions(material, "a thin wall")
+    cutter = job.cutters[op.cutter]
+    wall, foot = _wall(job, shape)
+    feed, spindle = mm_s_from_mm_min(op.feed_mm_min), rad_s_from_rpm(op.speed_rpm)
+    step = _step_over(job, cutter) * (-1.0 if op.milling == "down" else 1.0)
+    posture = CutterPose(
+        cutter,
+        feed * math.tau / (spindle * cutter.flutes),
+        step,
+        math.radians(op.lead_deg),
+        -math.copysign(math.radians(op.lean_deg), step),
+    )
+    scallop = step * step / (8.0 * cutter.corner_radius)
+    limits = DepthRange(op.depth_min_mm, op.depth_max_mm)
+    law, even = (
+        law_on_stock(posture, material, limits, slope=slope, scallop=scallop, measure="greatest")
+        for slope in (op.slope, 0.0)
+    )
+    experiments: Experiments | None = None
+    findings: tuple[Finding, ...] = ()
+    if job.threshold_file is not None:
+        experiments, findings = read_cuts(job.threshold_file, table.limits.deflection_workpiece_um / 1000.0)
+    return WallInputs(
+        job=job,
+        title=title_of(job.path),
+        shape=shape,
+        allowance=table.wall.allowance_mm,
+        side_numbers=tuple(k for k, a in enumerate(table.wall.allowance_mm) if a > 0.0),
+        foot=foot,
+        wall=wall,
+        places=(np.linspace(0.0, 1.0, wall.shape[0]), np.linspace(foot, 1.0, wall.shape[1])),
+        cutter=cutter,
+        material=material,
+        machine=machine,
+        posture=posture,
+        pass_motion=PassMotion(posture, feed, machine.rapid, spindle, op.clearance_mm),
+        step_over=step,
+        law=law,
+        even_law=even,
+        scallop=scallop,
+        measure="greatest",
+        slope=op.slope,
+        deflection=table.limits.deflection_workpiece_um / 1000.0,
+        factor=1.0 - op.reserve,
+        experiments=experiments,
+        findings=findings,
+    )
+
+
+def _shape(job: ThinWallJob) -> ThinWall:
+    w = job.table.wall
+    if w.shape == "plate":
+        assert w.length_mm is not None and w.height_mm is not None and w.thickness_mm is not None  # noqa: PT018
+        return plate(w.length_mm, w.height_mm, w.thickness_mm)
+    if w.shape == "blade":
+        value = {key: float(x) for key, x in w.model_dump().items() if isinstance(x, (int, float))}
+        return blade(
+            (value["chord_root_mm"], value["chord_tip_mm"]),
+            value["height_mm"],
+            (value["thickness_root_mm"], value["thickness_tip_mm"]),
+            value["edge_share"],
+            math.radians(value["camber_deg"]),
+            (math.radians(value["stagger_root_deg"]), math.radians(value["stagger_tip_deg"])),
+        )
+    if w.shape == "step":
+        return wall_of_faces(job)
+    assert w.unit is not None and w.edge_share is not None  # noqa: PT018
+    made = loft(checked(read_sections(job.section_files, w.unit, columns=w.columns)))
+    return through_sections(made, w.edge_share, w.span or (0.0, 1.0))
+
+
+def _wall(job: ThinWallJob, shape: ThinWall) -> tuple[Blank, float]:
+    """The wall in finite elements with all of its stock, and the share of v that is its foot."""
+    w, made = job.table.wall, job.table.workpiece
+    _, height, _ = shape.size()
+    foot = w.foot_mm / height
+    if not foot < 0.8:
+        raise InputError(
+            f"wall.foot_mm = {w.foot_mm:g}: must be below 0.8 of the wall's height of {height:.4g} mm: the rest is cut"
+        )
+    i, j = w.elements
+    rows = max(1, round(foot * j))
+    if rows >= j:
+        raise InputError(f"wall.elements = {list(w.elements)}: {j} up the wall: the foot takes {rows}: state more")
+    v = np.concatenate([np.linspace(0.0, foot, rows + 1)[:-1], np.linspace(foot, 1.0, j - rows + 1)])
+
+    def place(p: Floats) -> Floats:
+        stock = tuple(np.full(len(p), a) for a in w.allowance_mm)
+        low, high = shape.offset(p[:, 0], p[:, 1], (stock[0], stock[1]))
+        return np.asarray((1.0 - p[:, 2:]) * low + p[:, 2:] * high)
+
+    grid = from_map(np.linspace(0.0, 1.0, i + 1).tolist(), v.tolist(), [0.0, 1.0], place)
+    solid = SolidWorkpiece(grid, 1000.0 * made.modulus_gpa, made.poisson, 1e-12 * made.density_kg_m3, grid.side("j-"))
+    return Blank(solid, w.allowance_mm, 1, rows), foot
+
+
+def _step_over(job: ThinWallJob, cutter: Cutter) -> float:
+    """Step-over [mm], stated or from the height h of what two rows leave: 2 sqrt(2 r h - h^2) of a ball on a plane."""
+    op = job.operation
+    if op.step_over_mm is not None:
+        return op.step_over_mm
+    assert op.scallop_um is not None
+    r, h = cutter.corner_radius, op.scallop_um / 1000.0
+    if not math.isclose(2.0 * r, cutter.diameter):
+        raise InputError(
+            "operation.0.scallop_um: is known for a ball only: state step_over_mm for cutter "
+            f"{cutter.number} with corner_radius_mm = {r:g}"
+        )
+    if not h < 0.5 * r:
+        raise InputError(f"operation.0.scallop_um = {op.scallop_um:g}: must be below {500.0 * r:g}, half the radius")
+    return 2.0 * math.sqrt(2.0 * r * h - h * h)

@@ -1,0 +1,217 @@
+"""What cutting a thin wall gave: three variants of its passes, each planned, written and simulated.
+
+Notation: F_n [N] greatest force along the normal of the surface that a pass leaves, over a revolution; F_th [N] what
+the place bears, limit over normal compliance in the state of that pass; u, v parameters of a side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.errors import Finding
+from chipload.geometry.thin_wall import ThinWall
+from chipload.jobs.checks import DefaultChecks
+from chipload.machine.machine import Machine
+from chipload.program.commands import Commands
+from chipload.program.program import Program
+from chipload.result import Provenance
+
+Floats = NDArray[np.float64]
+#: share by which a simulated force may exceed its threshold
+OVER = 0.01
+#: the variant whose program is released
+USED = "variable"
+
+
+@dataclass(frozen=True, eq=False)
+class PassMap:
+    """One pass on the places of its side.
+
+    Attributes
+    ----------
+    side : number of the side
+    points : (n, m, 3) float [mm], places
+    u, v : (n,), (m,) their parameters
+    depth : (n, m) float [mm]
+    threshold : (n, m) float [N], limit over compliance, or calibrated
+    """
+
+    side: int
+    points: Floats
+    u: Floats
+    v: Floats
+    depth: Floats
+    threshold: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Finish:
+    """One finished side.
+
+    Attributes
+    ----------
+    points : (n, m, 3) float [mm]
+    error : (n, m) float [mm], by deflection, positive where material is left
+    rigid : (n, m) float [mm], what a rigid cutter leaves: cusps
+    made : (n, m) bool, whether a step of the simulation comes to the point
+    """
+
+    side: int
+    points: Floats
+    error: Floats
+    rigid: Floats
+    made: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """What the simulated stock is beside the finished wall.
+
+    Attributes
+    ----------
+    gouge : greatest depth into the wall [mm]; 0: none
+    left : greatest height over it [mm]
+    at : (3,) float [mm], where the gouge is
+    points : how many were looked at
+    nearest : least distance of the cutter to the finished wall along the path [mm]; below 0: it gouges
+    """
+
+    gouge: float
+    left: float
+    at: tuple[float, float, float]
+    points: int
+    nearest: float
+
+
+@dataclass(frozen=True)
+class Help:
+    """A place that bears not even the smallest depth, and what would make it feasible."""
+
+    side: int
+    at: tuple[float, float, float]
+    force_allowable_n: float
+    force_n: float
+    feed_per_tooth_mm: float | None
+    diameter_mm: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Variant:
+    """One variant.
+
+    Attributes
+    ----------
+    name : ``variable``, ``constant`` or ``unconstrained``
+    order : of the sides
+    passes_otherwise : passes in the other order, None: one side
+    held : deflection [mm] that it was planned under; infinite: none
+    maps : a pass each, in the order of cutting
+    program : the whole of it
+    commands : on the machine
+    beyond : what the machine does not give
+    seconds : on the machine
+    columns : a row a step of the simulation
+    finish : a finished side each
+    shape : the simulated stock beside the finished wall
+    planned_force, planned_deflection : greatest [N], [mm]; None: compliance not known
+    infeasible : places that bear nothing
+    stress : greatest equivalent stress at the clamp [MPa] under the simulated forces
+    """
+
+    name: str
+    order: str
+    passes_otherwise: int | None
+    held: float
+    maps: tuple[PassMap, ...]
+    program: Program
+    commands: Commands
+    beyond: tuple[Finding, ...]
+    seconds: float
+    columns: Mapping[str, NDArray[Any]]
+    finish: tuple[Finish, ...]
+    shape: Shape
+    planned_force: float
+    planned_deflection: float | None
+    infeasible: tuple[Help, ...]
+    stress: float
+
+    @property
+    def over(self) -> NDArray[np.int64]:
+        """Steps whose F_n exceeds F_th by more than :data:`OVER`, the worst first."""
+        ratio = self.columns["force_over_allowable"]
+        bad = np.flatnonzero(ratio > 1.0 + OVER)
+        return np.asarray(bad[np.argsort(-ratio[bad], kind="stable")])
+
+    @property
+    def deflection(self) -> float:
+        """Greatest of the wall [mm]."""
+        return 1e-3 * float(self.columns["deflection_workpiece_um"].max(initial=0.0))
+
+    @property
+    def error(self) -> float:
+        """Greatest size of the form error by deflection [mm]."""
+        return max((float(np.abs(f.error[f.made]).max(initial=0.0)) for f in self.finish), default=0.0)
+
+    @property
+    def force(self) -> float:
+        """Greatest F_n [N]."""
+        return float(self.columns["force_normal_n"].max(initial=0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class ThinWallResult:
+    """A thin wall, cut.
+
+    Attributes
+    ----------
+    title : of the job
+    wall : its finished shape
+    allowance : [mm] on k- and k+
+    stock, finished : (vertices (n, 3), faces (m, 3)) of the workpiece before, and of the finished wall
+    cutter, machine : of the operation
+    limits, unchecked : stated limits by name, and names of those that are not stated
+    threshold_source, threshold_text : ``modelled`` or ``calibrated``, and a sentence
+    reserve : share by which the planner kept below the thresholds
+    step_over : [mm]
+    feed_per_tooth : [mm]
+    variants : by name
+    findings : what was noticed
+    settings : JSON values
+    checks : what is checked beside the stated limits
+    provenance : where the numbers come from
+    """
+
+    title: str
+    wall: ThinWall
+    allowance: tuple[float, float]
+    stock: tuple[Floats, NDArray[np.int64]]
+    finished: tuple[Floats, NDArray[np.int64]]
+    cutter: Cutter
+    machine: Machine
+    limits: Mapping[str, float]
+    unchecked: tuple[str, ...]
+    threshold_source: str
+    threshold_text: str
+    reserve: float
+    step_over: float
+    feed_per_tooth: float
+    variants: Mapping[str, Variant]
+    findings: tuple[Finding, ...]
+    settings: Mapping[str, Any]
+    checks: DefaultChecks
+    provenance: Provenance
+
+
+def helps(place: Help) -> str:
+    """What would make a place feasible."""
+    if place.feed_per_tooth_mm is not None:
+        return f"a feed of at most {place.feed_per_tooth_mm:.4g} mm a tooth would do"
+    if place.diameter_mm is not None:
+        return f"the edge alone is too much; a cutter of at most {place.diameter_mm:.4g} mm would do"
+    return "neither a smaller feed nor a smaller cutter of this shape would do"

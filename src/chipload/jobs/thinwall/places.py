@@ -1,0 +1,99 @@
+"""The places that a wall is planned at: those of its elements along it, every row of the cutter up it.
+
+Notation: u, v parameters of a side; C_nn [mm/N] normal compliance; D [mm] stock left on a side, (n, m) at the places.
+
+Finite elements know their own places only; the compliance between them is that of cubics of its logarithm, as the
+simulation takes it. A state of the wall is solved for once, whoever asks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import RectBivariateSpline
+
+from chipload.jobs.thinwall.inputs import WallInputs
+from chipload.planning.thinwall.blank import SIDES, FinishSurface
+from chipload.planning.thinwall.passes import ThresholdOf
+from chipload.planning.thinwall.threshold import Threshold, modelled
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Places of all sides with stock.
+
+    Attributes
+    ----------
+    u, v : (n,), (m,) float
+    surfaces : finish surface of each side at them
+    """
+
+    inputs: WallInputs
+    u: Floats
+    v: Floats
+    surfaces: tuple[FinishSurface, ...]
+    _solved: dict[tuple[bytes, int], Floats] = field(default_factory=dict)
+
+    @property
+    def grid(self) -> tuple[Floats, Floats]:
+        """Parameters u and v."""
+        return self.u, self.v
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Numbers n and m."""
+        return len(self.u), len(self.v)
+
+    def coarse(self, left: Sequence[Floats]) -> list[Floats]:
+        """Stock at the places of the elements, of stock at these."""
+        v = self.inputs.places[1]
+        return [np.array([np.interp(v, self.v, row) for row in D]) for D in left]
+
+    def compliance(self, left: Sequence[Floats], side: int) -> Floats:
+        """C_nn at the elements' places of a side with stock ``left`` at these places on all sides."""
+        states = self.inputs.both(self.coarse(left))
+        key = (b"".join(D.tobytes() for D in states), side)
+        if key not in self._solved:
+            number = self.inputs.side_numbers[side]
+            known = self.inputs.wall.threshold(states, SIDES[number], 1.0).compliance
+            assert known is not None
+            self._solved[key] = known.reshape(self.inputs.wall.shape)
+        return self._solved[key]
+
+    def threshold(self, deflection: float, factor: float) -> ThresholdOf:
+        """Thresholds at these places under a deflection that is allowed [mm]; ``factor`` of them is used."""
+        u, v = np.meshgrid(self.u, self.v, indexing="ij")
+
+        def limited(left: Sequence[Floats], side: int) -> Threshold:
+            C = between(self.inputs.places, self.compliance(left, side), u.ravel(), v.ravel())
+            return modelled(C, deflection, factor)
+
+        def measured(left: Sequence[Floats], side: int) -> Threshold:
+            known = replace(self.inputs, places=self.grid).threshold(deflection)(left, side)
+            return replace(known, force=factor * known.force, factor=factor * known.factor)
+
+        return limited if self.inputs.experiments is None else measured
+
+
+def places_of(inputs: WallInputs) -> Places:
+    """The places; as many rows as the side with most of them has."""
+    u = inputs.places[0]
+    v = max((inputs.fine(s).v for s in inputs.side_numbers), key=len)
+    a, b = np.meshgrid(u, v, indexing="ij")
+    surfaces = tuple(
+        FinishSurface(inputs.shape.sides(a, b)[s], inputs.shape.normals(a, b)[s], inputs.allowance[s])
+        for s in inputs.side_numbers
+    )
+    return Places(inputs, u, v, surfaces)
+
+
+def between(places: tuple[Floats, Floats], values: Floats, u: Floats, v: Floats) -> Floats:
+    """Values above 0 of places (n, m) at parameters (k,), by cubics of their logarithm."""
+    n, m = values.shape
+    spline = RectBivariateSpline(*places, np.log(values), kx=min(3, n - 1), ky=min(3, m - 1))
+    return np.asarray(np.exp(spline.ev(u, v)))

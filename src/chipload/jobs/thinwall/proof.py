@@ -1,0 +1,250 @@
+"""One variant of the passes over a thin wall, run through the stock: forces, deflections, form error, gouges.
+
+Notation: F_n [N] greatest force along the normal of the surface that a pass leaves; C_nn [mm/N] normal compliance of
+the wall in the state of that pass, by finite elements; F_th [N] threshold. C_nn between places by cubics of its
+logarithm, see :mod:`chipload.jobs.thinwall.places`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
+
+from chipload.jobs.checks import check_columns
+from chipload.jobs.thinwall.inputs import WallInputs
+from chipload.jobs.thinwall.outcome import Finish, Shape
+from chipload.jobs.thinwall.places import Places, between
+from chipload.planning.thinwall.blank import SIDES
+from chipload.planning.thinwall.linking import PassProgram
+from chipload.planning.thinwall.passes import Plan
+from chipload.program.program import Program
+from chipload.progress import Progress
+from chipload.simulation.chips import Removal, Resolution, remove
+from chipload.simulation.contact_points import touched
+from chipload.simulation.deflection import form_error, step_deflections
+from chipload.simulation.section_deviation import beside, nearest
+from chipload.stock.layers import LayeredStock
+from chipload.structure.places import normals_of, on_cut, on_side, weights
+from chipload.structure.solid import displacement, factorise
+from chipload.structure.spindle import tool_bars
+from chipload.structure.stress import greatest
+
+Floats = NDArray[np.float64]
+
+#: side of a tile of the stock, in diameters of the cutter
+TILE = 1.0
+#: layers below the reach of the cutter are so many times as thick
+COARSE = 8.0
+#: places of a step at which the wall is judged: its beginning, middle and end
+JUDGED, MIDDLE = (0.0, 0.5, 1.0), 1
+#: points of a finished side, along and up
+POINTS = (33, 25)
+#: points of the finished wall that the path is held against are so far apart [mm]
+CLOUD = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """What the simulation found.
+
+    Attributes
+    ----------
+    columns : a row a step, all passes one after another
+    thresholds : (n, m) [N] a pass, at the places of its side
+    finish, shape : of the finished wall
+    stress : greatest equivalent stress at the clamp [MPa]
+    """
+
+    columns: Mapping[str, NDArray[Any]]
+    thresholds: tuple[Floats, ...]
+    finish: tuple[Finish, ...]
+    shape: Shape
+    stress: float
+
+
+def wall_stock(inputs: WallInputs) -> LayeredStock:
+    """The workpiece before it is cut, in layers that are thin where the cutter comes.
+
+    Raises
+    ------
+    InputError
+        There are too many layers.
+    """
+    op, cutter = inputs.job.operation, inputs.cutter
+    stock = LayeredStock.of_mesh(inputs.stock_mesh(), COARSE * op.layer_mm, TILE * cutter.diameter)
+    low = inputs.foot_height - cutter.corner_radius
+    stock.refine(max(low, float(stock.bounds[0])), float(stock.bounds[-1]), op.layer_mm)
+    return stock
+
+
+def resolution_of(inputs: WallInputs, legs: Sequence[PassProgram]) -> Resolution:
+    """How fine the simulation looks: a row of the passes is a step."""
+    op = inputs.job.operation
+    longest = max(float(np.linalg.norm(np.diff(leg.program.p_work, axis=0), axis=1).max()) for leg in legs)
+    return Resolution(max(longest, op.step_mm), op.tolerance_mm, op.corner_slices, 0.5 * inputs.cutter.radius)
+
+
+def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats, progress: Progress) -> Proof:
+    """Run the passes of a plan at these places through the stock.
+
+    Parameters
+    ----------
+    times : (n,) float [s], time of each row of all passes, one after another, on the machine
+    """
+    inputs = places.inputs
+    cutter = inputs.cutter
+    stock, fine = wall_stock(inputs), resolution_of(inputs, legs)
+    bars = {cutter.number: tool_bars(cutter)}
+    law = inputs.law if plan.name == "variable" else inputs.even_law
+    left = [np.full(places.shape, inputs.allowance[s]) for s in inputs.side_numbers]
+    parts: list[dict[str, NDArray[Any]]] = []
+    thresholds: list[Floats] = []
+    finish: dict[int, Finish] = {}
+    time = way = stress = 0.0
+    ends = np.cumsum([len(leg.program) for leg in legs])
+    for k, (p, leg, own) in enumerate(zip(plan.passes, legs, np.split(times, ends[:-1]), strict=True)):
+        removal = remove(
+            leg.program,
+            stock,
+            {cutter.number: cutter},
+            inputs.material,
+            fine,
+            keep=True,
+            accuracy=False,
+            times=own,
+            progress=lambda part, what, k=k: progress((k + part) / len(legs), f"pass {k + 1} of {len(legs)}"),  # type: ignore[misc]
+        )
+        left[p.side] = p.low
+        number = inputs.side_numbers[p.side]
+        C = places.compliance(left, p.side)
+        F_th = places.threshold(inputs.deflection, 1.0)(left, p.side).force.reshape(places.shape)
+        thresholds.append(F_th)
+        columns = _columns(places, removal, leg, C, F_th, bars)
+        u, v = np.clip(columns["u"], 0.0, 1.0), np.clip(columns["v"], inputs.foot, 1.0)
+        share = RegularGridInterpolator(places.grid, plan.corrections[p.side])(np.column_stack([u, v]))
+        columns["force_normal_planned_n"] = share * law.force(columns["depth_mm"])
+        columns["t_s"] = columns["t_s"] + time
+        columns["s_mm"] = columns["s_mm"] + way
+        time, way = float(columns["t_s"][-1]), float(columns["s_mm"][-1])
+        columns["pass"] = np.full(len(columns["t_s"]), leg.program.labels[0], dtype=object)
+        parts.append(columns)
+        stress = max(stress, _stress(inputs, places.coarse(left), number, columns))
+        if float(p.low.max()) <= 1e-9:
+            finish[number] = _finish(inputs, removal, number, C, bars)
+    whole = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+    return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(inputs, stock, legs), stress)
+
+
+def _stress(inputs: WallInputs, left: Sequence[Floats], number: int, columns: Mapping[str, NDArray[Any]]) -> float:
+    """Greatest equivalent stress [MPa] of the elements at the clamp by the contact point whose force bends them most:
+    its force times its height.
+    """
+    k = int(np.argmax(columns["force_normal_n"] * columns["contact_z_mm"]))
+    if not columns["force_normal_n"][k] > 0.0:
+        return 0.0
+    solid = inputs.wall.state(inputs.both(left))
+    grid = solid.grid
+    places = on_side(grid, SIDES[number], [columns["u"][k]], [_rows(inputs, float(columns["v"][k])) / grid.counts[1]])
+    assert solid.kept is not None
+    places = on_cut(places, solid.kept, SIDES[number])
+    force = weights(grid, places).T @ (columns["force_normal_n"][k] * normals_of(grid, places, SIDES[number]))
+    foot = np.arange(len(grid.elements)).reshape(grid.counts)[:, 0].ravel()
+    return greatest(solid, displacement(factorise(solid), force), foot)
+
+
+def _rows(inputs: WallInputs, v: float) -> float:
+    """How many rows of elements a parameter v lies above the clamp."""
+    j = inputs.wall.solid.grid.counts[1]
+    return float(np.interp(v, [0.0, inputs.foot, 1.0], [0.0, inputs.wall.foot + 1e-9, j]))
+
+
+def _columns(
+    places: Places, removal: Removal, leg: PassProgram, C: Floats, F_th: Floats, bars: Mapping[int, Any]
+) -> dict[str, NDArray[Any]]:
+    """Columns of a pass: those of the removal, and what its contact points feel.
+
+    The force of a step acts anywhere in it: threshold and compliance are the worst of its beginning, middle and end, so
+    that edges and corners of the wall are among them. `contact_*_mm` is the place of that threshold; `u`, `v` and
+    `depth_mm` are those of the middle.
+    """
+    inputs = places.inputs
+    columns = dict(removal.columns)
+    columns.pop("label")
+    n = len(columns["line"])
+    known = np.column_stack([leg.place, leg.depth])
+    spots = [
+        touched(removal, int(leg.program.line[0]), leg.contact, leg.points, leg.normals, known, within)
+        for within in JUDGED
+    ]
+    uv = [(np.clip(x[:, 0], 0.0, 1.0), np.clip(x[:, 1], inputs.foot, 1.0)) for _, x in spots]
+    gives = np.stack([between(inputs.places, C, u, v) for u, v in uv])
+    if inputs.experiments is None:
+        allowable = inputs.deflection / gives
+    else:
+        allowable = np.stack([between(places.grid, F_th, u, v) for u, v in uv])
+    place, values = spots[MIDDLE]
+    u, v = uv[MIDDLE]
+    found = step_deflections(removal, inputs.material, place, work=gives.max(axis=0), bars=bars)
+    weakest, each = allowable.argmin(axis=0), np.arange(len(u))
+    threshold = allowable[weakest, each]
+    judged = np.stack([spot.point for spot, _ in spots])[weakest, each]
+    columns |= {
+        "deflection_workpiece_um": 1000.0 * found["work_mm"],
+        "deflection_cutter_um": 1000.0 * found["cutter_mm"],
+        "deflection_um": 1000.0 * found["deflection_mm"],
+        "force_normal_n": found["force_normal_n"],
+    }
+    columns |= check_columns(inputs.job.table.checks, removal.cuts, inputs.material, columns["deflection_um"])
+    at = place.step
+    for name, given in (
+        ("u", u),
+        ("v", v),
+        ("depth_mm", values[:, 2]),
+        ("force_allowable_n", threshold),
+        *((f"contact_{x}_mm", judged[:, k]) for k, x in enumerate("xyz")),
+    ):
+        columns[name] = np.zeros(n)
+        columns[name][at] = given
+    ratio = np.zeros(n)
+    ratio[at] = found["force_normal_n"][at] / threshold
+    columns["force_over_allowable"] = ratio
+    columns["side"] = np.full(n, leg.side)
+    return columns
+
+
+def _finish(inputs: WallInputs, removal: Removal, number: int, C: Floats, bars: Mapping[int, Any]) -> Finish:
+    """Form error of a side by its last pass."""
+    u, v = np.meshgrid(
+        np.linspace(0.02, 0.98, POINTS[0]), np.linspace(inputs.foot, 1.0, POINTS[1] + 1)[1:], indexing="ij"
+    )
+    points, normals = inputs.shape.sides(u, v)[number], inputs.shape.normals(u, v)[number]
+    found = form_error(
+        removal,
+        inputs.material,
+        points.reshape(-1, 3),
+        normals.reshape(-1, 3),
+        work=between(inputs.places, C, u.ravel(), v.ravel()),
+        bars=bars,
+        near=0.5 * inputs.allowance[number],
+    )
+    return Finish(number, points, found.error.reshape(u.shape), found.gap.reshape(u.shape), found.made.reshape(u.shape))
+
+
+def _shape(inputs: WallInputs, stock: LayeredStock, legs: Sequence[PassProgram]) -> Shape:
+    """Path and stock beside the finished wall."""
+    length, height, _ = inputs.shape.size()
+    u, v = np.meshgrid(
+        np.linspace(0.0, 1.0, round(length / CLOUD) + 1),
+        np.linspace(0.0, 1.0, round(height / CLOUD) + 1),
+        indexing="ij",
+    )
+    cloud = np.concatenate([p.reshape(-1, 3) for p in inputs.shape.sides(u, v)])
+    gap = nearest(Program.join([leg.program for leg in legs]), inputs.cutter, cloud)
+    found = beside(stock, inputs.finished_mesh(), inputs.foot_height + inputs.cutter.corner_radius)
+    at = found.at if found.gouge > -gap.distance else gap.at
+    return Shape(found.gouge, found.left, at, found.points, gap.distance)

@@ -1,0 +1,236 @@
+"""The result of a thin wall: a track for each variant, limits, findings, maps over the wall."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import Finding, Severity
+from chipload.jobs.checks import chip_findings, default_limits, unchecked_checks
+from chipload.jobs.thinwall.outcome import OVER, USED, Finish, ThinWallResult, Variant, helps
+from chipload.report.programs import ENDINGS, program_name
+from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict, check_limit, in_memory, state_of
+
+Floats = NDArray[np.float64]
+
+#: contact points over their allowable force that are listed, the worst first
+LISTED = 100
+#: columns of the plan that the history does not keep
+DROPPED = ("u", "v", "side", "label")
+
+
+def result_of(walled: ThinWallResult) -> Result:
+    """The result of a thin wall; the variant in use first."""
+    tracks = [_track(walled, one) for one in walled.variants.values()]
+    tracks.sort(key=lambda track: not track.in_use)
+    variable = walled.variants[USED]
+    return Result(
+        capability="thinwall",
+        title=walled.title,
+        tracks=tuple(tracks),
+        operations=(_operation(walled, variable),),
+        findings=walled.findings,
+        unchecked=(
+            *unchecked_checks(walled.checks),
+            *(f"limit {name}: not stated" for name in walled.unchecked),
+            "holder, clamp and machine: no collision check",
+            "chatter: not calculated",
+            "tangential forces do not bend the wall; a bent wall is not cut less deep",
+        ),
+        provenance=walled.provenance,
+        maps=tuple(_maps(walled)),
+        note=_note(walled),
+    )
+
+
+def limits_of(walled: ThinWallResult, one: Variant) -> tuple[LimitCheck, ...]:
+    """Every limit of a variant: those of the job, the force at each contact point, the yield stress, the gouge, and
+    those that are checked by default.
+    """
+    c, out = one.columns, []
+    for name, limit in walled.limits.items():
+        if name == "form_error_um":
+            out.append(_form_error(one, limit))
+        else:
+            out.append(check_limit(name, limit, c, track=one.name))
+    out.append(check_limit("force_over_allowable", 1.0 + OVER, c, track=one.name, rows=c["force_normal_n"] > 0.0))
+    strength = float(walled.settings["yield_mpa"])
+    out.append(LimitCheck("stress_mpa", strength, one.stress, state_of(one.stress, strength)[0], one.name))
+    gouge, tolerance = max(one.shape.gouge, -one.shape.nearest, 0.0), float(walled.settings["gouge_tolerance_mm"])
+    place = (float(one.shape.at[0]), float(one.shape.at[1]), float(one.shape.at[2]))
+    out.append(LimitCheck("gouge_mm", tolerance, gouge, state_of(gouge, tolerance)[0], one.name, place=place))
+    return (*out, *default_limits(walled.checks, walled.machine, c, one.name, {}))
+
+
+def findings_of(walled: ThinWallResult, one: Variant) -> tuple[Finding, ...]:
+    """What was found in a variant beside its limits."""
+    out = list(one.beyond)
+    if one.infeasible:
+        worst = min(one.infeasible, key=lambda h: h.force_allowable_n)
+        text = (
+            f"{len(one.infeasible)} places do not allow even the smallest depth of cut: allowable force "
+            f"{worst.force_allowable_n:.4g} N, needed {worst.force_n:.4g} N: {helps(worst)}"
+        )
+        out.append(Finding("thinwall-infeasible", 0, text, Severity.EXCEEDS, worst.at))
+    missed = sum(int((~f.made).sum()) for f in one.finish)
+    if missed:
+        text = f"{missed} points of the finished surface are not reached by any step"
+        out.append(Finding("thinwall-not-finished", 0, text, Severity.EXCEEDS))
+    rapids = int((one.columns["rapid"] & (one.columns["chip_pieces"] > 0)).sum())
+    if rapids:
+        out.append(Finding("rapid-cuts", 0, f"{rapids} rapids go through material", Severity.EXCEEDS))
+    return (*out, *chip_findings(walled.checks, one.columns))
+
+
+def failures_of(walled: ThinWallResult, one: Variant) -> tuple[str, ...]:
+    """What keeps a variant from holding, the worst first."""
+    found = [(Verdict.of_finding(f), f.text) for f in findings_of(walled, one)]
+    found += [(c.state, c.text) for c in limits_of(walled, one)]
+    return tuple(text for state in (Verdict.EXCEEDS, Verdict.UNPROVEN) for s, text in found if s is state)
+
+
+def _track(walled: ThinWallResult, one: Variant) -> Track:
+    stem, columns = program_name(0, one.name), dict(one.columns)
+    columns["cutting_s"] = columns.pop("seconds")
+    return Track(
+        name=one.name,
+        kind=TrackKind.VARIANT,
+        in_use=one.name == USED,
+        time_s=one.seconds,
+        limits=limits_of(walled, one),
+        findings=findings_of(walled, one),
+        programs=(f"{stem}.{ENDINGS[walled.machine.dialect]}", f"{stem}.apt"),
+        blocks=in_memory({name: values for name, values in columns.items() if name not in DROPPED}),
+    )
+
+
+def _form_error(one: Variant, limit: float) -> LimitCheck:
+    """The form error of the finished sides, where it is greatest."""
+    worst, place = 0.0, None
+    for f in one.finish:
+        size = np.where(f.made, np.abs(f.error), -1.0)
+        k = np.unravel_index(int(np.argmax(size)), size.shape)
+        if 1000.0 * size[k] > worst:
+            worst = 1000.0 * float(size[k])
+            place = (float(f.points[k][0]), float(f.points[k][1]), float(f.points[k][2]))
+    if not one.finish:
+        return LimitCheck("form_error_um", limit, None, Verdict.UNPROVEN, one.name, reason="no side is finished")
+    return LimitCheck("form_error_um", limit, worst, state_of(worst, limit)[0], one.name, place=place)
+
+
+def _operation(walled: ThinWallResult, v: Variant) -> dict[str, Any]:
+    c = walled.variants["constant"]
+    return {
+        "kind": "thinwall",
+        "in_use": USED,
+        "wall": walled.wall.name,
+        "threshold_source": walled.threshold_source,
+        "threshold": walled.threshold_text,
+        "reserve": walled.reserve,
+        "step_over_mm": walled.step_over,
+        "feed_per_tooth_mm": walled.feed_per_tooth,
+        "time_constant_over_variable": c.seconds / v.seconds,
+        "variants": {name: _variant(one) for name, one in walled.variants.items()},
+        "infeasible": [
+            {
+                "side": h.side,
+                "place": list(h.at),
+                "force_allowable_n": h.force_allowable_n,
+                "force_n": h.force_n,
+                "feed_per_tooth_mm": h.feed_per_tooth_mm,
+                "diameter_mm": h.diameter_mm,
+                "helps": helps(h),
+            }
+            for h in v.infeasible
+        ],
+        "settings": dict(walled.settings),
+    }
+
+
+def _variant(one: Variant) -> dict[str, Any]:
+    c = one.columns
+    cuts = c["force_normal_n"] > 0.0
+    known = cuts & (c["force_normal_planned_n"] > 0.0)
+    ratio = c["force_normal_n"][known] / c["force_normal_planned_n"][known]
+    return {
+        "passes": len(one.maps),
+        "time_min": one.seconds / 60.0,
+        "deflection_workpiece_um_max": 1000.0 * one.deflection,
+        "form_error_um_max": 1000.0 * one.error,
+        "force_normal_n_max": one.force,
+        "order": one.order,
+        "passes_in_the_other_order": one.passes_otherwise,
+        "planned": {
+            "deflection_workpiece_um_allowed": 1000.0 * one.held if np.isfinite(one.held) else None,
+            "deflection_workpiece_um_max": None if one.planned_deflection is None else 1000.0 * one.planned_deflection,
+            "force_normal_n_max": one.planned_force,
+        },
+        "depth_mm": {
+            "min": min(float(m.depth[m.depth > 0.0].min()) for m in one.maps if (m.depth > 0.0).any()),
+            "max": max(float(m.depth.max()) for m in one.maps),
+        },
+        "contact_points": int(cuts.sum()),
+        "force_over_allowable_max": float(c["force_over_allowable"].max(initial=0.0)),
+        "force_over_planned": {"median": float(np.median(ratio)), "max": float(ratio.max())} if len(ratio) else None,
+        "over_threshold": len(one.over),
+        "over_threshold_at": [
+            {
+                "pass": str(c["pass"][k]),
+                "line": int(c["line"][k]),
+                "place": [float(c[f"contact_{x}_mm"][k]) for x in "xyz"],
+                "force_n": float(c["force_normal_n"][k]),
+                "force_allowable_n": float(c["force_allowable_n"][k]),
+            }
+            for k in one.over[:LISTED]
+        ],
+        "deflection_cutter_um_max": float(c["deflection_cutter_um"].max(initial=0.0)),
+        "torque_nm_max": float(c["torque_nm"].max(initial=0.0)),
+        "power_w_max": float(c["power_w"].max(initial=0.0)),
+        "chip_volume_mm3": float(c["chip_volume_mm3"].sum()),
+        "stress_mpa_max": one.stress,
+        "gouge_um": 1000.0 * one.shape.gouge,
+        "left_um": 1000.0 * one.shape.left,
+        "cutter_to_wall_um_min": 1000.0 * one.shape.nearest,
+        "scallop_um_max": 1000.0 * max((float(f.rigid[f.made].max(initial=0.0)) for f in one.finish), default=0.0),
+        "steps": len(c["line"]),
+        "program": program_name(0, one.name),
+    }
+
+
+def _maps(walled: ThinWallResult) -> list[SurfaceMap]:
+    """Form error of every variant's finished sides, and depth and allowable force of every pass of the one in use."""
+    out = [
+        _map(f"form error, {one.name}, side {f.side + 1}", "form_error_um", f, one.name)
+        for one in walled.variants.values()
+        for f in one.finish
+    ]
+    for k, m in enumerate(walled.variants[USED].maps):
+        for column, values in (("depth_mm", m.depth), ("force_allowable_n", m.threshold)):
+            name = f"{column}, pass {k + 1}, side {m.side + 1}"
+            points = np.asarray(m.points).reshape(-1, 3)
+            out.append(SurfaceMap(name, column, points, np.asarray(values).ravel(), _faces(m.depth.shape), USED))
+    return out
+
+
+def _map(name: str, column: str, f: Finish, track: str) -> SurfaceMap:
+    values = np.where(f.made, 1000.0 * f.error, np.nan)
+    return SurfaceMap(name, column, np.asarray(f.points).reshape(-1, 3), values.ravel(), _faces(values.shape), track)
+
+
+def _faces(shape: tuple[int, ...]) -> NDArray[np.int64]:
+    """(m, 3) triangles of a grid of points."""
+    at = np.arange(shape[0] * shape[1]).reshape(shape[:2])
+    a, b, c, d = (x.ravel() for x in (at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]))
+    return np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+
+
+def _note(walled: ThinWallResult) -> str:
+    """Variable against constant depth."""
+    v, c = walled.variants[USED], walled.variants["constant"]
+    minutes = f"{v.seconds / 60.0:.4g} min with variable depth, {c.seconds / 60.0:.4g} min with constant depth"
+    if v.deflection > c.deflection * (1.0 + 1e-9):
+        minutes += f", which bends the wall by {1e3 * c.deflection:.4g} µm instead of {1e3 * v.deflection:.4g} µm"
+    bad = failures_of(walled, c)
+    return f"{minutes}, which does not hold: {bad[0]}." if bad else f"{minutes} within the same limits."

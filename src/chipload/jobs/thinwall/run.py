@@ -1,0 +1,403 @@
+"""A job that cuts a thin wall: three variants are planned, written for the machine, and simulated one after another."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutting.material import beyond
+from chipload.errors import Finding, InputError, Severity
+from chipload.jobs.checks import default_checks
+from chipload.jobs.provenance import provenance_of, title_of
+from chipload.jobs.thinwall.inputs import WallInputs, read_wall
+from chipload.jobs.thinwall.job import ThinWallJob
+from chipload.jobs.thinwall.outcome import Help, PassMap, ThinWallResult, Variant
+from chipload.jobs.thinwall.places import Places, places_of
+from chipload.jobs.thinwall.proof import Proof, prove, resolution_of, wall_stock
+from chipload.machine.limits import limit_findings
+from chipload.machine.machine import Machine
+from chipload.planning.thinwall.blank import SIDES
+from chipload.planning.thinwall.correction import found
+from chipload.planning.thinwall.depth import largest_depths, normal_force
+from chipload.planning.thinwall.experiments import Proposal, propose_cuts
+from chipload.planning.thinwall.force_table import ForceTable
+from chipload.planning.thinwall.linking import Margins, PassProgram, link_passes
+from chipload.planning.thinwall.passes import Plan
+from chipload.planning.thinwall.variants import PlannedVariant as Planned
+from chipload.planning.thinwall.variants import even, limited_to, unlimited
+from chipload.program.check import check_program
+from chipload.program.commands import Commands
+from chipload.program.program import Program
+from chipload.program.read import times_on
+from chipload.program.to_axes import to_axes
+from chipload.program.to_work import axes_of
+from chipload.progress import Progress, silent
+from chipload.result import Provenance
+from chipload.simulation.chips import counted
+from chipload.simulation.estimate import estimate
+
+Floats = NDArray[np.float64]
+
+#: of depths that are compared
+VARIANTS = 3
+#: share of the work that reading and planning is, for the progress
+PLANNING = 0.05
+#: plans of variable depths that are corrected by the simulation of the one before, and simulated
+ROUNDS = 3
+#: simulated at most, where none of those bends the wall no more than the constant depth does
+TRIES = 6
+#: these are held to this share of what would just do
+HOLD = 0.97
+#: a plan is worth another simulation if it takes at most this share of the best one's time
+FASTER = 0.97
+#: constant depths that are simulated at most, until one holds
+CONSTANTS = 3
+#: safe height of the tip over the wall, in radii of the cutter
+SAFE = 1.5
+#: links sag by this share of their distance to the stock
+SAG = 0.3
+#: rows run on beyond the edges of the wall by so many [mm], over the reach of the corner in its stock
+BEYOND = 1.0
+
+
+def run(job: ThinWallJob, progress: Progress = silent) -> ThinWallResult:
+    """Plan the three variants of a job, write their programs and simulate them.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, values do not go together, or the machine does not reach a place.
+    Cancelled
+        By ``progress``.
+    """
+    inputs = read_wall(job)
+    _thick_enough(inputs)
+    tried = _Tried(places_of(inputs), progress)
+    free = tried.prove(_unlimited(tried.places), 0.25)
+    constant, corrections = _constant(tried, free)
+    variable = _variable(tried, constant, corrections)
+    made = {"variable": variable, "constant": constant, "unconstrained": free}
+    progress(1.0, "proved")
+    body, finished = inputs.stock_mesh(), inputs.finished_mesh()
+    text = inputs.finished_threshold()
+    settings: dict[str, Any] = {k: v for k, v in job.operation.model_dump().items() if v is not None}
+    settings |= {
+        "gouge_tolerance_mm": inputs.gouge_tolerance,
+        "yield_mpa": job.table.workpiece.yield_mpa,
+        "simulated_tries": tried.variable,
+    }
+    return ThinWallResult(
+        title=title_of(job.path),
+        wall=inputs.shape,
+        allowance=inputs.allowance,
+        stock=(np.asarray(body.vertices), np.asarray(body.faces)),
+        finished=(np.asarray(finished.vertices), np.asarray(finished.faces)),
+        cutter=inputs.cutter,
+        machine=inputs.machine,
+        limits=job.limits,
+        unchecked=job.unchecked,
+        threshold_source=text.source,
+        threshold_text=text.text,
+        reserve=job.operation.reserve,
+        step_over=abs(inputs.step_over),
+        feed_per_tooth=inputs.posture.feed_per_tooth,
+        variants=made,
+        findings=_findings(inputs),
+        settings=settings,
+        checks=default_checks(job.table.checks, {inputs.cutter.number: inputs.cutter}, inputs.material, 0.5),
+        provenance=_provenance(job, inputs),
+    )
+
+
+def _thick_enough(inputs: WallInputs) -> None:
+    """Refuse a finished wall that is thinner than what is cut off it at once."""
+    thickness, deepest = inputs.shape.size()[2], min(inputs.law.limits.greatest, max(inputs.allowance))
+    if not thickness >= deepest:
+        raise InputError(
+            f"wall: {thickness:.4g} mm thick where it is thinnest, thinner than a cut of {deepest:g} mm: state less "
+            "operation.0.depth_max_mm, or a thicker wall"
+        )
+
+
+def check(job: ThinWallJob) -> tuple[list[str], bool]:
+    """What the job names: the wall, its finite elements, the greatest threshold, and the steps of the first variant,
+    which is laid out but not simulated.
+
+    Raises
+    ------
+    InputError
+        As :func:`run`.
+    """
+    inputs = read_wall(job)
+    _thick_enough(inputs)
+    places = places_of(inputs)
+    legs = _linked(inputs, _unlimited(places).plan, places.grid)
+    program = Program.join([leg.program for leg in legs])
+    _on_machine(inputs, program)
+    wall_stock(inputs)
+    count = counted(program, {inputs.cutter.number: inputs.cutter}, resolution_of(inputs, legs))
+    length, height, thickness = inputs.shape.size()
+    nodes = len(inputs.wall.solid.grid.nodes)
+    bearing = inputs.finished_threshold()
+    lines = [
+        *map(str, _findings(inputs)),
+        f"{job.path.name}: {inputs.shape.name}: {length:.4g} mm long, {height:.4g} mm high, at least "
+        f"{thickness:.4g} mm thick; {len(inputs.wall.solid.grid.elements)} elements, {nodes} nodes",
+        f"threshold of the finished side {SIDES[inputs.side_numbers[0]]}, {bearing.source}: {bearing.force.min():.4g} "
+        f"to {bearing.force.max():.4g} N; normal force {inputs.law.forces[0]:.4g} N at {inputs.law.depths[0]:g} mm, "
+        f"{inputs.law.forces[-1]:.4g} N at {inputs.law.depths[-1]:g} mm",
+        f"{VARIANTS} variants or more; the unconstrained one: {estimate(count, 0)}",
+    ]
+    return lines, True
+
+
+def propose(
+    job: ThinWallJob, sites: int, scatter: float, bracket: float, steps: int, repeats: int, progress: Progress = silent
+) -> Proposal:
+    """Calibration cuts that pin best what the finished wall bears: where and how deep, around the modelled threshold.
+
+    Parameters
+    ----------
+    sites, scatter, bracket, steps, repeats : as of :func:`chipload.planning.thinwall.experiments.propose_cuts`
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, values do not go together, or a site bears not even the smallest depth.
+    """
+    inputs = replace(read_wall(job), experiments=None)
+    u, v = np.meshgrid(*inputs.places, indexing="ij")
+    points = inputs.coarse(inputs.side_numbers[0]).points.reshape(-1, 3)
+    places = np.column_stack([u.ravel(), v.ravel()])
+    modelled = inputs.finished_threshold().force.ravel()
+    return propose_cuts(
+        places, points, modelled, inputs.law, sites, scatter, bracket=bracket, steps=steps, repeats=repeats,
+        progress=progress,
+    )  # fmt: skip
+
+
+class _Tried:
+    """Plans that are simulated one after another; how far that is, is told on the way."""
+
+    def __init__(self, places: Places, progress: Progress) -> None:
+        self.places, self.progress = places, progress
+        self.done = PLANNING
+        self.variable = 0
+
+    def prove(self, planned: Planned, share: float) -> Variant:
+        """Write and simulate a plan, which takes this share of what is left to do."""
+        name, low = planned.plan.name, self.done
+        width = share * (1.0 - low)
+        self.variable += name == "variable"
+        legs = _linked(self.places.inputs, planned.plan, self.places.grid)
+        program = Program.join([leg.program for leg in legs])
+        run = _on_machine(self.places.inputs, program)
+        proof = prove(
+            self.places, planned.plan, legs, run.times, lambda p, w: self.progress(low + width * p, f"{name}: {w}")
+        )
+        self.done = low + width
+        return _variant(self.places, planned, program, run, proof)
+
+
+def _unlimited(places: Places) -> Planned:
+    inputs = places.inputs
+    return unlimited(places.surfaces, places.threshold(inputs.deflection, inputs.factor), inputs.even_law)
+
+
+def _constant(tried: _Tried, free: Variant) -> tuple[Variant, tuple[Floats, ...]]:
+    """The constant depth that the simulation of the greatest one lets expect, corrected until it holds; and the
+    corrections of the force in even stock that the greatest one gave.
+    """
+    places = tried.places
+    inputs, law = places.inputs, places.inputs.even_law
+    threshold_of = places.threshold(inputs.deflection, inputs.factor)
+    at_most = _measured(places, free, law, tuple(np.ones(places.shape) for _ in places.surfaces))
+    corrections = at_most
+    for turn in range(CONSTANTS):
+        planned = even(places.surfaces, threshold_of, law, inputs.deflection, corrections)
+        constant = tried.prove(planned, 0.4)
+        if not len(constant.over) or turn == CONSTANTS - 1 or _smallest(places, planned):
+            break
+        measured = _measured(places, constant, law, corrections)
+        corrections = tuple(np.maximum(c, m) for c, m in zip(corrections, measured, strict=True))
+    return constant, at_most
+
+
+def _smallest(places: Places, planned: Planned) -> bool:
+    """Whether the passes are as thin as they may be."""
+    return max(float(p.depth.max()) for p in planned.plan.passes) <= places.inputs.law.limits.smallest * (1.0 + 1e-9)
+
+
+def _variable(tried: _Tried, constant: Variant, corrections: tuple[Floats, ...]) -> Variant:
+    """Variable depths that bend the wall no more than the constant one: planned, simulated, corrected by what was
+    found. Of the plans that hold the fastest one; where none does, the one that exceeds least.
+
+    Parameters
+    ----------
+    corrections : of the law's forces, to begin with
+    """
+    places = tried.places
+    inputs = places.inputs
+    modelled = inputs.experiments is None
+    held = min(inputs.deflection, constant.deflection / inputs.factor) if modelled else inputs.deflection
+    best: Variant | None = None
+    least: tuple[float, Variant] | None = None
+    share = 1.0
+    for turn in range(TRIES):
+        threshold_of = (
+            places.threshold(share * held, inputs.factor) if modelled else places.threshold(held, share * inputs.factor)
+        )
+        planned = limited_to(places.surfaces, threshold_of, inputs.law, inputs.slope, share * held, corrections)
+        if best is not None and _seconds(places, planned) > FASTER * best.seconds:
+            break
+        one = tried.prove(planned, 0.4)
+        over = float(one.columns["force_over_allowable"].max())
+        over = max(over, one.deflection / constant.deflection) if modelled else over
+        good = not len(one.over) and (not modelled or one.deflection <= constant.deflection)
+        if good:
+            best = one
+        elif least is None or over < least[0]:
+            least = (over, one)
+        if best is not None and turn >= ROUNDS - 1:
+            break
+        measured = _measured(places, one, inputs.law, corrections)
+        if not good:
+            measured = tuple(np.maximum(c, m) for c, m in zip(corrections, measured, strict=True))
+            share *= HOLD / over if turn >= ROUNDS - 1 else 1.0
+        corrections = measured
+    if best is not None:
+        return best
+    assert least is not None
+    return least[1]
+
+
+def _seconds(places: Places, planned: Planned) -> float:
+    """Time of a plan on the machine."""
+    legs = _linked(places.inputs, planned.plan, places.grid)
+    return float(_on_machine(places.inputs, Program.join([leg.program for leg in legs])).times.sum())
+
+
+def _measured(places: Places, one: Variant, law: ForceTable, before: tuple[Floats, ...]) -> tuple[Floats, ...]:
+    """Corrections of the law by what a variant was found to do; where it did nothing, those before."""
+    c = one.columns
+    cut = (c["force_normal_n"] > 0.0) & (c["depth_mm"] >= law.limits.smallest * (1.0 - 1e-9))
+    out = []
+    for side, old in enumerate(before):
+        k = np.flatnonzero(cut & (c["side"] == side))
+        new = found(places.grid, c["u"][k], c["v"][k], c["force_normal_n"][k] / law.force(c["depth_mm"][k]))
+        out.append(np.where(np.isnan(new), old, new))
+    return tuple(out)
+
+
+def _linked(inputs: WallInputs, plan: Plan, places: tuple[Floats, Floats] | None = None) -> tuple[PassProgram, ...]:
+    """The way of a plan at these places, u and v; None: those of the elements."""
+    sides = [inputs.fine(s) for s in inputs.side_numbers]
+    cutter = inputs.cutter
+    allowance = max(inputs.allowance)
+    reach = math.sqrt(2.0 * cutter.corner_radius * allowance)
+    sag = SAG * (inputs.pass_motion.clearance - allowance)
+    margins = Margins(BEYOND + reach, inputs.top + SAFE * cutter.radius, sag)
+    return link_passes(plan.passes, sides, places or inputs.places, inputs.pass_motion, margins)
+
+
+def _variant(places: Places, planned: Planned, program: Program, run: _OnMachine, proof: Proof) -> Variant:
+    plan = planned.plan
+    maps = tuple(
+        PassMap(p.side, places.surfaces[p.side].points, *places.grid, p.depth, threshold)
+        for p, threshold in zip(plan.passes, proof.thresholds, strict=True)
+    )
+    return Variant(
+        plan.name,
+        planned.order,
+        planned.passes_otherwise,
+        planned.deflection,
+        maps,
+        program,
+        run.commands,
+        run.exceeding,
+        float(run.times.sum()),
+        proof.columns,
+        proof.finish,
+        proof.shape,
+        plan.force_max,
+        plan.deflection_max,
+        _infeasible(places, plan, planned.deflection) if plan.name == "variable" else (),
+        proof.stress,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _OnMachine:
+    """A program on the machine: the axes, the time of each row of the tip [s], what the machine does not give."""
+
+    commands: Commands
+    times: Floats
+    exceeding: tuple[Finding, ...]
+
+
+def _on_machine(inputs: WallInputs, program: Program) -> _OnMachine:
+    """What the axes do for a program."""
+    machine: Machine = inputs.machine
+    lengths = {inputs.cutter.number: inputs.cutter.overhang}
+    commands, _ = to_axes(program, machine, tool_lengths=lengths)
+    axes = axes_of(commands, machine)
+    broken = [*check_program(program, machine), *limit_findings(machine, axes, commands.line, placed=False)]
+    exceeding = tuple(replace(f, severity=Severity.EXCEEDS) for f in broken if f.code != "machine-offset")
+    return _OnMachine(commands, times_on(program, machine, lengths), exceeding)
+
+
+def _infeasible(places: Places, plan: Plan, held: float) -> tuple[Help, ...]:
+    """Places that bear not even the smallest depth in some pass under the limit itself, with what would help there."""
+    if not plan.infeasible:
+        return ()
+    inputs = places.inputs
+    least: dict[tuple[int, int, int], float] = {}
+    for p in plan.passes:
+        force = p.threshold.force.reshape(p.low.shape)
+        for side, i, j in plan.infeasible:
+            if side == p.side:
+                key = (side, i, j)
+                least[key] = min(least.get(key, math.inf), float(force[i, j]))
+    keys = sorted(least)
+    limits = inputs.law.limits
+    plane = float(normal_force(inputs.posture, inputs.material, [limits.smallest], measure=inputs.measure)[0])
+    share = plane / float(inputs.law.forces[0])  # what helps is asked of plane stock
+    if inputs.experiments is None:  # the plan may be held to less than the limit
+        least = {key: force * inputs.deflection / held for key, force in least.items()}
+    shares = [share / float(plan.corrections[side][i, j]) for side, i, j in keys]
+    asked = largest_depths(
+        inputs.posture,
+        inputs.material,
+        [s * least[k] for s, k in zip(shares, keys, strict=True)],
+        limits,
+        measure=inputs.measure,
+    )
+    out = []
+    for one in asked.infeasible:
+        side, i, j = keys[one.place]
+        x, y, z = places.surfaces[side].points[i, j].tolist()
+        s = shares[one.place]
+        out.append(Help(side, (x, y, z), one.threshold / s, one.force / s, one.feed_per_tooth, one.diameter))
+    return tuple(out)
+
+
+def _findings(inputs: WallInputs) -> tuple[Finding, ...]:
+    """What asks more of the coefficients than they were measured for, and what the experiments' reader noticed."""
+    speed = inputs.pass_motion.spindle * inputs.cutter.radius * math.sin(inputs.posture.beta)
+    asked = beyond(inputs.material, inputs.posture.feed_per_tooth, speed)
+    beyond_range = (Finding("chip-beyond-coefficients", 0, text, Severity.UNPROVEN) for text in asked)
+    return (*beyond_range, *inputs.findings)
+
+
+def _provenance(job: ThinWallJob, inputs: WallInputs) -> Provenance:
+    files: dict[str, Path] = {}
+    named = {"machine": job.machine, "material": job.material, "threshold": job.threshold_file}
+    files |= {k: v for k, v in named.items() if isinstance(v, Path)}
+    files |= {f"section {k}": f for k, f in enumerate(job.section_files)}
+    files |= {f"cutter {k}": job.path.parent / c.file for k, c in enumerate(job.table.cutter) if c.file is not None}
+    return provenance_of(files, job.overrides, inputs.machine, (inputs.material,))

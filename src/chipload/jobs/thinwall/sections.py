@@ -1,0 +1,217 @@
+"""Sections of the report on a thin wall: the variants side by side, maps, what happens along the path."""
+
+from __future__ import annotations
+
+from html import escape
+
+import numpy as np
+import plotly.graph_objects as go
+
+from chipload.jobs.thinwall.outcome import OVER, USED, ThinWallResult, Variant, helps
+from chipload.jobs.thinwall.result import failures_of
+from chipload.jobs.thinwall.wall_figures import COLOURS, SIDE_NAMES, along, bars, maps, space
+from chipload.report.page import state_cell
+from chipload.report.programs import program_name
+from chipload.report.sheet import figure, items, table, value_text
+from chipload.result import Verdict
+
+#: rows that tables list
+LISTED = 40
+#: passes whose maps are drawn
+MAPS = 12
+
+
+def sections_of(walled: ThinWallResult, figures: dict[str, go.Figure]) -> list[str]:
+    """The sections of the report; figures are put among ``figures``."""
+    used = walled.variants[USED]
+    c = walled.cutter
+    length, height, thickness = walled.wall.size()
+    body = [
+        f"<h2>Operation 0: {escape(walled.wall.name)}</h2>",
+        f"<p>{length:.4g} mm long, {height:.4g} mm high, at least {thickness:.4g} mm thick when finished, clamped at "
+        f"z = 0; {walled.allowance[0]:g} and {walled.allowance[1]:g} mm of stock on its sides. Cutter {c.number}: "
+        f"D {c.diameter:g} mm, corner {c.corner_radius:g} mm, {c.flutes} flutes; rows {walled.step_over:.4g} mm apart, "
+        f"{walled.feed_per_tooth:.4g} mm a tooth.</p>",
+        f'<p class="note">{escape(", ".join(f"{k} {value_text(v)}" for k, v in walled.settings.items()))}</p>',
+        "<h3>Variants</h3>",
+        '<p class="note">Variable: the greatest depth that each place allows. Constant: one depth everywhere '
+        "under the same limit. Unconstrained: the greatest depth, whatever the deflection. Numbers are those of the "
+        "simulation; the time is that of the machine.</p>",
+        _variants(walled),
+        figure("bars", _bars(walled), figures),
+        "<h3>Allowable normal force</h3>",
+        f"<p>{escape(walled.threshold_text[:1].upper() + walled.threshold_text[1:])}. The planner keeps "
+        f"{100.0 * walled.reserve:g} % below it; its force is corrected, place by place, by what the simulation of "
+        f"the plan before found: the simulated force is {_agreement(used)} of the planned one.</p>",
+        figure("threshold", _thresholds(used), figures),
+        "<h3>Depth of each pass</h3>",
+        f'<p class="note">Variable, in the order of cutting; sides {escape(used.order)}.'
+        f"{f' The first {MAPS} of {len(used.maps)} passes.' if len(used.maps) > MAPS else ''}</p>",
+        figure(
+            "depth",
+            maps(
+                [m.depth for m in used.maps[:MAPS]],
+                [m.points for m in used.maps[:MAPS]],
+                [f"pass {k + 1}, side {m.side + 1}" for k, m in enumerate(used.maps[:MAPS])],
+                "mm",
+            ),
+            figures,
+        ),
+        "<h3>Along the path</h3>",
+        figure("along", along(walled), figures),
+        "<h3>The finished surface</h3>",
+        '<p class="note">Form error by the deflection of cutter and wall at the moment each point is made; blue: '
+        "material is left. Cusps between rows are not in it. Every pass meets what the passes before "
+        "were planned to leave.</p>",
+    ]
+    finish = [(f"{name}, side {f.side + 1}", f) for name, v in walled.variants.items() for f in v.finish]
+    if finish:
+        drawn = maps(
+            [np.where(f.made, 1000.0 * f.error, np.nan) for _, f in finish],
+            [f.points for _, f in finish],
+            [name for name, _ in finish],
+            "µm",
+            signed=True,
+        )
+        body.append(figure("finish", drawn, figures))
+    body += [
+        "<h3>Path</h3>",
+        figure("space", space(walled, used), figures),
+        *_infeasible(used),
+        *_over(walled),
+        "<h3>Geometry</h3>",
+        _checked(walled),
+    ]
+    return body
+
+
+def _variants(walled: ThinWallResult) -> str:
+    head = ["variant", "passes", "time [min]", "workpiece deflection [µm]", "form error [µm]", "force [N]"]
+    head += ["force over allowable", "stress [MPa]", "limits", "program"]
+    rows = []
+    for name, one in walled.variants.items():
+        bad = failures_of(walled, one)
+        status = state_cell(Verdict.HOLDS if not bad else Verdict.EXCEEDS)
+        rows.append(
+            [
+                f'<span class="dot" style="background:{COLOURS[name]}"></span>{name}'
+                + (" <b>in use</b>" if name == USED else ""),
+                str(len(one.maps)),
+                f"{one.seconds / 60.0:.4g}",
+                f"{1000.0 * one.deflection:.4g}",
+                f"{1000.0 * one.error:.4g}",
+                f"{one.force:.4g}",
+                f"{one.columns['force_over_allowable'].max(initial=0.0):.3f}",
+                f"{one.stress:.4g}",
+                status,
+                f"<code>{program_name(0, name)}</code>" + (" verified" if name == USED and not bad else ""),
+            ]
+        )
+    return table(head, rows, numbers=(1, 2, 3, 4, 5, 6, 7), used=[name == USED for name in walled.variants])
+
+
+def _bars(walled: ThinWallResult) -> go.Figure:
+    v = walled.variants
+    return bars(
+        {
+            "time [min]": {n: o.seconds / 60.0 for n, o in v.items()},
+            "passes": {n: float(len(o.maps)) for n, o in v.items()},
+            "workpiece deflection [µm]": {n: 1000.0 * o.deflection for n, o in v.items()},
+            "form error [µm]": {n: 1000.0 * o.error for n, o in v.items()},
+        }
+    )
+
+
+def _agreement(one: Variant) -> str:
+    c = one.columns
+    known = (c["force_normal_n"] > 0.0) & (c["force_normal_planned_n"] > 0.0) & (c["depth_mm"] > 0.0)
+    if not known.any():
+        return "not known to be a share"
+    low, middle, high = (
+        100.0 * x
+        for x in np.percentile(
+            (c["force_normal_n"] / np.where(known, c["force_normal_planned_n"], 1.0))[known], [5, 50, 95]
+        )
+    )
+    return f"{low:.3g} to {high:.3g} % (5 to 95 % of the contact points, median {middle:.3g} %)"
+
+
+def _thresholds(one: Variant) -> go.Figure:
+    """The last pass of each side, on the finished wall, and the first."""
+    chosen, titles = [], []
+    for side in sorted({m.side for m in one.maps}):
+        own = [(k, m) for k, m in enumerate(one.maps) if m.side == side]
+        for word, (k, m) in (("first", own[0]), ("last", own[-1])):
+            chosen.append(m)
+            titles.append(f"{SIDE_NAMES[m.side].split(',')[0]}, {word} pass ({k + 1})")
+    return maps([m.threshold for m in chosen], [m.points for m in chosen], titles, "N", logarithmic=True)
+
+
+def _infeasible(one: Variant) -> list[str]:
+    if not one.infeasible:
+        return ["<h3>Places that allow no cut</h3>", "<p>None: every place allows at least the smallest depth.</p>"]
+    rows = [
+        [
+            f"{h.side + 1}",
+            ", ".join(f"{x:.2f}" for x in h.at),
+            f"{h.force_allowable_n:.4g}",
+            f"{h.force_n:.4g}",
+            "" if h.feed_per_tooth_mm is None else f"{h.feed_per_tooth_mm:.4g}",
+            "" if h.diameter_mm is None else f"{h.diameter_mm:.4g}",
+            escape(helps(h)),
+        ]
+        for h in sorted(one.infeasible, key=lambda h: h.force_allowable_n)[:LISTED]
+    ]
+    head = [
+        "side",
+        "place x, y, z [mm]",
+        "allowable [N]",
+        "needed [N]",
+        "feed a tooth [mm]",
+        "cutter D [mm]",
+        "remedy",
+    ]
+    more = len(one.infeasible) - len(rows)
+    note = [f'<p class="note">{more} more in summary.json.</p>'] if more > 0 else []
+    return ["<h3>Places that allow no cut</h3>", table(head, rows, numbers=(0, 1, 2, 3, 4, 5)), *note]
+
+
+def _over(walled: ThinWallResult) -> list[str]:
+    out = [f"<h3>Contact points over their allowable force by more than {100.0 * OVER:g} %</h3>"]
+    rows = []
+    for name, one in walled.variants.items():
+        c = one.columns
+        rows += [
+            [
+                name,
+                escape(str(c["pass"][k])),
+                str(int(c["line"][k])),
+                ", ".join(f"{c[f'contact_{x}_mm'][k]:.2f}" for x in "xyz"),
+                f"{c['depth_mm'][k]:.3f}",
+                f"{c['force_normal_n'][k]:.4g}",
+                f"{c['force_allowable_n'][k]:.4g}",
+                f"{c['force_over_allowable'][k]:.3f}",
+            ]
+            for k in one.over[: LISTED if name == USED else 5]
+        ]
+    counts = ", ".join(
+        f"{name} {len(o.over)} of {int((o.columns['force_normal_n'] > 0.0).sum())}"
+        for name, o in walled.variants.items()
+    )
+    out.append(f"<p>{counts}.</p>")
+    if rows:
+        head = ["variant", "pass", "row", "place x, y, z [mm]", "depth [mm]", "force [N]", "allowable [N]", "ratio"]
+        out.append(table(head, rows, numbers=(2, 3, 4, 5, 6, 7)))
+    return out
+
+
+def _checked(walled: ThinWallResult) -> str:
+    used = walled.variants[USED]
+    s = used.shape
+    texts = [
+        f"Path of {USED} against the finished wall: the cutter comes no nearer than {1000.0 * s.nearest:.3g} µm "
+        f"(below 0 it would gouge; {walled.settings['gouge_tolerance_mm']:g} mm is allowed for chords).",
+        f"What is left of the stock against the finished wall: at most {1000.0 * s.gouge:.3g} µm into it, "
+        f"{1000.0 * s.left:.3g} µm over it above the foot ({s.points} points of its sections).",
+    ]
+    return items(texts)

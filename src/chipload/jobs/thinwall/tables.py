@@ -1,0 +1,164 @@
+"""A job that cuts a thin wall: a plate or a blade with stock on its sides, as deep in each place as the wall bears."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from chipload.cutter.table import CutterTable
+from chipload.jobs.tables import (
+    ChecksTable,
+    Count,
+    FaceName,
+    Limits,
+    NotNegative,
+    Number,
+    Positive,
+    SourceTable,
+    Table,
+    Text,
+    Unit,
+)
+
+
+def _range(low: float, high: float, unit: str, hint: tuple[str, str]) -> BeforeValidator:
+    """Refuse what is no number within a range that any metal is in; name the unit that was probably meant."""
+
+    def checked(value: Any) -> Any:
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and not low <= value <= high:
+            meant = hint[0] if value > high else hint[1]
+            raise ValueError(f"must be from {low:g} to {high:g} {unit}; {meant}")
+        return value
+
+    return BeforeValidator(checked)
+
+
+#: ranges that workpieces of metal are in
+Gigapascal = Annotated[Number, _range(1.0, 1000.0, "GPa", ("is it in MPa or Pa?", "is it in MPa / 1e6?"))]
+Density = Annotated[Number, _range(500.0, 25000.0, "kg/m3", ("is it in g/m3?", "is it in g/cm3?"))]
+Megapascal = Annotated[Number, _range(10.0, 5000.0, "MPa", ("is it in Pa?", "is it in GPa?"))]
+
+#: keys that a shape needs, and those that it also understands
+SHAPES: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "plate": (("length_mm", "height_mm", "thickness_mm"), ()),
+    "blade": (
+        (
+            "chord_root_mm",
+            "chord_tip_mm",
+            "height_mm",
+            "thickness_root_mm",
+            "thickness_tip_mm",
+            "edge_share",
+            "camber_deg",
+            "stagger_root_deg",
+            "stagger_tip_deg",
+        ),
+        (),
+    ),
+    "sections": (("files", "unit", "edge_share"), ("columns", "span")),
+    "step": (("file", "front", "back", "clamp"), ("edge_share", "span", "fit_mm")),
+}
+#: keys of every shape
+EVERY = ("shape", "foot_mm", "allowance_mm", "elements")
+
+
+class WallTable(Table):
+    """The wall, clamped below; which keys it needs depends on its shape, see :data:`SHAPES`."""
+
+    shape: Literal["plate", "blade", "sections", "step"]
+    foot_mm: Positive = Field(description="height above the clamp that keeps its stock")
+    allowance_mm: tuple[NotNegative, NotNegative] = Field(description="stock on the side towards +y and towards -y")
+    elements: tuple[Count, Count] = Field(description="finite elements along the wall and up it, the foot among them")
+    length_mm: Positive | None = None
+    height_mm: Positive | None = None
+    thickness_mm: Positive | None = None
+    chord_root_mm: Positive | None = None
+    chord_tip_mm: Positive | None = None
+    thickness_root_mm: Positive | None = None
+    thickness_tip_mm: Positive | None = None
+    edge_share: NotNegative | None = Field(
+        None, description="of a blade: its thickness at the edges; else the part of u left out at each edge"
+    )
+    camber_deg: Number | None = None
+    stagger_root_deg: Number | None = None
+    stagger_tip_deg: Number | None = None
+    files: tuple[Text, ...] | None = Field(None, description="sections from the clamp to the free edge")
+    unit: Unit | None = Field(None, description="of the files, which do not say it")
+    columns: Text | None = Field(None, description="of files that do not name them, as X Y Z")
+    span: tuple[NotNegative, NotNegative] | None = Field(None, description="part of the span that is the wall")
+    file: Text | None = Field(None, description="STEP file; `chipload check FILE` lists its faces")
+    front: FaceName | None = Field(None, description="face, by number or point [mm] on it: the side towards +y")
+    back: FaceName | None = Field(None, description="the face opposite: the side towards -y")
+    clamp: FaceName | None = Field(
+        None, description="what is clamped: a face beside the front, or a point of that edge"
+    )
+    fit_mm: Positive | None = Field(
+        None, le=0.1, description="how far a patch may leave its face where it is fitted; none: 0.001"
+    )
+
+
+class WorkpieceTable(Table):
+    """What the wall is made of."""
+
+    name: Text
+    modulus_gpa: Gigapascal = Field(description="Young's modulus")
+    poisson: NotNegative = Field(lt=0.5, description="Poisson's ratio")
+    density_kg_m3: Density
+    yield_mpa: Megapascal = Field(description="stress up to which the wall springs back")
+
+
+class ThresholdTable(Table):
+    """Experiments that say which force a place bears; without it the threshold is modelled."""
+
+    file: Text = Field(description="CSV: u, v, normal_force_n, and deflection_um where that was measured")
+    deviations: NotNegative = Field(description="standard deviations of its scatter that are kept as reserve")
+
+
+class WallOperationTable(Table):
+    """How the wall is cut."""
+
+    kind: Literal["thinwall"]
+    cutter: Count = Field(description="number of a [[cutter]]")
+    milling: Literal["down", "up"]
+    feed_mm_min: Positive = Field(le=1e5, description="of the middle of the cutter's corner")
+    speed_rpm: Positive = Field(le=1e6)
+    lean_deg: Positive = Field(lt=89.0, description="of the axis from the surface's normal towards the free edge")
+    lead_deg: Number = Field(description="of the axis forward along the feed")
+    step_over_mm: Positive | None = Field(None, description="from row to row; or scallop_um")
+    scallop_um: Positive | None = Field(None, description="height of what rows leave between them; or step_over_mm")
+    depth_min_mm: Positive
+    depth_max_mm: Positive
+    slope: Positive = Field(le=1.0, description="greatest change of depth over a way along the surface")
+    reserve: NotNegative = Field(
+        lt=1.0, description="share by which the planner keeps below the threshold for what its force model leaves out"
+    )
+    clearance_mm: Positive = Field(description="from the surface between two pieces of the path")
+    step_mm: Positive = Field(le=10.0, description="from contact point to contact point, a step of the simulation")
+    chord_mm: Positive = Field(0.005, le=0.1, description="how far rows may leave the surface between contact points")
+    layer_mm: Positive = Field(le=1.0, description="thickness of the layers of the simulation")
+    tolerance_mm: Positive = Field(0.001, le=0.05, description="how far chords may leave the edges of chips")
+    corner_slices: Count = Field(48, le=400, description="slices of the corner radius in the simulation")
+
+
+class ThinWallLimitsTable(Limits):
+    """What the plan must keep."""
+
+    deflection_workpiece_um: Positive = Field(description="greatest deflection of the wall normal to its surface")
+    form_error_um: Positive | None = Field(None, description="greatest form error of the finished surface")
+    torque_nm: Positive | None = None
+
+
+class ThinWallJobTable(Table):
+    """The whole file of a job that cuts a thin wall."""
+
+    wall: WallTable
+    workpiece: WorkpieceTable
+    machine: SourceTable
+    material: SourceTable
+    threshold: ThresholdTable | None = None
+    cutter: tuple[CutterTable, ...] = Field(min_length=1)
+    operation: tuple[WallOperationTable, ...] = Field(min_length=1, max_length=1)
+    limits: ThinWallLimitsTable
+    checks: ChecksTable = Field(default_factory=ChecksTable.model_construct)

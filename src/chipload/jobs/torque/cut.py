@@ -1,0 +1,384 @@
+"""What a program cuts from the stock of a thin tube or cone, as planned and as it really is.
+
+Notation: z height [mm], s distance from the clamp along the wall, f half angle: z = z_0 +- s cos f; r_0 + s sin f the
+radius of the middle surface; the wall t / cos f wide across Z, its outer edge t / (2 cos f) outside that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.control.wall import Loads, two_parts
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material
+from chipload.errors import InputError, Severity
+from chipload.jobs.torque.job import TorqueJob
+from chipload.jobs.torque.tables import RoundTable, ShellTable, SurpriseTable
+from chipload.machine.machine import Machine
+from chipload.program.build import helix, plunge, rapid
+from chipload.program.program import RAPID, Program
+from chipload.program.read import read_program
+from chipload.program.setup import Setup
+from chipload.progress import Progress, silent
+from chipload.simulation.chips import Removal, Resolution, remove
+from chipload.stock.layers import LayeredStock
+from chipload.stock.rings import Boss, ring_stock
+from chipload.stock.tile_grid import LAYER_LIMIT
+from chipload.structure.beam import compliance
+from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+#: chords of a conical helix leave it by at most this [mm]
+CHORD_MM = 0.005
+#: most points of a conical helix
+MOST_POINTS = 2_000_000
+#: least cutting coefficient that is believed [MPa]: what the other simulation of the two is made with
+LITTLE_MPA = 10.0
+#: a flank within so much of the finished surface makes it [mm]
+MAKES_MM = 0.05
+#: layers where no cutter comes are so many times as thick
+COARSE = 8.0
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the finished wall is."""
+
+    table: ShellTable
+
+    @property
+    def _up(self) -> float:
+        return 1.0 if self.table.clamped == "low" else -1.0
+
+    @property
+    def angle(self) -> float:
+        """F [rad]."""
+        return math.radians(self.table.angle_deg)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Lowest and highest z [mm]."""
+        other = self.table.clamp_z_mm + self._up * self.table.length_mm * math.cos(self.angle)
+        return min(self.table.clamp_z_mm, other), max(self.table.clamp_z_mm, other)
+
+    def along(self, z: Floats) -> Floats:
+        """S of heights [mm]; outside 0 .. length beside the wall."""
+        return np.asarray(self._up * (z - self.table.clamp_z_mm) / math.cos(self.angle))
+
+    def outer(self, z: Floats) -> Floats:
+        """Radius of the finished outer surface at heights [mm]."""
+        return np.asarray(self._middle(z) + 0.5 * self.table.wall_mm / math.cos(self.angle))
+
+    def bore(self, z: Floats, thinner: float = 0.0) -> Floats:
+        """Radius of the bore, of a wall that is thinner by a share."""
+        return self.outer(z) - self.table.wall_mm * (1.0 - thinner) / math.cos(self.angle)
+
+    def _middle(self, z: Floats) -> Floats:
+        return np.asarray(self.table.mean_radius_mm + self.along(z) * math.sin(self.angle))
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """What the steps of a program cut; steps from the first feed to the last.
+
+    Parameters
+    ----------
+    removal : all of it
+    stock : what is left
+    points : (n + 1, 3) float [mm], ends of the steps
+    feed : (n,) float [mm/s]
+    loads : in two parts
+    near, far : (n,) float [mm], s of the ends of the depth of cut, nearer to the clamp and to the free end
+    makes : (n,) bool, the step makes the finished surface
+    tool : (n,) float [mm/N], compliance of the cutter in the middle of the depth of cut
+    """
+
+    removal: Removal
+    stock: LayeredStock
+    points: Floats
+    feed: Floats
+    loads: Loads
+    near: Floats
+    far: Floats
+    makes: Bools
+    tool: Floats
+
+
+def program_of(job: TorqueJob, machine: Machine, progress: Progress = silent) -> Program:
+    """The program that is named, or made.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, does not hold on the machine, leans its axis, or changes its spindle speed while it cuts.
+    """
+    if job.program_file is None:
+        ask = job.table.round
+        assert ask is not None
+        program = round_program(ask, Place(job.table.shell), job.cutters[ask.cutter])
+    else:
+        table = job.table.program
+        assert table is not None
+        feed = mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None
+        reading = read_program(
+            job.program_file, machine, dialect=table.dialect, feed=feed, tolerance=table.tolerance_mm,
+            setup=Setup(table.parameters, table.work_offsets, job.cutters), comments=table.tool_comments,
+            progress=progress,
+        )  # fmt: skip
+        if reading.violations:
+            raise InputError(f"{job.program_file.name}: does not hold: {reading.violations[0]}")
+        gaps = [f for f in reading.findings if f.severity >= Severity.UNPROVEN]
+        if gaps:
+            raise InputError(f"{job.program_file.name}: {gaps[0]}: what is not read cannot be controlled")
+        program = reading.program
+    if np.abs(program.axis - (0.0, 0.0, 1.0)).max() > 1e-9:
+        raise InputError("program: the cutter's axis leans: must be +Z all along; use a cutter with the wall's taper")
+    cuts = program.motion != RAPID
+    if not cuts.any():
+        raise InputError("program: no motion at a feed: nothing to control")
+    speeds = np.unique(program.spindle[cuts])
+    if len(speeds) != 1 or speeds[0] == 0.0:
+        raise InputError(
+            f"program: spindle speeds {', '.join(f'{x:g}' for x in speeds)} rad/s: must be one, not 0: the spindle is "
+            "told from its torque at one speed"
+        )
+    return program
+
+
+def round_program(ask: RoundTable, place: Place, cutter: Cutter) -> Program:
+    """Straight to the wall, down it in a helix, once round at the bottom, straight away."""
+    spindle, tool = rad_s_from_rpm(ask.speed_rpm), cutter.number
+    feed = mm_s_from_mm_min(ask.feed_mm_min)
+    # down milling has the wall on the right of travel: clockwise round it
+    sense = -1 if ask.milling == "down" else 1
+    corner = float(cutter.radius_at(cutter.apt[3]))
+
+    def radius(z: float) -> float:
+        """Of the tip's path, so that the flank leaves the wall."""
+        return float(place.outer(np.array([z + cutter.apt[3]]))[0]) + corner
+
+    top, low = ask.top_mm, ask.bottom_mm
+    start = (radius(top), -sense * ask.lead_mm)
+    clear = place.ends[1] + ask.clearance_mm
+    parts = [
+        rapid([[*start, clear], [*start, top]], spindle, tool, "link"),
+        plunge([radius(top), 0.0, top], feed, spindle, tool, "lead"),
+    ]
+    if place.angle == 0.0:
+        parts.append(
+            helix((radius(top), 0.0), (0.0, 0.0), (top, low), ask.pitch_mm, feed, spindle, tool, "round", sense)
+        )
+    else:
+        turns = math.ceil((top - low) / ask.pitch_mm - 1e-9)
+        step = 2.0 * math.acos(1.0 - CHORD_MM / max(radius(top), radius(low)))
+        n = max(8, math.ceil(math.tau / step))
+        if turns * n > MOST_POINTS:
+            raise InputError(
+                f"round.pitch_mm = {ask.pitch_mm:g}: {turns:.4g} rounds from top_mm = {top:g} to bottom_mm = {low:g}, "
+                f"{turns * n:.4g} points: must be at most {MOST_POINTS}: state a larger pitch, or a lower top"
+            )
+        z = np.concatenate([np.linspace(top, low, turns * n + 1)[1:], np.full(n, low)])
+        a = sense * math.tau * np.arange(1, len(z) + 1) / n
+        r = np.array([radius(float(x)) for x in z])
+        parts.append(plunge(np.column_stack([r * np.cos(a), r * np.sin(a), z]), feed, spindle, tool, "round"))
+    away = [radius(low), sense * ask.lead_mm]
+    parts += [
+        plunge([*away, low], feed, spindle, tool, "lead"),
+        rapid([*away, clear], spindle, tool, "link"),
+    ]
+    return Program.join(parts)
+
+
+def shell_stock(
+    job: TorqueJob, program: Program, centre: tuple[float, float] = (0.0, 0.0), thinner: float = 0.0
+) -> LayeredStock:
+    """The stock: rings outside the wall, their outer edge off its centre, layers thin where the cutter comes."""
+    table, place = job.table.shell, Place(job.table.shell)
+    low, high = place.ends
+    feeds = np.flatnonzero(program.motion != RAPID)
+    rows = np.unique(np.concatenate([feeds, np.maximum(feeds - 1, 0)]))
+    z = program.p_work[rows, 2]
+    lowest = min(max(float(z.min()), low), high)
+    fine = job.table.simulation.layer_mm
+    if (high - low) / fine > LAYER_LIMIT:
+        raise InputError(
+            f"simulation.layer_mm = {fine:g}: {(high - low) / fine:.4g} layers: must be at most {LAYER_LIMIT}: state "
+            "thicker ones"
+        )
+    bounds = [np.linspace(lowest, high, max(1, math.ceil((high - lowest) / fine - 1e-9)) + 1)]
+    if lowest > low:
+        bounds.insert(0, np.linspace(low, lowest, max(1, math.ceil((lowest - low) / (COARSE * fine))) + 1)[:-1])
+    bosses = [Boss(math.radians(b.from_deg), math.radians(b.to_deg), b.radial_mm) for b in table.boss]
+    return ring_stock(
+        np.concatenate(bounds),
+        lambda h: place.bore(h, thinner),
+        lambda h: place.outer(h) + table.stock_mm,
+        centre,
+        bosses,
+        4.0 * max(c.diameter for c in job.cutters.values()),
+    )
+
+
+def resolution_of(job: TorqueJob) -> Resolution:
+    """How fine the chips are looked at."""
+    ask, smallest = job.table.simulation, min(c.radius for c in job.cutters.values())
+    return Resolution(ask.step_mm, ask.tolerance_mm, 6, 0.5 * smallest)
+
+
+def require_linear(material: Material) -> None:
+    """Refuse a material whose torque has no part that goes with the feed and one of the edge.
+
+    Raises
+    ------
+    InputError
+        It has a size effect, or cuts as softly as the material that the parts are found with.
+    """
+    if any(material.exponents):
+        raise InputError(
+            f"material {material.name}: has a size effect: must have none here: the torque is split into a part of the "
+            "edge and one that goes with the feed"
+        )
+    if material.Ktc <= LITTLE_MPA:
+        raise InputError(f"material.ktc_mpa = {material.Ktc:g}: must be above {LITTLE_MPA:g}")
+
+
+def cut(
+    job: TorqueJob,
+    program: Program,
+    stock: LayeredStock,
+    material: Material,
+    rapids: float,
+    progress: Progress,
+    *,
+    keep: bool = False,
+) -> Cut:
+    """Run the program through the stock, which changes.
+
+    Parameters
+    ----------
+    rapids : feed of the rapids between two cuts [mm/s]
+    keep : the removal keeps what the teeth cut
+
+    Raises
+    ------
+    InputError
+        As :func:`chipload.simulation.chips.remove`; the material has a size effect, the tip stands while it cuts.
+    """
+    require_linear(material)
+    fine, little = resolution_of(job), LITTLE_MPA / material.Ktc
+    light = replace(
+        material, Ktc=LITTLE_MPA, Krc=little * material.Krc, Kac=little * material.Kac, spread=None, covariance=None
+    )
+    before = stock.state()
+    less = remove(
+        program, stock, job.cutters, light, fine, accuracy=False, progress=lambda x, what: progress(0.5 * x, what)
+    ).columns
+    stock.restore(before)
+    removal = remove(
+        program,
+        stock,
+        job.cutters,
+        material,
+        fine,
+        keep=keep,
+        accuracy=False,
+        progress=lambda x, what: progress(0.5 + 0.5 * x, what),
+    )
+    c = removal.columns
+    feeds = np.flatnonzero(~c["rapid"])
+    own = slice(int(feeds[0]), int(feeds[-1]) + 1)
+    ends = np.column_stack([c[f"{x}_mm"] for x in "xyz"])
+    start = ends[own.start - 1] if own.start > 0 else np.asarray(program.p_work[0])
+    points = np.vstack([start, ends[own]])
+    length = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if (length == 0.0).any():
+        line = int(c["line"][own][int(np.argmin(length))])
+        raise InputError(f"line {line}: the tip stands: must move along the path")
+    loads = two_parts(
+        1e3 * c["torque_mean_nm"][own], c["force_normal_n"][own],
+        1e3 * less["torque_mean_nm"][own], less["force_normal_n"][own], little,
+    )  # fmt: skip
+    feed = np.where(c["rapid"][own], rapids, mm_s_from_mm_min(1.0) * c["feed_mm_min"][own])
+    near, far, height = _depths(Place(job.table.shell), stock.bounds, points, c["chip_layers"][own])
+    tools = c["tool"][own]
+    makes, soft = np.zeros(len(feed), dtype=np.bool_), np.zeros(len(feed))
+    for number in np.unique(tools).tolist():
+        rows = np.flatnonzero((tools == number) & (height > 0.0))
+        m, t = _on_the_wall(Place(job.table.shell), job.cutters[number], points, rows, height)
+        makes[rows], soft[rows] = m, t
+    return Cut(removal, stock, points, feed, loads, near, far, makes, soft)
+
+
+def _depths(place: Place, bounds: Floats, points: Floats, layers: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
+    """S of both ends of each step's depth of cut, and its height: as many layers from the tip up as lost something."""
+    tip = 0.5 * (points[1:, 2] + points[:-1, 2])
+    first = np.clip(np.searchsorted(0.5 * (bounds[1:] + bounds[:-1]), tip), 0, len(bounds) - 1)
+    top = bounds[np.clip(first + layers, 0, len(bounds) - 1)]
+    low = bounds[first]
+    cuts = (layers > 0) & (top > low)
+    a, b = place.along(low), place.along(top)
+    near = np.clip(np.minimum(a, b), 0.0, place.table.length_mm)
+    far = np.clip(np.maximum(a, b), 0.0, place.table.length_mm)
+    return np.where(cuts, near, 0.0), np.where(cuts, far, 0.0), np.where(cuts, top - low, 0.0)
+
+
+def _on_the_wall(
+    place: Place, cutter: Cutter, points: Floats, rows: NDArray[np.int64], height: Floats
+) -> tuple[Bools, Floats]:
+    """Whether the flank makes the finished surface, and the cutter's compliance, in the middle of the depth of cut."""
+    middle = 0.5 * (points[rows] + points[rows + 1])
+    half = np.minimum(0.5 * height[rows], cutter.flute_length)
+    gap = np.hypot(middle[:, 0], middle[:, 1]) - cutter.radius_at(half) - place.outer(middle[:, 2] + half)
+    return np.abs(gap) <= MAKES_MM, compliance(cutter, half, half)
+
+
+def true_loads(loads: Loads, points: Floats, place: Place, surprises: tuple[SurpriseTable, ...]) -> Loads:
+    """The loads with a worn cutter and hard spots; thicker sides and thinner walls are in what was cut."""
+    cut, edge = np.ones(len(loads.torque_cut)), np.ones(len(loads.torque_cut))
+    middle = 0.5 * (points[1:] + points[:-1])
+    around = place.outer(middle[:, 2])
+    for x in surprises:
+        if x.kind == "worn-cutter":
+            assert x.edge_share is not None
+            cut *= 1.0 + x.share
+            edge *= 1.0 + x.edge_share
+        elif x.kind == "hard-spot":
+            assert x.at_deg is not None
+            assert x.width_mm is not None
+            assert x.ramp_mm is not None
+            turn = np.arctan2(middle[:, 1], middle[:, 0]) - math.radians(x.at_deg)
+            away = around * np.abs(np.angle(np.exp(1j * turn)))
+            there = np.clip((0.5 * x.width_mm - away) / x.ramp_mm + 1.0, 0.0, 1.0)
+            cut *= 1.0 + x.share * there
+            edge *= 1.0 + x.share * there
+    return Loads(loads.torque_edge * edge, loads.torque_cut * cut, loads.force_edge * edge, loads.force_cut * cut)
+
+
+def off_centre(stock_mm: float, surprises: tuple[SurpriseTable, ...]) -> tuple[float, float]:
+    """Where the centre of the stock's outer edge really is [mm]."""
+    x = y = 0.0
+    for one in surprises:
+        if one.kind == "thicker-side":
+            assert one.at_deg is not None
+            x += one.share * stock_mm * math.cos(math.radians(one.at_deg))
+            y += one.share * stock_mm * math.sin(math.radians(one.at_deg))
+    return x, y
+
+
+def thinner_share(surprises: tuple[SurpriseTable, ...]) -> float:
+    """Share by which the wall is thinner than planned."""
+    return 1.0 - math.prod(1.0 - x.share for x in surprises if x.kind == "thinner-wall")
+
+
+def contact_width(stock_mm: float, cutters: Mapping[int, Cutter]) -> float:
+    """How wide the contact is round the wall, as on a flat one: sqrt(a (2 R - a)) with the smallest cutter [mm]."""
+    radius = min(c.radius for c in cutters.values())
+    a = min(stock_mm, radius)
+    return math.sqrt(a * (2.0 * radius - a))

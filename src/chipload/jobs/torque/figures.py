@@ -1,0 +1,204 @@
+"""How the result of a torque-controlled program is presented: sections of the report, scene, files."""
+
+from __future__ import annotations
+
+from functools import partial
+from html import escape
+
+import numpy as np
+import plotly.graph_objects as go
+
+from chipload.control.fuzzy import FuzzyTable
+from chipload.jobs.torque import torque_figures as drawn
+from chipload.jobs.torque.files import HAL, PATH, program_files
+from chipload.jobs.torque.numbers import operation_numbers
+from chipload.jobs.torque.outcome import HELD, Case, TorqueResult
+from chipload.jobs.torque.scene import scene_bytes
+from chipload.report.presentation import Presentation
+from chipload.report.sheet import figure, items, table
+
+SETS = ("NB", "NM", "NS", "Z", "PS", "PM", "PB")
+
+
+def presentation_of(outcome: TorqueResult) -> Presentation:
+    """The presentation of a torque-controlled program."""
+    return Presentation(partial(_sections, outcome), partial(scene_bytes, outcome), partial(program_files, outcome))
+
+
+def _sections(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
+    body = _limit(outcome, figures)
+    if outcome.cases:
+        body += _controllers(outcome, figures)
+    body += _wall(outcome, figures)
+    if outcome.estimator is not None:
+        body += _estimator(outcome, figures)
+    body += _rules(outcome.table, figures)
+    return [
+        *body,
+        "<h2>On a machine</h2>",
+        f"<p><code>0-override</code> beside <code>chipload hal {HAL}</code> holds the torque along "
+        f"<code>{PATH}</code>, which has the path, its planned torque in two parts, the true one for a "
+        "trial without a spindle, and the relief. <code>0-feedforward</code> has the feeds that the planned "
+        "torque allows written into it, for a machine that measures nothing.</p>",
+    ]
+
+
+def _limit(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
+    what = operation_numbers(outcome)
+    where = what["torque_limit"]
+    why = {
+        "deflection": f"its deflection of {outcome.limits['form_error_um']:g} µm",
+        "strength": f"{outcome.limits['strength_share']:g} of its strength of {outcome.strength:g} MPa",
+        "stated": "the limit that the job states",
+    }[outcome.source]
+    place = ", ".join(f"{round(x, 3) + 0.0:g}" for x in where["place"])
+    body = ["<h2>Allowable torque</h2>"]
+    if outcome.attainable:
+        body.append(
+            f"<p>The limit is <b>{what['torque_limit_nm']:.4g} N m</b>, mean over a revolution. It comes from {why}, "
+            f"at ({place}) mm: the wall of {outcome.thinnest:.4g} mm (as thin as the tolerance lets it be) and the "
+            f"cutter allow {where['force_n']:.4g} N along the normal there. Elsewhere the wall allows more, up to "
+            f"{where['relief_max']:.3g} times as much torque: the relief, which the controller is told. Held are "
+            f"{where['held_nm']:.4g} N m. The wall as it really is, {outcome.real:.4g} mm, would allow "
+            f"{where['true_wall_nm']:.4g} N m. The closed formula of one tooth, which knows no engagement, says "
+            f"{where['one_tooth_formula_nm']:.3g} N m.</p>"
+        )
+    said = what["surface_off_um"]
+    if said is not None:
+        body.append(
+            f"<p>What the program leaves lies {said['min']:.3g} to {said['max']:.3g} µm from the finished surface of "
+            "the job, without deflection.</p>"
+        )
+    surprises = [f"{text}" for text in outcome.surprises] or ["none"]
+    return [
+        *body,
+        figure("allowable", drawn.allowable(outcome), figures),
+        "<h3>Deviations from the plan</h3>",
+        items(surprises),
+    ]
+
+
+def _controllers(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
+    body = ["<h2>Controllers</h2>"]
+    for case in outcome.cases:
+        by = outcome.compared(case)
+        title = (
+            f"{1e3 * case.loop.latency:g} ms latency, steps of {100.0 * case.quantum:g} %"
+            if case.quantum or case.loop.latency
+            else "Without latency, any override"
+        )
+        body += [
+            f"<h3>{title}</h3>",
+            _table(outcome, case),
+            f"<p>{drawn.NAMES[HELD]}: {by['shorter_percent']:.3g} % shorter than the constant feed that respects the "
+            f"limit everywhere, form error {by['form_error_change_percent']:+.3g} % against that one's.</p>",
+        ]
+    plain, late = outcome.cases
+    lost = late.runs[HELD].outcome.time - plain.runs[HELD].outcome.time
+    body += [
+        f"<p>Latency and steps cost {lost:.3g} s with the model, and move its greatest torque from "
+        f"{1e-3 * plain.runs[HELD].outcome.load_max:.4g} to {1e-3 * late.runs[HELD].outcome.load_max:.4g} N m.</p>",
+        '<p class="note">Torque is over its relief, so that it compares with the one limit; a constant feed is the '
+        "greatest that respects the limit everywhere, surprises and all, which nobody knows beforehand.</p>",
+        f"<h3>Along the path, {1e3 * late.loop.latency:g} ms latency</h3>",
+        figure("path", drawn.along(outcome, late, "path"), figures),
+        "<h3>Over time</h3>",
+        figure("time", drawn.along(outcome, late, "time"), figures),
+    ]
+    return body
+
+
+def _table(outcome: TorqueResult, case: Case) -> str:
+    rows = []
+    most = 1e-3 * outcome.torque * (1.0 + 1e-2 * outcome.limits["torque_over_percent"])
+    for name, run in case.runs.items():
+        n = run.numbers()
+
+        def cell(value: float, limit: float, digits: str = ".4g") -> str:
+            return f'<span class="{"ok" if value <= limit else "no"}">{value:{digits}}</span>'
+
+        rows.append([
+            f'<span class="dot" style="background:{drawn.COLOURS[name]}"></span>{drawn.NAMES[name]}',
+            f"{n['time_s']:.2f}",
+            cell(n["torque_nm_max"], most),
+            f"{n['torque_raw_nm_max']:.4g}",
+            f"{n['torque_over_limit_s']:.3f}",
+            cell(n["form_error_um_max"], outcome.limits["form_error_um"], ".3g"),
+            cell(n["stress_mpa_max"], outcome.limits["strength_share"] * outcome.strength, ".3g"),
+            f"{n['override_min']:.2f} to {n['override_max']:.2f}",
+            str(n["ended"]),
+        ])  # fmt: skip
+    head = (
+        "controller", "time [s]", "torque / relief", "torque", "over limit [s]", "form error", "stress", "override",
+        "ended",
+    )  # fmt: skip
+    units = (
+        f'<p class="note">Torque in N m, at most {most:.4g} over its relief; form error in µm, at most '
+        f"{outcome.limits['form_error_um']:g}; stress in MPa, at most "
+        f"{outcome.limits['strength_share'] * outcome.strength:g}.</p>"
+    )
+    return table(head, rows, numbers=(1, 2, 3, 4, 5, 6), used=[name == HELD for name in case.runs]) + units
+
+
+def _wall(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
+    solid, whole = outcome.solid, float(outcome.oval.share.sum())
+    rows = [
+        [f"{p.s:.4g}", f"{1e3 * p.shell:.4g}", f"{1e3 * p.solid:.4g}", f"{100.0 * (p.solid / p.shell - 1.0):+.2f}"]
+        for p in solid.places
+    ]
+    a, b, c = solid.counts
+    share = 100.0 * float(outcome.oval.share[1]) / whole
+    beam = (
+        f"A beam with shear gives {1e3 * outcome.oval.beam:.3g} µm: it is wrong by {whole / outcome.oval.beam:.3g} "
+        "times."
+        if outcome.oval.beam is not None
+        else f"There is no beam for a cone; its first harmonic, which a beam would have, is {share:.3g} % of it."
+    )
+    return [
+        "<h2>Compliance of the wall</h2>",
+        f"<p>Under 1 N at the free end the wall of {outcome.thinnest:.4g} mm is deflected by "
+        f"{1e3 * whole:.4g} µm, nearly all of it by becoming oval. {beam}</p>",
+        figure("oval", drawn.ovalised(outcome), figures),
+        "<h3>Second opinion: the same wall by finite elements</h3>",
+        f'<p class="note">Half of the wall by {a} x {b} x {c} hexahedra of 20 nodes (half round, along, through), '
+        f"{solid.nodes} nodes; the same force on the same area, displacement of the end of the depth of cut.</p>",
+        table(("from the clamp [mm]", "shell [µm/N]", "hexahedra [µm/N]", "apart [%]"), rows, numbers=(0, 1, 2, 3)),
+    ]
+
+
+def _estimator(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
+    e = outcome.estimator
+    assert e is not None
+    rows = [
+        ["noise of the estimate, from its sensor, closed form [N m]", f"{1e-3 * e.noise:.3g}"],
+        ["the same, seen in the run [N m]", f"{1e-3 * e.seen:.3g}"],
+        ["lag of sensor and filter [ms]", f"{1e3 * e.lag:.3g}"],
+        ["greatest error by that lag, while the torque changes [N m]", f"{1e-3 * e.behind:.3g}"],
+        ["resolution: noise, quantisation, idle map [N m]", f"{1e-3 * e.resolution:.3g}"],
+        ["lighter than this is not trusted: nothing is sped up on it [N m]", f"{1e-3 * e.light:.3g}"],
+        ["share of the time in cut that is lighter [%]", f"{100.0 * e.light_share:.3g}"],
+    ]
+    return [
+        "<h2>Torque estimate from the spindle</h2>",
+        table(("", ""), rows, numbers=(1,)),
+        f"<p>Not to be trusted: torques below {1e-3 * e.light:.3g} N m"
+        f"; changes within {3e3 * e.lag:.3g} ms; speeds other than the programmed one, for which the idle current is "
+        "not stated.</p>",
+        figure("measured", drawn.measured(outcome), figures),
+    ]
+
+
+def _rules(fuzzy: FuzzyTable, figures: dict[str, go.Figure]) -> list[str]:
+    named = len(fuzzy.output) == len(SETS)
+    head = ["error \\ change", *(f"{x:.3g}" for x in fuzzy.change)]
+    rows = [
+        [f"{e:.3g}", *((SETS[k] if named else f"{fuzzy.output[k]:.3g}") for k in row)]
+        for e, row in zip(fuzzy.error, np.asarray(fuzzy.rules), strict=True)
+    ]
+    return [
+        f"<h2>The fuzzy controller: {escape(fuzzy.name)}</h2>",
+        '<p class="note">Triangles over the centres; min, max and centroid. The answer moves the trim: the share of '
+        "the limit that the model may plan with.</p>",
+        table(head, rows),
+        figure("surface", drawn.answers(fuzzy), figures),
+    ]

@@ -1,0 +1,91 @@
+"""The numbers of a torque-controlled program in summary.json: the limit, the controllers, the wall."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from chipload.jobs.torque.outcome import Case, TorqueResult
+
+
+def operation_numbers(outcome: TorqueResult) -> dict[str, Any]:
+    """The operation in summary.json."""
+    low, high = outcome.surface or (None, None)
+    answer: dict[str, Any] = {
+        "kind": "torque",
+        "program": {"file": outcome.program_name, "motions": len(outcome.program)},
+        "torque_limit_nm": 1e-3 * outcome.torque,
+        "torque_limit": {
+            "source": outcome.source,
+            "force_n": outcome.limit.force,
+            "s_mm": float(outcome.path.model.s[outcome.limit.step + 1]),
+            "place": outcome.path.points[outcome.limit.step + 1].tolist(),
+            "held_nm": 0.0 if outcome.controller is None else 1e-3 * outcome.controller.torque_ref,
+            "true_wall_nm": 1e-3 * outcome.true_torque,
+            "one_tooth_formula_nm": 1e-3 * outcome.one_tooth,
+            "relief_max": float(outcome.path.relief.max()),
+        },
+        "torque_planned_nm_max": 1e-3 * float(outcome.path.model.torque(1.0).max()),
+        "torque_true_nm_max": 1e-3 * float(outcome.path.truth.torque(1.0).max()),
+        "path_mm": float(outcome.path.model.s[-1]),
+        "surface_off_um": None if low is None or high is None else {"min": 1e3 * low, "max": 1e3 * high},
+        "wall": {
+            "planned_mm": outcome.wall.thickness,
+            "limit_made_for_mm": outcome.thinnest,
+            "real_mm": outcome.real,
+        },
+        "surprises": list(outcome.surprises),
+    }
+    if outcome.cases:
+        plain, late = outcome.cases
+        answer |= {
+            "controllers": _controllers(plain),
+            "compared": outcome.compared(plain),
+            "with_latency": {
+                "latency_ms": 1e3 * late.loop.latency,
+                "override_step": late.quantum,
+                "controllers": _controllers(late),
+                "compared": outcome.compared(late),
+                "lost": {
+                    name: {
+                        "time_s": late.runs[name].outcome.time - run.outcome.time,
+                        "torque_nm": 1e-3 * (late.runs[name].outcome.load_max - run.outcome.load_max),
+                        "form_error_um": 1e3 * float(late.runs[name].error.max() - run.error.max()),
+                    }
+                    for name, run in plain.runs.items()
+                },
+            },
+        }
+    if outcome.estimator is not None:
+        e = outcome.estimator
+        answer["estimator"] = {
+            "noise_nm": 1e-3 * e.noise,
+            "noise_seen_nm": 1e-3 * e.seen,
+            "behind_nm_max": 1e-3 * e.behind,
+            "lag_s": e.lag,
+            "resolution_nm": 1e-3 * e.resolution,
+            "light_nm": 1e-3 * e.light,
+            "light_share": e.light_share,
+        }
+    answer["second_opinion"] = {
+        "elements": {"half_round": outcome.solid.counts[0], "along": outcome.solid.counts[1],
+                     "through": outcome.solid.counts[2], "nodes_each": 20},
+        "nodes": outcome.solid.nodes,
+        "places": [
+            {"s_mm": p.s, "shell_um_n": 1e3 * p.shell, "hexahedra_um_n": 1e3 * p.solid} for p in outcome.solid.places
+        ],
+        "apart_percent_max": 100.0 * outcome.solid.apart,
+    }  # fmt: skip
+    whole = float(outcome.oval.share.sum())
+    answer["ovalisation"] = {
+        "s_mm": outcome.oval_s,
+        "whole_um_n": 1e3 * whole,
+        "beam_um_n": None if outcome.oval.beam is None else 1e3 * outcome.oval.beam,
+        "shell_over_beam": None if outcome.oval.beam is None else whole / outcome.oval.beam,
+        "first_harmonic_share": float(outcome.oval.share[1] / whole),
+    }
+    answer["settings"] = dict(outcome.settings)
+    return answer
+
+
+def _controllers(case: Case) -> dict[str, Any]:
+    return {name: run.numbers() for name, run in case.runs.items()}

@@ -1,0 +1,211 @@
+"""What holding the torque on a thin wall gave: the limit, each controller with and without latency, and what holds.
+
+Torques are held against what the wall bears at their place: `torque_nm_max` is the torque over its relief, so that it
+compares with the one limit, that of the place where the wall bears least; `torque_raw_nm_max` is the torque itself.
+The verdict is over the fuzzy controller with the model of the cut, with the latency of the job; the others are there
+to compare.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.control import plant
+from chipload.control.fuzzy import FuzzyTable
+from chipload.control.linuxcnc.path import ToolPath
+from chipload.control.override import Override
+from chipload.control.plant import Loop, Spindle
+from chipload.control.wall import PathLimit
+from chipload.errors import Finding
+from chipload.jobs.checks import DefaultChecks
+from chipload.jobs.tables import ChecksTable
+from chipload.jobs.torque.step_checks import StepChecks
+from chipload.machine.machine import Machine
+from chipload.program.program import Program
+from chipload.result import Provenance
+from chipload.stock.layers import LayeredStock
+from chipload.structure.shell import Ovalisation, Shell
+
+Floats = NDArray[np.float64]
+
+#: the controller that the verdict is about
+HELD = "fuzzy_feedforward"
+#: the controller that the others are compared with
+PLAIN = "constant"
+
+
+@dataclass(frozen=True, eq=False)
+class ControllerRun:
+    """One controller along the path.
+
+    Parameters
+    ----------
+    config, modelled : the controller, and whether it has the model
+    outcome : of the loop
+    error : (k,) float [mm], of wall and cutter where they make the finished surface, a row of the outcome
+    stress : (k,) float [MPa], greatest equivalent one of the wall
+    deflection : (k,) float [mm], of wall and cutter anywhere
+    ratio : (k,) float, feed per tooth over the programmed one
+    """
+
+    config: Override
+    modelled: bool
+    outcome: plant.Outcome
+    error: Floats
+    stress: Floats
+    deflection: Floats
+    ratio: Floats
+
+    def numbers(self) -> dict[str, Any]:
+        """In summary.json."""
+        return {
+            "time_s": self.outcome.time,
+            "torque_nm_max": 1e-3 * self.outcome.load_max,
+            "torque_raw_nm_max": 1e-3 * self.outcome.torque_max,
+            "torque_over_limit_s": self.outcome.time_over,
+            "form_error_um_max": 1e3 * float(self.error.max()),
+            "stress_mpa_max": float(self.stress.max()),
+            "override_min": float(self.outcome.override[1:].min(initial=1.0)),
+            "override_max": float(self.outcome.override.max()),
+            "ended": self.outcome.ended,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """All controllers in one loop: its latency [s] and the step of the override that the machine takes."""
+
+    loop: Loop
+    quantum: float
+    runs: Mapping[str, ControllerRun]
+
+
+@dataclass(frozen=True)
+class ComplianceComparison:
+    """Compliance of one place by the shell and by hexahedra [mm/N]."""
+
+    s: float
+    shell: float
+    solid: float
+
+
+@dataclass(frozen=True, eq=False)
+class SolidComparison:
+    """The second opinion: compared places, numbers of elements (half round, along, through) and of nodes."""
+
+    places: tuple[ComplianceComparison, ...]
+    counts: tuple[int, int, int]
+    nodes: int
+
+    @property
+    def apart(self) -> float:
+        """Greatest relative difference."""
+        return max(abs(x.solid / x.shell - 1.0) for x in self.places)
+
+
+@dataclass(frozen=True)
+class Estimator:
+    """How far the torque that the spindle tells is to be trusted.
+
+    Parameters
+    ----------
+    noise : standard deviation of the estimate from its sensor, in closed form [N mm]
+    seen : the same, in the run of the verdict [N mm]
+    behind : greatest error while the torque changes, from the lags alone [N mm]
+    lag : of sensor and filter [s]
+    resolution : what it cannot tell from nothing [N mm]: noise, quantisation, idle map
+    light : below it the controller trusts nothing [N mm]
+    light_share : share of the time in cut below it
+    """
+
+    noise: float
+    seen: float
+    behind: float
+    lag: float
+    resolution: float
+    light: float
+    light_share: float
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueResult:
+    """The whole result.
+
+    Parameters
+    ----------
+    title, program_name : of the job and its program
+    wall : as planned, at its finished thickness
+    thinnest, real : the wall that the limit is made for, and the one that the surprises leave [mm]
+    strength : [MPa]
+    limits : stated limits by name
+    unchecked : names of those that are not stated
+    limit : of torque, from the wall alone
+    torque : the limit that is kept [N mm], the least of that and the stated one; 0: not attainable
+    true_torque : what the wall as it really is would bear [N mm]
+    one_tooth : the limit by the closed formula of one tooth [N mm], to compare
+    path : with what is planned and what is true
+    cases : the loop without latency, and as stated; none where no torque is allowable
+    controller : of the verdict; None: likewise
+    steps : (n,) columns of the planned path by name
+    oval : harmonics at the free end; solid : second opinion
+    checks, check_table, step_checks : what is checked beside the stated limits, its table, and the steps for it
+    surface : least and greatest distance of what is left from the finished surface [mm]; None: no whole layer was cut
+    """
+
+    title: str
+    program_name: str
+    program: Program
+    machine: Machine
+    wall: Shell
+    thinnest: float
+    real: float
+    strength: float
+    limits: Mapping[str, float]
+    unchecked: tuple[str, ...]
+    tolerance: float
+    limit: PathLimit
+    torque: float
+    true_torque: float
+    one_tooth: float
+    path: ToolPath
+    steps: Mapping[str, NDArray[Any]]
+    cases: tuple[Case, ...]
+    controller: Override | None
+    table: FuzzyTable
+    spindle: Spindle
+    estimator: Estimator | None
+    oval: Ovalisation
+    oval_s: float
+    solid: SolidComparison
+    surface: tuple[float, float] | None
+    surprises: tuple[str, ...]
+    stock: LayeredStock
+    findings: tuple[Finding, ...]
+    settings: Mapping[str, Any]
+    checks: DefaultChecks
+    check_table: ChecksTable
+    step_checks: StepChecks
+    provenance: Provenance
+
+    @property
+    def attainable(self) -> bool:
+        """Whether there is a torque that the wall bears."""
+        return self.torque > 0.0
+
+    @property
+    def source(self) -> str:
+        """Where the limit of torque comes from: `deflection`, `strength` or `stated`."""
+        return "stated" if self.torque < self.limit.torque else self.limit.by
+
+    def compared(self, case: Case) -> dict[str, float]:
+        """How much shorter than the constant feed, and by how much the error differs, both in percent."""
+        held, plain = case.runs[HELD], case.runs[PLAIN]
+        return {
+            "shorter_percent": 100.0 * (1.0 - held.outcome.time / plain.outcome.time),
+            "form_error_change_percent": 100.0 * (float(held.error.max()) / float(plain.error.max()) - 1.0),
+        }

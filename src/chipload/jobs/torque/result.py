@@ -1,0 +1,152 @@
+"""The result of a torque-controlled program: a track for each controller and latency, limits, findings.
+
+The verdict stands on the fuzzy controller with the model of the cut and the latency that the job states.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from chipload.control.override import STATUS
+from chipload.errors import Finding, Severity
+from chipload.jobs.checks import chip_findings, default_limits, unchecked_checks
+from chipload.jobs.torque.numbers import operation_numbers
+from chipload.jobs.torque.outcome import HELD, PLAIN, Case, ControllerRun, TorqueResult
+from chipload.jobs.torque.step_checks import check_columns
+from chipload.report.programs import ENDINGS
+from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, check_limit, in_memory
+from chipload.result.limits import Columns
+from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
+
+
+def result_of(outcome: TorqueResult) -> Result:
+    """The result: the controller in use with its latency first, then the others, then all without latency."""
+    tracks = [_track(outcome, case, name) for case in reversed(outcome.cases) for name in case.runs]
+    tracks.sort(key=lambda track: not track.in_use)
+    return Result(
+        capability="torque",
+        title=outcome.title,
+        tracks=tuple(tracks) or (_not_run(outcome),),
+        operations=(operation_numbers(outcome),),
+        findings=_findings(outcome),
+        unchecked=(
+            *unchecked_checks(outcome.checks),
+            *(f"limit {name}: not stated" for name in outcome.unchecked),
+            *(() if outcome.cases else ("cutter strength, chips and spindle: no controller was run",)),
+            "chatter and runout beyond that of the cutter: not calculated",
+            "the wall has one thickness, that at the end of the cut",
+        ),
+        provenance=outcome.provenance,
+        note=_note(outcome),
+    )
+
+
+def track_name(case: Case, controller: str) -> str:
+    """Name of the track of a controller: with its latency, if the loop has one."""
+    return f"{controller}, {1e3 * case.loop.latency:g} ms" if _real(case) else controller
+
+
+def limits_of(outcome: TorqueResult, columns: Columns, track: str) -> tuple[LimitCheck, ...]:
+    """Every limit of the job against a controller, then those that are checked by default."""
+    stated = (check_limit(name, limit, columns, track=track) for name, limit in outcome.limits.items())
+    return (*stated, *default_limits(outcome.checks, outcome.machine, columns, track, {}))
+
+
+def _real(case: Case) -> bool:
+    """Whether the loop has latency or steps, as on a machine."""
+    return bool(case.loop.latency or case.quantum)
+
+
+def _track(outcome: TorqueResult, case: Case, name: str) -> Track:
+    run, track = case.runs[name], track_name(case, name)
+    columns = _columns(outcome, run)
+    used = name == HELD and case is outcome.cases[-1]
+    return Track(
+        name=track,
+        kind=TrackKind.CONTROLLER,
+        in_use=used,
+        time_s=run.outcome.time,
+        limits=limits_of(outcome, columns, track),
+        findings=(*_run_findings(case, run), *chip_findings(outcome.checks, columns)),
+        programs=(f"0-override.{ENDINGS[outcome.machine.dialect]}",) if used else (),
+        parameters={"latency_s": case.loop.latency, "override_step": case.quantum},
+        blocks=in_memory(columns),
+    )
+
+
+def _not_run(outcome: TorqueResult) -> Track:
+    """No torque is allowable: every limit stays unproven."""
+    reason = "no torque is allowable, so no controller was run"
+    limits = (LimitCheck(name, x, None, Verdict.UNPROVEN, HELD, reason=reason) for name, x in outcome.limits.items())
+    return Track(HELD, TrackKind.CONTROLLER, True, None, tuple(limits))
+
+
+def _columns(outcome: TorqueResult, run: ControllerRun) -> Columns:
+    """(n,) columns of a controller, a row a step of it."""
+    o, path = run.outcome, outcome.path
+    relief = np.interp(o.s, path.model.s, path.relief)
+    over = 100.0 * np.maximum(o.torque / (outcome.torque * relief) - 1.0, 0.0)
+    return {
+        "t_s": o.t,
+        "duration_s": np.diff(o.t, prepend=0.0),
+        "s_mm": o.s,
+        **{f"{x}_mm": np.interp(o.s, path.model.s, path.points[:, k]) for k, x in enumerate("xyz")},
+        "feed_mm_min": mm_min_from_mm_s(1.0) * o.feed,
+        "override": o.override,
+        "override_state": np.array([STATUS[k] for k in o.status], dtype=object),
+        "torque_nm": 1e-3 * o.torque,
+        "torque_measured_nm": 1e-3 * o.measured,
+        "torque_allowable_nm": 1e-3 * outcome.torque * relief,
+        "torque_over_percent": over,
+        "form_error_um": 1e3 * run.error,
+        "stress_mpa": run.stress,
+        "strength_share": run.stress / outcome.strength,
+        "spindle_rpm": rpm_from_rad_s(1.0) * o.speed,
+        **check_columns(outcome.step_checks, path.model.s, o, run.ratio, 1e3 * run.deflection, outcome.check_table),
+    }
+
+
+def _run_findings(case: Case, run: ControllerRun) -> tuple[Finding, ...]:
+    """What was found in a run beside its limits."""
+    out, o, plain = [], run.outcome, case.runs[PLAIN].outcome
+    if not o.finished:
+        text = f"the controller stopped at {o.s[-1]:.4g} mm of the path: {o.ended}"
+        out.append(Finding("controller-stopped", 0, text, Severity.EXCEEDS))
+    if float(o.override.max()) > run.config.cap:
+        text = f"override {float(o.override.max()):.4g} exceeds {run.config.cap:.4g}"
+        out.append(Finding("override-above-cap", 0, text, Severity.EXCEEDS))
+    if o.finished and plain.finished and o.time > plain.time:
+        text = (
+            f"takes {o.time:.4g} s, longer than the {plain.time:.4g} s of the constant feed that keeps the limit "
+            "everywhere"
+        )
+        out.append(Finding("slower-than-constant", 0, text, Severity.EXCEEDS))
+    return tuple(out)
+
+
+def _findings(outcome: TorqueResult) -> tuple[Finding, ...]:
+    """What was found in the whole result."""
+    out = [Finding(f.code, f.line, f.text, Severity.EXCEEDS, f.place, f.row) for f in outcome.findings]
+    if not outcome.attainable:
+        text = (
+            f"no torque is allowable: at step {outcome.limit.step} the edge force alone exceeds the "
+            f"{outcome.limit.force:.4g} N that the wall allows by its {outcome.limit.by}"
+        )
+        out.append(Finding("no-allowable-torque", 0, text, Severity.EXCEEDS))
+    elif outcome.surface is None:
+        out.append(Finding("wall-not-finished", 0, "the program finishes no part of the wall", Severity.EXCEEDS))
+    elif outcome.surface[0] < -outcome.tolerance:
+        text = f"the program cuts {-1e3 * outcome.surface[0]:.4g} µm into the wall"
+        out.append(Finding("wall-gouged", 0, text, Severity.EXCEEDS))
+    return tuple(out)
+
+
+def _note(outcome: TorqueResult) -> str:
+    if not outcome.cases:
+        return ""
+    case = outcome.cases[-1]
+    by = outcome.compared(case)
+    return (
+        f"With {1e3 * case.loop.latency:g} ms latency {by['shorter_percent']:.3g} % shorter than the constant feed "
+        "that keeps the limit everywhere."
+    )

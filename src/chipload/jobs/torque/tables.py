@@ -1,0 +1,191 @@
+"""The tables of a job that holds the torque on a thin tube or cone: which keys there are, their units and ranges.
+
+The keys of ``[override]`` and ``[spindle]`` are those of the file of ``chipload hal``.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from chipload.cutter.table import CutterTable
+from chipload.jobs.tables import ChecksTable, Count, Limits, NotNegative, Number, Positive, SourceTable, Table, Text
+
+Share = Annotated[Number, Field(gt=0.0, le=1.0)]
+Angle = Annotated[Number, Field(ge=-360.0, le=720.0)]
+
+
+class ShellProgramTable(Table):
+    """A program that exists and goes round the wall."""
+
+    file: Text
+    dialect: Literal["linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"] | None = None
+    feed_mm_min: Positive | None = Field(None, le=1e5, description="feed of cuts before the program states one")
+    tolerance_mm: Positive = Field(0.001, le=1.0, description="how far the tip may leave its path where a move is cut")
+    parameters: dict[str, Number] = Field(
+        default_factory=dict, description='values that the controller holds, as "#100" = 2.5, "#<depth>", R10 or Q10'
+    )
+    work_offsets: dict[str, tuple[Number, ...]] = Field(
+        default_factory=dict,
+        description="origins of work offsets in the machine, X Y Z A B C U V W in mm and degrees, as G55 = [80, 0, 0]",
+    )
+    tool_comments: bool = Field(True, description="hold the diameters in the program's comments against the cutters")
+
+
+class RoundTable(Table):
+    """A program that is made: down the wall in a helix, then once round at the bottom."""
+
+    cutter: Count = Field(description="number of a [[cutter]]")
+    milling: Literal["down", "up"]
+    top_mm: Number = Field(description="height of the tip where the helix begins")
+    bottom_mm: Number = Field(description="height of the tip in the last round")
+    pitch_mm: Positive = Field(description="how far the helix falls in a round")
+    feed_mm_min: Positive = Field(le=1e5, description="feed of the tip")
+    speed_rpm: Positive = Field(le=1e6, description="spindle speed")
+    clearance_mm: Positive = Field(description="height of rapids above the top of the wall")
+    lead_mm: Positive = Field(description="length of the straight way to the wall and away from it")
+
+
+class BossTable(Table):
+    """Stock that stands out over a part of the round, known beforehand."""
+
+    from_deg: Angle
+    to_deg: Angle = Field(description="above from_deg, counter-clockwise from +X")
+    radial_mm: Positive = Field(description="so much more than stock_mm")
+
+
+class ShellTable(Table):
+    """The finished wall: a tube or cone about Z through X0 Y0, clamped at one end."""
+
+    mean_radius_mm: Positive = Field(le=2000.0, description="of the middle of the wall at the clamped end")
+    length_mm: Positive = Field(le=5000.0, description="along the wall, from the clamp to the free end")
+    wall_mm: Positive = Field(description="thickness of the finished wall, along its normal")
+    angle_deg: Number = Field(
+        0.0, ge=-60.0, le=60.0, description="half angle of a cone; above 0: wider at its free end"
+    )
+    clamped: Literal["low", "high"] = Field(description="which end is clamped")
+    clamp_z_mm: Number = Field(description="z of the clamped end")
+    modulus_gpa: Number = Field(ge=0.1, le=1000.0, description="Young's modulus: aluminium 70, titanium 114, steel 210")
+    poisson: Number = Field(ge=0.0, lt=0.5, description="Poisson's ratio")
+    strength_mpa: Number = Field(ge=1.0, le=5000.0, description="stress that the wall must not exceed: its yield")
+    stock_mm: Positive = Field(description="radial stock outside the finished wall")
+    wall_tolerance_mm: NotNegative = Field(description="the wall may be thinner by so much; the limit is made for that")
+    boss: tuple[BossTable, ...] = Field((), max_length=20)
+
+
+class SurpriseTable(Table):
+    """Something true that the plan does not know."""
+
+    kind: Literal["thicker-side", "hard-spot", "worn-cutter", "thinner-wall"]
+    share: Number = Field(gt=0.0, le=3.0, description="0.3: 30 % more (of a thinner wall: less)")
+    at_deg: Angle | None = Field(None, description="where round the wall, counter-clockwise from +X")
+    width_mm: Positive | None = Field(None, description="of a hard spot, round the wall")
+    ramp_mm: Positive | None = Field(None, description="over so much path a hard spot comes and goes")
+    edge_share: NotNegative | None = Field(
+        None, le=9.0, description="of a worn cutter: the edge's part grows by so much"
+    )
+
+
+class OverrideTable(Table):
+    """The rules of the controller; what it holds comes from the limit."""
+
+    hold: Share = Field(description="share of the limit of torque that is held")
+    overload_nm: Positive
+    torque_most_nm: Positive
+    light_nm: Positive
+    floor: Share
+    cap: Positive
+    start: Share
+    air_override: Positive
+    lost_override: NotNegative
+    lost_s: Positive
+    above_programmed: bool = False
+    slew_up_per_s: Positive = 1.0
+    slew_down_per_s: Positive = 5.0
+    gain_up_per_s: Positive = 1.5
+    gain_down_per_s: Positive = 6.0
+    error_span: Positive = 1.0
+    change_span: Positive = 0.5
+    pi_gain: NotNegative = 0.3
+    pi_rate_per_s: NotNegative = 1.5
+    overload_steps: Count = 3
+    stuck_steps: Count = 10
+    air_steps: Count = 3
+    settle_steps: Count = 5
+    low_share: NotNegative = Field(
+        0.5, le=1.0, description="a reading below that share of the prediction is not believed"
+    )
+    low_steps: Count = Field(50, description="so many of them in a cut stop the machine")
+    off_path_steps: Count = Field(10, description="so many steps under load off the path stop the machine")
+    gap_s: Positive = Field(0.5, le=10.0, description="a longer time between steps counts as a start")
+
+
+class SpindleTable(Table):
+    """The spindle that the torque is measured with."""
+
+    inertia_kg_m2: Positive
+    torque_constant_nm_a: Positive
+    idle_a: tuple[Number, Number] = Field(description="current of the free spindle: [A], [A s] times the speed")
+    stiffness_a_s: Positive
+    reset_a: NotNegative
+    most_current_a: Positive
+    sensor_lag_s: NotNegative
+    smoothing_s: NotNegative
+    noise_a: NotNegative = Field(description="standard deviation of a reading of the current")
+    current_step_a: NotNegative = Field(description="step of a reading of the current; 0: none")
+    idle_error_share: NotNegative = Field(le=1.0, description="share by which the idle current may differ from idle_a")
+
+
+class LoopTable(Table):
+    """Times of the loop; the second comparison is made with the latency and the steps that are stated here."""
+
+    period_ms: Positive = Field(le=1000.0, description="between two steps of the controller")
+    latency_ms: NotNegative = Field(le=10_000.0, description="until an override acts")
+    override_step: NotNegative = Field(le=0.1, description="step of the override that the controller takes, 0.01: 1 %")
+    acceleration_mm_s2: Positive | None = Field(
+        None, description="of the axes along the path; else the machine's least"
+    )
+    seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
+
+
+class ControlTable(Table):
+    """The controller."""
+
+    file: Text | None = Field(None, description="sets and rules (TOML); else the standard ones")
+    override: OverrideTable
+
+
+class SimulationTable(Table):
+    """How fine the chips are looked at."""
+
+    step_mm: Positive = Field(le=10.0, description="longest step of the tip")
+    layer_mm: Positive = Field(le=10.0, description="thickness of the layers of the stock")
+    tolerance_mm: Positive = Field(0.005, le=0.1, description="how far chords may leave the edges of chips")
+
+
+class TorqueLimitsTable(Limits):
+    """The limits of the wall."""
+
+    form_error_um: Positive = Field(le=5000.0, description="by the deflection of wall and cutter along the normal")
+    strength_share: Share = Field(description="share of the strength that the wall may be strained to")
+    torque_nm: Positive | None = Field(None, description="of the cutter or the spindle, if less")
+    torque_over_percent: NotNegative = Field(le=50.0, description="the torque may exceed its limit by so much")
+
+
+class TorqueJobTable(Table):
+    """The whole file."""
+
+    program: ShellProgramTable | None = None
+    round: RoundTable | None = None
+    machine: SourceTable
+    material: SourceTable
+    cutter: tuple[CutterTable, ...] = Field(min_length=1)
+    shell: ShellTable
+    surprise: tuple[SurpriseTable, ...] = Field((), max_length=50)
+    spindle: SpindleTable
+    control: ControlTable
+    loop: LoopTable
+    simulation: SimulationTable
+    limits: TorqueLimitsTable
+    checks: ChecksTable = Field(default_factory=ChecksTable.model_construct)

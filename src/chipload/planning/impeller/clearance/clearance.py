@@ -1,0 +1,92 @@
+"""Whether a pose, or all of a move, of the whole cutter is clear of the check points.
+
+Notation: p [mm] tip, T unit axis; D distance of the nearest check point from the cutter, below 0 where one is in it. On
+a move the tip goes straight and the axis turns evenly from T0 to T1. No point of the cutter within L of the tip goes
+further than |p1 - p0| + L angle(T0, T1), so that D at the middle less half of that bounds D on all of the move: it is
+halved until the bound decides.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.planning.impeller.clearance import _kernels
+from chipload.planning.impeller.scene import Floats, Ints, Scene
+
+#: halvings of a move before it counts as not clear
+_DEPTH = 14
+
+
+def clearance(
+    scene: Scene, cutter: CatalogueCutter, tips: ArrayLike, axes: ArrayLike, cap: float, above: float = 0.0
+) -> tuple[Floats, Ints]:
+    """Distance of the nearest check point from the cutter at each pose.
+
+    Parameters
+    ----------
+    tips, axes : (n, 3) [mm], unit
+    cap : [mm] what is farther counts as this far
+    above : [mm] that neck, shank and holder are made larger by
+
+    Returns
+    -------
+    (n,) float [mm], (n,) int the check point, -1: none within ``cap``
+    """
+    p = np.ascontiguousarray(tips, dtype=np.float64).reshape(-1, 3)
+    a = np.ascontiguousarray(axes, dtype=np.float64).reshape(-1, 3)
+    tree = scene.tree
+    out, which = np.empty(len(p)), np.empty(len(p), dtype=np.int64)
+    _kernels.nearest(
+        scene.ordered, tree.nodes, tree.spans, tree.leaves, p, a, cutter.rho, cutter.corner_radius,
+        cutter.stages(above), cap, out, which,
+    )  # fmt: skip
+    return out, np.where(which >= 0, tree.order[np.maximum(which, 0)] if len(tree.order) else which, which)
+
+
+def between(axes0: Floats, axes1: Floats, share: Floats) -> Floats:
+    """Unit axes (n, 3) at the ``share`` (n,) of the turn from ``axes0`` to ``axes1`` (n, 3)."""
+    dot = np.clip((axes0 * axes1).sum(axis=1), -1.0, 1.0)
+    angle = np.arccos(dot)
+    flat = angle < 1e-7
+    sine = np.where(flat, 1.0, np.sin(angle))
+    a = np.where(flat, 1.0 - share, np.sin((1.0 - share) * angle) / sine)
+    b = np.where(flat, share, np.sin(share * angle) / sine)
+    out = a[:, None] * axes0 + b[:, None] * axes1
+    unit: Floats = out / np.linalg.norm(out, axis=1)[:, None]
+    return unit
+
+
+def moves_clear(
+    scene: Scene, cutter: CatalogueCutter, tips: ArrayLike, axes: ArrayLike, margin: float, above: float = 0.0
+) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Whether the cutter keeps ``margin`` [mm] from every check point all along each of the n - 1 moves: proved.
+
+    Parameters
+    ----------
+    tips, axes : (n, 3) poses, one after the other
+    """
+    p = np.asarray(tips, dtype=np.float64).reshape(-1, 3)
+    a = np.asarray(axes, dtype=np.float64).reshape(-1, 3)
+    ok = np.ones(len(p) - 1, dtype=np.bool_)
+    row, low, high = np.arange(len(p) - 1), np.zeros(len(p) - 1), np.ones(len(p) - 1)
+    turn = np.arccos(np.clip((a[1:] * a[:-1]).sum(axis=1), -1.0, 1.0))
+    travel = np.linalg.norm(np.diff(p, axis=0), axis=1)
+    centre, radius = scene.tree.nodes[0, :3], max(float(scene.tree.nodes[0, 3]), 0.0)
+    lever = np.maximum(np.linalg.norm(p[1:] - centre, axis=1), np.linalg.norm(p[:-1] - centre, axis=1)) + radius
+    reach = travel + lever * turn
+    for _ in range(_DEPTH):
+        if not len(row):
+            return ok
+        mid = 0.5 * (low + high)
+        tip = p[row] + mid[:, None] * (p[row + 1] - p[row])
+        half = 0.5 * (high - low) * reach[row]
+        got, _ = clearance(scene, cutter, tip, between(a[row], a[row + 1], mid), margin + float(half.max()), above)
+        bad = got < margin
+        ok[row[bad]] = False
+        left = ok[row] & (got < margin + half)
+        row, low, mid, high = row[left], low[left], mid[left], high[left]
+        row, low, high = np.tile(row, 2), np.concatenate([low, mid]), np.concatenate([mid, high])
+    ok[row] = False
+    return ok

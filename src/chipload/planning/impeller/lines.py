@@ -1,0 +1,357 @@
+"""Lines on a surface: where they lie, the pallet angles that are valid there, the tracks on them, what is missed.
+
+Notation: a line runs along one parameter p of the surface, at fixed stations, at q(p) of the other. The pallet angles
+come from the exact ranges at its stations (``pallet.py``), looked for near those of the line before first. Where a
+line comes to a point that is not reached, its end is found by halving; points between are added where a straight row
+would leave the path (``mend.py``).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.errors import InputError
+from chipload.geometry.bspline import BSplinePatch
+from chipload.planning.impeller.pallet import Turned, pallet_angles
+from chipload.planning.impeller.ranges.ranges import valid_ranges
+from chipload.planning.impeller.refinement import Refinement
+from chipload.planning.impeller.scene import Floats, Ints, Scene
+from chipload.planning.impeller.track import ToolTrack
+
+#: points of a line whose pallet angles are looked for together, and how far from those of the line before [rad]
+_GROUP, _WINDOW = 6, math.radians(10.0)
+#: stations and halvings by which the first line that is reached is looked for
+_KNOTS, _BISECT = 17, 4
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class LineMotion:
+    """What a line is milled with.
+
+    Parameters
+    ----------
+    chord : greatest distance of the tip from its path between two points [mm]
+    feed : of the tip [mm/s]
+    rate : greatest of the pallet [rad/s]
+    clearance : of neck, shank and holder [mm]
+    wanted : [rad] by which the pallet keeps away from the ends of its ranges, where they are wide enough
+    """
+
+    chord: float
+    feed: float
+    rate: float
+    clearance: float
+    wanted: float = math.radians(4.0)
+
+    def __post_init__(self) -> None:
+        for name, unit in (("chord", "mm"), ("feed", "mm/s"), ("rate", "rad/s")):
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise InputError(f"{name} = {value:g} {unit}: must be above 0")
+        if not (0.0 <= self.clearance < math.inf and 0.0 <= self.wanted < math.inf):
+            raise InputError("motion: clearance and wanted must be at least 0")
+
+
+@dataclass(frozen=True)
+class UnreachedSpan:
+    """Points of a line that the cutter does not reach: from ``first`` to ``last`` (u, v), ``length`` [mm].
+
+    ``reason``: `no pallet angle` is valid there, the pallet `cannot follow` from the point before in time, or the row
+    between two points `touches` the part.
+    """
+
+    line: int
+    first: tuple[float, float]
+    last: tuple[float, float]
+    length: float
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Tracks:
+    """What one cutter mills on one surface at one table angle.
+
+    Parameters
+    ----------
+    tracks : in the order of the lines
+    missed : what is not reached, and where lines are split
+    lines : how many lines there are
+    """
+
+    tracks: tuple[ToolTrack, ...]
+    missed: tuple[UnreachedSpan, ...]
+    lines: int
+
+    @property
+    def length(self) -> float:
+        """Of the paths in the cut [mm]."""
+        return math.fsum(t.length for t in self.tracks)
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A line at the stations: (u, v), S, N, K, its direction, the pieces with B, B at every station (nan: none)."""
+
+    q: Floats
+    at: Floats
+    S: Floats
+    N: Floats
+    K: Floats
+    d: Floats
+    pieces: tuple[Turned, ...]
+    pallet: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Lines of one cutter on one surface at one table angle.
+
+    Parameters
+    ----------
+    surface, along, scene, number, cutter, table, pallets : as :func:`finishing`
+    p : (n,) the stations, of the parameter ``along``
+    """
+
+    surface: BSplinePatch
+    along: str
+    p: Floats
+    scene: Scene
+    number: int
+    cutter: CatalogueCutter
+    table: float
+    how: LineMotion
+    pallets: tuple[tuple[float, float], ...]
+    workers: int
+
+    @property
+    def mender(self) -> Refinement:
+        """Puts points between those of a track."""
+        return Refinement(
+            self.surface, self.scene, self.number, self.cutter, self.table, self.how.chord, self.how.clearance
+        )
+
+    def line(self, q: Floats, before: Floats) -> Line:
+        """The line at q, its pallet angles near those of the line ``before`` where there are any."""
+        S, N, K, d, at = self.on(q)
+        scene = self.scene.at_contacts(S, N, K, self.number)
+        step = np.linalg.norm(np.diff(S, axis=0), axis=1)
+        most = self.how.rate * step / self.how.feed
+        pieces = pallet_angles(self._ranges(scene, before), step, most, self.how.wanted, before)
+        if any(a.last == b.first for a, b in itertools.pairwise(pieces)):
+            # a line that can be followed with other angles than those of the line before
+            ranges = self._valid(scene, np.arange(len(q)), self.pallets)
+            pieces = min((pieces, pallet_angles(ranges, step, most, self.how.wanted)), key=len)
+        pallet = np.full(len(q), np.nan)
+        for piece in pieces:
+            pallet[piece.first : piece.last] = piece.pallet
+        return Line(q, at, S, N, K, d, pieces, pallet)
+
+    def border(self, Q: tuple[float, float], need: Flags | None = None) -> Floats:
+        """Q at every station from Q[0] towards Q[1] where the cutter first reaches the surface, evened out.
+
+        Looked at are the stations that are in ``need``.
+        """
+        among = np.arange(len(self.p)) if need is None else np.flatnonzero(need)
+        knots = among[np.unique(np.linspace(0, len(among) - 1, min(len(among), _KNOTS)).round().astype(int))]
+        low, high = np.zeros(len(knots)), np.full(len(knots), np.nan)
+        for f in np.concatenate([[0.0], np.geomspace(0.02, 0.6, 9)]):
+            open_ = np.flatnonzero(np.isnan(high))
+            if not len(open_):
+                break
+            got = self._reached(knots[open_], np.full(len(open_), Q[0] + f * (Q[1] - Q[0])))
+            high[open_[got]], low[open_[~got]] = f, f
+        some = np.isfinite(high) & (high > 0.0)
+        for _ in range(_BISECT if some.any() else 0):
+            f = 0.5 * (low[some] + high[some])
+            got = self._reached(knots[some], Q[0] + f * (Q[1] - Q[0]))
+            high[some] = np.where(got, f, high[some])
+            low[some] = np.where(got, low[some], f)
+        known = np.isfinite(high)
+        if not some.any():
+            return np.full(len(self.p), Q[0])
+        f = np.interp(self.p, self.p[knots[known]], high[known])
+        f = np.minimum(np.maximum(gaussian_filter1d(maximum_filter1d(f, 3), 1.0, mode="nearest"), f), 1.0)
+        out: Floats = Q[0] + f * (Q[1] - Q[0])
+        return out
+
+    def strip(self, q: Floats, border: float) -> UnreachedSpan:
+        """What lies between the border and the first line."""
+        k, edge = int(q.argmax()), (self.on(np.full(len(q), border)))
+        length = float(np.linalg.norm(np.diff(edge[0], axis=0), axis=1).sum())
+        (a, b), (c, d) = edge[4][0].tolist(), self.on(q)[4][k].tolist()
+        return UnreachedSpan(-1, (a, b), (c, d), length, "no pallet angle")
+
+    def _reached(self, stations: Ints, q: Floats) -> Flags:
+        u, v = (self.p[stations], q) if self.along == "u" else (q, self.p[stations])
+        S, N, K = (f(u, v) for f in (self.surface.at, self.surface.normal, self.surface.curvature))
+        scene = self.scene.at_contacts(S, N, K, self.number)
+        got = self._valid(scene, np.arange(len(stations)), self.pallets)
+        return np.array([len(r) > 0 for r in got])
+
+    def tracks(
+        self, line: Line, use: Flags, number: int, need: Flags | None = None
+    ) -> tuple[list[ToolTrack], list[UnreachedSpan]]:
+        """Tracks of the pieces of a line where it is in ``use``, and what is missed of what they ``need`` to mill.
+
+        A piece that ends between two stations goes on from the last as far as the cutter does; where the next piece
+        begins so far back that they meet, nothing is missed.
+        """
+        tracks: list[ToolTrack] = []
+        missed: list[UnreachedSpan] = []
+        need = use if need is None else use & need
+        covered = np.zeros(len(use), dtype=np.bool_)
+        ways = self.mender
+        owner = np.full(len(use), -1)
+        for k, piece in enumerate(line.pieces):
+            owner[piece.first : piece.last] = k
+        gone: dict[tuple[int, int], float] = {}  # (first station, towards the next 1 or back -1): how far [share]
+        for mine, piece in enumerate(line.pieces):
+            for a, b in runs(use[piece.first : piece.last]):
+                i, j = piece.first + a, piece.first + b
+                covered[i:j] = True
+                at, B = [*line.at[i:j]], [*piece.pallet[a:b]]
+                for side, here, there in ((-1, i, i - 1), (1, j - 1, j)):
+                    if not (0 <= there < len(use) and use[there] and owner[there] != mine):
+                        continue
+                    more = ways.furthest(line.at[here], B[0 if side < 0 else -1], line.at[there])
+                    gone[here, side] = 0.0 if more is None else more[2]
+                    if more is not None:
+                        k = 0 if side < 0 else len(at)
+                        at.insert(k, more[0])
+                        B.insert(k, more[1])
+                if len(at) < 2:
+                    continue
+                parts, bad = ways.refined(ways.track(np.array(at), np.array(B), number))
+                tracks += parts
+                for row in bad[:1]:
+                    k = i + min(int(row), j - i - 1)
+                    if need[k]:
+                        missed.append(self._missed(number, line.at[k : min(k + 2, j)], "touches"))
+        for a, b in runs(need & ~covered):
+            ends = [*line.at[a:b]]
+            if a and use[a - 1]:
+                ends.insert(0, line.at[a - 1] + gone.get((a - 1, 1), 0.0) * (line.at[a] - line.at[a - 1]))
+            if b < len(use) and use[b]:
+                ends.append(line.at[b] + gone.get((b, -1), 0.0) * (line.at[b - 1] - line.at[b]))
+            missed.append(self._missed(number, np.array(ends), "no pallet angle"))
+        for k in range(1, len(use)):
+            if need[k - 1] and need[k] and covered[k - 1] and covered[k] and owner[k - 1] != owner[k]:
+                first, last = gone.get((k - 1, 1), 0.0), 1.0 - gone.get((k, -1), 0.0)
+                if first < last:
+                    step = line.at[k] - line.at[k - 1]
+                    between = line.at[k - 1] + np.array([[first], [last]]) * step
+                    missed.append(self._missed(number, between, "cannot follow"))
+        return tracks, missed
+
+    def _missed(self, number: int, at: Floats, reason: str) -> UnreachedSpan:
+        (a, b), (c, d) = at[0].tolist(), at[-1].tolist()
+        return UnreachedSpan(number, (a, b), (c, d), self._length(at), reason)
+
+    def _length(self, at: Floats) -> float:
+        return float(np.linalg.norm(np.diff(self.surface.at(*at.T), axis=0), axis=1).sum())
+
+    def on(self, q: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+        """S, N, K, direction of the line and (u, v) at the stations."""
+        u, v = (self.p, q) if self.along == "u" else (q, self.p)
+        Sp, Sq = (self.surface.at(u, v, *x) for x in (((1, 0), (0, 1)) if self.along == "u" else ((0, 1), (1, 0))))
+        d = Sp + np.gradient(q, self.p)[:, None] * Sq
+        d /= np.linalg.norm(d, axis=1)[:, None]
+        return (
+            self.surface.at(u, v),
+            self.surface.normal(u, v),
+            self.surface.curvature(u, v),
+            d,
+            np.column_stack([u, v]),
+        )
+
+    def _ranges(self, scene: Scene, before: Floats) -> tuple[Floats, ...]:
+        """Ranges of every point, near the angles of the line ``before`` first, else everywhere."""
+        n = len(before)
+        out: list[Floats] = [np.zeros((0, 2))] * n
+        left = np.ones(n, dtype=np.bool_)
+        for a in range(0, n, _GROUP):
+            group = np.arange(a, min(a + _GROUP, n))
+            known = before[group]
+            if not np.isfinite(known).all():
+                continue
+            low, high = known.min() - _WINDOW, known.max() + _WINDOW
+            spans = _within(low, high, self.pallets)
+            if high - low > math.pi or not spans:
+                continue
+            got = self._valid(scene, group, spans)
+            for k, r in zip(group, got, strict=True):
+                out[k], left[k] = r, not len(r)
+        rest = np.flatnonzero(left)
+        if len(rest):
+            for k, r in zip(rest, self._valid(scene, rest, self.pallets), strict=True):
+                out[k] = r
+        return tuple(out)
+
+    def _valid(self, scene: Scene, points: Ints, spans: tuple[tuple[float, float], ...]) -> tuple[Floats, ...]:
+        got = valid_ranges(scene, self.cutter, self.table, self.how.clearance, spans, points, workers=self.workers)
+        return got.ranges
+
+    def facing(self, p: Floats, q: Floats) -> tuple[Floats, Floats]:
+        """Points and normals (n, 3) of the surface."""
+        u, v = (p, q) if self.along == "u" else (q, p)
+        return self.surface.at(u, v), self.surface.normal(u, v)
+
+
+def stations(surface: BSplinePatch, along: str, P: tuple[float, float], Q: tuple[float, float], chord: float) -> int:
+    """Points of a line, so that its chords are within a half of ``chord`` of the surface."""
+    lines = np.linspace(*Q, 5)
+    for count in (9, 13, 17, 25, 33, 49, 65, 97, 129, 193, 257, 385, 513):
+        p = np.linspace(*P, 2 * count - 1)
+        worst = 0.0
+        for q in lines:
+            S = surface.at(p, q) if along == "u" else surface.at(q, p)
+            middle = 0.5 * (S[:-2:2] + S[2::2])
+            worst = max(worst, float(np.linalg.norm(S[1::2] - middle, axis=1).max()))
+        if worst <= 0.5 * chord:
+            return count
+    raise InputError(f"finish.chord = {chord:g} mm: more than 513 points a line: raise it")
+
+
+def stretched(
+    surface: BSplinePatch, along: str, P: tuple[float, float], Q: tuple[float, float], count: int, overrun: float
+) -> Floats:
+    """Stations from P[0] to P[1], evenly, and beyond them by ``overrun`` [mm] where the surface goes so far."""
+    p = np.linspace(*P, count)
+    lines = np.linspace(*Q, 5)
+    size = np.linalg.norm(
+        [(surface.at(x, lines, 1, 0) if along == "u" else surface.at(lines, x, 0, 1)) for x in P], axis=2
+    ).min(axis=1)
+    out = [p]
+    for end, sign, mm in ((P[0], -1.0, size[0]), (P[1], 1.0, size[1])):
+        more = min(overrun / mm, end if sign < 0.0 else 1.0 - end)
+        if more > 1e-6:
+            steps = math.ceil(more / (p[1] - p[0]) - 1e-9)
+            out.append(end + sign * more * np.arange(1, steps + 1) / steps)
+    return np.sort(np.concatenate(out))
+
+
+def runs(flags: Flags) -> list[tuple[int, int]]:
+    """(first, after the last) of each run of True."""
+    edge = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int64), [0]])))
+    return [(int(a), int(b)) for a, b in zip(edge[::2], edge[1::2], strict=True)]
+
+
+def _within(low: float, high: float, pallets: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    """Parts of low..high, taken round by whole turns, that lie in the ``pallets``."""
+    out = []
+    for a, b in pallets:
+        first = math.ceil((a - high) / math.tau)
+        for turn in range(first, first + 3):
+            x, y = max(a, low + math.tau * turn), min(b, high + math.tau * turn)
+            if y > x:
+                out.append((x, y))
+    return tuple(sorted(out))

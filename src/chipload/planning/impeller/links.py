@@ -1,0 +1,295 @@
+"""How the cutter comes to a track, from one to the next, and away: moves that are proved to be clear.
+
+Notation: p tip [mm], T axis, N normal at the contact; alpha table angle, H(alpha) the height along T above which
+nothing of the part lies, whatever the pallet angle: the part is within a body of revolution, H = max of r sin(alpha) +
+z cos(alpha). With its tip above H the cutter is clear wherever it stands.
+
+The cutter leaves a track along N + T, T or N by the lift, and comes to one the same way back: on these it touches, so
+that they are looked at in small steps, and may be as deep as ``touch``. Where a channel is too narrow for that it goes
+up along T to H at once, and may be as deep as ``touch`` all the way, which is proved. From a lift it goes straight to
+the lifted beginning of the next track where that is near and proved clear (``clear/``), else up along T to H, round,
+and down.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.errors import InputError
+from chipload.planning.impeller.clearance.clearance import between, clearance, moves_clear
+from chipload.planning.impeller.closed_form import axis_at
+from chipload.planning.impeller.scene import Floats, Ints, Scene
+from chipload.planning.impeller.track import ToolTrack, pallet_of, written
+from chipload.program.program import LINE, RAPID
+
+_SMALL = 24  # places at which a lift is looked at
+_TURN = math.radians(3.0)  # of the pallet in one row above the part
+_LIFTS = (1.0, 0.5, 0.25)  # of the lift that are tried
+
+
+@dataclass(frozen=True)
+class Link:
+    """How tracks are linked.
+
+    Parameters
+    ----------
+    lift : off the surface at the ends of a track [mm], > 0
+    margin : that links keep from the part [mm], > 0, below the lift
+    touch : how deep a lift may be in the check points [mm], >= 0; above 0 a narrow channel can be left
+    near : longest direct link [mm]
+    feed : of links and lifts [mm/s]
+    above : of the safe height over the part [mm], > 0
+    """
+
+    lift: float
+    margin: float
+    touch: float
+    near: float
+    feed: float
+    above: float
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.margin < self.lift < math.inf and 0.0 <= self.touch < self.margin):
+            raise InputError(
+                f"link: lift {self.lift:g}, margin {self.margin:g}, touch {self.touch:g} mm: "
+                "must be touch < margin < lift"
+            )
+        if not (self.near >= 0.0 and 0.0 < self.feed < math.inf and 0.0 < self.above < math.inf):
+            raise InputError("link: must be near at least 0, feed and above above 0")
+
+
+@dataclass(frozen=True, eq=False)
+class Moves:
+    """Moves in columns: motion, tip (n, 3) [mm], axis (n, 3), feed [mm/s], label."""
+
+    motion: tuple[int, ...]
+    tip: Floats
+    axis: Floats
+    feed: Floats
+    label: tuple[str, ...]
+
+    @staticmethod
+    def of(motion: int, tip: Floats, axis: Floats, feed: float, label: str) -> Moves:
+        """Moves of one kind."""
+        n = len(tip)
+        return Moves((motion,) * n, tip, axis, np.full(n, feed), (label,) * n)
+
+    @staticmethod
+    def join(parts: list[Moves]) -> Moves:
+        """Moves that follow one another."""
+        return Moves(
+            tuple(m for x in parts for m in x.motion), np.vstack([x.tip for x in parts]),
+            np.vstack([x.axis for x in parts]), np.concatenate([x.feed for x in parts]),
+            tuple(t for x in parts for t in x.label),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Linked:
+    """All moves of one cutter at one table angle.
+
+    Parameters
+    ----------
+    moves : from the safe height to it again
+    refused : (number of the track, why) of tracks that the cutter cannot come to or leave: they are not in the moves
+    direct, retracts : how many links go straight and how many over the part
+    track : (n,) of each move the number of the track that it leads to, mills or leaves; -1: none
+    """
+
+    moves: Moves
+    refused: tuple[tuple[int, str], ...]
+    direct: int
+    retracts: int
+    track: Ints
+
+
+def safe_height(points: Floats, table: float) -> float:
+    """H(alpha) [mm] of points (n, 3): no point is higher along T(B) at any B.
+
+    >>> round(safe_height(np.array([[3.0, 4.0, 2.0]]), 0.5 * np.pi), 9)
+    5.0
+    """
+    return float((np.hypot(points[:, 0], points[:, 1]) * math.sin(table) + points[:, 2] * math.cos(table)).max())
+
+
+def linked(
+    tracks: tuple[ToolTrack, ...],
+    scene: Scene,
+    cutter: CatalogueCutter,
+    table: float,
+    feed: float,
+    how: Link,
+    clear_of: float,
+    label: str = "finish",
+    rate: float = math.inf,
+    one_way: bool = False,
+    outline: Floats | None = None,
+) -> Linked:
+    """Every track in order, each from its nearer end, with what is between.
+
+    Parameters
+    ----------
+    tracks : as :func:`finishing` gives them
+    feed : in the tracks [mm/s]
+    clear_of : clearance of neck, shank and holder [mm]
+    rate : greatest of the pallet [rad/s]: rows on which it would be faster are fed more slowly
+    one_way : each track in its own direction, never from its end; nothing but ways over the part is rapid
+    outline : (k, 3) more points that the safe height is above, as of the blank
+    """
+    T = axis_at(table, 0.0)
+    points = scene.check if outline is None else np.vstack([scene.check, outline])
+    top = safe_height(points, table) + how.above
+    job = _Job(scene, cutter, table, how, clear_of, top)
+    parts: list[Moves] = []
+    of: list[int] = []
+    refused: list[tuple[int, str]] = []
+    direct = retracts = 0
+    away: tuple[Floats, Floats] | None = None  # lifted pose at the end of the last track
+
+    def add(number: int, *moves: Moves) -> None:
+        for move in moves:
+            parts.append(move)
+            of.extend([number] * len(move.tip))
+
+    for number, given in enumerate(tracks):
+        track = given
+        if away is not None and not one_way:
+            ends = [float(np.linalg.norm(given.tip[k] - away[0])) for k in (0, -1)]
+            track = given if ends[0] <= ends[1] else given.back()
+        begin, end = job.away(track, 0), job.away(track, -1)
+        if begin is None or end is None:
+            refused.append((number, "no way off the surface at its " + ("beginning" if begin is None else "end")))
+            continue
+        there = begin[-1]
+        over = job.over(there, track.axis[0])
+        short = None if away is None else job.direct(away, (there, track.axis[0]))
+        if short is not None:
+            add(number, Moves.of(LINE, short[0], short[1], how.feed, "link"))
+            direct += 1
+        else:
+            if away is not None:
+                up = job.over(*away)
+                add(of[-1], job.up(up, away[1], one_way))
+                add(number, job.round((up, away[1]), (over, track.axis[0])))
+                retracts += 1
+            else:
+                add(number, Moves.of(RAPID, over[None], track.axis[:1], 0.0, "link"))
+            add(number, Moves.of(LINE, there[None], track.axis[:1], how.feed, "link"))
+        add(number, *(Moves.of(LINE, p[None], track.axis[:1], how.feed, "link") for p in begin[-2::-1]))
+        add(number, Moves.of(LINE, track.tip[:1], track.axis[:1], feed, "lead"))
+        add(number, Moves.of(LINE, track.tip[1:], track.axis[1:], feed, label))
+        add(number, Moves.of(LINE, end[0][None], track.axis[-1:], feed, "lead"))
+        add(number, *(Moves.of(LINE, p[None], track.axis[-1:], how.feed, "link") for p in end[1:]))
+        away = (end[-1], track.axis[-1])
+    if away is not None:
+        add(of[-1], job.up(job.over(*away), away[1], one_way))
+    else:
+        add(-1, Moves.of(RAPID, (top * T)[None], T[None], 0.0, "link"))
+    return Linked(_within_rate(Moves.join(parts), rate), tuple(refused), direct, retracts, np.array(of))
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    scene: Scene
+    cutter: CatalogueCutter
+    table: float
+    how: Link
+    clear_of: float
+    top: float
+
+    def away(self, track: ToolTrack, k: int) -> tuple[Floats, ...] | None:
+        """Tips on the way off the end ``k`` of a track, the last with a clear way up; None: there is none."""
+        p, T, N = track.tip[k], track.axis[k], track.normal[k]
+        share = np.arange(1, _SMALL + 1)[:, None] / _SMALL
+        for size in _LIFTS:
+            for way in (N + T, T, N, N + 2.0 * T, 2.0 * N + T):
+                step = self.how.lift * size * way / np.linalg.norm(way)
+                tips = p + share * step
+                got, _ = clearance(
+                    self.scene, self.cutter, tips, np.tile(T, (_SMALL, 1)), self.how.lift + 1.0, self.clear_of
+                )
+                if got.min() < -self.how.touch or got[-1] <= self.how.margin:
+                    continue
+                if self._up(tips[-1], T, self.how.margin):
+                    return (tips[-1],)
+        # too narrow for a lift: up along the axis as it stands, where it may touch what it touches now
+        if not self._up(p, T, -self.how.touch):
+            return None
+        return p + min(self.how.lift, self._rise(p, T)) * T, self.over(p, T)
+
+    def _rise(self, tip: Floats, axis: Floats) -> float:
+        return max(self.top - float(tip @ axis), 0.0)
+
+    def _up(self, tip: Floats, axis: Floats, margin: float) -> bool:
+        tips = [tip, self.over(tip, axis)]
+        return bool(moves_clear(self.scene, self.cutter, tips, [axis, axis], margin, self.clear_of).all())
+
+    def over(self, tip: Floats, axis: Floats) -> Floats:
+        """Tip above the part along the axis."""
+        up: Floats = tip + self._rise(tip, axis) * axis
+        return up
+
+    def up(self, tip: Floats, axis: Floats, fed: bool) -> Moves:
+        """The way up along the axis, ``fed``: not in rapid, for the blank may stand there."""
+        motion, feed = (LINE, self.how.feed) if fed else (RAPID, 0.0)
+        return Moves.of(motion, tip[None], axis[None], feed, "link")
+
+    def direct(self, a: tuple[Floats, Floats], b: tuple[Floats, Floats]) -> tuple[Floats, Floats] | None:
+        """Tips and axes of a straight link, None: too far or not clear. The axis stays at the table angle."""
+        if np.linalg.norm(b[0] - a[0]) > self.how.near:
+            return None
+        B0, B1 = pallet_of(self.table, a[1]), pallet_of(self.table, b[1])
+        turn = (B1 - B0 + math.pi) % math.tau - math.pi
+        count = max(1, math.ceil(abs(turn) / _TURN))
+        share = np.arange(1, count + 1) / count
+        tips = a[0] + share[:, None] * (b[0] - a[0])
+        axes = np.vstack([axis_at(self.table, written(B0 + share[:-1] * turn)).reshape(-1, 3), b[1][None]])
+        ok = moves_clear(
+            self.scene, self.cutter, np.vstack([a[0], tips]), np.vstack([a[1], axes]), self.how.margin, self.clear_of
+        )
+        return (tips, axes) if ok.all() else None
+
+    def round(self, a: tuple[Floats, Floats], b: tuple[Floats, Floats]) -> Moves:
+        """Rapids above the part: the pallet turns, the cutter keeps its height."""
+        B0, B1 = pallet_of(self.table, a[1]), pallet_of(self.table, b[1])
+        turn = (B1 - B0 + math.pi) % math.tau - math.pi
+        count = max(1, math.ceil(abs(turn) / _TURN))
+        share = np.arange(1, count + 1) / count
+        B = written(B0 + share * turn)
+        p0, p1 = _turned(a[0], -B0), _turned(b[0], -(B0 + turn))
+        tips = np.array([_turned(p0 + s * (p1 - p0), x) for s, x in zip(share, B, strict=True)])
+        tips[-1] = b[0]
+        axes = axis_at(self.table, B)
+        axes[-1] = b[1]
+        return Moves.of(RAPID, tips, axes, 0.0, "link")
+
+
+def _within_rate(moves: Moves, rate: float) -> Moves:
+    """The moves, fed so that the pallet keeps its rate."""
+    B = np.arctan2(moves.axis[:, 1], moves.axis[:, 0])
+    turn = np.abs((np.diff(B, prepend=B[:1]) + math.pi) % math.tau - math.pi)
+    length = np.linalg.norm(np.diff(moves.tip, axis=0, prepend=moves.tip[:1]), axis=1)
+    with np.errstate(divide="ignore"):
+        most = np.where(turn > 0.0, length * rate * (1.0 - 1e-9) / np.where(turn > 0.0, turn, 1.0), np.inf)
+    return replace(moves, feed=np.where((moves.feed > 0.0) & (length > 0.0), np.minimum(moves.feed, most), moves.feed))
+
+
+def deepest(moves: Moves, scene: Scene, cutter: CatalogueCutter, above: float, places: int = 3) -> tuple[float, int]:
+    """Least distance [mm] of the check points from the cutter at the rows and ``places`` between, and the row."""
+    share = np.arange(1, places + 2) / (places + 1)
+    tips = (moves.tip[:-1, None] + share[:, None] * (moves.tip[1:] - moves.tip[:-1])[:, None]).reshape(-1, 3)
+    row = np.repeat(np.arange(1, len(moves.tip)), len(share))
+    axes = between(moves.axis[row - 1], moves.axis[row], np.tile(share, len(moves.tip) - 1))
+    got, _ = clearance(scene, cutter, tips, axes, 1.0, above)
+    k = int(got.argmin())
+    return float(got[k]), int(row[k])
+
+
+def _turned(p: Floats, angle: float) -> Floats:
+    c, s = math.cos(angle), math.sin(angle)
+    out: Floats = np.array([c * p[0] - s * p[1], s * p[0] + c * p[1], p[2]])
+    return out

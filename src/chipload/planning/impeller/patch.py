@@ -1,0 +1,45 @@
+"""A patch: what one cutter mills at one table angle on one side of the channel.
+
+Notation: u along a side from the leading edge, v from hub to shroud; alpha table angle, B pallet angle. The strips of a
+side follow each other across one of u and v; the paths of a patch run along the other one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from chipload.planning.impeller.scene import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """Contiguous strips of one side, milled with one cutter at one table angle.
+
+    Parameters
+    ----------
+    body : 0 blade, 1 splitter, -1 hub floor
+    side : `plus`, `minus` or `floor`
+    order : `u` or `v`, the parameter across which strips follow each other; the paths run along the other one
+    low, high : its range of that parameter, within 0..1
+    cutter : index in the catalogue
+    table : alpha [rad]
+    at : (k, 2) u and v of its contact points
+    ranges : for each contact point (m, 2) valid pallet angles [rad]; m = 0: unreachable with every cutter
+    path, time : predicted, of one such side [mm], [s]
+    area : that is milled [mm2]
+    part : range of the other parameter; not 0..1 where no cutter at one table angle mills a whole strip
+    """
+
+    body: int
+    side: str
+    order: str
+    low: float
+    high: float
+    cutter: int
+    table: float
+    at: Floats
+    ranges: tuple[Floats, ...]
+    path: float
+    time: float
+    area: float
+    part: tuple[float, float] = (0.0, 1.0)

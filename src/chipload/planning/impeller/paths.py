@@ -1,0 +1,239 @@
+"""Finishing paths of a patch: lines that leave a scallop of the same height between them.
+
+Notation: a line runs along one parameter p of the surface at q(p) of the other; d its direction, N normal, e = N x d;
+h height of the scallop. The next line lies at the step w across e, q + w / (S_q.e) with the derivative half-way; w is
+how far the pass reaches below h on this side and how far the next one does on its own (``cusp.py``), then refined until
+the crest between the poses of both (``crest.py``) is as high as aimed. The next line's pallet angles are not known
+before it lies: they are first taken for those of this line.
+
+The pallet angles of a line come from the exact ranges at its points (``pallet.py``). Points without a range are left
+out and told; the line is split there. A line that reaches the border of the patch ends there; a part of a line along
+the border is the last.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d, minimum_filter1d
+
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.errors import InputError
+from chipload.geometry.bspline import BSplinePatch
+from chipload.planning.impeller.closed_form import axis_at
+from chipload.planning.impeller.lines import Flags, Line, LineMotion, Lines, Tracks, UnreachedSpan, stations, stretched
+from chipload.planning.impeller.ranges.ranges import FULL
+from chipload.planning.impeller.scallop_height import scallop_heights, shares
+from chipload.planning.impeller.scallop_width import reaches
+from chipload.planning.impeller.scene import Floats, Scene
+from chipload.planning.impeller.track import ToolTrack, posed
+from chipload.progress import Progress, silent
+
+_MENDS, _ROUNDS, _FINE = 3, 12, 0.5
+_LINES = 5000
+_STILL = 5e-3  # share by which a step may still change
+
+
+@dataclass(frozen=True)
+class PatchFinish:
+    """How a patch is finished.
+
+    Parameters
+    ----------
+    scallop : greatest height h [mm]
+    motion : what the lines are milled with
+    overrun : how far the lines go on beyond the patch at their ends [mm], where the surface does and the cutter reaches
+    aim : share of h that the step is laid out for; the rest is for what is not of second order
+    """
+
+    scallop: float
+    motion: LineMotion
+    overrun: float = 0.0
+    aim: float = 0.9
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.scallop < math.inf and 0.0 < self.aim <= 1.0):
+            raise InputError(f"scallop_mm = {self.scallop:g}, aim {self.aim:g}: must be above 0, aim at most 1")
+
+
+def finishing(
+    surface: BSplinePatch,
+    along: str,
+    box: tuple[tuple[float, float], tuple[float, float]],
+    scene: Scene,
+    number: int,
+    cutter: CatalogueCutter,
+    table: float,
+    how: PatchFinish,
+    pallets: tuple[tuple[float, float], ...] = FULL,
+    workers: int = 1,
+    progress: Progress = silent,
+) -> Tracks:
+    """Tracks over a part of a surface at constant scallop.
+
+    Parameters
+    ----------
+    along : `u` or `v`, the parameter that the lines run along
+    box : (low, high) of u, (low, high) of v, within 0..1
+    scene : its check points; its contact points are not looked at
+    number : of the surface among those of the check points
+    table : alpha [rad]
+    pallets : (k, 2) [rad] where B may be
+    """
+    if along not in ("u", "v"):
+        raise InputError(f"along = {along!r}: must be u or v")
+    P, Q = box if along == "u" else box[::-1]
+    if not (0.0 <= P[0] < P[1] <= 1.0 and 0.0 <= Q[0] < Q[1] <= 1.0):
+        raise InputError(f"box = {box}: must be ascending, within 0..1")
+    p = stretched(surface, along, P, Q, stations(surface, along, P, Q, how.motion.chord), how.overrun)
+    need = (p >= P[0]) & (p <= P[1])
+    job = Lines(surface, along, p, scene, number, cutter, table, how.motion, pallets, workers)
+    step = _Stepper(job, how.scallop, how.aim, need)
+    tracks: list[ToolTrack] = []
+    missed: list[UnreachedSpan] = []
+    q = job.border(Q, need)
+    line = job.line(q, np.full(len(p), np.nan))
+    if (q > Q[0]).any():
+        missed.append(job.strip(q, Q[0]))
+    use = np.ones(len(p), dtype=np.bool_)
+    for number_of in range(_LINES):
+        new, gone = job.tracks(line, use, number_of, need)
+        tracks += new
+        missed += gone
+        progress(float(np.clip((line.q.min() - Q[0]) / (Q[1] - Q[0]), 0.0, 1.0)), f"{number_of + 1} lines")
+        open_ = line.q < Q[1]
+        if not open_[need].any():
+            return Tracks(tuple(tracks), tuple(missed), number_of + 1)
+        line = step.next(line, Q[1])
+        # where the line before has reached the border there is nothing left
+        use = (
+            open_ | np.roll(open_, 1) & (np.arange(len(p)) > 0) | np.roll(open_, -1) & (np.arange(len(p)) < len(p) - 1)
+        )
+    raise InputError(f"finish.scallop = {how.scallop:g} mm: more than {_LINES} lines: raise it")
+
+
+@dataclass(frozen=True, eq=False)
+class _Stepper:
+    """From line to line at the scallop asked, within ``aim`` of it, at the stations that ``need`` it."""
+
+    lines: Lines
+    scallop: float
+    aim: float
+    need: Flags
+
+    def next(self, line: Line, end: float) -> Line:
+        """The next line towards ``end``, so that the scallop between is as high as asked.
+
+        The step is first laid out for the pallet angles of this line, then for those of the new one.
+        """
+        ahead, behind = self._reach(line)
+        w = self._even(ahead + behind)
+        B, out = line.pallet, line
+        for _ in range(_MENDS):
+            w = self._step(line, w, B)
+            out = self.lines.line(self._moved(line, w, end), B)
+            crest = self._crest(line, out.q, out.pallet)
+            off = crest > self.scallop * (0.5 + 0.5 * self.aim)
+            if not off.any() or not np.isfinite(out.pallet).any():
+                break
+            B = out.pallet
+        return out
+
+    def _moved(self, line: Line, w: Floats, end: float) -> Floats:
+        out: Floats = np.minimum(line.q + self._dq(line, w), end)
+        return out
+
+    def _step(self, line: Line, w: Floats, pallet: Floats) -> Floats:
+        """The step at which the crest is as high as aimed, if the next line is milled at these pallet angles."""
+        aim = self.aim * self.scallop
+        for _ in range(_ROUNDS):
+            crest = self._crest(line, self._moved(line, w, 1.0), pallet)
+            ratio = np.clip(np.sqrt(aim / np.clip(crest, 0.1 * aim, None)), 0.6, 1.3)
+            if not np.isfinite(ratio).any() or (np.nanmin(ratio) > 0.99 and np.nanmax(ratio) < 1.03):
+                break
+            new = np.minimum(
+                self._even(np.where(np.isfinite(ratio), w * ratio, np.nan)),
+                self.lines.cutter.rho + self.lines.cutter.corner_radius,
+            )
+            still = np.abs(new - w).max() < _STILL * w.max()
+            w = new
+            if still:
+                break
+        return w
+
+    def _crest(self, line: Line, q: Floats, pallet: Floats) -> Floats:
+        """(n,) crest between a line and one at q, the highest near each station; nan: one of them is not milled."""
+        n = len(q)
+        length = float(np.linalg.norm(np.diff(line.S, axis=0), axis=1).mean())
+        sub = 2 * max(1, math.ceil(0.5 * length / _FINE))
+        at = np.arange((n - 1) * sub + 1) / sub
+        p, q0, q1 = (np.interp(at, np.arange(n), x) for x in (self.lines.p, line.q, q))
+        B0, B1 = (_blended(x, at) for x in (line.pallet, pallet))
+        share = shares()
+        P, Q = np.repeat(p, len(share)), (q0[:, None] + share * (q1 - q0)[:, None]).ravel()
+        points, normals = (x.reshape(len(at), len(share), 3) for x in self.lines.facing(P, Q))
+        one, two = self._poses(*self.lines.facing(p, q0), B0), self._poses(*self.lines.facing(p, q1), B1)
+        fine = scallop_heights(
+            points, normals, (one[0], two[0]), (one[1], two[1]), self.lines.cutter.rho, self.lines.cutter.corner_radius
+        )
+        near = np.pad(np.where(np.isfinite(fine), fine, -np.inf), sub // 2, constant_values=-np.inf)
+        worst = np.array([near[k * sub : k * sub + sub + 1].max() for k in range(n)])
+        both = np.isfinite(line.pallet) & np.isfinite(pallet) & np.isfinite(worst)
+        return np.where(both & self.need, worst, np.nan)
+
+    def _poses(self, S: Floats, N: Floats, pallet: Floats) -> tuple[Floats, Floats]:
+        known = np.isfinite(pallet)
+        tip, axis = posed(S, N, self.lines.table, np.where(known, pallet, 0.0), self.lines.cutter)
+        return np.where(known[:, None], tip, np.nan), np.where(known[:, None], axis, np.nan)
+
+    def _reach(self, line: Line) -> tuple[Floats, Floats]:
+        """How far a line reaches towards a growing q and against it; nan where it has no pallet angle."""
+        ahead, behind = np.full(len(line.q), np.nan), np.full(len(line.q), np.nan)
+        k = np.flatnonzero(np.isfinite(line.pallet) & self.need)
+        if len(k):
+            T = axis_at(self.lines.table, line.pallet[k])
+            a, b = reaches(
+                line.N[k], T, line.d[k], line.K[k], self.lines.cutter.rho, self.lines.cutter.corner_radius,
+                self.aim * self.scallop,
+            )  # fmt: skip
+            left = self._sign(line)[k] > 0.0
+            ahead[k], behind[k] = np.where(left, a, b), np.where(left, b, a)
+        return ahead, behind
+
+    def _sign(self, line: Line) -> Floats:
+        """(n,) S_q.e: mm across the line for a growth of q by 1."""
+        return self._across(line, line.q)
+
+    def _across(self, line: Line, q: Floats) -> Floats:
+        u, v = (self.lines.p, q) if self.lines.along == "u" else (q, self.lines.p)
+        Sq = self.lines.surface.at(u, v, *((0, 1) if self.lines.along == "u" else (1, 0)))
+        out: Floats = (Sq * np.cross(line.N, line.d)).sum(axis=1)
+        return out
+
+    def _even(self, w: Floats) -> Floats:
+        """Steps without jumps along the line, nowhere above those given; where there are none, of the nearest."""
+        known = np.flatnonzero(np.isfinite(w))
+        if len(known) == 0:
+            r, h = self.lines.cutter.corner_radius, self.scallop
+            return np.full(len(w), 2.0 * math.sqrt(2.0 * max(r, h) * h))
+        near = known[np.abs(known[None] - np.arange(len(w))[:, None]).argmin(axis=1)]
+        out: Floats = np.minimum(gaussian_filter1d(minimum_filter1d(w[near], 3), 1.0, mode="nearest"), w[near])
+        return out
+
+    def _dq(self, line: Line, w: Floats) -> Floats:
+        first = w / np.abs(self._across(line, line.q))
+        middle = np.clip(line.q + 0.5 * first, 0.0, 1.0)
+        out: Floats = w / np.abs(self._across(line, middle))
+        return out
+
+
+def _blended(pallet: Floats, at: Floats) -> Floats:
+    """Pallet angles between stations; nan next to a station that has none."""
+    i = np.minimum(at.astype(np.int64), len(pallet) - 2)
+    w = at - i
+    turn = pallet[i + 1] - pallet[i]
+    turn = turn - math.tau * np.round(turn / math.tau)
+    out: Floats = pallet[i] + w * turn
+    return np.where(w == 0.0, pallet[i], np.where(w == 1.0, pallet[i + 1], out))

@@ -1,0 +1,97 @@
+"""The pallet angles at which one cutter is clear, neck, shank and holder too.
+
+Notation: as in ``search.py``. A range is a row (from, to) [rad] of pallet angles; at its ends the cutter touches.
+Parts narrower than ``FLAT`` where the cutter's axis stands along the normal are left out: there V has no direction.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.planning.impeller.blocks import BLOCK, in_blocks
+from chipload.planning.impeller.ranges import _kernels
+from chipload.planning.impeller.scene import Floats, Ints, Scene
+from chipload.progress import Progress, silent
+
+#: all pallet angles [rad]
+FULL = ((0.0, 2.0 * math.pi),)
+#: a part of B narrower than this [rad] next to n = 1 counts as forbidden
+FLAT = 1e-4
+
+_WIDTH = math.radians(2.0)  # of a part of B for which near check points are collected at once
+_MOST = 32  # ranges of one contact point, points of one proof
+
+
+@dataclass(frozen=True, eq=False)
+class Ranges:
+    """Where one cutter may go.
+
+    Parameters
+    ----------
+    ranges : for each contact point (k, 2) float [rad]; k = 0: nowhere
+    blockers : for each contact point the check points that forbid every B, where there is no range, else none
+    complete : (c,) bool; False: there were too many arcs to tell, no range is claimed
+    """
+
+    ranges: tuple[Floats, ...]
+    blockers: tuple[Ints, ...]
+    complete: NDArray[np.bool_]
+
+
+def valid_ranges(
+    scene: Scene,
+    cutter: CatalogueCutter,
+    tables: ArrayLike,
+    clearance: float = 0.0,
+    pallets: ArrayLike = FULL,
+    points: ArrayLike | None = None,
+    least: float = 1e-9,
+    workers: int = 1,
+    progress: Progress = silent,
+) -> Ranges:
+    """Pallet angles at which the cutter touches a contact point and is clear of every check point.
+
+    Parameters
+    ----------
+    tables : alpha [rad], one for all or one for each of the ``points``
+    clearance : between all above the cutting part and the check points [mm]
+    pallets : (k, 2) [rad], where B may be
+    points : (c,) int, which contact points; None: all
+    least : narrower ranges [rad] are left out
+    """
+    which = np.arange(len(scene.contact)) if points is None else np.asarray(points, dtype=np.int64)
+    alpha = np.broadcast_to(np.asarray(tables, dtype=np.float64), which.shape)
+    spans = np.ascontiguousarray(np.asarray(pallets, dtype=np.float64).reshape(-1, 2))
+    rows, tree = np.ascontiguousarray(scene.rows[which]), scene.tree
+    cones = np.column_stack([np.sin(alpha), np.cos(alpha)])
+    number = np.zeros(len(which), dtype=np.int64)
+    found = np.zeros((len(which), _MOST, 2))
+    hints = np.full((len(which), 1), -2, dtype=np.int64)
+    proof = np.full((len(which), _MOST), -1, dtype=np.int64)
+    tool = np.array([cutter.rho, cutter.corner_radius])
+    stages = cutter.stages(clearance)
+    check, own = scene.check[tree.order], scene.check_surface[tree.order]
+
+    def block(first: int) -> None:
+        _kernels.fitted(
+            check, own, tree.nodes, tree.spans, tree.leaves, rows, cones, scene.near**2, tool, stages, spans, _WIDTH,
+            FLAT, least, hints, first, min(first + BLOCK, len(rows)), number, found, proof,
+        )  # fmt: skip
+
+    in_blocks(block, len(which), workers, progress, f"pallet angles of D {cutter.diameter:g} mm")
+    # a contact point where the corner is larger than the radius of curvature has no range at any B
+    tight = cutter.corner_radius * scene.curvature_max[which] >= 1.0
+    number[tight] = 0
+    proof[tight] = -1
+    proof[tight, 0] = -2
+    ranges = tuple(found[k, : max(int(n), 0)].copy() for k, n in enumerate(number))
+    given = np.where(proof >= 0, tree.order[np.maximum(proof, 0)] if len(check) else proof, proof)
+    blockers = tuple(
+        np.unique(row[(row != -1) & (row != -3)]) if n == 0 else row[:0] for row, n in zip(given, number, strict=True)
+    )
+    return Ranges(ranges, blockers, number >= 0)

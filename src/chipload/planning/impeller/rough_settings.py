@@ -1,0 +1,206 @@
+"""Roughing of every channel: which cutter, at which table angle, and its programs.
+
+Notation: alpha table angle, D diameter. A channel is looked at on points of its layers (``floor.py``) beside walls
+thicker by their allowances. The largest cutter that fits is the largest that, by the proved search point by point, goes
+at a stated share of them; its table angle is the one at which it goes at most of them. What it does not reach there is
+roughed at a second angle where that adds enough, and so on; rows there go only where those before did not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.catalogue import Catalogue, CatalogueCutter
+from chipload.errors import InputError
+from chipload.planning.impeller.answer import largest_cutters
+from chipload.planning.impeller.floor import layer_of
+from chipload.planning.impeller.impeller import Impeller
+from chipload.planning.impeller.lines import Tracks
+from chipload.planning.impeller.links import Link, Linked, linked
+from chipload.planning.impeller.programs import program_of
+from chipload.planning.impeller.ranges.ranges import valid_ranges
+from chipload.planning.impeller.roughing import RoughingSettings, layers, roughing, thickened, uncut
+from chipload.planning.impeller.scene import Floats, Scene
+from chipload.planning.impeller.tables import IndexTable
+from chipload.planning.impeller.track import ToolTrack
+from chipload.program.program import Program
+from chipload.progress import Progress, silent
+
+#: shares along and across a layer of the points at which a channel is looked at; most layers of them
+_ALONG, _ACROSS, _LAYERS = np.linspace(0.06, 0.94, 9), (0.25, 0.5, 0.75), 4
+#: least share of the points that a further table angle must add
+_WORTH = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class RoughingSetting:
+    """Roughing of one channel with one cutter at one table angle.
+
+    Parameters
+    ----------
+    index : of the body on whose plus side the channel is
+    cutter, table : which, alpha [rad]
+    layers : how many
+    tracks : rows, and what is missed of them
+    linked : all moves
+    program : in the frame of the impeller
+    stopped : rows that are left out, for what is above the cutting part met uncut blank there
+    walls, top, how, link, spindle, tool : what the moves were made with
+    """
+
+    index: int
+    cutter: CatalogueCutter
+    table: float
+    layers: int
+    tracks: Tracks
+    linked: Linked
+    program: Program
+    stopped: tuple[ToolTrack, ...]
+    walls: Scene
+    top: Floats
+    how: RoughingSettings
+    link: Link
+    spindle: float
+    tool: int
+
+    def without(self, numbers: Sequence[int]) -> RoughingSetting:
+        """The same without some of its rows, linked anew."""
+        gone = set(numbers)
+        keep = tuple(t for k, t in enumerate(self.tracks.tracks) if k not in gone)
+        out = tuple(t for k, t in enumerate(self.tracks.tracks) if k in gone)
+        tracks = replace(self.tracks, tracks=keep)
+        way = _linked(keep, self.walls, self.cutter, self.table, self.how, self.link, self.top)
+        program = program_of(way.moves, self.spindle, self.tool)
+        return replace(self, tracks=tracks, linked=way, program=program, stopped=(*self.stopped, *out))
+
+    def numbered(self, tool: int) -> RoughingSetting:
+        """The same with another tool number."""
+        return replace(self, tool=tool, program=program_of(self.linked.moves, self.spindle, tool))
+
+    @property
+    def machined(self) -> tuple[ToolTrack, ...]:
+        """The rows that are in the moves."""
+        gone = {k for k, _ in self.linked.refused}
+        return tuple(t for k, t in enumerate(self.tracks.tracks) if k not in gone)
+
+
+def roughed(
+    impeller: Impeller, catalogue: Catalogue, stated: CatalogueCutter | None, how: RoughingSettings, link: Link,
+    spindle: float,
+    table: IndexTable, share: float, ahead: float = 0.0, workers: int = 1, progress: Progress = silent,
+) -> tuple[RoughingSetting, ...]:  # fmt: skip
+    """The roughing programs of all channels.
+
+    Parameters
+    ----------
+    stated : the cutter; None: the largest of the catalogue that goes at the ``share`` of the points of the channels
+    spindle : [rad/s]
+    ahead : how far the hub goes on ahead of the blade's leading edge [mm]
+
+    Raises
+    ------
+    InputError
+        No cutter goes at the share of the points.
+    """
+    scenes = [_looked_at(impeller, k, how, ahead) for k in range(len(impeller.bodies))]
+    cutter = stated if stated is not None else _largest(scenes, catalogue, how, table, share, workers)
+    spans = tuple((float(a), float(b)) for a, b in table.spans)
+    plans: list[tuple[int, float]] = []
+    for index, scene in enumerate(scenes):
+        goes = np.array([_goes(scene, cutter, float(alpha), how, table, workers) for alpha in table.angle])
+        if not goes.any():
+            raise InputError(
+                f"operation.0.rough: D {cutter.diameter:g} r {cutter.corner_radius:g} mm goes nowhere in the channel "
+                f"on the plus side of the {'splitter' if index else 'blade'}: state a smaller one"
+            )
+        done = np.zeros(goes.shape[1], dtype=np.bool_)
+        while True:
+            gain = (goes & ~done).sum(axis=1)
+            best = int(gain.argmax())
+            if done.any() and gain[best] < _WORTH * len(done):
+                break
+            plans.append((index, float(table.angle[best])))
+            done |= goes[best]
+            if done.all():
+                break
+    out: list[RoughingSetting] = []
+    for k, (index, alpha) in enumerate(plans):
+        before = [t for r in out if r.index == index for t in r.machined]
+        tracks, walls = roughing(
+            impeller, index, cutter, alpha, how, ahead, spans, workers,
+            _part(progress, k, len(plans)), before,
+        )  # fmt: skip
+        top = uncut(impeller, index, how, ahead, whole=True)
+        way = _linked(tracks.tracks, walls, cutter, alpha, how, link, top)
+        count = len(layers(impeller, how.depth, how.hub, ahead))
+        program, tool = program_of(way.moves, spindle, len(out) + 1), len(out) + 1
+        out.append(
+            RoughingSetting(index, cutter, alpha, count, tracks, way, program, (), walls, top, how, link, spindle, tool)
+        )
+    return tuple(out)
+
+
+def _linked(
+    tracks: tuple[ToolTrack, ...],
+    walls: Scene,
+    cutter: CatalogueCutter,
+    alpha: float,
+    how: RoughingSettings,
+    link: Link,
+    top: Floats,
+) -> Linked:
+    motion = how.motion
+    return linked(
+        tracks, walls, cutter, alpha, motion.feed, link, motion.clearance, "rough", motion.rate, one_way=True,
+        outline=top,
+    )  # fmt: skip
+
+
+def _part(progress: Progress, k: int, n: int) -> Progress:
+    return lambda done, what: progress((k + done) / n, what)
+
+
+def _looked_at(impeller: Impeller, index: int, how: RoughingSettings, ahead: float) -> Scene:
+    """Points of some layers of a channel, beside its thickened walls."""
+    w = layers(impeller, how.depth, how.hub, ahead)
+    some = w[np.unique(np.linspace(0, len(w) - 1, min(len(w), _LAYERS)).round().astype(int))]
+    parts: list[tuple[Floats, Floats, Floats]] = []
+    u, v = (x.ravel() for x in np.meshgrid(_ALONG, _ACROSS, indexing="ij"))
+    for share in some:
+        patch = layer_of(impeller, index, float(share), how.hub, ahead)
+        parts.append((patch.at(u, v), patch.normal(u, v), patch.curvature(u, v)))
+    S, N, K = (np.concatenate([p[k] for p in parts]) for k in range(3))
+    return thickened(impeller, index, how, ahead).at_contacts(S, N, K, 2)
+
+
+def _largest(
+    scenes: Sequence[Scene], catalogue: Catalogue, how: RoughingSettings, table: IndexTable, share: float, workers: int
+) -> CatalogueCutter:
+    """The largest cutter that goes at the share of the points, each at its own table angle."""
+    found = np.concatenate(
+        [
+            largest_cutters(
+                s, catalogue, table.angle, how.motion.clearance, pallets=table.spans, workers=workers
+            ).diameter
+            for s in scenes
+        ]
+    )
+    most = float(np.sort(found)[::-1][max(int(np.ceil(share * len(found))) - 1, 0)])
+    if most <= 0.0:
+        raise InputError(
+            f"operation.0.rough.share = {share:g}: no cutter of catalogue {catalogue.name} goes at so many points of "
+            f"the channels, at {float((found > 0.0).mean()):.3g} of them one does: lower it, or state a cutter"
+        )
+    able = [c for c in catalogue.cutters if c.diameter <= most]
+    return max(able, key=lambda c: (c.diameter, c.corner_radius))
+
+
+def _goes(
+    scene: Scene, cutter: CatalogueCutter, alpha: float, how: RoughingSettings, table: IndexTable, workers: int
+) -> NDArray[np.bool_]:
+    got = valid_ranges(scene, cutter, alpha, how.motion.clearance, table.spans, workers=workers)
+    return np.array([len(r) > 0 for r in got.ranges])

@@ -1,0 +1,69 @@
+"""How far from its path a pass stays below a scallop, on either side, with corner and flank.
+
+Notation: S contact point, N normal, T cutter axis, n = N.T, V unit across T towards N; d along the path, e = N x d
+across it; r corner radius, rho = R - r; K curvature tensor of the surface; h height of the scallop.
+
+Seen along d the cutter is the hull of its corner, a circle of radius rho drawn out by r, and of all above it along T.
+In the plane of e and N its lower outline is, at the distance x, y(x) = the largest over phi of
+(x sin phi - H(phi)) / cos phi, H the support of the hull in the direction u = -N cos phi + e sin phi,
+H = u.(r N + rho V) + r + rho sqrt(1 - (u.T)^2), for all u.T <= 0. Near the path y is the circle of the corner
+(``step_over.py``: q its curvature beyond the surface's), beyond the end of the corner it is the straight flank. Two
+neighbouring passes meet at h where the one reaches it on its right side and the other on its left.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from chipload.planning.impeller.scene import Floats
+from chipload.planning.impeller.step_over import contact_of, trace_curvature
+
+_PHI = np.radians(np.concatenate([-np.geomspace(80.0, 0.2, 60), [0.0], np.geomspace(0.2, 80.0, 60)]))
+
+
+def reaches(
+    normal: Floats, axis: Floats, along: Floats, curvature: Floats, rho: float, corner: float, scallop: float
+) -> tuple[Floats, Floats]:
+    """Distances (c,), (c,) float [mm] from the path, towards e and against it, where the pass is ``scallop`` high.
+
+    At most R; 0 where the cutter does not fit the curvature of the surface.
+    """
+    N, T = normal, axis
+    q = trace_curvature(contact_of(N, T, along, curvature), rho, corner)
+    d = along - (along * N).sum(axis=1)[:, None] * N
+    d /= np.linalg.norm(d, axis=1)[:, None]
+    e = np.cross(N, d)
+    n = (N * T).sum(axis=1)
+    s = np.sqrt(np.clip(1.0 - n * n, 1e-300, None))
+    V = (N - n[:, None] * T) / s[:, None]
+    k = np.einsum("ci,cij,cj->c", e, curvature, e)
+    c1, c2 = (e * (T - n[:, None] * N)).sum(axis=1) / s, (e * np.cross(N, T)).sum(axis=1) / s
+    flat = corner * c1**2 + (corner + rho / s) * c2**2 if corner > 0.0 else rho / s * c2**2
+    R = rho + corner
+    x = np.concatenate([[0.0], np.geomspace(1e-3 * R, R, 80)])
+    eT = (e * T).sum(axis=1)
+    # beside the fixed slopes that of the flank, u.T = 0
+    flank = np.clip(np.arctan2(n, np.abs(eT)), 0.0, _PHI[-1]) * np.where(eT < 0.0, -1.0, 1.0)
+    phi = np.column_stack([np.tile(_PHI, (len(N), 1)), flank])
+    cos, sin = np.cos(phi), np.sin(phi)
+    uT = -n[:, None] * cos + eT[:, None] * sin
+    uV = -s[:, None] * cos + (e * V).sum(axis=1)[:, None] * sin
+    H = corner * (1.0 - cos) + rho * (uV + np.sqrt(np.clip(1.0 - uT**2, 0.0, None)))
+    H = np.where(uT <= 1e-9, H, np.inf)
+    # coupled with the curvature along the path: as the circle of the corner is
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bare = np.where(flat > 0.0, 1.0 / np.where(flat > 0.0, flat, 1.0), np.inf) - k
+        scale = np.where((bare > 0.0) & np.isfinite(bare) & np.isfinite(q), q / bare, 1.0)
+    out = []
+    for sign in (1.0, -1.0):
+        y = ((sign * x)[None, :, None] * sin[:, None] - H[:, None]) / cos[:, None]
+        g = (y.max(axis=2) - 0.5 * k[:, None] * x**2) * scale[:, None]
+        over = g >= scallop
+        j = np.where(over.any(axis=1), over.argmax(axis=1), len(x) - 1)
+        rows = np.arange(len(N))
+        g0, g1, x0, x1 = g[rows, np.maximum(j - 1, 0)], g[rows, j], x[np.maximum(j - 1, 0)], x[j]
+        # between two places the outline is nearly a parabola
+        root = np.sqrt(np.clip(np.stack([g0, g1, np.full_like(g0, scallop)]), 0.0, None))
+        share = np.where(root[1] > root[0], (root[2] - root[0]) / np.where(root[1] > root[0], root[1] - root[0], 1), 1)
+        out.append(np.where(q > 0.0, np.where(over.any(axis=1), x0 + share * (x1 - x0), R), 0.0))
+    return out[0], out[1]

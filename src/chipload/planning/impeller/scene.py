@@ -1,0 +1,104 @@
+"""What is milled and what must not be touched: contact points and check points.
+
+Notation: S contact point [mm], N its unit normal into the channel, K curvature tensor of its surface (3, 3) [1/mm],
+above 0 where the surface bends towards N; c check point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import InputError
+from chipload.planning.impeller.tree import Tree, tree_of
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_UNIT = 1e-6  # a normal may differ from a unit vector by so much
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Contact points and check points of one set-up.
+
+    Parameters
+    ----------
+    contact : S (c, 3) float [mm]
+    normal : N (c, 3) float, unit
+    curvature : K (c, 3, 3) float [1/mm]
+    surface : (c,) int, which surface each contact point lies on
+    check : (m, 3) float [mm]
+    check_surface : (m,) int
+    near : check points of the contact's own surface nearer than this [mm] are left out: there the curvature stands for
+        them. A deviation of the surface from its second order, over that distance, is not seen.
+
+    Raises
+    ------
+    InputError
+        An array has the wrong shape or a number that is not finite, a normal is not a unit vector.
+    """
+
+    contact: Floats
+    normal: Floats
+    curvature: Floats
+    surface: Ints
+    check: Floats
+    check_surface: Ints
+    near: float
+    known: Tree | None = field(default=None, repr=False)
+    tree: Tree = field(init=False, repr=False)
+    rows: Floats = field(init=False, repr=False)
+    ordered: Floats = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        c, m = len(self.contact), len(self.check)
+        shapes = {"contact": (c, 3), "normal": (c, 3), "curvature": (c, 3, 3), "check": (m, 3)}
+        for name, shape in shapes.items():
+            value = np.array(getattr(self, name), dtype=np.float64)
+            if value.shape != shape:
+                raise InputError(f"scene.{name}: shape {value.shape}: must be {shape}")
+            if not np.isfinite(value).all():
+                raise InputError(f"scene.{name}: a number is not finite")
+            value.flags.writeable = False
+            object.__setattr__(self, name, value)
+        for name, length in (("surface", c), ("check_surface", m)):
+            number = np.array(getattr(self, name), dtype=np.int64)
+            if number.shape != (length,):
+                raise InputError(f"scene.{name}: shape {number.shape}: must be ({length},)")
+            number.flags.writeable = False
+            object.__setattr__(self, name, number)
+        if c == 0:
+            raise InputError("scene.contact: no contact point: must have at least one")
+        wrong = np.abs((self.normal**2).sum(axis=1) - 1.0) > _UNIT
+        if wrong.any():
+            raise InputError(f"scene.normal of contact point {int(wrong.argmax())}: must be a unit vector")
+        if not 0.0 <= self.near < np.inf:
+            raise InputError(f"scene.near_mm = {self.near:g}: must be at least 0")
+        object.__setattr__(self, "tree", tree_of(self.check) if self.known is None else self.known)
+        object.__setattr__(self, "rows", self._rows())
+        object.__setattr__(self, "ordered", np.ascontiguousarray(self.check[self.tree.order]))
+
+    def at_contacts(self, contact: Floats, normal: Floats, curvature: Floats, surface: int) -> Scene:
+        """The same check points with other contact points, all on one surface."""
+        number = np.full(len(contact), surface, dtype=np.int64)
+        return Scene(contact, normal, curvature, number, self.check, self.check_surface, self.near, self.tree)
+
+    def _rows(self) -> Floats:
+        """(c, 16): S, N, tangents E1, E2, K in them, the surface."""
+        N = self.normal
+        other = np.eye(3)[np.abs(N).argmin(axis=1)]
+        E1 = np.cross(N, other)
+        E1 /= np.linalg.norm(E1, axis=1)[:, None]
+        E2 = np.cross(N, E1)
+        K = [np.einsum("ci,cij,cj->c", a, self.curvature, b) for a, b in ((E1, E1), (E1, E2), (E2, E2))]
+        return np.column_stack([self.contact, N, E1, E2, *K, self.surface])
+
+    @property
+    def curvature_max(self) -> Floats:
+        """Largest principal curvature (c,) [1/mm] of the surface at each contact point."""
+        a, b, d = self.rows[:, 12], self.rows[:, 13], self.rows[:, 14]
+        out: Floats = 0.5 * (a + d) + np.hypot(0.5 * (a - d), b)
+        return out

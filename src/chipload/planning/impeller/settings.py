@@ -1,0 +1,258 @@
+"""From patches to moves: one program for each cutter at each table angle, every patch finished in its turn.
+
+What the passes of all patches together leave too high is milled by rest passes (``rest.py``), in the program of the
+cutter at the table angle that reaches it, or in one of its own.
+
+Notation: a setting is a cutter at a table angle with the patches that are milled so; alpha table angle [rad]. In the
+scene of a channel the surfaces are numbered as :meth:`Impeller.scene` does for the plus side of the blade.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from chipload.cutter.catalogue import Catalogue, CatalogueCutter
+from chipload.geometry.bspline import BSplinePatch as Surface
+from chipload.planning.impeller.floor import patch_of
+from chipload.planning.impeller.impeller import FILLET, Impeller
+from chipload.planning.impeller.lines import Tracks
+from chipload.planning.impeller.links import Link, Linked, linked
+from chipload.planning.impeller.patch import Patch
+from chipload.planning.impeller.paths import PatchFinish, finishing
+from chipload.planning.impeller.programs import program_of
+from chipload.planning.impeller.rest_machining import (
+    Pair,
+    RestPasses,
+    RestSettings,
+    SurfaceGrid,
+    face_of,
+    left_over,
+    regions,
+)
+from chipload.planning.impeller.scene import Floats, Scene
+from chipload.planning.impeller.surfaces import BODIES, ContactSampling, counts, hub_range
+from chipload.planning.impeller.tables import IndexTable
+from chipload.planning.impeller.track import ToolTrack
+from chipload.program.program import Program
+from chipload.progress import Progress, silent
+
+#: number of each surface in the scene of the blade's plus side
+NUMBERS = {(0, "plus"): 0, (1, "minus"): 1, (0, "minus"): 3, (1, "plus"): 4}
+NUMBERS |= {(body, f"{side} fillet"): FILLET + n for (body, side), n in NUMBERS.items()}
+_FLOOR = 2
+#: rest passes take what is left above this share of the scallop: the count is of points, and not exact
+_AIM = 0.95
+
+
+@dataclass(frozen=True, eq=False)
+class Milling:
+    """A patch with its finishing path.
+
+    Parameters
+    ----------
+    patch : the patch
+    along : `u` or `v`, which its lines run along
+    box : (low, high) of u, of v
+    tracks : what is milled, and what is missed
+    """
+
+    patch: Patch
+    along: str
+    box: tuple[tuple[float, float], tuple[float, float]]
+    tracks: Tracks
+
+
+@dataclass(frozen=True, eq=False)
+class CutterSetting:
+    """A cutter at a table angle.
+
+    Parameters
+    ----------
+    cutter, table : which, alpha [rad]
+    millings : its patches in their order
+    rests : rest passes where other passes leave too much, after the patches
+    linked : all moves; tracks that cannot be come to
+    program : in the frame of the impeller, of one channel
+    """
+
+    cutter: CatalogueCutter
+    table: float
+    millings: tuple[Milling, ...]
+    rests: tuple[RestPasses, ...]
+    linked: Linked
+    program: Program
+
+    @property
+    def tracks(self) -> tuple[ToolTrack, ...]:
+        """Of all patches, then of the rest passes."""
+        return (*(t for m in self.millings for t in m.tracks.tracks), *(t for r in self.rests for t in r.tracks))
+
+    @property
+    def machined(self) -> tuple[ToolTrack, ...]:
+        """The tracks that are in the moves."""
+        gone = {k for k, _ in self.linked.refused}
+        return tuple(t for k, t in enumerate(self.tracks) if k not in gone)
+
+    @property
+    def length(self) -> float:
+        """Of the path in the cut [mm]."""
+        return math.fsum(t.length for t in self.machined)
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedSettings:
+    """All settings, and what by the planner's own count is still left higher than asked.
+
+    ``left`` [mm2] of each surface by body and side, ``unreached`` [mm2] of it where no cutter and table angle that was
+    tried has a valid pallet angle.
+    """
+
+    settings: tuple[CutterSetting, ...]
+    left: dict[tuple[int, str], float]
+    unreached: dict[tuple[int, str], float]
+
+
+def channel_scene(impeller: Impeller, how: ContactSampling) -> Scene:
+    """Check points of the channels beside the blade, as fine as ``how`` says."""
+    check, hub = counts(impeller, how)
+    return impeller.scene(
+        0, "plus", ([0.5], [0.5]), check, how.near, max(how.around, 1), hub, hub_range(impeller, how.ahead)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class FinishSettings:
+    """What finishing programs are planned with.
+
+    Parameters
+    ----------
+    scene : of :func:`channel_scene`
+    spindle : [rad/s]
+    ahead : how far the hub goes on ahead of the blade's leading edge [mm]
+    tools : tool numbers that are taken
+    """
+
+    impeller: Impeller
+    catalogue: Catalogue
+    scene: Scene
+    how: PatchFinish
+    link: Link
+    spindle: float
+    table: IndexTable
+    ahead: float = 0.0
+    workers: int = 1
+    tools: int = 0
+
+    @property
+    def spans(self) -> tuple[tuple[float, float], ...]:
+        """Where the pallet may stand [rad]."""
+        return tuple((float(a), float(b)) for a, b in self.table.spans)
+
+    def milling(self, patch: Patch) -> Milling:
+        """The finishing path of a patch."""
+        strips, part = (patch.low, patch.high), patch.part
+        along, box = ("v", (strips, part)) if patch.order == "u" else ("u", (part, strips))
+        if patch.part == (0.0, 1.0):
+            other = np.unique(patch.at[:, 1 if patch.order == "u" else 0])
+            whole = (float(other[0]), float(other[-1]))
+            box = (strips, whole) if patch.order == "u" else (whole, strips)
+        tracks = finishing(
+            self.surface(patch.body, patch.side), along, box, self.scene, _number(patch.body, patch.side),
+            self.catalogue.cutters[patch.cutter], patch.table, self.how, self.spans, self.workers,
+        )  # fmt: skip
+        return Milling(patch, along, box, tracks)
+
+    def surface(self, body: int, side: str) -> Surface:
+        """The surface with its parameters."""
+        return patch_of(self.impeller, BODIES[body], side, self.ahead)
+
+    def setting(self, pair: Pair, millings: Sequence[Milling], rests: Sequence[RestPasses], tool: int) -> CutterSetting:
+        """The tracks of a cutter at a table angle, linked; ``tool`` its number."""
+        cutter, alpha = self.catalogue.cutters[pair[0]], pair[1]
+        tracks = (*(t for m in millings for t in m.tracks.tracks), *(t for r in rests for t in r.tracks))
+        motion = self.how.motion
+        moves = linked(tracks, self.scene, cutter, alpha, motion.feed, self.link, motion.clearance, rate=motion.rate)
+        program = program_of(moves.moves, self.spindle, self.tools + tool)
+        return CutterSetting(cutter, alpha, tuple(millings), tuple(rests), moves, program)
+
+
+def planned(
+    job: FinishSettings, patches: Sequence[Patch], rounds: int = 8, progress: Progress = silent
+) -> PlannedSettings:
+    """The settings of patches, in the order in which their first patches stand, then those of rest passes alone.
+
+    Parameters
+    ----------
+    rounds : most times that what is left is looked at and milled with rest passes
+    """
+    groups: dict[Pair, list[Milling]] = {}
+    for done, patch in enumerate(patches):
+        groups.setdefault((patch.cutter, patch.table), []).append(job.milling(patch))
+        progress(0.8 * (done + 1) / len(patches), f"paths of {done + 1} patches")
+    settings = {pair: job.setting(pair, rows, (), k) for k, (pair, rows) in enumerate(groups.items(), 1)}
+    faces = _faces(job, [m for rows in groups.values() for m in rows])
+    h = job.how.scallop
+    hopeless = [np.zeros((len(f.u), len(f.v)), dtype=np.bool_) for f in faces]
+    left: list[Floats] = []
+    for turn in range(rounds + 1):
+        passes = [(s.cutter, s.machined) for s in settings.values()]
+        left = [left_over(f, passes) for f in faces]
+        plan = RestSettings(
+            job.scene, job.catalogue, job.how.motion, h, job.how.overrun, tuple(settings), job.table.angle, job.spans,
+            job.workers,
+        )  # fmt: skip
+        new: dict[Pair, list[RestPasses]] = {}
+        for face, over, lost in zip(faces, left, hopeless, strict=True):
+            for region in regions(over, _AIM * h, lost) if turn < rounds else ():
+                pair = plan.chosen(face, region)
+                if pair is None:
+                    lost |= region
+                else:
+                    new.setdefault(pair, []).append(plan.passes(face, region, pair))
+        if not new:
+            break
+        for pair, rests in new.items():
+            old = settings.get(pair)
+            settings[pair] = job.setting(
+                pair, old.millings if old else (), (*(old.rests if old else ()), *rests),
+                [*settings].index(pair) + 1 if old else len(settings) + 1,
+            )  # fmt: skip
+        progress(0.8 + 0.2 * (turn + 1) / rounds, f"rest passes, {turn + 1} times")
+    area, lost_area = {}, {}
+    for face, over, lost in zip(faces, left, hopeless, strict=True):
+        cell = _cells(face)
+        area[face.body, face.side] = float(cell[over > h].sum())
+        lost_area[face.body, face.side] = float(cell[(over > h) & lost].sum())
+    return PlannedSettings(tuple(settings.values()), area, lost_area)
+
+
+def _number(body: int, side: str) -> int:
+    return NUMBERS.get((body, side), _FLOOR)
+
+
+def _faces(job: FinishSettings, millings: Sequence[Milling]) -> list[SurfaceGrid]:
+    """Every surface that is milled, as far as its patches go."""
+    boxes: dict[tuple[int, str], list[tuple[tuple[float, float], tuple[float, float]]]] = {}
+    for m in millings:
+        boxes.setdefault((m.patch.body, m.patch.side), []).append(m.box)
+    corner = min(job.catalogue.cutters[m.patch.cutter].corner_radius for m in millings)
+    out = []
+    for (body, side), rows in boxes.items():
+        grid = np.array(rows)
+        low, high = grid[:, :, 0].min(axis=0), grid[:, :, 1].max(axis=0)
+        box = ((float(low[0]), float(high[0])), (float(low[1]), float(high[1])))
+        surface, number = job.surface(body, side), _number(body, side)
+        out.append(face_of(body, side, surface, number, box, job.how.scallop, corner))
+    return out
+
+
+def _cells(face: SurfaceGrid) -> Floats:
+    """(a, b) area [mm2] that each grid point stands for."""
+    U, V = (x.ravel() for x in np.meshgrid(face.u, face.v, indexing="ij"))
+    size = np.linalg.norm(np.cross(face.surface.at(U, V, 1, 0), face.surface.at(U, V, 0, 1)), axis=1)
+    out: Floats = size.reshape(len(face.u), len(face.v)) * (face.u[1] - face.u[0]) * (face.v[1] - face.v[0])
+    return out

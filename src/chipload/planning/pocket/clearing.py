@@ -1,0 +1,388 @@
+"""A whole pocket cleared at constant engagement: passes of a front that never meets more than a*.
+
+Notation: O centre of the cutter, T its heading, R radius; material lies on the RIGHT of travel (down milling; up
+milling is the mirror image of it). a* the engagement wanted, 1 - cos a* = s / R. A **pass** turns at every step as far
+towards the material as the exact engagement allows; it slides along the wall where that holds it. Where it ends the
+cutter goes on from the nearest place of the cleared edge that still has material beside it.
+
+Reference: [Uddin2007] for the law da/ds = sin b / (R sin(a - b)) - kappa.
+Differs from source: the law only says where the root search begins; what is kept is the engagement itself, along the
+whole of each step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import InputError
+from chipload.geometry.contour import Contour, Region
+from chipload.planning.pocket import _kernels
+from chipload.planning.pocket.leftover import leftover, widest_left
+from chipload.planning.pocket.reach import CHORD, Reach, centre_region, reach_of, widest_places
+from chipload.planning.pocket.starts import Starts
+from chipload.planning.result import Event
+from chipload.progress import Progress, silent
+from chipload.stock.planar import TOUCH, PlanarStock
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: values of ``ClearingPath.kind``: into the material, cutting, through cleared space, up, across and down again
+ENTRY, CUT, LINK, LIFT = 0, 1, 2, 3
+#: step length / R where none is given
+STEP = 0.06
+#: smallest turning radius / R, towards the material
+TURN_RIGHT = 0.4
+#: greatest turn away from the material at one place [rad]
+TURN_LEFT = math.radians(100.0)
+#: length / R without material that ends a pass
+IDLE = 1.5
+#: entries at most besides the first of each part, and the room / R that one needs
+ENTRIES, LEAST_ROOM = 50, 0.02
+#: so many passes within 2 R that take less than this part of R^2 each are given up
+SLOW_PASSES, SLOW_AREA = 30, 0.02
+#: steps between two calls of ``progress``
+CHUNK = 4000
+#: depth / R that is looked into for material beside the path, round after round
+DEPTHS = (0.03, 0.006)
+#: area / R^2 that a pass must take for its start to be used again
+WORTH = 3e-4
+#: part of the reachable area that may be left without another round
+ENOUGH = 5e-4
+
+
+@dataclass(frozen=True, eq=False)
+class ClearingPath:
+    """The way of the cutter's centre, and what it left. Row k goes straight from row k - 1 to row k.
+
+    Parameters
+    ----------
+    x, y : (n,) float [mm]
+    kind : (n,) int, ENTRY, CUT, LINK or LIFT; row 0 is a LIFT: the cutter comes from above
+    engagement : (n,) float [rad], at the end of the step; pi in an ENTRY, 0 in LINK and LIFT
+    engagement_max : (n,) float [rad], greatest along the step
+    arcs : (n,) int, separate engaged arcs at the end of the step
+    pass_number : (n,) int, from 1; 0 where it belongs to none
+    events : in the order of the path
+    reachable_mm2, cleared_mm2, leftover_mm2 : areas [mm^2] of the opening of the region, and its parts
+    leftover : contours of what is left and could be reached, the greatest first
+    lengths_mm : path length by kind: `entry`, `cut`, `link`, `lift`
+    """
+
+    x: Floats
+    y: Floats
+    kind: Ints
+    engagement: Floats
+    engagement_max: Floats
+    arcs: Ints
+    pass_number: Ints
+    events: tuple[Event, ...]
+    reachable_mm2: float
+    cleared_mm2: float
+    leftover_mm2: float
+    leftover: tuple[Contour, ...]
+    lengths_mm: Mapping[str, float]
+
+    @property
+    def cleared_share(self) -> float:
+        """Cleared part of what can be reached."""
+        return self.cleared_mm2 / self.reachable_mm2
+
+    @property
+    def passes(self) -> int:
+        """Number of passes."""
+        return int(self.pass_number.max(initial=0))
+
+
+def clear_region(
+    region: Region,
+    radius: float,
+    engagement: float,
+    *,
+    milling: Literal["down", "up"] = "down",
+    step: float | None = None,
+    allowance: float = 0.0,
+    progress: Progress = silent,
+) -> ClearingPath:
+    """Path that clears ``region`` with a cutter of ``radius`` [mm], never engaged by more than ``engagement`` [rad].
+
+    Parameters
+    ----------
+    step : greatest step [mm], <= R / 4; 0.06 R where none is given
+    allowance : [mm] left on every wall, >= 0
+
+    Raises
+    ------
+    InputError
+        An argument is out of its range, or the cutter does not fit into the region anywhere.
+    """
+    step = STEP * radius if step is None else step
+    centres = require_clearing(region, radius, engagement, milling, step, allowance)
+    if milling == "up":
+        return _mirrored_path(
+            clear_region(
+                _mirrored(region), radius, engagement, milling="down", step=step, allowance=allowance, progress=progress
+            )
+        )
+    run = _Run(centres, radius, engagement, step, progress)
+    for x, y, room in widest_places(centres, CHORD * radius):
+        run.enter(x, y, room)
+        run.clear()
+    run.enter_elsewhere()
+    return run.result()
+
+
+def require_clearing(
+    region: Region, radius: float, engagement: float, milling: str, step: float, allowance: float
+) -> Region:
+    """The region of the cutter's centre, if :func:`clear_region` can clear ``region``.
+
+    Raises
+    ------
+    InputError
+        As :func:`clear_region`.
+    """
+    if not 0.0 < radius < math.inf:
+        raise InputError(f"radius = {radius:g} mm: must be above 0")
+    if not math.radians(2.0) <= engagement <= math.radians(150.0):
+        raise InputError(f"engagement = {math.degrees(engagement):.4g} deg: must be between 2 and 150")
+    if not 0.0 < step <= 0.25 * radius:
+        raise InputError(f"step = {step:g} mm: must be above 0 and at most radius / 4 = {0.25 * radius:g}")
+    if not 0.0 <= allowance < math.inf:
+        raise InputError(f"allowance = {allowance:g} mm: must be at least 0")
+    if milling not in ("down", "up"):
+        raise InputError(f"milling = {milling!r}: must be 'down' or 'up'")
+    centres = centre_region(region, radius + allowance)
+    if not centres.contours:
+        raise InputError(f"radius = {radius:g} mm: the cutter fits nowhere into the region; take a smaller one")
+    return centres
+
+
+class _Run:
+    """The state of one clearing: stock, path so far, places to go on from."""
+
+    def __init__(self, centres: Region, radius: float, limit: float, step: float, progress: Progress) -> None:
+        xmin, ymin, xmax, ymax = centres.bounds
+        self.centres, self.radius, self.limit, self.step = centres, radius, limit, step
+        self.progress = progress
+        self.stock = PlanarStock((xmin - radius, ymin - radius, xmax + radius, ymax + radius), radius)
+        self.reach: Reach = reach_of(centres, self.stock.grid, CHORD * radius)
+        self.reachable = centre_region(centres, -radius)
+        self.rows: list[Floats] = []
+        self.events: list[Event] = []
+        self.starts = Starts(radius, step)
+        self.passes = 0
+        self.at = np.zeros(2)
+        self.area = 0.0
+        self.ends: Counter[str] = Counter()
+        self.lately: list[tuple[float, float, float]] = []
+        self.steps = 0
+        self.most = 100_000 + int(20.0 * self.reachable.area / (step * radius * (1.0 - math.cos(limit))))
+
+    # -- rows -----------------------------------------------------------------------------------------------
+    def add(self, points: Floats, kind: int, e_end: Floats | float, e_max: Floats | float, arcs: Floats | int) -> None:
+        """Rows of the path: x, y, kind, E, greatest E, arcs, pass."""
+        rows = np.zeros((len(points), 7))
+        rows[:, 0:2], rows[:, 2], rows[:, 3], rows[:, 4], rows[:, 5] = points, kind, e_end, e_max, arcs
+        rows[:, 6] = self.passes if kind == CUT else 0
+        self.rows.append(rows)
+        self.at = points[-1].copy()
+
+    # -- moves ----------------------------------------------------------------------------------------------
+    def enter(self, x: float, y: float, room: float) -> None:
+        """A helical bore at the widest place: its circle is as wide as there is room for, so that it leaves no core."""
+        R = self.radius
+        rh = min(0.9 * R, 0.98 * room)
+        n = max(12, math.ceil(2.0 * math.pi * rh / self.step))
+        a = np.linspace(0.0, 2.0 * math.pi, n + 1)
+        ring = np.column_stack([x + rh * np.cos(a), y + rh * np.sin(a)])
+        self.add(ring[:1], LIFT, 0.0, 0.0, 0)
+        self.add(ring[1:], ENTRY, math.pi, math.pi, 1)
+        self.stock.remove(np.hstack([ring[:-1], ring[1:]]))
+        self.events.append(
+            Event("pocket-entry", x, y, f"helical bore of diameter {2.0 * (R + rh):.4g} mm: a full slot by its nature")
+        )
+        heading = np.arctan2(*(ring[1:] - ring[:-1]).T[::-1])
+        self.starts.add(ring[1:], heading)
+
+    def enter_elsewhere(self) -> None:
+        """Bores into what no pass came to, the widest place first, as long as that clears anything."""
+        for _ in range(ENTRIES):
+            rows = np.vstack(self.rows)
+            x, y, room = widest_left(self.reachable, self.centres, rows[:, 0:2], rows[:, 2] >= LIFT, self.radius)
+            if room < LEAST_ROOM * self.radius:
+                break
+            before = self.area
+            self.enter(x, y, room)
+            self.clear()
+            if self.area - before < 1e-3 * self.radius**2:
+                break
+
+    def clear(self) -> None:
+        """Passes until nothing more is found beside the path, or there are far more steps than there should be."""
+        for depth in DEPTHS:
+            self.starts.revive()
+            while self.steps <= self.most:
+                self.starts.search(self.stock, self.reach, depth)
+                k = self.starts.nearest(self.at, self._linked)
+                if k is None:
+                    break
+                if not self._pass_from(k):
+                    self.starts.drop(k)
+                elif len(self.lately) >= SLOW_PASSES:
+                    self._leave_if_slow()
+
+    def _leave_if_slow(self) -> None:
+        """Leave a channel hardly wider than the cutter, where pass after pass takes next to nothing."""
+        took = np.array(self.lately)
+        self.lately.clear()
+        low, high = took[:, 1:].min(axis=0), took[:, 1:].max(axis=0)
+        if took[:, 0].sum() > SLOW_AREA * SLOW_PASSES * self.radius**2 or (high - low).max() > 2.0 * self.radius:
+            return
+        x, y = 0.5 * (low + high)
+        self.starts.abandon(np.array([x, y]), 2.0 * self.radius)
+        text = f"{SLOW_PASSES} passes took {took[:, 0].sum():.3g} mm2 here, hardly wider than the cutter: left"
+        self.events.append(Event("pocket-narrow", float(x), float(y), text))
+
+    def _linked(self, p: Floats) -> bool:
+        return self._clear_line(self.at, p)
+
+    def _clear_line(self, p: Floats, q: Floats) -> bool:
+        s = self.stock
+        return bool(
+            _kernels.line_clear(
+                p[0],
+                p[1],
+                q[0],
+                q[1],
+                self.step,
+                self.radius,
+                TOUCH,
+                s.grid,
+                s.head,
+                s.link,
+                s.axis,
+                *self.reach.arguments(),
+            )
+        )
+
+    def _pass_from(self, k: int) -> bool:
+        """One pass from the start k; whether it took enough for the start to be tried again."""
+        for x, y, heading in self.starts.candidates(k):
+            before = self.stock.state()
+            rows, headings, reason, at = self._steps(x, y, heading)
+            cuts = np.flatnonzero(rows[:, 5] > 1e-4 * self.radius * self.step)
+            if len(cuts) == 0 or rows[:, 5].sum() < 1e-5 * self.radius**2:
+                self.stock.restore(before)
+                continue
+            end = cuts[-1] + 1
+            if (rows[end:, 2] > 0.0).any():
+                self.stock.restore(before)
+                places = np.vstack([[[x, y]], rows[:end, 0:2]])
+                self.stock.remove(np.hstack([places[:-1], places[1:]])[rows[:end, 2] > 0.0])
+            rows, headings = rows[:end], headings[:end]
+            self._go(np.array([x, y]))
+            self.passes += 1
+            self.add(rows[:, 0:2], CUT, rows[:, 3], rows[:, 2], rows[:, 4])
+            self.area += float(rows[:, 5].sum())
+            self.lately.append((float(rows[:, 5].sum()), *rows[:, 0:2].mean(axis=0).tolist()))
+            self.ends[reason] += 1
+            if reason == "pocket-blocked":
+                text = (
+                    f"pass {self.passes} stops: no turn keeps the engagement within {math.degrees(self.limit):.4g} deg"
+                )
+                self.events.append(Event(reason, float(at[0]), float(at[1]), text))
+            self.starts.add(rows[:, 0:2], headings)
+            self.progress(min(0.99, self.area / self.reachable.area), f"front, pass {self.passes}")
+            return float(rows[:, 5].sum()) > WORTH * self.radius**2
+        return False
+
+    def _go(self, q: Floats) -> None:
+        """From where the cutter is to q: a straight link where that is clear, else up and down again."""
+        if np.hypot(*(q - self.at)) < 1e-9:
+            return
+        kind = LINK if self._clear_line(self.at, q) else LIFT
+        self.add(q[None, :], kind, 0.0, 0.0, 0)
+
+    def _steps(self, x: float, y: float, heading: float) -> tuple[Floats, Floats, str, Floats]:
+        """Steps of a pass: rows of the kernel, headings, why it ended, where."""
+        s, R = self.stock, self.radius
+        state = np.array([x, y, heading, 0.0, 0.0])
+        right = self.step / (TURN_RIGHT * R)
+        parts = []
+        reason = _kernels.RUNNING
+        while reason == _kernels.RUNNING:
+            s.reserve(CHUNK + 8)
+            out = np.zeros((CHUNK, _kernels.COLUMNS))
+            n, reason, s.capsules, s.used = _kernels.run_pass(
+                state, self.step, self.limit, right, TURN_LEFT, IDLE * R, R, TOUCH, out, s.capsules,
+                s.used, s.grid, s.head, s.count, s.link, s.axis, *self.reach.arguments(),
+            )  # fmt: skip
+            parts.append(out[:n])
+            if reason == _kernels.RUNNING:
+                self.progress(min(0.99, self.area / self.reachable.area), f"front, pass {self.passes + 1}")
+            self.steps += n
+            if self.steps > self.most:
+                break
+        rows = np.vstack(parts)
+        before = np.vstack([[[x, y]], rows[:-1, 0:2]]) if len(rows) else np.zeros((0, 2))
+        headings = np.arctan2(rows[:, 1] - before[:, 1], rows[:, 0] - before[:, 0])
+        return rows, headings, "pocket-blocked" if reason == _kernels.BLOCKED else "pocket-lost", state[0:2]
+
+    # -- the end --------------------------------------------------------------------------------------------
+    def result(self) -> ClearingPath:
+        """The path with its areas."""
+        rows = np.vstack(self.rows)
+        kind = rows[:, 2].astype(np.int64)
+        area, contours, places = leftover(self.reachable, rows[:, 0:2], kind >= LIFT, self.radius)
+        events = list(self.events)
+        for mm2, (x, y) in places:
+            events.append(Event("pocket-leftover", x, y, f"{mm2:.4g} mm2 is left that could be reached"))
+        leg = np.hypot(*np.diff(rows[:, 0:2], axis=0, prepend=rows[:1, 0:2]).T)
+        names = {"entry": ENTRY, "cut": CUT, "link": LINK, "lift": LIFT}
+        whole = self.reachable.area
+        return ClearingPath(
+            x=rows[:, 0],
+            y=rows[:, 1],
+            kind=kind,
+            engagement=rows[:, 3],
+            engagement_max=rows[:, 4],
+            arcs=rows[:, 5].astype(np.int64),
+            pass_number=rows[:, 6].astype(np.int64),
+            events=tuple(events),
+            reachable_mm2=whole,
+            cleared_mm2=whole - area,
+            leftover_mm2=area,
+            leftover=contours,
+            lengths_mm={name: float(leg[kind == k].sum()) for name, k in names.items()},
+        )
+
+
+def _mirrored(region: Region) -> Region:
+    """The mirror image in the y axis, inside on the left again."""
+    flip = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+    return Region(tuple(_image(c, flip) for c in region.contours))
+
+
+def _image(contour: Contour, flip: Floats) -> Contour:
+    seg = contour.segments * flip
+    seg[seg[:, 6] == 0.0, 4:6] = 0.0
+    return Contour(seg).reversed()
+
+
+def _mirrored_path(path: ClearingPath) -> ClearingPath:
+    """The mirror image of a path in the y axis."""
+    flip = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+    return replace(
+        path,
+        x=-path.x,
+        events=tuple(replace(e, x=-e.x) for e in path.events),
+        leftover=tuple(_image(c, flip) for c in path.leftover),
+    )

@@ -1,0 +1,99 @@
+"""Where the cutter's centre may be, and what it can reach from there.
+
+Notation: R [mm] cutter radius. The **centre region** is the region inset by R plus the allowance; what is reachable is
+the centre region grown by R: the opening of the region by a disc.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from chipload.geometry.contour import Contour, Region
+from chipload.geometry.offset import offset_region
+from chipload.planning.pocket import _kernels
+
+Floats = NDArray[np.float64]
+
+#: chords leave the arcs of the centre region by at most this part of R, to its inside
+CHORD = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """The centre region as edges (n, 4) [mm], and its cells for the kernels (see ``_kernels``)."""
+
+    edges: Floats
+    rows: NDArray[np.int64]
+    row_edges: NDArray[np.int64]
+    flag: NDArray[np.int8]
+
+    def arguments(self) -> tuple[NDArray[Any], ...]:
+        """What the kernels take."""
+        return self.flag, self.edges, self.rows, self.row_edges
+
+
+def centre_region(region: Region, distance: float) -> Region:
+    """The region of the cutter's centre: inset by ``distance`` [mm]; no contour where nothing is left."""
+    return offset_region(region, distance)
+
+
+def inner_points(contour: Contour, chord: float) -> Floats:
+    """(m, 2) vertices [mm] of a polygon inside a closed contour of the centre region: chords where the arc bends
+    around the inside, tangents where the inside bends around the arc; at most ``chord`` [mm] off.
+    """
+    out = []
+    for (x0, y0, _, _, xc, yc, sweep), r in zip(contour.segments, contour.radii, strict=True):
+        out.append([x0, y0])
+        if sweep == 0.0:
+            continue
+        n = max(2, math.ceil(abs(sweep) / (2.0 * math.acos(1.0 - min(chord / r, 0.5)))))
+        a0, d = math.atan2(y0 - yc, x0 - xc), sweep / n
+        if sweep > 0.0:
+            a = a0 + d * np.arange(1, n)
+            rr = r
+        else:
+            a = a0 + d * (np.arange(n) + 0.5)
+            rr = r / math.cos(0.5 * d)
+        out.extend(np.column_stack([xc + rr * np.cos(a), yc + rr * np.sin(a)]).tolist())
+    return np.array(out)
+
+
+def reach_of(centres: Region, grid: Floats, chord: float) -> Reach:
+    """The centre region laid on the cells of the stock's grid."""
+    loops = [inner_points(c, chord) for c in centres.contours]
+    edges = np.vstack([np.hstack([p, np.roll(p, -1, axis=0)]) for p in loops])
+    y0, h, nx, ny = grid[1], grid[2], int(grid[3]), int(grid[4])
+    low = np.floor((np.minimum(edges[:, 1], edges[:, 3]) - y0) / h).astype(np.int64)
+    high = np.floor((np.maximum(edges[:, 1], edges[:, 3]) - y0) / h).astype(np.int64)
+    row = np.concatenate([np.arange(a, b + 1) for a, b in zip(low, high, strict=True)])
+    edge = np.repeat(np.arange(len(edges)), high - low + 1)
+    order = np.argsort(row, kind="stable")
+    rows = np.searchsorted(row[order], np.arange(ny + 1)).astype(np.int64)
+    flag = np.zeros(nx * ny, dtype=np.int8)
+    row_edges = edge[order].astype(np.int64)
+    _kernels.mark(grid, edges, rows, row_edges, flag)
+    return Reach(edges, rows, row_edges, flag)
+
+
+def widest_places(centres: Region, chord: float) -> list[tuple[float, float, float]]:
+    """(x, y, radius) [mm] of the largest circle in each separate part of the centre region, from left to right."""
+    rings = [shapely.make_valid(shapely.polygons(inner_points(c, chord))) for c in centres.contours]
+    outer = [g for g, c in zip(rings, centres.contours, strict=True) if c.area > 0.0]
+    holes = [g for g, c in zip(rings, centres.contours, strict=True) if c.area <= 0.0]
+    whole = shapely.difference(shapely.union_all(outer), shapely.union_all(holes))
+    out = []
+    for part in shapely.get_parts(whole):
+        if part.area <= 0.0:
+            continue
+        size = math.sqrt(part.area)
+        line = shapely.maximum_inscribed_circle(part, tolerance=1e-4 * size)
+        (x, y), _ = shapely.get_coordinates(line)
+        radius = float(shapely.distance(shapely.points(x, y), part.boundary))
+        out.append((float(x), float(y), radius))
+    return sorted(out)

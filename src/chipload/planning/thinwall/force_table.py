@@ -1,0 +1,96 @@
+"""Force and depth of cut in a table, for the many places of a wall that one posture of the cutter passes.
+
+Notation: d [mm] depth, F_n [N] force normal to the surface, as in :mod:`chipload.planning.thinwall.depth`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.cutting.material import Material
+from chipload.errors import InputError
+from chipload.planning.thinwall.depth import DepthRange, Measure, normal_force
+from chipload.planning.thinwall.plane_stock import CutterPose
+
+Floats = NDArray[np.float64]
+
+#: depths of a table in a decade
+A_DECADE = 128
+
+
+@dataclass(frozen=True, eq=False)
+class ForceTable:
+    """F_n(d) in a table, for the many places of a wall: straight between depths in a geometric row.
+
+    Attributes
+    ----------
+    limits : smallest and greatest depth
+    depths, forces : (k,) float [mm], [N]; the force is the greatest up to that depth, so that it rises
+    """
+
+    limits: DepthRange
+    depths: Floats
+    forces: Floats
+
+    def force(self, depth: ArrayLike) -> Floats:
+        """F_n (...) [N]; below the smallest depth straight to 0 (rather too small)."""
+        d = np.concatenate([[0.0], self.depths])
+        return np.asarray(np.interp(np.asarray(depth, dtype=np.float64), d, np.concatenate([[0.0], self.forces])))
+
+    def depth(self, threshold: ArrayLike) -> Floats:
+        """Largest depth (...) [mm] whose force is at most the threshold; 0 where infeasible."""
+        F = np.asarray(threshold, dtype=np.float64)
+        rising = self.forces + 1e-12 * self.forces[-1] * np.arange(len(self.forces))
+        return np.asarray(np.where(rising[0] > F, 0.0, np.interp(F, rising, self.depths)))
+
+
+def law_of(
+    posture: CutterPose, material: Material, limits: DepthRange, *, measure: Measure, looks: int | None = None
+) -> ForceTable:
+    """Table of F_n; 128 depths a decade: between them it is right to 1e-4 of what :func:`normal_force` says."""
+    if limits.greatest > posture.deepest:
+        raise InputError(
+            f"depth_max_mm = {limits.greatest:g}: must be at most {posture.deepest:.6g}, where the flank begins to cut"
+        )
+    decades = math.log10(limits.greatest / limits.smallest)
+    d = np.geomspace(limits.smallest, limits.greatest, looks or math.ceil(A_DECADE * decades) + 2)
+    return ForceTable(limits, d, np.maximum.accumulate(normal_force(posture, material, d, measure=measure)))
+
+
+def law_on_stock(
+    posture: CutterPose, material: Material, limits: DepthRange, *, slope: float, scallop: float, measure: Measure
+) -> ForceTable:
+    """Table of F_n on stock that is not plane: deeper below the contact point, with cusps of the pass before on it.
+
+    Within the reach sqrt(2 r (d + c)) of the cutter stock whose depth changes with a slope of at most L, and that has
+    cusps of at most c, is nowhere deeper than d + c + L sqrt(2 r (d + c)). The force is taken there, so that it is
+    rather too great.
+
+    Parameters
+    ----------
+    slope : L, at least 0
+    scallop : c, at least 0 [mm]
+
+    Raises
+    ------
+    InputError
+        The greatest depth, so deepened, is beyond the corner of the cutter.
+    """
+
+    def met(d: Floats) -> Floats:
+        return np.asarray(d + scallop + slope * np.sqrt(2.0 * posture.cutter.corner_radius * (d + scallop)))
+
+    deepest = float(met(np.array(limits.greatest)))
+    if deepest > posture.deepest:
+        raise InputError(
+            f"depth_max_mm = {limits.greatest:g}: the cutter meets stock of {deepest:.4g} mm with cusps of "
+            f"{scallop:.3g} mm and a slope of {slope:g}: must be at most {posture.deepest:.4g}, where the flank "
+            "begins to cut"
+        )
+    plane = law_of(posture, material, DepthRange(limits.smallest, deepest, limits.tolerance), measure=measure)
+    d = np.geomspace(limits.smallest, limits.greatest, len(plane.depths))
+    return ForceTable(limits, d, plane.force(met(d)))

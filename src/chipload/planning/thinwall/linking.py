@@ -1,0 +1,277 @@
+"""The whole way of a cutter over a wall: every pass row by row, the links between rows and between sides.
+
+Notation: rows, q, n and t as in :mod:`chipload.planning.thinwall.paths`; C [mm] the middle of the corner circle's
+centres; c [mm] clearance along n; A the cutter's axis. A row runs on beyond both edges of the wall by o [mm], so that
+the cutter comes to its depth in the air. Between two pieces it lifts by c along n and goes back along the next row at
+that distance; between two passes it goes out along A, a little away from the wall, until its tip is as high as the
+safe height, over the wall, and in along the next axis.
+
+The feed is that of C, which is what a chip's thickness comes from, not that of the tip, which is nearer to the surface.
+
+Every row of the program has its own line number, its place on the side (u along it, v up it) and the depth that is
+planned there, so that a checker can say at which contact point something was found.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from chipload.errors import InputError
+from chipload.planning.thinwall.blank import FinishSurface
+from chipload.planning.thinwall.passes import WallPass
+from chipload.planning.thinwall.paths import PassMotion, Rows, placed, rows_of
+from chipload.program.program import LINE, RAPID, Program
+
+Floats = NDArray[np.float64]
+
+
+#: the way out leans by this share of n from the axis: away from the wall
+ASIDE = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class FineSide:
+    """One side, finely.
+
+    Attributes
+    ----------
+    surface : (n, m) points, m rows of the cutter apart
+    u, v : (n,), (m,) float, its parameters
+    """
+
+    surface: FinishSurface
+    u: Floats
+    v: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class PassProgram:
+    """One pass as a program, and what is known at its rows.
+
+    Attributes
+    ----------
+    program : from the safe height to the safe height; ``line`` counts the rows of the whole tour from 1
+    side : number of the side
+    contact : (k,) bool, rows that end at a contact point
+    points, normals : (k, 3) float [mm], q and n of those rows; 0 elsewhere
+    place : (k, 2) float, u and v
+    depth : (k,) float [mm], planned; 0 beyond the edges
+    """
+
+    program: Program
+    side: int
+    contact: NDArray[np.bool_]
+    points: Floats
+    normals: Floats
+    place: Floats
+    depth: Floats
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Distances [mm] of a tour: beyond the edges of the wall, the safe height of the tip, and how far links may leave
+    their distance to the surface.
+    """
+
+    beyond: float
+    safe: float
+    sag: float
+
+    def __post_init__(self) -> None:
+        for key in ("beyond", "safe", "sag"):
+            if not 0.0 < getattr(self, key) < math.inf:
+                raise InputError(f"tour.{key}_mm = {getattr(self, key):g}: must be above 0")
+
+
+def refined(values: Floats, at: tuple[Floats, Floats], to: tuple[Floats, Floats]) -> Floats:
+    """Depths (n, m) of places at parameters ``at`` between them, at parameters ``to``; no value beyond its neighbours.
+
+    Monotone cubics along u, then along v.
+    """
+    first = PchipInterpolator(at[0], values, axis=0)(to[0])
+    return np.asarray(PchipInterpolator(at[1], first, axis=1)(to[1]))
+
+
+def beyond_edges(rows: Rows, distance: float) -> Rows:
+    """Rows with a point more at both ends, ``distance`` [mm] on along the feed, where nothing is cut."""
+
+    def ends(values: Floats) -> Floats:
+        return np.concatenate([values[:, :1], values, values[:, -1:]], axis=1)
+
+    contact = ends(rows.contact)
+    contact[:, 0] -= distance * rows.feed[:, 0]
+    contact[:, -1] += distance * rows.feed[:, -1]
+    cut = np.pad(rows.cut, ((0, 0), (1, 1)))
+    return Rows(contact, ends(rows.normal), ends(rows.feed), cut)
+
+
+def link_passes(
+    passes: Sequence[WallPass],
+    sides: Sequence[FineSide],
+    places: tuple[Floats, Floats],
+    pass_motion: PassMotion,
+    margins: Margins,
+) -> tuple[PassProgram, ...]:
+    """A leg a pass, in order.
+
+    Parameters
+    ----------
+    places : (n,), (m,) parameters u and v of the places that the passes have their depths at
+
+    Raises
+    ------
+    InputError
+        A pass finds no stock, or the axis does not stand above the horizontal.
+    """
+    out: list[PassProgram] = []
+    line = 1
+    for number, p in enumerate(passes):
+        leg = _pass_program(p, sides[p.side], places, pass_motion, margins, f"pass {number + 1} side {p.side + 1}")
+        count = len(leg.program)
+        out.append(replace(leg, program=replace(leg.program, line=np.arange(line, line + count))))
+        line += count
+    return tuple(out)
+
+
+def _pass_program(
+    p: WallPass, side: FineSide, places: tuple[Floats, Floats], pass_motion: PassMotion, margins: Margins, label: str
+) -> PassProgram:
+    low, high = (refined(d, places, (side.u, side.v)) for d in (p.low, p.high))
+    bare = rows_of(side.surface, low, high, pass_motion.posture)
+    if not bare.cut.any():
+        raise InputError(f"{label}: the pass finds no stock")
+    place, depth = _known(bare, side, high - low)
+    rows = beyond_edges(bare, margins.beyond)
+    place = np.concatenate([place[:, :1], place, place[:, -1:]], axis=1)
+    depth = np.pad(depth, ((0, 0), (1, 1)))
+    tip, axis, centre = placed(rows, pass_motion.posture)
+    low_axis = float(axis[..., 2].min())
+    if min(low_axis, float((axis + ASIDE * rows.normal)[..., 2].min())) < 0.02:
+        raise InputError(
+            f"{label}: the cutter's axis stands {math.degrees(math.asin(low_axis)):.3g} deg above the horizontal: lean "
+            "it more towards the free edge (operation.lean_deg)"
+        )
+    path = _Path()
+    lifted = tip + pass_motion.clearance * rows.normal
+    away = axis + ASIDE * rows.normal
+    outside = lifted + ((margins.safe - lifted[..., 2]) / away[..., 2]).clip(0.0)[..., None] * away
+    before: tuple[int, int] | None = None
+    for r in range(len(tip)):
+        on = np.concatenate([[0], rows.cut[r].astype(np.int64), [0]])
+        for a, b in zip(np.flatnonzero(np.diff(on) == 1), np.flatnonzero(np.diff(on) == -1), strict=True):
+            first, last = max(int(a) - 1, 0), min(int(b), tip.shape[1] - 1)
+            if before is None:
+                path.rapid(outside[r, first], axis[r, first])
+                path.rapid(lifted[r, first], axis[r, first])
+            else:
+                step = 1 if first >= before[1] else -1
+                back = np.arange(before[1], first + step, step)
+                for k in back[_corners(lifted[r, back], margins.sag)]:
+                    path.rapid(lifted[r, k], axis[r, k])
+            path.line(tip[r, first], axis[r, first], centre[r, first], lifted[r, first] - tip[r, first])
+            for k in range(first, last + 1):
+                path.known(rows.contact[r, k], rows.normal[r, k], place[r, k], depth[r, k])
+                if k < last:
+                    path.line(tip[r, k + 1], axis[r, k + 1], centre[r, k + 1], centre[r, k])
+            path.rapid(lifted[r, last], axis[r, last])
+            before = (r, last)
+    assert before is not None
+    path.rapid(outside[before], axis[before])
+    return path.pass_program(p.side, pass_motion, label)
+
+
+def _corners(points: Floats, sag: float) -> NDArray[np.int64]:
+    """Numbers of the points (n, 3) whose chords stay within ``sag`` of all, first and last among them."""
+    keep, todo = {0, len(points) - 1}, [(0, len(points) - 1)]
+    while todo:
+        a, b = todo.pop()
+        if b - a < 2:
+            continue
+        chord = points[b] - points[a]
+        v = points[a + 1 : b] - points[a]
+        size = float(chord @ chord)
+        t = np.clip(v @ chord / size, 0.0, 1.0) if size > 0.0 else np.zeros(len(v))
+        off = np.linalg.norm(v - t[:, None] * chord, axis=1)
+        k = int(off.argmax())
+        if off[k] > sag:
+            keep.add(a + 1 + k)
+            todo += [(a, a + 1 + k), (a + 1 + k, b)]
+    return np.array(sorted(keep))
+
+
+def _known(rows: Rows, side: FineSide, depth: Floats) -> tuple[Floats, Floats]:
+    """Parameters (r, s, 2) and planned depth (r, s) of the contact points, in their order."""
+    count = len(rows.contact)
+    v = np.linspace(1.0, 0.0, count)
+    at = np.linspace(0.0, 1.0, len(side.v))
+    up = np.interp(v, at, side.v)
+    along = side.u
+    values = np.stack([np.interp(v, at, column) for column in depth], axis=1)
+    straight = np.linalg.norm(rows.contact[0, 0] - side.surface.points[0, -1])
+    if straight > np.linalg.norm(rows.contact[0, 0] - side.surface.points[-1, -1]):
+        along, values = along[::-1], values[:, ::-1]
+    place = np.stack(np.broadcast_arrays(along[None, :], up[:, None]), axis=-1)
+    return place, values
+
+
+class _Path:
+    """Rows of a leg as they come."""
+
+    def __init__(self) -> None:
+        self.points: list[Floats] = []
+        self.axes: list[Floats] = []
+        self.motion: list[int] = []
+        self.ratio: list[float] = []
+        self.at: dict[int, tuple[Floats, Floats, Floats, float]] = {}
+
+    def rapid(self, tip: Floats, axis: Floats) -> None:
+        if self.points and np.allclose(tip, self.points[-1], atol=1e-9) and np.allclose(axis, self.axes[-1], atol=1e-9):
+            return
+        self._add(tip, axis, RAPID, 0.0)
+
+    def line(self, tip: Floats, axis: Floats, centre: Floats, before: Floats) -> None:
+        """``before`` is the centre at the point before."""
+        way = float(np.linalg.norm(centre - before))
+        own = float(np.linalg.norm(tip - self.points[-1]))
+        self._add(tip, axis, LINE, own / way if self.motion[-1] == LINE and way > 0.0 else 1.0)
+
+    def known(self, point: Floats, normal: Floats, place: Floats, depth: float) -> None:
+        """What the last row ends at."""
+        self.at[len(self.points) - 1] = (point, normal, place, depth)
+
+    def _add(self, tip: Floats, axis: Floats, motion: int, ratio: float) -> None:
+        self.points.append(tip)
+        self.axes.append(axis)
+        self.motion.append(motion)
+        self.ratio.append(ratio)
+
+    def pass_program(self, side: int, pass_motion: PassMotion, label: str) -> PassProgram:
+        count = len(self.points)
+        zero, none = np.zeros((count, 3)), np.zeros(count, dtype=np.int64)
+        program = Program(
+            motion=np.array(self.motion),
+            p_work=np.array(self.points),
+            axis=np.array(self.axes),
+            centre=zero,
+            normal=np.tile([0.0, 0.0, 1.0], (count, 1)),
+            turns=none,
+            feed=pass_motion.feed * np.array(self.ratio),
+            spindle=np.full(count, pass_motion.spindle if pass_motion.posture.clockwise else -pass_motion.spindle),
+            tool=np.full(count, pass_motion.posture.cutter.number),
+            line=none,
+            label=none,
+            labels=(label,),
+        )
+        at = np.array(sorted(self.at))
+        points, normals, place, depth = zero.copy(), zero.copy(), np.zeros((count, 2)), np.zeros(count)
+        for k in at.tolist():
+            points[k], normals[k], place[k], depth[k] = self.at[k]
+        contact = np.zeros(count, dtype=np.bool_)
+        contact[at] = True
+        return PassProgram(program, side, contact, points, normals, place, depth)

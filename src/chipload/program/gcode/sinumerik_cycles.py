@@ -1,0 +1,94 @@
+"""Sinumerik's drilling cycles as blocks of LinuxCNC's: CYCLE81 to CYCLE86.
+
+Notation: RTP retraction plane, RFP reference plane, SDIS safety distance above it, DP final depth (absolute) or DPR
+(below RFP, without sign), DTB dwell at the bottom [s]. A cycle goes at rapid to RFP + SDIS, cuts to the bottom, and
+ends at rapid in RTP. Of CYCLE83 the first plunge FDEP or FDPR is that of all (DAM, which shortens the later ones, is
+left out); VARI 0 breaks chips, 1 clears them. CYCLE84 taps with the pitch PIT, or that of the metric size MPIT, at the
+speed SST.
+
+Reference: Siemens, Sinumerik 840D sl Programming Manual Cycles, "Drilling".
+"""
+
+from __future__ import annotations
+
+from chipload.errors import InputError
+from chipload.program.gcode.controller import Controller
+from chipload.program.gcode.words import Block
+
+#: LinuxCNC's code of each cycle
+CYCLES = {"CYCLE81": 810, "CYCLE82": 820, "CYCLE83": 830, "CYCLE84": 331, "CYCLE85": 850, "CYCLE86": 860}
+#: pitch [mm] of metric threads by their size
+PITCHES = {
+    3: 0.5, 4: 0.7, 5: 0.8, 6: 1.0, 8: 1.25, 10: 1.5, 12: 1.75, 14: 2.0, 16: 2.0, 18: 2.5, 20: 2.5, 22: 2.5, 24: 3.0,
+    27: 3.0, 30: 3.5, 33: 3.5, 36: 4.0, 39: 4.0, 42: 4.5, 45: 4.5, 48: 5.0,
+}  # fmt: skip
+#: axis along the tool by plane
+NORMAL = {170: "z", 180: "y", 190: "x"}
+
+
+def hole_blocks(name: str, given: list[float | None], c: Controller) -> list[Block]:
+    """The blocks of a cycle where the tool stands.
+
+    Parameters
+    ----------
+    name : of the cycle
+    given : its arguments in their places; None: not given
+
+    Raises
+    ------
+    InputError
+        An argument that the cycle needs is missing, or the plane is none of G17 to G19.
+    """
+    args = dict(enumerate([*given, *[None] * 20]))
+    rtp, rfp, sdis, dp, dpr = (args[k] for k in range(5))
+    if rtp is None or rfp is None or (dp is None and dpr is None):
+        raise InputError(f"{name}: RTP, RFP and DP or DPR must be given")
+    normal = NORMAL.get(c.state.plane)
+    if normal is None:
+        raise InputError(f"{name}: cycles lie in the planes of G17, G18 and G19")
+    bottom = dp if dp is not None else rfp - abs(dpr or 0.0)
+    r = rfp + abs(sdis or 0.0)
+    code, dwell = CYCLES[name], args[5] or 0.0
+    cut = Block(words={normal: bottom, "r": r}, g=[900, 990, code])
+    begin = Block(words={normal: r}, g=[900, 0])
+    if name in ("CYCLE82", "CYCLE86"):
+        cut.words["p"] = dwell
+    if name == "CYCLE83":
+        _pecks(cut, args, rfp, r)
+        c.once("nc-cycle", f"{name}: all plunges are as deep as the first")
+    if name == "CYCLE84":
+        cut = _tap(cut, args, c, normal, bottom)
+    if name == "CYCLE85" and args[6] is not None:
+        cut.words["f"] = args[6]
+    if name == "CYCLE86" and args[6] in (3.0, 4.0):
+        cut.m = [int(args[6] or 3.0)]
+    after = Block(words={normal: rtp}, g=[0])
+    ends = [Block(g=[910])] if not c.state.absolute else []
+    if name == "CYCLE84" and args[6] in (3.0, 4.0, 5.0):
+        after.m = [int(args[6] or 5.0)]
+    if c.state.motion == 10:
+        ends.append(Block(g=[10]))
+    return [begin, cut, after, *ends]
+
+
+def _pecks(cut: Block, args: dict[int, float | None], rfp: float, r: float) -> None:
+    first, below = args[5], args[6]
+    depth = rfp - first if first is not None else abs(below) if below is not None else None
+    if depth is None or depth <= 0.0:
+        raise InputError("CYCLE83: FDEP or FDPR must lie below RFP")
+    # LinuxCNC counts the first plunge from R
+    cut.words["q"] = depth + (r - rfp)
+    if args[11] == 0.0:
+        cut.g[-1] = 730
+
+
+def _tap(cut: Block, args: dict[int, float | None], c: Controller, normal: str, bottom: float) -> Block:
+    size, pitch, speed = args[7], args[8], args[10]
+    if pitch is None and size is not None:
+        pitch = PITCHES.get(round(abs(size)), 0.0) * (1.0 if size > 0.0 else -1.0) / c.state.scale
+    if not pitch:
+        raise InputError("CYCLE84: PIT, or the metric size MPIT, must be given")
+    if speed is None:
+        raise InputError("CYCLE84: SST must be given: the spindle speed of tapping")
+    words = {normal: bottom, "k": abs(pitch), "s": speed}
+    return Block(words=words, g=[900, 331], m=[3 if pitch > 0.0 else 4])

@@ -1,0 +1,68 @@
+"""How a controller takes the joints of a path: what G61, G61.1 and G64 ask for, as a column of a program.
+
+Notation: a row of the column is (control, tolerance [mm], naive tolerance [mm]). The tolerance bounds how far the
+joint at the end of the row may be rounded off; the naive tolerance, how far the straight line that replaces several
+short lines may leave their points (the "naive CAM detector" of LinuxCNC).
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+
+
+class PathControl(IntEnum):
+    """How the joint at the end of a row is passed."""
+
+    #: the program does not say: as the machine's file says
+    MACHINE = 0
+    #: a stop at every joint (G61.1)
+    EXACT_STOP = 1
+    #: the path exactly, without a stop where it is smooth (G61)
+    EXACT_PATH = 2
+    #: rounded off within the tolerance; tolerance 0: none is stated (G64)
+    CONTINUOUS = 3
+    #: a rapid that sends an axis for the first time, from where it happens to stand: it takes no time
+    UNPLACED = 4
+
+
+PathMode = tuple[float, float, float]
+
+#: of programs that do not say
+UNSTATED: PathMode = (float(PathControl.MACHINE), 0.0, 0.0)
+#: of texts that do not say: as controllers start, G64 without a tolerance
+FREE: PathMode = (float(PathControl.CONTINUOUS), 0.0, 0.0)
+
+
+def mode_column(name: str, values: object, n: int) -> Floats:
+    """(n, 3) float, the column of a program of ``n`` rows; None: not stated.
+
+    Raises
+    ------
+    InputError
+        The shape is wrong, a control is unknown, a tolerance is negative or no number.
+    """
+    column = np.zeros((n, 3)) if values is None else np.array(values, dtype=np.float64)
+    if column.shape != (n, 3):
+        raise InputError(f"{name}.path_mode: shape {column.shape}: must be {(n, 3)}")
+    if not np.isfinite(column).all() or (column < 0.0).any():
+        raise InputError(f"{name}.path_mode: a tolerance must be finite and at least 0 mm")
+    if not np.isin(column[:, 0], [float(c) for c in PathControl]).all():
+        raise InputError(f"{name}.path_mode: a control is unknown: must be one of PathControl")
+    column.setflags(write=False)
+    return column
+
+
+def resolved(column: Floats, tolerance: float) -> Floats:
+    """(n, 3) the column with the machine's own corner ``tolerance`` [mm] where the program does not say.
+
+    The same as a program that is written for the machine says: G61 for 0, else G64 P.
+    """
+    control = PathControl.EXACT_PATH if tolerance == 0.0 else PathControl.CONTINUOUS
+    return np.where(column[:, :1] == PathControl.MACHINE, (float(control), tolerance, tolerance), column)

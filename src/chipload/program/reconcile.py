@@ -1,0 +1,147 @@
+"""One cutter for each tool: what the job, the tool table, CL data and comments state about it agrees, or is refused.
+
+Notation: a statement is a diameter [mm] with the place that makes it. The job's ``[[cutter]]`` is what is simulated;
+the tool table is what the controller compensates for; CUTTER of CL data and the comments of NC text are what the path
+was made for. Tools without a ``[[cutter]]`` are not compared: the table may hold tools that a text uses as allowances.
+
+Comments that are read: a tool number with a diameter, as ``T1 D=10. CR=0.``, ``TOOL 2 - DIA 6.0``, ``T3 = 8.0 MM END
+MILL``, ``TOOL: T1 = 10.0 dia.``; a number without a unit is in the unit that the text selects first.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from chipload.cutter.cutter import Cutter
+from chipload.errors import Finding, InputError
+from chipload.program.apt.cutters import Shape
+from chipload.program.gcode.tools import ToolTable
+from chipload.units import MM_PER
+
+#: diameters and radii that differ by at most this are one [mm]: wear and regrinding, which is a finding
+WEAR_MM = 0.05
+#: diameters that differ by less are the same number [mm]
+SAME_MM = 1e-3
+#: angles that differ by at most this are one [rad]
+SAME_ANGLE = math.radians(0.5)
+
+_COMMENT = re.compile(r"\(([^()\n]*)\)|;([^\n]*)")
+_TOOL = r"\bT(?:OOL)?\s*(?:NO\.?|NUMBER)?\s*[:#=]?\s*T?(?P<tool>[0-9]{1,8})\b"
+_VALUE = r"(?P<value>[0-9]+\.?[0-9]*|\.[0-9]+)(?![0-9./])\s*(?P<unit>MM|INCH(?:ES)?\b|IN\b|\")?"
+_STATED = (
+    re.compile(rf"{_TOOL}[^()\n]{{0,80}}?\b(?:D|DIA\.?|DIAM\.?|DIAMETER)\s*[=:]?\s*{_VALUE}"),
+    re.compile(rf"{_TOOL}\s*[-=:|,]\s*{_VALUE}\s*(?:DIA|FLAT|BALL|BULL|END|MILL|ROUND|SLOT)"),
+)
+_UNITS = re.compile(r"\bG\s*(20|21|70|71)\b(?!\.)")
+
+
+class Statement(NamedTuple):
+    """A diameter [mm] of a tool, and where it stands."""
+
+    diameter: float
+    where: str
+    line: int
+
+
+def tool_comments(text: str) -> dict[int, Statement]:
+    r"""What the comments of an NC text state about the diameter of each tool, the first of each tool.
+
+    >>> tool_comments("(T1 D=10. CR=0. - ZMIN=-5. - flat end mill)")[1].diameter
+    10.0
+    >>> tool_comments("G20\n(TOOL: T2 = 0.5 dia. ENDMILL)")[2].diameter
+    12.7
+    """
+    found = _UNITS.search(_COMMENT.sub(" ", text).upper())
+    own = MM_PER["inch"] if found is not None and found[1] in ("20", "70") else 1.0
+    out: dict[int, Statement] = {}
+    for tool, statement in _comments(text, own):
+        out.setdefault(tool, statement)
+    return out
+
+
+def _comments(text: str, own: float) -> Iterator[tuple[int, Statement]]:
+    for number, line in enumerate(text.split("\n"), start=1):
+        if "(" not in line and ";" not in line:
+            continue
+        for comment in _COMMENT.finditer(line):
+            said = (comment[1] if comment[1] is not None else comment[2]).upper()
+            hit = next((hit for hit in (pattern.search(said) for pattern in _STATED) if hit is not None), None)
+            if hit is not None and float(hit["value"]) > 0.0:
+                mm = own if hit["unit"] is None else MM_PER["mm" if hit["unit"] == "MM" else "inch"]
+                shown = " ".join(said.split())[:60]
+                yield int(hit["tool"]), Statement(float(hit["value"]) * mm, f"the comment ({shown})", number)
+
+
+def agree(
+    name: str,
+    cutters: Mapping[int, Cutter],
+    *,
+    tools: ToolTable | None = None,
+    comments: Mapping[int, Statement] | None = None,
+    shapes: Mapping[int, Shape] | None = None,
+) -> tuple[Finding, ...]:
+    """Hold what is stated about each cutter against the cutter that is simulated; differences by wear are findings.
+
+    Parameters
+    ----------
+    name : of the program, for messages
+    cutters : of the job, by tool
+    tools : the tool table; entries without a diameter state none
+    comments : of the NC text, by tool
+    shapes : of CL data, by tool
+
+    Raises
+    ------
+    InputError
+        A statement differs from the cutter by more than wear: the message gives both numbers.
+    """
+    found: list[Finding] = []
+    for number, cutter in sorted(cutters.items()):
+        table = tools.tools.get(number) if tools is not None else None
+        if table is not None and table.diameter != 0.0:
+            stated = Statement(abs(table.diameter), "the tool table", 0)
+            found += _same(name, number, cutter, stated, f"correct D of T{number} in the tool table or")
+        if comments and number in comments:
+            remedy = "correct whichever is wrong, or set program.tool_comments = false:"
+            found += _same(name, number, cutter, comments[number], remedy)
+        if shapes and number in shapes:
+            _same_shape(name, number, cutter, shapes[number])
+    return tuple(found)
+
+
+def _same(name: str, number: int, cutter: Cutter, stated: Statement, remedy: str) -> list[Finding]:
+    """A finding where a diameter differs a little."""
+    apart = abs(stated.diameter - cutter.diameter)
+    if apart <= SAME_MM:
+        return []
+    numbers = (
+        f"{stated.where} states {stated.diameter:g} mm for tool {number}, the [[cutter]] has {cutter.diameter:g} mm"
+    )
+    if apart > WEAR_MM:
+        where = f"{name}: line {stated.line}" if stated.line else name
+        raise InputError(
+            f"{where}: {numbers}: must agree within {WEAR_MM:g} mm: {remedy} diameter_mm of the [[cutter]] with "
+            f"number = {number}"
+        )
+    return [Finding("tool-diameter", stated.line, f"{numbers}: taken as wear, the [[cutter]] is simulated")]
+
+
+def _same_shape(name: str, number: int, cutter: Cutter, shape: Shape) -> None:
+    """Refuse a CUTTER of CL data that is not the cutter of the job."""
+    d, r, _, _, alpha, beta, _ = shape
+    pairs = (
+        ("diameter", d, cutter.diameter, "diameter_mm", WEAR_MM, 1.0, "mm"),
+        ("corner radius", r, cutter.corner_radius, "corner_radius_mm", WEAR_MM, 1.0, "mm"),
+        ("bottom angle", alpha, cutter.bottom, "bottom_deg", SAME_ANGLE, 180.0 / math.pi, "deg"),
+        ("taper", beta, cutter.taper, "taper_deg", SAME_ANGLE, 180.0 / math.pi, "deg"),
+    )
+    for what, stated, own, key, slack, shown, unit in pairs:
+        if abs(stated - own) > slack:
+            raise InputError(
+                f"{name}: CUTTER states the {what} {stated * shown:g} {unit} for tool {number}, the [[cutter]] has "
+                f"{own * shown:g} {unit}: must agree within {slack * shown:g} {unit}: correct the CUTTER or {key} of "
+                f"the [[cutter]] with number = {number}"
+            )

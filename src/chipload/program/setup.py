@@ -1,0 +1,120 @@
+"""What a controller knows before a program begins: parameters, work offsets, the cutters of its tools.
+
+Notation: a parameter is named as the text names it: ``#5221``, ``#<depth>`` or ``_hal[x]`` (RS-274), ``R10``
+(Sinumerik), ``Q10`` (Heidenhain). A work offset is named by the code that selects it: ``G54`` to ``G59.3``,
+``G54.1 P7`` (Fanuc), ``G505`` (Sinumerik). Its origin is the place of its zero in the machine's coordinates, X Y Z A B
+C U V W [mm, deg]; only differences count where the machine has no rotary axes.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from chipload.cutter.cutter import Cutter
+from chipload.errors import InputError
+
+_HASH = re.compile(r"#?([0-9]{1,6})|#<([a-z_][^<>]*)>|(_[^<>]*)")
+_LETTER = {"sinumerik": "r", "heidenhain": "q"}
+_OFFSET = re.compile(r"G(5[4-9])(?:\.([123]))?(?:\s*P([0-9]{1,3}))?|G(5[0-9]{2})")
+
+Nine = tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """What a program finds when it begins.
+
+    Parameters
+    ----------
+    parameters : value by name
+    work_offsets : 3 to 9 numbers [mm, deg] by code
+    placed_in : code of the work offset in whose coordinates the workpiece is; None: the first that the program uses
+    cutters : of the tools, by number
+    """
+
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    work_offsets: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    cutters: Mapping[int, Cutter] = field(default_factory=dict)
+    placed_in: str | None = None
+
+    def values(self, dialect: str) -> dict[int | str, float]:
+        """Value of each parameter by number, or by name in lower case without spaces.
+
+        Raises
+        ------
+        InputError
+            The dialect has no parameter of that name.
+
+        >>> Setup({"#100": 2.5, "#<depth>": 1.0}).values("linuxcnc"), Setup({"Q10": 3.0}).values("heidenhain")
+        ({100: 2.5, 'depth': 1.0}, {10: 3.0})
+        """
+        out: dict[int | str, float] = {}
+        for name, value in self.parameters.items():
+            plain = "".join(name.split()).lower()
+            letter = _LETTER.get(dialect, "")
+            found = re.fullmatch(rf"{letter}([0-9]{{1,6}})", plain) if letter else _HASH.fullmatch(plain)
+            if found is None or dialect == "apt":
+                shown = {"apt": "no parameters", "sinumerik": "R10", "heidenhain": "Q10"}.get(
+                    dialect, "#100 or #<name>"
+                )
+                raise InputError(f"program.parameters: {name!r}: must be as {dialect} names them: {shown}")
+            if not math.isfinite(value):
+                raise InputError(f"program.parameters: {name} = {value:g}: must be a finite number")
+            out[int(found[1]) if found[1] else found[2] or found[3]] = float(value)
+        return out
+
+    def origins(self, dialect: str) -> dict[int, tuple[Nine, float]]:
+        """(9,) [mm, deg] and rotation [deg] of each work offset by its number, 1 for G54.
+
+        Raises
+        ------
+        InputError
+            The dialect has no work offset of that name, or its numbers are not 3 to 9.
+
+        >>> Setup(work_offsets={"G55": [10.0, 0.0, -5.0]}).origins("linuxcnc")
+        {2: ((10.0, 0.0, -5.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0)}
+        """
+        out: dict[int, tuple[Nine, float]] = {}
+        for name, given in self.work_offsets.items():
+            number = offset_number(name, dialect)
+            origin = tuple(float(x) for x in given)
+            if not 3 <= len(origin) <= 9 or not all(math.isfinite(x) for x in origin):
+                raise InputError(
+                    f"program.work_offsets: {name} = {list(given)}: must be 3 to 9 numbers, X Y Z A B C U V W in mm "
+                    "and degrees"
+                )
+            out[number] = (origin + (0.0,) * (9 - len(origin)), 0.0)
+        return out
+
+    def placed(self, dialect: str) -> int | None:
+        """Number of the work offset of ``placed_in``."""
+        return None if self.placed_in is None else offset_number(self.placed_in, dialect, "placed_in")
+
+    def diameters(self) -> dict[int, float]:
+        """Diameter [mm] of each cutter by its tool."""
+        return {number: cutter.diameter for number, cutter in self.cutters.items()}
+
+
+def offset_number(name: str, dialect: str, key: str = "work_offsets") -> int:
+    """Number of a work offset that a code selects; ``key`` of the job for messages.
+
+    >>> offset_number("G59.3", "linuxcnc"), offset_number("G54.1 P7", "fanuc"), offset_number("G505", "sinumerik")
+    (9, 16, 5)
+    """
+    found = _OFFSET.fullmatch(" ".join(name.split()).upper())
+    if found is not None and dialect in ("linuxcnc", "fanuc", "sinumerik"):
+        code, point, extended, siemens = found.groups()
+        if siemens and dialect == "sinumerik" and int(siemens) >= 505:
+            return int(siemens) - 500
+        if extended and dialect == "fanuc" and code == "54" and point == "1" and 1 <= int(extended) <= 300:
+            return 9 + int(extended)
+        if code and not extended and (point is None or (code == "59" and dialect == "linuxcnc")):
+            number = int(code) - 53 + int(point or 0)
+            if dialect != "sinumerik" or number <= 4:
+                return number
+    known = {"linuxcnc": "G54 to G59.3", "fanuc": "G54 to G59 or G54.1 P1 to P300", "sinumerik": "G54 to G57, G505 on"}
+    text = f"must be {known[dialect]}" if dialect in known else f"{dialect} has none: leave it out"
+    raise InputError(f"program.{key}: {name!r}: {text}")

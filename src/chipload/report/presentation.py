@@ -1,0 +1,28 @@
+"""How a capability presents its result: its part of the report, its scene and its files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import IO
+
+import plotly.graph_objects as go
+
+#: content of a file, or what writes it bit by bit
+Content = bytes | Callable[[IO[bytes]], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Presentation:
+    """What a result folder holds beside the common files.
+
+    Parameters
+    ----------
+    sections : puts figures into a mapping by name and returns HTML between the limits and the findings of the report
+    scene : scene.glb
+    files : programs and other files by name
+    """
+
+    sections: Callable[[dict[str, go.Figure]], list[str]]
+    scene: Callable[[], bytes]
+    files: Callable[[], Mapping[str, Content]] = field(default=dict)

@@ -1,0 +1,201 @@
+"""Every quantity of chipload's results: its column name, unit, label and meaning, once.
+
+The table is used for the fields of history.parquet, the limits, the report, the page and docs/columns.md. A limit has
+the name of the column that it bounds; :data:`BOUNDED` lists the few limits that bound a column of another name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from chipload.errors import InputError
+
+
+@dataclass(frozen=True)
+class Column:
+    """A quantity.
+
+    Parameters
+    ----------
+    name : of the column, with the unit in it
+    unit : as printed; empty for a count or a word
+    label : as a person reads it
+    meaning : one sentence
+    signed : whether a limit bounds its size, whatever the sign
+    """
+
+    name: str
+    unit: str
+    label: str
+    meaning: str
+    signed: bool = False
+
+    @property
+    def title(self) -> str:
+        """Label and unit.
+
+        >>> COLUMNS["force_n"].title
+        'force [N]'
+        """
+        return f"{self.label} [{self.unit}]" if self.unit else self.label
+
+
+_ROWS = (
+    # where and when
+    ("operation", "", "operation", "number of the operation in the job, from 0"),
+    ("track", "", "track", "the strategy, variant, controller or program that the row belongs to"),
+    ("pass", "", "pass", "name of the pass or section of the program"),
+    ("line", "", "line", "line of the program's text; 0: none"),
+    ("tool", "", "tool", "tool number"),
+    ("motion", "", "motion", "rapid, line, arc or dwell"),
+    ("rapid", "", "rapid", "whether the step is a rapid"),
+    ("s_mm", "mm", "path", "length of the tip's path up to the end of the step"),
+    ("t_s", "s", "time", "time on the machine at the end of the step, with rapids but the one from an unknown place"),
+    ("duration_s", "s", "duration", "time that the step takes on the machine"),
+    ("cutting_s", "s", "cutting time", "time of the step at the commanded feed"),
+    ("x_mm", "mm", "x", "tip in the workpiece frame"),
+    ("y_mm", "mm", "y", "tip in the workpiece frame"),
+    ("z_mm", "mm", "z", "tip in the workpiece frame"),
+    ("axis_x", "", "axis x", "tool axis in the workpiece frame, a unit vector from the tip to the spindle"),
+    ("axis_y", "", "axis y", "tool axis in the workpiece frame"),
+    ("axis_z", "", "axis z", "tool axis in the workpiece frame"),
+    ("contact_x_mm", "mm", "contact x", "contact point on the finished surface"),
+    ("contact_y_mm", "mm", "contact y", "contact point on the finished surface"),
+    ("contact_z_mm", "mm", "contact z", "contact point on the finished surface"),
+    # what is commanded
+    ("feed_mm_min", "mm/min", "feed", "feed of the tip"),
+    ("spindle_rpm", "1/min", "spindle speed", "spindle speed, negative when it turns anticlockwise"),
+    ("override", "", "feed override", "feed over programmed feed"),
+    ("override_state", "", "override state", "what determined the feed override"),
+    ("feed_limited_by", "", "feed limited by", "what limits the feed of the line"),
+    ("latency_s", "s", "latency", "time between a measurement and the override that follows from it"),
+    # engagement and chip
+    ("engagement_deg", "deg", "engagement", "engagement angle of the cutter"),
+    ("engagement_max_deg", "deg", "greatest engagement", "greatest engagement angle within the step"),
+    ("ae_mm", "mm", "radial depth of cut", "radial depth of cut"),
+    ("ap_mm", "mm", "axial depth of cut", "axial depth of cut"),
+    ("depth_mm", "mm", "depth of cut", "depth of cut normal to the surface"),
+    ("chip_max_mm", "mm", "chip thickness", "greatest undeformed chip thickness"),
+    ("chip_volume_mm3", "mm\u00b3", "chip volume", "volume that the step removes"),
+    ("engaged_volume_mm3", "mm\u00b3", "engaged volume", "volume that the engaged edge sweeps in the step"),
+    ("cutting_work_j", "J", "cutting work", "work of the torque without the edge coefficients"),
+    ("chip_pieces", "", "chip pieces", "greatest number of separate pieces of the chip on one layer"),
+    ("chip_layers", "", "chip layers", "layers of the stock that lose material"),
+    ("flute_fill", "", "chip space", "loose chip volume of a tooth over the volume of its flute"),
+    # loads
+    ("force_n", "N", "force", "greatest size of the force on the cutter over a revolution"),
+    ("force_xy_n", "N", "force across the axis", "greatest force on the cutter across its axis over a revolution"),
+    ("force_x_n", "N", "force x", "force on the cutter where the force across the axis is greatest"),
+    ("force_y_n", "N", "force y", "force on the cutter where the force across the axis is greatest"),
+    ("force_z_n", "N", "force z", "force on the cutter where the force across the axis is greatest"),
+    ("force_x_mean_n", "N", "mean force x", "mean of the force on the cutter over a revolution"),
+    ("force_y_mean_n", "N", "mean force y", "mean of the force on the cutter over a revolution"),
+    ("force_z_mean_n", "N", "mean force z", "mean of the force on the cutter over a revolution"),
+    ("force_x_max_n", "N", "greatest force x", "greatest value over a revolution"),
+    ("force_y_max_n", "N", "greatest force y", "greatest value over a revolution"),
+    ("force_z_max_n", "N", "greatest force z", "greatest value over a revolution"),
+    ("force_x_min_n", "N", "least force x", "least value over a revolution"),
+    ("force_y_min_n", "N", "least force y", "least value over a revolution"),
+    ("force_z_min_n", "N", "least force z", "least value over a revolution"),
+    ("force_sd_n", "N", "standard deviation of force", "of the greatest force, by the spread of the coefficients"),
+    ("torque_sd_nm", "N m", "standard deviation of torque", "of greatest torque, by the spread of the coefficients"),
+    ("torque_mean_sd_nm", "N m", "standard deviation of mean torque", "by the spread of the coefficients"),
+    ("power_sd_w", "W", "standard deviation of power", "of the mean power, by the spread of the coefficients"),
+    ("force_normal_n", "N", "normal force", "greatest force that presses on the surface that the step leaves"),
+    ("force_normal_planned_n", "N", "planned normal force", "normal force that the plan expects"),
+    ("force_allowable_n", "N", "allowable normal force", "normal force that the workpiece allows at the place"),
+    ("force_over_allowable", "", "force over allowable", "normal force over allowable normal force"),
+    ("torque_nm", "N m", "torque", "greatest torque on the cutter over a revolution"),
+    ("torque_mean_nm", "N m", "mean torque", "mean torque over a revolution, which the spindle has to give"),
+    ("torque_measured_nm", "N m", "measured torque", "torque as the controller measures it"),
+    ("torque_allowable_nm", "N m", "allowable torque", "torque that the workpiece allows at the place"),
+    ("torque_over_percent", "%", "torque over allowable", "torque above the allowable torque, in percent of it"),
+    ("power_w", "W", "power", "mean power over a revolution"),
+    ("cutter_stress_mpa", "MPa", "cutter stress", "greatest equivalent stress of shank and fluted section"),
+    ("strength_share", "", "stress over strength", "greatest equivalent stress of the workpiece over its strength"),
+    ("stress_mpa", "MPa", "workpiece stress", "greatest equivalent stress of the workpiece"),
+    # deflection and form error
+    ("deflection_um", "\u00b5m", "deflection", "distance by which cutter and workpiece part"),
+    ("deflection_cutter_um", "\u00b5m", "cutter deflection", "deflection of cutter, holder and spindle"),
+    ("deflection_workpiece_um", "\u00b5m", "workpiece deflection", "deflection of the workpiece"),
+    ("deflection_share", "", "deflection share", "deflection over the greatest with which the rigid model holds"),
+    ("form_error_um", "\u00b5m", "form error", "material left on the surface by deflection; negative: removed", True),
+    ("form_points", "", "finished points", "points of the part's surface that the step finishes"),
+    ("axial_overrun_mm", "mm", "cut above the flutes", "engaged length of the cutter above its flutes"),
+    # forces that are measured, beside those of the force model
+    ("rotation_deg", "deg", "rotation", "rotation of tooth 0 from the beginning of a slot"),
+    ("force_feed_n", "N", "force along the feed", "predicted force on the cutter along the feed"),
+    ("force_across_n", "N", "force across the feed", "predicted force on the cutter to the left of the feed"),
+    ("force_axis_n", "N", "force along the axis", "predicted force on the cutter along its axis"),
+    ("force_feed_measured_n", "N", "measured force along the feed", "mean turn of the measured force"),
+    ("force_across_measured_n", "N", "measured force across the feed", "mean turn of the measured force"),
+    ("force_axis_measured_n", "N", "measured force along the axis", "mean turn of the measured force"),
+    ("mean_percent", "%", "error of mean force", "predicted less measured mean force, of the measured", True),
+    ("peak_percent", "%", "error of peak force", "predicted less measured peak force, of the measured", True),
+    # geometry of the part
+    ("gouge_mm", "mm", "gouge", "deepest cut into the part"),
+    ("excess_mm", "mm", "excess", "most material over the part where the cutter came near it"),
+    ("scallop_mm", "mm", "scallop height", "height of the material left between two passes"),
+    ("clearance_mm", "mm", "clearance", "least distance of shank and holder to anything they must not touch"),
+    ("unreached_points", "", "unreached contact points", "contact points that no cutter of the catalogue reaches"),
+    ("uncertified_points", "", "uncertified contact points", "contact points whose largest cutter is not certified"),
+    ("time_s", "s", "program time", "time of the program on the machine"),
+)  # fmt: skip
+
+
+#: units by the ending of a column's name
+UNITS: Mapping[str, str] = {
+    "mm_min": "mm/min", "mm3": "mm\u00b3", "mm": "mm", "um": "\u00b5m", "deg": "deg", "s": "s", "n": "N", "nm": "N m",
+    "w": "W", "j": "J", "mpa": "MPa", "rpm": "1/min", "percent": "%",
+}  # fmt: skip
+
+
+def unit_of(name: str) -> str:
+    """The unit that the ending of a column's name states; empty where it states none.
+
+    >>> unit_of("feed_mm_min"), unit_of("torque_nm"), unit_of("tool")
+    ('mm/min', 'N m', '')
+    """
+    words = name.split("_")
+    return next((UNITS[end] for k in range(1, len(words)) if (end := "_".join(words[k:])) in UNITS), "")
+
+
+def _by_name(columns: Iterable[Column]) -> Mapping[str, Column]:
+    """Columns by name; one name stands once."""
+    table: dict[str, Column] = {}
+    for column in columns:
+        if column.name in table:
+            raise ValueError(f"column {column.name}: stands twice in the table of columns")
+        if column.unit != unit_of(column.name):
+            raise ValueError(f"column {column.name}: unit {column.unit!r} is not that of its name")
+        table[column.name] = column
+    return table
+
+
+#: every quantity by its column name
+COLUMNS: Mapping[str, Column] = _by_name(Column(*row) for row in _ROWS)
+
+#: limits that bound a column of another name: limit, (column, label)
+BOUNDED: Mapping[str, tuple[str, str]] = {
+    "spindle_torque_nm": ("torque_mean_nm", "spindle torque"),
+    "spindle_power_w": ("power_w", "spindle power"),
+}
+
+
+def column_of(limit: str) -> Column:
+    """The column that a limit bounds, labelled as the limit.
+
+    >>> column_of("spindle_power_w").title, column_of("spindle_power_w").name
+    ('spindle power [W]', 'power_w')
+
+    Raises
+    ------
+    InputError
+        No column has this name.
+    """
+    name, label = BOUNDED.get(limit, (limit, ""))
+    if name not in COLUMNS:
+        raise InputError(f"limit {limit}: not known: no column of a history has this name")
+    own = COLUMNS[name]
+    return Column(own.name, own.unit, label, own.meaning, own.signed) if label else own

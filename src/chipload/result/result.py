@@ -1,0 +1,165 @@
+"""The result of a job of any kind: verdict, limits, tracks, findings, maps and where the numbers come from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import Finding
+from chipload.result.columns import COLUMNS
+from chipload.result.limits import LimitCheck
+from chipload.result.track import Track
+from chipload.result.verdict import Verdict
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where the numbers of a result come from; nothing of this computer, no time of day.
+
+    Parameters
+    ----------
+    inputs : what was read: name, file name and hash
+    overrides : keys of the job that were overridden
+    machine : its name and note
+    materials : source of the coefficients by name of the material
+    versions : of chipload, Python and the libraries that may change a number
+    """
+
+    inputs: Mapping[str, str]
+    overrides: tuple[str, ...]
+    machine: str
+    materials: Mapping[str, str]
+    versions: Mapping[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceMap:
+    """A quantity over a surface of the part.
+
+    Parameters
+    ----------
+    name : unique in the result
+    column : name of the quantity, see :data:`chipload.result.columns.COLUMNS`
+    points : (n, 3) float [mm]
+    values : (n,) float, in the unit of the column; NaN where the quantity is not known
+    faces : (m, 3) int, triangles of the points; (0, 3): points only
+    track : name of the track that it belongs to; empty: the whole result
+    """
+
+    name: str
+    column: str
+    points: Floats
+    values: Floats
+    faces: NDArray[np.int64]
+    track: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse arrays that do not belong together."""
+        n = len(self.points)
+        if self.points.shape != (n, 3) or self.values.shape != (n,) or self.faces.shape[1:] != (3,):
+            raise ValueError(f"map {self.name}: shapes {self.points.shape}, {self.values.shape}, {self.faces.shape}")
+        if self.column not in COLUMNS:
+            raise ValueError(f"map {self.name}: column {self.column} is not known")
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """The result of a job.
+
+    Parameters
+    ----------
+    capability : name of the folder in ``jobs/`` that made it
+    title : of the job
+    tracks : those in use first, within an operation in the order of the job
+    operations : JSON values particular to the capability, one a operation
+    findings : of the job, its files and the whole result
+    unchecked : names of limits that are not stated and of checks that are switched off
+    provenance : where the numbers come from
+    maps : quantities over surfaces
+    note : a sentence that the message adds where everything holds; empty: none
+    """
+
+    capability: str
+    title: str
+    tracks: tuple[Track, ...]
+    operations: tuple[Mapping[str, Any], ...]
+    findings: tuple[Finding, ...]
+    unchecked: tuple[str, ...]
+    provenance: Provenance
+    maps: tuple[SurfaceMap, ...] = ()
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse two tracks of one name, and one in use behind one of its operation that is not."""
+        names = [track.name for track in self.tracks]
+        if len(set(names)) < len(names):
+            raise ValueError(f"tracks: names {names} must differ")
+        unused: set[int] = set()
+        for track in self.tracks:
+            if track.in_use and track.operation in unused:
+                raise ValueError(f"tracks: of operation {track.operation}: those in use come first: move {track.name}")
+            if not track.in_use:
+                unused.add(track.operation)
+
+    @property
+    def in_use(self) -> tuple[Track, ...]:
+        """The tracks that the verdict stands on."""
+        return tuple(track for track in self.tracks if track.in_use)
+
+    @property
+    def limits(self) -> tuple[LimitCheck, ...]:
+        """Every limit of the tracks in use."""
+        return tuple(check for track in self.in_use for check in track.limits)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """The worst of the tracks in use and of the findings; unproven if no limit was checked."""
+        states = [track.verdict for track in self.in_use] + [Verdict.of_finding(f) for f in self.findings]
+        return Verdict.worst(states + ([] if self.limits else [Verdict.UNPROVEN]))
+
+    @cached_property
+    def message(self) -> str:
+        """The verdict in a sentence or two, with the numbers of the limits.
+
+        What exceeds comes first, then what is unproven; where everything holds, every limit is named.
+        """
+        texts: dict[Verdict, list[str]] = {state: [] for state in Verdict}
+        for f in self.findings:
+            texts[Verdict.of_finding(f)].append(_located(f))
+        for track in self.in_use:
+            of = f"{track.name}: " if len(self.in_use) > 1 else ""
+            for f in track.findings:
+                texts[Verdict.of_finding(f)].append(of + _located(f))
+            for check in track.limits:
+                texts[check.state].append(of + check.text)
+        if self.verdict is Verdict.HOLDS:
+            held = "; ".join(
+                (f"{track.name}: " if len(self.in_use) > 1 else "") + ", ".join(check.text for check in track.limits)
+                for track in self.in_use
+                if track.limits
+            )
+            return f"Holds: {held}.{f' {self.note}' if self.note else ''}"
+        found = list(dict.fromkeys(texts[self.verdict])) or ["no limit was checked"]
+        more = f"; and {len(found) - 1} more" if len(found) > 1 else ""
+        return f"{self.verdict.value.capitalize()}: {found[0]}{more}."
+
+    def track(self, name: str) -> Track:
+        """The track of a name.
+
+        Raises
+        ------
+        KeyError
+            There is none.
+        """
+        return {track.name: track for track in self.tracks}[name]
+
+
+def _located(finding: Finding) -> str:
+    return f"line {finding.line}: {finding.text}" if finding.line else finding.text

@@ -1,0 +1,85 @@
+"""A track: one program along its path, with its limits, its time and its history.
+
+A result has one track for each strategy of a contour, variant of a thin wall, controller of a torque-controlled
+program, or program. Tracks never share rows: their time begins at 0 and rises.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import Finding
+from chipload.result.limits import Columns, LimitCheck
+from chipload.result.verdict import Verdict
+
+#: yields the rows of a history, some ten thousand at a time
+Blocks = Callable[[], Iterator[Columns]]
+
+
+class TrackKind(enum.StrEnum):
+    """What the tracks of a result compare."""
+
+    STRATEGY = "strategy"
+    VARIANT = "variant"
+    CONTROLLER = "controller"
+    PROGRAM = "program"
+    MEASUREMENT = "measurement"
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """One program along its path.
+
+    Parameters
+    ----------
+    name : of the strategy, variant, controller or program; unique in the result
+    kind : what the tracks of this result compare
+    in_use : whether the verdict stands on it and its program is released
+    time_s : of the program on the machine [s]; None: it was not run
+    limits : each limit of the job against this track
+    findings : what was found in this track
+    programs : names of its program files
+    operation : number of its operation
+    parameters : what sets it apart beside its name, as ``{"latency_s": 0.1}``
+    blocks : its history, a row a step of the program
+    """
+
+    name: str
+    kind: TrackKind
+    in_use: bool
+    time_s: float | None
+    limits: tuple[LimitCheck, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    programs: tuple[str, ...] = ()
+    operation: int = 0
+    parameters: Mapping[str, float | str] = field(default_factory=dict)
+    blocks: Blocks = field(default=lambda: iter(()))
+
+    def __post_init__(self) -> None:
+        """Refuse a time that is no number."""
+        if self.time_s is not None and not (math.isfinite(self.time_s) and self.time_s >= 0.0):
+            raise ValueError(f"track {self.name}: time_s = {self.time_s}: must be a finite number from 0")
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst of its limits and findings."""
+        states = [check.state for check in self.limits] + [Verdict.of_finding(f) for f in self.findings]
+        return Verdict.worst(states)
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """(n,) columns of the whole history by name; empty if there is none."""
+        blocks = list(self.blocks())
+        return {name: np.concatenate([b[name] for b in blocks]) for name in (blocks[0] if blocks else ())}
+
+
+def in_memory(columns: Columns) -> Blocks:
+    """Blocks of a history that is in memory."""
+    return lambda: iter((columns,))

@@ -1,0 +1,334 @@
+"""How far the loads of a simulation may be from those of a finer one, and whether their work is that of the volume.
+
+Two numbers are found from a run and stated beside it.
+
+**Energy balance**, a cutter: W = sum of T omega dt over its steps, T the mean torque without the edge coefficients,
+against sum of K V, V [mm^3] the volume that the sections of the stock have lost in a step and K [MPa] its specific
+energy: Ktc where the material has no size effect; else the mean of Ktc h^(-m) over the engaged edge with the
+thickness h that the loads were computed with (of the whole cutter, in a step that lost volume and has no engaged
+edge). The quotient less 1 is 0 where contact, thickness and volume are right. V and the engaged edge come from
+different computations.
+
+**Resolution error**, a column of loads: some steps are computed once more in a stock of their own. It is the stock
+before the run in the box of the cutter, in layers whose thickness is a share of their height over the lowest point of
+the cutter, so that the shallowest cut has several; the earlier steps that reach into the box are removed from it;
+then the step is cut in halves, with twice the slices (at least FINE, narrow near the bottom) and half the angle
+between rotations. With c the load of the run, f that of the finer one and w the worst of the run, the error is
+
+    FACTOR max e / w + FLOOR + v / (1 - v),  e = |f - c| where c >= w / 2, else max(f - w, 0),
+
+for a small load matters to a limit only by what exceeds the worst; v the share of the volume that was lost in films,
+for which no loads are computed. FACTOR covers what the finer run is off itself: the error of layers, slices and steps
+is of first order at least, and the finer ones are at most half as thick, so that it is 2. Where the axis leans slices
+do not end where contact ends, the peak over a rotation comes unevenly, and it is 3. FLOOR, 1 % (2 % where an axis
+leans), is what both runs share: rotations that are looked at, edges of the stock within the tolerance. The steps are
+a worst one of each column, the ones that lose most, others evenly spaced among those in cut, and some that lose
+nothing at the height of a section though the cutter is in the stock. How many: as the earlier steps that they need
+allow, at most SHARE of the steps of the run, but for the first and for short programs.
+
+By moves the stock has no layers. The earlier steps that reach into the box are made again in the initial body, then the
+step with MORE times the slices and half the angle between rotations, once at the same instants, for f - c, and once in
+halves, for what exceeds the worst: where the contact is exact, a load that differs between the halves of a step, as
+where the cutter enters, is no error of the resolution unless it is greater than any that was found. FLOOR is that of
+:data:`MOVES_FLOOR`, no less than what 99 of 100 moves of the benchmark are off by (docs/design/engines.md), for of all
+steps a few are computed once more.
+
+Deflection and form error go with the force: they have its error.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.slices import slices
+from chipload.simulation.checkpoint import in_rows
+from chipload.simulation.loads import LOADS
+from chipload.simulation.moves import MoveRun, moved
+from chipload.simulation.steps import Steps
+from chipload.simulation.swept_area import boxes, swept_ahead
+from chipload.stock.layers import LayeredStock
+
+if TYPE_CHECKING:
+    from chipload.simulation.chips import RunSettings
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Columns = Mapping[str, NDArray[Any]]
+#: columns of some steps in a stock, which changes
+Remove = Callable[[Steps, LayeredStock, "RunSettings"], Columns]
+#: greatest loads of a step that is computed once more, by column: looked at as in the run, and in its halves
+Again = Callable[["Window"], tuple[Mapping[str, float], Mapping[str, float]]]
+
+#: columns that are compared; the others that a limit may hold go with the force
+COMPARED = ("force_n", "torque_nm", "torque_mean_nm", "power_w", "chip_max_mm")
+WITH_FORCE = ("deflection_um", "form_error_um")
+#: earlier steps that are removed again: at most this share of the run's, and this number in a short run
+SHARE, LEAST = 0.05, 60
+#: slices of the corner in the finer run, at least
+FINE = 48
+#: on the difference of the two resolutions, upright and where the axis leans
+FACTOR, LEANING = 2.0, 3.0
+#: error that both resolutions share, likewise
+FLOOR, LEANING_FLOOR = 0.01, 0.02
+#: by moves: error of a column that is not found from a few steps, and slices of the finer run over those of the run
+MOVES_FLOOR = {"force_n": 0.03, "torque_nm": 0.03, "torque_mean_nm": 0.01, "power_w": 0.01, "chip_max_mm": 0.03}
+MORE = 4
+#: layers of the finer stock: the lowest in diameters, each so many times as thick as the one below it
+LOWEST, GROWTH = 5e-4, 1.3
+#: steps that are looked at beside the worst ones
+EVEN, IDLE = 3, 2
+#: rows of columns that are read at once
+ROWS = 65_536
+
+
+def energy_balance(columns: Columns, ktc: float) -> dict[int, float]:
+    """Work over sum of K V, less 1, of each tool number that cuts: see the module.
+
+    Parameters
+    ----------
+    columns : of a removal
+    ktc : tangential coefficient [MPa], for a cutter that has no engaged edge in any step
+
+    Examples
+    --------
+    >>> c = {"tool": [1, 1], "rapid": [False, False], "chip_volume_mm3": [2.0, 2.0], "engaged_volume_mm3": [2.0, 2.2]}
+    >>> c = {name: np.array(v) for name, v in {**c, "cutting_work_j": [2.0, 2.2]}.items()}
+    >>> round(energy_balance(c, 1000.0)[1], 12)
+    0.05
+    """
+    totals: dict[int, Floats] = {}
+    for part in in_rows(columns, ROWS):
+        lost = np.where(part["rapid"], 0.0, part["chip_volume_mm3"])
+        engaged, work = part["engaged_volume_mm3"], 1000.0 * part["cutting_work_j"]
+        has = engaged > 0.0
+        known = lost * np.divide(work, engaged, out=np.zeros(len(work)), where=has)
+        for tool in np.unique(part["tool"]).tolist():
+            own = part["tool"] == tool
+            sums = [work[own].sum(), engaged[own].sum(), known[own].sum(), lost[own & ~has].sum(), lost[own].sum()]
+            totals[tool] = totals.get(tool, np.zeros(5)) + sums
+    out = {}
+    for tool, (work, engaged, known, rest, lost) in sorted(totals.items()):
+        if lost > 0.0:
+            mean = work / engaged if engaged > 0.0 else ktc
+            out[tool] = float(work / (known + mean * rest) - 1.0)
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """A step that is computed once more: its number, its box, the earlier steps that reach into the box."""
+
+    step: int
+    own: Steps
+    low: Floats
+    high: Floats
+    earlier: tuple[Steps, ...]
+
+    @property
+    def upright(self) -> bool:
+        """Whether the axis stands upright in all of the step."""
+        return bool(min(self.own.a0[0, 2], self.own.a1[0, 2]) > 1.0 - 1e-12)
+
+    @property
+    def factor(self) -> float:
+        """On the difference of the two resolutions."""
+        return FACTOR if self.upright else LEANING
+
+    @property
+    def cost(self) -> int:
+        """How many earlier steps there are."""
+        return sum(len(s) for s in self.earlier)
+
+
+def resolution_error(
+    blocks: Iterable[Steps], before: LayeredStock, columns: Columns, setting: RunSettings, again: Again
+) -> dict[str, float]:
+    """Relative error of the worst value of each column of loads: see the module.
+
+    Parameters
+    ----------
+    blocks : the steps of the run, in blocks; gone through twice
+    before : the stock before the run; it is not changed
+    columns : of the removal
+    setting : of the run
+    again : :func:`layers_again` or :func:`moves_again`
+
+    Returns
+    -------
+    mapping of :data:`COMPARED` and :data:`WITH_FORCE` to at least 0; inf where the run has a load of 0 and the finer
+    one has not
+    """
+    asked, count = _asked(columns, before)
+    found = dict.fromkeys((*COMPARED, *WITH_FORCE), 0.0)
+    lost = dict.fromkeys(COMPARED, 0.0)
+    worst = {name: float(np.max(columns[name], initial=0.0)) for name in COMPARED}
+    budget, spent = max(int(SHARE * count), LEAST), 0
+    windows = {w.step: w for w in _windows(blocks, asked, setting)}
+    for number, step in enumerate(asked):
+        window = windows[step]
+        spent += window.cost
+        if number > 0 and spent > budget:
+            spent -= window.cost
+            continue
+        alike, halves = again(window)
+        for name in COMPARED:
+            c, w = float(columns[name][step]), worst[name]
+            off = max(halves[name] - w, abs(alike[name] - c) if c >= 0.5 * w else alike[name] - w)
+            lost[name] = max(lost[name], window.factor * off)
+    films, least = _films(columns), FLOOR if all(w.upright for w in windows.values()) else LEANING_FLOOR
+    for name in COMPARED:
+        if worst[name] > 0.0 and films < 1.0:
+            floor = least if setting.moves is None else MOVES_FLOOR[name]
+            found[name] = lost[name] / worst[name] + floor + films / (1.0 - films)
+        elif lost[name] > 0.0 or films > 0.0:
+            found[name] = math.inf
+    return found | dict.fromkeys(WITH_FORCE, found["force_n"])
+
+
+def _asked(columns: Columns, before: LayeredStock) -> tuple[list[int], int]:
+    """Steps to compute once more, the most telling first, and how many the run has."""
+    rapid, volume = np.asarray(columns["rapid"]), np.asarray(columns["chip_volume_mm3"])
+    force = np.asarray(columns["force_n"])
+    worst = [_among_worst(np.asarray(columns[name])) for name in COMPARED if len(force)]
+    cut = np.flatnonzero(force > 0.0)
+    out = [k for k in worst if force[k] > 0.0]
+    if len(cut):
+        out.append(int(cut[np.argmax(volume[cut])]))
+        out += cut[((np.arange(EVEN) + 0.5) / EVEN * len(cut)).astype(np.int64)].tolist()
+    within = np.asarray(columns["z_mm"]) < before.bounds[-1]
+    for i, name in enumerate(("x_mm", "y_mm")):
+        borders = before.xs if i == 0 else before.ys
+        within &= (np.asarray(columns[name]) > borders[0]) & (np.asarray(columns[name]) < borders[-1])
+    idle = np.flatnonzero(within & (force == 0.0) & ~rapid & (np.asarray(columns["seconds"]) > 0.0))
+    if len(idle):
+        out += idle[((np.arange(IDLE) + 0.5) / IDLE * len(idle)).astype(np.int64)].tolist()
+    return list(dict.fromkeys(out)), len(force)
+
+
+def _among_worst(values: Floats) -> int:
+    """The middle one of the steps whose load is within 1 % of the worst: the first of many alike is often an entry."""
+    alike = np.flatnonzero(values >= 0.99 * values.max())
+    return int(alike[len(alike) // 2])
+
+
+def _films(columns: Columns) -> float:
+    """Share of the volume that was lost, not by rapids, in steps without loads."""
+    volume = np.where(columns["rapid"], 0.0, columns["chip_volume_mm3"])
+    whole = float(np.abs(volume).sum())
+    return float(np.abs(volume[np.asarray(columns["chip_pieces"]) == 0]).sum()) / whole if whole > 0.0 else 0.0
+
+
+def _windows(blocks: Iterable[Steps], asked: list[int], setting: RunSettings) -> list[Window]:
+    """Windows about steps, from one pass for the steps and one for what came before them."""
+    own: dict[int, tuple[Steps, Floats, Floats]] = {}
+    earlier: dict[int, list[Steps]] = {k: [] for k in asked}
+    last = max(asked, default=-1)
+    for turn in range(2):
+        at = 0
+        for block in blocks:
+            if at > last:
+                break
+            a, b = boxes(block, setting.cutters)
+            for k in asked:
+                if turn == 0 and at <= k < at + len(block):
+                    own[k] = (_rows(block, np.array([k - at])), a[k - at], b[k - at])
+                if turn == 1:
+                    _, low, high = own[k]
+                    near = ((b > low) & (a < high)).all(axis=1) & (at + np.arange(len(block)) < k)
+                    if near.any():
+                        earlier[k].append(_rows(block, np.flatnonzero(near)))
+            at += len(block)
+    return [Window(k, *own[k], tuple(earlier[k])) for k in asked]
+
+
+def _rows(steps: Steps, rows: Ints) -> Steps:
+    return Steps(**{f.name: getattr(steps, f.name)[rows] for f in fields(Steps)})
+
+
+def layers_again(before: LayeredStock, setting: RunSettings, remove: Remove) -> Again:
+    """Steps in a finer stock of layers; ``remove`` gives the columns of some steps."""
+
+    def again(window: Window) -> tuple[Mapping[str, float], Mapping[str, float]]:
+        fine = _finer_layers(window, before, setting, remove)
+        return fine, fine
+
+    return again
+
+
+def moves_again(setting: RunSettings, run: MoveRun) -> Again:
+    """Steps by moves with more slices."""
+    flank = {n: length / MORE for n, length in run.flank_mm.items()}
+    rotation = 0.5 * setting.resolution.rotation
+
+    def greatest(window: Window, own: Steps) -> Mapping[str, float]:
+        stock = run.stock.cropped(window.low, window.high)
+        if stock is None:
+            return dict.fromkeys(COMPARED, 0.0)
+        for some in window.earlier:
+            stock.skip(some.p0, some.p1, some.tool)
+        finer = replace(run, stock=stock, corner_pieces=MORE * run.corner_pieces, flank_mm=flank)
+        loads = moved(own, finer, 0, setting.cutters, setting.material, rotation).loads
+        return {name: float(loads[:, LOADS.index(name)].max()) for name in COMPARED}
+
+    return lambda window: (greatest(window, window.own), greatest(window, _halves(window.own)))
+
+
+def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, remove: Remove) -> dict[str, float]:
+    """The greatest loads in the halves of a step, in a finer stock."""
+    tool = int(window.own.tool[0])
+    cutter = setting.cutters[tool]
+    stock = before.cropped(window.low[:2], window.high[:2])
+    if stock is None:
+        return dict.fromkeys(COMPARED, 0.0)
+    low, high = float(window.low[2]), float(window.high[2])
+    thickest = 0.5 * float(np.median(before.thickness[slice(*_span(before, low, high))]))
+    heights, z, thin = [low], low, LOWEST * cutter.diameter
+    while z < high:
+        z += min(thin, thickest)
+        thin *= GROWTH
+        heights.append(z)
+    stock.refine_at(heights, 0.25 * LOWEST * cutter.diameter)
+    fine = setting.resolution
+    pieces = max(2 * fine.corner_pieces, FINE)
+    fine = replace(
+        fine,
+        rotation=0.5 * fine.rotation,
+        corner_pieces=pieces,
+        flank_mm=0.5 * fine.flank_mm,
+        bottom_pieces=2 * fine.bottom_pieces,
+    )
+    profile = slices(
+        cutter,
+        bottom_pieces=fine.bottom_pieces,
+        corner_pieces=fine.corner_pieces,
+        flank_mm=fine.flank_mm,
+        grading=max(fine.grading, 2.0) if window.upright else fine.grading,
+    )
+    again = replace(setting, profiles={tool: profile}, resolution=fine, watch=None)
+    tolerance = fine.tolerance
+    for some in window.earlier:
+        for _, swept in swept_ahead(some, stock, setting.cutters, setting.interpolation, tolerance, setting.workers):
+            stock.remove_many([i for i, _ in swept.met], [shape for _, shape in swept.met], 0.5 * tolerance)
+    columns = remove(_halves(window.own), stock, again)
+    return {name: float(columns[name].max()) for name in COMPARED}
+
+
+def _span(stock: LayeredStock, low: float, high: float) -> tuple[int, int]:
+    layers = stock.layers_between(low, high)
+    return (layers.start, layers.stop) if layers else (0, stock.layers)
+
+
+def _halves(step: Steps) -> Steps:
+    """One step as two of half its length and time."""
+    p, a = 0.5 * (step.p0 + step.p1), step.a0 + step.a1
+    a = a / np.linalg.norm(a, axis=1)[:, None]
+    both = {f.name: np.repeat(getattr(step, f.name), 2) for f in fields(Steps) if getattr(step, f.name).ndim == 1}
+    both["seconds"] = 0.5 * both["seconds"]
+    ends = {"p0": [step.p0, p], "p1": [p, step.p1], "a0": [step.a0, a], "a1": [a, step.a1]}
+    return Steps(**both, **{name: np.concatenate(v) for name, v in ends.items()})

@@ -1,0 +1,360 @@
+"""The folder in which a run keeps what it has finished, so that the same run goes on there after it was stopped.
+
+Notation: a piece is the columns of steps that follow one another, in one Parquet file; the state is all that goes on
+from one step to the next, after the last step of the last piece, in some files. ``last.json`` names the pieces and the
+state that belong together and is replaced at one moment: whatever else lies there is of a piece that was not finished,
+and is written again.
+
+The key stands for all that the result depends on. What was kept under another key is of another run: it is thrown away.
+What cannot be read is set aside in a folder beside it, never removed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import shutil
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import shapely
+from numpy.typing import NDArray
+
+from chipload.errors import InputError
+from chipload.files import FRESH, cannot_write, sweep, write_whole
+
+if sys.platform != "win32":
+    import fcntl
+
+#: seconds of work between two states
+EVERY_S = 10.0
+KIND = "chipload unfinished simulation 1"
+LAST, LOCK = "last.json", "lock"
+
+Arrays = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class StoredChunk:
+    """A finished piece: its file, its number of steps, the hash of the file."""
+
+    file: str
+    steps: int
+    sha256: str
+
+
+class _Damaged(Exception):
+    """A file that was kept is not the one that was written; its name."""
+
+
+class Stored(Mapping[str, NDArray[Any]]):
+    """Columns in files: a column is read when it is asked for, and not kept.
+
+    A column that a piece lacks is 0 there.
+    """
+
+    def __init__(self, folder: Path, parts: Sequence[StoredChunk]) -> None:
+        self.files = [(folder / part.file, part.steps) for part in parts]
+        self.names = tuple(dict.fromkeys(name for file, _ in self.files for name in pq.read_schema(file).names))
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        if name not in self.names:
+            raise KeyError(name)
+        return np.concatenate([_read(file, name, count) for file, count in self.files])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def pieces(self) -> Iterator[dict[str, NDArray[Any]]]:
+        """All columns, piece after piece."""
+        for file, count in self.files:
+            yield {name: _read(file, name, count) for name in self.names}
+
+
+def in_rows(columns: Arrays, size: int) -> Iterator[dict[str, NDArray[Any]]]:
+    """Columns, ``size`` rows at a time and the rest.
+
+    >>> [some["x"].tolist() for some in in_rows({"x": np.arange(5)}, 2)]
+    [[0, 1], [2, 3], [4]]
+    """
+    held: dict[str, NDArray[Any]] = {}
+    for piece in columns.pieces() if isinstance(columns, Stored) else (columns,):
+        held = {k: np.concatenate([held[k], v]) if held else v for k, v in piece.items()}
+        count = len(next(iter(held.values())))
+        for at in range(0, count - size + 1, size):
+            yield {k: v[at : at + size] for k, v in held.items()}
+        held = {k: v[count // size * size :] for k, v in held.items()}
+    if held and len(next(iter(held.values()))):
+        yield held
+
+
+class Checkpoint:
+    """The folder of a run, held by that run alone; a context that lets it go.
+
+    What is in the folder stays when the context is left, unless :meth:`begin` was called and the input was then
+    refused: :meth:`discard` removes it.
+
+    Parameters
+    ----------
+    folder : it may be there or not; it is made when the first piece is written
+    every_s : seconds of work between two states [s]; 0: one after every block
+    fresh : throw away what was kept
+    notice : is told from where the run goes on
+
+    Raises
+    ------
+    InputError
+        Another run holds the folder, or it holds something else.
+    OutputError
+        It cannot be written.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        every_s: float = EVERY_S,
+        *,
+        fresh: bool = False,
+        notice: Callable[[str], None] = lambda text: None,
+    ) -> None:
+        if not 0.0 <= every_s < math.inf:
+            raise InputError(f"{folder}: every_s = {every_s:g}: must be at least 0 s")
+        self.folder, self.every_s, self.fresh, self.notice = folder, every_s, fresh, notice
+        self.key, self.parts, self.number, self.safe = "", list[StoredChunk](), 0, 0
+        self._lock: int | None = None
+        if folder.exists():
+            require_ours(folder)
+            self._hold()
+
+    def __enter__(self) -> Checkpoint:
+        return self
+
+    def __exit__(self, _kind: object, error: object, _trace: object) -> None:
+        if isinstance(error, InputError) and self.key:
+            self.discard()
+        self.close()
+
+    def begin(self, key: str) -> dict[str, Path] | None:
+        """The files of the state from which the run of this key goes on; None: it begins at its beginning.
+
+        ``safe`` is the number of steps that were kept.
+        """
+        self.key = key
+        if self.folder.exists():
+            state = None
+            if not self.fresh and (self.folder / LAST).exists():
+                try:
+                    state = self._kept()
+                except _Damaged as err:
+                    self.set_aside(str(err))
+                    return None
+                except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+                    self.set_aside(LAST)
+                    return None
+            if state is not None:
+                return state
+            if any(file.name != LOCK for file in self.folder.iterdir()):
+                self.notice(f"begins again: {'it was asked to' if self.fresh else 'what was kept is of another input'}")
+            self._clear()
+        return None
+
+    def _kept(self) -> dict[str, Path] | None:
+        """Files of the state; None: of another run."""
+        last = json.loads((self.folder / LAST).read_bytes())
+        if last["kind"] != KIND or last["key"] != self.key:
+            return None
+        parts = [StoredChunk(**part) for part in last["parts"]]
+        state = {name: StoredChunk(**part) for name, part in last["state"].items()}
+        for part in (*parts, *state.values()):
+            file = self.folder / part.file
+            if not file.exists() or _hash(file) != part.sha256:
+                raise _Damaged(part.file)
+        self.parts, self.number, self.safe = parts, len(parts), sum(part.steps for part in parts)
+        return {name: self.folder / part.file for name, part in state.items()}
+
+    def set_aside(self, what: str) -> None:
+        """Keep what cannot be read in a folder beside this one, and begin again; ``what`` is the file at fault."""
+        number = 1
+        while (aside := self.folder.with_name(f"{self.folder.name}.damaged-{number}")).exists():
+            number += 1
+        try:
+            aside.mkdir()
+            for file in list(self.folder.iterdir()):
+                if file.name != LOCK:
+                    file.rename(aside / file.name)
+        except OSError as err:
+            raise cannot_write(aside, err) from None
+        self.parts, self.number, self.safe = [], 0, 0
+        self.notice(f"begins again: {what} cannot be read: what was kept is set aside in {aside}")
+
+    def add(self, columns: Arrays) -> None:
+        """Write a piece; it counts from the next :meth:`commit` on."""
+        self._make()
+        name = f"{self.number:06d}.parquet"
+        table = pa.table({k: pa.array(np.ascontiguousarray(v)) for k, v in columns.items()})
+        sink = pa.BufferOutputStream()
+        pq.write_table(table, sink, compression="zstd", use_dictionary=False)
+        self.parts.append(self._write(name, sink.getvalue().to_pybytes(), table.num_rows))
+        self.number += 1
+
+    def commit(self, state: Mapping[str, bytes]) -> None:
+        """Make the pieces so far and the state that belongs to them, files by name, the ones that count."""
+        self._make()
+        made = {name: self._write(f"{name}-{self.number:06d}.npz", data, 0) for name, data in state.items()}
+        parts = {"parts": [asdict(p) for p in self.parts], "state": {name: asdict(p) for name, p in made.items()}}
+        write_whole(self.folder / LAST, (json.dumps({"kind": KIND, "key": self.key, **parts}) + "\n").encode())
+        for old in set(self.folder.glob("*.npz")) - {self.folder / part.file for part in made.values()}:
+            old.unlink()
+        self.safe = sum(part.steps for part in self.parts)
+
+    def again(self, why: str) -> None:
+        """Throw away what was kept: the run of this key begins at its beginning; ``why`` is told."""
+        self.notice(why)
+        self.parts, self.number, self.safe = [], 0, 0
+        if self._lock is not None:
+            self._clear()
+
+    def columns(self) -> Stored:
+        """What the pieces hold."""
+        return Stored(self.folder, self.parts)
+
+    def close(self) -> None:
+        """Let another run have the folder."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    def discard(self) -> None:
+        """Remove the folder, if this run holds it."""
+        if self._lock is not None and is_ours(self.folder):
+            shutil.rmtree(self.folder, ignore_errors=True)
+        self.safe = 0
+        self.close()
+
+    def _write(self, name: str, data: bytes, steps: int) -> StoredChunk:
+        write_whole(self.folder / name, data)
+        return StoredChunk(name, steps, hashlib.sha256(data).hexdigest())
+
+    def _make(self) -> None:
+        if self._lock is not None:
+            return
+        try:
+            self.folder.mkdir(parents=True)
+        except FileExistsError:
+            raise InputError(f"{self.folder}: another run has begun there: name another result") from None
+        except OSError as err:
+            raise cannot_write(self.folder, err) from None
+        self._hold()
+
+    def _hold(self) -> None:
+        """Lock the folder for as long as this process lives."""
+        try:
+            self._lock = os.open(self.folder / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+        except OSError as err:
+            raise cannot_write(self.folder, err) from None
+        try:
+            if sys.platform != "win32":
+                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            self.close()
+            raise InputError(f"{self.folder}: another run works there: wait for it or name another result") from None
+        sweep(self.folder)
+
+    def _clear(self) -> None:
+        for file in self.folder.iterdir():
+            if file.name != LOCK:
+                file.unlink()
+
+
+def is_ours(folder: Path) -> bool:
+    """Whether a folder holds nothing but what a run that was stopped may leave."""
+    try:
+        return (
+            not folder.is_symlink()
+            and folder.is_dir()
+            and all(
+                p.name in (LAST, LOCK) or p.suffix in (".parquet", ".npz") or p.name.startswith(FRESH)
+                for p in folder.iterdir()
+            )
+        )
+    except OSError as err:
+        raise cannot_write(folder, err) from None
+
+
+def require_ours(folder: Path) -> None:
+    """Refuse a folder with other files in it.
+
+    Raises
+    ------
+    InputError
+        It is something else.
+    """
+    try:
+        there = folder.exists()
+    except OSError as err:
+        raise cannot_write(folder, err) from None
+    if there and not is_ours(folder):
+        raise InputError(
+            f"{folder}: is needed to keep what is finished, and holds other files: move it or name another result"
+        )
+
+
+def digest(*values: Any) -> str:
+    """A hash of values: numbers, texts, arrays, geometries, dataclasses, and tuples, lists and mappings of them."""
+    out = hashlib.sha256()
+    for value in values:
+        _feed(out, value)
+    return out.hexdigest()
+
+
+def _feed(out: Any, value: Any) -> None:
+    if isinstance(value, np.ndarray) and value.dtype == object:
+        _feed(out, ("shapes", *value.shape))
+        for binary in shapely.to_wkb(value.ravel(), byte_order=1):
+            _feed(out, binary)
+    elif isinstance(value, np.ndarray):
+        out.update(f"array {value.dtype} {value.shape}:".encode())
+        out.update(np.ascontiguousarray(value).tobytes())
+    elif is_dataclass(value) and not isinstance(value, type):
+        out.update(type(value).__qualname__.encode())
+        _feed(out, {f.name: getattr(value, f.name) for f in fields(value)})
+    elif isinstance(value, Mapping):
+        out.update(f"mapping {len(value)}:".encode())
+        for key, held in value.items():
+            _feed(out, key)
+            _feed(out, held)
+    elif isinstance(value, (tuple, list)):
+        out.update(f"row {len(value)}:".encode())
+        for held in value:
+            _feed(out, held)
+    elif isinstance(value, bytes):
+        out.update(f"bytes {len(value)}:".encode())
+        out.update(value)
+    elif value is None or isinstance(value, (bool, int, float, str, np.generic)):
+        text = repr(value)
+        out.update(f"{type(value).__name__} {len(text)}:{text}".encode())
+    else:
+        raise TypeError(f"no hash of a {type(value).__name__}")
+
+
+def _hash(file: Path) -> str:
+    with file.open("rb") as data:
+        return hashlib.file_digest(data, "sha256").hexdigest()
+
+
+def _read(file: Path, name: str, count: int) -> NDArray[Any]:
+    if name not in pq.read_schema(file).names:
+        return np.zeros(count)
+    column = pq.read_table(file, columns=[name]).column(0)
+    return np.asarray(column.to_numpy())

@@ -1,0 +1,225 @@
+"""Run a Program through a stock piece by piece: memory does not grow with it, and a run that was stopped goes on.
+
+Notation: a piece as in :mod:`chipload.simulation.checkpoint`. Steps are simulated in blocks; after a block, when some
+seconds have passed, the columns since the last time become a piece, the stock and the sums a state. A block needs the
+stock and the sums before it and nothing else, both come back from a file bit for bit, and blocks do not depend on when
+states were written: so the result has the same bytes however often the run was stopped.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from shapely import MultiPolygon, Polygon
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material
+from chipload.engagement.chips.move import Move
+from chipload.errors import InputError
+from chipload.program.program import Program
+from chipload.progress import Progress, silent
+from chipload.simulation.checkpoint import Checkpoint, digest
+from chipload.simulation.chips import (
+    ChipPieces,
+    Columns,
+    Floats,
+    Removal,
+    Resolution,
+    RunningSums,
+    RunSettings,
+    Watch,
+    block_of,
+    by_layers,
+    counted,
+    removal_of,
+    remove_block,
+    setting_of,
+    stacked,
+    with_accuracy,
+    with_engine,
+)
+from chipload.simulation.moves import Engine, HandOver
+from chipload.simulation.steps import BLOCK, steps_in_blocks
+from chipload.simulation.swept_area import Interpolation
+from chipload.stock.layers import LayeredStock
+from chipload.stock.shapes import read_shapes, shape_bytes
+
+#: steps whose columns are kept in memory at most
+MOST = 128 * BLOCK
+#: writing a state takes at most this share of the time
+SHARE = 0.05
+#: what a file of sums says of itself, and its arrays with their numbers of dimensions
+SUMS = "chipload sums of a simulation 1"
+ARRAYS = {"handed": 1, "numbers": 1, "basis": 2, "rapids": 1, "of": 1, "height": 1, "tip": 2, "axis": 2}
+
+
+def remove_in_chunks(
+    program: Program,
+    stock: LayeredStock,
+    cutters: Mapping[int, Cutter],
+    material: Material,
+    resolution: Resolution,
+    unfinished: Checkpoint,
+    *,
+    interpolation: Interpolation = "slerp",
+    watch: Watch | None = None,
+    times: Floats | None = None,
+    also: Any = (),
+    workers: int = 2,
+    engine: Engine = "layers",
+    progress: Progress = silent,
+) -> Removal:
+    """What :func:`chipload.simulation.chips.remove` does, with its columns in files and from where it was stopped.
+
+    Parameters
+    ----------
+    unfinished : the folder of the run; it holds the columns of the result, and stays until it is discarded
+    times, engine : as of :func:`chipload.simulation.chips.remove`
+    also : values of any kind on which the result depends beside the arguments: versions, what ``watch`` uses
+
+    Returns
+    -------
+    Removal
+        Its columns are :class:`chipload.simulation.checkpoint.Stored` where they did not stay in memory.
+
+    Raises
+    ------
+    InputError
+        As :func:`chipload.simulation.chips.remove`, and where the folder cannot be used.
+    """
+    count = counted(program, cutters, resolution)
+    setting = setting_of(cutters, material, resolution, interpolation, watch, workers)
+    shape = (stock.bounds, stock.xs, stock.ys, stock.cut, stock.room, stock.tidied, stock.tiles)
+    part = None if stock.part is None else (np.asarray(stock.part.vertices), np.asarray(stock.part.faces))
+    kept = unfinished.begin(
+        digest(
+            program,
+            cutters,
+            material,
+            resolution,
+            shape,
+            part,
+            interpolation,
+            watch is not None,
+            BLOCK,
+            times,
+            engine,
+            also,
+        )
+    )
+    setting, handed = with_engine(engine, setting, program, stock)
+    sums, before, state = RunningSums(stock.volume(), handed=handed), stock.copied(), None
+    if kept is not None:
+        try:
+            found_sums = _read_sums(kept["sums"], cutters)
+            if setting.moves is None or "stock" in kept:
+                state = LayeredStock.load(kept["stock"]).state()
+        except (InputError, KeyError) as err:
+            unfinished.set_aside(str(err))
+            kept = None
+    if kept is not None:
+        sums = found_sums
+        if state is not None:
+            stock.restore(state)
+            setting = replace(setting, moves=None)
+        elif setting.moves is not None:
+            setting.moves.skip(program, resolution.step_mm, sums.steps)
+        unfinished.notice(f"goes on after step {sums.steps} of {count}, kept in {unfinished.folder}")
+    try:
+        sums, columns = _removed(program, stock, sums, setting, unfinished, count, times, progress)
+    except HandOver as found:
+        setting, handed = by_layers(engine, setting, found)
+        unfinished.again(f"goes on by layers from the beginning: line {found.line}: {found.why}")
+        sums = RunningSums(stock.volume(), handed=handed)
+        sums, columns = _removed(program, stock, sums, setting, unfinished, count, times, progress)
+    if setting.moves is not None:
+        setting.moves.finish(stock)
+    progress(1.0, "removed")
+    every: Columns = unfinished.columns() if unfinished.parts else stacked(columns)
+    return with_accuracy(removal_of(program, stock, material, sums, every), program, before, setting)
+
+
+def _removed(
+    program: Program,
+    stock: LayeredStock,
+    sums: RunningSums,
+    setting: RunSettings,
+    unfinished: Checkpoint,
+    count: int,
+    times: Floats | None,
+    progress: Progress,
+) -> tuple[RunningSums, list[Columns]]:
+    """The sums after all steps, and the columns that did not go into files."""
+    resolution, cutters = setting.resolution, setting.cutters
+
+    def state() -> dict[str, bytes]:
+        # the moves come from the program again
+        layers = {} if setting.moves is not None else {"stock": stock.to_bytes()}
+        return layers | {"sums": _sums_bytes(sums, cutters)}
+
+    done = sums.steps
+    since, cost, waiting, columns = time.monotonic(), 0.0, 0, list[Columns]()
+    blocks = steps_in_blocks(
+        program, resolution.step_mm, resolution.tolerance, size=block_of(setting), first=done, times=times
+    )
+    for steps in blocks:
+        progress(sums.steps / count, "removing")
+        sums, some, _ = remove_block(steps, stock, sums, setting)
+        columns.append(some)
+        waiting += len(steps)
+        now = time.monotonic()
+        due = now - since >= max(unfinished.every_s, cost / SHARE)
+        if due or unfinished.every_s == 0.0 or waiting >= MOST:
+            unfinished.add(stacked(columns))
+            columns, waiting = [], 0
+        if due or unfinished.every_s == 0.0:
+            unfinished.commit(state())
+            since = time.monotonic()
+            cost = since - now
+    if unfinished.parts:
+        if columns:
+            unfinished.add(stacked(columns))
+        if unfinished.safe < count:
+            unfinished.commit(state())
+    return sums, columns
+
+
+def _sums_bytes(sums: RunningSums, cutters: Mapping[int, Cutter]) -> bytes:
+    piece = sums.piece
+    tool = [n for n, c in cutters.items() if piece is not None and c is piece.cutter]
+    none = np.zeros((0, 3))
+    handed = f"{sums.handed[0]} {sums.handed[1]}" if sums.handed is not None else ""
+    arrays = {
+        "handed": np.frombuffer(handed.encode(), dtype=np.uint8),
+        "numbers": np.array([sums.before, sums.steps, sums.s_mm, sums.t_s, sums.cut_s]),
+        "basis": sums.basis,
+        "rapids": np.array(sums.rapids, dtype=np.int64),
+        "of": np.array([piece.step, *tool] if piece is not None else [], dtype=np.int64),
+        "height": np.array([piece.height] if piece is not None else []),
+        "tip": piece.move.tip if piece is not None else none,
+        "axis": piece.move.axis if piece is not None else none,
+    }
+    shapes = np.empty(0 if piece is None else 1 + len(piece.chips), dtype=object)
+    shapes[:] = [] if piece is None else [piece.before, *piece.chips]
+    return shape_bytes(SUMS, arrays, shapes)
+
+
+def _read_sums(path: Path, cutters: Mapping[int, Cutter]) -> RunningSums:
+    a, shapes = read_shapes(path, SUMS, ARRAYS)
+    if a["numbers"].shape != (5,) or a["basis"].shape != (4, 6) or (len(a["of"]) == 0) != (len(shapes) == 0):
+        raise InputError(f"{path}: damaged: remove its folder")
+    before, steps, s_mm, t_s, cut_s = a["numbers"].tolist()
+    piece = None
+    if len(shapes):
+        step, tool = a["of"].tolist()
+        chips = tuple(p for p in shapes[1:] if isinstance(p, Polygon))
+        assert isinstance(shapes[0], MultiPolygon)
+        piece = ChipPieces(step, Move(a["tip"], a["axis"]), cutters[tool], float(a["height"][0]), shapes[0], chips)
+    line, _, why = bytes(a["handed"].astype(np.uint8)).decode().partition(" ")
+    handed = (int(line), why) if line else None
+    return RunningSums(before, int(steps), s_mm, t_s, cut_s, a["basis"], tuple(a["rapids"].tolist()), piece, handed)

@@ -1,0 +1,371 @@
+"""Steps of an upright cutter run through the stock as moves: what each removes and what that costs.
+
+Notation: as in :mod:`chipload.engagement.moves`. A step is looked at at its middle, and where it is long at more
+instants, the middles of equal parts of it. Its volume and its mean loads are the means over the instants, its greatest
+loads the greatest of any; what a ``watch`` gets is the tooth engagement at the instant of the greatest force, where
+several are alike at the one nearest to the middle.
+
+What this engine cannot do is handed over: :class:`HandOver` names the line and the reason.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutter.slices import edge_lag
+from chipload.cutting.band import deviations, mean_basis, peak_band
+from chipload.cutting.material import Material
+from chipload.cutting.revolution.revolution import loads_over_turn
+from chipload.engagement.moves.stock import Engaged, MoveStock
+from chipload.engagement.tooth_engagement import ToothEngagement, with_runout
+from chipload.errors import InputError
+from chipload.program.program import Program
+from chipload.simulation.loads import BANDS, LOADS, ONE_SIDE, Cuts, engaged_work
+from chipload.simulation.steps import ROWS, Steps, steps_in_blocks
+from chipload.stock.layers import LayeredStock
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Engine = Literal["auto", "moves", "layers"]
+
+#: slices of an engaged corner over those that are asked for: the greatest force is then within 3 % of the converged one
+#: in 99 of 100 moves of a finishing program at the default of a job, see docs/design/engines.md
+FINER = 5.0 / 3.0
+#: an axis that differs from z by no more than this is upright
+UPRIGHT = 1e-9
+#: columns of the loads that are means, of :data:`chipload.simulation.loads.LOADS`
+MEANS = np.array([0, 1, 2, 10, 12, 15, 16])
+LEAST = np.array([6, 7, 8])
+#: of the columns, the greatest force and the greatest torque
+FORCE, TORQUE = LOADS.index("force_n"), LOADS.index("torque_nm")
+#: forces of instants that differ by no more than this share are alike
+ALIKE = 1e-3
+#: a rapid that takes less than so many tolerances, over the edge that it meets, meets a film left by chords
+FILM = 4.0
+
+
+class HandOver(Exception):
+    """What the moves cannot simulate: the line of the program and the reason."""
+
+    def __init__(self, line: int, why: str) -> None:
+        super().__init__(why)
+        self.line, self.why = line, why
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """What some steps removed.
+
+    Parameters
+    ----------
+    removed : (n, 4) volume [mm^3], pieces and layers of each chip, contact of the shank: 0, for that is handed over
+    loads : (n, len(LOADS))
+    bands : (n,) each, columns of :data:`chipload.simulation.loads.BANDS`; none where the material has no band
+    basis : (4, 6) integral over the time in cut of what the coefficients are multiplied with
+    cuts : what the teeth cut, one a cutter
+    """
+
+    removed: Floats
+    loads: Floats
+    bands: Mapping[str, Floats]
+    basis: Floats
+    cuts: list[Cuts]
+
+
+@dataclass(frozen=True, eq=False)
+class MoveRun:
+    """A run by moves: its stock, the layers that it ends in, and how finely the edge is looked at.
+
+    Parameters
+    ----------
+    stock : the moves so far
+    layers : heights of the layers of the stock [mm], ascending bounds
+    corner_pieces, flank_mm : slices of an engaged corner, longest slice of the flank by tool number
+    tolerance : of outlines [mm]
+    """
+
+    stock: MoveStock
+    layers: Floats
+    corner_pieces: int
+    flank_mm: Mapping[int, float]
+    tolerance: float
+
+    def skip(self, program: Program, step_mm: float, count: int) -> None:
+        """Make the first ``count`` steps of a program without looking at them: a run that goes on."""
+        for steps in steps_in_blocks(program, step_mm, self.tolerance, size=ROWS):
+            if count <= 0:
+                return
+            self.stock.skip(steps.p0[:count], steps.p1[:count], steps.tool[:count])
+            count -= len(steps)
+
+    def finish(self, stock: LayeredStock) -> None:
+        """Take from the layers what the moves swept of their sections."""
+        low = self.stock.lowest()
+        at = [i for i, z in enumerate(stock.heights.tolist()) if z > low]
+        shapes = [self.stock.outlines(float(stock.heights[i]), 0.5 * self.tolerance) for i in at]
+        stock.remove_many([i for i, s in zip(at, shapes, strict=True) if not s.is_empty], [s for s in shapes if s])
+
+
+def run_by_moves(
+    program: Program,
+    stock: LayeredStock,
+    cutters: Mapping[int, Cutter],
+    step_mm: float,
+    tolerance: float,
+    corner_pieces: int,
+    flank_mm: float,
+) -> MoveRun:
+    """The run of a program by moves.
+
+    Raises
+    ------
+    HandOver
+        The stock was cut already, the axis turns, or tools lean.
+    """
+    if stock.cut.any():
+        raise HandOver(0, "the stock was cut before: its layers are all that is known of it")
+    lean = np.abs(np.asarray(program.axis) - (0.0, 0.0, 1.0)).max(axis=1) > UPRIGHT
+    if lean.any():
+        raise HandOver(int(program.line[int(np.argmax(lean))]), "the axis is not upright")
+    low = np.array([stock.xs[0], stock.ys[0], stock.bounds[0]])
+    high = np.array([stock.xs[-1], stock.ys[-1], stock.bounds[-1]])
+    used = {n: c for n, c in cutters.items() if bool((program.tool == n).any())}
+    if stock.part is None and not _is_block(stock):
+        raise HandOver(0, "the stock is neither a block nor a mesh")
+    moves = MoveStock(low, high, used, stock.part)
+    return MoveRun(
+        moves, np.asarray(stock.bounds), math.ceil(FINER * corner_pieces), dict.fromkeys(used, flank_mm), tolerance
+    )
+
+
+def _is_block(stock: LayeredStock) -> bool:
+    """Whether the layers fill their box."""
+    x, y, z = stock.xs, stock.ys, stock.bounds
+    whole = (x[-1] - x[0]) * (y[-1] - y[0]) * (z[-1] - z[0])
+    return bool(abs(stock.volume() - whole) <= 1e-9 * whole)
+
+
+def moved(
+    steps: Steps,
+    run: MoveRun,
+    first: int,
+    cutters: Mapping[int, Cutter],
+    material: Material,
+    rotation: float,
+) -> Moved:
+    """What some steps remove; ``first`` is the number of the first.
+
+    Raises
+    ------
+    HandOver
+        There is material above the flutes.
+    InputError
+        A cut is made with the spindle at rest.
+    """
+    n = len(steps)
+    found = run.stock.take(steps.p0, steps.p1, steps.tool, corner_pieces=run.corner_pieces, flank_mm=run.flank_mm)
+    if found.above.any():
+        k = int(found.step[int(np.argmax(found.above))])
+        tool = int(steps.tool[k])
+        raise HandOver(
+            int(steps.line[k]),
+            f"material stands above the flutes of tool {tool} ({cutters[tool].flute_length:g} mm)",
+        )
+    removed, loads, basis, cuts = np.zeros((n, 4)), np.zeros((n, len(LOADS))), np.zeros((4, 6)), list[Cuts]()
+    bands = {name: np.zeros(n) for name in BANDS} if material.has_band else {}
+    removed[:, 0] = np.bincount(found.step, found.volume / found.instants, n)
+    np.maximum.at(removed[:, 1], found.step, found.pieces)
+    removed[:, 2] = _layers(found, run.layers, n)
+    rapid = steps.rapid[found.step]
+    length = np.linalg.norm(steps.p1 - steps.p0, axis=1)[found.step]
+    film = rapid & (found.volume <= FILM * run.tolerance * length * found.edge_mm)
+    removed[found.step[film], 1] = 0.0
+    feeding = np.flatnonzero(~rapid)
+    for number in sorted(set(steps.tool[found.step[feeding]].tolist())):
+        entries = feeding[steps.tool[found.step[feeding]] == number]
+        cutter = cutters[number]
+        plain = engagement_of(found, entries, steps, cutter)
+        bites = with_runout(plain, cutter)
+        step = found.step[entries]
+        left, spindle = _left(found, entries), np.abs(steps.spindle[step])
+        each, at = loads_of_instants(bites, cutter, material, rotation, left, spindle, steps.seconds[step])
+        weight = 1.0 / found.instants[entries]
+        _together(loads, step, each, weight)
+        if material.has_band:
+            some = mean_basis(bites, cutter, material, bites.frame)
+            basis = basis + np.tensordot(steps.seconds[step] * weight, some, 1)
+            own, values = _bands(bites, cutter, material, step, each, at, some * weight[:, None, None], spindle)
+            for name, column in zip(BANDS, values, strict=True):
+                bands[name][own] = column
+        cuts.append(_cuts(number, cutter, first, steps, found, entries, plain, each[:, FORCE]))
+    return Moved(removed, loads, bands, basis, cuts)
+
+
+def loads_of_instants(
+    bites: ToothEngagement,
+    cutter: Cutter,
+    material: Material,
+    rotation: float,
+    left: Floats,
+    spindle: Floats,
+    seconds: Floats,
+) -> tuple[Floats, Floats]:
+    """(m, len(LOADS)) loads of steps that take ``seconds`` (m,) and cut all over as ``bites`` say, and (m, 2) rotations
+    [rad] at which force and torque are greatest.
+
+    Oracle: :func:`chipload.simulation.loads.loads_of_steps`, which takes rotation by rotation.
+    """
+    each, at = loads_over_turn(bites, cutter, material, rotation, left)
+    each[:, 10:12] /= 1000.0
+    each[:, 12] = each[:, 10] * spindle
+    volume, work = engaged_work(bites, cutter, material, spindle * seconds)
+    return np.column_stack([each, volume, work / 1000.0]), at
+
+
+def _bands(
+    bites: ToothEngagement,
+    cutter: Cutter,
+    material: Material,
+    step: Ints,
+    each: Floats,
+    at: Floats,
+    basis: Floats,
+    spindle: Floats,
+) -> tuple[Ints, tuple[Floats, ...]]:
+    """Steps, and of each the columns of :data:`BANDS`: of the greatest loads at the instant that has them, of the means
+    over the instants from ``basis`` (m, 4, 6), the weighted one of each instant.
+    """
+    own, of = np.unique(step, return_inverse=True)
+    whole = np.zeros((len(own), 4, 6))
+    np.add.at(whole, of, basis)
+    mean = deviations(whole, material)[:, 3] / 1000.0
+    worst = []
+    for column, name in enumerate((FORCE, TORQUE)):
+        kept = np.lexsort((-each[:, name], step))
+        kept = kept[np.flatnonzero(np.diff(step[kept], prepend=-1))]
+        some = bites if len(kept) == len(step) else _part(bites, kept)
+        worst.append(peak_band(some, cutter, material, at[kept, 0], at[kept, 1])[column])
+    speed = np.zeros(len(own))
+    speed[of] = spindle
+    return own, (worst[0], worst[1] / 1000.0, mean, mean * speed)
+
+
+def engagement_of(found: Engaged, entries: Ints, steps: Steps, cutter: Cutter) -> ToothEngagement:
+    """The tooth engagement of some entries of one cutter, without its runout.
+
+    Raises
+    ------
+    InputError
+        The spindle rests.
+    """
+    step = found.step[entries]
+    spindle = steps.spindle[step]
+    if not spindle.all():
+        line = int(steps.line[step[int(np.argmin(np.abs(spindle)))]])
+        raise InputError(f"line {line}: cuts with the spindle at rest: start it (M3 S) before the cut")
+    feed = (steps.p1 - steps.p0)[step]
+    feed = feed * (math.tau / (cutter.flutes * np.abs(spindle)) / steps.seconds[step])[:, None]
+    size = np.hypot(feed[:, 0], feed[:, 1])
+    upright = size <= 1e-12 * np.abs(feed[:, 2])
+    T = np.where(upright[:, None], [[1.0, 0.0]], feed[:, :2] / np.where(upright, 1.0, size)[:, None])
+    hand = np.where(spindle > 0.0, 1.0, -1.0)
+    frame = np.zeros((len(entries), 3, 3))
+    frame[:, 0, :2] = T
+    frame[:, 1, 0], frame[:, 1, 1] = -hand * T[:, 1], hand * T[:, 0]
+    frame[:, 2, 2] = 1.0
+    count = np.diff(found.start)[entries]
+    start = np.concatenate([[0], np.cumsum(count)])
+    of = np.repeat(np.arange(len(entries)), count)
+    row = np.arange(start[-1]) - start[of] + found.start[entries][of]
+    span, piece = found.span[row], found.slice[row]
+    # psi is counted from the motion counter-clockwise, phi from n in the sense of the spindle
+    turn = hand[of]
+    low = 0.5 * math.pi - np.where(turn > 0.0, span[:, 1], -span[:, 0])
+    wide = np.clip(span[:, 1] - span[:, 0], 0.0, math.tau)
+    low = low - math.tau * np.floor(low / math.tau)
+    s0, s1, _, _, sk, ck = found.slices[piece].T
+    rows = np.column_stack([low, low + wide, s0, s1, sk * size[of], -ck * feed[of, 2], 0.0 * low])
+    return ToothEngagement(start, rows, np.full(len(rows), -1), piece, _slices(found.slices, cutter), frame)
+
+
+def _slices(slices: Floats, cutter: Cutter) -> Floats:
+    """(k, 7) as a bite needs them."""
+    s0, _, rho, z, sk, ck = slices.T
+    lead = edge_lag(cutter)
+    return np.column_stack([s0, rho, z, sk, ck, lead * z, lead * sk])
+
+
+def _left(found: Engaged, entries: Ints) -> Floats:
+    """(m, 3) unit normal of the surface that is left; 0 where none or two that face each other are left."""
+    total, whole = found.left[entries], found.left_mm[entries]
+    size = np.linalg.norm(total, axis=1)
+    one = (size > ONE_SIDE * whole) & (whole > 0.0)
+    return np.asarray(np.where(one[:, None], total / np.where(one, size, 1.0)[:, None], 0.0))
+
+
+def _together(loads: Floats, step: Ints, each: Floats, weight: Floats) -> None:
+    """Loads of instants as those of their steps: means, greatest, least."""
+    fresh = np.unique(step)
+    loads[np.ix_(fresh, LEAST)] = math.inf
+    greatest = np.setdiff1d(np.arange(each.shape[1]), [*MEANS, *LEAST])
+    loads[np.ix_(fresh, greatest)] = -math.inf
+    for i in range(each.shape[1]):
+        if i in MEANS:
+            np.add.at(loads[:, i], step, weight * each[:, i])
+        elif i in LEAST:
+            np.minimum.at(loads[:, i], step, each[:, i])
+        else:
+            np.maximum.at(loads[:, i], step, each[:, i])
+
+
+def _layers(found: Engaged, bounds: Floats, n: int) -> Floats:
+    """(n,) number of layers between the least and the greatest height that each step engages."""
+    low, high = np.full(n, math.inf), np.full(n, -math.inf)
+    np.minimum.at(low, found.step, found.z[:, 0])
+    np.maximum.at(high, found.step, found.z[:, 1])
+    first = np.searchsorted(bounds, low, "right") - 1
+    last = np.searchsorted(bounds, high, "left")
+    return np.where(high > low, np.maximum(last - np.maximum(first, 0), 1), np.where(low < math.inf, 1, 0)).astype(
+        float
+    )
+
+
+def _cuts(
+    number: int,
+    cutter: Cutter,
+    first: int,
+    steps: Steps,
+    found: Engaged,
+    entries: Ints,
+    plain: ToothEngagement,
+    force: Floats,
+) -> Cuts:
+    """What the teeth of a cutter cut: of each step the instant of the greatest ``force`` (m,), where others are within
+    ``ALIKE`` of it the one that is nearest to the middle.
+    """
+    step = found.step[entries]
+    greatest = np.zeros(int(step.max(initial=-1)) + 1)
+    np.maximum.at(greatest, step, force)
+    off = np.abs(2 * found.instant[entries] + 1 - found.instants[entries])
+    order = np.lexsort((off, force < (1.0 - ALIKE) * greatest[step], step))
+    kept = np.sort(order[np.flatnonzero(np.diff(step[order], prepend=-1))])
+    some = plain if len(kept) == len(entries) else _part(plain, kept)
+    at = step[kept]
+    way = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
+    return Cuts(number, cutter, first + at, way, with_runout(some, cutter), some, steps.spindle[at])
+
+
+def _part(bites: ToothEngagement, kept: Ints) -> ToothEngagement:
+    """Some of the steps."""
+    assert bites.frame is not None
+    count = np.diff(bites.start)[kept]
+    start = np.concatenate([[0], np.cumsum(count)])
+    row = np.arange(start[-1]) - np.repeat(start[:-1], count) + np.repeat(bites.start[kept], count)
+    return ToothEngagement(start, bites.rows[row], bites.tooth[row], bites.slice[row], bites.slices, bites.frame[kept])

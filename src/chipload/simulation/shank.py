@@ -1,0 +1,65 @@
+"""Whether the shank stands in material: an axial depth that the flutes do not reach.
+
+The flutes end at ``flute_length``; the shank above them does not cut, it rubs and breaks. The stock is asked when a
+step ends: rings of points of the shank, inside its radius by a margin, upwards from the end of the flutes layer by
+layer, as far as the material goes on. A layer is known by its section at half its height, so an excess of less than
+half a layer is not seen.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.stock.layers import LayeredStock
+
+Floats = NDArray[np.float64]
+
+#: points of a ring
+AROUND = 32
+
+
+def axial_overrun(stock: LayeredStock, cutter: Cutter, tip: Floats, axis: Floats, margin: float) -> float:
+    """Length of the shank that stands in material, from the end of the flutes upwards [mm]; 0: none.
+
+    Parameters
+    ----------
+    stock : as it is
+    tip, axis : (3,) where the cutter is [mm], and its axis, unit
+    margin : what the shank may touch [mm]
+    """
+    shank = cutter.diameter if cutter.shank_diameter is None else cutter.shank_diameter
+    radius = 0.5 * shank - margin
+    low = float(tip[2] + cutter.flute_length * axis[2])
+    lean = radius * math.sqrt(max(1.0 - float(axis[2]) ** 2, 0.0))
+    first = int(np.searchsorted(stock.heights, low - lean))
+    if radius <= 0.0 or first >= stock.layers:
+        return 0.0
+    turn = np.arange(AROUND) * (math.tau / AROUND)
+    across = np.cross(axis, (1.0, 0.0, 0.0) if abs(axis[0]) < 0.9 else (0.0, 1.0, 0.0))
+    across /= np.linalg.norm(across)
+    ring = radius * (np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * np.cross(axis, across))
+    ring = np.vstack([np.zeros(3), 0.5 * ring, ring])
+    height, step = cutter.flute_length, float(stock.thickness[first])
+    # the lowest section above the flutes decides where an upright cutter begins
+    offset = float(stock.heights[first] - low) if lean < 1e-9 else 0.5 * step
+    found = 0.0
+    while height + offset < cutter.overhang and _holds(stock, tip + (height + offset) * axis + ring):
+        height += step
+        found = height - cutter.flute_length
+    return found
+
+
+def _holds(stock: LayeredStock, points: Floats) -> bool:
+    """Whether one of some points (n, 3) [mm] lies in the stock."""
+    layer = np.searchsorted(stock.bounds, points[:, 2], "right") - 1
+    i = np.searchsorted(stock.xs, points[:, 0], "right") - 1
+    j = np.searchsorted(stock.ys, points[:, 1], "right") - 1
+    layers, rows, columns = stock.tiles.shape
+    known = (layer >= 0) & (layer < layers) & (i >= 0) & (i < columns) & (j >= 0) & (j < rows)
+    tiles = stock.tiles[layer[known], j[known], i[known]]
+    return bool(shapely.intersects_xy(tiles, points[known, 0], points[known, 1]).any())

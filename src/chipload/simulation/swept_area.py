@@ -1,0 +1,214 @@
+"""What each step covers of each layer: found ahead of the removal, for it does not depend on the stock.
+
+Notation: a step as in :mod:`chipload.simulation.steps`; a layer is known by its section at half its height.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import MultiPolygon, Polygon
+
+from chipload.cutter.cutter import Cutter
+from chipload.engagement.chips.covered import covered_polygons
+from chipload.engagement.chips.move import LEAST_AXIS_Z, Move
+from chipload.errors import InputError
+from chipload.simulation.reach import reached
+from chipload.simulation.steps import Steps
+from chipload.stock.layers import LayeredStock
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Interpolation = Literal["slerp", "lerp"]
+
+#: a step, the layers in its box, which of them still have material in its way
+Met = tuple[Move, range, NDArray[np.bool_]]
+#: steps whose areas are found in one go
+TOGETHER = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Swept:
+    """What a step covers: the box that it does not leave, the layers in it, those met with their areas."""
+
+    move: Move
+    low: Floats
+    high: Floats
+    layers: range
+    met: list[tuple[int, Polygon | MultiPolygon]]
+
+
+def swept_ahead(
+    steps: Steps,
+    stock: LayeredStock,
+    cutters: Mapping[int, Cutter],
+    interpolation: Interpolation,
+    tolerance: float,
+    workers: int,
+) -> Iterator[tuple[int, Swept]]:
+    """Those steps that meet a layer, in their order; found in threads that run ahead of the caller.
+
+    Raises
+    ------
+    InputError
+        Beside or in the stock the axis lies, or looks down.
+    """
+    low, high, near = _near_stock(steps, stock, cutters)
+
+    def swept(part: range) -> list[tuple[int, Swept]]:
+        found: dict[int, Met] = {}
+        ranges = {k: stock.layers_between(low[k, 2], high[k, 2]) for k in part if near[k]}
+        ranges = {k: layers for k, layers in ranges.items() if layers}
+        for k, left in _left(steps, ranges, low, high, cutters, stock).items():
+            # an axis that lies is refused in air too
+            if left.any() or min(steps.a0[k, 2], steps.a1[k, 2]) < 2.0 * LEAST_AXIS_Z:
+                found[k] = _move(steps, k, interpolation), ranges[k], left
+        out: dict[int, Swept] = {}
+        for tool in sorted({int(steps.tool[k]) for k in found}):
+            own = {k: both for k, both in found.items() if steps.tool[k] == tool}
+            for (k, (move, layers, _)), met in zip(
+                own.items(), _covered(steps, own, cutters[tool], stock, tolerance), strict=True
+            ):
+                out[k] = Swept(move, low[k], high[k], layers, met)
+        return sorted(out.items())
+
+    parts = [range(i, min(i + TOGETHER, len(steps))) for i in range(0, len(steps), TOGETHER)]
+    with ThreadPoolExecutor(workers) as pool:
+        for several in pool.map(swept, parts):
+            for k, found in several:
+                if found.met:
+                    yield k, found
+
+
+def require_upright(
+    steps: Steps, stock: LayeredStock, cutters: Mapping[int, Cutter], interpolation: Interpolation
+) -> None:
+    """Refuse steps whose axis lies, or looks down, beside or in the stock.
+
+    Raises
+    ------
+    InputError
+        As :func:`swept_ahead`.
+    """
+    lies = np.minimum(steps.a0[:, 2], steps.a1[:, 2]) < 2.0 * LEAST_AXIS_Z
+    if not lies.any():
+        return
+    low, high, near = _near_stock(steps, stock, cutters)
+    for k in np.flatnonzero(lies & near).tolist():
+        if stock.layers_between(low[k, 2], high[k, 2]):
+            _move(steps, k, interpolation)
+
+
+def _near_stock(
+    steps: Steps, stock: LayeredStock, cutters: Mapping[int, Cutter]
+) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Boxes of the steps, and which of them come over, into or under the stock."""
+    low, high = boxes(steps, cutters)
+    near = (high[:, 0] >= stock.xs[0]) & (low[:, 0] <= stock.xs[-1])
+    near &= (high[:, 1] >= stock.ys[0]) & (low[:, 1] <= stock.ys[-1])
+    return low, high, near
+
+
+def _left(
+    steps: Steps,
+    ranges: Mapping[int, range],
+    low: Floats,
+    high: Floats,
+    cutters: Mapping[int, Cutter],
+    stock: LayeredStock,
+) -> dict[int, NDArray[np.bool_]]:
+    """Which layers of each step still have material where the cutter may come in them: in its box, and where it leans
+    in the figure of :mod:`chipload.simulation.reach`.
+
+    Asked ahead of the removal, so that more may be there than when the step comes, never less.
+    """
+    if not ranges:
+        return {}
+    of = list(ranges)
+    counts = [len(layers) for layers in ranges.values()]
+    step, layer = np.repeat(of, counts), np.concatenate([np.array(r) for r in ranges.values()])
+    a, b = low[step, :2], high[step, :2]
+    boxes = shapely.box(a[:, 0], a[:, 1], b[:, 0], b[:, 1])
+    i0, j0 = np.searchsorted(stock.xs, a[:, 0], "right"), np.searchsorted(stock.ys, a[:, 1], "right")
+    i1, j1 = np.searchsorted(stock.xs, b[:, 0], "left"), np.searchsorted(stock.ys, b[:, 1], "left")
+    i0, j0 = np.maximum(i0 - 1, 0), np.maximum(j0 - 1, 0)
+    i1, j1 = np.minimum(i1, len(stock.xs) - 1), np.minimum(j1, len(stock.ys) - 1)
+    left = np.zeros(len(step), dtype=np.bool_)
+    for dj in range(int((j1 - j0).max(initial=0))):
+        for di in range(int((i1 - i0).max(initial=0))):
+            ask = np.flatnonzero(~left & (j0 + dj < j1) & (i0 + di < i1))
+            left[ask] = shapely.intersects(boxes[ask], stock.tiles[layer[ask], j0[ask] + dj, i0[ask] + di])
+    out = dict(zip(of, np.split(left, np.cumsum(counts)[:-1]), strict=True))
+    for tool in np.unique(steps.tool[of]).tolist():
+        lean = [k for k in of if steps.tool[k] == tool and out[k].any() and min(steps.a0[k, 2], steps.a1[k, 2]) < 1.0]
+        asked = [np.array(ranges[k])[out[k]] for k in lean]
+        for k, met in zip(lean, reached(steps, lean, asked, cutters[tool], stock), strict=True):
+            out[k] = np.isin(ranges[k], met)
+    return out
+
+
+def _covered(
+    steps: Steps, own: Mapping[int, Met], cutter: Cutter, stock: LayeredStock, tolerance: float
+) -> list[list[tuple[int, Polygon | MultiPolygon]]]:
+    """What steps cover of each layer that they meet; layers that an upright flank crosses share one polygon."""
+    heights = stock.heights
+    asked: list[Floats] = []
+    of: list[Ints] = []
+    for k, (_, layers, left) in own.items():
+        z = heights[layers.start : layers.stop]
+        flank = _flank(steps, k, cutter, z)
+        alone = left & ~flank
+        asked.append(z[alone])
+        rows = np.cumsum(alone) - 1
+        if (left & flank).any():
+            # the last one asked for stands for all that the flank crosses; which are left does not choose its height
+            asked[-1] = np.append(asked[-1], z[flank][0])
+            rows[flank] = len(asked[-1]) - 1
+        of.append(np.where(left, rows, -1))
+    shapes = covered_polygons([move for move, _, _ in own.values()], cutter, asked, tolerance)
+    return [
+        [(i, shape) for i, n in zip(layers, rows.tolist(), strict=True) if n >= 0 and (shape := found[n]) is not None]
+        for (_, layers, _), rows, found in zip(own.values(), of, shapes, strict=True)
+    ]
+
+
+def _flank(steps: Steps, k: int, cutter: Cutter, heights: Floats) -> NDArray[np.bool_]:
+    """Which layers only the flank of an upright cylinder crosses, in all of the step."""
+    if not (steps.a0[k, 2] == steps.a1[k, 2] == 1.0 and cutter.taper == 0.0):
+        return np.zeros(len(heights), dtype=np.bool_)
+    _, r, _, f, _, _, top = cutter.apt
+    low, high = sorted((steps.p0[k, 2], steps.p1[k, 2]))
+    return np.asarray(
+        (heights > high + (f if r > 0.0 else cutter.radius * math.tan(cutter.bottom))) & (heights < low + top)
+    )
+
+
+def boxes(steps: Steps, cutters: Mapping[int, Cutter]) -> tuple[Floats, Floats]:
+    """(n, 3), (n, 3) corners of boxes that the cutter does not leave, as the axis turns by a few degrees in a step."""
+    p0, p1, a0, a1, tools = steps.p0, steps.p1, steps.a0, steps.a1, steps.tool
+    top, wide = np.empty((len(steps), 1)), np.empty((len(steps), 1))
+    for tool in np.unique(tools).tolist():
+        c = cutters[tool]
+        top[tools == tool] = c.flute_length
+        wide[tools == tool] = max(c.radius, float(c.radius_at([c.flute_length])[0]))
+    ends = np.array([p0, p1, p0 + top * a0, p1 + top * a1])
+    # the top of the cutter leaves its chord by the sagitta of the turn, and each circle reaches R across the axis
+    turn = np.linalg.norm(a1 - a0, axis=1)[:, None]
+    lean = np.sqrt(np.maximum(1.0 - np.minimum(a0, a1) ** 2, 1.0 - np.maximum(a0, a1) ** 2))
+    reach = wide * np.minimum(lean + turn, 1.0) + top * turn**2
+    return np.asarray(ends.min(axis=0) - reach), np.asarray(ends.max(axis=0) + reach)
+
+
+def _move(steps: Steps, k: int, interpolation: Interpolation) -> Move:
+    make = Move.slerp if interpolation == "slerp" else Move.lerp
+    try:
+        return make(steps.p0[k], steps.a0[k], steps.p1[k], steps.a1[k])
+    except InputError as err:
+        raise InputError(f"line {steps.line[k]}: {err}") from None

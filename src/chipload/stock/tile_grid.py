@@ -1,0 +1,117 @@
+"""Tiles and layers of a pile: their borders, which of them something reaches into, what a mesh fills of them.
+
+Notation: as in :mod:`chipload.stock.layers`.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import shapely
+import trimesh
+from numpy.typing import ArrayLike, NDArray
+from shapely import MultiPolygon, Polygon
+
+from chipload.errors import InputError
+from chipload.geometry.mesh import sections
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Shapes = NDArray[np.object_]
+
+#: most layers
+LAYER_LIMIT = 200_000
+#: most tiles times layers
+TILE_LIMIT = 20_000_000
+#: type numbers of GEOS
+POLYGON, MULTIPOLYGON = 3, 6
+
+
+def polygons(shape: Any) -> list[Polygon]:
+    """The polygons of a geometry that have an area; its lines and points are left out."""
+    parts = shapely.get_parts(shape)
+    return list(parts[(shapely.get_type_id(parts) == POLYGON) & (shapely.area(parts) > 0.0)])
+
+
+def areas_alone(shapes: Shapes) -> Shapes:
+    """(n,) the same geometries, those that also have lines or points, as rounding leaves them, without these.
+
+    >>> shapely.get_type_id(areas_alone(shapely.from_wkt(["GEOMETRYCOLLECTION (POINT (0 0))"]))).tolist()
+    [6]
+    """
+    out: Shapes = np.array(shapes, dtype=object)
+    for at in np.flatnonzero(~np.isin(shapely.get_type_id(out), (POLYGON, MULTIPOLYGON))).tolist():
+        out[at] = MultiPolygon(polygons(out[at]))
+    return out
+
+
+def cut_up(part: trimesh.Trimesh, heights: Floats, boxes: Shapes) -> Shapes:
+    """(n, rows, columns) tiles of the sections of a mesh."""
+    whole = np.empty((len(heights), 1, 1), dtype=object)
+    whole[:, 0, 0] = sections(part, heights)
+    shapely.prepare(whole)
+    tiles = shapely.intersection(boxes, whole)
+    return areas_alone(np.asarray(tiles).ravel()).reshape(tiles.shape)
+
+
+def turns_of(rows: Ints) -> list[Ints]:
+    """Numbers 0 .. len(rows) - 1 in groups, so that no layer comes twice in a group."""
+    if len(set(rows.tolist())) == len(rows):
+        return [np.arange(len(rows))] if len(rows) else []
+    order = np.argsort(rows, kind="stable")
+    ranks = np.empty(len(rows), dtype=np.int64)
+    first = np.flatnonzero(np.diff(rows[order], prepend=-1))
+    ranks[order] = np.arange(len(rows)) - np.repeat(first, np.diff([*first, len(rows)]))
+    return [np.flatnonzero(ranks == turn) for turn in range(int(ranks.max(initial=-1)) + 1)]
+
+
+def span(borders: Sequence[float], low: float, high: float) -> range:
+    """Tiles that the open interval low < x < high reaches into; not a number: none."""
+    if not high > low:
+        return range(0)
+    return range(max(bisect_right(borders, low) - 1, 0), min(bisect_left(borders, high), len(borders) - 1))
+
+
+def bounds_of(bounds_or_layer_mm: ArrayLike, low: float, high: float) -> Floats:
+    """(n + 1,) bounds [mm] of the layers: as given, or equal ones no thicker than the number given."""
+    given = np.asarray(bounds_or_layer_mm, dtype=np.float64)
+    if given.ndim == 0:
+        thickest = float(given)
+        if not 0.0 < thickest < math.inf:
+            raise InputError(f"stock.layer_mm = {thickest:g}: must be above 0")
+        given = np.linspace(low, high, _pieces(low, high, thickest, "stock.layer_mm", LAYER_LIMIT) + 1)
+    if given.ndim != 1 or len(given) < 2 or not np.isfinite(given).all() or not (np.diff(given) > 0.0).all():
+        raise InputError("stock.bounds: must be two or more ascending heights [mm]")
+    return given
+
+
+def borders_of(low: float, high: float, tile_mm: float) -> Floats:
+    """Borders [mm] of equal tiles no longer than ``tile_mm``."""
+    if not 0.0 < tile_mm < math.inf:
+        raise InputError(f"stock.tile_mm = {tile_mm:g}: must be above 0; two to four cutter diameters")
+    return np.linspace(low, high, _pieces(low, high, tile_mm, "stock.tile_mm", TILE_LIMIT) + 1)
+
+
+def _pieces(low: float, high: float, longest: float, key: str, most: int) -> int:
+    """Number of equal pieces no longer than ``longest``."""
+    count = (high - low) / longest * (1.0 - 1e-12)
+    if not count <= most:
+        raise InputError(
+            f"{key} = {longest:g}: {high - low:g} mm in {count:.4g} pieces: must be at most {most}: state more"
+        )
+    return max(1, math.ceil(count))
+
+
+def boxes_of(xs: Floats, ys: Floats, layers: int) -> Shapes:
+    """(rows, columns) squares of the tiles."""
+    if layers * len(xs) * len(ys) > TILE_LIMIT:
+        raise InputError(
+            f"stock: {layers} layers of {len(xs) - 1} x {len(ys) - 1} tiles: at most {TILE_LIMIT} in all: "
+            "take larger tiles or thicker layers"
+        )
+    boxes: Shapes = shapely.box(xs[None, :-1], ys[:-1, None], xs[None, 1:], ys[1:, None])
+    return boxes

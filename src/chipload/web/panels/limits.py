@@ -1,0 +1,68 @@
+"""The limit table, and what else does not hold or was noticed; a click goes to the place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from html import escape
+from typing import Any
+
+from nicegui import ui
+
+from chipload.errors import Severity
+from chipload.result import Verdict
+from chipload.web.checks import PageFinding, findings, limits, row_of
+from chipload.web.result import PageResult, PageTrack
+
+#: how a state is written
+CLASSES = {Verdict.HOLDS: "ok", Verdict.EXCEEDS: "no", Verdict.UNPROVEN: "may"}
+#: a click on a row of the table gives its row of the history
+CLICK = "(e) => { const r = e.target.closest('[data-row]'); if (r) emit(Number(r.getAttribute('data-row'))) }"
+
+
+class LimitPanel:
+    """Limits and findings of a track."""
+
+    def __init__(self, pick: Callable[[int], None]) -> None:
+        self.pick = pick
+        with ui.element("div").classes("cl-panel cl-tables"):
+            self.html = ui.html("", sanitize=True).classes("cl-scroll").on("click", self._clicked, js_handler=CLICK)
+            self.html.mark("limits")
+
+    def open(self, result: PageResult, track: PageTrack) -> None:
+        """Show a track."""
+        self.html.set_content(limit_table(track) + finding_list(findings(result, track)))
+
+    def _clicked(self, event: Any) -> None:
+        if isinstance(event.args, int) and event.args >= 0:
+            self.pick(event.args)
+
+
+def limit_table(track: PageTrack) -> str:
+    """The limits of a track as HTML."""
+    rows = limits(track)
+    if not rows:
+        return '<div class="cl-none">No limit was checked in this track.</div>'
+    out = []
+    for c in rows:
+        row, unit = row_of(track, c), escape(c.column.unit)
+        go = f' data-row="{row}" class="cl-go" title="go there"' if row is not None else ""
+        worst = "not known" if c.worst is None else f"{c.worst:.4g}"
+        share = min(100.0 * c.worst / c.limit, 100.0) if c.worst is not None and c.limit > 0.0 else 0.0
+        where, state = escape(c.reason or c.where), CLASSES[c.state]
+        bar = f'<div class="cl-share"><div class="cl-{state}-bar" style="width:{share:.0f}%"></div></div>'
+        out.append(
+            f"<tr{go}><td>{escape(c.column.label)}</td><td class=n>{worst}</td><td class=n>{c.limit:g} {unit}</td>"
+            f'<td>{bar}</td><td class=cl-{state}>{c.state.value}</td><td class=w title="{where}">{where}</td></tr>'
+        )
+    head = "<tr><th>limit</th><th class=n>worst</th><th class=n>at most</th><th></th><th>state</th><th>where</th></tr>"
+    return f'<table class="cl-limits"><thead>{head}</thead><tbody>{"".join(out)}</tbody></table>'
+
+
+def finding_list(rows: list[PageFinding]) -> str:
+    """Findings as HTML."""
+    items = []
+    for f in rows:
+        go = f' data-row="{f.row}"' if f.row is not None else ""
+        kind = ("cl-grave" if f.severity is not Severity.NOTE else "cl-note") + (" cl-go" if f.row is not None else "")
+        items.append(f'<div class="{kind}"{go}>{escape(f.text)}</div>')
+    return f'<div class="cl-found">{"".join(items)}</div>' if items else ""

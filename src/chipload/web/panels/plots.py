@@ -1,0 +1,107 @@
+"""The linked plots: choose columns and what they stand against; the cursor follows, a click moves the slider."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from nicegui import ui
+
+from chipload.web.checks import Bound, label_and_unit
+from chipload.web.panels import RELEASE
+from chipload.web.plots import abscissa, annotation, bounds_of, plots
+from chipload.web.result import PageResult, PageTrack, TextColumn
+
+#: a click on a plot gives the abscissa of the nearest point
+CLICK = "(e) => { if (e.points && e.points.length) emit(e.points[0].x) }"
+#: columns that are drawn first, where the history has them; how many at a time
+FIRST = ("engagement_deg", "force_n", "force_xy_n", "torque_nm", "deflection_um", "form_error_um", "feed_mm_min")
+MOST, AT_FIRST = 4, 2
+
+
+class PlotPanel:
+    """The plots of a track."""
+
+    def __init__(self, pick: Callable[[int], None], turned: Callable[[], None]) -> None:
+        self.pick, self.turned = pick, turned
+        self.result: PageResult | None = None
+        self.track: PageTrack | None = None
+        self.row, self.drawn = 0, -1
+        self.bounds: dict[str, Bound | None] = {}
+        with ui.element("div").classes("cl-panel cl-plots"):
+            with ui.element("div").classes("cl-head"):
+                self.columns = ui.select({}, multiple=True, on_change=self._changed).props(
+                    f"dense options-dense borderless use-chips hide-bottom-space max-values={MOST}"
+                ).classes("cl-columns").mark("columns")  # fmt: skip
+                self.columns.on("popup-hide", js_handler=RELEASE)
+                self.against = ui.toggle({"time": "time", "path": "path"}, value="time", on_change=self._turned).props(
+                    "dense no-caps size=sm unelevated toggle-color=blue-grey-7"
+                )
+            self.figure = ui.plotly({"data": [], "layout": {}, "config": {}}).classes("cl-figure")
+            self.figure.on("plotly_click", self._clicked, js_handler=CLICK)
+
+    def open(self, result: PageResult, track: PageTrack) -> None:
+        """Show a track."""
+        same = self.result is result
+        self.result, self.track, self.row = result, track, 0
+        if not same:
+            options = {c: _called(c) for c in result.columns}
+            kept = [c for c in self.columns.value or [] if c in options]
+            first = [c for c in FIRST if c in options and not _flat(result, track, c)][:AT_FIRST]
+            self.columns.set_options(options, value=kept or first or [result.columns[0]])
+        self._draw()
+
+    def at(self, row: int) -> None:
+        """Put the cursor at a row, and say the values there."""
+        self.row = row
+        if self.result is None or self.track is None or self.drawn == row:
+            return
+        self.drawn = row
+        x = float(abscissa(self.track, self.against.value)[row])
+        change: dict[str, Any] = {"shapes[0].x0": x, "shapes[0].x1": x}
+        for k, (column, bound) in enumerate(self.bounds.items()):
+            change[f"annotations[{k}].text"] = annotation(self.result, self.track, column, row, bound)
+        self.figure.run_plot_method("relayout", change)
+
+    def _chosen(self) -> list[str]:
+        return [c for c in self.columns.value or [] if isinstance(c, str)][:MOST]
+
+    def _draw(self) -> None:
+        if self.result is not None and self.track is not None:
+            self.bounds = bounds_of(self.result, self.track, self._chosen())
+            figure = plots(self.result, self.track, self.bounds, self.against.value, self.row)
+            self.figure.update_figure(figure)
+            self.drawn = self.row
+
+    def _changed(self) -> None:
+        self._draw()
+
+    def _turned(self) -> None:
+        self._draw()
+        self.turned()
+
+    def _clicked(self, event: Any) -> None:
+        if self.track is not None and isinstance(event.args, (int, float)):
+            x = abscissa(self.track, self.against.value)
+            self.pick(nearest(x, float(event.args)))
+
+
+def nearest(x: Any, value: float) -> int:
+    """Row of the nearest of rising numbers.
+
+    >>> nearest(np.array([0.0, 1.0, 4.0]), 2.9)
+    2
+    """
+    k = int(np.clip(np.searchsorted(x, value), 1, max(len(x) - 1, 1)))
+    return k - 1 if len(x) == 1 or abs(x[k - 1] - value) <= abs(x[min(k, len(x) - 1)] - value) else k
+
+
+def _flat(result: PageResult, track: PageTrack, column: str) -> bool:
+    values = result.column(track, column)
+    return isinstance(values, TextColumn) or not np.nanmax(np.abs(np.nan_to_num(values)), initial=0.0) > 0.0
+
+
+def _called(column: str) -> str:
+    word, unit = label_and_unit(column)
+    return f"{word} [{unit}]" if unit else word

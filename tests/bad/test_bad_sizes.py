@@ -1,0 +1,104 @@
+"""Sizes that no run can have are refused before anything is allocated, with the key, its value and the limit."""
+
+from __future__ import annotations
+
+import math
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chipload.cutter.cutter import Cutter
+from chipload.errors import InputError
+from chipload.examples import copy_example
+from chipload.jobs import check_job, load_job
+from chipload.jobs.program.workpiece import stock_points
+from chipload.program.build import rapid, rows
+from chipload.program.program import LINE, Program
+from chipload.simulation.chips import Resolution, counted
+from chipload.stock.layers import LayeredStock
+
+LOW, HIGH = (0.0, 0.0, 0.0), (100.0, 80.0, 40.0)
+
+
+def cutter(**changed: float) -> Cutter:
+    numbers = {"diameter": 10.0, "flutes": 4, "helix": 0.5, "flute_length": 20.0, "overhang": 30.0, "modulus": 6e5}
+    return Cutter(**{**numbers, **changed})
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"diameter": 1e-9}, r"cutter\.diameter_mm = 1e-09: must be from 0\.01 to 1000"),
+        ({"diameter": 1e9}, r"cutter\.diameter_mm = 1e\+09: must be from 0\.01 to 1000"),
+        ({"flutes": 10**9}, r"cutter\.flutes = 1e\+09: must be at most 200"),
+        ({"overhang": 1e6}, r"cutter\.overhang_mm = 1e\+06: must be at most 3000"),
+    ],
+)
+def test_a_cutter_that_cannot_be(changed: dict[str, float], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        cutter(**changed)
+
+
+@pytest.mark.parametrize("flutes", ["1e9", str(10**9), str(10**30)])
+def test_flutes_of_a_job(tmp_path: Path, flutes: str) -> None:
+    copy_example("bracket", tmp_path / "b")
+    with pytest.raises(InputError, match=r"cutter\.0\.flutes"):
+        load_job(tmp_path / "b" / "job.toml", [f"cutter.0.flutes={flutes}"])
+
+
+def refused(work: object, message: str) -> None:
+    """Refused, and no more than 10 MB were taken on the way."""
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match=message):
+            work()  # type: ignore[operator]
+        assert tracemalloc.get_traced_memory()[1] < 10_000_000
+    finally:
+        tracemalloc.stop()
+
+
+def test_layers_and_tiles() -> None:
+    refused(lambda: LayeredStock.block(LOW, HIGH, 1e-9, 40.0), r"stock\.layer_mm = 1e-09: 40 mm in 4e\+10 pieces: must")
+    refused(lambda: LayeredStock.block(LOW, HIGH, 1.0, 1e-9), r"stock\.tile_mm = 1e-09: 100 mm in 1e\+11 pieces: must")
+    refused(lambda: LayeredStock.block(LOW, HIGH, 1.0, 0.01), r"stock: 40 layers of 10000 x 8000 tiles: at most")
+    stock = LayeredStock.block(LOW, HIGH, 1.0, 40.0)
+    refused(lambda: stock.refine(0.0, 40.0, 1e-9), r"stock\.layer_mm = 1e-09: 4e\+10 layers: must be at most 200000")
+    assert stock.layers == 40
+
+
+def test_points_of_the_stock() -> None:
+    """447 GiB at a pitch of 1e-9 mm."""
+    stock = LayeredStock.block(LOW, HIGH, 10.0, 40.0)
+    refused(lambda: stock_points(stock, 1e-9), r"stock_points_mm = 1e-09: 3\.2e\+32 points: must be at most 4000000")
+    assert len(stock_points(stock, 10.0)) == 10 * 8 * 4
+
+
+def straight(length: float) -> Program:
+    there = rows([LINE], [[length, 0.0, 0.0]], (0.0, 0.0), 20.0, 300.0, 1, "cut")
+    return Program.join([rapid([0.0, 0.0, 0.0], 300.0, 1, "link"), there])
+
+
+def test_steps_of_a_simulation() -> None:
+    tip = Resolution(step_mm=1e-7, tolerance=0.01, corner_pieces=4, flank_mm=2.0, rotation=math.radians(10.0))
+    refused(
+        lambda: counted(straight(100.0), {1: cutter()}, tip), r"step_mm = 1e-07: 1e\+09 steps: must be at most 5000"
+    )
+    coarse = Resolution(step_mm=0.5, tolerance=0.01, corner_pieces=4, flank_mm=2.0, rotation=math.radians(10.0))
+    assert counted(straight(100.0), {1: cutter()}, coarse) == 200
+    assert np.isfinite(coarse.step_mm)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("round.pitch_mm=1e-9", r"round\.pitch_mm = 1e-09: .* points: must be at most 2000000"),
+        ("round.top_mm=1e9", r"round\.pitch_mm = .* points: must be at most 2000000|round\.top_mm"),
+        ("simulation.layer_mm=1e-9", r"simulation\.layer_mm = 1e-09: .* layers: must be at most 200000"),
+    ],
+)
+def test_a_helix_and_its_layers(tmp_path: Path, change: str, message: str) -> None:
+    copy_example("cone", tmp_path / "c")
+    with pytest.raises(InputError, match=message):
+        check_job(load_job(tmp_path / "c" / "job.toml", [change]))

@@ -1,0 +1,127 @@
+"""`chipload check` refuses what `chipload run` refuses, with the same words, and reads every kind of file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from chipload import examples
+from chipload.cli import app
+from chipload.errors import InputError
+from chipload.jobs import check_job, load_job, run_job
+from chipload.jobs.inspection import inspect_file
+
+#: an example, what is changed in it, how both refuse it
+REFUSED = [
+    ("contour", ["operation.0.kind=pocket"], "open"),
+    ("contour", ["cutter.0.diameter_mm=24"], "does not reach the wall"),
+    ("pocket", ["cutter.0.diameter_mm=60", "operation.0.radial_depth_mm=20"], "the cutter fits nowhere"),
+    ("chips", ["cutter.0.number=0"], "tool 1: no [[cutter]] has this number"),
+    ("chips", ["stiffness.holder_gpa=0.5"], "stiffness.holder_gpa = 0.5: must be from"),
+    ("chips", ["operation.0.step_mm=1e-7"], "must be at most 50000000"),
+    ("bracket", ["part.spacing_mm=1e-4"], "part: spacing_mm = 0.0001"),
+    ("feeds", ["cutter.0.number=9"], "tool 1: no [[cutter]] has this number"),
+    ("plate", ["wall.elements=[8, 2]", "wall.foot_mm=15"], "wall.elements = [8, 2]"),
+    ("plate", ["operation.0.depth_max_mm=3", "wall.allowance_mm=[3, 3]", "operation.0.clearance_mm=4"], "depth"),
+    ("tube", ["loop.acceleration_mm_s2=1e6"], "loop.acceleration_mm_s2 = 1e+06: must be at most"),
+    ("tube", ["limits.torque_nm=0.05"], "the limit is 0.05 N m"),
+    ("tube", ["control.override.light_nm=2", "limits.torque_nm=1"], "control.override.light_nm = 2: must be below"),
+    ("impeller", ["operation.0.table_deg=[1.5]"], "operation.0.table_deg: table angle 1.5 deg"),
+    ("impeller", ["catalogue.name=wu2020"], "catalogue wu2020: not known"),
+]
+
+
+@pytest.mark.parametrize(("name", "sets", "part"), REFUSED, ids=[f"{n} {s[0]}" for n, s, _ in REFUSED])
+def test_check_refuses_what_run_refuses(name: str, sets: list[str], part: str, tmp_path: Path) -> None:
+    job = load_job(examples.copy_example(name, tmp_path / name) / "job.toml", sets)
+    messages = []
+    for act in (check_job, run_job):
+        with pytest.raises(InputError) as caught:
+            act(job)
+        messages.append(str(caught.value))
+    assert messages[0] == messages[1]
+    assert part in messages[0]
+
+
+FIT = """name = "x"
+source = "test"
+method = "instantaneous"
+band_hz = {band}
+[cutter]
+number = 1
+diameter_mm = 10.0
+flutes = 2
+helix_deg = 30.0
+flute_length_mm = 22.0
+overhang_mm = 35.0
+modulus_gpa = 580.0
+[engagement]
+milling = "slot"
+axial_depth_mm = 2.0
+[channels]
+feed = "Fx_n"
+across = "Fy_n"
+on = "work"
+[[measurement]]
+file = "cut.csv"
+use = "fit"
+feed_mm_min = 600.0
+speed_rpm = 3000.0
+"""
+
+
+def a_fit(folder: Path, band: float) -> Path:
+    rows = "".join(f"{k * 1e-4:.4f},{(k * 7) % 40},{(k * 11) % 40}\n" for k in range(6000))
+    (folder / "cut.csv").write_text("t_s,Fx_n,Fy_n\n" + rows)
+    path = folder / "fit.toml"
+    path.write_text(FIT.format(band=band))
+    return path
+
+
+def test_a_fit_is_checked_as_it_is_run(tmp_path: Path) -> None:
+    path = a_fit(tmp_path, 400.0)
+    lines, holds = inspect_file(path) or ([], False)
+    assert holds
+    assert lines[0] == "fit.toml: right: 1 measurements, method instantaneous"
+    path = a_fit(tmp_path, 10.0)
+    messages = []
+    for act in (inspect_file, lambda p: run_job(load_job(p))):
+        with pytest.raises(InputError) as caught:
+            act(path)
+        messages.append(str(caught.value))
+    assert messages[0] == messages[1]
+    assert messages[0].startswith("band_hz = 10: must be at least the spindle's 50 Hz")
+
+
+@pytest.mark.parametrize(
+    ("file", "said"),
+    [
+        ("contour/corner.dxf", "corner.dxf: 0 closed and 1 open contours; x 0 to 28, y 0 to 28 mm"),
+        ("bracket/part.stl", "part.stl: a closed mesh of 36 triangles, 39300 mm3; x 0 to 60, y 0 to 40, z -20 to 0 mm"),
+        ("hecc/cutters.toml", "cutters.toml: catalogue long-reach: 19 cutters, 4 to 25 mm"),
+        ("plate/ti6al4v.toml", "ti6al4v.toml: material "),
+        ("tube/controller.toml", "controller.toml: rules of a fuzzy controller: tube"),
+    ],
+)
+def test_files_that_a_job_names_are_checked_alone(file: str, said: str) -> None:
+    lines, holds = inspect_file(Path(examples.__file__).parent / file) or ([], False)
+    assert holds
+    assert any(line.startswith(said) for line in lines)
+
+
+def test_a_program_is_checked_without_a_machine() -> None:
+    """A plain one on the plain machine, one with rotary axes on the first machine that has them; both say so."""
+    place = Path(examples.__file__).parent
+    for file, machine in (("feeds/pocket.nc", "vmc"), ("trunnion/cone.cls", "xyzbc-trunnion")):
+        done = CliRunner().invoke(app, ["check", str(place / file)])
+        assert done.exit_code == 0
+        assert done.output.startswith(f"no machine is stated: read for {machine}; ")
+
+
+def test_a_simulation_is_estimated(tmp_path: Path) -> None:
+    job = load_job(examples.copy_example("chips", tmp_path / "chips") / "job.toml")
+    lines, _ = check_job(job)
+    steps = len(run_job(job).outcome.simulated.removal.columns["line"])
+    assert lines[-1].startswith(f"estimate: {steps} steps, ")

@@ -1,0 +1,91 @@
+"""Loads over a revolution in one call against those rotation by rotation, which integrate each bite in closed form."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.force import forces_over_turn
+from chipload.cutting.material import Material
+from chipload.cutting.revolution.revolution import _one_by_one, loads_over_turn, rotations
+from chipload.engagement.tooth_engagement import ToothEngagement, with_runout
+
+STEEL = Material("steel", 1800.0, 700.0, 250.0, 25.0, 18.0, 6.0, source="made up")
+
+
+def some_engagement(seed: int, helix: float, flutes: int) -> ToothEngagement:
+    """ToothEngagement of random ranges of immersion on slices of a ball, a flank and a bottom."""
+    random = np.random.default_rng(seed)
+    start, rows, slices = [0], [], []
+    lag = math.tan(helix) / 5.0
+    for _ in range(30):
+        for _ in range(random.integers(0, 5)):
+            kappa = random.choice([random.uniform(0.05, 1.5), 0.5 * math.pi, 0.0])
+            s, length, z = random.uniform(-2.0, 6.0), random.choice([0.1, 3.0, 12.0]), random.uniform(0.0, 9.0)
+            for _ in range(random.integers(1, 3)):
+                a = random.uniform(0.0, math.tau)
+                b = a + random.uniform(0.01, 2.0)
+                h = random.uniform(0.01, 0.2, 3) * [1.0, 1.0, 0.3]
+                offset = max(0.0, -(h[0] * np.sin(x := np.linspace(a, b, 99)) + h[1] * np.cos(x)).min()) + h[2]
+                rows.append([a, b, s, s + length, h[0], offset, h[1], len(slices)])
+            sk = math.sin(kappa)
+            slices.append([s, random.uniform(0.5, 5.0), z, sk, math.cos(kappa), lag * z, lag * sk])
+        start.append(len(rows))
+    table = np.array(rows)
+    n = len(start) - 1
+    frame = np.linalg.qr(random.normal(size=(n, 3, 3)))[0]
+    piece = table[:, 7].astype(int)
+    return ToothEngagement(np.array(start), table[:, :7].copy(), np.full(len(rows), -1), piece, np.array(slices), frame)
+
+
+@pytest.mark.parametrize("flutes", [1, 2, 4])
+@pytest.mark.parametrize("helix", [0.0, 0.5, 1.1])
+@pytest.mark.parametrize("runout", [0.0, 0.01])
+def test_loads_are_those_rotation_by_rotation(flutes: int, helix: float, runout: float) -> None:
+    cutter = Cutter(10.0, flutes, helix, 20.0, 30.0, 6e5, runout=(runout, 0.4))
+    plain = some_engagement(flutes, helix, flutes)
+    bites = with_runout(plain, cutter)
+    left = np.random.default_rng(5).normal(size=(len(bites), 3))
+    found, at = loads_over_turn(bites, cutter, STEEL, math.radians(3.0), left)
+    count = rotations(cutter, math.radians(3.0))
+    known = _one_by_one(bites, cutter, STEEL, count, left)
+    np.testing.assert_allclose(found, known[:, :15], rtol=1e-6, atol=1e-6)
+    # at the rotations that are said to be worst the loads are the greatest
+    pitch = math.tau if runout > 0.0 else math.tau / flutes
+    numbers = np.rint(at * count / pitch).astype(int)
+    np.testing.assert_allclose(at, numbers * pitch / count, atol=1e-12)
+    force, torque = forces_over_turn(bites, cutter, STEEL, np.arange(count) * (pitch / count))
+    rows = np.arange(len(bites))
+    np.testing.assert_allclose(np.linalg.norm(force[rows, numbers[:, 0]], axis=1), known[:, 9], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(torque[rows, numbers[:, 1]], known[:, 11], rtol=1e-6, atol=1e-6)
+
+
+def test_a_full_circle_that_begins_at_a_rotation_counts_once() -> None:
+    """A plunge: the bottom and the flank cut all around."""
+    cutter = Cutter(10.0, 2, 0.4, 20.0, 30.0, 6e5)
+    rows = np.array(
+        [[0.0, math.tau, 0.0, 2.0, 0.0, 0.05, 0.0], [1.5 * math.pi, 3.5 * math.pi, 2.0, 4.0, 0.0, 0.1, 0.0]]
+    )
+    slices = np.array([[0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0], [2.0, 3.0, 0.0, 0.0, 1.0, 0.0, 0.0]])
+    frame = np.eye(3)[None]
+    bites = ToothEngagement(np.array([0, 2]), rows, np.full(2, -1), np.arange(2), slices, frame)
+    found, _ = loads_over_turn(bites, cutter, STEEL, math.radians(3.0), np.zeros((1, 3)))
+    # two teeth, 2 mm each of edge
+    known = 2 * 2.0 * ((1800.0 * 0.05 + 25.0) * 1.0 + (1800.0 * 0.1 + 25.0) * 3.0)
+    assert found[0, 10] == pytest.approx(known)
+    assert found[0, 11] == pytest.approx(known)
+
+
+def test_a_size_effect_takes_the_other_way() -> None:
+    cutter = Cutter(10.0, 2, 0.4, 20.0, 30.0, 6e5)
+    bites = some_engagement(3, 0.4, 2)
+    left = np.zeros((len(bites), 3))
+    law = replace(STEEL, exponents=(0.2, 0.2, 0.2))
+    assert not np.allclose(
+        loads_over_turn(bites, cutter, law, 0.05, left)[0][:, 9],
+        loads_over_turn(bites, cutter, STEEL, 0.05, left)[0][:, 9],
+    )

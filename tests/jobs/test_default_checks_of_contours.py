@@ -1,0 +1,71 @@
+"""What is checked in planned contours without being asked for: cutter stress, flutes, spindle, the rigid model."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material
+from chipload.engagement.contact import Engagement
+from chipload.jobs import load_job, run_job
+from chipload.planning.cost import CutConditions, cost
+from chipload.result import Verdict
+
+COARSE = ("operation.0.step_mm=0.4", 'operation.0.strategies=["plain"]', "operation.0.use=plain")
+ROOMY = ("limits.engagement_deg=60", "limits.force_xy_n=5000", "limits.torque_nm=50", "limits.form_error_um=100000")
+
+
+def test_a_thin_cutter_breaks(job_dir: Path) -> None:
+    """3 mm across, 35 mm long: every stated limit holds, and the shank would break."""
+    done = run_job(load_job(job_dir / "job.toml", (*COARSE, *ROOMY, "cutter.0.diameter_mm=3")))
+    checks = {check.name: check for check in done.result.limits}
+    assert all(checks[name].state is Verdict.HOLDS for name in ("engagement_deg", "force_xy_n", "torque_nm"))
+    assert checks["cutter_stress_mpa"].state is Verdict.EXCEEDS
+    assert checks["cutter_stress_mpa"].limit == 1500.0
+    assert done.result.verdict is Verdict.EXCEEDS
+    assert done.result.verdict.exit_code == 3
+    assert "cutter stress" in done.result.message
+    columns = done.result.track("plain").columns
+    assert columns["cutter_stress_mpa"].max() == checks["cutter_stress_mpa"].worst
+    # bending by the greatest force across the axis, from the middle of the edge to the clamp, is most of it
+    bending = 32.0 * columns["force_xy_n"] * (35.0 - 2.5) / (math.pi * 3.0**3)
+    assert checks["cutter_stress_mpa"].worst == pytest.approx(bending.max(), rel=0.25)
+
+
+def test_what_is_switched_off_is_listed(job_dir: Path) -> None:
+    off = ("checks.cutter_strength=false", "checks.spindle=false", "checks.flute_length=false")
+    done = run_job(load_job(job_dir / "job.toml", (*COARSE, *off)))
+    names = {check.name for check in done.result.limits}
+    assert not names & {"cutter_stress_mpa", "axial_overrun_mm", "spindle_torque_nm", "spindle_power_w"}
+    assert "deflection_share" in names
+    for name in ("cutter_strength", "spindle", "flute_length"):
+        assert f"check {name}: switched off by the job" in done.result.unchecked
+    assert "chip space of tools 1: gullet_mm2 is not stated" in done.result.unchecked
+
+
+def test_stress_of_a_straight_tooth_by_hand() -> None:
+    """No helix, one tooth, tangential force alone: M = F (L - ap / 2), T = F R, greatest normal stress."""
+    plain = Material("plain", 1000.0, 0.0, 0.0, 0.0, 0.0, 0.0, source="made up for this test")
+    mill = Cutter(10.0, 1, 0.0, 20.0, 40.0, 5.8e5)
+    met = Engagement(np.array([math.pi]), np.array([1]), np.tile([0.0, math.pi], (1, 4, 1)))
+    cut = CutConditions(mill, plain, 2.0, 100.0, "down")
+    speed = np.array([0.1 * 100.0 / math.tau])
+    one = np.array([0.0])
+    columns = cost(
+        cut, np.array(["finish"], dtype=object), one, one, np.zeros((1, 2)), np.array([[1.0, 0.0]]), -2.0, met, speed,
+        np.array([False]),
+    )  # fmt: skip
+    force = 1000.0 * 0.1 * 2.0
+    stress = []
+    for height, diameter in ((20.0, 8.0), (40.0, 10.0)):
+        sigma = 32.0 * force * (height - 1.0) / (math.pi * diameter**3)
+        tau = 16.0 * force * 5.0 / (math.pi * diameter**3)
+        stress.append(0.5 * sigma + math.hypot(0.5 * sigma, tau))
+    expected = mill.strength.concentration * max(stress)
+    assert columns["cutter_stress_mpa"][0] == pytest.approx(expected, rel=1e-3)
+    # radial depth 10 mm, feed per tooth 0.1 mm: the deflection may be 0.2 mm
+    assert columns["deflection_share"][0] == pytest.approx(columns["deflection_cutter_um"][0] / 200.0)

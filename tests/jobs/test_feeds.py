@@ -1,0 +1,340 @@
+"""New feeds of programs: closed forms of a slot, what still exceeds, and that what is said to hold does."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+
+from chipload.errors import InputError
+from chipload.jobs import FinishedJob, load_job, run_job
+from chipload.program.gcode.reader import read_gcode
+from chipload.report.page import page_bytes
+from chipload.result import Verdict
+
+MATERIAL = """name = "made up"
+workpiece = "none"
+source = "made up for this test"
+conditions = "none"
+ktc_mpa = 1200.0
+krc_mpa = 500.0
+kac_mpa = 300.0
+kte_n_mm = 14.0
+kre_n_mm = 11.0
+kae_n_mm = 2.0
+"""
+JOB = """[program]
+file = "a.ngc"
+[machine]
+name = "vmc"
+[stock]
+low_mm = [0.0, -20.0, -6.0]
+high_mm = [40.0, 20.0, 0.0]
+layer_mm = 1.5
+[material]
+file = "m.toml"
+[[cutter]]
+number = 1
+diameter_mm = 10.0
+flutes = 2
+helix_deg = 0.0
+flute_length_mm = 20.0
+overhang_mm = 30.0
+modulus_gpa = 580.0
+[[operation]]
+kind = "simulate"
+step_mm = 2.0
+tolerance_mm = 0.002
+[operation.feeds]
+slowest_percent = 10.0
+fastest_percent = 900.0
+change_least_percent = 0.0
+[limits]
+"""
+HEAD = "G21 G90 G94 G17\nT1 M6\nS3000 M3\n"
+SLOT = HEAD + "G0 X-8 Y0 Z5\nG0 Z-3\nG1 X34 F600 (slot)\nG0 Z5\nM2\n"
+
+
+def done(folder: Path, text: str, limits: str, changes: tuple[str, ...] = (), job: str = JOB) -> FinishedJob:
+    (folder / "m.toml").write_text(MATERIAL)
+    (folder / "a.ngc").write_bytes(text.encode())
+    (folder / "job.toml").write_text(job + limits)
+    return run_job(load_job(folder / "job.toml", list(changes)))
+
+
+def feed_of(text: str, line: int) -> float:
+    """The feed of a line: its own word or the last one above it."""
+    return float(re.findall(r"F([\d.]+)", "\n".join(text.split("\n")[:line]))[-1])
+
+
+#: limits at which a slot has a feed of some hundred mm/min
+LIMITS = {"force_n": 620.0, "torque_nm": 2.5, "power_w": 400.0, "chip_max_mm": 0.13}
+
+
+def slot_feed(name: str, load: float) -> float:
+    """The feed [mm/min] at which a slot of 3 mm with two straight teeth has a load.
+
+    [Altintas2012] ch. 2: a tooth straight ahead has h = f_z, all other rotations less; the mean torque as there.
+    """
+    a, teeth, rpm, omega = 3.0, 2, 3000.0, 3000.0 * math.tau / 60.0
+    cut, edge = np.array([1200.0, 500.0, 300.0]), np.array([14.0, 11.0, 2.0])
+    roots = np.roots([(cut**2).sum(), 2.0 * (cut * edge).sum(), (edge**2).sum() - (load / a) ** 2])
+    tooth = {
+        "force_n": float(roots.real.max()),
+        "torque_nm": (load * 1000.0 / (5.0 * a) - edge[0]) / cut[0],
+        "power_w": (load * 1000.0 / omega * math.tau / (teeth * a * 5.0) - math.pi * edge[0]) / (2.0 * cut[0]),
+        "chip_max_mm": load,
+    }
+    return tooth[name] * teeth * rpm
+
+
+def aimed(read: FinishedJob, name: str) -> float:
+    """The feed [mm/min] of the slot that leaves room for the resolution error of the load, as it is documented."""
+    error = read.outcome.feeds.before.resolution_error[name]
+    assert 0.01 <= error < 0.03
+    return slot_feed(name, LIMITS[name] / (1.0 + 2.0 * error))
+
+
+@pytest.mark.parametrize("name", ["force_n", "torque_nm", "power_w", "chip_max_mm"])
+def test_a_slot_gets_the_feed_of_the_closed_form(tmp_path: Path, name: str) -> None:
+    limit = LIMITS[name]
+    read = done(tmp_path, SLOT, f"{name} = {limit}\n")
+    feed = aimed(read, name)
+    assert 100.0 < feed < 3000.0
+    assert read.outcome.feeds is not None
+    assert feed_of(read.outcome.feeds.text, 6) == pytest.approx(feed, rel=1.2e-3)
+    assert feed_of(read.outcome.feeds.text, 6) <= feed
+    assert read.outcome.feeds.by == (name,)
+    assert read.result.verdict is Verdict.HOLDS
+    assert read.outcome.feeds.text == SLOT.replace("F600", f"F{feed_of(read.outcome.feeds.text, 6):g}")
+
+
+def test_a_limit_that_is_used_fully_still_holds_within_the_resolution_error(tmp_path: Path) -> None:
+    """The new loads are within their limit whatever their own resolution error; without room for it they are not."""
+    read = done(tmp_path, SLOT, "".join(f"{k} = {v}\n" for k, v in LIMITS.items()))
+    (check,) = (c for c in read.result.limits if c.name == read.outcome.feeds.by[0])
+    assert check.state is Verdict.HOLDS
+    assert check.resolution_error >= 0.01
+    assert 0.97 * check.limit < check.worst * (1.0 + check.resolution_error) <= check.limit
+    # the feed of the closed form for the whole limit is within it, but not within the resolution error
+    full = slot_feed(check.name, 0.999 * check.limit)
+    plain = JOB[: JOB.index("[operation.feeds]")] + "[limits]\n"
+    used = done(tmp_path, SLOT.replace("F600", f"F{full:.3f}"), f"{check.name} = {check.limit}\n", job=plain)
+    assert used.result.limits[0].state is Verdict.UNPROVEN
+    assert used.result.limits[0].worst < check.limit
+
+
+def test_the_least_of_two_limits_holds_a_line(tmp_path: Path) -> None:
+    read = done(tmp_path, SLOT, "".join(f"{k} = {v}\n" for k, v in LIMITS.items()))
+    feeds = {name: aimed(read, name) for name in LIMITS}
+    least = min(feeds, key=feeds.__getitem__)
+    assert read.outcome.feeds.by == (least,)
+    assert feed_of(read.outcome.feeds.text, 6) == pytest.approx(feeds[least], rel=1.2e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "per"),
+    [
+        (SLOT.replace("G21", "G20").replace("X-8", "X-0.314961").replace("X34 F600", "X1.338583 F23.6")
+         .replace("Z-3", "Z-0.11811"), 25.4),
+        (SLOT.replace("G94", "G93").replace("F600", "F14."), 42.0),
+        (SLOT.replace("G94", "G95").replace("F600", "F0.2"), 3000.0),
+    ],
+    ids=["inch", "inverse time", "per turn"],
+)  # fmt: skip
+def test_feeds_are_changed_in_the_unit_of_the_text(tmp_path: Path, text: str, per: float) -> None:
+    read = done(tmp_path, text, f"force_n = {LIMITS['force_n']}\n")
+    feed = aimed(read, "force_n")
+    assert feed_of(read.outcome.feeds.text, 6) == pytest.approx(feed / per, rel=1.3e-3)
+    assert re.sub(r" F[\d.]+", "", read.outcome.feeds.text) == re.sub(r" F[\d.]+", "", text)
+    assert read.result.verdict is Verdict.HOLDS
+
+
+def test_the_words_of_a_sinumerik_are_changed_too(tmp_path: Path) -> None:
+    text = "; a slot\nG71 G90 G94 G17\nT1 M6\nS3000 M3\nG0 X-8 Y0 Z5\nG0 Z-3\nG1 X34 F=600 ; F9\nG0 Z5\nM30\n"
+    (tmp_path / "a.mpf").write_text(text)
+    job = JOB.replace("a.ngc", "a.mpf")
+    read = done(tmp_path, SLOT, f"force_n = {LIMITS['force_n']}\n", job=job)
+    feed = aimed(read, "force_n")
+    word = re.search(r"F=([\d.]+) ; F9", read.outcome.feeds.text)
+    assert float(word[1]) == pytest.approx(feed, rel=1.2e-3)
+    assert read.outcome.feeds.text == text.replace("600", word[1])
+    bad = done(tmp_path, SLOT, "force_n = 50.0\n", job=job)
+    first, rest = bad.presentation.files()["0-feeds.mpf"].decode().split("\n", 1)
+    assert first.startswith("; a slot ; NOT VERIFIED: Exceeds: force ")
+    assert rest == bad.outcome.feeds.text.split("\n", 1)[1]
+
+
+def test_no_feed_is_asked_that_a_short_line_does_not_reach(tmp_path: Path) -> None:
+    """From rest to rest over s at the acceleration a the machine reaches sqrt(a s), here of 3000 mm/s^2."""
+    text = HEAD + "G0 X60 Y60 Z5\nG1 X60.03 F300\nG0 Y50\nG1 X68 F300\nG0 X70\nM2\n"
+    read = done(tmp_path, text, "force_n = 620.0\n", ("operation.0.feeds.air_mm_min=6000",))
+    assert feed_of(read.outcome.feeds.text, 5) == pytest.approx(60.0 * math.sqrt(3000.0 * 0.03), rel=1e-3)
+    assert feed_of(read.outcome.feeds.text, 7) == 6000.0
+    assert read.outcome.feeds.by == ("machine", "air")
+    # the long one: up and down takes v / a, the rest is at 100 mm/s
+    before, after = read.outcome.feeds.seconds_before, float(read.outcome.seconds.sum())
+    long = (7.97 / 5.0 + 5.0 / 3000.0) - (7.97 / 100.0 + 100.0 / 3000.0)
+    short = (0.03 / 5.0 + 5.0 / 3000.0) - 2.0 * math.sqrt(0.03 / 3000.0)
+    assert before - after == pytest.approx(long + short, rel=1e-3)
+
+
+WAYS = (
+    HEAD
+    + """G0 X-8 Y-12 Z5
+G0 Z-3
+G1 X-6 F400 ; air
+X20 (slot)
+Y12
+G3 X14 Y18 I-6 J0
+G1 X6 Y18
+X6.02
+G0 Z5
+G0 X60 Y60
+G1 X70 F300
+M2
+"""
+)
+
+
+def test_each_line_is_held_by_what_the_job_and_the_machine_say(tmp_path: Path) -> None:
+    more = ("operation.0.feeds.air_mm_min=4000", "operation.0.feeds.fastest_mm_min=900")
+    read = done(tmp_path, WAYS, "force_n = 620.0\n", more)
+    held = dict(zip(read.outcome.feeds.line.tolist(), read.outcome.feeds.by, strict=True))
+    # 0.02 mm from full feed to rest: sqrt(2 a s) is asked, no more
+    assert held == {6: "air", 7: "force_n", 8: "force_n", 9: "force_n", 10: "force_n", 11: "machine", 14: "air"}
+    assert feed_of(read.outcome.feeds.text, 6) == feed_of(read.outcome.feeds.text, 14) == 4000.0
+    assert max(feed_of(read.outcome.feeds.text, k) for k in (7, 8, 9, 10)) <= 900.0
+    assert feed_of(read.outcome.feeds.text, 11) <= 900.0
+    kept = done(tmp_path, WAYS, "force_n = 620.0\n")
+    assert feed_of(kept.outcome.feeds.text, 14) == 300.0
+    assert dict(zip(kept.outcome.feeds.line.tolist(), kept.outcome.feeds.by, strict=True))[14] == "programmed"
+
+
+def test_what_no_feed_can_hold_is_listed_and_said_in_the_first_line(tmp_path: Path) -> None:
+    read = done(tmp_path, WAYS.replace("\n", "\r\n"), "force_n = 50.0\n")
+    assert read.result.verdict is Verdict.EXCEEDS
+    assert read.result.message.startswith("Exceeds: force ")
+    feeds = read.result.operations[0]["feeds"]
+    listed = {x["line"]: x for x in feeds["still_exceeding"]}
+    assert feeds["still_exceeding_count"] == len(listed) >= 2
+    for row in listed.values():
+        assert row["slowest"]
+        assert row["factor"] == pytest.approx(0.1)
+        assert row["allowed"] == 50.0 < row["worst"] < row["before"]
+    text = read.presentation.files()["0-feeds.ngc"].decode()
+    first, rest = text.split("\r\n", 1)
+    assert re.fullmatch(r"G21 G90 G94 G17 \(NOT VERIFIED: [ -~]+\)", first)
+    assert rest == read.outcome.feeds.text.split("\r\n", 1)[1]
+    page = page_bytes(read.result, read.presentation).decode()
+    assert "Lines that still exceed a limit" in page
+    assert read.result.message.split(";")[0] in page
+
+
+def test_lines_that_would_rub_are_listed(tmp_path: Path) -> None:
+    """The least feed per tooth is a floor under limits, and what the fastest feed keeps below it is said."""
+    least = ("operation.0.feeds.tooth_feed_least_mm=0.05",)
+    slow = done(tmp_path, SLOT, "force_n = 50.0\n", least)
+    assert feed_of(slow.outcome.feeds.text, 6) == pytest.approx(0.05 * 2 * 3000, rel=1.2e-3)
+    assert slow.outcome.feeds.rubs == ()
+    rubs = done(
+        tmp_path, SLOT.replace("F600", "F60"), "force_n = 620.0\n", (*least, "operation.0.feeds.fastest_percent=200")
+    )
+    assert rubs.outcome.feeds.rubs == ((6, pytest.approx(0.02)),)
+    assert rubs.result.verdict is Verdict.EXCEEDS
+    assert rubs.result.message == "Exceeds: line 6: feed per tooth 0.02 mm is less than 0.05 mm."
+
+
+def test_a_limit_is_used_up(tmp_path: Path) -> None:
+    """A third simulation: the load that each line leaves is what its resolution error may take, and 1 % of feed more
+    takes it.
+    """
+    read = done(tmp_path, WAYS, "force_n = 620.0\n")
+    held = [k for k, by in zip(read.outcome.feeds.line.tolist(), read.outcome.feeds.by, strict=True) if by == "force_n"]
+    assert len(held) >= 3
+    lines = read.outcome.feeds.text.split("\n")
+    for k in held:
+        bare = re.sub(r" F[\d.]+", "", lines[k - 1]).split(" (")[0]
+        lines[k - 1] = f"{bare} F{1.01 * feed_of(read.outcome.feeds.text, k):.3f}"
+    for k in set(read.outcome.feeds.line.tolist()) - set(held):
+        lines[k - 1] = (
+            f"{re.sub(r' F[0-9.]+', '', lines[k - 1]).split(' ;')[0]} F{feed_of(read.outcome.feeds.text, k):g}"
+        )
+    plain = JOB[: JOB.index("[operation.feeds]")] + "[limits]\n"
+    more = done(tmp_path, "\n".join(lines), "force_n = 620.0\n", job=plain).outcome.simulated.removal.columns
+    room = 620.0 / (1.0 + 2.0 * read.outcome.feeds.before.resolution_error["force_n"])
+    assert sorted(set(more["line"][more["force_n"] > room].tolist())) == held
+    assert read.outcome.simulated.removal.columns["force_n"].max() <= room
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("#1 = 600\n" + SLOT.replace("F600", "F#1"), "line 7: F#1: a feed that is calculated cannot be changed"),
+        (HEAD + "o1 repeat [2]\nG1 X3 F60\no1 endrepeat\nM2\n", "line 4: o1 repeat: feeds are changed only in a text"),
+        (SLOT.replace("\n", "\r"), "a.ngc: a line ends with CR alone"),
+    ],
+)
+def test_texts_whose_feeds_cannot_be_changed(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(InputError, match=re.escape(said)):
+        done(tmp_path, text, "force_n = 620.0\n")
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "text"),
+    [
+        (
+            "a.cls",
+            "apt",
+            "PARTNO/x\nUNITS/MM\nLOADTL/1\nSPINDL/3000,CLW\nRAPID\nGOTO/-8,0,5\nFEDRAT/600\nGOTO/34,0,-3\nFINI\n",
+        ),
+        (
+            "a.h",
+            "heidenhain",
+            "0 BEGIN PGM a MM\n1 TOOL CALL 1 Z S3000\n2 L X-8 Y+0 Z-3 R0 FMAX M3\n3 L X+34 F600\n4 END PGM a MM\n",
+        ),
+    ],
+)
+def test_other_texts_are_to_be_converted_first(tmp_path: Path, name: str, kind: str, text: str) -> None:
+    (tmp_path / name).write_text(text)
+    said = (
+        f"operation.0.feeds: {name} is {kind}: feeds are changed in NC texts of LinuxCNC, Fanuc or Sinumerik: convert"
+    )
+    with pytest.raises(InputError, match=re.escape(said)):
+        done(tmp_path, SLOT, "force_n = 620.0\n", job=JOB.replace("a.ngc", name))
+
+
+@settings(max_examples=6, deadline=None, phases=[Phase.generate])
+@given(st.data())
+def test_what_is_said_to_hold_holds(tmp_path_factory, data) -> None:
+    """Random ways through a block, random cutters with runout: the second simulation never exceeds a limit on a line
+    that the feeds were said to hold, and the text moves as it did.
+    """
+    folder = tmp_path_factory.mktemp("ways")
+    rows, number = [], st.floats(-14.0, 34.0)
+    for _ in range(data.draw(st.integers(3, 7))):
+        word = data.draw(st.sampled_from(["", f" F{data.draw(st.integers(100, 2000))}"]))
+        rows.append(
+            f"G1 X{data.draw(number):.2f} Y{data.draw(number) - 10:.2f} Z{data.draw(st.floats(-4.0, 1.0)):.2f}{word}"
+        )
+    text = HEAD + "G0 X-9 Y0\nG0 Z-2\nF500\n" + "\n".join(rows) + "\nG0 Z9\nM2\n"
+    cutter = f"corner_radius_mm = {data.draw(st.sampled_from([0.0, 1.0, 5.0]))}\nrunout_mm = 0.01\nrunout_deg = 20.0\n"
+    job = JOB.replace("helix_deg = 0.0\n", f"helix_deg = 30.0\n{cutter}").replace(
+        "tolerance_mm = 0.002", "tolerance_mm = 0.01"
+    )
+    limits = f"force_n = {data.draw(st.integers(60, 600))}\nchip_max_mm = {data.draw(st.floats(0.02, 0.2)):.3f}\n"
+    read = done(folder, text, limits, job=job)
+    held, c = read.outcome.feeds, read.outcome.simulated.removal.columns
+    loose = held.line[np.array([by == "slowest" for by in held.by])]
+    for name, column in (("force_n", "force_n"), ("chip_max_mm", "chip_max_mm")):
+        over = c[column] > read.outcome.simulated.limits[name]
+        assert set(c["line"][over].tolist()) <= set(loose.tolist()), name
+    one, two = (read_gcode(x)[0] for x in (text, held.text))
+    np.testing.assert_array_equal(one.position, two.position)
+    assert re.sub(r" F[\d.]+", "", held.text) == re.sub(r" F[\d.]+", "", text)
+    np.testing.assert_allclose(held.before.columns["chip_max_mm"] > 0.0, c["chip_max_mm"] > 0.0)

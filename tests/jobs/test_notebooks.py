@@ -1,0 +1,76 @@
+"""The notebooks that are shipped run, and say what closed forms and symmetry say."""
+
+from __future__ import annotations
+
+import ast
+import math
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import chipload
+from chipload.jobs import load_job, run_job
+
+nbformat = pytest.importorskip("nbformat")
+nbclient = pytest.importorskip("nbclient")
+pytest.importorskip("ipykernel")
+
+FOLDER = Path(str(files("chipload") / "examples" / "notebooks"))
+NAMES = sorted(p.stem for p in FOLDER.glob("*.ipynb"))
+
+
+def ran(name: str) -> tuple[Any, list[Any]]:
+    """What the last cell of a notebook says, and all outputs."""
+    book = nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
+    place = {"metadata": {"path": str(FOLDER)}}
+    nbclient.NotebookClient(book, timeout=300, kernel_name="python3", resources=place).execute()
+    out = [o for cell in book.cells for o in cell.get("outputs", ())]
+    return ast.literal_eval(out[-1].data["text/plain"]), out
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_outputs_are_kept(name: str) -> None:
+    book = nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
+    nbformat.validate(book)
+    code = [c for c in book.cells if c.cell_type == "code"]
+    assert code
+    assert all(c.outputs == [] and c.execution_count is None for c in code)
+    assert f"`{name}.ipynb`" in (FOLDER / "README.md").read_text()
+
+
+def test_program() -> None:
+    said, out = ran("program")
+    # a slot 10 wide round a corner, inner and outer radius 1 and 11, and 1.5 mm off the outer wall; 4 deep
+    slot = 400.0 + 0.25 * math.pi * (11.0**2 - 1.0) + 240.0
+    wall = 1.5 * 40.0 + 0.25 * math.pi * (12.5**2 - 11.0**2) + 1.5 * 24.0
+    assert said["removed_mm3"] == pytest.approx(4.0 * (slot + wall), rel=2e-4)
+    assert said["verdict"] == ("unproven", "holds")
+    alone, whole = said["deflection_um"]
+    assert 0.0 < alone < whole < 60.0
+    job = run_job(load_job(FOLDER / "job.toml"))
+    assert chipload.History(job.outcome).numbers["deflection_um"]["max"] == pytest.approx(whole, rel=1e-9)
+    assert "<table>" in out[0].data["text/html"]
+    assert len(out[1].data["application/vnd.plotly.v1+json"]["data"]) >= 3
+
+
+def test_chip() -> None:
+    said, out = ran("chip")
+    assert said["pieces"] == 2
+    # the turn about the point is the same seen from its end: the pieces are alike
+    assert said["areas_mm2"][0] == pytest.approx(said["areas_mm2"][1], rel=1e-4)
+    assert said["volume_mm3"] > 0.0
+    assert sum("application/vnd.plotly.v1+json" in o.get("data", {}) for o in out) == 3
+
+
+def test_wall() -> None:
+    said, _ = ran("wall")
+    # by plate theory the edge's middle bears 0.504 of what its corner bears where b = 2 a, 0.73 where b = a
+    assert 0.504 < 1.0 / said["corner_over_middle"] < 0.73
+    # a beam of half the height gives way by an eighth; the edge of a plate by more, its corner bends by itself
+    assert 1.0 < said["corner_over_half_height"] < 8.0
+    before, after = said["corner_um_n"]
+    assert said["weaker_by"] == pytest.approx(after / before)
+    # more than a beam whose upper half is 2/3 as thick, 7/8 + 27/8 / 8; less than if all of it were
+    assert 7.0 / 8.0 + 27.0 / 64.0 < said["weaker_by"] < 27.0 / 8.0

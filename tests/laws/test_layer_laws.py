@@ -1,0 +1,236 @@
+"""The layered engine at default settings against double sums over the edge, and its stated error against the true one.
+
+Bounds: 2 % of the mean torque, 3 % of the peaks; where the settings are stated coarser, ``resolution_error`` covers it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material, material_named
+from chipload.jobs.program.api import simulate
+from chipload.jobs.program.history import History
+from chipload.program.build import plunge, rapid
+from chipload.program.program import Program
+from laws.edge_sum import Sum, edge_sum
+from simulation.test_steps import five_axis
+
+Floats = NDArray[np.float64]
+BALL = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=5.0)
+BULL = Cutter(12.0, 3, 0.4, 20.0, 30.0, 6e5, corner_radius=3.0)
+TAPER = Cutter(6.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=1.0, taper=0.1)
+FLAT = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
+AL = material_named("al7075-t6")
+NO_EDGE = Material("no edge", 1000.0, 300.0, 100.0, 0.0, 0.0, 0.0, source="made up for this test")
+FEED, SPINDLE = 20.0, 300.0
+COLUMNS = ("torque_mean_nm", "torque_nm", "force_n", "chip_max_mm")
+
+
+def path(points: Any, feed: float = FEED) -> Program:
+    return Program.join(
+        [rapid(points[0], SPINDLE, 1, "link"), *(plunge(p, feed, SPINDLE, 1, "cut") for p in points[1:])]
+    )
+
+
+def run(
+    program: Program, cutter: Cutter, high: float = 0.0, material: Material = AL, on: str = "vmc", **keys: Any
+) -> History:
+    block = ([0.0, -16.0, -12.0], [30.0, 16.0, high])
+    return simulate(program, block, cutter, material, on, {"force_n": 1e6}, **keys)
+
+
+def per_tooth(cutter: Cutter, direction: Any) -> Floats:
+    d = np.asarray(direction, dtype=np.float64)
+    return d / np.linalg.norm(d) * FEED * math.tau / (cutter.flutes * SPINDLE)
+
+
+def at(history: History, x: float) -> dict[str, float]:
+    """Loads of the step whose end is nearest to x."""
+    c = history.columns
+    cut = np.flatnonzero(~np.asarray(c["rapid"]))
+    k = int(cut[np.argmin(np.abs(c["x_mm"][cut] - x))])
+    return {name: float(c[name][k]) for name in (*COLUMNS, "x_mm", "z_mm")}
+
+
+def close(found: dict[str, float], exact: Sum, stated: Mapping[str, float]) -> None:
+    """Within 2 % of the mean torque, 3 % of the peaks; the chip, taken at the middle of slices, as stated."""
+    assert found["torque_mean_nm"] == pytest.approx(exact.torque_mean_nm, rel=0.02)
+    assert found["torque_nm"] == pytest.approx(exact.torque_nm, rel=0.03)
+    assert found["force_n"] == pytest.approx(exact.force_n, rel=0.03)
+    assert found["chip_max_mm"] == pytest.approx(exact.chip_max_mm, rel=0.03 + stated["chip_max_mm"])
+
+
+def covered(history: History, exact: Sum, k: int) -> None:
+    """The true loads lie within the stated error of those of step k."""
+    stated = history.resolution_error
+    for name in COLUMNS:
+        value = float(history.columns[name][k])
+        assert abs(getattr(exact, name) - value) <= stated[name] * value + 2e-3 * value, (name, stated[name])
+
+
+@pytest.mark.parametrize(
+    ("cutter", "depth", "step"),
+    [
+        (BALL, 0.02, 0.5),
+        (BALL, 0.02, 0.02),
+        (BALL, 0.3, 3.0),
+        (BALL, 1.0, 0.1),
+        (BALL, 1.874, 0.5),
+        (BALL, 5.0, 3.0),
+        (BULL, 0.02, 3.0),
+        (BULL, 0.3, 0.5),
+        (BULL, 5.0, 0.5),
+        (TAPER, 0.3, 0.5),
+        (TAPER, 3.0, 3.0),
+        (FLAT, 0.02, 0.1),
+        (FLAT, 5.0, 3.0),
+    ],
+)
+def test_a_straight_slot(cutter: Cutter, depth: float, step: float) -> None:
+    length = 2.0 if step < 0.1 else 20.0
+    begin = -cutter.diameter
+    points = [[begin, 0, -depth], [10.0, 0, -depth], [10.0 + length, 0, -depth]]
+    history = run(path([points[0], points[1]]) if step >= 0.1 else path(points), cutter, step_mm=step)
+    exact = edge_sum(cutter, (0, 0, -depth), (0, 0, 1), per_tooth(cutter, (1, 0, 0)), lambda p: p[..., 2] < 0.0, AL)
+    close(at(history, 9.0 if step < 3.0 else 7.0), exact, history.resolution_error)
+
+
+def test_points_of_a_program_however_near_cost_the_same() -> None:
+    """D 10 ball, 1 mm deep, program points 0.2, 0.1 and 0.02 mm apart."""
+    exact = edge_sum(BALL, (0, 0, -1), (0, 0, 1), per_tooth(BALL, (1, 0, 0)), lambda p: p[..., 2] < 0.0, AL)
+    for apart in (0.2, 0.1, 0.02):
+        x = np.concatenate([[-10.0, 5.0], np.arange(5.0, 7.0, apart)[1:]])
+        history = run(path([[v, 0.0, -1.0] for v in x]), BALL)
+        close(at(history, 6.5), exact, history.resolution_error)
+
+
+@pytest.mark.parametrize("cutter", [BALL, BULL, TAPER], ids=["ball", "bull", "taper"])
+@pytest.mark.parametrize("slope", [-0.02, -0.15, 0.1])
+def test_a_ramp(cutter: Cutter, slope: float) -> None:
+    """Down and up, in material that nothing has cut: what lies below the top and goes outward cuts."""
+    begin, end = (0.2, 0.2 + 25.0 * slope) if slope < 0.0 else (-3.0, -3.0 + 25.0 * slope)
+    history = run(path([[2.0, 0.0, begin], [27.0, 0.0, end]]), cutter, step_mm=0.5)
+    found = at(history, 22.0)
+    tip = (found["x_mm"] - 0.25, 0.0, begin + slope * (found["x_mm"] - 0.25 - 2.0))
+    exact = edge_sum(cutter, tip, (0, 0, 1), per_tooth(cutter, (1, 0, slope)), lambda p: p[..., 2] < 0.0, AL)
+    close(found, exact, history.resolution_error)
+
+
+@pytest.mark.parametrize("cutter", [BALL, BULL, FLAT], ids=["ball", "bull", "flat"])
+def test_a_plunge(cutter: Cutter) -> None:
+    history = run(path([[15.0, 0.0, 1.0], [15.0, 0.0, -3.0]]), cutter, step_mm=0.5)
+    c = history.columns
+    k = int(np.argmax(c["z_mm"] <= -2.0))
+    tip = (15.0, 0.0, float(c["z_mm"][k]) + 0.25)
+    exact = edge_sum(cutter, tip, (0, 0, 1), per_tooth(cutter, (0, 0, -1)), lambda p: p[..., 2] < 0.0, AL)
+    close({name: float(c[name][k]) for name in COLUMNS}, exact, history.resolution_error)
+
+
+@pytest.mark.parametrize("lean", [(0.3, 0.0), (0.0, 0.3), (-0.2, 0.2)])
+@pytest.mark.parametrize("cutter", [BALL, BULL, FLAT], ids=["ball", "bull", "flat"])
+def test_a_slot_with_a_leaning_axis(cutter: Cutter, lean: tuple[float, float]) -> None:
+    """Within the law, or within the error that the run states."""
+    axis = np.array([*lean, 1.0]) / math.hypot(*lean, 1.0)
+    tips = [[x, 0.0, -1.5] for x in (-14.0, 16.0)]
+    program = replace(five_axis(tips, [axis.tolist()] * 2, feed=FEED), spindle=np.full(2, SPINDLE))
+    history = run(program, cutter, on="cradle-ac", step_mm=1.0)
+    c = history.columns
+    k = int(np.flatnonzero(c["x_mm"] >= 14.0)[0])
+    exact = edge_sum(cutter, (0, 0, -1.5), axis, per_tooth(cutter, (1, 0, 0)), lambda p: p[..., 2] < 0.0, AL)
+    covered(history, exact, k)
+    found = {name: float(c[name][k]) for name in COLUMNS}
+    if cutter is BALL:
+        close(found, exact, history.resolution_error)
+
+
+def test_an_arc_removes_what_pappus_says() -> None:
+    """Work of a slot along an arc: Ktc times the area of the section times the way of its middle."""
+    angle = np.linspace(0.0, 0.5 * math.pi, 121)
+    points = np.column_stack([4.0 + 12.0 * np.sin(angle), -12.0 + 12.0 * np.cos(angle), np.full(121, -1.0)])
+    history = run(path([[-8.0, 0.0, -1.0], *points.tolist()]), BALL, material=NO_EDGE)
+    c = history.columns
+    own = (c["x_mm"] > 11.0) & (c["y_mm"] > -9.0)
+    way = float((c["cutting_s"][own] * FEED).sum())
+    area = 25.0 * math.acos(0.8) - 4.0 * 3.0
+    assert float(c["cutting_work_j"][own].sum()) == pytest.approx(area * way, rel=0.01)
+
+
+def raster(p: Floats, row: int, over: float, depth: float) -> NDArray[np.bool_]:
+    """Below the top and in none of the troughs of the rows before."""
+    solid = p[..., 2] < 0.0
+    for j in range(row):
+        y, z = p[..., 1] - (j - row) * over, p[..., 2] - (5.0 - depth)
+        solid &= ~((np.hypot(y, z) < 5.0) | ((z > 0.0) & (np.abs(y) < 5.0)))
+    return solid
+
+
+@pytest.mark.parametrize(
+    ("depth", "over", "layer"), [(0.3, 0.5, None), (0.3, 0.5, 0.5), (0.05, 0.3, None), (1.0, 2.0, None)]
+)
+def test_a_finishing_raster(depth: float, over: float, layer: float | None) -> None:
+    """0.3 mm of stock by a ball nose, also with the layers that were the default before."""
+    points: list[list[float]] = []
+    for k in range(3):
+        ends = [[-7.0, (k - 2) * over, -depth], [20.0, (k - 2) * over, -depth]]
+        points += [[ends[0][0], ends[0][1], 2.0], *ends, [ends[1][0], ends[1][1], 2.0]]
+    history = run(path(points), BALL, layer_mm=layer)
+    c = history.columns
+    k = int(np.flatnonzero((c["x_mm"] > 9.0) & (c["z_mm"] == -depth) & (np.abs(c["y_mm"]) < 1e-9))[0])
+    tip, way = (0.0, 0.0, -depth), per_tooth(BALL, (1, 0, 0))
+    exact = edge_sum(BALL, tip, (0, 0, 1), way, lambda p: raster(p, 2, over, depth), AL)
+    if layer is None:
+        close({name: float(c[name][k]) for name in COLUMNS}, exact, history.resolution_error)
+    # the worst step is one of the first row, a slot
+    slot = edge_sum(BALL, tip, (0, 0, 1), way, lambda p: p[..., 2] < 0.0, AL)
+    covered(history, slot, int(np.flatnonzero((c["x_mm"] > 9.0) & (c["z_mm"] == -depth))[0]))
+
+
+@pytest.mark.parametrize(
+    ("cutter", "depth", "keys"),
+    [
+        (BALL, 0.3, {"layer_mm": 0.5}),
+        (BALL, 1.0, {"layer_mm": 0.5, "corner_slices": 4}),
+        (BALL, 1.874, {"layer_mm": 0.6, "corner_slices": 12}),
+        (BALL, 0.3, {"corner_slices": 6}),
+        (BULL, 1.0, {"layer_mm": 1.0, "corner_slices": 2}),
+        (TAPER, 2.0, {"flank_mm": 4.0, "corner_slices": 2}),
+    ],
+)
+def test_coarse_settings_state_the_error_that_they_make(cutter: Cutter, depth: float, keys: dict[str, Any]) -> None:
+    history = run(path([[-12.0, 0.0, -depth], [20.0, 0.0, -depth]]), cutter, step_mm=0.5, **keys)
+    exact = edge_sum(cutter, (0, 0, -depth), (0, 0, 1), per_tooth(cutter, (1, 0, 0)), lambda p: p[..., 2] < 0.0, AL)
+    covered(history, exact, int(np.flatnonzero(history.columns["x_mm"] > 15.0)[0]))
+
+
+def test_a_shallow_ramp_removes_what_it_sweeps_or_says_that_it_does_not() -> None:
+    """0.1 mm deep at its end: by default within 10 % of the volume; in layers of 0.5 mm nothing is found, and said."""
+    program = path([[2.0, 0.0, 0.0], [27.0, 0.0, -0.1]])
+    x = (np.arange(20_000) + 0.5) / 20_000 * 25.0
+    depth = 0.1 * x / 25.0
+    volume = float(
+        (25.0 * np.arccos(1.0 - depth / 5.0) - (5.0 - depth) * np.sqrt(depth * (10.0 - depth))).mean() * 25.0
+    )
+    # and the front half of the cap at its end, before the tip
+    volume += math.pi * 0.1**2 * (15.0 - 0.1) / 6.0
+    history = run(program, BALL, step_mm=0.5)
+    assert float(history.columns["engaged_volume_mm3"].sum()) == pytest.approx(volume, rel=0.02)
+    assert float(history.columns["chip_volume_mm3"].sum()) == pytest.approx(volume, rel=0.1)
+    blind = run(program, BALL, step_mm=0.5, layer_mm=0.5)
+    assert blind.resolution_error["force_n"] == math.inf or blind.resolution_error["torque_mean_nm"] > 0.5
+
+
+@pytest.mark.parametrize("m", [0.0, 0.25])
+def test_the_energy_balance_of_a_slot_closes(m: float) -> None:
+    """Also with a size effect, where K is the mean of Ktc h^(-m) with the thickness used."""
+    metal = Material("m", 1000.0, 0.0, 0.0, 30.0, 0.0, 0.0, source="made up for this test", exponents=(m, 0.0, 0.0))
+    history = run(path([[-6.0, 0.0, -2.0], [40.0, 0.0, -2.0]]), BALL, step_mm=0.5, material=metal)
+    assert list(history.energy_balance) == [1]
+    assert history.energy_balance[1] == pytest.approx(0.0, abs=0.02)

@@ -1,0 +1,48 @@
+"""The pallet angle along a line: within its ranges, without jumps, split where it must be."""
+
+import math
+
+import numpy as np
+
+from chipload.planning.impeller.pallet import pallet_angles
+
+
+def test_follows_a_moving_range_and_keeps_from_its_ends():
+    n = 60
+    low = 0.8 * np.sin(np.linspace(0.0, 3.0, n))
+    ranges = tuple(np.array([[a, a + 0.3]]) for a in low)
+    (only,) = pallet_angles(ranges, np.ones(n - 1), np.full(n - 1, 0.2), math.radians(4.0))
+    assert (only.first, only.last) == (0, n)
+    depth = np.minimum(only.pallet - low, low + 0.3 - only.pallet)
+    assert depth.min() >= 0.5 * math.radians(4.0) - 1e-12
+    # the range moves by at most 0.041 a step; a state lies within one step of 2 degrees of it
+    assert np.abs(np.diff(only.pallet)).max() < 0.08
+
+
+def test_chooses_the_branch_that_goes_on():
+    # two ranges; the nearer to the preferred angle ends half-way
+    ranges = tuple(np.array([[0.0, 0.5], [2.0, 2.5]]) if k < 10 else np.array([[2.0, 2.5]]) for k in range(20))
+    (only,) = pallet_angles(ranges, np.ones(19), np.full(19, 0.1), 0.05, np.full(20, 0.25))
+    assert only.last == 20
+    assert only.pallet.min() >= 2.0
+    assert only.pallet.max() <= 2.5
+
+
+def test_range_over_the_full_turn_is_one():
+    ranges = tuple(np.array([[0.0, 0.1 + 0.01 * k], [2.0 * math.pi - 0.2 + 0.01 * k, 2.0 * math.pi]]) for k in range(8))
+    (only,) = pallet_angles(ranges, np.ones(7), np.full(7, 0.5), 0.05)
+    assert np.abs(np.diff(only.pallet)).max() < 0.1
+    inside = [any(a <= b % math.tau <= c for a, c in r) for b, r in zip(only.pallet, ranges, strict=True)]
+    assert all(inside)
+
+
+def test_split_where_nothing_is_valid_and_where_the_pallet_is_too_slow():
+    gap = tuple(np.array([[0.0, 1.0]]) if k != 4 else np.zeros((0, 2)) for k in range(9))
+    assert [(t.first, t.last) for t in pallet_angles(gap, np.ones(8), np.ones(8))] == [(0, 4), (5, 9)]
+    # the range moves by 0.3 a step and is 0.4 wide: at one angle two points at most are milled
+    drift = tuple(np.array([[0.3 * k, 0.3 * k + 0.4]]) for k in range(8))
+    fast, slow = (pallet_angles(drift, np.ones(7), np.full(7, most)) for most in (0.5, 1e-4))
+    assert [(t.first, t.last) for t in fast] == [(0, 8)]
+    assert [t.last - t.first for t in slow] == [2, 2, 2, 2]
+    for piece in slow:
+        assert np.abs(np.diff(piece.pallet)).max() <= 1e-4

@@ -1,0 +1,101 @@
+"""Reach of a pass and crest between two lines, against rays through the moving cutter (the dexels' own)."""
+
+import math
+
+import numpy as np
+import pytest
+
+from chipload.geometry.bspline import through
+from chipload.planning.impeller.scallop_height import distance, scallop_heights
+from chipload.planning.impeller.scallop_width import reaches
+from chipload.stock.dexels._kernels import pierce
+
+R, r = 6.0, 2.0
+SHAPE = np.array([r, R - r, r, 0.0, 0.0, r, R, 0.0, 60.0, R])
+
+
+def left_at(points, normals, tips, axes):
+    """Least s on the rays from the points along the normals that any pose takes: brute force."""
+    out = np.full(len(points), np.inf)
+    for i, (p, n) in enumerate(zip(points, normals, strict=True)):
+        a = np.cross(n, np.eye(3)[np.abs(n).argmin()])
+        a /= np.linalg.norm(a)
+        frame = np.stack([a, np.cross(n, a), n])
+        for tip, axis in zip(tips, axes, strict=True):
+            lo, hi = pierce(2, 0.0, 0.0, frame @ (tip - p), frame @ axis, SHAPE)
+            if lo <= hi:
+                out[i] = min(out[i], lo)
+    return out
+
+
+def tips_of(S, N, T):
+    n = (N * T).sum(axis=1)[:, None]
+    V = (N - n * T) / np.sqrt(1.0 - n * n)
+    return S + r * N + (R - r) * V - r * T
+
+
+@pytest.mark.parametrize("lean", [0.01, 0.05, 0.3, 0.7])
+@pytest.mark.parametrize("way", [0.0, 0.6, 1.2, 2.4])
+def test_pass_on_a_plane_is_as_high_as_said_at_its_reach(lean, way):
+    h = 0.05
+    N = np.array([0.0, 0.0, 1.0])
+    T = np.array([math.cos(lean), 0.0, math.sin(lean)])
+    d = np.array([math.cos(way), math.sin(way), 0.0])
+    ahead, behind = reaches(N[None], T[None], d[None], np.zeros((1, 3, 3)), R - r, r, h)
+    e = np.cross(N, d)
+    s = np.arange(-20.0, 20.0, 0.05)[:, None]
+    tips = tips_of(s * d, np.tile(N, (len(s), 1)), np.tile(T, (len(s), 1)))
+    for side, far in ((1.0, ahead[0]), (-1.0, behind[0])):
+        got = left_at([side * far * e], [N], tips, np.tile(T, (len(s), 1)))[0]
+        if far < R:
+            assert got == pytest.approx(h, rel=0.02)
+        else:
+            assert got <= h
+
+
+def test_second_order_where_the_corner_alone_counts():
+    # corner r along the step: w = 2 sqrt(2 r h - h^2)
+    N, T, d = np.array([[0.0, 0, 1]]), np.array([[math.cos(0.8), 0, math.sin(0.8)]]), np.array([[0.0, 1, 0]])
+    a, b = reaches(N, T, d, np.zeros((1, 3, 3)), R - r, r, 0.02)
+    assert a[0] + b[0] == pytest.approx(2.0 * math.sqrt(2.0 * r * 0.02 - 0.02**2), rel=2e-3)
+
+
+@pytest.mark.parametrize("bend", [-0.01, 0.0, 0.01])
+def test_crest_between_two_lines_of_a_bent_surface(bend):
+    x, y = np.linspace(-6.0, 6.0, 13), np.linspace(-2.0, 2.0, 5)
+    X, Y = np.meshgrid(x, y, indexing="ij")
+    patch = through(np.stack([X, Y, 0.5 * bend * X**2], axis=-1), (x + 6) / 12, (y + 2) / 4)
+    u = np.linspace(0.2, 0.8, 41)
+    q = (0.4, 0.4 + 0.9 / 4.0)
+    poses = []
+    for v, lean in zip(q, (0.25, 0.4), strict=True):
+        S, N = patch.at(u, v), patch.normal(u, v)
+        T = np.tile([0.0, math.cos(lean), math.sin(lean)], (len(u), 1))
+        poses.append((tips_of(S, N, T), T))
+    share = np.linspace(0.02, 0.98, 49)
+    at = (np.repeat(u, len(share)), (q[0] + share * (q[1] - q[0]))[None].repeat(len(u), axis=0).ravel())
+    P, M = (f(*at).reshape(len(u), len(share), 3) for f in (patch.at, patch.normal))
+    got = scallop_heights(P, M, (poses[0][0], poses[1][0]), (poses[0][1], poses[1][1]), R - r, r)
+    k = 20
+    fine = np.linspace(0.0, 1.0, 7)[:-1]
+    tips, axes = (
+        np.vstack([np.vstack([x[a] * (1 - f) + x[a + 1] * f for f in fine]) for x in z for a in range(10, 30)])
+        for z in ((poses[0][0], poses[1][0]), (poses[0][1], poses[1][1]))
+    )
+    true = left_at(P[k], M[k], tips, axes).max()
+    assert 0.01 < true < 0.2
+    assert got[k] == pytest.approx(true, rel=0.02, abs=2e-4)
+
+
+def test_distance_of_points_from_the_cutting_part():
+    rng = np.random.default_rng(3)
+    T = np.array([0.0, 0.0, 1.0])
+    p = rng.uniform(-12.0, 12.0, (400, 3))
+    # the body is the disc of R - r at height r, drawn upwards, and all within r of it
+    d, z = np.hypot(p[:, 0], p[:, 1]), p[:, 2] - r
+    core = np.hypot(np.maximum(d - (R - r), 0.0), np.minimum(z, 0.0))
+    got = distance(p, np.zeros(3), T, R - r, r)
+    out = core > r
+    assert out.sum() > 100
+    assert np.abs(got[out] - (core[out] - r)).max() < 1e-12
+    assert (got[~out] <= 1e-12).all()

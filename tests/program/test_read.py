@@ -1,0 +1,83 @@
+"""Programs that their controller refuses, or that hold what is not read: the rest is read, and the gap is stated."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from chipload.errors import InputError, Severity, worst_severity
+from chipload.machine.machine import machine_named
+from chipload.program.program import LINE, RAPID
+from chipload.program.read import ENDINGS, read_program
+
+VMC = machine_named("vmc")
+MOVES = "S600 M3\nG0 X0 Y0 Z5\nG1 X10 F600\n"
+
+
+def read(folder: Path, text: str, name: str = "part.ngc", **options):
+    (folder / name).write_text(text)
+    return read_program(folder / name, VMC, **options)
+
+
+def gaps(reading):
+    return [(f.code, f.line) for f in reading.findings if f.severity is Severity.UNPROVEN]
+
+
+@pytest.mark.parametrize(
+    ("text", "gap", "refusal"),
+    [
+        (MOVES + "%\n", ("nc-percent", 4), "%: ends a text that begins with %"),
+        (MOVES, ("nc-no-end", 4), "the text ends without M2, M30 or %"),
+        (MOVES + "G187 P2\nM2\n", ("nc-unknown-word", 4), "G187: is no code of LinuxCNC"),
+        (MOVES + "M777\nM2\n", ("nc-unknown-word", 4), "M777: is no code of LinuxCNC"),
+        (MOVES + "G1 X10 R3\nM2\n", ("nc-unused-word", 4), "R3: no code of the block uses it"),
+        (MOVES + "G76 P1 Z-5 I-1 J0.1 K0.5 X3\nM2\n", ("nc-unknown-word", 4), "threading cycles of a lathe"),
+        (MOVES + f"G1 X10 ({'long ' * 60})\nM2\n", ("nc-long-line", 4), "a line has at most 255"),
+    ],
+    ids=["percent", "no end", "G187", "M777", "unused word", "G76", "long line"],
+)
+def test_what_linuxcnc_refuses_leaves_a_program_unproven(tmp_path: Path, text, gap, refusal):
+    reading = read(tmp_path, text)
+    assert gaps(reading) == [gap]
+    assert reading.program.motion[:2].tolist() == [RAPID, LINE]
+    assert reading.program.p_work[1].tolist() == [10.0, 0.0, 5.0]
+    with pytest.raises(InputError, match=refusal.replace("(", r"\(")):
+        read(tmp_path, text, strict=True)
+
+
+def test_a_motion_that_is_not_read_does_not_move_until_another_motion(tmp_path: Path):
+    reading = read(tmp_path, MOVES + "G6.2 P3 K0 X11 Y1\nX12 Y2 K0\nX13 Y3 K1\nG1 X20 Y0\nX30\nM2\n")
+    assert reading.program.p_work[:, 0].tolist() == [0.0, 10.0, 20.0, 30.0]
+    assert gaps(reading) == [("nc-unknown-word", line) for line in (4, 5, 6)]
+
+
+@pytest.mark.parametrize("ending", [".gc", ".GC", ".gcd", ".din", ".g"])
+def test_further_endings(tmp_path: Path, ending):
+    assert ending.lower() in ENDINGS
+    reading = read(tmp_path, MOVES + "M2\n", f"part{ending}")
+    assert worst_severity(reading.findings) is Severity.NOTE
+    assert len(reading.program) == 2
+
+
+def test_many_gaps_stay_unproven_where_not_all_are_listed(tmp_path: Path):
+    reading = read(tmp_path, MOVES + "(msg, one)\n" + "G187 P1\n" * 3000 + "M2\n")
+    last = reading.findings[-1]
+    assert (last.code, last.severity) == ("nc-more-findings", Severity.UNPROVEN)
+    assert len(reading.findings) == 2001
+
+
+def test_real_programs_that_were_refused_for_one_word():
+    data = Path(os.environ.get("CHIPLOAD_DATA", "/nonexistent")) / "nc"
+    if not data.is_dir():
+        pytest.skip("no real programs: set CHIPLOAD_DATA")
+    for name, code, motions in (
+        ("camotics/compass/compass.ngc", "nc-percent", 2900),
+        ("camotics/heart/heart.ngc", "nc-no-end", 150),
+        ("linuxcnc_nurbs/UNIPA #1=1.ngc", "nc-unknown-word", 1),
+    ):
+        path = data / name
+        with pytest.raises(InputError):
+            read_program(path, VMC, strict=True)
+        reading = read_program(path, VMC)
+        assert {found for found, _ in gaps(reading)} == {code}, name
+        assert len(reading.program) > motions, name

@@ -1,0 +1,125 @@
+"""What job, tool table, CL data and comments state about a cutter."""
+
+import math
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from chipload.cutter.cutter import Cutter
+from chipload.errors import InputError, Severity
+from chipload.machine.machine import machine_named
+from chipload.program.apt.cutters import read_cutters
+from chipload.program.gcode.reader import read_gcode
+from chipload.program.gcode.tools import read_tool_table
+from chipload.program.read import read_program
+from chipload.program.reconcile import agree, tool_comments
+from chipload.program.setup import Setup
+
+MILL = Cutter(10.0, 4, math.radians(30.0), 20.0, 30.0, 5.8e5, number=1)
+
+
+@pytest.mark.parametrize(
+    ("text", "stated"),
+    [
+        ("(T1 D=10. CR=0. - ZMIN=-5. - flat end mill)", {1: 10.0}),
+        ("( TOOL: T1 = 10.0 dia. ENDMILLM1000:REG )", {1: 10.0}),
+        ("; T12 | 6.0 FLAT ENDMILL | H12", {12: 6.0}),
+        ("(TOOL 3 - DIA 8.5 MM)", {3: 8.5}),
+        ("G20\n(T2 D=0.5 CR=0.)", {2: 12.7}),
+        ("G21\n(T2 = 0.5 INCH END MILL)", {2: 12.7}),
+        ("(T1 D=10.)\n(T1 D=6.)", {1: 10.0}),
+        ("(Tool: 1/8 in Carbide End Mill)", {}),
+        ('(tool 4 is 1" in diameter and must be defined in the tool table)', {}),
+        ("(change tool 3 at 100 mm)", {}),
+        ("T1 D10 M6", {}),
+        ("(D=10 without a tool)", {}),
+    ],
+)
+def test_comments(text, stated):
+    assert {k: v.diameter for k, v in tool_comments(text).items()} == pytest.approx(stated)
+
+
+def test_a_real_comment_with_the_cutter_that_it_states(tmp_path: Path):
+    data = Path(os.environ.get("CHIPLOAD_DATA", "/nonexistent")) / "nc"
+    found = [p for p in sorted(data.rglob("*.ngc")) if "TOOL: T1 = 10.0 dia." in p.read_text("utf-8", "replace")]
+    if not found:
+        pytest.skip("no real programs: set CHIPLOAD_DATA")
+    for path in found:
+        machine = machine_named(f"{path.stem.split('-')[-1]}-trunnion")
+        read_program(path, machine, setup=Setup(cutters={1: MILL}))
+        with pytest.raises(InputError, match=r"states 10 mm for tool 1, the \[\[cutter\]\] has 12 mm"):
+            read_program(path, machine, setup=Setup(cutters={1: replace(MILL, diameter=12.0)}))
+
+
+@pytest.mark.parametrize(
+    ("record", "message"),
+    [
+        ("CUTTER/12", "CUTTER states the diameter 12 mm for tool 1, the [[cutter]] has 10 mm"),
+        ("CUTTER/10,2", "CUTTER states the corner radius 2 mm for tool 1, the [[cutter]] has 0 mm"),
+        ("CUTTER/10,0,5,0,0,3,20", "CUTTER states the taper 3 deg for tool 1, the [[cutter]] has 0 deg"),
+    ],
+)
+def test_a_cutter_of_cl_data_that_is_another_is_refused(record, message):
+    shapes, _ = read_cutters(f"UNITS/MM\n{record}\nLOADTL/1\nGOTO/0,0,0\nFINI")
+    with pytest.raises(InputError) as caught:
+        agree("part.apt", {1: MILL}, shapes=shapes)
+    assert str(caught.value).startswith(f"part.apt: {message}: must agree within ")
+    assert agree("part.apt", {2: replace(MILL, number=2)}, shapes=shapes) == ()
+
+
+def test_cl_data_of_a_job_is_held_against_its_cutters(tmp_path: Path):
+    path = tmp_path / "part.apt"
+    path.write_text("UNITS/MM\nLOADTL/1\nCUTTER/6\nRAPID\nGOTO/0,0,5\nFEDRAT/60,MMPM\nGOTO/0,0,0\nFINI\n")
+    with pytest.raises(InputError, match="CUTTER states the diameter 6 mm for tool 1"):
+        read_program(path, machine_named("vmc"), setup=Setup(cutters={1: MILL}))
+    assert len(read_program(path, machine_named("vmc"), setup=Setup(cutters={1: replace(MILL, diameter=6.0)})).program)
+
+
+SIDE = "G0 X0 Y0\nF60\nG41 D1\nG1 Y20\nG1 X30\nG40\nM2"
+
+
+def centre(findings_and, **options):
+    commands, findings = read_gcode(SIDE, **options)
+    found = {f.code: f.severity for f in findings}
+    assert findings_and <= found.keys()
+    # on the way along X the centre stands a radius to the left, at larger Y
+    return commands.position[-1, 1] - 20.0, found
+
+
+def test_what_g41_compensates_for():
+    table = read_tool_table("T1 P1 D8\n")[0]
+    radius, _ = centre(set(), tools=table, diameters={1: 8.0})
+    assert radius == pytest.approx(4.0)
+    radius, found = centre({"nc-diameter-of-cutter"}, diameters={1: 10.0})
+    assert (radius, found["nc-diameter-of-cutter"]) == (pytest.approx(5.0), Severity.NOTE)
+    radius, found = centre({"nc-diameter-unknown"})
+    assert (radius, found["nc-diameter-unknown"]) == (0.0, Severity.UNPROVEN)
+    radius, found = centre({"nc-diameter-missing"}, tools=read_tool_table("T1 P1\n")[0], diameters={1: 10.0})
+    assert (radius, found["nc-diameter-missing"]) == (pytest.approx(5.0), Severity.UNPROVEN)
+
+
+def test_d_of_other_dialects():
+    """Fanuc's D is a register, Sinumerik's an edge: without data both mean the cutter in the spindle."""
+    text = "T5 M6\n" + SIDE.replace("D1", "D31").replace("Y20", "Y20.").replace("X30", "X30.")
+    commands, findings = read_gcode(text, dialect="fanuc", diameters={5: 12.0})
+    assert commands.position[-1, 1] == pytest.approx(26.0)
+    assert max(f.severity for f in findings) is Severity.NOTE
+    tools = read_tool_table("T1 P1 D3\nT5 P5 D12\n")[0]
+    commands, _ = read_gcode(f"T5 M6\n{SIDE}".replace("M2", "M30"), dialect="sinumerik", tools=tools)
+    assert commands.position[-1, 1] == pytest.approx(26.0)
+
+
+def test_a_length_that_is_not_known_matters_where_an_axis_turns(tmp_path: Path):
+    path = tmp_path / "part.ngc"
+    path.write_text("T1 M6\nG43 H1\nG0 X0 Y0 Z50\nF600\nG1 X10\nM2\n")
+    for machine, severity in (("vmc", Severity.NOTE), ("xyzac-trunnion", Severity.UNPROVEN)):
+        noticed = read_program(path, machine_named(machine)).findings
+        assert [f.severity for f in noticed if f.code == "nc-length-unknown"] == [severity]
+
+
+def test_the_length_of_another_tool_leaves_the_result_unproven():
+    tools = read_tool_table("T1 P1 D8 Z40\nT2 P2 D8 Z50\n")[0]
+    _, findings = read_gcode("T1 M6\nG43 H2\nG0 Z5\nM2", tools=tools)
+    assert [(f.code, f.severity) for f in findings] == [("nc-length-of-another-tool", Severity.UNPROVEN)]

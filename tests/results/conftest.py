@@ -1,0 +1,151 @@
+"""Every example is run once in a test run; the workers of a run share the results.
+
+The first test that asks for an example runs it, behind a lock on a file; results stand in the base folder of the run.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import chipload.examples
+import chipload.report.folder as folder_module
+from chipload.cli import app
+from chipload.jobs import LoadedJob, load_job
+from chipload.result import Result, Summary, load_result, read_summary
+
+EXAMPLES = Path(chipload.examples.__file__).parent
+#: what makes a slow example shorter: coarser steps and layers; its kind, its limits and its files stay
+SHORTER: Mapping[str, tuple[str, ...]] = {
+    "contour": ("operation.0.step_mm=0.2",),
+    "pocket": ("operation.0.step_mm=0.6",),
+    "chips": ("operation.0.step_mm=4",),
+    "feeds": ("operation.0.step_mm=4", "stock.layer_mm=2"),
+    "bracket": ("operation.0.step_mm=6", "stock.layer_mm=5", "part.spacing_mm=5"),
+    "trunnion": (),
+    "tube": (),
+    "cone": (),
+    "plate": (),
+    "blade": (),
+    "impeller": (),
+    "hecc": (),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Example:
+    """An example that was run.
+
+    Parameters
+    ----------
+    name : of the example
+    folder : its result folder
+    exit_code, output : of ``chipload run``
+    differences : between the result that was made and the one that is read back; empty: none
+    """
+
+    name: str
+    folder: Path
+    exit_code: int
+    output: str
+    differences: tuple[str, ...]
+
+    @property
+    def loaded(self) -> LoadedJob:
+        """Its job."""
+        return load_job(EXAMPLES / self.name / "job.toml", SHORTER[self.name])
+
+    @property
+    def limits(self) -> dict[str, Any]:
+        """The limits that its job file states."""
+        values = tomllib.loads((EXAMPLES / self.name / "job.toml").read_text())
+        return dict(values.get("limits", {}))
+
+    @property
+    def result(self) -> Result:
+        """Its result, read back."""
+        return load_result(self.folder)
+
+    @property
+    def summary(self) -> Summary:
+        """Its summary."""
+        return read_summary(self.folder)
+
+
+@pytest.fixture(scope="session")
+def example(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Example]:
+    """The result of an example by name."""
+    base = tmp_path_factory.getbasetemp()
+    top = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "examples"
+    top.mkdir(exist_ok=True)
+
+    @cache
+    def of(name: str) -> Example:
+        with (top / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            ended = top / f"{name}.json"
+            if not ended.exists():
+                ended.write_text(json.dumps(_run(name, top / name)))
+            values = json.loads(ended.read_text())
+        return Example(name, top / name, values["exit_code"], values["output"], tuple(values["differences"]))
+
+    return of
+
+
+def _run(name: str, out: Path) -> dict[str, Any]:
+    """Run an example as the command does, and compare what is read back with what was written."""
+    made: list[Result] = []
+    write = folder_module.write_result
+
+    def kept(result: Result, *others: Any) -> Path:
+        made.append(result)
+        return write(result, *others)
+
+    words = ["run", str(EXAMPLES / name / "job.toml"), "--out", str(out)]
+    words += [word for value in SHORTER[name] for word in ("--set", value)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(folder_module, "write_result", kept)
+        done = CliRunner().invoke(app, words)
+    differences = _differences(made[0], load_result(out)) if made else ["no result was written"]
+    return {"exit_code": done.exit_code, "output": done.output, "differences": differences}
+
+
+def _differences(made: Result, back: Result) -> list[str]:
+    """What two results differ in, as names."""
+    plain = ("capability", "title", "verdict", "message", "limits", "findings", "unchecked", "provenance", "note")
+    out = [name for name in plain if getattr(made, name) != getattr(back, name)]
+    own = ("name", "kind", "in_use", "time_s", "limits", "findings", "programs", "operation", "verdict")
+    if [t.name for t in made.tracks] != [t.name for t in back.tracks]:
+        return [*out, "tracks"]
+    for a, b in zip(made.tracks, back.tracks, strict=True):
+        out += [f"{a.name}: {name}" for name in own if getattr(a, name) != getattr(b, name)]
+        out += [f"{a.name}: parameters"] if dict(a.parameters) != dict(b.parameters) else []
+        before, after = a.columns, b.columns
+        out += [f"{a.name}: columns {sorted(set(before) ^ set(after))}"] if set(before) != set(after) else []
+        out += [f"{a.name}: {n}" for n in set(before) & set(after) if not _same(before[n], after[n])]
+    if len(made.maps) != len(back.maps):
+        return [*out, "maps"]
+    for one, other in zip(made.maps, back.maps, strict=True):
+        same = (one.name, one.column, one.track) == (other.name, other.column, other.track)
+        same = same and all(_same(getattr(one, n), getattr(other, n)) for n in ("points", "values", "faces"))
+        out += [] if same else [f"map {one.name}"]
+    return out
+
+
+def _same(a: Any, b: Any) -> bool:
+    """Equal to the bit, words as words."""
+    a, b = np.asarray(a), np.asarray(b)
+    if a.dtype.kind in "OU":
+        return a.astype(str).tolist() == b.astype(str).tolist()
+    return bool(np.array_equal(a, b, equal_nan=a.dtype.kind == "f"))

@@ -1,0 +1,195 @@
+"""Every example's result: each limit is checked or unproven, and summary, report, exit code and API agree."""
+
+from __future__ import annotations
+
+import json
+import re
+from html import unescape
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from chipload.errors import InputError
+from chipload.machine.machine import machine_named
+from chipload.program.read import read_program
+from chipload.result import COLUMNS, Verdict
+from chipload.result.columns import unit_of
+from chipload.web.result import open_result
+
+NAMES = (
+    "contour",
+    "pocket",
+    "chips",
+    "feeds",
+    "bracket",
+    "trunnion",
+    "tube",
+    "cone",
+    "plate",
+    "blade",
+    "impeller",
+    "hecc",
+)
+every = pytest.mark.parametrize("name", NAMES)
+RANK = {"holds": 0, "unproven": 1, "exceeds": 2}
+
+
+def cells(html: str, after: str) -> list[list[str]]:
+    """Rows of the first table behind a heading, as text."""
+    table = html[html.index(after) :].split("<table>", 1)[1].split("</table>", 1)[0]
+    rows = re.findall(r"<tr[^>]*>(.*?)</tr>", table.split("<tbody>")[1], re.DOTALL)
+    return [[unescape(re.sub(r"<[^>]+>", "", x)).strip() for x in re.findall(r"<td[^>]*>(.*?)</td>", r)] for r in rows]
+
+
+@every
+def test_every_limit_of_the_job_is_checked_or_unproven(example, name):
+    done = example(name)
+    summary = done.summary
+    found = {limit.name: limit for limit in summary.limits}
+    assert set(done.limits) <= set(found)
+    for limit in summary.limits:
+        assert (limit.worst is None) <= (limit.state is Verdict.UNPROVEN)
+        assert bool(limit.reason) == (limit.state is Verdict.UNPROVEN)
+    for limit, value in done.limits.items():
+        assert found[limit].limit == value
+    for track in summary.tracks:
+        if track.rows:
+            assert set(done.limits) <= {limit.name for limit in track.limits}
+
+
+@every
+def test_one_state_everywhere(example, name):
+    done = example(name)
+    summary, report = json.loads((done.folder / "summary.json").read_text()), (done.folder / "report.html").read_text()
+    state = done.result.verdict.value
+    parts = [limit["state"] for limit in summary["limits"]] or ["unproven"]
+    of_finding = {"note": "holds", "unproven": "unproven", "exceeds": "exceeds"}
+    parts += [of_finding[f["severity"]] for f in summary["findings"]]
+    parts += [of_finding[f["severity"]] for t in summary["tracks"] if t["in_use"] for f in t["findings"]]
+    assert max(parts, key=RANK.__getitem__) == state
+    assert summary["verdict"] == state
+    assert done.exit_code == (0 if state == "holds" else 3)
+    first = re.search(r'<div class="verdict (good|open|bad)"><b>(.*?)</b><span>(.*?)</span>', report)
+    assert (first[1], first[2]) == ({"holds": "good", "unproven": "open", "exceeds": "bad"}[state], state)
+    assert unescape(first[3]) == summary["message"] == done.result.message
+    assert re.search(r"<title>(.*?)</title>", report)[1].endswith(f": {state}")
+    assert summary["message"] in done.output
+    assert summary["message"].lower().startswith(state)
+
+
+@every
+def test_the_page_opens_the_result_with_the_same_state(example, name):
+    done = example(name)
+    if not any(track.rows for track in done.summary.tracks):
+        with pytest.raises(InputError, match="nothing to show"):  # a search without programs
+            open_result(done.folder.parent, name)
+        return
+    page = open_result(done.folder.parent, name)
+    assert page.result.verdict is done.result.verdict
+    assert page.tracks[0].own.in_use
+    assert sum(map(len, page.tracks)) == page.count
+
+
+@every
+def test_numbers_of_the_message_are_those_of_the_limits(example, name):
+    done = example(name)
+    result = done.result
+    numbers = {(c.column.label, f"{c.worst:.4g}", f"{c.limit:g}") for c in result.limits if c.worst is not None}
+    labels = "|".join(sorted({re.escape(label) for label, *_ in numbers}, key=len, reverse=True))
+    said = re.findall(rf"(?:^|[:;,] )({labels}) ([\d.e+-]+)(?: \S+| N m)? (?:of|exceeds) ([\d.e+-]*\d)", result.message)
+    assert set(said) <= numbers
+    if result.verdict is Verdict.HOLDS:
+        assert set(said) == numbers
+
+
+@every
+def test_the_report_lists_every_limit_with_its_numbers(example, name):
+    done = example(name)
+    checks = [(t, c) for t in done.result.tracks for c in t.limits]
+    if not checks:
+        assert "No limit was checked" in (done.folder / "report.html").read_text()
+        return
+    rows = cells((done.folder / "report.html").read_text(), "<h2>Limits</h2>")
+    expected = sorted(
+        (t.name + (" in use" if t.in_use else ""), c.column.title, c.state.value, f"{c.limit:g}",
+         "not known" if c.worst is None else f"{c.worst:.4g}")
+        for t, c in checks
+    )  # fmt: skip
+    assert sorted(tuple(row[:5]) for row in rows) == expected
+    used = [" in use" in row[0] for row in rows]
+    assert used == sorted(used, reverse=True)
+
+
+@every
+def test_each_track_has_a_time_that_rises(example, name):
+    done = example(name)
+    for track, model in zip(done.result.tracks, done.summary.tracks, strict=True):
+        columns = track.columns
+        assert len(columns.get("t_s", ())) == model.rows
+        if not model.rows:
+            continue
+        t = columns["t_s"]
+        assert t[0] >= 0.0
+        still = int(np.searchsorted(t, 0.0, side="right"))
+        if still > 1:  # the move from where the machine stands, which is not known: no time is counted for it
+            assert len(set(columns["line"][:still].tolist())) == 1
+            assert (
+                columns["rapid"][:still].all() if "rapid" in columns else (columns["motion"][:still] == "rapid").all()
+            )
+        # a step without a length takes no time
+        assert (np.diff(t[max(still - 1, 0) :]) >= 0.0).all(), (
+            f"{track.name}: {np.flatnonzero(np.diff(t) < 0.0)[:9] + 1}"
+        )
+        assert t[-1] == pytest.approx(track.time_s, rel=1e-3)
+        assert np.allclose(np.cumsum(columns["duration_s"]), t, rtol=1e-9, atol=1e-9)
+
+
+@every
+def test_a_limit_names_the_row_that_it_was_read_from(example, name):
+    for track in example(name).result.tracks:
+        columns = track.columns
+        for check in (c for c in track.limits if c.row is not None):
+            whole = check.name == "engagement_deg" and "engagement_max_deg" in columns
+            column = "engagement_max_deg" if whole else check.column.name
+            if column in columns:  # excess is of points of the part, its row is the step that leaves it
+                assert abs(float(columns[column][check.row])) == pytest.approx(check.worst, rel=1e-9), check.name
+            if check.t_s is not None:
+                assert columns["t_s"][check.row] == pytest.approx(check.t_s, rel=1e-9)
+            if "line" in columns:
+                assert columns["line"][check.row] == check.line
+
+
+@every
+def test_programs_exist_and_open(example, name):
+    done = example(name)
+    machine = machine_named(done.loaded.job.machine)
+    for track in done.result.tracks:
+        for program in track.programs:
+            assert len(read_program(done.folder / program, machine).program) > 1, program
+    if any(track.programs for track in done.result.tracks):
+        # a surface of an impeller is searched without a program of its own
+        assert all(track.programs for track in done.result.in_use if track.time_s is not None)
+
+
+@every
+def test_the_track_in_use_is_first(example, name):
+    tracks = done = example(name).result.tracks
+    assert any(track.in_use for track in done)
+    for operation in {track.operation for track in tracks}:
+        used = [track.in_use for track in tracks if track.operation == operation]
+        assert used == sorted(used, reverse=True)
+
+
+@every
+def test_every_column_is_in_the_table_with_its_unit(example, name):
+    table = pq.read_table(example(name).folder / "history.parquet")
+    for field in table.schema:
+        assert field.name in COLUMNS
+        assert field.metadata[b"unit"].decode() == COLUMNS[field.name].unit == unit_of(field.name)
+        assert table[field.name].null_count < max(table.num_rows, 1), field.name
+
+
+@every
+def test_what_is_read_back_is_what_was_written(example, name):
+    assert example(name).differences == ()

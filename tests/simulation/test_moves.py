@@ -1,0 +1,321 @@
+"""Programs simulated by moves: loads in closed form, streaming, resume, what is handed over, the stock that is left."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from numpy.typing import NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.force import forces_along
+from chipload.cutting.material import Material, material_named
+from chipload.errors import Cancelled, InputError
+from chipload.program.build import rapid, rows
+from chipload.program.program import LINE, Program
+from chipload.simulation.accuracy import COMPARED, MOVES_FLOOR, WITH_FORCE
+from chipload.simulation.checkpoint import Checkpoint
+from chipload.simulation.chips import Removal, Resolution, remove
+from chipload.simulation.chunks import remove_in_chunks
+from chipload.simulation.loads import (
+    BANDS,
+    LOADS,
+    Cuts,
+    StepEngagement,
+    greatest_loads,
+    loads_of_steps,
+    over_turn,
+)
+from chipload.stock.layers import LayeredStock
+
+Floats = NDArray[np.float64]
+MILL = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
+BALL = Cutter(8.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=4.0, runout=(0.01, 0.3))
+FINE = Resolution(step_mm=1.0, tolerance=0.001, corner_pieces=12, flank_mm=2.5)
+ALLOY = replace(material_named("al7075-t6"), spread=0.05)
+LOW, HIGH = (0.0, 0.0, -8.0), (40.0, 30.0, 0.0)
+
+
+def block(layer: float = 0.5) -> LayeredStock:
+    return LayeredStock.block(LOW, HIGH, layer, 20.0)
+
+
+def path(points: Any, tool: int = 1, speed: float = 300.0, feed: float = 20.0) -> Program:
+    """Lines from point to point, a rapid to the first."""
+    p = np.asarray(points, dtype=float).tolist()
+    cut = rows([LINE] * (len(p) - 1), p[1:], (0.0, 0.0), feed, speed, tool, "cut")
+    return Program.join([rapid(p[0], speed, tool, "link"), cut])
+
+
+def zigzag() -> Program:
+    """A face by the mill, a plunge and a slot, then rows of the ball over a wave."""
+    x = np.linspace(-6.0, 46.0, 40)
+    face = [[float(a), float(y), -1.0] for k, y in enumerate((2.0, 8.0, 14.0)) for a in (x if k % 2 == 0 else x[::-1])]
+    one = path([*face, [20.0, 20.0, 1.0], [20.0, 20.0, -3.0], [30.0, 24.0, -3.5]])
+    wave = [
+        [float(a), 16.0 + 0.5 * k, -2.0 + 0.5 * math.sin(a / 5.0)]
+        for k in range(6)
+        for a in (x if k % 2 == 0 else x[::-1])
+    ]
+    return Program.join([one, rapid([20.0, 20.0, 9.0], 300.0, 1, "link"), path(wave, 2)])
+
+
+def run(program: Program, engine: str = "moves", stock: LayeredStock | None = None, **more: Any) -> Removal:
+    cutters = {1: MILL, 2: BALL}
+    return remove(program, stock or block(), cutters, ALLOY, FINE, engine=engine, **more)  # type: ignore[arg-type]
+
+
+def test_a_slot_costs_what_the_straight_flank_costs() -> None:
+    columns = run(path([[-8.0, 15.0, -3.0], [30.0, 15.0, -3.0]])).columns
+    known = forces_along(
+        [0.0], [math.pi], 20.0 * math.tau / 4 / 300.0, [[1.0, 0.0]], MILL, ALLOY, 3.0, spindle_speed=300.0
+    )
+    k = 30
+    for name in ("torque_mean_nm", "power_w", "chip_max_mm"):
+        assert columns[name][k] == pytest.approx(float(known[name][0]), rel=1e-9)
+    assert columns["torque_nm"][k] == pytest.approx(float(known["torque_nm"][0]), rel=1e-3)
+    for axis in "xyz":
+        assert columns[f"force_{axis}_mean_n"][k] == pytest.approx(float(known[f"force_{axis}_mean_n"][0]), rel=1e-9)
+    assert columns["chip_volume_mm3"][k] == pytest.approx(10.0 * 3.0 * 1.0, rel=1e-9)
+    assert columns["force_normal_n"][k] == 0.0
+
+
+@pytest.mark.parametrize("speed", [300.0, -300.0])
+def test_both_engines_agree_on_a_straight_flank(speed: float) -> None:
+    """A side cut of 2 mm by a flat mill, on which the layers are exact."""
+    program = path([[-8.0, -3.0, -4.0], [30.0, -3.0, -4.0]], speed=speed)
+    one, two = run(program).columns, run(program, "layers").columns
+    k = slice(20, 36)
+    for name in two:
+        scale = np.abs(two[name][k]).max() if two[name].dtype.kind == "f" else 1.0
+        np.testing.assert_allclose(one[name][k], two[name][k], rtol=1e-3, atol=2e-3 * scale, err_msg=name)
+
+
+def test_work_of_the_torque_is_ktc_times_the_volume_that_the_stock_lost() -> None:
+    plain = Material("plain", 900.0, 300.0, 100.0, 0.0, 0.0, 0.0, source="made up")
+    stock = block(0.02)
+    removal = remove(zigzag(), stock, {1: MILL, 2: BALL}, plain, FINE, engine="moves")
+    work = (1e3 * removal.columns["torque_mean_nm"] * 300.0 * removal.columns["seconds"]).sum()
+    lost = removal.volume_before - removal.volume_after
+    assert removal.volume_before == pytest.approx(40.0 * 30.0 * 8.0)
+    assert work == pytest.approx(900.0 * lost, rel=5e-3)
+    assert removal.columns["chip_volume_mm3"].sum() == pytest.approx(lost, rel=5e-3)
+
+
+def test_a_program_again_cuts_nothing() -> None:
+    program = path([[-8.0, 15.0, -3.0], [30.0, 15.0, -3.0], [30.0, 20.0, -3.0]])
+    back = [rapid(p, 300.0, 1, "link") for p in ([30.0, 20.0, 9.0], [-8.0, 15.0, 9.0])]
+    twice = Program.join([program, *back, program])
+    columns = run(twice).columns
+    n = len(columns["line"]) // 2
+    assert columns["chip_volume_mm3"][:n].sum() > 100.0
+    assert columns["chip_volume_mm3"][n:].sum() == 0.0
+    assert columns["force_n"][n:].max() == 0.0
+
+
+def test_a_rapid_through_material_is_found() -> None:
+    program = Program.join([path([[-8.0, 5.0, -1.0], [20.0, 5.0, -1.0]]), rapid([20.0, 20.0, -1.0], 300.0, 1, "link")])
+    assert [f.code for f in run(program).findings] == ["rapid-cuts"]
+
+
+def test_a_spindle_at_rest_is_refused() -> None:
+    with pytest.raises(InputError, match="cuts with the spindle at rest"):
+        run(path([[-8.0, 5.0, -1.0], [20.0, 5.0, -1.0]], speed=0.0))
+
+
+def leaning() -> Program:
+    program = path([[-8.0, 5.0, -1.0], [20.0, 5.0, -1.0]])
+    axis = np.array(program.axis)
+    axis[1] = (0.1, 0.0, math.sqrt(0.99))
+    return replace(program, axis=axis)
+
+
+def test_what_moves_cannot_do_goes_by_layers() -> None:
+    found = run(leaning(), "auto")
+    assert [(f.code, f.line) for f in found.findings] == [("handed-over", int(leaning().line[1]))]
+    known = run(leaning(), "layers")
+    for name in known.columns:
+        np.testing.assert_array_equal(found.columns[name], known.columns[name])
+    with pytest.raises(InputError, match="the axis is not upright: state engine"):
+        run(leaning(), "moves")
+
+
+def test_material_above_the_flutes_goes_by_layers() -> None:
+    short = replace(MILL, flute_length=2.0)
+    program = path([[-8.0, 15.0, -3.0], [30.0, 15.0, -3.0]])
+    stock = block()
+    found = remove(program, stock, {1: short}, ALLOY, FINE, engine="auto")
+    assert "above the flutes of tool 1 (2 mm)" in found.findings[0].text
+    other = block()
+    known = remove(program, other, {1: short}, ALLOY, FINE)
+    np.testing.assert_array_equal(found.columns["force_n"], known.columns["force_n"])
+    assert stock.to_bytes() == other.to_bytes()
+
+
+def test_a_stock_that_was_cut_goes_by_layers() -> None:
+    stock = block()
+    run(path([[-8.0, 5.0, -1.0], [20.0, 5.0, -1.0]]), stock=stock)
+    found = run(path([[-8.0, 9.0, -1.0], [20.0, 9.0, -1.0]]), "auto", stock)
+    assert "the stock was cut before" in found.findings[0].text
+
+
+def test_a_mesh_is_cut_as_its_box() -> None:
+    mesh = trimesh.creation.box(bounds=[LOW, HIGH])
+    one = run(zigzag()).columns
+    two = run(zigzag(), stock=LayeredStock.of_mesh(mesh, 0.5, 20.0)).columns
+    np.testing.assert_allclose(two["force_n"], one["force_n"], atol=1e-5 * one["force_n"].max())
+
+
+def test_the_layers_that_are_left_are_those_of_the_layered_engine() -> None:
+    one, two = block(), block()
+    run(zigzag(), stock=one)
+    run(zigzag(), "layers", two)
+    for a, b in zip(one.volumes(), two.volumes(), strict=True):
+        assert a == pytest.approx(b, abs=2e-3 * 40.0 * 30.0 * 0.5)
+    for i in range(0, one.layers, 3):
+        assert one.section(i).symmetric_difference(two.section(i)).area < 2.0
+
+
+def all_bytes(removal: Removal, stock: LayeredStock) -> list[bytes]:
+    c = removal.columns
+    whole = [removal.volume_before, removal.volume_after, removal.mean_band, removal.findings]
+    return [repr(whole).encode(), stock.to_bytes(), *(np.ascontiguousarray(c[k]).tobytes() for k in c)]
+
+
+def watch(cuts: Cuts) -> dict[str, Floats]:
+    return {"own": cuts.plain.chip_max() + cuts.way[:, 0]}
+
+
+@pytest.mark.parametrize("engine", ["moves", "auto"])
+def test_a_run_that_was_stopped_goes_on_with_the_same_bytes(
+    tmp_path: Path, engine: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("chipload.simulation.chips.BLOCK", 8 if engine == "moves" else 64)
+    cutters = {1: replace(MILL, flute_length=20.0 if engine == "moves" else 2.9), 2: BALL}
+    stock = block()
+    whole = remove(zigzag(), stock, cutters, ALLOY, FINE, engine=engine, watch=watch)
+    known = all_bytes(whole, stock)
+    assert (len(whole.findings) > 0) == (engine == "auto")
+    for _ in range(40):
+        calls = 0
+
+        def stop(done: float, what: str) -> None:
+            nonlocal calls
+            calls += 1
+            if calls == 4:
+                raise Cancelled("stopped")
+
+        again = block()
+        try:
+            with Checkpoint(tmp_path / "run", 0.0) as kept:
+                found = remove_in_chunks(
+                    zigzag(), again, cutters, ALLOY, FINE, kept, engine=engine, watch=watch, progress=stop
+                )
+                assert all_bytes(found, again) == known
+                return
+        except Cancelled:
+            continue
+    raise AssertionError("never done")
+
+
+def test_what_a_watch_gets_gives_the_same_loads() -> None:
+    """The kept engagement of a step at one instant gives the loads of the step and their bands."""
+    removal = run(zigzag(), keep=True)
+    for cuts in removal.cuts:
+        loads = greatest_loads(cuts, ALLOY, FINE.rotation, bands=True)
+        assert set(BANDS) < set(loads)
+        for name, values in loads.items():
+            np.testing.assert_allclose(values, removal.columns[name][cuts.step], rtol=1e-6, atol=1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize("tool", [0, 1])
+def test_every_load_is_that_of_the_layered_engine_for_the_same_engagement(tool: int) -> None:
+    """All columns of loads, work and engaged volume from the rows of one engine by the code of the other; tool 1 has
+    runout. The surface that is left is known to each in its own way and is tested elsewhere.
+    """
+    removal = run(zigzag(), keep=True)
+    cuts = removal.cuts[tool]
+    bites, seconds = cuts.bites, removal.columns["seconds"][cuts.step]
+    parts = [
+        StepEngagement(k, bites.frame[k], bites.rows[a:b], bites.slice[a:b])  # type: ignore[index]
+        for k, (a, b) in enumerate(itertools.pairwise(bites.start.tolist()))
+    ]
+    turn = over_turn(bites, cuts.cutter, ALLOY, FINE.rotation)
+    known = loads_of_steps(bites, parts, cuts.cutter, ALLOY, turn, cuts.spindle, seconds)
+    for i, name in enumerate(LOADS):
+        if name != "force_normal_n":
+            some = removal.columns[name][cuts.step]
+            np.testing.assert_allclose(
+                some, known[:, i], rtol=1e-6, atol=1e-8 * np.abs(known[:, i]).max(), err_msg=name
+            )
+
+
+def test_a_watch_gets_the_instant_of_the_greatest_force() -> None:
+    """Steps of 4 mm of a cutter of 8 mm, looked at five times, into a wall whose depth rises."""
+    program = path([[-4.0, 15.0, -0.5], [44.0, 15.0, -4.0]], tool=2)
+    fine = replace(FINE, step_mm=4.0)
+    removal = remove(program, block(), {2: BALL}, ALLOY, fine, engine="moves", keep=True)
+    cuts = removal.cuts[0]
+    loads = greatest_loads(cuts, ALLOY, FINE.rotation)
+    for name in ("force_n", "torque_nm"):
+        np.testing.assert_allclose(loads[name], removal.columns[name][cuts.step], rtol=2e-3, err_msg=name)
+    assert (loads["torque_mean_nm"] > 1.05 * removal.columns["torque_mean_nm"][cuts.step]).any()
+
+
+def test_what_is_engaged_is_what_is_removed() -> None:
+    """The volume under the chip thickness of the force model against that of the contact."""
+    columns = run(zigzag()).columns
+    volume, engaged = columns["chip_volume_mm3"], columns["engaged_volume_mm3"]
+    feeding = ~columns["rapid"]
+    np.testing.assert_allclose(engaged[feeding], volume[feeding], rtol=0.02, atol=1e-3 * volume.max())
+    np.testing.assert_allclose(columns["cutting_work_j"], 1e-3 * ALLOY.Ktc * engaged, rtol=1e-9)
+
+
+def test_accuracy_of_a_run() -> None:
+    removal = run(zigzag())
+    assert set(removal.energy_balance) == {1, 2}
+    assert max(abs(v) for v in removal.energy_balance.values()) < 0.01
+    assert set(removal.resolution_error) == {*COMPARED, *WITH_FORCE}
+    for name, floor in MOVES_FLOOR.items():
+        assert floor <= removal.resolution_error[name] < 0.15
+    assert (removal.columns["axial_overrun_mm"] == 0.0).all()
+
+
+def test_times_on_the_machine_count() -> None:
+    program = zigzag()
+    times = np.linspace(0.1, 0.5, len(program))
+    found, known = run(program, times=times).columns, run(program, "layers", times=times).columns
+    for name in ("t_s", "duration_s", "seconds"):
+        np.testing.assert_array_equal(found[name], known[name])
+    assert found["t_s"][-1] == pytest.approx(times.sum())
+
+
+@pytest.mark.parametrize("pattern", ["*.parquet", "sums-*.npz"])
+def test_a_damaged_checkpoint_is_set_aside(tmp_path: Path, pattern: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("chipload.simulation.chips.BLOCK", 8)
+    cutters, stock = {1: MILL, 2: BALL}, block()
+    known = all_bytes(remove(zigzag(), stock, cutters, ALLOY, FINE, engine="moves"), stock)
+
+    def stop(done: float, what: str) -> None:
+        if done > 0.5:
+            raise Cancelled("stopped")
+
+    with pytest.raises(Cancelled), Checkpoint(tmp_path / "run", 0.0) as kept:
+        remove_in_chunks(zigzag(), block(), cutters, ALLOY, FINE, kept, engine="moves", progress=stop)
+    file = sorted((tmp_path / "run").glob(pattern))[0]
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2] ^= 1
+    file.write_bytes(bytes(data))
+    said, again = list[str](), block()
+    with Checkpoint(tmp_path / "run", 0.0, notice=said.append) as kept:
+        found = remove_in_chunks(zigzag(), again, cutters, ALLOY, FINE, kept, engine="moves")
+        assert all_bytes(found, again) == known
+    assert len(said) == 1
+    assert "set aside" in said[0]
+    assert (tmp_path / "run.damaged-1" / file.name).read_bytes() == bytes(data)

@@ -1,0 +1,67 @@
+"""Write the pages of docs/ that are made from the source: summary.schema.json, columns.md and jobs.md.
+
+Run it after a change of the schema, of the table of columns or of the tables of a job: ``make reference``. With
+``--check`` nothing is written; the exit code is 1 if a page is not current.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from chipload.jobs.reference import reference
+from chipload.result import COLUMNS, SCHEMA_VERSION, Summary
+from chipload.result.columns import BOUNDED
+
+DOCS = Path(__file__).parents[1] / "docs"
+HEAD = """# Columns and limits
+
+Every quantity of a result has one name, with the unit in it. A limit in `[limits]` of a job has the name of the column
+that it bounds. The fields of `history.parquet` carry unit, label and meaning as metadata.
+
+This page is made from `src/chipload/result/columns.py` by `make reference`.
+"""
+
+
+def schema_text() -> str:
+    """The JSON Schema of summary.json."""
+    schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **Summary.model_json_schema()}
+    schema["title"] = f"summary.json of chipload, schema version {SCHEMA_VERSION}"
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+
+
+def columns_text() -> str:
+    """The table of columns, and the limits of another name."""
+    rows = ["| column | unit | label | meaning |", "|---|---|---|---|"]
+    for c in COLUMNS.values():
+        signed = " (a limit bounds its size)" if c.signed else ""
+        rows.append(f"| `{c.name}` | {c.unit} | {c.label} | {c.meaning}{signed} |")
+    others = ["| limit | column that it bounds | label |", "|---|---|---|"]
+    others += [f"| `{limit}` | `{column}` | {label} |" for limit, (column, label) in BOUNDED.items()]
+    return "\n".join([HEAD, *rows, "", "## Limits that bound a column of another name", "", *others, ""])
+
+
+PAGES = {"summary.schema.json": schema_text, "columns.md": columns_text, "jobs.md": reference}
+
+
+def main(check: bool) -> int:
+    """Write the pages, or name those that are not current."""
+    stale = [name for name, text in PAGES.items() if not current(name, text())]
+    for name in stale:
+        if check:
+            print(f"docs/{name}: is not current: run make reference")
+        else:
+            (DOCS / name).write_text(PAGES[name](), encoding="utf-8")
+            print(f"written: docs/{name}")
+    return 1 if check and stale else 0
+
+
+def current(name: str, text: str) -> bool:
+    """Whether a page of docs/ has this text."""
+    path = DOCS / name
+    return path.exists() and path.read_text(encoding="utf-8") == text
+
+
+if __name__ == "__main__":
+    sys.exit(main("--check" in sys.argv[1:]))

@@ -1,0 +1,95 @@
+"""Make the pictures of the documentation anew: each example is run as it is shipped, and its report photographed.
+
+    python tools/pictures.py [NAME ...]     all, or those of docs/NAME.png
+
+Needs Chromium and playwright, and as long as the examples take. Look at what changed before it is committed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from playwright.sync_api import Page, sync_playwright
+
+from chipload.examples import copy_example
+
+DOCS = Path(__file__).parent.parent / "docs"
+CHROMIUM = "/usr/bin/chromium"
+#: figures of the report side by side, each with width and height [pixels]; none: the top of the report
+FIGURES: dict[str, tuple[tuple[str, int, int], ...]] = {
+    "contour": (),
+    "feeds": (("feeds", 1000, 760),),
+    "bracket": (("part", 450, 520), ("loads", 550, 860)),
+    "notebooks": (("loads", 960, 860),),
+    "tube": (("path", 900, 860),),
+    "cone": (("allowable", 900, 380),),
+    "plate": (("depths", 940, 520),),
+    "blade": (("space", 940, 560),),
+}
+#: moves figures into a sheet of their own, above the page
+SHEET = """(wanted) => {
+    const sheet = document.createElement('div');
+    sheet.id = 'sheet';
+    sheet.style = 'position:absolute;top:0;left:0;background:white;display:flex;z-index:9';
+    document.body.appendChild(sheet);
+    window.scrollTo(0, 0);
+    for (const [name, width, height] of wanted) {
+        const figure = document.getElementById(name);
+        figure.style.width = width + 'px';
+        figure.style.height = height + 'px';
+        sheet.appendChild(figure);
+    }
+}"""
+RESIZE = """async (wanted) => {
+    for (const [name, width, height] of wanted) {
+        const figure = document.getElementById(name);
+        await Plotly.newPlot(figure, figure.data, {...figure.layout, width, height}, {displayModeBar: false});
+    }
+}"""
+
+
+def photograph(page: Page, report: Path, name: str) -> None:
+    """Write docs/NAME.png from a report."""
+    page.goto(report.as_uri())
+    page.wait_for_timeout(3000)
+    wanted = [list(figure) for figure in FIGURES[name]]
+    out = DOCS / f"{name}.png"
+    if not wanted:
+        page.screenshot(path=out)
+        return
+    page.evaluate(SHEET, wanted)
+    page.wait_for_timeout(3000)
+    page.evaluate(RESIZE, wanted)
+    page.wait_for_timeout(1000)
+    page.locator("#sheet").screenshot(path=out)
+
+
+def main() -> int:
+    """Run the examples and make their pictures."""
+    parser = argparse.ArgumentParser(description="Make the pictures of the documentation anew.")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(FIGURES)}")
+    names = parser.parse_args().names or list(FIGURES)
+    unknown = set(names) - set(FIGURES)
+    if unknown:
+        parser.error(f"{', '.join(sorted(unknown))}: must be of {', '.join(FIGURES)}")
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=["--use-gl=angle", "--no-sandbox"])
+        page = chromium.new_page(viewport={"width": 860, "height": 1266})
+        for name in names:
+            job = copy_example(name, Path(folder) / name)
+            words = [sys.executable, "-m", "chipload", "run", str(job / "job.toml"), "--out", str(job / "result")]
+            code = subprocess.run(words, check=False).returncode
+            if code not in (0, 3):
+                return code
+            photograph(page, job / "result" / "report.html", name)
+            print(f"docs/{name}.png", flush=True)
+        chromium.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
