@@ -42,7 +42,7 @@ up = [0.4, 0.95]
 points = [2, 2]
 
 [[operation]]
-kind = "sectional"
+kind = "impeller"
 table_deg = [60.0]
 check_mm = 5.0
 near_mm = 2.0

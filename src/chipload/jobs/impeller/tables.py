@@ -136,7 +136,7 @@ class RoughTable(Table):
 class ImpellerOperationTable(Table):
     """The search for the largest cutters of all surfaces."""
 
-    kind: Literal["sectional"]
+    kind: Literal["impeller"]
     check_mm: Positive = Field(description="most distance of check points")
     near_mm: Positive = Field(description="nearer on the own surface its curvature stands for check points")
     around: Annotated[int, Field(ge=0, le=20)] = Field(1, description="bodies beyond the channel that are checked")

@@ -1,6 +1,6 @@
 """Compiled: the pallet angles at which one cutter is clear of every check point, exactly.
 
-Notation: as in the kernels of ``sectional``; ``stages`` (k, 2) height above the corner's centres where a cylinder
+Notation: as in the kernels of ``impeller``; ``stages`` (k, 2) height above the corner's centres where a cylinder
 begins and its radius, the first row the cutting part (its radius rho + r is put in). d distance of a check point from
 the cutter's axis. When B moves by dB, h moves by at most sin(alpha) |y| dB and d by at most
 sin(alpha) (rho max(1, n/s) + |y - rho V|) dB: only the check points that come that near can matter, and the arcs of
