@@ -1,36 +1,59 @@
-# make setup | test | demo | reference | lock
+# make demo | test | quick | docs | package | reference | lock
 SHELL := /bin/bash
 PYTHON ?= $(shell /usr/bin/python3 -c 'import sys; print("/usr/bin/python3" if sys.version_info >= (3, 11) else "python3")' 2>/dev/null || echo python3)
 VENV := .venv
 BIN := $(VENV)/bin
-STAMP := $(VENV)/.ready
+PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
+export NO_MKDOCS_2_WARNING := 1
 export NUMBA_CACHE_DIR := $(CURDIR)/$(VENV)/numba
 
-.PHONY: setup test demo reference lock
+.PHONY: setup test quick docs package demo reference lock
 .DELETE_ON_ERROR:
 
-setup: $(STAMP)
-
-$(STAMP): requirements.lock pyproject.toml
+# what runs jobs and shows the page
+$(VENV)/.run: requirements-run.lock pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "chipload needs Python 3.11 or newer")'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps -e .
-	touch $(STAMP)
+	$(PIP) install --require-hashes -r requirements-run.lock
+	$(PIP) install --no-build-isolation --no-deps -e .
+	touch $@
+
+# and what tests and documentation need
+setup: $(VENV)/.ready
+
+$(VENV)/.ready: $(VENV)/.run requirements.lock
+	$(PIP) install --require-hashes -r requirements.lock
+	touch $@
 
 test: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site
 	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal -ra
 
+# the tests marked core, within 3 minutes on two cores
+quick: setup
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal -q -m core tests
+
+docs: setup
+	$(BIN)/mkdocs build --strict --site-dir site
+
+# the wheel and the source archive; the wheel runs a job in an environment of its own, away from the checkout
+package: setup
+	$(BIN)/python tools/package.py
+
+# the second core compiles for the third example while the first runs
 # 0: every limit holds; 3: done, but a limit does not hold, which the verdict says; anything else is a fault
-demo: setup
-	@for name in contour pocket chips; do \
-	  code=0; $(BIN)/chipload run examples/$$name/job.toml --out result/$$name || code=$$?; \
-	  if [ $$code -ne 0 ] && [ $$code -ne 3 ]; then exit $$code; fi; \
-	done
+demo: $(VENV)/.run
+	@mkdir -p result; \
+	job() { code=0; $(BIN)/chipload run examples/$$1/job.toml --out result/$$1 || code=$$?; [ $$code -eq 0 ] || [ $$code -eq 3 ]; }; \
+	job chips > result/chips.log 2>&1 & chips=$$!; \
+	job contour && job pocket; planned=$$?; \
+	wait $$chips; simulated=$$?; cat result/chips.log; rm result/chips.log; \
+	echo "the page: $(BIN)/chipload view result"; \
+	exit $$((planned + simulated))
 
 # docs/summary.schema.json, docs/columns.md and docs/jobs.md, from the source
 reference: setup
@@ -38,6 +61,7 @@ reference: setup
 
 # needs uv on the path or in .venv, nothing else here does
 UV ?= $(shell command -v uv || echo $(BIN)/uv)
+COMPILE = $(UV) pip compile --universal --python-version 3.11 --generate-hashes --no-header --no-annotate --no-emit-index-url --quiet
 lock:
-	$(UV) pip compile --universal --python-version 3.11 --generate-hashes --no-header --no-annotate \
-	  --no-emit-index-url --extra dev --quiet --output-file requirements.lock pyproject.toml
+	$(COMPILE) --extra dev --output-file requirements.lock pyproject.toml
+	$(COMPILE) --extra build --extra web --constraint requirements.lock --output-file requirements-run.lock pyproject.toml

@@ -1,11 +1,37 @@
-"""Names of a package that are imported when they are asked for (PEP 562)."""
+"""Late imports: names of a package when they are asked for (PEP 562), and libraries that an extra installs."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
+
+from chipload.errors import InputError
+
+#: extra of the package -> the module that it installs, and what needs it
+EXTRAS: Mapping[str, tuple[str, str]] = {
+    "cad": ("OCP", "reading STEP files"),
+    "web": ("nicegui", "the page in the browser"),
+    "notebook": ("pandas", "tables in a notebook"),
+    "cluster": ("distributed", "a sweep on a Dask cluster"),
+}
+
+
+def require_extra(extra: str) -> None:
+    """Refuse what needs an extra of the package that is not installed.
+
+    Raises
+    ------
+    InputError
+        The library of the extra is missing; the message names what needs it and the command that installs it.
+
+    >>> require_extra("web")
+    """
+    module, use = EXTRAS[extra]
+    if find_spec(module) is None:
+        raise InputError(f"{use} needs the extra {extra!r}, which is not installed: pip install 'chipload[{extra}]'")
 
 
 def attach(package: str, places: Mapping[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:

@@ -28,6 +28,7 @@ from typing import IO, Any
 import numpy as np
 
 from chipload.errors import InputError
+from chipload.lazy import require_extra
 
 #: modules whose functions a child may be asked for, each a function of the shape and of plain values
 SERVED = ("step", "step_faces", "step_meridian", "step_patch")
@@ -75,10 +76,12 @@ class Isolated:
         Raises
         ------
         InputError
-            That of the function; or the child has ended, took too long or too much memory.
+            That of the function; or the CAD kernel is not installed, or the child has ended, took too long or too
+            much memory.
         """
         try:
             if self._process is None:
+                require_extra("cad")
                 self._process = _start()
                 weakref.finalize(self, _kill, self._process)
                 self._ask([self.reader, str(self.file), self.key])

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import platform
 from collections.abc import Mapping, Sequence
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from chipload.cutting.material import Material
@@ -23,8 +24,12 @@ def hashes(files: Mapping[str, Path]) -> dict[str, str]:
 
 
 def versions() -> dict[str, str]:
-    """Versions of the libraries and of Python."""
-    return {name: version(name) for name in LIBRARIES} | {"python": platform.python_version()}
+    """Versions of the libraries that are installed, and of Python."""
+    found = {}
+    for name in LIBRARIES:
+        with contextlib.suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found | {"python": platform.python_version()}
 
 
 def sources() -> str:

@@ -66,6 +66,8 @@ class LayeredStock:
     tiles : (n, rows, columns) polygons, multipolygons or empty geometries, each within its tile
     part : closed mesh that layers are cut from again when they are split and nothing was removed from them
 
+    Notes
+    -----
     Besides these it keeps ``tidied`` [mm^3], what it has gained by edges that were made simpler, and for every tile the
     number of points (``room``) beyond which that is done next.
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from chipload.errors import InputError
+from chipload.lazy import require_extra
 from chipload.web.folder_access import OpenedFolder, open_path, resolve_name
 
 #: the only address that is listened on, and the port that is tried first where none is asked for
@@ -34,8 +35,9 @@ def serve(path: str | Path, port: int | None, show: bool, show_line: Callable[[s
     Raises
     ------
     InputError
-        Nothing can be shown of the path, or the port that was asked for is taken.
+        The page is not installed, nothing can be shown of the path, or the port that was asked for is taken.
     """
+    require_extra("web")
     opened = open_path(path)
     listener, taken = listen(port)
     own = int(listener.getsockname()[1])

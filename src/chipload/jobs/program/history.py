@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from chipload.errors import InputError
 from chipload.jobs.program.outcome import ProgramResult
 from chipload.jobs.program.result import result_of
+from chipload.lazy import require_extra
 from chipload.result import Result, Verdict
 from chipload.stock.layers import LayeredStock
 
@@ -106,10 +107,9 @@ class History:
 
     def to_pandas(self) -> pandas.DataFrame:
         """The columns as a table of pandas, which is to be installed: ``pip install chipload[notebook]``."""
-        try:
-            import pandas
-        except ImportError:
-            raise InputError("to_pandas: pandas is not installed: pip install 'chipload[notebook]'") from None
+        require_extra("notebook")
+        import pandas
+
         return pandas.DataFrame({name: np.array(values) for name, values in self.columns.items()})
 
     def save(self, out: str | Path) -> Path:
