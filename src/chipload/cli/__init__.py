@@ -1,0 +1,34 @@
+"""The command line: parse, call one function, show.
+
+Exit codes of every command: 0 done and every limit holds; 2 the input is wrong (one line, nothing written); 3 done, but
+a limit or a status does not hold; 4 the result cannot be written, what is kept of the work stays; 1 a fault of ours;
+130 stopped by Ctrl-C. Imports are late so that `--help` is quick.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+from typing import NoReturn
+
+# each of these modules adds its commands to the application
+from chipload.cli import hal, jobs, programs, results  # noqa: F401
+from chipload.cli.app import app
+
+__all__ = ["app", "main"]
+
+#: the commands in the order of the help
+ORDER = ("run", "check", "convert", "fit", "cuts", "example", "view", "hal")
+app.registered_commands.sort(key=lambda c: ORDER.index(c.name or getattr(c.callback, "__name__", "")))
+
+
+def main() -> NoReturn:
+    """Entry of the command ``chipload``."""
+    signal.signal(signal.SIGTERM, _stop)
+    app()
+    sys.exit(0)
+
+
+def _stop(_number: int, _frame: object) -> NoReturn:
+    """A polite kill stops as Ctrl-C does."""
+    raise KeyboardInterrupt

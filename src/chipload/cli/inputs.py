@@ -1,0 +1,58 @@
+"""What options state, as the values that the functions of chipload take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from chipload.errors import InputError
+from chipload.terminal import show
+from chipload.units import mm_s_from_mm_min
+
+if TYPE_CHECKING:
+    from chipload.machine.machine import Machine
+    from chipload.program.setup import Setup
+
+
+def setup_of(parameters: Sequence[str], work_offsets: Sequence[str]) -> Setup:
+    """What the controller holds, as options give it."""
+    from chipload.program.setup import Setup
+
+    def pairs(option: str, texts: Sequence[str]) -> Iterator[tuple[str, list[float]]]:
+        for text in texts:
+            name, _, values = text.rpartition("=")
+            try:
+                yield name.strip(), [float(value) for value in values.split(",")]
+            except ValueError:
+                raise InputError(f"--{option} {text}: must be a name, = and numbers") from None
+
+    given = dict(pairs("parameter", parameters))
+    for name, values in given.items():
+        if len(values) != 1:
+            raise InputError(f"--parameter {name}: {len(values)} numbers: must be one")
+    return Setup({name: values[0] for name, values in given.items()}, dict(pairs("work-offset", work_offsets)))
+
+
+def machine_of(name: str | None) -> Machine:
+    """A shipped machine by name, or a file: TOML of ours or LinuxCNC's .ini."""
+    from chipload.machine.ini import read_ini
+    from chipload.machine.machine import machine_named, machine_names, read_machine
+
+    if name is None:
+        raise InputError(f"--machine: missing: name a file (.toml, .ini) or one of {', '.join(machine_names())}")
+    if name.lower().endswith(".ini"):
+        machine, findings = read_ini(Path(name))
+        for f in findings:
+            show(f"{name}: {f}")
+        return machine
+    return read_machine(name) if name.lower().endswith(".toml") else machine_named(name)
+
+
+def feed_of(mm_min: float | None) -> float | None:
+    """A feed [mm/s] of one in mm/min."""
+    if mm_min is None:
+        return None
+    if not 0.0 < mm_min < 1e9:
+        raise InputError(f"--feed-mm-min = {mm_min:g}: must be above 0")
+    return mm_s_from_mm_min(mm_min)

@@ -1,0 +1,143 @@
+"""Commands that run a job: run, fit, cuts."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from chipload.cli.app import Debug, JobFile, Sets, app
+from chipload.errors import Cancelled, InputError
+from chipload.terminal import bar, guarded, say, show
+
+#: [s] between two states of a simulation
+KEEP_S = 10.0
+
+
+@app.command()
+def run(
+    job: JobFile,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="the result folder; appears whole or not at all")],
+    sets: Sets = None,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="throw away what an earlier run of a program kept when it was stopped")
+    ] = False,
+    keep_s: Annotated[
+        float,
+        typer.Option(
+            "--keep-s",
+            help="seconds of simulation between two states from which a stopped run can go on; 0: as often as possible",
+        ),
+    ] = KEEP_S,
+    debug: Debug = False,
+) -> None:
+    """Plan a job and prove its programs, or read the program that it names; write the result folder.
+
+    A simulation that was stopped goes on where it was when the same command is given again.
+    """
+
+    def work() -> int:
+        from chipload.jobs import load_job, run_job
+
+        loaded = load_job(job, sets or ())
+        from chipload.report.folder import check_target, checkpoint_folder, write_finished
+        from chipload.simulation.checkpoint import Checkpoint
+
+        check_target(out)
+        if not 0.0 <= keep_s < math.inf:
+            raise InputError(f"--keep-s = {keep_s:g}: must be at least 0 s")
+        if not loaded.capability.resumes:
+            say(f"a {loaded.capability.name} job does not resume: if it is stopped, it begins again")
+        with Checkpoint(checkpoint_folder(out), keep_s, fresh=fresh, notice=say) as kept:
+            try:
+                with bar() as progress:
+                    done = run_job(loaded, lambda part, what: progress(0.8 * part, what), kept)
+                    target = write_finished(
+                        done.result, done.presentation, out, lambda part, what: progress(0.8 + 0.2 * part, what)
+                    )
+            except (KeyboardInterrupt, Cancelled):
+                if not kept.safe:
+                    raise
+                raise Cancelled(
+                    f"{kept.safe} steps are kept in {kept.folder.name}: the same command goes on from there, with "
+                    "--fresh it begins again"
+                ) from None
+            kept.discard()
+        show(done.result.message)
+        show(f"report: {target / 'report.html'}")
+        return done.result.verdict.exit_code
+
+    guarded(work, debug)
+
+
+@app.command()
+def fit(
+    file: Annotated[Path, typer.Argument(metavar="FIT", help="the fit (TOML): measured cuts, cutter, engagement")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="the result folder; appears whole or not at all")],
+    sets: Sets = None,
+    debug: Debug = False,
+) -> None:
+    """Identify force coefficients from measured forces; write a material, its intervals and what it predicts."""
+
+    def work() -> int:
+        from chipload.jobs import load_job, run_job
+
+        loaded = load_job(file, sets or ())
+        if loaded.capability.name != "fit":
+            raise InputError(f"{file.name}: has no [[measurement]]: give it to chipload run")
+        from chipload.report.folder import check_target, write_finished
+
+        check_target(out)
+        with bar() as progress:
+            done = run_job(loaded, progress)
+            target = write_finished(done.result, done.presentation, out)
+        for f in done.result.findings:
+            show(str(f))
+        show(done.result.message)
+        show(f"report: {target / 'report.html'}")
+        return done.result.verdict.exit_code
+
+    guarded(work, debug)
+
+
+@app.command()
+def cuts(
+    job: JobFile,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="the table (CSV), to be filled in")],
+    sites: Annotated[int, typer.Option("--sites", help="places on the wall, at least 4")] = 6,
+    repeats: Annotated[
+        int, typer.Option("--repeats", help="places that are cut twice, which says how they scatter")
+    ] = 2,
+    steps: Annotated[int, typer.Option("--steps", help="depths below and above what the model says, each")] = 2,
+    bracket: Annotated[float, typer.Option("--bracket", help="factor from force to force")] = 1.25,
+    scatter_percent: Annotated[float, typer.Option("--scatter-percent", help="expected of one cut")] = 5.0,
+    sets: Sets = None,
+    debug: Debug = False,
+) -> None:
+    """Propose calibration cuts for a job with a [wall]: what it bears, measured; [threshold] file reads the table."""
+
+    def work() -> int:
+        from chipload.jobs import load_job
+        from chipload.jobs.thinwall.job import ThinWallJob
+
+        read = load_job(job, sets or ()).job
+        if not isinstance(read, ThinWallJob):
+            raise InputError(f"{job.name}: has no [wall]: calibration cuts are proposed for a thin wall")
+        from chipload.jobs.thinwall.run import propose
+        from chipload.planning.thinwall.table import write_cuts
+
+        with bar() as progress:
+            found = propose(read, sites, scatter_percent / 100.0, bracket, steps, repeats, progress)
+        write_cuts(out, found)
+        for f in found.findings:
+            show(str(f))
+        show(
+            f"{len(found.site)} cuts at {len(found.sites)} places: interpolation misses {100.0 * found.bias:.2g} %, "
+            f"scatter brings {100.0 * found.noise:.2g} % (root mean square over the wall)"
+        )
+        show(f'fill in and name it in the job: [threshold] file = "{out.name}"')
+        return 0
+
+    guarded(work, debug)

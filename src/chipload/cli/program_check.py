@@ -1,0 +1,69 @@
+"""What `chipload check` says about a program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from chipload.cli.inputs import feed_of, machine_of
+from chipload.errors import InputError, Severity
+from chipload.terminal import EXCEEDED, bar, show
+
+if TYPE_CHECKING:
+    from chipload.program.setup import Setup
+
+#: [mm] where none is stated
+TOLERANCE_MM = 0.001
+#: machines that a program is read for where none is stated: the first that has its axes
+GENERIC = ("vmc", "xyzbc-trunnion", "xyzac-trunnion", "xyzbc-head-table")
+
+
+def check_program(
+    path: Path,
+    machine: str | None,
+    tools: Path | None,
+    dialect: str | None,
+    feed_mm_min: float | None,
+    tolerance_mm: float,
+    setup: Setup,
+) -> int:
+    """Check a program: what leaves it unproven, the other findings by line, then what it is."""
+    from chipload.program.motions import lengths
+    from chipload.program.read import line_times, read_program, read_tools
+
+    table, feed = read_tools(tools) if tools is not None else None, feed_of(feed_mm_min)
+    refused: InputError | None = None
+    for name in GENERIC if machine is None else (machine,):
+        on = machine_of(name)
+        try:
+            with bar() as progress:
+                reading = read_program(
+                    path, on, dialect=dialect, tools=table, feed=feed, tolerance=tolerance_mm, setup=setup,
+                    progress=progress,
+                )  # fmt: skip
+            break
+        except InputError as err:
+            # the first refusal is told: that of the simplest machine
+            refused = refused or err
+    else:
+        assert refused is not None
+        raise refused
+    if machine is None:
+        show(f"no machine is stated: read for {on.name}; state yours with --machine, as its limits and times differ")
+    broken = set(map(id, reading.violations))
+    gaps = [f for f in reading.findings if f.severity >= Severity.UNPROVEN]
+    for f in gaps:
+        show(f"{f} [unproven]")
+    for f in sorted((*(f for f in reading.findings if f not in gaps), *reading.violations), key=lambda f: f.line):
+        show(f"{f}{' [does not hold]' if id(f) in broken else ''}")
+    low, high = reading.program.p_work.min(axis=0), reading.program.p_work.max(axis=0)
+    box = ", ".join(f"{x} {a:g} to {b:g}" for x, a, b in zip("XYZ", low, high, strict=True))
+    _, seconds = line_times(reading, on)
+    show(
+        f"{path.name}: {len(reading.commands)} motions on machine {on.name}, {lengths(reading.program).sum():.6g} mm, "
+        f"{seconds.sum() / 60.0:.4g} min; {box} mm"
+    )
+    count = len(reading.violations)
+    holds = "the limits hold" if not gaps else f"unproven: {gaps[0]}"
+    show(f"{count} {'finding does' if count == 1 else 'findings do'} not hold" if count else holds)
+    return EXCEEDED if reading.violations or gaps else 0

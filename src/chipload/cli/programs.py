@@ -1,0 +1,125 @@
+"""Commands that read a file without a job: check and convert."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from chipload.cli.app import (
+    Debug,
+    DialectName,
+    FeedIfUnsaid,
+    MachineName,
+    ParameterValues,
+    Sets,
+    ToleranceMm,
+    Tools,
+    WorkOffsets,
+    app,
+)
+from chipload.cli.inputs import feed_of, machine_of, setup_of
+from chipload.cli.program_check import TOLERANCE_MM, check_program
+from chipload.errors import InputError, Severity, worst_severity
+from chipload.terminal import EXCEEDED, bar, guarded, show
+
+#: findings of a machine that break nothing
+HARMLESS = ("machine-singular", "machine-rewind", "machine-offset")
+
+
+@app.command()
+def check(
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="a job, or any file that a job names"),
+    ],
+    machine: MachineName = None,
+    tools: Tools = None,
+    dialect: DialectName = None,
+    feed_mm_min: FeedIfUnsaid = None,
+    tolerance_mm: ToleranceMm = TOLERANCE_MM,
+    parameters: ParameterValues = None,
+    work_offsets: WorkOffsets = None,
+    sets: Sets = None,
+    debug: Debug = False,
+) -> None:
+    """Read any file as a run would and list all that is wrong; nothing is run or written.
+
+    A job with all that it names; a program as its controller does, on machine vmc (or one with the rotary axes that it
+    needs) where none is stated; a fit; the faces of a STEP file; a drawing, mesh, machine, material or tool table.
+    """
+
+    def work() -> int:
+        from chipload.jobs.inspection import BY_ENDING, inspect_file
+
+        job = file.suffix.lower() == ".toml"
+        if sets and not job:
+            raise InputError("--set: belongs to a job: leave it out for another file")
+        if not job and file.suffix.lower() not in BY_ENDING:
+            setup = setup_of(parameters or (), work_offsets or ())
+            return check_program(file, machine, tools, dialect, feed_mm_min, tolerance_mm, setup)
+        for option, value in (
+            ("machine", machine),
+            ("tools", tools),
+            ("dialect", dialect),
+            ("feed-mm-min", feed_mm_min),
+            ("parameter", parameters or None),
+            ("work-offset", work_offsets or None),
+        ):
+            if value is not None:
+                raise InputError(f"--{option}: belongs to a program: in a job state it in the file")
+        found = inspect_file(file, sets or ())
+        lines, holds = found if found is not None else ([], True)
+        for text in lines:
+            show(text)
+        return 0 if holds else EXCEEDED
+
+    guarded(work, debug)
+
+
+@app.command()
+def convert(
+    source: Annotated[Path, typer.Argument(metavar="PROGRAM", help="NC text or CL data")],
+    target: Annotated[
+        Path, typer.Argument(metavar="FILE", help="what is written; its ending says what: .ngc, .nc, .apt")
+    ],
+    machine: MachineName = None,
+    from_machine: Annotated[
+        str | None, typer.Option("--from", metavar="MACHINE", help="the machine of the source, if another")
+    ] = None,
+    tools: Tools = None,
+    dialect: DialectName = None,
+    feed_mm_min: FeedIfUnsaid = None,
+    tolerance_mm: ToleranceMm = TOLERANCE_MM,
+    tcp: Annotated[bool, typer.Option("--tcp", help="tell the controller the tip while rotary axes move")] = False,
+    debug: Debug = False,
+) -> None:
+    """Write a program for a machine, or as CL data; it is not verified, and its first line says so."""
+
+    def work() -> int:
+        from chipload.files import write_whole
+        from chipload.program.convert import convert_program
+        from chipload.program.read import read_program, read_tools
+
+        there = machine_of(machine)
+        here = machine_of(from_machine) if from_machine is not None else there
+        table = read_tools(tools) if tools is not None else None
+        lengths = table.lengths() if table is not None else {}
+        with bar() as progress:
+            reading = read_program(
+                source, here, dialect=dialect, tools=table, feed=feed_of(feed_mm_min), tolerance=tolerance_mm,
+                progress=progress,
+            )  # fmt: skip
+            text, findings = convert_program(
+                reading.program, reading.findings, there, target.suffix, title=source.name,
+                tool_lengths=lengths, tcp=tcp, tolerance=tolerance_mm,
+            )  # fmt: skip
+            write_whole(target, text.encode("ascii"))
+        for f in (*reading.findings, *findings):
+            show(str(f))
+        show(f"written: {target}: {len(text.splitlines())} lines for machine {there.name}, not verified")
+        exceeded = any(f.code.startswith("machine-") and f.code not in HARMLESS for f in findings)
+        return EXCEEDED if exceeded or worst_severity(reading.findings) >= Severity.UNPROVEN else 0
+
+    guarded(work, debug)

@@ -1,0 +1,53 @@
+"""Commands that show what there is: example and view."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from chipload.cli.app import Debug, app
+from chipload.errors import InputError
+from chipload.terminal import guarded, show
+
+
+@app.command()
+def example(
+    name: Annotated[str | None, typer.Argument(help="the example; none: list them")] = None,
+    folder: Annotated[Path | None, typer.Argument(metavar="DIR", help="where it is copied to")] = None,
+    debug: Debug = False,
+) -> None:
+    """List the examples, or copy one out."""
+
+    def work() -> int:
+        from chipload.examples import copy_example, example_titles
+
+        if name is None:
+            for key, title in example_titles().items():
+                show(f"{key:12} {title}")
+            return 0
+        if folder is None:
+            raise InputError(f"example {name}: missing folder: chipload example {name} DIR")
+        show(f"copied: chipload run {copy_example(name, folder) / 'job.toml'} --out result")
+        return 0
+
+    guarded(work, debug)
+
+
+@app.command()
+def view(
+    path: Annotated[Path, typer.Argument(metavar="PATH", help="a result folder, a job, or a folder that holds them")],
+    port: Annotated[int | None, typer.Option("--port", min=1, max=65535, help="else 8170, or a free one")] = None,
+    open_browser: Annotated[bool, typer.Option("--open/--no-open", help="open the page in the browser")] = True,
+    debug: Debug = False,
+) -> None:
+    """Show results and jobs of a folder in the browser, run jobs there; only for this computer; Ctrl-C ends it."""
+
+    def work() -> int:
+        from chipload.web.serve import serve
+
+        serve(path, port, open_browser, show)
+        return 0
+
+    guarded(work, debug)
