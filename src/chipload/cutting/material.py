@@ -9,6 +9,7 @@ Reference: [Altintas2012] ch. 2; [Kienzle1952] for the exponent; [Zhang2021] tab
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -235,6 +236,24 @@ def read_material(path: str | Path) -> Material:
         The file cannot be read, a key is unknown or missing, a number out of range, the source missing.
     """
     return _from_table(*read_table("material", path))
+
+
+def material_text(material: Material) -> str:
+    """A material as :func:`read_material` reads it; numbers to the last digit."""
+    values: dict[str, Any] = {key: getattr(material, key) for key in _TEXTS if getattr(material, key)}
+    for key, (name, _, _) in _NUMBERS.items():
+        if not (material.tangential and key in _DIRECTIONS):
+            values[key] = float(getattr(material, name))
+    values |= {key: m for key, m in zip(_EXPONENTS, material.exponents, strict=True) if m}
+    speed = material.speed and tuple(mm_min_from_mm_s(v) / 1000.0 for v in material.speed)
+    for name, limits in (("chip", material.chip), ("speed", speed)):
+        if limits is not None:
+            values |= dict(zip(_RANGES[name], limits, strict=True))
+    if material.spread is not None:
+        values["spread"] = material.spread
+    if material.covariance is not None:
+        values["covariance"] = [list(row) for row in material.covariance]
+    return "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in values.items())
 
 
 def beyond(material: Material, chip_max_mm: float, speed_mm_s: float) -> tuple[str, ...]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from chipload.cutting.fit import NAMES, predicted, predicted_mean
-from chipload.cutting.material import Material
+from chipload.cutting.material import material_text
 from chipload.jobs.fit.job import CHANNELS
 from chipload.jobs.fit.outcome import FitResult
 from chipload.jobs.fit.result import MATERIAL, UNITS
@@ -213,21 +212,3 @@ def _styled(out: go.Figure, height: int) -> go.Figure:
     out.update_xaxes(gridcolor=GRID, zeroline=False)
     out.update_yaxes(gridcolor=GRID, zeroline=False)
     return out
-
-
-def material_text(material: Material) -> str:
-    """The material as :func:`chipload.cutting.material.read_material` reads it."""
-    text: Callable[[str], str] = lambda s: json.dumps(s, ensure_ascii=False)  # noqa: E731
-    lines = [f"name = {text(material.name)}"]
-    if material.workpiece:
-        lines.append(f"workpiece = {text(material.workpiece)}")
-    keys = ("ktc_mpa", "krc_mpa", "kac_mpa", "kte_n_mm", "kre_n_mm", "kae_n_mm")
-    lines += [f"{key} = {float(v)!r}" for key, v in zip(keys, material.coefficients, strict=True)]
-    if material.chip is not None:
-        lines += [f"chip_min_mm = {material.chip[0]!r}", f"chip_max_mm = {material.chip[1]!r}"]
-    if material.covariance is not None:
-        rows = ",\n".join(f"    [{', '.join(repr(v) for v in row)}]" for row in material.covariance)
-        lines.append(f"covariance = [\n{rows},\n]")
-    lines += [f"source = {text(material.source)}", f"cutter = {text(material.cutter)}"]
-    lines.append(f"conditions = {text(material.conditions)}")
-    return "\n".join(lines) + "\n"
