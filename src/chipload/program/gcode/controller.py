@@ -11,8 +11,8 @@ from typing import cast
 
 from chipload.errors import InputError, Severity
 from chipload.program.commands import ARC, DWELL, PLANE_AXES, RAPID, XY, YZ, ZX
+from chipload.program.compensation import CentreMove, Compensation
 from chipload.program.gcode import arcs
-from chipload.program.gcode.compensation import CentreMove, Compensation
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.parameters import Parameters
 from chipload.program.gcode.state import AXES, LINEAR, NO_MOTION, ZERO, Datum, Nine, State, nine
