@@ -139,7 +139,7 @@ def data() -> Path:
 
 def test_a_real_conversational_program_with_the_parameters_that_it_asks_for(data: Path):
     path = data / "apt_dmu50" / "heidenhain" / "WALL.h"
-    with pytest.raises(InputError, match="Q13 comes from the controller and is not known here: state it in program"):
+    with pytest.raises(InputError, match="Q23 comes from the controller and is not known here: state it in program"):
         read_program(path, machine_named("dmu50"))
     given = {f"Q{n}": 10.0 for n in range(1, 40)}
     assert len(read_program(path, machine_named("dmu50"), setup=Setup(given)).program) == 5

@@ -24,7 +24,7 @@ from chipload.program.check import check_program
 from chipload.program.commands import Commands
 from chipload.program.gcode.reader import gcode_text, read_gcode
 from chipload.program.gcode.tools import ToolTable, read_tool_table
-from chipload.program.heidenhain.reader import read_heidenhain_file
+from chipload.program.heidenhain.reader import heidenhain_text, read_heidenhain, tool_definitions
 from chipload.program.program import Program
 from chipload.program.reconcile import agree, tool_comments
 from chipload.program.setup import Setup
@@ -124,8 +124,16 @@ def read_program(
         more = tuple(f for f in found if f.code not in LIMITS)
     else:
         if kind == "heidenhain":
-            agreed = agree(path.name, setup.cutters, tools=tools)
-            commands, findings = read_heidenhain_file(path, {int(k): v for k, v in values.items()})
+            text = heidenhain_text(path)
+            stated = tool_definitions(text) if setup.cutters and comments else {}
+            agreed = agree(path.name, setup.cutters, tools=tools, comments=stated)
+            known = setup.diameters()
+            if tools is not None:
+                known |= {n: abs(t.diameter) for n, t in tools.tools.items() if t.diameter != 0.0 and n not in known}
+            commands, findings = read_heidenhain(
+                text, name=path.name, folder=path.parent, parameters={int(k): v for k, v in values.items()},
+                radii={n: 0.5 * diameter for n, diameter in known.items()}, feed=feed,
+            )  # fmt: skip
         else:
             text = gcode_text(path) if text is None else text
             stated = tool_comments(text) if setup.cutters and comments else {}
@@ -136,7 +144,8 @@ def read_program(
                 lenient=not strict, progress=progress,
             )  # fmt: skip
         if len(commands) == 0:
-            raise InputError(f"{path.name}: no motion: nothing to check")
+            left_out = next((f": {f}" for f in findings if f.severity >= Severity.UNPROVEN), "")
+            raise InputError(f"{path.name}: no motion: nothing to check{left_out}")
         program, more = to_work(commands, machine, tolerance=tolerance, placed=placed)
         if machine.chain.rotary:
             findings = tuple(replace(f, severity=Severity.UNPROVEN) if f.code in OF_LENGTHS else f for f in findings)

@@ -111,30 +111,31 @@ def test_formulas_against_python():
 
 def test_what_the_controller_knows_may_be_given():
     blocks = ["FN18: SYSREAD Q3 = ID270 NR1 IDX3", "L X+0 Y+0 Z+Q3 FMAX"]
-    with pytest.raises(InputError, match=r"line 3: Q3 comes from the controller and is not known here: state it in"):
-        read(*blocks)
+    commands, findings = read(*blocks, "L X+1 FMAX")
+    assert commands.position[:, 0].tolist() == [1.0]
+    assert [(f.code, f.line, f.severity) for f in findings[1:]] == [("heidenhain-left-out", 3, Severity.UNPROVEN)]
+    assert "Q3 comes from the controller and is not known here: state it in program.parameters" in findings[1].text
+    with pytest.raises(InputError, match="line 3: Q3 comes from the controller"):
+        read(blocks[0], "FN9: IF +Q3 EQU +0 GOTO LBL 1", "LBL 1")
     assert read(*blocks, parameters={3: 7.5})[0].position[0, 2] == 7.5
 
 
 @pytest.mark.parametrize(
     ("block", "text"),
     [
-        ("L X+1 RL F100", "RL: radius compensation is not read: give the path of the tool's centre"),
         ("L X+1 QQ2 FMAX", "'QQ2': is not read in a motion"),
         ("L X+1", "a cut has no feed: give F"),
         ("L X+1 F AUTO", "F AUTO: the feed of a tool table is not known: give a number"),
         ("L X+1 F0", "F0: must be above 0 and below 1e+06"),
-        ("L IX+1 F10", "IX: where the axis stands is not known: give X first"),
-        ("C X+1 Y+1 DR+ F10", "an arc begins where the tool stands, which is not known: move there first"),
-        ("CYCL DEF 221 PATTERN", "CYCL DEF 221: is not read: write its motions"),
-        ("CYCL DEF 19.1 A+10", "CYCL DEF 19: a tilted working plane is not read: state the program in the work frame"),
         ("CALL LBL 4", "LBL 4 is not there"),
         ("Q1 = Q2", "Q2 is read before it is set: set it"),
         ("Q1 = 1 / 0", "formula: division by 0"),
         ("Q1 = ( 1", "formula: a bracket is not closed"),
-        ("APPR LT X+1 LEN10 F10", "'APPR LT X+1 LEN10 F10': is not read: take it out or write it as L and C blocks"),
-        ("CALL PGM X", "'CALL PGM X': is not read: take it out or write it as L and C blocks"),
-        ("L M99", "a cycle is called where the tool stands, which is not known: move there first"),
+        ("C X+1 Y+1 F10", "C: DR+ or DR- is missing"),
+        ("CR X+1 Y+1 DR+ F10", "CR: R is missing: the radius"),
+        ("QL2000 = 1", "QL2000: must be from QL0 to QL1999"),
+        ("FN8: Q1 = 3", "'FN8: Q1 = 3': must be a value, LEN and a value"),
+        ("CYCL DEF 221 Q200=2 Q203=0 Q225=0 Q226=0 Q242=0 Q243=1", "Q242 = 0: must be from 1 to 10000"),
     ],
 )
 def test_refused(block, text):
@@ -187,12 +188,103 @@ def test_rigid_tapping_and_reaming_with_q_parameters():
 
 
 def test_a_cycle_that_is_not_read_is_left_out_where_it_is_called():
-    commands, findings = read(
-        "L X+0 Y+0 Z+2 FMAX", "CYCL DEF 262 THREAD MLLNG Q335=10 Q239=1.5", "L X+5 FMAX M99", "L X+9 FMAX"
-    )
+    commands, findings = read("L X+0 Y+0 Z+2 FMAX", "CYCL DEF 251 POCKET Q218=60", "L X+5 FMAX M99", "L X+9 FMAX")
     assert commands.position[:, 0].tolist() == [0.0, 5.0, 9.0]
     assert [(f.code, f.line, f.severity) for f in findings] == [("heidenhain-cycle", 4, Severity.UNPROVEN)]
-    with pytest.raises(InputError, match="CYCL DEF 10: is not read"):
-        read("CYCL DEF 10.0 ROTATION")
     with pytest.raises(InputError, match="Q206 is read before it is set"):
         read("L X+0 Y+0 Z+2 FMAX", "CYCL DEF 201 REAMING Q200=2 Q201=-9 Q203=+0", "CYCL CALL")
+
+
+@pytest.mark.parametrize(
+    ("block", "code"),
+    [
+        ("L IX+1 F10", "heidenhain-left-out"),
+        ("C X+1 Y+1 DR+ F10", "heidenhain-left-out"),
+        ("L M99", "heidenhain-left-out"),
+        ("CALL PGM X", "heidenhain-call"),
+        ("TCH PROBE 400", "heidenhain-unread"),
+        ("PATTERN DEF POS1 ( X+1 Y+2 Z+0 )", "heidenhain-unread"),
+        ("CYCL CALL PAT FMAX", "heidenhain-cycle"),
+        ("RND R2", "heidenhain-corner"),
+        ("FN26: TABOPEN TNC:/DIR1/TAB1.TAB", "heidenhain-function"),
+    ],
+)
+def test_what_is_not_read_is_left_out_and_the_rest_is_carried_out(block, code):
+    commands, findings = read(*(["CC X+0 Y+0"] if block.startswith("C X") else []), block, "L X+4 FMAX")
+    assert commands.position[:, 0].tolist() == [4.0]
+    assert [(f.code, f.severity) for f in findings] == [(code, Severity.UNPROVEN)]
+
+
+@pytest.mark.parametrize(
+    ("on", "off"),
+    [
+        ("PLANE SPATIAL SPA+0 SPB+30 SPC+0 STAY", "PLANE RESET STAY"),
+        ("CYCL DEF 19.1 A+10 B+0 C+0", "CYCL DEF 19.1 A+0 B+0 C+0"),
+        ("CYCL DEF 10.1 ROT+35", "CYCL DEF 10.1 ROT+0"),
+        ("CYCL DEF 8.1 X Y", "CYCL DEF 8.1"),
+        ("CYCL DEF 11.1 SCL 0.75", "CYCL DEF 11.1 SCL 1"),
+    ],
+)
+def test_motions_in_changed_coordinates_are_left_out_until_they_end(on, off):
+    commands, findings = read("L X+0 Y+0 Z+5 FMAX", on, "L X+1 FMAX", off, "L X+2 FMAX")
+    assert commands.position[:, 0].tolist() == [0.0, 2.0]
+    assert [(f.code, f.line, f.severity) for f in findings] == [("heidenhain-plane", 3, Severity.UNPROVEN)]
+
+
+def test_a_plane_that_is_not_tilted_changes_nothing():
+    for block in ("PLANE SPATIAL SPA+0 SPB+0 SPC+0 STAY", "PLANE RESET STAY", "CYCL DEF 19.1 A+0 B+0"):
+        commands, findings = read("L X+0 Y+0 Z+5 FMAX", block, "L X+1 FMAX")
+        assert len(commands) == 2
+        assert findings == ()
+
+
+def test_programs_that_are_called_lie_beside(tmp_path):
+    (tmp_path / "step.h").write_text("BEGIN PGM STEP INCH\nL IX+1 F10\nEND PGM STEP INCH\n")
+    commands, findings = read("L X+0 Y+0 Z+5 FMAX", "CALL PGM STEP", "L IX+1", folder=tmp_path)
+    np.testing.assert_allclose(commands.position[:, 0], [0.0, 25.4, 26.4])
+    assert findings == ()
+    # a motion of a called program has the line that calls it
+    assert commands.line.tolist() == [2, 3, 4]
+
+
+def test_labels_by_name_and_by_parameter():
+    commands, _ = read(
+        "L X+0 Y+0 Z+0 FMAX", "Q5 = 7", 'CALL LBL "SLOT"', "CALL LBL Q5", "FN9: IF +1 EQU +1 GOTO LBL 9",
+        'LBL "SLOT"', "L X+1 F60", "LBL 0", "LBL 7", "L X+2", "LBL 0", "LBL 9",
+    )  # fmt: skip
+    assert commands.position[:, 0].tolist() == [0.0, 1.0, 2.0]
+
+
+def test_parameters_of_a_program_and_sides_of_a_triangle():
+    commands, _ = read(
+        "QL1 = 3", "QR1 = 4", "FN8: Q1 = +QL1 LEN +QR1", "FN13: Q2 = +QR1 ANG +QL1", "FN6: Q3 = SIN +Q2",
+        "L X+Q1 Y+Q3 Z+QL1 FMAX",
+    )  # fmt: skip
+    np.testing.assert_allclose(commands.position[0, :3], [5.0, 0.8, 3.0])
+
+
+def test_structure_blocks_label_the_motions():
+    commands, _ = read("10 * - Pocket 1", "L X+1 FMAX", "* - Drill", "L X+2 FMAX")
+    assert [commands.labels[k] for k in commands.label] == ["POCKET 1", "DRILL"]
+
+
+def test_feed_for_each_turn():
+    """600 rpm are ten turns a second; M136 makes F one too."""
+    commands, _ = read(
+        "TOOL CALL 1 Z S600", "L X+0 Y+0 Z+0 FMAX", "L X+1 FU0.2", "M136", "L X+2 F0.3", "M137", "L X+3 F60"
+    )
+    assert commands.feed.tolist() == pytest.approx([0.0, 2.0, 3.0, 1.0])
+
+
+def test_a_feed_from_outside_and_retraction_along_the_tool():
+    commands, findings = read("L X+0 Y+0 Z+0 FMAX", "L X+1", "M140 MB5", "L Z+9 M140 MB MAX", feed=3.0)
+    assert commands.feed.tolist() == [0.0, 3.0, 0.0, 3.0]
+    assert commands.position[:, 2].tolist() == [0.0, 0.0, 5.0, 9.0]
+    assert [f.code for f in findings] == ["heidenhain-m91"]
+
+
+def test_tools_by_name_and_with_changes():
+    commands, findings = read('TOOL CALL "D10" Z S100 DL+0.5', "L X+0 FMAX", "Q1 = 4", "TOOL CALL Q1 Z", "L X+1 FMAX")
+    assert commands.tool.tolist() == [9001, 4]
+    assert commands.frames[commands.frame[0]].tool[2] == 0.5
+    assert {f.code for f in findings} == {"nc-tool-unknown", "heidenhain-tool-unknown"}

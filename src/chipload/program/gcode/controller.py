@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from chipload.errors import InputError, Severity
 from chipload.program.commands import ARC, DWELL, PLANE_AXES, RAPID, XY, YZ, ZX
+from chipload.program.compensation import CentreMove, Compensation
 from chipload.program.gcode import arcs
-from chipload.program.gcode.compensation import CentreMove, Compensation
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.parameters import Parameters
 from chipload.program.gcode.state import AXES, LINEAR, NO_MOTION, ZERO, Datum, Nine, State, nine
@@ -20,6 +20,9 @@ from chipload.program.gcode.tools import Tool, ToolTable
 from chipload.program.gcode.track import Context, Findings, MotionRows
 from chipload.program.path_mode import PathControl
 from chipload.units import MM_PER
+
+if TYPE_CHECKING:
+    from chipload.program.gcode.frames import ProgramFrame
 
 PLANES = {170: XY, 180: ZX, 190: YZ, 171: XY, 181: ZX, 191: YZ}
 #: from the centre of a turning tool's nose to its tip, in radii along X and Z, by orientation
@@ -86,6 +89,12 @@ class Controller:
         #: Sinumerik: whether the spindle of the tapping block that is read turns against K; None: no such block
         self.reversed: bool | None = None
         self.named_tools: dict[str, int] = {}
+        #: turned and shifted coordinates of the program; None: those of the work offset
+        self.program_frame: ProgramFrame | None = None
+        #: where a retraction to where only the machine knows was left out
+        self.retracted: Nine | None = None
+        #: why motions are left out until further notice; empty: they are not
+        self.left_out = ""
         self.level = 0
         self._contexts: dict[int, int] = {}
         #: linear axes that have been sent somewhere; whether the block sends another, before any feed
@@ -142,6 +151,13 @@ class Controller:
         if number > 9:
             return self.origins[number]
         return self.stored(5201 + 20 * number), self.parameters.numbered.get(5210 + 20 * number, 0.0)
+
+    def set_origin(self, number: int, axes: Mapping[int, float]) -> None:
+        """State the origin of a work offset beyond the nine, by axis [units of the text, deg]."""
+        at, turn = self.origins.get(number, (ZERO, 0.0))
+        placed = {k: value * (self.state.scale if k in LINEAR else 1.0) for k, value in axes.items()}
+        self.origins[number] = nine([placed.get(k, at[k]) for k in range(9)]), turn
+        self.stated_offsets.add(number)
 
     def _start(self, start: Nine) -> None:
         number = int(self.parameters.numbered.get(5220, 1.0))

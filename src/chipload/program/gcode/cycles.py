@@ -18,7 +18,9 @@ from chipload.program.commands import DWELL, LINE, RAPID
 
 SPIN, STOP = -1, -2
 #: G codes in tenths
-CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 870, 880, 890})
+CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 870, 871, 880, 890})
+#: back boring as a Fanuc does it, under a number of its own
+FANUC_BACK_BORING = 871
 #: cycles that need a P word, a Q word
 NEED_P = frozenset({820, 860, 880, 890})
 NEED_Q = frozenset({730, 830})
@@ -51,8 +53,8 @@ class Hole:
 def cycle_steps(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
     """The steps from above R, over (a, b), to ``clear``."""
     r, bottom, clear = hole.r, hole.bottom, hole.clear
-    if code == 870:
-        yield from _back_bore(a, b, hole)
+    if code in (870, FANUC_BACK_BORING):
+        yield from _back_bore(a, b, hole) if code == 870 else _fanuc_back_bore(a, b, hole)
         return
     if code in NEED_Q:
         yield from _pecks(code, a, b, hole)
@@ -122,3 +124,20 @@ def _back_bore(a: float, b: float, hole: Hole) -> Iterator[Step]:
     yield RAPID, aside, beside, hole.clear, 0.0
     yield RAPID, a, b, hole.clear, 0.0
     yield SPIN, a, b, hole.clear, hole.sense
+
+
+def _fanuc_back_bore(a: float, b: float, hole: Hole) -> Iterator[Step]:
+    """R is below: from there the tool bores up to Z, stops, goes aside and out."""
+    aside, beside = a + hole.shift[0], b + hole.shift[1]
+    yield SPIN, a, b, hole.clear, 0
+    yield RAPID, aside, beside, hole.clear, 0.0
+    yield RAPID, aside, beside, hole.r, 0.0
+    yield RAPID, a, b, hole.r, 0.0
+    yield SPIN, a, b, hole.r, 1
+    yield LINE, a, b, hole.bottom, 0.0
+    yield DWELL, a, b, hole.bottom, hole.dwell or 0.0
+    yield SPIN, a, b, hole.bottom, 0
+    yield RAPID, aside, beside, hole.bottom, 0.0
+    yield RAPID, aside, beside, hole.clear, 0.0
+    yield RAPID, a, b, hole.clear, 0.0
+    yield SPIN, a, b, hole.clear, 1

@@ -7,6 +7,7 @@ is not carried out.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from chipload.errors import InputError
 from chipload.program.gcode.controller import Controller
@@ -14,12 +15,23 @@ from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.modal import COVET, GROUP_OF, M_GROUP_OF, USER_M, axes_given, shown
 from chipload.program.gcode.words import Block, bare, read_block
 
+if TYPE_CHECKING:
+    from chipload.program.gcode.flow import Flow
+
 #: calls of a subroutine by one M98
 MOST_CALLS = 1_000_000_000
 #: codes of LinuxCNC that are not carried out: threading cycles of a lathe
 UNREAD = frozenset({760})
+#: letters of a block that is left out and whose values stay
+KEPT_WORDS = "fst"
 #: stands for a motion that is not read and that the dialect made a finding of
 NOTED = 9999
+#: motions that last behind their block
+LASTING = (0, 10, 20, 30)
+
+
+class NotReadError(InputError):
+    """A block asks for what is not carried out here: a lenient reader leaves it out."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +50,25 @@ class Dialect:
     def begin(self, c: Controller, text: str) -> None:
         """What stands before the first block."""
 
+    def prepare(self, text: str) -> str:
+        """The text as the others write it."""
+        return text
+
     def read(self, raw: str, c: Controller) -> Block | None:
         """The block of a line; None where there is nothing to carry out."""
         text, comments = bare(raw)
+        if not self.strict and text.startswith("$"):
+            c.once("nc-ignored", f"{text[:20].upper()}: a command to the controller, no block: left out")
+            return None
         block = read_block(text, comments, c.parameters)
-        return block if self.strict else lenient(block, c)
+        if self.strict:
+            return block
+        _other_controllers(block, c)
+        return lenient(block, c)
+
+    def jump(self, flow: Flow, raw: str) -> bool:
+        """Carry out a line that says which block comes next; whether it does."""
+        return False
 
     def call(self, words: dict[str, float]) -> tuple[str, int]:
         """Label and repeats of M98."""
@@ -52,6 +78,40 @@ class Dialect:
         if not 0 <= times <= MOST_CALLS:
             raise InputError(f"M98: L{times}: must be from 0 to {MOST_CALLS}")
         return str(integer_of(words["p"], "P")), times
+
+
+def _other_controllers(block: Block, c: Controller) -> None:
+    """Words of Mach3, GRBL and their posts that LinuxCNC refuses: G70 and G71 as units, K0 of an arc in XY."""
+    units = {700: 200, 710: 210}
+    if not axes_given(block):
+        for code in [code for code in block.g if code in units]:
+            c.once("nc-units", f"{shown(code)}: taken as {shown(units[code])}")
+            block.g[block.g.index(code)] = units[code]
+    arc = next((code for code in block.g if code in (20, 30)), c.state.motion)
+    if arc in (20, 30) and c.state.plane == 170 and block.words.get("k") == 0.0:
+        c.once("nc-unused-word", "K0: is no coordinate of the plane of the arc: left out")
+        del block.words["k"]
+
+
+def leave_out(c: Controller, reason: str) -> None:
+    """Leave motions out from here on, until :func:`go_on`."""
+    c.left_out = reason
+    c.gap("nc-left-out", f"{reason}: motions are left out until it ends")
+
+
+def go_on(c: Controller) -> None:
+    """Carry motions out again."""
+    c.left_out = ""
+
+
+def _without_motion(block: Block, c: Controller) -> None:
+    """Take the motion out of a block; its code lasts all the same."""
+    lasting = [code for code in block.g if code in LASTING]
+    if lasting:
+        c.state.motion = lasting[-1]
+    if lasting or axes_given(block):
+        block.g = [code for code in block.g if GROUP_OF[code] not in ("motion", "once")]
+        block.words = {x: value for x, value in block.words.items() if x in KEPT_WORDS}
 
 
 def lenient(block: Block, c: Controller, unread: frozenset[int] = UNREAD) -> Block:
@@ -70,12 +130,14 @@ def lenient(block: Block, c: Controller, unread: frozenset[int] = UNREAD) -> Blo
             c.gap("nc-unknown-word", f"{names}: is not read: its block does not move")
         c.unread = names if axes_given(block) else c.unread
         block.g = [code for code in block.g if code not in bad and GROUP_OF[code] not in ("motion", "once")]
-        block.words = {x: value for x, value in block.words.items() if x in "fst"}
+        block.words = {x: value for x, value in block.words.items() if x in KEPT_WORDS}
     elif any(GROUP_OF[code] in ("motion", "none") for code in block.g):
         c.unread = ""
     elif c.unread and axes_given(block) and COVET.isdisjoint(block.g):
         c.gap("nc-unknown-word", f"{c.unread}, which is not read, goes on here: the block does not move")
-        block.words = {x: value for x, value in block.words.items() if x in "fst"}
+        block.words = {x: value for x, value in block.words.items() if x in KEPT_WORDS}
+    if c.left_out:
+        _without_motion(block, c)
     for m in [m for m in block.m if m not in M_GROUP_OF and m not in USER_M]:
         c.refused("nc-unknown-word", f"M{m}: is not known and does nothing here")
         block.m.remove(m)

@@ -73,9 +73,10 @@ class Drilling:
         if not state.absolute:
             r += level
             bottom += r
-        if r < bottom:
+        back = code == cycles.FANUC_BACK_BORING
+        if r < bottom and not back:
             raise InputError(f"R{r:g}: lies below the bottom of the hole, {bottom:g}: raise R")
-        clear = max(level, r) if state.old_level else r
+        clear = max(level, r) if state.old_level or back else r
         hole = self._hole(series, code, along, first, second, r, bottom, clear)
         self.series = series
         given = axes(self.c, block)
@@ -99,7 +100,7 @@ class Drilling:
             else:
                 a, b = a + given.get(first, 0.0), b + given.get(second, 0.0)
             go(RAPID, a, b, height)
-            if abs(height - r) > SAME:
+            if abs(height - r) > SAME and not back:
                 go(RAPID, a, b, r)
             for kind, p, q, h, value in cycles.cycle_steps(code, a, b, hole):
                 if kind in (RAPID, LINE):
@@ -153,6 +154,8 @@ class Drilling:
             i, j, k = (value or 0.0 for value in offsets)
             shift = (scale * (i, j, k)[first], scale * (i, j, k)[second])
             middle = (i, j, k)[along] + (0.0 if self.c.state.absolute else bottom)
+        elif code == cycles.FANUC_BACK_BORING:
+            shift = (scale * (series.i or 0.0), scale * (series.j or 0.0))
         dwell = series.dwell
         if dwell is not None and dwell < 0.0:
             raise InputError(f"P{dwell:g}: the time at the bottom must be 0 or more")

@@ -3,69 +3,89 @@
 Notation: codes of G are in tenths. P of a dwell is in ms, X and U of G4 in s; K of a cycle repeats it; a series of
 cycles returns to the level where it began (G98) until told otherwise; M98 P51234 calls O1234 five times. After M29,
 and in G84.2 and G84.3, tapping starts the spindle itself. Fine boring (G76) is carried out without its shift in the
-bottom of the hole.
+bottom of the hole; back boring (G87) shifts by Q against X, which leaves it unproven, as the machine's own setting
+says where to and the cutter is round. G33 has its lead in F. Macro statements are those of
+:mod:`~chipload.program.gcode.macros`; G68 turns about Z.
 
-Refused: macros (G65, G66, IF, WHILE, GOTO), turned and scaled coordinates (G16, G51, G68), tilted planes (G68.2), tool
-vectors (G43.5), G10 L20. Noted and left out: smoothing and look-ahead (G5.1, G8), tool offsets by G10 L10 to L13.
+Left out, so that the result is unproven: motions in polar, scaled or mirrored coordinates (G16, G51) and in tilted
+planes (G68.2) until they end, tool vectors (G43.5), modal macros (G66), involutes and splines. Noted and left out:
+smoothing and look-ahead (G5.1, G8), tool offsets by G10 L10 to L13, retractions to where only the machine knows.
 """
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from chipload.errors import InputError, Severity
 from chipload.program.gcode.controller import Controller
-from chipload.program.gcode.cycles import CYCLES
-from chipload.program.gcode.dialect import UNREAD, Dialect, lenient
+from chipload.program.gcode.cycles import CYCLES, FANUC_BACK_BORING
+from chipload.program.gcode.dialect import UNREAD, Dialect, NotReadError, go_on, leave_out, lenient
+from chipload.program.gcode.frames import remove, turn_about
+from chipload.program.gcode.macros import ALARM, OUTPUTS, macro_step, system_variables, with_brackets
 from chipload.program.gcode.modal import GROUP_OF, shown
 from chipload.program.gcode.offsets import choose
 from chipload.program.gcode.words import Block, bare, read_block
 
-_MACRO = re.compile(r"(?:/[1-9]?)?(?:n[0-9]+)?(if\[|while\[|goto|end[1-9]|do[1-9]|popen|pclos|dprnt|bprnt|setvn)")
+if TYPE_CHECKING:
+    from chipload.program.gcode.flow import Flow
+
+_COLON = re.compile(r"^([ \t]*):(?=[0-9])", re.MULTILINE)
 _SKIP = re.compile(r"^/[1-9]")
 #: a whole number that is not 0: with 0 the point makes no difference
 _NO_POINT = re.compile(r"[XYZIJKR][ \t]*[-+]?0*[1-9][0-9]*(?![0-9.])(?=[^\n(]*)", re.IGNORECASE)
 _COMMENT = re.compile(r"\([^()\n]*\)")
 
-REFUSED = {
+#: coordinates in which motions are left out until a code ends them
+CHANGED = {
     160: "polar coordinates",
     510: "scaling",
     511: "mirrored coordinates",
-    650: "a macro",
-    660: "a macro",
-    661: "a macro",
-    680: "turned coordinates",
     682: "a tilted plane",
     683: "a tilted plane",
     684: "a tilted plane",
-    435: "tip control by vectors",
-    440: "a negative tool length",
     71: "cylindrical interpolation",
     121: "polar interpolation",
     1120: "polar interpolation",
-    310: "a skip by a signal",
 }
-#: motions that are left out: back boring, threading, involutes, splines
-LEFT_OUT = frozenset({870, 330, 61, 62})
+#: and those codes
+ENDS = {150: (160,), 500: (510,), 501: (511,), 690: (682, 683, 684), 130: (), 131: (121,), 1130: (1120,)}
+#: blocks that are left out
+NOT_READ = {
+    660: "a modal macro",
+    661: "a modal macro",
+    435: "tip control by vectors",
+    440: "a negative tool length",
+}
+TURNED, UNTURNED, MACRO, SKIP, ENDS_CYLINDER = 680, 690, 650, 310, 71
+#: motions that are left out: involutes, splines
+LEFT_OUT = frozenset({61, 62})
 #: tapping: LinuxCNC's code and the M code that starts its spindle
 TAPPING = {840: (840, 3), 740: (740, 4), 842: (840, 3), 843: (740, 4)}
 FINE_BORING, BORING = 760, 860
 #: end of what is not on, or what does not concern the path
 IDLE = frozenset(
     {50, 51, 80, 81, 90, 110, 130, 131, 150, 220, 230, 250, 260, 270, 491, 495, 500, 501, 600, 620, 630, 641, 670}
-    | {690, 691, 692, 693, 1130}
+    | {531, 690, 691, 692, 693, 1030, 1130, 1870}
 )
 EXTENDED = 541
+#: G154 P and G234 of a Haas: more work offsets, tip control
+HAAS_EXTENDED, HAAS_TIP = 1540, 2340
 
 
 @dataclass(frozen=True)
 class Fanuc(Dialect):
     """See above."""
 
+    def prepare(self, text: str) -> str:
+        """A program number may begin with : instead of O."""
+        return _COLON.sub(r"\1O", text)
+
     def begin(self, c: Controller, text: str) -> None:
         """State at power on, and numbers without a decimal point."""
         c.state.old_level = True
+        c.parameters.live.update(system_variables(c))
         plain = _COMMENT.sub(lambda found: " " * len(found[0]), text)
         found = _NO_POINT.search(plain)
         if found is not None:
@@ -75,23 +95,64 @@ class Fanuc(Dialect):
     def read(self, raw: str, c: Controller) -> Block | None:
         """The block of a line, in LinuxCNC's words."""
         text, comments = bare(raw)
-        text = _SKIP.sub("/", text)
-        macro = _MACRO.match(text)
-        if macro is not None:
-            raise InputError(f"{macro[1].upper()}: macro statements are not read: write out what they do")
-        block = read_block(text, comments, c.parameters)
+        text = _SKIP.sub("/", text).replace("(", "")
+        if OUTPUTS.match(text):
+            c.once("nc-output", f"{text[:20].upper()}: writes nothing here")
+            return None
+        block = read_block(with_brackets(text), comments, c.parameters)
         for code in block.g:
-            if code in REFUSED:
-                raise InputError(f"{shown(code)}: {REFUSED[code]}: not read; write the moves out")
+            if code in NOT_READ:
+                raise NotReadError(f"{shown(code)}: {NOT_READ[code]}")
+        if any(key == ALARM for key, _ in block.sets):
+            c.gap("nc-alarm", f"#{ALARM}: an alarm ends the program here")
+            block.sets, block.m = [], [30]
+        self._coordinates(block, c)
+        if MACRO in block.g:
+            block.macro, block.words, block.g = {"p": -1.0, **block.words}, {}, []
+        if 97 in block.m:
+            block.m.remove(97)
+            block.block_call = {"p": -1.0, **{x: block.words.pop(x) for x in "pl" if x in block.words}}
         self._adapt(block, c)
         return lenient(block, c, UNREAD | LEFT_OUT)
+
+    def jump(self, flow: Flow, raw: str) -> bool:
+        """Macro statements."""
+        return macro_step(flow, raw)
+
+    def _coordinates(self, block: Block, c: Controller) -> None:
+        """G68 and G69; coordinates that are not read."""
+        words, g = block.words, block.g
+        for code in g:
+            if c.left_out and code in ENDS and c.left_out.split(":")[0] in map(shown, ENDS[code] or (ENDS_CYLINDER,)):
+                go_on(c)
+            if code == ENDS_CYLINDER and c.left_out.startswith(f"{shown(code)}:"):
+                # G7.1 C0 ends what G7.1 C50 began
+                go_on(c)
+                g.remove(code)
+                words.clear()
+                return
+        for code in [code for code in g if code in CHANGED]:
+            leave_out(c, f"{shown(code)}: {CHANGED[code]}")
+            g.remove(code)
+            words.clear()
+        if TURNED in g:
+            g.remove(TURNED)
+            if c.state.plane != 170 or "z" in words or words.keys() & {"i", "j", "k"}:
+                leave_out(c, "G68.2: a tilted plane")
+                words.clear()
+                return
+            remove(c)
+            x, y = (words.pop(axis, c.state.at[k] / c.state.scale) for k, axis in enumerate("xy"))
+            turn_about(c, x * c.state.scale, y * c.state.scale, words.pop("r", 0.0))
+        elif UNTURNED in g:
+            remove(c)
 
     def _adapt(self, block: Block, c: Controller) -> None:
         words, g = block.words, block.g
         self._holes(block, c)
         idle = [code for code in g if code in IDLE]
         if 50 in idle and not (words.get("p", 0.0) >= 1000.0 or "x" not in words):
-            raise InputError("G5: splines are not read: write the moves out")
+            raise NotReadError("G5: splines")
         for code in idle:
             if code in (51, 50, 80, 81):
                 c.once("nc-ignored", f"{shown(code)}: look-ahead and smoothing do not concern the path")
@@ -105,15 +166,30 @@ class Fanuc(Dialect):
                 seconds = words["p"] / 1000.0
             if seconds is not None:
                 words["p"] = seconds
+        if HAAS_EXTENDED in g:
+            g[g.index(HAAS_EXTENDED)] = EXTENDED
+        if HAAS_TIP in g:
+            g[g.index(HAAS_TIP)] = 434
         if EXTENDED in g or (540 in g and "p" in words and 40 not in g):
             self._extended(block, c)
         if 100 in g and words.get("l") != 2.0:
             if words.get("l") == 20.0:
-                raise InputError("G10 L20: more work offsets: not read; give them as G54 to G59")
+                words.pop("l")
+                number = words.pop("p", 0.0)
+                if not 1 <= number <= 300 or number != int(number):
+                    raise InputError(f"G10 L20 P{number:g}: P must be from 1 to 300")
+                c.set_origin(9 + int(number), {k: words.pop(x) for k, x in enumerate("xyzabc") if x in words})
+                g.remove(100)
+                return
             c.note("nc-ignored", "G10: offsets of tools that the program sets are left out")
             g.remove(100)
             for letter in "lprqxyz":
                 words.pop(letter, None)
+        if 330 in g and "f" in words:
+            words["k"] = words.pop("f")
+        if SKIP in g:
+            g[g.index(SKIP)] = 10
+            c.once("nc-skip", f"{shown(SKIP)}: a signal may end the motion earlier; the program goes on from its end")
         motion = next((x for x in g if x in CYCLES), c.state.motion)
         if motion in CYCLES:
             if "k" in words:
@@ -122,8 +198,15 @@ class Fanuc(Dialect):
                 words["p"] /= 1000.0
 
     def _holes(self, block: Block, c: Controller) -> None:
-        """Tapping and fine boring in LinuxCNC's words."""
+        """Tapping, fine and back boring in LinuxCNC's words."""
         words, g = block.words, block.g
+        if 870 in g:
+            g[g.index(870)] = FANUC_BACK_BORING
+            words["i"], words["j"] = -abs(words.pop("q", 0.0)), 0.0
+            c.gap(
+                "nc-back-boring",
+                "G87: the shift by Q is taken against X, where the machine has a setting, and the cutter as round",
+            )
         if 29 in block.m:
             block.m.remove(29)
             c.rigid = True

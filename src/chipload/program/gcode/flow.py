@@ -14,9 +14,10 @@ from pathlib import Path
 
 from chipload.errors import InputError
 from chipload.files import is_file, read_regular
-from chipload.program.gcode.dialect import Dialect
+from chipload.program.gcode.dialect import Dialect, NotReadError
 from chipload.program.gcode.expression import integer_of, read_value
 from chipload.program.gcode.interpreter import BlockInterpreter
+from chipload.program.gcode.macros import block_number, call_macro
 from chipload.program.gcode.parameters import LOCAL
 from chipload.program.gcode.plain import run_plain
 from chipload.program.gcode.source import KEYWORDS, OWord, Source, read_source
@@ -43,6 +44,7 @@ class _Call:
     local: bool
     left: int
     first: int
+    macro: bool = False
 
 
 class Flow:
@@ -147,19 +149,35 @@ class Flow:
             self.c.gap("nc-long-line", said)
 
     def _block(self, raw: str) -> bool:
-        block = self.dialect.read(raw, self.c)
-        if block is None:
+        if self.dialect.jump(self, raw):
+            return True
+        try:
+            block = self.dialect.read(raw, self.c)
+            if block is None:
+                self.line += 1
+                return True
+            for key, value in block.sets:
+                self.c.parameters.assign(key, value)
+            ends = self.i.execute(block)
+            for more in block.after:
+                self.i.execute(more)
+        except NotReadError as error:
+            if self.dialect.strict:
+                raise
+            self.c.gap("nc-not-read", f"{error}: the block is left out")
             self.line += 1
             return True
-        for key, value in block.sets:
-            self.c.parameters.assign(key, value)
-        ends = self.i.execute(block)
-        for more in block.after:
-            self.i.execute(more)
         self.line += 1
         if ends:
             return False
-        if 98 in block.m:
+        if block.macro:
+            try:
+                call_macro(self, block.macro)
+            except NotReadError as error:
+                self.c.gap("nc-not-read", f"{error}: the block is left out")
+        elif block.block_call:
+            self._call_block(block.block_call)
+        elif 98 in block.m:
             self._call_number(block.words)
         elif 99 in block.m:
             return self._return_number()
@@ -343,6 +361,20 @@ class Flow:
         self.c.level += 1
         self.source, self.line = source, line + 1
 
+    def statement(self, raw: str) -> None:
+        """Carry out a statement that stands within another (THEN)."""
+        block = self.dialect.read(raw, self.c)
+        if block is not None:
+            for key, value in block.sets:
+                self.c.parameters.assign(key, value)
+            self.i.execute(block)
+
+    def enter_macro(self, line: int, label: str, times: int) -> None:
+        """Begin a subroutine of the main text with parameters of its own (G65)."""
+        self._enter(self.main, line, label, False, times)
+        self._calls[-1].macro = True
+        self.c.parameters.enter([])
+
     def _call(self, word: OWord) -> None:
         arguments: list[float] = []
         rest = word.rest
@@ -386,10 +418,22 @@ class Flow:
         if place is None and label in self.main.numbers:
             place, source = self.main.numbers[label], self.main
         if place is None:
-            raise InputError(f"M98 P{label}: there is no block O{label} in this text")
+            said = f"M98 P{label}: there is no block O{label} in this text"
+            if self.dialect.strict:
+                raise InputError(said)
+            self.c.gap("nc-call", f"{said}: the call is left out")
+            self.line += 1
+            return
         self.line += 1
         if times > 0:
             self._enter(source, place, label, False, times)
+
+    def _call_block(self, words: dict[str, float]) -> None:
+        """M97 of a Haas: a subroutine that begins with its N number and ends with M99."""
+        number, times = integer_of(words.get("p", -1.0), "P"), integer_of(words.get("l", 1.0), "L")
+        place = block_number(self.source, self.line, number)
+        if times > 0:
+            self._enter(self.source, place - 1, f"N{number}", False, min(times, MOST_REPEATS))
 
     def _return_number(self) -> bool:
         """M99."""
@@ -405,5 +449,7 @@ class Flow:
             self.line = call.first
             self._loops = {}
         else:
+            if call.macro:
+                self.c.parameters.leave()
             self._leave()
         return True

@@ -9,7 +9,7 @@ Reference: LinuxCNC 2.9, "Modal Groups" and "Order of Execution"; what its inter
 from __future__ import annotations
 
 from chipload.errors import InputError
-from chipload.program.gcode.cycles import CYCLES, NEED_P, NEED_Q
+from chipload.program.gcode.cycles import CYCLES, FANUC_BACK_BORING, NEED_P, NEED_Q
 from chipload.program.gcode.state import NO_MOTION
 from chipload.program.gcode.words import Block
 
@@ -58,12 +58,12 @@ USES: dict[str, tuple[frozenset[int], frozenset[int], frozenset[int]]] = {
     "d": (frozenset(), frozenset({410, 411, 420, 421, 960}), frozenset()),
     "e": (frozenset({760}), frozenset(), frozenset({66, 67, 68})),
     "h": (frozenset({760}), frozenset({430, 432, 434}), frozenset()),
-    "i": (frozenset({20, 30, 50, 51, 331, 760, 870}), frozenset({100}), frozenset()),
-    "j": (frozenset({20, 30, 50, 51, 760, 870}), frozenset({100}), frozenset()),
+    "i": (frozenset({20, 30, 50, 51, 331, 760, 870, FANUC_BACK_BORING}), frozenset({100}), frozenset()),
+    "j": (frozenset({20, 30, 50, 51, 760, 870, FANUC_BACK_BORING}), frozenset({100}), frozenset()),
     "k": (frozenset({20, 30, 330, 331, 760, 870}), frozenset(), frozenset()),
     "l": (CYCLES | {52, 53, 760}, frozenset({100, 410, 411, 420, 421}), frozenset({66, 98})),
     "p": (
-        NEED_P | {20, 30, 50, 52, 740, 760, 840},
+        NEED_P | {20, 30, 50, 52, 740, 760, 840, FANUC_BACK_BORING},
         frozenset({40, 100, 640}),
         frozenset({*range(50, 54), *range(62, 67), 19, 98}),
     ),

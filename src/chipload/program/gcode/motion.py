@@ -17,7 +17,7 @@ from chipload.program.gcode.cycles import CYCLES
 from chipload.program.gcode.drilling import Drilling
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.modal import shown
-from chipload.program.gcode.offsets import note_machine_coordinates
+from chipload.program.gcode.offsets import in_machine_unknown, note_machine_coordinates
 from chipload.program.gcode.splines import Splines
 from chipload.program.gcode.state import LINEAR, NO_MOTION, put
 from chipload.program.gcode.synchronised import synchronised
@@ -77,6 +77,8 @@ class ControllerMotion:
             if not state.absolute:
                 raise InputError("G53: goes with G90 only")
             c.not_compensated("G53")
+            if in_machine_unknown(c, "G53", axes(self.c, block)):
+                return
             note_machine_coordinates(c, "G53")
             target = put(state.datum.to_machine(state.at), axes(self.c, block))
             to = state.datum.from_machine(target)

@@ -16,8 +16,9 @@ from chipload.errors import InputError, Severity
 from chipload.program.commands import RAPID
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.expression import integer_of
+from chipload.program.gcode.frames import without_frame
 from chipload.program.gcode.modal import shown
-from chipload.program.gcode.state import ZERO, Nine, nine, put
+from chipload.program.gcode.state import LINEAR, ZERO, Nine, nine, put
 from chipload.program.gcode.words import Block
 
 Axes = Mapping[int, float]
@@ -38,7 +39,8 @@ def choose(c: Controller, name: str, number: int) -> None:
     """The coordinates of a work offset of any number; one whose origin is not stated counts as the machine's."""
     _stated(c, name, number)
     offset, rotation = c.work_offset(number) if 1 <= number < 10 or number in c.origins else (ZERO, 0.0)
-    c.rebase(replace(c.state.datum, number=number, offset=offset, rotation=rotation))
+    with without_frame(c):
+        c.rebase(replace(c.state.datum, number=number, offset=offset, rotation=rotation))
 
 
 def _stated(c: Controller, name: str, number: int) -> None:
@@ -76,7 +78,8 @@ def set_data(c: Controller, block: Block, axes: Axes) -> None:
     words = block.words
     kind = integer_of(words.get("l", -1.0), "L")
     if kind in (2, 20):
-        _set_work_offset(c, block, axes, kind)
+        with without_frame(c):
+            _set_work_offset(c, block, axes, kind)
     elif kind in (1, 10, 11):
         _set_tool(c, block, axes, kind)
     elif kind != 0:
@@ -204,6 +207,11 @@ def _check_length(c: Controller, code: int, number: int) -> None:
 
 def shift(c: Controller, code: int, axes: Axes) -> None:
     """G52, G92 and G92.1 to G92.3."""
+    with without_frame(c):
+        _shift(c, code, axes)
+
+
+def _shift(c: Controller, code: int, axes: Axes) -> None:
     state, numbered = c.state, c.parameters.numbered
     c.not_compensated(shown(code))
     datum = state.datum
@@ -227,10 +235,43 @@ def shift(c: Controller, code: int, axes: Axes) -> None:
     c.rebase(replace(datum, shift=new))
 
 
+def in_machine_unknown(c: Controller, name: str, axes: Axes) -> bool:
+    """Whether a motion in the machine's coordinates is left out, as where they lie is not known; a finding says so.
+
+    Fanuc and Sinumerik alone, where it leads to the reference point; LinuxCNC keeps its offsets in the parameters. A
+    motion along Z is a retraction; one in X and Y before it may go through the work, which stays unproven.
+    """
+    number = c.state.datum.number
+    if c.dialect == "linuxcnc" or number in c.stated_offsets or number == 0 or not any(k in LINEAR for k in axes):
+        return False
+    here = c.state.at
+    if set(axes) & {0, 1} and 2 not in axes and c.retracted != here:
+        c.once(
+            "nc-machine-coordinates",
+            f"{name}: moves in the machine's coordinates, and where {_offset_name(number)} lies in them is not known: "
+            "it is left out: state it in program.work_offsets",
+            Severity.UNPROVEN,
+        )
+    else:
+        c.once(
+            "nc-machine-retraction",
+            f"{name}: a retraction to where only the machine knows is left out: state "
+            f"{_offset_name(number)} in program.work_offsets to have it",
+        )
+    if 2 in axes:
+        c.retracted = here
+    return True
+
+
 def go_home(c: Controller, code: int, axes: Axes, end: Nine) -> None:
     """G28 and G30: by way of ``end`` to the stored point, those axes alone that the block gives."""
     state = c.state
     c.not_compensated(shown(code))
+    if in_machine_unknown(c, shown(code), axes or dict.fromkeys(range(3), 0.0)):
+        if end != state.at:
+            c.straight(RAPID, end)
+            c.retracted = state.at if c.retracted is not None else None
+        return
     first = 5161 if code == 280 else 5181
     if not any(first + k in c.parameters.numbered for k in range(9)):
         c.once(

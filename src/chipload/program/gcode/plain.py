@@ -26,32 +26,15 @@ _CODE = {"0": 0, "1": 10, "2": 20, "3": 30}
 
 def run_plain(c: Controller, motion: ControllerMotion, lines: list[str], line: int) -> tuple[int, int]:
     """Carry out plain blocks from ``line`` on; the line of the first other block, and how many were carried out."""
-    state = c.state
-    if not (
-        state.absolute
-        and state.feed_mode in (930, 940)
-        and not state.absolute_centre
-        and not state.diameter
-        and state.compensation == 400
-        and motion.splines.spline is None
-        and not c.unread
-        and c.modal_hole is None
-        and state.motion in (0, 10, 20, 30, 800)
-    ):
-        return line, 0
-    if len(c.placed) < 3:
-        # which axes have been sent somewhere is noted block by block
+    if not _ready(c, motion):
         return line, 0
     if c.unplaced:
         c.unplaced = False
         c.changed()
-    match = _match
-    scale, inch, flat = state.scale, state.scale != 1.0, state.plane == 170
+    state, match, append, arc = c.state, _match, c.track.rows.append, c.track.arc
+    scale, inch, flat, inverse = state.scale, state.scale != 1.0, state.plane == 170, state.feed_mode == 930
     x, y, z, a, b, cc, u, v, w = state.at
-    code = state.motion
-    first, count = line, min(len(lines), line + PIECE)
-    append, arc = c.track.rows.append, c.track.arc
-    inverse = state.feed_mode == 930
+    code, first, count = state.motion, line, min(len(lines), line + PIECE)
     rapid = feed = -1
     while line < count:
         found = match(lines[line])
@@ -59,54 +42,30 @@ def run_plain(c: Controller, motion: ControllerMotion, lines: list[str], line: i
             break
         g, sx, sy, sz, sa, sb, sc, si, sj, sk, sf = found.groups()
         new = code if g is None else _CODE[g]
-        if sx is None and sy is None and sz is None:
-            if sa is None and sb is None and sc is None:
-                # no axes: an F, a G or an arc by its centre alone
-                break
-        elif new == 800:
+        linear = not (sx is None and sy is None and sz is None)
+        turning = not (sa is None and sb is None and sc is None)
+        # without axes it is an F, a G or an arc by its centre alone
+        if not (linear or turning) or new == 800 or not _centred(new, g, si, sj, sk, flat):
             break
-        if new == 800:
-            break
-        if new >= 20:
-            if not flat or sk is not None or g is None or (si is None and sj is None):
-                break
-        elif si is not None or sj is not None or sk is not None:
-            break
-        if inverse and new:
-            if sf is None or new != 10:
+        if inverse:
+            if (sf is None or new != 10) if new else sf is not None:
                 break
         elif sf is not None:
-            if inverse:
+            if not _take_feed(c, float(sf), new):
                 break
-            value = float(sf)
-            if value < 0.0 or (new and value * scale == 0.0):
-                break
-            state.feed, state.feed_turning = value * scale, value
-            c.changed()
             rapid = feed = -1
         elif new and state.feed == 0.0:
             break
         here = x, y, z, a, b, cc, u, v, w
         x0, y0, z0 = x, y, z
-        if sx is not None:
-            x = float(sx) * scale
-        if sy is not None:
-            y = float(sy) * scale
-        if sz is not None:
-            z = float(sz) * scale
+        x = x if sx is None else float(sx) * scale
+        y = y if sy is None else float(sy) * scale
+        z = z if sz is None else float(sz) * scale
+        if turning:
+            a = a if sa is None else float(sa)
+            b = b if sb is None else float(sb)
+            cc = cc if sc is None else float(sc)
         line += 1
-        if sa is not None or sb is not None or sc is not None:
-            if sa is not None:
-                a = float(sa)
-            if sb is not None:
-                b = float(sb)
-            if sc is not None:
-                cc = float(sc)
-            turning = x == x0 and y == y0 and z == z0 and (a, b, cc) != here[3:6]
-            if turning and new == 10 and not inverse:
-                append((LINE, x, y, z, a, b, cc, u, v, w, c.context(2), line))
-                code = new
-                continue
         if new == 0:
             if rapid < 0:
                 rapid = c.context(0)
@@ -114,6 +73,8 @@ def run_plain(c: Controller, motion: ControllerMotion, lines: list[str], line: i
         elif inverse:
             state.at, end = here, (x, y, z, a, b, cc, u, v, w)
             append((LINE, *end, c.straight_context(LINE, end, float(sf)), line))
+        elif turning and new == 10 and (x, y, z) == (x0, y0, z0) and (a, b, cc) != here[3:6]:
+            append((LINE, x, y, z, a, b, cc, u, v, w, c.context(2), line))
         else:
             if feed < 0:
                 feed = c.context(1)
@@ -132,3 +93,38 @@ def run_plain(c: Controller, motion: ControllerMotion, lines: list[str], line: i
         motion.drilling.series = None
         motion.splines.tangent = (0.0, 0.0)
     return line, line - first
+
+
+def _ready(c: Controller, motion: ControllerMotion) -> bool:
+    """Whether the modes are those of plain blocks; which axes have been sent somewhere is noted block by block."""
+    state = c.state
+    return (
+        state.absolute
+        and state.feed_mode in (930, 940)
+        and not state.absolute_centre
+        and not state.diameter
+        and state.compensation == 400
+        and motion.splines.spline is None
+        and not c.unread
+        and not c.left_out
+        and c.modal_hole is None
+        and state.motion in (0, 10, 20, 30, 800)
+        and len(c.placed) == 3
+    )
+
+
+def _centred(new: int, g: str | None, i: str | None, j: str | None, k: str | None, flat: bool) -> bool:
+    """Whether I, J and K suit the code: an arc has its G and a centre in XY, a straight motion none."""
+    if new >= 20:
+        return flat and k is None and g is not None and not (i is None and j is None)
+    return i is None and j is None and k is None
+
+
+def _take_feed(c: Controller, value: float, new: int) -> bool:
+    """Take F; False where the slow way has to refuse it."""
+    state = c.state
+    if value < 0.0 or (new and value * state.scale == 0.0):
+        return False
+    state.feed, state.feed_turning = value * state.scale, value
+    c.changed()
+    return True

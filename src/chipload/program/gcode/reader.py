@@ -111,6 +111,7 @@ def read_gcode(
         feed=feed,
     )
     text = text.replace("\r\n", "\n").replace("\r", "\n")
+    text = rule.prepare(text)
     rule.begin(controller, text)
     source = read_source(text, name)
     Flow(BlockInterpreter(controller), source, rule, folder, most_blocks, progress).run()

@@ -6,9 +6,12 @@ G710 mm.
 
 CYCLE81 to CYCLE86, with MCALL too, are carried out (:mod:`~chipload.program.gcode.sinumerik_cycles`).
 
-Refused: frames (TRANS, ROT, CYCLE800 ...), tool vectors (A3 B3 C3), jumps and loops, calls by L. Left out, so that the
-result is unproven: cycles that are not drilling, calls of other programs, curves (CIP, CT, splines). Noted and left
-out: what does not concern the path. G331 and G332 are G33 with the spindle one way and back.
+TRANS, ATRANS, ROT and AROT about Z are carried out (:mod:`~chipload.program.gcode.frames`).
+
+Refused: jumps and loops. Left out, so that the result is unproven: motions in mirrored, scaled or swivelled coordinates
+until they end, tool vectors (A3 B3 C3), cycles that are not drilling, calls of other programs, curves (CIP, CT,
+splines), values of names that nothing defines. Noted and left out: what does not concern the path. G331 and G332 are
+G33 with the spindle one way and back.
 """
 
 from __future__ import annotations
@@ -18,11 +21,12 @@ from dataclasses import dataclass
 
 from chipload.errors import InputError
 from chipload.program.gcode.controller import Controller
-from chipload.program.gcode.dialect import NOTED, Dialect, lenient
+from chipload.program.gcode.dialect import NOTED, Dialect, NotReadError, go_on, leave_out, lenient
 from chipload.program.gcode.expression import integer_of, read_value
+from chipload.program.gcode.frames import further, remove
 from chipload.program.gcode.offsets import choose
 from chipload.program.gcode.sinumerik_cycles import CYCLES, NORMAL, hole_blocks
-from chipload.program.gcode.state import AXES, LINEAR
+from chipload.program.gcode.state import AXES, LINEAR, ZERO, nine
 from chipload.program.gcode.words import LONGEST, Block
 
 _TOKEN = re.compile(
@@ -36,7 +40,11 @@ _TOKEN = re.compile(
 )
 _WAY = re.compile(r"(AC|IC|DC|ACP|ACN)\((.*)\)\Z", re.DOTALL)
 _R = re.compile(r"R([0-9]+)(?![0-9A-Z_])")
-_NAMED = re.compile(r"[A-Z]+")
+_NAMED = re.compile(r"[A-Z_$][A-Z0-9_$]*")
+_DEFINITION = re.compile(r"DEF\s+(?:CHAN\s+|NCK\s+)?(REAL|INT|BOOL|CHAR|STRING|AXIS|FRAME)\b(.*)")
+FUNCTIONS = ("SIN", "COS", "TAN", "ASIN", "ACOS", "SQRT", "ABS", "EXP", "LN")
+#: words of the program's coordinates; those that are not read unless they end something
+PLACED = ("TRANS", "ATRANS", "ROT", "AROT")
 
 FRAMES = frozenset(
     """
@@ -88,6 +96,9 @@ class Sinumerik(Dialect):
         if body.startswith("%") or (body.startswith("$") and "=" not in body):
             return None
         body = re.sub(r"^/[0-9]?\s*", "", body)
+        if _DEFINITION.match(body):
+            _define(body, c)
+            return None
         if len(body) > 4 * LONGEST:
             raise InputError(f"{len(body)} characters: a block has at most {4 * LONGEST}")
         at = 0
@@ -106,7 +117,9 @@ class Sinumerik(Dialect):
             elif found["call"]:
                 _called(block, c, found["call"], found["arguments"])
             elif not found["colon"]:
-                _keyword(block, c, found["word"])
+                _keyword(block, c, found["word"], body)
+        if block.frame:
+            _frame(block, c)
         self._resolve(block, c, values)
         self._holes(block, c)
         return lenient(block, c)
@@ -130,7 +143,9 @@ class Sinumerik(Dialect):
             if "f" in words:
                 words["p"] = words.pop("f")
             elif "s" in words:
-                raise InputError("G4 S: a dwell by turns of the spindle is not read: give F in seconds")
+                if state.speed == 0.0:
+                    raise InputError("G4 S: a dwell by turns of the spindle: its speed is not known: give S before")
+                words["p"] = words.pop("s") * 60.0 / state.speed
         if 330 in block.g and c.reversed is not None:
             clockwise = (words.get("k", 1.0) > 0.0) != c.reversed
             block.m = [m for m in block.m if m not in (3, 4, 5)] + [3 if clockwise else 4]
@@ -171,8 +186,11 @@ def _value(text: str, c: Controller) -> float:
     plain = _R.sub(r"#\1", "".join(text.split()))
     if _NAMED.sub("", plain) != plain:
         for name in _NAMED.findall(plain):
-            if name not in ("SIN", "COS", "TAN", "ASIN", "ACOS", "SQRT", "ABS", "EXP", "LN"):
-                raise InputError(f"{name}: is not read in a value: write the number")
+            if name in FUNCTIONS:
+                continue
+            if f"_{name.lower()}" not in c.parameters.shared:
+                raise NotReadError(f"{name}: its value is not known here")
+            plain = re.sub(rf"(?<![A-Z0-9_]){re.escape(name)}(?![A-Z0-9_])", f"#<_{name.lower()}>", plain)
     plain = plain.replace("(", "[").replace(")", "]").lower()
     value, end = read_value(f"[{plain}]", 0, c.parameters)
     if end != len(plain) + 2:
@@ -192,7 +210,7 @@ def _letter(block: Block, c: Controller, letter: str, value: float, values: list
     elif letter == "N":
         block.number = int(min(value, 1e12))
     elif letter == "L":
-        raise InputError(f"L{value:g}: calls a subroutine: not read; write its blocks out")
+        raise NotReadError(f"L{value:g}: calls a subroutine, which is not here")
     elif letter in _WORDS:
         _put(block, letter.lower(), value)
     else:
@@ -221,7 +239,7 @@ def _code(block: Block, c: Controller, code: int) -> None:
     elif code == 63:
         block.g.append(10)
     elif code in (34, 35, 58, 59, 74, 75, 110, 111, 112, *range(140, 149), 247, 248, 347, 348):
-        raise InputError(f"G{code}: is not read: write the moves out")
+        raise NotReadError(f"G{code}: is not read")
     else:
         # the dialect's reader makes a finding of it
         block.g.append(9990 - code % 100 if code > 998 else 10 * code + 9)
@@ -229,7 +247,7 @@ def _code(block: Block, c: Controller, code: int) -> None:
 
 def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple[str, str, float]]) -> None:
     if name in ("A3", "B3", "C3", "A2", "B2", "C2", "A4", "B4", "C4", "A5", "B5", "C5", "LEAD", "TILT"):
-        raise InputError(f"{name}: tool directions as vectors or angles to the surface are not read: post with axes")
+        raise NotReadError(f"{name}: tool directions as vectors or angles to the surface are not read: post with axes")
     if name == "T" and text.startswith('"'):
         number = c.named_tools.setdefault(text, 9001 + len(c.named_tools))
         c.once("nc-tool-unknown", f"tool {text}: is not known here; it counts as T{number} without length")
@@ -250,6 +268,10 @@ def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple
         _put(block, "p", _value(text, c) + 1.0)
     elif name in ("G", "M"):
         _letter(block, c, name, _value(text, c), values)
+    elif f"_{name.lower()}" in c.parameters.shared:
+        block.sets.append((f"_{name.lower()}", _value(text, c)))
+    elif name == "RPL":
+        _put(block, "p", _value(text, c))
     elif len(name) == 1 and name in _WORDS:
         way = _WAY.match(text)
         value = _value(way[2] if way is not None else text, c)
@@ -275,10 +297,10 @@ def _called(block: Block, c: Controller, name: str, arguments: str) -> None:
         c.note("nc-message", arguments.strip().strip('"')[:200])
     elif name == "TRAORI":
         _keyword(block, c, name)
-    elif name == "CYCLE800" and not arguments.strip():
-        c.once("nc-ignored", "CYCLE800(): resets a swivel that is not on")
-    elif name in FRAMES or name == "CYCLE800":
-        raise InputError(f"{name}: turned or shifted frames are not read: post in the coordinates of the work offset")
+    elif name == "CYCLE800":
+        _swivel(c, arguments)
+    elif name in FRAMES:
+        leave_out(c, f"{name}: changed coordinates")
     elif name in CYCLES:
         block.hole = (name, [_value(x, c) if x.strip() else None for x in arguments.split(",")])
     elif name in JUMPS:
@@ -289,7 +311,52 @@ def _called(block: Block, c: Controller, name: str, arguments: str) -> None:
         c.gap("nc-call", f"{name}({arguments.strip()[:60]}): cycles and calls are not read: left out")
 
 
-def _keyword(block: Block, c: Controller, word: str) -> None:
+def _swivel(c: Controller, arguments: str) -> None:
+    """CYCLE800: only one that does not swivel or shift, or ends a swivel, is read."""
+    values = [x.strip() for x in re.sub(r'"[^"]*"', "", arguments).split(",")]
+    # X0 Y0 Z0, A B C, X1 Y1 Z1
+    if any(_value(x, c) != 0.0 for x in values[4:13] if x):
+        leave_out(c, "CYCLE800: a swivelled plane")
+        return
+    go_on(c)
+    c.once("nc-ignored", "CYCLE800: a plane that is not swivelled")
+
+
+def _define(body: str, c: Controller) -> None:
+    """DEF REAL and INT: names with their values, 0 without one."""
+    found = _DEFINITION.match(body)
+    assert found is not None
+    for part in found[2].split(",") if found[1] in ("REAL", "INT", "BOOL") else []:
+        name, _, value = part.partition("=")
+        if not re.fullmatch(r"\s*[A-Z_][A-Z0-9_]*\s*", name):
+            c.once("nc-ignored", f"DEF: {part.strip()[:40]}: is not read")
+            continue
+        c.parameters.assign(f"_{name.strip().lower()}", _value(value, c) if value.strip() else 0.0)
+
+
+def _frame(block: Block, c: Controller) -> None:
+    """TRANS, ROT and the like, with their axes; without any they end all of it."""
+    word, words = block.frame, block.words
+    given = {x: words.pop(x) for x in "xyzabcpijk" if x in words}
+    if not word.startswith("A") and not given:
+        go_on(c)
+        remove(c)
+    elif word not in PLACED:
+        leave_out(c, f"{word}: mirrored, scaled or tilted coordinates")
+    elif word.endswith("TRANS"):
+        shift = nine([given.get(x, 0.0) * (c.state.scale if x in "xyz" else 1.0) for x in AXES])
+        if word == "TRANS":
+            remove(c)
+        further(c, 0.0, shift)
+    elif given.keys() - {"z", "p"} or ("p" in given and c.state.plane != 170):
+        leave_out(c, f"{word}: coordinates that are tilted")
+    else:
+        if word == "ROT":
+            remove(c)
+        further(c, given.get("z", given.get("p", 0.0)), ZERO)
+
+
+def _keyword(block: Block, c: Controller, word: str, body: str = "") -> None:
     if word in ("TRAORI", "TRAFOOF"):
         c.state.tcp = word == "TRAORI"
         c.changed()
@@ -301,12 +368,14 @@ def _keyword(block: Block, c: Controller, word: str) -> None:
         c.note("nc-ignored", "RET: ends a subroutine: the text ends here")
         block.m.append(30)
     elif word in FRAMES:
-        raise InputError(f"{word}: turned or shifted frames are not read: post in the coordinates of the work offset")
+        block.frame = word
     elif word in JUMPS:
         raise InputError(f"{word}: jumps, loops and calls are not read: write out what they do")
     elif word in CURVES or word.startswith(("CYCLE", "POCKET", "SLOT", "HOLES")):
         _left_out(block, c, word)
     elif word in IDLE:
         c.once("nc-ignored", f"{word}: does not concern the path and is left out")
+    elif re.fullmatch(rf"(?:N[0-9]+\s*)?{re.escape(word)}\s*", body):
+        c.gap("nc-call", f"{word[:40]}: calls a program that is not here: left out")
     else:
         c.note("nc-unknown-word", f"{word[:40]}: is not known")

@@ -4,7 +4,8 @@ Notation: RTP retraction plane, RFP reference plane, SDIS safety distance above 
 (below RFP, without sign), DTB dwell at the bottom [s]. A cycle goes at rapid to RFP + SDIS, cuts to the bottom, and
 ends at rapid in RTP. Of CYCLE83 the first plunge FDEP or FDPR is that of all (DAM, which shortens the later ones, is
 left out); VARI 0 breaks chips, 1 clears them. CYCLE84 taps with the pitch PIT, or that of the metric size MPIT, at the
-speed SST.
+speed SST. CYCLE840 taps with a floating chuck at the speed that holds; without a pitch at the feed F, out with the
+spindle reversed, after DTB. SDAC is the sense of the spindle behind it.
 
 Reference: Siemens, Sinumerik 840D sl Programming Manual Cycles, "Drilling".
 """
@@ -16,7 +17,8 @@ from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.words import Block
 
 #: LinuxCNC's code of each cycle
-CYCLES = {"CYCLE81": 810, "CYCLE82": 820, "CYCLE83": 830, "CYCLE84": 331, "CYCLE85": 850, "CYCLE86": 860}
+CYCLES = {"CYCLE81": 810, "CYCLE82": 820, "CYCLE83": 830, "CYCLE84": 331, "CYCLE85": 850, "CYCLE86": 860,
+          "CYCLE840": 331}  # fmt: skip
 #: pitch [mm] of metric threads by their size
 PITCHES = {
     3: 0.5, 4: 0.7, 5: 0.8, 6: 1.0, 8: 1.25, 10: 1.5, 12: 1.75, 14: 2.0, 16: 2.0, 18: 2.5, 20: 2.5, 22: 2.5, 24: 3.0,
@@ -58,6 +60,8 @@ def hole_blocks(name: str, given: list[float | None], c: Controller) -> list[Blo
         c.once("nc-cycle", f"{name}: all plunges are as deep as the first")
     if name == "CYCLE84":
         cut = _tap(cut, args, c, normal, bottom)
+    if name == "CYCLE840":
+        cut = _floating_tap(cut, args, c, normal, bottom)
     if name == "CYCLE85" and args[6] is not None:
         cut.words["f"] = args[6]
     if name == "CYCLE86" and args[6] in (3.0, 4.0):
@@ -66,6 +70,8 @@ def hole_blocks(name: str, given: list[float | None], c: Controller) -> list[Blo
     ends = [Block(g=[910])] if not c.state.absolute else []
     if name == "CYCLE84" and args[6] in (3.0, 4.0, 5.0):
         after.m = [int(args[6] or 5.0)]
+    if name == "CYCLE840" and args[7] in (3.0, 4.0, 5.0):
+        after.m = [int(args[7] or 5.0)]
     if c.state.motion == 10:
         ends.append(Block(g=[10]))
     return [begin, cut, after, *ends]
@@ -83,12 +89,28 @@ def _pecks(cut: Block, args: dict[int, float | None], rfp: float, r: float) -> N
 
 
 def _tap(cut: Block, args: dict[int, float | None], c: Controller, normal: str, bottom: float) -> Block:
-    size, pitch, speed = args[7], args[8], args[10]
-    if pitch is None and size is not None:
-        pitch = PITCHES.get(round(abs(size)), 0.0) * (1.0 if size > 0.0 else -1.0) / c.state.scale
+    pitch, speed = _pitch(args[7], args[8], c), args[10]
     if not pitch:
         raise InputError("CYCLE84: PIT, or the metric size MPIT, must be given")
     if speed is None:
         raise InputError("CYCLE84: SST must be given: the spindle speed of tapping")
     words = {normal: bottom, "k": abs(pitch), "s": speed}
     return Block(words=words, g=[900, 331], m=[3 if pitch > 0.0 else 4])
+
+
+def _pitch(size: float | None, pitch: float | None, c: Controller) -> float:
+    """Pitch [units of the text] by PIT, else by the metric size MPIT; 0: neither is given."""
+    if pitch is None and size is not None:
+        return PITCHES.get(round(abs(size)), 0.0) * (1.0 if size > 0.0 else -1.0) / c.state.scale
+    return pitch or 0.0
+
+
+def _floating_tap(cut: Block, args: dict[int, float | None], c: Controller, normal: str, bottom: float) -> Block:
+    pitch = _pitch(args[9], args[10], c)
+    if pitch:
+        sense = [] if c.state.sense else [3 if pitch > 0.0 else 4]
+        return Block(words={normal: bottom, "k": abs(pitch)}, g=[900, 331], m=sense)
+    cut.g[-1] = 840 if c.state.sense >= 0 else 740
+    cut.words["p"] = args[5] or 0.0
+    cut.m = [] if c.state.sense else [3]
+    return cut

@@ -46,6 +46,7 @@ class Source:
     places : lines of a key, in order
     subs : line of ``sub`` by label
     numbers : line of a bare ``o`` by label: a subroutine in the manner of Fanuc
+    blocks : lines by N word, where GOTO has asked for one
     """
 
     name: str
@@ -54,6 +55,7 @@ class Source:
     places: dict[tuple[str, str], list[int]] = field(default_factory=dict)
     subs: dict[str, int] = field(default_factory=dict)
     numbers: dict[str, int] = field(default_factory=dict)
+    blocks: dict[int, list[int]] | None = None
 
     def keyword(self, line: int) -> str:
         """Keyword on a line."""

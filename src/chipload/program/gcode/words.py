@@ -38,6 +38,8 @@ class Block:
     number : N word, -1 without
     after : blocks that are carried out behind it
     hole : Sinumerik's drilling cycle, its name and its arguments; ``modal``: MCALL stands before it
+    macro, block_call : words of Fanuc's G65, and of M97 of a Haas
+    frame : Sinumerik's word that sets the coordinates (TRANS, ROT ...)
     """
 
     words: dict[str, float] = field(default_factory=dict)
@@ -49,6 +51,9 @@ class Block:
     after: list[Block] = field(default_factory=list)
     hole: tuple[str, list[float | None]] | None = None
     modal: bool = False
+    macro: dict[str, float] = field(default_factory=dict)
+    block_call: dict[str, float] = field(default_factory=dict)
+    frame: str = ""
 
 
 def bare(line: str) -> tuple[str, list[str]]:

@@ -1,23 +1,36 @@
-"""Cycles of conversational programs: pecking (1), dwell time (9), working plane (19); what a call of one does.
+"""Cycles of conversational programs: what CYCL DEF sets, and what a call carries out where the tool stands.
 
-Notation of cycle 1: the tool stands the set-up clearance DIST above the surface; DEPTH of the hole and PLNGNG of each
-plunge are counted from the surface down; before each plunge it stops ``advanced_stop`` above what is drilled.
+Notation of cycle 1 (pecking): the tool stands the set-up clearance DIST above the surface; DEPTH of the hole and PLNGNG
+of each plunge are counted from the surface down; before each plunge it stops ``advanced_stop`` above what is drilled.
+
+Cycles 7 (datum shift), 9 (dwell) and 220, 221 (patterns) act where they are defined. Turned, mirrored and scaled
+coordinates (8, 10, 11, 26) and a tilted plane (19) are not read: motions are left out until they end. A cycle that is
+not read is left out where it is called.
 """
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Iterator
 
 from chipload.errors import InputError
 from chipload.program.commands import DWELL, LINE, RAPID
-from chipload.program.heidenhain.q_cycles import CYCLES, LEFT_OUT
+from chipload.program.heidenhain import bore_cycles, q_cycles, words
+from chipload.program.heidenhain.formula import NotKnownError, q_number
+from chipload.program.heidenhain.state import ConversationalState
+from chipload.program.heidenhain.switches import datum_shift, leave_out
 from chipload.units import mm_s_from_mm_min
 
-#: plunges of one hole
-MOST_PLUNGES = 10_000
+#: plunges of one hole, holes of one pattern
+MOST_PLUNGES, MOST_HOLES = 10_000, 10_000
 #: cycles that move nothing and set nothing that concerns the path
-SILENT = (32, 247)
+SILENT = (13, 14, 20, 32)
+#: by what the coordinates are changed, and the value that leaves them as they are
+CHANGES = {8: ("mirrored", 0.0), 10: ("turned", 0.0), 11: ("scaled", 1.0), 19: ("tilted", 0.0), 26: ("scaled", 1.0)}
+PRESET, PATTERNS = 247, (220, 221)
 _VALUE = re.compile(r"([A-Z ]*?)\s*([-+]?\d*\.?\d+)\s*$")
+_CHANGED = re.compile(rf"(?:\b|(?<=\s))[A-Z]*\s*([-+]?)\s*({words.VALUE})")
 
 
 def advanced_stop(depth: float) -> float:
@@ -32,32 +45,52 @@ def advanced_stop(depth: float) -> float:
 class Cycles:
     """The cycle that a call carries out, and its values as they are read."""
 
-    def __init__(self) -> None:
+    def __init__(self, state: ConversationalState) -> None:
+        self.s = state
         self.number: int | None = None
         self.values: dict[int, float] = {}
         self.modal = False
+        self.preset: float | None = None
 
-    def define(self, number: int, part: int, body: str, scale: float) -> float | None:
-        """Read one block of a definition; returns the seconds that a dwell takes at once."""
+    def define(self, text: str) -> None:
+        """Carry out one block of a definition."""
+        found = re.match(r"CYCLE? DEF\s*(\d{1,6})\s*(?:\.\s*(\d{1,3}))?\s*(.*)", text)
+        if found is None:
+            raise InputError(f"{text!r}: CYCL DEF must have a number")
+        s, number, part, body = self.s, int(found[1]), int(found[2] or 0), found[3]
+        if number == 7:
+            if part > 0:
+                datum_shift(s, text, body)
+            return
+        for letters, digits, value in words.Q_VALUE.findall(body):
+            s.q.set(q_number(letters, digits), self._q_value(value))
         if number == 9:
-            return self._value(number, body) if part > 0 else None
-        if number == 19:
-            if part > 0 and any(float(x) != 0.0 for x in re.findall(r"[ABC]\s*([-+]?\d*\.?\d+)", body)):
-                raise InputError("CYCL DEF 19: a tilted working plane is not read: state the program in the work frame")
-            return None
-        if number == 1:
+            if part > 0:
+                s.dwell(self._value(number, body))
+        elif number == 1:
             if part == 0:
-                self.number, self.values, self.modal = 1, {}, False
+                self.number, self.values = 1, {}
             else:
                 value = self._value(number, body)
-                self.values[part] = value if part == 4 else value * scale
-            return None
-        if number in CYCLES or number in LEFT_OUT:
-            self.number, self.values, self.modal = number, {}, False
-            return None
-        if number not in SILENT:
-            raise InputError(f"CYCL DEF {number}: is not read: write its motions")
-        return None
+                self.values[part] = value if part == 4 else value * s.scale
+        elif number in CHANGES:
+            self._change(text, number, part, body)
+        elif number == PRESET:
+            self._choose_preset(text)
+        elif number in PATTERNS:
+            self._pattern(number)
+        elif number in q_cycles.LEFT_OUT:
+            self.number, self.values = number, {}
+        elif number not in SILENT:
+            s.unproven("heidenhain-cycle", f"CYCL DEF {number}: is not read: left out")
+
+    def _q_value(self, text: str) -> float:
+        if text.endswith("MAX"):
+            return q_cycles.MAX
+        if text.endswith("AUTO"):
+            # the feed that lasts, in units of the text
+            return self.s.need() * 60.0 / self.s.scale
+        return self.s.q.formula(text)
 
     def _value(self, number: int, body: str) -> float:
         found = _VALUE.fullmatch(body)
@@ -68,10 +101,53 @@ class Cycles:
             raise InputError(f"CYCL DEF {number}: {body!r}: must be below 1e6")
         return value
 
-    def call(self, z: float) -> list[tuple[int, float, float]]:
-        """(motion, z [mm], feed [mm/s] or time [s]) of the hole under ``z``."""
-        if self.number is None:
+    def _change(self, text: str, number: int, part: int, body: str) -> None:
+        """Coordinates that are not read, or the end of them."""
+        how, none = CHANGES[number]
+        if part == 0:
+            return
+        values = [self.s.signed(sign, value) for sign, value in _CHANGED.findall(body)]
+        changes = bool(re.search(r"[XYZ]", body)) if number == 8 else any(value != none for value in values)
+        if changes:
+            leave_out(self.s, f"{text[:60]}: {how} coordinates are not read: motions are left out until they end")
+        elif how in self.s.left_out:
+            self.s.left_out = ""
+
+    def _choose_preset(self, text: str) -> None:
+        chosen = self.s.q.values.get(339)
+        if self.preset is not None and chosen != self.preset:
+            self.s.unproven(
+                "heidenhain-datum", f"{text[:40]}: another preset, which is not known here, counts as the first"
+            )
+        elif self.preset is None:
+            self.preset = chosen
+
+    # -- calls ------------------------------------------------------------------------------------------------
+    def call(self) -> None:
+        """Carry out the cycle where the tool stands."""
+        s, number = self.s, self.number
+        if s.left_out:
+            return
+        if s.unknown:
+            raise NotKnownError("a cycle is called where the tool stands, which is not known: move there first")
+        s.end_contour()
+        if number is None:
             raise InputError("a cycle is called and none is defined: give CYCL DEF 1")
+        if number == 1:
+            for motion, z, value in self._pecks(s.at[2]):
+                s.plunge(motion, z, value)
+        elif number in bore_cycles.CYCLES:
+            self._bore(number)
+        elif number in q_cycles.CYCLES:
+            self._drill(number)
+        else:
+            s.unproven("heidenhain-cycle", f"CYCL DEF {number}: is not read: what it cuts here is left out")
+
+    def _q(self, key: int, default: float | None) -> float:
+        return default if default is not None and key not in self.s.q.values else self.s.q.read(key)
+
+    def _pecks(self, z: float) -> Iterator[tuple[int, float, float]]:
+        """(motion, z [mm], feed [mm/s] or time [s]) of a hole of cycle 1 under ``z``."""
         missing = [k for k in (1, 2, 3, 5) if k not in self.values]
         if missing:
             raise InputError(f"CYCL DEF 1.{missing[0]}: is missing: define the cycle whole")
@@ -82,14 +158,99 @@ class Cycles:
         if depth / plunge > MOST_PLUNGES:
             raise InputError(f"CYCL DEF 1: more than {MOST_PLUNGES} plunges: raise PLNGNG")
         surface = z - distance
-        out: list[tuple[int, float, float]] = []
         done = 0.0
         while done < depth:
             if done > 0.0:
-                out.append((RAPID, surface - done + advanced_stop(depth), 0.0))
+                yield RAPID, surface - done + advanced_stop(depth), 0.0
             done = min(done + plunge, depth)
-            out.append((LINE, surface - done, feed))
+            yield LINE, surface - done, feed
             if done >= depth and dwell > 0.0:
-                out.append((DWELL, surface - done, dwell))
-            out.append((RAPID, z, 0.0))
+                yield DWELL, surface - done, dwell
+            yield RAPID, z, 0.0
+
+    def _drill(self, number: int) -> None:
+        s = self.s
+        if number == 202:
+            s.note("nc-fine-boring", "CYCL DEF 202: the shift away from the wall is left out")
+        # tapping starts the spindle itself
+        before, sense = s.sense, (s.sense or 1.0) if number in (206, 207, 209) else s.sense
+        s.sense = sense
+        for kind, z, value in q_cycles.q_cycle_steps(number, self._q, s.speed / math.tau, s.scale):
+            if kind == q_cycles.SPIN:
+                s.sense = value * sense
+            else:
+                s.plunge(kind, z, value)
+        s.sense = before
+
+    def _bore(self, number: int) -> None:
+        s, radius = self.s, self.s.radius()
+        if radius is None:
+            raise NotKnownError(
+                f"CYCL DEF {number}: no radius of tool {s.tool} is known: what it cuts here is left out: state R in "
+                f"TOOL DEF, D in a tool table, or a [[cutter]] with number = {s.tool}"
+            )
+        x0, y0 = s.at[:2]
+        for kind, x, y, z, feed, centre, turns in bore_cycles.bore_steps(number, self._q, radius, s.scale):
+            s.at = [x0 + x, y0 + y, z, *s.at[3:]]
+            s.row(kind, s.at, feed, (x0 + centre[0], y0 + centre[1]) if turns else (0.0, 0.0), turns)
+
+    # -- patterns ---------------------------------------------------------------------------------------------
+    def _pattern(self, number: int) -> None:
+        """220 (holes on a circle) and 221 (rows): the cycle defined last, at each hole."""
+        s = self.s
+        surface = s.scale * self._q(203, None)
+        away = surface + s.scale * max(abs(self._q(200, None)), self._q(204, 0.0))
+        between = surface + s.scale * abs(self._q(200, None)) if self._q(301, 1.0) == 0.0 else away
+        holes = self._circle() if number == 220 else self._rows()
+        level = away
+        for x, y in holes:
+            if 2 in s.unknown or s.at[2] < level:
+                s.plunge(RAPID, level, 0.0)
+            s.unknown.clear()
+            s.straight(RAPID, [x, y, *s.at[2:]])
+            self.call()
+            level = between
+        s.plunge(RAPID, away, 0.0)
+
+    def _count(self, key: int) -> int:
+        value = self._q(key, None)
+        if not 1 <= value <= MOST_HOLES:
+            raise InputError(f"Q{key} = {value:g}: must be from 1 to {MOST_HOLES}")
+        return round(value)
+
+    def _circle(self) -> list[tuple[float, float]]:
+        q, scale = self._q, self.s.scale
+        x, y, r = scale * q(216, None), scale * q(217, None), 0.5 * scale * q(244, None)
+        count, start, step = self._count(241), q(245, 0.0), q(247, 0.0)
+        if step == 0.0:
+            span = q(246, 360.0) - start
+            step = span / (count if abs(abs(span) - 360.0) < 1e-9 else max(1, count - 1))
+        angles = [math.radians(start + k * step) for k in range(count)]
+        return [(x + r * math.cos(a), y + r * math.sin(a)) for a in angles]
+
+    def _rows(self) -> list[tuple[float, float]]:
+        """Row by row, there and back; the first hole is about which the rows are turned (Q224)."""
+        q, scale = self._q, self.s.scale
+        x, y = scale * q(225, None), scale * q(226, None)
+        columns, rows = self._count(242), self._count(243)
+        if columns * rows > MOST_HOLES:
+            raise InputError(f"Q242 x Q243 = {columns * rows}: must be at most {MOST_HOLES}")
+        apart = scale * q(237, 0.0), scale * q(238, 0.0)
+        turn = math.radians(q(224, 0.0))
+        out = []
+        for j in range(rows):
+            for i in range(columns) if j % 2 == 0 else reversed(range(columns)):
+                a, b = i * apart[0], j * apart[1]
+                out.append((x + a * math.cos(turn) - b * math.sin(turn), y + a * math.sin(turn) + b * math.cos(turn)))
         return out
+
+
+def call_positions(s: ConversationalState, end: list[float]) -> None:
+    """CYCL CALL POS: at rapid to a place, above first."""
+    if 2 in s.unknown or end[2] >= s.at[2]:
+        s.plunge(RAPID, end[2], 0.0)
+        s.straight(RAPID, end)
+    else:
+        s.straight(RAPID, [*end[:2], *s.at[2:]])
+        s.plunge(RAPID, end[2], 0.0)
+    s.unknown.clear()

@@ -1,6 +1,7 @@
 """Q parameters and formulas of conversational programs.
 
-Notation: Qn a number; what the controller would put into one (SYSREAD, a probe) is not known and never guessed.
+Notation: Qn, QLn (of one program) and QRn (kept) are numbers; what the controller would put into one (SYSREAD, a probe)
+is not known and never guessed, nor is what is calculated from it.
 """
 
 from __future__ import annotations
@@ -11,11 +12,38 @@ from collections.abc import Callable, Mapping
 
 from chipload.errors import InputError
 
-#: numbers of Q parameters
+#: numbers of Q parameters; QL0 is kept as number 10000, QR0 as 20000
 LAST_Q = 2000
+FIRST = {"Q": 0, "QL": 10_000, "QR": 20_000}
 #: nesting of a formula, and its largest result
 DEPTH, LARGEST = 40, 1e15
-_TOKEN = re.compile(r"\s*(?:(\d+\.?\d*|\.\d+)|(Q)\s*(\d+)|([A-Z]+)|([-+*/^()]))")
+_Q = re.compile(r"(Q[LR]?)\s*(\d+)")
+_TOKEN = re.compile(r"\s*(?:(\d+\.?\d*|\.\d+)|(Q[LR]?)\s*(\d+)|([A-Z]+)|([-+*/^()]))")
+
+
+class NotKnownError(InputError):
+    """A value that only the controller, or the operator, knows: the block that needs it is left out."""
+
+
+def q_number(letters: str, digits: str) -> int:
+    """The number under which a parameter is kept.
+
+    >>> q_number("Q", "5"), q_number("QL", "5")
+    (5, 10005)
+    """
+    if len(digits) > 9 or int(digits) >= LAST_Q:
+        raise InputError(f"{letters}{digits[:12]}: must be from {letters}0 to {letters}{LAST_Q - 1}")
+    return FIRST[letters] + int(digits)
+
+
+def q_name(number: int) -> str:
+    """The name of a parameter.
+
+    >>> q_name(10005)
+    'QL5'
+    """
+    letters = max(FIRST, key=lambda x: (FIRST[x] <= number, FIRST[x]))
+    return f"{letters}{number - FIRST[letters]}"
 
 
 def _sign(x: float) -> float:
@@ -48,24 +76,36 @@ class QParameters:
 
     def __init__(self, given: Mapping[int, float]) -> None:
         self.given = dict(given)
+        #: parameters that were calculated from one that is not known, and that one
+        self.roots: dict[int, int] = {}
         self.values: dict[int, float | None] = dict(given)
 
     def read(self, number: int) -> float:
         """The value of Q ``number``."""
         if number not in self.values:
-            raise InputError(f"Q{number} is read before it is set: set it")
+            raise InputError(f"{q_name(number)} is read before it is set: set it")
         value = self.values[number]
         if value is None:
-            raise InputError(
-                f"Q{number} comes from the controller and is not known here: state it in program.parameters"
+            number = self.roots.get(number, number)
+            raise NotKnownError(
+                f"{q_name(number)} comes from the controller and is not known here: state it in program.parameters"
             )
         return value
 
     def set(self, number: int, value: float | None) -> None:
         """Put a value into Q ``number``; None: from the controller, unless it was given."""
-        if not 0 <= number < LAST_Q:
-            raise InputError(f"Q{number}: must be from Q0 to Q{LAST_Q - 1}")
+        self.roots.pop(number, None)
         self.values[number] = self.given.get(number) if value is None else value
+
+    def assign(self, number: int, *formulas: str, by: Callable[..., float] = lambda x: x) -> None:
+        """Put the value of formulas into Q ``number``; one that is not known makes it unknown too."""
+        try:
+            self.set(number, by(*(self.formula(text) for text in formulas)))
+        except NotKnownError:
+            unknown = [q_number(*found) for text in formulas for found in _Q.findall(text)]
+            root = next(k for k in unknown if self.values.get(k, 0.0) is None)
+            self.set(number, None)
+            self.roots[number] = self.roots.get(root, root)
 
     def formula(self, text: str) -> float:
         """The value of a formula.
@@ -152,7 +192,7 @@ class _Formula:
         if token[1] is not None:
             return _bounded(float(token[1]))
         if token[2] is not None:
-            return self.parameters.read(int(token[3]))
+            return self.parameters.read(q_number(token[2], token[3]))
         if token[4] == "PI":
             return math.pi
         if token[4] in FUNCTIONS:

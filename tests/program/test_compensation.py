@@ -9,7 +9,7 @@ import shapely
 
 from chipload.errors import InputError
 from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, RAPID, XY, YZ, ZX
-from chipload.program.gcode.compensation import Compensation
+from chipload.program.compensation import Compensation
 from rs274 import MISSING, Refused, canonical, rs274_installed
 
 

@@ -11,6 +11,8 @@ plane: one motion, and what follows it without moving in the plane, is held back
 The rules are those of LinuxCNC ("Tool Compensation" in its manual): the first motion leads to the offset of its own
 end, a change of direction below 0.05 rad is no corner, and what the tool does not fit into is refused. As there, a
 line that its corners turned back is not noticed where an arc follows it round a corner, or nothing but a smooth one.
+With ``square`` the first motion ends square to the start of the contour that follows it, and may be of any length, as
+a Heidenhain carries out RL and RR (iTNC 530 User's Manual, "Tool Radius Compensation").
 """
 
 from __future__ import annotations
@@ -68,6 +70,7 @@ class Compensation:
     shift : (2,) from the tool's centre to the point that is commanded, in the plane's axes [mm]
     slack : by how much an arc may turn more than programmed before it is refused [rad]; LinuxCNC's is 0.0254 in a text
         in mm, 0.001 in one in inches
+    square : the first motion ends square to the start of the contour
 
     Raises
     ------
@@ -84,6 +87,7 @@ class Compensation:
         *,
         shift: tuple[float, float] = (0.0, 0.0),
         slack: float = 0.0254,
+        square: bool = False,
     ) -> None:
         if plane == YZ:
             raise InputError("radius compensation: not in the plane YZ (G19): select G17 or G18")
@@ -91,7 +95,7 @@ class Compensation:
         self._radius = abs(radius)
         self._first, self._second, self._along = PLANE_AXES[plane]
         self._shift = complex(*shift)
-        self._slack = slack
+        self._slack, self._square = slack, square
         self._programmed = self._centre = tuple(start)
         self._held: list[CentreMove] = []
         self._front: _Offset | None = None
@@ -114,7 +118,9 @@ class Compensation:
             return self._pass(CentreMove(motion, tuple(end), (0.0, 0.0), 0, payload))
         length = abs(b - a)
         if self._front is None:
-            if length <= r:
+            if length == 0.0 and self._square:
+                return self._pass(CentreMove(motion, tuple(end), (0.0, 0.0), 0, payload))
+            if length <= r and not self._square:
                 raise self._short(length)
             u = (b - a) / length
             normal = self._side * 1j * r * u
@@ -171,6 +177,9 @@ class Compensation:
         """Join ``new`` to the front; what is final."""
         front, c = self._front, self._flat(self._centre)
         assert front is not None
+        if front.entry and self._square:
+            self._trim(new.m)
+            return self._append(new, end, payload)
         # from the direction to the tool's centre to its direction beside the new motion, > 0 away from the tool
         away = -self._side * cmath.phase((new.m - corner) / (c - corner))
         if away < -0.5 * math.pi:
@@ -250,7 +259,7 @@ class Compensation:
             raise self._gouge("a line between two corners", "use a smaller tool or a longer line")
 
     def _pass(self, move: CentreMove) -> list[CentreMove]:
-        """With a radius of 0 the contour is the path."""
+        """A motion as it is programmed: with a radius of 0, and before the first motion in the plane."""
         self._programmed = self._centre = move.end
         return [self._out(move)]
 

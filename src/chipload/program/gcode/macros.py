@@ -1,0 +1,189 @@
+"""Macro statements of a Fanuc: IF, GOTO, WHILE and DO, G65 with arguments, M97 of a Haas.
+
+Notation: lines count from 0. GOTO n leads to the next block N n, from the start of the text again where none follows. A
+parameter that nothing has set is vacant (#0): ``#1 EQ #0`` asks for that.
+
+Reference: Fanuc Series 0i-MF Operator's Manual, "Custom Macro".
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from chipload.errors import InputError
+from chipload.program.gcode.controller import Controller
+from chipload.program.gcode.dialect import NotReadError
+from chipload.program.gcode.expression import integer_of, read_value
+from chipload.program.gcode.source import Source
+from chipload.program.gcode.words import bare
+
+if TYPE_CHECKING:
+    from chipload.program.gcode.flow import Flow
+
+_START = r"(?:/[1-9]?)?(?:n[0-9]+)?"
+_STATEMENT = re.compile(rf"{_START}(if\[|while\[|goto|end[1-9]|do[1-9])")
+_TO = re.compile(r"goto(?P<value>[0-9]+|#|\[)")
+_NUMBER = re.compile(r"^[ \t]*(?:/[1-9]?[ \t]*)?[nN][ \t]*0*([0-9]+)", re.MULTILINE)
+_VACANT = re.compile(r"#([0-9]{1,4})(eq|ne)#0(?![0-9])")
+_ASSIGN = re.compile(rf"({_START}#(?:[0-9]+|\[[^\]=]*\]))=(.*)\Z", re.DOTALL)
+#: parameter of each argument of G65
+ARGUMENTS = dict(
+    zip(
+        "abcijkdefhmqrstuvwxyz",
+        (1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 13, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26),
+        strict=True,
+    )
+)
+#: setting this parameter stops the program with an alarm
+ALARM = 3000
+#: statements that write to a file or name parameters
+OUTPUTS = re.compile(rf"{_START}(popen|pclos|dprnt|bprnt|setvn)")
+
+
+def macro_step(flow: Flow, raw: str) -> bool:
+    """Carry out a macro statement; whether the line is one.
+
+    Raises
+    ------
+    InputError
+        A statement cannot be read, or what it leads to is not there.
+    """
+    text, comments = bare(raw)
+    text = text.replace("(", "")
+    found = _STATEMENT.match(text)
+    if found is None:
+        return False
+    for comment in comments:
+        flow.i.comment(comment)
+    word, rest = found[1].rstrip("["), text[found.end(1) :]
+    if word == "goto":
+        flow.line = target(flow, text[found.start(1) :])
+    elif word == "if":
+        _choose(flow, rest)
+    elif word == "while":
+        value, rest = _condition(flow, rest)
+        if not re.fullmatch(r"do[1-9]", rest):
+            raise InputError(f"{rest[:12]!r}: WHILE[...] is followed by DO and a number")
+        flow.line = flow.line + 1 if value else _end_of(flow.source, flow.line, rest[2:]) + 1
+    elif word.startswith("do"):
+        flow.line += 1
+    else:
+        flow.line = _head_of(flow.source, flow.line, word[3:])
+    return True
+
+
+def _condition(flow: Flow, rest: str) -> tuple[bool, str]:
+    """The value of a condition whose [ stands before ``rest``, and what follows it."""
+    numbered = flow.c.parameters.numbered
+    text = f"[{_VACANT.sub(lambda m: str(int((int(m[1]) not in numbered) == (m[2] == 'eq'))), rest)}"
+    value, end = read_value(text, 0, flow.c.parameters)
+    return value != 0.0, text[end:]
+
+
+def _choose(flow: Flow, rest: str) -> None:
+    """IF[...]GOTO n and IF[...]THEN with an assignment."""
+    taken, rest = _condition(flow, rest)
+    if rest.startswith("goto"):
+        flow.line = target(flow, rest) if taken else flow.line + 1
+    elif rest.startswith("then"):
+        if taken:
+            flow.statement(rest[4:])
+        flow.line += 1
+    else:
+        raise InputError(f"{rest[:12]!r}: IF[...] is followed by GOTO or THEN")
+
+
+def target(flow: Flow, text: str) -> int:
+    """The line that GOTO leads to."""
+    found = _TO.match(text)
+    if found is None:
+        raise InputError(f"{text[:12]!r}: GOTO is followed by the number of a block")
+    value, end = read_value(text, found.start("value"), flow.c.parameters)
+    if text[end:]:
+        raise InputError(f"{text[end : end + 12]!r}: nothing may follow GOTO")
+    return block_number(flow.source, flow.line, integer_of(value, "GOTO"))
+
+
+def block_number(source: Source, line: int, number: int) -> int:
+    """Line of the block N ``number``: the next one, else the first one."""
+    if source.blocks is None:
+        source.blocks = {}
+        for k, text in enumerate(source.lines):
+            hit = _NUMBER.match(text)
+            if hit is not None:
+                source.blocks.setdefault(int(hit[1][:12]), []).append(k)
+    places = source.blocks.get(number, [])
+    if not places:
+        raise InputError(f"GOTO {number}: there is no block N{number}")
+    return next((k for k in places if k > line), places[0])
+
+
+def _marks(source: Source, k: int, pattern: str) -> bool:
+    return re.search(pattern, "".join(source.lines[k].split("(")[0].split()).lower()) is not None
+
+
+def _end_of(source: Source, line: int, number: str) -> int:
+    for k in range(line + 1, len(source.lines)):
+        if _marks(source, k, rf"^{_START}end{number}$"):
+            return k
+    raise InputError(f"DO{number}: END{number} is missing")
+
+
+def _head_of(source: Source, line: int, number: str) -> int:
+    for k in range(line - 1, -1, -1):
+        if _marks(source, k, rf"do{number}$"):
+            return k
+    raise InputError(f"END{number}: DO{number} is missing before it")
+
+
+def with_brackets(text: str) -> str:
+    """An assignment whose value needs no brackets on a Fanuc, in LinuxCNC's words.
+
+    >>> with_brackets("#101=#100/2.")
+    '#101=[#100/2.]'
+    """
+    found = _ASSIGN.match(text)
+    return f"{found[1]}=[{found[2]}]" if found is not None and found[2] else text
+
+
+def call_macro(flow: Flow, words: dict[str, float]) -> None:
+    """G65: a subroutine of this text with parameters of its own."""
+    label = str(integer_of(words.get("p", -1.0), "P"))
+    place = flow.main.numbers.get(label)
+    if place is None:
+        raise NotReadError(f"G65 P{label}: there is no O{label} in this text")
+    times = integer_of(words.get("l", 1.0), "L")
+    flow.enter_macro(place, label, max(1, times))
+    numbered = flow.c.parameters.numbered
+    for number in range(1, 34):
+        numbered.pop(number, None)
+    for letter, number in ARGUMENTS.items():
+        if letter in words:
+            numbered[number] = words[letter]
+
+
+def system_variables(c: Controller) -> dict[int | str, Callable[[], float]]:
+    """Parameters that mirror the state: codes that hold, F, S, T, and where the tool is."""
+    state = c.state
+
+    def place(k: int) -> Callable[[], float]:
+        return lambda: state.at[k] / (state.scale if k < 3 else 1.0)
+
+    out: dict[int | str, Callable[[], float]] = {
+        4001: lambda: 0.0 if state.motion == 800 else state.motion / 10.0,
+        4002: lambda: state.plane / 10.0,
+        4003: lambda: 90.0 if state.absolute else 91.0,
+        4005: lambda: state.feed_mode / 10.0,
+        4006: lambda: 20.0 if state.scale != 1.0 else 21.0,
+        4007: lambda: state.compensation / 10.0,
+        4010: lambda: 98.0 if state.old_level else 99.0,
+        4014: lambda: 53.0 + state.datum.number if state.datum.number < 7 else 54.1,
+        4109: lambda: state.feed / state.scale,
+        4119: lambda: state.speed,
+        4120: lambda: float(state.tool),
+    }
+    for first in (5001, 5041, 5061):
+        out |= {first + k: place(k) for k in range(6)}
+    return out

@@ -1,0 +1,255 @@
+"""Motions of conversational programs: L and LP, C, CR, CT and CP about poles CC, approach and departure.
+
+Notation: ``text`` is a block without its first word; DR+ counter-clockwise; PR, PA polar coordinates about the pole.
+Approaches (APPR) go straight to the start of the contour, departures (DEP), roundings (RND) and chamfers (CHF) are left
+out: findings say so. A motion in the machine's own coordinates (M91) is left out: where they lie in the work is not
+known.
+
+Reference: Heidenhain, iTNC 530 User's Manual HEIDENHAIN Conversational, "Programming: Programming Contours".
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+import re
+
+from chipload.errors import InputError
+from chipload.program.commands import LINE, RAPID
+from chipload.program.heidenhain import words
+from chipload.program.heidenhain.formula import NotKnownError
+from chipload.program.heidenhain.state import ConversationalState
+from chipload.program.heidenhain.switches import after, before, m_codes
+
+#: an arc may end so much nearer to its pole than it begins, or farther [mm]
+ROUNDED = 0.02
+MOST_TURNS = 10_000
+_SPAN = re.compile(rf"\bIPA\s*([-+]?)\s*({words.VALUE})")
+
+
+def line(s: ConversationalState, text: str) -> None:
+    """L: a straight motion; or only functions, where no axis is named."""
+    codes, fast = _read(s, text)
+    end, named = s.ends(text)
+    _straight(s, text, end, named, codes, fast)
+
+
+def polar_line(s: ConversationalState, text: str) -> None:
+    """LP: a straight motion to polar coordinates; the one that is missing stays."""
+    codes, fast = _read(s, text)
+    end, named = s.ends(words.POLAR.sub(" ", text))
+    x, y = _centre(s)
+    radius, angle = cmath.polar(complex(s.at[0] - x, s.at[1] - y))
+    if {0, 1} & s.unknown and len(words.POLAR.findall(text)) < 2:
+        raise NotKnownError("LP: where the tool stands is not known: give PR and PA")
+    for step, letter, sign, value in words.POLAR.findall(text):
+        amount = s.signed(sign, value)
+        if letter == "R":
+            radius = amount * s.scale + (radius if step else 0.0)
+        else:
+            angle = math.radians(amount) + (angle if step else 0.0)
+    end[0], end[1] = x + radius * math.cos(angle), y + radius * math.sin(angle)
+    _straight(s, text, end, named | {0, 1}, codes, fast)
+
+
+def _straight(
+    s: ConversationalState, text: str, end: list[float], named: set[int], codes: list[int], fast: bool
+) -> None:
+    before(s, codes)
+    if s.left_out:
+        s.unknown |= {k for k in named if k < 3}
+    elif named and 91 in codes:
+        s.note("heidenhain-m91", "M91: a motion in the machine's own coordinates is left out")
+        s.end_contour()
+        s.unknown |= {k for k in named if k < 3}
+    elif named:
+        if 92 in codes:
+            raise InputError("M92: coordinates of the machine builder's point are not known here")
+        s.select(_side(s, text), named)
+        s.unknown -= named
+        s.straight(RAPID if fast else LINE, end)
+    else:
+        s.select(_side(s, text), named)
+    _retract(s, text)
+    after(s, codes)
+
+
+def _retract(s: ConversationalState, text: str) -> None:
+    """M140: back along the tool, which stands upright here."""
+    found = words.RETRACT.search(text)
+    if found is None:
+        return
+    s.end_contour()
+    if found[1] == "MAX" or 2 in s.unknown:
+        s.note("heidenhain-m91", "M140: a retraction to where only the machine knows is left out")
+        s.unknown.add(2)
+    else:
+        s.plunge(RAPID, s.at[2] + abs(s.amount(found[1])) * s.scale, 0.0)
+
+
+def pole(s: ConversationalState, text: str) -> None:
+    """CC: the pole; without coordinates it is where the tool stands."""
+    end, named = s.ends(text)
+    if not named and {0, 1} & s.unknown:
+        raise NotKnownError("CC: where the tool stands is not known: give X and Y")
+    for k in (0, 1):
+        if k in named or not named:
+            s.pole[k] = end[k]
+
+
+def arc(s: ConversationalState, text: str) -> None:
+    """C: an arc about the pole."""
+    codes, fast = _read(s, text)
+    sense = _sense(text, "C")
+    end, _ = s.ends(text)
+    _arc(s, text, end, _centre(s), sense, codes, fast)
+
+
+def arc_of_radius(s: ConversationalState, text: str) -> None:
+    """CR: an arc by its radius; below 0 it is the longer one of the two."""
+    found = words.RADIUS.search(text)
+    if found is None:
+        raise InputError("CR: R is missing: the radius")
+    without = words.RADIUS.sub(" ", text)
+    codes, fast = _read(s, without)
+    sense = _sense(text, "CR")
+    end, _ = s.ends(without)
+    _placed(s)
+    radius = s.signed(found[1], found[2]) * s.scale
+    start, chord = complex(*s.at[:2]), complex(end[0] - s.at[0], end[1] - s.at[1])
+    under = radius**2 - 0.25 * abs(chord) ** 2
+    if abs(chord) < 1e-9 or under < -ROUNDED * abs(radius):
+        raise InputError(f"CR: the radius {radius:g} mm does not reach from start to end: {abs(chord):.6g} mm apart")
+    out = math.copysign(math.sqrt(max(under, 0.0)), radius * sense)
+    centre = start + 0.5 * chord + 1j * chord / abs(chord) * out
+    _arc(s, text, end, (centre.real, centre.imag), sense, codes, fast)
+
+
+def tangent_arc(s: ConversationalState, text: str) -> None:
+    """CT: an arc that goes on in the direction of the motion before it."""
+    codes, fast = _read(s, text)
+    end, named = s.ends(text)
+    _placed(s)
+    if s.heading is None:
+        raise NotKnownError("CT: the direction before it is not known: move in the plane first")
+    chord = complex(end[0] - s.at[0], end[1] - s.at[1])
+    across = (chord / (1j * s.heading)).real
+    if abs(across) < 1e-9:
+        _straight(s, text, end, named, codes, fast)
+        return
+    centre = complex(*s.at[:2]) + 1j * s.heading * abs(chord) ** 2 / (2.0 * across)
+    _arc(s, text, end, (centre.real, centre.imag), 1 if across > 0.0 else -1, codes, fast)
+
+
+def helix(s: ConversationalState, text: str) -> None:
+    """CP: about the pole, by IPA or to PA, with a rise along Z."""
+    sweep, to = _SPAN.search(text), words.POLAR.search(text)
+    sense = _sense(text, "CP")
+    if sweep is None and (to is None or to[2] != "A"):
+        raise InputError("CP: IPA or PA must be given")
+    without = words.POLAR.sub(" ", text)
+    codes, fast = _read(s, without)
+    end, _ = s.ends(without)
+    x, y = _centre(s)
+    _placed(s)
+    vx, vy = s.at[0] - x, s.at[1] - y
+    if sweep is not None:
+        angle = math.radians(s.signed(sweep[1], sweep[2]))
+        if angle * sense < 0.0:
+            raise InputError("CP: IPA and DR have different signs")
+    else:
+        assert to is not None
+        angle = sense * ((sense * (math.radians(s.signed(to[3], to[4])) - math.atan2(vy, vx))) % math.tau or math.tau)
+    end[0] = x + vx * math.cos(angle) - vy * math.sin(angle)
+    end[1] = y + vx * math.sin(angle) + vy * math.cos(angle)
+    turns = max(1, math.ceil(abs(angle) / math.tau - 1e-9))
+    if turns > MOST_TURNS:
+        raise InputError(f"CP: {turns} turns: must be at most {MOST_TURNS}")
+    _arc(s, text, end, (x, y), sense * turns, codes, fast)
+
+
+def approach(s: ConversationalState, text: str) -> None:
+    """APPR: straight to the start of the contour."""
+    s.unproven("heidenhain-approach", f"APPR {text.strip()[:40]}: the approach is taken as a straight line")
+    found = re.match(r"\s*(P?L?C?[TN]|PLCT|LCT)\s*(.*)", text)
+    rest = re.sub(rf"\b(?:LEN|CCA)\s*[-+]?(?:{words.VALUE})", " ", found[2] if found else text)
+    rest = words.RADIUS.sub(" ", rest)
+    (polar_line if words.POLAR.search(rest) else line)(s, rest)
+
+
+def unread_corner(s: ConversationalState, text: str) -> None:
+    """RND, CHF and DEP: left out."""
+    what = "the departure" if text.startswith("DEP") else "the corner stays sharp: its rounding or chamfer"
+    s.unproven("heidenhain-corner", f"{text[:40]}: {what} is left out")
+    s.feed_of(text)
+
+
+def _read(s: ConversationalState, text: str) -> tuple[list[int], bool]:
+    """M functions and whether at rapid; words that nothing reads are refused: they may move something."""
+    fast = s.feed_of(text)
+    left = words.rest_of(
+        text, words.RETRACT, words.SETTINGS, words.POLAR, words.AXIS, words.TURN_FEED, words.FEED, words.M_CODE,
+        words.SIDE, words.TURN,
+    )  # fmt: skip
+    if left:
+        raise InputError(f"{left[:40]!r}: is not read in a motion")
+    return m_codes(text), fast
+
+
+def _side(s: ConversationalState, text: str) -> int:
+    """Side of the tool: that of the block, else the one that lasts."""
+    found = words.SIDE.search(text)
+    return s.side if found is None else {"L": 1, "R": -1, "0": 0}[found[1]]
+
+
+def _sense(text: str, word: str) -> int:
+    turn = words.TURN.search(text)
+    if turn is None:
+        raise InputError(f"{word}: DR+ or DR- is missing")
+    return 1 if turn[1] == "+" else -1
+
+
+def _centre(s: ConversationalState) -> tuple[float, float]:
+    x, y = s.pole
+    if x is None or y is None:
+        raise InputError("the pole is not known: give CC X Y first")
+    return x, y
+
+
+def _placed(s: ConversationalState) -> None:
+    if {0, 1} & s.unknown:
+        raise NotKnownError("an arc begins where the tool stands, which is not known: move there first")
+
+
+def _arc(
+    s: ConversationalState,
+    text: str,
+    end: list[float],
+    centre: tuple[float, float],
+    turns: int,
+    codes: list[int],
+    fast: bool,
+) -> None:
+    _placed(s)
+    x, y = centre
+    r0, r1 = math.hypot(s.at[0] - x, s.at[1] - y), math.hypot(end[0] - x, end[1] - y)
+    if r0 < 1e-9 or abs(r1 - r0) > ROUNDED:
+        raise InputError(
+            f"an arc begins {r0:.6g} mm from its pole and ends {r1:.6g} mm from it: must agree to {ROUNDED:g} mm"
+        )
+    if fast:
+        raise InputError("an arc at FMAX is not read: give its feed")
+    # the text rounds: the centre moves along the chord's bisector until both ends are as far
+    dx, dy = end[0] - s.at[0], end[1] - s.at[1]
+    chord = math.hypot(dx, dy)
+    if chord > 1e-9:
+        mx, my = 0.5 * (end[0] + s.at[0]), 0.5 * (end[1] + s.at[1])
+        along = (-dy * (x - mx) + dx * (y - my)) / chord
+        x, y = mx - dy / chord * along, my + dx / chord * along
+    before(s, codes)
+    s.select(_side(s, text), {0, 1})
+    if s.left_out:
+        s.unknown |= {0, 1}
+    else:
+        s.arc(end, (x, y), turns)
+    after(s, codes)

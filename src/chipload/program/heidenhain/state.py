@@ -1,0 +1,239 @@
+"""What holds while a conversational program is carried out, and the rows that it makes.
+
+Notation: ``at`` (9) is the programmed position [mm, rad]; beside a contour (RL, RR) the tool's centre stands elsewhere,
+and ``lag`` (2) [mm] is by how much it still does after R0, until X or Y is given. Axes in ``unknown`` stand where the
+program does not say.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import cast
+
+from chipload.errors import Finding, InputError, Severity
+from chipload.program.commands import ARC, DWELL, LINE, RAPID, XY, Frame, Row
+from chipload.program.compensation import CentreMove, Compensation
+from chipload.program.heidenhain.formula import NotKnownError, QParameters, q_number
+from chipload.program.heidenhain.words import AXIS, FEED, RETRACT, SETTINGS, TURN_FEED, number, rest_of
+from chipload.units import mm_s_from_mm_min
+
+#: findings that are kept
+KEPT = 2000
+#: largest coordinate [mm or deg]
+FARTHEST = 1e6
+AXES = "XYZABC"
+#: the parameter that holds the radius of the tool
+RADIUS_Q = 108
+
+
+class ConversationalState:
+    """State and outlets of one reading.
+
+    Parameters
+    ----------
+    name : of the program
+    parameters : Q parameters by number that are known before
+    radii : [mm] of the tools by number, where the program states none
+    feed : [mm/s] of cuts before the program states one; None: such a cut is refused
+    """
+
+    def __init__(
+        self, name: str, parameters: Mapping[int, float], radii: Mapping[int, float], feed: float | None
+    ) -> None:
+        self.line = 0
+        self.q = QParameters(parameters)
+        self.rows: list[Row] = []
+        self.findings: list[Finding] = []
+        self.labels: list[str] = [name]
+        self.frames: list[Frame] = [Frame()]
+        self.at = [0.0] * 9
+        self.unknown = set(range(3))
+        self.pole: list[float | None] = [None, None]
+        self.heading: complex | None = None
+        self.shift = [0.0] * 9
+        self.scale = 1.0
+        self.feed = feed
+        self.feed_of_turn = False
+        self.speed, self.sense = 0.0, 0.0
+        self.tool, self.lengths = 0, dict[int, float]()
+        self.radii, self.stated_radii, self.extra_radius = dict(radii), dict[int, float](), 0.0
+        self.tcp = False
+        self.ended = False
+        #: why motions are left out until further notice; empty: they are not
+        self.left_out = ""
+        self.side = 0
+        self.lag = [0.0, 0.0]
+        self._beside: Compensation | None = None
+
+    # -- findings ---------------------------------------------------------------------------------------------
+    def note(self, code: str, text: str, severity: Severity = Severity.NOTE) -> None:
+        """Keep a finding; one that was there is not repeated."""
+        if len(self.findings) < KEPT or severity > Severity.NOTE:
+            found = Finding(code, self.line, text, severity)
+            if found not in self.findings[-50:]:
+                self.findings.append(found)
+
+    def unproven(self, code: str, text: str) -> None:
+        """Keep a finding on something that is left out, so that the program is unproven."""
+        self.note(code, text, Severity.UNPROVEN)
+
+    # -- words ------------------------------------------------------------------------------------------------
+    def amount(self, text: str) -> float:
+        """The value of a number or of a parameter."""
+        plain = text.replace(" ", "").lstrip("+")
+        if not plain.startswith("Q"):
+            return number(plain)
+        letters = plain.rstrip("0123456789")
+        return self.q.read(q_number(letters, plain[len(letters) :]))
+
+    def signed(self, sign: str, text: str) -> float:
+        """The value with its sign."""
+        return self.amount(text) * (-1.0 if sign == "-" else 1.0)
+
+    def ends(self, text: str) -> tuple[list[float], set[int]]:
+        """The end of a motion and which axes it names."""
+        end, named = list(self.at), set[int]()
+        for step, letter, sign, value in AXIS.findall(rest_of(text, RETRACT, SETTINGS)):
+            k = AXES.index(letter)
+            amount = self.signed(sign, value) * (self.scale if k < 3 else math.pi / 180.0)
+            if not abs(amount) <= FARTHEST:
+                raise InputError(f"{letter} = {amount:g}: must be at most {FARTHEST:g}")
+            if step and k in self.unknown:
+                raise NotKnownError(f"I{letter}: where the axis stands is not known: give {letter} first")
+            end[k] = end[k] + amount if step else amount
+            named.add(k)
+        return end, named
+
+    def feed_of(self, text: str) -> bool:
+        """Take the feed of a block; whether it goes at rapid."""
+        turned = TURN_FEED.search(text)
+        if turned is not None:
+            self._take(self.amount(turned[1]), True)
+        found = FEED.search(text)
+        if found is not None and found[1] == "AUTO":
+            if self.feed is None:
+                raise InputError("F AUTO: the feed of a tool table is not known: give a number")
+            self.unproven(
+                "heidenhain-feed-auto", "F AUTO: the feed of a tool table is not known: the last one is taken"
+            )
+        elif found is not None and found[1] != "MAX":
+            self._take(self.amount(found[1]), False)
+        return found is not None and found[1] == "MAX"
+
+    def _take(self, value: float, of_turn: bool) -> None:
+        value *= self.scale
+        if not 0.0 < value < FARTHEST:
+            raise InputError(f"F{value:g}: must be above 0 and below {FARTHEST:g}")
+        of_turn = of_turn or self.feed_of_turn
+        if of_turn and self.speed == 0.0:
+            raise InputError(f"F{value:g} for each turn: the spindle speed is not known: give S")
+        self.feed = value * self.speed / math.tau if of_turn else mm_s_from_mm_min(value)
+
+    def need(self) -> float:
+        """The feed of a cut [mm/s]."""
+        if self.feed is None:
+            raise InputError("a cut has no feed: give F")
+        return self.feed
+
+    # -- tools and frames -------------------------------------------------------------------------------------
+    def radius(self) -> float | None:
+        """Radius of the tool [mm] with what TOOL CALL adds; None: nothing states it."""
+        stated = self.stated_radii.get(self.tool, self.radii.get(self.tool))
+        return None if stated is None else stated + self.extra_radius
+
+    def frame(self, extra_length: float = 0.0) -> None:
+        """The coordinates from here on: the datum shift and the length of the tool."""
+        self.end_contour()
+        tool, shift = [0.0] * 9, list(self.shift)
+        tool[2] = self.lengths.get(self.tool, 0.0) + extra_length
+        self.frames.append(Frame(shift=shift, tool=tool))  # type: ignore[arg-type]
+
+    # -- rows -------------------------------------------------------------------------------------------------
+    def select(self, side: int, moves: set[int]) -> None:
+        """Radius compensation of a block: side +1 left, -1 right, 0 none; ``moves`` the axes that it names."""
+        if side != self.side or (side and self._beside is None):
+            self.end_contour()
+            self.side = side
+            if side:
+                radius = self.radius()
+                if radius is None:
+                    self.unproven(
+                        "nc-diameter-unknown",
+                        f"R{'L' if side > 0 else 'R'}: no radius of tool {self.tool} is known, the path is compensated "
+                        f"by 0: state R in TOOL DEF, D in a tool table, or a [[cutter]] with number = {self.tool}",
+                    )
+                start = [x + d for x, d in zip(self.at[:2], self.lag, strict=True)]
+                self._beside = Compensation(side, radius or 0.0, XY, [*start, *self.at[2:]], square=True)
+                self.lag = [0.0, 0.0]
+        if not side and {0, 1} & moves:
+            self.lag = [0.0, 0.0]
+
+    def end_contour(self) -> None:
+        """Carry out what compensation holds back, and leave the tool where it stands."""
+        if self._beside is not None:
+            self._emit(self._beside.finish())
+            if self.rows:
+                standing = self.rows[-1][1]
+                self.lag = [standing[0] - self.at[0], standing[1] - self.at[1]]
+            self._beside = None
+        self.side = 0
+
+    def _emit(self, moves: list[CentreMove]) -> None:
+        for m in moves:
+            head, tail = cast("tuple[float, tuple[object, ...]]", m.payload)
+            self.rows.append((m.motion, tuple(m.end), XY, m.centre, m.turns, head, *tail))
+
+    def straight(self, motion: int, end: list[float]) -> None:
+        """RAPID or LINE to the programmed ``end``."""
+        feed = 0.0 if motion == RAPID else self.need()
+        self._turn_to(complex(end[0] - self.at[0], end[1] - self.at[1]))
+        self.at = end
+        if self._beside is not None:
+            self._emit(self._beside.line(motion, end, (feed, self._tail())))
+        else:
+            self.row(motion, end, feed)
+
+    def arc(self, end: list[float], centre: tuple[float, float], turns: int) -> None:
+        """ARC to the programmed ``end``."""
+        feed = self.need()
+        out = complex(end[0] - centre[0], end[1] - centre[1]) * (1j if turns > 0 else -1j)
+        self._turn_to(out)
+        self.at = end
+        if self._beside is not None:
+            self._emit(self._beside.arc(end, centre, turns, (feed, self._tail())))
+        else:
+            self.row(ARC, end, feed, centre, turns)
+
+    def _turn_to(self, along: complex) -> None:
+        if abs(along) > 1e-9:
+            self.heading = along / abs(along)
+
+    def dwell(self, seconds: float) -> None:
+        """DWELL where the tool stands."""
+        if self._beside is not None:
+            self._emit(self._beside.pause((seconds, self._tail())))
+        else:
+            self.row(DWELL, self.at, seconds)
+
+    def row(
+        self,
+        motion: int,
+        end: list[float],
+        feed: float = 0.0,
+        centre: tuple[float, float] = (0.0, 0.0),
+        turns: int = 0,
+    ) -> None:
+        """A motion of the tool's own centre."""
+        x, y = end[0] + self.lag[0], end[1] + self.lag[1]
+        self.rows.append((motion, (x, y, *end[2:]), XY, centre, turns, feed, *self._tail()))
+
+    def _tail(self) -> tuple[object, ...]:
+        spindle = self.speed * self.sense
+        return (spindle, self.tool, self.tcp, len(self.frames) - 1, self.line, len(self.labels) - 1)
+
+    def plunge(self, motion: int, z: float, value: float) -> None:
+        """RAPID or LINE along Z, or DWELL: ``value`` the feed [mm/s] or the time [s]."""
+        if motion != DWELL:
+            self.at = [*self.at[:2], z, *self.at[3:]]
+        self.row(motion, self.at, value if motion in (LINE, DWELL) else 0.0)
