@@ -18,7 +18,7 @@ from chipload.cli.app import app
 __all__ = ["app", "main"]
 
 #: the commands in the order of the help
-ORDER = ("init", "run", "simulate", "check", "convert", "fit", "cuts", "example", "view", "hal")
+ORDER = ("init", "run", "simulate", "check", "convert", "fit", "cuts", "example", "view", "export", "hal")
 app.registered_commands.sort(key=lambda c: ORDER.index(c.name or getattr(c.callback, "__name__", "")))
 
 
