@@ -62,10 +62,10 @@ NEVER = "must be given, a cutter is never guessed"
         ({"shank_diameter_mm": 0.0}, "cutter.shank_diameter_mm = 0: must be above 0"),
         ({"tool": 1}, "cutter.tool is given without cutter.file: give the tool table or leave it out"),
         ({"file_unit": "cm"}, "cutter.file_unit = 'cm': must be mm or inch"),
-        ({"file": "a.json"}, "cutter.file = a.json: must end in .fctb (FreeCAD) or .tbl (LinuxCNC)"),
+        ({"file": "a.xml"}, "cutter.file = a.xml: must end in .fctb, .json, .tools, .p21, .camotics, .tbl"),
         ({"file": "a.tbl"}, "cutter.tool is missing: a.tbl holds many: say which"),
         ({"file": "a.tbl", "tool": 1}, "cutter.file_unit is missing: a.tbl does not say its unit: give mm or inch"),
-        ({"file": "a.fctb", "tool": 1}, "cutter.tool is for a tool table (.tbl): leave it out with a.fctb"),
+        ({"file": "a.fctb", "tool": 1}, "cutter.tool is for a file of several tools: leave it out with a.fctb"),
     ],
 )
 def test_table_is_refused(change, message):

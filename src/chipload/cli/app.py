@@ -53,6 +53,9 @@ ToleranceMm = Annotated[
     float,
     typer.Option("--tolerance-mm", help="how far the tip may leave its path where a move with rotary axes is cut up"),
 ]
+Accept = Annotated[
+    bool, typer.Option("--accept", help="take the guesses of a draft as they are; the report lists them")
+]
 Debug = Annotated[bool, typer.Option("--debug", help="show the traceback of a fault")]
 
 

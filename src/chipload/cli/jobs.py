@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from chipload.cli.app import Debug, JobFile, Sets, app
-from chipload.errors import Cancelled, InputError
+from chipload.cli.app import Accept, Debug, JobFile, Sets, app
+from chipload.errors import Cancelled, InputError, Severity
 from chipload.terminal import bar, guarded, say, show
 
 #: [s] between two states of a simulation
@@ -31,6 +31,7 @@ def run(
             help="seconds of simulation between two states from which a stopped run can go on; 0: as often as possible",
         ),
     ] = KEEP_S,
+    accept: Accept = False,
     debug: Debug = False,
 ) -> None:
     """Plan a job and prove its programs, or read the program that it names; write the result folder.
@@ -53,7 +54,10 @@ def run(
         with Checkpoint(checkpoint_folder(out), keep_s, fresh=fresh, notice=say) as kept:
             try:
                 with bar() as progress:
-                    done = run_job(loaded, lambda part, what: progress(0.8 * part, what), kept)
+                    done = run_job(
+                        loaded, lambda part, what: progress(0.8 * part, what), kept,
+                        guesses=Severity.NOTE if accept else None,
+                    )  # fmt: skip
                     target = write_finished(
                         done.result, done.presentation, out, lambda part, what: progress(0.8 + 0.2 * part, what)
                     )

@@ -51,3 +51,25 @@ def view(
         return 0
 
     guarded(work, debug)
+
+
+@app.command()
+def export(
+    result: Annotated[Path, typer.Argument(metavar="RESULT", help="a result folder of chipload run")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="a new or empty folder for the files")],
+    csv: Annotated[bool, typer.Option("--csv", help="history.csv: a row a step, units in the names")] = False,
+    vtk: Annotated[bool, typer.Option("--vtk", help="paths .vtp, maps .vtu, stock .vtu and .stl: ParaView")] = False,
+    sheet: Annotated[bool, typer.Option("--sheet", help="setup.html: one page to be printed")] = False,
+    debug: Debug = False,
+) -> None:
+    """Write a result as CSV, VTK and a setup sheet for the machine; without an option, all of them."""
+
+    def work() -> int:
+        from chipload.report.export import KINDS, export_result
+
+        asked = [kind for kind, wanted in zip(KINDS, (csv, vtk, sheet), strict=True) if wanted]
+        for name in export_result(result, out, asked or KINDS):
+            show(f"written: {out / name}")
+        return 0
+
+    guarded(work, debug)

@@ -1,4 +1,4 @@
-"""FreeCAD tool bits (`.fctb`): JSON with lengths as texts such as `6,0 mm`, `1/4 in` or `0.25 "`.
+"""FreeCAD tool bits (`.fctb`) of 0.20 and 1.x: JSON with lengths as texts such as `6,0 mm`, `1/4 in` or `0.25 "`.
 
 Read are end mills, ball ends and bull noses (torus); a shape that does not mill with its flank is refused.
 """
@@ -43,7 +43,8 @@ def read_fctb(path: str | Path) -> dict[str, Any]:
     if not isinstance(data, dict) or not isinstance(data.get("parameter"), dict) or "shape" not in data:
         raise InputError(f"{label}: not a FreeCAD tool bit: must have shape and parameter")
     shape = str(data["shape"]).lower().rsplit("/", 1)[-1].removesuffix(".fcstd")
-    kind = SHAPES.get(shape)
+    # FreeCAD 1.x names the kind beside the file of the shape, which may be one of the user's own
+    kind = SHAPES.get(shape) or SHAPES.get(str(data.get("shape-type", "")).lower())
     if kind is None:
         raise InputError(f"{label}: shape {shape}: must be one of {', '.join(SHAPES)}")
     parameter = data["parameter"]

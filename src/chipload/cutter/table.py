@@ -13,13 +13,18 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
+from chipload.cutter.camotics import read_camotics_tool
 from chipload.cutter.cutter import FLUTED_FACTOR, LONGEST, MOST_FLUTES, THINNEST, WIDEST, Cutter
 from chipload.cutter.fctb import read_fctb
+from chipload.cutter.fusion import read_fusion_tool
+from chipload.cutter.iso13399 import read_iso13399
 from chipload.cutter.strength import ToolMaterial, ToolStrength
 from chipload.cutter.tooltable import read_tool_table
 from chipload.errors import InputError, InputErrors
 from chipload.tables import nearest
 
+#: endings of files with tool data
+ENDINGS = (".fctb", ".json", ".tools", ".p21", ".camotics", ".tbl")
 #: keys that a cutter cannot be without
 NEEDED = ("number", "diameter_mm", "flutes", "helix_deg", "flute_length_mm", "overhang_mm", "modulus_gpa")
 
@@ -32,8 +37,9 @@ def _rows(value: Any) -> Any:
 class CutterTable(BaseModel):
     """Keys of one ``[[cutter]]``: its own numbers, or those of a file.
 
-    ``file`` is a FreeCAD tool bit (`.fctb`) or a LinuxCNC tool table (`.tbl`, with ``tool`` the number in it and
-    ``file_unit`` the unit of its lengths, which the file does not say).
+    ``file`` is a FreeCAD tool bit (`.fctb`), a tool library of Fusion 360 or HSMWorks (`.json`, `.tools`), tool data of
+    ISO 13399 (`.p21`), a CAMotics project (`.camotics`) or a LinuxCNC tool table (`.tbl`), with ``tool`` the number in
+    it and ``file_unit`` the unit of the lengths of a tool table, which does not say it.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
@@ -67,9 +73,9 @@ class CutterTable(BaseModel):
     strength_mpa: float | None = Field(None, description="rupture strength of carbide, yield strength of steel")
     safety_factor: float | None = Field(None, description="strength over the stress that is allowed")
     stress_concentration: float | None = Field(None, description="stress at a notch over that of a smooth bar")
-    file: str | None = None
-    tool: int | None = None
-    file_unit: Literal["mm", "inch"] | None = None
+    file: str | None = Field(None, description=f"tool data: {', '.join(ENDINGS)}")
+    tool: int | None = Field(None, description="number of the tool in the file, where it holds several")
+    file_unit: Literal["mm", "inch"] | None = Field(None, description="of a tool table (.tbl), which does not say it")
 
     def cutter(self, folder: str | Path = ".") -> Cutter:
         """The cutter; ``file`` is relative to ``folder``.
@@ -125,18 +131,32 @@ class CutterTable(BaseModel):
             return {}
         path = folder / self.file
         kind = path.suffix.lower()
+        if kind not in ENDINGS:
+            raise InputError(f"cutter.file = {self.file}: must end in {', '.join(ENDINGS)}")
+        if kind in (".fctb", ".p21"):
+            if self.tool is not None:
+                raise InputError(f"cutter.tool is for a file of several tools: leave it out with {self.file}")
+        elif self.tool is None and kind not in (".json", ".tools"):
+            raise InputError(f"cutter.tool is missing: {self.file} holds many: say which")
+        if self.file_unit is not None and kind != ".tbl":
+            raise InputError(f"cutter.file_unit is for a tool table (.tbl): leave it out with {self.file}")
         if kind == ".fctb":
-            for key in ("tool", "file_unit"):
-                if getattr(self, key) is not None:
-                    raise InputError(f"cutter.{key} is for a tool table (.tbl): leave it out with {self.file}")
             return dict(read_fctb(path))
-        if kind == ".tbl":
-            if self.tool is None:
-                raise InputError(f"cutter.tool is missing: {self.file} holds many: say which")
-            if self.file_unit is None:
-                raise InputError(f"cutter.file_unit is missing: {self.file} does not say its unit: give mm or inch")
-            return dict(read_tool_table(path, self.tool, self.file_unit))
-        raise InputError(f"cutter.file = {self.file}: must end in .fctb (FreeCAD) or .tbl (LinuxCNC)")
+        if kind == ".p21":
+            return read_iso13399(path)
+        if kind in (".json", ".tools"):
+            return self._checked(read_fusion_tool(path, self.tool))
+        assert self.tool is not None
+        if kind == ".camotics":
+            return read_camotics_tool(path, self.tool)
+        if self.file_unit is None:
+            raise InputError(f"cutter.file_unit is missing: {self.file} does not say its unit: give mm or inch")
+        return dict(read_tool_table(path, self.tool, self.file_unit))
+
+    @staticmethod
+    def _checked(values: dict[str, Any]) -> dict[str, Any]:
+        """Values of a file as this table has them: tuples for lists."""
+        return {key: _rows(value) for key, value in values.items()}
 
 
 def _strength(values: Mapping[str, Any]) -> ToolStrength:

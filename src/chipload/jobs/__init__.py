@@ -19,8 +19,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from chipload.errors import InputError
+from chipload.errors import Finding, InputError, InputErrors, Severity
 from chipload.files import read_regular
+from chipload.jobs.confirm import guesses_of, take_confirm
 from chipload.jobs.messages import Errors, left_missing, table_errors
 from chipload.jobs.override import override
 from chipload.jobs.sources import cutter_errors, source_errors
@@ -80,11 +81,13 @@ class LoadedJob:
     capability : that it belongs to
     job : of the capability's own type
     source : name and hash of its file, or of the values that it was made of
+    guesses : of a draft that its user has not confirmed, a line each
     """
 
     capability: Capability
     job: Any
     source: str
+    guesses: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,6 +185,9 @@ def _loaded(
     data : what was read, for its hash
     """
     label, root = path.name, capability.root
+    tables = take_confirm(raw)
+    stated = [text.partition("=")[0].strip() for text in overrides]
+    guesses = guesses_of(tables, data.decode("utf-8", "replace"), stated) if tables else ()
     for text in overrides:
         override(raw, text, root)
     require_sound(label, raw)
@@ -189,7 +195,7 @@ def _loaded(
     try:
         with errors.collect():
             job = module.load(path, root.model_validate(raw), tuple(overrides))
-            return LoadedJob(capability, job, f"{label} sha256 {sha256(data).hexdigest()}")
+            return LoadedJob(capability, job, f"{label} sha256 {sha256(data).hexdigest()}", guesses)
     except ValidationError as err:
         others = [c.root for c in CAPABILITIES if c is not capability]
         errors.texts += table_errors(err, root, others)
@@ -204,27 +210,48 @@ def _loaded(
     raise AssertionError("a job is loaded or refused")
 
 
-def run_job(loaded: LoadedJob, progress: Progress = silent, checkpoint: Checkpoint | None = None) -> FinishedJob:
+def run_job(
+    loaded: LoadedJob,
+    progress: Progress = silent,
+    checkpoint: Checkpoint | None = None,
+    *,
+    guesses: Severity | None = None,
+) -> FinishedJob:
     """Run a job; nothing is written.
 
     Parameters
     ----------
     checkpoint : keeps what is finished, so that a stopped run goes on; used by the capabilities that can resume
+    guesses : what a guess of a draft is in the result: a note where its user accepts it, UNPROVEN for a first look;
+        None: a job with guesses is refused
 
     Raises
     ------
     InputError
-        A file that it names cannot be used, or its values together.
+        A file that it names cannot be used, or its values together; it has guesses that are not confirmed.
     Cancelled
         By ``progress``.
     """
     capability = loaded.capability
+    if loaded.guesses and guesses is None:
+        raise InputErrors(*loaded.guesses, unconfirmed(loaded))
     kept = {"checkpoint": checkpoint} if capability.resumes else {}
     outcome = capability.module("run").run(loaded.job, progress, **kept)
     result: Result = capability.module("result").result_of(outcome)
     inputs = {"job": loaded.source, **result.provenance.inputs}
-    result = replace(result, provenance=replace(result.provenance, inputs=inputs))
+    accepted = tuple(Finding("job-guess", 0, f"guess: {text}", guesses or Severity.NOTE) for text in loaded.guesses)
+    provenance = replace(result.provenance, inputs=inputs)
+    result = replace(result, provenance=provenance, findings=(*accepted, *result.findings))
     return FinishedJob(result, capability.module("figures").presentation_of(outcome), outcome)
+
+
+def unconfirmed(loaded: LoadedJob) -> str:
+    """What is said of a job with guesses."""
+    count = len(loaded.guesses)
+    return (
+        f"{count} guess{'es are' if count > 1 else ' is'} not confirmed: correct what is wrong, then delete "
+        "`confirm = true` of the table, or run with --accept"
+    )
 
 
 def check_job(loaded: LoadedJob) -> tuple[list[str], bool]:
@@ -236,4 +263,6 @@ def check_job(loaded: LoadedJob) -> tuple[list[str], bool]:
         As :func:`run_job`.
     """
     lines, holds = loaded.capability.module("run").check(loaded.job)
+    if loaded.guesses:
+        lines, holds = [*(f"guess: {text}" for text in loaded.guesses), *lines, unconfirmed(loaded)], False
     return lines, holds

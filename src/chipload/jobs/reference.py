@@ -20,7 +20,9 @@ A job is one TOML file: what is made, of what, on which machine, with which cutt
 its unit in its name. Unknown keys are refused with the nearest known one. Paths are relative to the job file.
 
 `chipload check job.toml` lists all that is wrong in a job and in the files that it names. `--set key.path=value`
-changes a key for one run. The commonest job runs a program through a stock:
+changes a key for one run. `chipload init FILE DIR` writes a job for a program, a drawing, a model or sections of a
+blade. Its guesses are marked; a table with `confirm = true` holds some, and `chipload run` refuses the job until that
+key is deleted or `--accept` takes all guesses as they are. The commonest job runs a program through a stock:
 
 ```toml
 [program]

@@ -54,12 +54,20 @@ def tool_comments(text: str) -> dict[int, Statement]:
     >>> tool_comments("G20\n(TOOL: T2 = 0.5 dia. ENDMILL)")[2].diameter
     12.7
     """
-    found = _UNITS.search(_COMMENT.sub(" ", text).upper())
-    own = MM_PER["inch"] if found is not None and found[1] in ("20", "70") else 1.0
     out: dict[int, Statement] = {}
-    for tool, statement in _comments(text, own):
+    for tool, statement in _comments(text, unit_mm(text)):
         out.setdefault(tool, statement)
     return out
+
+
+def unit_mm(text: str) -> float:
+    """The unit [mm] that an NC text selects first; mm where it selects none.
+
+    >>> unit_mm("(G20) G21 G0 X1"), unit_mm("G20 G0 X1")
+    (1.0, 25.4)
+    """
+    found = _UNITS.search(_COMMENT.sub(" ", text).upper())
+    return MM_PER["inch"] if found is not None and found[1] in ("20", "70") else 1.0
 
 
 def _comments(text: str, own: float) -> Iterator[tuple[int, Statement]]:

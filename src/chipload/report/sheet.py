@@ -63,6 +63,11 @@ addEventListener("beforeprint", () => Object.keys(figures).forEach(draw));
 """
 
 
+def style() -> str:
+    """The style of every page."""
+    return _STYLE
+
+
 def framed(title: str, word: str, body: Sequence[str], figures: Mapping[str, go.Figure]) -> bytes:
     """The whole file: ``title: word`` in the window's bar, the body, the figures that are drawn when they are seen."""
     # "<" cannot end the element when written as an escape of JSON

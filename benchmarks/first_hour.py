@@ -1,0 +1,146 @@
+"""From twelve files of others to a verdict: `chipload init`, at most three edits, `chipload run --accept`.
+
+    CHIPLOAD_DATA=... python benchmarks/first_hour.py [NAME ...] [--write]
+
+`--write` writes docs/first_hour.md. An edit is one changed line of job.toml. Times are processor times.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import resource
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[1] / ".." / "shared" / "data"))
+PAGE = Path(__file__).parents[1] / "docs" / "first_hour.md"
+#: a run that takes longer is given up [s]
+LONGEST_S = 900.0
+
+
+class Case(NamedTuple):
+    """A file, what it is, and the edits: table and key, new value, why."""
+
+    file: str
+    kind: str
+    edits: tuple[tuple[str, str, str], ...] = ()
+
+
+CASES = (
+    Case("nc/camotics/compass/text.camotics", "NC, CAMotics project"),
+    Case("nc/camotics/buildbotics/buildbotics.camotics", "NC, CAMotics project"),
+    Case("nc/linuxcnc_5axis/boat-xyzac.ngc", "NC, five axes"),
+    Case("nc/apt_dmu50/heidenhain/parts-2022/Dem-target1/11.h", "NC, Heidenhain"),
+    Case("nc/apt_dmu50/apt/Guincho_Lbar.apt", "APT"),
+    Case("nc/apt_dmu50/apt/Dem-target2.apt", "APT"),
+    Case("cad/dxf_hsm_nibbler/gear.dxf", "DXF"),
+    Case("cad/dxf_hsm_nibbler/octagon.dxf", "DXF"),
+    Case("cad/nist_step/nist_ftc_11_asme1_rb.stp", "STEP"),
+    Case("cad/nist_step/nist_ctc_01_asme1_ap203.stp", "STEP"),
+    Case("machines_tools/better_tool_library/Shape/slittingsaw.fcstd", "FreeCAD document"),
+    Case("blades/turbogrid_rotor37/profile.curve", "sections of a blade"),
+)
+
+
+def edited(text: str, key: str, value: str) -> str:
+    """The job with one value changed; ``key`` is ``table.key`` or ``table.number.key``."""
+    table, *number, name = key.split(".")
+    heads = [m.start() for m in re.finditer(rf"^\[\[?{table}\]\]?", text, re.MULTILINE)]
+    start = heads[int(number[0]) if number else 0]
+    end = next((h.start() for h in re.finditer(r"^\[", text, re.MULTILINE) if h.start() > start), len(text))
+    body, found = re.subn(rf"^(# )?{name} = .*$", f"{name} = {value}", text[start:end], count=1, flags=re.MULTILINE)
+    if not found:
+        head, _, rest = text[start:end].partition("\n")
+        body = f"{head}\n{name} = {value}\n{rest}"
+    return text[:start] + body + text[end:]
+
+
+def run(case: Case, folder: Path) -> dict[str, object]:
+    """Draft, edit, run; what came out."""
+    job, result = folder / "job", folder / "result"
+    command = [sys.executable, "-m", "chipload"]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    made = subprocess.run([*command, "init", DATA / case.file, job], capture_output=True, text=True)
+    if made.returncode:
+        return {"verdict": f"init: {made.stderr.strip()[:200]}"}
+    text = (job / "job.toml").read_text()
+    guesses = text.count("# guess: ")
+    for key, value, _ in case.edits:
+        text = edited(text, key, value)
+    (job / "job.toml").write_text(text)
+    try:
+        done = subprocess.run(
+            [*command, "run", job / "job.toml", "--accept", "--out", result],
+            capture_output=True, text=True, timeout=LONGEST_S,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return {"verdict": f"given up after {LONGEST_S:g} s"}
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    if done.returncode not in (0, 3):
+        return {"verdict": f"run {done.returncode}: {done.stderr.strip()[:300]}", "seconds": seconds}
+    summary = json.loads((result / "summary.json").read_text())
+    return {
+        "verdict": summary["verdict"],
+        "message": done.stdout.splitlines()[0],
+        "seconds": seconds,
+        "guesses": guesses,
+    }
+
+
+HEAD = """# The first hour
+
+What a user has becomes a job by `chipload init FILE DIR`, and a verdict by `chipload run DIR/job.toml --out result`.
+`init` writes what the file states and marks each guess; `run` refuses until each table with a guess is confirmed
+(delete `confirm = true`), or takes all guesses by `--accept`. `chipload simulate FILE` does both for a first look; its
+verdict is never better than unproven.
+
+| FILE | what init takes from it | kind of job |
+|---|---|---|
+| NC text (`.ngc`, `.nc`, `.h` ...) | tools and stock of comments, BLK FORM, WORKPIECE; axes, dialect | simulation |
+| APT CL data | CUTTER, tool lengths, stock size | simulation |
+| CAMotics project | tools, workpiece, the program that it names | simulation |
+| FreeCAD document | a CAM job: operations as a program, tool bits, stock; else the part | simulation; pocket or wall |
+| DXF | closed contours, else open ones; layers, unit | pocket; contour |
+| STEP | horizontal faces, else two curved faces | pocket; thin wall |
+| sections of a blade | shape, numbered files beside it | thin wall |
+
+## Twelve files of others
+
+Made by `python benchmarks/first_hour.py --write`, processor time of `init` and `run` together. An edit is one changed
+line of job.toml. A verdict rests on the guesses that were accepted; it says that the way from the file to the result is
+whole, not that these programs are right for a real workpiece.
+
+| file | kind | guesses | edits | verdict | time [s] |
+|---|---|---:|---|---|---:|
+"""
+
+
+def main() -> None:
+    """Run the cases that are named, or all."""
+    names = [a for a in sys.argv[1:] if not a.startswith("--")]
+    rows = []
+    for case in CASES:
+        if names and not any(n in case.file for n in names):
+            continue
+        with tempfile.TemporaryDirectory() as above:
+            out = run(case, Path(above) / Path(case.file).stem)
+        edits = "; ".join(f"`{k} = {v}`: {why}" for k, v, why in case.edits) or "none"
+        told = str(out["verdict"]) + (f": {out['message']}" if "message" in out else "")
+        told = told.replace("|", "/")
+        seconds = f"{out['seconds']:.0f}" if "seconds" in out else ""
+        rows.append(
+            f"| {Path(case.file).name} | {case.kind} | {out.get('guesses', '')} | {edits} | {told} | {seconds} |"
+        )
+        print(rows[-1], flush=True)
+    if "--write" in sys.argv:
+        PAGE.write_text(HEAD + "\n".join(rows) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,168 @@
+"""Tool libraries of Fusion 360 and HSMWorks: JSON (`.json`), or a ZIP that holds it (`.tools`).
+
+A tool's ``geometry`` has the symbols of ISO 13399 in the tool's own unit: DC diameter, RE corner radius, LCF flute
+length, LB length below the holder, SFDM shank, NOF flutes, SIG point angle, TA taper angle, HA helix angle [deg]. Read are end
+mills (flat, ball, bull nose), face mills, chamfer mills and drills; other shapes are refused.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import zipfile
+from pathlib import Path
+from typing import Any
+
+from chipload.errors import InputError
+from chipload.files import read_regular
+from chipload.units import MM_PER
+
+#: type of a tool -> what it is
+SHAPES = {
+    "flat end mill": "flat", "ball end mill": "ball", "bull nose end mill": "bull", "face mill": "bull",
+    "chamfer mill": "cone", "spot drill": "point", "drill": "point", "center drill": "point",
+}  # fmt: skip
+#: Young's modulus [GPa] by the material of the body
+MODULUS = {"carbide": 580.0, "hss": 210.0}
+#: symbol and key of the ``[[cutter]]``
+LENGTHS = {"DC": "diameter_mm", "LCF": "flute_length_mm", "LB": "overhang_mm", "SFDM": "shank_diameter_mm"}
+_UNITS = {"millimeters": "mm", "inches": "inch"}
+_LARGEST_FILE = 50_000_000
+_MOST_TOOLS = 100_000
+
+
+def read_fusion_tool(path: str | Path, tool: int | None) -> dict[str, Any]:
+    """One tool of a library, under the keys of a job's ``[[cutter]]``; what it does not state is not there.
+
+    Parameters
+    ----------
+    tool : number that its post-processor gives it; None: the only tool
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, the tool is not there or there twice, or its shape is another one.
+    """
+    label = f"cutter.file {path}"
+    tools = [t for t in _tools(path, label) if t.get("type") not in ("holder", "probe")]
+    if not tools:
+        raise InputError(f"{label}: holds no tool")
+    if tool is None:
+        if len(tools) > 1:
+            raise InputError(f"cutter.tool is missing: {Path(path).name} holds {len(tools)}: state the number of one")
+        chosen = tools[0]
+    else:
+        chosen = _numbered(tools, tool, label)
+    return _cutter(chosen, tool, f"{label}: tool {tool if tool is not None else ''}".rstrip())
+
+
+def _tools(path: str | Path, label: str) -> list[dict[str, Any]]:
+    data = read_regular(path, label, _LARGEST_FILE, "not a tool library")
+    try:
+        if data.startswith(b"PK"):
+            with zipfile.ZipFile(io.BytesIO(data)) as archive:
+                inner = next((i for i in archive.infolist() if i.filename.endswith(".json")), None)
+                if inner is None or inner.file_size > _LARGEST_FILE:
+                    raise InputError(f"{label}: not a tool library: holds no JSON of at most {_LARGEST_FILE} bytes")
+                data = archive.read(inner)
+        library = json.loads(data.decode("utf-8"))
+    except (ValueError, RecursionError, zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError):
+        raise InputError(f"{label}: not a Fusion tool library: must be JSON") from None
+    listed = library.get("data", library.get("tools")) if isinstance(library, dict) else library
+    if not isinstance(listed, list) or len(listed) > _MOST_TOOLS or not all(isinstance(t, dict) for t in listed):
+        raise InputError(f"{label}: not a Fusion tool library: must have a list of tools, data")
+    return listed
+
+
+def _numbered(tools: list[dict[str, Any]], number: int, label: str) -> dict[str, Any]:
+    posts = [(t, t.get("post-process")) for t in tools]
+    own = [(t, p.get("number")) for t, p in posts if isinstance(p, dict)]
+    found = [t for t, n in own if n == number]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise InputError(f"{label}: tool {number} stands {len(found)} times: give each its own number in the library")
+    known = sorted({n for _, n in own if isinstance(n, int)})
+    listed = ", ".join(map(str, known[:20])) or "none"
+    raise InputError(f"{label}: tool {number} is not there: must be one of {listed}")
+
+
+def _cutter(tool: dict[str, Any], number: int | None, label: str) -> dict[str, Any]:
+    kind = str(tool.get("type", "")).lower()
+    shape = SHAPES.get(kind)
+    if shape is None:
+        raise InputError(f"{label}: type {kind or 'missing'}: must be one of {', '.join(SHAPES)}")
+    unit = _UNITS.get(str(tool.get("unit", "")).lower())
+    if unit is None:
+        raise InputError(f"{label}: unit = {tool.get('unit')!r}: must be millimeters or inches")
+    geometry = tool.get("geometry")
+    if not isinstance(geometry, dict):
+        raise InputError(f"{label}: geometry is missing")
+    mm = MM_PER[unit]
+    out: dict[str, Any] = {} if number is None else {"number": number}
+    if str(tool.get("description", "")).strip():
+        out["name"] = str(tool["description"]).strip()
+    for symbol, key in LENGTHS.items():
+        value = _number(geometry, symbol, label)
+        if value is not None and value > 0.0:
+            out[key] = value * mm
+    flutes = _number(geometry, "NOF", label)
+    if flutes is not None and flutes >= 1.0:
+        out["flutes"] = int(flutes)
+    helix = _number(geometry, "HA", label)
+    if helix is not None:
+        out["helix_deg"] = helix
+    body = str(tool.get("BMC", "")).lower()
+    if body in MODULUS:
+        out |= {"modulus_gpa": MODULUS[body], "tool_material": body}
+    out |= _tip(shape, geometry, out, mm, label)
+    holder = _holder(tool.get("holder"), mm)
+    return out | ({"holder_mm": holder} if holder else {})
+
+
+def _tip(shape: str, geometry: dict[str, Any], out: dict[str, Any], mm: float, label: str) -> dict[str, Any]:
+    """Corner, taper and point."""
+    d = out.get("diameter_mm")
+    if shape == "ball" and d is not None:
+        return {"corner_radius_mm": 0.5 * d}
+    if shape == "bull":
+        corner = _number(geometry, "RE", label)
+        return {"corner_radius_mm": corner * mm} if corner else {}
+    if shape == "point":
+        angle = _number(geometry, "SIG", label)
+        if angle is None or not 0.0 < angle <= 180.0:
+            raise InputError(f"{label}: SIG, the point angle: must be above 0 and at most 180 deg")
+        return {"bottom_deg": 90.0 - 0.5 * angle}
+    if shape == "cone" and d is not None:
+        angle, tip = _number(geometry, "TA", label), _number(geometry, "tip-diameter", label) or 0.0
+        if angle is None or not 0.0 < angle < 90.0:
+            raise InputError(f"{label}: TA, the taper angle: must be above 0 and below 90 deg")
+        return {"diameter_mm": max(tip * mm, 0.01), "taper_deg": angle, "shank_diameter_mm": d}
+    return {}
+
+
+def _holder(holder: Any, mm: float) -> list[list[float]]:
+    """(length, diameter) [mm] of the parts, upwards; a cone counts with its larger end."""
+    segments = holder.get("segments") if isinstance(holder, dict) else None
+    out = []
+    for part in segments if isinstance(segments, list) else ():
+        sizes = [part.get(k) for k in ("height", "lower-diameter", "upper-diameter")] if isinstance(part, dict) else []
+        if len(sizes) == 3 and all(_is_number(s) for s in sizes):
+            height, low, high = (float(str(s)) * mm for s in sizes)
+            if height > 0.0 and max(low, high) > 0.0 and math.isfinite(height + low + high):
+                out.append([height, max(low, high)])
+    return out
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _number(geometry: dict[str, Any], symbol: str, label: str) -> float | None:
+    value = geometry.get(symbol)
+    if value is None:
+        return None
+    if not _is_number(value) or not math.isfinite(value):
+        raise InputError(f"{label}: {symbol} = {str(value)[:40]!r}: must be a finite number")
+    return float(value)

@@ -1,0 +1,194 @@
+"""What the comments and headers of a program state beside its motions: cutters, stock, material.
+
+Read are the forms of common posts: Fusion 360 (``T1 D=10. CR=0. - flat end mill``), FeatureCAM's APT (``INSERT/14MM CRB
+2FL 32 LOC``, ``CSI_SET_FLUTE_LENGTH``, ``INSERT/Stock Size``), Heidenhain (``BLK FORM``), Sinumerik (``WORKPIECE``).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from chipload.errors import InputError
+from chipload.program.apt.cutters import read_cutters
+from chipload.program.reconcile import tool_comments
+from chipload.units import MM_PER
+
+Box = tuple[tuple[float, float, float], tuple[float, float, float]]
+#: value and where it stands, by key of the ``[[cutter]]``
+Stated = dict[str, tuple[Any, str]]
+
+_COMMENT = re.compile(r"\(([^()\n]*)\)|;([^\n]*)|^\s*(?:INSERT|PPRINT)\s*/?([^\n]*)", re.MULTILINE)
+_NUMBER = r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))"
+_FUSION = re.compile(rf"\bT(\d+)\s+D={_NUMBER}\s+CR={_NUMBER}(?:\s+TAPER={_NUMBER}DEG)?([^()\n;]*)", re.IGNORECASE)
+_BLK = re.compile(
+    rf"BLK\s+FORM\s+0\.([12])\s+(?:[XYZ]\s+)?X\s*{_NUMBER}\s+Y\s*{_NUMBER}\s+Z\s*{_NUMBER}", re.IGNORECASE
+)
+_WORKPIECE = re.compile(r"WORKPIECE\s*\(([^)]*)\"BOX\"([^)]*)\)", re.IGNORECASE)
+_STOCK_SIZE = re.compile(rf"Stock\s+Size\s+X{_NUMBER}\s*Y{_NUMBER}\s*Z{_NUMBER}", re.IGNORECASE)
+#: a comment, and the tool that is defined behind it (Heidenhain)
+_TOOL_DEF = re.compile(r";([^\n]*)\n[^\n]*\bTOOL\s+(?:DEF|CALL)\s+(\d{1,8})\b", re.IGNORECASE)
+_MATERIALS = (
+    (r"STAINLESS|\b304L?\b|\b316L?\b|1\.43\d\d|1\.44\d\d|INOX", "group-14-stainless"),
+    (r"INCONEL|NIMONIC|HASTELLOY", "group-34-nickel"),
+    (r"NODULAR|DUCTILE IRON|\bGGG\d*\b", "group-17-nodular-iron"),
+    (r"CAST IRON|GREY IRON|GRAY IRON|\bGG\d\d\b", "group-15-grey-iron"),
+    (r"\b4140\b|\b4340\b|42CRMO4", "group-7-steel"),
+    (r"STEEL|\b1045\b|\bC45\b|\b1018\b|\bS235|\bST37", "group-2-steel"),
+    (r"BRASS", "group-27-brass"),
+    (r"7075", "al7075-t6"),
+    (r"6082", "al6082-t6"),
+    (r"ALU|\b6061\b|\b2024\b|\b5083\b", "group-22-aluminium"),
+)
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a text states beside its motions.
+
+    Parameters
+    ----------
+    cutters : by tool number
+    stock : corners of a block [mm], and where it stands
+    material : a shipped name, and the comment
+    """
+
+    cutters: Mapping[int, Stated] = field(default_factory=dict)
+    stock: tuple[Box, str] | None = None
+    material: tuple[str, str] | None = None
+
+
+def read_header(text: str, apt: bool = False, mm: float = 1.0) -> Header:
+    r"""What a text states in comments and declarations; what cannot be read is left out.
+
+    Parameters
+    ----------
+    apt : the text is CL data
+    mm : in the unit of numbers without one
+
+    >>> read_header("(T1 D=10. CR=0.5 - ZMIN=-5. - bullnose end mill)").cutters[1]["corner_radius_mm"][0]
+    0.5
+    >>> read_header("BLK FORM 0.1 Z X+0 Y+0 Z-24\nBLK FORM 0.2 X+220 Y+220 Z+0").stock[0]
+    ((0.0, 0.0, -24.0), (220.0, 220.0, 0.0))
+    """
+    cutters = _apt_cutters(text) if apt else _nc_cutters(text, mm)
+    return Header(cutters, _stock(text, mm), _material(text))
+
+
+def _nc_cutters(text: str, mm: float) -> dict[int, Stated]:
+    out: dict[int, Stated] = {}
+    for hit in _FUSION.finditer(text):
+        where = f"the comment ({' '.join(hit[0].split())[:50]})"
+        d, r = float(hit[2]) * mm, float(hit[3]) * mm
+        own = out.setdefault(int(hit[1]), {})
+        own.setdefault("diameter_mm", (d, where))
+        if r > 0.0:
+            own.setdefault("corner_radius_mm", (min(r, 0.5 * d), where))
+        if hit[4] and 0.0 < float(hit[4]) < 80.0 and "drill" not in hit[5].lower():
+            own.setdefault("taper_deg", (float(hit[4]), where))
+        own.setdefault("name", (_kind(hit[5]), where))
+    for number, statement in tool_comments(text).items():
+        out.setdefault(number, {}).setdefault("diameter_mm", (statement.diameter, statement.where))
+        if "BALL" in statement.where.upper():
+            out[number].setdefault("corner_radius_mm", (0.5 * statement.diameter, statement.where))
+    for defined in _TOOL_DEF.finditer(text):
+        own = out.setdefault(int(defined[2]), {})
+        for key, stated in _described(defined[1], mm).items():
+            own.setdefault(key, stated)
+    return {n: {k: v for k, v in own.items() if v[0] != ""} for n, own in out.items()}
+
+
+def _described(name: str, mm: float) -> Stated:
+    """What the description of a tool states: ``14MM CRB 2FL 32 LOC FLUTE LEN 32.0 FLUTE EXT 60.0``."""
+    where = f"the comment ({' '.join(name.split())[:50]})"
+    out: Stated = {"name": (" ".join(name.split()), where)}
+    if found := re.search(rf"{_NUMBER}\s*MM\b", name, re.IGNORECASE):
+        out["diameter_mm"] = (float(found[1]), where)
+        if re.search(r"\bBALL", name, re.IGNORECASE):
+            out["corner_radius_mm"] = (0.5 * float(found[1]), where)
+    for word, key in (("LEN", "flute_length_mm"), ("EXT", "overhang_mm")):
+        if found := re.search(rf"FLUTE\s+{word}\s+{_NUMBER}", name, re.IGNORECASE):
+            out[key] = (float(found[1]) * mm, where)
+    flutes = re.search(r"\b(\d{1,2})\s*FL\b", name, re.IGNORECASE)
+    if flutes and 1 <= int(flutes[1]) <= 20:
+        out["flutes"] = (int(flutes[1]), where)
+    if re.search(r"\b(CRB|CARB|CARBIDE)\b", name, re.IGNORECASE):
+        out["modulus_gpa"] = (580.0, f"carbide: {where}")
+    return out
+
+
+def _kind(text: str) -> str:
+    words = [part.strip() for part in text.split(" - ") if part.strip() and "=" not in part]
+    return words[-1].lstrip("- ") if words else ""
+
+
+def _apt_cutters(text: str) -> dict[int, Stated]:
+    """Shapes of CUTTER records, and FeatureCAM's lengths and descriptions."""
+    try:
+        shapes = read_cutters(text)[0]
+    except InputError:
+        return {}
+    out: dict[int, Stated] = {}
+    for number, (d, r, _, _, alpha, beta, _) in shapes.items():
+        own: Stated = {"diameter_mm": (d, "CUTTER")}
+        if r > 0.0:
+            own["corner_radius_mm"] = (r, "CUTTER")
+        if alpha > 0.0:
+            own["bottom_deg"] = (math.degrees(alpha), "CUTTER")
+        if beta > 0.0:
+            own["taper_deg"] = (math.degrees(beta), "CUTTER")
+        out[number] = own
+    mm = MM_PER["inch"] if re.search(r"^\s*UNITS?\s*/\s*INCH", text, re.MULTILINE) else 1.0
+    name, tool = "", None
+    for line in text.splitlines():
+        word, _, rest = line.strip().partition("/")
+        value = re.match(rf"\s*{_NUMBER}", rest)
+        if word == "INSERT" and not re.match(r"\s*Stock", rest, re.IGNORECASE):
+            name = rest.strip()
+        elif word in ("LOAD", "LOADTL") and (found := re.search(r"(\d+)", rest)):
+            tool = out.get(int(found[1]))
+            if tool is not None and name:
+                for key, described in _described(name, mm).items():
+                    tool.setdefault(key, described)
+            name = ""
+        elif tool is not None and value and word == "CSI_SET_FLUTE_LENGTH":
+            tool.setdefault("flute_length_mm", (float(value[1]) * mm, word))
+        elif tool is not None and value and word == "CSI_SET_EXTENSION_LENGTH":
+            tool.setdefault("overhang_mm", (float(value[1]) * mm, word))
+    return out
+
+
+def _stock(text: str, mm: float) -> tuple[Box, str] | None:
+    corners = {hit[1]: tuple(float(hit[k]) for k in (2, 3, 4)) for hit in _BLK.finditer(text)}
+    if set(corners) == {"1", "2"}:
+        low, high = corners["1"], corners["2"]
+        if all(a < b for a, b in zip(low, high, strict=True)):
+            return ((low[0], low[1], low[2]), (high[0], high[1], high[2])), "BLK FORM"
+    if hit := _WORKPIECE.search(text):
+        numbers = [part.strip() for part in hit[2].split(",")]
+        try:
+            _, top, bottom, _, x0, y0, x1, y1 = (float(p or 0.0) for p in numbers[-8:])
+        except ValueError:
+            return None
+        if x0 < x1 and y0 < y1 and bottom < top:
+            return ((x0, y0, bottom), (x1, y1, top)), "WORKPIECE"
+    if hit := _STOCK_SIZE.search(text):
+        x, y, z = (float(hit[k]) * mm for k in (1, 2, 3))
+        if min(x, y, z) > 0.0:
+            return ((0.0, 0.0, -z), (x, y, 0.0)), "Stock Size, with the program's zero at its upper corner"
+    return None
+
+
+def _material(text: str) -> tuple[str, str] | None:
+    said = [" ".join((hit[1] or hit[2] or hit[3] or "").split()) for hit in _COMMENT.finditer(text)]
+    for comment in said:
+        for pattern, name in _MATERIALS:
+            # a tool of high-speed steel is no workpiece of steel
+            if re.search(pattern, comment, re.IGNORECASE) and not re.search(
+                r"\bT(?:OOL)?\s*\d|HIGH.SPEED|\bHSS\b|MILL|DRILL", comment, re.IGNORECASE
+            ):
+                return name, comment[:60]
+    return None

@@ -1,0 +1,64 @@
+"""The ``[[cutter]]`` of a draft: what sources state about a tool, and guesses for the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from chipload.jobs.drafts.comments import Stated
+from chipload.jobs.drafts.draft import DraftTable, Entry
+
+#: keys that a cutter has, in the order of the file
+KEYS = (
+    "diameter_mm", "corner_radius_mm", "bottom_deg", "taper_deg", "flutes", "helix_deg", "flute_length_mm",
+    "overhang_mm", "shank_diameter_mm", "modulus_gpa",
+)  # fmt: skip
+
+
+def cutter_table(number: int, sources: Iterable[Stated], deepest: float = 0.0) -> DraftTable:
+    """The table of a tool; the first source that states a key counts.
+
+    Parameters
+    ----------
+    sources : what is stated, the surest first
+    deepest : how far below the top of the stock the tool cuts [mm]
+    """
+    stated: dict[str, tuple[Any, str]] = {}
+    for source in sources:
+        for key, value in source.items():
+            stated.setdefault(key, value)
+    guessed = _guesses(stated, deepest)
+    entries = [Entry("number", number)]
+    if "name" in stated:
+        entries.append(Entry("name", str(stated["name"][0])[:80]))
+    for key in KEYS:
+        if key in stated:
+            entries.append(Entry(key, stated[key][0], stated[key][1]))
+        elif key in guessed:
+            entries.append(Entry(key, *guessed[key], True))
+    entries += [
+        Entry("holder_mm", note="length and diameter of its parts: collisions", example="[[30.0, 25.0]]"),
+        Entry("gullet_mm2", note="area between two teeth: room for chips", example="8.0"),
+    ]
+    return DraftTable("cutter", tuple(entries), repeated=True)
+
+
+def _guesses(stated: Mapping[str, tuple[Any, str]], deepest: float) -> dict[str, tuple[Any, str]]:
+    """Values for the keys that a cutter cannot be without."""
+    out: dict[str, tuple[Any, str]] = {}
+    if "diameter_mm" not in stated:
+        out["diameter_mm"] = (10.0, "no file states it")
+    d = float(stated.get("shank_diameter_mm", stated.get("diameter_mm", (10.0, "")))[0])
+    out["flutes"] = (2 if d < 4.0 else 3, "no file states them; usual in aluminium")
+    out["helix_deg"] = (30.0, "no file states it; usual of end mills")
+    longest = float(stated["overhang_mm"][0]) if "overhang_mm" in stated else 3000.0
+    if "flute_length_mm" in stated:
+        flute = float(stated["flute_length_mm"][0])
+    else:
+        flute = min(round(max(2.5 * d, deepest + 1.0), 3), longest)
+        reason = "2.5 times the diameter" if flute <= 2.5 * d else "as deep as the program cuts, and 1 mm"
+        out["flute_length_mm"] = (flute, f"no file states it; {reason}")
+    if "overhang_mm" not in stated:
+        out["overhang_mm"] = (round(flute + max(d, 5.0), 3), "no file states it; flutes and one diameter")
+    out["modulus_gpa"] = (580.0, "no file states it; carbide; high-speed steel has 210")
+    return out

@@ -1,0 +1,228 @@
+"""Drafts of jobs that plan a pocket or a contour: from a drawing (DXF) or from a horizontal face of a model (STEP)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from chipload.errors import InputError
+from chipload.geometry.chains import Drawing
+from chipload.geometry.contour import Contour
+from chipload.geometry.dxf import read_dxf
+from chipload.geometry.step import read_step_face
+from chipload.geometry.step_faces import Face, read_faces
+from chipload.jobs.drafts.cutters import cutter_table
+from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, relative
+from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.units import rpm_from_rad_s
+
+#: diameters that a shop has [mm], largest first
+DIAMETERS = (20.0, 16.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5)
+#: share of the area that the guessed cutter must reach
+REACH = 0.97
+#: radial depth over the diameter, axial depth over the diameter, feed per tooth over the diameter
+RADIAL, AXIAL, FEED = 0.15, 0.5, 0.005
+#: cutting speed [m/min], for aluminium with carbide
+CUTTING_M_MIN = 200.0
+#: points along a contour that the size of the cutter is found on
+POINTS = 400
+
+
+def draft_drawing(file: Path, folder: Path, machine: str | None = None) -> Draft:
+    """The draft of a pocket where the drawing has closed contours, else of a contour.
+
+    Raises
+    ------
+    InputError
+        The drawing cannot be read.
+    """
+    drawing, unit = _read(file)
+    layers = sorted(set(drawing.layers))
+    whole = [layer for layer in layers if all(c.closed for c in _of_layer(drawing, layer))]
+    part = [Entry("file", relative(file, folder))]
+    if unit is not None:
+        part.append(Entry("units_if_unstated", unit, "the drawing names no unit", True))
+    contours: Sequence[Contour] = drawing.contours
+    if len(whole) < len(layers) and whole:
+        best = max(whole, key=lambda layer: sum(abs(c.area) for c in _of_layer(drawing, layer)))
+        contours = _of_layer(drawing, best)
+        part.append(Entry("layers", [best], f"the closed contours of those of {', '.join(layers)[:60]}", True))
+    else:
+        part.append(
+            Entry(
+                "layers",
+                note=f"layers that are read; the drawing has {', '.join(layers)[:60]}",
+                example=str(layers[:1]).replace("'", '"'),
+            )
+        )
+    on = _machine(machine)
+    head = (DraftTable("part", tuple(part)),)
+    notes = tuple(str(f) for f in drawing.findings[:8])
+    if all(c.closed for c in contours):
+        size, region = _cutter_for(contours)
+        top = Entry("top_mm", 0.0, "a drawing has no height: its plane is the top", True)
+        tables = (*head, DraftTable("stock", (top,)), *_rest(on, machine, size, AXIAL * size, "pocket"))
+        return Draft(f"Clear the pocket of {file.name}: {region:.4g} mm2 at constant engagement.", tables, notes)
+    size = 10.0
+    top = Entry("top_mm", 0.0, "a drawing has no height: its plane is the top", True)
+    tables = (*head, DraftTable("stock", (top,)), *_rest(on, machine, size, AXIAL * size, "contour"))
+    return Draft(f"Finish the contours of {file.name} at limited engagement.", tables, notes)
+
+
+def draft_model(file: Path, folder: Path, machine: str | None = None) -> Draft:
+    """The draft of a pocket on the floor of a model, or of a thin wall where it has no horizontal plane.
+
+    Raises
+    ------
+    InputError
+        The model cannot be read.
+    """
+    model = read_faces(file, "part.file")
+    planes = [f for f in model.faces if f.kind == "plane" and float(f.high[2] - f.low[2]) < 1e-6]
+    if not planes:
+        from chipload.jobs.drafts.blade import draft_blade_model
+
+        return draft_blade_model(file, folder, model, machine)
+    top = max(float(f.high[2]) for f in model.faces)
+    floors = _floors(file, planes, top)
+    if not floors:
+        raise InputError(f"{file.name}: no horizontal face whose edges close: turn the part, or draw it as DXF")
+    level, drawing, size, region = floors[0]
+    axial = min(AXIAL * size, top - level) if top - level > 1e-3 else AXIAL * size
+    others = ", ".join(f"{z:g}" for z in sorted({round(float(f.low[2]), 3) for f in planes}, reverse=True)[:12])
+    part = DraftTable(
+        "part",
+        (
+            Entry("file", relative(file, folder)),
+            Entry("face_z_mm", round(level, 6), f"the largest floor; planes are at {others} mm", True),
+        ),
+    )
+    stock = DraftTable("stock", (Entry("top_mm", round(level + axial, 6), "one depth of cut above the face", True),))
+    tables = (part, stock, *_rest(_machine(machine), machine, size, axial, "pocket"))
+    notes = tuple(str(f) for f in drawing.findings[:8])
+    return Draft(f"Clear the face at z = {level:g} mm of {file.name}: {region:.4g} mm2.", tables, notes)
+
+
+def _floors(file: Path, planes: Sequence[Face], top: float) -> list[tuple[float, Drawing, float, float]]:
+    """Heights with closed contours, their drawing, cutter and area; floors below the top first, large ones first."""
+    areas: dict[float, float] = {}
+    for face in planes:
+        z = round(float(face.low[2]), 3)
+        areas[z] = areas.get(z, 0.0) + face.area
+    below = sorted((z for z in areas if z < top - 1e-3), key=lambda z: -areas[z])
+    bottom = min(areas)
+    order = [*(z for z in below if z > bottom), *(z for z in areas if z >= top - 1e-3), bottom]
+    for z in dict.fromkeys(order):
+        try:
+            drawing = read_step_face(file, z_mm=z)
+            if drawing.contours and all(c.closed for c in drawing.contours):
+                return [(z, drawing, *_cutter_for(drawing.contours))]
+        except InputError:
+            continue
+    return []
+
+
+def _read(file: Path) -> tuple[Drawing, str | None]:
+    """The drawing, and the unit that was taken where it names none."""
+    try:
+        return read_dxf(file), None
+    except InputError as err:
+        if "unit" not in str(err):
+            raise
+    return read_dxf(file, units_if_unstated="mm"), "mm"
+
+
+def _of_layer(drawing: Drawing, layer: str) -> list[Contour]:
+    return [c for c, own in zip(drawing.contours, drawing.layers, strict=True) if own == layer]
+
+
+def _cutter_for(contours: Sequence[Contour]) -> tuple[float, float]:
+    """Diameter [mm] of the largest cutter that reaches nearly all of the area, and the area [mm^2]."""
+    area: Any = shapely.Polygon()
+    for c in contours:
+        points = c.at(np.linspace(0.0, c.length, POINTS, endpoint=False))[0]
+        area = area.symmetric_difference(shapely.Polygon(points).buffer(0.0))
+    whole = float(area.area)
+    if not whole > 0.0:
+        raise InputError("the contours enclose no area")
+    for d in DIAMETERS:
+        opened = area.buffer(-0.5 * d).buffer(0.5 * d)
+        if float(opened.area) >= REACH * whole:
+            return d, whole
+    return DIAMETERS[-1], whole
+
+
+def _machine(name: str | None) -> Machine:
+    if name is None:
+        return machine_named("vmc")
+    return read_machine(name) if name.lower().endswith(".toml") else machine_named(name)
+
+
+def _rest(machine: Machine, named: str | None, d: float, axial: float, kind: str) -> tuple[DraftTable, ...]:
+    """Machine, material, cutter, operation and limits."""
+    flutes = 2 if d < 4.0 else 3
+    least, most = rpm_from_rad_s(machine.spindle_min), rpm_from_rad_s(machine.spindle_max)
+    speed = round(min(max(1000.0 * CUTTING_M_MIN / (math.pi * d), least), most), -1)
+    feed = round(min(FEED * d * flutes * speed, 60.0 * machine.feed_max), 0)
+    radial = round(RADIAL * d, 4)
+    key = "file" if named is not None and named.lower().endswith(".toml") else "name"
+    own = Entry(key, named) if named is not None else Entry("name", "vmc", "chipload machines lists all", True)
+    cut = f"{CUTTING_M_MIN:g} m/min, carbide in aluminium"
+    entries = [
+        Entry("kind", kind),
+        Entry("cutter", 1),
+        Entry("milling", "down"),
+        Entry(
+            "radial_depth_mm",
+            radial if kind == "pocket" else 0.1,
+            f"{RADIAL:g} of the diameter" if kind == "pocket" else "of the finish pass",
+            True,
+        ),
+        Entry("axial_depth_mm", round(axial, 4), "one depth of cut", True),
+        Entry("feed_mm_min", feed, f"{FEED * d:.3g} mm a tooth", True),
+        Entry("speed_rpm", speed, cut, True),
+        Entry("step_mm", max(0.02 * d, 0.05)),
+        Entry("clearance_mm", 5.0, "height of rapids above the stock", True),
+    ]
+    if kind == "pocket":
+        entries.append(Entry("allowance_mm", note="left on the wall", example="0.2"))
+        engagement = math.degrees(math.acos(1.0 - 2.0 * RADIAL))
+        limit = Entry("engagement_deg", round(1.1 * engagement, 1), "a tenth above that of a straight front", True)
+    else:
+        entries += [
+            Entry("side", "left", "of the contour in its direction; or inside, outside", True),
+            Entry("strategies", ["plain", "backward"]),
+            Entry("use", "backward"),
+            Entry("joint", "sharp"),
+            Entry("semifinish_depth_mm", 0.5, "radial depth of the pass before", True),
+            Entry("tolerance_mm", 0.02),
+            Entry("lead_mm", round(0.3 * d, 3), "radius of the lead-in", True),
+        ]
+        limit = Entry("engagement_deg", 30.0, "a finish pass", True)
+    limits = [limit]
+    if machine.torque is not None:
+        limits.append(Entry("torque_nm", machine.torque / 1000.0, f"of the spindle of {machine.name}"))
+    limits.append(Entry("force_xy_n", note="across the axis", example="500.0"))
+    why = f"the largest that reaches {100.0 * REACH:g} % of the area" if kind == "pocket" else "a common size"
+    cutter = cutter_table(1, [])
+    sized = tuple(
+        Entry("diameter_mm", d, why, True) if e.key == "diameter_mm"
+        else Entry(e.key, flutes, e.note, True) if e.key == "flutes"
+        else Entry(e.key, max(2.5 * d, round(axial + 1.0, 3)), e.note, True) if e.key == "flute_length_mm"
+        else Entry(e.key, max(2.5 * d, round(axial + 1.0, 3)) + max(d, 5.0), e.note, True) if e.key == "overhang_mm"
+        else e
+        for e in cutter.entries
+    )  # fmt: skip
+    material = Entry("name", "al7075-t6", "the file names no material; chipload materials lists all", True)
+    return (
+        DraftTable("machine", (own,)),
+        DraftTable("material", (material,)),
+        DraftTable("cutter", sized, repeated=True),
+        DraftTable("operation", tuple(entries), repeated=True),
+        DraftTable("limits", tuple(limits)),
+    )

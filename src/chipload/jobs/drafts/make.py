@@ -1,0 +1,48 @@
+"""Which draft a file proposes, by its ending."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from chipload.errors import InputError
+from chipload.files import is_file
+from chipload.jobs.drafts.draft import Draft
+
+
+def draft_of(file: Path, folder: Path, *, machine: str | None = None, tools: Path | None = None) -> Draft:
+    """The draft of a job for a file.
+
+    Parameters
+    ----------
+    file : NC text, CL data, a CAMotics project, DXF, STEP, FreeCAD document or blade sections
+    folder : of the job, to which file names are relative
+    machine : a shipped name or a file (TOML); None: guessed
+    tools : a LinuxCNC tool table of a program
+
+    Raises
+    ------
+    InputError
+        The file is missing or cannot be used.
+    """
+    if not is_file(file):
+        raise InputError(f"{file}: no such file: name a program, a drawing, a model or sections of a blade")
+    ending = file.suffix.lower()
+    if ending == ".camotics":
+        from chipload.jobs.drafts.projects import draft_camotics
+
+        return draft_camotics(file, folder, machine)
+    if ending == ".fcstd":
+        from chipload.jobs.drafts.freecad import draft_freecad
+
+        return draft_freecad(file, folder, machine)
+    if ending in (".dxf", ".step", ".stp"):
+        from chipload.jobs.drafts.drawing import draft_drawing, draft_model
+
+        make = draft_drawing if ending == ".dxf" else draft_model
+        return make(file, folder, machine)
+    from chipload.jobs.drafts.blade import draft_sections, holds_sections
+    from chipload.jobs.drafts.program import Known, draft_program
+
+    if holds_sections(file):
+        return draft_sections(file, folder, machine)
+    return draft_program(file, folder, Known(machine=machine, tools=tools))

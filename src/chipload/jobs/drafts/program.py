@@ -1,0 +1,296 @@
+"""A draft of a job that simulates a program: NC text or CL data, with what is known from a project beside it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from chipload.errors import InputError, Severity
+from chipload.files import read_regular
+from chipload.jobs.drafts.comments import Box, Header, Stated, read_header
+from chipload.jobs.drafts.cutters import cutter_table
+from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, relative
+from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.program.apt.reader import apt_text
+from chipload.program.gcode.reader import gcode_text
+from chipload.program.motions import bounds, lengths
+from chipload.program.program import DWELL, RAPID, Program
+from chipload.program.read import ENDINGS, ProgramReading, read_program, read_tools
+from chipload.program.reconcile import unit_mm
+from chipload.program.setup import Setup
+from chipload.units import mm_s_from_mm_min
+
+#: machines that a program is read for where none is stated: the first that has its axes
+MACHINES = ("vmc", "xyzbc-trunnion", "xyzac-trunnion", "xyzbc-head-table")
+#: NC texts longer than this are read in one dialect only [bytes]
+LONG = 3_000_000
+#: feed of cuts that the draft takes where the text states none [mm/min]
+FEED_MM_MIN = 300.0
+#: material over and around the motions in a guessed block [mm]
+ALLOWANCE_MM = 1.0
+#: steps that a guessed step length aims at
+STEPS = 8_000
+#: findings that are listed in the draft
+LISTED = 8
+#: ends of the codes of findings that say nothing about the motions
+PLAIN = ("-unused", "-unknown", "-coolant")
+_LARGEST = 500_000_000
+
+
+@dataclass(frozen=True)
+class Known:
+    """What a project or the caller knows about a program.
+
+    Parameters
+    ----------
+    cutters : by tool number
+    stock : corners of a block [mm], and where it stands
+    machine : a shipped name or a file
+    tools : a tool table
+    text : of the program, where it is not yet a file
+    origin : the file that all this stands in, for the title
+    """
+
+    cutters: Mapping[int, Stated] = field(default_factory=dict)
+    stock: tuple[Box, str] | None = None
+    machine: str | None = None
+    tools: Path | None = None
+    text: str | None = None
+    origin: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class _Chosen:
+    """How a program is read: machine, dialect (None: by ending or machine), feed [mm/min] before the first F."""
+
+    machine: Machine
+    dialect: str | None
+    feed: float | None
+    reading: ProgramReading
+
+
+def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft:
+    """The draft of a job that simulates a program.
+
+    Parameters
+    ----------
+    folder : of the job, to which file names are relative
+
+    Raises
+    ------
+    InputError
+        The program cannot be read for any machine that comes with chipload.
+    """
+    known = known or Known()
+    chosen = _read(path, known)
+    program = chosen.reading.program
+    apt = ENDINGS.get(path.suffix.lower()) == "apt" or chosen.dialect == "apt"
+    text = known.text if known.text is not None else _text(path, apt)
+    header = read_header(text, apt, unit_mm(text))
+    block, stock_entries = _stock(program, known, header)
+    cuts = _cutting(program)
+    numbers = [int(n) for n in np.unique(program.tool[cuts])] if cuts.any() else [int(program.tool[-1])]
+    deepest = {
+        n: block[1][2] - float(program.p_work[cuts & (program.tool == n), 2].min(initial=block[1][2])) for n in numbers
+    }
+    tables = [
+        _program_table(path, folder, chosen, known),
+        _machine_table(chosen, known),
+        DraftTable("stock", stock_entries, note="the block that the program starts from [mm]"),
+        _material_table(header),
+        *(
+            cutter_table(
+                n, [known.cutters.get(n, {}), _of_table(known.tools, n), header.cutters.get(n, {})], deepest[n]
+            )
+            for n in numbers
+        ),
+        _operation_table(program, cuts, numbers, known, header),
+        _limits_table(chosen.machine),
+    ]
+    found = [f for f in chosen.reading.findings if f.severity >= Severity.UNPROVEN]
+    rest = [f for f in chosen.reading.findings if f not in found and not f.code.endswith(PLAIN)]
+    notes = [str(f) for f in (*found, *chosen.reading.violations, *rest)][:LISTED]
+    origin = known.origin or path.name
+    return Draft(
+        f"Simulate {origin}: chips, forces, torque and collisions of the program in its stock.",
+        tuple(tables),
+        tuple(notes),
+    )
+
+
+def _text(path: Path, apt: bool) -> str:
+    try:
+        return apt_text(path) if apt else gcode_text(path)
+    except InputError:
+        return read_regular(path, path.name, _LARGEST).decode("latin-1")
+
+
+def _read(path: Path, known: Known) -> _Chosen:
+    """The reading with the least that is left unproven, on the first machine that has the axes."""
+    tools = read_tools(known.tools) if known.tools is not None else None
+    ending = path.suffix.lower()
+    size = len(known.text) if known.text is not None else path.stat().st_size if path.is_file() else 0
+    dialects: tuple[str | None, ...] = (None,)
+    if ENDINGS.get(ending, "") is None and size <= LONG:
+        dialects = (None, "fanuc", "sinumerik")
+    elif ending not in ENDINGS:
+        dialects = ("linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt")
+    refused: InputError | None = None
+    for name in MACHINES if known.machine is None else (known.machine,):
+        machine = read_machine(name) if name.lower().endswith(".toml") else machine_named(name)
+        best: tuple[int, _Chosen] | None = None
+        for dialect in dialects:
+            for feed in (None, FEED_MM_MIN):
+                try:
+                    own = None if feed is None else mm_s_from_mm_min(feed)
+                    reading = read_program(
+                        path, machine, dialect=dialect, tools=tools, feed=own, text=known.text, setup=Setup()
+                    )
+                except InputError as err:
+                    refused = refused or err
+                    if "feed" not in str(err):
+                        break
+                    continue
+                gaps = sum(f.severity >= Severity.UNPROVEN for f in reading.findings)
+                if best is None or gaps < best[0]:
+                    best = (gaps, _Chosen(machine, dialect, feed, reading))
+                break
+            if best is not None and best[0] == 0:
+                break
+        if best is not None:
+            return best[1]
+    assert refused is not None
+    raise refused
+
+
+def _cutting(program: Program) -> np.ndarray:
+    """(n,) whether each row moves at a feed."""
+    return np.asarray((program.motion != RAPID) & (program.motion != DWELL))
+
+
+def _stock(program: Program, known: Known, header: Header) -> tuple[Box, tuple[Entry, ...]]:
+    """The block, and its entries."""
+    more = (Entry("layer_mm", note="thickness of the layers of the simulation", example="0.5"),)
+    for stated in (known.stock, header.stock):
+        if stated is not None:
+            (low, high), where = stated
+            sure = where.startswith(("BLK", "workpiece", "stock of"))
+            note = f"{where}" if sure else f"{where}: check it against the program's zero"
+            return (low, high), (
+                Entry("low_mm", list(low), note, not sure), Entry("high_mm", list(high), note, not sure), *more
+            )  # fmt: skip
+    lowest, highest, why = _around(program)
+    box = (
+        (float(lowest[0]), float(lowest[1]), float(lowest[2])),
+        (float(highest[0]), float(highest[1]), float(highest[2])),
+    )
+    return box, (Entry("low_mm", list(box[0]), why, True), Entry("high_mm", list(box[1]), why, True), *more)
+
+
+def _around(program: Program) -> tuple[np.ndarray, np.ndarray, str]:
+    """Corners of a block around the motions below the clearance."""
+    low, high = bounds(program)
+    cuts = _cutting(program)
+    rapid = (program.motion == RAPID) & (
+        np.hypot(*np.diff(program.p_work[:, :2], axis=0, prepend=program.p_work[:1, :2]).T) > 1e-9
+    )
+    clearance = float(program.p_work[rapid, 2].min()) if rapid.any() else math.inf
+    below = cuts & (low[:, 2] < clearance - 1e-6)
+    if not below.any():
+        below = cuts if cuts.any() else np.ones(len(program), dtype=np.bool_)
+    lowest, highest = low[below].min(axis=0), high[below].max(axis=0)
+    level = below & (np.hypot(*(high - low)[:, :2].T) > 1e-9)
+    top = float(low[level, 2].max()) if level.any() else float(highest[2])
+    if top < 0.0 <= clearance:
+        top = 0.0
+    elif clearance < math.inf:
+        top = min(top, clearance)
+    if top <= lowest[2] + 1e-6:
+        top = float(lowest[2]) + ALLOWANCE_MM
+    corner_low = np.array([lowest[0] - ALLOWANCE_MM, lowest[1] - ALLOWANCE_MM, lowest[2] - ALLOWANCE_MM]).round(3)
+    corner_high = np.array([highest[0] + ALLOWANCE_MM, highest[1] + ALLOWANCE_MM, top]).round(3)
+    return corner_low, corner_high, f"box of the centre path below the rapids, {ALLOWANCE_MM:g} mm more"
+
+
+def _of_table(tools: Path | None, number: int) -> Stated:
+    """What a tool table states about a tool."""
+    if tools is None:
+        return {}
+    tool = read_tools(tools).tools.get(number)
+    if tool is None or tool.diameter == 0.0:
+        return {}
+    own: Stated = {"diameter_mm": (abs(tool.diameter), f"D of {tools.name}")}
+    if tool.comment:
+        own["name"] = (tool.comment, tools.name)
+    return own
+
+
+def _program_table(path: Path, folder: Path, chosen: _Chosen, known: Known) -> DraftTable:
+    entries = [Entry("file", path.name if known.text is not None else relative(path, folder))]
+    if chosen.dialect is not None:
+        entries.append(Entry("dialect", chosen.dialect, "the one that leaves the fewest words unread", True))
+    else:
+        entries.append(Entry("dialect", note="else by the ending of the file and the machine", example='"fanuc"'))
+    if known.tools is not None:
+        entries.append(Entry("tools", relative(known.tools, folder)))
+    else:
+        entries.append(Entry("tools", note="LinuxCNC tool table: lengths, diameters", example='"shop.tbl"'))
+    if chosen.feed is not None:
+        entries.append(Entry("feed_mm_min", chosen.feed, "the text cuts before it states a feed", True))
+    offsets = Entry("work_offsets", note="origins in the machine", example="{ G54 = [0.0, 0.0, 0.0] }")
+    return DraftTable("program", (*entries, offsets), note="the program; lengths here are in mm, whatever unit it has")
+
+
+def _machine_table(chosen: _Chosen, known: Known) -> DraftTable:
+    machine = chosen.machine
+    if known.machine is not None:
+        key = "file" if known.machine.lower().endswith(".toml") else "name"
+        return DraftTable("machine", (Entry(key, known.machine),))
+    axes = "".join(a.letter for a in machine.chain.axes)
+    note = f"the first shipped one with the axes {axes}; chipload machines lists all"
+    return DraftTable("machine", (Entry("name", machine.name, note, True),))
+
+
+def _material_table(header: Header) -> DraftTable:
+    if header.material is not None:
+        name, where = header.material
+        entry = Entry("name", name, f"by the comment ({where}); chipload materials lists all", True)
+    else:
+        entry = Entry("name", "al7075-t6", "the file names no material; chipload materials lists all", True)
+    return DraftTable("material", (entry,))
+
+
+def _operation_table(
+    program: Program, cuts: np.ndarray, numbers: list[int], known: Known, header: Header
+) -> DraftTable:
+    length = float(lengths(program)[cuts].sum())
+    sizes = [known.cutters.get(n, header.cutters.get(n, {})).get("diameter_mm", (10.0, ""))[0] for n in numbers]
+    step = max(0.125 * min(sizes, default=10.0), length / STEPS, 0.1)
+    step = min(float(f"{step:.2g}"), 100.0)
+    return DraftTable(
+        "operation",
+        (
+            Entry("kind", "simulate"),
+            Entry("step_mm", step, "longest step; smaller: finer and slower"),
+            Entry("engine", note="moves: exact, upright axis; layers: any axis", example='"auto"'),
+        ),
+        repeated=True,
+    )
+
+
+def _limits_table(machine: Machine) -> DraftTable:
+    entries: list[Entry] = []
+    if machine.torque is not None:
+        entries.append(Entry("torque_nm", machine.torque / 1000.0, f"of the spindle of {machine.name}"))
+    if machine.power_w is not None:
+        entries.append(Entry("power_w", float(machine.power_w), f"of the spindle of {machine.name}"))
+    if not entries:
+        entries.append(Entry("force_n", 1000.0, "no limit is stated anywhere", True))
+    else:
+        entries.append(Entry("force_n", note="on the cutter", example="800.0"))
+    entries.append(Entry("deflection_um", note="with [stiffness]; see docs/jobs.md", example="30.0"))
+    return DraftTable("limits", tuple(entries), note="what must not be exceeded; further checks are made by default")

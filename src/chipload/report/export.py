@@ -1,0 +1,143 @@
+"""A result as files for other programs: CSV, VTK, STL, and the setup sheet."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet as pq
+
+from chipload.errors import InputError
+from chipload.files import cannot_write, fresh_folder
+from chipload.report.presentation import Content
+from chipload.report.setup_sheet import setup_sheet
+from chipload.report.vtk import polyline, triangles
+from chipload.result import Result
+from chipload.result.load import HISTORY, load_result
+from chipload.stock.layers import LayeredStock
+
+#: what can be asked for
+KINDS = ("csv", "vtk", "sheet")
+#: rows of a history that are written at once
+ROWS = 65_536
+
+
+def export_result(folder: Path, out: Path, kinds: Sequence[str] = KINDS) -> tuple[str, ...]:
+    """Write a result folder as other files into a new or empty folder; whole or not at all.
+
+    ``csv``: history.csv, a row a step, units in the names of the columns. ``vtk``: the path of each track with all its
+    numbers (.vtp), surface maps (.vtu), the stock that is left (.vtu and .stl). ``sheet``: setup.html, one page.
+
+    Returns
+    -------
+    the names of the files
+
+    Raises
+    ------
+    InputError
+        It is no result, there is nothing of that kind in it, or ``out`` holds something.
+    OutputError
+        It cannot be written.
+    """
+    result = load_result(folder)
+    files: dict[str, Callable[[], Content]] = {}
+    if "csv" in kinds:
+        files["history.csv"] = lambda: lambda file: _csv(folder / HISTORY, file)
+    if "vtk" in kinds:
+        files |= _vtk(result, folder)
+    if "sheet" in kinds:
+        files["setup.html"] = lambda: setup_sheet(result)
+    if not files:
+        raise InputError(f"{folder}: nothing to export: name one of {', '.join(KINDS)}")
+    _write(files, out)
+    return tuple(files)
+
+
+def _csv(history: Path, file: IO[bytes]) -> None:
+    """history.parquet as text, some rows at a time."""
+    try:
+        with pq.ParquetFile(history) as source:
+            writer = None
+            for batch in source.iter_batches(ROWS):
+                table = pa.Table.from_batches([batch])
+                plain = [f.with_type(pa.string()) if pa.types.is_dictionary(f.type) else f for f in table.schema]
+                table = table.cast(pa.schema([f.remove_metadata() for f in plain]))
+                writer = writer or pyarrow.csv.CSVWriter(file, table.schema)
+                writer.write_table(table)
+            if writer is None:
+                file.write((",".join(f'"{name}"' for name in source.schema_arrow.names) + "\n").encode())
+            else:
+                writer.close()
+    except pa.ArrowException as err:
+        raise InputError(f"{history}: cannot be read: {err}: run the job again") from None
+
+
+def _vtk(result: Result, folder: Path) -> dict[str, Callable[[], Content]]:
+    files: dict[str, Callable[[], Content]] = {}
+    for track in result.tracks:
+        name = f"path-{_safe(track.name)}.vtp"
+        blocks = list(track.blocks())
+        if blocks and all(key in blocks[0] for key in ("x_mm", "y_mm", "z_mm")):
+            files[name] = lambda blocks=blocks: _path(blocks)  # type: ignore[misc]
+    for k, one in enumerate(result.maps):
+        values = {one.column: np.asarray(one.values, dtype=np.float64).ravel()}
+        files[f"map-{k}-{_safe(one.name)}.vtu"] = lambda one=one, values=values: triangles(  # type: ignore[misc]
+            one.points, one.faces, values
+        )
+    stock = folder / "stock.npz"
+    if stock.is_file():
+        mesh: list[Any] = []
+
+        def left() -> Any:
+            if not mesh:
+                mesh.append(LayeredStock.load(stock).mesh())
+            return mesh[0]
+
+        files["stock.vtu"] = lambda: triangles(left().vertices, left().faces)
+        files["stock.stl"] = lambda: _stl(left())
+    return files
+
+
+def _path(blocks: Sequence[Mapping[str, Any]]) -> bytes:
+    names = [n for n, v in blocks[0].items() if np.asarray(v).dtype.kind in "fiub"]
+    columns = {n: np.concatenate([np.asarray(b[n]) for b in blocks]) for n in names}
+    points = np.column_stack([columns[key] for key in ("x_mm", "y_mm", "z_mm")])
+    return polyline(points, columns)
+
+
+def _stl(mesh: Any) -> bytes:
+    out = io.BytesIO()
+    mesh.export(out, file_type="stl")
+    return out.getvalue()
+
+
+def _safe(name: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-") or "track"
+
+
+def _write(files: Mapping[str, Callable[[], Content]], out: Path) -> None:
+    target = out.absolute()
+    try:
+        if target.exists() and (not target.is_dir() or any(target.iterdir())):
+            raise InputError(f"--out {out}: is not empty: name a folder that is new or empty")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with fresh_folder(target.parent) as fresh:
+            for name, make in files.items():
+                content = make()
+                with (fresh / name).open("wb") as file:
+                    if isinstance(content, bytes):
+                        file.write(content)
+                    else:
+                        content(file)
+            fresh.chmod(0o755)
+            if target.exists():
+                target.rmdir()
+            fresh.rename(target)
+    except OSError as err:
+        raise cannot_write(f"--out {out}", err) from None

@@ -1,0 +1,316 @@
+"""`chipload init` and `simulate`: what a file states is in the job; the rest is a guess that must be confirmed."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from chipload.cli import app
+from chipload.jobs import check_job, load_job, run_job
+from chipload.jobs.confirm import guesses_of, take_confirm
+from chipload.jobs.drafts.comments import read_header
+from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, write_draft
+
+FUSION = """%
+(T3 D=8. CR=0. - ZMIN=-2. - flat end mill)
+(MATERIAL STEEL 1045)
+G21 G90 G94 G17
+T3 M6
+S4000 M3
+G0 X-10 Y5 Z15
+Z5
+G1 Z-2 F100
+X30 F400
+Y15
+G0 Z15
+X0
+M5
+M2
+%
+"""
+
+
+def call(*words: object) -> tuple[int, str, str]:
+    done = CliRunner().invoke(app, [str(w) for w in words])
+    return done.exit_code, done.stdout, done.stderr
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Path:
+    path = tmp_path / "slot.nc"
+    path.write_text(FUSION)
+    return path
+
+
+def test_what_a_program_states_and_what_is_guessed(program: Path, tmp_path: Path) -> None:
+    code, said, _ = call("init", program, tmp_path / "job")
+    assert code == 0
+    job = tomllib.loads((tmp_path / "job" / "job.toml").read_text())
+    assert job["program"] == {"file": "../slot.nc"}
+    (cutter,) = job["cutter"]
+    assert (cutter["number"], cutter["diameter_mm"], cutter["confirm"]) == (3, 8.0, True)
+    assert job["material"]["name"] == "group-2-steel"
+    # the centre path goes from (-10, 5, -2) to (30, 15, -2); program zero is the top; 1 mm around it
+    assert job["stock"]["low_mm"] == [-11.0, 4.0, -3.0]
+    assert job["stock"]["high_mm"] == [31.0, 16.0, 0.0]
+    # the spindle of the machine bounds torque and power
+    assert (job["limits"]["torque_nm"], job["limits"]["power_w"]) == (70.0, 11000.0)
+    assert "guess: cutter.0.flutes = 3: no file states them; usual in aluminium" in said
+    # what is stated is no guess
+    assert "cutter.0.diameter_mm" not in said
+
+
+def test_a_draft_is_refused_until_confirmed(program: Path, tmp_path: Path) -> None:
+    call("init", program, tmp_path / "job")
+    job = tmp_path / "job" / "job.toml"
+    code, _, said = call("run", job, "--out", tmp_path / "out")
+    assert code == 2
+    lines = said.splitlines()
+    text = job.read_text().splitlines()
+    number = next(k for k, line in enumerate(text, 1) if line.startswith("flutes"))
+    assert f"chipload: cutter.0.flutes = 3: no file states them; usual in aluminium (line {number})" in lines
+    assert len(lines) == job.read_text().count("# guess: ") + 1
+    assert lines[-1].startswith(f"chipload: {len(lines) - 1} guesses are not confirmed")
+    assert not (tmp_path / "out").exists()
+    # a table without `confirm` is confirmed
+    job.write_text(job.read_text().replace("confirm = true\n", ""))
+    assert load_job(job).guesses == ()
+
+
+def test_an_option_is_a_guess_no_more(program: Path, tmp_path: Path) -> None:
+    call("init", program, tmp_path / "job")
+    job = tmp_path / "job" / "job.toml"
+    before, after = load_job(job).guesses, load_job(job, ["cutter.0.flutes=4"]).guesses
+    assert [g for g in before if g not in after] == [next(g for g in before if g.startswith("cutter.0.flutes"))]
+
+
+def test_accepted_guesses_stand_in_the_result(program: Path, tmp_path: Path) -> None:
+    call("init", program, tmp_path / "job")
+    job = tmp_path / "job" / "job.toml"
+    code, said, _ = call("run", job, "--accept", "--out", tmp_path / "out", "--set", "operation.0.step_mm=4")
+    assert code in (0, 3)
+    summary = json.loads((tmp_path / "out" / "summary.json").read_bytes())
+    notes = [f for f in summary["findings"] if f["code"] == "job-guess"]
+    assert len(notes) == len(load_job(job).guesses) > 5
+    lines, holds = check_job(load_job(job))
+    assert not holds
+    assert lines[0].startswith("guess: machine.name = ")
+    assert "report:" in said
+
+
+def test_a_first_look_is_never_better_than_unproven(program: Path, tmp_path: Path) -> None:
+    code, said, _ = call("simulate", program, "--set", "operation.0.step_mm=4", "--out", tmp_path / "out")
+    assert code == 3
+    lines = said.splitlines()
+    assert lines[1].startswith("guess: machine.name = ")
+    assert json.loads((tmp_path / "out" / "summary.json").read_bytes())["verdict"] == "unproven"
+    # the same job with its guesses accepted is no worse than that, and writes nothing beside the program
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["out", "slot.nc"]
+
+
+def test_a_job_is_not_overwritten(program: Path, tmp_path: Path) -> None:
+    call("init", program, tmp_path / "job")
+    before = (tmp_path / "job" / "job.toml").read_bytes()
+    code, _, said = call("init", program, tmp_path / "job")
+    assert code == 2
+    assert said.startswith(f"chipload: {tmp_path / 'job' / 'job.toml'}: is there already and is not overwritten")
+    assert (tmp_path / "job" / "job.toml").read_bytes() == before
+
+
+def test_a_draft_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from chipload.jobs.drafts import draft as module
+
+    write = module.write_whole
+
+    def fails(path: Path, data: bytes) -> None:
+        if path.name == "job.toml":
+            raise OSError(28, "No space left on device")
+        write(path, data)
+
+    monkeypatch.setattr(module, "write_whole", fails)
+    made = Draft("a job", (DraftTable("machine", (Entry("name", "vmc"),)),), files={"program.ngc": b"M2\n"})
+    (tmp_path / "old").mkdir()
+    for folder in ("new", "old"):
+        with pytest.raises(Exception, match="cannot be written"):
+            write_draft(made, tmp_path / folder)
+    assert not (tmp_path / "new").exists()
+    assert list((tmp_path / "old").iterdir()) == []
+
+
+def test_confirm_must_be_true_or_false() -> None:
+    raw = {"cutter": [{"number": 1, "confirm": True}], "machine": {"confirm": False, "name": "vmc"}}
+    assert take_confirm(raw) == ("cutter.0",)
+    assert raw == {"cutter": [{"number": 1}], "machine": {"name": "vmc"}}
+    with pytest.raises(Exception, match=r"machine.confirm = 'yes': must be true or false"):
+        take_confirm({"machine": {"confirm": "yes"}})
+    # a table without marked guesses is named itself
+    assert guesses_of(["machine"], '[machine]\nconfirm = true\nname = "vmc"\n') == (
+        "machine: confirm = true: the table is not confirmed",
+    )
+
+
+def test_comments_of_other_posts() -> None:
+    """FeatureCAM's APT, Heidenhain and Sinumerik: numbers as they stand in the texts."""
+    apt = "UNITS/MM\nINSERT/[HOLDER=C40] 14MM CRB 2FL 32 LOC\nCUTTER/14.,0,7.,0,0,0,84.\nLOAD/TOOL,17\n"
+    apt += "CSI_SET_FLUTE_LENGTH/32.\nCSI_SET_EXTENSION_LENGTH/60.\nINSERT/Stock Size X135. Y130. Z30.\nGOTO/0,0,0\n"
+    found = read_header(apt, apt=True)
+    tool = {k: v for k, (v, _) in found.cutters[17].items()}
+    assert tool["diameter_mm"] == 14.0
+    assert (tool["flutes"], tool["modulus_gpa"], tool["flute_length_mm"], tool["overhang_mm"]) == (2, 580.0, 32.0, 60.0)
+    assert found.stock is not None
+    assert found.stock[0] == ((0.0, 0.0, -30.0), (135.0, 130.0, 0.0))
+    conversational = ";3.0mm DRILL FLUTE LEN 16.0 FLUTE EXT 25.0\n26 TOOL DEF 114 L+1.000 R+0.000\n"
+    drill = read_header(conversational).cutters[114]
+    assert [drill[k][0] for k in ("diameter_mm", "flute_length_mm", "overhang_mm")] == [3.0, 16.0, 25.0]
+    siemens = read_header('WORKPIECE(,"",,"BOX",112,0,-20,-80,-5,-5,100,60)')
+    assert siemens.stock is not None
+    assert siemens.stock[0] == ((-5.0, -5.0, -20.0), (100.0, 60.0, 0.0))
+    # high-speed steel is a tool's
+    assert read_header("(T1 HSS STEEL END MILL)").material is None
+
+
+def test_inches_become_millimetres(tmp_path: Path) -> None:
+    path = tmp_path / "inch.nc"
+    path.write_text("(T1 D=0.5 CR=0.)\nG20 G90\nT1 M6\nS3000 M3\nG0 X0 Y0 Z1\nG1 Z-0.1 F10\nX1\nG0 Z1\nM2\n")
+    call("init", path, tmp_path / "job")
+    job = tomllib.loads((tmp_path / "job" / "job.toml").read_text())
+    assert job["cutter"][0]["diameter_mm"] == 12.7
+    assert job["stock"]["high_mm"][0] == 26.4
+
+
+def test_a_camotics_project(tmp_path: Path) -> None:
+    (tmp_path / "slot.nc").write_text(FUSION)
+    tool = {"units": "imperial", "shape": "ballnose", "length": 1, "diameter": 0.25}
+    block = {"automatic": False, "bounds": {"min": [-20, 0, -8], "max": [40, 20, 0]}}
+    project = {"units": "metric", "tools": {"3": tool}, "workpiece": block, "files": ["slot.tpl"]}
+    (tmp_path / "slot.camotics").write_text(json.dumps(project))
+    code, said, _ = call("init", tmp_path / "slot.camotics", tmp_path / "job")
+    assert code == 0
+    job = tomllib.loads((tmp_path / "job" / "job.toml").read_text())
+    (cutter,) = job["cutter"]
+    assert (cutter["diameter_mm"], cutter["corner_radius_mm"], cutter["flute_length_mm"]) == (6.35, 3.175, 25.4)
+    assert (job["stock"]["low_mm"], job["stock"]["high_mm"]) == ([-20.0, 0.0, -8.0], [40.0, 20.0, 0.0])
+    assert "guess: stock" not in said
+
+
+def prop(name: str, kind: str, inner: str) -> str:
+    return f'<Property name="{name}" type="{kind}">{inner}</Property>'
+
+
+def document(path: Path) -> None:
+    """A CAM job as FreeCAD 0.20 saves it: a box as stock, a ball nose of 6 mm, one operation with its path."""
+    link, float_, text = "App::PropertyLink", "App::PropertyLength", "App::PropertyString"
+    place = '<PropertyPlacement Px="-5" Py="-5" Pz="-10" Q0="0" Q1="0" Q2="0" Q3="1"/>'
+    objects = {
+        "Job": ("Path::FeaturePython", [
+            prop("Stock", link, '<Link value="Stock"/>'), prop("Operations", link, '<Link value="Operations"/>'),
+        ]),
+        "Operations": ("App::DocumentObjectGroup", [
+            prop("Group", "App::PropertyLinkList", '<LinkList count="1"><Link value="Profile"/></LinkList>'),
+        ]),
+        "Stock": ("Part::FeaturePython", [
+            *(prop(k, float_, f'<Float value="{v}"/>') for k, v in (("Length", 50), ("Width", 30), ("Height", 10))),
+            prop("Placement", "App::PropertyPlacement", place),
+        ]),
+        "Profile": ("Path::FeaturePython", [
+            prop("ToolController", link, '<Link value="TC"/>'), prop("Label", text, '<String value="Rough (1)"/>'),
+            prop("Path", "Path::PropertyPath", '<Path file="Profile.nc" version="1"/>'),
+        ]),
+        "TC": ("Path::FeaturePython", [
+            prop("Tool", link, '<Link value="Bit"/>'),
+            prop("ToolNumber", "App::PropertyInteger", '<Integer value="5"/>'),
+            prop("SpindleSpeed", "App::PropertyFloat", '<Float value="9000"/>'),
+        ]),
+        "Bit": ("Part::FeaturePython", [
+            prop("Diameter", float_, '<Float value="6"/>'),
+            prop("Flutes", "App::PropertyInteger", '<Integer value="4"/>'),
+            prop("CuttingEdgeHeight", float_, '<Float value="18"/>'),
+            prop("ShapeName", text, '<String value="ballend"/>'), prop("Label", text, '<String value="6mm Ball"/>'),
+        ]),
+    }  # fmt: skip
+    head = "".join(f'<Object type="{kind}" name="{name}"/>' for name, (kind, _) in objects.items())
+    data = "".join(
+        f'<Object name="{name}"><Properties>{"".join(ps)}</Properties></Object>' for name, (_, ps) in objects.items()
+    )
+    with zipfile.ZipFile(path, "w") as archive:
+        xml = f"<?xml version='1.0'?><Document><Objects>{head}</Objects><ObjectData>{data}</ObjectData></Document>"
+        archive.writestr("Document.xml", xml)
+        archive.writestr("Profile.nc", "(Rough)\nG0 X0 Y0 Z5\nG1 X0 Y0 Z-3 F2.5\nG1 X20 Y0 Z-3 F10\nG0 Z5\n")
+
+
+def test_a_freecad_job(tmp_path: Path) -> None:
+    """Feeds of the document are mm/s: 10 is F600."""
+    document(tmp_path / "part.FCStd")
+    code, _, said = call("init", tmp_path / "part.FCStd", tmp_path / "job")
+    assert code == 0, said
+    text = (tmp_path / "job" / "program.ngc").read_text()
+    assert "G1 X20 Y0 Z-3 F600.0000" in text
+    assert "T5 M6 (TC)\n" in text
+    assert "S9000 M3" in text
+    job = tomllib.loads((tmp_path / "job" / "job.toml").read_text())
+    assert job["program"]["file"] == "program.ngc"
+    assert (job["stock"]["low_mm"], job["stock"]["high_mm"]) == ([-5.0, -5.0, -10.0], [45.0, 25.0, 0.0])
+    (cutter,) = job["cutter"]
+    assert [cutter[k] for k in ("number", "diameter_mm", "corner_radius_mm", "flutes", "flute_length_mm")] == [
+        5, 6.0, 3.0, 4, 18.0
+    ]  # fmt: skip
+    lines, _ = check_job(load_job(tmp_path / "job" / "job.toml"))
+    assert any(line.startswith("estimate: ") for line in lines)
+
+
+def test_damaged_documents_are_refused(tmp_path: Path) -> None:
+    for name, data in {"a": b"", "b": b"PK\x03\x04 nothing", "c": b"<Document/>"}.items():
+        path = tmp_path / f"{name}.FCStd"
+        path.write_bytes(data)
+        code, _, said = call("init", path, tmp_path / "job")
+        assert (code, "not a FreeCAD document" in said) == (2, True)
+    with zipfile.ZipFile(tmp_path / "d.FCStd", "w") as archive:
+        archive.writestr("Document.xml", '<!DOCTYPE a [<!ENTITY b "c">]><Document>&b;</Document>')
+    assert "entities are not read" in call("init", tmp_path / "d.FCStd", tmp_path / "job")[2]
+    assert not (tmp_path / "job").exists()
+
+
+def square(path: Path) -> None:
+    """A closed square of 40 mm that names no unit."""
+    import ezdxf
+
+    drawing = ezdxf.new("R2000")
+    drawing.header["$INSUNITS"] = 0
+    drawing.modelspace().add_lwpolyline([(0, 0), (40, 0), (40, 40), (0, 40)], close=True)
+    drawing.saveas(path)
+
+
+def test_a_drawing_is_a_pocket(tmp_path: Path) -> None:
+    """Of a square of 40 mm an opening by diameter D leaves out (4 - pi) D^2 / 4: 3 % of the area is D = 14.95 mm."""
+    square(tmp_path / "square.dxf")
+    code, said, _ = call("init", tmp_path / "square.dxf", tmp_path / "job")
+    assert code == 0
+    assert "1600 mm2" in said
+    job = tomllib.loads((tmp_path / "job" / "job.toml").read_text())
+    assert (job["operation"][0]["kind"], job["cutter"][0]["diameter_mm"]) == ("pocket", 12.0)
+    assert job["part"]["units_if_unstated"] == "mm"
+    lines, _ = check_job(load_job(tmp_path / "job" / "job.toml"))
+    assert "operation 0: pocket, cutter 1 of 12 mm, 1600 mm2" in lines
+
+
+def test_sections_are_a_thin_wall(tmp_path: Path) -> None:
+    """Three numbered files of an ellipse of 30 by 4 mm, 20 mm apart."""
+    from math import cos, pi, sin
+
+    for k in range(3):
+        rows = [f"{15 * cos(t)} {2 * sin(t)} {20 * k}" for t in (2 * pi * i / 60 for i in range(60))]
+        (tmp_path / f"blade_{k + 1}.txt").write_text("X Y Z\n" + "\n".join(rows) + "\n")
+    code, _, said = call("init", tmp_path / "blade_2.txt", tmp_path / "job")
+    assert code == 0, said
+    job = tomllib.loads((tmp_path / "job" / "job.toml").read_text())
+    assert job["wall"]["files"] == [f"../blade_{k}.txt" for k in (1, 2, 3)]
+    assert job["wall"]["unit"] == "mm"
+    loaded = load_job(tmp_path / "job" / "job.toml")
+    assert loaded.capability.name == "thinwall"
+    with pytest.raises(Exception, match=r"wall.unit = .mm.: the files name none"):
+        run_job(loaded)

@@ -1,0 +1,152 @@
+"""A result as CSV, VTK and setup sheet: every number comes back as it stands; the mesh keeps its volume."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import struct
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import trimesh
+from typer.testing import CliRunner
+
+from chipload.cli import app
+from chipload.errors import InputError
+from chipload.report.vtk import polyline, triangles
+from chipload.stock.layers import LayeredStock
+
+PROGRAM = "G21 G90 G94\nT1 M6\nS3000 M3\nG0 X-8 Y5 Z5\nG1 Z-2 F300\nX28\nG0 Z5\nM5\nM2\n"
+JOB = """
+[program]
+file = "slot.ngc"
+[machine]
+name = "vmc"
+[stock]
+low_mm = [0.0, 0.0, -6.0]
+high_mm = [20.0, 10.0, 0.0]
+[material]
+name = "al7075-t6"
+[[cutter]]
+number = 1
+diameter_mm = 6.0
+flutes = 2
+helix_deg = 30.0
+flute_length_mm = 18.0
+overhang_mm = 25.0
+modulus_gpa = 580.0
+[[operation]]
+kind = "simulate"
+step_mm = 3.0
+[limits]
+torque_nm = 5.0
+"""
+
+
+def call(*words: object) -> tuple[int, str, str]:
+    done = CliRunner().invoke(app, [str(w) for w in words])
+    return done.exit_code, done.stdout, done.stderr
+
+
+def read_vtk(path: Path) -> dict[str, np.ndarray]:
+    """Arrays of a VTK file by name: base64 of the length (UInt64) and the values, little-endian."""
+    kinds = {"Float64": "<f8", "Int64": "<i8", "UInt8": "u1"}
+    out = {}
+    for element in ElementTree.parse(path).getroot().iter("DataArray"):
+        assert element.get("format") == "binary"
+        data = base64.b64decode(element.text or "")
+        (size,) = struct.unpack("<Q", data[:8])
+        assert size == len(data) - 8
+        values = np.frombuffer(data[8:], dtype=kinds[str(element.get("type"))])
+        parts = int(element.get("NumberOfComponents", "1"))
+        out[str(element.get("Name"))] = values.reshape(-1, parts) if parts > 1 else values
+    return out
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("slot")
+    (folder / "slot.ngc").write_text(PROGRAM)
+    (folder / "job.toml").write_text(JOB)
+    code, _, said = call("run", folder / "job.toml", "--out", folder / "result")
+    assert code in (0, 3), said
+    return folder / "result"
+
+
+@pytest.fixture(scope="module")
+def exported(result: Path) -> Path:
+    out = result.parent / "export"
+    code, _, said = call("export", result, "--out", out)
+    assert code == 0, said
+    return out
+
+
+def test_csv_has_every_column_and_row(result: Path, exported: Path) -> None:
+    history = pq.read_table(result / "history.parquet")
+    with (exported / "history.csv").open(newline="") as file:
+        head, *rows = csv.reader(file)
+    assert head == history.column_names
+    assert len(rows) == history.num_rows > 10
+    for name in ("force_n", "torque_nm", "x_mm", "t_s"):
+        found = [float(row[head.index(name)]) for row in rows]
+        np.testing.assert_array_equal(found, history[name].to_numpy())
+    assert {row[head.index("track")] for row in rows} == {"program"}
+
+
+def test_the_path_in_vtk(result: Path, exported: Path) -> None:
+    history = pq.read_table(result / "history.parquet")
+    found = read_vtk(exported / "path-program.vtp")
+    np.testing.assert_array_equal(found["points"][:, 0], history["x_mm"].to_numpy())
+    np.testing.assert_array_equal(found["force_n"], history["force_n"].to_numpy())
+    assert found["connectivity"].tolist() == list(range(history.num_rows))
+    assert found["offsets"].tolist() == [history.num_rows]
+    numbers = [f.name for f in history.schema if str(f.type) in ("double", "int64", "bool", "int32")]
+    full = [n for n in numbers if history[n].null_count < history.num_rows and n != "operation"]
+    assert set(full) <= set(found)
+
+
+def test_the_stock_keeps_its_volume(result: Path, exported: Path) -> None:
+    """1200 mm3 less a slot of 6 by 2 by 20 mm: 960 mm3; layers and tiles keep it to 1e-3."""
+    found = read_vtk(exported / "stock.vtu")
+    faces = found["connectivity"].reshape(-1, 3)
+    assert set(found["types"].tolist()) == {5}
+    a, b, c = (found["points"][faces[:, k]] for k in range(3))
+    volume = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum()) / 6.0
+    assert volume == pytest.approx(960.0, rel=1e-3)
+    assert trimesh.load_mesh(exported / "stock.stl").volume == pytest.approx(volume, rel=1e-6)
+    assert LayeredStock.load(result / "stock.npz").volume() == pytest.approx(volume, rel=1e-6)
+
+
+def test_another_reader_reads_the_same(exported: Path) -> None:
+    meshio = pytest.importorskip("meshio")
+    read = meshio.read(exported / "stock.vtu")
+    np.testing.assert_array_equal(read.points, read_vtk(exported / "stock.vtu")["points"])
+    assert read.cells[0].type == "triangle"
+
+
+def test_the_sheet_shows_verdict_program_and_limits(exported: Path) -> None:
+    text = (exported / "setup.html").read_text()
+    assert "<script" not in text
+    for part in ("Holds: ", "torque [N m]", "0-program.apt", "vmc", "X -8 to 28", "size: A4"):
+        assert part in text
+
+
+def test_what_is_refused(result: Path, exported: Path, tmp_path: Path) -> None:
+    assert call("export", result, "--out", exported)[0] == 2
+    code, _, said = call("export", tmp_path, "--out", tmp_path / "out")
+    assert (code, "name a result folder" in said) == (2, True)
+    assert not (tmp_path / "out").exists()
+    with pytest.raises(InputError, match="there is nothing to write"):
+        polyline([], {})
+    with pytest.raises(InputError, match="force_n: 1 values: must be 2"):
+        polyline([[0, 0, 0], [1, 0, 0]], {"force_n": np.zeros(1)})
+    with pytest.raises(InputError, match="a face names a point outside 0 to 2"):
+        triangles(np.eye(3), [[0, 1, 3]])
+
+
+def test_one_kind_alone(result: Path, tmp_path: Path) -> None:
+    assert call("export", result, "--out", tmp_path / "a", "--csv")[0] == 0
+    assert [p.name for p in (tmp_path / "a").iterdir()] == ["history.csv"]
