@@ -47,7 +47,7 @@ helix_deg = 30.0
 flute_length_mm = 22.0
 overhang_mm = 30.0
 modulus_gpa = 580.0
-[shell]
+[torque_control.shell]
 mean_radius_mm = 12.0
 length_mm = 30.0
 wall_mm = 1.5
@@ -83,7 +83,7 @@ smoothing_s = 0.02
 noise_a = 0.03
 current_step_a = 0.005
 idle_error_share = 0.01
-[control.override]
+[torque_control.override]
 hold = 0.9
 overload_nm = 2.0
 torque_most_nm = 6.0
@@ -181,8 +181,8 @@ def test_the_verdict_is_what_was_measured(result, what):
 def test_a_cutter_that_would_break(job, tmp_path):
     """2 mm across, 30 mm long: the stress of its shank is far above what carbide takes."""
     thin = ["--set", "cutter.0.diameter_mm=2", "--set", "limits.form_error_um=5000", "--set", "limits.strength_share=1"]
-    thin += ["--set", "control.override.overload_nm=90", "--set", "control.override.torque_most_nm=100"]
-    code, out, err = call("run", job, "--out", tmp_path / "r", *thin, "--set", "shell.strength_mpa=5000")
+    thin += ["--set", "torque_control.override.overload_nm=90", "--set", "torque_control.override.torque_most_nm=100"]
+    code, out, err = call("run", job, "--out", tmp_path / "r", *thin, "--set", "torque_control.shell.strength_mpa=5000")
     assert code == 3, out + err
     summary = json.loads((tmp_path / "r" / "summary.json").read_text())
     (stress,) = (c for c in summary["limits"] if c["name"] == "cutter_stress_mpa")
@@ -309,19 +309,19 @@ def test_check(job):
     [
         ("wall_mm = 1.5", "wall_mm = 3.0", "shell.wall_mm = 3: must be at most a fifth of the least radius 12"),
         ("modulus_gpa = 70.0", "modulus_gpa = 70000.0", "shell.modulus_gpa = 70000: must be at most 1000"),
-        ("poisson = 0.33", "poisson = 0.5", "shell.poisson = 0.5: must be below 0.5"),
+        ("poisson = 0.33", "poisson = 0.5", "torque_control.shell.poisson = 0.5: must be below 0.5"),
         ("strength_mpa = 250.0", "strength_mpa = 2.5e8", "shell.strength_mpa = 2.5e+08: must be at most 5000"),
         ("wall_tolerance_mm = 0.1", "wall_tolerance_mm = 0.8", "tolerance_mm = 0.8: must be below half of wall_mm"),
         ("ramp_mm = 4.0\n", "", "surprise.1.ramp_mm: missing: state it"),
         ("at_deg = -90.0", "at_deg = -90.0\nwidth_mm = 3.0", "surprise.0.width_mm: not used by kind = thicker-side"),
         ('kind = "hard-spot"', 'kind = "soft-spot"', "must be one of 'thicker-side', 'hard-spot'"),
         ("bottom_mm = -2.0", "bottom_mm = -0.5", "round.bottom_mm = -0.5: must be below top_mm = -1"),
-        ("[shell]", "[shell]\nangle_deg = -5.0", "taper_deg = 0: must be 5, that of the wall"),
-        ("[shell]", "[shell]\nangle_deg = 5.0", "this wall is wider upwards: clamp its other end"),
+        ("control.shell]", "control.shell]\nangle_deg = -5.0", "taper_deg = 0: must be 5, that of the wall"),
+        ("control.shell]", "control.shell]\nangle_deg = 5.0", "this wall is wider upwards: clamp its other end"),
         ("[round]", '[program]\nfile = "x.ngc"\n[round]', "program, round: both are stated"),
         ("acceleration_mm_s2 = 1000.0", "acceleration_mm_s2 = 9000.0", "must be at most 3000, that of machine vmc"),
         ("cutter = 1", "cutter = 2", "round.cutter = 2: no [[cutter]] has this number"),
-        ("hold = 0.9\n", "", "control.override.hold: missing: state it (share of the limit of torque that is held)"),
+        ("hold = 0.9\n", "", "override.hold: missing: state it (share of the limit of torque that is held)"),
         ("form_error_um = 30.0\n", "", "limits.form_error_um: missing: state it"),
         ("torque_over_percent = 5.0\n", "", "limits.torque_over_percent: missing: state it"),
         ("idle_error_share = 0.01\n", "", "spindle.idle_error_share: missing: state it"),
@@ -338,11 +338,28 @@ def test_refused(job, tmp_path, old, new, says):
     assert not (tmp_path / "r").exists()
 
 
+def test_tables_by_their_old_names(job, tmp_path):
+    """`[shell]` and `[control]` are refused with what they are called now; `--set` too."""
+    job.write_text(
+        JOB.replace("[torque_control.shell]", "[shell]").replace("[torque_control.override]", "[control.override]")
+    )
+    code, _, err = call("check", job)
+    assert code == 2
+    assert err.splitlines() == [
+        "chipload: job.toml: shell: renamed: write [torque_control.shell]",
+        "chipload: job.toml: control: renamed: write [torque_control]",
+    ]
+    job.write_text(JOB)
+    code, _, err = call("check", job, "--set", "shell.wall_mm=1.2")
+    assert code == 2
+    assert "--set shell.wall_mm=1.2: shell: renamed: write torque_control.shell.wall_mm" in err
+
+
 def test_a_spindle_that_cannot_hold_the_limit(job, tmp_path):
     """Its light cuts are told from air, but not the limit from what is held: refused with both numbers."""
     code, _, err = call(
         "run", job, "--out", tmp_path / "r", "--set", "spindle.idle_error_share=0.05", "--set",
-        "control.override.light_nm=0.06", "--set", "limits.torque_over_percent=0",
+        "torque_control.override.light_nm=0.06", "--set", "limits.torque_over_percent=0",
     )  # fmt: skip
     assert code == 2
     assert "spindle: it resolves 0.0394 N m" in err
@@ -355,8 +372,8 @@ def test_a_controller_that_is_slower_than_the_constant_feed(job, tmp_path):
     """Where the limit is never reached the constant feed is the programmed one, and holding the torque costs time."""
     code, out, err = call(
         "run", job, "--out", tmp_path / "r", "--set", "limits.form_error_um=5000", "--set", "limits.strength_share=1",
-        "--set", "shell.strength_mpa=5000", "--set", "control.override.overload_nm=90", "--set",
-        "control.override.torque_most_nm=100",
+        "--set", "torque_control.shell.strength_mpa=5000", "--set", "torque_control.override.overload_nm=90", "--set",
+        "torque_control.override.torque_most_nm=100",
     )  # fmt: skip
     assert code == 3, out + err
     operation = json.loads((tmp_path / "r" / "summary.json").read_text())["operations"][0]

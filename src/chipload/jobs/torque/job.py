@@ -11,7 +11,7 @@ from typing import Any
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
 from chipload.jobs.sources import cutters, entries_of, sources_of
-from chipload.jobs.torque.tables import RoundTable, SurpriseTable, TorqueJobTable
+from chipload.jobs.torque.tables import RoundTable, ShellTable, SurpriseTable, TorqueJobTable
 
 ONE_PROGRAM = "state a [program] with a file, or a [round] that is made"
 #: keys that each kind of surprise needs beside `share`
@@ -47,6 +47,11 @@ class TorqueJob:
     cutters: Mapping[int, Cutter]
     overrides: tuple[str, ...]
 
+    @property
+    def shell(self) -> ShellTable:
+        """The finished wall."""
+        return self.table.torque_control.shell
+
 
 def load(path: Path, table: TorqueJobTable, overrides: Sequence[str]) -> TorqueJob:
     """The job of a table that was read.
@@ -70,9 +75,9 @@ def load(path: Path, table: TorqueJobTable, overrides: Sequence[str]) -> TorqueJ
     if table.round is not None and tools:
         errors.texts += _wrong_round(table, table.round, tools)
     for k, surprise in enumerate(table.surprise):
-        errors.texts += _wrong_surprise(f"surprise.{k}", surprise, table.shell.wall_mm)
+        errors.texts += _wrong_surprise(f"surprise.{k}", surprise, table.torque_control.shell.wall_mm)
     errors.refuse()
-    control = table.control.file
+    control = table.torque_control.file
     return TorqueJob(
         path, table, None if table.program is None else folder / table.program.file, sources["machine"],
         sources["material"], None if control is None else folder / control, tools, tuple(overrides),
@@ -89,22 +94,22 @@ def missing(values: Mapping[str, Any]) -> list[str]:
 
 
 def _wrong_shell(table: TorqueJobTable) -> Iterator[str]:
-    shell = table.shell
+    shell, at = table.torque_control.shell, "torque_control.shell"
     f = math.radians(shell.angle_deg)
     least = min(shell.mean_radius_mm, shell.mean_radius_mm + shell.length_mm * math.sin(f))
     if shell.wall_mm > 0.2 * least:
         yield (
-            f"shell.wall_mm = {shell.wall_mm:g}: must be at most a fifth of the least radius {least:g}: a thin wall is "
-            "meant"
+            f"{at}.wall_mm = {shell.wall_mm:g}: must be at most a fifth of the least radius {least:g}: a thin wall "
+            "is meant"
         )
     if shell.wall_tolerance_mm >= 0.5 * shell.wall_mm:
         yield (
-            f"shell.wall_tolerance_mm = {shell.wall_tolerance_mm:g}: must be below half of wall_mm = {shell.wall_mm:g}"
+            f"{at}.wall_tolerance_mm = {shell.wall_tolerance_mm:g}: must be below half of wall_mm = {shell.wall_mm:g}"
         )
     for k, boss in enumerate(shell.boss):
         if not boss.from_deg < boss.to_deg <= boss.from_deg + 360.0:
             yield (
-                f"shell.boss.{k}.to_deg = {boss.to_deg:g}: must be above from_deg = {boss.from_deg:g} and at most "
+                f"{at}.boss.{k}.to_deg = {boss.to_deg:g}: must be above from_deg = {boss.from_deg:g} and at most "
                 f"{boss.from_deg + 360.0:g}"
             )
 
@@ -118,7 +123,7 @@ def _wrong_round(table: TorqueJobTable, ask: RoundTable, tools: Mapping[int, Cut
         yield f"round.bottom_mm = {ask.bottom_mm:g}: must be below top_mm = {ask.top_mm:g}"
     taper = math.degrees(tools[ask.cutter].taper)
     # a flank that is wider upwards leaves a wall that is narrower upwards
-    upwards = table.shell.angle_deg * (1.0 if table.shell.clamped == "low" else -1.0)
+    upwards = table.torque_control.shell.angle_deg * (1.0 if table.torque_control.shell.clamped == "low" else -1.0)
     if abs(upwards + taper) > 1e-6:
         yield (
             f"round.cutter = {ask.cutter}: taper_deg = {taper:g}: must be {max(-upwards, 0.0):g}, that of the wall: "

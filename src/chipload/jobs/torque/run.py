@@ -90,10 +90,10 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
         A file cannot be read, or values do not go together.
     """
     machine, material, table, program, spindle = _opened(job)
-    surprises, place = job.table.surprise, Place(job.table.shell)
+    surprises, place = job.table.surprise, Place(job.shell)
     thinner = thinner_share(surprises)
     planned = cut(job, program, shell_stock(job, program), material, machine.rapid, _part(progress, 0.0, 0.3))
-    centre = off_centre(job.table.shell.stock_mm, surprises)
+    centre = off_centre(job.shell.stock_mm, surprises)
     real = cut(
         job, program, shell_stock(job, program, centre, thinner), material, machine.rapid, _part(progress, 0.3, 0.6),
         keep=True,
@@ -101,13 +101,13 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
     loads = true_loads(real.loads, real.points, place, surprises)
     progress(0.6, "the wall")
     shell = wall_of(job)
-    width = contact_width(job.table.shell.stock_mm, job.cutters)
-    thin = ritz(replace(shell, thickness=shell.thickness - job.table.shell.wall_tolerance_mm))
+    width = contact_width(job.shell.stock_mm, job.cutters)
+    thin = ritz(replace(shell, thickness=shell.thickness - job.shell.wall_tolerance_mm))
     true = thin if thin.shell.thickness == shell.thickness * (1.0 - thinner) else ritz(
         replace(shell, thickness=shell.thickness * (1.0 - thinner))
     )  # fmt: skip
     ask = job.table.limits
-    allowed = (1e-3 * ask.form_error_um, ask.strength_share * job.table.shell.strength_mpa)
+    allowed = (1e-3 * ask.form_error_um, ask.strength_share * job.shell.strength_mpa)
     limit = path_limit(planned.loads, unit_response(thin, planned.near, planned.far, width, planned.tool), *allowed)
     walls = unit_response(true, real.near, real.far, width, real.tool)
     torque = min(limit.torque, 1e3 * ask.torque_nm) if ask.torque_nm is not None else limit.torque
@@ -141,10 +141,10 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
         wall=shell,
         thinnest=thin.shell.thickness,
         real=true.shell.thickness,
-        strength=job.table.shell.strength_mpa,
+        strength=job.shell.strength_mpa,
         limits=ask.stated,
         unchecked=ask.unstated,
-        tolerance=job.table.shell.wall_tolerance_mm,
+        tolerance=job.shell.wall_tolerance_mm,
         limit=limit,
         torque=torque,
         true_torque=path_limit(loads, walls, *allowed).torque,
@@ -184,8 +184,8 @@ def check(job: TorqueJob) -> tuple[list[str], bool]:
     kind = "tube" if shell.cone_angle == 0.0 else "cone"
     thinner = thinner_share(job.table.surprise)
     shell_stock(job, program)
-    stock = shell_stock(job, program, off_centre(job.table.shell.stock_mm, job.table.surprise), thinner)
-    granted = 1.0 + 1e-2 * job.table.limits.torque_over_percent - job.table.control.override.hold
+    stock = shell_stock(job, program, off_centre(job.shell.stock_mm, job.table.surprise), thinner)
+    granted = 1.0 + 1e-2 * job.table.limits.torque_over_percent - job.table.torque_control.override.hold
     least = torque_resolution(spindle, 1e-3 * job.table.loop.period_ms).total / granted if granted > 0.0 else math.inf
     count = counted(program, job.cutters, resolution_of(job))
     return [
@@ -211,7 +211,7 @@ def _opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, Program, Spi
     program = program_of(job, machine)
     spindle = _spindle(job, program.spindle)
     period = 1e-3 * job.table.loop.period_ms
-    check_light(spindle, period, 1e3 * job.table.control.override.light_nm)
+    check_light(spindle, period, 1e3 * job.table.torque_control.override.light_nm)
     if job.table.limits.torque_nm is not None:
         # the limit is at most this one, so that a spindle that cannot hold this one holds none
         _resolved(job, spindle, 1e3 * job.table.limits.torque_nm)
@@ -221,10 +221,10 @@ def _opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, Program, Spi
 
 def _resolved(job: TorqueJob, spindle: Spindle, torque: float) -> None:
     """Refuse a limit of torque [N mm] that the spindle cannot hold, or that counts as light."""
-    hold = job.table.control.override.hold
+    hold = job.table.torque_control.override.hold
     excess = 1e-2 * job.table.limits.torque_over_percent
     check_limit(spindle, 1e-3 * job.table.loop.period_ms, torque, hold, excess)
-    light = 1e3 * job.table.control.override.light_nm
+    light = 1e3 * job.table.torque_control.override.light_nm
     if light >= hold * torque:
         raise _wrong_side("light_nm", light, hold * torque)
 
@@ -232,7 +232,8 @@ def _resolved(job: TorqueJob, spindle: Spindle, torque: float) -> None:
 def _wrong_side(key: str, value: float, held: float) -> InputError:
     side = "below" if key == "light_nm" else "above"
     return InputError(
-        f"control.override.{key} = {1e-3 * value:g}: must be {side} the torque that is held, {1e-3 * held:.4g} N m"
+        f"torque_control.override.{key} = {1e-3 * value:g}: must be {side} the torque that is held, "
+        f"{1e-3 * held:.4g} N m"
     )
 
 
@@ -248,7 +249,7 @@ def _acceleration(job: TorqueJob, machine: Machine) -> float:
 
 def wall_of(job: TorqueJob) -> Shell:
     """The finished wall as planned."""
-    t = job.table.shell
+    t = job.shell
     return Shell(t.mean_radius_mm, t.length_mm, t.wall_mm, 1e3 * t.modulus_gpa, t.poisson, math.radians(t.angle_deg))
 
 
@@ -297,7 +298,7 @@ def _spindle(job: TorqueJob, speeds: Floats) -> Spindle:
 
 
 def _controller(job: TorqueJob, torque: float) -> Override:
-    t = job.table.control.override.model_dump()
+    t = job.table.torque_control.override.model_dump()
     hold = t.pop("hold")
     overload = 1e3 * t["overload_nm"]
     if overload < hold * torque:

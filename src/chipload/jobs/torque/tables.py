@@ -1,6 +1,6 @@
 """The tables of a job that holds the torque on a thin tube or cone: which keys there are, their units and ranges.
 
-The keys of ``[override]`` and ``[spindle]`` are those of the file of ``chipload hal``.
+The keys of ``[torque_control]`` `override` and ``[spindle]`` are those of the file of ``chipload hal``.
 """
 
 from __future__ import annotations
@@ -149,10 +149,11 @@ class LoopTable(Table):
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
 
 
-class ControlTable(Table):
-    """The controller."""
+class TorqueControlTable(Table):
+    """The wall, and the controller that holds the torque on it."""
 
     file: Text | None = Field(None, description="sets and rules (TOML); else the standard ones")
+    shell: ShellTable
     override: OverrideTable
 
 
@@ -181,10 +182,9 @@ class TorqueJobTable(Table):
     machine: SourceTable
     material: SourceTable
     cutter: tuple[CutterTable, ...] = Field(min_length=1)
-    shell: ShellTable
+    torque_control: TorqueControlTable
     surprise: tuple[SurpriseTable, ...] = Field((), max_length=50)
     spindle: SpindleTable
-    control: ControlTable
     loop: LoopTable
     simulation: SimulationTable
     limits: TorqueLimitsTable
