@@ -16,7 +16,8 @@ from numba import njit
 from chipload.control import _fuzzy, _override
 from chipload.control.fuzzy import standard
 from chipload.control.override import Override, begin, sets_of
-from chipload.control.plant import Loop, Spindle, TorqueProfile, run
+from chipload.control.plant import Loop, TorqueProfile, run
+from chipload.control.spindle_model import Spindle
 
 LIMIT = 2000.0
 RULES = Override(

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
+from chipload.commands_torque import hal, spindle
 from chipload.errors import Cancelled, InputError, Severity, worst_severity
 from chipload.terminal import EXCEEDED, bar, guarded, say, show
 from chipload.units import mm_s_from_mm_min
@@ -345,47 +346,6 @@ def view(
     guarded(work, debug)
 
 
-@app.command()
-def hal(
-    file: Annotated[Path, typer.Argument(metavar="HAL", help="the controller (TOML): path, override, spindle")],
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="what happened, step by step (CSV)")] = None,
-    name: Annotated[str, typer.Option("--name", help="of the component; its pins and signals begin so")] = "chipload",
-    python: Annotated[
-        str, typer.Option("--python", help="the interpreter that LinuxCNC's modules belong to")
-    ] = "/usr/bin/python3",
-    debug: Debug = False,
-) -> None:
-    """Hold the torque on a LinuxCNC that runs: a component in HAL that sends the override; Ctrl-C ends it."""
-
-    def work() -> int:
-        from chipload.control.hal import control, load_hal, table_of
-        from chipload.control.linuxcnc.hal_client import HalPins
-        from chipload.files import write_whole
-
-        job = load_hal(file)
-        asked: list[int] = []
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda n, _: asked.append(n))
-        with HalPins(name, python) as pins:
-            record = control(
-                job,
-                pins,
-                stop=lambda: bool(asked),
-                notice=lambda reason, s: typer.echo(
-                    f"stopped the machine: {reason} at {s:.4g} mm: it stays stopped until this command ends", err=True
-                ),
-            )
-        if out is not None:
-            write_whole(out, table_of(record).encode("ascii"))
-        show(
-            f"{len(record.rows)} steps, ended: {record.ended}; greatest torque {1e-3 * record.torque_max:.4g} N m, "
-            f"limit held {1e-3 * job.override.torque_ref:.4g} N m"
-        )
-        return 0 if record.ended == "path" else EXCEEDED
-
-    guarded(work, debug)
-
-
 @app.callback(invoke_without_command=True)
 def top(version: Annotated[bool, typer.Option("--version", help="show the version and leave")] = False) -> None:
     """Plan and prove CNC milling of the parts that are hard to mill."""
@@ -394,6 +354,10 @@ def top(version: Annotated[bool, typer.Option("--version", help="show the versio
 
         show(f"chipload {installed('chipload')}")
         raise typer.Exit
+
+
+app.command()(hal)
+app.command()(spindle)
 
 
 def main() -> NoReturn:

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from chipload import examples
 from chipload.cli import app
-from chipload.control.hal import load_hal
+from chipload.control.hal_file import load_hal
 from chipload.control.plant import Loop
 from chipload.control.plant import run as play
 from chipload.cutter.cutter import Cutter

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from chipload.control.plant import Spindle
+from chipload.control.spindle_model import Spindle
 from chipload.errors import InputError
 
 #: standard deviations of the noise that an estimate is granted

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.control.fuzzy import write_fuzzy
-from chipload.control.hal import HalJob, write_hal
+from chipload.control.hal import HalJob
+from chipload.control.hal_file import write_hal
 from chipload.control.linuxcnc.path import write_path
 from chipload.jobs.torque.outcome import TorqueResult
 from chipload.program.gcode.writer import write_commands, write_gcode

@@ -19,7 +19,8 @@ from chipload.control import plant
 from chipload.control.fuzzy import FuzzyTable
 from chipload.control.linuxcnc.path import ToolPath
 from chipload.control.override import Override
-from chipload.control.plant import Loop, Spindle
+from chipload.control.plant import Loop
+from chipload.control.spindle_model import Spindle
 from chipload.control.wall import PathLimit
 from chipload.errors import Finding
 from chipload.jobs.checks import DefaultChecks

@@ -17,9 +17,10 @@ from chipload.control.fuzzy import FuzzyTable, read_fuzzy, standard
 from chipload.control.limit import torque_limit
 from chipload.control.linuxcnc.path import ToolPath, tool_path
 from chipload.control.override import Override
-from chipload.control.plant import Loop, Spindle, comparison
+from chipload.control.plant import Loop, comparison
 from chipload.control.resolution import check_light, check_limit, torque_resolution
 from chipload.control.spindle import first_order
+from chipload.control.spindle_model import Spindle
 from chipload.control.wall import (
     Loads,
     PathLimit,
