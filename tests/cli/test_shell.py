@@ -74,6 +74,7 @@ share = 0.02
 [spindle]
 inertia_kg_m2 = 0.003
 torque_constant_nm_a = 0.15
+torque_constant_error_share = 0.01
 idle_a = [2.0, 0.004]
 stiffness_a_s = 0.5
 reset_a = 5.0
@@ -83,6 +84,9 @@ smoothing_s = 0.02
 noise_a = 0.03
 current_step_a = 0.005
 idle_error_share = 0.01
+[spindle.deviation]
+torque_constant_percent = 0.5
+idle_percent = 0.5
 [torque_control.override]
 hold = 0.9
 overload_nm = 2.0
@@ -110,7 +114,7 @@ torque_over_percent = 5.0
 """
 #: what a run says before it begins
 NOTICE = "chipload: a torque job does not resume: if it is stopped, it begins again\n"
-NAMES = ["constant", "constant_torque", "derated_schedule", "pi", "fuzzy", "fuzzy_feedforward"]
+NAMES = ["constant", "model", "model_not_derated", "pi", "fuzzy", "fuzzy_feedforward"]
 
 
 def call(*words):
@@ -193,11 +197,27 @@ def test_a_cutter_that_would_break(job, tmp_path):
     assert np.array(rows["cutter_stress_mpa"])[own].max() == pytest.approx(stress["worst"])
 
 
+def test_what_is_compared_with(result, what):
+    """No controller is faster than the feed at the limit at every instant, and the estimate says how far it holds."""
+    summary = json.loads((result / "summary.json").read_text())
+    for controllers in (what["controllers"], what["with_latency"]["controllers"]):
+        for name, run in controllers.items():
+            assert what["ideal_time_s"] < run["time_s"] or run["torque_nm_max"] > what["torque_limit_nm"], name
+    e = what["estimate"]
+    assert e["range_nm"] == [pytest.approx(0.03), pytest.approx(0.15 * (40.0 - 2.0 - 0.004 * 628.3), rel=1e-3)]
+    assert math.prod(1.0 + (math.tau * e["bandwidth_hz"] * x) ** 2 for x in (0.01, 0.02)) == pytest.approx(2.0)
+    # 3 flutes at 6000 rpm, read every 10 ms
+    assert (e["tooth_passing_hz"], e["tooth_passing_seen_hz"]) == (pytest.approx(300.0), pytest.approx(0.0, abs=1e-6))
+    assert what["spindle_deviation"]["torque_constant_percent"] == 0.5
+    assert 0.0 < what["with_latency"]["compared"]["of_possible_percent"] < 100.0
+    assert summary["operations"][0]["kind"] == "torque"
+
+
 def test_the_derated_schedule_respects_the_limit(what):
     """Open loop, with the model's feeds lowered until the truth is within the limit, and no further."""
     limit = what["torque_limit_nm"]
     for controllers in (what["controllers"], what["with_latency"]["controllers"]):
-        derated, alone = controllers["derated_schedule"], controllers["constant_torque"]
+        derated, alone = controllers["model"], controllers["model_not_derated"]
         assert derated["ended"] == "path"
         assert 0.97 * limit < derated["torque_nm_max"] <= limit
         assert derated["time_s"] > alone["time_s"]
@@ -261,7 +281,15 @@ def test_it_can_be_handed_to_the_machine(result, what):
     limit = 1e3 * what["torque_limit_nm"]
     loop = Loop(job.acceleration, job.period, job.latency)
     again = play(
-        job.path.truth, job.path.model, job.override, job.table, job.spindle, loop, limit, relief=job.path.relief
+        job.path.truth,
+        job.path.model,
+        job.override,
+        job.table,
+        job.spindle,
+        loop,
+        limit,
+        relief=job.path.relief,
+        deviation=job.deviation,
     )
     assert again.time == pytest.approx(late["controllers"]["fuzzy_feedforward"]["time_s"], rel=1e-3)
     assert 1e-3 * again.load_max == pytest.approx(late["controllers"]["fuzzy_feedforward"]["torque_nm_max"], rel=2e-3)
@@ -281,7 +309,7 @@ def test_both_programs_go_the_same_way(result, what):
     assert feeds.max() <= 30.0 + 1e-9
     # in time they take what the model alone takes, but for the acceleration and the steps of 5 %
     seconds = (lengths(fed)[fed.motion != RAPID] / feeds).sum()
-    alone = what["controllers"]["constant_torque"]["time_s"]
+    alone = what["controllers"]["model_not_derated"]["time_s"]
     assert alone - 0.5 < seconds < 1.25 * alone
 
 
@@ -294,8 +322,20 @@ def test_unattainable_is_a_result(job, tmp_path):
     assert summary["operations"][0]["torque_limit_nm"] == 0.0
     assert "controllers" not in summary["operations"][0]
     assert (tmp_path / "r" / "report.html").stat().st_size > 1000
-    # an older result may be replaced
+    assert "no feed would do; one of these would: a depth of cut of at most" in out
     assert call("check", job)[0] == 0
+
+
+def test_what_would_do_does(job):
+    """Found by `check`, before a run; the wall that it names is then enough."""
+    hard = ("--set", "limits.form_error_um=9")
+    code, out, _ = call("check", job, *hard)
+    assert code == 3
+    assert "no torque is allowable, by the wall's deflection" in out
+    wall = float(out.split("a wall of at least ")[1].split(" mm")[0])
+    code, out, _ = call("check", job, *hard, "--set", f"torque_control.shell.wall_mm={wall}")
+    assert code == 0, out
+    assert "the limit of torque is about" in out
 
 
 def test_check(job):
@@ -364,7 +404,7 @@ def test_a_spindle_that_cannot_hold_the_limit(job, tmp_path):
     assert code == 2
     assert "spindle: it resolves 0.0394 N m" in err
     assert "the limit is " in err
-    assert "this spindle holds limits from 0.394 N m" in err
+    assert "this spindle holds limits from 0.433 N m" in err
     assert not (tmp_path / "r").exists()
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from chipload.control.spindle_file import IDENTIFIED
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
 from chipload.jobs.sources import cutters, entries_of, sources_of
@@ -34,6 +35,7 @@ class TorqueJob:
     program_file : NC text or CL data; None: the program is made
     machine, material : a shipped name or a file
     control_file : sets and rules; None: the standard ones
+    spindle_file : what `chipload spindle` wrote; None: the job states its values
     cutters : by number
     overrides : the `--set` texts that were applied
     """
@@ -44,6 +46,7 @@ class TorqueJob:
     machine: str | Path
     material: str | Path
     control_file: Path | None
+    spindle_file: Path | None
     cutters: Mapping[int, Cutter]
     overrides: tuple[str, ...]
 
@@ -77,16 +80,24 @@ def load(path: Path, table: TorqueJobTable, overrides: Sequence[str]) -> TorqueJ
     for k, surprise in enumerate(table.surprise):
         errors.texts += _wrong_surprise(f"surprise.{k}", surprise, table.torque_control.shell.wall_mm)
     errors.refuse()
-    control = table.torque_control.file
+    control, spindle = table.torque_control.file, table.spindle.file
     return TorqueJob(
         path, table, None if table.program is None else folder / table.program.file, sources["machine"],
-        sources["material"], None if control is None else folder / control, tools, tuple(overrides),
+        sources["material"], None if control is None else folder / control,
+        None if spindle is None else folder / spindle, tools, tuple(overrides),
     )  # fmt: skip
 
 
 def missing(values: Mapping[str, Any]) -> list[str]:
     """What a job lacks that one of its tables alone cannot see; ``values`` are those of the file."""
     found = [f"program, round: neither is stated: {ONE_PROGRAM}"] if not {"program", "round"} & set(values) else []
+    spindle = values.get("spindle")
+    if isinstance(spindle, dict) and "file" not in spindle:
+        found += [
+            f"spindle.{key}: missing: state it, or a file of chipload spindle"
+            for key in IDENTIFIED
+            if key not in spindle
+        ]
     for k, surprise in entries_of(values, "surprise"):
         needs = SURPRISES.get(str(surprise.get("kind")), ())
         found += [f"surprise.{k}.{key}: missing: state it" for key in needs if key not in surprise]
