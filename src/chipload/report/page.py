@@ -19,6 +19,8 @@ from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict
 
 #: findings and limits that the report lists
 LISTED = 300
+#: up to so many tracks have all their limits in the table
+WHOLE = 4
 #: classes of the banner and of a cell by state
 BANNERS = {Verdict.HOLDS: "good", Verdict.UNPROVEN: "open", Verdict.EXCEEDS: "bad"}
 CELLS = {Verdict.HOLDS: "ok", Verdict.UNPROVEN: "may", Verdict.EXCEEDS: "no"}
@@ -52,14 +54,16 @@ def page_bytes(result: Result, presentation: Presentation) -> bytes:
 
 
 def limits_table(tracks: Iterable[Track]) -> list[str]:
-    """Every limit of the tracks in use, the worst state first; of each other track those that do not hold, and the rest
-    in one row.
+    """Every limit, those of tracks in use first, within a track the worst state first.
+
+    Of more than :data:`WHOLE` tracks those not in use show the limits that do not hold, the rest in one row.
     """
     all_tracks = list(tracks)
+    whole = len(all_tracks) <= WHOLE
     order = list(Verdict)
     checks: list[tuple[Track, LimitCheck | None]] = []
     for track in sorted(all_tracks, key=lambda track: not track.in_use):
-        shown = [check for check in track.limits if track.in_use or check.state is not Verdict.HOLDS]
+        shown = [check for check in track.limits if whole or track.in_use or check.state is not Verdict.HOLDS]
         shown.sort(key=lambda check: -order.index(check.state))
         checks += [(track, check) for check in shown]
         if len(shown) < len(track.limits):
