@@ -57,6 +57,7 @@ def limits_table(tracks: Iterable[Track]) -> list[str]:
     """Every limit, those of tracks in use first, within a track the worst state first.
 
     Of more than :data:`WHOLE` tracks those not in use show the limits that do not hold, the rest in one row.
+    Behind the worst value a column is left out where all its cells are empty.
     """
     all_tracks = list(tracks)
     whole = len(all_tracks) <= WHOLE
@@ -72,7 +73,10 @@ def limits_table(tracks: Iterable[Track]) -> list[str]:
         return ["<p>No limit was checked.</p>"]
     rows = [_limit_row(track, check) for track, check in checks[:LISTED]]
     head = ["track", "limit", "state", "at most", "worst", "resolution", "line", "time [s]", "place [mm]", "reason"]
-    return [table(head, rows, numbers=(3, 4, 5, 6, 7), used=[t.in_use for t, _ in checks[:LISTED]])]
+    kept = [k for k in range(len(head)) if k < 5 or any(row[k] for row in rows)]
+    numbers = tuple(i for i, k in enumerate(kept) if k in (3, 4, 5, 6, 7))
+    cells = [[row[k] for k in kept] for row in rows]
+    return [table([head[k] for k in kept], cells, numbers, [t.in_use for t, _ in checks[:LISTED]])]
 
 
 def _limit_row(track: Track, check: LimitCheck | None) -> list[str]:

@@ -8,35 +8,28 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from chipload.control.fuzzy import FuzzyTable, read_fuzzy, standard
 from chipload.control.identification import aliased, bandwidth
 from chipload.control.limit import torque_limit
-from chipload.control.linuxcnc.path import ToolPath, tool_path
 from chipload.control.override import Override
 from chipload.control.resolution import check_light, torque_resolution
 from chipload.control.spindle import first_order
 from chipload.control.spindle_model import Spindle
 from chipload.control.wall import (
-    Loads,
     PathLimit,
-    UnitResponse,
-    WallPath,
     path_limit,
-    row_means,
-    unit_response,
 )
 from chipload.cutting.material import Material, material_named, need_directions, read_material
 from chipload.errors import InputError
 from chipload.jobs.checks import default_checks
 from chipload.jobs.provenance import provenance_of, title_of
+from chipload.jobs.torque.allowable import Allowable, allowable, allowed, feed_at, limit_of, thinnest, wall_of
 from chipload.jobs.torque.controllers import cases_of, controller_of, shortest
 from chipload.jobs.torque.cut import (
     Cut,
     Place,
-    contact_width,
     cut,
     off_centre,
     program_of,
@@ -44,7 +37,6 @@ from chipload.jobs.torque.cut import (
     resolution_of,
     shell_stock,
     thinner_share,
-    true_loads,
 )
 from chipload.jobs.torque.job import TorqueJob
 from chipload.jobs.torque.outcome import (
@@ -65,7 +57,7 @@ from chipload.result import Provenance
 from chipload.simulation.chips import counted
 from chipload.simulation.estimate import estimate
 from chipload.stock.rings import surface_off
-from chipload.structure.shell import Ritz, Shell, compliance, ovalisation, ritz
+from chipload.structure.shell import Ritz, compliance, ovalisation
 from chipload.structure.wall_solid import normal_compliance, wall_solid
 from chipload.units import mm_min_from_mm_s
 
@@ -73,10 +65,6 @@ Floats = NDArray[np.float64]
 
 #: elements of the second opinion: half round, along, through
 MESH = (24, 20, 1)
-#: the torque that is allowed anywhere is at most so many times the limit
-RELIEF_MOST = 3.0
-#: the allowable torque is the least of so many steps on both sides
-NEAR = 2
 #: a check simulates the plan with steps and layers so many times as long, if these are at most so many steps
 COARSER, COARSER_LAYERS, MOST_PREVIEWED = 4.0, 2.0, 3000
 
@@ -89,57 +77,38 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
     InputError
         A file cannot be read, or values do not go together.
     """
-    machine, material, table, program, spindle = _opened(job)
-    surprises, place = job.table.surprise, Place(job.shell)
-    thinner = thinner_share(surprises)
-    planned = cut(job, program, shell_stock(job, program), material, machine.rapid, _part(progress, 0.0, 0.3))
-    centre = off_centre(job.shell.stock_mm, surprises)
-    real = cut(
-        job, program, shell_stock(job, program, centre, thinner), material, machine.rapid, _part(progress, 0.3, 0.6),
-        keep=True,
-    )  # fmt: skip
-    loads = true_loads(real.loads, real.points, place, surprises)
-    progress(0.6, "the wall")
-    shell = wall_of(job)
-    width = contact_width(job.shell.stock_mm, job.cutters)
-    thin, limit = _limit_of(job, planned)
-    true = thin if thin.shell.thickness == shell.thickness * (1.0 - thinner) else ritz(
-        replace(shell, thickness=shell.thickness * (1.0 - thinner))
-    )  # fmt: skip
-    ask = job.table.limits
-    walls = unit_response(true, real.near, real.far, width, real.tool)
-    torque = min(limit.torque, 1e3 * ask.torque_nm) if ask.torque_nm is not None else limit.torque
-    path = _path(planned, loads, _relief(limit, torque))
+    machine, material, table, program, spindle = opened(job)
+    a = allowable(job, program, material, machine, lambda done, what: progress(0.65 * done, what))
+    ask, shell, place, torque = job.table.limits, wall_of(job), Place(job.shell), a.torque
+    progress(0.7, "controllers")
     controller: Override | None = None
     cases: tuple[Case, ...] = ()
     shortest_time = math.inf
     if torque > 0.0:
         require_resolved(job, spindle, torque)
         controller, acceleration = controller_of(job, torque), _acceleration(job, machine)
-        cases = cases_of(
-            job, path, controller, table, spindle, torque, _walls(path, loads, walls, real), acceleration, progress
-        )
-        shortest_time = shortest(path, controller, torque, acceleration)
+        cases = cases_of(job, a.path, controller, table, spindle, torque, a.walls, acceleration, progress)
+        shortest_time = shortest(a.path, controller, torque, acceleration)
     progress(0.9, "second opinion")
-    low, high = _finished(place, real)
+    low, high = _finished(place, a.real)
     return TorqueResult(
         title=title_of(job.path),
         program_name=job.program_file.name if job.program_file is not None else "made: down the wall and once round",
         program=program,
         machine=machine,
         wall=shell,
-        thinnest=thin.shell.thickness,
-        real=true.shell.thickness,
+        thinnest=a.thin.shell.thickness,
+        real=a.true.shell.thickness,
         strength=job.shell.strength_mpa,
         limits=ask.stated,
         unchecked=ask.unstated,
         tolerance=job.shell.wall_tolerance_mm,
-        limit=limit,
+        limit=a.limit,
         torque=torque,
-        true_torque=path_limit(loads, walls, *_allowed(job)).torque,
-        one_tooth=_one_tooth(limit, planned, material, job),
-        path=path,
-        steps=_step_columns(planned, loads, limit, path),
+        true_torque=path_limit(a.loads, a.response, *allowed(job)).torque,
+        one_tooth=_one_tooth(a.limit, a.planned, material, job),
+        path=a.path,
+        steps=_step_columns(a),
         cases=cases,
         controller=controller,
         table=table,
@@ -147,34 +116,34 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
         deviation=deviation_of(job),
         estimate=_estimate(job, cases, spindle, controller) if controller is not None else None,
         ideal_time=shortest_time,
-        remedy="" if torque > 0.0 else remedy_text(job, thin.shell, planned, limit),
-        oval=ovalisation(thin, thin.shell.length),
-        oval_s=thin.shell.length,
-        solid=_second_opinion(thin, width, planned),
-        surface=surface_off(real.stock, place.outer, low, high),
-        surprises=tuple(_text_of(x.model_dump(exclude_none=True)) for x in surprises),
-        stock=real.stock,
-        findings=(*planned.removal.findings, *real.removal.findings),
+        remedy="" if torque > 0.0 else remedy_text(job, a.thin.shell, a.planned, a.limit),
+        oval=ovalisation(a.thin, a.thin.shell.length),
+        oval_s=a.thin.shell.length,
+        solid=_second_opinion(a.thin, a.width, a.planned),
+        surface=surface_off(a.real.stock, place.outer, low, high),
+        surprises=tuple(_text_of(x.model_dump(exclude_none=True)) for x in job.table.surprise),
+        stock=a.real.stock,
+        findings=(*a.planned.removal.findings, *a.real.removal.findings),
         settings=job.table.model_dump(exclude_none=True, exclude={"cutter", "surprise"}),
         checks=default_checks(job.table.checks, job.cutters, material, 0.5),
         check_table=job.table.checks,
-        step_checks=step_checks(real, loads, material, _fastest(cases)),
+        step_checks=step_checks(a.real, a.loads, material, _fastest(cases)),
         provenance=_provenance(job, machine, material),
     )
 
 
-def _step_columns(planned: Cut, true: Loads, limit: PathLimit, path: ToolPath) -> dict[str, NDArray[Any]]:
+def _step_columns(a: Allowable) -> dict[str, NDArray[Any]]:
     """Columns of the steps of the plan."""
-    c = planned.removal.columns
+    c, planned, true = a.planned.removal.columns, a.planned.loads, a.loads
     first = int(np.flatnonzero(~c["rapid"])[0])
-    own = slice(first, first + len(planned.feed))
+    own = slice(first, first + len(a.planned.feed))
     return {
         "line": c["line"][own],
-        "s_mm": path.model.s[1:],
+        "s_mm": a.path.model.s[1:],
         **{f"{x}_mm": c[f"{x}_mm"][own] for x in "xyz"},
-        "torque_planned_nm": 1e-3 * (planned.loads.torque_edge + planned.loads.torque_cut),
+        "torque_planned_nm": 1e-3 * (planned.torque_edge + planned.torque_cut),
         "torque_true_nm": 1e-3 * (true.torque_edge + true.torque_cut),
-        "torque_allowable_nm": 1e-3 * limit.each,
+        "torque_allowable_nm": 1e-3 * a.limit.each,
     }
 
 
@@ -186,7 +155,7 @@ def check(job: TorqueJob) -> tuple[list[str], bool]:
     InputError
         As :func:`run`, but for what only the exact limit of torque shows.
     """
-    machine, material, table, program, spindle = _opened(job)
+    machine, material, table, program, spindle = opened(job)
     shell = wall_of(job)
     kind = "tube" if shell.cone_angle == 0.0 else "cone"
     thinner = thinner_share(job.table.surprise)
@@ -221,12 +190,12 @@ def _preview(job: TorqueJob, program: Program, material: Material, machine: Mach
     if counted(program, job.cutters, resolution_of(rough)) > MOST_PREVIEWED:
         return "the limit of torque is found when the job is run", True
     planned = cut(rough, program, shell_stock(rough, program), material, machine.rapid, silent)
-    _, limit = _limit_of(rough, planned)
+    _, limit = limit_of(rough, planned)
     where = f"by the wall's {limit.by}, {planned.far[limit.step]:.3g} mm from the clamp"
     if limit.torque <= 0.0:
         shell = thinnest(rough)
         return f"no torque is allowable, {where}: {remedy_text(rough, shell, planned, limit)}", False
-    feed = _feed_at(planned, limit, limit.step)
+    feed = feed_at(planned, limit, limit.step)
     return (
         f"by a coarse simulation the limit of torque is about {1e-3 * limit.torque:.2g} N m, {where}; the feed must be "
         f"at most {feed:.3g} mm/min there, {mm_min_from_mm_s(float(planned.feed[limit.step])):.4g} are programmed",
@@ -234,34 +203,7 @@ def _preview(job: TorqueJob, program: Program, material: Material, machine: Mach
     )
 
 
-def _feed_at(planned: Cut, limit: PathLimit, k: int) -> float:
-    """Feed at which a step reaches its allowable force [mm/min]."""
-    loads = planned.loads
-    override = (limit.each[k] - loads.torque_edge[k]) / loads.torque_cut[k]
-    return float(mm_min_from_mm_s(float(planned.feed[k])) * override)
-
-
-def thinnest(job: TorqueJob) -> Shell:
-    """The wall that the limit is made for: as thin as its tolerance lets it be."""
-    shell = wall_of(job)
-    return replace(shell, thickness=shell.thickness - job.shell.wall_tolerance_mm)
-
-
-def _limit_of(job: TorqueJob, planned: Cut) -> tuple[Ritz, PathLimit]:
-    """The thinnest wall and the allowable torque along the plan."""
-    thin = ritz(thinnest(job))
-    width = contact_width(job.shell.stock_mm, job.cutters)
-    wall = unit_response(thin, planned.near, planned.far, width, planned.tool)
-    return thin, path_limit(planned.loads, wall, *_allowed(job))
-
-
-def _allowed(job: TorqueJob) -> tuple[float, float]:
-    """Deflection [mm] and stress [MPa] that are allowed."""
-    ask = job.table.limits
-    return 1e-3 * ask.form_error_um, ask.strength_share * job.shell.strength_mpa
-
-
-def _opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, Program, Spindle]:
+def opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, Program, Spindle]:
     """What the job names, if its values go together.
 
     Raises
@@ -293,44 +235,11 @@ def _acceleration(job: TorqueJob, machine: Machine) -> float:
     return stated or most
 
 
-def wall_of(job: TorqueJob) -> Shell:
-    """The finished wall as planned."""
-    t = job.shell
-    return Shell(t.mean_radius_mm, t.length_mm, t.wall_mm, 1e3 * t.modulus_gpa, t.poisson, math.radians(t.angle_deg))
-
-
 def _named(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable]:
     machine = machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
     material = material_named(job.material) if isinstance(job.material, str) else read_material(job.material)
     need_directions(material, "the wall of a shell")
     return machine, material, read_fuzzy(job.control_file) if job.control_file is not None else standard()
-
-
-def _part(progress: Progress, low: float, high: float) -> Progress:
-    return lambda done, what: progress(low + (high - low) * done, what)
-
-
-def _relief(limit: PathLimit, torque: float) -> Floats:
-    """(n + 1,) allowable torque at the ends of the steps over the limit, the least of the steps near."""
-    if torque <= 0.0:
-        return np.ones(len(limit.each) + 1)
-    # a stated limit holds everywhere
-    each = np.clip(limit.each / torque, 1.0, RELIEF_MOST if torque >= limit.torque else 1.0)
-    padded = np.concatenate([np.repeat(each[:1], NEAR + 1), each, np.repeat(each[-1:], NEAR + 1)])
-    return np.asarray(sliding_window_view(padded, 2 * NEAR + 2).min(axis=1)[: len(each) + 1])
-
-
-def _path(planned: Cut, true: Loads, relief: Floats) -> ToolPath:
-    believed = np.column_stack([row_means(planned.loads.torque_edge), row_means(planned.loads.torque_cut)])
-    real = np.column_stack([row_means(true.torque_edge), row_means(true.torque_cut)])
-    return tool_path(planned.points, np.append(planned.feed, planned.feed[-1]), believed, real, relief)
-
-
-def _walls(path: ToolPath, loads: Loads, walls: UnitResponse, real: Cut) -> tuple[WallPath, WallPath, WallPath]:
-    """For the error (of the finished surface), for the stress and for the deflection (everywhere), per newton."""
-    force = (row_means(loads.force_edge), row_means(loads.force_cut))
-    error = WallPath(path.model.s, *force, np.where(real.makes, walls.compliance, 0.0))
-    return error, WallPath(path.model.s, *force, walls.stress), WallPath(path.model.s, *force, walls.compliance)
 
 
 def _one_tooth(limit: PathLimit, planned: Cut, material: Material, job: TorqueJob) -> float:
