@@ -274,12 +274,11 @@ def plan_thin_wall(
 # -- simulation and control -------------------------------------------------------------------------------------
 def hold_torque(
     *,
-    shell: Values,
+    torque_control: Values,
     machine: Source,
     material: Source,
     cutter: Cutters,
     spindle: Values,
-    control: Values,
     loop: Values,
     simulation: Values,
     limits: Values,
@@ -296,7 +295,7 @@ def hold_torque(
 
     Parameters
     ----------
-    shell, spindle, control, loop, simulation, limits : keys of the table of this name
+    torque_control, spindle, loop, simulation, limits : keys of the table of this name
     machine, material : a shipped name, a file, or keys of the table
     cutter : one :class:`chipload.Cutter`, or several
     program, round : a program that exists (its file or keys), or keys of ``[round]`` by which one is made
@@ -305,9 +304,9 @@ def hold_torque(
     folder : that file names are relative to
     """
     return _run(
-        "torque", folder, progress, shell=shell, program=program, round=round, machine=machine, material=material,
-        cutter=_cutters(cutter), surprise=surprise, spindle=spindle, control=control, loop=loop, simulation=simulation,
-        limits=limits, checks=checks,
+        "torque", folder, progress, torque_control=torque_control, program=program, round=round, machine=machine,
+        material=material, cutter=_cutters(cutter), surprise=surprise, spindle=spindle, loop=loop,
+        simulation=simulation, limits=limits, checks=checks,
     )  # fmt: skip
 
 

@@ -27,7 +27,11 @@ REFUSED = [
     ("plate", ["operation.0.depth_max_mm=3", "wall.allowance_mm=[3, 3]", "operation.0.clearance_mm=4"], "depth"),
     ("tube", ["loop.acceleration_mm_s2=1e6"], "loop.acceleration_mm_s2 = 1e+06: must be at most"),
     ("tube", ["limits.torque_nm=0.05"], "the limit is 0.05 N m"),
-    ("tube", ["control.override.light_nm=2", "limits.torque_nm=1"], "control.override.light_nm = 2: must be below"),
+    (
+        "tube",
+        ["torque_control.override.light_nm=2", "limits.torque_nm=1"],
+        "torque_control.override.light_nm = 2: must be below",
+    ),
     ("impeller", ["operation.0.table_deg=[1.5]"], "operation.0.table_deg: table angle 1.5 deg"),
     ("impeller", ["catalogue.name=wu2020"], "catalogue wu2020: not known"),
 ]

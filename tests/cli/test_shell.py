@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from chipload import examples
 from chipload.cli import app
-from chipload.control.hal import load_hal
+from chipload.control.hal_file import load_hal
 from chipload.control.plant import Loop
 from chipload.control.plant import run as play
 from chipload.cutter.cutter import Cutter
@@ -47,7 +47,7 @@ helix_deg = 30.0
 flute_length_mm = 22.0
 overhang_mm = 30.0
 modulus_gpa = 580.0
-[shell]
+[torque_control.shell]
 mean_radius_mm = 12.0
 length_mm = 30.0
 wall_mm = 1.5
@@ -74,6 +74,7 @@ share = 0.02
 [spindle]
 inertia_kg_m2 = 0.003
 torque_constant_nm_a = 0.15
+torque_constant_error_share = 0.01
 idle_a = [2.0, 0.004]
 stiffness_a_s = 0.5
 reset_a = 5.0
@@ -83,7 +84,10 @@ smoothing_s = 0.02
 noise_a = 0.03
 current_step_a = 0.005
 idle_error_share = 0.01
-[control.override]
+[spindle.deviation]
+torque_constant_percent = 0.5
+idle_percent = 0.5
+[torque_control.override]
 hold = 0.9
 overload_nm = 2.0
 torque_most_nm = 6.0
@@ -110,7 +114,7 @@ torque_over_percent = 5.0
 """
 #: what a run says before it begins
 NOTICE = "chipload: a torque job does not resume: if it is stopped, it begins again\n"
-NAMES = ["constant", "constant_torque", "derated_schedule", "pi", "fuzzy", "fuzzy_feedforward"]
+NAMES = ["constant", "model", "model_not_derated", "pi", "fuzzy", "fuzzy_feedforward"]
 
 
 def call(*words):
@@ -181,8 +185,8 @@ def test_the_verdict_is_what_was_measured(result, what):
 def test_a_cutter_that_would_break(job, tmp_path):
     """2 mm across, 30 mm long: the stress of its shank is far above what carbide takes."""
     thin = ["--set", "cutter.0.diameter_mm=2", "--set", "limits.form_error_um=5000", "--set", "limits.strength_share=1"]
-    thin += ["--set", "control.override.overload_nm=90", "--set", "control.override.torque_most_nm=100"]
-    code, out, err = call("run", job, "--out", tmp_path / "r", *thin, "--set", "shell.strength_mpa=5000")
+    thin += ["--set", "torque_control.override.overload_nm=90", "--set", "torque_control.override.torque_most_nm=100"]
+    code, out, err = call("run", job, "--out", tmp_path / "r", *thin, "--set", "torque_control.shell.strength_mpa=5000")
     assert code == 3, out + err
     summary = json.loads((tmp_path / "r" / "summary.json").read_text())
     (stress,) = (c for c in summary["limits"] if c["name"] == "cutter_stress_mpa")
@@ -193,11 +197,27 @@ def test_a_cutter_that_would_break(job, tmp_path):
     assert np.array(rows["cutter_stress_mpa"])[own].max() == pytest.approx(stress["worst"])
 
 
+def test_what_is_compared_with(result, what):
+    """No controller is faster than the feed at the limit at every instant, and the estimate says how far it holds."""
+    summary = json.loads((result / "summary.json").read_text())
+    for controllers in (what["controllers"], what["with_latency"]["controllers"]):
+        for name, run in controllers.items():
+            assert what["ideal_time_s"] < run["time_s"] or run["torque_nm_max"] > what["torque_limit_nm"], name
+    e = what["estimate"]
+    assert e["range_nm"] == [pytest.approx(0.03), pytest.approx(0.15 * (40.0 - 2.0 - 0.004 * 628.3), rel=1e-3)]
+    assert math.prod(1.0 + (math.tau * e["bandwidth_hz"] * x) ** 2 for x in (0.01, 0.02)) == pytest.approx(2.0)
+    # 3 flutes at 6000 rpm, read every 10 ms
+    assert (e["tooth_passing_hz"], e["tooth_passing_seen_hz"]) == (pytest.approx(300.0), pytest.approx(0.0, abs=1e-6))
+    assert what["spindle_deviation"]["torque_constant_percent"] == 0.5
+    assert 0.0 < what["with_latency"]["compared"]["of_possible_percent"] < 100.0
+    assert summary["operations"][0]["kind"] == "torque"
+
+
 def test_the_derated_schedule_respects_the_limit(what):
     """Open loop, with the model's feeds lowered until the truth is within the limit, and no further."""
     limit = what["torque_limit_nm"]
     for controllers in (what["controllers"], what["with_latency"]["controllers"]):
-        derated, alone = controllers["derated_schedule"], controllers["constant_torque"]
+        derated, alone = controllers["model"], controllers["model_not_derated"]
         assert derated["ended"] == "path"
         assert 0.97 * limit < derated["torque_nm_max"] <= limit
         assert derated["time_s"] > alone["time_s"]
@@ -261,7 +281,15 @@ def test_it_can_be_handed_to_the_machine(result, what):
     limit = 1e3 * what["torque_limit_nm"]
     loop = Loop(job.acceleration, job.period, job.latency)
     again = play(
-        job.path.truth, job.path.model, job.override, job.table, job.spindle, loop, limit, relief=job.path.relief
+        job.path.truth,
+        job.path.model,
+        job.override,
+        job.table,
+        job.spindle,
+        loop,
+        limit,
+        relief=job.path.relief,
+        deviation=job.deviation,
     )
     assert again.time == pytest.approx(late["controllers"]["fuzzy_feedforward"]["time_s"], rel=1e-3)
     assert 1e-3 * again.load_max == pytest.approx(late["controllers"]["fuzzy_feedforward"]["torque_nm_max"], rel=2e-3)
@@ -281,7 +309,7 @@ def test_both_programs_go_the_same_way(result, what):
     assert feeds.max() <= 30.0 + 1e-9
     # in time they take what the model alone takes, but for the acceleration and the steps of 5 %
     seconds = (lengths(fed)[fed.motion != RAPID] / feeds).sum()
-    alone = what["controllers"]["constant_torque"]["time_s"]
+    alone = what["controllers"]["model_not_derated"]["time_s"]
     assert alone - 0.5 < seconds < 1.25 * alone
 
 
@@ -294,8 +322,20 @@ def test_unattainable_is_a_result(job, tmp_path):
     assert summary["operations"][0]["torque_limit_nm"] == 0.0
     assert "controllers" not in summary["operations"][0]
     assert (tmp_path / "r" / "report.html").stat().st_size > 1000
-    # an older result may be replaced
+    assert "no feed would do; one of these would: a depth of cut of at most" in out
     assert call("check", job)[0] == 0
+
+
+def test_what_would_do_does(job):
+    """Found by `check`, before a run; the wall that it names is then enough."""
+    hard = ("--set", "limits.form_error_um=9")
+    code, out, _ = call("check", job, *hard)
+    assert code == 3
+    assert "no torque is allowable, by the wall's deflection" in out
+    wall = float(out.split("a wall of at least ")[1].split(" mm")[0])
+    code, out, _ = call("check", job, *hard, "--set", f"torque_control.shell.wall_mm={wall}")
+    assert code == 0, out
+    assert "the limit of torque is about" in out
 
 
 def test_check(job):
@@ -309,19 +349,19 @@ def test_check(job):
     [
         ("wall_mm = 1.5", "wall_mm = 3.0", "shell.wall_mm = 3: must be at most a fifth of the least radius 12"),
         ("modulus_gpa = 70.0", "modulus_gpa = 70000.0", "shell.modulus_gpa = 70000: must be at most 1000"),
-        ("poisson = 0.33", "poisson = 0.5", "shell.poisson = 0.5: must be below 0.5"),
+        ("poisson = 0.33", "poisson = 0.5", "torque_control.shell.poisson = 0.5: must be below 0.5"),
         ("strength_mpa = 250.0", "strength_mpa = 2.5e8", "shell.strength_mpa = 2.5e+08: must be at most 5000"),
         ("wall_tolerance_mm = 0.1", "wall_tolerance_mm = 0.8", "tolerance_mm = 0.8: must be below half of wall_mm"),
         ("ramp_mm = 4.0\n", "", "surprise.1.ramp_mm: missing: state it"),
         ("at_deg = -90.0", "at_deg = -90.0\nwidth_mm = 3.0", "surprise.0.width_mm: not used by kind = thicker-side"),
         ('kind = "hard-spot"', 'kind = "soft-spot"', "must be one of 'thicker-side', 'hard-spot'"),
         ("bottom_mm = -2.0", "bottom_mm = -0.5", "round.bottom_mm = -0.5: must be below top_mm = -1"),
-        ("[shell]", "[shell]\nangle_deg = -5.0", "taper_deg = 0: must be 5, that of the wall"),
-        ("[shell]", "[shell]\nangle_deg = 5.0", "this wall is wider upwards: clamp its other end"),
+        ("control.shell]", "control.shell]\nangle_deg = -5.0", "taper_deg = 0: must be 5, that of the wall"),
+        ("control.shell]", "control.shell]\nangle_deg = 5.0", "this wall is wider upwards: clamp its other end"),
         ("[round]", '[program]\nfile = "x.ngc"\n[round]', "program, round: both are stated"),
         ("acceleration_mm_s2 = 1000.0", "acceleration_mm_s2 = 9000.0", "must be at most 3000, that of machine vmc"),
         ("cutter = 1", "cutter = 2", "round.cutter = 2: no [[cutter]] has this number"),
-        ("hold = 0.9\n", "", "control.override.hold: missing: state it (share of the limit of torque that is held)"),
+        ("hold = 0.9\n", "", "override.hold: missing: state it (share of the limit of torque that is held)"),
         ("form_error_um = 30.0\n", "", "limits.form_error_um: missing: state it"),
         ("torque_over_percent = 5.0\n", "", "limits.torque_over_percent: missing: state it"),
         ("idle_error_share = 0.01\n", "", "spindle.idle_error_share: missing: state it"),
@@ -338,16 +378,33 @@ def test_refused(job, tmp_path, old, new, says):
     assert not (tmp_path / "r").exists()
 
 
+def test_tables_by_their_old_names(job, tmp_path):
+    """`[shell]` and `[control]` are refused with what they are called now; `--set` too."""
+    job.write_text(
+        JOB.replace("[torque_control.shell]", "[shell]").replace("[torque_control.override]", "[control.override]")
+    )
+    code, _, err = call("check", job)
+    assert code == 2
+    assert err.splitlines() == [
+        "chipload: job.toml: shell: renamed: write [torque_control.shell]",
+        "chipload: job.toml: control: renamed: write [torque_control]",
+    ]
+    job.write_text(JOB)
+    code, _, err = call("check", job, "--set", "shell.wall_mm=1.2")
+    assert code == 2
+    assert "--set shell.wall_mm=1.2: shell: renamed: write torque_control.shell.wall_mm" in err
+
+
 def test_a_spindle_that_cannot_hold_the_limit(job, tmp_path):
     """Its light cuts are told from air, but not the limit from what is held: refused with both numbers."""
     code, _, err = call(
         "run", job, "--out", tmp_path / "r", "--set", "spindle.idle_error_share=0.05", "--set",
-        "control.override.light_nm=0.06", "--set", "limits.torque_over_percent=0",
+        "torque_control.override.light_nm=0.06", "--set", "limits.torque_over_percent=0",
     )  # fmt: skip
     assert code == 2
     assert "spindle: it resolves 0.0394 N m" in err
     assert "the limit is " in err
-    assert "this spindle holds limits from 0.394 N m" in err
+    assert "this spindle holds limits from 0.433 N m" in err
     assert not (tmp_path / "r").exists()
 
 
@@ -355,8 +412,8 @@ def test_a_controller_that_is_slower_than_the_constant_feed(job, tmp_path):
     """Where the limit is never reached the constant feed is the programmed one, and holding the torque costs time."""
     code, out, err = call(
         "run", job, "--out", tmp_path / "r", "--set", "limits.form_error_um=5000", "--set", "limits.strength_share=1",
-        "--set", "shell.strength_mpa=5000", "--set", "control.override.overload_nm=90", "--set",
-        "control.override.torque_most_nm=100",
+        "--set", "torque_control.shell.strength_mpa=5000", "--set", "torque_control.override.overload_nm=90", "--set",
+        "torque_control.override.torque_most_nm=100",
     )  # fmt: skip
     assert code == 3, out + err
     operation = json.loads((tmp_path / "r" / "summary.json").read_text())["operations"][0]

@@ -13,13 +13,13 @@ from chipload.control.override import Override
 from chipload.control.plant import (
     Fault,
     Loop,
-    Spindle,
     Surprise,
     TorqueProfile,
     comparison,
     run,
     surprised,
 )
+from chipload.control.spindle_model import Spindle
 from chipload.errors import InputError
 
 TABLE = standard()

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from chipload.control.linuxcnc.simulated_spindle import Load, advance, at_speed, measure
-from chipload.control.plant import Spindle
 from chipload.control.resolution import check_light, check_limit, torque_resolution
+from chipload.control.spindle_model import Spindle
 from chipload.errors import InputError
 
 SPINDLE = Spindle(628.0, 5.0, 300.0, (2.0, 0.004), 0.5, 5.0, 60.0, 0.01, 0.02, 0.05, 0.02, 0.03)

@@ -16,12 +16,14 @@ from typer.testing import CliRunner
 from chipload.cli import app
 from chipload.control import hal
 from chipload.control.fuzzy import standard
-from chipload.control.hal import HalJob, control, table_of, write_hal
+from chipload.control.hal import HalJob, control, table_of
+from chipload.control.hal_file import write_hal
 from chipload.control.linuxcnc import hal_client
 from chipload.control.linuxcnc.hal_client import PinValues
 from chipload.control.linuxcnc.path import tool_path, write_path
 from chipload.control.override import STATUS, STOPS, Override, Reading, Status, begin, step, stopped
-from chipload.control.plant import Fault, Loop, Spindle, TorqueProfile, comparison, run
+from chipload.control.plant import Fault, Loop, TorqueProfile, comparison, run
+from chipload.control.spindle_model import Spindle
 from chipload.errors import InputError
 
 SPINDLE = Spindle(628.0, 5.0, 300.0, (2.0, 0.004), 0.5, 5.0, 60.0, 0.01, 0.02, 0.05)
@@ -198,7 +200,7 @@ def test_the_command_ends_with_the_reason(tmp_path, monkeypatch):
     (tmp_path / "hal.toml").write_text(write_hal(JOB, "path.csv"))
 
     class Pins(Cutting):
-        def __init__(self, name, python):
+        def __init__(self, name, python, sources):
             super().__init__(change=lambda pins, k: pins._replace(velocity=math.nan) if k > 20 else pins, steps=40)
 
         def __enter__(self):

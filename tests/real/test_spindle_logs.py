@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import csv
 import os
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from chipload.cli import app
 from chipload.control.logs import read_log
 from chipload.control.spindle import estimate, idle_map
 
@@ -166,3 +169,26 @@ def test_the_table_of_runs():
     print(f"rms error {a:.4f} by condition, {b:.4f} by the mean, of {current.mean():.3f}")
     assert a > 0.95 * b
     assert a < 0.04 * current.mean()
+
+
+@pytest.mark.parametrize(("option", "least"), [((), 3.0), (("--power",), 0.0)])
+def test_the_command_says_that_wax_is_not_felt(tmp_path, option, least):
+    """Four runs, each predicted from the others: cuts are told from air by chance only, exit code 3."""
+    (tmp_path / "columns.toml").write_text(
+        'sample_s = 0.1\n[speed]\ncolumn = "S1_ActualVelocity"\nunit = "rev/s"\n'
+        '[current]\ncolumn = "S1_CurrentFeedback"\nunit = "A"\n[power]\ncolumn = "S1_OutputPower"\nunit = "kW"\n'
+        '[label]\ncolumn = "Machining_Process"\ncutting = ["Layer"]\n'
+    )
+    logs = [str(MILL / f"experiment_{number}.csv") for number in ("11", "12", "13", "14")]
+    words = ["spindle", *logs, "--columns", str(tmp_path / "columns.toml"), "--out", str(tmp_path / "s.toml"), *option]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 3, done.output
+    found = tomllib.loads((tmp_path / "s.toml").read_text())
+    print(done.output)
+    assert "torque_constant_nm_a" not in found
+    assert found.get("noise_a", 1.0) > least or option
+    each = list(found["predictions"].values())
+    assert len(each) == 4
+    for log in each:
+        assert 0.3 < log["apart_share"] < 0.7
+        assert log["covered_share"] > 0.9

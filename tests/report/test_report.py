@@ -25,7 +25,7 @@ from chipload.jobs.contour.result import result_of
 from chipload.jobs.contour.scene import scene_bytes
 from chipload.planning.result import Event, StrategyResult
 from chipload.report.folder import write_result
-from chipload.report.page import page_bytes
+from chipload.report.page import limits_table, page_bytes
 from chipload.report.shape import pieces, slab, thinned
 from chipload.result import Verdict
 from chipload.result.history import write_history
@@ -244,6 +244,21 @@ def test_the_page_states_the_verdict_before_all_else(outcome: Maker) -> None:
     assert places == sorted(places)
     assert "limit torque_nm: not stated" in body
     assert "operation.0.x: a finding" in body
+
+
+def test_limits_of_many_tracks_are_folded(outcome: Maker) -> None:
+    """Of six tracks the one in use shows all, another what does not hold and a row for the rest."""
+    tracks = result_of(outcome("plain")).tracks
+    used = next(t for t in tracks if t.in_use)
+    others = [replace(t, name=f"{t.name} {k}", in_use=False) for k in range(2) for t in tracks if not t.in_use]
+    broken = replace(used, name="broken", in_use=False)
+    table = "".join(limits_table([used, *others, broken]))
+    rows = [re.sub("<[^>]*>", "|", row) for row in re.findall(r"<tr.*?</tr>", table)[1:]]
+    assert len(rows) == 2 + 2 * (1 + 2) + 2
+    assert sum("all limits (2)" in row for row in rows) == 2
+    assert [("exceeds" in row, "the other limits (1)" in row) for row in rows if "broken" in row] == [
+        (True, False), (False, True),
+    ]  # fmt: skip
 
 
 def test_the_table_of_limits_has_the_numbers_of_the_result(outcome: Maker) -> None:

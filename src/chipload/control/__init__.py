@@ -8,10 +8,12 @@ from chipload.lazy import attach
 
 if TYPE_CHECKING:
     from chipload.control.fuzzy import FuzzyTable
-    from chipload.control.hal import HalJob, load_hal
+    from chipload.control.hal import HalJob
+    from chipload.control.hal_file import load_hal
     from chipload.control.linuxcnc.path import ToolPath, tool_path, write_path
     from chipload.control.override import Override
-    from chipload.control.plant import Loop, Spindle, TorqueProfile
+    from chipload.control.plant import Loop, TorqueProfile
+    from chipload.control.spindle_model import Spindle
 
 __all__ = [
     "FuzzyTable",
@@ -29,10 +31,12 @@ __all__ = [
 __getattr__, __dir__ = attach(
     __name__,
     {
-        "plant": "Loop Spindle TorqueProfile",
+        "plant": "Loop TorqueProfile",
+        "spindle_model": "Spindle",
         "override": "Override",
         "fuzzy": "FuzzyTable",
-        "hal": "HalJob load_hal",
+        "hal": "HalJob",
+        "hal_file": "load_hal",
         "linuxcnc.path": "ToolPath tool_path write_path",
     },
 )

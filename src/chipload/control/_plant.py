@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from chipload.control import _estimator
 from chipload.control._override import OVERLOAD, OVERRIDE, RUN, TRIM, Observation, allowed, step
 
 Floats = NDArray[np.float64]
@@ -50,19 +51,21 @@ class Axes(NamedTuple):
 
 
 class SpindleDrive(NamedTuple):
-    """The numbers of a :class:`chipload.control.plant.Spindle`."""
+    """The numbers of the real spindle, as :class:`chipload.control.spindle_model.Spindle` has them; ``idle_drift``
+    [A/s] is what its idle current gains.
+    """
 
     speed: float
     inertia: float
     torque_constant: float
     idle_constant: float
     idle_slope: float
+    idle_drift: float
     stiffness: float
     reset: float
     most_current: float
     current_step: float
     sensor_lag: float
-    smoothing: float
 
 
 class SensorFault(NamedTuple):
@@ -83,8 +86,67 @@ def between_rows(at, values, i, s):
     return (1.0 - x) * values[i] + x * values[i + 1]
 
 
+# places of the state of the spindle: speed, what the integral of its controller adds, current behind the sensor
+SPEED, SUMMED, SENSED = range(3)
+
+
 @njit(cache=True, nogil=True)
-def run(columns, feed_forward, predicting, rules, sets, state, axes, spindle, fault, noise, limit, quick, out):
+def turn(drive, wheel, torque, t, dt):
+    """The spindle under a torque [N mm] for ``dt`` [s]: speed loop with a limited current; changes its state."""
+    w = wheel[SPEED]
+    wrong = drive.speed - w
+    drawn = drive.stiffness * wrong + wheel[SUMMED]
+    if abs(drawn) <= drive.most_current:
+        wheel[SUMMED] += drive.reset * wrong * dt
+    drawn = min(max(drawn, -drive.most_current), drive.most_current)
+    idle = drive.idle_constant + drive.idle_drift * t + drive.idle_slope * w
+    wheel[SPEED] = w + (drive.torque_constant * (drawn - idle) - torque) / drive.inertia * dt
+    wheel[SENSED] += (drawn - wheel[SENSED]) * (min(dt / drive.sensor_lag, 1.0) if drive.sensor_lag > 0.0 else 1.0)
+
+
+@njit(cache=True, nogil=True)
+def read_current(drive, wheel, noise):
+    """The current as it is read [A]."""
+    current = wheel[SENSED] + noise
+    return np.rint(current / drive.current_step) * drive.current_step if drive.current_step > 0.0 else current
+
+
+@njit(cache=True, nogil=True)
+def faulty(fault, t, reading, held):
+    """A reading as the fault of the sensor leaves it, and the last one without it."""
+    if not fault.begin <= t < fault.end:
+        return reading, reading
+    if fault.kind == NOT_A_NUMBER:
+        reading = np.nan
+    elif fault.kind == STUCK:
+        reading = held
+    elif fault.kind == VALUE:
+        reading = fault.value
+    elif fault.kind == SCALED:
+        reading *= fault.value
+    return reading, held
+
+
+@njit(cache=True, nogil=True)
+def model_override(columns, rules, state, axes, s, actual, programmed, first):
+    """The override that the model allows at s, with the trim of the controller, and the row at or before s."""
+    known = axes.latency + axes.every * axes.dt
+    soon = max(actual, min(rules.cap, state[OVERRIDE] + rules.slew_up * known))
+    return allowed(
+        s, columns.at, columns.feed, columns.model_edge, columns.model_cut, rules.torque_ref * state[TRIM], known, soon,
+        min(rules.slew_down, axes.acceleration / programmed), rules.cap, first,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def put_row(row, t, s, feed, torque, measured, sent, status, speed):
+    """One row of the outcome."""
+    row[0], row[1], row[2], row[3] = t, s, feed, torque
+    row[4], row[5], row[6], row[7] = measured, sent, status, speed
+
+
+@njit(cache=True, nogil=True)
+def run(columns, feed_forward, predicting, rules, sets, state, axes, drive, belief, fault, noise, limit, quick, out):
     """Controller, axes and spindle along a path; see :func:`chipload.control.plant.run`.
 
     ``feed_forward``: the override follows the model; ``predicting``: readings are held against it; ``noise`` (m,) [A],
@@ -92,106 +154,66 @@ def run(columns, feed_forward, predicting, rules, sets, state, axes, spindle, fa
     measured, override, status, speed. Returns rows filled, how it ended, time, greatest torque, the same over its
     relief, time in which that is over the limit.
     """
-    at, feed, edge, cut, relief = columns.at, columns.feed, columns.edge, columns.cut, columns.relief
-    model_edge, model_cut = columns.model_edge, columns.model_cut
-    dt, acc, every = axes.dt, axes.acceleration, axes.every
-    kt, idle0, idle1, most = spindle.torque_constant, spindle.idle_constant, spindle.idle_slope, spindle.most_current
-    inertia, lag, smooth = spindle.inertia, spindle.sensor_lag, spindle.smoothing
+    at, dt, every = columns.at, axes.dt, axes.every
+    period, change = every * dt, axes.acceleration * dt
     # until the first override acts the axes stand
     queue = np.zeros(axes.delay + 1)
-    t, s, v, w = 0.0, at[0], 0.0, spindle.speed
-    i, first = 0, 0
-    summed = idle0 + idle1 * w
-    sensed, rate, filtered = summed, 0.0, 0.0
-    expected_sensed, expected = 0.0, 0.0
-    rows, k, status, head = 0, 0, RUN, 0
-    sent, command = 0.0, 0.0
-    greatest, most_load, over = 0.0, 0.0, 0.0
-    end = at[len(at) - 1]
-    ended = TIMED_OUT
-    reading, held, torque, relief_here = 0.0, 0.0, 0.0, 1.0
+    idle = drive.idle_constant + drive.idle_slope * drive.speed
+    wheel, estimator = np.array([drive.speed, idle, idle]), np.empty(_estimator.STATE)
+    _estimator.begin(estimator, drive.speed)
+    smooth = min(period / belief.smoothing, 1.0) if belief.smoothing > 0.0 else 1.0
+    lag = min(dt / belief.sensor_lag, 1.0) if belief.sensor_lag > 0.0 else 1.0
+    t, s, v, i, first, rows, k, status, head = 0.0, at[0], 0.0, 0, 0, 0, 0, RUN, 0
+    expected_sensed, expected, sent, command, reading, held, torque, relief = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0
+    greatest, most_load, over, ended = 0.0, 0.0, 0.0, TIMED_OUT
     while t < axes.longest:
         while i + 2 < len(at) and at[i + 1] <= s:
             i += 1
-        programmed = between_rows(at, feed, i, s)
+        programmed = between_rows(at, columns.feed, i, s)
         if k % every == 0:
             number = k // every
-            current = sensed + noise[number % len(noise)]
-            if spindle.current_step > 0.0:
-                current = np.rint(current / spindle.current_step) * spindle.current_step
-            raw = kt * (current - idle0 - idle1 * w) - rate
-            y = min(every * dt / smooth, 1.0) if smooth > 0.0 else 1.0
-            filtered += (raw - filtered) * y
-            expected += (expected_sensed - expected) * y
-            relief_here = between_rows(at, relief, i, s)
-            reading = filtered / relief_here
-            if fault.begin <= t < fault.end:
-                if fault.kind == NOT_A_NUMBER:
-                    reading = np.nan
-                elif fault.kind == STUCK:
-                    reading = held
-                elif fault.kind == VALUE:
-                    reading = fault.value
-                elif fault.kind == SCALED:
-                    reading *= fault.value
-            else:
-                held = reading
+            current = read_current(drive, wheel, noise[number % len(noise)])
+            estimated = _estimator.read(belief, estimator, current, wheel[SPEED], period)
+            expected += (expected_sensed - expected) * smooth
+            relief = between_rows(at, columns.relief, i, s)
+            reading, held = faulty(fault, t, estimated / relief, held)
             model = -1.0
             if feed_forward:
-                known = axes.latency + every * dt
-                soon = max(v / programmed, min(rules.cap, state[OVERRIDE] + rules.slew_up * known))
-                model, first = allowed(
-                    s, at, feed, model_edge, model_cut, rules.torque_ref * state[TRIM], known, soon,
-                    min(rules.slew_down, acc / programmed), rules.cap, first,
-                )  # fmt: skip
+                model, first = model_override(columns, rules, state, axes, s, v / programmed, programmed, first)
             predicted = expected if predicting else np.nan
-            seen = Observation(reading, every * dt, True, v / programmed, predicted, model, False)
+            seen = Observation(reading, period, True, v / programmed, predicted, model, False)
             sent, status = step(rules, sets, state, seen)
             queue[head] = sent
             head = (head + 1) % len(queue)
             command = queue[head] if len(queue) > 1 else sent
         goal = command * programmed
-        v = min(goal, v + acc * dt) if goal > v else max(goal, v - acc * dt)
-        ratio = v / programmed * (spindle.speed / w)
-        torque = between_rows(at, edge, i, s) + between_rows(at, cut, i, s) * ratio if v > 0.0 else 0.0
-        believed = 0.0
+        v = min(goal, v + change) if goal > v else max(goal, v - change)
+        believed = torque = 0.0
         if v > 0.0:
-            believed = between_rows(at, model_edge, i, s) + between_rows(at, model_cut, i, s) * ratio
-        # spindle: speed loop with a limited current
-        wrong = spindle.speed - w
-        drawn = spindle.stiffness * wrong + summed
-        if abs(drawn) <= most:
-            summed += spindle.reset * wrong * dt
-        drawn = min(max(drawn, -most), most)
-        turning = (kt * (drawn - idle0 - idle1 * w) - torque) / inertia
-        w += turning * dt
-        x = min(dt / lag, 1.0) if lag > 0.0 else 1.0
-        sensed += (drawn - sensed) * x
-        rate += (inertia * turning - rate) * x
-        expected_sensed += (believed - expected_sensed) * x
-        greatest = max(greatest, torque)
-        load = torque / between_rows(at, relief, i, s)
-        most_load = max(most_load, load)
+            ratio = v / programmed * (drive.speed / wheel[SPEED])
+            torque = between_rows(at, columns.edge, i, s) + between_rows(at, columns.cut, i, s) * ratio
+            believed = between_rows(at, columns.model_edge, i, s) + between_rows(at, columns.model_cut, i, s) * ratio
+        turn(drive, wheel, torque, t, dt)
+        expected_sensed += (believed - expected_sensed) * lag
+        load = torque / between_rows(at, columns.relief, i, s)
+        greatest, most_load = max(greatest, torque), max(most_load, load)
         if load > limit:
             over += dt
         if k % (every * quick) == 0 and rows < len(out):
-            out[rows, 0], out[rows, 1], out[rows, 2], out[rows, 3] = t, s, v, torque
-            out[rows, 4], out[rows, 5], out[rows, 6], out[rows, 7] = reading * relief_here, sent, status, w
+            put_row(out[rows], t, s, v, torque, reading * relief, sent, status, wheel[SPEED])
             rows += 1
         s += v * dt
         t += dt
         k += 1
-        if s >= end:
+        if s >= at[len(at) - 1]:
             ended = FINISHED
-            break
-        if v == 0.0 and command == 0.0 and status >= OVERLOAD:
+        elif v == 0.0 and command == 0.0 and status >= OVERLOAD:
             ended = STOPPED
-            break
-        if w <= axes.stall * spindle.speed:
+        elif wheel[SPEED] <= axes.stall * drive.speed:
             ended = STALLED
+        if ended != TIMED_OUT:
             break
     if rows < len(out):
-        out[rows, 0], out[rows, 1], out[rows, 2], out[rows, 3] = t, s, v, torque
-        out[rows, 4], out[rows, 5], out[rows, 6], out[rows, 7] = reading * relief_here, sent, status, w
+        put_row(out[rows], t, s, v, torque, reading * relief, sent, status, wheel[SPEED])
         rows += 1
     return rows, ended, t, greatest, most_load, over

@@ -10,8 +10,12 @@ row where the log has no column of time:
     column = "S1_ActualVelocity"
     unit = "rev/s"
 
-Quantities are ``time``, ``speed``, ``current``, ``torque``, ``feed`` and ``label`` (a text, without a unit). Currents
-that were written in steps of a converter have the unit ``count``; what is made of them is in counts too.
+Quantities are ``time``, ``speed``, ``current``, ``power``, ``torque``, ``feed`` and ``label`` (a text, without a unit;
+its key ``cutting`` lists how the texts of rows in the cut begin). Currents that were written in steps of a converter
+have the unit ``count``; what is made of them is in counts too. Without a table the columns are known by their names, as
+`time_s`, `speed_rpm`, `current_a`, `power_w`, `torque_nm`: what `chipload hal --out` writes is read so. A log without a
+head, as LinuxCNC's `halsampler` writes it, has ``head = false``; its columns are numbered from 1, and are separated by
+spaces.
 """
 
 from __future__ import annotations
@@ -39,10 +43,19 @@ UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3},
     "speed": {"rad/s": 1.0, "rpm": math.tau / 60.0, "rev/s": math.tau},
     "current": {"A": 1.0, "mA": 1e-3, "count": 1.0},
+    "power": {"W": 1e3, "kW": 1e6},
     "torque": {"N mm": 1.0, "N m": 1e3},
     "feed": {"mm/s": 1.0, "mm/min": 1.0 / 60.0},
 }
 _QUANTITIES = (*UNITS, "label")
+#: columns that are known by their names: name -> quantity, unit
+KNOWN = {
+    "time_s": ("time", "s"), "t_s": ("time", "s"), "time_ms": ("time", "ms"), "speed_rpm": ("speed", "rpm"),
+    "speed_rad_s": ("speed", "rad/s"), "speed_rev_s": ("speed", "rev/s"), "spindle_rpm": ("speed", "rpm"),
+    "current_a": ("current", "A"), "power_w": ("power", "W"), "power_kw": ("power", "kW"),
+    "torque_nm": ("torque", "N m"), "torque_mean_nm": ("torque", "N m"), "torque_nmm": ("torque", "N mm"),
+    "feed_mm_min": ("feed", "mm/min"), "feed_mm_s": ("feed", "mm/s"), "label": ("label", ""),
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,27 +66,41 @@ class Log:
     ----------
     time : (n,) float [s], rising
     current : (n,) float [A] (or counts)
+    power : (n,) float [N mm/s]
     speed : (n,) float [rad/s]
     torque : (n,) float [N mm]
     feed : (n,) float [mm/s]
     label : (n,) text
+    cutting : (n,) bool, by the label
     """
 
     time: Floats
-    current: Floats
+    current: Floats | None = None
+    power: Floats | None = None
     speed: Floats | None = None
     torque: Floats | None = None
     feed: Floats | None = None
     label: NDArray[np.str_] | None = None
+    cutting: NDArray[np.bool_] | None = None
 
 
-def read_log(path: str | Path, columns: dict[str, Any] | str | Path) -> tuple[Log, list[Finding]]:
+@dataclass(frozen=True)
+class _Columns:
+    """Quantity -> (column, unit), time of a row, how labels of the cut begin, and whether there is a head."""
+
+    wanted: dict[str, tuple[str, str]]
+    sample: float | None
+    cutting: tuple[str, ...]
+    head: bool
+
+
+def read_log(path: str | Path, columns: dict[str, Any] | str | Path | None = None) -> tuple[Log, list[Finding]]:
     """Read a log.
 
     Parameters
     ----------
     path : CSV with a head of names, separated by commas
-    columns : the table of columns, or the path of its TOML file
+    columns : the table of columns, or the path of its TOML file; None: the columns are known by their names
 
     Returns
     -------
@@ -86,13 +113,13 @@ def read_log(path: str | Path, columns: dict[str, Any] | str | Path) -> tuple[Lo
         A file cannot be read or is too large, a column is not there, a unit is not known, no row is left.
     """
     label = f"log {path}"
-    wanted, sample = _wanted(columns)
-    data = read_regular(path, label, MOST_BYTES, "cut it into parts")
-    rows = csv.reader(io.StringIO(data.decode("utf-8-sig", "replace"), newline=""))
+    stated = _stated(columns) if columns is not None else None
+    data = read_regular(path, label, MOST_BYTES, "cut it into parts").decode("utf-8-sig", "replace")
     try:
-        names = [name.strip() for name in next(rows, [])]
+        names, rows = _table(data, stated is None or stated.head)
+        asked = stated or _by_name(label, names)
         places = {}
-        for quantity, (name, _) in wanted.items():
+        for quantity, (name, _) in asked.wanted.items():
             if name not in names:
                 near = f": the nearest is {nearest(name, names)}" if names else ": the file is empty"
                 raise InputError(f"{label}: no column {name} for {quantity}{near}")
@@ -100,6 +127,7 @@ def read_log(path: str | Path, columns: dict[str, Any] | str | Path) -> tuple[Lo
         kept, bad, number = _kept(rows, places)
     except csv.Error as err:
         raise InputError(f"{label}: not a CSV file: {err}") from None
+    wanted, sample = asked.wanted, asked.sample
     findings = []
     if bad:
         findings.append(Finding("log-row", bad[0], f"{len(bad)} rows are left out: a number is missing"))
@@ -110,6 +138,8 @@ def read_log(path: str | Path, columns: dict[str, Any] | str | Path) -> tuple[Lo
         values = [row[k] for row in kept]
         if quantity == "label":
             made["label"] = np.array(values, dtype=np.str_)
+            if asked.cutting:
+                made["cutting"] = np.array([str(x).startswith(asked.cutting) for x in values])
         else:
             made[quantity] = np.array(values, dtype=np.float64) * UNITS[quantity][wanted[quantity][1]]
     rising = np.concatenate([[True], made["time"][1:] > np.maximum.accumulate(made["time"])[:-1]])
@@ -120,6 +150,30 @@ def read_log(path: str | Path, columns: dict[str, Any] | str | Path) -> tuple[Lo
         )
         made = {key: column[rising] for key, column in made.items()}
     return Log(**made), findings
+
+
+def _table(text: str, head: bool) -> tuple[list[str], Any]:
+    """Names of the columns, and the rows; without a head the names are numbers, the separators spaces."""
+    if head:
+        rows = csv.reader(io.StringIO(text, newline=""))
+        return [name.strip() for name in next(rows, [])], rows
+    lines = [line.split() for line in text.splitlines()]
+    return [str(k + 1) for k in range(max(map(len, lines), default=0))], iter(lines)
+
+
+def _by_name(label: str, names: list[str]) -> _Columns:
+    """The columns that are known by their names."""
+    wanted: dict[str, tuple[str, str]] = {}
+    for name in names:
+        quantity, unit = KNOWN.get(name, ("", ""))
+        if quantity and quantity not in wanted:
+            wanted[quantity] = (name, unit)
+    if "time" not in wanted or not {"current", "power"} & set(wanted):
+        raise InputError(
+            f"{label}: no column of time and of current or power by a known name, as time_s and current_a: state "
+            "--columns, a TOML file that names them"
+        )
+    return _Columns(wanted, None, (), True)
 
 
 def _kept(rows: Any, places: dict[str, int]) -> tuple[list[list[float | str]], list[int], list[int]]:
@@ -150,29 +204,40 @@ def _kept(rows: Any, places: dict[str, int]) -> tuple[list[list[float | str]], l
     return kept, bad, number
 
 
-def _wanted(columns: dict[str, Any] | str | Path) -> tuple[dict[str, tuple[str, str]], float | None]:
-    """Quantity -> (column, unit), and the time of a row."""
+def _stated(columns: dict[str, Any] | str | Path) -> _Columns:
+    """The table of columns, checked."""
     label, table = ("log columns", columns) if isinstance(columns, dict) else read_table("log columns", columns)
-    out = {}
-    sample = None
+    out: dict[str, tuple[str, str]] = {}
+    sample, cutting, head = None, (), True
     for key, value in table.items():
         if key == "sample_s":
             if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
                 raise InputError(f"{label}: sample_s = {value!r}: must be a number above 0")
             sample = float(value)
             continue
+        if key == "head":
+            if not isinstance(value, bool):
+                raise InputError(f"{label}: head = {value!r}: must be true or false")
+            head = value
+            continue
         if key not in _QUANTITIES:
             raise InputError(
                 f"{label}: unknown quantity {key}: the nearest known one is {nearest(key, [*_QUANTITIES])}"
             )
-        if not isinstance(value, dict) or not isinstance(value.get("column"), str):
+        column = value.get("column") if isinstance(value, dict) else None
+        if not (isinstance(column, str) or (isinstance(column, int) and not isinstance(column, bool))):
             raise InputError(f"{label}: {key}: must be a table with column and unit")
         unit = value.get("unit", "")
         if key != "label" and unit not in UNITS[key]:
             raise InputError(f"{label}: {key}.unit = {unit!r}: must be one of {', '.join(UNITS[key])}")
-        out[key] = (value["column"], unit)
-    if "current" not in out:
-        raise InputError(f"{label}: current is missing: the column of the spindle current must be named")
+        if key == "label":
+            texts = value.get("cutting", [])
+            if not (isinstance(texts, list) and all(isinstance(x, str) and x for x in texts)):
+                raise InputError(f"{label}: label.cutting = {texts!r}: must be a list of texts")
+            cutting = tuple(texts)
+        out[key] = (str(column), unit)
+    if not {"current", "power"} & set(out):
+        raise InputError(f"{label}: current is missing: the column of the spindle current must be named, or power")
     if ("time" in out) == (sample is not None):
         raise InputError(f"{label}: must give either time or sample_s")
-    return out, sample
+    return _Columns(out, sample, cutting, head)

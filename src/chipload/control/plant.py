@@ -7,7 +7,10 @@ K_T [N mm/A], I current [A].
 
     J dw/dt = K_T (I - I_idle(w)) - T,   I_idle = i_0 + i_1 w,
     I = K_P (w_0 - w) + K_I integral of (w_0 - w), within the drive's current,
-    T_measured = lag of [K_T (I - I_idle) - J dw/dt] + K_T noise, read in whole steps of the current, smoothed.
+    I_read = lag of I + noise, in whole steps,   T_measured: chipload.control._estimator, from I_read and w.
+
+The plant turns the real spindle (:class:`SpindleDeviation`), the estimator believes its data: K_T, I_idle, J and the
+lag of the two may differ, and the real I_idle may drift.
 
 Where the wall allows more than what is held, the controller is told the torque over its relief (T and T_model alike):
 it holds the same share of what is allowed everywhere.
@@ -27,8 +30,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.control import _plant
+from chipload.control._estimator import Belief
 from chipload.control.fuzzy import FuzzyTable
 from chipload.control.override import STATUS, Override, begin, sets_of
+from chipload.control.spindle_model import AS_STATED, Spindle, SpindleDeviation
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -147,47 +152,6 @@ def surprised(profile: TorqueProfile, surprises: tuple[Surprise, ...], spacing: 
 
 
 @dataclass(frozen=True)
-class Spindle:
-    """A spindle with its drive and current sensor.
-
-    Parameters
-    ----------
-    speed : w_0 [rad/s]
-    inertia : J [N mm s^2] (1 kg m^2 = 1000)
-    torque_constant : K_T [N mm/A]
-    idle : (i_0 [A], i_1 [A s])
-    stiffness, reset : K_P [A s], K_I [A] of the speed controller
-    most_current : of the drive [A]
-    sensor_lag : time constant [s]
-    smoothing : time constant of the filter behind it [s], about a revolution
-    noise : standard deviation of a reading of the current [A]
-    current_step : quantisation of a reading of the current [A]; 0: none
-    idle_error : share by which the idle current may differ from ``idle`` (temperature, lubricant)
-    """
-
-    speed: float
-    inertia: float
-    torque_constant: float
-    idle: tuple[float, float]
-    stiffness: float
-    reset: float
-    most_current: float
-    sensor_lag: float
-    smoothing: float
-    noise: float
-    current_step: float = 0.0
-    idle_error: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("speed", "inertia", "torque_constant", "stiffness", "most_current"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise InputError(f"spindle.{name} = {getattr(self, name):g}: must be above 0")
-        for name in ("reset", "sensor_lag", "smoothing", "noise", "current_step", "idle_error"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise InputError(f"spindle.{name} = {getattr(self, name):g}: must be at least 0")
-
-
-@dataclass(frozen=True)
 class Loop:
     """Times of the loop and the limit of the axes.
 
@@ -280,6 +244,7 @@ def run(
     every_row: int = 1,
     relief: Floats | None = None,
     monitor: TorqueProfile | None = None,
+    deviation: SpindleDeviation = AS_STATED,
 ) -> Outcome:
     """Run a controller along a path.
 
@@ -288,13 +253,14 @@ def run(
     truth : what the cutter meets
     model : what the controller believes, at the same programmed feeds; None: it has no feed-forward
     controller, table : see :mod:`chipload.control.override`
-    spindle, loop : the machine
+    spindle, loop : the machine; what the estimator believes of the spindle
     limit : torque for ``time_over`` [N mm]
     fault : of the sensor
     every_row : keep every so many steps of the controller
     relief : (n,) float, above 0, at the rows of ``truth``: what is allowed there over what is held; the
         controller is told the torque over it; None: 1 everywhere
     monitor : model that readings are held against where there is no feed-forward; None: ``model``
+    deviation : of the real spindle
 
     Raises
     ------
@@ -327,7 +293,8 @@ def run(
         sets_of(table),
         begin(controller, model is not None),
         _plant.Axes(loop.period / every, every, delay, delay * loop.period, loop.acceleration, loop.longest_s, STALL),
-        _drive(spindle),
+        _drive(deviation.applied(spindle), deviation.drift(spindle)),
+        belief_of(spindle),
         _plant.SensorFault(FAULTS.index(fault.kind), float(fault.begin), float(fault.end), float(fault.value)),
         np.random.default_rng(loop.seed).normal(0.0, spindle.noise, 65_536),
         limit,
@@ -354,19 +321,31 @@ def run(
     )
 
 
-def _drive(spindle: Spindle) -> _plant.SpindleDrive:
-    return _plant.SpindleDrive(
-        speed=float(spindle.speed),
-        inertia=float(spindle.inertia),
+def belief_of(spindle: Spindle) -> Belief:
+    """What the estimator takes a spindle for."""
+    return Belief(
         torque_constant=float(spindle.torque_constant),
         idle_constant=float(spindle.idle[0]),
         idle_slope=float(spindle.idle[1]),
-        stiffness=float(spindle.stiffness),
-        reset=float(spindle.reset),
-        most_current=float(spindle.most_current),
-        current_step=float(spindle.current_step),
+        inertia=float(spindle.inertia),
         sensor_lag=float(spindle.sensor_lag),
         smoothing=float(spindle.smoothing),
+    )
+
+
+def _drive(real: Spindle, drift: float) -> _plant.SpindleDrive:
+    return _plant.SpindleDrive(
+        speed=float(real.speed),
+        inertia=float(real.inertia),
+        torque_constant=float(real.torque_constant),
+        idle_constant=float(real.idle[0]),
+        idle_slope=float(real.idle[1]),
+        idle_drift=float(drift),
+        stiffness=float(real.stiffness),
+        reset=float(real.reset),
+        most_current=float(real.most_current),
+        current_step=float(real.current_step),
+        sensor_lag=float(real.sensor_lag),
     )
 
 

@@ -7,8 +7,8 @@ spindle at its speed, c the share by which it may differ from its map. The error
     R = K_T (2 n sqrt(g / (2 - g)) + q / 2 + c I_0),
 
 two standard deviations of the noise behind the filter, half a step and the error of the idle map. A reading below R is
-not told from air. A torque that is held may in truth be R greater, so a limit T with a share h held and an excess of x
-granted needs R <= (1 + x - h) T.
+not told from air. With a share k by which the torque constant may be wrong, a torque h T that is held may in truth be
+(1 + k) h T + R, so a limit T of which an excess of x is granted needs R <= (1 + x - (1 + k) h) T.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from chipload.control.plant import Spindle
+from chipload.control.spindle_model import Spindle
 from chipload.errors import InputError
 
 #: standard deviations of the noise that an estimate is granted
@@ -95,15 +95,22 @@ def check_limit(spindle: Spindle, period: float, limit: float, hold: float, exce
     Raises
     ------
     InputError
-        The resolution is above (1 + x - h) T.
+        The resolution is above (1 + x - (1 + k) h) T.
     """
-    found, granted = torque_resolution(spindle, period), 1.0 + excess - hold
+    found, wrong = torque_resolution(spindle, period), 1.0 + spindle.torque_constant_error
+    granted = 1.0 + excess - wrong * hold
+    if granted <= 0.0:
+        raise InputError(
+            f"spindle: its torque constant may be wrong by {100.0 * (wrong - 1.0):.3g} %: a share of {hold:g} of the "
+            f"limit cannot be held: log more cuts of known torque, or hold at most {(1.0 + excess) / wrong:.3g}"
+        )
     if found.total > granted * limit:
-        lower = 1.0 + excess - found.total / limit
+        lower = (1.0 + excess - found.total / limit) / wrong
         held = f", or hold at most {lower:.2g}" if lower > 0.5 else ""
         raise InputError(
             f"spindle: it resolves {found}, the limit is {1e-3 * limit:.4g} N m: must be at most "
-            f"{1e-3 * granted * limit:.3g} N m, the share of the limit that is neither held nor allowed in excess: "
+            f"{1e-3 * granted * limit:.3g} N m, the share of the limit that is neither held, torque "
+            f"constant {100.0 * (wrong - 1.0):.2g} % wrong, nor allowed in excess: "
             f"{_remedy(found)}{held}; this spindle holds limits from {1e-3 * found.total / granted:.3g} N m"
         )
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,6 +102,29 @@ def lagged_rate(speed: Floats, time: Floats, lag: float) -> Floats:
     return (speed - first_order(speed, time, lag)) / lag
 
 
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One log of a spindle.
+
+    Parameters
+    ----------
+    time, speed, current : (n,) float [s], [rad/s], [A]
+    torque : (n,) float [N mm], 0 in the air; not a number where it is not known
+    """
+
+    time: Floats
+    speed: Floats
+    current: Floats
+    torque: Floats
+
+    def __post_init__(self) -> None:
+        n = len(self.time)
+        for name in ("speed", "current", "torque"):
+            column = getattr(self, name)
+            if column.shape != (n,) or not (np.isfinite(column) | (name == "torque")).all():
+                raise InputError(f"spindle.{name}: must be a column of {n} numbers like time")
+
+
 def identify(
     time: Floats,
     speed: Floats,
@@ -111,82 +135,127 @@ def identify(
     level: float = 0.95,
     share: float = 0.2,
 ) -> SpindleMap:
-    """Identify a spindle from logged cuts of known torque (0 in the air).
+    """Identify a spindle from one log of cuts of known torque (0 in the air); as :func:`identify_runs`."""
+    if not np.isfinite(torque).all():
+        raise InputError(f"spindle.torque: must be a column of {len(time)} numbers like time")
+    run = Run(time, speed, current, torque)
+    if float(np.ptp(speed)) == 0.0 and float(np.abs(speed).max()) > 0.0:
+        raise InputError("spindle.speed: the speed must change somewhere (a run-up), or J cannot be found")
+    return identify_runs((run,), sensor_lag, idle_terms, level, share)
+
+
+def identify_runs(
+    runs: Sequence[Run],
+    sensor_lag: float,
+    idle_terms: int = 2,
+    level: float = 0.95,
+    share: float = 0.2,
+    torque_constant: float | None = None,
+    inertia: bool = True,
+    settled: float | None = None,
+) -> SpindleMap:
+    """Identify a spindle from logs of cuts of known torque, air runs (torque 0), or both.
 
     Parameters
     ----------
-    time, speed, current, torque : (n,) float [s], [rad/s], [A], [N mm]
+    runs : the logs; rows of unknown torque are left out
     sensor_lag : tau [s]
     idle_terms : coefficients of I_idle, 1 .. 4
     level : of the intervals
     share : an estimate counts as trusted where its error is below this share of the torque
+    torque_constant : K_T [N mm/A] that is known, and not identified
+    inertia : J is identified; False: it is 0, for logs of one speed
+    settled : rows are left out while a lag of so long still shows what is not known [s]; None: ``sensor_lag``
 
     Raises
     ------
     InputError
-        Columns differ in length, are too short, or do not tell the parameters apart (one speed, one torque, no ramp).
+        The rows are too few, or do not tell the parameters apart (one speed, one torque, no ramp).
     """
-    n = len(time)
-    for name, column in (("speed", speed), ("current", current), ("torque", torque)):
-        if column.shape != (n,) or not np.isfinite(column).all():
-            raise InputError(f"spindle.{name}: must be a column of {n} numbers like time")
     if not 1 <= idle_terms <= 4:
         raise InputError(f"spindle.idle_terms = {idle_terms}: must be from 1 to 4")
-    if n < 10 * (idle_terms + 2):
-        raise InputError(f"spindle.time: {n} rows: must be at least {10 * (idle_terms + 2)} to identify")
-    scale_w = float(np.abs(speed).max())
-    scale_t = float(np.abs(torque).max())
-    rate = lagged_rate(speed, time, sensor_lag)
-    scale_r = float(np.abs(rate).max())
-    for name, scale, cure in (
-        ("speed", scale_w, "the spindle must turn"),
-        ("torque", scale_t, "at least one cut of known torque is needed"),
-        ("speed", float(np.ptp(speed)), "the speed must change somewhere (a run-up), or J cannot be found"),
-    ):
-        if scale == 0.0:
-            raise InputError(f"spindle.{name}: {cure}")
-    lagged = [first_order(torque / scale_t, time, sensor_lag), rate / scale_r]
-    powers = [first_order((speed / scale_w) ** k, time, sensor_lag) for k in range(idle_terms)]
-    # the sensor's state before the first row is not known
-    settled = time - time[0] >= 5.0 * sensor_lag
-    design = np.stack([*lagged, *powers], axis=1)[settled]
-    found, _, rank, _ = np.linalg.lstsq(design, current[settled], rcond=1e-10)
-    if rank < design.shape[1]:
+    count = sum(len(run.time) for run in runs)
+    if count < 10 * (idle_terms + 2):
+        raise InputError(f"spindle.time: {count} rows: must be at least {10 * (idle_terms + 2)} to identify")
+    scale_w = max(float(np.abs(run.speed).max()) for run in runs)
+    scale_t = max(float(np.abs(np.nan_to_num(run.torque)).max()) for run in runs)
+    if scale_w == 0.0:
+        raise InputError("spindle.speed: the spindle must turn")
+    if scale_t == 0.0 and torque_constant is None:
+        raise InputError("spindle.torque: at least one cut of known torque is needed")
+    settled = sensor_lag if settled is None else settled
+    parts = [_rows(run, sensor_lag, settled, idle_terms, scale_w, scale_t or 1.0) for run in runs]
+    design, current = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+    scale_r = float(np.abs(design[:, 1]).max()) or 1.0
+    design[:, 1] /= scale_r
+    known = np.zeros(len(current))
+    if torque_constant is not None:
+        known = design[:, 0] * (scale_t or 1.0) / torque_constant
+    free = [k for k in range(idle_terms + 2) if not (k == 0 and torque_constant is not None) and (k != 1 or inertia)]
+    found, _, rank, _ = np.linalg.lstsq(design[:, free], current - known, rcond=1e-10)
+    if rank < len(free):
         raise InputError(
             "spindle: torque, acceleration and idle current cannot be told apart: cuts at two speeds and two torques "
             "are needed, or fewer idle_terms"
         )
-    left = current[settled] - design @ found
-    freedom = len(left) - design.shape[1]
-    variance = float(left @ left) / freedom
+    left = current - known - design[:, free] @ found
+    freedom = len(left) - len(free)
     power = float(left @ left)
+    variance = power / freedom
     rho = min(max(float(left[1:] @ left[:-1]) / power, 0.0), 0.99) if power > 0.0 else 0.0
-    covariance = variance * (1.0 + rho) / (1.0 - rho) * np.linalg.inv(design.T @ design)
-    per_torque, per_rate = found[0] / scale_t, found[1] / scale_r
-    if per_torque <= 0.0:
-        raise InputError("spindle.torque: a greater torque takes less current: the columns do not belong together")
-    constant = 1.0 / per_torque
-    inertia = per_rate * constant
+    covariance = np.zeros((idle_terms + 2, idle_terms + 2))
+    inner = np.linalg.inv(design[:, free].T @ design[:, free])
+    covariance[np.ix_(free, free)] = variance * (1.0 + rho) / (1.0 - rho) * inner
+    values = np.zeros(idle_terms + 2)
+    values[free] = found
+    per_rate = values[1] / scale_r
+    if torque_constant is None:
+        if values[0] <= 0.0:
+            raise InputError("spindle.torque: a greater torque takes less current: the columns do not belong together")
+        constant = float(scale_t / values[0])
+    else:
+        constant = torque_constant
     # delta method: K_T = 1/a, J = b/a
-    jacobian = np.zeros((idle_terms + 2, idle_terms + 2))
-    jacobian[0, 0] = -(constant**2) / scale_t
-    jacobian[1, 0], jacobian[1, 1] = -inertia * constant / scale_t, constant / scale_r
-    for k in range(idle_terms):
-        jacobian[2 + k, 2 + k] = scale_w**-k
+    jacobian = np.zeros_like(covariance)
+    if torque_constant is None:
+        jacobian[0, 0] = -(constant**2) / scale_t
+        jacobian[1, 0] = -per_rate * constant**2 / scale_t
+    jacobian[1, 1] = constant / scale_r
+    jacobian[2:, 2:] = np.diag(scale_w ** -np.arange(idle_terms, dtype=np.float64))
     spread = np.sqrt(np.diag(jacobian @ covariance @ jacobian.T))
-    light, biased = _light(lagged[0][settled] * scale_t, constant * left, share)
+    light, biased = _light(design[:, 0] * scale_t, constant * left, share) if scale_t > 0.0 else (0.0, 0.0)
     return SpindleMap(
         torque_constant=constant,
-        inertia=inertia,
-        idle=found[2:] / scale_w ** np.arange(idle_terms),
+        inertia=per_rate * constant,
+        idle=values[2:] / scale_w ** np.arange(idle_terms),
         half_width=float(student.ppf(0.5 + 0.5 * level, freedom)) * spread,
         level=level,
-        speeds=(float(speed.min()), float(speed.max())),
+        speeds=(min(float(run.speed.min()) for run in runs), max(float(run.speed.max()) for run in runs)),
         light=light,
         biased=biased,
         residual=math.sqrt(variance),
         sensor_lag=sensor_lag,
     )
+
+
+def _rows(
+    run: Run, lag: float, settled: float, idle_terms: int, scale_w: float, scale_t: float
+) -> tuple[Floats, Floats]:
+    """Columns torque, acceleration and powers of the speed behind the lag, and the current, of the rows that count."""
+    usable = known_rows(run, settled)
+    columns = [first_order(np.nan_to_num(run.torque) / scale_t, run.time, lag), lagged_rate(run.speed, run.time, lag)]
+    columns += [first_order((run.speed / scale_w) ** k, run.time, lag) for k in range(idle_terms)]
+    return np.stack(columns, axis=1)[usable], run.current[usable]
+
+
+def known_rows(run: Run, lag: float) -> NDArray[np.bool_]:
+    """(n,) bool: the torque is known, and what the sensor still shows of rows before it is too."""
+    unknown = np.isnan(run.torque)
+    # the state of the sensor before the first row is not known
+    last = np.where(unknown, run.time, -np.inf)
+    last[0] = max(last[0], run.time[0] if lag > 0.0 else -np.inf)
+    since = run.time - np.maximum.accumulate(last)
+    return np.asarray(~unknown & (since >= 5.0 * lag))
 
 
 def idle_map(

@@ -150,7 +150,9 @@ def path_limit(loads: Loads, wall: UnitResponse, deflection: float, stress: floa
     """
     on = (wall.compliance > 0.0) & (loads.force_cut > 0.0)
     if not on.any():
-        raise InputError("shell: the program cuts nothing from the wall: check shell.clamp_z_mm, its radius and stock")
+        raise InputError(
+            "torque_control.shell: the program cuts nothing from the wall: check its clamp_z_mm, radius and stock"
+        )
     with np.errstate(divide="ignore", invalid="ignore"):
         bend = np.where(on, deflection / wall.compliance, np.inf)
         force = np.where(on, np.minimum(bend, stress / wall.stress), np.inf)

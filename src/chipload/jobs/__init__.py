@@ -22,7 +22,7 @@ from pydantic import BaseModel, ValidationError
 from chipload.errors import Finding, InputError, InputErrors, Severity
 from chipload.files import read_regular
 from chipload.jobs.confirm import guesses_of, take_confirm
-from chipload.jobs.messages import Errors, left_missing, table_errors
+from chipload.jobs.messages import Errors, left_missing, renamed_tables, table_errors
 from chipload.jobs.override import override
 from chipload.jobs.sources import cutter_errors, source_errors
 from chipload.progress import Progress, silent
@@ -63,7 +63,7 @@ class Capability:
 
 #: every capability; a job file belongs to the first whose table it has
 CAPABILITIES = (
-    Capability("torque", "shell", "TorqueJobTable"),
+    Capability("torque", "torque_control", "TorqueJobTable"),
     Capability("program", "program", "ProgramJobTable", resumes=True),
     Capability("impeller", "impeller", "ImpellerJobTable"),
     Capability("thinwall", "wall", "ThinWallJobTable"),
@@ -192,6 +192,8 @@ def _loaded(
         override(raw, text, root)
     require_sound(label, raw)
     errors, module = Errors(), capability.module("job")
+    errors.texts += renamed_tables(raw)
+    errors.refuse(f"{label}: ")
     try:
         with errors.collect():
             job = module.load(path, root.model_validate(raw), tuple(overrides))

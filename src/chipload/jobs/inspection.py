@@ -84,7 +84,7 @@ def _catalogue(path: Path) -> list[str]:
 
 
 def _hal(path: Path) -> list[str]:
-    from chipload.control.hal import load_hal
+    from chipload.control.hal_file import load_hal
 
     job = load_hal(path)
     return [f"{path.name}: a controller for chipload hal, torque held {1e-3 * job.override.torque_ref:.4g} N m"]

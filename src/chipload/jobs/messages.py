@@ -13,6 +13,18 @@ from pydantic import BaseModel, ValidationError
 
 from chipload.errors import InputError, InputErrors
 
+#: tables of a job file that have another name now
+RENAMED = {"shell": "torque_control.shell", "control": "torque_control"}
+
+
+def renamed_tables(keys: Iterable[str]) -> list[str]:
+    """A line for each table that has another name now.
+
+    >>> renamed_tables(["machine", "shell"])
+    ['shell: renamed: write [torque_control.shell]']
+    """
+    return [f"{key}: renamed: write [{RENAMED[key]}]" for key in keys if key in RENAMED]
+
 
 class Errors:
     """Collects the errors of an input, so that all of them are refused at once."""

@@ -7,7 +7,7 @@ import tomllib
 from typing import Any
 
 from chipload.errors import InputError
-from chipload.jobs.messages import keys_at, nearest_key
+from chipload.jobs.messages import RENAMED, keys_at, nearest_key
 from chipload.jobs.tables import Table
 
 
@@ -17,6 +17,8 @@ def override(raw: dict[str, Any], text: str, root: type[Table]) -> None:
     keys = [k.strip() for k in path.split(".")]
     if not equals or not all(keys):
         raise InputError(f"--set {text}: must be key.path=value, as cutter.0.diameter_mm=12")
+    if keys[0] in RENAMED:
+        raise InputError(f"--set {text}: {keys[0]}: renamed: write {'.'.join((RENAMED[keys[0]], *keys[1:]))}")
     here: Any = raw
     holder: Any
     slot: Any

@@ -19,6 +19,8 @@ from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict
 
 #: findings and limits that the report lists
 LISTED = 300
+#: up to so many tracks have all their limits in the table
+WHOLE = 4
 #: classes of the banner and of a cell by state
 BANNERS = {Verdict.HOLDS: "good", Verdict.UNPROVEN: "open", Verdict.EXCEEDS: "bad"}
 CELLS = {Verdict.HOLDS: "ok", Verdict.UNPROVEN: "may", Verdict.EXCEEDS: "no"}
@@ -52,29 +54,51 @@ def page_bytes(result: Result, presentation: Presentation) -> bytes:
 
 
 def limits_table(tracks: Iterable[Track]) -> list[str]:
-    """Every limit of every track; those of tracks in use first, within them the worst state first."""
-    checks = [(track, check) for track in tracks for check in track.limits]
+    """Every limit, those of tracks in use first, within a track the worst state first.
+
+    Of more than :data:`WHOLE` tracks those not in use show the limits that do not hold, the rest in one row.
+    Behind the worst value a column is left out where all its cells are empty.
+    """
+    all_tracks = list(tracks)
+    whole = len(all_tracks) <= WHOLE
     order = list(Verdict)
-    checks.sort(key=lambda x: (not x[0].in_use, -order.index(x[1].state)))
+    checks: list[tuple[Track, LimitCheck | None]] = []
+    for track in sorted(all_tracks, key=lambda track: not track.in_use):
+        shown = [check for check in track.limits if whole or track.in_use or check.state is not Verdict.HOLDS]
+        shown.sort(key=lambda check: -order.index(check.state))
+        checks += [(track, check) for check in shown]
+        if len(shown) < len(track.limits):
+            checks.append((track, None))
     if not checks:
         return ["<p>No limit was checked.</p>"]
-    rows = [
-        [
-            escape(track.name) + (" <b>in use</b>" if track.in_use else ""),
-            escape(check.column.title),
-            state_cell(check.state),
-            f"{check.limit:g}",
-            "not known" if check.worst is None else f"{check.worst:.4g}",
-            f"{100.0 * check.resolution_error:.2g} %" if check.resolution_error else "",
-            str(check.line or ""),
-            "" if check.t_s is None else f"{check.t_s:.4g}",
-            place_cell(check),
-            escape(check.reason),
-        ]
-        for track, check in checks[:LISTED]
-    ]
+    rows = [_limit_row(track, check) for track, check in checks[:LISTED]]
     head = ["track", "limit", "state", "at most", "worst", "resolution", "line", "time [s]", "place [mm]", "reason"]
-    return [table(head, rows, numbers=(3, 4, 5, 6, 7), used=[t.in_use for t, _ in checks[:LISTED]])]
+    kept = [k for k in range(len(head)) if k < 5 or any(row[k] for row in rows)]
+    numbers = tuple(i for i, k in enumerate(kept) if k in (3, 4, 5, 6, 7))
+    cells = [[row[k] for k in kept] for row in rows]
+    return [table([head[k] for k in kept], cells, numbers, [t.in_use for t, _ in checks[:LISTED]])]
+
+
+def _limit_row(track: Track, check: LimitCheck | None) -> list[str]:
+    """A limit of a track; None: those that hold, in one row."""
+    name = escape(track.name) + (" <b>in use</b>" if track.in_use else "")
+    if check is None:
+        held = [x.column.label for x in track.limits if x.state is Verdict.HOLDS]
+        others = "all limits" if len(held) == len(track.limits) else "the other limits"
+        text = f'<span title="{escape(", ".join(held))}">{others} ({len(held)})</span>'
+        return [name, text, state_cell(Verdict.HOLDS), *[""] * 7]
+    return [
+        name,
+        f'<span class="name">{escape(check.column.title)}</span>',
+        state_cell(check.state),
+        f"{check.limit:g}",
+        "not known" if check.worst is None else f"{check.worst:.4g}",
+        f"{100.0 * check.resolution_error:.2g} %" if check.resolution_error else "",
+        str(check.line or ""),
+        "" if check.t_s is None else f"{check.t_s:.4g}",
+        place_cell(check),
+        escape(check.reason),
+    ]
 
 
 def tracks_table(tracks: tuple[Track, ...]) -> list[str]:

@@ -33,7 +33,7 @@ table { border-collapse: collapse; width: 100%; margin: 6px 0 12px; font-variant
 th, td { text-align: left; padding: 5px 10px; border-bottom: 1px solid var(--line); vertical-align: top; }
 thead th { font-weight: 600; color: var(--soft); font-size: 12.5px; border-bottom: 1.5px solid #aab2bb; }
 td.n, th.n { text-align: right; white-space: nowrap; }
-td:first-child { white-space: nowrap; }
+td:first-child, td .name { white-space: nowrap; }
 tr.used td { background: #f1f7f6; }
 .ok { color: var(--good); } .no { color: var(--bad); font-weight: 600; }
 .may { color: var(--may); font-weight: 600; }

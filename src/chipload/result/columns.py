@@ -119,7 +119,7 @@ _ROWS = (
     ("deflection_um", "\u00b5m", "deflection", "distance by which cutter and workpiece part"),
     ("deflection_cutter_um", "\u00b5m", "cutter deflection", "deflection of cutter, holder and spindle"),
     ("deflection_workpiece_um", "\u00b5m", "workpiece deflection", "deflection of the workpiece"),
-    ("deflection_share", "", "deflection share", "deflection over the greatest with which the rigid model holds"),
+    ("deflection_share", "", "deflection over model range", "deflection over the greatest that the rigid model covers"),
     ("form_error_um", "\u00b5m", "form error", "material left on the surface by deflection; negative: removed", True),
     ("form_points", "", "finished points", "points of the part's surface that the step finishes"),
     ("axial_overrun_mm", "mm", "cut above the flutes", "engaged length of the cutter above its flutes"),

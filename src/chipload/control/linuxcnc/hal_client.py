@@ -7,8 +7,10 @@ imported here: :mod:`chipload.control.linuxcnc.pins` is run by that Python, and 
 from __future__ import annotations
 
 import json
+import math
 import select
 import subprocess
+from collections.abc import Mapping
 from importlib import resources
 from types import TracebackType
 from typing import NamedTuple, Protocol
@@ -28,13 +30,17 @@ PINS: tuple[tuple[str, str, str], ...] = (
     ("velocity", "float", "in"),
     ("torque-in", "float", "in"),
     ("feed-in", "float", "in"),
+    ("current-in", "float", "in"),
+    ("speed-in", "float", "in"),
 )
 #: pins that each have a signal of the name `<component>-<pin>`
-SIGNALS = ("feed", "beat", "x", "y", "z", "velocity", "torque-in", "feed-in")
+SIGNALS = ("feed", "beat", "x", "y", "z", "velocity", "torque-in", "feed-in", "current-in", "speed-in")
 
 
 class PinValues(NamedTuple):
-    """What the in pins read: time [s], position [mm], velocity on the path [mm/s], torque [N m], override in force."""
+    """What the in pins read: time [s], position [mm], velocity on the path [mm/s], torque [N m], override in force,
+    current of the spindle [A] and its speed [rev/s], as LinuxCNC's `spindle.0.speed-in`.
+    """
 
     time: float
     x: float
@@ -43,6 +49,8 @@ class PinValues(NamedTuple):
     velocity: float
     torque: float
     feed: float
+    current: float = math.nan
+    speed: float = math.nan
 
 
 class ControlledMachine(Protocol):
@@ -60,6 +68,7 @@ class HalPins:
     name : of the component
     python : interpreter that has the module `hal`
     answer_s : longest wait for an answer [s]
+    sources : for an in pin the pin or signal in HAL whose value is taken instead, connected or not
 
     Raises
     ------
@@ -67,7 +76,13 @@ class HalPins:
         There is no such interpreter, it has no `hal`, or HAL does not take the component.
     """
 
-    def __init__(self, name: str, python: str = "/usr/bin/python3", answer_s: float = 5.0) -> None:
+    def __init__(
+        self,
+        name: str,
+        python: str = "/usr/bin/python3",
+        answer_s: float = 5.0,
+        sources: Mapping[str, str] | None = None,
+    ) -> None:
         script = resources.files("chipload.control.linuxcnc") / "pins.py"
         self._answer_s = answer_s
         try:
@@ -78,7 +93,9 @@ class HalPins:
         except OSError as err:
             raise InputError(f"--python = {python}: cannot be run: {err.strerror}") from None
         signals = {pin: f"{name}-{pin}" for pin in SIGNALS}
-        answer = self._line(json.dumps({"name": name, "pins": PINS, "signals": signals}))
+        answer = self._line(
+            json.dumps({"name": name, "pins": PINS, "signals": signals, "sources": dict(sources or {})})
+        )
         if answer != "ready":
             self._process.kill()
             why = (self._process.communicate()[1].strip().splitlines() or ["no answer"])[-1]

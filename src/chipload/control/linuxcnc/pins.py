@@ -2,9 +2,10 @@
 
 It uses the standard library and `hal` only, and is passive: each line on its input is one exchange, and when its input
 ends, it leaves HAL. The first line is JSON: {"name": component, "pins": [[name, type, direction], ...], "signals":
-{pin: signal}}, types `float`, `bit`, `s32`, directions `in`, `out`; signals are made where there are none. Each later
-line holds the values of the out pins in their order; the answer is the time [s] and the values of the in pins.
-A value that is no number is not set: the line is answered with `error`, and the beat that it carried does not arrive.
+{pin: signal}, "sources": {in pin: pin or signal in HAL whose value is taken instead}}, types `float`, `bit`, `s32`,
+directions `in`, `out`; signals are made where there are none. Each later line holds the values of the out pins in their
+order; the answer is the time [s] and the values of the in pins. A value that is no number is not set: the line is
+answered with `error`, and the beat that it carried does not arrive.
 """
 
 from __future__ import annotations
@@ -14,11 +15,13 @@ import math
 import signal
 import sys
 import time
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 
-def serve(component: Any, out_pins: list[str], in_pins: list[str]) -> None:
-    """Exchange lines until the input ends."""
+def serve(component: Any, out_pins: list[str], readers: Sequence[Callable[[], Any]]) -> None:
+    """Exchange lines until the input ends; ``readers`` give the values of the in pins."""
     for line in sys.stdin:
         words = line.split()
         try:
@@ -31,7 +34,7 @@ def serve(component: Any, out_pins: list[str], in_pins: list[str]) -> None:
         for name, value in zip(out_pins, values, strict=True):
             kind = type(component[name])
             component[name] = kind(value)
-        print(time.monotonic(), *(float(component[name]) for name in in_pins), flush=True)
+        print(time.monotonic(), *(float(read()) for read in readers), flush=True)
 
 
 def main() -> None:
@@ -54,9 +57,16 @@ def main() -> None:
                 kind = next(k for n, k, _ in asked["pins"] if n == name)
                 hal.new_sig(sig, types[kind])
             hal.connect(f"{asked['name']}.{name}", sig)
+        pins, sources = asked["pins"], asked["sources"]
+        readers = [
+            partial(hal.get_value, sources[name]) if name in sources else partial(component.__getitem__, name)
+            for name, _, way in pins
+            if way == "in"
+        ]
+        for read in readers:
+            read()
         print("ready", flush=True)
-        pins = asked["pins"]
-        serve(component, [n for n, _, w in pins if w == "out"], [n for n, _, w in pins if w == "in"])
+        serve(component, [name for name, _, way in pins if way == "out"], readers)
     except BrokenPipeError:
         pass
     finally:

@@ -10,7 +10,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from chipload.control.plant import Spindle
+import numpy as np
+
+from chipload.control import _estimator
+from chipload.control.plant import belief_of
+from chipload.control.spindle_model import Spindle
 from chipload.errors import InputError
 
 
@@ -23,7 +27,7 @@ class SpindleState:
     speed : w [rad/s]
     reset : what the integral of the speed controller adds [A]
     sensed : current behind the lag of its sensor [A]
-    rate : J dw/dt behind the same lag [N mm]
+    last_speed, lagged_speed : that the estimator read last, and behind the lag of the sensor [rad/s]
     filtered : measured torque [N mm]
     expected_sensed : torque of the model behind the lag of the sensor [N mm]
     expected : the same behind the filter too, as it would be measured [N mm]
@@ -32,7 +36,8 @@ class SpindleState:
     speed: float
     reset: float
     sensed: float
-    rate: float = 0.0
+    last_speed: float
+    lagged_speed: float
     filtered: float = 0.0
     expected_sensed: float = 0.0
     expected: float = 0.0
@@ -49,7 +54,7 @@ class Load:
 def at_speed(spindle: Spindle) -> SpindleState:
     """The spindle in the air at its speed."""
     idle = spindle.idle[0] + spindle.idle[1] * spindle.speed
-    return SpindleState(speed=spindle.speed, reset=idle, sensed=idle)
+    return SpindleState(spindle.speed, idle, idle, spindle.speed, spindle.speed)
 
 
 def advance(
@@ -59,15 +64,17 @@ def advance(
     model: tuple[Load, Load],
     seconds: float,
     substep: float,
+    believed_lag: float | None = None,
 ) -> tuple[SpindleState, float]:
     """The spindle after some time.
 
     Parameters
     ----------
-    spindle, state : as they are
+    spindle, state : as they really are
     true, model : load at the beginning and at the end; what the cutter meets, what is expected
     seconds : between them, above 0
     substep : longest step of the sum [s]
+    believed_lag : lag of the sensor that the expectation is made with [s]; None: that of the spindle
 
     Returns
     -------
@@ -77,9 +84,9 @@ def advance(
         raise InputError(f"spindle.advance: seconds = {seconds:g}, substep = {substep:g}: must be above 0")
     n = max(math.ceil(seconds / substep - 1e-9), 1)
     dt = seconds / n
-    w, reset, sensed, rate, expected = state.speed, state.reset, state.sensed, state.rate, state.expected_sensed
-    lag = spindle.sensor_lag
-    x = min(dt / lag, 1.0) if lag > 0.0 else 1.0
+    w, reset, sensed, expected = state.speed, state.reset, state.sensed, state.expected_sensed
+    lags = spindle.sensor_lag, spindle.sensor_lag if believed_lag is None else believed_lag
+    x, y = (min(dt / lag, 1.0) if lag > 0.0 else 1.0 for lag in lags)
     greatest = 0.0
     for k in range(n):
         b = (k + 0.5) / n
@@ -96,23 +103,28 @@ def advance(
         accelerating = spindle.torque_constant * (drawn - idle) - torque
         w += accelerating / spindle.inertia * dt
         sensed += (drawn - sensed) * x
-        rate += (accelerating - rate) * x
-        expected += (believed - expected) * x
+        expected += (believed - expected) * y
         greatest = max(greatest, torque)
-    new = replace(state, speed=w, reset=reset, sensed=sensed, rate=rate, expected_sensed=expected)
+    new = replace(state, speed=w, reset=reset, sensed=sensed, expected_sensed=expected)
     return new, greatest
 
 
-def measure(spindle: Spindle, state: SpindleState, noise: float, seconds: float) -> SpindleState:
-    """The state after a reading with ``noise`` [A], ``seconds`` after the last: ``filtered``, and ``expected``."""
-    idle = spindle.idle[0] + spindle.idle[1] * state.speed
+def read_current(spindle: Spindle, state: SpindleState, noise: float) -> float:
+    """The current as the real spindle's sensor gives it, with ``noise`` [A]."""
     current = state.sensed + noise
-    if spindle.current_step > 0.0:
-        current = round(current / spindle.current_step) * spindle.current_step
-    raw = spindle.torque_constant * (current - idle) - state.rate
-    share = min(seconds / spindle.smoothing, 1.0) if spindle.smoothing > 0.0 else 1.0
-    return replace(
-        state,
-        filtered=state.filtered + (raw - state.filtered) * share,
-        expected=state.expected + (state.expected_sensed - state.expected) * share,
-    )
+    return round(current / spindle.current_step) * spindle.current_step if spindle.current_step > 0.0 else current
+
+
+def estimated(believed: Spindle, state: SpindleState, current: float, seconds: float) -> SpindleState:
+    """The state after the estimator read ``current`` [A], ``seconds`` after the last reading."""
+    values = np.array([state.last_speed, state.lagged_speed, state.filtered])
+    _estimator.read(belief_of(believed), values, current, state.speed, seconds)
+    share = min(seconds / believed.smoothing, 1.0) if believed.smoothing > 0.0 else 1.0
+    expected = state.expected + (state.expected_sensed - state.expected) * share
+    last, lagged, filtered = map(float, values)
+    return replace(state, last_speed=last, lagged_speed=lagged, filtered=filtered, expected=expected)
+
+
+def measure(spindle: Spindle, state: SpindleState, noise: float, seconds: float) -> SpindleState:
+    """The state after a reading with ``noise`` [A] of a spindle that is what the estimator takes it for."""
+    return estimated(spindle, state, read_current(spindle, state, noise), seconds)

@@ -122,7 +122,7 @@ def program_of(job: TorqueJob, machine: Machine, progress: Progress = silent) ->
     if job.program_file is None:
         ask = job.table.round
         assert ask is not None
-        program = round_program(ask, Place(job.table.shell), job.cutters[ask.cutter])
+        program = round_program(ask, Place(job.shell), job.cutters[ask.cutter])
     else:
         table = job.table.program
         assert table is not None
@@ -200,7 +200,7 @@ def shell_stock(
     job: TorqueJob, program: Program, centre: tuple[float, float] = (0.0, 0.0), thinner: float = 0.0
 ) -> LayeredStock:
     """The stock: rings outside the wall, their outer edge off its centre, layers thin where the cutter comes."""
-    table, place = job.table.shell, Place(job.table.shell)
+    table, place = job.shell, Place(job.shell)
     low, high = place.ends
     feeds = np.flatnonzero(program.motion != RAPID)
     rows = np.unique(np.concatenate([feeds, np.maximum(feeds - 1, 0)]))
@@ -306,12 +306,12 @@ def cut(
         1e3 * less["torque_mean_nm"][own], less["force_normal_n"][own], little,
     )  # fmt: skip
     feed = np.where(c["rapid"][own], rapids, mm_s_from_mm_min(1.0) * c["feed_mm_min"][own])
-    near, far, height = _depths(Place(job.table.shell), stock.bounds, points, c["chip_layers"][own])
+    near, far, height = _depths(Place(job.shell), stock.bounds, points, c["chip_layers"][own])
     tools = c["tool"][own]
     makes, soft = np.zeros(len(feed), dtype=np.bool_), np.zeros(len(feed))
     for number in np.unique(tools).tolist():
         rows = np.flatnonzero((tools == number) & (height > 0.0))
-        m, t = _on_the_wall(Place(job.table.shell), job.cutters[number], points, rows, height)
+        m, t = _on_the_wall(Place(job.shell), job.cutters[number], points, rows, height)
         makes[rows], soft[rows] = m, t
     return Cut(removal, stock, points, feed, loads, near, far, makes, soft)
 

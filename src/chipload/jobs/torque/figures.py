@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from functools import partial
 from html import escape
 
@@ -30,15 +31,17 @@ def _sections(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]
     if outcome.cases:
         body += _controllers(outcome, figures)
     body += _wall(outcome, figures)
-    if outcome.estimator is not None:
-        body += _estimator(outcome, figures)
+    if outcome.estimate is not None:
+        body += _estimate(outcome, figures)
     body += _rules(outcome.table, figures)
     return [
         *body,
         "<h2>On a machine</h2>",
         f"<p><code>0-override</code> beside <code>chipload hal {HAL}</code> holds the torque along "
         f"<code>{PATH}</code>, which has the path, its planned torque in two parts, the true one for a "
-        "trial without a spindle, and the relief. <code>0-feedforward</code> has the feeds that the planned "
+        "trial without a spindle, and the allowable torque over the limit (<code>relief</code>). "
+        "<code>--current-pin</code> and <code>--speed-pin</code> name where HAL has the current and the speed of the "
+        "spindle. <code>0-feedforward</code> has the feeds that the planned "
         "torque allows written into it, for a machine that measures nothing.</p>",
     ]
 
@@ -58,9 +61,9 @@ def _limit(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
             f"<p>The limit is <b>{what['torque_limit_nm']:.4g} N m</b>, mean over a revolution. It comes from {why}, "
             f"at ({place}) mm: the wall of {outcome.thinnest:.4g} mm (as thin as the tolerance lets it be) and the "
             f"cutter allow {where['force_n']:.4g} N along the normal there. Elsewhere the wall allows more, up to "
-            f"{where['relief_max']:.3g} times as much torque: the relief, which the controller is told. Held are "
-            f"{where['held_nm']:.4g} N m. The wall as it really is, {outcome.real:.4g} mm, would allow "
-            f"{where['true_wall_nm']:.4g} N m. The closed formula of one tooth, which knows no engagement, says "
+            f"{where['relief_max']:.3g} times as much torque; the controller holds the same share of what is allowable "
+            f"everywhere, {where['held_nm']:.4g} N m here. The wall as it really is, {outcome.real:.4g} mm, would "
+            f"allow {where['true_wall_nm']:.4g} N m. The closed formula of one tooth, which knows no engagement, says "
             f"{where['one_tooth_formula_nm']:.3g} N m.</p>"
         )
     said = what["surface_off_um"]
@@ -69,7 +72,8 @@ def _limit(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
             f"<p>What the program leaves lies {said['min']:.3g} to {said['max']:.3g} µm from the finished surface of "
             "the job, without deflection.</p>"
         )
-    surprises = [f"{text}" for text in outcome.surprises] or ["none"]
+    spindle = [f"spindle: {name} {value:+g}" for name, value in asdict(outcome.deviation).items() if value]
+    surprises = [*outcome.surprises, *spindle] or ["none"]
     return [
         *body,
         figure("allowable", drawn.allowable(outcome), figures),
@@ -91,15 +95,18 @@ def _controllers(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[s
             f"<h3>{title}</h3>",
             _table(outcome, case),
             f"<p>{drawn.NAMES[HELD]}: {by['shorter_percent']:.3g} % shorter than the constant feed that respects the "
-            f"limit everywhere, form error {by['form_error_change_percent']:+.3g} % against that one's.</p>",
+            f"limit everywhere, {by['shorter_than_model_percent']:.3g} % shorter than the model's derated schedule; "
+            f"{by['of_possible_percent']:.3g} % of what is physically possible; form error "
+            f"{by['form_error_change_percent']:+.3g} % against the constant feed's.</p>",
         ]
     plain, late = outcome.cases
     lost = late.runs[HELD].outcome.time - plain.runs[HELD].outcome.time
     body += [
         f"<p>Latency and steps cost {lost:.3g} s with the model, and move its greatest torque from "
         f"{1e-3 * plain.runs[HELD].outcome.load_max:.4g} to {1e-3 * late.runs[HELD].outcome.load_max:.4g} N m.</p>",
-        '<p class="note">Torque is over its relief, so that it compares with the one limit; a constant feed is the '
-        "greatest that respects the limit everywhere, surprises and all, which nobody knows beforehand.</p>",
+        '<p class="note">The constant feed and the derated schedule are the fastest that respect the limit everywhere, '
+        "deviations and all, which nobody knows beforehand. The last row is the shortest time that is physically "
+        "possible: the torque at its limit at every instant.</p>",
         f"<h3>Along the path, {1e3 * late.loop.latency:g} ms latency</h3>",
         figure("path", drawn.along(outcome, late, "path"), figures),
         "<h3>Over time</h3>",
@@ -120,7 +127,7 @@ def _table(outcome: TorqueResult, case: Case) -> str:
         rows.append([
             f'<span class="dot" style="background:{drawn.COLOURS[name]}"></span>{drawn.NAMES[name]}',
             f"{n['time_s']:.2f}",
-            cell(n["torque_nm_max"], most),
+            cell(100.0 * n["torque_nm_max"] / (1e-3 * outcome.torque), 100.0 * most / (1e-3 * outcome.torque)),
             f"{n['torque_raw_nm_max']:.4g}",
             f"{n['torque_over_limit_s']:.3f}",
             cell(n["form_error_um_max"], outcome.limits["form_error_um"], ".3g"),
@@ -129,15 +136,18 @@ def _table(outcome: TorqueResult, case: Case) -> str:
             str(n["ended"]),
         ])  # fmt: skip
     head = (
-        "controller", "time [s]", "torque / relief", "torque", "over limit [s]", "form error", "stress", "override",
-        "ended",
+        "controller", "time [s]", "torque of allowable [%]", "torque [N m]", "over limit [s]", "form error", "stress",
+        "override", "ended",
     )  # fmt: skip
     units = (
-        f'<p class="note">Torque in N m, at most {most:.4g} over its relief; form error in µm, at most '
+        f'<p class="note">Torque at most {100.0 * most / (1e-3 * outcome.torque):.4g} % of what is allowable; form '
+        "error in µm, at most "
         f"{outcome.limits['form_error_um']:g}; stress in MPa, at most "
         f"{outcome.limits['strength_share'] * outcome.strength:g}.</p>"
     )
-    return table(head, rows, numbers=(1, 2, 3, 4, 5, 6), used=[name == HELD for name in case.runs]) + units
+    rows.append(["torque at its limit at every instant", f"{outcome.ideal_time:.2f}", "100", *[""] * 6])
+    used = [*(name == HELD for name in case.runs), False]
+    return table(head, rows, numbers=(1, 2, 3, 4, 5, 6), used=used) + units
 
 
 def _wall(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
@@ -166,15 +176,19 @@ def _wall(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
     ]
 
 
-def _estimator(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
-    e = outcome.estimator
+def _estimate(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
+    e = outcome.estimate
     assert e is not None
     rows = [
         ["noise of the estimate, from its sensor, closed form [N m]", f"{1e-3 * e.noise:.3g}"],
         ["the same, seen in the run [N m]", f"{1e-3 * e.seen:.3g}"],
         ["lag of sensor and filter [ms]", f"{1e3 * e.lag:.3g}"],
         ["greatest error by that lag, while the torque changes [N m]", f"{1e-3 * e.behind:.3g}"],
+        ["bandwidth of both [Hz]", f"{e.bandwidth:.3g}"],
         ["resolution: noise, quantisation, idle map [N m]", f"{1e-3 * e.resolution:.3g}"],
+        ["share by which the torque constant may be wrong [%]", f"{100.0 * e.constant_error:.3g}"],
+        ["holds for torques from, to [N m]", f"{1e-3 * e.range[0]:.3g}, {1e-3 * e.range[1]:.3g}"],
+        [f"tooth passing frequency {e.aliased[0]:.4g} Hz, as the readings show it [Hz]", f"{e.aliased[1]:.3g}"],
         ["lighter than this is not trusted: nothing is sped up on it [N m]", f"{1e-3 * e.light:.3g}"],
         ["share of the time in cut that is lighter [%]", f"{100.0 * e.light_share:.3g}"],
     ]

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.control.fuzzy import write_fuzzy
-from chipload.control.hal import HalJob, write_hal
+from chipload.control.hal import HalJob
+from chipload.control.hal_file import write_hal
 from chipload.control.linuxcnc.path import write_path
 from chipload.jobs.torque.outcome import TorqueResult
 from chipload.program.gcode.writer import write_commands, write_gcode
@@ -52,6 +53,7 @@ def program_files(outcome: TorqueResult) -> dict[str, bytes]:
         path=outcome.path, override=case.runs["fuzzy_feedforward"].config, table=outcome.table, source="plant",
         spindle=outcome.spindle, acceleration=case.loop.acceleration, period=case.loop.period,
         latency=case.loop.latency, modelled=True, window=WINDOW_MM, away=AWAY_MM,
+        deviation=outcome.deviation,
     )  # fmt: skip
     out[PATH] = write_path(outcome.path).encode("ascii")
     out[TABLE] = write_fuzzy(outcome.table).encode("ascii")

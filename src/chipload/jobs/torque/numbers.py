@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import asdict
 from typing import Any
 
 from chipload.jobs.torque.outcome import Case, TorqueResult
@@ -55,17 +57,24 @@ def operation_numbers(outcome: TorqueResult) -> dict[str, Any]:
                 },
             },
         }
-    if outcome.estimator is not None:
-        e = outcome.estimator
-        answer["estimator"] = {
+    answer["ideal_time_s"] = outcome.ideal_time if outcome.ideal_time < math.inf else None
+    if outcome.estimate is not None:
+        e = outcome.estimate
+        answer["estimate"] = {
             "noise_nm": 1e-3 * e.noise,
             "noise_seen_nm": 1e-3 * e.seen,
             "behind_nm_max": 1e-3 * e.behind,
             "lag_s": e.lag,
+            "bandwidth_hz": e.bandwidth if e.bandwidth < math.inf else None,
+            "range_nm": [1e-3 * x for x in e.range],
             "resolution_nm": 1e-3 * e.resolution,
+            "torque_constant_error_share": e.constant_error,
             "light_nm": 1e-3 * e.light,
             "light_share": e.light_share,
+            "tooth_passing_hz": e.aliased[0],
+            "tooth_passing_seen_hz": e.aliased[1],
         }
+    answer["spindle_deviation"] = asdict(outcome.deviation)
     answer["second_opinion"] = {
         "elements": {"half_round": outcome.solid.counts[0], "along": outcome.solid.counts[1],
                      "through": outcome.solid.counts[2], "nodes_each": 20},

@@ -19,7 +19,8 @@ from chipload.control import plant
 from chipload.control.fuzzy import FuzzyTable
 from chipload.control.linuxcnc.path import ToolPath
 from chipload.control.override import Override
-from chipload.control.plant import Loop, Spindle
+from chipload.control.plant import Loop
+from chipload.control.spindle_model import Spindle, SpindleDeviation
 from chipload.control.wall import PathLimit
 from chipload.errors import Finding
 from chipload.jobs.checks import DefaultChecks
@@ -37,6 +38,8 @@ Floats = NDArray[np.float64]
 HELD = "fuzzy_feedforward"
 #: the controller that the others are compared with
 PLAIN = "constant"
+#: the feed schedule of the model, open loop: derated until it respects the limit in truth, and with the torque held
+MODEL, MODEL_FULL = "model", "model_not_derated"
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +112,8 @@ class SolidComparison:
 
 
 @dataclass(frozen=True)
-class Estimator:
-    """How far the torque that the spindle tells is to be trusted.
+class Estimate:
+    """How far the torque that is estimated from the spindle is to be trusted.
 
     Parameters
     ----------
@@ -118,18 +121,26 @@ class Estimator:
     seen : the same, in the run of the verdict [N mm]
     behind : greatest error while the torque changes, from the lags alone [N mm]
     lag : of sensor and filter [s]
+    bandwidth : at which both leave half of the power [Hz]
+    range : (least, greatest) torque that it holds for [N mm]
     resolution : what it cannot tell from nothing [N mm]: noise, quantisation, idle map
+    constant_error : share by which the torque constant may be wrong
     light : below it the controller trusts nothing [N mm]
     light_share : share of the time in cut below it
+    aliased : (tooth passing frequency, the one that the period of the controller shows it at) [Hz]
     """
 
     noise: float
     seen: float
     behind: float
     lag: float
+    bandwidth: float
+    range: tuple[float, float]
     resolution: float
+    constant_error: float
     light: float
     light_share: float
+    aliased: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +162,10 @@ class TorqueResult:
     path : with what is planned and what is true
     cases : the loop without latency, and as stated; none where no torque is allowable
     controller : of the verdict; None: likewise
+    deviation : of the real spindle from what is believed
+    ideal_time : with the feed at the limit at every instant [s]; inf where no torque is allowable
     steps : (n,) columns of the planned path by name
+    remedy : what would make a torque allowable, where none is
     oval : harmonics at the free end; solid : second opinion
     checks, check_table, step_checks : what is checked beside the stated limits, its table, and the steps for it
     surface : least and greatest distance of what is left from the finished surface [mm]; None: no whole layer was cut
@@ -178,7 +192,10 @@ class TorqueResult:
     controller: Override | None
     table: FuzzyTable
     spindle: Spindle
-    estimator: Estimator | None
+    deviation: SpindleDeviation
+    estimate: Estimate | None
+    ideal_time: float
+    remedy: str
     oval: Ovalisation
     oval_s: float
     solid: SolidComparison
@@ -203,9 +220,14 @@ class TorqueResult:
         return "stated" if self.torque < self.limit.torque else self.limit.by
 
     def compared(self, case: Case) -> dict[str, float]:
-        """How much shorter than the constant feed, and by how much the error differs, both in percent."""
-        held, plain = case.runs[HELD], case.runs[PLAIN]
+        """How much shorter than the constant feed and than the model alone, the share of what is possible, and by how
+        much the error differs from the constant feed's, all in percent.
+        """
+        held, plain, model = case.runs[HELD], case.runs[PLAIN], case.runs[MODEL]
+        saved, possible = plain.outcome.time - held.outcome.time, plain.outcome.time - self.ideal_time
         return {
             "shorter_percent": 100.0 * (1.0 - held.outcome.time / plain.outcome.time),
+            "shorter_than_model_percent": 100.0 * (1.0 - held.outcome.time / model.outcome.time),
+            "of_possible_percent": 100.0 * saved / possible if possible > 0.0 else 0.0,
             "form_error_change_percent": 100.0 * (float(held.error.max()) / float(plain.error.max()) - 1.0),
         }

@@ -130,7 +130,7 @@ def _findings(outcome: TorqueResult) -> tuple[Finding, ...]:
     if not outcome.attainable:
         text = (
             f"no torque is allowable: at step {outcome.limit.step} the edge force alone exceeds the "
-            f"{outcome.limit.force:.4g} N that the wall allows by its {outcome.limit.by}"
+            f"{outcome.limit.force:.4g} N that the wall allows by its {outcome.limit.by}: {outcome.remedy}"
         )
         out.append(Finding("no-allowable-torque", 0, text, Severity.EXCEEDS))
     elif outcome.surface is None:

@@ -3,41 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from chipload.control import plant
 from chipload.control.fuzzy import FuzzyTable, read_fuzzy, standard
+from chipload.control.identification import aliased, bandwidth
 from chipload.control.limit import torque_limit
-from chipload.control.linuxcnc.path import ToolPath, tool_path
 from chipload.control.override import Override
-from chipload.control.plant import Loop, Spindle, comparison
-from chipload.control.resolution import check_light, check_limit, torque_resolution
+from chipload.control.resolution import check_light, torque_resolution
 from chipload.control.spindle import first_order
+from chipload.control.spindle_model import Spindle
 from chipload.control.wall import (
-    Loads,
     PathLimit,
-    UnitResponse,
-    WallPath,
     path_limit,
-    row_means,
-    unit_response,
-    wall_error,
 )
 from chipload.cutting.material import Material, material_named, need_directions, read_material
 from chipload.errors import InputError
 from chipload.jobs.checks import default_checks
 from chipload.jobs.provenance import provenance_of, title_of
+from chipload.jobs.torque.allowable import Allowable, allowable, allowed, feed_at, limit_of, thinnest, wall_of
+from chipload.jobs.torque.controllers import cases_of, controller_of, shortest
 from chipload.jobs.torque.cut import (
     Cut,
     Place,
-    contact_width,
     cut,
     off_centre,
     program_of,
@@ -45,20 +37,19 @@ from chipload.jobs.torque.cut import (
     resolution_of,
     shell_stock,
     thinner_share,
-    true_loads,
 )
 from chipload.jobs.torque.job import TorqueJob
 from chipload.jobs.torque.outcome import (
     HELD,
-    PLAIN,
     Case,
     ComplianceComparison,
-    ControllerRun,
-    Estimator,
+    Estimate,
     SolidComparison,
     TorqueResult,
 )
-from chipload.jobs.torque.step_checks import feed_ratio, step_checks
+from chipload.jobs.torque.remedies import remedy_text
+from chipload.jobs.torque.spindle import deviation_of, estimate_range, require_resolved, spindle_of
+from chipload.jobs.torque.step_checks import step_checks
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
@@ -66,19 +57,16 @@ from chipload.result import Provenance
 from chipload.simulation.chips import counted
 from chipload.simulation.estimate import estimate
 from chipload.stock.rings import surface_off
-from chipload.structure.shell import Ritz, Shell, compliance, ovalisation, ritz
+from chipload.structure.shell import Ritz, compliance, ovalisation
 from chipload.structure.wall_solid import normal_compliance, wall_solid
+from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
 
 #: elements of the second opinion: half round, along, through
 MESH = (24, 20, 1)
-#: the torque that is allowed anywhere is at most so many times the limit
-RELIEF_MOST = 3.0
-#: the allowable torque is the least of so many steps on both sides
-NEAR = 2
-#: the constant feed is lowered so often until the spindle's droop is in it
-DROOPS = 8
+#: a check simulates the plan with steps and layers so many times as long, if these are at most so many steps
+COARSER, COARSER_LAYERS, MOST_PREVIEWED = 4.0, 2.0, 3000
 
 
 def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
@@ -89,115 +77,133 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
     InputError
         A file cannot be read, or values do not go together.
     """
-    machine, material, table, program, spindle = _opened(job)
-    surprises, place = job.table.surprise, Place(job.table.shell)
-    thinner = thinner_share(surprises)
-    planned = cut(job, program, shell_stock(job, program), material, machine.rapid, _part(progress, 0.0, 0.3))
-    centre = off_centre(job.table.shell.stock_mm, surprises)
-    real = cut(
-        job, program, shell_stock(job, program, centre, thinner), material, machine.rapid, _part(progress, 0.3, 0.6),
-        keep=True,
-    )  # fmt: skip
-    loads = true_loads(real.loads, real.points, place, surprises)
-    progress(0.6, "the wall")
-    shell = wall_of(job)
-    width = contact_width(job.table.shell.stock_mm, job.cutters)
-    thin = ritz(replace(shell, thickness=shell.thickness - job.table.shell.wall_tolerance_mm))
-    true = thin if thin.shell.thickness == shell.thickness * (1.0 - thinner) else ritz(
-        replace(shell, thickness=shell.thickness * (1.0 - thinner))
-    )  # fmt: skip
-    ask = job.table.limits
-    allowed = (1e-3 * ask.form_error_um, ask.strength_share * job.table.shell.strength_mpa)
-    limit = path_limit(planned.loads, unit_response(thin, planned.near, planned.far, width, planned.tool), *allowed)
-    walls = unit_response(true, real.near, real.far, width, real.tool)
-    torque = min(limit.torque, 1e3 * ask.torque_nm) if ask.torque_nm is not None else limit.torque
-    path = _path(planned, loads, _relief(limit, torque))
+    machine, material, table, program, spindle = opened(job)
+    a = allowable(job, program, material, machine, lambda done, what: progress(0.65 * done, what))
+    ask, shell, place, torque = job.table.limits, wall_of(job), Place(job.shell), a.torque
+    progress(0.7, "controllers")
     controller: Override | None = None
     cases: tuple[Case, ...] = ()
+    shortest_time = math.inf
     if torque > 0.0:
-        _resolved(job, spindle, torque)
-        controller = _controller(job, torque)
-        cases = _cases(
-            job, path, controller, table, spindle, torque, _walls(path, loads, walls, real), machine, progress
-        )
+        require_resolved(job, spindle, torque)
+        controller, acceleration = controller_of(job, torque), _acceleration(job, machine)
+        cases = cases_of(job, a.path, controller, table, spindle, torque, a.walls, acceleration, progress)
+        shortest_time = shortest(a.path, controller, torque, acceleration)
     progress(0.9, "second opinion")
-    c = planned.removal.columns
-    first = int(np.flatnonzero(~c["rapid"])[0])
-    own = slice(first, first + len(planned.feed))
-    steps = {
-        "line": c["line"][own],
-        "s_mm": path.model.s[1:],
-        **{f"{x}_mm": c[f"{x}_mm"][own] for x in "xyz"},
-        "torque_planned_nm": 1e-3 * (planned.loads.torque_edge + planned.loads.torque_cut),
-        "torque_true_nm": 1e-3 * (loads.torque_edge + loads.torque_cut),
-        "torque_allowable_nm": 1e-3 * limit.each,
-    }
-    low, high = _finished(place, real)
+    low, high = _finished(place, a.real)
     return TorqueResult(
         title=title_of(job.path),
         program_name=job.program_file.name if job.program_file is not None else "made: down the wall and once round",
         program=program,
         machine=machine,
         wall=shell,
-        thinnest=thin.shell.thickness,
-        real=true.shell.thickness,
-        strength=job.table.shell.strength_mpa,
+        thinnest=a.thin.shell.thickness,
+        real=a.true.shell.thickness,
+        strength=job.shell.strength_mpa,
         limits=ask.stated,
         unchecked=ask.unstated,
-        tolerance=job.table.shell.wall_tolerance_mm,
-        limit=limit,
+        tolerance=job.shell.wall_tolerance_mm,
+        limit=a.limit,
         torque=torque,
-        true_torque=path_limit(loads, walls, *allowed).torque,
-        one_tooth=_one_tooth(limit, planned, material, job),
-        path=path,
-        steps=steps,
+        true_torque=path_limit(a.loads, a.response, *allowed(job)).torque,
+        one_tooth=_one_tooth(a.limit, a.planned, material, job),
+        path=a.path,
+        steps=_step_columns(a),
         cases=cases,
         controller=controller,
         table=table,
         spindle=spindle,
-        estimator=_estimator(cases, spindle, controller) if controller is not None else None,
-        oval=ovalisation(thin, thin.shell.length),
-        oval_s=thin.shell.length,
-        solid=_second_opinion(thin, width, planned),
-        surface=surface_off(real.stock, place.outer, low, high),
-        surprises=tuple(_text_of(x.model_dump(exclude_none=True)) for x in surprises),
-        stock=real.stock,
-        findings=(*planned.removal.findings, *real.removal.findings),
+        deviation=deviation_of(job),
+        estimate=_estimate(job, cases, spindle, controller) if controller is not None else None,
+        ideal_time=shortest_time,
+        remedy="" if torque > 0.0 else remedy_text(job, a.thin.shell, a.planned, a.limit),
+        oval=ovalisation(a.thin, a.thin.shell.length),
+        oval_s=a.thin.shell.length,
+        solid=_second_opinion(a.thin, a.width, a.planned),
+        surface=surface_off(a.real.stock, place.outer, low, high),
+        surprises=tuple(_text_of(x.model_dump(exclude_none=True)) for x in job.table.surprise),
+        stock=a.real.stock,
+        findings=(*a.planned.removal.findings, *a.real.removal.findings),
         settings=job.table.model_dump(exclude_none=True, exclude={"cutter", "surprise"}),
         checks=default_checks(job.table.checks, job.cutters, material, 0.5),
         check_table=job.table.checks,
-        step_checks=step_checks(real, loads, material, _fastest(cases)),
+        step_checks=step_checks(a.real, a.loads, material, _fastest(cases)),
         provenance=_provenance(job, machine, material),
     )
 
 
+def _step_columns(a: Allowable) -> dict[str, NDArray[Any]]:
+    """Columns of the steps of the plan."""
+    c, planned, true = a.planned.removal.columns, a.planned.loads, a.loads
+    first = int(np.flatnonzero(~c["rapid"])[0])
+    own = slice(first, first + len(a.planned.feed))
+    return {
+        "line": c["line"][own],
+        "s_mm": a.path.model.s[1:],
+        **{f"{x}_mm": c[f"{x}_mm"][own] for x in "xyz"},
+        "torque_planned_nm": 1e-3 * (planned.torque_edge + planned.torque_cut),
+        "torque_true_nm": 1e-3 * (true.torque_edge + true.torque_cut),
+        "torque_allowable_nm": 1e-3 * a.limit.each,
+    }
+
+
 def check(job: TorqueJob) -> tuple[list[str], bool]:
-    """Read all that the job names and what of it does not go together; nothing is cut.
+    """Read all that the job names, say what of it does not go together, and find the limit of torque coarsely.
 
     Raises
     ------
     InputError
-        As :func:`run`, but for what only the limit of torque shows, which the cut gives.
+        As :func:`run`, but for what only the exact limit of torque shows.
     """
-    machine, material, table, program, spindle = _opened(job)
+    machine, material, table, program, spindle = opened(job)
     shell = wall_of(job)
     kind = "tube" if shell.cone_angle == 0.0 else "cone"
     thinner = thinner_share(job.table.surprise)
     shell_stock(job, program)
-    stock = shell_stock(job, program, off_centre(job.table.shell.stock_mm, job.table.surprise), thinner)
-    granted = 1.0 + 1e-2 * job.table.limits.torque_over_percent - job.table.control.override.hold
+    stock = shell_stock(job, program, off_centre(job.shell.stock_mm, job.table.surprise), thinner)
+    wrong = 1.0 + spindle.torque_constant_error
+    granted = 1.0 + 1e-2 * job.table.limits.torque_over_percent - wrong * job.table.torque_control.override.hold
     least = torque_resolution(spindle, 1e-3 * job.table.loop.period_ms).total / granted if granted > 0.0 else math.inf
     count = counted(program, job.cutters, resolution_of(job))
+    text, attainable = _preview(job, program, material, machine)
     return [
         f"{job.path.name}: a {kind}, radius {shell.radius:g}, length {shell.length:g}, wall {shell.thickness:g} mm; "
         f"{len(program)} motions on machine {machine.name}, stock of {stock.volume():.5g} mm3, material "
         f"{material.name}, controller {table.name}, {len(job.table.surprise)} surprises",
-        f"the spindle holds limits of torque from {1e-3 * least:.3g} N m; the limit is found when the job is run",
+        f"the spindle holds limits of torque from {1e-3 * least:.3g} N m",
+        text,
         estimate(4 * count, len(program)),
-    ], True
+    ], attainable
 
 
-def _opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, Program, Spindle]:
+def _preview(job: TorqueJob, program: Program, material: Material, machine: Machine) -> tuple[str, bool]:
+    """The limit of torque by a coarse simulation of the plan, in a sentence, and whether there is one."""
+    fine = job.table.simulation
+    coarse = fine.model_copy(
+        update={
+            "step_mm": min(COARSER * fine.step_mm, 10.0),
+            "layer_mm": min(COARSER_LAYERS * fine.layer_mm, 10.0),
+            "tolerance_mm": max(fine.tolerance_mm, 0.02),
+        }
+    )
+    rough = replace(job, table=job.table.model_copy(update={"simulation": coarse}))
+    if counted(program, job.cutters, resolution_of(rough)) > MOST_PREVIEWED:
+        return "the limit of torque is found when the job is run", True
+    planned = cut(rough, program, shell_stock(rough, program), material, machine.rapid, silent)
+    _, limit = limit_of(rough, planned)
+    where = f"by the wall's {limit.by}, {planned.far[limit.step]:.3g} mm from the clamp"
+    if limit.torque <= 0.0:
+        shell = thinnest(rough)
+        return f"no torque is allowable, {where}: {remedy_text(rough, shell, planned, limit)}", False
+    feed = feed_at(planned, limit, limit.step)
+    return (
+        f"by a coarse simulation the limit of torque is about {1e-3 * limit.torque:.2g} N m, {where}; the feed must be "
+        f"at most {feed:.3g} mm/min there, {mm_min_from_mm_s(float(planned.feed[limit.step])):.4g} are programmed",
+        True,
+    )
+
+
+def opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, Program, Spindle]:
     """What the job names, if its values go together.
 
     Raises
@@ -209,31 +215,14 @@ def _opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, Program, Spi
     require_linear(material)
     _acceleration(job, machine)
     program = program_of(job, machine)
-    spindle = _spindle(job, program.spindle)
+    spindle = spindle_of(job, program.spindle)
     period = 1e-3 * job.table.loop.period_ms
-    check_light(spindle, period, 1e3 * job.table.control.override.light_nm)
+    check_light(spindle, period, 1e3 * job.table.torque_control.override.light_nm)
     if job.table.limits.torque_nm is not None:
         # the limit is at most this one, so that a spindle that cannot hold this one holds none
-        _resolved(job, spindle, 1e3 * job.table.limits.torque_nm)
+        require_resolved(job, spindle, 1e3 * job.table.limits.torque_nm)
     counted(program, job.cutters, resolution_of(job))
     return machine, material, table, program, spindle
-
-
-def _resolved(job: TorqueJob, spindle: Spindle, torque: float) -> None:
-    """Refuse a limit of torque [N mm] that the spindle cannot hold, or that counts as light."""
-    hold = job.table.control.override.hold
-    excess = 1e-2 * job.table.limits.torque_over_percent
-    check_limit(spindle, 1e-3 * job.table.loop.period_ms, torque, hold, excess)
-    light = 1e3 * job.table.control.override.light_nm
-    if light >= hold * torque:
-        raise _wrong_side("light_nm", light, hold * torque)
-
-
-def _wrong_side(key: str, value: float, held: float) -> InputError:
-    side = "below" if key == "light_nm" else "above"
-    return InputError(
-        f"control.override.{key} = {1e-3 * value:g}: must be {side} the torque that is held, {1e-3 * held:.4g} N m"
-    )
 
 
 def _acceleration(job: TorqueJob, machine: Machine) -> float:
@@ -246,136 +235,11 @@ def _acceleration(job: TorqueJob, machine: Machine) -> float:
     return stated or most
 
 
-def wall_of(job: TorqueJob) -> Shell:
-    """The finished wall as planned."""
-    t = job.table.shell
-    return Shell(t.mean_radius_mm, t.length_mm, t.wall_mm, 1e3 * t.modulus_gpa, t.poisson, math.radians(t.angle_deg))
-
-
 def _named(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable]:
     machine = machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
     material = material_named(job.material) if isinstance(job.material, str) else read_material(job.material)
     need_directions(material, "the wall of a shell")
     return machine, material, read_fuzzy(job.control_file) if job.control_file is not None else standard()
-
-
-def _part(progress: Progress, low: float, high: float) -> Progress:
-    return lambda done, what: progress(low + (high - low) * done, what)
-
-
-def _relief(limit: PathLimit, torque: float) -> Floats:
-    """(n + 1,) allowable torque at the ends of the steps over the limit, the least of the steps near."""
-    if torque <= 0.0:
-        return np.ones(len(limit.each) + 1)
-    # a stated limit holds everywhere
-    each = np.clip(limit.each / torque, 1.0, RELIEF_MOST if torque >= limit.torque else 1.0)
-    padded = np.concatenate([np.repeat(each[:1], NEAR + 1), each, np.repeat(each[-1:], NEAR + 1)])
-    return np.asarray(sliding_window_view(padded, 2 * NEAR + 2).min(axis=1)[: len(each) + 1])
-
-
-def _path(planned: Cut, true: Loads, relief: Floats) -> ToolPath:
-    believed = np.column_stack([row_means(planned.loads.torque_edge), row_means(planned.loads.torque_cut)])
-    real = np.column_stack([row_means(true.torque_edge), row_means(true.torque_cut)])
-    return tool_path(planned.points, np.append(planned.feed, planned.feed[-1]), believed, real, relief)
-
-
-def _walls(path: ToolPath, loads: Loads, walls: UnitResponse, real: Cut) -> tuple[WallPath, WallPath, WallPath]:
-    """For the error (of the finished surface), for the stress and for the deflection (everywhere), per newton."""
-    force = (row_means(loads.force_edge), row_means(loads.force_cut))
-    error = WallPath(path.model.s, *force, np.where(real.makes, walls.compliance, 0.0))
-    return error, WallPath(path.model.s, *force, walls.stress), WallPath(path.model.s, *force, walls.compliance)
-
-
-def _spindle(job: TorqueJob, speeds: Floats) -> Spindle:
-    t = job.table.spindle
-    return Spindle(
-        speed=float(np.abs(speeds).max()), inertia=1e3 * t.inertia_kg_m2, torque_constant=1e3 * t.torque_constant_nm_a,
-        idle=t.idle_a, stiffness=t.stiffness_a_s, reset=t.reset_a, most_current=t.most_current_a,
-        sensor_lag=t.sensor_lag_s, smoothing=t.smoothing_s, noise=t.noise_a, current_step=t.current_step_a,
-        idle_error=t.idle_error_share,
-    )  # fmt: skip
-
-
-def _controller(job: TorqueJob, torque: float) -> Override:
-    t = job.table.control.override.model_dump()
-    hold = t.pop("hold")
-    overload = 1e3 * t["overload_nm"]
-    if overload < hold * torque:
-        raise _wrong_side("overload_nm", overload, hold * torque)
-    newton_mm = {k: 1e3 * t.pop(f"{k}_nm") for k in ("overload", "torque_most", "light")}
-    plain = {k.removesuffix("_per_s"): v for k, v in t.items()}
-    return Override(kind="mamdani", torque_ref=hold * torque, quantum=0.0, **newton_mm, **plain)
-
-
-def _cases(
-    job: TorqueJob, path: ToolPath, controller: Override, table: FuzzyTable, spindle: Spindle, torque: float,
-    walls: tuple[WallPath, WallPath, WallPath], machine: Machine, progress: Progress,
-) -> tuple[Case, ...]:  # fmt: skip
-    """Every controller without latency, and with what the job states."""
-    ask = job.table.loop
-    acceleration = _acceleration(job, machine)
-    out = []
-    for k, (latency, quantum) in enumerate(((0.0, 0.0), (1e-3 * ask.latency_ms, ask.override_step))):
-        loop = Loop(
-            acceleration,
-            1e-3 * ask.period_ms,
-            latency,
-            min(1e-3, 1e-3 * ask.period_ms),
-            seed=ask.seed,
-        )
-        config = replace(controller, quantum=quantum)
-
-        def one(override: Override, modelled: bool, loop: Loop = loop) -> ControllerRun:
-            model = path.model if modelled else None
-            found = plant.run(
-                path.truth, model, override, table, spindle, loop, torque, relief=path.relief, monitor=path.model
-            )
-            error, stress, bent = (wall_error(w, path.model, found, spindle.speed) for w in walls)
-            ratio = feed_ratio(path.model, found, spindle.speed)
-            return ControllerRun(override, modelled, found, error, stress, bent, ratio)
-
-        constant = _constant(path, config, torque, one)
-        runs: dict[str, ControllerRun] = {}
-        for name, (override, modelled) in comparison(constant, config).items():
-            runs[name] = one(override, modelled)
-            if name == PLAIN:
-                # its override follows the model, nothing is measured
-                runs["constant_torque"] = one(replace(config, kind="fixed"), True)
-                runs["derated_schedule"] = _derated(config, torque, one)
-        out.append(Case(loop, quantum, runs))
-        progress(0.75 + 0.05 * k, "controllers")
-    return tuple(out)
-
-
-def _constant(path: ToolPath, config: Override, torque: float, one: Callable[[Override, bool], ControllerRun]) -> float:
-    """The greatest constant override that respects the limit everywhere, the droop of the spindle and all."""
-    t, cuts = path.truth, path.truth.cut > 0.0
-    most = (torque * path.relief - t.edge)[cuts] / t.cut[cuts]
-    value = min(float(most.min(initial=np.inf)), config.cap)
-    if value <= 0.0:
-        return config.floor
-    for _ in range(DROOPS):
-        found = one(comparison(value, config)[PLAIN][0], False).outcome.load_max
-        if found <= torque:
-            break
-        value *= torque / found
-    return value
-
-
-def _derated(config: Override, torque: float, one: Callable[[Override, bool], ControllerRun]) -> ControllerRun:
-    """The feed schedule of the model alone, planned with the greatest torque at which it respects the limit in
-    truth.
-    """
-    planned = config.torque_ref
-    run = one(replace(config, kind="fixed"), True)
-    for _ in range(DROOPS):
-        if run.outcome.load_max <= torque:
-            break
-        planned *= torque / run.outcome.load_max
-        if planned <= config.light:
-            break
-        run = one(replace(config, kind="fixed", torque_ref=planned), True)
-    return run
 
 
 def _one_tooth(limit: PathLimit, planned: Cut, material: Material, job: TorqueJob) -> float:
@@ -390,21 +254,26 @@ def _one_tooth(limit: PathLimit, planned: Cut, material: Material, job: TorqueJo
     return float(torque_limit(limit.force, radius, depth, material, min(mean / peak, 1.0)).torque)
 
 
-def _estimator(cases: tuple[Case, ...], spindle: Spindle, controller: Override) -> Estimator:
+def _estimate(job: TorqueJob, cases: tuple[Case, ...], spindle: Spindle, controller: Override) -> Estimate:
     case = cases[-1]
     found = case.runs[HELD].outcome
     share = min(case.loop.period / spindle.smoothing, 1.0) if spindle.smoothing > 0.0 else 1.0
     behind = first_order(first_order(found.torque, found.t, spindle.sensor_lag), found.t, spindle.smoothing)
     later = slice(min(len(found.t) // 10, 50), None)
     cutting = found.torque > 0.0
-    return Estimator(
+    passing = max(c.flutes for c in job.cutters.values()) * spindle.speed / math.tau
+    return Estimate(
         noise=spindle.torque_constant * spindle.noise * math.sqrt(share / (2.0 - share)),
         seen=float(np.std((found.measured - behind)[later])),
         behind=float(np.abs(behind - found.torque)[later].max()),
         lag=spindle.sensor_lag + spindle.smoothing,
+        bandwidth=bandwidth(spindle.sensor_lag, spindle.smoothing),
+        range=estimate_range(job, spindle),
         resolution=torque_resolution(spindle, case.loop.period).total,
+        constant_error=spindle.torque_constant_error,
         light=controller.light,
         light_share=float((found.torque[cutting] < controller.light).mean()) if cutting.any() else 0.0,
+        aliased=(passing, aliased(passing, 1.0 / case.loop.period)),
     )
 
 
@@ -447,6 +316,7 @@ def _provenance(job: TorqueJob, machine: Machine, material: Material) -> Provena
         "machine": job.machine,
         "material": job.material,
         "controller": job.control_file,
+        "spindle": job.spindle_file,
     }
     files = {k: v for k, v in named.items() if isinstance(v, Path)}
     files |= {f"cutter {k}": job.path.parent / c.file for k, c in enumerate(job.table.cutter) if c.file is not None}

@@ -1,6 +1,6 @@
 """The tables of a job that holds the torque on a thin tube or cone: which keys there are, their units and ranges.
 
-The keys of ``[override]`` and ``[spindle]`` are those of the file of ``chipload hal``.
+The keys of ``[torque_control]`` `override` and ``[spindle]`` are those of the file of ``chipload hal``.
 """
 
 from __future__ import annotations
@@ -107,8 +107,8 @@ class OverrideTable(Table):
     gain_down_per_s: Positive = 6.0
     error_span: Positive = 1.0
     change_span: Positive = 0.5
-    pi_gain: NotNegative = 0.3
-    pi_rate_per_s: NotNegative = 1.5
+    pi_gain: NotNegative | None = Field(None, description="of the PI controller; else by its tuning rule")
+    pi_rate_per_s: NotNegative | None = Field(None, description="of the PI controller; else by its tuning rule")
     overload_steps: Count = 3
     stuck_steps: Count = 10
     air_steps: Count = 3
@@ -121,20 +121,46 @@ class OverrideTable(Table):
     gap_s: Positive = Field(0.5, le=10.0, description="a longer time between steps counts as a start")
 
 
-class SpindleTable(Table):
-    """The spindle that the torque is measured with."""
+class SpindleDeviationTable(Table):
+    """How the real spindle of the simulation differs from what the controller believes."""
 
-    inertia_kg_m2: Positive
-    torque_constant_nm_a: Positive
-    idle_a: tuple[Number, Number] = Field(description="current of the free spindle: [A], [A s] times the speed")
+    torque_constant_percent: Number = Field(
+        0.0, ge=-90.0, le=900.0, description="above 0: more torque for a current, so more than is estimated"
+    )
+    idle_percent: Number = Field(0.0, ge=-100.0, le=900.0, description="more current for the free spindle")
+    idle_drift_percent_per_min: Number = Field(
+        0.0, ge=-1000.0, le=1000.0, description="the same, growing while the program runs"
+    )
+    inertia_percent: Number = Field(0.0, ge=-90.0, le=900.0, description="more inertia")
+    sensor_lag_ms: Number = Field(0.0, ge=-1000.0, le=1000.0, description="a longer lag of the sensor")
+
+
+class SpindleTable(Table):
+    """The spindle that the torque is estimated from.
+
+    Keys that ``chipload spindle`` identifies may stand in its file.
+    """
+
+    file: Text | None = Field(None, description="what `chipload spindle` wrote; a key that is stated here counts more")
+    inertia_kg_m2: Positive | None = Field(None, description="of the rotor")
+    torque_constant_nm_a: Positive | None = Field(None, description="torque for an ampere")
+    torque_constant_error_share: NotNegative | None = Field(
+        None, le=0.5, description="share by which the torque constant may differ: its interval"
+    )
+    idle_a: tuple[Number, Number] | None = Field(
+        None, description="current of the free spindle: [A], [A s] times the speed"
+    )
     stiffness_a_s: Positive
     reset_a: NotNegative
     most_current_a: Positive
-    sensor_lag_s: NotNegative
-    smoothing_s: NotNegative
-    noise_a: NotNegative = Field(description="standard deviation of a reading of the current")
-    current_step_a: NotNegative = Field(description="step of a reading of the current; 0: none")
-    idle_error_share: NotNegative = Field(le=1.0, description="share by which the idle current may differ from idle_a")
+    sensor_lag_s: NotNegative | None = Field(None, description="time constant of the current sensor")
+    smoothing_s: NotNegative | None = Field(None, description="time constant of the filter, about a revolution")
+    noise_a: NotNegative | None = Field(None, description="standard deviation of a reading of the current")
+    current_step_a: NotNegative | None = Field(None, description="step of a reading of the current; 0: none")
+    idle_error_share: NotNegative | None = Field(
+        None, le=1.0, description="share by which the idle current may differ from idle_a"
+    )
+    deviation: SpindleDeviationTable = Field(default_factory=SpindleDeviationTable.model_construct)
 
 
 class LoopTable(Table):
@@ -149,10 +175,11 @@ class LoopTable(Table):
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
 
 
-class ControlTable(Table):
-    """The controller."""
+class TorqueControlTable(Table):
+    """The wall, and the controller that holds the torque on it."""
 
     file: Text | None = Field(None, description="sets and rules (TOML); else the standard ones")
+    shell: ShellTable
     override: OverrideTable
 
 
@@ -181,10 +208,9 @@ class TorqueJobTable(Table):
     machine: SourceTable
     material: SourceTable
     cutter: tuple[CutterTable, ...] = Field(min_length=1)
-    shell: ShellTable
+    torque_control: TorqueControlTable
     surprise: tuple[SurpriseTable, ...] = Field((), max_length=50)
     spindle: SpindleTable
-    control: ControlTable
     loop: LoopTable
     simulation: SimulationTable
     limits: TorqueLimitsTable

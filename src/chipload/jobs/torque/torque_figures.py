@@ -19,16 +19,16 @@ Floats = NDArray[np.float64]
 
 COLOURS = {
     "constant": "#8a8f98",
-    "constant_torque": "#a8793a",
-    "derated_schedule": "#7a4f9a",
+    "model": "#7a4f9a",
+    "model_not_derated": "#a8793a",
     "pi": "#3457a6",
     "fuzzy": "#c9821a",
     "fuzzy_feedforward": "#0b7a75",
 }
 NAMES = {
-    "constant": "constant feed",
-    "constant_torque": "fixed override, the model alone",
-    "derated_schedule": "feed schedule of the model, derated, open loop",
+    "constant": "greatest constant feed",
+    "model": "feed schedule of the model, derated, open loop",
+    "model_not_derated": "the same, not derated",
     "pi": "PI",
     "fuzzy": "fuzzy",
     "fuzzy_feedforward": "fuzzy with the model",
@@ -38,15 +38,15 @@ EXAGGERATED = 0.35
 
 
 def along(outcome: TorqueResult, case: Case, by: str) -> go.Figure:
-    """Torque over relief, override, feed and form error of every controller, by ``path`` or ``time``."""
-    titles = ("torque / relief [N m]", "override", "feed [mm/min]", "form error [µm]")
+    """Torque over what is allowable, override, feed and form error of every controller, by ``path`` or ``time``."""
+    titles = ("torque / allowable", "override", "feed [mm/min]", "form error [µm]")
     figure = make_subplots(rows=4, cols=1, shared_xaxes=True, vertical_spacing=0.03)
     path = outcome.path
     for name, run in case.runs.items():
         o = run.outcome
         x = o.s if by == "path" else o.t
         relief = np.interp(o.s, path.model.s, path.relief)
-        values = (1e-3 * o.torque / relief, o.override, mm_min_from_mm_s(1.0) * o.feed, 1e3 * run.error)
+        values = (o.torque / (outcome.torque * relief), o.override, mm_min_from_mm_s(1.0) * o.feed, 1e3 * run.error)
         for row, (y, title) in enumerate(zip(values, titles, strict=True), start=1):
             keep = thinned(y, LINE_POINTS // 4)
             figure.add_trace(
@@ -58,7 +58,7 @@ def along(outcome: TorqueResult, case: Case, by: str) -> go.Figure:
                 ),
                 row=row, col=1,
             )  # fmt: skip
-    for row, limit in ((1, 1e-3 * outcome.torque), (4, outcome.limits["form_error_um"])):
+    for row, limit in ((1, 1.0), (4, outcome.limits["form_error_um"])):
         said = {"text": f"limit {limit:.4g}", "font": {"color": LIMIT, "size": 11}}
         line = {"color": LIMIT, "width": 1.2, "dash": "dash"}
         figure.add_hline(y=limit, line=line, annotation=said, annotation_position="top left", row=row, col=1)

@@ -37,7 +37,8 @@ from pathlib import Path
 
 import numpy as np
 
-from chipload.control.hal import COLUMNS, HalJob, load_hal
+from chipload.control.hal import COLUMNS, HalJob
+from chipload.control.hal_file import load_hal
 from chipload.control.linuxcnc.path import locate
 from chipload.control.plant import Loop, run
 

@@ -1,0 +1,210 @@
+"""The commands of torque control: ``chipload hal`` and ``chipload spindle``."""
+
+from __future__ import annotations
+
+import math
+import signal
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from chipload.cli.app import Debug, app
+from chipload.errors import InputError
+from chipload.terminal import EXCEEDED, guarded, show
+
+if TYPE_CHECKING:
+    from chipload.control.identification import IdentifiedSpindle
+
+#: share of pairs below which a cut is not told from air
+TOLD_APART = 0.8
+
+
+@app.command()
+def hal(
+    file: Annotated[Path, typer.Argument(metavar="HAL", help="the controller (TOML): path, override, spindle")],
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="what happened, step by step (CSV)")] = None,
+    name: Annotated[str, typer.Option("--name", help="of the component; its pins and signals begin so")] = "chipload",
+    current_pin: Annotated[
+        str | None,
+        typer.Option(
+            "--current-pin", metavar="PIN", help="pin or signal with the spindle's current [A], as vfd.current"
+        ),
+    ] = None,
+    speed_pin: Annotated[
+        str | None,
+        typer.Option("--speed-pin", metavar="PIN", help="of the spindle's speed [rev/s], as spindle.0.speed-in"),
+    ] = None,
+    python: Annotated[
+        str, typer.Option("--python", help="the interpreter that LinuxCNC's modules belong to")
+    ] = "/usr/bin/python3",
+    debug: Debug = False,
+) -> None:
+    """Hold the torque on a LinuxCNC that runs: a component in HAL that sends the override; Ctrl-C ends it.
+
+    The torque is estimated from the spindle's current and speed (--current-pin, --speed-pin); else by the `source` of
+    the file.
+    """
+
+    def work() -> int:
+        from chipload.control.hal import control, table_of
+        from chipload.control.hal_file import load_hal
+        from chipload.control.linuxcnc.hal_client import HalPins
+        from chipload.files import write_whole
+
+        if (current_pin is None) != (speed_pin is None):
+            missing, there = ("--speed-pin", "--current-pin") if speed_pin is None else ("--current-pin", "--speed-pin")
+            raise InputError(f"{missing}: missing: with {there} state both: the torque is told from current and speed")
+        job, sources = load_hal(file), {}
+        if current_pin is not None and speed_pin is not None:
+            job, sources = replace(job, source="current"), {"current-in": current_pin, "speed-in": speed_pin}
+        asked: list[int] = []
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda n, _: asked.append(n))
+        with HalPins(name, python, sources=sources) as pins:
+            record = control(
+                job,
+                pins,
+                stop=lambda: bool(asked),
+                notice=lambda reason, s: typer.echo(
+                    f"stopped the machine: {reason} at {s:.4g} mm: it stays stopped until this command ends", err=True
+                ),
+            )
+        if out is not None:
+            write_whole(out, table_of(record).encode("ascii"))
+        show(
+            f"{len(record.rows)} steps, ended: {record.ended}; greatest torque {1e-3 * record.torque_max:.4g} N m, "
+            f"limit held {1e-3 * job.override.torque_ref:.4g} N m"
+        )
+        return 0 if record.ended == "path" else EXCEEDED
+
+    guarded(work, debug)
+
+
+@app.command()
+def spindle(
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="logs (CSV) of cuts and air runs")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="the spindle (TOML), for [spindle] file of a job")],
+    columns: Annotated[
+        Path | None,
+        typer.Option("--columns", metavar="FILE", help="names and units of the columns (TOML), if they are not known"),
+    ] = None,
+    air: Annotated[
+        list[Path] | None, typer.Option("--air", metavar="LOG", help="a log in which nothing is cut; repeatable")
+    ] = None,
+    power: Annotated[bool, typer.Option("--power", help="read the column of power, not the one of current")] = False,
+    torque_constant_nm_a: Annotated[
+        float | None, typer.Option("--torque-constant-nm-a", help="that is known, from the data sheet")
+    ] = None,
+    efficiency: Annotated[
+        float | None, typer.Option("--efficiency", help="of the spindle, that is known; with --power")
+    ] = None,
+    sensor_lag_s: Annotated[
+        float | None, typer.Option("--sensor-lag-s", help="time constant of the sensor, that is known")
+    ] = None,
+    flutes: Annotated[
+        int | None, typer.Option("--flutes", help="of the cutter: names the tooth passing frequency")
+    ] = None,
+    debug: Debug = False,
+) -> None:
+    """Identify a spindle from logs: what torque its current or power means, over which range, how surely.
+
+    Columns that are known by name: time_s, speed_rpm, current_a or power_w, torque_nm (0 in the air). Each log is
+    predicted from the others. Exit code 3: the spindle does not tell cuts from air.
+    """
+
+    def work() -> int:
+        from chipload.control.identification import identify_spindle, run_of
+        from chipload.control.logs import read_log
+        from chipload.control.spindle_file import write_spindle
+        from chipload.files import write_whole
+
+        source = "power" if power else "current"
+        constant = efficiency if power else torque_constant_nm_a
+        for option, value, wanted in (
+            ("--efficiency", efficiency, power), ("--torque-constant-nm-a", torque_constant_nm_a, not power),
+            ("--sensor-lag-s", sensor_lag_s, True),
+        ):  # fmt: skip
+            if value is None:
+                continue
+            if not wanted:
+                raise InputError(f"{option}: not used with{'' if power else 'out'} --power: leave it out")
+            if not (0.0 <= value < math.inf) or (value == 0.0 and option != "--sensor-lag-s"):
+                raise InputError(f"{option} = {value:g}: must be above 0")
+        runs, hashes = {}, {}
+        for path in dict.fromkeys((*logs, *(air or ()))):
+            log, findings = read_log(path, columns)
+            for f in findings:
+                show(f"{path.name}: {f}")
+            runs[path.name] = run_of(log, f"log {path}", source, path in (air or ()))
+            hashes[path.name] = f"sha256 {sha256(path.read_bytes()).hexdigest()}"
+        stated = None if constant is None else constant if power else 1e3 * constant
+        found = identify_spindle(tuple(runs.values()), tuple(runs), source, stated, sensor_lag_s)
+        write_whole(out, write_spindle(found, hashes).encode("utf-8"))
+        for line in lines_of(found, flutes):
+            show(line)
+        show(f"written: {out}")
+        return EXCEEDED if any(answer.apart < TOLD_APART for answer in found.predictions) else 0
+
+    guarded(work, debug)
+
+
+def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
+    """What was identified, a line each."""
+    from chipload.control.identification import aliased
+    from chipload.units import rpm_from_rad_s
+
+    f, level = found.found, f"{100.0 * found.found.level:g} %"
+    power = found.source == "power"
+    unit, scale = ("N m", 1e-3) if power else ("A", 1.0)
+    name = "efficiency" if power else "torque constant"
+    constant = f"{f.torque_constant:.4g}" if power else f"{1e-3 * f.torque_constant:.4g} N m/A"
+    how = {True: "stated", False: f"+- {100.0 * found.constant_error:.2g} % at {level}", None: ""}[found.constant_known]
+    low, high = (x * rpm_from_rad_s(1.0) for x in f.speeds)
+    out = [
+        f"{name}: {constant} ({how})"
+        if found.constant_known is not None
+        else f"{name}: not known: no cut of known torque; torques below are in {unit}",
+        f"idle {'power over speed' if power else 'current'}: "
+        + " + ".join(
+            f"{scale * float(x):.4g}{' w' if k else ''} +- {scale * float(h):.2g}"
+            for k, (x, h) in enumerate(zip(f.idle, f.half_width[2:], strict=True))
+        )
+        + f" {unit}, w in rad/s, drift {60.0 * scale * found.drift:.3g} +- {60.0 * scale * found.drift_half_width:.2g} "
+        f"{unit}/min",
+        f"inertia: {1e-6 * f.inertia * 1e3:.4g} kg m2 +- {1e-6 * float(f.half_width[1]) * 1e3:.2g}"
+        if found.inertia_found and found.constant_known is not None
+        else "inertia: not known" + ("" if found.inertia_found else ": the speed does not change"),
+        f"lag: {1e3 * found.lag:.3g} ms, {1e3 * found.lag_interval[0]:.3g} to {1e3 * found.lag_interval[1]:.3g}; noise "
+        f"{scale * found.noise:.3g} {unit}, step {scale * found.step:.3g} {unit}",
+    ]
+    if found.constant_known is not None:
+        least, most = (1e-3 * x for x in found.torque)
+        out.append(
+            f"holds for torques from {least:.3g} to {most:.4g} N m, {low:.5g} to {high:.5g} rpm, below "
+            f"{found.bandwidth:.3g} Hz"
+            if most < math.inf
+            else f"holds for torques above {least:.3g} N m, below {found.bandwidth:.3g} Hz; no cut above that is logged"
+        )
+    torque = "N m" if found.constant_known is not None else unit
+    per = 1e-3 if found.constant_known is not None else scale
+    for answer in found.predictions:
+        text = f"held out {answer.name}: error {per * answer.rms:.3g} {torque} rms, {per * answer.mean:+.3g} mean"
+        if answer.greatest > 0.0:
+            text += f", of {per * answer.greatest:.4g} at most ({100.0 * answer.rms / answer.greatest:.2g} %)"
+        text += f", {100.0 * answer.covered:.3g} % inside their interval"
+        if math.isfinite(answer.apart):
+            told = "told from air" if answer.apart >= TOLD_APART else "not told from air"
+            text += f"; cuts {told}: {100.0 * answer.apart:.3g} % of pairs in order (50 %: chance)"
+        out.append(text)
+    if flutes is not None:
+        passing = flutes * found.cut_speed / math.tau
+        seen = aliased(passing, 1.0 / found.period)
+        inside = seen < found.bandwidth
+        out.append(
+            f"tooth passing frequency {passing:.4g} Hz: readings at {1.0 / found.period:.4g} Hz show it at "
+            f"{seen:.3g} Hz, " + ("inside the bandwidth: it looks like a torque" if inside else "above the bandwidth")
+        )
+    return out

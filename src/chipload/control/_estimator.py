@@ -1,0 +1,63 @@
+"""The torque of cutting from one reading of current and speed after the other, compiled.
+
+Notation: I current, w speed as read now and before, tau lag of the current sensor, w' the speed behind the same lag,
+straight between two readings; T filter of time constant t:
+
+    raw = K_T (I - i_0 - i_1 w') - J (w - w') / tau,    T += min(dt / t, 1) (raw - T).
+
+Without a lag dw/dt is the difference of two readings. Oracle: :func:`chipload.control.spindle.estimate` on a log.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+# places of the state: speed that was read last, the same behind the lag of the sensor, torque
+LAST_SPEED, LAGGED_SPEED, TORQUE = range(3)
+STATE = 3
+
+
+class Belief(NamedTuple):
+    """What the estimator takes the spindle for: K_T [N mm/A], i_0 [A], i_1 [A s], J [N mm s^2], tau and t [s]."""
+
+    torque_constant: float
+    idle_constant: float
+    idle_slope: float
+    inertia: float
+    sensor_lag: float
+    smoothing: float
+
+
+@njit(cache=True, nogil=True)
+def begin(state, speed):
+    """The state in the air at a speed [rad/s]."""
+    state[LAST_SPEED] = state[LAGGED_SPEED] = speed
+    state[TORQUE] = 0.0
+
+
+@njit(cache=True, nogil=True)
+def read(belief, state, current, speed, seconds):
+    """The torque [N mm] after a reading, ``seconds`` after the last, above 0; changes the state."""
+    lag = belief.sensor_lag
+    if lag > 0.0:
+        a = seconds / lag
+        decay = math.exp(-a)
+        ramp = (1.0 - decay) / a
+        lagged = decay * state[LAGGED_SPEED] + (ramp - decay) * state[LAST_SPEED] + (1.0 - ramp) * speed
+        rate = (speed - lagged) / lag
+    else:
+        lagged = speed
+        rate = (speed - state[LAST_SPEED]) / seconds
+    state[LAST_SPEED], state[LAGGED_SPEED] = speed, lagged
+    idle = belief.idle_constant + belief.idle_slope * lagged
+    raw = belief.torque_constant * (current - idle) - belief.inertia * rate
+    share = min(seconds / belief.smoothing, 1.0) if belief.smoothing > 0.0 else 1.0
+    state[TORQUE] += (raw - state[TORQUE]) * share
+    return state[TORQUE]
