@@ -11,8 +11,8 @@ from chipload.cutting.force import forces_over_turn
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import engagement_of_arcs
 from chipload.errors import InputError
-from chipload.stability.location_error import location_error
 from chipload.stability.modes import Modes
+from chipload.stability.surface_error import location_error
 from stability.stability_oracles import HALF, ONE, TAU, mill
 
 METAL = Material("plain", 700.0, 210.0, 0.0, 10.0, 12.0, 0.0, source="made up for tests")

@@ -73,7 +73,7 @@ def limits_table(tracks: Iterable[Track]) -> list[str]:
         ]
         for track, check in checks[:LISTED]
     ]
-    head = ["track", "limit", "state", "at most", "worst", "resolution", "line", "time [s]", "place [mm]", "reason"]
+    head = ["track", "limit", "state", "limit value", "worst", "resolution", "line", "time [s]", "place [mm]", "reason"]
     return [table(head, rows, numbers=(3, 4, 5, 6, 7), used=[t.in_use for t, _ in checks[:LISTED]])]
 
 

@@ -10,10 +10,10 @@ if TYPE_CHECKING:
     from chipload.stability.chart import StabilityChart, critical_depth, stability_chart
     from chipload.stability.cuts import DynamicCuts, dynamic_cuts
     from chipload.stability.grouping import CutGroups, grouped
-    from chipload.stability.location_error import location_error
     from chipload.stability.margin import StabilityMargins, largest_multipliers, stability_margins
     from chipload.stability.modes import Modes
-    from chipload.stability.quiet_speeds import QuietSpeeds, SpeedWindow, quiet_speeds
+    from chipload.stability.speeds import QuietSpeeds, SpeedWindow, quiet_speeds
+    from chipload.stability.surface_error import location_error
     from chipload.stability.variable_pitch import revolution_multiplier
     from chipload.stability.zero_order import zero_order_margin
 
@@ -43,10 +43,10 @@ __getattr__, __dir__ = attach(
         "chart": "StabilityChart critical_depth stability_chart",
         "cuts": "DynamicCuts dynamic_cuts",
         "grouping": "CutGroups grouped",
-        "location_error": "location_error",
+        "surface_error": "location_error",
         "margin": "StabilityMargins largest_multipliers stability_margins",
         "modes": "Modes",
-        "quiet_speeds": "QuietSpeeds SpeedWindow quiet_speeds",
+        "speeds": "QuietSpeeds SpeedWindow quiet_speeds",
         "variable_pitch": "revolution_multiplier",
         "zero_order": "zero_order_margin",
     },

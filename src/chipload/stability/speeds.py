@@ -57,9 +57,8 @@ class QuietSpeeds:
         out = []
         for a, b in edges.tolist():
             k = a + int(np.argmax(self.margin[a:b]))
-            out.append(
-                SpeedWindow(*(float(self.speed[i]) for i in (a, b - 1, k)), margin=float(self.margin[k]))
-            )
+            low, high, best = (float(self.speed[i]) for i in (a, b - 1, k))
+            out.append(SpeedWindow(low, high, best, float(self.margin[k])))
         return tuple(out)
 
     def advised(self, present: float) -> tuple[float, float]:
@@ -70,9 +69,9 @@ class QuietSpeeds:
         (3.0, 3.0)
         """
         good = self.margin >= self.margin.max() * (1.0 - ALIKE)
-        other = np.flatnonzero(~good)
-        place = np.arange(len(self.speed))
-        far = np.abs(place[:, None] - other[None, :]).min(axis=1, initial=len(place)) if len(other) else 0 * place
+        # what lies beyond the speeds that were looked at is not known: it counts as falling
+        other = np.concatenate([[-1], np.flatnonzero(~good), [len(good)]])
+        far = np.abs(np.arange(len(good))[:, None] - other[None, :]).min(axis=1)
         order = np.lexsort((np.abs(self.speed - present), -far, ~good))
         k = int(order[0])
         return float(self.speed[k]), float(self.margin[k])
