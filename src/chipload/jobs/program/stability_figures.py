@@ -21,7 +21,6 @@ from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table
 from chipload.result.limits import Columns
 from chipload.stability.chart import StabilityChart, stability_chart
-from chipload.stability.cuts import DynamicCuts
 from chipload.stability.margin import MOST_MARGIN
 from chipload.units import rpm_from_rad_s
 
@@ -69,13 +68,16 @@ def stability_sections(
             f'<p class="note">Speeds at which the least margin of its steps is at least {stability.wanted:g}.</p>',
             table(head, cells, numbers=(0, 1, 2)),
         ]
-    drawn = worst_chart(stability, int(what["tool"]))
+    tool = int(what["tool"])
+    drawn, old = worst_chart(stability, tool), None if speeds is None else speeds.stability
     if drawn is not None:
         body += [
             "<h3>Stability chart</h3>",
             '<p class="note">Of the cut that is nearest to chatter: above the line it chatters. Dots are the different '
-            "cuts of the tool; a red one is below the wanted margin.</p>",
-            figure("stability", chart_figure(*drawn, stability, int(what["tool"])), figures),
+            "cuts of the tool, which have a limit of their own; a red one is below the wanted margin.</p>",
+            figure(
+                "stability", chart_figure(drawn, tool, stability, None if speeds is None else speeds.stability), figures
+            ),
         ]
     body += [
         "<h3>Margin along the path</h3>",
@@ -84,8 +86,8 @@ def stability_sections(
     return body
 
 
-def worst_chart(stability: StabilityResult, tool: int) -> tuple[StabilityChart, DynamicCuts] | None:
-    """The chart of the cut of a tool that is nearest to chatter, and all its cuts; None: it has none."""
+def worst_chart(stability: StabilityResult, tool: int) -> StabilityChart | None:
+    """The chart of the cut of a tool that is nearest to chatter; None: it has none."""
     some = stability.watch.cuts.get(tool, [])
     low, high = stability.range_of(tool)
     if not some or not high > low:
@@ -96,37 +98,42 @@ def worst_chart(stability: StabilityResult, tool: int) -> tuple[StabilityChart, 
     cut = cuts.chosen([int(np.lexsort((-engaged_edge(cuts), margin))[0])])
     depth = float(cut.rows[0, 4]) if len(cut.rows) == 1 else 1.0
     grid = np.linspace(DEEPEST * depth / DEPTHS, DEEPEST * depth, DEPTHS)
-    return stability_chart(cut, np.geomspace(low, high, SPEEDS), grid), cuts
+    return stability_chart(cut, np.geomspace(low, high, SPEEDS), grid)
 
 
-def chart_figure(chart: StabilityChart, cuts: DynamicCuts, stability: StabilityResult, tool: int) -> go.Figure:
-    """Depth at which the worst cut chatters over speed, with the cuts of the tool."""
-    margin = np.array([x[0] for x in stability.watch.known[tool].values()])
-    rpm = rpm_from_rad_s(1.0) * chart.speed
+def chart_figure(
+    chart: StabilityChart, tool: int, stability: StabilityResult, before: StabilityResult | None
+) -> go.Figure:
+    """Depth at which the worst cut chatters over speed, with the cuts of the tool, also at its speeds before."""
     out = go.Figure()
     out.add_trace(
         go.Scatter(
-            x=rpm.astype(np.float32), y=chart.limit.astype(np.float32), mode="lines", name="limit",
-            line={"color": INK, "width": 1.6}, fill="tozeroy", fillcolor="rgba(11,122,117,0.12)",
+            x=(rpm_from_rad_s(1.0) * chart.speed).astype(np.float32), y=chart.limit.astype(np.float32), mode="lines",
+            name="limit", line={"color": INK, "width": 1.6}, fill="tozeroy", fillcolor="rgba(11,122,117,0.12)",
             hovertemplate="%{x:.5g} rpm: %{y:.3g}<extra>limit</extra>",
         )
     )  # fmt: skip
-    single = np.diff(cuts.start) == 1
-    if chart.is_depth:
-        depth = np.where(single, cuts.rows[np.minimum(cuts.start[:-1], len(cuts.rows) - 1), 4], np.nan)
-    else:
+    marks = [(stability, "circle", "cuts"), *([(before, "x", "before")] if before is not None else [])]
+    for own, symbol, name in marks:
+        some = own.watch.cuts.get(tool, [])
+        if not some:
+            continue
+        cuts, margin = joined(some), np.array([x[0] for x in own.watch.known[tool].values()])
+        single = np.diff(cuts.start) == 1
         depth = np.ones(len(cuts))
-    speed = rpm_from_rad_s(1.0) * cuts.pitch / cuts.period
-    shown = np.isfinite(depth)
-    bad = margin < stability.wanted
-    for chosen, colour, name in ((shown & ~bad, STOCK, "cuts"), (shown & bad, LIMIT, "cuts below the wanted margin")):
-        if chosen.any():
-            out.add_trace(
-                go.Scatter(
-                    x=speed[chosen], y=depth[chosen], mode="markers", name=name, marker={"color": colour, "size": 8},
-                    customdata=margin[chosen], hovertemplate="margin %{customdata:.3g}<extra></extra>",
-                )
-            )  # fmt: skip
+        if chart.is_depth:
+            depth = np.where(single, cuts.rows[np.minimum(cuts.start[:-1], len(cuts.rows) - 1), 4], np.nan)
+        speed, bad = rpm_from_rad_s(1.0) * cuts.pitch / cuts.period, margin < stability.wanted
+        for chosen, colour, what in ((~bad, STOCK, name), (bad, LIMIT, f"{name}, below the wanted margin")):
+            shown = np.isfinite(depth) & chosen
+            if shown.any():
+                out.add_trace(
+                    go.Scatter(
+                        x=speed[shown], y=depth[shown], mode="markers", name=what, customdata=margin[shown],
+                        marker={"color": colour, "size": 8, "symbol": symbol},
+                        hovertemplate="margin %{customdata:.3g}<extra></extra>",
+                    )
+                )  # fmt: skip
     out.update_layout(
         template="none", height=380, font=FONT, margin={"l": 74, "r": 16, "t": 30, "b": 50},
         legend={"orientation": "h", "y": 1.01, "yanchor": "bottom", "x": 0.0},
