@@ -12,13 +12,17 @@ import pytest
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
-from chipload.engagement.tooth_engagement import engagement_of_arcs
+from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
 from chipload.errors import InputError
 from chipload.jobs import FinishedJob, load_job, run_job
+from chipload.jobs.program.dynamics import Dynamics
+from chipload.jobs.program.stability import StabilityResult, StabilityWatch
+from chipload.machine.machine import machine_named
 from chipload.program.gcode.speed_words import SpeedWord, speed_words, with_speeds
 from chipload.report.page import page_bytes
 from chipload.result import Verdict
 from chipload.result.limits import LimitCheck, check_limit, state_of
+from chipload.simulation.loads import Cuts
 from chipload.stability.cuts import dynamic_cuts
 from chipload.stability.margin import stability_margins
 from chipload.stability.modes import Modes
@@ -281,3 +285,68 @@ def test_a_limit_that_is_a_least_value() -> None:
         "stability margin 1.3 of at least 1.2",
     )
     assert check_limit("stability_margin", 1.4, rows).text == "stability margin 1.3 is below 1.4 in line 2"
+
+
+def test_a_mirrored_program_has_the_same_margins(tmp_path: Path) -> None:
+    """M4 and the other side: each step has the margin of its mirror image."""
+    text = TEXT.replace("Z-1.5", "Z-3")
+    one = done(tmp_path, text=text).result.in_use[0].columns
+    other = done(tmp_path, text=text.replace("M3", "M4").replace("Y20", "Y-20")).result.in_use[0].columns
+    assert one["stability_margin"].min() < 3.0
+    assert other["stability_margin"] == pytest.approx(one["stability_margin"], rel=1e-6)
+    wrong = done(tmp_path, text=text.replace("M3", "M4")).result.in_use[0].columns
+    assert abs(wrong["stability_margin"].min() - one["stability_margin"].min()) > 0.05
+
+
+def test_by_moves_the_margins_are_the_same(tmp_path: Path) -> None:
+    (tmp_path / "m.toml").write_text(MATERIAL)
+    (tmp_path / "a.ngc").write_text(TEXT.replace("Z-1.5", "Z-3"))
+    job = JOB.replace("MODES", MODES).replace("LIMITS", "").replace("SPEEDS", "")
+    (tmp_path / "job.toml").write_text(job)
+    layers, moves = (
+        run_job(load_job(tmp_path / "job.toml", [f"operation.0.engine={engine}"])).result.in_use[0].columns
+        for engine in ("layers", "moves")
+    )
+    steady = (layers["x_mm"] > 8.0) & (layers["x_mm"] < 36.0)
+    assert moves["stability_margin"][steady] == pytest.approx(layers["stability_margin"][steady], rel=0.01)
+
+
+def test_plain_values_give_margins_too() -> None:
+    import chipload
+
+    cutter = chipload.Cutter(
+        number=1, diameter_mm=10.0, flutes=3, helix_deg=30.0, flute_length_mm=20.0, overhang_mm=40.0, modulus_gpa=580.0
+    )
+    from chipload.program.build import plunge, rapid
+    from chipload.program.program import Program
+
+    path = [rapid([-6, 0, -2], 900.0, 1, "link"), plunge([30, 0, -2], 20.0, 900.0, 1, "cut")]
+    mode = {"frequency_hz": 800.0, "damping_ratio": 0.03, "stiffness_n_um": 12.0, "direction": "y"}
+    block = ([0, -9, -5], [20, 9, 0])
+    values = {"stock": block, "cutter": cutter, "material": "al7075-t6", "machine": "vmc", "limits": {}, "step_mm": 6.0}
+    history = chipload.simulate(Program.join(path), dynamics={"mode": (mode,)}, **values)
+    (check,) = (c for c in history.result.limits if c.name == "stability_margin")
+    assert check.worst == history["stability_margin"].min()
+    sure = chipload.simulate(Program.join(path), dynamics={"mode": (mode,)}, confidence=0.95, **values)
+    (lower,) = (c for c in sure.result.limits if c.name == "stability_margin")
+    assert lower.worst == pytest.approx(check.worst / (1.0 + 1.6448536 * 0.25))  # the material has a spread of 25 %
+    with pytest.raises(InputError, match=r"limits.stability_margin: needs modes"):
+        chipload.simulate(Program.join(path), **{**values, "limits": {"stability_margin": 1.2}})
+
+
+def test_a_cutter_that_leans_has_no_known_margin() -> None:
+    cutter = Cutter(10.0, 3, 0.0, 20.0, 30.0, 5.8e5)
+    metal = Material("m", 700.0, 210.0, 100.0, 10.0, 12.0, 2.0, source="made up for tests")
+    dynamics = Dynamics({1: Modes([650.0], [0.02], [5000.0], [[1.0, 0.0]])}, {1: (1,)}, {1: "one"}, ())
+    watch = StabilityWatch(dynamics, metal)
+    frame = np.eye(3)[None].copy()
+    lean = np.array([[[1.0, 0.0, 0.0], [0.0, 0.8, 0.6], [0.0, -0.6, 0.8]]])
+    flank = np.array([[0.0, 5.0, 0.0, 1.0, 0.0, 0.0, 0.0]])
+    rows = [[math.pi / 2, math.pi, 0.0, 3.0, 0.05, 0.0, 0.0]]
+    for axes in (frame, lean):
+        met = ToothEngagement([0, 1], rows, [-1], [0], flank, axes)
+        columns = watch(Cuts(1, cutter, np.array([0]), np.zeros((1, 12)), met, met, np.array([900.0])))
+        assert (columns["stability_margin"][0] > 0.0) == (axes is frame)
+    result = StabilityResult(watch, machine_named("vmc"), 1.0, {1: 5.0})
+    assert result.reason(np.array([1])) == "tool 1 leans: modes are known for an upright axis only"
+    assert result.reason(np.array([2])) == ""

@@ -36,7 +36,9 @@ def program_limits(
     own = stability or simulation.stability
     return (
         *(_stated(simulation, upper, track, name, limit) for name, limit in loads.items()),
-        *stability_limits(own, simulation.limits, columns, track, simulation.errors, direction),
+        *stability_limits(
+            own, simulation.limits, columns, track, simulation.errors, direction, simulation.checks.sigma
+        ),
         *default_limits(simulation.checks, simulation.machine, columns, track, simulation.errors),
     )
 

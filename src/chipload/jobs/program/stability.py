@@ -193,15 +193,27 @@ def stability_limits(
     track: str,
     errors: Mapping[str, float],
     direction: str,
+    sigma: float,
 ) -> tuple[LimitCheck, ...]:
-    """Checks of :data:`STABILITY_LIMITS`: those that the job states, and a margin of 1 where modes are stated."""
+    """Checks of :data:`STABILITY_LIMITS`: those that the job states, and a margin of 1 where modes are stated.
+
+    Parameters
+    ----------
+    stability : of the track; None: no modes are stated
+    stated : limits of the job
+    errors : relative error of columns by the resolution of the simulation
+    direction : why the direction of forces is not known; empty: it is
+    sigma : the margin is held at coefficients greater by so many of their standard deviations
+    """
     limits = {name: stated[name] for name in STABILITY_LIMITS if name in stated}
     if stability is None:
         return tuple(
             check_limit(name, v, {}, track=track, reason="no [dynamics] is stated") for name, v in limits.items()
         )
     limits.setdefault("stability_margin", DEFAULT_MARGIN)
-    margin = np.asarray(columns["stability_margin"])
+    spread = _spread(stability.watch.material) if sigma > 0.0 else 0.0
+    margin = np.asarray(columns["stability_margin"]) / (1.0 + sigma * spread)
+    columns = {**columns, "stability_margin": margin}
     cutting = cutting_rows(columns)
     reason = direction or stability.reason(np.unique(np.asarray(columns["tool"])[cutting]))
     if not reason and (margin[cutting] == 0.0).any():
@@ -217,6 +229,13 @@ def stability_limits(
         rows = margin > 0.0 if name == "stability_margin" else cutting
         out.append(check_limit(name, limit, columns, track=track, rows=rows, error=error, reason=why))
     return tuple(out)
+
+
+def _spread(material: Material) -> float:
+    """Greatest relative standard deviation of the cutting coefficients across the axis."""
+    sd = np.sqrt(np.diag(material.variances)[:2])
+    size = np.abs(np.array(material.coefficients[:2]))
+    return float(np.divide(sd, size, out=np.zeros(2), where=size > 0.0).max())
 
 
 def cutting_rows(columns: Columns) -> NDArray[np.bool_]:

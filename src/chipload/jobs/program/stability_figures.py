@@ -69,7 +69,7 @@ def stability_sections(
             table(head, cells, numbers=(0, 1, 2)),
         ]
     tool = int(what["tool"])
-    drawn, old = worst_chart(stability, tool), None if speeds is None else speeds.stability
+    drawn = worst_chart(stability, tool)
     if drawn is not None:
         body += [
             "<h3>Stability chart</h3>",
