@@ -9,8 +9,8 @@ from importlib import import_module
 import pytest
 
 PACKAGES = (
-    "cutter", "machine", "stock", "geometry", "program", "engagement", "structure", "cutting", "control", "planning",
-    "simulation",
+    "cutter", "machine", "stock", "geometry", "program", "engagement", "structure", "cutting", "control", "stability",
+    "planning", "simulation",
 )  # fmt: skip
 
 

@@ -23,6 +23,7 @@ CHROMIUM = "/usr/bin/chromium"
 FIGURES: dict[str, tuple[tuple[str, int, int], ...]] = {
     "contour": (),
     "feeds": (("feeds", 1000, 760),),
+    "chatter": (("stability", 500, 460), ("margin", 500, 460)),
     "bracket": (("part", 450, 520), ("loads", 550, 860)),
     "notebooks": (("loads", 960, 860),),
     "tube": (("path", 900, 860),),

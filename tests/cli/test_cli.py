@@ -165,6 +165,7 @@ def test_examples_are_listed_with_a_line_each() -> None:
     assert [line.split()[0] for line in out.splitlines()] == [
         "blade",
         "bracket",
+        "chatter",
         "chips",
         "cone",
         "contour",
@@ -196,7 +197,9 @@ def test_an_example_overwrites_nothing(tmp_path: Path) -> None:
 def test_an_unknown_example_names_the_nearest(tmp_path: Path) -> None:
     code, _, err = call("example", "contur", tmp_path / "a")
     assert code == 2
-    known = "blade, bracket, chips, cone, contour, feeds, hecc, impeller, notebooks, plate, pocket, trunnion, tube"
+    known = (
+        "blade, bracket, chatter, chips, cone, contour, feeds, hecc, impeller, notebooks, plate, pocket, trunnion, tube"
+    )
     assert err == f"chipload: example contur: not known; did you mean contour? (known: {known})\n"
 
 

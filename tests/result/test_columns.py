@@ -10,7 +10,7 @@ from chipload.result.columns import BOUNDED, _by_name, unit_of
 #: units by the ending of a name, written here a second time on purpose
 ENDINGS = {
     "_mm_min": "mm/min", "_mm3": "mm\u00b3", "_mm": "mm", "_um": "\u00b5m", "_deg": "deg", "_s": "s", "_n": "N",
-    "_nm": "N m", "_w": "W", "_j": "J", "_mpa": "MPa", "_rpm": "1/min", "_percent": "%",
+    "_nm": "N m", "_w": "W", "_j": "J", "_mpa": "MPa", "_rpm": "1/min", "_percent": "%", "_hz": "Hz",
 }  # fmt: skip
 
 

@@ -33,6 +33,7 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
     "chips": ("operation.0.step_mm=4",),
     "feeds": ("operation.0.step_mm=4", "stock.layer_mm=2"),
     "bracket": ("operation.0.step_mm=6", "stock.layer_mm=5", "part.spacing_mm=5"),
+    "chatter": ("operation.0.step_mm=4", "stock.layer_mm=2"),
     "trunnion": (),
     "tube": (),
     "cone": (),

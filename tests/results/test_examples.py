@@ -23,6 +23,7 @@ NAMES = (
     "pocket",
     "chips",
     "feeds",
+    "chatter",
     "bracket",
     "trunnion",
     "tube",
@@ -98,7 +99,10 @@ def test_numbers_of_the_message_are_those_of_the_limits(example, name):
     result = done.result
     numbers = {(c.column.label, f"{c.worst:.4g}", f"{c.limit:g}") for c in result.limits if c.worst is not None}
     labels = "|".join(sorted({re.escape(label) for label, *_ in numbers}, key=len, reverse=True))
-    said = re.findall(rf"(?:^|[:;,] )({labels}) ([\d.e+-]+)(?: \S+| N m)? (?:of|exceeds) ([\d.e+-]*\d)", result.message)
+    said = re.findall(
+        rf"(?:^|[:;,] )({labels}) ([\d.e+-]+)(?: \S+| N m)? (?:of at least|of|exceeds|is below) ([\d.e+-]*\d)",
+        result.message,
+    )
     assert set(said) <= numbers
     if result.verdict is Verdict.HOLDS:
         assert set(said) == numbers

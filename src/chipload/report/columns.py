@@ -13,7 +13,7 @@ from plotly.subplots import make_subplots
 from chipload.errors import InputError
 from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS
 from chipload.report.shape import thinned
-from chipload.result import column_of
+from chipload.result import COLUMNS, column_of
 from chipload.tables import nearest
 
 #: the columns that are drawn where none is named
@@ -21,7 +21,7 @@ USUAL = ("force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um")
 #: axes that columns are drawn against, and their titles
 AGAINST = {"t_s": "time [s]", "s_mm": "path [mm]"}
 #: columns whose size is held, whatever their sign
-SIGNED = ("form_error_um",)
+SIGNED = tuple(name for name, column in COLUMNS.items() if column.signed)
 #: height of a row [px]
 ROW = 190
 
@@ -65,7 +65,7 @@ def columns_figure(
             for end in (bound[name], *((-bound[name],) if name in SIGNED else ())):
                 out.add_hline(y=end, line={"color": LIMIT, "width": 1.2, "dash": "dash"}, row=row, col=1)
             size = np.abs(y[keep]) if name in SIGNED else y[keep]
-            over = keep[size > bound[name]]
+            over = keep[size < bound[name] if COLUMNS[name].least else size > bound[name]]
             if len(over):
                 given = {"x": across[over], "y": y[over], "customdata": columns["line"][over], "hovertemplate": says}
                 mark = {"color": LIMIT, "size": 5}

@@ -72,7 +72,7 @@ def limits_table(tracks: Iterable[Track]) -> list[str]:
     if not checks:
         return ["<p>No limit was checked.</p>"]
     rows = [_limit_row(track, check) for track, check in checks[:LISTED]]
-    head = ["track", "limit", "state", "at most", "worst", "resolution", "line", "time [s]", "place [mm]", "reason"]
+    head = ["track", "limit", "state", "limit value", "worst", "resolution", "line", "time [s]", "place [mm]", "reason"]
     kept = [k for k in range(len(head)) if k < 5 or any(row[k] for row in rows)]
     numbers = tuple(i for i, k in enumerate(kept) if k in (3, 4, 5, 6, 7))
     cells = [[row[k] for k in kept] for row in rows]

@@ -23,6 +23,7 @@ class Column:
     label : as a person reads it
     meaning : one sentence
     signed : whether a limit bounds its size, whatever the sign
+    least : whether a limit is the least value that is allowed
     """
 
     name: str
@@ -30,6 +31,7 @@ class Column:
     label: str
     meaning: str
     signed: bool = False
+    least: bool = False
 
     @property
     def title(self) -> str:
@@ -123,6 +125,13 @@ _ROWS = (
     ("form_error_um", "\u00b5m", "form error", "material left on the surface by deflection; negative: removed", True),
     ("form_points", "", "finished points", "points of the part's surface that the step finishes"),
     ("axial_overrun_mm", "mm", "cut above the flutes", "engaged length of the cutter above its flutes"),
+    # vibration
+    ("stability_margin", "", "stability margin", "factor on the cutting force, and for straight teeth on the depth of "
+     "cut, at which the step begins to chatter; 3: 3 or more; 0: not known", False, True),
+    ("chatter_hz", "Hz", "chatter frequency", "frequency of chatter at the stability margin; 0: the margin is 3"),
+    ("chatter_mode", "", "chatter mode", "number of the mode that chatters, from 1 as in the job; 0: none"),
+    ("sle_um", "\u00b5m", "surface location error", "material left on the wall by forced vibration; negative: removed; "
+     "0 where the step chatters or makes no wall", True),
     # forces that are measured, beside those of the force model
     ("rotation_deg", "deg", "rotation", "rotation of tooth 0 from the beginning of a slot"),
     ("force_feed_n", "N", "force along the feed", "predicted force on the cutter along the feed"),
@@ -147,7 +156,7 @@ _ROWS = (
 #: units by the ending of a column's name
 UNITS: Mapping[str, str] = {
     "mm_min": "mm/min", "mm3": "mm\u00b3", "mm": "mm", "um": "\u00b5m", "deg": "deg", "s": "s", "n": "N", "nm": "N m",
-    "w": "W", "j": "J", "mpa": "MPa", "rpm": "1/min", "percent": "%",
+    "w": "W", "j": "J", "mpa": "MPa", "rpm": "1/min", "percent": "%", "hz": "Hz",
 }  # fmt: skip
 
 
@@ -198,4 +207,4 @@ def column_of(limit: str) -> Column:
     if name not in COLUMNS:
         raise InputError(f"limit {limit}: not known: no column of a history has this name")
     own = COLUMNS[name]
-    return Column(own.name, own.unit, label, own.meaning, own.signed) if label else own
+    return Column(own.name, own.unit, label, own.meaning, own.signed, own.least) if label else own

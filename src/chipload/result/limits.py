@@ -2,7 +2,7 @@
 
 Notation: e relative error of a column, from the resolution of the calculation and from the spread of coefficients; a
 value v stands for v - e |v| .. v + e |v|. A limit that lies above this band holds, one below it is exceeded, one inside
-it is unproven.
+it is unproven. Where a limit is the least value that is allowed (:attr:`Column.least`), all of this is turned round.
 """
 
 from __future__ import annotations
@@ -101,21 +101,27 @@ class LimitCheck:
         'force 412 of 500 N'
         """
         unit = f" {self.column.unit}" if self.column.unit else ""
+        least = self.column.least
         if self.worst is None:
-            return f"{self.column.label} of at most {self.limit:g}{unit} is not known: {self.reason}"
+            bound = "at least" if least else "at most"
+            return f"{self.column.label} of {bound} {self.limit:g}{unit} is not known: {self.reason}"
         if self.state is Verdict.EXCEEDS:
-            return f"{self.column.label} {self.worst:.4g}{unit} exceeds {self.limit:g}{unit} {self.where}".rstrip()
-        text = f"{self.column.label} {self.worst:.4g} of {self.limit:g}{unit}"
+            beyond = "is below" if least else "exceeds"
+            return f"{self.column.label} {self.worst:.4g}{unit} {beyond} {self.limit:g}{unit} {self.where}".rstrip()
+        text = f"{self.column.label} {self.worst:.4g} of {'at least ' if least else ''}{self.limit:g}{unit}"
         return text if self.state is Verdict.HOLDS else f"{text}, unproven: {self.reason}"
 
 
-def state_of(worst: float, limit: float, error: float = 0.0, reason: str = "") -> tuple[Verdict, str]:
+def state_of(
+    worst: float, limit: float, error: float = 0.0, reason: str = "", *, least: bool = False
+) -> tuple[Verdict, str]:
     """State of a value against its limit, and why it is unproven.
 
     Parameters
     ----------
     error : relative error of ``worst``
-    reason : why the value may be greater, whatever its error; empty: it may not
+    reason : why the value may be worse, whatever its error; empty: it may not
+    least : whether the limit is the least value that is allowed
 
     Raises
     ------
@@ -132,6 +138,8 @@ def state_of(worst: float, limit: float, error: float = 0.0, reason: str = "") -
     if math.isinf(error):
         return Verdict.UNPROVEN, reason or "the resolution of the calculation makes an error of unknown size"
     band = error * abs(worst)
+    if least:
+        worst, limit = -worst, -limit
     if worst - band > limit:
         return Verdict.EXCEEDS, ""
     if reason:
@@ -151,7 +159,7 @@ def check_limit(
     error: float = 0.0,
     reason: str = "",
 ) -> LimitCheck:
-    """Check a limit against the greatest value of its column.
+    """Check a limit against the greatest value of its column, or the least where the limit is a least value.
 
     Parameters
     ----------
@@ -175,12 +183,13 @@ def check_limit(
         return LimitCheck(name, limit, None, Verdict.UNPROVEN, track, reason=missing)
     values = np.asarray(columns[column.name], dtype=np.float64)
     size = np.abs(values) if column.signed else values
+    worse = -size if column.least else size
     among = np.arange(len(size)) if rows is None else np.flatnonzero(rows)
     if len(among) == 0:
         return LimitCheck(name, limit, None, Verdict.UNPROVEN, track, reason=reason or "no step was checked")
-    k = int(among[np.argmax(size[among])])
+    k = int(among[np.argmax(worse[among])])
     worst = float(size[k])
-    state, why = state_of(worst, limit, error, reason)
+    state, why = state_of(worst, limit, error, reason, least=column.least)
     place = None
     if {"x_mm", "y_mm", "z_mm"} <= set(columns):
         place = (float(columns["x_mm"][k]), float(columns["y_mm"][k]), float(columns["z_mm"][k]))

@@ -17,7 +17,7 @@ LISTED = 300
 
 @dataclass(frozen=True, eq=False)
 class Bound:
-    """A limit of a column: ``above`` (n,) rows exceed it."""
+    """A limit of a column: ``above`` (n,) rows exceed it, or are below a limit that is a least value."""
 
     limit: float
     above: NDArray[np.bool_]
@@ -51,9 +51,10 @@ def bound_of(result: PageResult, track: PageTrack, column: str) -> Bound | None:
     if isinstance(values, TextColumn):
         return None
     size = np.abs(np.nan_to_num(values)) if check.column.signed else np.nan_to_num(values)
-    above = size > check.limit
+    above = size < check.limit if check.column.least else size > check.limit
     if check.worst is not None:
-        above &= size <= check.worst * (1.0 + 1e-9)
+        worst = check.worst * (1.0 + 1e-9 * (-1.0 if check.column.least else 1.0))
+        above &= size >= worst if check.column.least else size <= worst
     return Bound(check.limit, above)
 
 

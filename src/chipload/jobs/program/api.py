@@ -63,6 +63,7 @@ def simulate(
     part: Body | None = None,
     fixtures: Sequence[Body] = (),
     stiffness: Mapping[str, float] | None = None,
+    dynamics: Mapping[str, Any] | None = None,
     checks: Mapping[str, Any] | None = None,
     step_mm: float | None = None,
     layer_mm: float | None = None,
@@ -84,6 +85,7 @@ def simulate(
     part : what should come out: mesh [mm], file, or keys of ``[part]`` (``mesh`` in place of ``file``)
     fixtures : what no tool may touch, likewise
     stiffness : keys of ``[stiffness]``; what is not stated leaves deflections unproven
+    dynamics : keys of ``[dynamics]``, as ``{"mode": ({"frequency_hz": 812.0, ...},)}``; each step then has a margin
     checks : keys of ``[checks]``, which are made unless one is false, as ``{"cutter_strength": False}``
     step_mm : longest step of the tip; None: a quarter of the smallest diameter
     layer_mm : thickness of the layers of a block or a mesh; None: from depths of cut and cutters
@@ -130,6 +132,7 @@ def simulate(
         "operation": ({"kind": "simulate", **finest, **settings},),
         "limits": dict(limits),
         "stiffness": None if stiffness is None else dict(stiffness),
+        "dynamics": None if dynamics is None else dict(dynamics),
         "checks": dict(checks or {}),
     }
     layers = stock if isinstance(stock, LayeredStock) else None
@@ -146,6 +149,11 @@ def simulate(
     for key in ("form_error_um", "gouge_mm", "excess_mm"):
         if made.part is None and getattr(made.limits, key) is not None:
             raise InputError(f"limits.{key}: needs the part that should come out: give part or leave it out")
+    for key in ("stability_margin", "sle_um"):
+        if made.dynamics is None and getattr(made.limits, key) is not None:
+            raise InputError(f"limits.{key}: needs modes of vibration: give dynamics or leave it out")
+    if made.operation[0].speeds is not None:
+        raise InputError("speeds: are changed in the text of a job's program: write a job (chipload run)")
     job = ProgramJob(
         path=Path(name).absolute(), table=made, program_file=name, tools_file=None, machine=on.name, overrides=(),
         cutters=cutters, material=metal.name, meshes=meshes,

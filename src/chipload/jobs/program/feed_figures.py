@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from chipload.jobs.program.numbers import COMPARED, exceeding, feed_numbers
-from chipload.jobs.program.outcome import FeedResult, SimulationResult
+from chipload.jobs.program.outcome import FeedResult, SimulationResult, SpeedResult
 from chipload.report.figures import FONT, GRID, LIMIT, LINE_POINTS
 from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table
@@ -117,7 +117,7 @@ def along(feeds: FeedResult, simulation: SimulationResult, checks: Sequence[Limi
     return out
 
 
-def program_text(feeds: FeedResult, unless: str | None) -> str:
+def program_text(feeds: FeedResult | SpeedResult, unless: str | None) -> str:
     """The text; where it does not hold, ``unless`` says why behind the words of its first line; no line is added.
 
     A line of ``%`` alone is passed over, and Sinumerik's paths.

@@ -17,8 +17,9 @@ from chipload.jobs.program.feed_figures import feed_sections, program_text
 from chipload.jobs.program.limits import program_limits
 from chipload.jobs.program.numbers import operation_numbers, program_numbers
 from chipload.jobs.program.outcome import ProgramResult, SimulationResult
-from chipload.jobs.program.result import APT, OPTIMISED, feeds_name, result_of
+from chipload.jobs.program.result import APT, OPTIMISED, feeds_name, result_of, speeds_name
 from chipload.jobs.program.rows import motion_rows
+from chipload.jobs.program.stability_figures import stability_sections
 from chipload.program.apt.writer import write_apt
 from chipload.program.motions import spans
 from chipload.program.program import DWELL, RAPID, Program
@@ -76,6 +77,10 @@ def _files(program: ProgramResult) -> dict[str, Content]:
         holds = result.verdict is Verdict.HOLDS
         own = program_text(program.feeds, None if holds else result.message)
         files[feeds_name(program)] = own.encode("utf-8", "surrogateescape")
+    if program.speeds is not None:
+        result = result_of(program)
+        own = program_text(program.speeds, None if result.verdict is Verdict.HOLDS else result.message)
+        files[speeds_name(program)] = own.encode("utf-8", "surrogateescape")
     if program.simulated is not None:
         files["stock.npz"] = program.simulated.stock.to_bytes()
     return files
@@ -102,6 +107,7 @@ def _sections(program: ProgramResult, figures: dict[str, go.Figure]) -> list[str
     ]
     if program.simulated is not None:
         body += _load_sections(program.simulated, time_s, figures)
+        body += stability_sections(program.simulated, program.speeds, figures)
     return body
 
 

@@ -11,6 +11,7 @@ import trimesh
 
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
+from chipload.jobs.program.dynamics import dynamics_of
 from chipload.jobs.program.tables import LOADS, ProgramJobTable, ProgramLimitsTable
 from chipload.jobs.sources import Limited, cutters, sources_of
 
@@ -67,10 +68,13 @@ def load(path: Path, table: ProgramJobTable, overrides: Sequence[str]) -> Progra
         errors.texts += _contradictions(table)
         with errors.collect():
             tools = cutters(table.cutter, folder)
+        with errors.collect():
+            if table.dynamics is not None and tools:
+                dynamics_of(table.dynamics, folder, tools)
     else:
         errors.texts += [
             f'{key}: not used where a program is only read: add an [[operation]] with kind = "simulate" or leave it out'
-            for key in ("stock", "part", "fixture", "material", "cutter", "stiffness")
+            for key in ("stock", "part", "fixture", "material", "cutter", "stiffness", "dynamics")
             if getattr(table, key)
         ]
     errors.refuse()
@@ -108,6 +112,14 @@ def _contradictions(table: ProgramJobTable) -> Iterator[str]:
     for key in ("form_error_um", "gouge_mm", "excess_mm"):
         if table.part is None and getattr(table.limits, key) is not None:
             yield f"limits.{key}: needs the part that should come out: state [part] or leave it out"
+    if table.dynamics is None:
+        for key in ("stability_margin", "sle_um"):
+            if getattr(table.limits, key) is not None:
+                yield f"limits.{key}: needs modes of vibration: state [dynamics] or leave it out"
+        if table.operation[0].speeds is not None:
+            yield "operation.0.speeds: needs modes of vibration: state [dynamics] or leave it out"
+    if table.operation[0].speeds is not None and table.operation[0].feeds is not None:
+        yield "operation.0.speeds: with feeds: ask for speeds first, then for feeds of the new program"
     if table.operation[0].feeds is not None and not any(getattr(table.limits, name) is not None for name in LOADS):
         yield (
             f"operation.0.feeds: no limit of a load is stated, so nothing would hold them: state at least one of "

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from chipload.jobs.checks import DIRECTED, default_limits, load_error, upper_loads
 from chipload.jobs.program.outcome import SimulationResult
+from chipload.jobs.program.stability import STABILITY_LIMITS, StabilityResult, stability_limits
 from chipload.machine.machine import Machine
 from chipload.result import LimitCheck, Verdict, check_limit, column_of, state_of
 from chipload.result.limits import Columns
@@ -18,17 +19,26 @@ from chipload.simulation.surface import Difference
 BY_STIFFNESS = ("deflection_um", "form_error_um")
 
 
-def program_limits(simulation: SimulationResult, columns: Columns, track: str) -> tuple[LimitCheck, ...]:
+def program_limits(
+    simulation: SimulationResult, columns: Columns, track: str, stability: StabilityResult | None = None
+) -> tuple[LimitCheck, ...]:
     """Every limit of the job, then those that are checked by default.
 
     Parameters
     ----------
     columns : of the track, a row a step
     track : its name
+    stability : of the track; None: that of the simulation
     """
     upper = upper_loads(columns, simulation.checks.sigma)
+    loads = {name: limit for name, limit in simulation.limits.items() if name not in STABILITY_LIMITS}
+    direction = simulation.checks.unknown_direction
+    own = stability or simulation.stability
     return (
-        *(_stated(simulation, upper, track, name, limit) for name, limit in simulation.limits.items()),
+        *(_stated(simulation, upper, track, name, limit) for name, limit in loads.items()),
+        *stability_limits(
+            own, simulation.limits, columns, track, simulation.errors, direction, simulation.checks.sigma
+        ),
         *default_limits(simulation.checks, simulation.machine, columns, track, simulation.errors),
     )
 

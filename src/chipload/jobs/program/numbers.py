@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from chipload.cutting.strength import allowed_stress
 from chipload.jobs.checks import upper_loads
 from chipload.jobs.program import part_numbers
-from chipload.jobs.program.outcome import FeedResult, ProgramResult, SimulationResult
+from chipload.jobs.program.outcome import FeedResult, ProgramResult, SimulationResult, SpeedResult
+from chipload.jobs.program.stability import stability_numbers
 from chipload.program.motions import lengths
 from chipload.program.program import DWELL, RAPID
 from chipload.result import LimitCheck
@@ -103,6 +104,7 @@ def operation_numbers(simulation: SimulationResult, time_s: float) -> dict[str, 
         "band_error": dict(removal.band_error),
         "cutter_stress_mpa": {"max": float(c["cutter_stress_mpa"].max(initial=0.0)), "allowed": _allowed(simulation)},
         "settings": dict(simulation.settings),
+        **({} if simulation.stability is None else {"stability": stability_numbers(simulation.stability, c)}),
     }
 
 
@@ -213,4 +215,23 @@ def feed_numbers(
         "still_exceeding_count": len(listed),
         "rubbing": [{"line": line, "tooth_feed_mm": feed} for line, feed in feeds.rubs[:MOST_LINES]],
         "rubbing_count": len(feeds.rubs),
+    }
+
+
+def speed_numbers(speeds: SpeedResult, simulation: SimulationResult, time_s: float, program: str) -> dict[str, Any]:
+    """``speeds`` of the operation in summary.json; ``program`` is the file with them."""
+    assert simulation.stability is not None
+    before = stability_numbers(speeds.stability, speeds.before.columns)
+    after = stability_numbers(simulation.stability, simulation.removal.columns)
+    keys = ("margin_min", "line", "chatter_hz", "mode", "speed_rpm")
+    return {
+        "program": program,
+        "time_before_s": speeds.seconds_before,
+        "time_after_s": time_s,
+        "tools": [
+            {"tool": t.tool, "before_rpm": list(t.before), "rpm": t.rpm, "margin_expected": t.margin}
+            for t in speeds.tools
+        ],
+        "before": {key: before[key] for key in keys},
+        "after": {key: after[key] for key in keys},
     }

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.jobs.checks import DefaultChecks
+from chipload.jobs.program.stability import StabilityResult
 from chipload.machine.machine import Machine
 from chipload.program.read import ProgramReading
 from chipload.result import Provenance
@@ -40,6 +41,7 @@ class SimulationResult:
     compared_with : names of what shank and holder were held against
     no_holder : tools whose holder is not stated
     rigid : what was not stated of what gives way, and counts as rigid
+    stability : margins and quiet speeds; None: no modes are stated
     """
 
     removal: Removal
@@ -55,6 +57,7 @@ class SimulationResult:
     compared_with: tuple[str, ...] = ()
     no_holder: tuple[int, ...] = ()
     rigid: tuple[str, ...] = ()
+    stability: StabilityResult | None = None
 
     @property
     def errors(self) -> Mapping[str, float]:
@@ -90,6 +93,38 @@ class FeedResult:
     seconds_before: float
 
 
+@dataclass(frozen=True)
+class ToolSpeed:
+    """A new spindle speed of a tool [1/min], and the least margin that its steps are expected to have with it."""
+
+    tool: int
+    before: tuple[float, ...]
+    rpm: float
+    margin: float
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedResult:
+    """New spindle speeds of a program.
+
+    Parameters
+    ----------
+    text : the program with them
+    dialect : of the text
+    tools : what each tool has
+    before : what the program removes at the programmed speeds
+    stability : margins there
+    seconds_before : time of the program at the programmed speeds [s]
+    """
+
+    text: str
+    dialect: str
+    tools: tuple[ToolSpeed, ...]
+    before: Removal
+    stability: StabilityResult
+    seconds_before: float
+
+
 @dataclass(frozen=True, eq=False)
 class ProgramResult:
     """A program that was read for a machine.
@@ -105,6 +140,7 @@ class ProgramResult:
     simulated : what the program does to its stock; None: it was only read
     feeds : how it came to its feeds if they are new; None: they are those of the file
     cutters : by tool number; empty: not known
+    speeds : how it came to its spindle speeds if they are new; None: they are those of the file
     """
 
     title: str
@@ -117,3 +153,4 @@ class ProgramResult:
     simulated: SimulationResult | None = None
     feeds: FeedResult | None = None
     cutters: Mapping[int, Cutter] = field(default_factory=dict)
+    speeds: SpeedResult | None = None

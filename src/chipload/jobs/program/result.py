@@ -11,8 +11,8 @@ import numpy as np
 from chipload.errors import Finding, Severity
 from chipload.jobs.checks import chip_findings, unchecked_checks
 from chipload.jobs.program.limits import program_limits
-from chipload.jobs.program.numbers import feed_numbers, operation_numbers, program_numbers
-from chipload.jobs.program.outcome import FeedResult, ProgramResult, SimulationResult
+from chipload.jobs.program.numbers import feed_numbers, operation_numbers, program_numbers, speed_numbers
+from chipload.jobs.program.outcome import FeedResult, ProgramResult, SimulationResult, SpeedResult
 from chipload.jobs.program.rows import motion_rows, step_rows
 from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict, in_memory
 from chipload.result.limits import Columns
@@ -20,8 +20,8 @@ from chipload.simulation.placement import stock_placement
 
 #: names of the tracks: the program as it is, and with new feeds
 PROGRAM, ORIGINAL, OPTIMISED = "program", "original", "optimised"
-#: stem of the program with new feeds, and the CL data of every program
-FEEDS, APT = "0-feeds", "0-program.apt"
+#: stem of the program with new feeds, with new speeds, and the CL data of every program
+FEEDS, SPEEDS, APT = "0-feeds", "0-speeds", "0-program.apt"
 
 
 def result_of(program: ProgramResult) -> Result:
@@ -34,6 +34,10 @@ def result_of(program: ProgramResult) -> Result:
         if program.feeds is not None:
             time_s, name = float(program.seconds.sum()), feeds_name(program)
             operation["feeds"] = feed_numbers(program.feeds, simulation, tracks[0].limits, time_s, name)
+        if program.speeds is not None:
+            operation["speeds"] = speed_numbers(
+                program.speeds, simulation, float(program.seconds.sum()), speeds_name(program)
+            )
         operations.append(operation)
     else:
         operations.append({"kind": "read"})
@@ -54,6 +58,11 @@ def result_of(program: ProgramResult) -> Result:
 def feeds_name(program: ProgramResult) -> str:
     """File of the program with new feeds."""
     return f"{FEEDS}{Path(program.name).suffix}"
+
+
+def speeds_name(program: ProgramResult) -> str:
+    """File of the program with new speeds."""
+    return f"{SPEEDS}{Path(program.name).suffix}"
 
 
 def unchecked(program: ProgramResult) -> tuple[str, ...]:
@@ -96,6 +105,8 @@ def _tracks(program: ProgramResult) -> tuple[Track, ...]:
         return (Track(PROGRAM, TrackKind.PROGRAM, True, time_s, (), findings, (APT,), blocks=blocks),)
     found = (*broken, *_found(simulation))
     columns = simulation.removal.columns
+    if program.speeds is not None:
+        return _tracks_of_speeds(program, program.speeds, found)
     if program.feeds is None:
         limits = program_limits(simulation, columns, PROGRAM)
         found = (*_misplaced(simulation, limits), *found)
@@ -110,6 +121,24 @@ def _tracks(program: ProgramResult) -> tuple[Track, ...]:
     limits = tuple(c for c in program_limits(simulation, first, ORIGINAL) if c.name not in ("gouge_mm", "excess_mm"))
     before = Track(
         ORIGINAL, TrackKind.PROGRAM, False, own.seconds_before, limits, blocks=lambda: step_rows(simulation, own.before)
+    )  # fmt: skip
+    return (after, before)
+
+
+def _tracks_of_speeds(program: ProgramResult, speeds: SpeedResult, found: tuple[Finding, ...]) -> tuple[Track, ...]:
+    """The program with new speeds, then as it was."""
+    simulation = program.simulated
+    assert simulation is not None
+    after = Track(
+        OPTIMISED, TrackKind.PROGRAM, True, float(program.seconds.sum()),
+        program_limits(simulation, simulation.removal.columns, OPTIMISED), found, (speeds_name(program), APT),
+        blocks=lambda: step_rows(simulation),
+    )  # fmt: skip
+    limits = program_limits(simulation, speeds.before.columns, ORIGINAL, speeds.stability)
+    before = Track(
+        ORIGINAL, TrackKind.PROGRAM, False, speeds.seconds_before,
+        tuple(c for c in limits if c.name not in ("gouge_mm", "excess_mm", "form_error_um")),
+        blocks=lambda: step_rows(simulation, speeds.before),
     )  # fmt: skip
     return (after, before)
 
@@ -150,6 +179,11 @@ def _with_cause(simulation: SimulationResult, feeds: FeedResult) -> Iterator[Col
 
 
 def _note(program: ProgramResult) -> str:
+    if program.speeds is not None:
+        tools = "; ".join(f"tool {t.tool} {t.rpm:g} rpm" for t in program.speeds.tools)
+        return (
+            f"The program takes {program.seconds.sum():.4g} s, before {program.speeds.seconds_before:.4g} s; {tools}."
+        )
     if program.feeds is None:
         return ""
     before, after = program.feeds.seconds_before, float(program.seconds.sum())

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.jobs.program.outcome import ProgramResult, SimulationResult
+from chipload.jobs.program.stability import filled_margins
 from chipload.program.read import times_of
 from chipload.result.limits import Columns
 from chipload.result.motions import motion_columns
@@ -30,6 +31,8 @@ def step_rows(simulation: SimulationResult, removal: Removal | None = None) -> I
         count = len(columns["label"])
         if removal is None and simulation.left is not None:
             columns["gouge_mm"] = np.maximum(-simulation.left.deepest[at : at + count], 0.0)
+        if "stability_margin" in columns:
+            columns["stability_margin"] = filled_margins(columns)
         columns["cutting_s"] = columns.pop("seconds")
         yield {"pass": names[columns.pop("label")], **columns}
         at += count

@@ -17,6 +17,8 @@ from chipload.jobs.program.job import ProgramJob
 from chipload.jobs.program.limits import spindle_limits
 from chipload.jobs.program.outcome import FeedResult, ProgramResult, SimulationResult
 from chipload.jobs.program.preparation import bodies_of, material_of, resolution_of, timed
+from chipload.jobs.program.speeds import new_speeds, speeds_changeable, stability_of, watch_of
+from chipload.jobs.program.stability import STABILITY_COLUMNS
 from chipload.jobs.program.stiffness import deflecting, stiffness_of, watched, with_columns
 from chipload.jobs.program.tables import LOADS, SimulateTable
 from chipload.jobs.program.workpiece import insides, stock_body
@@ -80,7 +82,7 @@ def run(
 
     reading = read()
     lines, seconds = line_times(reading, machine)
-    simulated, fed = None, None
+    simulated, fed, sped = None, None, None
     if job.simulates:
         stock, material, begin = stock_body(job, reading.program), material_of(job), share
         wants_feeds = job.table.operation[0].feeds is not None
@@ -96,6 +98,18 @@ def run(
                 )  # fmt: skip
                 lines, seconds = line_times(reading, machine)
                 stock = stock_body(job, reading.program)
+        if job.table.operation[0].speeds is not None:
+            own = speeds_changeable(job.program_file, machine, table.dialect)
+            straight(reading.program)
+            bodies_of(job, reading, stock, machine, material)
+            if simulate:
+                begin = 0.5 * (1.0 + share)
+                sped, reading = new_speeds(
+                    job, *own, reading, stock, material, machine, read, float(seconds.sum()),
+                    lambda done, what: progress(share + (begin - share) * done, what),
+                )  # fmt: skip
+                lines, seconds = line_times(reading, machine)
+                stock = stock_body(job, reading.program)
         if simulate:
             simulated = _simulated(
                 job, reading, stock, machine, material, checkpoint,
@@ -104,6 +118,8 @@ def run(
     files: dict[str, Path] = {"program": job.program_file}
     named = {"machine": job.machine, "tools": job.tools_file, "material": job.material}
     fixtures = {f"fixture {k}": f for k, f in enumerate(job.table.fixture)}
+    if job.table.dynamics is not None and job.table.dynamics.file is not None:
+        named["modes"] = job.path.parent / job.table.dynamics.file
     for name, solid in {"stock": job.table.stock, "part": job.table.part, **fixtures}.items():
         if solid is not None and solid.file is not None:
             named[name] = job.path.parent / solid.file
@@ -113,7 +129,7 @@ def run(
     provenance = provenance_of(files, job.overrides, machine, metal)
     name = job.program_file.name
     return ProgramResult(
-        title_of(job.path), name, reading, lines, seconds, machine, provenance, simulated, fed, job.cutters
+        title_of(job.path), name, reading, lines, seconds, machine, provenance, simulated, fed, job.cutters, sped
     )  # fmt: skip
 
 
@@ -130,7 +146,8 @@ def check(job: ProgramJob) -> tuple[list[str], bool]:
     if job.simulates:
         stock, material = stock_body(job, done.reading.program), material_of(job)
         bodies = bodies_of(job, done.reading, stock, done.machine, material)
-        twice = 2 if job.table.operation[0].feeds is not None else 1
+        op = job.table.operation[0]
+        twice = 2 if op.feeds is not None or op.speeds is not None else 1
         needs = [estimate(twice * bodies.steps, len(done.reading.program))]
     noticed = [str(f) for f in (*done.reading.findings, *done.reading.violations)]
     count = len(done.reading.violations)
@@ -247,13 +264,18 @@ def _simulated(
     if made is not None:
         watches.append(forming(made, gives, material))
 
+    vibrates = watch_of(job, material)
+    if vibrates is not None:
+        watches.append(vibrates)
+
     def watch(cuts: Cuts) -> dict[str, NDArray[np.float64]]:
         return {name: values for each in watches for name, values in each(cuts).items()}
 
     def removing(done: float, what: str) -> None:
         progress(SHARE + 0.8 * done, what)
 
-    if checkpoint is None:
+    # the different cuts are kept in memory, for the speeds: such a run does not go on where it was stopped
+    if checkpoint is None or vibrates is not None:
         removal = remove(
             program, stock, job.cutters, material, fine, interpolation=op.interpolation, watch=watch, times=times,
             engine=op.engine, progress=removing,
@@ -266,6 +288,8 @@ def _simulated(
             engine=op.engine, progress=removing,
         )  # fmt: skip
     removal = with_columns(removal, (*watched(gives, formed=made is not None), *CHECK_COLUMNS))
+    if vibrates is not None:
+        removal = with_columns(removal, STABILITY_COLUMNS)
     touched = collisions(
         steps, job.cutters, solids, op.tolerance_mm, above_only=frozenset(["part"]),
         progress=passing(0.8 + SHARE, "collisions"),
@@ -279,6 +303,7 @@ def _simulated(
     return SimulationResult(
         removal, stock, machine, material, job.limits, job.unchecked, settings, bodies.checks, left, touched,
         compared_with, _no_holder(job), gives.unknown,
+        None if vibrates is None else stability_of(job, vibrates, machine),
     )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from chipload.cutter.table import CutterTable
+from chipload.jobs.program.dynamics_tables import DynamicsTable, SpeedsTable
 from chipload.jobs.tables import (
     ChecksTable,
     Count,
@@ -120,6 +121,7 @@ class SimulateTable(Table):
         None, description="pitch of the points of the stock that shank and holder are held against; none: they are not"
     )
     feeds: FeedsTable | None = Field(None, description="new feeds for the lines of the program; none: they stay")
+    speeds: SpeedsTable | None = Field(None, description="new spindle speeds; needs [dynamics]; none: they stay")
     confidence: Number = Field(
         0.5, ge=0.5, lt=1.0, description="one-sided confidence at which limits of loads are held; 0.5: their mean"
     )
@@ -136,6 +138,10 @@ class ProgramLimitsTable(Limits):
     form_error_um: Positive | None = Field(None, description="what giving way leaves on, or takes from, the [part]")
     gouge_mm: Positive | None = Field(None, description="deepest cut into the [part]")
     excess_mm: Positive | None = Field(None, description="most material over the [part] where the tool came near it")
+    stability_margin: Positive | None = Field(
+        None, le=3.0, description="least stability margin, see [dynamics]; 1 where it is not stated"
+    )
+    sle_um: Positive | None = Field(None, description="what forced vibration leaves on, or takes from, a wall")
 
 
 #: limits that feeds can hold
@@ -175,6 +181,7 @@ class ProgramJobTable(Table):
     material: SourceTable | None = None
     cutter: tuple[CutterTable, ...] = ()
     stiffness: StiffnessTable | None = None
+    dynamics: DynamicsTable | None = None
     checks: ChecksTable = Field(default_factory=ChecksTable.model_construct)
     operation: tuple[SimulateTable, ...] = Field((), max_length=1)
     limits: ProgramLimitsTable = Field(default_factory=ProgramLimitsTable.model_construct)

@@ -48,13 +48,17 @@ def limit_table(track: PageTrack) -> str:
         go = f' data-row="{row}" class="cl-go" title="go there"' if row is not None else ""
         worst = "not known" if c.worst is None else f"{c.worst:.4g}"
         share = min(100.0 * c.worst / c.limit, 100.0) if c.worst is not None and c.limit > 0.0 else 0.0
+        least = "\u2265 " if c.column.least else ""
+        if c.column.least and c.worst:
+            share = min(100.0 * c.limit / c.worst, 100.0)
         where, state = escape(c.reason or c.where), CLASSES[c.state]
         bar = f'<div class="cl-share"><div class="cl-{state}-bar" style="width:{share:.0f}%"></div></div>'
         out.append(
-            f"<tr{go}><td>{escape(c.column.label)}</td><td class=n>{worst}</td><td class=n>{c.limit:g} {unit}</td>"
+            f"<tr{go}><td>{escape(c.column.label)}</td><td class=n>{worst}</td>"
+            f"<td class=n>{least}{c.limit:g} {unit}</td>"
             f'<td>{bar}</td><td class=cl-{state}>{c.state.value}</td><td class=w title="{where}">{where}</td></tr>'
         )
-    head = "<tr><th>limit</th><th class=n>worst</th><th class=n>at most</th><th></th><th>state</th><th>where</th></tr>"
+    head = "<tr><th>limit</th><th class=n>worst</th><th class=n>limit</th><th></th><th>state</th><th>where</th></tr>"
     return f'<table class="cl-limits"><thead>{head}</thead><tbody>{"".join(out)}</tbody></table>'
 
 

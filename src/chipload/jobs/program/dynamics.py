@@ -1,0 +1,120 @@
+"""Modes of every tool of a job, as far as they are stated.
+
+A mode without damping or stiffness is left out, and what it is of is named: stability is then unproven.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from chipload.cutter.cutter import Cutter
+from chipload.errors import InputError
+from chipload.files import read_regular
+from chipload.jobs.messages import table_errors
+from chipload.jobs.program.dynamics_tables import DynamicsTable, ModesFileTable, ModeTable
+from chipload.stability.modes import Modes
+
+#: N/mm in 1 N/um, t in 1 kg
+PER_UM, PER_KG = 1000.0, 1e-3
+#: largest file of modes [bytes]
+LARGEST_FILE = 1_000_000
+DIRECTIONS = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
+
+
+@dataclass(frozen=True, eq=False)
+class Dynamics:
+    """Modes of the tools of a job.
+
+    Parameters
+    ----------
+    modes : by tool number; a tool of which none is known is not among them
+    number : of each mode of a tool, from 1 as the job and its file list them
+    name : of each mode by this number
+    unknown : what is not stated and would be needed
+    """
+
+    modes: Mapping[int, Modes]
+    number: Mapping[int, tuple[int, ...]]
+    name: Mapping[int, str]
+    unknown: tuple[str, ...]
+
+
+def dynamics_of(table: DynamicsTable, folder: Path, cutters: Mapping[int, Cutter]) -> Dynamics:
+    """Modes of every tool.
+
+    Raises
+    ------
+    InputError
+        No mode is stated, one states stiffness and mass, names a tool that is not there, or its values cannot be.
+    """
+    listed = [*table.mode, *(read_modes(folder / table.file) if table.file is not None else ())]
+    if not listed:
+        raise InputError("dynamics: no mode: state [[dynamics.mode]] or file (chipload tap makes one)")
+    unknown: list[str] = []
+    known: list[tuple[int, ModeTable, float]] = []
+    for k, mode in enumerate(listed, 1):
+        where = f"dynamics.mode {k}"
+        if mode.tool is not None and mode.tool not in cutters:
+            raise InputError(f"{where}: tool = {mode.tool}: no [[cutter]] has this number")
+        if mode.stiffness_n_um is not None and mode.mass_kg is not None:
+            raise InputError(f"{where}: stiffness_n_um and mass_kg: state one of them")
+        stiffness = math.nan
+        if mode.stiffness_n_um is not None:
+            stiffness = PER_UM * mode.stiffness_n_um
+        elif mode.mass_kg is not None:
+            stiffness = PER_KG * mode.mass_kg * (math.tau * mode.frequency_hz) ** 2
+        else:
+            unknown.append(f"stiffness of mode {k}")
+        if mode.damping_ratio is None:
+            unknown.append(f"damping of mode {k}")
+        if mode.damping_ratio is not None and not math.isnan(stiffness):
+            known.append((k, mode, stiffness))
+    modes, number = {}, {}
+    for tool in sorted(cutters):
+        own = [x for x in known if x[1].tool in (None, tool)]
+        if not any(m.of == "cutter" and m.tool in (None, tool) for m in listed):
+            unknown.append(f"modes of tool {tool}")
+        if own:
+            modes[tool] = _modes(own)
+            number[tool] = tuple(k for k, _, _ in own)
+    names = {k: f"{m.of} {m.frequency_hz:g} Hz" for k, m in enumerate(listed, 1)}
+    return Dynamics(modes, number, names, tuple(dict.fromkeys(unknown)))
+
+
+def read_modes(path: Path) -> tuple[ModeTable, ...]:
+    """Modes of a file.
+
+    Raises
+    ------
+    InputError
+        It cannot be read or is no table of modes.
+    """
+    try:
+        raw = tomllib.loads(read_regular(path, path.name, LARGEST_FILE).decode("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as err:
+        raise InputError(f"{path.name}: no TOML: {err}") from None
+    for mode in raw.get("mode", ()) if isinstance(raw.get("mode"), list) else ():
+        if isinstance(mode, dict):
+            for key in ("residual_percent", "coherence"):
+                mode.pop(key, None)
+    try:
+        return ModesFileTable.model_validate(raw).mode
+    except ValidationError as err:
+        texts = table_errors(err, ModesFileTable)
+        raise InputError(f"{path.name}: {next(iter(texts))}") from None
+
+
+def _modes(some: Iterable[tuple[int, ModeTable, float]]) -> Modes:
+    rows = list(some)
+    return Modes(
+        frequency=[m.frequency_hz for _, m, _ in rows],  # type: ignore[arg-type]
+        damping=[m.damping_ratio for _, m, _ in rows],  # type: ignore[arg-type]
+        stiffness=[k for _, _, k in rows],  # type: ignore[arg-type]
+        direction=[DIRECTIONS[m.direction] if isinstance(m.direction, str) else m.direction for _, m, _ in rows],  # type: ignore[arg-type]
+    )

@@ -1,0 +1,49 @@
+"""The tables of a job about vibration: modes of cutter and workpiece, and speeds that are asked for."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from chipload.jobs.tables import Count, Number, Positive, Table, Text
+
+
+def _direction(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+Direction = Annotated[Literal["x", "y"] | tuple[Number, Number], BeforeValidator(_direction)]
+
+
+class ModeTable(Table):
+    """A mode of vibration at the cutter's tip, or of the workpiece where it is cut."""
+
+    tool: Count | None = Field(None, description="tool number; none: every tool")
+    of: Literal["cutter", "workpiece"] = Field("cutter", description="cutter: with holder and spindle")
+    frequency_hz: Positive = Field(description="natural frequency")
+    damping_ratio: Positive | None = Field(None, lt=1.0, description="not stated: stability is unproven")
+    stiffness_n_um: Positive | None = Field(None, description="modal stiffness")
+    mass_kg: Positive | None = Field(None, description="modal mass, in place of stiffness_n_um")
+    direction: Direction = Field(description="x, y or [x, y] of the machine")
+
+
+class DynamicsTable(Table):
+    """How cutter and workpiece vibrate: with it every step has a stability margin."""
+
+    file: Text | None = Field(None, description="modes as [[mode]], as chipload tap writes them")
+    mode: tuple[ModeTable, ...] = Field((), description="modes in the job")
+
+
+class ModesFileTable(Table):
+    """A file of modes."""
+
+    mode: tuple[ModeTable, ...] = Field(min_length=1)
+    source: str = ""
+
+
+class SpeedsTable(Table):
+    """New spindle speeds, one a tool, with the greatest stability margin; the feed per tooth stays."""
+
+    least_rpm: Positive | None = Field(None, description="none: that of the machine")
+    most_rpm: Positive | None = Field(None, description="none: that of the machine")

@@ -1,0 +1,193 @@
+"""New spindle speeds for a program that exists: from the margins of its steps to its own text with other S words.
+
+One speed a tool, the one with the greatest least margin of those cuts of the tool that are nearest to chatter or
+longest in cut. The feed per tooth stays. The new text is read again, and motion by motion it must be the old program at
+the wanted speeds and feeds; what then holds is said by simulating it from fresh stock, which is done by the caller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutting.material import Material
+from chipload.errors import InputError
+from chipload.jobs.checks import CHECK_COLUMNS, with_checks
+from chipload.jobs.program.dynamics import dynamics_of
+from chipload.jobs.program.feeds import changeable, read_as
+from chipload.jobs.program.job import ProgramJob
+from chipload.jobs.program.outcome import SpeedResult, ToolSpeed
+from chipload.jobs.program.preparation import resolution_of, timed
+from chipload.jobs.program.stability import (
+    DEFAULT_MARGIN,
+    STABILITY_COLUMNS,
+    StabilityResult,
+    StabilityWatch,
+    rounded_rpm,
+)
+from chipload.jobs.program.stiffness import deflecting, stiffness_of, watched, with_columns
+from chipload.jobs.program.tables import SimulateTable
+from chipload.machine.machine import Machine
+from chipload.program.gcode.feed_words import DIGITS
+from chipload.program.gcode.speed_words import speed_words, with_speeds
+from chipload.program.program import DWELL, RAPID, Program
+from chipload.program.read import ProgramReading
+from chipload.progress import Progress
+from chipload.simulation.chips import remove
+from chipload.simulation.loads import Cuts, Floats
+from chipload.stock.layers import LayeredStock
+from chipload.units import rpm_from_rad_s
+
+#: a speed that gains less than this in margin stays as it is
+GAIN = 0.02
+
+
+def watch_of(job: ProgramJob, material: Material) -> StabilityWatch | None:
+    """What asks for margins; None: no modes are stated."""
+    if job.table.dynamics is None:
+        return None
+    return StabilityWatch(dynamics_of(job.table.dynamics, job.path.parent, job.cutters), material)
+
+
+def stability_of(job: ProgramJob, watch: StabilityWatch, machine: Machine) -> StabilityResult:
+    """The result of a watch that has seen every step."""
+    wanted = max(job.limits.get("stability_margin", DEFAULT_MARGIN), DEFAULT_MARGIN)
+    radii = {n: c.radius for n, c in job.cutters.items()}
+    asked = job.table.operation[0].speeds
+    speeds = (None, None) if asked is None else (asked.least_rpm, asked.most_rpm)
+    return StabilityResult(watch, machine, wanted, radii, speeds)
+
+
+def speeds_changeable(path: Path, machine: Machine, dialect: str | None) -> tuple[str, str]:
+    """The text of a program whose speeds can be changed, and its dialect.
+
+    Raises
+    ------
+    InputError
+        They cannot be changed in the text; the message says what to do.
+    """
+    try:
+        text, kind = changeable(path, machine, dialect)
+    except InputError as err:
+        raise InputError(str(err).replace("operation.0.feeds", "operation.0.speeds")) from None
+    speed_words(text)
+    return text, kind
+
+
+def new_speeds(
+    job: ProgramJob,
+    text: str,
+    dialect: str,
+    reading: ProgramReading,
+    stock: LayeredStock,
+    material: Material,
+    machine: Machine,
+    read: Callable[[str], ProgramReading],
+    seconds: float,
+    progress: Progress,
+) -> tuple[SpeedResult, ProgramReading]:
+    """The text with new speeds, from what the program cuts of a stock, which changes; and what it does then.
+
+    Raises
+    ------
+    InputError
+        The speeds cannot be changed in the text: the line is named.
+    """
+    op: SimulateTable = job.table.operation[0]
+    stability = watch_of(job, material)
+    assert stability is not None
+    gives = stiffness_of(job.table.stiffness, job.cutters)
+    bends = with_checks(job.table.checks, material, deflecting(gives, material))
+    program, times = timed(reading, job, machine)
+
+    def watch(cuts: Cuts) -> dict[str, Floats]:
+        return {**bends(cuts), **stability(cuts)}
+
+    before = remove(
+        program, stock, job.cutters, material, resolution_of(job, reading.program), interpolation=op.interpolation,
+        times=times, watch=watch, accuracy=False, engine=op.engine, progress=progress,
+    )  # fmt: skip
+    before = with_columns(before, (*watched(gives), *CHECK_COLUMNS, *STABILITY_COLUMNS))
+    found = stability_of(job, stability, machine)
+    tools = _advised(found, reading.program)
+    new = _new_text(text, reading.program, {t.tool: t.rpm for t in tools})
+    after = read(read_as(new))
+    _same(reading.program, after.program, {t.tool: t.rpm for t in tools})
+    return SpeedResult(new, dialect, tools, before, found, seconds), after
+
+
+def _advised(stability: StabilityResult, program: Program) -> tuple[ToolSpeed, ...]:
+    """What each tool with known cuts gets; a tool that has one speed which is as good keeps it."""
+    out = []
+    for tool, quiet in stability.quiet.items():
+        moving = (
+            (program.tool == tool) & (program.motion != RAPID) & (program.motion != DWELL) & (program.spindle != 0.0)
+        )
+        own = np.unique(np.abs(program.spindle[moving]))
+        if not len(own):
+            continue
+        speed, margin = quiet.advised(float(own[-1]))
+        rpm = rounded_rpm(speed)
+        present = float(np.interp(own[-1], quiet.speed, quiet.margin))
+        if len(own) == 1 and present >= stability.wanted and margin <= present + GAIN:
+            rpm, margin = rpm_from_rad_s(float(own[0])), present
+        before = tuple(round(rpm_from_rad_s(float(x)), 6) for x in own)
+        out.append(ToolSpeed(tool, before, rpm, margin))
+    return tuple(out)
+
+
+def _new_text(text: str, program: Program, wanted: Mapping[int, float]) -> str:
+    """The text with the wanted speeds [1/min] of tools."""
+    words = speed_words(text)
+    starts = np.array([w.line for w in words], dtype=np.int64)
+    cuts = (program.motion != RAPID) & (program.motion != DWELL) & (program.spindle != 0.0)
+    under = np.searchsorted(starts, program.line, side="right") - 1
+    speeds: dict[int, float] = {}
+    for k, word in enumerate(words):
+        tools = set(program.tool[cuts & (under == k)].tolist())
+        if not tools & set(wanted):
+            continue
+        if len(tools) > 1:
+            named = ", ".join(map(str, sorted(tools)))
+            raise InputError(
+                f"line {word.line}: S{word.rpm:g} holds for tools {named}: write an S word behind each tool change"
+            )
+        speeds[word.line] = wanted[tools.pop()]
+    lost = cuts & (under < 0) & np.isin(program.tool, list(wanted))
+    if lost.any():
+        raise InputError(f"line {program.line[lost][0]}: cuts at a speed that no S word above it states")
+    feeds: dict[int, float] = {}
+    for row in np.flatnonzero((program.motion != RAPID) & (program.motion != DWELL)).tolist():
+        line, tool = int(program.line[row]), int(program.tool[row])
+        old = abs(rpm_from_rad_s(float(program.spindle[row])))
+        factor = wanted[tool] / old if tool in wanted and old > 0.0 else 1.0
+        if feeds.setdefault(line, factor) != factor:
+            raise InputError(f"line {line}: moves at two speeds: write them on lines of their own")
+    return with_speeds(text, speeds, {line: 1.0 if abs(f - 1.0) < 1e-9 else f for line, f in feeds.items()})
+
+
+def _same(old: Program, new: Program, wanted: Mapping[int, float]) -> None:
+    """Refuse a new text that is not the old program at the wanted speeds and with its feed per tooth."""
+    wrong, at = len(old) != len(new), 0
+    if not wrong:
+        off: NDArray[np.bool_] = np.zeros(len(old), dtype=np.bool_)
+        for name in ("motion", "p_work", "axis", "centre", "normal", "turns", "tool", "line"):
+            differs = np.asarray(getattr(old, name)) != np.asarray(getattr(new, name))
+            off |= differs if differs.ndim == 1 else differs.any(axis=1)
+        moves = (old.motion != RAPID) & (old.motion != DWELL)
+        factor = np.ones(len(old))
+        for tool, rpm in wanted.items():
+            own = moves & (old.tool == tool) & (old.spindle != 0.0)
+            speed = np.sign(old.spindle[own]) * rpm / rpm_from_rad_s(1.0)
+            off[own] |= np.abs(new.spindle[own] - speed) > 1e-9 * np.abs(speed)
+            factor[own] = np.abs(speed / old.spindle[own])
+        rounded = 1.01 * 10.0 ** (1 - DIGITS)
+        feed = old.feed * factor
+        off |= moves & ((new.feed > feed * (1.0 + 1e-9)) | (new.feed < feed * (1.0 - rounded)))
+        wrong, at = bool(off.any()), int(old.line[np.argmax(off)])
+    if wrong:
+        where = f"line {at}: " if at else ""
+        raise InputError(f"{where}its speed cannot be set by words of its own: convert the program first")

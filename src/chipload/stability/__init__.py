@@ -1,0 +1,53 @@
+"""Chatter: how far a cut is from it, at which speeds it is quiet, and where the forced motion leaves the wall."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from chipload.lazy import attach
+
+if TYPE_CHECKING:
+    from chipload.stability.chart import StabilityChart, critical_depth, stability_chart
+    from chipload.stability.cuts import DynamicCuts, dynamic_cuts
+    from chipload.stability.grouping import CutGroups, grouped
+    from chipload.stability.margin import StabilityMargins, largest_multipliers, stability_margins
+    from chipload.stability.modes import Modes
+    from chipload.stability.speeds import QuietSpeeds, SpeedWindow, quiet_speeds
+    from chipload.stability.surface_error import location_error
+    from chipload.stability.variable_pitch import revolution_multiplier
+    from chipload.stability.zero_order import zero_order_margin
+
+__all__ = [
+    "CutGroups",
+    "DynamicCuts",
+    "Modes",
+    "QuietSpeeds",
+    "SpeedWindow",
+    "StabilityChart",
+    "StabilityMargins",
+    "critical_depth",
+    "dynamic_cuts",
+    "grouped",
+    "largest_multipliers",
+    "location_error",
+    "quiet_speeds",
+    "revolution_multiplier",
+    "stability_chart",
+    "stability_margins",
+    "zero_order_margin",
+]
+
+__getattr__, __dir__ = attach(
+    __name__,
+    {
+        "chart": "StabilityChart critical_depth stability_chart",
+        "cuts": "DynamicCuts dynamic_cuts",
+        "grouping": "CutGroups grouped",
+        "surface_error": "location_error",
+        "margin": "StabilityMargins largest_multipliers stability_margins",
+        "modes": "Modes",
+        "speeds": "QuietSpeeds SpeedWindow quiet_speeds",
+        "variable_pitch": "revolution_multiplier",
+        "zero_order": "zero_order_margin",
+    },
+)

@@ -1,0 +1,129 @@
+"""Cuts as the stability kernels take them: tooth engagement, force coefficients, speed, modes.
+
+Notation: as in :mod:`chipload.stability.directional._kernels`. On a slice whose outward normal makes the angle kappa
+with the axis, a displacement r across the axis changes the chip thickness by sin(kappa) u.r, and the force across the
+axis is -dFt e - (sin(kappa) dFr + cos(kappa) dFa) u. So kt = sin(kappa) Ktc, kr = sin(kappa)^2 Krc,
+ka = sin(kappa) cos(kappa) Kac; with an exponent m each is (1 - m) times that at a thickness of 1 mm, the slope of the
+force at the nominal thickness. Edge forces do not depend on the thickness. Thrust is rigid, runout is left out: each
+tooth cuts what the one before it left.
+
+Reference: [Altintas1995]; [Engin2001] for kappa.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material
+from chipload.engagement.tooth_engagement import ToothEngagement
+from chipload.errors import InputError
+from chipload.stability.modes import Modes
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class DynamicCuts:
+    """n cuts by one cutter.
+
+    Parameters
+    ----------
+    start : (n + 1,) int; the rows of cut i are start[i] .. start[i + 1] - 1
+    rows : (b, 11) float, as the kernels take them
+    exponents : (3,) float, of the size effect
+    period : (n,) float [s], time between two teeth
+    pitch : angle between two teeth [rad]
+    modes : of cutter and work
+    U : (n, 2, M) float, their shapes along T and n of each cut
+    """
+
+    start: Ints
+    rows: Floats
+    exponents: Floats
+    period: Floats
+    pitch: float
+    modes: Modes
+    U: Floats
+
+    def __len__(self) -> int:
+        return len(self.period)
+
+    def at_speeds(self, period: ArrayLike) -> DynamicCuts:
+        """The same cuts with other times between two teeth [s]."""
+        times = np.array(np.broadcast_to(np.asarray(period, dtype=np.float64), (len(self),)))
+        if not ((times > 0.0) & np.isfinite(times)).all():
+            raise InputError("stability: the time between two teeth must be above 0 s")
+        return DynamicCuts(self.start, self.rows, self.exponents, times, self.pitch, self.modes, self.U)
+
+    def chosen(self, index: ArrayLike) -> DynamicCuts:
+        """Some of the cuts, also several times."""
+        at = np.asarray(index, dtype=np.int64).ravel()
+        size = np.diff(self.start)[at]
+        start = np.concatenate([[0], np.cumsum(size)])
+        row = np.repeat(self.start[at] - start[:-1], size) + np.arange(start[-1])
+        return DynamicCuts(
+            start, np.ascontiguousarray(self.rows[row]), self.exponents, np.ascontiguousarray(self.period[at]),
+            self.pitch, self.modes, np.ascontiguousarray(self.U[at]),
+        )  # fmt: skip
+
+
+def dynamic_cuts(
+    engagement: ToothEngagement,
+    cutter: Cutter,
+    material: Material,
+    modes: Modes,
+    speed: ArrayLike,
+    T: ArrayLike | None = None,
+    n: ArrayLike | None = None,
+) -> DynamicCuts:
+    """Cuts of a cutter at their speeds.
+
+    Parameters
+    ----------
+    engagement : without runout; one tooth period is that of evenly spaced teeth
+    speed : () or (n,) float [rad/s], of the spindle, either sign
+    T, n : (n, 2) float, in x and y of the machine; None: those of ``engagement.frame``
+
+    Raises
+    ------
+    InputError
+        The spindle stands, teeth are listed one by one, or there is no frame.
+    """
+    if (engagement.tooth >= 0).any():
+        raise InputError("stability: tooth engagement of single teeth: give the engagement without runout")
+    omega = np.abs(np.broadcast_to(np.asarray(speed, dtype=np.float64), (len(engagement),)))
+    if not ((omega > 0.0) & np.isfinite(omega)).all():
+        raise InputError("stability: a spindle speed of 0: must be above 0 rad/s")
+    if T is None or n is None:
+        if engagement.frame is None:
+            raise InputError("stability: the tooth engagement has no frames: give T and n")
+        T, n = engagement.frame[:, 0, :2], engagement.frame[:, 1, :2]
+    U = modes.in_frames(T, n)
+    if len(U) != len(engagement):
+        raise InputError(f"stability: {len(U)} frames for {len(engagement)} cuts: need one each")
+    return DynamicCuts(
+        np.array(engagement.start), kernel_rows(engagement, material), np.array(material.exponents, dtype=np.float64),
+        np.ascontiguousarray(math.tau / (cutter.flutes * omega)), math.tau / cutter.flutes, modes, U,
+    )  # fmt: skip
+
+
+def kernel_rows(engagement: ToothEngagement, material: Material) -> Floats:
+    """(b, 11) float: phi from and to, lag at both ends, length, kt, kr, ka, along, across, offset."""
+    own = engagement.slices[engagement.slice]
+    low, high, s_from, s_to, along, offset, across = engagement.rows.T
+    sine, cosine, lag, rate = own[:, 3], own[:, 4], own[:, 5], own[:, 6]
+    kt, kr, ka = ((1.0 - m) * k for m, k in zip(material.exponents, material.coefficients[:3], strict=True))
+    first = lag + rate * (s_from - own[:, 0])
+    length = s_to - s_from
+    return np.ascontiguousarray(
+        np.column_stack(
+            [low, high, first, first + rate * length, length, kt * sine, kr * sine**2, ka * sine * cosine, along,
+             across, offset]
+        )
+    )  # fmt: skip

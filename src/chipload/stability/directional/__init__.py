@@ -1,0 +1,1 @@
+"""How the cutting force answers a displacement, cell by cell of a tooth period."""

@@ -1,0 +1,1 @@
+"""Harmonics of the cutting force."""

@@ -1,0 +1,129 @@
+"""How far cuts are from chatter: the greatest multiplier, and the factor on the force at which it is 1.
+
+Notation: mu the greatest multiplier of the map of one tooth period; |mu| < 1: a disturbance dies out. The margin is the
+factor on all cutting coefficients, and for straight teeth on the axial depth, at which |mu| = 1: below 1 the cut
+chatters. It is found up to :data:`MOST_MARGIN` and is that where the cut is stable at each factor that is looked at.
+At the margin the vector of mu says which mode chatters, its angle at which frequency.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.errors import InputError
+from chipload.stability import _kernels
+from chipload.stability.cuts import DynamicCuts
+
+Floats = NDArray[np.float64]
+
+#: greatest margin that is told from a greater one
+MOST_MARGIN = float(_kernels.ABOVE[-1])
+#: cells of the map in a wave of the fastest mode, and where values are printed
+PER_WAVE, PER_WAVE_EXACT = 9.0, 40.0
+#: dimensions of the Krylov space beside two a mode, and how still |mu| is then
+SPARE, STILL = 24, 1e-4
+#: the same where values are printed
+SPARE_EXACT, STILL_EXACT = 60, 1e-10
+#: cuts that one thread takes at once, and most threads
+CHUNK, MOST_THREADS = 32, 8
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityMargins:
+    """What is known of n cuts.
+
+    Parameters
+    ----------
+    margin : (n,) float, 0 < margin <= :data:`MOST_MARGIN`
+    frequency : (n,) float [Hz], of chatter at the margin; 0: the margin is the greatest
+    mode : (n,) int, number of the mode that chatters, from 0; -1: none does
+    growth : (n,) float, log |mu| of the cut as it is; above 0 it chatters
+    """
+
+    margin: Floats
+    frequency: Floats
+    mode: NDArray[np.int64]
+    growth: Floats
+
+    def __len__(self) -> int:
+        return len(self.margin)
+
+
+def largest_multipliers(
+    cuts: DynamicCuts,
+    gain: ArrayLike = 1.0,
+    *,
+    per_wave: float = PER_WAVE_EXACT,
+    most: int | None = None,
+    still: float = STILL_EXACT,
+) -> NDArray[np.complex128]:
+    """Multiplier of greatest modulus of each cut, of a pair the one above the real axis, (n,) complex.
+
+    Parameters
+    ----------
+    gain : () or (n,) float, factor on the cutting force
+    per_wave : cells of the map in a wave of the fastest mode; the error falls with its fourth power
+    most : dimensions of the Krylov space; None: enough to print the value
+    still : how little |mu| moves over two dimensions when it ends
+
+    Raises
+    ------
+    InputError
+        An eigenvalue was not found.
+    """
+    factor = np.array(np.broadcast_to(np.asarray(gain, dtype=np.float64), (len(cuts),)))
+    out = np.zeros((len(cuts), 3))
+    pitch = np.full(len(cuts), cuts.pitch)
+    dimension = 2 * len(cuts.modes) + SPARE_EXACT if most is None else most
+
+    def part(first: int, last: int) -> None:
+        _kernels.multipliers(
+            first, last, cuts.start, cuts.rows, cuts.exponents, cuts.period, pitch, cuts.modes.omega,
+            np.array(cuts.modes.damping), cuts.U, factor, per_wave, dimension, still, out,
+        )  # fmt: skip
+
+    shared(part, len(cuts))
+    if (out[:, 0] < 0.0).any():
+        raise InputError("stability: a multiplier was not found: check frequency and damping of the modes")
+    return np.asarray(out[:, 0] * np.exp(1j * out[:, 1]))
+
+
+def stability_margins(cuts: DynamicCuts) -> StabilityMargins:
+    """Margins of cuts; each costs five to ten evaluations of the map.
+
+    Raises
+    ------
+    InputError
+        An eigenvalue was not found.
+    """
+    out = np.zeros((len(cuts), 5))
+    pitch = np.full(len(cuts), cuts.pitch)
+
+    def part(first: int, last: int) -> None:
+        _kernels.margins(
+            first, last, cuts.start, cuts.rows, cuts.exponents, cuts.period, pitch, cuts.modes.omega,
+            np.array(cuts.modes.damping), cuts.U, PER_WAVE, 2 * len(cuts.modes) + SPARE, STILL, out,
+        )  # fmt: skip
+
+    shared(part, len(cuts))
+    if (out[:, 0] < 0.0).any():
+        raise InputError("stability: a multiplier was not found: check frequency and damping of the modes")
+    return StabilityMargins(out[:, 0], out[:, 1], out[:, 2].astype(np.int64), out[:, 3])
+
+
+def shared(part: Callable[[int, int], None], count: int) -> None:
+    """Call ``part(first, last)`` on chunks of ``count`` things in threads."""
+    ends = [(k, min(k + CHUNK, count)) for k in range(0, count, CHUNK)]
+    threads = min(os.cpu_count() or 1, MOST_THREADS, len(ends))
+    if threads < 2:
+        for first, last in ends:
+            part(first, last)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(lambda ab: part(*ab), ends))

@@ -1,0 +1,99 @@
+"""Modes of cutter and workpiece at the cut.
+
+Notation: f natural frequency [Hz], w = 2 pi f, z damping ratio, k modal stiffness [N/mm], m = k / w^2 modal mass [t];
+a unit direction in the machine's x and y; U = direction / sqrt(m), so that r = U q with q'' + 2 z w q' + w^2 q = U^T F
+for the displacement r of the cutter from the work under the force F on the cutter. A mode of the workpiece enters in
+the same way: cutter and work part by the sum of both.
+
+The axial motion is taken as rigid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+
+#: values that are believed: frequency [Hz], damping ratio, stiffness [N/mm]
+FREQUENCY, DAMPING, STIFFNESS = (1.0, 50_000.0), (1e-5, 0.5), (10.0, 1e8)
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Modes of one cutter, in its holder, with those of the workpiece.
+
+    Parameters
+    ----------
+    frequency : (M,) float [Hz]
+    damping : (M,) float, damping ratio
+    stiffness : (M,) float [N/mm], modal stiffness at the tip
+    direction : (M, 2) float, in x and y of the machine; made unit vectors
+
+    Raises
+    ------
+    InputError
+        Shapes do not agree, or a value is outside of what is believed.
+
+    Examples
+    --------
+    >>> one = Modes([100.0], [0.02], [5000.0], [[0.0, 2.0]])
+    >>> one.direction.tolist(), float(one.mass[0].round(8))
+    ([[0.0, 1.0]], 0.01266515)
+    """
+
+    frequency: Floats
+    damping: Floats
+    stiffness: Floats
+    direction: Floats
+
+    def __post_init__(self) -> None:
+        for name, (low, high), unit in (
+            ("frequency", FREQUENCY, " Hz"), ("damping", DAMPING, ""), ("stiffness", STIFFNESS, " N/mm"),
+        ):  # fmt: skip
+            value = np.array(getattr(self, name), dtype=np.float64)
+            if value.ndim != 1 or value.shape != np.shape(self.frequency) or len(value) == 0:
+                raise InputError(f"modes.{name} of shape {value.shape}: must be a number for each of one or more modes")
+            bad = np.flatnonzero(~((value >= low) & (value <= high)))
+            if len(bad):
+                raise InputError(f"modes.{name} = {value[bad[0]]:g}{unit}: must be from {low:g} to {high:g}{unit}")
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+        direction = np.array(self.direction, dtype=np.float64)
+        if direction.shape != (len(self), 2):
+            raise InputError(f"modes.direction of shape {direction.shape}: must be ({len(self)}, 2)")
+        size = np.hypot(direction[:, 0], direction[:, 1])
+        if not (np.isfinite(size) & (size > 0.0)).all():
+            raise InputError("modes.direction: must be finite and not 0")
+        direction /= size[:, None]
+        direction.setflags(write=False)
+        object.__setattr__(self, "direction", direction)
+
+    def __len__(self) -> int:
+        return len(self.frequency)
+
+    @property
+    def omega(self) -> Floats:
+        """(M,) natural frequencies [rad/s]."""
+        return np.asarray(2.0 * np.pi * self.frequency)
+
+    @property
+    def mass(self) -> Floats:
+        """(M,) modal masses [t]."""
+        return np.asarray(self.stiffness / self.omega**2)
+
+    def in_frames(self, T: ArrayLike, n: ArrayLike) -> Floats:
+        """U (c, 2, M) of cuts whose T and n are given as (c, 2) in x and y of the machine [1/sqrt(t)]."""
+        axes = np.stack([np.asarray(T, dtype=np.float64), np.asarray(n, dtype=np.float64)], axis=1)
+        return np.ascontiguousarray(np.einsum("caj,kj->cak", axes, self.direction) / np.sqrt(self.mass))
+
+    def receptance(self, omega: ArrayLike) -> NDArray[np.complex128]:
+        """(.., 2, 2) displacement in x and y per force at angular frequencies [rad/s], [mm/N]."""
+        w = np.asarray(omega, dtype=np.float64)[..., None]
+        share = 1.0 / (self.omega**2 - w**2 + 2j * self.damping * self.omega * w)
+        shape = self.direction.T / np.sqrt(self.mass)
+        return np.asarray(np.einsum("ak,...k,bk->...ab", shape, share, shape))

@@ -1,0 +1,1 @@
+"""The map of a revolution of a cutter whose teeth are not evenly spaced."""

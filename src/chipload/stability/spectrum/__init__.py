@@ -1,0 +1,1 @@
+"""Greatest eigenvalue of a small Hessenberg matrix."""

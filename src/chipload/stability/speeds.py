@@ -1,0 +1,107 @@
+"""Quiet speeds: the least margin of several cuts over spindle speeds, its windows, and the speed to take.
+
+Notation: margin as in :mod:`chipload.stability.margin`; at a speed the least over all cuts counts. A window is a range
+of the speeds that were looked at in which it is at least what is wanted. The speed to take has the greatest least
+margin; where many have the same (the greatest that is told), the one farthest from where it falls, then the nearest to
+the present speed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.errors import InputError
+from chipload.stability.cuts import DynamicCuts
+from chipload.stability.margin import stability_margins
+
+Floats = NDArray[np.float64]
+
+#: margins that differ by less than this are the same
+ALIKE = 0.02
+
+
+@dataclass(frozen=True)
+class SpeedWindow:
+    """Speeds from ``low`` to ``high`` [rad/s], both looked at; the greatest least margin is ``margin`` at ``best``."""
+
+    low: float
+    high: float
+    best: float
+    margin: float
+
+
+@dataclass(frozen=True, eq=False)
+class QuietSpeeds:
+    """Least margins over speeds.
+
+    Parameters
+    ----------
+    speed : (s,) float [rad/s]
+    margin : (s,) float, least of all cuts
+    wanted : margin that is asked for
+    """
+
+    speed: Floats
+    margin: Floats
+    wanted: float
+
+    @property
+    def windows(self) -> tuple[SpeedWindow, ...]:
+        """Ranges of speeds with the wanted margin, by speed."""
+        good = np.concatenate([[False], self.margin >= self.wanted, [False]])
+        edges = np.flatnonzero(np.diff(good.astype(np.int8))).reshape(-1, 2)
+        out = []
+        for a, b in edges.tolist():
+            k = a + int(np.argmax(self.margin[a:b]))
+            low, high, best = (float(self.speed[i]) for i in (a, b - 1, k))
+            out.append(SpeedWindow(low, high, best, float(self.margin[k])))
+        return tuple(out)
+
+    def advised(self, present: float) -> tuple[float, float]:
+        """Speed to take [rad/s] and its least margin.
+
+        >>> found = QuietSpeeds(np.arange(1.0, 8.0), np.array([0.5, 3.0, 3.0, 3.0, 0.9, 3.0, 0.4]), 1.0)
+        >>> found.advised(6.0)
+        (3.0, 3.0)
+        """
+        good = self.margin >= self.margin.max() * (1.0 - ALIKE)
+        # what lies beyond the speeds that were looked at is not known: it counts as falling
+        other = np.concatenate([[-1], np.flatnonzero(~good), [len(good)]])
+        far = np.abs(np.arange(len(good))[:, None] - other[None, :]).min(axis=1)
+        order = np.lexsort((np.abs(self.speed - present), -far, ~good))
+        k = int(order[0])
+        return float(self.speed[k]), float(self.margin[k])
+
+
+def quiet_speeds(parts: Sequence[DynamicCuts], speed: ArrayLike, wanted: float) -> QuietSpeeds:
+    """Least margins of cuts at speeds.
+
+    Parameters
+    ----------
+    parts : cuts; their own speeds do not count
+    speed : (s,) float [rad/s], rising, above 0
+    wanted : margin above which a speed is quiet
+
+    Raises
+    ------
+    InputError
+        There is no cut, or speeds do not rise from above 0.
+    """
+    speeds = np.asarray(speed, dtype=np.float64)
+    if not sum(map(len, parts)):
+        raise InputError("quiet speeds: no cut: nothing to look at")
+    if speeds.ndim != 1 or not len(speeds) or not (speeds[0] > 0.0 and (np.diff(speeds) > 0.0).all()):
+        raise InputError("quiet speeds: speeds must rise from above 0 rad/s")
+    least = np.full(len(speeds), np.inf)
+    for cuts in parts:
+        if not len(cuts):
+            continue
+        some = cuts.chosen(np.repeat(np.arange(len(cuts)), len(speeds)))
+        some = some.at_speeds(np.tile(cuts.pitch / speeds, len(cuts)))
+        found = stability_margins(some).margin.reshape(len(cuts), len(speeds))
+        least = np.minimum(least, found.min(axis=0))
+    return QuietSpeeds(speeds, least, wanted)

@@ -1,0 +1,85 @@
+"""Surface location error: where the forced vibration of a stable cut leaves the wall.
+
+Notation: a stable motion without runout has the tooth period, so that r(t) = r(t - tau) and the regenerative force is
+0: the motion is that of the modes under the force of the rigid model, r_k = G(i k 2 pi / tau) F_k for each harmonic.
+The wall at a height is made when the edge passes there at phi = 0 (up milling) or pi (down milling). The error is
+positive where material is left, as a form error is. It changes sign where the tooth frequency passes that of a mode.
+
+It says nothing of a cut that chatters. Modes that are left out are rigid here.
+
+Reference: [Schmitz2009] ch. 5 for the effect.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material
+from chipload.engagement.tooth_engagement import ToothEngagement
+from chipload.errors import InputError
+from chipload.stability.cuts import DynamicCuts, dynamic_cuts
+from chipload.stability.location import _kernels
+from chipload.stability.margin import shared
+from chipload.stability.modes import Modes
+
+Floats = NDArray[np.float64]
+
+
+def force_rows(engagement: ToothEngagement, material: Material) -> Floats:
+    """(b, 11) float, rows as the kernel takes them.
+
+    Raises
+    ------
+    InputError
+        The material has a size effect.
+    """
+    if any(material.exponents):
+        raise InputError(
+            f"material {material.name}: has a size effect: the surface location error is known for coefficients "
+            "without exponents only"
+        )
+    own = engagement.slices[engagement.slice]
+    low, high, s_from, s_to, along, offset, across = engagement.rows.T
+    sine, cosine, lag, rate = own[:, 3], own[:, 4], own[:, 5], own[:, 6]
+    first = lag + rate * (s_from - own[:, 0])
+    cut, edge = material.Krc * sine + material.Kac * cosine, material.Kre * sine + material.Kae * cosine
+    tangential = (material.Ktc * offset + material.Kte, material.Ktc * along, material.Ktc * across)
+    radial = (cut * offset + edge, cut * along, cut * across)
+    ends = (low, high, first, first + rate * (s_to - s_from), s_to - s_from)
+    return np.ascontiguousarray(np.column_stack([*ends, *tangential, *radial]))
+
+
+def location_error(
+    engagement: ToothEngagement,
+    cutter: Cutter,
+    material: Material,
+    modes: Modes,
+    speed: ArrayLike,
+    T: ArrayLike | None = None,
+    n: ArrayLike | None = None,
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Error of the wall of greatest size over its height, (n,) float [mm], and whether a cut makes a wall, (n,) bool.
+
+    Parameters as :func:`chipload.stability.cuts.dynamic_cuts`. A cut that makes no wall has the error 0.
+    """
+    cuts = dynamic_cuts(engagement, cutter, material, modes, speed, T, n)
+    return wall_errors(cuts, force_rows(engagement, material))
+
+
+def wall_errors(cuts: DynamicCuts, rows: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """As :func:`location_error`, of cuts and the rows of :func:`force_rows`."""
+    out = np.zeros((len(cuts), 2))
+    teeth = round(math.tau / cuts.pitch)
+
+    def part(first: int, last: int) -> None:
+        _kernels.wall_errors(
+            first, last, cuts.start, rows, cuts.period, teeth, cuts.modes.omega, np.array(cuts.modes.damping), cuts.U,
+            out,
+        )  # fmt: skip
+
+    shared(part, len(cuts))
+    return out[:, 0], out[:, 1] > 0.0
