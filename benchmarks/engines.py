@@ -27,7 +27,8 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import material_named
 from chipload.engagement.moves.stock import MoveStock
 from chipload.program.program import LINE, RAPID, Program
-from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.chips import remove
+from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
 from simulation import BALL, finishing
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.simulation.accuracy import COMPARED
-from chipload.simulation.chips import Removal, Resolution, remove
+from chipload.simulation.chips import remove
+from chipload.simulation.removal import Removal, Resolution
 from chipload.stock.layers import LayeredStock
 from engagement.moves.field import BULL, TAPER, Field
 from simulation.test_moves import path

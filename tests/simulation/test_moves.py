@@ -21,7 +21,7 @@ from chipload.program.build import rapid, rows
 from chipload.program.program import LINE, Program
 from chipload.simulation.accuracy import COMPARED, MOVES_FLOOR, WITH_FORCE
 from chipload.simulation.checkpoint import Checkpoint
-from chipload.simulation.chips import Removal, Resolution, remove
+from chipload.simulation.chips import remove
 from chipload.simulation.chunks import remove_in_chunks
 from chipload.simulation.loads import (
     BANDS,
@@ -32,6 +32,7 @@ from chipload.simulation.loads import (
     loads_of_steps,
     over_turn,
 )
+from chipload.simulation.removal import Removal, Resolution
 from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]
