@@ -38,7 +38,7 @@ from chipload.stock.layers import LayeredStock
 Floats = NDArray[np.float64]
 MILL = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
 BALL = Cutter(8.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=4.0, runout=(0.01, 0.3))
-FINE = Resolution(step_mm=1.0, tolerance=0.001, corner_pieces=12, flank_mm=2.5)
+FINE = Resolution(step_mm=1.0, tolerance=0.001, corner_pieces=24, flank_mm=2.5)
 ALLOY = replace(material_named("al7075-t6"), spread=0.05)
 LOW, HIGH = (0.0, 0.0, -8.0), (40.0, 30.0, 0.0)
 
