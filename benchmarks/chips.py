@@ -35,7 +35,8 @@ from chipload.cutting.material import material_named
 from chipload.engagement.chips.covered import covered_areas
 from chipload.engagement.chips.move import Move
 from chipload.program.program import LINE, RAPID, Program
-from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.chips import remove
+from chipload.simulation.removal import Resolution
 from chipload.stock.dexel import TriDexel
 from chipload.stock.layers import LayeredStock
 

@@ -27,7 +27,8 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import material_named
 from chipload.engagement.moves.stock import MoveStock
 from chipload.program.program import LINE, RAPID, Program
-from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.chips import remove
+from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
 from simulation import BALL, finishing
 
@@ -105,7 +106,7 @@ def p99(some: Floats, known: Floats) -> float:
 
 def million() -> list[str]:
     begun = time.process_time()
-    seconds, _ = simulated("finishing", 1_000_000, 12, 2.0)
+    seconds, _ = simulated("finishing", 1_000_000, 24, 2.0)
     used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     print(f"finishing, 1000000 moves: {seconds:.1f} s, peak {used:.0f} MB (all {time.process_time() - begun:.1f} s)")
     late = [f"10^6 moves take {seconds:.0f} s"] if seconds > 1.2 * MILLION_S else []
@@ -122,14 +123,14 @@ def main() -> None:
     missed = []
     for name, (rate, worst) in GOALS.items():
         _, cutter, _, _ = case(name, 10)
-        simulated(name, 300, 12, 0.5 * cutter.radius)
-        each = statistics.median(simulated(name, args.moves, 12, 0.5 * cutter.radius)[0] for _ in range(3))
+        simulated(name, 300, 24, 0.5 * cutter.radius)
+        each = statistics.median(simulated(name, args.moves, 24, 0.5 * cutter.radius)[0] for _ in range(3))
         alone = statistics.median(geometry(name, args.moves) for _ in range(3))
         stated = statistics.median(
-            simulated(name, args.moves, 12, 0.5 * cutter.radius, accuracy=True)[0] for _ in range(3)
+            simulated(name, args.moves, 24, 0.5 * cutter.radius, accuracy=True)[0] for _ in range(3)
         )
-        some = simulated(name, args.few, 12, 0.5 * cutter.radius)[1]
-        known = simulated(name, args.few, 96, cutter.radius / 16.0)[1]
+        some = simulated(name, args.few, 24, 0.5 * cutter.radius)[1]
+        known = simulated(name, args.few, 192, cutter.radius / 16.0)[1]
         print(
             f"{name}, {args.moves} moves: {args.moves / stated:.0f} moves/s with loads and their error, "
             f"{args.moves / each:.0f} with loads, {args.moves / alone:.0f} geometry"

@@ -28,8 +28,9 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import material_named
 from chipload.program.program import LINE, RAPID, Program
 from chipload.simulation.checkpoint import Checkpoint
-from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.chips import remove
 from chipload.simulation.chunks import remove_in_chunks
+from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
 
 BALL = Cutter(8.0, 2, math.radians(30.0), 20.0, 35.0, 6e5, corner_radius=4.0)

@@ -34,7 +34,8 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import material_named
 from chipload.program.program import LINE, RAPID, Program
-from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.chips import remove
+from chipload.simulation.removal import Resolution
 from chipload.stock.dexel import TriDexel
 from chipload.stock.layers import LayeredStock
 

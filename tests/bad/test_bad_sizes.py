@@ -16,7 +16,8 @@ from chipload.jobs import check_job, load_job
 from chipload.jobs.program.workpiece import stock_points
 from chipload.program.build import rapid, rows
 from chipload.program.program import LINE, Program
-from chipload.simulation.chips import Resolution, counted
+from chipload.simulation.chips import counted
+from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
 
 LOW, HIGH = (0.0, 0.0, 0.0), (100.0, 80.0, 40.0)

@@ -50,7 +50,7 @@ def test_loads_are_those_rotation_by_rotation(flutes: int, helix: float, runout:
     plain = some_engagement(flutes, helix, flutes)
     bites = with_runout(plain, cutter)
     left = np.random.default_rng(5).normal(size=(len(bites), 3))
-    found, at = loads_over_turn(bites, cutter, STEEL, math.radians(3.0), left)
+    found, at, _ = loads_over_turn(bites, cutter, STEEL, math.radians(3.0), left)
     count = rotations(cutter, math.radians(3.0))
     known = _one_by_one(bites, cutter, STEEL, count, left)
     np.testing.assert_allclose(found, known[:, :15], rtol=1e-6, atol=1e-6)
@@ -73,7 +73,7 @@ def test_a_full_circle_that_begins_at_a_rotation_counts_once() -> None:
     slices = np.array([[0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0], [2.0, 3.0, 0.0, 0.0, 1.0, 0.0, 0.0]])
     frame = np.eye(3)[None]
     bites = ToothEngagement(np.array([0, 2]), rows, np.full(2, -1), np.arange(2), slices, frame)
-    found, _ = loads_over_turn(bites, cutter, STEEL, math.radians(3.0), np.zeros((1, 3)))
+    found, _, _ = loads_over_turn(bites, cutter, STEEL, math.radians(3.0), np.zeros((1, 3)))
     # two teeth, 2 mm each of edge
     known = 2 * 2.0 * ((1800.0 * 0.05 + 25.0) * 1.0 + (1800.0 * 0.1 + 25.0) * 3.0)
     assert found[0, 10] == pytest.approx(known)

@@ -20,7 +20,7 @@ from chipload.jobs import load_job, run_job
 from chipload.machine.machine import machine_named
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
-from chipload.simulation.chips import Columns
+from chipload.simulation.removal import Columns
 from chipload.stock.layers import LayeredStock
 from cli.test_simulate import JOB, SLOT
 

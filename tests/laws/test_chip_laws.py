@@ -29,7 +29,8 @@ from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.geometry.contour import Contour
 from chipload.machine.machine import machine_named
 from chipload.planning.contour.plan import Finishing, plan_contour
-from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.chips import remove
+from chipload.simulation.removal import Resolution
 from chipload.stock.dexel import TriDexel
 from chipload.stock.layers import LayeredStock
 from simulation.test_steps import five_axis

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.simulation.accuracy import COMPARED
-from chipload.simulation.chips import Removal, Resolution, remove
+from chipload.simulation.chips import remove
+from chipload.simulation.removal import Removal, Resolution
 from chipload.stock.layers import LayeredStock
 from engagement.moves.field import BULL, TAPER, Field
 from simulation.test_moves import path
@@ -30,7 +31,7 @@ LOW, HIGH = np.array([0.0, 0.0, -8.0]), np.array([24.0, 16.0, 0.0])
 
 
 def run(
-    points: Floats, cutter: Cutter, step_mm: float = 1.0, top: float = 0.0, corner: int = 12, accuracy: bool = False
+    points: Floats, cutter: Cutter, step_mm: float = 1.0, top: float = 0.0, corner: int = 24, accuracy: bool = False
 ) -> Removal:
     """With the slices of a job that states none."""
     stock = LayeredStock.block(LOW, [*HIGH[:2], top], 0.5, 40.0)
@@ -71,7 +72,7 @@ def test_slots_of_a_ball(cutter: Cutter, depth: float, apart: float) -> None:
     ("cutter", "depth"), [(BALL10, 0.3), (BALL12, 1.874), (BALL10, 1.0), (BULL, 0.5), (TAPER, 0.5)]
 )
 def test_peaks_are_those_of_many_slices(cutter: Cutter, depth: float) -> None:
-    one, two = (run(slot(depth, 0.5), cutter, corner=n).columns for n in (12, 100))
+    one, two = (run(slot(depth, 0.5), cutter, corner=n).columns for n in (24, 100))
     for name in ("force_n", "torque_nm", "torque_mean_nm"):
         np.testing.assert_allclose(one[name][-8:], two[name][-8:], rtol=0.01)
 

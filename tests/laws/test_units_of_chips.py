@@ -14,7 +14,8 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import material_named
 from chipload.engagement.chips.covered import covered_areas
 from chipload.engagement.chips.move import Move
-from chipload.simulation.chips import Removal, Resolution, remove
+from chipload.simulation.chips import remove
+from chipload.simulation.removal import Removal, Resolution
 from chipload.stock.layers import LayeredStock
 from laws.test_chip_laws import BALL, BULL, FLAT, FORCES, HIGH, LOW, walk
 from simulation.test_steps import five_axis

@@ -13,7 +13,8 @@ from chipload.cutting.material import material_named
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
 from chipload.simulation.chip_space import flute_fill
-from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.chips import remove
+from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
 
 AL = material_named("al7075-t6")

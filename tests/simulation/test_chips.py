@@ -14,7 +14,8 @@ from chipload.cutting.material import Material, material_named
 from chipload.errors import InputError
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
-from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.chips import remove
+from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
 from simulation.test_steps import five_axis
 

@@ -18,8 +18,9 @@ from chipload.errors import Cancelled, InputError
 from chipload.program.build import rapid, rows
 from chipload.program.program import ARC_CCW, LINE, Program
 from chipload.simulation.checkpoint import LAST, Checkpoint, Stored, in_rows
-from chipload.simulation.chips import Removal, Resolution, remove
+from chipload.simulation.chips import remove
 from chipload.simulation.chunks import remove_in_chunks
+from chipload.simulation.removal import Removal, Resolution
 from chipload.simulation.steps import Steps, steps_in_blocks, steps_of
 from chipload.stock.layers import LayeredStock
 from simulation.test_steps import five_axis

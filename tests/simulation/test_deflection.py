@@ -16,8 +16,9 @@ from chipload.engagement.tooth_engagement import engagement_of_arcs
 from chipload.errors import InputError
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
-from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.chips import remove
 from chipload.simulation.deflection import contacts, form_error, step_deflections
+from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
 from chipload.structure.grid import from_map
 from chipload.structure.places import locate, normals_of

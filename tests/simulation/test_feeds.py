@@ -12,8 +12,9 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
-from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.chips import remove
 from chipload.simulation.loads import Cuts, at_feeds, greatest_loads, joined
+from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
 
 FINE = Resolution(step_mm=2.0, tolerance=1e-3, corner_pieces=12, flank_mm=1.0)

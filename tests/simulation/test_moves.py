@@ -21,7 +21,7 @@ from chipload.program.build import rapid, rows
 from chipload.program.program import LINE, Program
 from chipload.simulation.accuracy import COMPARED, MOVES_FLOOR, WITH_FORCE
 from chipload.simulation.checkpoint import Checkpoint
-from chipload.simulation.chips import Removal, Resolution, remove
+from chipload.simulation.chips import remove
 from chipload.simulation.chunks import remove_in_chunks
 from chipload.simulation.loads import (
     BANDS,
@@ -32,12 +32,13 @@ from chipload.simulation.loads import (
     loads_of_steps,
     over_turn,
 )
+from chipload.simulation.removal import Removal, Resolution
 from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]
 MILL = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
 BALL = Cutter(8.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=4.0, runout=(0.01, 0.3))
-FINE = Resolution(step_mm=1.0, tolerance=0.001, corner_pieces=12, flank_mm=2.5)
+FINE = Resolution(step_mm=1.0, tolerance=0.001, corner_pieces=24, flank_mm=2.5)
 ALLOY = replace(material_named("al7075-t6"), spread=0.05)
 LOW, HIGH = (0.0, 0.0, -8.0), (40.0, 30.0, 0.0)
 

@@ -10,8 +10,9 @@ from chipload.cutting.material import material_named
 from chipload.errors import InputError, Severity
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
-from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.chips import remove
 from chipload.simulation.placement import placement_of, stock_placement
+from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
 
 MILL = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)

@@ -12,7 +12,8 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import material_named
 from chipload.program.program import Program
 from chipload.simulation import swept_area
-from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.chips import remove
+from chipload.simulation.removal import Resolution
 from chipload.simulation.steps import steps_of
 from chipload.stock.layers import LayeredStock
 from simulation.test_steps import five_axis

@@ -21,7 +21,8 @@ from chipload.jobs.program.stiffness import deflecting, stiffness_of
 from chipload.jobs.program.tables import StiffnessTable
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
-from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.chips import remove
+from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
 
 SOFT = Material("soft", 900.0, 400.0, 0.0, 12.0, 18.0, 0.0, source="made up for this test")

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting import _kernels
-from chipload.cutting.force import in_work
+from chipload.cutting.bases import _kernels as bases
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement
 
@@ -61,11 +61,15 @@ def mean_band(
 def mean_basis(bites: ToothEngagement, cutter: Cutter, material: Material, frame: ArrayLike | None = None) -> Floats:
     """B of the mean loads, (n, 4, 6): force and torque for 1 of each coefficient; for the band of a sum add B first."""
     basis = np.zeros((len(bites), 4, 6))
-    for k, law in enumerate(_unit_laws(material)):
-        out = np.zeros((len(bites), 4))
-        _kernels.means(bites.start, bites.rows, bites.tooth, bites.slice, bites.slices, cutter.flutes, law, out)
-        basis[:, :, k] = out
-    return basis if frame is None else _turned(basis, frame)
+    rows = (bites.start, bites.rows, bites.tooth, bites.slice, bites.slices)
+    if not any(material.exponents):
+        bases.mean_bases(*rows, cutter.flutes, basis)
+    else:
+        for k, law in enumerate(_unit_laws(material)):
+            out = np.zeros((len(bites), 4))
+            _kernels.means(*rows, cutter.flutes, law, out)
+            basis[:, :, k] = out
+    return basis if frame is None else turned_basis(basis, frame)
 
 
 def deviations(basis: Floats, material: Material) -> Floats:
@@ -96,7 +100,7 @@ def band_over_turn(
         rows = (bites.start, bites.rows, bites.tooth, bites.slice, bites.slices)
         _kernels.turn_of(*rows, angles, cutter.flutes, law, out)
         basis[..., k] = out
-    deviation = deviations(basis if frame is None else _turned(basis, frame), material)
+    deviation = deviations(basis if frame is None else turned_basis(basis, frame), material)
     return deviation[..., :3], deviation[..., 3]
 
 
@@ -144,7 +148,10 @@ def _bases_at(bites: ToothEngagement, cutter: Cutter, material: Material, theta:
     out = np.zeros((len(bites), 4, 6))
     angles = np.ascontiguousarray(theta, dtype=np.float64)
     rows = (bites.start, bites.rows, bites.tooth, bites.slice, bites.slices)
-    _kernels.bases_at(*rows, angles, cutter.flutes, _unit_laws(material), out)
+    if not any(material.exponents):
+        bases.bases_at(*rows, angles, cutter.flutes, out)
+    else:
+        _kernels.bases_at(*rows, angles, cutter.flutes, _unit_laws(material), out)
     return out
 
 
@@ -153,8 +160,8 @@ def _unit_laws(material: Material) -> Floats:
     return np.column_stack([np.eye(6), np.broadcast_to(material.exponents, (6, 3))])
 
 
-def _turned(basis: Floats, frame: ArrayLike) -> Floats:
-    """B with its forces turned into ``frame``."""
-    for k in range(6):
-        basis[..., :3, k] = in_work(basis[..., :3, k], frame)
-    return basis
+def turned_basis(basis: Floats, frame: ArrayLike) -> Floats:
+    """B (n, ..., 4, 6) with its forces turned into ``frame`` (n, 3, 3), rows T, n and A."""
+    frames = np.asarray(frame, dtype=np.float64)
+    across = np.swapaxes(frames, 1, 2).reshape(len(frames), *[1] * (basis.ndim - 3), 3, 3)
+    return np.concatenate([across @ basis[..., :3, :], basis[..., 3:, :]], axis=-2)

@@ -20,8 +20,8 @@ from chipload.machine.machine import Machine
 from chipload.result import LimitCheck, Verdict, check_limit
 from chipload.result.limits import Columns
 from chipload.simulation.chip_space import flute_fill
-from chipload.simulation.chips import BANDED
 from chipload.simulation.loads import Cuts, Floats
+from chipload.simulation.removal import BANDED
 
 #: columns that these checks add to those of the simulation
 CHECK_COLUMNS = ("cutter_stress_mpa", "deflection_share")

@@ -10,7 +10,8 @@ if TYPE_CHECKING:
     from chipload.simulation.centre_path import CentrePath
     from chipload.simulation.checkpoint import Checkpoint
     from chipload.simulation.chip_space import flute_fill
-    from chipload.simulation.chips import Removal, Resolution, remove
+    from chipload.simulation.chips import remove
+    from chipload.simulation.removal import Removal, Resolution
     from chipload.simulation.steps import Steps, steps_of
     from chipload.simulation.surface import Collision, Difference
     from chipload.simulation.verify import verify_contour
@@ -32,7 +33,8 @@ __all__ = [
 __getattr__, __dir__ = attach(
     __name__,
     {
-        "chips": "Removal Resolution remove",
+        "chips": "remove",
+        "removal": "Removal Resolution",
         "steps": "Steps steps_of",
         "surface": "Collision Difference",
         "verify": "verify_contour",

@@ -55,7 +55,7 @@ from chipload.simulation.swept_area import boxes, swept_ahead
 from chipload.stock.layers import LayeredStock
 
 if TYPE_CHECKING:
-    from chipload.simulation.chips import RunSettings
+    from chipload.simulation.removal import RunSettings
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -11,10 +11,9 @@ and :mod:`chipload.engagement.immersion.immersion` for the one in force.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -46,6 +45,7 @@ from chipload.simulation.loads import (
     over_turn,
 )
 from chipload.simulation.moves import Engine, HandOver, MoveRun, moved, run_by_moves
+from chipload.simulation.removal import ChipPieces, Columns, Removal, Resolution, RunningSums, RunSettings, Watch
 from chipload.simulation.shank import axial_overrun
 from chipload.simulation.steps import BLOCK, ROWS, StepBlocks, Steps, steps_in_blocks
 from chipload.simulation.swept_area import TOGETHER, Interpolation, swept_ahead
@@ -54,21 +54,6 @@ from chipload.stock.tile_grid import polygons
 from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
-Columns = Mapping[str, NDArray[Any]]
-
-#: more columns of steps that cut
-Watch = Callable[[Cuts], Mapping[str, Floats]]
-
-#: columns that have a band, and the column of its standard deviation; linear in the force are those of ``force_sd_n``
-BANDED = {
-    "force_n": "force_sd_n",
-    "torque_nm": "torque_sd_nm",
-    "torque_mean_nm": "torque_mean_sd_nm",
-    "power_w": "power_sd_w",
-    "deflection_um": "force_sd_n",
-    "form_error_um": "force_sd_n",
-    "cutter_stress_mpa": "force_sd_n",
-}
 
 #: most steps of a simulation
 MOST_STEPS = 50_000_000
@@ -76,141 +61,6 @@ MOST_STEPS = 50_000_000
 FILM = 4.0
 #: blocks of steps that go together by moves
 MOVES = 8
-
-
-@dataclass(frozen=True)
-class Resolution:
-    """How fine the simulation looks.
-
-    Parameters
-    ----------
-    step_mm : longest step of the tip [mm]
-    tolerance : how far chords leave the edges of chips [mm]
-    corner_pieces : slices of a corner radius
-    flank_mm : length of a slice along the flank [mm]
-    rotation : between two rotations at which the force is looked at [rad]
-    grading : of the slices of a corner, see :func:`chipload.cutter.slices.slices`
-    bottom_pieces : slices of the bottom line
-    """
-
-    step_mm: float
-    tolerance: float
-    corner_pieces: int
-    flank_mm: float
-    rotation: float = math.radians(1.0)
-    grading: float = 1.0
-    bottom_pieces: int = 4
-
-
-@dataclass(frozen=True, eq=False)
-class ChipPieces:
-    """The chip of one step on one layer: the one with most pieces, of those the one whose pieces are most alike.
-
-    Parameters
-    ----------
-    step : its number
-    move, cutter : of the step
-    height : of the layer's section [mm]
-    before : (multi)polygon, the section before the step, around the cutter
-    chips : the pieces
-    """
-
-    step: int
-    move: Move
-    cutter: Cutter
-    height: float
-    before: Any
-    chips: tuple[Polygon, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Removal:
-    """What a program removed.
-
-    Parameters
-    ----------
-    columns : (n,) each, a row a step, see :func:`remove`
-    volume_before, volume_after : of the stock [mm^3]
-    mean_band : (4,) standard deviation of the mean force x, y, z [N] and torque [N m] over the time in cut, from that
-        of the coefficients; None: the material does not say how sure they are
-    piece : the chip with most pieces that are most alike; None where nothing was cut
-    findings : rapids that cut, and whether the run was handed over to the layers
-    labels : of the program, `label` of the columns counts in them
-    cuts : what the teeth cut, one a cutter that cut; empty unless it was asked for
-    energy_balance : work over the specific energy of the volume removed, less 1, by tool number; empty where nothing
-        was cut or it was not asked for
-    resolution_error : relative error of the worst value of a column, by its name; empty unless it was asked for; both
-        as :mod:`chipload.simulation.accuracy` says
-    """
-
-    columns: Columns
-    volume_before: float
-    volume_after: float
-    mean_band: tuple[float, ...] | None
-    piece: ChipPieces | None
-    findings: tuple[Finding, ...]
-    labels: tuple[str, ...]
-    cuts: tuple[Cuts, ...] = ()
-    energy_balance: Mapping[int, float] = field(default_factory=dict)
-    resolution_error: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def band_error(self) -> dict[str, float]:
-        """Standard deviation over the value, by column, at the greatest value of the column: what the spread of the
-        coefficients makes of it. Empty where the material does not say how sure they are.
-
-        Deflection and stress are linear in the force of one rotation: theirs is that of the force.
-        """
-        out: dict[str, float] = {}
-        for name, band in BANDED.items():
-            if band in self.columns and name in self.columns:
-                k = int(np.argmax(np.abs(self.columns[name])))
-                base = self.columns["force_n" if band == "force_sd_n" else name]
-                if base[k] > 0.0:
-                    out[name] = float(self.columns[band][k] / base[k])
-        return out
-
-
-@dataclass(frozen=True, eq=False)
-class RunSettings:
-    """What a run keeps to, step after step: see :func:`remove`; ``profiles`` are slices of the cutters;
-    ``moves`` the run by moves, None where it goes by layers.
-    """
-
-    cutters: Mapping[int, Cutter]
-    profiles: Mapping[int, Slices]
-    material: Material
-    resolution: Resolution
-    interpolation: Interpolation
-    watch: Watch | None
-    workers: int
-    moves: MoveRun | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class RunningSums:
-    """What is known after some steps and goes on in the next.
-
-    Parameters
-    ----------
-    before : volume of the stock before the first step [mm^3]
-    steps : how many they are
-    s_mm, t_s, cut_s : their length [mm], their time and the time in cut [s]
-    basis : (4, 6) integral over the time in cut of what the coefficients are multiplied with
-    rapids : lines with rapids that cut
-    piece : as in :class:`Removal`
-    handed : line and reason for which the run was handed over from moves to layers
-    """
-
-    before: float
-    steps: int = 0
-    s_mm: float = 0.0
-    t_s: float = 0.0
-    cut_s: float = 0.0
-    basis: Floats = field(default_factory=lambda: np.zeros((4, 6)))
-    rapids: tuple[int, ...] = ()
-    piece: ChipPieces | None = None
-    handed: tuple[int, str] | None = None
 
 
 def remove(

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from chipload.cutter.cutter import Cutter
@@ -25,14 +26,6 @@ from chipload.program.program import Program
 from chipload.progress import Progress, silent
 from chipload.simulation.checkpoint import Checkpoint, digest
 from chipload.simulation.chips import (
-    ChipPieces,
-    Columns,
-    Floats,
-    Removal,
-    Resolution,
-    RunningSums,
-    RunSettings,
-    Watch,
     block_of,
     by_layers,
     counted,
@@ -44,10 +37,13 @@ from chipload.simulation.chips import (
     with_engine,
 )
 from chipload.simulation.moves import Engine, HandOver
+from chipload.simulation.removal import ChipPieces, Columns, Removal, Resolution, RunningSums, RunSettings, Watch
 from chipload.simulation.steps import BLOCK, steps_in_blocks
 from chipload.simulation.swept_area import Interpolation
 from chipload.stock.layers import LayeredStock
 from chipload.stock.shapes import read_shapes, shape_bytes
+
+Floats = NDArray[np.float64]
 
 #: steps whose columns are kept in memory at most
 MOST = 128 * BLOCK

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.simulation.chips import Removal
 from chipload.simulation.deflection import Contacts
+from chipload.simulation.removal import Removal
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

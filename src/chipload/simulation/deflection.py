@@ -49,8 +49,8 @@ from chipload.engagement.tooth_engagement import tooth_radii
 from chipload.errors import InputError
 from chipload.progress import Progress, silent
 from chipload.simulation.bending import _kernels
-from chipload.simulation.chips import Removal
 from chipload.simulation.loads import GRAZES, ONE_SIDE, Cuts
+from chipload.simulation.removal import Removal
 from chipload.structure.spindle import Bar
 
 Floats = NDArray[np.float64]

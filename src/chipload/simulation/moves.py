@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import edge_lag
-from chipload.cutting.band import deviations, mean_basis, peak_band
+from chipload.cutting.band import deviations, peak_band, turned_basis
 from chipload.cutting.material import Material
 from chipload.cutting.revolution.revolution import loads_over_turn
 from chipload.engagement.moves.stock import Engaged, MoveStock
@@ -35,9 +35,10 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Engine = Literal["auto", "moves", "layers"]
 
-#: slices of an engaged corner over those that are asked for: the greatest force is then within 3 % of the converged one
-#: in 99 of 100 moves of a finishing program at the default of a job, see docs/design/engines.md
-FINER = 5.0 / 3.0
+#: slices of the engaged part of a corner over those that are asked for of the whole corner: the greatest force is then
+#: within 3 % of the converged one in 99 of 100 moves of a finishing program at the default of a job, see
+#: docs/design/engines.md
+ENGAGED = 0.5
 #: an axis that differs from z by no more than this is upright
 UPRIGHT = 1e-9
 #: columns of the loads that are means, of :data:`chipload.simulation.loads.LOADS`
@@ -141,7 +142,7 @@ def run_by_moves(
         raise HandOver(0, "the stock is neither a block nor a mesh")
     moves = MoveStock(low, high, used, stock.part)
     return MoveRun(
-        moves, np.asarray(stock.bounds), math.ceil(FINER * corner_pieces), dict.fromkeys(used, flank_mm), tolerance
+        moves, np.asarray(stock.bounds), math.ceil(ENGAGED * corner_pieces), dict.fromkeys(used, flank_mm), tolerance
     )
 
 
@@ -195,11 +196,12 @@ def moved(
         bites = with_runout(plain, cutter)
         step = found.step[entries]
         left, spindle = _left(found, entries), np.abs(steps.spindle[step])
-        each, at = loads_of_instants(bites, cutter, material, rotation, left, spindle, steps.seconds[step])
+        each, at, mean = loads_of_instants(bites, cutter, material, rotation, left, spindle, steps.seconds[step])
         weight = 1.0 / found.instants[entries]
         _together(loads, step, each, weight)
         if material.has_band:
-            some = mean_basis(bites, cutter, material, bites.frame)
+            assert bites.frame is not None
+            some = turned_basis(mean, bites.frame)
             basis = basis + np.tensordot(steps.seconds[step] * weight, some, 1)
             own, values = _bands(bites, cutter, material, step, each, at, some * weight[:, None, None], spindle)
             for name, column in zip(BANDS, values, strict=True):
@@ -216,17 +218,21 @@ def loads_of_instants(
     left: Floats,
     spindle: Floats,
     seconds: Floats,
-) -> tuple[Floats, Floats]:
-    """(m, len(LOADS)) loads of steps that take ``seconds`` (m,) and cut all over as ``bites`` say, and (m, 2) rotations
-    [rad] at which force and torque are greatest.
+) -> tuple[Floats, Floats, Floats]:
+    """(m, len(LOADS)) loads of steps that take ``seconds`` (m,) and cut all over as ``bites`` say, (m, 2) rotations
+    [rad] at which force and torque are greatest, and (m, 4, 6) basis of the mean loads along T, n and the axis.
 
     Oracle: :func:`chipload.simulation.loads.loads_of_steps`, which takes rotation by rotation.
     """
-    each, at = loads_over_turn(bites, cutter, material, rotation, left)
+    each, at, basis = loads_over_turn(bites, cutter, material, rotation, left)
     each[:, 10:12] /= 1000.0
     each[:, 12] = each[:, 10] * spindle
-    volume, work = engaged_work(bites, cutter, material, spindle * seconds)
-    return np.column_stack([each, volume, work / 1000.0]), at
+    if any(material.exponents):
+        volume, work = engaged_work(bites, cutter, material, spindle * seconds)
+    else:
+        volume = basis[:, 3, 0] * spindle * seconds
+        work = material.Ktc * volume
+    return np.column_stack([each, volume, work / 1000.0]), at, basis
 
 
 def _bands(

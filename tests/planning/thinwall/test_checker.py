@@ -11,7 +11,8 @@ from chipload.planning.thinwall.blank import FinishSurface
 from chipload.planning.thinwall.depth import DepthRange, largest_depths, normal_force
 from chipload.planning.thinwall.paths import PassMotion, program_of, rows_of
 from chipload.planning.thinwall.plane_stock import CutterPose
-from chipload.simulation.chips import Resolution, remove
+from chipload.simulation.chips import remove
+from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
 
 STEEL = Material("steel", 1900.0, 600.0, 300.0, 24.0, 20.0, 5.0, source="made up, of the usual size")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
+from chipload.cutting.band import mean_basis
 from chipload.cutting.force import forces_over_turn, in_work, mean_forces
 from chipload.cutting.material import Material
 from chipload.cutting.revolution import _kernels
@@ -33,10 +34,11 @@ def rotations(cutter: Cutter, rotation: float) -> int:
 
 def loads_over_turn(
     bites: ToothEngagement, cutter: Cutter, material: Material, rotation: float, left: ArrayLike
-) -> tuple[Floats, Floats]:
+) -> tuple[Floats, Floats, Floats]:
     """(n, 15) mean, greatest and least force x, y, z [N] on the cutter in the frame of the work, greatest size of the
-    force, mean and greatest torque [N mm], 0, thickest chip [mm], greatest force against ``left`` [N]; and (n, 2)
-    rotations [rad] at which the size of the force and the torque are greatest.
+    force, mean and greatest torque [N mm], 0, thickest chip [mm], greatest force against ``left`` [N]; (n, 2)
+    rotations [rad] at which the size of the force and the torque are greatest; and (n, 4, 6) the basis of the mean
+    loads along T, n and the axis, see :func:`chipload.cutting.band.mean_basis`.
 
     Parameters
     ----------
@@ -48,6 +50,7 @@ def loads_over_turn(
     count = rotations(cutter, rotation)
     alike = cutter.runout[0] == 0.0
     teeth = cutter.flutes if alike else 1
+    basis = mean_basis(bites, cutter, material)
     if any(material.exponents) or (alike and bool((bites.tooth >= 0).any())):
         out = _one_by_one(bites, cutter, material, count, away)
     else:
@@ -58,10 +61,10 @@ def loads_over_turn(
             bites.start, bites.rows, bites.tooth, bites.slice, bites.slices, table, bites.frame, cutter.flutes, count,
             alike, np.array(material.law), away, out,
         )  # fmt: skip
-        mean, torque = mean_forces(bites, cutter, material)
-        out[:, :3] = in_work(mean, bites.frame)
-        out[:, 10] = torque
-    return out[:, :COLUMNS], out[:, COLUMNS:] * (math.tau / teeth / count)
+        mean = basis @ np.array(material.coefficients)
+        out[:, :3] = in_work(mean[:, :3], bites.frame)
+        out[:, 10] = mean[:, 3]
+    return out[:, :COLUMNS], out[:, COLUMNS:] * (math.tau / teeth / count), basis
 
 
 def _one_by_one(bites: ToothEngagement, cutter: Cutter, material: Material, count: int, left: Floats) -> Floats:

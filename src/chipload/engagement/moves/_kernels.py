@@ -70,8 +70,96 @@ def within(qx, qy, ux, uy, h2, along, radius):
 
 
 @njit(cache=True, nogil=True)
+def clamped(a, b):
+    """The part a / b of a motion, within 0..1; 0 where it does not move."""
+    if a <= 0.0:
+        return 0.0
+    return a / b if a < b else 1.0
+
+
+@njit(cache=True, nogil=True)
+def from_ball(m, r, x, y, z):
+    """Square of the distance of a point from the nearest centre of a ball of radius r that makes a move, or from the
+    axis above it: the volume is swept where this is below r^2.
+
+    The square is convex in the time and smooth, so that its least value is where the point is below the nearest centre,
+    if it is, and else where the axis is nearest.
+    """
+    qx = x - m[0]
+    qy = y - m[1]
+    w = z - m[2] - r
+    ux = m[3]
+    uy = m[4]
+    uz = m[5]
+    h2 = ux * ux + uy * uy
+    along = qx * ux + qy * uy
+    t = clamped(along + w * uz, h2 + uz * uz)
+    dz = w - t * uz
+    if dz > 0.0:
+        t = clamped(along, h2)
+        dz = 0.0
+    dx = qx - t * ux
+    dy = qy - t * uy
+    return dx * dx + dy * dy + dz * dz
+
+
+@njit(cache=True, nogil=True)
+def radius_at(c, w):
+    """Greatest distance of the cutter from its axis at the height w above its tip; below 0 where there is none."""
+    if w <= 0.0:
+        return -1.0
+    if w < c[Z1]:
+        return w / c[TA]
+    if w < c[Z2]:
+        return c[E] + math.sqrt(max(c[CORNER] ** 2 - (c[F] - w) ** 2, 0.0))
+    return min(c[RHO2] + (w - c[Z2]) * c[TB], c[WIDE]) if c[TB] > 0.0 else c[WIDE]
+
+
+@njit(cache=True, nogil=True)
+def section(m, c, z):
+    """What a move sweeps at a height, where that is what a disc sweeps: from and to of its times, its radius squared
+    (below 0 where nothing is swept), and whether it is so: not for balls, nor for a corner or a taper on a ramp.
+    """
+    uz = m[5]
+    w = z - m[2] + EPS
+    level = uz == 0.0 or (m[3] == 0.0 and m[4] == 0.0)
+    if c[KIND] == BALL or not (level or c[KIND] == FLAT):
+        return 0.0, 1.0, -1.0, False
+    if level:
+        r = radius_at(c, w - min(uz, 0.0))
+        return 0.0, 1.0, (r + EPS) ** 2 if r >= 0.0 else -1.0, True
+    first = 0.0
+    last = 1.0
+    if uz > 0.0:
+        if w <= 0.0:
+            return 0.0, 1.0, -1.0, True
+        last = min(w / uz, 1.0)
+    else:
+        if w <= uz:
+            return 0.0, 1.0, -1.0, True
+        first = max(w / uz, 0.0)
+    return first, last, (c[WIDE] + EPS) ** 2, True
+
+
+@njit(cache=True, nogil=True)
+def from_track(m, first, last, x, y):
+    """Square of the distance in the plan of a point from the axis at its nearest time of first..last of a move."""
+    qx = x - m[0]
+    qy = y - m[1]
+    t = min(max(clamped(qx * m[3] + qy * m[4], m[3] * m[3] + m[4] * m[4]), first), last)
+    dx = qx - t * m[3]
+    dy = qy - t * m[4]
+    return dx * dx + dy * dy
+
+
+@njit(cache=True, nogil=True)
 def swept(m, c, x, y, z):
     """Whether a point is in the volume that a move sweeps."""
+    if c[KIND] == BALL:
+        return from_ball(m, c[CORNER], x, y, z) < (c[CORNER] + EPS) ** 2
+    first, last, far2, disc = section(m, c, z)
+    if disc:
+        return far2 >= 0.0 and from_track(m, first, last, x, y) < far2
     qx = x - m[0]
     qy = y - m[1]
     w = z - m[2]
@@ -80,36 +168,9 @@ def swept(m, c, x, y, z):
     uz = m[5]
     h2 = ux * ux + uy * uy
     along = qx * ux + qy * uy
-    if c[KIND] == BALL:
-        w -= c[CORNER]
-        far = (c[CORNER] + EPS) ** 2
-        l2 = h2 + uz * uz
-        t = (along + w * uz) / l2 if l2 > 0.0 else 0.0
-        t = min(max(t, 0.0), 1.0)
-        dx = qx - t * ux
-        dy = qy - t * uy
-        dz = w - t * uz
-        if dx * dx + dy * dy + dz * dz < far:
-            return True
-        if w < min(0.0, uz):
-            return False
-        t = along / h2 if h2 > 0.0 else (0.0 if uz > 0.0 else 1.0)
-        t = min(max(t, 0.0), 1.0)
-        dx = qx - t * ux
-        dy = qy - t * uy
-        return dx * dx + dy * dy < far and w > t * uz - EPS
-    if h2 == 0.0 or uz == 0.0:
-        t = along / h2 if h2 > 0.0 else 0.0
-        t = min(max(t, 0.0), 1.0)
-        dx = qx - t * ux
-        dy = qy - t * uy
-        rho = max(math.sqrt(dx * dx + dy * dy) - EPS, 0.0)
-        return profile(c, rho) < w - min(uz, 0.0) + EPS
     first, last = within(qx, qy, ux, uy, h2, along, c[WIDE] + EPS)
     if first > last:
         return False
-    if c[KIND] == FLAT:
-        return w - (first if uz > 0.0 else last) * uz + EPS > 0.0
     return below(c, qx, qy, w + EPS, ux, uy, uz, h2, along, first, last)
 
 

@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import shapely
@@ -21,6 +22,7 @@ from shapely import MultiPolygon
 
 from chipload.cutter.cutter import Cutter
 from chipload.engagement.moves import _kernels
+from chipload.engagement.moves.edge import _kernels as edge
 from chipload.engagement.moves.front import _kernels as front
 from chipload.engagement.moves.initial import _kernels as initial
 from chipload.engagement.moves.outline import _kernels as outline
@@ -58,6 +60,41 @@ def cutter_row(cutter: Cutter) -> Floats:
     heights = (f - r * math.cos(alpha), f - r * math.sin(beta))
     row = [kind, r, e, f, math.tan(alpha), math.tan(beta), end, heights[0], out, heights[1], wide, height]
     return np.array(row)
+
+
+def corner_parts(count: int) -> Floats:
+    """(count, 3) parts of 0..1 into which the engaged part of a corner is cut: from, to, and where each is looked at.
+
+    They are the weights and nodes of Gauss and Legendre, so that a sum over the slices is that of a smooth engagement;
+    the slices are narrow at both ends, where contact begins and where the chip is thickest.
+
+    >>> corner_parts(2).round(6).tolist()
+    [[0.0, 0.5, 0.211325], [0.5, 1.0, 0.788675]]
+    """
+    node, weight = np.polynomial.legendre.leggauss(count)
+    end = np.cumsum(0.5 * weight)
+    return np.column_stack([end - 0.5 * weight, end, 0.5 + 0.5 * node])
+
+
+def work_room(grid: Floats, cutters: Floats, pieces: int, flank: Floats) -> tuple[NDArray[Any], ...]:
+    """Arrays that :func:`chipload.engagement.moves.front._kernels.run` works in.
+
+    Parameters
+    ----------
+    grid, cutters : of the index
+    pieces, flank : slices of a corner, and longest slice of the flank of each cutter [mm]
+    """
+    cells, most, samples = 0, 0, 0
+    for c, longest in zip(cutters, flank, strict=True):
+        cells = max(cells, (int(2.0 * c[_kernels.WIDE] / grid[2]) + 3) * (int(2.0 * c[_kernels.WIDE] / grid[3]) + 3))
+        sk = math.cos(math.atan(c[_kernels.TB]))
+        most = max(most, 3 * pieces + front.LEVELS + edge.ROUND + int(c[_kernels.FLUTE] / sk / longest) + 4)
+        samples = max(samples, int(math.tau / min(min(grid[2], grid[3]) / c[_kernels.WIDE], front.APART)) + 4)
+    spans = most * (samples + 1)
+    return (
+        np.empty((cells, 6)), np.empty(front.LEVELS), np.empty((most, 11)), np.empty((spans, 2)),
+        np.empty(spans, np.int64), np.empty(spans, np.int64), np.empty(3), np.empty(2, np.int64),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,11 +265,25 @@ class MoveStock:
         entries = int(instants.sum()) + 1
         entry, out = np.empty((entries, 3), dtype=np.int64), np.empty((entries, 10))
         state = np.array([begin, 0, 0, 0, 0])
-        at = 0
+        parts = corner_parts(pieces)
+        at, work = 0, work_room(self.grid, self.cutters, pieces, flank)
         while True:
             at = int(
                 front.run(
-                    at, frame, instants, state, self._index(), pieces, flank, slices, rows, owner, entry, out, self.used
+                    at,
+                    frame,
+                    instants,
+                    state,
+                    self._index(),
+                    work,
+                    parts,
+                    flank,
+                    slices,
+                    rows,
+                    owner,
+                    entry,
+                    out,
+                    self.used,
                 )
             )
             if at == len(p0):

@@ -34,8 +34,8 @@ from chipload.program.program import DWELL, RAPID, Program
 from chipload.program.read import ProgramReading, dialect_of
 from chipload.program.time import peak_speed, program_time
 from chipload.result import column_of
-from chipload.simulation.chips import Removal, Watch
 from chipload.simulation.loads import Cuts, at_feeds, greatest_loads
+from chipload.simulation.removal import Removal, Watch
 from chipload.simulation.steps import Steps
 from chipload.units import mm_s_from_mm_min
 

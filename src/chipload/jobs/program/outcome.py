@@ -16,7 +16,7 @@ from chipload.jobs.program.stability import StabilityResult
 from chipload.machine.machine import Machine
 from chipload.program.read import ProgramReading
 from chipload.result import Provenance
-from chipload.simulation.chips import Removal
+from chipload.simulation.removal import Removal
 from chipload.simulation.surface import Collision, Difference
 from chipload.stock.layers import LayeredStock
 

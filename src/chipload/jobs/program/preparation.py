@@ -17,7 +17,8 @@ from chipload.jobs.program.workpiece import fixture_points, part_body, stock_poi
 from chipload.machine.machine import Machine
 from chipload.program.program import RAPID, Program
 from chipload.program.read import ProgramReading, times_of
-from chipload.simulation.chips import Resolution, counted, require_steps
+from chipload.simulation.chips import counted, require_steps
+from chipload.simulation.removal import Resolution
 from chipload.simulation.steps import StepBlocks
 from chipload.simulation.surface import require_points
 from chipload.simulation.swept_area import require_upright

@@ -14,7 +14,7 @@ from chipload.program.read import times_of
 from chipload.result.limits import Columns
 from chipload.result.motions import motion_columns
 from chipload.simulation.checkpoint import in_rows
-from chipload.simulation.chips import Removal
+from chipload.simulation.removal import Removal
 
 Floats = NDArray[np.float64]
 

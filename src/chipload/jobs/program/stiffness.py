@@ -19,9 +19,9 @@ from chipload.cutting.material import Material
 from chipload.errors import InputError
 from chipload.jobs.program.tables import StiffnessTable
 from chipload.simulation.chip_space import flute_fill
-from chipload.simulation.chips import Removal
 from chipload.simulation.deflection import tip_deflections
 from chipload.simulation.loads import Cuts, Floats
+from chipload.simulation.removal import Removal
 from chipload.structure.spindle import RIGID, Bar, cutter_bars, springs, tool_bars, tube
 
 #: N/mm in 1 N/um, N mm/rad in 1 N m/rad, MPa in 1 GPa

@@ -24,9 +24,10 @@ from chipload.planning.thinwall.linking import PassProgram
 from chipload.planning.thinwall.passes import Plan
 from chipload.program.program import Program
 from chipload.progress import Progress
-from chipload.simulation.chips import Removal, Resolution, remove
+from chipload.simulation.chips import remove
 from chipload.simulation.contact_points import touched
 from chipload.simulation.deflection import form_error, step_deflections
+from chipload.simulation.removal import Removal, Resolution
 from chipload.simulation.section_deviation import beside, nearest
 from chipload.stock.layers import LayeredStock
 from chipload.structure.places import normals_of, on_cut, on_side, weights

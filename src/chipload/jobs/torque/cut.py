@@ -25,7 +25,8 @@ from chipload.program.program import RAPID, Program
 from chipload.program.read import read_program
 from chipload.program.setup import Setup
 from chipload.progress import Progress, silent
-from chipload.simulation.chips import Removal, Resolution, remove
+from chipload.simulation.chips import remove
+from chipload.simulation.removal import Removal, Resolution
 from chipload.stock.layers import LayeredStock
 from chipload.stock.rings import Boss, ring_stock
 from chipload.stock.tile_grid import LAYER_LIMIT

@@ -14,6 +14,8 @@ from chipload.engagement.moves._kernels import CORNER, FLUTE, RHO1, RHO2, TA, TB
 PI = math.pi
 #: heights closer than this count as one [mm]
 SAME = 1e-6
+#: slices of the part of a corner that cuts all round on the way down
+ROUND = 2
 
 
 @njit(cache=True, nogil=True)
@@ -50,16 +52,71 @@ def candidates(p, T, narrow, c, grid, shape, level, near):
                 continue
             near[count, 0] = max(d - half, 0.0)
             near[count, 1] = d + half
-            if d <= half:
-                near[count, 2] = 0.0
-                near[count, 3] = PI
-            else:
-                near[count, 2] = math.atan2(dy * T[0] - dx * T[1], ahead)
-                near[count, 3] = math.asin(half / d)
+            near[count, 2] = ahead
+            near[count, 3] = dy * T[0] - dx * T[1]
             near[count, 4] = ceil
             near[count, 5] = level[i * shape[1] + j, 0] - p[2]
             count += 1
     return count
+
+
+@njit(cache=True, nogil=True)
+def direction(x, y):
+    """Angle of a vector within 2e-5 rad, in -pi .. pi.
+
+    Reference: [Abramowitz1964] 4.4.47.
+    """
+    ax = abs(x)
+    ay = abs(y)
+    q = min(ax, ay) / max(ax, ay)
+    s = q * q
+    a = q * (0.9998660 + s * (-0.3302995 + s * (0.1801410 + s * (-0.0851330 + s * 0.0208351))))
+    if ay > ax:
+        a = 0.5 * PI - a
+    if x < 0.0:
+        a = PI - a
+    return a if y >= 0.0 else -a
+
+
+@njit(cache=True, nogil=True)
+def windows(near, count, half, out, slices):
+    """Range of psi in which candidates touch each slice: columns 9 and 10 of ``out``, the first above the second where
+    none does, infinite where they are all round.
+    """
+    for k in range(slices):
+        out[k, 9] = math.inf
+        out[k, 10] = -math.inf
+    for i in range(count):
+        d0 = near[i, 0]
+        d1 = near[i, 1]
+        # slices rise and widen: the first that reaches as far as the cell does
+        a = 0
+        b = slices
+        while a < b:
+            k = (a + b) // 2
+            if out[k, 8] < d0:
+                a = k + 1
+            else:
+                b = k
+        if a == slices or out[a, 7] > d1 or out[a, 3] >= near[i, 4]:
+            continue
+        low = -math.inf
+        high = math.inf
+        if d0 > 0.0:
+            # no less than asin(q), exact at 0 and 1
+            q = half / (d0 + half)
+            wide = q * (1.0 + 0.5708 * q * q) + 2e-4
+            at = direction(near[i, 2], near[i, 3])
+            if at - wide >= -PI and at + wide <= PI:
+                low = at - wide
+                high = at + wide
+        for k in range(a, slices):
+            if out[k, 7] > d1 or out[k, 3] >= near[i, 4]:
+                break
+            if low < out[k, 9]:
+                out[k, 9] = low
+            if high > out[k, 10]:
+                out[k, 10] = high
 
 
 @njit(cache=True, nogil=True)
@@ -78,8 +135,19 @@ def add_slice(out, k, s0, s1, rho, z0, sk, ck, z, rho0, rho1):
 
 
 @njit(cache=True, nogil=True)
-def sliced(c, near, count, down, pieces, flank, levels, out):
+def add_corner(out, k, c, alpha, k0, k1, mid):
+    """:func:`add_slice` of the corner from the angle k0 of its normal to k1, looked at at ``mid``."""
+    r = c[CORNER]
+    return add_slice(
+        out, k, r * (k0 - alpha), r * (k1 - alpha), c[E] + r * math.sin(mid), c[F] - r * math.cos(k0), math.sin(mid),
+        math.cos(mid), c[F] - r * math.cos(mid), c[E] + r * math.sin(k0), c[E] + r * math.sin(k1),
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def sliced(c, near, count, u, parts, flank, levels, out):
     """Cut the part of the profile that the candidates touch into slices; their number."""
+    pieces = len(parts)
     inner = math.inf
     outer = 0.0
     top = 0.0
@@ -91,7 +159,7 @@ def sliced(c, near, count, down, pieces, flank, levels, out):
     top = min(top, c[FLUTE])
     k = 0
     r = c[CORNER]
-    if c[RHO1] > 0.0 and inner < c[RHO1] and (down or c[TA] > 0.0):
+    if c[RHO1] > 0.0 and inner < c[RHO1] and (u[2] < 0.0 or c[TA] > 0.0):
         a = inner
         b = min(outer, c[RHO1])
         if c[TA] > 0.0:
@@ -113,15 +181,20 @@ def sliced(c, near, count, down, pieces, flank, levels, out):
         b = end if outer >= c[RHO2] else min(end, math.asin((outer - c[E]) / r))
         if top < c[Z2]:
             b = min(b, math.acos((c[F] - top) / r))
+        # where the normal leans against the motion the front ends: none below on the way up, all round on the way down
+        turn = math.atan2(abs(u[2]), math.hypot(u[0], u[1]))
+        if u[2] > 0.0:
+            a = max(a, turn)
+        elif a < turn < b:
+            for i in range(ROUND):
+                k0 = a + (turn - a) * i / ROUND
+                k1 = a + (turn - a) * (i + 1) / ROUND
+                k = add_corner(out, k, c, alpha, k0, k1, 0.5 * (k0 + k1))
+            a = turn
         for i in range(pieces if b > a else 0):
-            k0 = a + (b - a) * i / pieces
-            k1 = a + (b - a) * (i + 1) / pieces
-            mid = 0.5 * (k0 + k1)
-            k = add_slice(
-                out, k, r * (k0 - alpha), r * (k1 - alpha), c[E] + r * math.sin(mid), c[F] - r * math.cos(k0),
-                math.sin(mid), math.cos(mid), c[F] - r * math.cos(mid), c[E] + r * math.sin(k0),
-                c[E] + r * math.sin(k1),
-            )  # fmt: skip
+            k = add_corner(
+                out, k, c, alpha, a + (b - a) * parts[i, 0], a + (b - a) * parts[i, 1], a + (b - a) * parts[i, 2]
+            )
     if outer >= c[RHO2] and top > c[Z2]:
         k = flanked(c, near, count, top, pieces, flank, levels, out, k)
     return k

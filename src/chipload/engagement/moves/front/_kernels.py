@@ -12,133 +12,23 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit, types
 
-from chipload.engagement.moves._kernels import (
-    AIR,
-    FLUTE,
-    MATERIAL,
-    TB,
-    WIDE,
-    keep,
-    swept,
-    what_is,
-)
-from chipload.engagement.moves.edge._kernels import candidates, sliced
+from chipload.engagement.moves._kernels import AIR, FLUTE, MATERIAL, WIDE, keep, what_is
+from chipload.engagement.moves.border._kernels import border, ridge
+from chipload.engagement.moves.borrowed._kernels import borrowed
+from chipload.engagement.moves.edge._kernels import add_slice, candidates, sliced, windows
 
 PI = math.pi
 TAU = 2.0 * math.pi
 #: beside the end of the front, where the contact is judged [rad]
 BESIDE = 1e-4
-#: square of the angle [rad^2] to which the border of the material is found, and most moves that are asked for it
-NARROW, TURNS = 1e-8, 200
 #: greatest angle between two samples [rad]
 APART = 0.35
 #: heights of the stock that cut the flank into slices; where there are more they are evenly thick
 LEVELS = 16
 #: least sine of the front's end that counts
 ALONG = 1e-9
-
-
-@njit(cache=True, nogil=True)
-def window(near, count, rho0, rho1, z0, end):
-    """Range of psi in -end .. end in which candidates touch a slice; the first above the second where none does."""
-    low = math.inf
-    high = -math.inf
-    for i in range(count):
-        if near[i, 1] >= rho0 and near[i, 0] <= rho1 and near[i, 4] > z0:
-            a = near[i, 2] - near[i, 3]
-            b = near[i, 2] + near[i, 3]
-            if a < -PI or b > PI:
-                return -end, end
-            low = min(low, a)
-            high = max(high, b)
-    return max(low, -end), min(high, end)
-
-
-@njit(cache=True, nogil=True)
-def border(px, py, z, rho, T, cm, sm, ca, sa, e, index):
-    """Psi between a direction (cos, sin) in material (cm, sm) and one in air (ca, sa) where the material ends; ``e``
-    the move that swept the latter, or AIR.
-
-    The border is that of one move, found by halving, unless what is left beside it was swept by another.
-    """
-    for _ in range(TURNS):
-        if (cm - ca) ** 2 + (sm - sa) ** 2 < NARROW:
-            break
-        lc = cm
-        ls = sm
-        hc = ca
-        hs = sa
-        while (lc - hc) ** 2 + (ls - hs) ** 2 >= NARROW:
-            c = lc + hc
-            s = ls + hs
-            size = 1.0 / math.sqrt(c * c + s * s)
-            c *= size
-            s *= size
-            if e < 0:
-                lc = c
-                ls = s
-                break
-            x = px + rho * (c * T[0] - s * T[1])
-            y = py + rho * (c * T[1] + s * T[0])
-            if swept(index[6][e], index[8][index[7][e]], x, y, z):
-                hc = c
-                hs = s
-            else:
-                lc = c
-                ls = s
-        f = what_is(px + rho * (lc * T[0] - ls * T[1]), py + rho * (lc * T[1] + ls * T[0]), z, index, e)
-        if f == MATERIAL:
-            cm = lc
-            sm = ls
-            ca = hc
-            sa = hs
-        else:
-            ca = lc
-            sa = ls
-            e = f
-    return math.atan2(sm + sa, cm + ca)
-
-
-@njit(cache=True, nogil=True)
-def ridge(px, py, z, rho, T, ca, sa, cb, sb, ea, eb, index):
-    """Whether there is material between two directions (cos, sin of psi) in air, a swept by the move ``ea``, b by
-    ``eb``, and a direction in it: from the border of one move on to that of the next until b is reached.
-    """
-    if ea < 0:
-        ca, sa, cb, sb, ea, eb = cb, sb, ca, sa, eb, ea
-    if ea < 0:
-        return False, 0.0, 0.0
-    for _ in range(TURNS):
-        m = index[6][ea]
-        cutter = index[8][index[7][ea]]
-        if swept(m, cutter, px + rho * (cb * T[0] - sb * T[1]), py + rho * (cb * T[1] + sb * T[0]), z):
-            return False, 0.0, 0.0
-        hc = cb
-        hs = sb
-        while (ca - hc) ** 2 + (sa - hs) ** 2 >= NARROW:
-            c = ca + hc
-            s = sa + hs
-            size = 1.0 / math.sqrt(c * c + s * s)
-            c *= size
-            s *= size
-            if swept(m, cutter, px + rho * (c * T[0] - s * T[1]), py + rho * (c * T[1] + s * T[0]), z):
-                ca = c
-                sa = s
-            else:
-                hc = c
-                hs = s
-        f = what_is(px + rho * (hc * T[0] - hs * T[1]), py + rho * (hc * T[1] + hs * T[0]), z, index, eb)
-        if f == MATERIAL:
-            return True, hc, hs
-        if f < 0 or f == eb:
-            return False, 0.0, 0.0
-        ca = hc
-        sa = hs
-        ea = f
-    return False, 0.0, 0.0
 
 
 @njit(cache=True, nogil=True)
@@ -199,8 +89,11 @@ def parts_of(spans, slice_of, first, count, room):
         room[i] = i
     pieces = count
     for i in range(count):
-        for j in range(i):
-            if slice_of[first + i] - slice_of[first + j] != 1:
+        for j in range(i - 1, -1, -1):
+            apart = slice_of[first + i] - slice_of[first + j]
+            if apart > 1:
+                break
+            if apart < 1:
                 continue
             if spans[i, 0] < spans[j, 1] and spans[j, 0] < spans[i, 1]:
                 a = i
@@ -216,7 +109,7 @@ def parts_of(spans, slice_of, first, count, room):
 
 
 @njit(cache=True, nogil=True)
-def engaged(p, u, c, T, pieces, flank, index, near, levels, scratch, spans, mine, room, slices, rows, owner, at, out):
+def engaged(p, u, c, T, parts, flank, index, near, levels, scratch, spans, mine, room, slices, rows, owner, at, out):
     """What is engaged at the tip position p of a step u.
 
     Spans (psi from, to) of ``mine`` slices go to ``rows`` from ``at[0]`` on, their slices to ``slices`` from ``at[1]``;
@@ -229,8 +122,11 @@ def engaged(p, u, c, T, pieces, flank, index, near, levels, scratch, spans, mine
     count = candidates(p, T, u[2] >= 0.0, c, grid, index[1], index[2], near)
     if count == 0:
         return True
-    number = sliced(c, near, count, u[2] < 0.0, pieces, flank, levels, scratch)
+    number = sliced(c, near, count, u, parts, flank, levels, scratch)
     apart = 2.5 * min(grid[2], grid[3])
+    # above the flutes
+    add_slice(scratch, number, 0.0, 0.0, c[WIDE], c[FLUTE], 1.0, 0.0, c[FLUTE], c[WIDE], c[WIDE])
+    windows(near, count, 0.5 * math.hypot(grid[2], grid[3]), scratch, number + 1)
     row = at[0]
     have = at[1]
     total = 0
@@ -238,15 +134,6 @@ def engaged(p, u, c, T, pieces, flank, index, near, levels, scratch, spans, mine
     out[3] = -math.inf
     for k in range(number + 1):
         probe = k == number
-        if probe:
-            # above the flutes
-            scratch[k, 2] = c[WIDE]
-            scratch[k, 3] = c[FLUTE]
-            scratch[k, 6] = c[FLUTE]
-            scratch[k, 4] = 1.0
-            scratch[k, 5] = 0.0
-            scratch[k, 7] = c[WIDE]
-            scratch[k, 8] = c[WIDE]
         rho = scratch[k, 2]
         sk = scratch[k, 4]
         ck = scratch[k, 5]
@@ -255,7 +142,8 @@ def engaged(p, u, c, T, pieces, flank, index, near, levels, scratch, spans, mine
         if side <= rise + ALONG * (hu + abs(u[2])):
             continue
         end = PI if rise <= -side else math.acos(rise / side)
-        low, high = window(near, count, scratch[k, 7], scratch[k, 8], scratch[k, 3], end)
+        low = max(scratch[k, 9], -end)
+        high = min(scratch[k, 10], end)
         if low >= high:
             continue
         found = intervals(
@@ -298,22 +186,6 @@ def engaged(p, u, c, T, pieces, flank, index, near, levels, scratch, spans, mine
     return True
 
 
-@njit(cache=True, nogil=True)
-def rooms(index, pieces, flank):
-    """Most candidates, slices and samples of a slice of any cutter."""
-    grid = index[0]
-    cells = 0
-    most = 0
-    samples = 0
-    for k in range(len(index[8])):
-        c = index[8][k]
-        cells = max(cells, (int(2.0 * c[WIDE] / grid[2]) + 3) * (int(2.0 * c[WIDE] / grid[3]) + 3))
-        sk = math.cos(math.atan(c[TB]))
-        most = max(most, 3 * pieces + LEVELS + int(c[FLUTE] / sk / flank[k]) + 4)
-        samples = max(samples, int(TAU / min(min(grid[2], grid[3]) / c[WIDE], APART)) + 4)
-    return cells, most, samples
-
-
 _F1, _F2, _I1, _I2, _S = (
     types.float64[::1],
     types.float64[:, ::1],
@@ -321,15 +193,17 @@ _F1, _F2, _I1, _I2, _S = (
     types.int64[:, ::1],
     types.int32[::1],
 )
+#: room for :func:`run`: candidates, levels, slices, spans, their slices, pieces, place, rows and slices so far
+WORK = types.Tuple((_F2, _F1, _F2, _F2, _I1, _I1, _F1, _I1))
 INDEX = types.Tuple((_F1, _I1, _F2, _I2, _S, _F1, _F2, _I1, _F2, _F1, _F1, _I1, _S, _F2))
 
 
 @njit(
-    types.int64(types.int64, _F2, _I1, _I1, INDEX, types.int64, _F1, _F2, _F2, _I1, _I2, _F2, _I1),
+    types.int64(types.int64, _F2, _I1, _I1, INDEX, WORK, _F2, _F1, _F2, _F2, _I1, _I2, _F2, _I1),
     cache=True,
     nogil=True,
 )
-def run(begin, frame, instants, state, index, pieces, flank, slices, rows, owner, entry, out, used):
+def run(begin, frame, instants, state, index, work, parts, flank, slices, rows, owner, entry, out, used):
     """Find what each step from ``begin`` on engages at its instants and enter it into the index.
 
     Parameters
@@ -348,16 +222,13 @@ def run(begin, frame, instants, state, index, pieces, flank, slices, rows, owner
     -------
     The number of steps, or the one at which room ran out: ``state[1]`` 0: of rows, 1: of lists.
     """
+    # the caller keeps all of them
+    index = borrowed(index)
+    near, levels, scratch, spans, mine, room, p, at = borrowed(work)
+    frame, instants, state, parts, flank = borrowed((frame, instants, state, parts, flank))
+    slices, rows, owner = borrowed((slices, rows, owner))
+    entry, out, used = borrowed((entry, out, used))
     n = len(instants)
-    cells, most, samples = rooms(index, pieces, flank)
-    near = np.empty((cells, 6))
-    levels = np.empty(LEVELS)
-    scratch = np.empty((most, 9))
-    spans = np.empty((most * (samples + 1), 2))
-    mine = np.empty(len(spans), np.int64)
-    room = np.empty(len(spans), np.int64)
-    p = np.empty(3)
-    at = np.empty(2, np.int64)
     for k in range(begin, n):
         q = state[0] + k
         m = index[6][q]
@@ -374,7 +245,7 @@ def run(begin, frame, instants, state, index, pieces, flank, slices, rows, owner
                     return k
                 before = at[0]
                 if not engaged(
-                    p, m[3:], c, frame[k], pieces, flank[index[7][q]], index, near, levels, scratch, spans, mine, room,
+                    p, m[3:], c, frame[k], parts, flank[index[7][q]], index, near, levels, scratch, spans, mine, room,
                     slices, rows, owner, at, out[entries],
                 ):  # fmt: skip
                     return k

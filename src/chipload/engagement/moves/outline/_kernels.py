@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from numba import njit, types
 
-from chipload.engagement.moves._kernels import place, swept
+from chipload.engagement.moves._kernels import EPS, place, swept
+from chipload.engagement.moves.borrowed._kernels import borrowed
 from chipload.engagement.moves.front._kernels import INDEX
 
 #: halvings of a side
@@ -26,6 +27,9 @@ def was_swept(x, y, z, index, tops):
     ceil = index[2][cell, 1]
     if z >= ceil:
         return ceil < tops[cell]
+    if z < index[2][cell, 0] - EPS:
+        # below all that moves swept here
+        return False
     at = index[3][cell, 0]
     for k in range(at + index[3][cell, 1] - 1, at - 1, -1):
         e = index[4][k]
@@ -88,6 +92,9 @@ def outlines(z, xs, ys, index, tops, inside, onward, points, first):
     ``xs``, ``ys``: nodes, the outermost beside the body; ``inside`` and ``onward`` room for a mark a node and a number
     a side.
     """
+    # the caller keeps all of them
+    index = borrowed(index)
+    tops, points, first = borrowed((tops, points, first))
     n = len(xs)
     m = len(ys)
     inside[:] = False

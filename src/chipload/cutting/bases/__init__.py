@@ -1,0 +1,1 @@
+"""Loads for 1 of each coefficient of a linear law."""

@@ -1,0 +1,1 @@
+"""Where the material ends on a circle of the cutter."""

@@ -1,0 +1,1 @@
+"""Arrays that compiled loops use without counting their references."""
