@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.jobs.checks import DefaultChecks
+from chipload.jobs.program.workpiece_compliance import WorkpieceCompliance
 from chipload.machine.machine import Machine
 from chipload.program.read import ProgramReading
 from chipload.result import Provenance
@@ -40,6 +41,7 @@ class SimulationResult:
     compared_with : names of what shank and holder were held against
     no_holder : tools whose holder is not stated
     rigid : what was not stated of what gives way, and counts as rigid
+    workpiece : how far the workpiece gives way where it is cut; None: no [workpiece] is stated
     """
 
     removal: Removal
@@ -55,6 +57,7 @@ class SimulationResult:
     compared_with: tuple[str, ...] = ()
     no_holder: tuple[int, ...] = ()
     rigid: tuple[str, ...] = ()
+    workpiece: WorkpieceCompliance | None = None
 
     @property
     def errors(self) -> Mapping[str, float]:
