@@ -33,7 +33,11 @@ LOADED = 0.1
 #: the columns that tell this, the first that a track has
 LOADS = ("force_n", "force_xy_n", "force_normal_n", "torque_mean_nm")
 #: loads whose direction is not known where the material has a tangential force alone
-DIRECTED = ("force_n", "deflection_um", "form_error_um", "cutter_stress_mpa", "deflection_share")
+DIRECTED = (
+    "force_n", "deflection_um", "deflection_workpiece_um", "form_error_um", "cutter_stress_mpa", "deflection_share",
+)  # fmt: skip
+#: columns that have the error of the force where they have none of their own
+WITH_FORCE = ("cutter_stress_mpa", "deflection_workpiece_um")
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,12 +242,12 @@ def _spindle(machine: Machine, columns: Columns, track: str, errors: Mapping[str
 
 
 def load_error(errors: Mapping[str, float], column: str) -> float:
-    """Relative error of a column by the resolution; the stress of the cutter has that of the force.
+    """Relative error of a column by the resolution; stress and deflection have that of the force.
 
     >>> load_error({"force_n": 0.02}, "cutter_stress_mpa"), load_error({"force_n": 0.02}, "power_w")
     (0.02, 0.0)
     """
-    return errors.get("force_n" if column == "cutter_stress_mpa" else column, 0.0)
+    return errors.get(column, errors.get("force_n", 0.0) if column in WITH_FORCE else 0.0)
 
 
 def upper_loads(columns: Columns, sigma: float) -> dict[str, NDArray[np.float64]]:

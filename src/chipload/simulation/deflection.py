@@ -230,7 +230,7 @@ def tip_deflections(
     material: Material,
     *,
     bars: tuple[Bar, ...],
-    work: float | None = None,
+    work: float | Floats | None = None,
     rotation: float = math.radians(2.0),
 ) -> dict[str, Floats]:
     """How far the tip of one cutter and the work part in some steps, at most over a revolution.
@@ -242,7 +242,8 @@ def tip_deflections(
     ----------
     cuts : of one cutter, as the watch of :func:`chipload.simulation.chips.remove` gets them
     bars : of cutter, holder and spindle, from the tip upwards
-    work : c [mm/N]; None: the work counts as rigid
+    work : c [mm/N]; (c, s, 3, 3): compliance of the work in the frame of the program at some places of each step, of
+        which the one that moves farthest counts; None: the work counts as rigid
     rotation : between two rotations that are looked at [rad]
 
     Returns
@@ -251,7 +252,7 @@ def tip_deflections(
         ``deflection_cutter_um`` greatest size of u, with ``work`` also ``deflection_workpiece_um`` c times that of F,
         ``deflection_um`` greatest size of u + c F.
     """
-    if work is not None and not 0.0 <= work < math.inf:
+    if isinstance(work, float) and not 0.0 <= work < math.inf:
         raise InputError(f"tip_deflections: work = {work:g} mm/N: a compliance must be at least 0")
     pitch = math.tau if cuts.cutter.runout[0] > 0.0 else math.tau / cuts.cutter.flutes
     m = max(math.ceil(pitch / rotation), 8)
@@ -264,10 +265,17 @@ def tip_deflections(
     out = {"deflection_cutter_um": 1e3 * np.linalg.norm(bent, axis=2).max(axis=1)}
     if work is None:
         return out | {"deflection_um": out["deflection_cutter_um"]}
-    apart = work * force
-    out["deflection_workpiece_um"] = 1e3 * np.linalg.norm(apart, axis=2).max(axis=1)
-    apart[..., :2] += bent
-    return out | {"deflection_um": 1e3 * np.linalg.norm(apart, axis=2).max(axis=1)}
+    if isinstance(work, float):
+        apart = (work * force)[:, :, None]
+    else:
+        # in the frame of the cutter, as the force is
+        frame = cuts.bites.frame
+        assert frame is not None
+        own = np.einsum("nia,nsab,njb->nsij", frame, work, frame)
+        apart = np.einsum("nsij,nmj->nmsi", own, force)
+    out["deflection_workpiece_um"] = 1e3 * np.linalg.norm(apart, axis=3).max(axis=(1, 2))
+    apart[..., :2] += bent[:, :, None]
+    return out | {"deflection_um": 1e3 * np.linalg.norm(apart, axis=3).max(axis=(1, 2))}
 
 
 def form_error(

@@ -33,6 +33,7 @@ BANDED = {
     "torque_mean_nm": "torque_mean_sd_nm",
     "power_w": "power_sd_w",
     "deflection_um": "force_sd_n",
+    "deflection_workpiece_um": "force_sd_n",
     "form_error_um": "force_sd_n",
     "cutter_stress_mpa": "force_sd_n",
 }

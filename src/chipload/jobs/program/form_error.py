@@ -52,7 +52,7 @@ def forming(left: Difference, stiffness: Stiffness, material: Material) -> Calla
         error, made = np.zeros(len(cuts)), np.zeros(len(cuts))
         some = at[np.searchsorted(step, cuts.step[0]) : np.searchsorted(step, cuts.step[-1], "right")]
         if len(some):
-            work = None if stiffness.work is None else np.full(len(some), stiffness.work)
+            work = _work(stiffness, left, some)
             bars = {cuts.tool: stiffness.bars[cuts.tool]}
             found = form_error_of(
                 [cuts], material, left.points[some], normals[some], work=work, bars=bars, near=2.0 * NEAR
@@ -65,3 +65,10 @@ def forming(left: Difference, stiffness: Stiffness, material: Material) -> Calla
         return {"form_error_um": error, "form_points": made}
 
     return columns
+
+
+def _work(stiffness: Stiffness, left: Difference, points: NDArray[np.int64]) -> Floats | None:
+    """Compliance of the work at points of the part: that of the step which makes each, at its height on the contact."""
+    if stiffness.work is None or isinstance(stiffness.work, float):
+        return None if stiffness.work is None else np.full(len(points), stiffness.work)
+    return stiffness.work.at_points(left.step[points], left.points[points])

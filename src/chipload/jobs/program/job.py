@@ -11,6 +11,7 @@ import trimesh
 
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
+from chipload.jobs.program.clamped import clamp_errors
 from chipload.jobs.program.dynamics import dynamics_of
 from chipload.jobs.program.tables import LOADS, ProgramJobTable, ProgramLimitsTable
 from chipload.jobs.sources import Limited, cutters, sources_of
@@ -74,7 +75,7 @@ def load(path: Path, table: ProgramJobTable, overrides: Sequence[str]) -> Progra
     else:
         errors.texts += [
             f'{key}: not used where a program is only read: add an [[operation]] with kind = "simulate" or leave it out'
-            for key in ("stock", "part", "fixture", "material", "cutter", "stiffness", "dynamics")
+            for key in ("stock", "part", "fixture", "material", "cutter", "stiffness", "dynamics", "workpiece")
             if getattr(table, key)
         ]
     errors.refuse()
@@ -109,6 +110,7 @@ def _contradictions(table: ProgramJobTable) -> Iterator[str]:
         saved = stock.file is not None and stock.file.lower().endswith(".npz")
         if saved and stock.layer_mm is not None:
             yield "stock.layer_mm: leave it out: the layers of an earlier result stay"
+    yield from clamp_errors(table)
     for key in ("form_error_um", "gouge_mm", "excess_mm"):
         if table.part is None and getattr(table.limits, key) is not None:
             yield f"limits.{key}: needs the part that should come out: state [part] or leave it out"

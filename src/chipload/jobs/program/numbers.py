@@ -93,6 +93,7 @@ def operation_numbers(simulation: SimulationResult, time_s: float) -> dict[str, 
         "power_w": {"mean": mean("power_w"), "max": float(c["power_w"].max(initial=0.0))},
         "chip_max_mm": {"max": float(c["chip_max_mm"].max(initial=0.0))},
         "deflection_um": deflection(simulation),
+        **workpiece(simulation),
         "form_error_um": form_error(simulation),
         **part_numbers.numbers(simulation.left, c),
         "collisions": part_numbers.listed(simulation.collisions, c),
@@ -134,6 +135,17 @@ def deflection(simulation: SimulationResult) -> dict[str, Any]:
         "place": [float(c[f"{x}_mm"][k]) for x in "xyz"],
         "not_stated": list(simulation.rigid),
     }
+
+
+def workpiece(simulation: SimulationResult) -> dict[str, Any]:
+    """How far the workpiece gives way where it is cut, in summary.json; empty: no [workpiece] is stated."""
+    if simulation.workpiece is None:
+        return {}
+    c = simulation.removal.columns
+    k = int(np.argmax(c["deflection_workpiece_um"]))
+    place = [float(c[f"{x}_mm"][k]) for x in "xyz"]
+    worst = {"max": float(c["deflection_workpiece_um"][k]), "line": int(c["line"][k]), "place": place}
+    return {"deflection_workpiece_um": worst, **simulation.workpiece.numbers}
 
 
 def form_error(simulation: SimulationResult) -> dict[str, Any]:

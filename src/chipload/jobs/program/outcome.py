@@ -13,6 +13,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.jobs.checks import DefaultChecks
 from chipload.jobs.program.stability import StabilityResult
+from chipload.jobs.program.workpiece_compliance import WorkpieceCompliance
 from chipload.machine.machine import Machine
 from chipload.program.read import ProgramReading
 from chipload.result import Provenance
@@ -42,6 +43,7 @@ class SimulationResult:
     no_holder : tools whose holder is not stated
     rigid : what was not stated of what gives way, and counts as rigid
     stability : margins and quiet speeds; None: no modes are stated
+    workpiece : how far the workpiece gives way where it is cut; None: no [workpiece] is stated
     """
 
     removal: Removal
@@ -58,6 +60,7 @@ class SimulationResult:
     no_holder: tuple[int, ...] = ()
     rigid: tuple[str, ...] = ()
     stability: StabilityResult | None = None
+    workpiece: WorkpieceCompliance | None = None
 
     @property
     def errors(self) -> Mapping[str, float]:

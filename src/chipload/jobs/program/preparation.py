@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from chipload.cutting.material import Material, material_named, read_material
 from chipload.jobs.checks import DefaultChecks, default_checks
+from chipload.jobs.program.clamped import require_clamped
 from chipload.jobs.program.job import ProgramJob
 from chipload.jobs.program.stiffness import Stiffness, stiffness_of
 from chipload.jobs.program.tables import SimulateTable
@@ -71,6 +72,7 @@ def bodies_of(
     require_steps(reading.program, op.step_mm)
     checks = default_checks(job.table.checks, job.cutters, material, op.confidence)
     stiffness = stiffness_of(job.table.stiffness, job.cutters)
+    require_clamped(job.table.workpiece, stock)
     program, times = timed(reading, job, machine)
     fine = resolution_of(job, program)
     count = counted(program, job.cutters, fine)

@@ -150,6 +150,8 @@ def _found(simulation: SimulationResult) -> tuple[Finding, ...]:
         place = (float(c.at[0]), float(c.at[1]), float(c.at[2]))
         text = f"{c.what} goes {c.depth_mm:.3g} mm into {c.into}"
         out.append(Finding("collision", c.line, text, Severity.EXCEEDS, place, int(c.step)))
+    if simulation.workpiece is not None:
+        out += simulation.workpiece.findings
     return (*out, *chip_findings(simulation.checks, simulation.removal.columns))
 
 

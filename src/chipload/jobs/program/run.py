@@ -22,6 +22,7 @@ from chipload.jobs.program.stability import STABILITY_COLUMNS
 from chipload.jobs.program.stiffness import deflecting, stiffness_of, watched, with_columns
 from chipload.jobs.program.tables import LOADS, SimulateTable
 from chipload.jobs.program.workpiece import insides, stock_body
+from chipload.jobs.program.workpiece_compliance import WorkpieceCompliance, with_soft_errors, workpiece_compliance
 from chipload.jobs.provenance import provenance_of, sources, title_of, versions
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.program import RAPID
@@ -84,16 +85,17 @@ def run(
     lines, seconds = line_times(reading, machine)
     simulated, fed, sped = None, None, None
     if job.simulates:
-        stock, material, begin = stock_body(job, reading.program), material_of(job), share
+        stock, material, begin, soft = stock_body(job, reading.program), material_of(job), share, None
         wants_feeds = job.table.operation[0].feeds is not None
         if wants_feeds:
             own = changeable(job.program_file, machine, table.dialect)
             straight(reading.program)
             bodies_of(job, reading, stock, machine, material)
             if simulate:
+                soft = _soft(job, reading, stock, machine, material, progress)
                 begin = 0.5 * (1.0 + share)
                 fed, reading = _new_feeds(
-                    job, *own, reading, stock, material, machine, read, float(seconds.sum()),
+                    job, *own, reading, stock, material, machine, read, float(seconds.sum()), soft,
                     lambda done, what: progress(share + (begin - share) * done, what),
                 )  # fmt: skip
                 lines, seconds = line_times(reading, machine)
@@ -112,7 +114,7 @@ def run(
                 stock = stock_body(job, reading.program)
         if simulate:
             simulated = _simulated(
-                job, reading, stock, machine, material, checkpoint,
+                job, reading, stock, machine, material, checkpoint, soft,
                 lambda done, what: progress(begin + (1.0 - begin) * done, what),
             )  # fmt: skip
     files: dict[str, Path] = {"program": job.program_file}
@@ -175,7 +177,7 @@ def simulate_read(
     if stock is None:
         stock = stock_body(job, reading.program)
     lines, seconds = line_times(reading, machine)
-    done = _simulated(job, reading, stock, machine, material, None, progress)
+    done = _simulated(job, reading, stock, machine, material, None, None, progress)
     name = job.program_file.name
     return ProgramResult(
         title_of(job.path), name, reading, lines, seconds, machine, provenance, done, cutters=job.cutters
@@ -192,6 +194,7 @@ def _new_feeds(
     machine: Machine,
     read: Callable[[str], ProgramReading],
     seconds: float,
+    soft: WorkpieceCompliance | None,
     progress: Progress,
 ) -> tuple[FeedResult, ProgramReading]:
     """The text with new feeds, from what the program cuts of a stock, which changes; and what it does then."""
@@ -202,7 +205,7 @@ def _new_feeds(
     limits = {name: limit for name, limit in job.limits.items() if name in LOADS}
     if "spindle" not in job.table.checks.off:
         limits |= spindle_limits(machine, turning)
-    gives = stiffness_of(job.table.stiffness, job.cutters)
+    gives = stiffness_of(job.table.stiffness, job.cutters, None if soft is None else soft.steps)
     bends = with_checks(job.table.checks, material, deflecting(gives, material))
     checks = default_checks(job.table.checks, job.cutters, material, op.confidence)
     program, times = timed(reading, job, machine)
@@ -211,8 +214,8 @@ def _new_feeds(
         program, stock, job.cutters, material, fine, interpolation=op.interpolation, times=times, watch=bends,
         engine=op.engine, progress=lambda done, what: progress(0.5 * done, what),
     )  # fmt: skip
-    before = with_columns(before, (*watched(gives), *CHECK_COLUMNS))
-    more = bends if "deflection_um" in limits else None
+    before = with_soft_errors(with_columns(before, (*watched(gives), *CHECK_COLUMNS)), soft)
+    more = bends if limits.keys() & {"deflection_um", "deflection_workpiece_um"} else None
     errors = {name: SPARE * error for name, error in before.resolution_error.items()}
     asked = Asked(op.feeds, limits, fine.rotation, checks, errors, more)
     steps = steps_of(program, op.step_mm, op.tolerance_mm)
@@ -235,14 +238,16 @@ def _simulated(
     machine: Machine,
     material: Material,
     checkpoint: Checkpoint | None,
+    soft: WorkpieceCompliance | None,
     progress: Progress,
 ) -> SimulationResult:
-    """The program, run through the stock of the job."""
+    """The program, run through the stock of the job; ``soft``: how the workpiece gives way, None: not found yet."""
     op: SimulateTable = job.table.operation[0]
     bodies = bodies_of(job, reading, stock, machine, material)
-    program, times, fine, part, gives = (
-        bodies.program, bodies.times, bodies.resolution, bodies.part, bodies.stiffness
-    )  # fmt: skip
+    program, times, fine, part = bodies.program, bodies.times, bodies.resolution, bodies.part
+    if soft is None and job.table.workpiece is not None:
+        soft = _soft(job, reading, stock, machine, material, progress)
+    gives = bodies.stiffness if soft is None else stiffness_of(job.table.stiffness, job.cutters, soft.steps)
     points, before, stiffness = bodies.stock_points, insides(stock), job.table.stiffness
     watches = [with_checks(job.table.checks, material, deflecting(gives, material))]
     steps = StepBlocks(program, op.step_mm, op.tolerance_mm)
@@ -260,7 +265,7 @@ def _simulated(
         )  # fmt: skip
         solids["part"] = left.points
     # form error costs as much as the chips, and says little where nothing is known to give way
-    made = left if stiffness is not None or "form_error_um" in job.limits else None
+    made = left if stiffness is not None or soft is not None or "form_error_um" in job.limits else None
     if made is not None:
         watches.append(forming(made, gives, material))
 
@@ -284,10 +289,10 @@ def _simulated(
         formed = None if made is None else (made.points, made.faces, made.distance, made.step)
         removal = remove_in_chunks(
             program, stock, job.cutters, material, fine, checkpoint, interpolation=op.interpolation, watch=watch,
-            times=times, also=(versions(), sources(), repr(stiffness), repr(job.table.checks), formed),
-            engine=op.engine, progress=removing,
+            times=times, engine=op.engine, progress=removing,
+            also=(versions(), sources(), repr((stiffness, job.table.workpiece)), repr(job.table.checks), formed),
         )  # fmt: skip
-    removal = with_columns(removal, (*watched(gives, formed=made is not None), *CHECK_COLUMNS))
+    removal = with_soft_errors(with_columns(removal, (*watched(gives, formed=made is not None), *CHECK_COLUMNS)), soft)
     if vibrates is not None:
         removal = with_columns(removal, STABILITY_COLUMNS)
     touched = collisions(
@@ -303,8 +308,21 @@ def _simulated(
     return SimulationResult(
         removal, stock, machine, material, job.limits, job.unchecked, settings, bodies.checks, left, touched,
         compared_with, _no_holder(job), gives.unknown,
-        None if vibrates is None else stability_of(job, vibrates, machine),
+        None if vibrates is None else stability_of(job, vibrates, machine), soft,
     )  # fmt: skip
+
+
+def _soft(
+    job: ProgramJob,
+    reading: ProgramReading,
+    stock: LayeredStock,
+    machine: Machine,
+    material: Material,
+    progress: Progress,
+) -> WorkpieceCompliance | None:
+    """How the workpiece gives way where the program cuts it; None: no [workpiece] is stated."""
+    program, _ = timed(reading, job, machine)
+    return workpiece_compliance(job, program, stock, material, resolution_of(job, program), progress)
 
 
 def _no_holder(job: ProgramJob) -> tuple[int, ...]:

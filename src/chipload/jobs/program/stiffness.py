@@ -22,6 +22,7 @@ from chipload.simulation.chip_space import flute_fill
 from chipload.simulation.deflection import tip_deflections
 from chipload.simulation.loads import Cuts, Floats
 from chipload.simulation.removal import Removal
+from chipload.structure.cells.states import StepCompliances
 from chipload.structure.spindle import RIGID, Bar, cutter_bars, springs, tool_bars, tube
 
 #: N/mm in 1 N/um, N mm/rad in 1 N m/rad, MPa in 1 GPa
@@ -37,19 +38,22 @@ class Stiffness:
     Parameters
     ----------
     bars : by tool number, from the tip to the spindle
-    work : compliance of the work [mm/N]; None: not stated
+    work : compliance of the work [mm/N], the same everywhere, or that of a workpiece in the state of each step; None:
+        not stated
     room : whether the room for chips is stated of a cutter
     unknown : what was not stated and counts as rigid
     """
 
     bars: Mapping[int, tuple[Bar, ...]]
-    work: float | None
+    work: float | StepCompliances | None
     room: bool
     unknown: tuple[str, ...]
 
 
-def stiffness_of(table: StiffnessTable | None, cutters: Mapping[int, Cutter]) -> Stiffness:
-    """Bars and joints of every cutter.
+def stiffness_of(
+    table: StiffnessTable | None, cutters: Mapping[int, Cutter], workpiece: StepCompliances | None = None
+) -> Stiffness:
+    """Bars and joints of every cutter, and the compliance of the work.
 
     Raises
     ------
@@ -71,6 +75,8 @@ def stiffness_of(table: StiffnessTable | None, cutters: Mapping[int, Cutter]) ->
     chains = {n: c for n, c in cutters.items() if c.tip_stiffness is None}
     keys = [k for k in StiffnessTable.model_fields if k != "holder_gpa"] if chains else ["work_n_um"]
     missing = [f"stiffness.{k}" for k in keys if getattr(said, k) is None]
+    if workpiece is not None:
+        missing = [name for name in missing if name != "stiffness.work_n_um"]
     # a spindle that does not tilt feels no lever: the length of a rigid holder does not matter then
     matters = modulus is None or math.isfinite(modulus) or math.isfinite(said.spindle_nm_rad or 1.0)
     bare = sorted(n for n, c in chains.items() if not c.holder) if matters else []
@@ -83,7 +89,7 @@ def stiffness_of(table: StiffnessTable | None, cutters: Mapping[int, Cutter]) ->
     for number, cutter in chains.items():
         holder = [_part(length, diameter, modulus) for length, diameter in cutter.holder]
         bars[number] = (*cutter_bars(cutter, grip), *holder, Bar(0.0, 0.0, nose))
-    work = None if said.work_n_um is None else 1.0 / (PER * said.work_n_um)
+    work = workpiece if workpiece is not None or said.work_n_um is None else 1.0 / (PER * said.work_n_um)
     return Stiffness(bars, work, any(c.gullet is not None for c in cutters.values()), tuple(missing))
 
 
@@ -100,7 +106,8 @@ def deflecting(stiffness: Stiffness, material: Material) -> Callable[[Cuts], dic
     """
 
     def columns(cuts: Cuts) -> dict[str, Floats]:
-        found = tip_deflections(cuts, material, bars=stiffness.bars[cuts.tool], work=stiffness.work)
+        work = stiffness.work.at(cuts.step) if isinstance(stiffness.work, StepCompliances) else stiffness.work
+        found = tip_deflections(cuts, material, bars=stiffness.bars[cuts.tool], work=work)
         return found if cuts.cutter.gullet is None else found | {"flute_fill": flute_fill(cuts)}
 
     return columns

@@ -135,6 +135,7 @@ class ProgramLimitsTable(Limits):
     power_w: Positive | None = None
     chip_max_mm: Positive | None = None
     deflection_um: Positive | None = Field(None, description="how far tool and work part, see [stiffness]")
+    deflection_workpiece_um: Positive | None = Field(None, description="how far the [workpiece] gives way")
     form_error_um: Positive | None = Field(None, description="what giving way leaves on, or takes from, the [part]")
     gouge_mm: Positive | None = Field(None, description="deepest cut into the [part]")
     excess_mm: Positive | None = Field(None, description="most material over the [part] where the tool came near it")
@@ -145,7 +146,7 @@ class ProgramLimitsTable(Limits):
 
 
 #: limits that feeds can hold
-LOADS = ("force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um")
+LOADS = ("force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um", "deflection_workpiece_um")
 
 
 def _stiff(value: Any) -> Any:
@@ -170,6 +171,37 @@ class StiffnessTable(Table):
     work_n_um: Stiff | None = Field(None, description="work where it is cut, the same in every direction")
 
 
+class ClampTable(Table):
+    """A part of the stock that is held: on a face of it, in a box, or round a point such as a screw."""
+
+    face: Literal["x-", "x+", "y-", "y+", "z-", "z+"] | None = Field(
+        None, description="side of the stock; with low_mm and high_mm only what lies between them"
+    )
+    low_mm: Point | None = Field(None, description="lower corner of a box")
+    high_mm: Point | None = Field(None, description="upper corner of a box")
+    point_mm: Point | None = Field(None, description="middle of an upright cylinder")
+    diameter_mm: Positive | None = Field(None, description="of the cylinder; it is as high as that")
+    directions: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = Field("xyz", description="directions that are held")
+    stiffness_n_um: Positive | None = Field(
+        None, description="of the whole clamp in each direction, as of soft jaws or vacuum; none: it does not give way"
+    )
+
+
+class WorkpieceTable(Table):
+    """What the stock is made of and how it is clamped: it gives way in the state in which each step finds it."""
+
+    modulus_gpa: Positive = Field(le=1000.0, description="Young's modulus")
+    poisson: NotNegative = Field(lt=0.5, description="Poisson's ratio")
+    clamp: tuple[ClampTable, ...] = Field(min_length=1, description="all of them together allow no rigid motion")
+    cell_mm: Positive | None = Field(None, description="side of the cells; none: by the thinnest wall that is left")
+    states: Count = Field(16, le=200, description="states of removal that are solved at most")
+    state_change_percent: Positive = Field(
+        5.0,
+        le=100.0,
+        description="a state is added between two that differ by more, of the greatest deflection",
+    )
+
+
 class ProgramJobTable(Table):
     """The whole file of a job that runs a program instead of a plan; with an operation it is simulated."""
 
@@ -182,6 +214,7 @@ class ProgramJobTable(Table):
     cutter: tuple[CutterTable, ...] = ()
     stiffness: StiffnessTable | None = None
     dynamics: DynamicsTable | None = None
+    workpiece: WorkpieceTable | None = None
     checks: ChecksTable = Field(default_factory=ChecksTable.model_construct)
     operation: tuple[SimulateTable, ...] = Field((), max_length=1)
     limits: ProgramLimitsTable = Field(default_factory=ProgramLimitsTable.model_construct)

@@ -1,0 +1,117 @@
+"""Where the steps of a program touch the workpiece, and the stock before some of them.
+
+The program is run through the stock once ahead, for this alone: what a step touches and what is left then do not depend
+on the feed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material
+from chipload.program.program import Program
+from chipload.progress import Progress, silent
+from chipload.simulation.chips import counted, remove_block, setting_of
+from chipload.simulation.loads import GRAZES, Cuts
+from chipload.simulation.removal import Resolution, RunningSums
+from chipload.simulation.steps import steps_in_blocks
+from chipload.simulation.swept_area import Interpolation
+from chipload.stock.layers import LayeredStock
+from chipload.structure.cells.states import StepLines
+
+Floats = NDArray[np.float64]
+
+#: steps between two stocks that are kept
+TOGETHER = 64
+
+
+@dataclass(frozen=True, eq=False)
+class CutAhead:
+    """A program that was run ahead.
+
+    Attributes
+    ----------
+    lines : where the steps that cut touch the workpiece
+    stocks : (step, removed volume [mm^3], stock before that step), rising; the last is what is left
+    """
+
+    lines: StepLines
+    stocks: tuple[tuple[int, float, LayeredStock], ...]
+
+
+def cut_ahead(
+    program: Program,
+    stock: LayeredStock,
+    cutters: Mapping[int, Cutter],
+    material: Material,
+    resolution: Resolution,
+    interpolation: Interpolation,
+    progress: Progress = silent,
+) -> CutAhead:
+    """Run a program through a stock, which changes, and keep where it cuts and what is left every few steps."""
+    count = counted(program, cutters, resolution)
+    setting = setting_of(cutters, material, resolution, interpolation, None, 2)
+    sums, known = RunningSums(stock.volume()), list[tuple[NDArray[np.int64], Floats, Floats, Floats]]()
+    stocks, volume = [(0, 0.0, stock.copied())], 0.0
+    for steps in steps_in_blocks(program, resolution.step_mm, resolution.tolerance, size=TOGETHER):
+        progress(sums.steps / count, "where it cuts")
+        first = sums.steps
+        sums, columns, cuts = remove_block(steps, stock, sums, setting)
+        removed = volume + np.cumsum([0.0, *columns["chip_volume_mm3"]])
+        for c in cuts:
+            row = c.step - first
+            known.append((c.step, contact_lines(c), columns["force_n"][row], removed[row]))
+        if removed[-1] > volume:
+            volume = float(removed[-1])
+            stocks.append((sums.steps, volume, stock.copied()))
+    stocks.append((count, volume, stocks[-1][2]))
+    if not known:
+        return CutAhead(StepLines(np.zeros(0, np.int64), np.zeros((0, 2, 3)), np.zeros(0), np.zeros(0)), tuple(stocks))
+    step, lines, force, before = (np.concatenate([some[k] for some in known]) for k in range(4))
+    order = np.argsort(step, kind="stable")
+    return CutAhead(StepLines(step[order], lines[order], force[order], before[order]), tuple(stocks))
+
+
+def contact_lines(cuts: Cuts) -> Floats:
+    """(c, 2, 3) float [mm], ends of the line along which each step touches the surface that it leaves.
+
+    It runs along the axis through the mean of the ends of the engagement at which the chip has no thickness, from the
+    lowest to the highest of them; where a step leaves no surface, through the middle of its engagement.
+    """
+    bites = cuts.bites
+    assert bites.frame is not None
+    owner = np.repeat(np.arange(len(bites)), np.diff(bites.start))
+    p, q, a, b, along, offset, across = bites.rows.T
+    s0, rho, z0, sk = bites.slices[bites.slice, :4].T
+    n = len(bites)
+    total, weight = np.zeros((n, 3)), np.zeros(n)
+    low, high = np.full(n, np.inf), np.full(n, -np.inf)
+    size = GRAZES * (np.hypot(along, across) + np.abs(offset))
+    for leaves in (True, False):
+        lacking = weight[owner] == 0.0
+        for phi in (p, q) if leaves else (0.5 * (p + q),):
+            h = along * np.sin(phi) + across * np.cos(phi) + offset
+            counts = (np.abs(h) <= size) | (not leaves)
+            counts &= (b > a) & lacking
+            k, some = owner[counts], (b - a)[counts]
+            middle = 0.5 * (a + b)[counts] - s0[counts]
+            at = np.column_stack([
+                rho[counts] * np.sin(phi[counts]), rho[counts] * np.cos(phi[counts]), z0[counts] + sk[counts] * middle
+            ])  # fmt: skip
+            np.add.at(total, k, some[:, None] * at)
+            np.add.at(weight, k, some)
+            for s in (a, b):
+                z = z0[counts] + sk[counts] * (s[counts] - s0[counts])
+                np.minimum.at(low, k, z)
+                np.maximum.at(high, k, z)
+    known = weight > 0.0
+    mean = total / np.where(known, weight, 1.0)[:, None]
+    ends = np.repeat(mean[:, None], 2, axis=1)
+    ends[known, 0, 2], ends[known, 1, 2] = low[known], high[known]
+    tip = 0.5 * (cuts.way[:, :3] + cuts.way[:, 3:6])
+    return np.asarray(tip[:, None] + np.einsum("nei,nij->nej", ends, bites.frame))

@@ -1,0 +1,157 @@
+"""How far the workpiece of a job gives way, step by step, and how well that is known.
+
+The program is run ahead, the stock is kept every few steps, and its compliance is solved in a few of these states. What
+the cells do to the result is found at the worst places: there the same states are solved in cells of :data:`COARSER`
+times the side. The difference stands for the error, which falls with the square of the side at least: what is left in
+the finer cells is then at most 1 / (COARSER^2 - 1) = 0.8 of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutting.material import Material
+from chipload.errors import Finding, Severity
+from chipload.jobs.program.clamped import clamped_volumes, clamps_of, elastic_of
+from chipload.jobs.program.contact_lines import cut_ahead
+from chipload.jobs.program.job import ProgramJob
+from chipload.program.program import Program
+from chipload.progress import Progress, silent
+from chipload.simulation.removal import Removal, Resolution
+from chipload.stock.layers import LayeredStock
+from chipload.structure.cells.grid import CellGrid, grid_over
+from chipload.structure.cells.states import State, StepCompliances, size_of, step_compliances
+from chipload.structure.cells.thickness import cells_over
+from chipload.structure.cells.workpiece import CellWorkpiece, cell_workpiece, line_compliances
+
+Floats = NDArray[np.float64]
+
+#: side of the cells that the error is found with, over that of the cells
+COARSER = 1.5
+#: least distance of contact lines that are solved, in cells
+SPACING = 0.5
+#: error of the cells that is not found so
+FLOOR = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class WorkpieceCompliance:
+    """Compliance of the workpiece of a program.
+
+    Attributes
+    ----------
+    steps : compliance in the state of each step
+    wall : [mm] thinnest wall that is left
+    cell : [mm] longest side of the cells
+    unknowns : of the state with most
+    error : relative error of the greatest deflection, by cells and states
+    state_change : how far a compliance may lie from that of its own state, relative, among the worst steps
+    findings : material that hangs on nothing
+    """
+
+    steps: StepCompliances
+    wall: float
+    cell: float
+    unknowns: int
+    error: float
+    state_change: float
+    findings: tuple[Finding, ...]
+
+    @property
+    def numbers(self) -> Mapping[str, float | int]:
+        """What summary.json says of it."""
+        return {
+            "states": len(self.steps.states),
+            "state_change_percent": 100.0 * self.state_change,
+            "cell_mm": self.cell,
+            "thinnest_wall_mm": self.wall,
+            "unknowns": self.unknowns,
+        }
+
+
+def workpiece_compliance(
+    job: ProgramJob,
+    program: Program,
+    stock: LayeredStock,
+    material: Material,
+    resolution: Resolution,
+    progress: Progress = silent,
+) -> WorkpieceCompliance | None:
+    """Compliance of the workpiece of a job where its program cuts; None: the job has no [workpiece].
+
+    Parameters
+    ----------
+    stock : before the program; it does not change
+
+    Raises
+    ------
+    InputError
+        A clamp holds nothing, a rigid motion is free, or the cells do not resolve the thinnest wall.
+    """
+    table = job.table.workpiece
+    if table is None:
+        return None
+    op = job.table.operation[0]
+    elastic, clamps = elastic_of(table), clamps_of(table, stock)
+    held = clamped_volumes(table, stock)
+    ahead = cut_ahead(
+        program, stock.copied(), job.cutters, material, resolution, op.interpolation,
+        lambda done, what: progress(0.4 * done, what),
+    )  # fmt: skip
+    grid, wall = cells_over(stock, ahead.stocks[-1][2], table.cell_mm)
+    most = [0]
+
+    def build(then: LayeredStock, cells: CellGrid) -> CellWorkpiece:
+        made = cell_workpiece(then, cells, elastic, clamps, held)
+        most[0] = max(most[0], 3 * len(made.modes))
+        return made
+
+    states = [State(k, v, lambda then=then: build(then, grid)) for k, v, then in ahead.stocks]  # type: ignore[misc]
+    share = table.state_change_percent / 100.0
+    found = step_compliances(
+        ahead.lines, states, tolerance=share, most=max(table.states, 2), spacing=SPACING * float(grid.size.max()),
+        progress=lambda done, what: progress(0.4 + 0.5 * done, what),
+    )  # fmt: skip
+    change = float(found.uncertainty[found.worst].max(initial=0.0))
+    progress(0.9, "error of the cells")
+    error = _cell_error(found, [then for _, _, then in ahead.stocks], grid, build)
+    findings: tuple[Finding, ...] = ()
+    if found.loose > 1e-6 * stock.volume():
+        text = f"{found.loose:.3g} mm3 of the workpiece hang on nothing: they hold no force"
+        findings = (Finding("loose-material", 0, text, Severity.UNPROVEN),)
+    return WorkpieceCompliance(
+        found, wall, float(grid.size.max()), most[0], float(error + FLOOR + change), change, findings
+    )
+
+
+def _cell_error(
+    found: StepCompliances,
+    stocks: Sequence[LayeredStock],
+    grid: CellGrid,
+    build: Callable[[LayeredStock, CellGrid], CellWorkpiece],
+) -> float:
+    """Greatest relative difference to wider cells at the worst places."""
+    low, high = grid.origin, grid.origin + grid.size * grid.counts
+    wide, error = grid_over(low, high, COARSER * float(grid.size.max()), grid.order), 0.0
+    for state in np.unique(found.after).tolist():
+        own = np.flatnonzero(found.after == state)
+        other = size_of(line_compliances(build(stocks[state], wide), found.lines[found.worst[own]]))
+        size = size_of(found.after_compliance[own])
+        error = max(error, float(np.abs(other / size - 1.0).max(initial=0.0)))
+    return error
+
+
+def with_soft_errors(removal: Removal, soft: WorkpieceCompliance | None) -> Removal:
+    """A removal whose deflections have the error of the workpiece's compliance beside that of the force."""
+    if soft is None or not removal.resolution_error:
+        return removal
+    force, c = removal.resolution_error["force_n"], removal.columns
+    work, whole = (float(c[name].max(initial=0.0)) for name in ("deflection_workpiece_um", "deflection_um"))
+    share = min(work / whole, 1.0) if whole > 0.0 else 0.0
+    errors = {"deflection_workpiece_um": soft.error, "deflection_um": share * soft.error, "form_error_um": soft.error}
+    own = {name: force + error for name, error in errors.items()}
+    return replace(removal, resolution_error={**removal.resolution_error, **own})

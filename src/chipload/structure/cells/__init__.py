@@ -1,0 +1,1 @@
+"""A workpiece in equal cells over its layered stock: finite cells, which need no mesh."""

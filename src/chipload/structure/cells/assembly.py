@@ -1,0 +1,181 @@
+"""Stiffness and mass of the material in cells: sums of fixed tensors times moments.
+
+Notation: M (e, n^3) moments of the active cells, alpha the share of stiffness that the empty part of a cut cell keeps;
+a, b modes of a cell, i, j directions; G_ab,ij the integral of dN_a/dx_i dN_b/dx_j; la, mu the constants of Lame. Then
+K_ai,bj = la G_ij + mu G_ji + mu delta_ij trace(G).
+
+Cells of thick material keep only the modes of their corners: where a block of :data:`BULK` cells in each direction is
+full, and no other cell touches it, the error of order 1 is below that of the thin walls beside it
+(docs/design/workpiece.md).
+
+Reference: [Parvizian2007] for alpha; [Duester2008].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, binary_opening
+from scipy.sparse import bsr_array, coo_array, csr_array
+
+from chipload.errors import InputError
+from chipload.structure.cells.grid import Array, CellGrid, Indices, product_tensors
+
+#: stiffness of the empty part of a cut cell over that of the material
+ALPHA = 1e-9
+#: a cell with a smaller share of material is left out
+LEAST_SHARE = 1e-6
+#: cells along each side of a full block that keep the modes of their corners only
+BULK = 4
+#: a cell counts as full from this share on
+FULL = 1.0 - 1e-9
+#: modes (three directions each) that a structure may have
+MOST_MODES = 150_000
+
+
+@dataclass(frozen=True, eq=False)
+class CellModes:
+    """Which modes a workpiece has.
+
+    Attributes
+    ----------
+    cells : (e, 3) int, active cells
+    number : (e, m) int, number of each of their modes; -1: not used
+    lattice : (u, 3) int, place of each mode in the lattice, in the order of the numbers
+    """
+
+    cells: Indices
+    number: Indices
+    lattice: Indices
+
+    def __len__(self) -> int:
+        return len(self.lattice)
+
+
+def shares(moments: Array) -> Array:
+    """(nx, ny, nz) share of each cell that is material."""
+    return np.asarray(moments[..., 0, 0, 0] / 8.0)
+
+
+def modes_of(grid: CellGrid, share: Array, bulk: int = BULK, *, limited: bool = True) -> CellModes:
+    """The modes of the cells that hold material.
+
+    Parameters
+    ----------
+    share : (nx, ny, nz) of material
+    bulk : see :data:`BULK`; 0: every mode is used
+    limited : refuse more than :data:`MOST_MODES`
+
+    Raises
+    ------
+    InputError
+        There are more than :data:`MOST_MODES`.
+    """
+    active = share > LEAST_SHARE
+    cells = np.argwhere(active)
+    numbers = grid.modes_of(cells)
+    used = np.ones(numbers.shape, dtype=np.bool_)
+    if bulk > 0 and grid.order > 1:
+        deep = binary_opening(share >= FULL, np.ones((bulk,) * 3, dtype=np.bool_))
+        # what stands on it bends its surface
+        deep &= ~binary_dilation(active & ~deep, np.ones((3, 3, 3), dtype=np.bool_))
+        used = ~deep[active][:, None] | _corners(grid.order)
+    kept = np.unique(numbers[used])
+    if limited and len(kept) > MOST_MODES:
+        raise InputError(
+            f"workpiece: {3 * len(kept)} unknowns in cells of {np.round(grid.size, 3).tolist()} mm: at most "
+            f"{3 * MOST_MODES}: state a larger workpiece.cell_mm"
+        )
+    at = np.searchsorted(kept, numbers)
+    at[at == len(kept)] = 0
+    number = np.where(kept[at] == numbers, at, -1)
+    return CellModes(cells, number, np.stack(np.unravel_index(kept, grid.lattice), axis=1))
+
+
+def _corners(order: int) -> NDArray[np.bool_]:
+    """(m,) which modes of a cell belong to a corner."""
+    end = np.isin(np.arange(order + 1), (0, order))
+    return np.asarray((end[:, None, None] & end[:, None] & end).ravel())
+
+
+def stiffness(
+    grid: CellGrid, modes: CellModes, moments: Array, modulus: float, poisson: float, alpha: float = ALPHA
+) -> csr_array:
+    """(3 u, 3 u) sparse stiffness [N/mm], all three directions of a mode side by side.
+
+    Parameters
+    ----------
+    moments : (nx, ny, nz, n, n, n), see :func:`chipload.structure.cells.moments.stock_moments`
+    modulus, poisson : [MPa], of the material
+    alpha : see :data:`ALPHA`
+    """
+    la, mu = modulus * poisson / (1.0 + poisson) / (1.0 - 2.0 * poisson), modulus / 2.0 / (1.0 + poisson)
+    gradients, _ = product_tensors(grid)
+    trace = mu * np.einsum("qabii->qab", gradients)
+    law = la * gradients + mu * gradients.swapaxes(3, 4)
+    for i in range(3):
+        law[..., i, i] += trace
+    M = _cells_of(moments, modes)
+    M *= 1.0 - alpha
+    M[:, 0] += 8.0 * alpha
+    return _assembled(modes, M, law)
+
+
+def springs(grid: CellGrid, modes: CellModes, moments: Array, per_volume: Array) -> csr_array:
+    """(3 u, 3 u) sparse stiffness [N/mm] of springs in the material.
+
+    Parameters
+    ----------
+    moments : of the material that the springs hold
+    per_volume : (3, 3) float [N/mm per mm^3]
+    """
+    _, values = product_tensors(grid)
+    return _assembled(modes, _cells_of(moments, modes), values[..., None, None] * per_volume)
+
+
+def mass(grid: CellGrid, modes: CellModes, moments: Array, density: float) -> csr_array:
+    """(3 u, 3 u) sparse mass [t]; ``density`` [t/mm^3]."""
+    return springs(grid, modes, moments, density * np.eye(3))
+
+
+def _cells_of(moments: Array, modes: CellModes) -> Array:
+    """(e, n^3) moments of the active cells."""
+    x, y, z = modes.cells.T
+    return np.array(moments[x, y, z].reshape(len(modes.cells), -1))
+
+
+def _assembled(modes: CellModes, M: Array, law: Array) -> csr_array:
+    """The sum over cells of M (e, n^3) times ``law`` (n^3, m, m, 3, 3)."""
+    some = np.flatnonzero(M.any(axis=1))
+    M, number, u = M[some], modes.number[some], len(modes)
+    m = number.shape[1]
+    # blocks on and above the diagonal of the lattice: the others are their transposes
+    pairs = [(a, b) for a in range(m) for b in range(a, m)]
+    keys = np.unique(np.concatenate([_keys(number, a, b, u) for a, b in pairs]))
+    keys = keys[keys >= 0]
+    data = np.zeros((len(keys), 3, 3))
+    for a in range(m):
+        blocks = (M @ law[:, a, a:].reshape(len(law), -1)).reshape(len(M), m - a, 3, 3)
+        for b in range(a, m):
+            key = _keys(number, a, b, u)
+            own = np.flatnonzero(key >= 0)
+            lower = own[number[own, a] > number[own, b]]
+            block = blocks[:, b - a]
+            if len(lower):
+                block[lower] = block[lower].swapaxes(1, 2)
+            # a pair of modes of given places in the cell is that of one cell only
+            data[np.searchsorted(keys, key[own])] += block[own]
+    row, column = keys // u, keys % u
+    off = row != column
+    both = (np.append(row, column[off]), np.append(column, row[off]))
+    at = coo_array((np.arange(1, len(both[0]) + 1), both), shape=(u, u)).tocsr()
+    every = np.concatenate([data, data[off].swapaxes(1, 2)])
+    return csr_array(bsr_array((every[at.data - 1], at.indices, at.indptr), shape=(3 * u, 3 * u)))
+
+
+def _keys(number: Indices, a: int, b: int, u: int) -> Indices:
+    """(e,) int which block of the matrix modes a and b of each cell belong to; -1: none."""
+    p, q = number[:, a], number[:, b]
+    return np.where((p >= 0) & (q >= 0), np.minimum(p, q) * u + np.maximum(p, q), -1)

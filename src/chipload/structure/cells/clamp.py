@@ -1,0 +1,161 @@
+"""Clamps of a workpiece: material in a region that is held, stiffly or by springs.
+
+Notation: a clamp holds the material of the stock within an upright prism, in some of the directions x, y, z. Springs
+are spread over that material: k_v = k / V [N/mm per mm^3], with the stiffness k of the whole clamp in each direction
+and the volume V that it holds of the stock before the first cut. A stiff clamp has k_v = :data:`STIFF` E / (h d) with
+the cell size h and its own least side d, at most h: far stiffer than the material beneath it. A face is a thin slab of
+the stock along it.
+
+Rigid motions: S (6, 6) the stiffness of all clamps, each with a total of 1, against translations and rotations about
+the middle of the held material, lengths over the diagonal of the stock. A motion with less than :data:`LOOSE` is free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from chipload.errors import InputError
+from chipload.stock.layers import LayeredStock
+from chipload.structure.cells.assembly import CellModes, springs
+from chipload.structure.cells.grid import Array, CellGrid
+from chipload.structure.cells.moments import Region, stock_moments
+
+#: k_v h d / E of a stiff clamp
+STIFF = 1e4
+#: smallest eigenvalue of S of a workpiece that is held
+LOOSE = 1e-8
+#: names of the rigid motions
+MOTIONS = tuple(f"{kind} {axis}" for kind in ("motion along", "rotation about") for axis in "xyz")
+
+
+@dataclass(frozen=True, eq=False)
+class Clamp:
+    """A part of the stock that is held.
+
+    Parameters
+    ----------
+    name : as messages name it
+    region : of the stock
+    directions : (3,) bool, x, y, z that are held
+    stiffness : [N/mm] of the whole clamp in each of them; inf: stiff
+    """
+
+    name: str
+    region: Region
+    directions: NDArray[np.bool_]
+    stiffness: float = np.inf
+
+    def __post_init__(self) -> None:
+        """Refuse a clamp that holds nothing."""
+        if not self.stiffness > 0.0 or not self.directions.any():
+            raise InputError(f"{self.name}: a clamp holds at least one direction with a stiffness above 0")
+
+
+@dataclass(frozen=True, eq=False)
+class ClampStiffness:
+    """Springs of clamps in the modes of a workpiece.
+
+    Attributes
+    ----------
+    matrix : (3 u, 3 u) sparse [N/mm]
+    volumes : (c,) float [mm^3] that each clamp holds now
+    rigid : (6, 6) float, S
+    cells : (nx, ny, nz) bool, cells that are held
+    """
+
+    matrix: csr_array
+    volumes: Array
+    rigid: Array
+    cells: NDArray[np.bool_]
+
+
+def clamp_stiffness(
+    clamps: Sequence[Clamp],
+    stock: LayeredStock,
+    grid: CellGrid,
+    modes: CellModes,
+    modulus: float,
+    first: Sequence[float] | None = None,
+) -> ClampStiffness:
+    """The springs of clamps.
+
+    Parameters
+    ----------
+    modulus : [MPa] of the workpiece
+    first : [mm^3] what each held before the first cut; None: what it holds now
+
+    Raises
+    ------
+    InputError
+        A clamp holds no material, or a rigid motion is free.
+    """
+    count = 3 * len(modes)
+    whole, cells = csr_array((count, count)), np.zeros(grid.counts, dtype=np.bool_)
+    volumes, unit = [], []
+    for k, clamp in enumerate(clamps):
+        moments = stock_moments(stock, grid, clamp.region)
+        volume = float(moments[..., 0, 0, 0].sum() * np.prod(grid.size) / 8.0)
+        if not volume > 0.0:
+            x0, y0, x1, y1 = clamp.region.outline.bounds
+            raise InputError(
+                f"{clamp.name}: holds nothing: no stock between ({x0:g}, {y0:g}, {clamp.region.low:g}) and "
+                f"({x1:g}, {y1:g}, {clamp.region.high:g}) mm: place it on the stock"
+            )
+        held = np.diag(clamp.directions.astype(np.float64))
+        size = float(grid.size.min())
+        per_volume = STIFF * modulus / (size * min(size, clamp.region.thickness(stock)))
+        if np.isfinite(clamp.stiffness):
+            per_volume = clamp.stiffness / (volume if first is None else first[k])
+        one = springs(grid, modes, moments, held)
+        whole = whole + per_volume * one
+        cells |= moments[..., 0, 0, 0] > 0.0
+        volumes.append(volume)
+        unit.append(one / volume)
+    R = rigid_motions(grid, modes, _middle(grid, cells))
+    S = sum((R.T @ (one @ R) for one in unit), np.zeros((6, 6)))
+    require_clamped(S)
+    return ClampStiffness(csr_array(whole), np.array(volumes), S, cells)
+
+
+def require_clamped(S: Array) -> None:
+    """Refuse a workpiece that can move as a rigid body.
+
+    Raises
+    ------
+    InputError
+        A motion has no stiffness; it is named.
+    """
+    values, vectors = np.linalg.eigh(S)
+    free = vectors[:, values < LOOSE]
+    if free.shape[1]:
+        part = (free**2).sum(axis=1)
+        named = [MOTIONS[k] for k in np.argsort(-part, kind="stable")[: free.shape[1]]]
+        raise InputError(
+            f"workpiece.clamp: {', '.join(named)} {'is' if len(named) == 1 else 'are'} free: add a clamp that holds "
+            f"{'it' if len(named) == 1 else 'them'}"
+        )
+
+
+def rigid_motions(grid: CellGrid, modes: CellModes, about: Array) -> Array:
+    """(3 u, 6) float coefficients of three translations and three rotations; rotations per diagonal of the grid."""
+    at = modes.lattice
+    vertex = (at % grid.order == 0).all(axis=1)
+    scale = float(np.linalg.norm(grid.size * grid.counts))
+    x = np.where(vertex[:, None], (grid.origin + at / grid.order * grid.size - about) / scale, 0.0)
+    out = np.zeros((len(modes), 3, 6))
+    for d in range(3):
+        out[vertex, d, d] = 1.0
+        e, f = (d + 1) % 3, (d + 2) % 3
+        out[:, e, 3 + d], out[:, f, 3 + d] = -x[:, f], x[:, e]
+    return out.reshape(-1, 6)
+
+
+def _middle(grid: CellGrid, cells: NDArray[np.bool_]) -> Array:
+    """Middle [mm] of the held cells."""
+    at = np.argwhere(cells)
+    return np.asarray(grid.origin + (0.5 * (at.min(axis=0) + at.max(axis=0) + 1.0)) * grid.size)

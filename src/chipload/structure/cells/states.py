@@ -1,0 +1,255 @@
+"""Compliance of a workpiece where it is cut, in the state of removal in which each step cuts it.
+
+Notation: a state is the stock before a step. Compliance at a place only grows while material is removed, so between two
+states it lies between those of both. It is solved in a few states and interpolated between them by the volume removed,
+its size by its logarithm. An interval whose two states differ most in deflection, force times compliance, is halved by
+volume, until none differs by more than the tolerance times the greatest deflection or there are enough states.
+
+Some contact lines are solved, at most :data:`LINES`, no nearer to one another than they must be; a step between two of
+them takes the mean by distance. The worst steps are solved themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from chipload.progress import Progress, silent
+from chipload.structure.cells.grid import Array, Indices
+from chipload.structure.cells.workpiece import STATIONS, CellWorkpiece, line_compliances
+
+#: contact lines that are solved beside those of the worst steps
+LINES = 160
+#: steps that are solved themselves
+WORST = 12
+
+
+@dataclass(frozen=True, eq=False)
+class StepLines:
+    """Where and how hard the steps of a program cut.
+
+    Parameters
+    ----------
+    step : (c,) int, rising, the steps that cut
+    lines : (c, 2, 3) float [mm], lower and upper end of their contact
+    force : (c,) float [N], greatest of each
+    removed : (c,) float [mm^3] removed before each
+    """
+
+    step: Indices
+    lines: Array
+    force: Array
+    removed: Array
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A state of removal that can be built.
+
+    Parameters
+    ----------
+    step : the first step that is not yet cut
+    removed : [mm^3]
+    build : makes its workpiece
+    """
+
+    step: int
+    removed: float
+    build: Callable[[], CellWorkpiece]
+
+
+@dataclass(frozen=True, eq=False)
+class StepCompliances:
+    """Compliance of the workpiece in the state of each step.
+
+    Attributes
+    ----------
+    step : (c,) int, rising
+    lines : (c, 2, 3) float [mm]
+    compliance : (c, s, 3, 3) float [mm/N] at the stations of the line
+    uncertainty : (c,) float, how far the compliance of each may lie from that of its own state, relative
+    worst : (w,) int, rows that were solved themselves, the greatest deflection first
+    after : (w,) int, number of the state that was solved after each of them
+    after_compliance : (w, s, 3, 3) float [mm/N] in that state
+    states : steps before which a state was solved
+    loose : [mm^3] greatest volume that hung on nothing
+    """
+
+    step: Indices
+    lines: Array
+    compliance: Array
+    uncertainty: Array
+    worst: Indices
+    after: Indices
+    after_compliance: Array
+    states: tuple[int, ...]
+    loose: float
+
+    def at(self, steps: Indices) -> Array:
+        """(n, s, 3, 3) compliance of steps; of a step that is not known, that of the last known one before it."""
+        return np.asarray(self.compliance[self._rows(steps)])
+
+    def at_points(self, steps: Indices, points: Array) -> Array:
+        """(n, 3, 3) compliance of steps at points (n, 3) [mm] beside their contact: by a parabola along its line."""
+        rows = self._rows(steps)
+        low, along = self.lines[rows, 0], self.lines[rows, 1] - self.lines[rows, 0]
+        length = np.einsum("ni,ni->n", along, along)
+        share = np.einsum("ni,ni->n", points - low, along)
+        t = np.clip(np.divide(share, length, out=np.full(len(rows), 0.5), where=length > 0.0), 0.0, 1.0)
+        weight = np.stack([(1.0 - t) * (1.0 - 2.0 * t), 4.0 * t * (1.0 - t), t * (2.0 * t - 1.0)], axis=1)
+        return np.asarray(np.einsum("ns,nsij->nij", weight, self.compliance[rows]))
+
+    def _rows(self, steps: Indices) -> Indices:
+        return np.maximum(np.searchsorted(self.step, steps, side="right") - 1, 0)
+
+
+def size_of(compliance: Array) -> Array:
+    """(...,) greatest displacement per force over the stations of (..., s, 3, 3)."""
+    return np.asarray(np.linalg.norm(compliance, ord=2, axis=(-2, -1)).max(axis=-1))
+
+
+def step_compliances(
+    steps: StepLines,
+    states: Sequence[State],
+    *,
+    tolerance: float,
+    most: int,
+    spacing: float,
+    progress: Progress = silent,
+) -> StepCompliances:
+    """Compliance in the state of every step that cuts.
+
+    Parameters
+    ----------
+    states : that can be chosen, by rising step; the first before all, the last after all steps
+    tolerance : difference between neighbouring states over the greatest deflection
+    most : states at most
+    spacing : least distance [mm] of contact lines that are solved
+    """
+    samples = _samples(steps.lines, spacing)
+    solved: dict[int, CellWorkpiece] = {}
+    loose = [0.0]
+    known: dict[tuple[int, int], Array] = {}
+
+    def compliance(k: int, rows: Indices) -> Array:
+        """Of contact lines in state k; kept, its factors only for the one used last."""
+        missing = [r for r in rows.tolist() if (k, r) not in known]
+        if missing:
+            if k not in solved:
+                solved.clear()
+                solved[k] = states[k].build()
+                loose[0] = max(loose[0], solved[k].loose)
+            work = solved[k]
+            for r, c in zip(missing, line_compliances(work, steps.lines[missing]), strict=True):
+                known[k, r] = c
+        return np.array([known[k, r] for r in rows.tolist()]).reshape(-1, len(STATIONS), 3, 3)
+
+    def rows_of(a: int, b: int) -> Indices:
+        return np.arange(*np.searchsorted(steps.step, [states[a].step, states[b].step]))
+
+    def sampled(a: int, b: int) -> Indices:
+        return samples[slice(*np.searchsorted(steps.step[samples], [states[a].step, states[b].step]))]
+
+    def deflection(k: int, rows: Indices) -> Array:
+        return np.asarray(size_of(compliance(k, rows)) * steps.force[rows])
+
+    def difference(a: int, b: int) -> float:
+        """Greatest difference of deflection between both ends of an interval."""
+        rows = sampled(a, b)
+        later, earlier = deflection(b, rows), deflection(a, rows)
+        return float(np.abs(later - earlier).max(initial=0.0))
+
+    chosen = _first_states(states)
+    spans: dict[tuple[int, int], float] = {}
+    for n, (a, b) in enumerate(pairwise(chosen)):
+        progress(n / most, "states of the workpiece")
+        spans[a, b] = difference(a, b)
+    while len(chosen) < most:
+        progress(len(chosen) / most, "states of the workpiece")
+        top = max(deflection(b, sampled(a, b)).max(initial=0.0) for a, b in spans)
+        wide = [(change, a, b) for (a, b), change in spans.items() if change > tolerance * top]
+        middle = None
+        for _, a, b in sorted(wide, reverse=True):
+            volume = 0.5 * (states[a].removed + states[b].removed)
+            between = [k for k in range(a + 1, b) if len(sampled(a, k)) and len(sampled(k, b))]
+            middle = min(between, key=lambda k: abs(states[k].removed - volume), default=None)
+            if middle is not None:
+                break
+        if middle is None:
+            break
+        del spans[a, b]
+        compliance(middle, sampled(a, b))
+        spans[a, middle], spans[middle, b] = difference(a, middle), difference(middle, b)
+        chosen = sorted([*chosen, middle])
+    out, doubt = np.zeros((len(steps.step), len(STATIONS), 3, 3)), np.zeros(len(steps.step))
+    where = np.zeros((len(steps.step), 2), dtype=np.int64)
+    for a, b in sorted(spans):
+        own, rows = rows_of(a, b), sampled(a, b)
+        if not len(own):
+            continue
+        if not len(rows):
+            rows = own[:1]
+        where[own] = a, b
+        ends = [_between(steps.lines, own, rows, compliance(k, rows)) for k in (a, b)]
+        out[own], doubt[own] = _in_state(steps.removed[own], states[a].removed, states[b].removed, *ends)
+    worst = np.argsort(-size_of(out) * steps.force, kind="stable")[:WORST]
+    later = np.zeros((len(worst), *out.shape[1:]))
+    for k in np.unique(where[worst]).tolist():
+        compliance(k, worst[(where[worst] == k).any(axis=1)])  # one state at a time
+    for a, b in sorted({(int(a), int(b)) for a, b in where[worst]}):
+        own = np.flatnonzero((where[worst] == (a, b)).all(axis=1))
+        rows = worst[own]
+        ends = [compliance(k, rows) for k in (a, b)]
+        later[own] = ends[1]
+        out[rows], doubt[rows] = _in_state(steps.removed[rows], states[a].removed, states[b].removed, *ends)
+    order = np.argsort(-size_of(out[worst]) * steps.force[worst], kind="stable")
+    return StepCompliances(
+        steps.step, steps.lines, out, doubt, worst[order], where[worst[order], 1], later[order],
+        tuple(states[k].step for k in chosen), loose[0],
+    )  # fmt: skip
+
+
+def _first_states(states: Sequence[State]) -> list[int]:
+    """The first, the last, and two between at thirds of the volume."""
+    whole = states[-1].removed
+    removed = np.array([state.removed for state in states])
+    between = [int(np.abs(removed - share * whole).argmin()) for share in (1.0 / 3.0, 2.0 / 3.0)]
+    return sorted({0, *between, len(states) - 1})
+
+
+def _samples(lines: Array, spacing: float) -> Indices:
+    """Rows no nearer to the one before than ``spacing`` [mm], which grows until there are at most :data:`LINES`."""
+    middle = lines.mean(axis=1).tolist()
+    while True:
+        kept = list(range(min(len(middle), 1)))
+        for k in range(1, len(middle)):
+            (x, y, z), (a, b, c) = middle[k], middle[kept[-1]]
+            if (x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2 > spacing * spacing:
+                kept.append(k)
+        if len(kept) <= LINES:
+            return np.array(kept, dtype=np.int64)
+        spacing *= 1.3
+
+
+def _between(lines: Array, own: Indices, rows: Indices, values: Array) -> Array:
+    """Values of rows ``own`` from those of some of them, the mean of the two beside each by distance."""
+    middle = lines.mean(axis=1)
+    before = np.clip(np.searchsorted(rows, own, side="right") - 1, 0, len(rows) - 1)
+    after = np.minimum(before + 1, len(rows) - 1)
+    a, b = (np.linalg.norm(middle[own] - middle[rows[k]], axis=1) for k in (before, after))
+    t = np.divide(a, a + b, out=np.zeros(len(a)), where=a + b > 0.0)[:, None, None, None]
+    return np.asarray((1.0 - t) * values[before] + t * values[after])
+
+
+def _in_state(removed: Array, low: float, high: float, first: Array, last: Array) -> tuple[Array, Array]:
+    """Compliance between two states by the volume removed, and how far it may be off, relative."""
+    t = np.clip((removed - low) / (high - low), 0.0, 1.0) if high > low else np.zeros(len(removed))
+    a, b = size_of(first), size_of(last)
+    size = a ** (1.0 - t) * b**t
+    w = t[:, None, None, None]
+    mixed = (1.0 - w) * first / a[:, None, None, None] + w * last / b[:, None, None, None]
+    mixed *= (size / size_of(mixed))[:, None, None, None]
+    return mixed, np.maximum(np.maximum(a, b) - size, size - np.minimum(a, b)) / size

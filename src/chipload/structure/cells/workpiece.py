@@ -1,0 +1,245 @@
+"""A clamped workpiece in one state of its removal, and how far it gives way where it is cut.
+
+Notation: u modes, K (3 u, 3 u) stiffness of material and clamps. A **contact line** is the segment along which a cutter
+touches the surface, from its lowest to its highest point; the force is spread evenly over it, since under a point force
+an elastic body gives way without bound. With the load w = mean over the line of the modes' values, its compliance at a
+**station** of the line with the modes' values v is C = (v x I)^T K^-1 (w x I), (3, 3) [mm/N].
+
+K is factored in an order of nested dissection: planes of the lattice cut the workpiece in halves again and again, the
+modes of a plane come after those of both sides. A line touches few of the factors, those from its cells to the last
+plane; lines that lie near one another are solved abreast.
+
+Reference: [George1973] for the order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import label
+from scipy.sparse import csc_array, csr_array
+from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
+
+from chipload.errors import InputError
+from chipload.stock.layers import LayeredStock
+from chipload.structure.cells.assembly import LEAST_SHARE, CellModes, modes_of, shares, stiffness
+from chipload.structure.cells.clamp import Clamp, clamp_stiffness
+from chipload.structure.cells.grid import Array, CellGrid, Indices, shape_values
+from chipload.structure.cells.moments import stock_moments
+from chipload.structure.cells.nearest import StockSections
+from chipload.structure.factors import Factors
+
+#: points along a contact line over which the force is spread, at least, and a cell
+SPREAD, PER_CELL = 4, 3
+#: stations of a contact line, from its lower end (0) to its upper end (1)
+STATIONS = (0.0, 0.5, 1.0)
+#: modes that nested dissection does not cut any more
+LEAF = 60
+#: lines that are solved abreast: three right-hand sides each
+ABREAST = 21
+
+
+@dataclass(frozen=True)
+class Elastic:
+    """What a workpiece is made of.
+
+    Parameters
+    ----------
+    modulus : Young's modulus [MPa]
+    poisson : Poisson's ratio
+    """
+
+    modulus: float
+    poisson: float
+
+    def __post_init__(self) -> None:
+        """Refuse what is no elastic solid."""
+        if not 0.0 < self.modulus < np.inf or not 0.0 <= self.poisson < 0.5:
+            raise InputError(f"workpiece: modulus {self.modulus:g} MPa: above 0; Poisson {self.poisson:g}: 0 to 0.5")
+
+
+@dataclass(frozen=True, eq=False)
+class CellWorkpiece:
+    """A clamped workpiece, factored.
+
+    Attributes
+    ----------
+    grid, modes : its cells and their modes
+    share : (nx, ny, nz) float, of each cell that is material
+    stiffness : (3 u, 3 u) sparse [N/mm]
+    factors : of the stiffness with the modes in ``order``
+    order : (3 u,) int
+    place : (3 u,) int, the inverse of ``order``
+    volume : [mm^3] of the material that is held
+    loose : [mm^3] of material that hangs on nothing and was left out
+    clamped : [mm^3] that each clamp holds
+    sections : of the stock, on which forces act
+    """
+
+    grid: CellGrid
+    modes: CellModes
+    share: Array
+    stiffness: csr_array
+    factors: Factors
+    order: Indices
+    place: Indices
+    volume: float
+    loose: float
+    clamped: Array
+    sections: StockSections
+
+    def solve(self, right: Array) -> Array:
+        """(3 u, q) displacements of the modes under forces (3 u, q)."""
+        return np.asarray(self.factors.solve(right[self.order])[self.place])
+
+
+def cell_workpiece(
+    stock: LayeredStock, grid: CellGrid, elastic: Elastic, clamps: Sequence[Clamp], held: ArrayLike | None = None
+) -> CellWorkpiece:
+    """A stock as it is now, clamped and factored.
+
+    Parameters
+    ----------
+    held : (c,) float [mm^3] what each clamp held before the first cut; None: what it holds now
+
+    Raises
+    ------
+    InputError
+        A clamp holds nothing, a rigid motion is free, or the cells are too many.
+    """
+    moments = stock_moments(stock, grid)
+    share, loose = shares(moments), 0.0
+    modes = modes_of(grid, share)
+    first = None if held is None else np.asarray(held, dtype=np.float64).tolist()
+    springs = clamp_stiffness(clamps, stock, grid, modes, elastic.modulus, first)
+    pieces, count = label(share > LEAST_SHARE)
+    if count > 1:
+        kept = np.isin(pieces, np.unique(pieces[springs.cells & (pieces > 0)]))
+        loose = float(share[~kept].sum() * np.prod(grid.size))
+        if loose > 0.0:
+            share = np.where(kept, share, 0.0)
+            modes = modes_of(grid, share)
+            springs = clamp_stiffness(clamps, stock, grid, modes, elastic.modulus, first)
+    K = stiffness(grid, modes, moments, elastic.modulus, elastic.poisson) + springs.matrix
+    order = (3 * dissected(modes.lattice, grid.order)[:, None] + np.arange(3)).ravel()
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    options = {"SymmetricMode": True}
+    lu = splu(csc_array(K[order][:, order]), permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options)
+    volume = float(share.sum() * np.prod(grid.size))
+    return CellWorkpiece(
+        grid, modes, share, csr_array(K), Factors(lu), order, place, volume, loose, springs.volumes,
+        StockSections(stock),
+    )  # fmt: skip
+
+
+def dissected(lattice: Indices, p: int) -> Indices:
+    """(u,) int order of modes by nested dissection; ``lattice`` (u, 3) int their places, ``p`` the order of cells."""
+    out: list[Indices] = []
+    waiting: list[tuple[Indices, bool]] = [(np.arange(len(lattice)), False)]
+    while waiting:
+        some, done = waiting.pop()
+        cut = None if done or len(some) <= LEAF else _separator(lattice[some], p)
+        if cut is None:
+            out.append(some)
+            continue
+        axis, at = cut
+        v = lattice[some, axis]
+        # taken from the end: below, above, then the plane between
+        waiting += [(some[v == at], True), (some[v > at], False), (some[v < at], False)]
+    return np.concatenate(out)
+
+
+def _separator(at: Indices, p: int) -> tuple[int, int] | None:
+    """The plane between cells with the fewest modes among those that leave at least a third on either side."""
+    best: tuple[float, int, int] | None = None
+    for axis in range(3):
+        v = at[:, axis]
+        low, size = int(v.min()), np.bincount(v - v.min())
+        below = np.concatenate([[0], np.cumsum(size)[:-1]]) / len(v)
+        planes = np.arange(1, len(size) - 1)
+        planes = planes[(planes + low) % p == 0]
+        if not len(planes):
+            continue
+        uneven = np.abs(below[planes] + 0.5 * size[planes] / len(v) - 0.5)
+        cost = size[planes] + len(v) * np.maximum(uneven - 1.0 / 6.0, 0.0) * 10.0
+        k = int(np.argmin(cost))
+        if best is None or cost[k] < best[0]:
+            best = (float(cost[k]), axis, int(planes[k]) + low)
+    return None if best is None else best[1:]
+
+
+def mode_weights(work: CellWorkpiece, points: Array) -> csr_array:
+    """(n, u) sparse values of the modes at points (n, 3), or at the nearest material to them."""
+    cell, local = work.grid.cell_of(work.sections.nearest(points))
+    empty = work.share[tuple(cell.T)] <= LEAST_SHARE
+    if empty.any():
+        active = work.modes.cells
+        found = active[cKDTree(active).query(cell[empty])[1]]
+        local[empty] = np.clip(local[empty] + 2.0 * (cell[empty] - found), -1.0, 1.0)
+        cell[empty] = found
+    rows = np.full(work.grid.counts, -1, dtype=np.int64)
+    rows[tuple(work.modes.cells.T)] = np.arange(len(work.modes.cells))
+    number = work.modes.number[rows[tuple(cell.T)]]
+    values = shape_values(work.grid, local)
+    n, some = len(points), number >= 0
+    at = np.broadcast_to(np.arange(n)[:, None], number.shape)
+    return csr_array((values[some], (at[some], number[some])), shape=(n, len(work.modes)))
+
+
+def line_compliances(work: CellWorkpiece, lines: ArrayLike) -> Array:
+    """Compliance of contact lines.
+
+    Parameters
+    ----------
+    lines : (c, 2, 3) float [mm], lower and upper end
+
+    Returns
+    -------
+    (c, s, 3, 3) float [mm/N] at the s :data:`STATIONS`: displacement (first of the two) per force.
+    """
+    ends = np.asarray(lines, dtype=np.float64).reshape(-1, 2, 3)
+    c = len(ends)
+    out = np.empty((c, len(STATIONS), 3, 3))
+    if not c:
+        return out
+    longest = float(np.linalg.norm((ends[:, 1] - ends[:, 0]) / work.grid.size, axis=1).max())
+    count = max(SPREAD, int(np.ceil(PER_CELL * longest)))
+    t = (np.arange(count) + 0.5) / count
+    spread = _along(work, ends, t)
+    mean = csr_array((np.full(c * count, 1.0 / count), np.arange(c * count), np.arange(c + 1) * count))
+    loads, stations = csr_array(mean @ spread), _along(work, ends, np.array(STATIONS))
+    cell = work.grid.cell_of(ends.mean(axis=1))[0]
+    near = np.lexsort(cell.T)
+    for at in range(0, c, ABREAST):
+        some = near[at : at + ABREAST]
+        out[some] = _solved(work, csr_array(loads[some]), stations, some)
+    return out
+
+
+def _along(work: CellWorkpiece, ends: Array, t: Array) -> csr_array:
+    """(c t, u) values of the modes at shares ``t`` of lines."""
+    points = ends[:, None, 0] + t[:, None] * (ends[:, None, 1] - ends[:, None, 0])
+    return mode_weights(work, points.reshape(-1, 3))
+
+
+def _solved(work: CellWorkpiece, loads: csr_array, stations: csr_array, some: NDArray[np.int64]) -> Array:
+    """(c, s, 3, 3) compliance of a few lines."""
+    c, s, u = len(some), len(STATIONS), len(work.modes)
+    dense = np.zeros((u, 3, c, 3))
+    w = loads.T.toarray()
+    for d in range(3):
+        dense[:, d, :, d] = w
+    right = dense.reshape(3 * u, 3 * c)
+    rows = np.unique(stations[(some[:, None] * s + np.arange(s)).ravel()].indices)
+    wanted = (3 * rows[:, None] + np.arange(3)).ravel()
+    found = work.factors.solve(right[work.order], work.place[wanted]).reshape(len(rows), 3, c, 3)
+    out = np.empty((c, s, 3, 3))
+    for k, line in enumerate(some.tolist()):
+        v = stations[line * s : (line + 1) * s][:, rows]
+        out[k] = (v @ found[:, :, k].reshape(len(rows), 9)).reshape(s, 3, 3)
+    return out
