@@ -48,6 +48,59 @@ def test_rim_against_every_capsule(seed, n):
     assert (True, False) in seen
 
 
+def arc_chain(seed, n):
+    """(n, 7) lines and arcs of any radius and sense, up to a full turn."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for _ in range(n):
+        p, a = rng.uniform(7.0, 23.0, 2), rng.uniform(-math.pi, math.pi)
+        rho, sweep = 10.0 ** rng.uniform(-0.8, 1.5), rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-2.0, 0.7)
+        sweep = math.copysign(min(abs(sweep), 6.0 / rho), sweep)
+        x, y = p[0] + rho * math.cos(a), p[1] + rho * math.sin(a)
+        b = math.atan2(p[1] - y, p[0] - x) + sweep
+        q = (x + rho * math.cos(b), y + rho * math.sin(b))
+        rows.append([*p, *q, x, y, sweep] if rng.random() < 0.8 else [*p, *q, 0.0, 0.0, 0.0])
+    return np.array(rows)
+
+
+def distance_from_segments(segments, points):
+    """Least distance of points from lines and arcs: the foot where the segment has one, else an end."""
+    out = np.full(len(points), np.inf)
+    for x0, y0, x1, y1, xc, yc, sweep in segments:
+        a, b, c = np.array([x0, y0]), np.array([x1, y1]), np.array([xc, yc])
+        ends = np.minimum(np.hypot(*(points - a).T), np.hypot(*(points - b).T))
+        if sweep == 0.0:
+            t = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
+            foot = np.hypot(*(points - a - t[:, None] * (b - a)).T)
+        else:
+            turn = np.arctan2(*(points - c).T[::-1]) - math.atan2(y0 - yc, x0 - xc)
+            on = (turn * math.copysign(1.0, sweep)) % math.tau <= abs(sweep)
+            foot = np.where(on, np.abs(np.hypot(*(points - c).T) - math.hypot(*(a - c))), np.inf)
+        out = np.minimum(out, np.minimum(ends, foot))
+    return out
+
+
+@pytest.mark.parametrize(("seed", "n"), [(1, 1), (2, 1), (3, 3), (4, 12), (5, 400)])
+def test_rim_against_every_arc(seed, n):
+    """As above, with arcs: one alone, few that leave most uncut, and many."""
+    for again in range(40 if n < 100 else 1):
+        segments = arc_chain(1000 * seed + again, n)
+        stock = PlanarStock((0.0, 0.0, 30.0, 30.0), R)
+        stock.remove_segments(segments)
+        rng = np.random.default_rng(seed + again)
+        rim = (np.arange(720) + 0.5) * (2.0 * math.pi / 720) - 0.5 * math.pi
+        for _ in range(12):
+            near = segments[rng.integers(n), 0:2] + rng.uniform(-2.2 * R, 2.2 * R, 2)
+            centre, a = np.clip(near, 3.0, 27.0), rng.uniform(-math.pi, math.pi)
+            arcs = stock.arcs(centre, (math.cos(a), math.sin(a)), whole=True)
+            told = ((rim[:, None] >= arcs[:, 0]) & (rim[:, None] <= arcs[:, 1])).any(axis=1)
+            far = distance_from_segments(
+                segments, centre + R * (1.0 - TOUCH) * np.column_stack([np.cos(a + rim), np.sin(a + rim)])
+            )
+            sure = np.abs(far - R) > 1e-8
+            assert (told == (far > R))[sure].all(), (seed, again, centre, a)
+
+
 def test_engagement_of_a_slot_and_of_a_step_over():
     """A full slot is pi; beside a straight cut by s it is acos(1 - s / R)."""
     stock = PlanarStock((-20.0, -20.0, 20.0, 20.0), R)

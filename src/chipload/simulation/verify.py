@@ -29,6 +29,8 @@ Bools = NDArray[np.bool_]
 MATCH_MM = 1e-6
 #: where a rim lies on the edge of an earlier disc there is no one engagement: that this far [mm] before counts too
 BEFORE_MM = 1e-5
+#: engagements with stock no thicker than this [mm] beside the cutter agree: on a wall just made roundings leave films
+FILM_MM = 1e-4
 #: stock that a rapid passes through counts when it is thicker than this [mm]
 RAPID_MM = 1e-6
 #: rows between two calls of ``progress``
@@ -121,22 +123,15 @@ def verify_contour(
     unproven, unless ``passes`` leaves them out. Rows above the stock's top must show no engagement.
     """
     columns = _columns(history)
-    for name, value in (
-        ("engagement_tolerance_deg", engagement_tolerance_deg),
-        ("gouge_tolerance_mm", gouge_tolerance_mm),
-        ("excess_tolerance_mm", excess_tolerance_mm),
-    ):
-        if not value > 0.0:
-            raise InputError(f"verify: {name} = {value:g}: must be above 0")
-    if stock is not None and not stock.contours:
-        raise InputError("verify: the stock has no contour: pass None for material everywhere")
+    _need_tolerances(
+        stock,
+        engagement_tolerance_deg=engagement_tolerance_deg,
+        gouge_tolerance_mm=gouge_tolerance_mm,
+        excess_tolerance_mm=excess_tolerance_mm,
+    )
     failed: list[str] = []
     open_: list[str] = []
-    difference, cleft, remains = (
-        GreatestDistance(0.0, (0.0, 0.0), 0),
-        GreatestDistance(0.0, (0.0, 0.0), 0),
-        GreatestDistance(0.0, (0.0, 0.0), 0),
-    )
+    difference = cleft = remains = GreatestDistance(0.0, (0.0, 0.0), 0)
     hits: list[Place] = []
     compared = samples = 0
     try:
@@ -153,32 +148,45 @@ def verify_contour(
             failed.append(f"rapid through stock at ({x:.4f}, {y:.4f}), {len(hits)} motions in all")
         progress(0.15, "rapids")
         if wall:
-            for level in levels:
-                cleft = max(cleft, gouge(level.trail, wall, material, step_mm), key=lambda v: v.value_mm)
-                remains = max(remains, excess(level.trail, wall, step_mm), key=lambda v: v.value_mm)
-                samples += cleft.samples + remains.samples
+            cleft, remains, asked = _wall(levels, wall, material, step_mm)
+            samples += asked
             if cleft.value_mm > gouge_tolerance_mm:
                 failed.append(_exceeds("gouge", cleft, "mm", gouge_tolerance_mm))
             if remains.value_mm > excess_tolerance_mm:
                 failed.append(_exceeds("excess", remains, "mm", excess_tolerance_mm))
         progress(0.3, "wall")
-        rows = _compare(
+        difference, compared = _compare(
             program, levels, columns, passes, stock_top_mm, engagement_tolerance_deg, workers, progress, failed, open_
         )
-        difference, compared = rows
         samples += compared
         if difference.value_mm > engagement_tolerance_deg:
             failed.append(_exceeds("engagement differs by", difference, "deg", engagement_tolerance_deg))
     except Cancelled:
         open_.append("stopped before the end")
+    compared_with = f"{compared} of {len(columns['x_mm'])} rows against the trail of {len(program)} motions"
+    return _verification(
+        compared_with, bool(wall), difference, cleft, remains, hits, (compared, samples), failed, open_
+    )
+
+
+def _verification(
+    what: str,
+    wall: bool,
+    difference: GreatestDistance,
+    cleft: GreatestDistance,
+    remains: GreatestDistance,
+    hits: Sequence[Place],
+    counts: tuple[int, int],
+    failed: Sequence[str],
+    open_: Sequence[str],
+) -> Verification:
+    """The verdict on ``what`` was compared, from what was found."""
     verdict: Literal["proved", "failed", "unproven"] = "failed" if failed else "unproven" if open_ else "proved"
     against = (
         f"gouge {cleft.value_mm * 1e3:.3g} um, excess {remains.value_mm * 1e3:.3g} um" if wall else "no wall given"
     )
-    text = (
-        f"{verdict}: {compared} of {len(columns['x_mm'])} rows against the trail of {len(program)} motions, engagement "
-        f"within {difference.value_mm:.3g} deg; {against}; {len(hits)} rapids through stock"
-    )
+    within = f"engagement within {difference.value_mm:.3g} deg"
+    text = f"{verdict}: {what}, {within}; {against}; {len(hits)} rapids through stock"
     return Verification(
         verdict,
         difference.value_mm,
@@ -188,11 +196,32 @@ def verify_contour(
         remains.value_mm,
         remains.at,
         tuple(hits),
-        compared,
-        samples,
+        *counts,
         (*failed, *open_),
         text,
     )
+
+
+def _need_tolerances(stock: Region | None, **tolerances: float) -> None:
+    """Refuse a tolerance that is not above 0, and a stock without a contour."""
+    for name, value in tolerances.items():
+        if not value > 0.0:
+            raise InputError(f"verify: {name} = {value:g}: must be above 0")
+    if stock is not None and not stock.contours:
+        raise InputError("verify: the stock has no contour: pass None for material everywhere")
+
+
+def _wall(
+    levels: Sequence[_Level], wall: Sequence[Contour], material: str, step: float
+) -> tuple[GreatestDistance, GreatestDistance, int]:
+    """The greatest gouge and excess of all levels, and the number of points asked."""
+    cleft = remains = GreatestDistance(0.0, (0.0, 0.0), 0)
+    samples = 0
+    for level in levels:
+        cleft = max(cleft, gouge(level.trail, wall, material, step), key=lambda v: v.value_mm)
+        remains = max(remains, excess(level.trail, wall, step), key=lambda v: v.value_mm)
+        samples += cleft.samples + remains.samples
+    return cleft, remains, samples
 
 
 def _exceeds(what: str, worst: GreatestDistance, unit: str, limit: float) -> str:
@@ -305,6 +334,7 @@ def _compare(
     gap = np.where(air, np.abs(columns["engagement_deg"]), 0.0)
     total, finished = max(int((wanted & ~air).sum()), 1), 0
     for level in levels:
+        film = float(np.degrees(np.arccos(1.0 - FILM_MM / level.trail.radius)))
         flat = np.abs(z - level.z) <= LEVEL_MM
         still = (np.abs(z1[k] - z0[k]) > LEVEL_MM) | (length[k] == 0.0)
         one = wanted & flat & ~air & ~still
@@ -317,18 +347,20 @@ def _compare(
                 use = np.flatnonzero(mine[rows])
                 at = rows[use]
                 planned = columns["engagement_deg"][at]
-                off = np.abs(_degrees(level.trail, kk[at], ww[at], COARSE_DEG, workers) - planned)
+                off = _difference(_degrees(level.trail, kk[at], ww[at], COARSE_DEG, workers), planned, film)
                 again = np.flatnonzero(off > tolerance)
                 if len(again):
                     j = at[again]
-                    off[again] = np.abs(_degrees(level.trail, kk[j], ww[j], FINE_DEG, workers) - planned[again])
+                    off[again] = _difference(
+                        _degrees(level.trail, kk[j], ww[j], FINE_DEG, workers), planned[again], film
+                    )
                 best[use] = np.minimum(best[use], off)
             stuck = np.flatnonzero((best > tolerance) & one[rows])
             if len(stuck):
                 at = rows[stuck]
                 just_before = np.maximum(w[at] - BEFORE_MM / length[k[at]], 0.0)
                 found_there = _degrees(level.trail, k[at], just_before, FINE_DEG, workers)
-                best[stuck] = np.minimum(best[stuck], np.abs(found_there - columns["engagement_deg"][at]))
+                best[stuck] = np.minimum(best[stuck], _difference(found_there, columns["engagement_deg"][at], film))
             gap[rows] = best
             done[rows] = True
             finished += len(rows)
@@ -348,6 +380,11 @@ def _compare(
 
 def _degrees(trail: CentrePath, k: Ints, w: Floats, step_deg: float, workers: int) -> Floats:
     return np.degrees(rim_engagement(trail, k, w, step_deg=step_deg, workers=workers).angle)
+
+
+def _difference(found: Floats, planned: Floats, film: float) -> Floats:
+    """(m,) |found - planned| [deg]; 0 where both are at most ``film`` [deg]."""
+    return np.where(np.maximum(found, planned) <= film, 0.0, np.abs(found - planned))
 
 
 def _other_side(k: Ints, w: Floats, length: Floats) -> tuple[Ints, Floats]:

@@ -1,6 +1,8 @@
 """Compiled loops of the planar stock: what a rim meets, and what a capsule takes away.
 
-Notation: R [mm] cutter radius; a **capsule** is the disc of radius R swept along an axis from A to B. The plane is
+Notation: R [mm] cutter radius; a **capsule** is the disc of radius R swept along an axis from A to B, a line or an
+arc. A row of ``axis`` is ``ax, ay, bx, by, xc, yc, rho, t0, sweep``: the ends, and for an arc its centre, radius, the
+angle [rad] of A about the centre and the sweep [rad], 0 < sweep <= pi / 2; sweep = 0 is a line. The plane is
 cut into square cells; ``head[cell]`` is FULL (no capsule reaches it), EMPTY (it is wholly cleared) or the first entry
 of a chain ``link[:, 0]`` (next entry or -1), ``link[:, 1]`` (capsule). ``grid`` is
 ``[x0, y0, h, nx, ny, reach, piece, room]``: origin, cell side, cells each way, the radius of the disc about a cell's
@@ -25,10 +27,19 @@ PARTS, FINER = 8, 4
 
 
 @njit(cache=True, nogil=True, inline="always")
-def axis_distance(px, py, ax, ay, bx, by):
-    """Distance of P from the straight axis AB."""
-    ex, ey = bx - ax, by - ay
+def axis_distance(px, py, axis, q):
+    """Distance of P from the axis in row q."""
+    ax, ay = axis[q, 0], axis[q, 1]
     wx, wy = px - ax, py - ay
+    if axis[q, 8] > 0.0:
+        xc, yc = axis[q, 4], axis[q, 5]
+        ux, uy = px - xc, py - yc
+        vx, vy = axis[q, 2] - xc, axis[q, 3] - yc
+        if (ax - xc) * uy - (ay - yc) * ux >= 0.0 and ux * vy - uy * vx >= 0.0:
+            return abs(math.sqrt(ux * ux + uy * uy) - axis[q, 6])
+        vx, vy = px - axis[q, 2], py - axis[q, 3]
+        return math.sqrt(min(wx * wx + wy * wy, vx * vx + vy * vy))
+    ex, ey = axis[q, 2] - ax, axis[q, 3] - ay
     ll = ex * ex + ey * ey
     t = 0.0
     if ll > 0.0:
@@ -36,6 +47,17 @@ def axis_distance(px, py, ax, ay, bx, by):
         t = min(1.0, max(0.0, t))
     dx, dy = wx - t * ex, wy - t * ey
     return math.sqrt(dx * dx + dy * dy)
+
+
+@njit(cache=True, nogil=True)
+def axis_row(ax, ay, bx, by, xc, yc, sweep, row):
+    """Fill a row of ``axis``; an arc that turns to the right is stored from its other end."""
+    if sweep < 0.0:
+        ax, ay, bx, by = bx, by, ax, ay
+    row[0], row[1], row[2], row[3], row[4], row[5] = ax, ay, bx, by, xc, yc
+    row[6] = math.sqrt((ax - xc) ** 2 + (ay - yc) ** 2)
+    row[7] = math.atan2(ay - yc, ax - xc)
+    row[8] = abs(sweep)
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -108,6 +130,85 @@ def covered(ax, ay, bx, by, r, R):
 
 
 @njit(cache=True, nogil=True)
+def covered_by_arc(cx, cy, rho, t0, sweep, r, R, out):
+    """Arcs of the circle of radius r about the origin that lie in the capsule of radius R about an arc: their number
+    (0 to 2), and their ends in ``out``.
+
+    Notation: C the centre of the axis, L its distance; c(t) = C + rho e(t); alpha(t) the direction and d(t) the
+    distance of c(t), h(d) half the angle that its disc covers. The discs that meet the circle are a window of t about
+    the place nearest to the origin. In each of its parts alpha - h to alpha + h is covered; its ends are at an end of
+    the part, or where an envelope of the capsule (C + (rho +- R) e(t)) crosses the circle.
+    """
+    L = math.sqrt(cx * cx + cy * cy)
+    reach = r + R
+    near = math.atan2(-cy, -cx)  # t of the axis' circle nearest to the origin
+    if L < 1e-12:
+        if rho >= reach:
+            return 0
+        if rho <= R - r:
+            out[0, 0], out[0, 1] = -math.pi, math.pi
+            return 1
+        h = half_width(rho, r, R)
+        out[0, 0], out[0, 1] = t0 - h, t0 + sweep + h
+        return 1
+    bound = (L * L + rho * rho - reach * reach) / (2.0 * L * rho)
+    if bound >= 1.0:
+        return 0
+    window = math.pi if bound <= -1.0 else math.acos(bound)
+    # the middle of the window as a turn at or after t0 - pi
+    middle = near + 2.0 * math.pi * math.ceil((t0 - math.pi - near) / (2.0 * math.pi))
+    count = 0
+    for turn in range(2):
+        m = middle + 2.0 * math.pi * turn
+        ta, tb = max(t0, m - window), min(t0 + sweep, m + window)
+        if ta >= tb:
+            continue
+        # direction of c(ta), from which all others are counted on
+        xa, ya = cx + rho * math.cos(ta), cy + rho * math.sin(ta)
+        first = math.atan2(ya, xa)
+        lo, hi = 1e9, -1e9
+        for k in range(6):
+            if k < 2:
+                t = ta if k == 0 else tb
+                x, y = cx + rho * math.cos(t), cy + rho * math.sin(t)
+                d = math.sqrt(x * x + y * y)
+                if d <= R - r:
+                    out[0, 0], out[0, 1] = -math.pi, math.pi
+                    return 1
+                ahead = half_width(d, r, R)
+                behind = -ahead
+            else:
+                e = rho + R if k < 4 else rho - R
+                c = (r * r - L * L - e * e) / (2.0 * L * e) if e != 0.0 else 2.0
+                if not -1.0 <= c <= 1.0:
+                    continue
+                # about the direction away from the origin
+                t = near + math.pi + (math.acos(c) if k % 2 == 0 else -math.acos(c))
+                t += 2.0 * math.pi * math.ceil((ta - t) / (2.0 * math.pi))
+                if t > tb:
+                    continue
+                ux, uy = math.cos(t), math.sin(t)
+                x, y = cx + rho * ux, cy + rho * uy
+                px, py = cx + e * ux, cy + e * uy
+                ahead = math.atan2(x * py - y * px, x * px + y * py)
+                behind = ahead
+            step = math.atan2(y, x) - first
+            if rho > L:  # the origin is inside: the direction only grows
+                step -= 2.0 * math.pi * math.floor((step + 1e-9) / (2.0 * math.pi))
+            else:
+                step -= 2.0 * math.pi * round(step / (2.0 * math.pi))
+            hi = max(hi, first + step + ahead)
+            lo = min(lo, first + step + behind)
+        # the nearest disc of all may hold the whole circle
+        if ta <= m <= tb and abs(L - rho) <= R - r:
+            out[0, 0], out[0, 1] = -math.pi, math.pi
+            return 1
+        out[count, 0], out[count, 1] = lo, hi
+        count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
 def uncut(ox, oy, tx, ty, r, R, whole, grid, head, link, axis, out):
     """Uncut arcs of the circle of radius r about O; ``out[k] = lo, hi`` from T, counter-clockwise; returns the count.
 
@@ -123,7 +224,9 @@ def uncut(ox, oy, tx, ty, r, R, whole, grid, head, link, axis, out):
     uhi = np.empty(16)
     vlo = np.empty(34)
     vhi = np.empty(34)
+    part = np.empty((2, 2))
     count = 0
+    heading = math.atan2(ty, tx)
     ca, sa = math.cos(piece), math.sin(piece)
     c, s = math.cos(-0.5 * math.pi + 0.5 * piece), math.sin(-0.5 * math.pi + 0.5 * piece)
     for k in range(m):
@@ -142,35 +245,44 @@ def uncut(ox, oy, tx, ty, r, R, whole, grid, head, link, axis, out):
         while at >= 0:
             q = link[at, 1]
             at = link[at, 0]
-            d = axis_distance(mx, my, axis[q, 0], axis[q, 1], axis[q, 2], axis[q, 3])
+            d = axis_distance(mx, my, axis, q)
             if d >= R + half:
                 continue
             if d <= R - half:
                 n = 0
                 break
-            pax, pay = axis[q, 0] - ox, axis[q, 1] - oy
-            pbx, pby = axis[q, 2] - ox, axis[q, 3] - oy
-            lo, hi = covered(pax * tx + pay * ty, pay * tx - pax * ty, pbx * tx + pby * ty, pby * tx - pbx * ty, r, R)
-            if lo > hi:
-                continue
-            # of the turns of the covered arc those that can reach into [a0, a1]
-            turns = math.ceil((a0 - hi) / (2.0 * math.pi)) * 2.0 * math.pi
-            lo += turns
-            hi += turns
-            while lo < a1 and n > 0:
-                kept = 0
-                for v in range(n):
-                    if lo > ulo[v]:
-                        vlo[kept], vhi[kept] = ulo[v], min(lo, uhi[v])
-                        kept += 1
-                    if hi < uhi[v]:
-                        vlo[kept], vhi[kept] = max(hi, ulo[v]), uhi[v]
-                        kept += 1
-                n = min(kept, 16)
-                for v in range(n):
-                    ulo[v], uhi[v] = vlo[v], vhi[v]
-                lo += 2.0 * math.pi
-                hi += 2.0 * math.pi
+            if axis[q, 8] > 0.0:
+                cx, cy = axis[q, 4] - ox, axis[q, 5] - oy
+                parts = covered_by_arc(
+                    cx * tx + cy * ty, cy * tx - cx * ty, axis[q, 6], axis[q, 7] - heading, axis[q, 8], r, R, part
+                )
+            else:
+                pax, pay = axis[q, 0] - ox, axis[q, 1] - oy
+                pbx, pby = axis[q, 2] - ox, axis[q, 3] - oy
+                part[0, 0], part[0, 1] = covered(
+                    pax * tx + pay * ty, pay * tx - pax * ty, pbx * tx + pby * ty, pby * tx - pbx * ty, r, R
+                )
+                parts = 1 if part[0, 0] <= part[0, 1] else 0
+            for side in range(parts):
+                lo, hi = part[side, 0], part[side, 1]
+                # of the turns of the covered arc those that can reach into [a0, a1]
+                turns = math.ceil((a0 - hi) / (2.0 * math.pi)) * 2.0 * math.pi
+                lo += turns
+                hi += turns
+                while lo < a1 and n > 0:
+                    kept = 0
+                    for v in range(n):
+                        if lo > ulo[v]:
+                            vlo[kept], vhi[kept] = ulo[v], min(lo, uhi[v])
+                            kept += 1
+                        if hi < uhi[v]:
+                            vlo[kept], vhi[kept] = max(hi, ulo[v]), uhi[v]
+                            kept += 1
+                    n = min(kept, 16)
+                    for v in range(n):
+                        ulo[v], uhi[v] = vlo[v], vhi[v]
+                    lo += 2.0 * math.pi
+                    hi += 2.0 * math.pi
             if n == 0:
                 break
         for v in range(n):
@@ -189,7 +301,7 @@ def keep_one(px, py, hd, at, link, axis, R, keep):
     found = -1
     while at >= 0:
         q = link[at, 1]
-        if axis_distance(px, py, axis[q, 0], axis[q, 1], axis[q, 2], axis[q, 3]) <= R - hd:
+        if axis_distance(px, py, axis, q) <= R - hd:
             found = k
             if keep[k]:
                 break
@@ -206,7 +318,7 @@ def keep_all(px, py, hd, at, link, axis, R, keep):
     k = 0
     while at >= 0:
         q = link[at, 1]
-        if not keep[k] and axis_distance(px, py, axis[q, 0], axis[q, 1], axis[q, 2], axis[q, 3]) < R + hd:
+        if not keep[k] and axis_distance(px, py, axis, q) < R + hd:
             keep[k] = True
         at = link[at, 0]
         k += 1
@@ -281,16 +393,19 @@ def remove(q, R, grid, head, count, link, used, axis):
     x0, y0, h, reach = grid[0], grid[1], grid[2], grid[5]
     nx, ny = int(grid[3]), int(grid[4])
     ax, ay, bx, by = axis[q, 0], axis[q, 1], axis[q, 2], axis[q, 3]
-    i0 = max(0, math.floor((min(ax, bx) - R - reach - x0) / h))
-    i1 = min(nx - 1, math.floor((max(ax, bx) + R + reach - x0) / h))
-    j0 = max(0, math.floor((min(ay, by) - R - reach - y0) / h))
-    j1 = min(ny - 1, math.floor((max(ay, by) + R + reach - y0) / h))
+    out = R + reach
+    if axis[q, 8] > 0.0:
+        out += axis[q, 6] * (1.0 - math.cos(0.5 * axis[q, 8]))
+    i0 = max(0, math.floor((min(ax, bx) - out - x0) / h))
+    i1 = min(nx - 1, math.floor((max(ax, bx) + out - x0) / h))
+    j0 = max(0, math.floor((min(ay, by) - out - y0) / h))
+    j1 = min(ny - 1, math.floor((max(ay, by) + out - y0) / h))
     for j in range(j0, j1 + 1):
         for i in range(i0, i1 + 1):
             cell = j * nx + i
             if head[cell] == EMPTY:
                 continue
-            d = axis_distance(x0 + (i + 0.5) * h, y0 + (j + 0.5) * h, ax, ay, bx, by)
+            d = axis_distance(x0 + (i + 0.5) * h, y0 + (j + 0.5) * h, axis, q)
             if d <= R - reach:
                 head[cell] = EMPTY
             elif d < R + reach:
@@ -304,3 +419,33 @@ def remove(q, R, grid, head, count, link, used, axis):
                     used = prune(cell, grid, head, link, used, axis, R)
                     count[cell] = max(MORE, used - before)
     return used
+
+
+@njit(cache=True, nogil=True)
+def remove_segment(ax, ay, bx, by, xc, yc, sweep, q, R, grid, head, count, link, used, axis):
+    """Enter a line or an arc, cut into capsules of at most R / 2 and an eighth of a turn, from row q on.
+
+    Returns the rows and the chain entries used.
+    """
+    if sweep == 0.0:
+        length = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
+        rho, t0 = 0.0, 0.0
+        parts = max(1, math.ceil(2.0 * length / R))
+    else:
+        rho = math.sqrt((ax - xc) ** 2 + (ay - yc) ** 2)
+        t0 = math.atan2(ay - yc, ax - xc)
+        parts = max(1, math.ceil(max(2.0 * rho * abs(sweep) / R, 4.0 * abs(sweep) / math.pi)))
+    x0, y0 = ax, ay
+    for k in range(parts):
+        w = (k + 1) / parts
+        if k + 1 == parts:
+            x1, y1 = bx, by
+        elif sweep == 0.0:
+            x1, y1 = ax + w * (bx - ax), ay + w * (by - ay)
+        else:
+            x1, y1 = xc + rho * math.cos(t0 + w * sweep), yc + rho * math.sin(t0 + w * sweep)
+        axis_row(x0, y0, x1, y1, xc, yc, sweep / parts, axis[q])
+        used = remove(q, R, grid, head, count, link, used, axis)
+        q += 1
+        x0, y0 = x1, y1
+    return q, used

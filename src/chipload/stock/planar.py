@@ -8,7 +8,6 @@ cleared keeps none. No boundary is built, so no tangency can break one: an error
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
@@ -73,14 +72,14 @@ class PlanarStock:
         self.count = np.full(nx * ny, _kernels.MORE, dtype=np.int64)
         self.link = np.zeros((1 << 16, 2), dtype=np.int64)
         self.used = 0
-        self.axis: Floats = np.zeros((1 << 12, 4))
+        self.axis: Floats = np.zeros((1 << 12, 9))
         self.capsules = 0
         self._arcs: Floats = np.zeros((_kernels.ARCS, 2))
 
     def reserve(self, capsules: int) -> None:
         """Make room for so many more capsules."""
         if self.capsules + capsules > len(self.axis):
-            self.axis = np.vstack([self.axis, np.zeros((max(capsules, len(self.axis)), 4))])
+            self.axis = np.vstack([self.axis, np.zeros((max(capsules, len(self.axis)), 9))])
         need = self.used + (2 * capsules + 2) * int(self.grid[7])
         if need > len(self.link):
             self.link = np.vstack(
@@ -98,17 +97,18 @@ class PlanarStock:
     def remove(self, axes: ArrayLike) -> None:
         """Take away the capsules about ``axes`` (n, 4) [mm], rows ``ax, ay, bx, by``."""
         rows = np.asarray(axes, dtype=np.float64).reshape(-1, 4)
-        for row in rows:
-            parts = max(1, math.ceil(math.hypot(row[2] - row[0], row[3] - row[1]) / (0.5 * self.radius)))
-            u = np.linspace(0.0, 1.0, parts + 1)[:, None]
-            p = row[0:2] * (1.0 - u) + row[2:4] * u
-            self.reserve(parts)
-            for a, b in itertools.pairwise(p):
-                self.axis[self.capsules] = (*a, *b)
-                self.used = _kernels.remove(
-                    self.capsules, self.radius, self.grid, self.head, self.count, self.link, self.used, self.axis
-                )
-                self.capsules += 1
+        self.remove_segments(np.column_stack([rows, np.zeros((len(rows), 3))]))
+
+    def remove_segments(self, segments: ArrayLike) -> None:
+        """Take away the capsules about ``segments`` (n, 7), lines and arcs of a contour; lines may have no length."""
+        for row in np.asarray(segments, dtype=np.float64).reshape(-1, 7):
+            length = math.hypot(row[2] - row[0], row[3] - row[1])
+            if row[6] != 0.0:
+                length = abs(row[6]) * math.hypot(row[0] - row[4], row[1] - row[5])
+            self.reserve(2 + math.ceil(2.0 * length / self.radius) + math.ceil(4.0 * abs(row[6]) / math.pi))
+            self.capsules, self.used = _kernels.remove_segment(
+                *row, self.capsules, self.radius, self.grid, self.head, self.count, self.link, self.used, self.axis
+            )
 
     def arcs(self, centre: ArrayLike, heading: ArrayLike, whole: bool = False) -> Floats:
         """(k, 2) uncut arcs [rad] of the rim about ``centre``, counter-clockwise from the unit ``heading``.

@@ -8,7 +8,7 @@ import shapely
 
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
-from chipload.planning.pocket.clearing import CUT, ENTRY, LIFT, LINK, clear_region
+from chipload.planning.pocket.clearing import CUT, ENTRY, LIFT, LINK, clear_region, polyline
 from chipload.planning.pocket.leftover import leftover, swept, widest_left
 from chipload.planning.pocket.reach import centre_region, reach_of, widest_places
 from chipload.stock.planar import PlanarStock
@@ -59,15 +59,30 @@ def test_leftover_of_one_straight_cut():
     assert room == pytest.approx(2.0, abs=0.01)
 
 
-def test_steps_are_short_and_lengths_add_up():
+def test_lengths_add_up_and_the_centre_stays_in_its_region():
+    """Length by kind; arcs begin where the row before them ends; no place leaves the centre region."""
     path = clear_region(SQUARE, 3.0, math.acos(0.8))
-    legs = np.hypot(np.diff(path.x), np.diff(path.y))
-    assert legs[path.kind[1:] == CUT].max() <= 0.06 * 3.0 + 1e-9
+    seg = path.segments
+    arc = seg[:, 6] != 0.0
+    assert arc.any()
+    radius = np.hypot(*(seg[arc, 0:2] - seg[arc, 4:6]).T)
+    assert np.hypot(*(seg[arc, 2:4] - seg[arc, 4:6]).T) == pytest.approx(radius, abs=1e-9)
+    chord = np.hypot(path.x[1:] - path.x[:-1], path.y[1:] - path.y[:-1])
+    legs = np.append(0.0, np.where(arc[1:], 0.0, chord))
+    legs[arc] = radius * np.abs(seg[arc, 6])
     for kind, name in ((ENTRY, "entry"), (CUT, "cut"), (LINK, "link"), (LIFT, "lift")):
-        assert path.lengths_mm[name] == pytest.approx(legs[path.kind[1:] == kind].sum())
+        assert path.lengths_mm[name] == pytest.approx(legs[path.kind == kind].sum())
     assert path.passes == path.pass_number.max() >= 5
-    assert (path.x >= 3.0 - 1e-9).all()
-    assert (path.x <= 17.0 + 1e-9).all()
+    points, _ = polyline(seg[:, 2:4], seg[:, 4:6], seg[:, 6], path.kind == LIFT, 1e-4)
+    assert points.min() >= 3.0 - 4e-4
+    assert points.max() <= 17.0 + 4e-4
+
+
+def test_arcs_take_far_fewer_rows_than_steps():
+    """A round pocket is one spiral: less than one row in 0.5 R of path."""
+    path = clear_region(Region.of([Contour.circle((0.0, 0.0), 20.0)]), 3.0, math.acos(0.8))
+    assert path.lengths_mm["cut"] / (path.kind == CUT).sum() > 0.5 * 3.0
+    assert path.cleared_share > 0.9999
 
 
 def test_two_rooms_are_entered_apart():

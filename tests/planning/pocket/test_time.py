@@ -10,13 +10,14 @@ from chipload.errors import InputError
 from chipload.machine.machine import machine_named
 from chipload.planning.link_rows import row_ends
 from chipload.planning.pocket.clearing import CUT, LIFT, LINK, ClearingPath
-from chipload.planning.pocket.plan import Clearing, _programs, _speeds, _times
+from chipload.planning.pocket.motions import clock, motions_of, samples_of, programs_of, speeds
+from chipload.planning.pocket.plan import Clearing
 from chipload.planning.result import StrategyResult
 from chipload.program.program import Program
 from chipload.program.time import program_time
 
 MACHINE = machine_named("vmc")
-ASKED = Clearing("down", 0.15, 1.0, 20.0, 838.0, 0.0, 5.0, 0.2)
+ASKED = Clearing("down", 0.15, 1.0, 20.0, 838.0, 0.0, 5.0, 0.2, link_feed=20.0, link_lift=0.0)
 
 
 def path(x, y, kind):
@@ -24,8 +25,14 @@ def path(x, y, kind):
     whole = np.zeros(n, dtype=np.int64)
     flat = np.zeros(n)
     return ClearingPath(
-        np.array(x, float), np.array(y, float), np.array(kind), flat, flat, whole, whole, (), 1.0, 1.0, 0.0, (), {}
-    )
+        np.array(x, float), np.array(y, float), np.zeros((n, 2)), flat, np.array(kind), flat, whole, (), 1.0, 1.0, 0.0,
+        (), {},
+    )  # fmt: skip
+
+
+def programs(run, asked=ASKED):
+    motions = motions_of(run, asked.heights, asked.feed, asked.link_feed)
+    return motions, programs_of(motions, asked.feed, asked.axial_depth, asked.spindle_speed, 1)
 
 
 @pytest.mark.parametrize(
@@ -44,11 +51,11 @@ def test_time_between_stops(x, y, kind, steps_mm):
     corner below the plunge, takes no longer.
     """
     run = path(x, y, kind)
-    centre = np.column_stack([run.x, run.y])
-    _, speed = _speeds(run, centre, ASKED, MACHINE)
-    programs = _programs(run, centre, ASKED, 1)
-    program = Program.join(programs)
-    time = _times(run, programs, row_ends(program, MACHINE))
+    motions, parts = programs(run)
+    samples = samples_of(motions, 10.0)
+    _, speed, own = speeds(motions, samples, MACHINE)
+    program = Program.join(parts)
+    time = clock(motions, samples, own, parts, row_ends(program, MACHINE))
     assert np.isfinite(time).all()
     assert (speed <= ASKED.feed).all()
     a, v = MACHINE.acceleration_xy, ASKED.feed
@@ -59,6 +66,22 @@ def test_time_between_stops(x, y, kind, steps_mm):
     assert (time[moves] - time[moves - 1] > 0.0).all()
     level = (program.p_work[:, 2] == -1.0) & (np.diff(program.p_work[:, 2], prepend=9.0) == 0.0)
     assert program_time(program, MACHINE)[level].sum() <= sum(wanted)
+
+
+def test_a_link_runs_off_the_floor_at_its_own_feed():
+    """30 mm of link: 1 mm up and 1 mm down over 0.1 mm, 28 mm between; a link of 1 mm stays on the floor."""
+    asked = replace(ASKED, link_feed=200.0, link_lift=0.1)
+    run = path([0.0, 5.0, 35.0, 40.0, 41.0, 45.0], np.zeros(6), [LIFT, CUT, LINK, CUT, LINK, CUT])
+    _, parts = programs(run, asked)
+    program = Program.join(parts)
+    level = program.p_work[2:-1]
+    assert level[:, 0].tolist() == pytest.approx([5.0, 6.0, 34.0, 35.0, 40.0, 41.0, 45.0])
+    assert level[:, 2].tolist() == pytest.approx([-1.0, -0.9, -0.9, -1.0, -1.0, -1.0, -1.0])
+    assert program.feed[2:-1].tolist() == [20.0, 200.0, 200.0, 200.0, 20.0, 200.0, 20.0]
+    slow = Program.join(programs(run, replace(ASKED, link_lift=0.1))[1])
+    # 31 mm at 200 mm/s in place of 20 mm/s, but for the ramps of speed
+    gain = program_time(slow, MACHINE).sum() - program_time(program, MACHINE).sum()
+    assert 1.1 < gain < 31.0 * (1 / 20 - 1 / 200) + 0.6
 
 
 @pytest.mark.parametrize(
@@ -75,7 +98,7 @@ def test_time_between_stops(x, y, kind, steps_mm):
 )
 def test_a_result_refuses_what_is_not_finite(changes, message):
     run = path([0.0, 0.125], [0.0, 0.0], [LIFT, CUT])
-    program = Program.join(_programs(run, np.column_stack([run.x, run.y]), ASKED, 1))
+    program = Program.join(programs(run)[1])
     good = StrategyResult("pocket", program, {"x_mm": np.zeros(2), "y_mm": np.zeros(2)}, {"time_s": 1.0, "n": 3})
     with pytest.raises(InputError) as refused:
         replace(good, **changes)

@@ -172,7 +172,7 @@ def _unchecked(outcome: ContourResult) -> tuple[str, ...]:
 
 def _not_compared(outcome: ContourResult) -> tuple[str, ...]:
     return tuple(
-        f"operation {k}, {name}: engagement of {check.numbers['rows_not_compared']} steps down into the stock"
+        f"operation {k}, {name}: engagement of {check.numbers['rows_not_compared']} steps that rise or descend"
         for k, op in enumerate(outcome.operations)
         for name, check in op.verifications.items()
         if check.numbers.get("rows_not_compared")

@@ -23,7 +23,7 @@ from chipload.jobs.contour.tables import OperationTable
 from chipload.jobs.provenance import provenance_of, title_of
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.contour.plan import Finishing, check_contour, plan_contour
-from chipload.planning.pocket.plan import Clearing, check_pocket, plan_pocket
+from chipload.planning.pocket.plan import LINK_LIFT_MM, Clearing, check_pocket, plan_pocket
 from chipload.planning.result import OperationResult, StrategyResult
 from chipload.program.check import check_program
 from chipload.progress import Progress, silent
@@ -33,8 +33,8 @@ from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 #: what the simulation may find and still call a program proved
 ENGAGEMENT_DEG, GOUGE_MM, CHORDS_MM = 0.05, 1e-4, 1e-3
-#: passes that descend, whose engagement the simulation in the plane cannot compare; their path it does follow
-NOT_LEVEL = ("entry",)
+#: passes that descend or rise, whose engagement the simulation in the plane cannot compare; their path it does follow
+NOT_LEVEL = ("entry", "ramp")
 VERDICTS = {"proved": Verdict.HOLDS, "failed": Verdict.EXCEEDS, "unproven": Verdict.UNPROVEN}
 
 
@@ -179,6 +179,8 @@ def _setting(job: ContourJob, op: OperationTable) -> Finishing | Clearing:
             step=op.step_mm,
             allowance=op.allowance_mm or 0.0,
             rigid=rigid,
+            link_feed=None if op.link_feed_mm_min is None else mm_s_from_mm_min(op.link_feed_mm_min),
+            link_lift=LINK_LIFT_MM if op.link_lift_mm is None else op.link_lift_mm,
         )
     forward = op.kind == "forward"
     strategies: tuple[str, ...] = ("forward",) if forward else tuple(op.strategies or ())
@@ -214,8 +216,8 @@ def verify(
     before = strategy.drawn.get("stock before", ())
     if not before and op.kind != "pocket":
         return Verification(Verdict.UNPROVEN, "the planner does not say what stock the program starts from")
-    # eased joints may leave the drawn wall to either side, a cutter may leave stock in a corner; the path of a front is
-    # made of chords, and what it leaves over is judged by its area, which the planner reports
+    # eased joints may leave the drawn wall to either side, a cutter may leave stock in a corner; the path of a pocket
+    # lies within a tolerance of its region, and what it leaves over is judged by its area, which the planner reports
     leave = op.tolerance_mm or 0.0
     gouge = leave if op.joint == "clothoid" else 0.0
     if op.kind == "pocket":

@@ -63,6 +63,12 @@ class OperationTable(Table):
     tolerance_mm: Positive | None = Field(None, le=1.0, description="how far eased joints may leave the drawing")
     lead_mm: Positive | None = Field(None, description="radius of the lead-in")
     allowance_mm: NotNegative | None = Field(None, description="left on the wall")
+    link_feed_mm_min: Positive | None = Field(
+        None, le=1e5, description="feed of links through cleared space; none: the machine's greatest feed"
+    )
+    link_lift_mm: NotNegative | None = Field(
+        None, description="how far links stay off the floor, where they are long enough; none: 0.1"
+    )
 
 
 class ContourLimitsTable(Limits):
@@ -100,4 +106,8 @@ NEEDS: Mapping[str, tuple[str, ...]] = {
 
 
 #: keys that each kind also understands
-MAY: Mapping[str, tuple[str, ...]] = {"contour": ("use", "passes"), "forward": ("passes",), "pocket": ("allowance_mm",)}
+MAY: Mapping[str, tuple[str, ...]] = {
+    "contour": ("use", "passes"),
+    "forward": ("passes",),
+    "pocket": ("allowance_mm", "link_feed_mm_min", "link_lift_mm"),
+}

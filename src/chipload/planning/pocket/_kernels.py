@@ -13,13 +13,16 @@ import math
 import numpy as np
 from numba import njit
 
-from chipload.stock._kernels import ARCS, remove, uncut
+from chipload.stock._kernels import ARCS, uncut
 
-RUNNING, LOST, BLOCKED = 0, 1, 2
 #: a turn to the left [rad] that is tried again with half the step
 SHARP = 0.2
-#: columns of a step: x, y, greatest E along it, E at its end, arcs at its end, mm^2 taken
-COLUMNS = 6
+#: an arc's end is found when E is so much below the limit at most [rad]
+CLOSE = 4e-4
+#: an arc does not end nearer to a wall than this part of R
+FILM = 1e-3
+#: length of an arc over that of a straight step; greatest turn of an arc to the left over that to the right
+LONGER, SMOOTH = 2.0, 1.5
 
 
 @njit(cache=True, nogil=True)
@@ -198,82 +201,105 @@ def turn(ox, oy, th, guess, l, limit, right, left, full, slack, r, R, grid, head
 
 
 @njit(cache=True, nogil=True)
-def run_pass(state, step, limit, right, left, lost, R, touch, out, capsule, used, grid, head, count, link, axis,
-             flag, edges, rows, row_edges):  # fmt: skip
-    """Steps until the pass ends or ``out`` is full.
+def arc_place(x, y, th, phi, l):
+    """(x, y, heading) at the end of an arc of length l that leaves (x, y) along th and turns by phi."""
+    c = l if abs(phi) < 1e-9 else l * math.sin(0.5 * phi) / (0.5 * phi)
+    return x + c * math.cos(th + 0.5 * phi), y + c * math.sin(th + 0.5 * phi), th + phi
 
-    ``state`` = x, y, heading, last turn, length on which less than a hundredth of R (1 - cos a*) was cut; ``right``,
-    ``left``: greatest turn of a whole step;
-    ``lost``: length without material that ends the pass. Returns (steps, reason, capsules, chain entries).
+
+@njit(cache=True, nogil=True)
+def arc_engagement(x, y, th, phi, l, r, R, grid, head, link, axis, arcs):
+    """E at the end of an arc."""
+    ex, ey, et = arc_place(x, y, th, phi, l)
+    return angle_at(ex, ey, math.cos(et), math.sin(et), r, R, grid, head, link, axis, arcs)
+
+
+@njit(cache=True, nogil=True)
+def arc_allowed(x, y, th, phi, l, margin, grid, flag, edges, rows, row_edges):
+    """Whether an arc stays in the centre region, by its end and its middle. An end within ``margin`` of a wall on the
+    right is refused: a straight step reaches the wall itself, so that no film stays on it.
     """
-    arcs = np.empty((ARCS, 2))
-    r = R * (1.0 - touch)
-    slack = 1e-4 * R
-    x, y, th, guess, idle = state[0], state[1], state[2], state[3], state[4]
-    n = 0
-    reason = RUNNING
-    while n < len(out) and capsule < len(axis) and used + 2.0 * grid[7] < len(link):
-        found = False
-        l = step
-        phi = 0.0
-        for _ in range(5):
-            share = l / step
-            ok, phi = turn(x, y, th, guess * share, l, limit, right * share, left, False, slack, r, R, grid, head,
-                           link, axis, arcs, flag, edges, rows, row_edges)  # fmt: skip
-            if ok:
-                e = worst_of_step(x, y, th, phi, l, True, r, R, grid, head, link, axis, arcs)
-                if e > limit + 1e-5:
-                    ok, phi = turn(x, y, th, phi, l, limit, right * share, left, True, slack, r, R, grid, head,
-                                   link, axis, arcs, flag, edges, rows, row_edges)  # fmt: skip
-                if ok:
-                    found = True
-                    break
-            l *= 0.5
-        if not found:
-            reason = BLOCKED
-            break
-        # a shorter step may reach into the corner that a whole one has to cut
-        while phi > SHARP and l > step / 32.0:
-            share = 0.5 * l / step
-            ok, less = turn(x, y, th, 0.0, 0.5 * l, limit, right * share, left, True, slack, r, R, grid, head, link,
-                            axis, arcs, flag, edges, rows, row_edges)  # fmt: skip
-            if not ok or less > phi - SHARP:
-                break
-            l *= 0.5
-            phi = less
-        th += phi
-        guess = phi * step / l
-        tx, ty = math.cos(th), math.sin(th)
-        e = worst_of_step(x, y, th, 0.0, l, True, r, R, grid, head, link, axis, arcs)
-        if phi < 0.0:
-            t = R * math.tan(-0.5 * phi)
-            if t < l:
+    ex, ey, et = arc_place(x, y, th, phi, l)
+    if not allowed(ex, ey, grid, flag, edges, rows, row_edges):
+        return False
+    if not allowed(ex + margin * math.sin(et), ey - margin * math.cos(et), grid, flag, edges, rows, row_edges):
+        return False
+    ex, ey, _ = arc_place(x, y, th, 0.5 * phi, 0.5 * l)
+    return allowed(ex, ey, grid, flag, edges, rows, row_edges)
+
+
+@njit(cache=True, nogil=True)
+def arc_turn(x, y, th, guess, l, limit, right, r, R, grid, head, link, axis, arcs, flag, edges, rows, row_edges):
+    """(found, phi): the turn of an arc at whose end E is the limit, from the law's own rate.
+
+    Turning by d phi moves the end by l d phi / 2 away from the material and turns the rim by d phi:
+    dE/dphi = -(1 + l / (2 R sin E)) beside a straight edge; from the second try on the rate is what was found.
+    """
+    phi = max(guess, -right)
+    e = arc_engagement(x, y, th, phi, l, r, R, grid, head, link, axis, arcs)
+    if e < 0.02:
+        return False, 0.0
+    rate = -(1.0 + 0.5 * l / (R * math.sin(limit)))
+    before, e_before = phi, e
+    for k in range(6):
+        if limit - CLOSE <= e <= limit:
+            return arc_allowed(x, y, th, phi, l, FILM * R, grid, flag, edges, rows, row_edges), phi
+        if k > 0 and abs(phi - before) > 1e-12:
+            found = (e - e_before) / (phi - before)
+            if found < 0.3 * rate:
+                rate = max(found, 6.0 * rate)
+        before, e_before = phi, e
+        phi = phi + min(0.3, max(-0.3, (limit - 0.4 * CLOSE - e) / rate))
+        if phi > SMOOTH * right:
+            return False, 0.0
+        if phi < -right:
+            e = arc_engagement(x, y, th, -right, l, r, R, grid, head, link, axis, arcs)
+            if e_before - 0.004 <= e <= limit:
+                return arc_allowed(x, y, th, -right, l, FILM * R, grid, flag, edges, rows, row_edges), -right
+            return False, 0.0
+        e = arc_engagement(x, y, th, phi, l, r, R, grid, head, link, axis, arcs)
+    return False, 0.0
+
+
+@njit(cache=True, nogil=True)
+def wall_heading(chord, last, phi):
+    """Direction of a smooth wall at the end of a chord, from the chord before it; the chord's own at a corner."""
+    turn = chord - last
+    turn -= 2.0 * math.pi * round(turn / (2.0 * math.pi))
+    return chord + 0.5 * turn if abs(turn) <= SHARP and abs(phi) <= SHARP else chord
+
+
+@njit(cache=True, nogil=True)
+def chord_step(x, y, th, guess, step, limit, right, left, slack, r, R, grid, head, link, axis, arcs, flag, edges, rows,
+               row_edges):  # fmt: skip
+    """(found, phi, l): a straight step, turned at its beginning: along a wall, through a corner, without material."""
+    l = step
+    for _ in range(5):
+        share = l / step
+        ok, phi = turn(x, y, th, guess * share, l, limit, right * share, left, False, slack, r, R, grid, head, link,
+                       axis, arcs, flag, edges, rows, row_edges)  # fmt: skip
+        if ok:
+            tx, ty = math.cos(th + phi), math.sin(th + phi)
+            e = 0.0
+            for k in range(3):
+                t = l * (0.02 + 0.3 * k)
                 e = max(e, angle_at(x + t * tx, y + t * ty, tx, ty, r, R, grid, head, link, axis, arcs))
-        k = uncut(x + 0.5 * l * tx, y + 0.5 * l * ty, tx, ty, r, R, False, grid, head, link, axis, arcs)
-        area = 0.0
-        for v in range(k):
-            area += R * l * (math.sin(arcs[v, 1]) - math.sin(arcs[v, 0]))
-        nx, ny = x + l * tx, y + l * ty
-        k = uncut(nx, ny, tx, ty, r, R, False, grid, head, link, axis, arcs)
-        end = 0.0
-        for v in range(k):
-            end += arcs[v, 1] - arcs[v, 0]
-        if e > 0.0:
-            axis[capsule, 0], axis[capsule, 1], axis[capsule, 2], axis[capsule, 3] = x, y, nx, ny
-            used = remove(capsule, R, grid, head, count, link, used, axis)
-            capsule += 1
-        x, y = nx, ny
-        out[n, 0], out[n, 1], out[n, 2], out[n, 3], out[n, 4], out[n, 5] = x, y, e, end, k, area
-        n += 1
-        if area > 0.01 * R * (1.0 - math.cos(limit)) * l:
-            idle = 0.0
-        else:
-            idle += l
-            if idle > lost:
-                reason = LOST
-                break
-    state[0], state[1], state[2], state[3], state[4] = x, y, th, guess, idle
-    return n, reason, capsule, used
+            if e > limit + 1e-5:
+                ok, phi = turn(x, y, th, phi, l, limit, right * share, left, True, slack, r, R, grid, head, link, axis,
+                               arcs, flag, edges, rows, row_edges)  # fmt: skip
+        if ok:
+            # a shorter step may reach into the corner that a whole one has to cut
+            while phi > SHARP and l > step / 32.0:
+                share = 0.5 * l / step
+                ok, less = turn(x, y, th, 0.0, 0.5 * l, limit, right * share, left, True, slack, r, R, grid, head,
+                                link, axis, arcs, flag, edges, rows, row_edges)  # fmt: skip
+                if not ok or less > phi - SHARP:
+                    break
+                l *= 0.5
+                phi = less
+            return True, phi, l
+        l *= 0.5
+    return False, 0.0, 0.0
 
 
 @njit(cache=True, nogil=True)

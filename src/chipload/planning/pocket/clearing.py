@@ -13,9 +13,9 @@ whole of each step.
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
-from chipload.planning.pocket import _kernels
+from chipload.planning.pocket import _kernels, _pass
 from chipload.planning.pocket.leftover import leftover, widest_left
 from chipload.planning.pocket.reach import CHORD, Reach, centre_region, reach_of, widest_places
 from chipload.planning.pocket.starts import Starts
@@ -48,10 +48,18 @@ IDLE = 1.5
 ENTRIES, LEAST_ROOM = 50, 0.02
 #: so many passes within 2 R that take less than this part of R^2 each are given up
 SLOW_PASSES, SLOW_AREA = 30, 0.02
-#: steps between two calls of ``progress``
-CHUNK = 4000
+#: steps between two calls of ``progress``, and capsules that the stock has room for before them
+CHUNK, ROOM = 2000, 1600
 #: depth / R that is looked into for material beside the path, round after round
 DEPTHS = (0.03, 0.006)
+#: vertices of a pass lie within this part of R, of at most so many mm, from the lines and arcs that are written
+FIT, FIT_UP_TO = 2e-4, 8.0
+#: the steps keep this much [rad] below the engagement that what is written must keep
+MARGIN = 2e-3
+#: what is written is looked at every 0.03 R, and keeps this much [rad] below it there
+BETWEEN = 4e-4
+#: what is written may leave the centre region by this part of R: the middle of a chord of a convex wall
+SLACK = 1e-4
 #: area / R^2 that a pass must take for its start to be used again
 WORTH = 3e-4
 #: part of the reachable area that may be left without another round
@@ -60,15 +68,15 @@ ENOUGH = 5e-4
 
 @dataclass(frozen=True, eq=False)
 class ClearingPath:
-    """The way of the cutter's centre, and what it left. Row k goes straight from row k - 1 to row k.
+    """The way of the cutter's centre, and what it left. Row k goes along a line or an arc from row k - 1 to row k.
 
     Parameters
     ----------
     x, y : (n,) float [mm]
+    centre : (n, 2) float [mm], of the arc; 0, 0 of a line
+    sweep : (n,) float [rad], counter-clockwise > 0; 0: a line
     kind : (n,) int, ENTRY, CUT, LINK or LIFT; row 0 is a LIFT: the cutter comes from above
-    engagement : (n,) float [rad], at the end of the step; pi in an ENTRY, 0 in LINK and LIFT
-    engagement_max : (n,) float [rad], greatest along the step
-    arcs : (n,) int, separate engaged arcs at the end of the step
+    engagement_max : (n,) float [rad], greatest along the row; pi in an ENTRY, 0 in LINK and LIFT
     pass_number : (n,) int, from 1; 0 where it belongs to none
     events : in the order of the path
     reachable_mm2, cleared_mm2, leftover_mm2 : areas [mm^2] of the opening of the region, and its parts
@@ -78,10 +86,10 @@ class ClearingPath:
 
     x: Floats
     y: Floats
+    centre: Floats
+    sweep: Floats
     kind: Ints
-    engagement: Floats
     engagement_max: Floats
-    arcs: Ints
     pass_number: Ints
     events: tuple[Event, ...]
     reachable_mm2: float
@@ -94,6 +102,17 @@ class ClearingPath:
     def cleared_share(self) -> float:
         """Cleared part of what can be reached."""
         return self.cleared_mm2 / self.reachable_mm2
+
+    @cached_property
+    def segments(self) -> Floats:
+        """(n, 7) the rows as those of a contour; row 0 has no length."""
+        p = np.column_stack([self.x, self.y])
+        return np.column_stack([np.vstack([p[:1], p[:-1]]), p, self.centre, self.sweep])
+
+    @cached_property
+    def lengths(self) -> Floats:
+        """(n,) length of each row [mm]."""
+        return segment_lengths(self.segments)
 
     @property
     def passes(self) -> int:
@@ -170,7 +189,8 @@ class _Run:
 
     def __init__(self, centres: Region, radius: float, limit: float, step: float, progress: Progress) -> None:
         xmin, ymin, xmax, ymax = centres.bounds
-        self.centres, self.radius, self.limit, self.step = centres, radius, limit, step
+        self.centres, self.radius, self.step = centres, radius, step
+        self.most_engaged, self.limit = limit - BETWEEN, limit - MARGIN
         self.progress = progress
         self.stock = PlanarStock((xmin - radius, ymin - radius, xmax + radius, ymax + radius), radius)
         self.reach: Reach = reach_of(centres, self.stock.grid, CHORD * radius)
@@ -181,17 +201,18 @@ class _Run:
         self.passes = 0
         self.at = np.zeros(2)
         self.area = 0.0
-        self.ends: Counter[str] = Counter()
         self.lately: list[tuple[float, float, float]] = []
         self.steps = 0
         self.most = 100_000 + int(20.0 * self.reachable.area / (step * radius * (1.0 - math.cos(limit))))
 
     # -- rows -----------------------------------------------------------------------------------------------
-    def add(self, points: Floats, kind: int, e_end: Floats | float, e_max: Floats | float, arcs: Floats | int) -> None:
-        """Rows of the path: x, y, kind, E, greatest E, arcs, pass."""
-        rows = np.zeros((len(points), 7))
-        rows[:, 0:2], rows[:, 2], rows[:, 3], rows[:, 4], rows[:, 5] = points, kind, e_end, e_max, arcs
-        rows[:, 6] = self.passes if kind == CUT else 0
+    def add(self, points: Floats, kind: int, e_max: Floats | float = 0.0, arcs: Floats | None = None) -> None:
+        """Rows of the path: x, y, kind, greatest E, pass, centre and sweep."""
+        rows = np.zeros((len(points), 8))
+        rows[:, 0:2], rows[:, 2], rows[:, 3] = points, kind, e_max
+        rows[:, 4] = self.passes if kind == CUT else 0
+        if arcs is not None:
+            rows[:, 5:8] = arcs
         self.rows.append(rows)
         self.at = points[-1].copy()
 
@@ -201,22 +222,21 @@ class _Run:
         R = self.radius
         rh = min(0.9 * R, 0.98 * room)
         n = max(12, math.ceil(2.0 * math.pi * rh / self.step))
-        a = np.linspace(0.0, 2.0 * math.pi, n + 1)
-        ring = np.column_stack([x + rh * np.cos(a), y + rh * np.sin(a)])
-        self.add(ring[:1], LIFT, 0.0, 0.0, 0)
-        self.add(ring[1:], ENTRY, math.pi, math.pi, 1)
-        self.stock.remove(np.hstack([ring[:-1], ring[1:]]))
+        a = np.linspace(0.0, 2.0 * math.pi, n + 1)[1:]
+        half = np.array([[x - rh, y], [x + rh, y]])
+        circle = np.array([[x, y, math.pi], [x, y, math.pi]])
+        self.add(half[1:], LIFT)
+        self.add(half, ENTRY, math.pi, circle)
+        self.stock.remove_segments(np.column_stack([half[::-1], half, circle]))
         self.events.append(
             Event("pocket-entry", x, y, f"helical bore of diameter {2.0 * (R + rh):.4g} mm: a full slot by its nature")
         )
-        heading = np.arctan2(*(ring[1:] - ring[:-1]).T[::-1])
-        self.starts.add(ring[1:], heading)
+        self.starts.add(np.column_stack([x + rh * np.cos(a), y + rh * np.sin(a)]), a + 0.5 * math.pi)
 
     def enter_elsewhere(self) -> None:
         """Bores into what no pass came to, the widest place first, as long as that clears anything."""
         for _ in range(ENTRIES):
-            rows = np.vstack(self.rows)
-            x, y, room = widest_left(self.reachable, self.centres, rows[:, 0:2], rows[:, 2] >= LIFT, self.radius)
+            x, y, room = widest_left(self.reachable, self.centres, *self._polyline(), self.radius)
             if room < LEAST_ROOM * self.radius:
                 break
             before = self.area
@@ -276,93 +296,114 @@ class _Run:
     def _pass_from(self, k: int) -> bool:
         """One pass from the start k; whether it took enough for the start to be tried again."""
         for x, y, heading in self.starts.candidates(k):
-            before = self.stock.state()
-            rows, headings, reason, at = self._steps(x, y, heading)
-            cuts = np.flatnonzero(rows[:, 5] > 1e-4 * self.radius * self.step)
-            if len(cuts) == 0 or rows[:, 5].sum() < 1e-5 * self.radius**2:
-                self.stock.restore(before)
+            start = np.array([x, y])
+            clear = self._linked(start)  # of what is there before the pass
+            segments, places, took, reason, at = self._pass(x, y, heading)
+            if not len(segments):
                 continue
-            end = cuts[-1] + 1
-            if (rows[end:, 2] > 0.0).any():
-                self.stock.restore(before)
-                places = np.vstack([[[x, y]], rows[:end, 0:2]])
-                self.stock.remove(np.hstack([places[:-1], places[1:]])[rows[:end, 2] > 0.0])
-            rows, headings = rows[:end], headings[:end]
-            self._go(np.array([x, y]))
+            if np.hypot(*(start - self.at)) > 1e-9:
+                self.add(start[None, :], LINK if clear else LIFT)
             self.passes += 1
-            self.add(rows[:, 0:2], CUT, rows[:, 3], rows[:, 2], rows[:, 4])
-            self.area += float(rows[:, 5].sum())
-            self.lately.append((float(rows[:, 5].sum()), *rows[:, 0:2].mean(axis=0).tolist()))
-            self.ends[reason] += 1
-            if reason == "pocket-blocked":
+            self.add(segments[:, 2:4], CUT, segments[:, 7], segments[:, 4:7])
+            self.area += took
+            self.lately.append((took, *places[:, 0:2].mean(axis=0).tolist()))
+            if reason == _pass.BLOCKED:
                 text = (
-                    f"pass {self.passes} stops: no turn keeps the engagement within {math.degrees(self.limit):.4g} deg"
+                    f"pass {self.passes} stops: no turn keeps the engagement within "
+                    f"{math.degrees(self.most_engaged):.4g} deg"
                 )
-                self.events.append(Event(reason, float(at[0]), float(at[1]), text))
-            self.starts.add(rows[:, 0:2], headings)
+                self.events.append(Event("pocket-blocked", float(at[0]), float(at[1]), text))
+            self.starts.add(places[:, 0:2], places[:, 2])
             self.progress(min(0.99, self.area / self.reachable.area), f"front, pass {self.passes}")
-            return float(rows[:, 5].sum()) > WORTH * self.radius**2
+            return took > WORTH * self.radius**2
         return False
 
-    def _go(self, q: Floats) -> None:
-        """From where the cutter is to q: a straight link where that is clear, else up and down again."""
-        if np.hypot(*(q - self.at)) < 1e-9:
-            return
-        kind = LINK if self._clear_line(self.at, q) else LIFT
-        self.add(q[None, :], kind, 0.0, 0.0, 0)
-
-    def _steps(self, x: float, y: float, heading: float) -> tuple[Floats, Floats, str, Floats]:
-        """Steps of a pass: rows of the kernel, headings, why it ended, where."""
+    def _pass(self, x: float, y: float, heading: float) -> tuple[Floats, Floats, float, int, Floats]:
+        """One pass: its segments (m, 8), places (n, 3), mm^2 taken, why it ended, where."""
         s, R = self.stock, self.radius
-        state = np.array([x, y, heading, 0.0, 0.0])
+        state = np.array([x, y, heading, 0.0, 0.0, 1e9])
         right = self.step / (TURN_RIGHT * R)
-        parts = []
-        reason = _kernels.RUNNING
-        while reason == _kernels.RUNNING:
-            s.reserve(CHUNK + 8)
-            out = np.zeros((CHUNK, _kernels.COLUMNS))
-            n, reason, s.capsules, s.used = _kernels.run_pass(
-                state, self.step, self.limit, right, TURN_LEFT, IDLE * R, R, TOUCH, out, s.capsules,
-                s.used, s.grid, s.head, s.count, s.link, s.axis, *self.reach.arguments(),
+        segments, places, took, reason = [], [], 0.0, _pass.RUNNING
+        while reason == _pass.RUNNING and self.steps <= self.most:
+            s.reserve(ROOM)
+            steps, made, at = (np.zeros((CHUNK, columns)) for columns in (5, 8, 3))
+            numbers = np.zeros(6)
+            numbers[:2] = s.capsules, s.used
+            reason = _pass.run_pass(
+                state, self.step, self.limit, self.most_engaged, right, TURN_LEFT, IDLE * R,
+                FIT * min(R, FIT_UP_TO), SLACK * R, R, TOUCH, steps, made, at, numbers,
+                s.grid, s.head, s.count, s.link, s.axis, *self.reach.arguments(),
             )  # fmt: skip
-            parts.append(out[:n])
-            if reason == _kernels.RUNNING:
+            s.capsules, s.used = int(numbers[0]), int(numbers[1])
+            segments.append(made[: int(numbers[3])])
+            places.append(at[1 : int(numbers[2]) + 1])
+            took += float(numbers[4])
+            self.steps += int(numbers[5])
+            if reason == _pass.RUNNING:
                 self.progress(min(0.99, self.area / self.reachable.area), f"front, pass {self.passes + 1}")
-            self.steps += n
-            if self.steps > self.most:
-                break
-        rows = np.vstack(parts)
-        before = np.vstack([[[x, y]], rows[:-1, 0:2]]) if len(rows) else np.zeros((0, 2))
-        headings = np.arctan2(rows[:, 1] - before[:, 1], rows[:, 0] - before[:, 0])
-        return rows, headings, "pocket-blocked" if reason == _kernels.BLOCKED else "pocket-lost", state[0:2]
+        return np.vstack(segments), np.vstack(places), took, int(reason), state[0:2]
+
+    def _polyline(self) -> tuple[Floats, NDArray[np.bool_]]:
+        """The path so far by points beside which it lies at most ``CHORD`` R, and whether the cutter is raised."""
+        rows = np.vstack(self.rows)
+        return polyline(rows[:, 0:2], rows[:, 5:7], rows[:, 7], rows[:, 2] >= LIFT, 2.0 * CHORD * self.radius)
 
     # -- the end --------------------------------------------------------------------------------------------
     def result(self) -> ClearingPath:
         """The path with its areas."""
         rows = np.vstack(self.rows)
         kind = rows[:, 2].astype(np.int64)
-        area, contours, places = leftover(self.reachable, rows[:, 0:2], kind >= LIFT, self.radius)
+        area, contours, places = leftover(self.reachable, *self._polyline(), self.radius)
         events = list(self.events)
         for mm2, (x, y) in places:
             events.append(Event("pocket-leftover", x, y, f"{mm2:.4g} mm2 is left that could be reached"))
-        leg = np.hypot(*np.diff(rows[:, 0:2], axis=0, prepend=rows[:1, 0:2]).T)
         names = {"entry": ENTRY, "cut": CUT, "link": LINK, "lift": LIFT}
         whole = self.reachable.area
-        return ClearingPath(
+        path = ClearingPath(
             x=rows[:, 0],
             y=rows[:, 1],
+            centre=rows[:, 5:7],
+            sweep=rows[:, 7],
             kind=kind,
-            engagement=rows[:, 3],
-            engagement_max=rows[:, 4],
-            arcs=rows[:, 5].astype(np.int64),
-            pass_number=rows[:, 6].astype(np.int64),
+            engagement_max=rows[:, 3],
+            pass_number=rows[:, 4].astype(np.int64),
             events=tuple(events),
             reachable_mm2=whole,
             cleared_mm2=whole - area,
             leftover_mm2=area,
             leftover=contours,
-            lengths_mm={name: float(leg[kind == k].sum()) for name, k in names.items()},
+            lengths_mm={},
         )
+        return replace(path, lengths_mm={name: float(path.lengths[kind == k].sum()) for name, k in names.items()})
+
+
+def segment_lengths(segments: Floats) -> Floats:
+    """(n,) lengths [mm] of lines and arcs (n, 7); 0 is allowed."""
+    seg = segments
+    chord = np.hypot(seg[:, 2] - seg[:, 0], seg[:, 3] - seg[:, 1])
+    rho = np.hypot(seg[:, 0] - seg[:, 4], seg[:, 1] - seg[:, 5])
+    return np.asarray(np.where(seg[:, 6] == 0.0, chord, rho * np.abs(seg[:, 6])))
+
+
+def polyline(
+    points: Floats, centre: Floats, sweep: Floats, raised: NDArray[np.bool_], chord: float
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Points (m, 2) of a path whose chords leave its arcs by at most ``chord`` [mm], and ``raised`` for each."""
+    before = np.vstack([points[:1], points[:-1]])
+    v = before - centre
+    rho = np.hypot(v[:, 0], v[:, 1])
+    parts = np.ones(len(points), dtype=np.int64)
+    arc = sweep != 0.0
+    parts[arc] = np.ceil(np.abs(sweep[arc]) / (2.0 * np.arccos(1.0 - np.minimum(chord / rho[arc], 0.5))))
+    k = np.repeat(np.arange(len(points)), parts)
+    share = (np.arange(len(k)) - np.repeat(np.cumsum(parts) - parts, parts) + 1) / parts[k]
+    a = sweep[k] * share
+    out = centre[k] + np.column_stack(
+        [np.cos(a) * v[k, 0] - np.sin(a) * v[k, 1], np.sin(a) * v[k, 0] + np.cos(a) * v[k, 1]]
+    )
+    whole = share >= 1.0
+    out[whole] = points[k[whole]]
+    return out, raised[k]
 
 
 def _mirrored(region: Region) -> Region:
@@ -383,6 +424,8 @@ def _mirrored_path(path: ClearingPath) -> ClearingPath:
     return replace(
         path,
         x=-path.x,
+        centre=path.centre * (-1.0, 1.0),
+        sweep=-path.sweep,
         events=tuple(replace(e, x=-e.x) for e in path.events),
         leftover=tuple(_image(c, flip) for c in path.leftover),
     )

@@ -6,7 +6,6 @@ Notation: R cutter radius, s radial depth, a* = arccos(1 - s/R) the engagement t
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -19,33 +18,38 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.cutting.rigid import OF_DEPTH, OF_FEED
 from chipload.cutting.wall_error import Milling
-from chipload.engagement.contact import PIECES, Engagement
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.geometry.distance import distance
 from chipload.geometry.offset import offset_region
-from chipload.machine.feed import corner_speed, limited_speed
 from chipload.machine.machine import Machine
 from chipload.planning.cost import CutConditions, cost
 from chipload.planning.link_rows import row_ends, with_last_link
 from chipload.planning.pocket.clearing import CUT, ENTRY, LIFT, STEP, ClearingPath, clear_region, require_clearing
+from chipload.planning.pocket.motions import (
+    ZONES,
+    Heights,
+    Motions,
+    clock,
+    motions_of,
+    samples_of,
+    programs_of,
+    replayed,
+    speeds,
+)
 from chipload.planning.pocket.reach import CHORD
 from chipload.planning.result import Columns, Event, OperationResult, StrategyResult
-from chipload.program.build import helix, plunge, rapid, retract, rows
-from chipload.program.program import LINE, Program
+from chipload.program.program import Program
 from chipload.progress import Progress, silent
-from chipload.stock.planar import PlanarStock
 
 Floats = NDArray[np.float64]
 
-#: slope of the helical entry [rad]
-RAMP = math.radians(3.0)
 #: engagement above a* that counts as one [deg]
 ABOVE_DEG = 0.01
 #: share of the reachable area that must be cleared
 CLEARED = 0.995
-#: `pass` of a row by its kind
-ZONES = {ENTRY: "entry", CUT: "pocket", 2: "link", LIFT: "link"}
+#: height of a link above the floor where none is stated [mm]
+LINK_LIFT_MM = 0.1
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,8 @@ class Clearing:
     """What the engineer asks of a pocket; mm, mm/s, rad/s, as in :class:`chipload.planning.contour.plan.Finishing`.
 
     ``step`` greatest step, taken as 0.06 R where it is less (the engagement is kept along the whole of each step);
-    ``allowance`` left on the walls.
+    ``allowance`` left on the walls; ``link_feed`` of links through cleared space [mm/s], None: the machine's greatest;
+    ``link_lift`` how far links stay off the floor, where they are long enough.
     """
 
     milling: Milling
@@ -66,6 +71,14 @@ class Clearing:
     step: float
     allowance: float = 0.0
     rigid: tuple[float, float] = (OF_FEED, OF_DEPTH)
+    link_feed: float | None = None
+    link_lift: float = LINK_LIFT_MM
+
+    @property
+    def heights(self) -> Heights:
+        """The levels of the program."""
+        floor = self.top - self.axial_depth
+        return Heights(floor, min(floor + self.link_lift, self.top), self.top, self.top + self.clearance)
 
 
 def plan_pocket(
@@ -96,35 +109,49 @@ def plan_pocket(
         progress=lambda done, what: progress(0.9 * done, what),
     )
     cut = CutConditions(cutter, material, setting.axial_depth, setting.spindle_speed, setting.milling, *setting.rigid)
-    centre, heading = np.column_stack([path.x, path.y]), headings(path)
-    met = replayed(path, centre, heading, radius)
-    length, speed = _speeds(path, centre, setting, machine)
-    programs = _programs(path, centre, setting, cutter.number)
+    link_feed = machine.feed_max if setting.link_feed is None else setting.link_feed
+    motions = motions_of(path, setting.heights, setting.feed, link_feed)
+    samples = samples_of(motions, step)
+    met, most = replayed(motions, samples, radius)
+    length, speed, own = speeds(motions, samples, machine)
+    programs = programs_of(motions, setting.feed, setting.axial_depth, setting.spindle_speed, cutter.number)
     program = Program.join(programs)
     ends = row_ends(program, machine)
-    time = _times(path, programs, ends)
-    zone = np.array([ZONES[int(k)] for k in path.kind], dtype=object)
-    zone[:-1][path.kind[1:] == ENTRY] = "entry"
-    walls = np.abs(distance(region.segments, centre) - radius - setting.allowance) <= 2.0 * CHORD * radius
-    z = setting.top - setting.axial_depth
+    time = clock(motions, samples, own, programs, ends)
+    kind = motions.kind[samples.motion]
+    zone = np.array([ZONES[int(k)] for k in kind], dtype=object)
+    zone[:-1][(kind[:-1] == LIFT) & (kind[1:] == ENTRY)] = "entry"
+    on_front = kind == CUT
+    walls = np.abs(distance(region.segments, samples.centre) - radius - setting.allowance) <= 2.0 * CHORD * radius
     history: Columns = {
-        **cost(cut, zone, length, time, centre, heading, z, met, speed, walls & (path.kind == CUT)),
-        "engagement_max_deg": np.degrees(path.engagement_max),
+        **cost(
+            cut,
+            zone,
+            length,
+            time,
+            samples.centre,
+            samples.heading,
+            setting.heights.floor,
+            met,
+            speed,
+            walls & on_front,
+        ),
+        "z_mm": motions.height[samples.motion],
+        "engagement_max_deg": np.degrees(most),
     }
-    on_front = path.kind == CUT
     reach = offset_region(offset_region(region, radius + setting.allowance), -radius)
     result = StrategyResult(
         "pocket",
         program,
-        with_last_link(history, setting.top + setting.clearance, float(ends[-1])),
-        {**_summary(path, history, on_front, wanted), "time_s": float(ends[-1])},
+        with_last_link(history, setting.heights.safe, float(ends[-1])),
+        {**_summary(path, history, on_front, wanted), **_times(history, program, float(ends[-1]))},
         (*path.events, *_failures(path, history, on_front, wanted)),
         np.append(on_front, False),
         {
             "wall": reach.contours,
             "part": region.contours,
             "leftover": path.leftover,
-            "front path": _chains(path, centre),
+            "front path": _chains(motions),
         },
     )
     progress(1.0, "pocket")
@@ -156,135 +183,30 @@ def _asked(contours: Sequence[Contour], setting: Clearing, radius: float) -> tup
     return region, wanted, min(max(setting.step, STEP * radius), 0.25 * radius)
 
 
-def headings(path: ClearingPath) -> Floats:
-    """(n, 2) unit direction of the step that ends in each row; +x where the row does not move."""
-    d = np.column_stack([np.diff(path.x, prepend=path.x[:1]), np.diff(path.y, prepend=path.y[:1])])
-    length = np.hypot(d[:, 0], d[:, 1])
-    still = length == 0.0
-    d[still] = (1.0, 0.0)
-    return d / np.where(still, 1.0, length)[:, None]
-
-
-def replayed(path: ClearingPath, centre: Floats, heading: Floats, radius: float) -> Engagement:
-    """The engaged arcs at the end of every step, from the stock as the steps before it left it. O(n)."""
-    n = len(centre)
-    stock = PlanarStock(
-        (path.x.min() - radius, path.y.min() - radius, path.x.max() + radius, path.y.max() + radius), radius
-    )
-    angle, count, phi = np.zeros(n), np.zeros(n, dtype=np.int64), np.zeros((n, PIECES, 2))
-    for k in range(1, n):
-        if path.kind[k] == LIFT:
-            continue
-        if path.kind[k] in (CUT, ENTRY):
-            arcs = stock.arcs(centre[k], heading[k])
-            angle[k], count[k] = (arcs[:, 1] - arcs[:, 0]).sum(), len(arcs)
-            kept = arcs[np.argsort(arcs[:, 0] - arcs[:, 1])[:PIECES]]
-            phi[k, : len(kept), 0], phi[k, : len(kept), 1] = 0.5 * math.pi - kept[:, 1], 0.5 * math.pi - kept[:, 0]
-        stock.remove([[*centre[k - 1], *centre[k]]])
-    return Engagement(angle, count, np.clip(phi, 0.0, math.pi))
-
-
-def _runs(path: ClearingPath) -> list[tuple[int, int]]:
-    """Rows first..last of each stretch that begins where the cutter comes down."""
-    starts = np.flatnonzero(path.kind == LIFT)
-    return list(zip(starts.tolist(), [*(starts[1:] - 1).tolist(), len(path.kind) - 1], strict=True))
-
-
-def _speeds(path: ClearingPath, centre: Floats, setting: Clearing, machine: Machine) -> tuple[Floats, Floats]:
-    """Length at the level [mm] and speed [mm/s] of every row."""
-    leg = np.hypot(*np.diff(centre, axis=0, prepend=centre[:1]).T)
-    leg[path.kind == LIFT] = 0.0
-    length = np.cumsum(leg)
-    speed = np.zeros(len(leg))
-    turn = headings(path)
-    theta = np.arctan2(turn[:-1, 0] * turn[1:, 1] - turn[:-1, 1] * turn[1:, 0], (turn[:-1] * turn[1:]).sum(axis=1))
-    acceleration = machine.acceleration_xy
-    limit = np.minimum(setting.feed, np.append(corner_speed(theta, acceleration, machine.corner_tolerance), np.inf))
-    for a, b in _runs(path):
-        speed[a : b + 1], _ = limited_speed(
-            length[a : b + 1] - length[a], limit[a : b + 1], acceleration, between=setting.feed
-        )
-    return length, speed
-
-
-def _times(path: ClearingPath, programs: list[Program], ends: Floats) -> Floats:
-    """(n,) time of every row [s] from that at the ends of the program's rows; of a lift when the cutter is down again.
-
-    The program of a run ends with its steps and the way up.
-    """
-    time, first = np.zeros(len(path.kind)), 0
-    for (a, b), program in zip(_runs(path), programs, strict=True):
-        first += len(program)
-        time[a : b + 1] = ends[first - 2 - (b - a) : first - 1]
-    return time
-
-
-def _ring(path: ClearingPath, a: int) -> slice:
-    """Rows of the bore that begins at the lift ``a``, its start included."""
-    rest = path.kind[a + 1 :] != ENTRY
-    return slice(a, a + 1 + (int(np.argmax(rest)) if rest.any() else len(rest)))
-
-
-def _bore_circumference(path: ClearingPath, centre: Floats, a: int) -> float:
-    return float(np.hypot(*np.diff(centre[_ring(path, a)], axis=0).T).sum())
-
-
-def _bore_turns(path: ClearingPath, a: int, setting: Clearing) -> int:
-    centre = np.column_stack([path.x, path.y])
-    return math.ceil(setting.axial_depth / (_bore_circumference(path, centre, a) * math.tan(RAMP)))
-
-
-def _programs(path: ClearingPath, centre: Floats, setting: Clearing, tool: int) -> list[Program]:
-    """A program a run: rapid above the stock, helical bore from its top, straight steps at depth, up."""
-    z, safe = setting.top - setting.axial_depth, setting.top + setting.clearance
-    speed, out = setting.spindle_speed, []
-    for a, b in _runs(path):
-        parts = [rapid([*centre[a], safe], speed, tool, "link")]
-        if b > a and path.kind[a + 1] == ENTRY:
-            ring = centre[_ring(path, a)]
-            middle = ring[:-1].mean(axis=0)
-            turns = _bore_turns(path, a, setting)
-            sense = 1 if Contour.polyline(ring).area > 0.0 else -1
-            parts.append(plunge([*centre[a], setting.top], setting.feed, speed, tool, "entry"))
-            parts.append(
-                helix(
-                    centre[a],
-                    (float(middle[0]), float(middle[1])),
-                    (setting.top, z),
-                    setting.axial_depth / turns,
-                    setting.feed,
-                    speed,
-                    tool,
-                    "entry",
-                    sense=sense,
-                    level=False,
-                )
-            )
-        else:
-            parts.append(plunge([*centre[a], z], setting.feed, speed, tool, "entry"))
-        names = [ZONES[int(k)] for k in path.kind[a + 1 : b + 1]]
-        points = np.column_stack([centre[a + 1 : b + 1], np.full(b - a, z)])
-        for first, last, name in _stretches(names):
-            parts.append(rows(LINE, points[first:last], (0.0, 0.0), setting.feed, speed, tool, name))
-        parts.append(retract([*centre[b], safe], speed, tool, "link"))
-        out.append(Program.join(parts))
-    return out
-
-
-def _stretches(names: list[str]) -> list[tuple[int, int, str]]:
-    """(first, last + 1, name) of equal neighbours."""
-    cut = [0, *(k for k in range(1, len(names)) if names[k] != names[k - 1]), len(names)]
-    return [(a, b, names[a]) for a, b in itertools.pairwise(cut) if b > a]
-
-
-def _chains(path: ClearingPath, centre: Floats) -> tuple[Contour, ...]:
-    """The cutting passes as contours, for pictures."""
+def _chains(motions: Motions) -> tuple[Contour, ...]:
+    """The runs as contours, for pictures."""
     out = []
-    for a, b in _runs(path):
-        chain = centre[a : b + 1]
-        if len(chain) > 1 and np.hypot(*np.diff(chain, axis=0).T).max() > 1e-6:
-            out.append(Contour.polyline(chain))
+    for a, b in motions.runs:
+        keep = motions.lengths[a + 1 : b + 1] > 1e-6
+        if keep.any():
+            seg = motions.segments[a + 1 : b + 1][keep].copy()
+            seg[1:, 0:2] = seg[:-1, 2:4]
+            out.append(Contour(seg))
     return tuple(out)
+
+
+def _times(history: Columns, program: Program, whole: float) -> dict[str, object]:
+    """Time [s] by what the cutter does, and the number of motions. What is no cut and no entry is a link."""
+    took = np.diff(history["t_s"], prepend=0.0)
+    cutting = float(took[history["pass"] == "pocket"].sum())
+    entry = float(took[history["pass"] == "entry"].sum())
+    return {
+        "time_s": whole,
+        "cutting_s": cutting,
+        "entry_s": entry,
+        "link_s": whole - cutting - entry,
+        "motions": len(program),
+    }
 
 
 def _failures(path: ClearingPath, history: Columns, on_front: NDArray[np.bool_], wanted: float) -> list[Event]:
@@ -294,7 +216,7 @@ def _failures(path: ClearingPath, history: Columns, on_front: NDArray[np.bool_],
     k = int(np.argmax(most))
     if most[k] > math.degrees(wanted) + ABOVE_DEG:
         text = f"engagement {most[k]:.4f} deg, wanted at most {math.degrees(wanted):.4f} deg"
-        out.append(Event("pocket-engagement", float(path.x[k]), float(path.y[k]), text, failure=True))
+        out.append(Event("pocket-engagement", float(history["x_mm"][k]), float(history["y_mm"][k]), text, failure=True))
     if path.cleared_share < CLEARED:
         x, y = path.leftover[0].start if path.leftover else (float(path.x[-1]), float(path.y[-1]))
         text = (
@@ -324,6 +246,7 @@ def _summary(path: ClearingPath, history: Columns, on_front: NDArray[np.bool_], 
         "reachable_mm2": path.reachable_mm2,
         "cleared_mm2": path.cleared_mm2,
         "cleared_share": path.cleared_share,
+        "cleared_percent": 100.0 * path.cleared_share,
         "leftover_mm2": path.leftover_mm2,
         "events": dict(Counter(e.code for e in path.events)),
     }

@@ -1,0 +1,254 @@
+"""The path of a pocket as motions of a program, and as rows of a history along them.
+
+Notation: a **run** is what lies between two places where the cutter comes down; a **piece** is a part of a motion, of
+which the history has a row at its end.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.engagement.contact import PIECES, Engagement
+from chipload.machine.feed import corner_speed, curvature_speed, limited_speed
+from chipload.machine.machine import Machine
+from chipload.planning.pocket import _replay
+from chipload.planning.pocket.clearing import CUT, ENTRY, LIFT, LINK, ClearingPath, segment_lengths
+from chipload.program.build import helix, plunge, rapid, retract, rows
+from chipload.program.program import ARC_CCW, ARC_CW, LINE, Program
+from chipload.stock.planar import PlanarStock
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: kind of a motion beside those of a path: a link rises off the floor, or comes back to it
+RAMP = 4
+#: `pass` of a motion by its kind
+ZONES = {ENTRY: "entry", CUT: "pocket", LINK: "link", LIFT: "link", RAMP: "ramp"}
+#: length of a ramp over its height, and the share of a link that each of its ramps takes at most
+SLOPE, SHARE = 10.0, 0.25
+#: slope of the helical entry [rad]
+HELIX = math.radians(3.0)
+
+
+@dataclass(frozen=True)
+class Heights:
+    """Heights of the tip [mm]: the floor, a link off it, the top of the stock, rapids."""
+
+    floor: float
+    link: float
+    top: float
+    safe: float
+
+
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """Motion after motion of a pocket's program.
+
+    Parameters
+    ----------
+    segments : (n, 7) float [mm, rad], as in a contour; a LIFT begins a run and counts with its end only
+    height : (n,) float [mm], of the tip at the end
+    kind : (n,) int
+    feed : (n,) float [mm/s], as programmed
+    heights : the levels
+    """
+
+    segments: Floats
+    height: Floats
+    kind: Ints
+    feed: Floats
+    heights: Heights
+
+    @cached_property
+    def lengths(self) -> Floats:
+        """(n,) length in the plane [mm]; 0 of a LIFT."""
+        return np.where(self.kind == LIFT, 0.0, segment_lengths(self.segments))
+
+    @cached_property
+    def runs(self) -> list[tuple[int, int]]:
+        """First and last motion of each run."""
+        first = np.flatnonzero(self.kind == LIFT)
+        return list(zip(first.tolist(), [*(first[1:] - 1).tolist(), len(self.kind) - 1], strict=True))
+
+
+def motions_of(path: ClearingPath, heights: Heights, feed: float, link_feed: float) -> Motions:
+    """The motions of a path: links longer than their ramps run ``heights.link`` high, at ``link_feed`` [mm/s]."""
+    rise = heights.link - heights.floor
+    seg, z, kind = [], [], []
+    for row, k in zip(path.segments, path.kind.tolist(), strict=True):
+        p, q = row[0:2], row[2:4]
+        length = float(np.hypot(*(q - p)))
+        ramp = min(SLOPE * rise, SHARE * length)
+        if k == LINK and rise > 0.0 and ramp >= 0.5 * SLOPE * rise:
+            a, b = p + ramp / length * (q - p), q - ramp / length * (q - p)
+            corners = [p, a, b, q]
+            seg += [[*u, *v, 0.0, 0.0, 0.0] for u, v in pairwise(corners)]
+            z += [heights.link, heights.link, heights.floor]
+            kind += [RAMP, LINK, RAMP]
+        else:
+            seg.append(row.tolist())
+            z.append(heights.floor)
+            kind.append(k)
+    kinds = np.array(kind, dtype=np.int64)
+    speed = np.where((kinds == CUT) | (kinds == ENTRY), feed, link_feed)
+    return Motions(np.array(seg), np.array(z), kinds, speed, heights)
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """The rows of a history along motions, a sample at the end of each piece.
+
+    Parameters
+    ----------
+    motion : (m,) int
+    share : (m,) float, of the motion at the end of the piece
+    centre, heading : (m, 2) float [mm], at the end
+    begins : (m, 2) float, heading at the beginning
+    length : (m,) float [mm], of the piece; 0 of a LIFT
+    """
+
+    motion: Ints
+    share: Floats
+    centre: Floats
+    heading: Floats
+    begins: Floats
+    length: Floats
+
+
+def samples_of(motions: Motions, step: float) -> Samples:
+    """Motions that cut in samples of at most ``step`` [mm], others whole."""
+    seg, kind = motions.segments, motions.kind
+    parts = np.ones(len(kind), dtype=np.int64)
+    cuts = (kind == CUT) | (kind == ENTRY)
+    parts[cuts] = np.maximum(1, np.ceil(motions.lengths[cuts] / step - 1e-9)).astype(np.int64)
+    k = np.repeat(np.arange(len(kind)), parts)
+    share = (np.arange(len(k)) - np.repeat(np.cumsum(parts) - parts, parts) + 1) / parts[k]
+    centre, heading = places(seg[k], share)
+    _, begins = places(seg[k], share - 1.0 / parts[k])
+    still = motions.lengths[k] == 0.0
+    heading[still] = begins[still] = (1.0, 0.0)
+    return Samples(k, share, centre, heading, begins, motions.lengths[k] / parts[k])
+
+
+def places(seg: Floats, share: Floats) -> tuple[Floats, Floats]:
+    """(m, 2) points [mm] and unit headings at the shares of segments (m, 7); heading +x where one has no length."""
+    p, q, centre, sweep = seg[:, 0:2], seg[:, 2:4], seg[:, 4:6], seg[:, 6]
+    arc = sweep != 0.0
+    v = p - centre
+    c, s = np.cos(sweep * share), np.sin(sweep * share)
+    w = np.column_stack([c * v[:, 0] - s * v[:, 1], s * v[:, 0] + c * v[:, 1]])
+    at = np.where(arc[:, None], centre + w, p + share[:, None] * (q - p))
+    at = np.where((share >= 1.0)[:, None], q, at)
+    d = np.where(arc[:, None], np.sign(sweep)[:, None] * np.column_stack([-w[:, 1], w[:, 0]]), q - p)
+    length = np.hypot(d[:, 0], d[:, 1])
+    d[length == 0.0] = (1.0, 0.0)
+    return at, d / np.where(length == 0.0, 1.0, length)[:, None]
+
+
+def replayed(motions: Motions, samples: Samples, radius: float) -> tuple[Engagement, Floats]:
+    """The engaged arcs at the end of every piece, from the stock as the motions before it left it, and the greatest
+    engagement (m,) [rad] along it. O(m).
+    """
+    c = samples.centre
+    low, high = c.min(axis=0) - 2.0 * radius, c.max(axis=0) + 2.0 * radius
+    stock = PlanarStock((low[0], low[1], high[0], high[1]), radius)
+    m = len(c)
+    angle, most, count, phi = np.zeros(m), np.zeros(m), np.zeros(m, dtype=np.int64), np.zeros((m, PIECES, 2))
+    cuts = (motions.kind == CUT) | (motions.kind == ENTRY)
+    first = np.flatnonzero(cuts[samples.motion])
+    for block in np.array_split(first, max(1, len(first) // 1000)):
+        if len(block):
+            need = np.ceil(2.0 * samples.length[block] / radius) + 5.0
+            stock.reserve(int(need.sum()) + 8)
+            stock.capsules, stock.used = _replay.replay(
+                motions.segments, samples.motion, samples.share, block, radius, angle, most, count, phi,
+                stock.capsules, stock.used, stock.grid, stock.head, stock.count, stock.link, stock.axis,
+            )  # fmt: skip
+    return Engagement(angle, count, np.clip(phi, 0.0, math.pi)), most
+
+
+def speeds(motions: Motions, samples: Samples, machine: Machine) -> tuple[Floats, Floats, Floats]:
+    """Length [mm] along the path, speed [mm/s] and time within the run [s] at the end of every piece."""
+    acceleration = machine.acceleration_xy
+    t, u = samples.heading[:-1], samples.begins[1:]
+    theta = np.arctan2(t[:, 0] * u[:, 1] - t[:, 1] * u[:, 0], (t * u).sum(axis=1))
+    seg, k = motions.segments, samples.motion
+    rho = np.hypot(seg[:, 0] - seg[:, 4], seg[:, 1] - seg[:, 5])
+    bend = np.where(seg[:, 6] == 0.0, 0.0, 1.0 / np.where(seg[:, 6] == 0.0, 1.0, rho))
+    within = np.minimum(motions.feed, curvature_speed(bend, acceleration))[k]
+    limit = np.minimum(within, np.append(within[1:], np.inf))
+    limit = np.minimum(limit, np.append(corner_speed(theta, acceleration, machine.corner_tolerance), np.inf))
+    length = np.cumsum(samples.length)
+    speed, time = np.zeros(len(k)), np.zeros(len(k))
+    for a, b in runs_of(motions, samples):
+        if b > a:
+            speed[a : b + 1], time[a : b + 1] = limited_speed(
+                length[a : b + 1] - length[a], limit[a : b + 1], acceleration, between=within[a + 1 : b + 1]
+            )
+    return length, speed, time
+
+
+def runs_of(motions: Motions, samples: Samples) -> list[tuple[int, int]]:
+    """First and last piece of each run."""
+    first = np.searchsorted(samples.motion, [a for a, _ in motions.runs])
+    return list(zip(first.tolist(), [*(first[1:] - 1).tolist(), len(samples.motion) - 1], strict=True))
+
+
+def clock(motions: Motions, samples: Samples, time: Floats, programs: list[Program], ends: Floats) -> Floats:
+    """(m,) time at the end of every piece [s] from that at the ends of the program's rows; of a LIFT when the cutter is
+    down again. Within a motion time goes as it was planned.
+
+    The program of a run ends with its motions and the way up.
+    """
+    out, first = np.zeros(len(samples.motion)), 0
+    last_piece = np.append(samples.motion[1:] != samples.motion[:-1], True)
+    for (a, b), (i, j), program in zip(motions.runs, runs_of(motions, samples), programs, strict=True):
+        first += len(program)
+        at = ends[first - 2 - (b - a) : first - 1]
+        own = time[i : j + 1]
+        out[i : j + 1] = np.interp(own, own[last_piece[i : j + 1]], at)
+    return out
+
+
+def programs_of(motions: Motions, setting_feed: float, depth: float, spindle: float, tool: int) -> list[Program]:
+    """A program a run: rapid above the stock, helical bore from its top or straight down where it is clear, the motions
+    at depth, up.
+    """
+    h, out = motions.heights, []
+    for a, b in motions.runs:
+        seg = motions.segments[a + 1 : b + 1]
+        at = motions.segments[a, 2:4]
+        parts = [rapid([*at, h.safe], spindle, tool, "link")]
+        if b > a and motions.kind[a + 1] == ENTRY:
+            xc, yc, sweep = seg[0, 4:7]
+            around = math.tau * math.hypot(at[0] - xc, at[1] - yc)
+            turns = math.ceil(depth / (around * math.tan(HELIX)))
+            parts.append(plunge([*at, h.top], setting_feed, spindle, tool, "entry"))
+            parts.append(
+                helix(at, (float(xc), float(yc)), (h.top, h.floor), depth / turns, setting_feed, spindle, tool, "entry",
+                      sense=1 if sweep > 0.0 else -1, level=False)
+            )  # fmt: skip
+        else:
+            parts.append(plunge([*at, h.floor], motions.feed[a], spindle, tool, "entry"))
+        for first, last, name in _stretches([ZONES[int(k)] for k in motions.kind[a + 1 : b + 1]]):
+            part, sweep = seg[first:last], seg[first:last, 6]
+            motion = np.where(sweep == 0.0, LINE, np.where(sweep > 0.0, ARC_CCW, ARC_CW))
+            to = np.column_stack([part[:, 2:4], motions.height[a + 1 + first : a + 1 + last]])
+            feed = motions.feed[a + 1 + first : a + 1 + last]
+            parts.append(rows(motion, to, part[:, 4:6], feed, spindle, tool, name))
+        x, y = motions.segments[b, 2:4]
+        parts.append(retract([x, y, h.safe], spindle, tool, "link"))
+        out.append(Program.join(parts))
+    return out
+
+
+def _stretches(names: list[str]) -> list[tuple[int, int, str]]:
+    """(first, last + 1, name) of equal neighbours."""
+    cut = [0, *(k for k in range(1, len(names)) if names[k] != names[k - 1]), len(names)]
+    return [(a, b, names[a]) for a, b in pairwise(cut) if b > a]
