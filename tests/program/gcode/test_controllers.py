@@ -57,9 +57,9 @@ def test_back_boring():
 
 
 def test_turned_coordinates():
-    """G68 about (10, 0) by 90 degrees: (20, 0) becomes (10, 10); a work offset lies beneath it."""
-    commands, findings = fanuc("G0 X0. Y0. Z0.", "G68 X10. Y0. R90.", "X20. Y0.", "G91 X1.", "G90 G69", "X20. Y0.")
-    np.testing.assert_allclose(machine(commands)[1:], [[10, 10, 0], [10, 11, 0], [20, 0, 0]], atol=1e-9)
+    """G68 about (10, 4) by 90 degrees: (20, 4) becomes (10, 14); a work offset lies beneath it."""
+    commands, findings = fanuc("G0 X0. Y0. Z0.", "G68 X10. Y4. R90.", "X20. Y4.", "G91 X1.", "G90 G69", "X20. Y4.")
+    np.testing.assert_allclose(machine(commands)[1:], [[10, 14, 0], [10, 15, 0], [20, 4, 0]], atol=1e-9)
     assert unproven(findings) == []
     lines = ("G0 X0. Y0. Z0.", "G68 X0. Y0. R90.", "G55 X5. Y0.", "G69 X5. Y0.")
     commands, _ = fanuc(*lines, origins={2: ((100.0, *[0.0] * 8), 0.0), 1: ((0.0,) * 9, 0.0)})

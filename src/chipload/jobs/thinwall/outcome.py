@@ -60,6 +60,7 @@ class Finish:
     error : (n, m) float [mm], by deflection, positive where material is left
     rigid : (n, m) float [mm], what a rigid cutter leaves: cusps
     made : (n, m) bool, whether a step of the simulation comes to the point
+    unsure : (n, m) float, relative error of the compliance by its mesh
     """
 
     side: int
@@ -67,6 +68,7 @@ class Finish:
     error: Floats
     rigid: Floats
     made: NDArray[np.bool_]
+    unsure: Floats
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
 from chipload.jobs.thinwall.inputs import WallInputs
+from chipload.jobs.thinwall.mesh_error import error_at, mesh_error
 from chipload.planning.thinwall.blank import SIDES, FinishSurface
 from chipload.planning.thinwall.passes import ThresholdOf
 from chipload.planning.thinwall.threshold import Threshold, modelled
@@ -38,6 +39,7 @@ class Places:
     v: Floats
     surfaces: tuple[FinishSurface, ...]
     _solved: dict[tuple[bytes, int], Floats] = field(default_factory=dict)
+    _errors: dict[int, Floats] = field(default_factory=dict)
 
     @property
     def grid(self) -> tuple[Floats, Floats]:
@@ -65,12 +67,26 @@ class Places:
             self._solved[key] = known.reshape(self.inputs.wall.shape)
         return self._solved[key]
 
-    def threshold(self, deflection: float, factor: float) -> ThresholdOf:
-        """Thresholds at these places under a deflection that is allowed [mm]; ``factor`` of them is used."""
-        u, v = np.meshgrid(self.u, self.v, indexing="ij")
+    def error(self, side: int) -> Floats:
+        """Relative error of the compliance of a side by its mesh, at the elements' places of the finished wall."""
+        if side not in self._errors:
+            none = [np.zeros(self.shape) for _ in self.surfaces]
+            self._errors[side] = mesh_error(self.inputs, self.compliance(none, side), side)
+        return self._errors[side]
+
+    def threshold(self, deflection: float, factor: float, spare: bool = True) -> ThresholdOf:
+        """Thresholds at these places under a deflection that is allowed [mm]; ``factor`` of them is used.
+
+        Parameters
+        ----------
+        spare : the compliance is taken with the error of its mesh, so that what is planned holds with it
+        """
+        u, v = (x.ravel() for x in np.meshgrid(self.u, self.v, indexing="ij"))
 
         def limited(left: Sequence[Floats], side: int) -> Threshold:
-            C = between(self.inputs.places, self.compliance(left, side), u.ravel(), v.ravel())
+            C = between(self.inputs.places, self.compliance(left, side), u, v)
+            if spare:
+                C *= 1.0 + error_at(self.inputs.places, self.error(side), u, v)
             return modelled(C, deflection, factor)
 
         def measured(left: Sequence[Floats], side: int) -> Threshold:

@@ -17,6 +17,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from chipload.jobs.checks import check_columns
 from chipload.jobs.thinwall.inputs import WallInputs
+from chipload.jobs.thinwall.mesh_error import error_at
 from chipload.jobs.thinwall.outcome import Finish, Shape
 from chipload.jobs.thinwall.places import Places, between
 from chipload.planning.thinwall.blank import SIDES
@@ -123,9 +124,10 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
         left[p.side] = p.low
         number = inputs.side_numbers[p.side]
         C = places.compliance(left, p.side)
-        F_th = places.threshold(inputs.deflection, 1.0)(left, p.side).force.reshape(places.shape)
+        F_th = places.threshold(inputs.deflection, 1.0, spare=False)(left, p.side).force.reshape(places.shape)
         thresholds.append(F_th)
-        columns = _columns(places, removal, leg, C, F_th, bars)
+        error = places.error(p.side)
+        columns = _columns(places, removal, leg, C, F_th, error, bars)
         u, v = np.clip(columns["u"], 0.0, 1.0), np.clip(columns["v"], inputs.foot, 1.0)
         share = RegularGridInterpolator(places.grid, plan.corrections[p.side])(np.column_stack([u, v]))
         columns["force_normal_planned_n"] = share * law.force(columns["depth_mm"])
@@ -136,7 +138,7 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
         parts.append(columns)
         stress = max(stress, _stress(inputs, places.coarse(left), number, columns))
         if float(p.low.max()) <= 1e-9:
-            finish[number] = _finish(inputs, removal, number, C, bars)
+            finish[number] = _finish(inputs, removal, number, C, error, bars)
     whole = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(inputs, stock, legs), stress)
 
@@ -165,13 +167,19 @@ def _rows(inputs: WallInputs, v: float) -> float:
 
 
 def _columns(
-    places: Places, removal: Removal, leg: PassProgram, C: Floats, F_th: Floats, bars: Mapping[int, Any]
+    places: Places,
+    removal: Removal,
+    leg: PassProgram,
+    C: Floats,
+    F_th: Floats,
+    error: Floats,
+    bars: Mapping[int, Any],
 ) -> dict[str, NDArray[Any]]:
     """Columns of a pass: those of the removal, and what its contact points feel.
 
     The force of a step acts anywhere in it: threshold and compliance are the worst of its beginning, middle and end, so
     that edges and corners of the wall are among them. `contact_*_mm` is the place of that threshold; `u`, `v` and
-    `depth_mm` are those of the middle.
+    `depth_mm` are those of the middle. `compliance_error` is the greatest error of the compliance by its mesh there.
     """
     inputs = places.inputs
     columns = dict(removal.columns)
@@ -188,6 +196,7 @@ def _columns(
         allowable = inputs.deflection / gives
     else:
         allowable = np.stack([between(places.grid, F_th, u, v) for u, v in uv])
+    unsure = np.stack([error_at(inputs.places, error, u, v) for u, v in uv]).max(axis=0)
     place, values = spots[MIDDLE]
     u, v = uv[MIDDLE]
     found = step_deflections(removal, inputs.material, place, work=gives.max(axis=0), bars=bars)
@@ -207,6 +216,7 @@ def _columns(
         ("v", v),
         ("depth_mm", values[:, 2]),
         ("force_allowable_n", threshold),
+        ("compliance_error", unsure),
         *((f"contact_{x}_mm", judged[:, k]) for k, x in enumerate("xyz")),
     ):
         columns[name] = np.zeros(n)
@@ -218,7 +228,9 @@ def _columns(
     return columns
 
 
-def _finish(inputs: WallInputs, removal: Removal, number: int, C: Floats, bars: Mapping[int, Any]) -> Finish:
+def _finish(
+    inputs: WallInputs, removal: Removal, number: int, C: Floats, error: Floats, bars: Mapping[int, Any]
+) -> Finish:
     """Form error of a side by its last pass."""
     u, v = np.meshgrid(
         np.linspace(0.02, 0.98, POINTS[0]), np.linspace(inputs.foot, 1.0, POINTS[1] + 1)[1:], indexing="ij"
@@ -233,7 +245,16 @@ def _finish(inputs: WallInputs, removal: Removal, number: int, C: Floats, bars: 
         bars=bars,
         near=0.5 * inputs.allowance[number],
     )
-    return Finish(number, points, found.error.reshape(u.shape), found.gap.reshape(u.shape), found.made.reshape(u.shape))
+    unsure = error_at(inputs.places, error, u.ravel(), v.ravel())
+    shape = u.shape
+    return Finish(
+        number,
+        points,
+        found.error.reshape(shape),
+        found.gap.reshape(shape),
+        found.made.reshape(shape),
+        unsure.reshape(shape),
+    )
 
 
 def _shape(inputs: WallInputs, stock: LayeredStock, legs: Sequence[PassProgram]) -> Shape:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,9 @@ Floats = NDArray[np.float64]
 #: contact points over their allowable force that are listed, the worst first
 LISTED = 100
 #: columns of the plan that the history does not keep
-DROPPED = ("u", "v", "side", "label")
+DROPPED = ("u", "v", "side", "label", "compliance_error")
+#: limits that are proportional to the compliance of the wall
+OF_COMPLIANCE = ("deflection_workpiece_um", "deflection_um", "force_over_allowable")
 
 
 def result_of(walled: ThinWallResult) -> Result:
@@ -54,14 +57,32 @@ def limits_of(walled: ThinWallResult, one: Variant) -> tuple[LimitCheck, ...]:
         if name == "form_error_um":
             out.append(_form_error(one, limit))
         else:
-            out.append(check_limit(name, limit, c, track=one.name))
-    out.append(check_limit("force_over_allowable", 1.0 + OVER, c, track=one.name, rows=c["force_normal_n"] > 0.0))
+            out.append(check_limit(name, limit, c, track=one.name, error=mesh_error_of(walled, name, c)))
+    over, cuts = "force_over_allowable", c["force_normal_n"] > 0.0
+    out.append(check_limit(over, 1.0 + OVER, c, track=one.name, rows=cuts, error=mesh_error_of(walled, over, c)))
     strength = float(walled.settings["yield_mpa"])
     out.append(LimitCheck("stress_mpa", strength, one.stress, state_of(one.stress, strength)[0], one.name))
     gouge, tolerance = max(one.shape.gouge, -one.shape.nearest, 0.0), float(walled.settings["gouge_tolerance_mm"])
     place = (float(one.shape.at[0]), float(one.shape.at[1]), float(one.shape.at[2]))
     out.append(LimitCheck("gouge_mm", tolerance, gouge, state_of(gouge, tolerance)[0], one.name, place=place))
     return (*out, *default_limits(walled.checks, walled.machine, c, one.name, {}))
+
+
+def mesh_error_of(walled: ThinWallResult, name: str, columns: Mapping[str, NDArray[Any]]) -> float:
+    """By how much the greatest value of a column may grow by the error of the mesh, relative; 0: not of the compliance.
+
+    Thresholds that experiments gave have none of it.
+    """
+    if name not in OF_COMPLIANCE or (name == "force_over_allowable" and walled.threshold_source != "modelled"):
+        return 0.0
+    values = np.abs(columns[name])
+    return _growth(values, columns["compliance_error"])
+
+
+def _growth(values: Floats, error: Floats) -> float:
+    """By how much the greatest of values may grow, each by its own relative error."""
+    greatest = float(values.max(initial=0.0))
+    return float((values * (1.0 + error)).max()) / greatest - 1.0 if greatest > 0.0 else 0.0
 
 
 def findings_of(walled: ThinWallResult, one: Variant) -> tuple[Finding, ...]:
@@ -117,7 +138,10 @@ def _form_error(one: Variant, limit: float) -> LimitCheck:
             place = (float(f.points[k][0]), float(f.points[k][1]), float(f.points[k][2]))
     if not one.finish:
         return LimitCheck("form_error_um", limit, None, Verdict.UNPROVEN, one.name, reason="no side is finished")
-    return LimitCheck("form_error_um", limit, worst, state_of(worst, limit)[0], one.name, place=place)
+    sizes = [(np.where(f.made, np.abs(f.error), 0.0).ravel(), f.unsure.ravel()) for f in one.finish]
+    error = _growth(*(np.concatenate(x) for x in zip(*sizes, strict=True)))
+    state, why = state_of(worst, limit, error)
+    return LimitCheck("form_error_um", limit, worst, state, one.name, place=place, resolution_error=error, reason=why)
 
 
 def _operation(walled: ThinWallResult, v: Variant) -> dict[str, Any]:
