@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
+import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,6 +16,8 @@ import typer
 from chipload.errors import Cancelled, InputError, InputErrors, OutputError
 from chipload.files import cannot_write, is_full
 
+#: [s] between two lines of progress in a log
+LOG_S = 60.0
 FAULT, WRONG, EXCEEDED, UNWRITTEN, STOPPED = 1, 2, 3, 4, 130
 
 
@@ -125,19 +128,42 @@ def _let_go_of_output() -> None:
         os.close(nowhere)
 
 
+def log_lines(clock: Callable[[], float], every_s: float = LOG_S) -> Callable[[float, str], None]:
+    """A progress function that says how far a run is, and about how much time is left, every so many seconds.
+
+    Parameters
+    ----------
+    clock : time now [s]
+    """
+    begun = last = clock()
+
+    def report(done: float, what: str) -> None:
+        nonlocal last
+        now = clock()
+        if now - last < every_s or not 0.0 < done < 1.0:
+            return
+        last = now
+        left = (now - begun) * (1.0 - done) / done
+        shown = f"{left / 60.0:.0f} min" if left >= 90.0 else f"{left:.0f} s"
+        say(f"{100.0 * done:.0f} %, about {shown} left: {what}")
+
+    return report
+
+
 @contextmanager
 def bar() -> Iterator[Callable[[float, str], None]]:
-    """A progress bar on stderr where that is a terminal, else nothing."""
+    """A progress bar on stderr where that is a terminal, else a line a minute, as in the log of a batch job."""
     if not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
-        yield lambda done, what: None
+        yield log_lines(time.monotonic)
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     columns = (
         BarColumn(),
         TextColumn("{task.percentage:>3.0f} %"),
         TimeElapsedColumn(),
+        TimeRemainingColumn(),
         TextColumn("{task.description}"),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bars:

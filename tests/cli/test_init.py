@@ -275,6 +275,40 @@ def test_damaged_documents_are_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "job").exists()
 
 
+def test_a_freecad_part_is_a_pocket(tmp_path: Path) -> None:
+    """A block of 60 x 40 x 20 mm with a pocket of 40 x 20 mm, 8 mm deep: its floor is at z = 12."""
+    pytest.importorskip("OCP")
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+    from OCP.BRepTools import BRepTools
+    from OCP.gp import gp_Pnt
+
+    block = BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), gp_Pnt(60, 40, 20)).Shape()
+    hollow = BRepPrimAPI_MakeBox(gp_Pnt(10, 10, 12), gp_Pnt(50, 30, 30)).Shape()
+    BRepTools.Write_s(BRepAlgoAPI_Cut(block, hollow).Shape(), str(tmp_path / "shape.brp"))
+    shape = prop("Shape", "Part::PropertyPartShape", '<Part file="Shape.brp"/>')
+    data = f'<Object name="Body"><Properties>{shape}</Properties></Object>'
+    with zipfile.ZipFile(tmp_path / "part.FCStd", "w") as archive:
+        head = '<Object type="PartDesign::Body" name="Body"/>'
+        archive.writestr(
+            "Document.xml", f"<Document><Objects>{head}</Objects><ObjectData>{data}</ObjectData></Document>"
+        )
+        archive.write(tmp_path / "shape.brp", "Shape.brp")
+    code, _, said = call("init", tmp_path / "part.FCStd", tmp_path / "job")
+    assert code == 0, said
+    assert sorted(p.name for p in (tmp_path / "job").iterdir()) == ["job.toml", "part.step"]
+    job = tomllib.loads((tmp_path / "job" / "job.toml").read_text())
+    assert (job["part"]["file"], job["part"]["face_z_mm"]) == ("part.step", 12.0)
+    # an opening by D leaves (4 - pi) D^2 / 4 in the corners: 3 % of 800 mm2 is D = 10.6 mm; a depth of D / 2
+    assert (job["cutter"][0]["diameter_mm"], job["operation"][0]["axial_depth_mm"]) == (10.0, 5.0)
+    assert job["stock"]["top_mm"] == 17.0
+    lines, _ = check_job(load_job(tmp_path / "job" / "job.toml"))
+    assert any("800 mm2" in line for line in lines)
+    # the same document gives the same bytes
+    call("init", tmp_path / "part.FCStd", tmp_path / "again")
+    assert (tmp_path / "again" / "part.step").read_bytes() == (tmp_path / "job" / "part.step").read_bytes()
+
+
 def square(path: Path) -> None:
     """A closed square of 40 mm that names no unit."""
     import ezdxf

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from chipload.cli.app import Debug, MachineName, Sets, Tools, app
+from chipload.cli.inputs import show_limits
 from chipload.errors import InputError
 from chipload.terminal import bar, guarded, show
 
@@ -19,26 +20,47 @@ File = Annotated[
 ]
 
 
+MachineOf = Annotated[
+    str | None,
+    typer.Option("--on", metavar="MACHINE", help="a shipped machine, or a file (.toml); else guessed"),
+]
+
+
 @app.command()
 def init(
     file: File,
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="where job.toml is written")],
-    machine: MachineName = None,
+    folder: Annotated[
+        Path | None, typer.Argument(metavar="DIR", help="where job.toml is written; of a template: leave FILE out")
+    ] = None,
+    for_machine: MachineOf = None,
     tools: Tools = None,
+    material: Annotated[bool, typer.Option("--material", help="write a template of a material into DIR")] = False,
+    machine: Annotated[bool, typer.Option("--machine", help="write a template of a machine into DIR")] = False,
+    catalogue: Annotated[bool, typer.Option("--catalogue", help="write a template of a catalogue into DIR")] = False,
+    fixture: Annotated[bool, typer.Option("--fixture", help="write a block as a fixture (STL) into DIR")] = False,
     debug: Debug = False,
 ) -> None:
     """Write a job for a file: what the file states, and guesses for the rest, which you confirm.
 
-    A job that is there is not overwritten.
+    A job that is there is not overwritten. `chipload init --material DIR` writes a template of a material instead;
+    likewise --machine, --catalogue and --fixture.
     """
 
     def work() -> int:
+        wanted = {"material": material, "machine": machine, "catalogue": catalogue, "fixture": fixture}
+        kinds = [kind for kind, asked in wanted.items() if asked]
+        if kinds:
+            if folder is not None:
+                raise InputError(f"{file}: a template needs no file: chipload init --{kinds[0]} DIR")
+            return _templates(kinds, file)
+        if folder is None:
+            raise InputError(f"{file}: missing folder: chipload init FILE DIR")
         from chipload.jobs.drafts.draft import write_draft
         from chipload.jobs.drafts.make import draft_of
 
         if (folder / "job.toml").exists():
             raise InputError(f"{folder / 'job.toml'}: is there already and is not overwritten: name another folder")
-        draft = draft_of(file, folder, machine=machine, tools=tools)
+        draft = draft_of(file, folder, machine=for_machine, tools=tools)
         job = write_draft(draft, folder)
         show(draft.title)
         for note in draft.notes:
@@ -49,6 +71,17 @@ def init(
         return 0
 
     guarded(work, debug)
+
+
+def _templates(kinds: list[str], folder: Path) -> int:
+    """Write templates and say how a job names them."""
+    from chipload.jobs.drafts.templates import write_template
+
+    for kind in kinds:
+        path = write_template(kind, folder)
+        table = f'[[{kind}]] file = "{path.name}", units = "mm", spacing_mm = 2.0' if kind == "fixture" else ""
+        show(f"written: {path}; in the job: {table or f'[{kind}] file = {chr(34)}{path.name}{chr(34)}'}")
+    return 0
 
 
 @app.command()
@@ -86,6 +119,7 @@ def simulate(
                 done = run_job(loaded, progress, guesses=Severity.UNPROVEN)
                 target = write_finished(done.result, done.presentation, out) if out is not None else None
         show(done.result.message)
+        show_limits(done.result)
         show(f"{done.result.verdict.value}: a first look; chipload init {file} DIR writes the job")
         if target is not None:
             show(f"report: {target / 'report.html'}")

@@ -1,4 +1,4 @@
-"""What options state, as the values that the functions of chipload take."""
+"""What options state, as the values that the functions of chipload take, and lines that several commands show."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from chipload.units import mm_s_from_mm_min
 if TYPE_CHECKING:
     from chipload.machine.machine import Machine
     from chipload.program.setup import Setup
+    from chipload.result import Result
 
 
 def setup_of(parameters: Sequence[str], work_offsets: Sequence[str]) -> Setup:
@@ -56,3 +57,11 @@ def feed_of(mm_min: float | None) -> float | None:
     if not 0.0 < mm_min < 1e9:
         raise InputError(f"--feed-mm-min = {mm_min:g}: must be above 0")
     return mm_s_from_mm_min(mm_min)
+
+
+def show_limits(result: Result) -> None:
+    """A line with the worst value of each limit, which the message of an unproven result may leave out."""
+    known = [c for c in result.limits if c.worst is not None]
+    worst = ", ".join(f"{c.column.label} {c.worst:.4g} of {c.limit:g} {c.column.unit}".strip() for c in known)
+    if worst:
+        show(f"worst values: {worst}")

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from chipload.cli.app import Accept, Debug, JobFile, Sets, app
+from chipload.cli.inputs import show_limits
 from chipload.errors import Cancelled, InputError, Severity
 from chipload.terminal import bar, guarded, say, show
 
@@ -32,6 +33,9 @@ def run(
         ),
     ] = KEEP_S,
     accept: Accept = False,
+    coarse: Annotated[
+        bool, typer.Option("--coarse", help="a first answer with larger steps in about a tenth of the time; unproven")
+    ] = False,
     debug: Debug = False,
 ) -> None:
     """Plan a job and prove its programs, or read the program that it names; write the result folder.
@@ -43,6 +47,10 @@ def run(
         from chipload.jobs import load_job, run_job
 
         loaded = load_job(job, sets or ())
+        if coarse:
+            from chipload.jobs.coarse import coarser, marked
+
+            loaded = load_job(job, (*(sets or ()), *coarser(loaded)))
         from chipload.report.folder import check_target, checkpoint_folder, write_finished
         from chipload.simulation.checkpoint import Checkpoint
 
@@ -58,6 +66,7 @@ def run(
                         loaded, lambda part, what: progress(0.8 * part, what), kept,
                         guesses=Severity.NOTE if accept else None,
                     )  # fmt: skip
+                    done = marked(done) if coarse else done
                     target = write_finished(
                         done.result, done.presentation, out, lambda part, what: progress(0.8 + 0.2 * part, what)
                     )
@@ -70,6 +79,8 @@ def run(
                 ) from None
             kept.discard()
         show(done.result.message)
+        if coarse:
+            show_limits(done.result)
         show(f"report: {target / 'report.html'}")
         return done.result.verdict.exit_code
 

@@ -1,8 +1,8 @@
 """Tool libraries of Fusion 360 and HSMWorks: JSON (`.json`), or a ZIP that holds it (`.tools`).
 
 A tool's ``geometry`` has the symbols of ISO 13399 in the tool's own unit: DC diameter, RE corner radius, LCF flute
-length, LB length below the holder, SFDM shank, NOF flutes, SIG point angle, TA taper angle, HA helix angle [deg].
-Read are end mills (flat, ball, bull nose), face mills, chamfer mills and drills; other shapes are refused.
+length, LB length below the holder, SFDM shank, NOF flutes, SIG point, TA taper, HA helix angle [deg]. Read are
+end mills (flat, ball, bull nose), face mills, chamfer mills and drills; other shapes are refused.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -34,6 +34,8 @@ FEED_MM_MIN = 300.0
 ALLOWANCE_MM = 1.0
 #: steps that a guessed step length aims at
 STEPS = 8_000
+#: thickness of layers in smallest diameters, and most layers where cutters come
+LAYER, LAYERS = 0.05, 60
 #: findings that are listed in the draft
 LISTED = 8
 #: ends of the codes of findings that say nothing about the motions
@@ -97,10 +99,13 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     deepest = {
         n: block[1][2] - float(program.p_work[cuts & (program.tool == n), 2].min(initial=block[1][2])) for n in numbers
     }
+    sizes = [_size(known.cutters.get(n) or header.cutters.get(n) or _of_table(known.tools, n)) for n in numbers]
     tables = [
         _program_table(path, folder, chosen, known),
         _machine_table(chosen, known),
-        DraftTable("stock", stock_entries, note="the block that the program starts from [mm]"),
+        DraftTable(
+            "stock", (*stock_entries, _layer(deepest, sizes)), note="the block that the program starts from [mm]"
+        ),
         _material_table(header),
         *(
             cutter_table(
@@ -108,7 +113,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
             )
             for n in numbers
         ),
-        _operation_table(program, cuts, numbers, known, header),
+        _operation_table(program, cuts, sizes),
         _limits_table(chosen.machine),
     ]
     found = [f for f in chosen.reading.findings if f.severity >= Severity.UNPROVEN]
@@ -174,21 +179,20 @@ def _cutting(program: Program) -> np.ndarray:
 
 def _stock(program: Program, known: Known, header: Header) -> tuple[Box, tuple[Entry, ...]]:
     """The block, and its entries."""
-    more = (Entry("layer_mm", note="thickness of the layers of the simulation", example="0.5"),)
     for stated in (known.stock, header.stock):
         if stated is not None:
             (low, high), where = stated
             sure = where.startswith(("BLK", "workpiece", "stock of"))
             note = f"{where}" if sure else f"{where}: check it against the program's zero"
             return (low, high), (
-                Entry("low_mm", list(low), note, not sure), Entry("high_mm", list(high), note, not sure), *more
+                Entry("low_mm", list(low), note, not sure), Entry("high_mm", list(high), note, not sure)
             )  # fmt: skip
     lowest, highest, why = _around(program)
     box = (
         (float(lowest[0]), float(lowest[1]), float(lowest[2])),
         (float(highest[0]), float(highest[1]), float(highest[2])),
     )
-    return box, (Entry("low_mm", list(box[0]), why, True), Entry("high_mm", list(box[1]), why, True), *more)
+    return box, (Entry("low_mm", list(box[0]), why, True), Entry("high_mm", list(box[1]), why, True))
 
 
 def _around(program: Program) -> tuple[np.ndarray, np.ndarray, str]:
@@ -214,6 +218,17 @@ def _around(program: Program) -> tuple[np.ndarray, np.ndarray, str]:
     corner_low = np.array([lowest[0] - ALLOWANCE_MM, lowest[1] - ALLOWANCE_MM, lowest[2] - ALLOWANCE_MM]).round(3)
     corner_high = np.array([highest[0] + ALLOWANCE_MM, highest[1] + ALLOWANCE_MM, top]).round(3)
     return corner_low, corner_high, f"box of the centre path below the rapids, {ALLOWANCE_MM:g} mm more"
+
+
+def _size(stated: Stated) -> float:
+    """The size of a cutter [mm]: of a tapered one its shank."""
+    return float(stated.get("shank_diameter_mm" if "taper_deg" in stated else "diameter_mm", (10.0, ""))[0])
+
+
+def _layer(deepest: Mapping[int, float], sizes: Sequence[float]) -> Entry:
+    """Thickness of the layers: a share of the smallest cutter, and not more than a number of them."""
+    layer = max(LAYER * min(sizes), max(deepest.values()) / LAYERS, 0.01)
+    return Entry("layer_mm", float(f"{layer:.2g}"), "layers of the simulation; smaller: finer and slower")
 
 
 def _of_table(tools: Path | None, number: int) -> Stated:
@@ -264,11 +279,8 @@ def _material_table(header: Header) -> DraftTable:
     return DraftTable("material", (entry,))
 
 
-def _operation_table(
-    program: Program, cuts: np.ndarray, numbers: list[int], known: Known, header: Header
-) -> DraftTable:
+def _operation_table(program: Program, cuts: np.ndarray, sizes: Sequence[float]) -> DraftTable:
     length = float(lengths(program)[cuts].sum())
-    sizes = [known.cutters.get(n, header.cutters.get(n, {})).get("diameter_mm", (10.0, ""))[0] for n in numbers]
     step = max(0.125 * min(sizes, default=10.0), length / STEPS, 0.1)
     step = min(float(f"{step:.2g}"), 100.0)
     return DraftTable(

@@ -85,7 +85,8 @@ def stock_body(job: ProgramJob, program: Program) -> LayeredStock:
     mesh = job.meshes.get("stock")
     if mesh is None and table.file is not None and table.file.lower().endswith(".npz"):
         return LayeredStock.load(folder / table.file)
-    tile = TILE * max(c.diameter for c in job.cutters.values())
+    # a tapered cutter is wider above its tip
+    tile = TILE * max(c.diameter + 2.0 * c.flute_length * math.tan(c.taper) for c in job.cutters.values())
     if mesh is None and table.file is None:
         assert table.low_mm is not None
         assert table.high_mm is not None

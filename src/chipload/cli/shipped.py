@@ -1,0 +1,62 @@
+"""Commands that list what comes with chipload: machines, materials, cutters, examples."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import TYPE_CHECKING
+
+from chipload.cli.app import Debug, app
+from chipload.terminal import guarded, plain, show
+
+if TYPE_CHECKING:
+    from chipload.jobs.shipped import Listing
+
+
+@app.command()
+def machines(debug: Debug = False) -> None:
+    """List the machines that come with chipload: axes, travel, feed, spindle, where the numbers come from."""
+    guarded(lambda: _shown("machines"), debug)
+
+
+@app.command()
+def materials(debug: Debug = False) -> None:
+    """List the materials that come with chipload: coefficients, range, spread, source."""
+    guarded(lambda: _shown("materials"), debug)
+
+
+@app.command()
+def cutters(debug: Debug = False) -> None:
+    """List the cutter catalogues that come with chipload; a job states its cutters or names a tool library."""
+    guarded(lambda: _shown("cutters"), debug)
+
+
+@app.command()
+def examples(debug: Debug = False) -> None:
+    """List the examples; chipload example NAME DIR copies one."""
+    guarded(lambda: _shown("examples"), debug)
+
+
+def _shown(name: str) -> int:
+    from chipload.jobs.shipped import LISTINGS
+
+    listing = LISTINGS[name]()
+    if sys.stdout.isatty() and os.environ.get("TERM") != "dumb":
+        _rich(listing)
+    else:
+        for row in (listing.head, *listing.rows):
+            show("\t".join(" ".join(cell.split()) for cell in row))
+    return 0
+
+
+def _rich(listing: Listing) -> None:
+    """The table in the width of the terminal."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(show_edge=False, pad_edge=False)
+    for title in listing.head:
+        table.add_column(title, overflow="fold")
+    for row in listing.rows:
+        table.add_row(*(plain(cell) for cell in row))
+    Console().print(table, markup=False)

@@ -1,0 +1,116 @@
+"""A first answer in a fraction of the time: a job with coarser steps, layers and tolerances.
+
+The geometry, limits and checks stay; only the resolution of the calculation changes, by overrides that the result lists
+as those of ``--set``. What such a run says is not proven: its result has an UNPROVEN finding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from pydantic import BaseModel
+
+from chipload.errors import Finding, InputError, Severity
+from chipload.jobs import FinishedJob, LoadedJob
+
+#: by capability: dotted key of the job -> factor, and the greatest value
+FACTORS: Mapping[str, Mapping[str, tuple[float, float]]] = {
+    "program": {
+        "operation.step_mm": (8.0, 100.0),
+        "operation.tolerance_mm": (20.0, 0.1),
+        "stock.layer_mm": (4.0, 1e3),
+        "stock.chord_mm": (5.0, 1.0),
+        "part.spacing_mm": (3.0, 1e3),
+        "fixture.spacing_mm": (3.0, 1e3),
+    },
+    "contour": {"operation.step_mm": (10.0, 10.0)},
+    "thinwall": {
+        "operation.step_mm": (2.5, 10.0),
+        "operation.layer_mm": (2.0, 1.0),
+        "operation.chord_mm": (5.0, 0.1),
+        "operation.tolerance_mm": (10.0, 0.05),
+        "operation.corner_slices": (0.25, 400),
+    },
+    "torque": {
+        "operation.step_mm": (4.0, 10.0),
+        "operation.layer_mm": (2.0, 10.0),
+        "operation.tolerance_mm": (10.0, 0.1),
+    },
+    "impeller": {
+        "operation.check_mm": (3.0, 1e3),
+        "operation.rough.check_mm": (3.0, 1e3),
+        "operation.rough.grid_mm": (3.0, 1e3),
+        "operation.paths.check_mm": (3.0, 1e3),
+    },
+}
+#: layers of a stock that states none, in smallest diameters; slices of corner radii that a program job does not state
+LAYER, SLICES = 0.2, 8
+
+
+def coarser(loaded: LoadedJob) -> tuple[str, ...]:
+    """The overrides ``key.path=value`` that make a job coarse.
+
+    Raises
+    ------
+    InputError
+        Its capability has no resolution to change.
+    """
+    factors = FACTORS.get(loaded.capability.name)
+    if factors is None:
+        raise InputError(f"--coarse: a {loaded.capability.name} job has no steps that could be coarser: leave it out")
+    table: BaseModel = loaded.job.table
+    out = []
+    for key, (factor, most) in factors.items():
+        first, *rest = key.split(".")
+        held = getattr(table, first, None)
+        for number, entry in enumerate(held) if isinstance(held, tuple) else ((None, held),):
+            path = [first, *([] if number is None else [str(number)]), *rest]
+            value = _at(entry, rest)
+            if value is not None:
+                scaled = value * factor
+                # a tolerance that is above what is coarse stays
+                new = max(min(scaled, most), value) if factor > 1.0 else max(scaled, 1)
+                out.append(f"{'.'.join(path)}={format_value(int(new) if isinstance(value, int) else new)}")
+    if loaded.capability.name == "program":
+        out += _of_program(loaded)
+    return tuple(out)
+
+
+def format_value(value: float | int) -> str:
+    """A number as ``--set`` takes it, to four digits.
+
+    >>> format_value(0.024691), format_value(12)
+    ('0.02469', '12')
+    """
+    return str(value) if isinstance(value, int) else f"{value:.4g}"
+
+
+def _at(entry: Any, keys: Sequence[str]) -> float | int | None:
+    """A number in a table and its tables; None: not stated."""
+    for key in keys:
+        entry = getattr(entry, key, None)
+    return entry if isinstance(entry, (int, float)) and not isinstance(entry, bool) else None
+
+
+def _of_program(loaded: LoadedJob) -> list[str]:
+    """What a simulation chooses by itself where it is not stated."""
+    job = loaded.job
+    out = []
+    stock = job.table.stock
+    saved = stock is not None and stock.file is not None and stock.file.lower().endswith(".npz")
+    if stock is not None and stock.layer_mm is None and not saved and job.cutters:
+        smallest = min(cutter.diameter for cutter in job.cutters.values())
+        out.append(f"stock.layer_mm={format_value(LAYER * smallest)}")
+    for k, op in enumerate(job.table.operation):
+        if op.corner_slices is None:
+            out.append(f"operation.{k}.corner_slices={SLICES}")
+    return out
+
+
+def marked(done: FinishedJob) -> FinishedJob:
+    """The result of a coarse run: nothing in it is proven."""
+    text = "--coarse: a first answer with larger steps and thicker layers; run the job without it for a proof"
+    finding = Finding("job-coarse", 0, text, Severity.UNPROVEN)
+    return replace(done, result=replace(done.result, findings=(finding, *done.result.findings)))

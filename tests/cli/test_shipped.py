@@ -1,0 +1,149 @@
+"""What comes with chipload is listed with numbers and units; templates are read back by the product; coarse runs."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from chipload.cli import app
+from chipload.jobs import load_job
+from chipload.jobs.coarse import coarser
+from chipload.tables import shipped_names
+
+JOB = """
+[program]
+file = "slot.ngc"
+[machine]
+name = "vmc"
+[stock]
+low_mm = [0.0, 0.0, -6.0]
+high_mm = [20.0, 10.0, 0.0]
+[material]
+name = "al7075-t6"
+[[cutter]]
+number = 1
+diameter_mm = 6.0
+flutes = 2
+helix_deg = 30.0
+flute_length_mm = 18.0
+overhang_mm = 25.0
+modulus_gpa = 580.0
+[[operation]]
+kind = "simulate"
+step_mm = 0.5
+[limits]
+torque_nm = 5.0
+"""
+
+
+def call(*words: object) -> tuple[int, str, str]:
+    done = CliRunner().invoke(app, [str(w) for w in words])
+    return done.exit_code, done.stdout, done.stderr
+
+
+def rows_of(command: str) -> tuple[list[str], dict[str, dict[str, str]]]:
+    code, said, _ = call(command)
+    assert code == 0
+    head, *rows = csv.reader(io.StringIO(said), delimiter="\t", quoting=csv.QUOTE_NONE)
+    assert all(len(row) == len(head) for row in rows)
+    return head, {row[0]: dict(zip(head, row, strict=True)) for row in rows}
+
+
+def test_machines_with_their_numbers() -> None:
+    """Numbers of data/machines/vmc.toml as they stand there."""
+    _, found = rows_of("machines")
+    assert tuple(found) == shipped_names("machine")
+    vmc = found["vmc"]
+    assert [vmc[k] for k in ("axes", "feed [mm/min]", "spindle [rpm]", "power [W]", "torque [N m]", "dialect")] == [
+        "XYZ", "12000", "60..15000", "11000", "70", "linuxcnc",
+    ]  # fmt: skip
+    assert vmc["travel x y z [mm]"] == "-400..400 -250..250 -250..250"
+    assert all(row["source"] for row in found.values())
+
+
+def test_materials_with_their_numbers_and_sources() -> None:
+    _, found = rows_of("materials")
+    assert tuple(found) == shipped_names("material")
+    six, group = found["al6082-t6"], found["group-2-steel"]
+    assert (six["Ktc Krc Kac [MPa]"], six["Kte Kre Kae [N/mm]"], six["holds for"]) == (
+        "631 99 273", "13 10 2.8", "all loads",
+    )  # fmt: skip
+    assert (group["Ktc Krc Kac [MPa]"], group["exponent"], group["chip [mm]"], group["spread [%]"]) == (
+        "1500", "0.22", "0.05..1", "20",
+    )  # fmt: skip
+    assert group["holds for"] == "torque, power"
+    assert all("doi" in row["source"] or "catalogue" in row["source"] for row in found.values())
+
+
+def test_cutters_and_examples() -> None:
+    code, said, _ = call("cutters")
+    assert code == 0
+    assert "wu2019\t10..80\t2\t36\t" in said
+    _, found = rows_of("examples")
+    assert {"chips", "contour", "pocket", "blade"} <= set(found)
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        ("material", "material my-material: Ktc 800, Krc 200, Kac 150"),
+        ("machine", "machine my-machine: X -300 to 300"),
+        ("catalogue", "catalogue my-catalogue: 2 cutters, 10 to 16 mm"),
+        ("fixture", "a closed mesh of 12 triangles, 101500 mm3"),
+    ],
+)
+def test_a_template_is_read_back(kind: str, said: str, tmp_path: Path) -> None:
+    code, written, _ = call("init", f"--{kind}", tmp_path / "mine")
+    assert code == 0
+    (file,) = (tmp_path / "mine").iterdir()
+    assert f'file = "{file.name}"' in written
+    code, found, err = call("check", file)
+    assert (code, said in found) == (0, True), err
+    # it is not overwritten
+    before = file.read_bytes()
+    assert call("init", f"--{kind}", tmp_path / "mine")[0] == 2
+    assert file.read_bytes() == before
+
+
+def test_a_template_in_a_job(tmp_path: Path) -> None:
+    call("init", "--material", "--machine", "--fixture", tmp_path)
+    (tmp_path / "slot.ngc").write_text("G21 G90 G94\nT1 M6\nS3000 M3\nG0 X-8 Y5 Z5\nG1 Z-2 F300\nX28\nG0 Z5\nM2\n")
+    fixture = '[[fixture]]\nfile = "fixture.stl"\nunits = "mm"\nspacing_mm = 2.0\n'
+    text = JOB.replace('name = "vmc"', 'file = "machine.toml"').replace('name = "al7075-t6"', 'file = "material.toml"')
+    (tmp_path / "job.toml").write_text(text + fixture)
+    code, said, err = call("check", tmp_path / "job.toml")
+    assert code == 0, said + err
+
+
+def test_what_init_refuses(tmp_path: Path) -> None:
+    assert "missing folder: chipload init FILE DIR" in call("init", tmp_path / "a.nc")[2]
+    assert "a template needs no file: chipload init --material DIR" in call("init", "a", "b", "--material")[2]
+
+
+def test_a_coarse_run_says_so(tmp_path: Path) -> None:
+    """The same slot with coarser steps: unproven, the torque within a tenth, the overrides in the provenance."""
+    (tmp_path / "slot.ngc").write_text("G21 G90 G94\nT1 M6\nS3000 M3\nG0 X-8 Y5 Z5\nG1 Z-2 F300\nX28\nG0 Z5\nM2\n")
+    (tmp_path / "job.toml").write_text(JOB)
+    job = tmp_path / "job.toml"
+    asked = coarser(load_job(job))
+    assert asked == (
+        "operation.0.step_mm=4", "operation.0.tolerance_mm=0.02", "stock.chord_mm=0.05", "stock.layer_mm=1.2",
+        "operation.0.corner_slices=8",
+    )  # fmt: skip
+    call("run", job, "--out", tmp_path / "fine")
+    code, said, _ = call("run", job, "--coarse", "--out", tmp_path / "coarse")
+    assert code == 3
+    assert "worst values: torque" in said
+    fine, coarse = (json.loads((tmp_path / n / "summary.json").read_bytes()) for n in ("fine", "coarse"))
+    assert coarse["verdict"] == "unproven"
+    assert coarse["findings"][0]["code"] == "job-coarse"
+    assert "job-coarse" not in [f["code"] for f in fine["findings"]]
+    assert coarse["provenance"]["overrides"] == list(asked)
+    assert coarse["tracks"][0]["rows"] < 0.5 * fine["tracks"][0]["rows"]
+    torque = [next(c["worst"] for c in s["limits"] if c["name"] == "torque_nm") for s in (fine, coarse)]
+    assert torque[1] == pytest.approx(torque[0], rel=0.1)
