@@ -42,6 +42,8 @@ MARGIN_ERROR = 0.01
 UPRIGHT = 1.0 - 1e-9
 #: cuts of a tool that speeds are looked for with: those nearest to chatter, and those with most edge in cut
 NEAREST, LARGEST = 12, 12
+#: waves of the fastest mode in a tooth period at the least speed that is looked at: slower ones have no pockets
+MOST_WAVES = 20.0
 #: speeds that are looked at, evenly spaced in their logarithm, and how a speed is rounded [1/min]
 SPEEDS, ROUND_RPM = 161, 10.0
 
@@ -175,11 +177,14 @@ class StabilityResult:
         return out
 
     def range_of(self, tool: int) -> tuple[float, float]:
-        """Speeds [rad/s] that the machine, the job and the range of the coefficients allow a tool."""
+        """Speeds [rad/s] that machine, job and range of the coefficients allow a tool, but for slow ones."""
         per = rpm_from_rad_s(1.0)
         low, high = (x / per if x is not None else None for x in self.speeds)
         low = max(low or 0.0, self.machine.spindle_min, 0.02 * self.machine.spindle_max)
         high = min(high or math.inf, self.machine.spindle_max)
+        some = self.watch.cuts.get(tool)
+        if some:
+            low = max(low, float(some[0].modes.frequency.max()) * some[0].pitch / MOST_WAVES)
         radius, measured = self.radii.get(tool, 0.0), self.watch.material.speed
         if measured is not None and radius > 0.0:
             low, high = max(low, measured[0] / radius), min(high, measured[1] / radius)
