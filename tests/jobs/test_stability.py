@@ -350,3 +350,26 @@ def test_a_cutter_that_leans_has_no_known_margin() -> None:
     result = StabilityResult(watch, machine_named("vmc"), 1.0, {1: 5.0})
     assert result.reason(np.array([1])) == "tool 1 leans: modes are known for an upright axis only"
     assert result.reason(np.array([2])) == ""
+
+
+def test_spreads_of_the_modes_give_a_probability(tmp_path: Path) -> None:
+    spreads = "frequency_percent = 2.0\ndamping_percent = 15.0\nstiffness_percent = 5.0\n"
+    text = TEXT.replace("S9000", "S6000").replace("Z-1.5", "Z-2").replace("F1350", "F900")
+    read = done(tmp_path, text=text, modes=spreads + MODES, limits="stable_probability = 0.9")
+    columns, check = read.result.in_use[0].columns, check_of(read, "stable_probability")
+    assert check.column.least
+    assert check.worst == columns["stable_probability"].min()
+    assert check.worst == read.result.operations[0]["stability"]["stable_probability"]
+    # the material states no spread: only the modes are unsure
+    assert 0.9 < check.worst <= 1.0
+    assert check.state is Verdict.HOLDS
+    assert (columns["stable_probability"][columns["chip_pieces"] == 0] == 1.0).all()
+    chatters = done(tmp_path, text=text.replace("Z-2", "Z-5"), modes=spreads + MODES, limits="stable_probability = 0.9")
+    assert check_of(chatters, "stable_probability").state is Verdict.EXCEEDS
+
+
+def test_a_probability_needs_all_three_spreads(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="state all of frequency_percent, damping_percent, stiffness_percent"):
+        done(tmp_path, modes="damping_percent = 20.0\n" + MODES)
+    with pytest.raises(InputError, match=r"limits\.stable_probability: needs spreads"):
+        done(tmp_path, limits="stable_probability = 0.9")

@@ -327,3 +327,47 @@ def test_what_the_functions_cannot_use_is_refused():
     ):  # fmt: skip
         with pytest.raises(InputError, match=text):
             call()
+
+
+def test_a_cut_whose_map_has_no_solution_is_looked_at_in_finer_cells(monkeypatch):
+    from chipload.stability import margin
+
+    cut = cut_of(TWO, 8000, 2.0, HALF)
+    exact, asked, own = stability_margins(cut).margin[0], [], margin._margins
+
+    def lost(cuts, per_wave):
+        asked.append(per_wave)
+        out = own(cuts, per_wave)
+        if per_wave < 20.0:
+            out[:, 0] = -1.0 if per_wave < 12.0 else np.nan
+        return out
+
+    monkeypatch.setattr(margin, "_margins", lost)
+    assert stability_margins(cut.chosen([0, 0])).margin == pytest.approx([exact] * 2, rel=5e-3)
+    assert asked == [9.0, 15.0, 25.0]
+    monkeypatch.setattr(margin, "_margins", lambda cuts, per_wave: np.full((len(cuts), 5), -1.0))
+    with pytest.raises(InputError, match="a multiplier was not found"):
+        stability_margins(cut)
+
+
+def test_quiet_speeds_have_the_least_margin_of_all_cuts():
+    from chipload.stability.speeds import quiet_speeds
+
+    cuts = [cut_of(TWO, 6000, depth, HALF) for depth in (1.0, 2.0)]
+    speed = np.linspace(5000, 14000, 40) * TAU / 60.0
+    found = quiet_speeds(cuts, speed, 1.2)
+    for k in (3, 20, 33):
+        each = [stability_margins(cut_of(TWO, speed[k] * 60 / TAU, d, HALF)).margin[0] for d in (1.0, 2.0)]
+        assert found.margin[k] == pytest.approx(min(each))
+    for window in found.windows:
+        inside = (speed >= window.low) & (speed <= window.high)
+        assert (found.margin[inside] >= 1.2).all()
+        assert window.margin == found.margin[inside].max()
+    assert sum(((speed >= w.low) & (speed <= w.high)).sum() for w in found.windows) == (found.margin >= 1.2).sum()
+    margin = found.advised(900.0)[1]
+    assert margin >= 0.98 * found.margin.max()
+    for bad in ([], [-1.0, 2.0], [2.0, 1.0]):
+        with pytest.raises(InputError, match="speeds must rise"):
+            quiet_speeds(cuts, bad, 1.0)
+    with pytest.raises(InputError, match="no cut"):
+        quiet_speeds([], [1.0, 2.0], 1.0)

@@ -128,6 +128,8 @@ _ROWS = (
     # vibration
     ("stability_margin", "", "stability margin", "factor on the cutting force, and for straight teeth on the depth of "
      "cut, at which the step begins to chatter; 3: 3 or more; 0: not known", False, True),
+    ("stable_probability", "", "probability of stability", "that the step does not chatter, by the spread of modes and "
+     "coefficients; 0: it surely chatters, or is not known", False, True),
     ("chatter_hz", "Hz", "chatter frequency", "frequency of chatter at the stability margin; 0: the margin is 3"),
     ("chatter_mode", "", "chatter mode", "number of the mode that chatters, from 1 as in the job; 0: none"),
     ("sle_um", "\u00b5m", "surface location error", "material left on the wall by forced vibration; negative: removed; "

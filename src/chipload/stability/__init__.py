@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from chipload.stability.grouping import CutGroups, grouped
     from chipload.stability.margin import StabilityMargins, largest_multipliers, stability_margins
     from chipload.stability.modes import Modes
+    from chipload.stability.probability import ModeSpread, stable_probability
     from chipload.stability.speeds import QuietSpeeds, SpeedWindow, quiet_speeds
     from chipload.stability.surface_error import location_error
     from chipload.stability.variable_pitch import revolution_multiplier
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = [
     "CutGroups",
     "DynamicCuts",
+    "ModeSpread",
     "Modes",
     "QuietSpeeds",
     "SpeedWindow",
@@ -34,6 +36,7 @@ __all__ = [
     "revolution_multiplier",
     "stability_chart",
     "stability_margins",
+    "stable_probability",
     "zero_order_margin",
 ]
 
@@ -46,6 +49,7 @@ __getattr__, __dir__ = attach(
         "surface_error": "location_error",
         "margin": "StabilityMargins largest_multipliers stability_margins",
         "modes": "Modes",
+        "probability": "ModeSpread stable_probability",
         "speeds": "QuietSpeeds SpeedWindow quiet_speeds",
         "variable_pitch": "revolution_multiplier",
         "zero_order": "zero_order_margin",

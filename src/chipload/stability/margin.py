@@ -26,6 +26,8 @@ Floats = NDArray[np.float64]
 MOST_MARGIN = float(_kernels.ABOVE[-1])
 #: cells of the map in a wave of the fastest mode, and where values are printed
 PER_WAVE, PER_WAVE_EXACT = 9.0, 40.0
+#: cells in a wave where the first did not do
+FINER = (15.0, 25.0)
 #: dimensions of the Krylov space beside two a mode, and how still |mu| is then
 SPARE, STILL = 24, 1e-4
 #: the same where values are printed
@@ -97,24 +99,37 @@ def largest_multipliers(
 def stability_margins(cuts: DynamicCuts) -> StabilityMargins:
     """Margins of cuts; each costs five to ten evaluations of the map.
 
+    Where a cell of the map has no solution or eigenvalues are not found, the cut is looked at again in finer cells.
+
     Raises
     ------
     InputError
-        An eigenvalue was not found.
+        An eigenvalue was not found in the finest cells either.
     """
+    out = np.full((len(cuts), 5), -1.0)
+    for per_wave in (PER_WAVE, *FINER):
+        lost = np.flatnonzero(~(out[:, 0] >= 0.0))
+        if not len(lost):
+            break
+        out[lost] = _margins(cuts if len(lost) == len(cuts) else cuts.chosen(lost), per_wave)
+    if not (out[:, 0] >= 0.0).all():
+        raise InputError("stability: a multiplier was not found: check frequency and damping of the modes")
+    return StabilityMargins(out[:, 0], out[:, 1], out[:, 2].astype(np.int64), out[:, 3])
+
+
+def _margins(cuts: DynamicCuts, per_wave: float) -> Floats:
+    """(n, 5) as the kernel gives them."""
     out = np.zeros((len(cuts), 5))
     pitch = np.full(len(cuts), cuts.pitch)
 
     def part(first: int, last: int) -> None:
         _kernels.margins(
             first, last, cuts.start, cuts.rows, cuts.exponents, cuts.period, pitch, cuts.modes.omega,
-            np.array(cuts.modes.damping), cuts.U, PER_WAVE, 2 * len(cuts.modes) + SPARE, STILL, out,
+            np.array(cuts.modes.damping), cuts.U, per_wave, 2 * len(cuts.modes) + SPARE, STILL, out,
         )  # fmt: skip
 
     shared(part, len(cuts))
-    if (out[:, 0] < 0.0).any():
-        raise InputError("stability: a multiplier was not found: check frequency and damping of the modes")
-    return StabilityMargins(out[:, 0], out[:, 1], out[:, 2].astype(np.int64), out[:, 3])
+    return out
 
 
 def shared(part: Callable[[int, int], None], count: int) -> None:

@@ -149,7 +149,7 @@ def simulate(
     for key in ("form_error_um", "gouge_mm", "excess_mm"):
         if made.part is None and getattr(made.limits, key) is not None:
             raise InputError(f"limits.{key}: needs the part that should come out: give part or leave it out")
-    for key in ("stability_margin", "sle_um"):
+    for key in ("stability_margin", "stable_probability", "sle_um"):
         if made.dynamics is None and getattr(made.limits, key) is not None:
             raise InputError(f"limits.{key}: needs modes of vibration: give dynamics or leave it out")
     if made.operation[0].speeds is not None:

@@ -19,6 +19,7 @@ from chipload.files import read_regular
 from chipload.jobs.messages import table_errors
 from chipload.jobs.program.dynamics_tables import DynamicsTable, ModesFileTable, ModeTable
 from chipload.stability.modes import Modes
+from chipload.stability.probability import ModeSpread
 
 #: N/mm in 1 N/um, t in 1 kg
 PER_UM, PER_KG = 1000.0, 1e-3
@@ -37,12 +38,14 @@ class Dynamics:
     number : of each mode of a tool, from 1 as the job and its file list them
     name : of each mode by this number
     unknown : what is not stated and would be needed
+    spread : of the modes; None: not stated
     """
 
     modes: Mapping[int, Modes]
     number: Mapping[int, tuple[int, ...]]
     name: Mapping[int, str]
     unknown: tuple[str, ...]
+    spread: ModeSpread | None = None
 
 
 def dynamics_of(table: DynamicsTable, folder: Path, cutters: Mapping[int, Cutter]) -> Dynamics:
@@ -84,7 +87,16 @@ def dynamics_of(table: DynamicsTable, folder: Path, cutters: Mapping[int, Cutter
             modes[tool] = _modes(own)
             number[tool] = tuple(k for k, _, _ in own)
     names = {k: f"{m.of} {m.frequency_hz:g} Hz" for k, m in enumerate(listed, 1)}
-    return Dynamics(modes, number, names, tuple(dict.fromkeys(unknown)))
+    return Dynamics(modes, number, names, tuple(dict.fromkeys(unknown)), _spread(table))
+
+
+def _spread(table: DynamicsTable) -> ModeSpread | None:
+    """Spreads of the modes, all or none."""
+    names = ("frequency_percent", "damping_percent", "stiffness_percent")
+    stated = [0.01 * value for name in names if (value := getattr(table, name)) is not None]
+    if stated and len(stated) < len(names):
+        raise InputError(f"dynamics: state all of {', '.join(names)}, or none")
+    return ModeSpread(*stated) if stated else None
 
 
 def read_modes(path: Path) -> tuple[ModeTable, ...]:

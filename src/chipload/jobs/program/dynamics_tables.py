@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from chipload.jobs.tables import Count, Number, Positive, Table, Text
+from chipload.jobs.tables import Count, NotNegative, Number, Positive, Table, Text
 
 
 def _direction(value: Any) -> Any:
@@ -33,6 +33,12 @@ class DynamicsTable(Table):
 
     file: Text | None = Field(None, description="modes as [[mode]], as chipload tap writes them")
     mode: tuple[ModeTable, ...] = Field((), description="modes in the job")
+    frequency_percent: NotNegative | None = Field(
+        None, lt=100.0, description="standard deviation of the frequencies; stated with the next two: each step has a "
+        "probability of stability",
+    )  # fmt: skip
+    damping_percent: NotNegative | None = Field(None, lt=100.0, description="of the damping ratios")
+    stiffness_percent: NotNegative | None = Field(None, lt=100.0, description="of the stiffnesses")
 
 
 class ModesFileTable(Table):

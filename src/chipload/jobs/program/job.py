@@ -115,11 +115,13 @@ def _contradictions(table: ProgramJobTable) -> Iterator[str]:
         if table.part is None and getattr(table.limits, key) is not None:
             yield f"limits.{key}: needs the part that should come out: state [part] or leave it out"
     if table.dynamics is None:
-        for key in ("stability_margin", "sle_um"):
+        for key in ("stability_margin", "stable_probability", "sle_um"):
             if getattr(table.limits, key) is not None:
                 yield f"limits.{key}: needs modes of vibration: state [dynamics] or leave it out"
         if table.operation[0].speeds is not None:
             yield "operation.0.speeds: needs modes of vibration: state [dynamics] or leave it out"
+    elif table.limits.stable_probability is not None and table.dynamics.frequency_percent is None:
+        yield "limits.stable_probability: needs spreads: state frequency_percent, damping_percent and stiffness_percent"
     if table.operation[0].speeds is not None and table.operation[0].feeds is not None:
         yield "operation.0.speeds: with feeds: ask for speeds first, then for feeds of the new program"
     if table.operation[0].feeds is not None and not any(getattr(table.limits, name) is not None for name in LOADS):

@@ -70,7 +70,10 @@ def unchecked(program: ProgramResult) -> tuple[str, ...]:
     simulation = program.simulated
     if simulation is None:
         return ("removal, engagement, forces and collisions: the program was read, not simulated",)
-    out = [*unchecked_checks(simulation.checks), *(f"limit {name}: not stated" for name in simulation.unchecked)]
+    # where modes are stated a margin of 1 is checked
+    always = () if simulation.stability is None else ("stability_margin",)
+    missing = [name for name in simulation.unchecked if name not in always]
+    out = [*unchecked_checks(simulation.checks), *(f"limit {name}: not stated" for name in missing)]
     if simulation.left is None:
         out.append("gouge and excess: no [part] is stated")
     if "stock" not in simulation.compared_with:

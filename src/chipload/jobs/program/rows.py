@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.jobs.program.outcome import ProgramResult, SimulationResult
-from chipload.jobs.program.stability import filled_margins
+from chipload.jobs.program.stability import PROBABILITY, filled_margins, filled_probability
 from chipload.program.read import times_of
 from chipload.result.limits import Columns
 from chipload.result.motions import motion_columns
@@ -33,6 +33,8 @@ def step_rows(simulation: SimulationResult, removal: Removal | None = None) -> I
             columns["gouge_mm"] = np.maximum(-simulation.left.deepest[at : at + count], 0.0)
         if "stability_margin" in columns:
             columns["stability_margin"] = filled_margins(columns)
+        if PROBABILITY in columns:
+            columns[PROBABILITY] = filled_probability(columns)
         columns["cutting_s"] = columns.pop("seconds")
         yield {"pass": names[columns.pop("label")], **columns}
         at += count

@@ -18,7 +18,6 @@ from chipload.jobs.program.limits import spindle_limits
 from chipload.jobs.program.outcome import FeedResult, ProgramResult, SimulationResult
 from chipload.jobs.program.preparation import bodies_of, material_of, resolution_of, timed
 from chipload.jobs.program.speeds import new_speeds, speeds_changeable, stability_of, watch_of
-from chipload.jobs.program.stability import STABILITY_COLUMNS
 from chipload.jobs.program.stiffness import deflecting, stiffness_of, watched, with_columns
 from chipload.jobs.program.tables import LOADS, SimulateTable
 from chipload.jobs.program.workpiece import insides, stock_body
@@ -294,7 +293,7 @@ def _simulated(
         )  # fmt: skip
     removal = with_soft_errors(with_columns(removal, (*watched(gives, formed=made is not None), *CHECK_COLUMNS)), soft)
     if vibrates is not None:
-        removal = with_columns(removal, STABILITY_COLUMNS)
+        removal = with_columns(removal, vibrates.columns)
     touched = collisions(
         steps, job.cutters, solids, op.tolerance_mm, above_only=frozenset(["part"]),
         progress=passing(0.8 + SHARE, "collisions"),

@@ -23,7 +23,6 @@ from chipload.jobs.program.outcome import SpeedResult, ToolSpeed
 from chipload.jobs.program.preparation import resolution_of, timed
 from chipload.jobs.program.stability import (
     DEFAULT_MARGIN,
-    STABILITY_COLUMNS,
     StabilityResult,
     StabilityWatch,
     rounded_rpm,
@@ -110,7 +109,7 @@ def new_speeds(
         program, stock, job.cutters, material, resolution_of(job, reading.program), interpolation=op.interpolation,
         times=times, watch=watch, accuracy=False, engine=op.engine, progress=progress,
     )  # fmt: skip
-    before = with_columns(before, (*watched(gives), *CHECK_COLUMNS, *STABILITY_COLUMNS))
+    before = with_columns(before, (*watched(gives), *CHECK_COLUMNS, *stability.columns))
     found = stability_of(job, stability, machine)
     tools = _advised(found, reading.program)
     new = _new_text(text, reading.program, {t.tool: t.rpm for t in tools})

@@ -25,6 +25,7 @@ from chipload.simulation.loads import Cuts
 from chipload.stability.cuts import DynamicCuts, dynamic_cuts
 from chipload.stability.grouping import grouped
 from chipload.stability.margin import MOST_MARGIN, stability_margins
+from chipload.stability.probability import stable_probability
 from chipload.stability.speeds import QuietSpeeds, quiet_speeds
 from chipload.stability.surface_error import force_rows, wall_errors
 from chipload.units import rpm_from_rad_s
@@ -33,8 +34,10 @@ Floats = NDArray[np.float64]
 
 #: columns that the watch adds
 STABILITY_COLUMNS = ("stability_margin", "chatter_hz", "chatter_mode", "sle_um")
+#: the one that needs spreads of the modes
+PROBABILITY = "stable_probability"
 #: limits of these, and the margin that is checked where none is stated
-STABILITY_LIMITS = ("stability_margin", "sle_um")
+STABILITY_LIMITS = ("stability_margin", PROBABILITY, "sle_um")
 DEFAULT_MARGIN = 1.0
 #: relative error of a margin by the map and by rounding what steps cut
 MARGIN_ERROR = 0.01
@@ -42,6 +45,8 @@ MARGIN_ERROR = 0.01
 UPRIGHT = 1.0 - 1e-9
 #: cuts of a tool that speeds are looked for with: those nearest to chatter, and those with most edge in cut
 NEAREST, LARGEST = 12, 12
+#: waves of the fastest mode in a tooth period at the least speed that is looked at: slower ones have no pockets
+MOST_WAVES = 20.0
 #: speeds that are looked at, evenly spaced in their logarithm, and how a speed is rounded [1/min]
 SPEEDS, ROUND_RPM = 161, 10.0
 
@@ -58,13 +63,18 @@ class StabilityWatch:
 
     dynamics: Dynamics
     material: Material
-    known: dict[int, dict[bytes, tuple[float, float, float, float]]] = field(default_factory=dict)
+    known: dict[int, dict[bytes, tuple[float, ...]]] = field(default_factory=dict)
     cuts: dict[int, list[DynamicCuts]] = field(default_factory=dict)
     leaning: set[int] = field(default_factory=set)
 
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return STABILITY_COLUMNS if self.dynamics.spread is None else (*STABILITY_COLUMNS, PROBABILITY)
+
     def __call__(self, cuts: Cuts) -> dict[str, Floats]:
         """The columns of some steps of one cutter."""
-        out = np.zeros((len(cuts), len(STABILITY_COLUMNS)))
+        out = np.zeros((len(cuts), len(self.columns)))
         frame, modes = cuts.plain.frame, self.dynamics.modes.get(cuts.tool)
         assert frame is not None
         upright = bool((frame[:, 2, 2] >= UPRIGHT).all())
@@ -86,12 +96,12 @@ class StabilityWatch:
             out = np.array([table[key] for key in groups.key])
             number = np.array([0, *self.dynamics.number[cuts.tool]])
             out[:, 2] = number[out[:, 2].astype(np.int64) + 1]
-        return dict(zip(STABILITY_COLUMNS, out.T.copy(), strict=True))
+        return dict(zip(self.columns, out.T.copy(), strict=True))
 
     def _values(
         self, some: DynamicCuts, whole: DynamicCuts, at: NDArray[np.int64], engagement: Any
-    ) -> Iterator[tuple[float, float, float, float]]:
-        """Margin, frequency, mode and error of the wall of new cuts."""
+    ) -> Iterator[tuple[float, ...]]:
+        """The columns of new cuts."""
         found = stability_margins(some)
         error = np.zeros(len(some))
         if not any(self.material.exponents):
@@ -99,7 +109,9 @@ class StabilityWatch:
             row = np.concatenate([np.arange(whole.start[k], whole.start[k] + n) for k, n in zip(at, size, strict=True)])
             rows = np.ascontiguousarray(force_rows(engagement, self.material)[row])
             error = np.where(found.margin >= 1.0, 1e3 * wall_errors(some, rows)[0], 0.0)
-        columns = (found.margin, found.frequency, found.mode.astype(np.float64), error)
+        columns = [found.margin, found.frequency, found.mode.astype(np.float64), error]
+        if self.dynamics.spread is not None:
+            columns.append(stable_probability(some, self.dynamics.spread, _relative_covariance(self.material)))
         return zip(*(x.tolist() for x in columns), strict=True)
 
     def parts(self, tool: int) -> DynamicCuts | None:
@@ -175,11 +187,14 @@ class StabilityResult:
         return out
 
     def range_of(self, tool: int) -> tuple[float, float]:
-        """Speeds [rad/s] that the machine, the job and the range of the coefficients allow a tool."""
+        """Speeds [rad/s] that machine, job and range of the coefficients allow a tool, but for slow ones."""
         per = rpm_from_rad_s(1.0)
         low, high = (x / per if x is not None else None for x in self.speeds)
         low = max(low or 0.0, self.machine.spindle_min, 0.02 * self.machine.spindle_max)
         high = min(high or math.inf, self.machine.spindle_max)
+        some = self.watch.cuts.get(tool)
+        if some:
+            low = max(low, float(some[0].modes.frequency.max()) * some[0].pitch / MOST_WAVES)
         radius, measured = self.radii.get(tool, 0.0), self.watch.material.speed
         if measured is not None and radius > 0.0:
             low, high = max(low, measured[0] / radius), min(high, measured[1] / radius)
@@ -211,7 +226,7 @@ def stability_limits(
             check_limit(name, v, {}, track=track, reason="no [dynamics] is stated") for name, v in limits.items()
         )
     limits.setdefault("stability_margin", DEFAULT_MARGIN)
-    spread = _spread(stability.watch.material) if sigma > 0.0 else 0.0
+    spread = float(np.sqrt(np.diag(_relative_covariance(stability.watch.material)).max())) if sigma > 0.0 else 0.0
     margin = np.asarray(columns["stability_margin"]) / (1.0 + sigma * spread)
     columns = {**columns, "stability_margin": margin}
     cutting = cutting_rows(columns)
@@ -226,16 +241,18 @@ def stability_limits(
             why = "where a step chatters the error is not a number"
         if name == "sle_um" and any(stability.watch.material.exponents):
             why = f"material {stability.watch.material.name} has a size effect"
-        rows = margin > 0.0 if name == "stability_margin" else cutting
-        out.append(check_limit(name, limit, columns, track=track, rows=rows, error=error, reason=why))
+        rows = cutting if name == "sle_um" else margin > 0.0
+        known = 0.0 if name == PROBABILITY else error
+        out.append(check_limit(name, limit, columns, track=track, rows=rows, error=known, reason=why))
     return tuple(out)
 
 
-def _spread(material: Material) -> float:
-    """Greatest relative standard deviation of the cutting coefficients across the axis."""
-    sd = np.sqrt(np.diag(material.variances)[:2])
+def _relative_covariance(material: Material) -> Floats:
+    """(2, 2) of the tangential and the radial cutting coefficient, over their sizes; 0: the material does not say."""
     size = np.abs(np.array(material.coefficients[:2]))
-    return float(np.divide(sd, size, out=np.zeros(2), where=size > 0.0).max())
+    if not material.has_band or not (size > 0.0).all():
+        return np.zeros((2, 2))
+    return np.asarray(material.variances[:2, :2] / np.outer(size, size))
 
 
 def cutting_rows(columns: Columns) -> NDArray[np.bool_]:
@@ -249,6 +266,12 @@ def filled_margins(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.float64]:
     return np.asarray(np.where((margin == 0.0) & ~cutting_rows(columns), MOST_MARGIN, margin))
 
 
+def filled_probability(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.float64]:
+    """``stable_probability`` with 1 where nothing is cut."""
+    known = np.asarray(columns[PROBABILITY])
+    return np.asarray(np.where((known == 0.0) & ~cutting_rows(columns), 1.0, known))
+
+
 def stability_numbers(stability: StabilityResult, columns: Columns) -> dict[str, Any]:
     """``stability`` of the operation in summary.json: the step nearest to chatter, and quiet speeds of its tool."""
     margin = np.asarray(columns["stability_margin"])
@@ -257,13 +280,14 @@ def stability_numbers(stability: StabilityResult, columns: Columns) -> dict[str,
     out: dict[str, Any] = {"margin_wanted": stability.wanted, "not_stated": list(dynamics.unknown)}
     if not len(known):
         empty = dict.fromkeys(("margin_min", "line", "tool", "chatter_hz", "mode", "speed_rpm", "speed_rpm_advised"))
-        return {**out, **empty, "margin_advised": None, "windows": [], "different_cuts": 0}
+        return {**out, **empty, "stable_probability": None, "margin_advised": None, "windows": [], "different_cuts": 0}
     k = int(known[np.argmin(margin[known])])
     tool, number = int(columns["tool"][k]), int(columns["chatter_mode"][k])
     speed = speed_of(columns, k)
     quiet = stability.quiet.get(tool)
     out |= {
         "margin_min": float(margin[k]),
+        "stable_probability": float(np.asarray(columns[PROBABILITY])[known].min()) if PROBABILITY in columns else None,
         "line": int(columns["line"][k]),
         "tool": tool,
         "chatter_hz": float(columns["chatter_hz"][k]),

@@ -142,6 +142,9 @@ class ProgramLimitsTable(Limits):
     stability_margin: Positive | None = Field(
         None, le=3.0, description="least stability margin, see [dynamics]; 1 where it is not stated"
     )
+    stable_probability: Positive | None = Field(
+        None, lt=1.0, description="least probability of stability; needs spreads in [dynamics]"
+    )
     sle_um: Positive | None = Field(None, description="what forced vibration leaves on, or takes from, a wall")
 
 
