@@ -265,7 +265,10 @@ def summed(job: HalJob, rows: np.ndarray, control: np.ndarray, killed: float | N
     begun = min(max(float(c["override"][max(first - 1, 0)]), job.override.floor), job.override.cap)
     held = replace(job.override, start=begun, air_override=max(job.override.air_override, begun))
     loop = Loop(job.acceleration, job.period, job.latency)
-    same = run(job.path.truth, job.path.model, held, job.table, job.spindle, loop, limit, relief=job.path.relief)
+    same = run(
+        job.path.truth, job.path.model, held, job.table, job.spindle, loop, limit, relief=job.path.relief,
+        deviation=job.deviation,
+    )  # fmt: skip
     load = c["torque_nmm"] / c["relief"]
     # steady: the override of 0.1 s is the same within a step; at a corner and at the ends the machine slows by itself
     goal, feed = c["in_force"] * programmed, c["feed_mm_s"]
