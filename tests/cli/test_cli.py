@@ -44,7 +44,7 @@ def planned(monkeypatch: pytest.MonkeyPatch, outcome: Maker) -> Callable[[Contou
     """Let `run` find an outcome, or an accident, in place of the planner."""
 
     def put(made: ContourResult | BaseException) -> None:
-        def stand_in(loaded: LoadedJob, progress: Progress, kept: Checkpoint) -> FinishedJob:
+        def stand_in(loaded: LoadedJob, progress: Progress, kept: Checkpoint, **_: object) -> FinishedJob:
             progress(0.5, "half")
             if isinstance(made, BaseException):
                 raise made
