@@ -22,6 +22,7 @@ from chipload.control.linuxcnc.path import write_path
 from chipload.control.override import STATUS
 from chipload.control.plant import Loop, run
 from chipload.control.spindle_model import AS_STATED, SpindleDeviation
+from chipload.errors import InputError
 from simulated_machine import ACCELERATION, FEED, JOB, PATH, PERIOD, RULES, SPINDLE, Simulated, round_path
 
 
@@ -99,6 +100,23 @@ def test_a_wrong_torque_constant(constant):
     share = found.column("torque_nmm")[late] / found.column("measured_nmm")[late]
     # idle current is drawn at the real constant too: (c - 1) K_T I_idle is not seen
     assert np.median(share) == pytest.approx(constant, rel=0.05)
+
+
+def test_the_loop_closes_on_the_power():
+    """The power is torque of the current times speed: told from it the loop is the same; the other pin is refused."""
+    spindle = replace(
+        SPINDLE, torque_constant=1e3, idle=(0.3 * 2.0, 0.3 * 0.004), noise=0.3 * SPINDLE.noise, current_step=0.0
+    )
+    job = replace(JOB, spindle=spindle, source="power", told_from="power")
+    by_power, machine = go(job, change=lambda i, w, t: (0.3 * i * math.tau * w, w))
+    by_current, other = go()
+    assert by_power.ended == "path"
+    assert machine.t == pytest.approx(other.t, rel=2e-3)
+    # later the last digit moves the override by a step of it
+    measured = [found.column("measured_nmm")[:70] for found in (by_power, by_current)]
+    np.testing.assert_allclose(*measured, atol=1e-6)
+    with pytest.raises(InputError, match="identified from its power: name the pin of that, --power-pin"):
+        replace(job, source="current")
 
 
 def test_a_drift_of_the_idle_current():

@@ -285,7 +285,7 @@ def test_a_wall_that_allows_more_is_given_more():
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ('source = "plant"', 'source = "sensor"', "hal.source = 'sensor': must be one of plant, current, pin"),
+        ('source = "plant"', 'source = "sensor"', "hal.source = 'sensor': must be one of plant, current, power, pin"),
         ("period_s = 0.01", "", "period_s is missing"),
         ("period_s = 0.01", "period_s = true", "period_s = True: must be a number"),
         ("period_s", "period_ms", "unknown key period_ms: the nearest known one is period_s"),

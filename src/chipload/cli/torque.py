@@ -33,6 +33,10 @@ def hal(
             "--current-pin", metavar="PIN", help="pin or signal with the spindle's current [A], as vfd.current"
         ),
     ] = None,
+    power_pin: Annotated[
+        str | None,
+        typer.Option("--power-pin", metavar="PIN", help="the same of its power [W], in the place of the current"),
+    ] = None,
     speed_pin: Annotated[
         str | None,
         typer.Option("--speed-pin", metavar="PIN", help="of the spindle's speed [rev/s], as spindle.0.speed-in"),
@@ -54,12 +58,17 @@ def hal(
         from chipload.control.linuxcnc.hal_client import HalPins
         from chipload.files import write_whole
 
-        if (current_pin is None) != (speed_pin is None):
-            missing, there = ("--speed-pin", "--current-pin") if speed_pin is None else ("--current-pin", "--speed-pin")
+        if current_pin is not None and power_pin is not None:
+            raise InputError("--current-pin, --power-pin: state one of them, what the spindle was identified from")
+        name_of = "--current-pin" if power_pin is None else "--power-pin"
+        measured = current_pin if power_pin is None else power_pin
+        if (measured is None) != (speed_pin is None):
+            missing, there = ("--speed-pin", name_of) if speed_pin is None else (name_of, "--speed-pin")
             raise InputError(f"{missing}: missing: with {there} state both: the torque is told from current and speed")
         job, sources = load_hal(file), {}
-        if current_pin is not None and speed_pin is not None:
-            job, sources = replace(job, source="current"), {"current-in": current_pin, "speed-in": speed_pin}
+        if measured is not None and speed_pin is not None:
+            job = replace(job, source="current" if power_pin is None else "power")
+            sources = {"current-in": measured, "speed-in": speed_pin}
         asked: list[int] = []
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda n, _: asked.append(n))

@@ -35,7 +35,9 @@ from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
 
-SOURCES = ("plant", "current", "pin")
+SOURCES = ("plant", "current", "power", "pin")
+#: sources that the torque is estimated from, with the speed
+MEASURED = ("current", "power")
 #: share of its speed by which the spindle may differ from it where its torque is trusted
 SPEED_SHARE = 0.1
 #: longest substep of the simulated spindle [s]
@@ -55,7 +57,8 @@ class HalJob:
     ----------
     path : of the tip in the coordinates of the pins, with its torque
     override, table : the controller
-    source : of the torque: ``plant``, the simulated spindle; ``current``, pins of current and speed; ``pin``, a torque
+    source : of the torque: ``plant``, the simulated spindle; ``current`` or ``power``, pins of it and of the speed;
+        ``pin``, a torque
     spindle : what the estimator takes the spindle for; its lags hold for a torque of a pin too
     acceleration : of the axes [mm/s^2]
     period : between steps [s]
@@ -64,12 +67,13 @@ class HalJob:
     window : the machine is looked for so far from its last place [mm], on the whole path while it is off it
     away : farther from the path it is not on it [mm]
     deviation : of the simulated spindle from ``spindle``
+    told_from : ``current`` or ``power``, what ``spindle`` was identified from; of power its currents are P / w [N m]
     """
 
     path: ToolPath
     override: Override
     table: FuzzyTable
-    source: Literal["plant", "current", "pin"]
+    source: Literal["plant", "current", "power", "pin"]
     spindle: Spindle
     acceleration: float
     period: float
@@ -78,6 +82,7 @@ class HalJob:
     window: float
     away: float
     deviation: SpindleDeviation = AS_STATED
+    told_from: Literal["current", "power"] = "current"
 
     def __post_init__(self) -> None:
         if self.source not in SOURCES:
@@ -87,6 +92,13 @@ class HalJob:
                 raise InputError(f"hal.{name} = {getattr(self, name):g}: must be above 0")
         if not 0.0 <= self.latency <= 10.0:
             raise InputError(f"hal.latency = {self.latency:g} s: must be from 0 to 10")
+        if self.told_from not in MEASURED:
+            raise InputError(f"hal.told_from = {self.told_from!r}: must be one of {', '.join(MEASURED)}")
+        if self.source in MEASURED and self.source != self.told_from:
+            raise InputError(
+                f"hal.source = {self.source!r}: the spindle was identified from its {self.told_from}: name the pin of "
+                f"that, --{self.told_from}-pin, or identify it from logs of its {self.source}"
+            )
         check_light(self.spindle, self.period, self.override.light)
 
 
@@ -150,13 +162,15 @@ class _Cut:
 
     def _measure(self, seen: PinValues, real: Spindle, noise: float, seconds: float) -> None:
         """The torque from current and speed, those of the pins or the simulated ones."""
-        if self.source == "current":
-            self.current = seen.current
-            if not (math.isfinite(seen.current) and math.isfinite(seen.speed)):
+        if self.source in MEASURED:
+            speed = math.tau * abs(seen.speed)
+            # a power over the speed is a torque [N m]
+            self.current = seen.current if self.source == "current" else seen.current / speed if speed else math.nan
+            if not (math.isfinite(self.current) and math.isfinite(speed)):
                 return
             simulated = self.state
-            turning = replace(simulated, speed=math.tau * abs(seen.speed))
-            self.state = replace(estimated(self.believed, turning, seen.current, seconds), speed=simulated.speed)
+            turning = replace(simulated, speed=speed)
+            self.state = replace(estimated(self.believed, turning, self.current, seconds), speed=simulated.speed)
         else:
             self.current = read_current(real, self.state, noise)
             self.state = estimated(self.believed, self.state, self.current, seconds)
@@ -165,12 +179,12 @@ class _Cut:
         """The torque that the controller is told [N mm]; not a number: there is none."""
         if self.source == "pin":
             return 1e3 * seen.torque
-        lost = self.source == "current" and not (math.isfinite(seen.current) and math.isfinite(seen.speed))
+        lost = self.source in MEASURED and not (math.isfinite(seen.current) and math.isfinite(seen.speed))
         return math.nan if lost else self.state.filtered
 
     def speed(self, seen: PinValues) -> float:
         """Of the spindle [rad/s]."""
-        return math.tau * abs(seen.speed) if self.source == "current" else self.state.speed
+        return math.tau * abs(seen.speed) if self.source in MEASURED else self.state.speed
 
 
 def control(

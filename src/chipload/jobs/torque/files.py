@@ -53,7 +53,7 @@ def program_files(outcome: TorqueResult) -> dict[str, bytes]:
         path=outcome.path, override=case.runs["fuzzy_feedforward"].config, table=outcome.table, source="plant",
         spindle=outcome.spindle, acceleration=case.loop.acceleration, period=case.loop.period,
         latency=case.loop.latency, modelled=True, window=WINDOW_MM, away=AWAY_MM,
-        deviation=outcome.deviation,
+        deviation=outcome.deviation, told_from=outcome.told_from,
     )  # fmt: skip
     out[PATH] = write_path(outcome.path).encode("ascii")
     out[TABLE] = write_fuzzy(outcome.table).encode("ascii")

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,6 +162,7 @@ class TorqueResult:
     path : with what is planned and what is true
     cases : the loop without latency, and as stated; none where no torque is allowable
     controller : of the verdict; None: likewise
+    told_from : what the spindle was identified from
     deviation : of the real spindle from what is believed
     ideal_time : with the feed at the limit at every instant [s]; inf where no torque is allowable
     steps : (n,) columns of the planned path by name
@@ -192,6 +193,7 @@ class TorqueResult:
     controller: Override | None
     table: FuzzyTable
     spindle: Spindle
+    told_from: Literal["current", "power"]
     deviation: SpindleDeviation
     estimate: Estimate | None
     ideal_time: float

@@ -48,7 +48,7 @@ from chipload.jobs.torque.outcome import (
     TorqueResult,
 )
 from chipload.jobs.torque.remedies import remedy_text
-from chipload.jobs.torque.spindle import deviation_of, estimate_range, require_resolved, spindle_of
+from chipload.jobs.torque.spindle import deviation_of, estimate_range, require_resolved, spindle_of, told_from
 from chipload.jobs.torque.step_checks import step_checks
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.program import Program
@@ -113,6 +113,7 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
         controller=controller,
         table=table,
         spindle=spindle,
+        told_from=told_from(job, spindle),
         deviation=deviation_of(job),
         estimate=_estimate(job, cases, spindle, controller) if controller is not None else None,
         ideal_time=shortest_time,

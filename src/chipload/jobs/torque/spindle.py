@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,12 @@ def spindle_of(job: TorqueJob, speeds: Floats) -> Spindle:
         current_step=values["current_step_a"], idle_error=values["idle_error_share"],
         torque_constant_error=values["torque_constant_error_share"],
     )  # fmt: skip
+
+
+def told_from(job: TorqueJob, spindle: Spindle) -> Literal["current", "power"]:
+    """What the spindle was identified from."""
+    power = job.spindle_file is not None and read_spindle(job.spindle_file, spindle.speed).source == "power"
+    return "power" if power else "current"
 
 
 def deviation_of(job: TorqueJob) -> SpindleDeviation:

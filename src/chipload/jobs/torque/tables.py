@@ -138,7 +138,8 @@ class SpindleDeviationTable(Table):
 class SpindleTable(Table):
     """The spindle that the torque is estimated from.
 
-    Keys that ``chipload spindle`` identifies may stand in its file.
+    Keys that ``chipload spindle`` identifies may stand in its file. Of a spindle that is told from its power all
+    currents are torques, power over speed [N m].
     """
 
     file: Text | None = Field(None, description="what `chipload spindle` wrote; a key that is stated here counts more")
