@@ -30,7 +30,7 @@ import numpy as np
 from chipload.errors import InputError
 
 #: modules whose functions a child may be asked for, each a function of the shape and of plain values
-SERVED = ("step", "step_faces", "step_meridian", "step_patch")
+SERVED = ("step", "step_faces", "step_meridian", "step_patch", "step_roles", "step_side")
 #: time of the processor [s] for each call, and more for each MB of the file
 CALL_S, MB_S = 10.0, 10.0
 #: a call may take so many times as long by the clock, for the processor may be shared
