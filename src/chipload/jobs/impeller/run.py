@@ -24,7 +24,7 @@ from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.impeller.answer import Answer, largest_cutters, one_cutter, one_cutter_of
 from chipload.planning.impeller.compare import Partition, compared
 from chipload.planning.impeller.costs import ChannelSide, Terms
-from chipload.planning.impeller.covering.covering import Covering, covering_of
+from chipload.planning.impeller.covering.covering import Covering, covering_of, first_edge
 from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.surfaces import BODIES, ContactSampling, ContactSurface, hub_range, surface_of
 from chipload.planning.impeller.tables import IndexTable, index_table
@@ -109,12 +109,10 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
     for k, surface in enumerate(_surfaces(job, impeller)):
         s = surface.scene
         lines.append(f"surface {k}: {surface.name}: {len(s.contact)} contact points, {len(s.check)} check points")
-    covering = _covering(job, impeller, catalogue)
-    if covering is not None:
-        lines.append(
-            f"between check points: certified within {covering.tolerance:g} mm for corner radii from "
-            f"{covering.corner:g} mm, by {len(covering.points)} points of the walls"
-        )
+    corner = _least_corner(job, impeller, catalogue)
+    if corner is not None:
+        within = job.operation.tolerance_mm
+        lines.append(f"between check points: certified within {within:g} mm for corner radii from {corner:g} mm")
     corners = ", ".join(f"{r:g}" for r in catalogue.families)
     lines.append(f"catalogue {catalogue.name}: {len(catalogue.cutters)} cutters, corner radii {corners} mm")
     return lines, True
@@ -216,14 +214,21 @@ def _tables(machine: Machine, op: ImpellerOperationTable) -> IndexTable:
 
 def _covering(job: ImpellerJob, impeller: Impeller, catalogue: Catalogue) -> Covering | None:
     """The walls covered for every cutter with a corner radius; None: there is no such cutter."""
-    op = job.operation
-    corners = [r for r in catalogue.families if r > 0.0]
-    if not corners:
+    op, corner = job.operation, _least_corner(job, impeller, catalogue)
+    if corner is None:
         return None
-    try:
-        return covering_of(impeller, op.tolerance_mm, min(corners), op.around, hub_range(impeller, _ahead(job)))
-    except InputError as err:
-        raise InputError(f"operation.0.tolerance_mm = {op.tolerance_mm:g}: {err}") from None
+    return covering_of(impeller, op.tolerance_mm, corner, op.around, hub_range(impeller, _ahead(job)))
+
+
+def _least_corner(job: ImpellerJob, impeller: Impeller, catalogue: Catalogue) -> float | None:
+    """The least corner radius above 0, for which the walls can be covered; None: there is none."""
+    op, corner = job.operation, min((r for r in catalogue.families if r > 0.0), default=None)
+    if corner is not None:
+        try:
+            first_edge(impeller, op.tolerance_mm, corner, op.around)
+        except InputError as err:
+            raise InputError(f"operation.0.tolerance_mm = {op.tolerance_mm:g}: {err}") from None
+    return corner
 
 
 def _surfaces(job: ImpellerJob, impeller: Impeller, covering: Covering | None = None) -> list[ContactSurface]:

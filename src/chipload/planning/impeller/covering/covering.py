@@ -159,15 +159,7 @@ def covering_of(
     InputError
         There would be too many nodes.
     """
-    sunk = SUNK * tolerance
-    tight = min(tolerance, 0.5 * corner)
-    edge = _FIRST * math.sqrt(2.0 * ((corner - sunk) ** 2 - (corner - tight) ** 2))
-    count = _area(impeller, around) / edge**2
-    if count > _MOST_NODES:
-        raise InputError(
-            f"a corner radius of {corner:g} mm needs about {count:.2g} points of the walls: must be at most "
-            f"{_MOST_NODES:g}: state more, or leave cutters of so small a corner radius out of the catalogue"
-        )
+    sunk, edge = SUNK * tolerance, first_edge(impeller, tolerance, corner, around)
     while True:
         parts = _walls(impeller, around, hub_range, edge)
         reach, bend = max(x.reach for x in parts), max(x.bend for x in parts)
@@ -176,6 +168,25 @@ def covering_of(
         edge *= _LESS
     points = np.concatenate([x.points - sunk * x.normals for x in parts])
     return Covering(points, tolerance, corner, reach, bend, sunk)
+
+
+def first_edge(impeller: Impeller, tolerance: float, corner: float, around: int) -> float:
+    """Width of the first cells [mm] of :func:`covering_of`.
+
+    Raises
+    ------
+    InputError
+        There would be too many nodes.
+    """
+    sunk, tight = SUNK * tolerance, min(tolerance, 0.5 * corner)
+    edge = _FIRST * math.sqrt(2.0 * ((corner - sunk) ** 2 - (corner - tight) ** 2))
+    count = _area(impeller, around) / edge**2
+    if count > _MOST_NODES:
+        raise InputError(
+            f"a corner radius of {corner:g} mm needs about {count:.2g} points of the walls: must be at most "
+            f"{_MOST_NODES:g}: state more, or leave cutters of so small a corner radius out of the catalogue"
+        )
+    return edge
 
 
 def _area(impeller: Impeller, around: int) -> float:
