@@ -140,7 +140,6 @@ PRIVATE = {
     "function program/read:_held",
     "function report/diagram:_pieces",
     "function report/shape:pieces",
-    "function simulation/channel/channel:_pieces",
     "function simulation/checkpoint:pieces",
     "function simulation/chips:bites",
     "function simulation/section_deviation:beside",

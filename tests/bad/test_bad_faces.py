@@ -12,13 +12,14 @@ import pytest
 from chipload import examples
 from chipload.errors import InputError
 from chipload.examples import copy_example
-from chipload.geometry.bspline import BSplinePatch
+from chipload.geometry.bspline import BSplinePatch, through
 from chipload.geometry.revolve import Revolved
 from chipload.jobs import check_job, load_job
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from step_files import face, turned, written
 
 EXAMPLES = Path(examples.__file__).parent
+U, V = (x.ravel() for x in np.meshgrid(np.linspace(0.0, 1.0, 15), np.linspace(0.0, 1.0, 9), indexing="ij"))
 IMPELLER = impeller_of(ImpellerShape())
 STEP = """[impeller.step]
 file = "impeller.step"
@@ -164,12 +165,26 @@ def test_a_face_with_a_hole(job):
 
 def test_a_face_with_three_sides(job):
     written(job.parent / "impeller.step", three_sided(), *FACES[1:])
-    said = refused(job)
-    assert said.startswith("impeller.step.plus: face 1 has 3 edges and 3 corners of more than 20 deg, at (")
-    assert said.endswith(
-        ") mm: must have four sides: hub, shroud and two edges of a blade, or those of a wall: cut the face in CAD "
-        "along the edge that is missing, or state sections instead of faces"
+    assert refused(job) == (
+        "impeller.step.plus: face 1: no edge along the shroud, nearest 24.4 mm: state all faces of the side, or check "
+        "shroud"
     )
+
+
+def test_a_part_of_a_side(job):
+    """Half of a side does not reach from hub to shroud."""
+    blade = IMPELLER.blade
+    lower = through(blade.plus.at(U, 0.5 * V).reshape(15, 9, 3), U[::9], V[:9])
+    written(job.parent / "impeller.step", face(lower), face(lower), *FACES[1:])
+    text = refused(
+        job, "plus = 1\nminus = 2\nhub = [3]\nshroud = [4]", "plus = [1, 2]\nminus = 3\nhub = [4]\nshroud = [5]"
+    )
+    assert text.startswith("impeller.step.plus: faces 1, 2: no edge along the shroud, nearest ")
+    assert text.endswith(" mm: state all faces of the side, or check shroud")
+
+
+def test_a_face_of_a_side_twice(job):
+    assert refused(job, "plus = 1", "plus = [1, 1]") == ("impeller.step.plus: face 1 stands twice: name each face once")
 
 
 def test_a_hub_with_a_corner(job):

@@ -232,7 +232,7 @@ def test_a_stopped_run_leaves_no_half_file(job_dir: Path, tmp_path: Path, number
         "from chipload.jobs.contour.result import result_of\n"
         "one = made.made_outcome()\n"
         "done = jobs.FinishedJob(result_of(one), presentation_of(one), one)\n"
-        "jobs.run_job = lambda loaded, progress, kept: done\n"
+        "jobs.run_job = lambda loaded, progress, kept, **_: done\n"
         "main()\n"
     )
     words = [sys.executable, "-c", slow, "run", str(job_dir / "job.toml"), "--out", str(tmp_path / "r")]

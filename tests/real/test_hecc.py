@@ -104,7 +104,7 @@ def test_largest_cutters_of_each_side(impeller, body, side):
     sizes = [CatalogueCutter(d, r) for d in (2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0)]
     tables = np.radians(np.arange(20.0, 91.0, 10.0))
     found = largest_cutters(s, Catalogue("shop", tuple(sizes)), tables, 0.0)
-    assert found.certified.all()
+    assert found.bounded.all()
     # nothing is dropped: reached, or listed with its reason
     missed = {u.point for u in found.unreachable}
     assert missed == set(np.flatnonzero(found.cutter < 0).tolist())

@@ -31,7 +31,7 @@ from chipload.errors import InputError
 from chipload.lazy import require_extra
 
 #: modules whose functions a child may be asked for, each a function of the shape and of plain values
-SERVED = ("brep", "step", "step_faces", "step_meridian", "step_patch")
+SERVED = ("brep", "step", "step_faces", "step_meridian", "step_patch", "step_roles", "step_side")
 #: time of the processor [s] for each call, and more for each MB of the file
 CALL_S, MB_S = 10.0, 10.0
 #: a call may take so many times as long by the clock, for the processor may be shared

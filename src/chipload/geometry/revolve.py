@@ -52,6 +52,11 @@ class Revolved:
         object.__setattr__(self, "meridian", m)
         object.__setattr__(self, "_curve", make_interp_spline(s / s[-1], m, k=min(3, len(m) - 1)))
 
+    @property
+    def knots(self) -> Floats:
+        """Places s (k,) between which the curve is a polynomial of at most third degree."""
+        return np.unique(self._curve.t)
+
     def curve(self, s: ArrayLike, derivative: int = 0) -> Floats:
         """(k, 2) r and z [mm] at s, or a derivative."""
         out: Floats = self._curve(np.asarray(s, dtype=np.float64), nu=derivative)

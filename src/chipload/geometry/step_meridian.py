@@ -24,11 +24,13 @@ JOIN = 1e-2
 SMOOTH = np.radians(10.0)
 #: a face is of revolution if the radius and the height round it change by less [mm]
 ROUND = 1e-3
+#: the long edges of the tip of a blade are nearer than this in radius and height [mm]
+TIP = 1.0
 #: points of a face's meridian
 COUNT = 201
 
 
-def meridian_of(faces: Sequence[Face], R: Floats, key: str) -> Floats:
+def meridian_of(faces: Sequence[Face], R: Floats, key: str, tips: bool = False) -> Floats:
     """The meridional curve of faces, from the inlet to the outlet: from the end that lies high and near to the axis.
 
     Parameters
@@ -36,6 +38,7 @@ def meridian_of(faces: Sequence[Face], R: Floats, key: str) -> Floats:
     faces : in any order, each going on where another ends
     R : (3, 3) rotation from the frame of the file to that whose axis is z
     key : who asks, for a message
+    tips : a face that is not of revolution counts as the tip of a blade: its meridian is the middle of its long edges
 
     Returns
     -------
@@ -46,15 +49,15 @@ def meridian_of(faces: Sequence[Face], R: Floats, key: str) -> Floats:
     InputError
         A face is not of revolution about the axis, or they do not go on smoothly one after another.
     """
-    out: Floats = faces[0].part.call("step_meridian.joined", [f.number for f in faces], R, key)
+    out: Floats = faces[0].part.call("step_meridian.joined", [f.number for f in faces], R, key, tips)
     return out
 
 
 # -- in the process of the CAD kernel ---------------------------------------------------------------------------
-def joined(part: Part, numbers: Sequence[int], R: Floats, key: str) -> Floats:
+def joined(part: Part, numbers: Sequence[int], R: Floats, key: str, tips: bool) -> Floats:
     """What :func:`meridian_of` gives of the faces of these numbers."""
     rest = [inside(part, number) for number in numbers]
-    left = [_meridian(f, R, key) for f in rest]
+    left = [meridian_in(f, R, key, tips) for f in rest]
     # begin with the piece that has the first of all ends
     ends = [max(_first(p[0]), _first(p[-1])) for p in left]
     k = int(np.argmax(ends))
@@ -87,7 +90,7 @@ def _first(p: Floats) -> float:
     return float(p[1] - p[0])
 
 
-def _meridian(face: Inside, R: Floats, key: str) -> Floats:
+def meridian_in(face: Inside, R: Floats, key: str, tips: bool) -> Floats:
     """(n, 2) r and z of one face, in either sense."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepTools import BRepTools
@@ -108,6 +111,8 @@ def _meridian(face: Inside, R: Floats, key: str) -> Floats:
             raise InputError(f"{key}: face {face.number} is a plane along the axis: must be of revolution about it")
         return _across(face, R)
     round_u, round_v = (float(np.ptp(grid, axis=k).max()) for k in (0, 1))
+    if min(round_u, round_v) > ROUND and tips:
+        return _tip(face, R, key)
     if min(round_u, round_v) > ROUND:
         raise InputError(
             f"{key}: face {face.number} is not of revolution about the axis: round it radius or height change by "
@@ -118,8 +123,40 @@ def _meridian(face: Inside, R: Floats, key: str) -> Floats:
     return rz(u, np.full(COUNT, v[0]))
 
 
+def _tip(face: Inside, R: Floats, key: str) -> Floats:
+    """Half-way between the two longest edges of the tip of a blade, by shares of their length."""
+    rows = sorted(_edges(face, R), key=lambda e: -float(np.linalg.norm(np.diff(e, axis=0), axis=1).sum()))[:2]
+    curves = []
+    for p in rows:
+        m = np.stack([np.hypot(p[:, 0], p[:, 1]), p[:, 2]], axis=-1)
+        length = np.concatenate([[0.0], np.linalg.norm(np.diff(m, axis=0), axis=1).cumsum()])
+        if length[-1] == 0.0:
+            raise InputError(
+                f"{key}: face {face.number} is not the tip of a blade: an edge has no length along the axis"
+            )
+        share = np.linspace(0.0, length[-1], COUNT)
+        curves.append(np.stack([np.interp(share, length, m[:, k]) for k in (0, 1)], axis=-1))
+    a, b = curves
+    if np.linalg.norm(a[0] - b[-1]) < np.linalg.norm(a[0] - b[0]):
+        b = b[::-1]
+    apart = float(np.linalg.norm(a - b, axis=1).max())
+    if apart > TIP:
+        raise InputError(
+            f"{key}: face {face.number} is neither of revolution about the axis nor the tip of a blade: its edges are "
+            f"{apart:.4g} mm apart in radius and height, at most {TIP:g} mm: check flow, or state a file of points"
+        )
+    return np.asarray(0.5 * (a + b), dtype=np.float64)
+
+
 def _across(face: Inside, R: Floats) -> Floats:
     """Of a plane across the axis: from its least to its greatest radius along its edges."""
+    p = np.concatenate(_edges(face, R))
+    r = np.hypot(p[:, 0], p[:, 1])
+    return np.stack([np.linspace(r.min(), r.max(), COUNT), np.full(COUNT, p[:, 2].mean())], axis=-1)
+
+
+def _edges(face: Inside, R: Floats) -> list[Floats]:
+    """Points (n, 3) of each edge of a face."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve
     from OCP.TopAbs import TopAbs_EDGE
     from OCP.TopExp import TopExp_Explorer
@@ -133,6 +170,4 @@ def _across(face: Inside, R: Floats) -> Floats:
         t = np.linspace(curve.FirstParameter(), curve.LastParameter(), COUNT)
         made = [curve.Value(float(x)) for x in t]
         rows.append(np.array([(p.X(), p.Y(), p.Z()) for p in made]) @ R.T)
-    p = np.concatenate(rows)
-    r = np.hypot(p[:, 0], p[:, 1])
-    return np.stack([np.linspace(r.min(), r.max(), COUNT), np.full(COUNT, p[:, 2].mean())], axis=-1)
+    return rows

@@ -38,7 +38,7 @@ PIECES = (2, 4, 8, 16)
 #: greatest change of the distance of parameter lines that is kept
 UNEVEN = 2.0
 _SAMPLES = 201
-_POLYNOMIAL = ("plane", "b-spline", "Bezier", "of extrusion")
+POLYNOMIAL = ("plane", "b-spline", "Bezier", "of extrusion")
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,21 @@ def patch_of(face: Face, key: str, fit: float) -> ReadFace:
     return ReadFace(BSplinePatch(knots_u, knots_v, control, side), kept, off)
 
 
+def four_sided(face: Face) -> bool:
+    """Whether a face is one piece with four corners, which :func:`patch_of` takes."""
+    return bool(face.part.call("step_patch.has_four", face.number))
+
+
 # -- in the process of the CAD kernel ---------------------------------------------------------------------------
+def has_four(part: Part, number: int) -> bool:
+    """As :func:`four_sided`, of the face of that number."""
+    from OCP.BRep import BRep_Tool
+
+    face = inside(part, number)
+    loop = loop_of(face, BRep_Tool.Surface_s(face.shape))
+    return face.holes == 0 and (len(loop) == 4 or len(_corners(loop)) == 4)
+
+
 def taken(part: Part, number: int, key: str, fit: float) -> tuple[Floats, Floats, Floats, int, bool, float]:
     """Knots, poles and side of the patch of a face, whether they are those of the file, and how far it leaves it."""
     made = _taken(inside(part, number), key, fit)
@@ -95,12 +109,12 @@ def _taken(face: Inside, key: str, fit: float) -> ReadFace:
         raise InputError(f"{key}: face {face.number} has {said}: must be one piece without any")
     surface = BRep_Tool.Surface_s(face.shape)
     side = -1 if face.shape.Orientation() == TopAbs_REVERSED else 1
-    loop = _loop(face, surface)
-    rim, low, high = _box(loop, surface)
-    if rim <= fit and face.kind in _POLYNOMIAL:
-        kept = _kept(surface, low, high, side)
+    loop = loop_of(face, surface)
+    rim, low, high = box_of(loop, surface)
+    if rim <= fit and face.kind in POLYNOMIAL:
+        kept = kept_of(surface, low, high, side)
         if kept is not None:
-            off = max(rim, _off(kept, lambda s, t: low + np.stack([s, t], axis=-1) * (high - low), surface, 17))
+            off = max(rim, off_of(kept, lambda s, t: low + np.stack([s, t], axis=-1) * (high - low), surface, 17))
             if off <= fit:
                 return _even(ReadFace(kept, True, off), face, key, fit)
     return _fitted(face, surface, loop, side, key, fit)
@@ -117,12 +131,13 @@ class _Piece:
     length: Floats
 
 
-def _points(surface: Any, uv: Floats) -> Floats:
+def points_of(surface: Any, uv: Floats) -> Floats:
+    """Points (..., 3) [mm] of a surface of the kernel at u and v (..., 2)."""
     out = [surface.Value(float(u), float(v)) for u, v in uv.reshape(-1, 2)]
     return np.array([(p.X(), p.Y(), p.Z()) for p in out]).reshape(*uv.shape[:-1], 3)
 
 
-def _loop(face: Inside, surface: Any) -> list[_Piece]:
+def loop_of(face: Inside, surface: Any) -> list[_Piece]:
     """The edges round the face, those without length left out."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Curve2d
@@ -145,14 +160,14 @@ def _loop(face: Inside, surface: Any) -> list[_Piece]:
             return p.X(), p.Y()
 
         uv = np.array([at(float(x)) for x in t])
-        points = _points(surface, uv)
+        points = points_of(surface, uv)
         length = np.concatenate([[0.0], np.linalg.norm(np.diff(points, axis=0), axis=1).cumsum()])
         if length[-1] > 0.0:
             out.append(_Piece(at, t, uv, points, length))
     return out
 
 
-def _box(loop: list[_Piece], surface: Any) -> tuple[float, Floats, Floats]:
+def box_of(loop: list[_Piece], surface: Any) -> tuple[float, Floats, Floats]:
     """How far [mm] the loop is from the box of parameter lines round it, and the box."""
     uv = np.concatenate([p.uv for p in loop])
     low, high = uv.min(axis=0), uv.max(axis=0)
@@ -167,12 +182,12 @@ def _box(loop: list[_Piece], surface: Any) -> tuple[float, Floats, Floats]:
             for value in (low[axis], high[axis]):
                 snapped = p.uv.copy()
                 snapped[:, axis] = value
-                away.append(np.linalg.norm(_points(surface, snapped) - p.points, axis=1).max())
+                away.append(np.linalg.norm(points_of(surface, snapped) - p.points, axis=1).max())
         rim = max(rim, float(min(away)))
     return rim, low, high
 
 
-def _kept(surface: Any, low: Floats, high: Floats, side: int) -> BSplinePatch | None:
+def kept_of(surface: Any, low: Floats, high: Floats, side: int) -> BSplinePatch | None:
     """Poles and knots of the kernel's surface within a box; None: it is rational."""
     from OCP.Geom import Geom_RectangularTrimmedSurface
     from OCP.GeomConvert import GeomConvert
@@ -200,11 +215,11 @@ def _unit(knots: Floats) -> Floats:
     return out
 
 
-def _off(patch: BSplinePatch, uv_of: Callable[[Floats, Floats], Floats], surface: Any, count: int) -> float:
+def off_of(patch: BSplinePatch, uv_of: Callable[[Floats, Floats], Floats], surface: Any, count: int) -> float:
     """Greatest distance [mm] of patch and surface at the middles between ``count`` places and along the sides."""
     x = np.linspace(0.0, 1.0, 2 * count - 1)
     s, t = np.meshgrid(x, x, indexing="ij")
-    points = _points(surface, uv_of(s, t))
+    points = points_of(surface, uv_of(s, t))
     return float(np.linalg.norm(patch.at(s.ravel(), t.ravel()).reshape(points.shape) - points, axis=2).max())
 
 
@@ -235,10 +250,10 @@ def _fitted(face: Inside, surface: Any, loop: list[_Piece], side: int, key: str,
             raise InputError(
                 f"{key}: face {face.number} folds between its four sides: state it in parts, or as sections"
             )
-        patch = through(_points(surface, uv), x, x, side=int(np.sign(sense[0, 0])) * side)
+        patch = through(points_of(surface, uv), x, x, side=int(np.sign(sense[0, 0])) * side)
         middles = np.sort(np.concatenate([x, 0.5 * (x[1:] + x[:-1])]))
         s, t = np.meshgrid(middles, middles, indexing="ij")
-        points = _points(surface, uv_of(s, t))
+        points = points_of(surface, uv_of(s, t))
         off = float(np.linalg.norm(patch.at(s.ravel(), t.ravel()).reshape(points.shape) - points, axis=2).max())
         best = min(best, off)
         if off <= fit:
@@ -302,12 +317,7 @@ def _four(face: Inside, loop: list[_Piece], key: str) -> list[list[_Piece]]:
     """The loop as four sides."""
     if len(loop) == 4:
         return [[p] for p in loop]
-    corner = []
-    for before, after in zip([loop[-1], *loop[:-1]], loop, strict=True):
-        a, b = before.points[-1] - before.points[-2], after.points[1] - after.points[0]
-        turn = np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)
-        corner.append(bool(turn > CORNER))
-    starts = np.flatnonzero(corner)
+    starts = _corners(loop)
     if len(starts) != 4:
         at = ", ".join("(" + ", ".join(f"{x:.4g}" for x in loop[k].points[0]) + ")" for k in starts.tolist()[:6])
         raise InputError(
@@ -319,6 +329,16 @@ def _four(face: Inside, loop: list[_Piece], key: str) -> list[list[_Piece]]:
     ring = loop[starts[0] :] + loop[: starts[0]]
     ends = [*(starts - starts[0]).tolist(), len(loop)]
     return [ring[a:b] for a, b in pairwise(ends)]
+
+
+def _corners(loop: list[_Piece]) -> NDArray[np.int64]:
+    """Which edges of a loop begin at a corner."""
+    corner = []
+    for before, after in zip([loop[-1], *loop[:-1]], loop, strict=True):
+        a, b = before.points[-1] - before.points[-2], after.points[1] - after.points[0]
+        turn = np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)
+        corner.append(bool(turn > CORNER))
+    return np.flatnonzero(corner)
 
 
 def _side(pieces: list[_Piece]) -> Callable[[Floats], Floats]:

@@ -98,8 +98,10 @@ def _fuzzy(path: Path) -> list[str]:
 
 def _model(path: Path) -> list[str]:
     from chipload.geometry.step_faces import read_faces
+    from chipload.geometry.step_roles import roles_of
 
-    return list(read_faces(path, "model").lines())
+    model = read_faces(path, "model")
+    return [*model.lines(), *roles_of(model)]
 
 
 def _mesh(path: Path) -> list[str]:

@@ -55,6 +55,18 @@ Count = Annotated[int, BeforeValidator(_only_count), Field(ge=1, le=1000)]
 FaceName = Annotated[int | tuple[float, float, float], BeforeValidator(_only_face)]
 
 
+def _side_faces(value: Any) -> Any:
+    """One face, or a list of several; three numbers are a point."""
+    several = isinstance(value, list | tuple) and len(value) > 0
+    if several and not (len(value) == 3 and all(isinstance(x, int | float) for x in value)):
+        return tuple(_only_face(x) for x in value)
+    return _only_face(value)
+
+
+#: a side of a blade: a face, or several that make it together
+SideFaces = Annotated[int | tuple[float, float, float] | tuple[FaceName, ...], BeforeValidator(_side_faces)]
+
+
 Text = Annotated[str, Field(min_length=1)]
 
 

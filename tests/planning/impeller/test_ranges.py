@@ -89,7 +89,9 @@ def test_answer_agrees_with_the_gouge_test_over_the_catalogue():
     tables = np.radians([25.0, 45.0, 65.0])
     catalogue = catalogue_named("wu2019")
     found = largest_cutters(s, catalogue, tables, clearance=0.0)
-    assert found.certified.all()
+    assert found.bounded.all()
+    # without a covering of the walls nothing is certified between the check points
+    assert not found.certified.any()
     B = np.radians(np.arange(0.25, 360.0, 0.5))
     for k in range(3):
         D = found.diameter[k]

@@ -40,7 +40,7 @@ def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
     rows = [
         [
             str(k), f"<code>{escape(program_name(milled, k))}</code>", str(len(p.setting.program)),
-            f"{p.setting.length:.1f}", f"{p.seconds / 60.0:.2f}", f"{p.gouge:.4f}",
+            f"{p.setting.length:.1f}", f"{p.seconds / 60.0:.2f}", f"{p.gouge.found:.4f} to {p.gouge.bound:.4f}",
             f"{p.missed:.1f}", str(sum(len(r.tracks) for r in p.setting.rests)),
             f"{p.setting.linked.direct} + {p.setting.linked.retracts}",
             '<span class="ok">verified</span>' if p.verified else '<span class="no">not verified</span>',

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from html import escape
 
@@ -10,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from chipload.jobs.impeller.checks import program_sections
-from chipload.jobs.impeller.outcome import ImpellerResult, Searched, for_all, largest, unreached_text
+from chipload.jobs.impeller.outcome import ImpellerResult, Searched, for_all, largest, uncertified_text, unreached_text
 from chipload.jobs.impeller.partitions import divided_sections
 from chipload.jobs.impeller.programs import program_files
 from chipload.jobs.impeller.result import failures_of
@@ -51,7 +50,7 @@ def _overview(milled: ImpellerResult) -> str:
             ]
         )  # fmt: skip
     head = ["", "surface", "one cutter for all [mm]", "table [deg]", "point by point, D [mm]", "contact points"]
-    head += ["check points", "not reached", "not proved", "search [s]"]
+    head += ["check points", "not reached", "not certified", "search [s]"]
     return f"<p>{escape(_sentence(for_all(milled)))}.</p>{table(head, rows, numbers=(3, 4, 5, 6, 7, 8, 9))}"
 
 
@@ -98,14 +97,26 @@ def _ranges_note(op: Searched) -> str:
     return f"Where {name} is clear at the table angle {alpha:.6g} deg, exact at both ends."
 
 
+def _between(op: Searched) -> str:
+    """What is certified between the check points."""
+    answer, covering = op.answer, op.surface.scene.covering
+    if covering is None:
+        return "Between the check points nothing is certified: no cutter has a corner radius."
+    return (
+        f"For {int(answer.certified.sum())} no wall lies deeper in the cutter than {covering.tolerance:g} mm between "
+        f"the check points either, at any pallet angle of its ranges: {len(covering.points)} points cover the walls, "
+        f"no point of a wall farther than {covering.reach:.3f} mm from one of them."
+    )
+
+
 def _proof(op: Searched) -> list[str]:
     answer = op.answer
     used = int(sum(len(b) for b in answer.blockers))
     text = (
-        f"For {int(answer.certified.sum())} of {len(op.place)} contact points it is proved that no larger cutter of "
+        f"For {int(answer.bounded.sum())} of {len(op.place)} contact points it is proved that no larger cutter of "
         f"the catalogue goes at any of {len(answer.tables)} table angles and any pallet angle: the arcs of pallet "
         f"angle that a few check points forbid, found exactly, cover all of them. {used} check points do it for all "
-        "contact points together; proof.npz has them, with every bound."
+        f"contact points together; proof.npz has them, with every bound. {_between(op)}"
     )
     rows = []
     shown = [x for x in op.limiting if not op.one or x.corner_radius == op.one.cutter.corner_radius]
@@ -139,18 +150,12 @@ def _proof(op: Searched) -> list[str]:
 
 
 def _open(op: Searched) -> list[str]:
-    s, d = op.settings, float(op.settings["check_mm"])
-    half = d / math.sqrt(2.0)
-    radii = sorted({x.cutter.diameter / 2.0 for x in [op.one] if x}) or [float(op.answer.diameter.max()) / 2.0]
-    corner = op.one.cutter.corner_radius if op.one else op.answer.families[0].corner_radius
-    flank = radii[0] - math.sqrt(radii[0] ** 2 - half**2) if half < radii[0] else radii[0]
-    edge = corner - math.sqrt(corner**2 - half**2) if half < corner else corner
+    s = op.settings
     out = [
-        f"Between check points: they are at most {d:g} mm apart along and across, so that between four of them a flat "
-        f"wall may stand {flank:.3f} mm inside the flank of D {2 * radii[0]:g} mm, and {edge:.3f} mm inside a corner "
-        f"of r {corner:g} mm. check_mm says how fine they are.",
-        f"Near the contact: check points of the own surface nearer than {s['near_mm']:g} mm are stood for by its "
-        "curvature at the contact.",
+        *([uncertified_text(op)] if uncertified_text(op) else []),
+        "The faces at the tip and at the leading and trailing edge of a blade: sides, fillets and hub are walls, each "
+        "with its edges.",
+        "The upper rim of a cutting part over a narrower neck.",
         f"Contact points cover along {s['along'][0]:g} to {s['along'][1]:g} and up {s['up'][0]:g} to {s['up'][1]:g} "
         "of the surface have contact points; between contact points nothing is claimed.",
         "Fillets, fixtures, pallet and the machine's linear axes: they are not in this search.",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ def operation_numbers(milled: ImpellerResult) -> dict[str, Any]:
         **_one(milled.surfaces[0], milled.one),
         **{key: sum(row[key] for row in rows) for key in ("cc_points", "check_points", "unreachable", "search_s")},
         "certified": all(row["certified"] for row in rows),
+        "certified_within_mm": milled.tolerance,
         **(partition_of(milled, used) if used is not None else {}),
         "hand_picked": None if picked is None else _picked(milled, picked),
         "ways": [partition_of(milled, way) for way in milled.partitions],
@@ -89,7 +91,8 @@ def _program(name: str, p: Checked) -> dict[str, Any]:
         "refused_lines": len(p.setting.linked.refused),
         "direct_links": p.setting.linked.direct,
         "retracts": p.setting.linked.retracts,
-        "gouge_mm": p.gouge,
+        "gouge_mm": p.gouge.found,
+        "gouge_bound_mm": p.gouge.bound if math.isfinite(p.gouge.bound) else None,
         "rest_passes": [
             {
                 "surface": f"{BODIES[r.body]} {r.side}",
@@ -149,7 +152,7 @@ def _finished(milled: ImpellerResult) -> dict[str, Any]:
     return {
         "path_mm": float(sum(p.setting.length for p in programs)),
         "time_min": sum(p.seconds for p in programs) / 60.0,
-        "gouge_mm": max((p.gouge for p in programs), default=0.0),
+        "gouge_mm": max((p.gouge.found for p in programs), default=0.0),
         "scallop_mean_mm": mean,
         "scallop_mean_share": None if mean is None else mean / scallops[0].asked,
         "surfaces": [

@@ -23,6 +23,7 @@ from chipload.planning.impeller.surfaces import BODIES, ContactSurface
 from chipload.planning.impeller.tables import IndexTable
 from chipload.result import Provenance
 from chipload.simulation.channel.channel import Remainder
+from chipload.simulation.channel.gouges import Gouge
 
 Floats = NDArray[np.float64]
 
@@ -34,6 +35,7 @@ REASONS: Mapping[str, str] = {
     "curvature": "every corner radius of the catalogue is larger than its radius of curvature",
     "cutting part": "the smallest cutters of the catalogue meet other walls",
     "above": "neck, shank or holder meet other walls",
+    "between": "every cutter that is clear of the check points meets a wall between them",
 }
 
 
@@ -155,7 +157,7 @@ class Checked:
     Parameters
     ----------
     setting : cutter, table angle, patches, moves
-    gouge : deepest that any part of the tool comes below a surface [mm], where it is: ``says``
+    gouge : deepest that any part of the tool comes below a surface, between bounds
     allowed : what of it is allowed [mm]
     scallops : of each patch
     findings : what the program asks of the machine that it does not give
@@ -163,8 +165,7 @@ class Checked:
     """
 
     setting: CutterSetting
-    gouge: float
-    message: str
+    gouge: Gouge
     allowed: float
     scallops: tuple[Scallop, ...]
     findings: tuple[str, ...]
@@ -173,7 +174,7 @@ class Checked:
     @property
     def verified(self) -> bool:
         """No gouge, nothing beyond the machine, no scallop higher than asked."""
-        return self.gouge <= self.allowed and not self.findings and all(s.holds for s in self.scallops)
+        return self.gouge.bound <= self.allowed and not self.findings and all(s.holds for s in self.scallops)
 
     @property
     def missed(self) -> float:
@@ -191,8 +192,8 @@ class Checked:
     def fails(self) -> tuple[str, ...]:
         """What does not hold."""
         out = [f"{self.name}: {f}" for f in self.findings]
-        if self.gouge > self.allowed:
-            out.append(f"{self.name}: {self.message}: gouge_mm = {self.allowed:g} is allowed")
+        if self.gouge.bound > self.allowed:
+            out.append(f"{self.name}: {self.gouge.message}: gouge_mm = {self.allowed:g} is allowed")
         for m, s in zip(self.setting.millings, self.scallops, strict=True):
             if not s.holds:
                 where = f"{BODIES[m.patch.body]} {m.patch.side}"
@@ -298,6 +299,11 @@ class ImpellerResult:
         return min(able, key=lambda way: way.divided.total if way.divided else math.inf, default=None)
 
     @property
+    def tolerance(self) -> float | None:
+        """How deep a wall may lie in a certified cutter [mm]; None: nothing is certified between check points."""
+        return self.surfaces[0].answer.tolerance
+
+    @property
     def area(self) -> float:
         """Of all surfaces [mm^2], one channel."""
         return float(sum(op.surface.area.sum() for op in self.surfaces))
@@ -324,6 +330,27 @@ def unmilled(milled: ImpellerResult) -> tuple[str, ...]:
     divided = milled.used.divided
     untold = divided.untold if divided else 0
     return (f"{untold} ranges of pallet angles had too many arcs to tell: they count as closed",) if untold else ()
+
+
+def uncertified_text(op: Searched) -> str:
+    """Why the largest cutters of contact points are not certified; empty: all are."""
+    answer, covering = op.answer, op.surface.scene.covering
+    count = int((~answer.certified).sum())
+    if not count:
+        return ""
+    text = f"{op.surface.name}: the largest cutter of {count} contact points is not certified"
+    if not answer.bounded.all():
+        return f"{text}: there are too many arcs of pallet angle to tell"
+    if covering is None or any(answer.catalogue.cutters[k].corner_radius == 0.0 for k in np.unique(answer.cutter)):
+        return f"{text} between check points: a sharp corner may meet a wall there: take cutters with a corner radius"
+    return f"{text} between check points: the rim of a shank or holder may meet a wall there: state more clearance_mm"
+
+
+def certified_text(milled: ImpellerResult) -> str:
+    """`certified between the check points within 0.05 mm`."""
+    if milled.tolerance is None:
+        return "nothing is certified between the check points"
+    return f"certified between the check points within {milled.tolerance:g} mm"
 
 
 def for_all(milled: ImpellerResult) -> str:

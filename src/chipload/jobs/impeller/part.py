@@ -17,9 +17,10 @@ from chipload.geometry.bspline import BSplinePatch
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.sections import Blade, checked, checked_diameter, loft, read_meridian, read_sections
 from chipload.geometry.sides import blade_of, foot_off, radius_of
-from chipload.geometry.step_faces import Model, Name, read_faces
+from chipload.geometry.step_faces import Face, Model, Name, read_faces
 from chipload.geometry.step_meridian import meridian_of
-from chipload.geometry.step_patch import patch_of
+from chipload.geometry.step_patch import four_sided, patch_of
+from chipload.geometry.step_side import side_of
 from chipload.jobs.impeller.job import ImpellerJob
 from chipload.jobs.impeller.tables import SectionsTable, ShapeTable, StepTable
 from chipload.planning.impeller.fillets import with_fillets
@@ -28,6 +29,8 @@ from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.surfaces import BODIES
 
 Floats = NDArray[np.float64]
+#: faces of one side
+Names = Name | tuple[Name, ...]
 
 _CYCLE = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 _OVER = np.diag([1.0, -1.0, -1.0])
@@ -116,16 +119,27 @@ def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diamet
         for k, number in enumerate(numbers):
             if number in numbers[:k]:
                 raise InputError(f"{at}: face {number} stands twice: name each face once")
-        found = meridian_of(faces, R, at)
+        found = meridian_of(faces, R, at, tips=key == "shroud")
         (r0, z0), (r1, z1) = found[0], found[-1]
         said.append(f"{key}: {'; '.join(map(str, faces))}: r {r0:.6g}, z {z0:.6g} to r {r1:.6g}, z {z1:.6g} mm")
         return Revolved(found, side)
 
     hub, shroud = revolved("hub", 1), revolved("shroud", -1)
 
-    def blade(plus: Name, minus: Name, prefix: str) -> Blade:
-        sides = [_side(model, name, f"impeller.step.{prefix}{key}", given.fit_mm, R, said)
-                 for key, name in (("plus", plus), ("minus", minus))]  # fmt: skip
+    def blade(plus: Names, minus: Names, prefix: str) -> Blade:
+        def side(key: str, names: Names) -> BSplinePatch:
+            at = f"impeller.step.{prefix}{key}"
+            faces = _faces(model, names, at)
+            if len(faces) == 1 and four_sided(faces[0]):
+                one = patch_of(faces[0], at, given.fit_mm)
+                taken, patch = str(one), one.patch.rotated(R)
+            else:
+                several = side_of(faces, at, given.fit_mm, R, hub, shroud)
+                taken, patch = str(several), several.patch
+            said.append(f"{prefix}{key}: {'; '.join(map(str, faces))}: {taken}")
+            return patch
+
+        sides = [side("plus", plus), side("minus", minus)]
         try:
             made = blade_of(sides[0], sides[1], hub, shroud, math.tau / blades)
             checked_diameter(2.0 * radius_of(made), outer_diameter, "faces")
@@ -141,8 +155,15 @@ def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diamet
     return Part(Impeller(main, splitter, hub, shroud, blades), tuple(said))
 
 
-def _side(model: Model, name: Name, key: str, fit: float, R: Floats, said: list[str]) -> BSplinePatch:
-    face = model.face(name, key)
-    taken = patch_of(face, key, fit)
-    said.append(f"{key.removeprefix('impeller.step.')}: {face}: {taken}")
-    return taken.patch.rotated(R)
+def _faces(model: Model, names: Names, key: str) -> list[Face]:
+    """The faces of a side: a number, a point, or several of either."""
+    if isinstance(names, int):
+        return [model.face(names, key)]
+    if len(names) == 3 and all(isinstance(x, int | float) for x in names):
+        x, y, z = names
+        return [model.face((float(x), float(y), float(z)), key)]  # type: ignore[arg-type]
+    faces = [model.face(name, key) for name in names]  # type: ignore[arg-type]
+    for k, one in enumerate(faces):
+        if any(one.number == other.number for other in faces[:k]):
+            raise InputError(f"{key}: face {one.number} stands twice: name each face once")
+    return faces

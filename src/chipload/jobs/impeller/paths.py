@@ -13,6 +13,7 @@ from chipload.jobs.impeller.tables import ImpellerOperationTable, PathsTable
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.compare import Partition
 from chipload.planning.impeller.coverage import between_lines
+from chipload.planning.impeller.covering.covering import Covering
 from chipload.planning.impeller.floor import patch_of
 from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.lines import LineMotion
@@ -27,9 +28,12 @@ from chipload.program.read import times_on
 from chipload.program.to_axes import to_axes
 from chipload.progress import Progress
 from chipload.simulation.channel.channel import Remainder, SurfacePoints, left_on, scallop_numbers, wall
+from chipload.simulation.channel.gouges import deepest_gouge
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
-#: points of the walls that are looked for gouges, along and up
+#: of the gouge that is allowed, how near its depth is found
+_RESOLUTION = 0.2
+#: points of the walls by which their cells are laid out, and where roughing is looked at, along and up
 _COARSE = (61, 25)
 #: not at the very edges of a blade: there a ray into the metal leaves it again
 _EDGE = 0.01
@@ -44,11 +48,11 @@ _FEW, _BETWEEN = 7, 14
 def checked_programs(
     impeller: Impeller, machine: Machine, table: IndexTable, way: Partition,
     op: ImpellerOperationTable, paths: PathsTable,
-    ahead: float, tools: int, workers: int, progress: Progress,
+    ahead: float, tools: int, workers: int, progress: Progress, covering: Covering | None = None,
 ) -> tuple[tuple[Checked, ...], tuple[Covered, ...]]:  # fmt: skip
     """A program for each setting of the way with what the check finds; what all of them leave on each surface.
 
-    ``tools`` : how many tool numbers are taken.
+    ``tools`` : how many tool numbers are taken; ``covering`` : of the walls between check points.
     """
     assert way.divided is not None
     feed = mm_s_from_mm_min(op.feed_mm_min)
@@ -60,6 +64,7 @@ def checked_programs(
     scene = channel_scene(
         impeller, ContactSampling((0.0, 1.0), (0.0, 1.0), (2, 2), paths.check_mm, op.near_mm, op.around, ahead)
     )
+    scene = replace(scene, covering=covering, known=scene.tree)
     job = FinishSettings(
         impeller, way.catalogue, scene, PatchFinish(op.scallop_mm, motion, paths.overrun_mm), link,
         rad_s_from_rpm(op.speed_rpm), table, ahead, workers, tools,
@@ -76,26 +81,29 @@ def _checked(
     faces = list(dict.fromkeys((m.patch.body, m.patch.side) for m in millings))
     dense = [_dense(impeller, m, job.ahead) for m in millings]
     whole = [_whole(job, body, side, millings) for body, side in faces]
-    walls = [*walls_of(impeller, job.ahead), *dense, *whole]
+    coarse = walls_of(impeller, job.ahead)
+    walls = [*dense, *whole]
     found = []
     for k, setting in enumerate(settings, 1):
         found.append(left_on(walls, setting.program, setting.cutter, _HEIGHT, _DEPTH, workers=job.workers))
         progress(k / len(settings), f"check of {k} programs")
     # what is left is what no program takes
     rest = [replace(same[0], rest=np.min([x.rest for x in same], axis=0)) for same in zip(*found, strict=True)]
-    crests = iter(rest[len(walls) - len(whole) - len(dense) :])
+    crests = iter(rest)
     out = []
-    for setting, own in zip(settings, found, strict=True):
+    for setting in settings:
         program = setting.program
         scallops = tuple(_scallop(m, next(crests), asked) for m in setting.millings)
         _, findings = to_axes(program, machine)
         said = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
-        worst = max(own, key=lambda left: left.deepest[0])
+        gouge = deepest_gouge(
+            coarse, program, setting.cutter, _DEPTH, _RESOLUTION * paths.gouge_mm, paths.gouge_mm, workers=job.workers
+        )
         seconds = float(times_on(program, machine).sum())
-        out.append(Checked(setting, worst.deepest[0], worst.message(), paths.gouge_mm, scallops, tuple(said), seconds))
+        out.append(Checked(setting, gouge, paths.gouge_mm, scallops, tuple(said), seconds))
     covered = tuple(
         Covered(face[0], face[1], left, asked, _SPACING, plan.unreached[face])
-        for face, left in zip(faces, rest[len(walls) - len(whole) :], strict=True)
+        for face, left in zip(faces, rest[len(dense) :], strict=True)
     )
     return tuple(out), covered
 

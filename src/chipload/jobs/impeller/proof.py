@@ -1,4 +1,4 @@
-"""contact_points.parquet and proof.npz: the largest cutter at each contact point, and what certifies it."""
+"""contact_points.parquet and proof.npz: the largest cutter at each contact point, and what proves that bound."""
 
 from __future__ import annotations
 
@@ -51,7 +51,9 @@ def proof_bytes(milled: ImpellerResult) -> bytes:
 
     ``contact``, ``normal`` (c, 3), ``curvature`` (c, 3, 3), ``check`` (m, 3), ``check_surface`` (m,), ``near``,
     ``tables`` (t,) [rad]; of each family f as `k/f/...` ``corner_radius``, ``rho``, ``bound``, ``pallet`` (c, t),
-    ``certified``, ``blockers`` (c, t, j), -1 none, -2 the curvature at the contact.
+    ``certified``, ``blockers`` (c, t, j), -1 none, -2 the curvature at the contact. ``covering`` (5,) [mm]: tolerance
+    between the check points, least corner radius, reach, bend and depth of the nodes (``covering/``); without it
+    nothing is certified between the check points.
     """
     arrays: dict[str, Any] = {}
     for k, op in enumerate(milled.surfaces):
@@ -59,6 +61,9 @@ def proof_bytes(milled: ImpellerResult) -> bytes:
         for name in ("contact", "normal", "curvature", "check", "check_surface", "near"):
             arrays[f"{k}/{name}"] = np.asarray(getattr(s, name))
         arrays[f"{k}/tables"] = op.answer.tables
+        if s.covering is not None:
+            w = s.covering
+            arrays[f"{k}/covering"] = np.array([w.tolerance, w.corner, w.reach, w.bend, w.sunk])
         for f, found in enumerate(op.answer.families):
             for name in ("corner_radius", "rho", "bound", "pallet", "certified", "blockers"):
                 arrays[f"{k}/{f}/{name}"] = np.asarray(getattr(found, name))

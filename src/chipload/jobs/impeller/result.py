@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 
 import numpy as np
@@ -9,7 +10,17 @@ import numpy as np
 from chipload.errors import Finding, Severity
 from chipload.jobs.impeller.names import program_name, rough_names
 from chipload.jobs.impeller.numbers import operation_numbers
-from chipload.jobs.impeller.outcome import Checked, Covered, ImpellerResult, Searched, for_all, unmilled, unreached_text
+from chipload.jobs.impeller.outcome import (
+    Checked,
+    Covered,
+    ImpellerResult,
+    Searched,
+    certified_text,
+    for_all,
+    uncertified_text,
+    unmilled,
+    unreached_text,
+)
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.program.program import Program
 from chipload.report.programs import ENDINGS
@@ -30,7 +41,7 @@ def result_of(milled: ImpellerResult) -> Result:
         findings=tuple(f for c in milled.covered or () for f in _left(c)),
         unchecked=_unchecked(milled),
         provenance=milled.provenance,
-        note=f"{for_all(milled)[:1].upper()}{for_all(milled)[1:]}.",
+        note=f"{for_all(milled)[:1].upper()}{for_all(milled)[1:]}, {certified_text(milled)}.",
     )
 
 
@@ -44,12 +55,16 @@ def _search(milled: ImpellerResult) -> Track:
     unproved = sum(int((~op.answer.certified).sum()) for op in milled.surfaces)
     findings = [f for op in milled.surfaces for f in _surface_findings(op)]
     findings += [Finding("impeller-partition", 0, text, Severity.EXCEEDS) for text in unmilled(milled)]
-    limits = (_count("unreached_points", unreached), _count("uncertified_points", unproved))
+    why = next((t for op in milled.surfaces if (t := uncertified_text(op))), "")
+    limits = (
+        _count("unreached_points", unreached, Verdict.EXCEEDS),
+        _count("uncertified_points", unproved, Verdict.UNPROVEN, why),
+    )
     return Track(SEARCH, TrackKind.PROGRAM, True, None, limits, tuple(findings))
 
 
-def _count(name: str, count: int) -> LimitCheck:
-    return LimitCheck(name, 0.0, float(count), Verdict.EXCEEDS if count else Verdict.HOLDS, SEARCH)
+def _count(name: str, count: int, state: Verdict, reason: str = "") -> LimitCheck:
+    return LimitCheck(name, 0.0, float(count), state if count else Verdict.HOLDS, SEARCH, reason=reason)
 
 
 def _surface_findings(op: Searched) -> tuple[Finding, ...]:
@@ -64,9 +79,8 @@ def _surface_findings(op: Searched) -> tuple[Finding, ...]:
         )
         x, y, z = (float(v) for v in op.place[missed[0].point])
         out.append(Finding("impeller-unreached", 0, text, Severity.EXCEEDS, (x, y, z)))
-    count = int((~op.answer.certified).sum())
-    if count:
-        text = f"{op.surface.name}: the largest cutter of {count} contact points is not certified"
+    text = uncertified_text(op)
+    if text:
         out.append(Finding("impeller-uncertified", 0, text, Severity.UNPROVEN))
     return tuple(out)
 
@@ -104,8 +118,22 @@ def _track(
 
 
 def _gouge(track: str, checked: Checked | CheckedRough) -> LimitCheck:
-    worst = max(checked.gouge, 0.0)
-    return LimitCheck("gouge_mm", checked.allowed, worst, state_of(worst, checked.allowed)[0], track)
+    """The bound of the deepest gouge; its error is down to what was found."""
+    gouge, limit = checked.gouge, checked.allowed
+    if math.isinf(gouge.bound):
+        why = "a sharp corner or rim of the tool may gouge between the points that are looked at"
+        state = Verdict.EXCEEDS if gouge.found > limit else Verdict.UNPROVEN
+        return LimitCheck("gouge_mm", limit, gouge.found, state, track, reason="" if gouge.found > limit else why)
+    if gouge.bound <= limit or gouge.found > limit:
+        state, why = Verdict.HOLDS if gouge.bound <= limit else Verdict.EXCEEDS, ""
+    else:
+        state, why = Verdict.UNPROVEN, f"between {gouge.found:.4f} and {gouge.bound:.4f} mm: the limit lies within that"
+    error = 1.0 - gouge.found / gouge.bound if gouge.bound > 0.0 else 0.0
+    row = gouge.row if gouge.row >= 0 else None
+    place = gouge.place if gouge.row >= 0 else None
+    return LimitCheck(
+        "gouge_mm", limit, gouge.bound, state, track, row=row, place=place, resolution_error=error, reason=why
+    )
 
 
 def _scallops(track: str, p: Checked) -> tuple[LimitCheck, ...]:

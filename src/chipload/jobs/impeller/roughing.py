@@ -29,10 +29,13 @@ from chipload.program.read import times_on
 from chipload.program.to_axes import to_axes
 from chipload.progress import Progress
 from chipload.simulation.channel.channel import SurfacePoints, left_on
+from chipload.simulation.channel.gouges import deepest_gouge
 from chipload.simulation.channel.stock import ChannelRemoval, sector, taken_from
 from chipload.stock.dexel import TriDexel
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
+#: of the gouge that is allowed, how near its depth is found
+_RESOLUTION = 0.2
 #: instants of a row [mm], how far the rays go above and below a surface [mm]
 _STEP, _HEIGHT, _DEPTH = 1.0, 3.0, 0.5
 #: points of the blank's meridian; how far it goes on under the hub [mm]; how far beside the channel, in pitches
@@ -109,7 +112,9 @@ def _checked(
 ) -> CheckedRough:  # fmt: skip
     program = plan.program
     found = left_on(walls, program, plan.cutter, _HEIGHT, _DEPTH, step=_STEP, workers=workers)
-    worst = max(found, key=lambda left: left.deepest[0])
+    gouge = deepest_gouge(
+        walls, program, plan.cutter, _DEPTH, _RESOLUTION * paths.gouge_mm, paths.gouge_mm, step=_STEP, workers=workers
+    )
     stands: list[float | None] = []
     for hub in (False, True):
         least = min(float(x.rest.min()) for x in found if x.wall.name.startswith("floor") == hub)
@@ -118,7 +123,7 @@ def _checked(
     said = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
     seconds = float(times_on(program, machine).sum())
     return CheckedRough(
-        plan, worst.deepest[0], worst.message(), paths.gouge_mm, (stands[0], stands[1]), taken, touch,
+        plan, gouge, paths.gouge_mm, (stands[0], stands[1]), taken, touch,
         tuple(said), seconds,
     )  # fmt: skip
 

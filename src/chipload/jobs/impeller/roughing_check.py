@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from html import escape
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from chipload.planning.impeller.rough_settings import RoughingSetting
 from chipload.report.sheet import table
 from chipload.simulation.channel.channel import PARTS
+from chipload.simulation.channel.gouges import Gouge
 from chipload.simulation.channel.stock import ChannelRemoval
 
 
@@ -21,7 +23,7 @@ class CheckedRough:
     Parameters
     ----------
     rough : cutter, table angle, rows, moves
-    gouge : deepest that any part of the tool comes below a finished surface [mm], where it is: ``says``
+    gouge : deepest that any part of the tool comes below a finished surface, between bounds
     allowed : what of it is allowed [mm]
     stands : least that is left on the blades and on the hub where rows were milled [mm]; None: nowhere within reach
     taken : from the blank as the programs before it leave it, row by row
@@ -31,8 +33,7 @@ class CheckedRough:
     """
 
     rough: RoughingSetting
-    gouge: float
-    message: str
+    gouge: Gouge
     allowed: float
     stands: tuple[float | None, float | None]
     taken: ChannelRemoval
@@ -69,8 +70,8 @@ class CheckedRough:
     def fails(self) -> tuple[str, ...]:
         """What does not hold."""
         out = [f"{self.name}: {f}" for f in self.findings]
-        if self.gouge > self.allowed:
-            out.append(f"{self.name}: {self.message}: gouge_mm = {self.allowed:g} is allowed")
+        if self.gouge.bound > self.allowed:
+            out.append(f"{self.name}: {self.gouge.message}: gouge_mm = {self.allowed:g} is allowed")
         out += [f"{self.name}: {p}: touch_mm3 = {self.touch:g} is allowed" for p in self.taken.problems(self.touch)]
         if not self.rough.machined:
             out.append(f"{self.name}: no row can be milled")
@@ -94,7 +95,8 @@ class CheckedRough:
             "missed_mm": self.missed,
             "refused_rows": len(rough.linked.refused),
             "stopped_rows": len(rough.stopped),
-            "gouge_mm": self.gouge,
+            "gouge_mm": self.gouge.found,
+            "gouge_bound_mm": self.gouge.bound if math.isfinite(self.gouge.bound) else None,
             "stands_on_blades_mm": self.stands[0],
             "stands_on_hub_mm": self.stands[1],
             "taken_mm3": self.taken.before - self.taken.after,

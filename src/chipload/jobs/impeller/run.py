@@ -24,8 +24,9 @@ from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.impeller.answer import Answer, largest_cutters, one_cutter, one_cutter_of
 from chipload.planning.impeller.compare import Partition, compared
 from chipload.planning.impeller.costs import ChannelSide, Terms
+from chipload.planning.impeller.covering.covering import Covering, covering_of, first_edge
 from chipload.planning.impeller.impeller import Impeller
-from chipload.planning.impeller.surfaces import BODIES, ContactSampling, ContactSurface, surface_of
+from chipload.planning.impeller.surfaces import BODIES, ContactSampling, ContactSurface, hub_range, surface_of
 from chipload.planning.impeller.tables import IndexTable, index_table
 from chipload.planning.impeller.unreached import with_fits
 from chipload.progress import Progress, silent
@@ -51,10 +52,14 @@ def run(job: ImpellerJob, progress: Progress = silent) -> ImpellerResult:
     _picked(job, catalogue)
     _rougher(job, catalogue)
     op = job.operation
-    table, surfaces = _tables(machine, op), _surfaces(job, impeller)
+    table, begin = _tables(machine, op), time.perf_counter()
+    covering = _covering(job, impeller, catalogue)
+    took = time.perf_counter() - begin
+    surfaces = _surfaces(job, impeller, covering)
     done = []
     for k, surface in enumerate(surfaces):
-        done.append(_searched(job, k, surface, table, catalogue, part_of(part_of(progress, 0, 2), k, len(surfaces))))
+        found = _searched(job, k, surface, table, catalogue, part_of(part_of(progress, 0, 2), k, len(surfaces)))
+        done.append(replace(found, search_s=found.search_s + took / len(surfaces)))
         _reached(k, done[-1])
     pairs = [(found.surface.scene, found.answer) for found in done]
     whole = one_cutter_of(pairs, op.clearance_mm, table.spans, WORKERS)
@@ -75,7 +80,7 @@ def run(job: ImpellerJob, progress: Progress = silent) -> ImpellerResult:
         )  # fmt: skip
     programs, covered = checked_programs(
         impeller, machine, table, milled.used, op, op.paths, _ahead(job), len(roughs or ()), WORKERS,
-        part_of(half, 3, 4) if roughs else part_of(half, 1, 2),
+        part_of(half, 3, 4) if roughs else part_of(half, 1, 2), covering,
     )  # fmt: skip
     return replace(milled, programs=programs, covered=covered, roughs=roughs)
 
@@ -104,6 +109,10 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
     for k, surface in enumerate(_surfaces(job, impeller)):
         s = surface.scene
         lines.append(f"surface {k}: {surface.name}: {len(s.contact)} contact points, {len(s.check)} check points")
+    corner = _least_corner(job, impeller, catalogue)
+    if corner is not None:
+        within = job.operation.tolerance_mm
+        lines.append(f"between check points: certified within {within:g} mm for corner radii from {corner:g} mm")
     corners = ", ".join(f"{r:g}" for r in catalogue.families)
     lines.append(f"catalogue {catalogue.name}: {len(catalogue.cutters)} cutters, corner radii {corners} mm")
     return lines, True
@@ -203,13 +212,32 @@ def _tables(machine: Machine, op: ImpellerOperationTable) -> IndexTable:
         raise InputError(f"operation.0.table_deg: {err}") from None
 
 
-def _surfaces(job: ImpellerJob, impeller: Impeller) -> list[ContactSurface]:
+def _covering(job: ImpellerJob, impeller: Impeller, catalogue: Catalogue) -> Covering | None:
+    """The walls covered for every cutter with a corner radius; None: there is no such cutter."""
+    op, corner = job.operation, _least_corner(job, impeller, catalogue)
+    if corner is None:
+        return None
+    return covering_of(impeller, op.tolerance_mm, corner, op.around, hub_range(impeller, _ahead(job)))
+
+
+def _least_corner(job: ImpellerJob, impeller: Impeller, catalogue: Catalogue) -> float | None:
+    """The least corner radius above 0, for which the walls can be covered; None: there is none."""
+    op, corner = job.operation, min((r for r in catalogue.families if r > 0.0), default=None)
+    if corner is not None:
+        try:
+            first_edge(impeller, op.tolerance_mm, corner, op.around)
+        except InputError as err:
+            raise InputError(f"operation.0.tolerance_mm = {op.tolerance_mm:g}: {err}") from None
+    return corner
+
+
+def _surfaces(job: ImpellerJob, impeller: Impeller, covering: Covering | None = None) -> list[ContactSurface]:
     op, ahead = job.operation, _ahead(job)
     out = []
     for k, s in enumerate(job.table.surface):
         how = ContactSampling(s.along, s.up, s.points, op.check_mm, op.near_mm, op.around, ahead)
         try:
-            out.append(surface_of(impeller, s.body, s.side, how))
+            out.append(surface_of(impeller, s.body, s.side, how, covering))
         except InputError as err:
             raise InputError(f"surface.{k}: {err}") from None
     return out

@@ -6,7 +6,18 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from chipload.jobs.tables import Count, FaceName, NotNegative, Number, Positive, SourceTable, Table, Text, Unit
+from chipload.jobs.tables import (
+    Count,
+    FaceName,
+    NotNegative,
+    Number,
+    Positive,
+    SideFaces,
+    SourceTable,
+    Table,
+    Text,
+    Unit,
+)
 
 Share = Annotated[Number, Field(ge=0.0, le=1.0)]
 Span = tuple[Share, Share]
@@ -40,18 +51,21 @@ class SectionsTable(Table):
 
 
 class StepTable(Table):
-    """Blades by faces of a STEP file; a face is named by its number or by a point [mm] on it, in the file's frame."""
+    """Blades by faces of a STEP file; a face is named by its number or by a point [mm] on it, in the file's frame.
+
+    A side may be a list of faces; three numbers are one point.
+    """
 
     file: Text = Field(description="`chipload check FILE` lists its faces")
     flow: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = Field(
         description="which way along the axis of rotation the flow comes in; the axis goes through the origin"
     )
-    plus: FaceName = Field(description="side that faces a growing angle about the axis, seen against the flow")
-    minus: FaceName = Field(description="side that faces a falling angle, of the same blade or of another")
-    splitter_plus: FaceName | None = Field(None, description="likewise of a splitter; none: there are no splitters")
-    splitter_minus: FaceName | None = None
+    plus: SideFaces = Field(description="side that faces a growing angle about the axis, seen against the flow")
+    minus: SideFaces = Field(description="side that faces a falling angle, of the same blade or of another")
+    splitter_plus: SideFaces | None = Field(None, description="likewise of a splitter; none: there are no splitters")
+    splitter_minus: SideFaces | None = None
     hub: tuple[FaceName, ...] | Text = Field(description="faces of revolution, or a file of points as of sections")
-    shroud: tuple[FaceName, ...] | Text = Field(description="likewise; the tip of one blade is a face of it")
+    shroud: tuple[FaceName, ...] | Text = Field(description="likewise; the tip of one blade is faces of it")
     unit: Unit | None = Field(None, description="of hub and shroud where they are files of points")
     fit_mm: Positive = Field(0.001, le=0.1, description="how far a patch may leave its face where it is fitted")
     hub_ahead_mm: NotNegative = Field(description="how far the hub goes on ahead of the leading edge")
@@ -139,6 +153,9 @@ class ImpellerOperationTable(Table):
     kind: Literal["impeller"]
     check_mm: Positive = Field(description="most distance of check points")
     near_mm: Positive = Field(description="nearer on the own surface its curvature stands for check points")
+    tolerance_mm: Positive = Field(
+        0.05, le=1.0, description="how deep a wall may lie in a cutter between check points where it is certified"
+    )
     around: Annotated[int, Field(ge=0, le=20)] = Field(1, description="bodies beyond the channel that are checked")
     table_deg: tuple[Number, ...] | None = Field(None, min_length=1, description="table angles; none: all")
     clearance_mm: NotNegative = Field(description="of neck, shank and holder")

@@ -2,7 +2,8 @@
 
 Notation: R cutter radius, r corner radius, rho = R - r; a family is the cutters of one r. rho* of a family
 (``search.py``) is a proved bound, tested with the cutting part alone; the cutters below it are tried from the largest
-down, each with its neck, shank and holder, by their exact ranges of the pallet angle.
+down, each with its neck, shank and holder, by their exact ranges of the pallet angle. Where the scene has a covering,
+those ranges hold on the walls between the check points too, within its tolerance (``covering/``).
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ class Unreachable:
     """A contact point that no cutter of the catalogue mills.
 
     ``reason``: `turned away` (no table angle faces it), `curvature` (every corner radius is larger than the radius of
-    curvature), `cutting part` (the smallest cutter meets the ``blockers``), `above` (neck, shank or holder meets them);
+    curvature), `cutting part` (the smallest cutter meets the ``blockers``), `above` (neck, shank or holder meets them),
+    `between` (each cutter that is clear of the check points meets a wall between them);
     ``fits`` [mm] the diameter that would, with ``fits_corner``; nan: none does.
     """
 
@@ -54,7 +56,9 @@ class Answer:
     table : (c,) int, index of the table angle
     ranges : for each contact point (k, 2) pallet angles [rad] at which that cutter is clear
     blockers : for each contact point check points that forbid the cutters tried above it; with those of the families
-    certified : (c,) bool, no larger cutter of the catalogue goes at any table and pallet angle: proved
+    bounded : (c,) bool, no larger cutter of the catalogue goes at any table and pallet angle: proved
+    certified : (c,) bool, that, and no wall lies deeper in the cutter than ``tolerance`` at any angle of its ranges
+    tolerance : [mm] of the scene's covering; None: it has none, nothing is certified
     unreachable : what is not reached, and why
     """
 
@@ -65,7 +69,9 @@ class Answer:
     table: Ints
     ranges: tuple[Floats, ...]
     blockers: tuple[Ints, ...]
+    bounded: NDArray[np.bool_]
     certified: NDArray[np.bool_]
+    tolerance: float | None
     unreachable: tuple[Unreachable, ...]
 
     @property
@@ -102,7 +108,8 @@ def largest_cutters(
     cutter, table = np.full(c, -1), np.zeros(c, dtype=np.int64)
     empty = np.zeros((0, 2))
     ranges, refused = [empty] * c, [np.zeros(0, dtype=np.int64)] * c
-    certified = np.logical_and.reduce([f.certified.all(axis=1) for f in families])
+    bounded = np.logical_and.reduce([f.certified.all(axis=1) for f in families])
+    between = np.zeros(c, dtype=np.bool_)
     waiting = [_candidates(catalogue, families, k) for k in range(c)]
     place = np.zeros(c, dtype=np.int64)
     open_points = [k for k in range(c) if waiting[k]]
@@ -121,12 +128,25 @@ def largest_cutters(
                     cutter[k], table[k], ranges[k] = index, tried[j], got.ranges[j]
                 else:
                     refused[k] = got.blockers[j]
-                    certified[k] &= got.complete[j]
+                    bounded[k] &= got.complete[j]
+                    between[k] |= got.between[j]
                     place[k] += 1
         open_points = [k for k in open_points if cutter[k] < 0 and place[k] < len(waiting[k])]
     blockers = tuple(np.unique(np.concatenate([refused[k], *(_proof(f, k) for f in families)])) for k in range(c))
-    missed = tuple(_reason(scene, families, int(k), bool(waiting[k]), blockers[k]) for k in np.flatnonzero(cutter < 0))
-    return Answer(catalogue, alpha, families, cutter, table, tuple(ranges), blockers, certified, missed)
+    missed = tuple(
+        _reason(scene, families, int(k), bool(waiting[k]), bool(between[k]), blockers[k])
+        for k in np.flatnonzero(cutter < 0)
+    )
+    proves = np.array([_proves(scene, one, clearance) for one in catalogue.cutters] + [scene.covering is not None])
+    tolerance = None if scene.covering is None else scene.covering.tolerance
+    return Answer(
+        catalogue, alpha, families, cutter, table, tuple(ranges), blockers, bounded, bounded & proves[cutter],
+        tolerance, missed,
+    )  # fmt: skip
+
+
+def _proves(scene: Scene, cutter: CatalogueCutter, clearance: float) -> bool:
+    return scene.covering is not None and scene.covering.proves(cutter, clearance)
 
 
 def one_cutter(
@@ -231,13 +251,15 @@ def _proof(f: SearchLimits, k: int) -> Ints:
     return out
 
 
-def _reason(scene: Scene, families: tuple[SearchLimits, ...], k: int, tried: bool, blockers: Ints) -> Unreachable:
+def _reason(
+    scene: Scene, families: tuple[SearchLimits, ...], k: int, tried: bool, between: bool, blockers: Ints
+) -> Unreachable:
     best = max(families, key=lambda f: (f.rho[k].max() >= 0.0, f.rho[k].max() + f.corner_radius))
     rho = best.rho[k].max()
     fits, corner = (2.0 * (rho + best.corner_radius), best.corner_radius) if rho >= 0.0 else (math.nan, math.nan)
     who = tuple(int(i) for i in blockers)
     if tried:
-        return Unreachable(k, "above", who, math.nan, math.nan)
+        return Unreachable(k, "between" if between else "above", who, math.nan, math.nan)
     if all(f.corner_radius * scene.curvature_max[k] >= 1.0 for f in families):
         return Unreachable(k, "curvature", (CURVATURE,), math.nan, math.nan)
     if not who:

@@ -2,8 +2,8 @@
 
 Notation: between two poses the tip goes straight and the axis turns evenly. Half-way the cutter should touch the
 surface at the middle of u, v and B: how far the straight row is off along the normal there is its chord error. A check
-point that lies deeper than the chord in the cutter at a quarter, a half or three quarters is a gouge. Either is refined
-by a point between, whose pallet angle is the nearest valid one to the middle.
+point, or a node of the scene's covering, that lies deeper than the chord in the cutter at a quarter, a half or three
+quarters is a gouge. Either is refined by a point between, whose pallet angle is the nearest valid one to the middle.
 """
 
 from __future__ import annotations
@@ -74,6 +74,8 @@ class Refinement:
         got, _ = clearance(self.scene, self.cutter, tips, axes, 1.0, self.clearance)
         deep = np.zeros(len(at))
         np.maximum.at(deep, row, -got)
+        if self.scene.covering is not None:
+            np.maximum.at(deep, row, self.scene.covering.met(self.cutter, tips, axes, self.clearance))
         out: Ints = np.flatnonzero((off > self.chord) | (deep > self.chord))
         return out
 

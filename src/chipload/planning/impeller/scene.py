@@ -7,12 +7,16 @@ above 0 where the surface bends towards N; c check point.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
 from chipload.planning.impeller.tree import Tree, tree_of
+
+if TYPE_CHECKING:
+    from chipload.planning.impeller.covering.covering import Covering
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -34,6 +38,7 @@ class Scene:
     check_surface : (m,) int
     near : check points of the contact's own surface nearer than this [mm] are left out: there the curvature stands for
         them. A deviation of the surface from its second order, over that distance, is not seen.
+    covering : of the walls between the check points; None: ranges hold at the check points alone
 
     Raises
     ------
@@ -49,6 +54,7 @@ class Scene:
     check_surface: Ints
     near: float
     known: Tree | None = field(default=None, repr=False)
+    covering: Covering | None = field(default=None, repr=False)
     tree: Tree = field(init=False, repr=False)
     rows: Floats = field(init=False, repr=False)
     ordered: Floats = field(init=False, repr=False)
@@ -84,7 +90,9 @@ class Scene:
     def at_contacts(self, contact: Floats, normal: Floats, curvature: Floats, surface: int) -> Scene:
         """The same check points with other contact points, all on one surface."""
         number = np.full(len(contact), surface, dtype=np.int64)
-        return Scene(contact, normal, curvature, number, self.check, self.check_surface, self.near, self.tree)
+        return Scene(
+            contact, normal, curvature, number, self.check, self.check_surface, self.near, self.tree, self.covering
+        )
 
     def _rows(self) -> Floats:
         """(c, 16): S, N, tangents E1, E2, K in them, the surface."""

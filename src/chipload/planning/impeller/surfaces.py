@@ -9,12 +9,13 @@ body's plus side, both 0..1.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
+from chipload.planning.impeller.covering.covering import Covering
 from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.scene import Floats, Scene
 
@@ -87,8 +88,10 @@ class ContactSurface:
         return len(self.u), len(self.v)
 
 
-def surface_of(impeller: Impeller, body: str, side: str, how: ContactSampling) -> ContactSurface:
-    """A surface of an impeller.
+def surface_of(
+    impeller: Impeller, body: str, side: str, how: ContactSampling, covering: Covering | None = None
+) -> ContactSurface:
+    """A surface of an impeller; its ranges hold between the check points where a ``covering`` of the walls is given.
 
     Raises
     ------
@@ -109,6 +112,7 @@ def surface_of(impeller: Impeller, body: str, side: str, how: ContactSampling) -
     scene = impeller.scene(index, walls, (u, v), check, how.near, how.around, hub, where)
     if side == "floor":
         scene = _floor(impeller, index, u, v, scene, where)
+    scene = replace(scene, covering=covering, known=scene.tree)
     grid = scene.contact.reshape(len(u), len(v), 3)
     along = np.linalg.norm(np.diff(grid, axis=0, prepend=grid[:1]), axis=2).cumsum(axis=0)
     up = np.linalg.norm(np.diff(grid, axis=1, prepend=grid[:, :1]), axis=2).cumsum(axis=1)

@@ -116,3 +116,63 @@ def left(
                     rest[i], rest_row[i] = best, k
                 if -best > gouge[i]:
                     gouge[i], gouge_row[i], gouge_part[i] = -best, k, part
+
+
+@njit(cache=True, nogil=True)
+def lowest(
+    points: Any, frames: Any, tips: Any, axes: Any, starts: Any, shapes: Any, kinds: Any, depth: float, height: float,
+    step: float, tol: float, low: Any, rows: Any, part_of: Any,
+) -> None:  # fmt: skip
+    """The least s of the ray of each point in the parts of each of the ``kinds`` 0..2, into ``low`` (n, 3), which holds
+    ``height``; the row and the part where it is met into ``rows``, ``part_of`` (n, 3).
+    """
+    tip, axis = np.empty(3), np.empty(3)
+    n, parts = len(tips), len(shapes)
+    half = 0.5 * (height + depth)
+    for i in range(len(points)):
+        S, frame = points[i], frames[i]
+        middle = S + 0.5 * (height - depth) * frame[2]
+        for k in range(1, n):
+            ax, ay, az = axes[k, 0], axes[k, 1], axes[k, 2]
+            x, y, z = middle[0] - tips[k, 0], middle[1] - tips[k, 1], middle[2] - tips[k, 2]
+            dx, dy, dz = tips[k, 0] - tips[k - 1, 0], tips[k, 1] - tips[k - 1, 1], tips[k, 2] - tips[k - 1, 2]
+            bx, by, bz = ax - axes[k - 1, 0], ay - axes[k - 1, 1], az - axes[k - 1, 2]
+            long = math.sqrt(dx * dx + dy * dy + dz * dz)
+            far = math.sqrt(x * x + y * y + z * z)
+            sweep = long + math.sqrt(bx * bx + by * by + bz * bz) * (far + long + half)
+            slack = sweep + half
+            h = x * ax + y * ay + z * az
+            d2 = far * far - h * h
+            for part in range(parts):
+                big = shapes[part, 9] + slack
+                if d2 > big * big or h < starts[part] - slack or h > starts[part] + shapes[part, 8] + slack:
+                    continue
+                kind = kinds[part]
+                count = max(1, math.ceil(sweep / step))
+                best, at = height, 0
+                for m in range(count + 1):
+                    s = lower(m / count, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis)
+                    if s < best:
+                        best, at = s, m
+                # between two instants a part comes lower by less than this
+                if best >= height or best - 0.05 >= low[i, kind]:
+                    continue
+                lo, hi = max(at - 1, 0) / count, min(at + 1, count) / count
+                t1, t2 = hi - _GOLDEN * (hi - lo), lo + _GOLDEN * (hi - lo)
+                f1 = lower(t1, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis)
+                f2 = lower(t2, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis)
+                for _ in range(_STEPS):
+                    best = min(best, f1, f2)
+                    if abs(f1 - f2) < tol and f1 < height:
+                        break
+                    if f1 <= f2:
+                        hi, t2, f2 = t2, t1, f1
+                        t1 = hi - _GOLDEN * (hi - lo)
+                        f1 = lower(t1, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis)
+                    else:
+                        lo, t1, f1 = t1, t2, f2
+                        t2 = lo + _GOLDEN * (hi - lo)
+                        f2 = lower(t2, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis)
+                best = min(best, f1, f2)
+                if best < low[i, kind]:
+                    low[i, kind], rows[i, kind], part_of[i, kind] = best, k, part

@@ -43,7 +43,10 @@ _BLOCK = 512
 
 @dataclass(frozen=True, eq=False)
 class SurfacePoints:
-    """Points on a surface, a grid of ``shape`` (a, b) with u the slower, their normals, u, v and area [mm2] of each."""
+    """Points on a surface, a grid of ``shape`` (a, b) with u the slower, their normals, u, v and area [mm2] of each.
+
+    ``surface`` they lie on; None where only its points are known.
+    """
 
     name: str
     points: Floats
@@ -52,6 +55,7 @@ class SurfacePoints:
     v: Floats
     area: Floats
     shape: tuple[int, int]
+    surface: BSplinePatch | None = None
 
 
 def wall(name: str, surface: BSplinePatch, u: Floats, v: Floats) -> SurfacePoints:
@@ -68,7 +72,7 @@ def wall(name: str, surface: BSplinePatch, u: Floats, v: Floats) -> SurfacePoint
     U, V = (x.ravel() for x in np.meshgrid(u, v, indexing="ij"))
     size = np.linalg.norm(np.cross(surface.at(U, V, 1, 0), surface.at(U, V, 0, 1)), axis=1)
     share = np.outer(_weights(u), _weights(v)).ravel()
-    return SurfacePoints(name, surface.at(U, V), surface.normal(U, V), U, V, size * share, (len(u), len(v)))
+    return SurfacePoints(name, surface.at(U, V), surface.normal(U, V), U, V, size * share, (len(u), len(v)), surface)
 
 
 def _weights(x: Floats) -> Floats:
@@ -190,13 +194,13 @@ def left_on(
     if not (height > 0.0 and depth > 0.0 and step > 0.0 and tol > 0.0):
         raise InputError("channel: height, depth, step and tol: must be above 0")
     starts, shapes, kinds = tool_parts(cutter)
-    tips, axes, of = _pieces(program)
+    tips, axes, of = parted_moves(program)
     cutting = (program.motion == LINE)[of]
     out = []
     total, done = sum(len(w.points) for w in walls), 0
     for w in walls:
         n = len(w.points)
-        frames = _frames(w.normals)
+        frames = frames_of(w.normals)
         rest, gouge = np.full(n, height), np.zeros(n)
         rest_row, row, part = np.full(n, -1), np.full(n, -1), np.full(n, -1)
 
@@ -218,7 +222,7 @@ def left_on(
     return tuple(out)
 
 
-def _pieces(program: Program) -> tuple[Floats, Floats, Ints]:
+def parted_moves(program: Program) -> tuple[Floats, Floats, Ints]:
     """Tips and axes (m, 3) of the rows in pieces of at most :data:`PIECE`, and the row of each."""
     length = np.linalg.norm(np.diff(program.p_work, axis=0, prepend=program.p_work[:1]), axis=1)
     count = np.maximum(np.ceil(length / PIECE), 1.0).astype(np.int64)
@@ -231,7 +235,7 @@ def _pieces(program: Program) -> tuple[Floats, Floats, Ints]:
     return np.ascontiguousarray(tips), np.ascontiguousarray(axes), of
 
 
-def _frames(normals: Floats) -> Floats:
+def frames_of(normals: Floats) -> Floats:
     """(n, 3, 3) rows e1, e2, N."""
     other = np.eye(3)[np.abs(normals).argmin(axis=1)]
     e1 = np.cross(other, normals)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.planning.impeller.clearance import _kernels
 from chipload.planning.impeller.scene import Floats, Ints, Scene
+from chipload.planning.impeller.tree import Tree
 
 #: halvings of a move before it counts as not clear
 _DEPTH = 14
@@ -34,15 +35,22 @@ def clearance(
     -------
     (n,) float [mm], (n,) int the check point, -1: none within ``cap``
     """
+    tree = scene.tree
+    out, which = nearest(scene.ordered, tree, cutter, cutter.stages(above), tips, axes, cap)
+    return out, np.where(which >= 0, tree.order[np.maximum(which, 0)] if len(tree.order) else which, which)
+
+
+def nearest(
+    ordered: Floats, tree: Tree, cutter: CatalogueCutter, stages: Floats, tips: ArrayLike, axes: ArrayLike, cap: float
+) -> tuple[Floats, Ints]:
+    """As :func:`clearance` of points ``ordered`` (m, 3) by their tree; the point's place in that order."""
     p = np.ascontiguousarray(tips, dtype=np.float64).reshape(-1, 3)
     a = np.ascontiguousarray(axes, dtype=np.float64).reshape(-1, 3)
-    tree = scene.tree
     out, which = np.empty(len(p)), np.empty(len(p), dtype=np.int64)
     _kernels.nearest(
-        scene.ordered, tree.nodes, tree.spans, tree.leaves, p, a, cutter.rho, cutter.corner_radius,
-        cutter.stages(above), cap, out, which,
-    )  # fmt: skip
-    return out, np.where(which >= 0, tree.order[np.maximum(which, 0)] if len(tree.order) else which, which)
+        ordered, tree.nodes, tree.spans, tree.leaves, p, a, cutter.rho, cutter.corner_radius, stages, cap, out, which
+    )
+    return out, which
 
 
 def between(axes0: Floats, axes1: Floats, share: Floats) -> Floats:

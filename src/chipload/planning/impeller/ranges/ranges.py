@@ -36,11 +36,13 @@ class Ranges:
     ranges : for each contact point (k, 2) float [rad]; k = 0: nowhere
     blockers : for each contact point the check points that forbid every B, where there is no range, else none
     complete : (c,) bool; False: there were too many arcs to tell, no range is claimed
+    between : (c,) bool, the check points leave a range, the walls between them leave none
     """
 
     ranges: tuple[Floats, ...]
     blockers: tuple[Ints, ...]
     complete: NDArray[np.bool_]
+    between: NDArray[np.bool_]
 
 
 def valid_ranges(
@@ -94,4 +96,21 @@ def valid_ranges(
     blockers = tuple(
         np.unique(row[(row != -1) & (row != -3)]) if n == 0 else row[:0] for row, n in zip(given, number, strict=True)
     )
-    return Ranges(ranges, blockers, number >= 0)
+    complete, between = number >= 0, np.zeros(len(which), dtype=np.bool_)
+    open_rows = np.flatnonzero(number > 0)
+    if scene.covering is None or not len(open_rows):
+        return Ranges(ranges, blockers, complete, between)
+    kept, told = scene.covering.kept(
+        scene,
+        cutter,
+        alpha[open_rows],
+        clearance,
+        which[open_rows],
+        tuple(ranges[k] for k in open_rows),
+        least,
+        workers,
+    )
+    left = dict(zip(open_rows.tolist(), kept, strict=True))
+    complete[open_rows] = told
+    between[open_rows] = told & np.array([len(row) == 0 for row in kept])
+    return Ranges(tuple(left.get(k, row) for k, row in enumerate(ranges)), blockers, complete, between)

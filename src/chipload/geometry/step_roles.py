@@ -1,0 +1,68 @@
+"""What the faces of a STEP part may be of an impeller: sides of its blades, tips, its hub; guessed from their sizes.
+
+Faces of one kind whose areas are nearly the same, as many as blades or twice as many, are faces of the blades: those of
+the largest area the sides. The largest other face that is of revolution about an axis of the file, and neither a plane
+nor a cylinder, is the hub.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from chipload.errors import InputError
+from chipload.geometry.step import Part
+from chipload.geometry.step_faces import Face, Model, inside
+from chipload.geometry.step_meridian import meridian_in
+
+#: areas of like faces differ by less than this share
+LIKE = 0.01
+#: so many like faces at least are faces of blades
+FEWEST = 3
+#: faces that are looked at for a hub, the largest first
+_LOOKED = 4
+_AXES = {"x": np.roll(np.eye(3), -1, axis=0), "y": np.roll(np.eye(3), 1, axis=0), "z": np.eye(3)}
+
+
+def roles_of(model: Model) -> list[str]:
+    """A line for the sides of the blades and one for the hub; none: nothing tells that it is an impeller."""
+    groups = [g for g in _like(model.faces) if len(g) >= FEWEST and g[0].kind not in ("plane", "cylinder")]
+    if not groups:
+        return []
+    sides = max(groups, key=lambda g: sum(f.area for f in g))
+    blades = {f.number for g in groups for f in g}
+    others = [f for f in model.faces if f.number not in blades and f.kind not in ("plane", "cylinder")]
+    hub = None
+    for face in sorted(others, key=lambda f: -f.area)[:_LOOKED]:
+        for axis, R in _AXES.items():
+            ends = face.part.call("step_roles.round_about", face.number, R)
+            if ends and hub is None:
+                hub = f"face {face.number}: of revolution about {axis}, r {ends[0]:.4g} to {ends[1]:.4g} mm: the hub?"
+    if hub is None:
+        return []
+    numbers = ", ".join(str(f.number) for f in sides)
+    low, high = min(f.area for f in sides), max(f.area for f in sides)
+    return [f"{len(sides)} like faces of {low:.4g} to {high:.4g} mm2: sides of blades?: {numbers}", hub]
+
+
+def _like(faces: Sequence[Face]) -> list[list[Face]]:
+    """Faces of one kind whose areas, in order, differ by less than :data:`LIKE`."""
+    out: list[list[Face]] = []
+    for face in sorted(faces, key=lambda f: (f.kind, f.area)):
+        last = out[-1][-1] if out else None
+        if last is not None and last.kind == face.kind and face.area <= (1.0 + LIKE) * last.area:
+            out[-1].append(face)
+        else:
+            out.append([face])
+    return [sorted(g, key=lambda f: f.number) for g in out]
+
+
+# -- in the process of the CAD kernel ---------------------------------------------------------------------------
+def round_about(part: Part, number: int, R: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> list[float]:
+    """Least and greatest radius [mm] of a face that is of revolution about z after a rotation; else nothing."""
+    try:
+        curve = meridian_in(inside(part, number), R, "", tips=False)
+    except InputError:
+        return []
+    return [float(curve[:, 0].min()), float(curve[:, 0].max())]

@@ -1,0 +1,1 @@
+"""Which of the ranges of a cutter hold between the check points too."""

@@ -1,0 +1,262 @@
+"""The deepest gouge of a program on walls, between bounds: cells of the walls are divided where more may be hidden.
+
+Notation: p a point of a wall, N its normal, s(p) the least s at which the ray p + s N is in a part of the tool in any
+row; -s is the gouge. t [mm] greatest distance along a wall from a point of a cell to its nearest corner q, w [rad]
+greatest angle of their normals.
+
+Where the gouge is greatest, G, the part's boundary lies along the wall. If a ball of radius r rolls round inside the
+part, one of them has its centre at r - G over p, and from q it is met at s(q) <= bend - G with bend = r - sqrt(r^2 -
+(t + r w)^2) + 3/2 t w. So no gouge of a cell is deeper than bend - s of its corners. The cutting part rolls its corner
+radius. Parts above have rims: they are made larger by g all round, rolled by a ball of that radius, and what they come
+deeper than g counts.
+
+Limits: w is taken from the normals at the corners, half as much again. On the edge of a wall the bound is that along
+the edge.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.errors import InputError
+from chipload.program.motions import is_arc
+from chipload.program.program import Program
+from chipload.simulation.channel import _kernels
+from chipload.simulation.channel.channel import PARTS, SurfacePoints, frames_of, parted_moves, tool_parts
+
+Floats = NDArray[np.float64]
+
+#: width of the first cells [mm]
+_FIRST = 2.5
+#: how often a cell is halved at most
+_LEVELS = 8
+#: of the reach of a cell, by how much parts above the cutting part are made larger
+_GROWN = 2.5
+#: of the normals' angle at the corners of a cell, what counts for the way to the nearest one
+_TURN = 0.75
+#: so many corners are looked at in all; then the bound stays as it is
+_MOST = 4_000_000
+#: reach of the cells at which a cutter with a sharp corner is looked at [mm]; its bound is not known
+_SHARP = 0.5
+#: a bound below this share of the limit is enough
+_ENOUGH = 0.5
+_BLOCK = 512
+
+
+@dataclass(frozen=True)
+class Gouge:
+    """The deepest gouge of a program.
+
+    Parameters
+    ----------
+    found : deepest that a part of the tool comes below a wall [mm]; 0: none does
+    bound : no part comes deeper below any point of the walls [mm]; inf: it is not known, as with a sharp corner
+    wall, place, row, part : of what was found: name of the wall, point [mm], row of the program, of :data:`PARTS`
+    """
+
+    found: float
+    bound: float
+    wall: str
+    place: tuple[float, float, float]
+    row: int
+    part: int
+
+    @property
+    def message(self) -> str:
+        """Where it is, in words."""
+        if self.row < 0:
+            return "nothing comes below a wall"
+        x, y, z = self.place
+        limit = f", nothing deeper than {self.bound:.4f} mm" if math.isfinite(self.bound) else ""
+        return (
+            f"{self.wall}: the {PARTS[self.part]} comes {self.found:.4f} mm below the surface at "
+            f"({x:.2f}, {y:.2f}, {z:.2f}) in row {self.row}{limit}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Cells:
+    """Cells of walls: number of the wall (n,), low and high u and v (n, 4)."""
+
+    wall: NDArray[np.int64]
+    box: Floats
+
+    def corners(self) -> Floats:
+        """(n, 4, 2) u and v."""
+        return self.box[:, [[0, 2], [1, 2], [0, 3], [1, 3]]]
+
+    def divided(self, which: NDArray[np.bool_]) -> _Cells:
+        """Each cell of ``which`` in four."""
+        box = self.box[which]
+        u, v = 0.5 * (box[:, 0] + box[:, 1]), 0.5 * (box[:, 2] + box[:, 3])
+        a, b, c, d = box.T
+        four = [(a, u, c, v), (u, b, c, v), (a, u, v, d), (u, b, v, d)]
+        return _Cells(np.tile(self.wall[which], 4), np.concatenate([np.stack(x, axis=-1) for x in four]))
+
+
+def deepest_gouge(
+    walls: Sequence[SurfacePoints], program: Program, cutter: CatalogueCutter, depth: float, resolution: float,
+    limit: float, step: float = 0.25, tol: float = 1e-5, workers: int = 1,
+) -> Gouge:  # fmt: skip
+    """The deepest gouge of a program, known to within the resolution, or to be below half of the limit.
+
+    Parameters
+    ----------
+    walls : their surfaces, from the least to the greatest u and v of each are looked at
+    depth : [mm] how far below a wall is looked; less than the thickness of a blade
+    resolution : of the gouge [mm]; finer where the limit lies between what is found and its bound
+    limit : of the gouge [mm]
+    step, tol : as :func:`left_on`
+
+    Raises
+    ------
+    InputError
+        The program has arcs, a wall has no surface, or a number is out of range.
+    """
+    if is_arc(program).any():
+        raise InputError("channel: the program has arcs: must be of straight rows")
+    if not (depth > 0.0 and resolution > 0.0 and limit > 0.0):
+        raise InputError("channel: depth, resolution and limit: must be above 0")
+    tips, axes, of = parted_moves(program)
+    cells = _first(walls)
+    best = Gouge(0.0, 0.0, "", (0.0, 0.0, 0.0), -1, 0)
+    settled, looked = 0.0, 0
+    for level in range(_LEVELS + 1):
+        at = cells.corners()
+        # cells share their corners
+        rows = np.column_stack([np.repeat(cells.wall, 4), at.reshape(-1, 2)])
+        once, corner = np.unique(rows, axis=0, return_inverse=True)
+        number, corner = once[:, 0].astype(np.int64), corner.reshape(-1, 4)
+        points, normals = _on(walls, number, np.asarray(once[:, 1:], dtype=np.float64))
+        t, w = _reach(points[corner], normals[corner])
+        grown = _GROWN * float(t.max())
+        starts, shapes, kinds = _parts(cutter, grown)
+        low = np.full((len(points), 3), _height(grown))
+        row, part = np.full((len(points), 3), -1), np.zeros((len(points), 3), dtype=np.int64)
+
+        def block(
+            first: int, points: Floats = points, normals: Floats = normals, starts: Floats = starts,
+            shapes: Floats = shapes, kinds: NDArray[np.int64] = kinds, low: Floats = low,
+            row: NDArray[np.int64] = row, part: NDArray[np.int64] = part, height: float = _height(grown),
+        ) -> None:  # fmt: skip
+            last = min(first + _BLOCK, len(points))
+            frames = frames_of(normals[first:last])
+            _kernels.lowest(
+                points[first:last], frames, tips, axes, starts, shapes, kinds, depth, height, step, tol,
+                low[first:last], row[first:last], part[first:last],
+            )  # fmt: skip
+
+        with ThreadPoolExecutor(workers) as pool:
+            for _ in pool.map(block, range(0, len(points), _BLOCK)):
+                pass
+        k, which = np.unravel_index(int(low[:, :2].argmin()), (len(points), 2))
+        if -low[k, which] > best.found:
+            x, y, z = points[k].tolist()
+            name = walls[int(number[k])].name
+            best = Gouge(
+                -float(low[k, which]),
+                0.0,
+                name,
+                (x, y, z),
+                int(of[row[k, which]]),
+                int(tool_parts(cutter)[2][part[k, which]]),
+            )
+        bound = _bounds(low[corner].min(axis=1), t, w, cutter.corner_radius, grown, depth)
+        looked += len(points)
+        target = max(best.found + resolution, _ENOUGH * limit)
+        if best.found <= limit < target:
+            target = max(limit, best.found + 0.1 * resolution)
+        open_cells = bound > target
+        settled = max(settled, float(bound[~open_cells].max(initial=0.0)))
+        sharp = cutter.corner_radius <= resolution and float(t.max()) <= _SHARP
+        # as deep as the rays go, or deeper
+        ended = sharp or best.found >= depth
+        if ended or level == _LEVELS or looked + 16 * int(open_cells.sum()) > _MOST or not open_cells.any():
+            settled = max(settled, float(bound.max(initial=0.0)))
+            break
+        cells = cells.divided(open_cells)
+    return Gouge(best.found, max(settled, best.found), best.wall, best.place, best.row, best.part)
+
+
+def _height(grown: float) -> float:
+    """How far above a wall is looked [mm]: what lies above is no matter."""
+    return max(1.0, grown)
+
+
+def _parts(cutter: CatalogueCutter, grown: float) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """As :func:`tool_parts`, what is above once more, larger: kinds 0 cutting part, 1 above it, 2 above and larger."""
+    starts, shapes, kinds = tool_parts(cutter)
+    upper = kinds > 0
+    larger = shapes[upper].copy()
+    # radius, length and the largest radius of a cylinder
+    larger[:, [1, 6, 9]] += grown
+    larger[:, 8] += 2.0 * grown
+    return (
+        np.concatenate([starts, starts[upper] - grown]),
+        np.concatenate([shapes, larger]),
+        np.concatenate([(kinds > 0).astype(np.int64), np.full(int(upper.sum()), 2)]),
+    )
+
+
+def _bounds(low: Floats, t: Floats, w: Floats, r: float, grown: float, depth: float) -> Floats:
+    """Deepest gouge (n,) that cells may have, whose corners have the least s ``low`` (n, 3) of the kinds of parts."""
+    out = _sag(r, t, w) - low[:, 0]
+    larger = _sag(grown, t, w) - low[:, 2] - grown
+    # a ray ends at the depth: deeper is not seen
+    larger[low[:, 2] <= -depth] = np.inf
+    out[low[:, 0] <= -depth] = np.inf
+    return np.maximum(out, larger)
+
+
+def _sag(r: float, t: Floats, w: Floats) -> Floats:
+    """How much a ball of radius r that is lowest on a cell is met higher from its nearest corner (n,) [mm]."""
+    wide = t + r * w
+    out: Floats = np.where(wide < r, r - np.sqrt(np.maximum(r * r - wide * wide, 0.0)) + 1.5 * t * w, np.inf)
+    return out
+
+
+def _first(walls: Sequence[SurfacePoints]) -> _Cells:
+    """All of the walls in cells of about :data:`_FIRST`."""
+    number, boxes = [], []
+    for k, wall in enumerate(walls):
+        ends = []
+        for axis, x in enumerate((wall.u, wall.v)):
+            low, high = float(x.min()), float(x.max())
+            grid = wall.points.reshape(*wall.shape, 3)
+            length = float(np.linalg.norm(np.diff(grid, axis=axis), axis=2).sum(axis=axis).max())
+            ends.append(np.linspace(low, high, max(math.ceil(length / _FIRST), 1) + 1))
+        u, v = ends
+        a, c = (x.ravel() for x in np.meshgrid(u[:-1], v[:-1], indexing="ij"))
+        b, d = (x.ravel() for x in np.meshgrid(u[1:], v[1:], indexing="ij"))
+        boxes.append(np.stack([a, b, c, d], axis=-1))
+        number.append(np.full(len(a), k))
+    return _Cells(np.concatenate(number), np.concatenate(boxes))
+
+
+def _on(walls: Sequence[SurfacePoints], number: NDArray[np.int64], at: Floats) -> tuple[Floats, Floats]:
+    """Points and normals (n, 3) at u and v (n, 2) of the walls of these numbers."""
+    points, normals = np.empty((len(at), 3)), np.empty((len(at), 3))
+    for k in np.unique(number).tolist():
+        of, surface = number == k, walls[k].surface
+        if surface is None:
+            raise InputError(f"channel: wall {walls[k].name}: only points of it are known: state its surface")
+        points[of], normals[of] = surface.at(*at[of].T), surface.normal(*at[of].T)
+    return points, normals
+
+
+def _reach(p: Floats, N: Floats) -> tuple[Floats, Floats]:
+    """Greatest distance t and angle w (n,) from a point of a cell to its nearest corner; corners p (n, 4, 3)."""
+    t, w = np.zeros(len(p)), np.zeros(len(p))
+    # opposite corners: of a cell that is nearly a parallelogram none of its points is farther than half of the longer
+    for a, b in ((0, 3), (1, 2)):
+        t = np.maximum(t, 0.5 * np.linalg.norm(p[:, a] - p[:, b], axis=1))
+    for a, b in ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)):
+        w = np.maximum(w, np.linalg.norm(N[:, a] - N[:, b], axis=1))
+    return t, _TURN * w

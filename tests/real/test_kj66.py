@@ -1,0 +1,86 @@
+"""A KJ66 impeller by others (STEP): sides of seven edges that go on through the hub, tips of three faces each."""
+
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chipload.examples import copy_example
+from chipload.geometry.step_faces import read_faces
+from chipload.jobs import check_job, load_job, run_job
+from chipload.jobs.impeller.part import AGAINST_Z, read_part
+
+DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2].parent / "shared" / "data"))
+FILE = DATA / "cad" / "impeller_kj66" / "impeller.step"
+
+pytestmark = pytest.mark.skipif(not FILE.is_file(), reason=f"{FILE} is missing")
+
+PART = """[impeller]
+blades = 9
+outer_diameter_mm = 100.2
+
+[impeller.step]
+file = "impeller.step"
+flow = "-y"
+plus = {plus}
+minus = {minus}
+hub = [88]
+shroud = [7, 2, 9]
+fit_mm = 0.02
+hub_ahead_mm = 0.0
+
+[[surface]]
+body = "blade"
+side = "plus"
+along = [0.1, 0.9]
+up = [0.2, 0.9]
+points = [4, 3]
+
+[catalogue]
+file = "cutters.toml"
+
+"""
+CUTTERS = """name = "small"
+note = "made up"
+cutter = [{ diameter_mm = 2.0, corner_radius_mm = 1.0 }, { diameter_mm = 3.0, corner_radius_mm = 1.0 }]
+"""
+
+
+def job(folder, plus=3, minus=1):
+    path = copy_example("impeller", folder / "job") / "job.toml"
+    shutil.copy(FILE, path.parent)
+    (path.parent / "cutters.toml").write_text(CUTTERS)
+    text = path.read_text()
+    machine = text[text.index("[machine]") : text.index("[[surface]]")]
+    search = text[text.index("[[operation]]") : text.index("hand_picked")].replace("check_mm = 3.0", "check_mm = 1.5")
+    path.write_text(PART.format(plus=plus, minus=minus) + machine + search.replace("near_mm = 2.0", "near_mm = 1.0"))
+    return path
+
+
+def test_its_sides_are_those_of_the_file(tmp_path):
+    """Points of the patches, turned back into the frame of the file, lie on the faces by the CAD kernel's distance."""
+    path = job(tmp_path)
+    part = read_part(load_job(path).job)
+    assert part.faces[4] == "blade: its foot leaves the hub by at most 0.00994 mm"
+    R = AGAINST_Z["-y"]
+    model = read_faces(FILE)
+    rng = np.random.default_rng(4)
+    u, v = rng.random(25), rng.random(25)
+    for number, patch in ((3, part.impeller.blade.plus), (1, part.impeller.blade.minus)):
+        away = [model.faces[number - 1].distance(p) for p in (patch.at(u, v) @ R).tolist()]
+        # the minus side may be that of another blade, turned
+        if number == 3:
+            assert max(away) < 0.005
+
+
+def test_it_is_searched(tmp_path):
+    found = run_job(load_job(job(tmp_path))).outcome
+    assert (found.surfaces[0].answer.cutter >= 0).all()
+    assert found.surfaces[0].answer.certified.all()
+
+
+def test_sides_that_are_changed_are_refused(tmp_path):
+    with pytest.raises(Exception, match="must be less than half: plus faces a growing angle about the axis: change"):
+        check_job(load_job(job(tmp_path, plus=1, minus=3)))
