@@ -32,9 +32,9 @@ from chipload.planning.pocket.motions import (
     Motions,
     clock,
     motions_of,
-    samples_of,
     programs_of,
     replayed,
+    samples_of,
     speeds,
 )
 from chipload.planning.pocket.reach import CHORD
