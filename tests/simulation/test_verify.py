@@ -1,5 +1,7 @@
 """A right plan is proved; a gouge, a rapid through stock, a wrong engagement and left stock are caught."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from chipload.errors import Cancelled, InputError
 from chipload.geometry.contour import Contour
 from chipload.program.program import ARC_CCW, LINE, RAPID, Program
 from chipload.simulation.material import material_left_of
-from chipload.simulation.verify import verify_contour
+from chipload.simulation.verify import FILM_MM, _difference, verify_contour
 
 R, S, RC, Z, SAFE = 5.0, 0.1, 8.0, -6.0, 5.0
 SHALLOW = np.degrees(np.arccos(1 - S / R))
@@ -232,3 +234,11 @@ def test_a_row_at_a_kink_is_held_against_both_headings():
     assert check(180.0).verdict == "proved"
     assert check(90.0).verdict == "proved"
     assert check(135.0).engagement_difference_deg == pytest.approx(45.0, abs=0.01)
+
+
+def test_films_agree_and_nothing_else():
+    """A film of 0.1 um is 0.468 deg at R = 3: below it two engagements agree, above it each difference counts."""
+    film = math.degrees(math.acos(1.0 - FILM_MM / 3.0))
+    assert film == pytest.approx(0.468, abs=1e-3)
+    found, planned = np.array([0.3, 0.0, 0.6, 36.8]), np.array([0.0, 0.4, 0.0, 36.9])
+    assert _difference(found, planned, film) == pytest.approx([0.0, 0.0, 0.6, 0.1])
