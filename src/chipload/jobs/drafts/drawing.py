@@ -27,6 +27,8 @@ DIAMETERS = (20.0, 16.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5
 REACH = 0.97
 #: radial depth over the diameter, axial depth over the diameter, feed per tooth over the diameter
 RADIAL, AXIAL, FEED = 0.15, 0.5, 0.005
+#: material left on the wall of a pocket over the diameter
+ALLOWANCE = 0.025
 #: cutting speed [m/min], for aluminium with carbide
 CUTTING_M_MIN = 200.0
 #: points along a contour that the size of the cutter is found on
@@ -190,7 +192,7 @@ def _rest(machine: Machine, named: str | None, d: float, axial: float, kind: str
         Entry("clearance_mm", 5.0, "height of rapids above the stock", True),
     ]
     if kind == "pocket":
-        entries.append(Entry("allowance_mm", note="left on the wall", example="0.2"))
+        entries.append(Entry("allowance_mm", round(ALLOWANCE * d, 3), "left on the wall for finishing", True))
         engagement = math.degrees(math.acos(1.0 - 2.0 * RADIAL))
         limit = Entry("engagement_deg", round(1.1 * engagement, 1), "a tenth above that of a straight front", True)
     else:
