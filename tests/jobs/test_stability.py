@@ -288,14 +288,17 @@ def test_a_limit_that_is_a_least_value() -> None:
 
 
 def test_a_mirrored_program_has_the_same_margins(tmp_path: Path) -> None:
-    """M4 and the other side: each step has the margin of its mirror image."""
+    """M4, the other side and mirrored modes: each step has the margin of its mirror image."""
     text = TEXT.replace("Z-1.5", "Z-3")
-    one = done(tmp_path, text=text).result.in_use[0].columns
-    other = done(tmp_path, text=text.replace("M3", "M4").replace("Y20", "Y-20")).result.in_use[0].columns
-    assert one["stability_margin"].min() < 3.0
-    assert other["stability_margin"] == pytest.approx(one["stability_margin"], rel=1e-6)
-    wrong = done(tmp_path, text=text.replace("M3", "M4")).result.in_use[0].columns
-    assert abs(wrong["stability_margin"].min() - one["stability_margin"].min()) > 0.05
+    mirrored = text.replace("M3", "M4").replace("Y20", "Y-20")
+    skew = MODES.replace('"x"', "[1.0, 0.4]").replace('"y"', "[-0.3, 1.0]")
+    other = MODES.replace('"x"', "[1.0, -0.4]").replace('"y"', "[-0.3, -1.0]")
+    one = done(tmp_path, text=text, modes=skew).result.in_use[0].columns["stability_margin"]
+    two = done(tmp_path, text=mirrored, modes=other).result.in_use[0].columns["stability_margin"]
+    wrong = done(tmp_path, text=mirrored, modes=skew).result.in_use[0].columns["stability_margin"]
+    assert one.min() < 3.0
+    assert two == pytest.approx(one, rel=1e-6)
+    assert abs(wrong.min() - one.min()) > 0.05
 
 
 def test_by_moves_the_margins_are_the_same(tmp_path: Path) -> None:

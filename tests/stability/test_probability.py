@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from statistics import NormalDist
 
 import numpy as np
 import pytest
@@ -37,6 +38,23 @@ def test_random_samples_of_whole_cuts_have_the_same_share():
     assert 0.1 < share < 0.9
     found = stable_probability(cut_of(TWO, 8000, 1.9, HALF), SPREAD, COEFFICIENTS, samples=256)[0]
     assert found == pytest.approx(share, abs=3.0 * math.sqrt(share * (1.0 - share) / count))
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_each_coefficient_counts_by_itself(which):
+    """One coefficient alone is unsure: the share of its quantiles at which the cut is stable."""
+    none, covariance = ModeSpread(0.0, 0.0, 0.0), np.zeros((2, 2))
+    covariance[which, which] = 0.6**2
+    stable, count = 0, 200
+    for q in (np.arange(count) + 0.5) / count:
+        factor = [1.0, 1.0]
+        factor[which] = max(1.0 + 0.6 * NormalDist().inv_cdf(q), 0.1)
+        metal = Material("m", 700.0 * factor[0], 210.0 * factor[1], 0.0, 0.0, 0.0, 0.0, source="made up for tests")
+        cut = cut_of(TWO, 8000, 1.8, HALF, metal=metal)
+        stable += abs(largest_multipliers(cut, per_wave=9.0, most=16, still=1e-3)[0]) < 1.0
+    found = stable_probability(cut_of(TWO, 8000, 1.8, HALF), none, covariance, samples=256)[0]
+    assert 0.05 < stable / count < 0.98
+    assert found == pytest.approx(stable / count, abs=0.02)
 
 
 def test_without_spread_it_is_certain():

@@ -141,3 +141,33 @@ def test_what_the_command_refuses(tmp_path: Path, text, words, message):
     assert done.exit_code == 2
     assert message in done.output
     assert not (tmp_path / "m.toml").exists()
+
+
+def test_mutated_files_are_read_or_refused(tmp_path: Path):
+    """Nothing but a refusal comes of bytes that are wrong."""
+    rng = np.random.default_rng(2)
+    h = receptance()
+    whole = {
+        "a.uff": universal(F, h / 1000.0, ordinate=8),
+        "a.csv": "".join(f"{f:g} {x.real:.6e} {x.imag:.6e} 0.9 m/N\n" for f, x in zip(F, h / 1000.0, strict=True)),
+    }
+    refused = 0
+    for name, text in whole.items():
+        for _ in range(60):
+            data = bytearray(text[:9000].encode())
+            for at in rng.integers(0, min(len(data), 1200), 4):
+                data[at] = rng.choice(list(b"0123456789-+.eE ,nai\n"))
+            (tmp_path / name).write_bytes(bytes(data))
+            try:
+                measured = read_receptance(tmp_path / name, "m/N")
+            except InputError:
+                refused += 1
+            else:
+                assert np.isfinite(measured.receptance.response).all()
+    assert refused > 20
+    (tmp_path / "huge.uff").write_text(whole["a.uff"].replace(f"{len(F):10d}", "9999999999"))
+    with pytest.raises(InputError, match="dataset 58 cannot be read"):
+        read_receptance(tmp_path / "huge.uff")
+    (tmp_path / "c.csv").write_text(whole["a.csv"].replace(" 0.9 ", " nan "))
+    with pytest.raises(InputError, match="a coherence is not from 0 to 1"):
+        read_receptance(tmp_path / "c.csv")

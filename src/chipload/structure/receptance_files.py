@@ -28,6 +28,8 @@ UNITS = {
     "m/N": (1000.0, 0), "mm/N": (1.0, 0), "um/N": (1e-3, 0), "m/s/N": (1000.0, 1), "m/s2/N": (1000.0, 2),
 }  # fmt: skip
 LARGEST_FILE = 200_000_000
+#: size of a number that is believed
+LARGEST = 1e30
 #: directions of dataset 58
 _DIRECTIONS = {1: "x", 2: "y", 3: "z"}
 #: kinds of its ordinate: displacement, velocity, acceleration
@@ -77,12 +79,22 @@ def read_receptance(path: Path, unit: str | None = None) -> MeasuredReceptance:
         raise InputError(f"{path.name}: {len(rows)} rows of frequency, real and imaginary part: must be at least 20")
     width = min(map(len, rows))
     table = np.array([row[:width] for row in rows])
+    if not (np.abs(table[:, :3]) < LARGEST).all():
+        raise InputError(f"{path.name}: a number is not finite, or beyond {LARGEST:g}")
     found = _UNIT.search(head)
     own = unit or (found[1].replace("\u00b5", "u").replace("\u03bc", "u") if found else None)
     if own is None:
         raise InputError(f"{path.name}: states no unit: give --unit, one of {', '.join(UNITS)}")
-    coherence = table[:, 3] if width > 3 else None
-    return MeasuredReceptance(_displacement(path.name, table[:, 0], table[:, 1] + 1j * table[:, 2], own), coherence, "")
+    measured = _displacement(path.name, table[:, 0], table[:, 1] + 1j * table[:, 2], own)
+    coherence = _coherence(path.name, table[:, 3], measured) if width > 3 else None
+    return MeasuredReceptance(measured, coherence, "")
+
+
+def _coherence(name: str, values: Array, measured: Receptance) -> Array:
+    """Coherence at the frequencies of the receptance, which may lack the first."""
+    if not ((values >= 0.0) & (values <= 1.0 + 1e-6)).all():
+        raise InputError(f"{name}: a coherence is not from 0 to 1")
+    return values[len(values) - len(measured.frequency) :]
 
 
 def _displacement(name: str, f: Array, H: Complex, unit: str) -> Receptance:
@@ -128,7 +140,7 @@ def _universal(name: str, text: str, unit: str | None) -> MeasuredReceptance:
     if coherence is not None and len(coherence) != len(f):
         coherence = None
     if coherence is not None:
-        coherence = coherence[len(f) - len(measured.frequency) :]
+        coherence = _coherence(name, coherence, measured)
     return MeasuredReceptance(measured, coherence, direction)
 
 
@@ -147,7 +159,11 @@ def _dataset(block: list[str]) -> tuple[int, str, int, Array, Complex]:
         else:
             numbers += [float(line[k : k + width].replace("D", "E")) for k in range(0, len(line.rstrip()), width)]
     parts = (2 if data in (5, 6) else 1) + (0 if even else 1)
+    if not 0 < count * parts <= len(numbers):
+        raise ValueError
     table = np.array(numbers[: count * parts]).reshape(count, parts)
+    if not ((np.abs(table) < LARGEST).all() and abs(first) < LARGEST and abs(step) < LARGEST):
+        raise ValueError
     f = np.asarray(first + step * np.arange(count) if even else table[:, 0], dtype=np.float64)
     table = table if even else table[:, 1:]
     values = table[:, 0] + (1j * table[:, 1] if data in (5, 6) else 0j)
