@@ -225,6 +225,13 @@ def test_a_run_that_was_stopped_goes_on_with_the_same_bytes(
     raise AssertionError("never done")
 
 
+@pytest.fixture
+def one_instant(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every short step is looked at in its middle alone."""
+    monkeypatch.setattr("chipload.engagement.moves.stock.MORE", (1, 1))
+
+
+@pytest.mark.usefixtures("one_instant")
 def test_what_a_watch_gets_gives_the_same_loads() -> None:
     """The kept engagement of a step at one instant gives the loads of the step and their bands."""
     removal = run(zigzag(), keep=True)
@@ -235,6 +242,7 @@ def test_what_a_watch_gets_gives_the_same_loads() -> None:
             np.testing.assert_allclose(values, removal.columns[name][cuts.step], rtol=1e-6, atol=1e-9, err_msg=name)
 
 
+@pytest.mark.usefixtures("one_instant")
 @pytest.mark.parametrize("tool", [0, 1])
 def test_every_load_is_that_of_the_layered_engine_for_the_same_engagement(tool: int) -> None:
     """All columns of loads, work and engaged volume from the rows of one engine by the code of the other; tool 1 has
@@ -267,6 +275,34 @@ def test_a_watch_gets_the_instant_of_the_greatest_force() -> None:
     for name in ("force_n", "torque_nm"):
         np.testing.assert_allclose(loads[name], removal.columns[name][cuts.step], rtol=2e-3, err_msg=name)
     assert (loads["torque_mean_nm"] > 1.05 * removal.columns["torque_mean_nm"][cuts.step]).any()
+
+
+def test_a_step_that_cuts_unlike_the_one_before_it_is_looked_at_three_times(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A mill of 10 mm enters a block at right angles in steps of 1 mm: against steps of 0.02 mm."""
+    program = path([[-6.0, 15.0, -3.0], [9.0, 15.0, -3.0]])
+    fine = remove(program, block(), {1: MILL}, ALLOY, replace(FINE, step_mm=0.02), engine="moves", accuracy=False)
+    known = fine.columns["chip_volume_mm3"].reshape(15, 50).sum(axis=1)
+    some = run(program, accuracy=False).columns["chip_volume_mm3"]
+    monkeypatch.setattr("chipload.engagement.moves.stock.MORE", (1, 1))
+    once = run(program, accuracy=False).columns["chip_volume_mm3"]
+    assert np.abs(some - known).max() < 0.5 * np.abs(once - known).max()
+    np.testing.assert_allclose(some[6:], known[6:], rtol=1e-3)
+
+
+def test_a_wall_that_a_step_meets_at_its_very_end_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Square into a wall that stands 0.3 mm before the corner of the path: against steps of 0.02 mm."""
+    program = path([[-8.0, -2.0, -3.0], [-4.7, -2.0, -3.0], [-4.7, 9.0, -3.0]])
+    fine = replace(FINE, step_mm=0.02)
+    known = remove(program, block(), {1: MILL}, ALLOY, fine, engine="moves", accuracy=False).columns
+    first = known["y_mm"] <= -2.0
+
+    def peak() -> float:
+        columns = run(program, accuracy=False).columns
+        return float(columns["force_n"][columns["y_mm"] <= -2.0].max())
+
+    assert peak() == pytest.approx(float(known["force_n"][first].max()), rel=0.03)
+    monkeypatch.setattr("chipload.engagement.moves.stock.MORE", (1, 1))
+    assert peak() == 0.0
 
 
 def test_what_is_engaged_is_what_is_removed() -> None:

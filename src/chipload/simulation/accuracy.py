@@ -31,7 +31,8 @@ step with MORE times the slices and half the angle between rotations, once at th
 halves, for what exceeds the worst: where the contact is exact, a load that differs between the halves of a step, as
 where the cutter enters, is no error of the resolution unless it is greater than any that was found. FLOOR is that of
 :data:`MOVES_FLOOR`, no less than what 99 of 100 moves of the benchmark are off by (docs/design/engines.md), for of all
-steps a few are computed once more.
+steps a few are computed once more; where all cutters have a straight flank and a flat bottom, on which slices are
+exact, it is that of the layers.
 
 Deflection and form error go with the force: they have its error.
 """
@@ -46,6 +47,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import slices
 from chipload.simulation.checkpoint import in_rows
 from chipload.simulation.loads import LOADS
@@ -181,14 +183,24 @@ def resolution_error(
             c, w = float(columns[name][step]), worst[name]
             off = max(halves[name] - w, abs(alike[name] - c) if c >= 0.5 * w else alike[name] - w)
             lost[name] = max(lost[name], window.factor * off)
+    # the flank of a flat mill is cut into slices where its contact changes: exact
+    straight = all(c.corner_radius == 0.0 and c.taper == 0.0 and c.bottom == 0.0 for c in _used(windows, setting))
     films, least = _films(columns), FLOOR if all(w.upright for w in windows.values()) else LEANING_FLOOR
     for name in COMPARED:
         if worst[name] > 0.0 and films < 1.0:
-            floor = least if setting.moves is None else MOVES_FLOOR[name]
+            floor = least if setting.moves is None or straight else MOVES_FLOOR[name]
             found[name] = lost[name] / worst[name] + floor + films / (1.0 - films)
         elif lost[name] > 0.0 or films > 0.0:
             found[name] = math.inf
     return found | dict.fromkeys(WITH_FORCE, found["force_n"])
+
+
+def _used(windows: Mapping[int, Window], setting: RunSettings) -> list[Cutter]:
+    """Cutters of the steps that are computed once more; of a run by moves those that made a move."""
+    some = {int(w.own.tool[0]) for w in windows.values()}
+    if setting.moves is not None:
+        some |= set(setting.moves.stock.table)
+    return [setting.cutters[n] for n in sorted(some)]
 
 
 def _asked(columns: Columns, before: LayeredStock) -> tuple[list[int], int]:
@@ -261,22 +273,32 @@ def layers_again(before: LayeredStock, setting: RunSettings, remove: Remove) -> 
     return again
 
 
-def moves_again(setting: RunSettings, run: MoveRun) -> Again:
-    """Steps by moves with more slices."""
+def moves_again(setting: RunSettings, run: MoveRun, columns: Columns) -> Again:
+    """Steps by moves with more slices; of the run's ``columns`` the volume says at how many instants it looked at a
+    step.
+    """
     flank = {n: length / MORE for n, length in run.flank_mm.items()}
     rotation = 0.5 * setting.resolution.rotation
 
-    def greatest(window: Window, own: Steps) -> Mapping[str, float]:
+    def loads_of(window: Window, own: Steps, more: tuple[int, int] | None) -> tuple[Mapping[str, float], float]:
         stock = run.stock.cropped(window.low, window.high)
         if stock is None:
-            return dict.fromkeys(COMPARED, 0.0)
+            return dict.fromkeys(COMPARED, 0.0), 0.0
         for some in window.earlier:
             stock.skip(some.p0, some.p1, some.tool)
+        stock.more = stock.more if more is None else more
         finer = replace(run, stock=stock, corner_pieces=MORE * run.corner_pieces, flank_mm=flank)
-        loads = moved(own, finer, 0, setting.cutters, setting.material, rotation).loads
-        return {name: float(loads[:, LOADS.index(name)].max()) for name in COMPARED}
+        found = moved(own, finer, 0, setting.cutters, setting.material, rotation)
+        worst = {name: float(found.loads[:, LOADS.index(name)].max()) for name in COMPARED}
+        return worst, float(found.removed[:, 0].sum())
 
-    return lambda window: (greatest(window, window.own), greatest(window, _halves(window.own)))
+    def again(window: Window) -> tuple[Mapping[str, float], Mapping[str, float]]:
+        volume = float(columns["chip_volume_mm3"][window.step])
+        alike = [loads_of(window, window.own, (n, n)) for n in (1, *run.stock.more)]
+        same = min(alike, key=lambda each: abs(each[1] - volume))[0]
+        return same, loads_of(window, _halves(window.own), None)[0]
+
+    return again
 
 
 def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, remove: Remove) -> dict[str, float]:

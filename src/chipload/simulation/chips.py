@@ -194,7 +194,7 @@ def with_accuracy(removal: Removal, program: Program, before: LayeredStock | Non
             before, setting, lambda steps, stock, to: remove_block(steps, stock, RunningSums(0.0), to)[1]
         )
     else:
-        again = moves_again(setting, setting.moves)
+        again = moves_again(setting, setting.moves, removal.columns)
     return replace(
         removal,
         energy_balance=energy_balance(removal.columns, setting.material.Ktc),

@@ -354,13 +354,17 @@ def _cuts(
     force: Floats,
 ) -> Cuts:
     """What the teeth of a cutter cut: of each step the instant of the greatest ``force`` (m,), where others are within
-    ``ALIKE`` of it the one that is nearest to the middle.
+    ``ALIKE`` of it the one that removes most, by a share of 1e-6, and of those the one nearest to the middle.
     """
     step = found.step[entries]
     greatest = np.zeros(int(step.max(initial=-1)) + 1)
     np.maximum.at(greatest, step, force)
     off = np.abs(2 * found.instant[entries] + 1 - found.instants[entries])
-    order = np.lexsort((off, force < (1.0 - ALIKE) * greatest[step], step))
+    most = np.zeros(len(greatest))
+    np.maximum.at(most, step, found.volume[entries])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        less = np.where(most[step] > 0.0, np.round(1.0 - found.volume[entries] / most[step], 6), 0.0)
+    order = np.lexsort((off, less, force < (1.0 - ALIKE) * greatest[step], step))
     kept = np.sort(order[np.flatnonzero(np.diff(step[order], prepend=-1))])
     some = plain if len(kept) == len(entries) else _part(plain, kept)
     at = step[kept]

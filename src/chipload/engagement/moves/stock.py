@@ -35,6 +35,8 @@ Ints = NDArray[np.int64]
 CELL, CELLS = 0.1, 4_000_000
 #: a step is looked at once every so many cutter radii, at its middle at least
 INSTANT = 0.25
+#: instants of a step that is looked at once and does not cut as the one before it, and of one that enters or leaves
+MORE = (3, 25)
 #: most nodes of the net of outlines
 NODES = 1_000_000
 
@@ -93,7 +95,8 @@ def work_room(grid: Floats, cutters: Floats, pieces: int, flank: Floats) -> tupl
     spans = most * (samples + 1)
     return (
         np.empty((cells, 6)), np.empty(front.LEVELS), np.empty((most, 11)), np.empty((spans, 2)),
-        np.empty(spans, np.int64), np.empty(spans, np.int64), np.empty(3), np.empty(2, np.int64),
+        np.empty(spans, np.int64), np.empty(spans, np.int64), np.array([0.0, 0.0, 0.0, 0.0]),
+        np.empty(2, np.int64),
     )  # fmt: skip
 
 
@@ -142,6 +145,8 @@ class MoveStock:
     cutters : by tool number
     body : closed mesh; None: the block from ``low`` to ``high``
 
+    Attribute ``more``: instants of steps that are unlike the one before, as :data:`MORE`.
+
     Examples
     --------
     A slot of 10 x 2 mm, 1 mm of the way: 20 mm^3.
@@ -173,7 +178,7 @@ class MoveStock:
         self.kept, self.reach = np.empty(1 << 16, dtype=np.int32), np.empty(1 << 16)
         self.used = np.zeros(1, dtype=np.int64)
         self.moves, self.of, self.count = np.empty((1024, 6)), np.empty(1024, dtype=np.int64), 0
-        self.body = body
+        self.body, self.more = body, MORE
         self.first, self.ids = np.zeros(cells + 1, dtype=np.int64), np.empty(0, dtype=np.int32)
         self.faces = np.empty((0, 12))
         if body is not None:
@@ -260,11 +265,12 @@ class MoveStock:
         frame = np.where(upright[:, None], [[1.0, 0.0]], u[:, :2] / np.where(upright, 1.0, size)[:, None])
         frame = np.ascontiguousarray(frame)
         flank = np.array([flank_mm[n] for n in self.tools])
+        most = int(np.where(instants == 1, max(self.more), instants).sum())
         many = 16 * max(int(instants.sum()), 1) + 256
         slices, rows, owner = np.empty((many, 6)), np.empty((2 * many, 2)), np.empty(2 * many, dtype=np.int64)
-        entries = int(instants.sum()) + 1
+        entries = most + 1
         entry, out = np.empty((entries, 3), dtype=np.int64), np.empty((entries, 10))
-        state = np.array([begin, 0, 0, 0, 0])
+        state = np.array([begin, 0, 0, 0, 0, *self.more])
         parts = corner_parts(pieces)
         at, work = 0, work_room(self.grid, self.cutters, pieces, flank)
         while True:
@@ -293,7 +299,7 @@ class MoveStock:
             else:
                 slices = np.concatenate([slices, np.empty_like(slices)])
                 rows, owner = np.concatenate([rows, np.empty_like(rows)]), np.concatenate([owner, np.empty_like(owner)])
-        _, _, b, k, m = state.tolist()
+        _, _, b, k, m, *_ = state.tolist()
         step, out = entry[:m, 0], out[:m]
         return Engaged(
             step.copy(), entry[:m, 1].copy(), instants[step], np.append(entry[:m, 2], b), rows[:b], owner[:b],

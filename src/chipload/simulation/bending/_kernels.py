@@ -14,8 +14,8 @@ import math
 import numpy as np
 from numba import njit
 
-from chipload.cutting._kernels import BESIDE, TAU, edge
-from chipload.cutting.bending._kernels import NODES, PIECE, WEIGHTS
+from chipload.cutting._kernels import BESIDE, TAU
+from chipload.cutting._strength import NODES, PIECE, WEIGHTS, edge_at, points_of
 
 GOLDEN = 0.6180339887498949
 #: steps of the golden section: the bracket shrinks to 1e-6 of the step, the distance to its square
@@ -221,9 +221,11 @@ def chained(za, zb, bars):
 @njit(cache=True, nogil=True)
 def bent(theta, z, rows, tooth, piece, slices, lo, hi, teeth, c, bars, out):
     """Load of all teeth at one rotation: out (5,) = force on the cutter along T, n, A [N], displacement of the cutter
-    at height z along T, n [mm]. Five points of Gauss on pieces that neither z nor ``PIECE`` of immersion divides.
+    at height z along T, n [mm]. Points of Gauss on pieces that neither z nor ``PIECE`` of immersion
+    divides, as many as their immersion asks for.
     """
     out[:] = 0.0
+    linear = c[6] == 0.0 and c[7] == 0.0 and c[8] == 0.0
     for r in range(lo, hi):
         p = rows[r, 0]
         q = rows[r, 1]
@@ -256,12 +258,13 @@ def bent(theta, z, rows, tooth, piece, slices, lo, hi, teeth, c, bars, out):
                         continue
                     parts = max(math.ceil(rate * (b2 - b1) / PIECE), 1)
                     h = (b2 - b1) / parts
+                    points = points_of(rate * h)
                     for part in range(parts):
-                        for g in range(5):
-                            s = b1 + h * (part + 0.5 + 0.5 * NODES[g])
+                        for g in range(points):
+                            s = b1 + h * (part + 0.5 + 0.5 * NODES[points, g])
                             phi = turn - base - rate * s
-                            t, n, a, _ = edge(phi, 0.0, rows[r, 4], rows[r, 5], rows[r, 6], sine, slices[k, 4], c)
-                            w = 0.5 * h * WEIGHTS[g]
+                            t, n, a, _ = edge_at(phi, linear, rows[r, 4], rows[r, 5], rows[r, 6], sine, slices[k, 4], c)
+                            w = 0.5 * h * WEIGHTS[points, g]
                             out[0] += w * t
                             out[1] += w * n
                             out[2] += w * a

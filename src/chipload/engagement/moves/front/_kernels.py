@@ -27,6 +27,11 @@ BESIDE = 1e-4
 APART = 0.35
 #: heights of the stock that cut the flank into slices; where there are more they are evenly thick
 LEVELS = 16
+#: a step cuts as the one before it if its volume a length differs by no more than this share; from the second on it
+#: enters or leaves
+STEADY, JUMP = 0.03, 0.3
+#: cosine of the angle between two moves from which on they make a corner
+CORNER = 0.985
 #: least sine of the front's end that counts
 ALONG = 1e-9
 
@@ -198,6 +203,21 @@ WORK = types.Tuple((_F2, _F1, _F2, _F2, _I1, _I1, _F1, _I1))
 INDEX = types.Tuple((_F1, _I1, _F2, _I2, _S, _F1, _F2, _I1, _F2, _F1, _F1, _I1, _S, _F2))
 
 
+@njit(cache=True, nogil=True)
+def turns(moves, q, end):
+    """Whether a move is the last of ``end`` or the next one goes another way."""
+    if q + 1 >= end:
+        return True
+    dot = 0.0
+    one = 0.0
+    two = 0.0
+    for d in range(3, 6):
+        dot += moves[q, d] * moves[q + 1, d]
+        one += moves[q, d] ** 2
+        two += moves[q + 1, d] ** 2
+    return dot < CORNER * math.sqrt(one * two)
+
+
 @njit(
     types.int64(types.int64, _F2, _I1, _I1, INDEX, WORK, _F2, _F1, _F2, _F2, _I1, _I2, _F2, _I1),
     cache=True,
@@ -209,9 +229,11 @@ def run(begin, frame, instants, state, index, work, parts, flank, slices, rows, 
     Parameters
     ----------
     frame : (n, 2) direction in the plan from which psi is counted, of each step
-    instants : (n,) at how many times a step is looked at: the middles of so many equal parts of it
+    instants : (n,) at how many times a step is looked at: the middles of so many equal parts of it; steps of one that
+        do not cut as the one before them get more
     state : number of the move that is the first step; 1 where the engagement of step ``begin`` is known; rows, slices
-        and entries so far
+        and entries so far; instants of steps that get more, and of
+        those that enter or leave
     index : see :func:`chipload.engagement.moves._kernels.what_is`; the moves of these steps are in it
     pieces, flank : slices of a corner, and longest slice of the flank of each cutter [mm]
     slices, rows, owner, out : see :func:`engaged`
@@ -237,8 +259,14 @@ def run(begin, frame, instants, state, index, work, parts, flank, slices, rows, 
             at[0] = state[2]
             at[1] = state[3]
             entries = state[4]
-            for i in range(instants[k]):
-                t = (i + 0.5) / instants[k]
+            length = math.sqrt(m[3] * m[3] + m[4] * m[4] + m[5] * m[5])
+            count = instants[k]
+            rate = 0.0
+            i = 0
+            while i < count:
+                # the middle first: where a step that is looked at once cuts unlike the one before it, also beside
+                j = (i + count // 2) % count
+                t = (j + 0.5) / count
                 for d in range(3):
                     p[d] = m[d] + t * m[3 + d]
                 if entries == len(out):
@@ -249,11 +277,42 @@ def run(begin, frame, instants, state, index, work, parts, flank, slices, rows, 
                     slices, rows, owner, at, out[entries],
                 ):  # fmt: skip
                     return k
+                if i == 0 and length > 0.0:
+                    rate = out[entries, 0] / length
+                    change = abs(rate - p[3]) / max(rate, p[3]) if rate != p[3] else 0.0
+                    if instants[k] == 1 and change > STEADY:
+                        count = state[5] if change < JUMP else state[6]
+                        j = count // 2
                 if at[0] > before or out[entries, 8] > 0.0:
                     entry[entries, 0] = k
-                    entry[entries, 1] = i
+                    entry[entries, 1] = j
                     entry[entries, 2] = before
                     entries += 1
+                if i == 0 and count == 1 and length > 0.0 and turns(index[6], q, state[0] + n):
+                    # a step that ends in a corner may meet the material at its very end
+                    t = 1.0 - 0.5 / state[6]
+                    for d in range(3):
+                        p[d] = m[d] + t * m[3 + d]
+                    if entries == len(out):
+                        return k
+                    rows_before = at[0]
+                    slices_before = at[1]
+                    if not engaged(
+                        p, m[3:], c, frame[k], parts, flank[index[7][q]], index, near, levels, scratch, spans, mine,
+                        room, slices, rows, owner, at, out[entries],
+                    ):  # fmt: skip
+                        return k
+                    end = out[entries, 0] / length
+                    at[0] = rows_before
+                    at[1] = slices_before
+                    if abs(end - rate) > STEADY * max(end, rate) or out[entries, 8] > 0.0:
+                        count = state[6]
+                        if entries > state[4]:
+                            entry[entries - 1, 1] = count // 2
+                i += 1
+            if length > 0.0 and count > 0:
+                p[3] = rate
+            instants[k] = count
             state[2] = at[0]
             state[3] = at[1]
             state[4] = entries
