@@ -267,73 +267,37 @@ def upright(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner):
     for k in range(len(slices)):
         bottom = tip[2] + slices[k, 6]
         top = tip[2] + slices[k, 7]
-        if slices[k, 7] - slices[k, 6] <= LEVEL:
-            place[0] = 0.5 * (slices[k, 0] + slices[k, 1])
-            place[1], place[2], place[3] = slices[k, 2], slices[k, 4], slices[k, 5]
-            l = layer_of(bottom, bounds)
-            if l >= 0:
-                s_from, s_to = slices[k, 0], slices[k, 1]
-                total = band(
-                    tip,
-                    frame,
-                    speed,
-                    turn,
-                    slices[k],
-                    k,
-                    l,
-                    place,
-                    s_from,
-                    s_to,
-                    widest,
-                    bounds,
-                    start,
-                    edges,
-                    breaks,
-                    rows,
-                    owner,
-                    total,
-                )
-                if total < 0:
-                    return -1
-            continue
-        first = max(int(np.searchsorted(bounds, bottom, side="right")) - 1, 0)
-        last = min(int(np.searchsorted(bounds, top, side="left")), len(bounds) - 1)
+        level = slices[k, 7] - slices[k, 6] <= LEVEL
+        if level:
+            # in one layer, or in none
+            first = layer_of(bottom, bounds)
+            last = first + 1 if first >= 0 else first
+        else:
+            first = max(int(np.searchsorted(bounds, bottom, side="right")) - 1, 0)
+            last = min(int(np.searchsorted(bounds, top, side="left")), len(bounds) - 1)
         for l in range(first, last):
-            at_height(slices[k], max(bounds[l], bottom) - tip[2], low)
-            at_height(slices[k], min(bounds[l + 1], top) - tip[2], high)
-            s_from = slices[k, 0] if bottom >= bounds[l] else low[0]
-            s_to = slices[k, 1] if top <= bounds[l + 1] else high[0]
-            if s_to - s_from <= 0.0:
-                continue
+            s_from, s_to = slices[k, 0], slices[k, 1]
+            if not level:
+                at_height(slices[k], max(bounds[l], bottom) - tip[2], low)
+                at_height(slices[k], min(bounds[l + 1], top) - tip[2], high)
+                s_from = s_from if bottom >= bounds[l] else low[0]
+                s_to = s_to if top <= bounds[l + 1] else high[0]
+                if s_to - s_from <= 0.0:
+                    continue
             r = slices[k, 8]
             place[0] = 0.5 * (s_from + s_to)
-            if r > 0.0:
-                kappa = math.atan2(slices[k, 4], slices[k, 5]) + (place[0] - 0.5 * (slices[k, 0] + slices[k, 1])) / r
+            place[1], place[2], place[3] = slices[k, 2], slices[k, 4], slices[k, 5]
+            off = place[0] - 0.5 * (slices[k, 0] + slices[k, 1])
+            if not level and r > 0.0:
+                kappa = math.atan2(slices[k, 4], slices[k, 5]) + off / r
                 place[2], place[3] = math.sin(kappa), math.cos(kappa)
                 place[1] = slices[k, 2] + r * (place[2] - slices[k, 4])
-            else:
-                place[2], place[3] = slices[k, 4], slices[k, 5]
-                place[1] = slices[k, 2] + (place[0] - 0.5 * (slices[k, 0] + slices[k, 1])) * place[3]
+            elif not level:
+                place[1] = slices[k, 2] + off * place[3]
             total = band(
-                tip,
-                frame,
-                speed,
-                turn,
-                slices[k],
-                k,
-                l,
-                place,
-                s_from,
-                s_to,
-                widest,
-                bounds,
-                start,
-                edges,
-                breaks,
-                rows,
-                owner,
-                total,
-            )
+                tip, frame, speed, turn, slices[k], k, l, place, s_from, s_to, widest, bounds, start, edges, breaks,
+                rows, owner, total,
+            )  # fmt: skip
             if total < 0:
                 return -1
     return total
