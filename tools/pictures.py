@@ -24,6 +24,7 @@ FIGURES: dict[str, tuple[tuple[str, int, int], ...]] = {
     "contour": (),
     "feeds": (("feeds", 1000, 760),),
     "bracket": (("part", 450, 520), ("loads", 550, 860)),
+    "part": (("bent", 700, 480),),
     "notebooks": (("loads", 960, 860),),
     "tube": (("path", 900, 860),),
     "cone": (("allowable", 900, 380),),

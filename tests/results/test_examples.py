@@ -23,6 +23,7 @@ NAMES = (
     "chips",
     "feeds",
     "bracket",
+    "part",
     "trunnion",
     "tube",
     "cone",

@@ -19,6 +19,7 @@ from chipload.jobs.program.numbers import operation_numbers, program_numbers
 from chipload.jobs.program.outcome import ProgramResult, SimulationResult
 from chipload.jobs.program.result import APT, OPTIMISED, feeds_name, result_of
 from chipload.jobs.program.rows import motion_rows
+from chipload.jobs.program.workpiece_figures import workpiece_section
 from chipload.program.apt.writer import write_apt
 from chipload.program.motions import spans
 from chipload.program.program import DWELL, RAPID, Program
@@ -133,6 +134,7 @@ def _load_sections(simulation: SimulationResult, time_s: float, figures: dict[st
         f'<p class="note">{SPREAD if torque["mean_sd"] is not None else NO_SPREAD}{escape(rigid)}</p>',
         figure("loads", along(simulation), figures),
     ]
+    body += workpiece_section(simulation, figures)
     chip = simulation.removal.piece
     if chip is not None:
         title = f"step {chip.step}, layer at z = {chip.height:.4g} mm"
