@@ -25,6 +25,7 @@ FIGURES: dict[str, tuple[tuple[str, int, int], ...]] = {
     "feeds": (("feeds", 1000, 760),),
     "chatter": (("stability", 500, 460), ("margin", 500, 460)),
     "bracket": (("part", 450, 520), ("loads", 550, 860)),
+    "part": (("bent", 700, 480),),
     "notebooks": (("loads", 960, 860),),
     "tube": (("path", 900, 860),),
     "cone": (("allowable", 900, 380),),

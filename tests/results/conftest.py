@@ -34,6 +34,13 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
     "feeds": ("operation.0.step_mm=4", "stock.layer_mm=2"),
     "bracket": ("operation.0.step_mm=6", "stock.layer_mm=5", "part.spacing_mm=5"),
     "chatter": ("operation.0.step_mm=4", "stock.layer_mm=2"),
+    "part": (
+        "operation.0.step_mm=4",
+        "stock.layer_mm=3",
+        "part.spacing_mm=5",
+        "workpiece.states=3",
+        "workpiece.cell_mm=4.9",
+    ),
     "trunnion": (),
     "tube": (),
     "cone": (),

@@ -25,6 +25,7 @@ NAMES = (
     "feeds",
     "chatter",
     "bracket",
+    "part",
     "trunnion",
     "tube",
     "cone",

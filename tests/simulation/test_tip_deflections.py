@@ -24,6 +24,7 @@ from chipload.program.program import Program
 from chipload.simulation.chips import remove
 from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
+from chipload.structure.cells.states import StepCompliances
 
 SOFT = Material("soft", 900.0, 400.0, 0.0, 12.0, 18.0, 0.0, source="made up for this test")
 MILL = Cutter(10.0, 2, 0.0, 12.0, 30.0, 6e5, holder=((40.0, 30.0), (20.0, 50.0)))
@@ -31,9 +32,9 @@ DEPTH, FEED, SPEED = 3.0, 20.0, 300.0
 LOAD = math.hypot(900.0 * math.tau * FEED / (2 * SPEED) + 12.0, 400.0 * math.tau * FEED / (2 * SPEED) + 18.0)
 
 
-def slot(cutter: Cutter = MILL, **stiffness: float):
+def slot(cutter: Cutter = MILL, workpiece: StepCompliances | None = None, **stiffness: float):
     table = StiffnessTable.model_validate(stiffness)
-    gives = stiffness_of(table, {cutter.number: cutter})
+    gives = stiffness_of(table, {cutter.number: cutter}, workpiece)
     program = Program.join(
         [
             rapid([-10.0, 0.0, -DEPTH], SPEED, 1, "link"),
@@ -96,6 +97,25 @@ def test_holder_joints_and_work_add_what_they_give() -> None:
     assert found["deflection_workpiece_um"] == pytest.approx(1e3 * work, rel=1e-6)
     # one straight tooth cuts, so that cutter and work part along one line
     assert found["deflection_um"] == pytest.approx(1e3 * (cutter + work), rel=1e-6)
+
+
+def everywhere(compliance: np.ndarray) -> StepCompliances:
+    """A workpiece whose compliance is the same in every step and at every station but the last, which is stiffer."""
+    none = np.zeros(0, dtype=np.int64)
+    C = np.stack([compliance, compliance, 0.5 * compliance])[None]
+    return StepCompliances(np.zeros(1, np.int64), np.zeros((1, 2, 3)), C, np.zeros(1), none, none, C[:0], (0,), 0.0)
+
+
+def test_a_workpiece_gives_way_in_the_frame_of_the_program() -> None:
+    found, columns, gives = slot(workpiece=everywhere(np.eye(3) / 25e3))
+    assert "stiffness.work_n_um" not in gives.unknown
+    assert found["deflection_workpiece_um"] == pytest.approx(1e3 * LOAD * DEPTH / 25e3, rel=1e-6)
+    for axis, name in enumerate("xyz"):
+        C = np.zeros((3, 3))
+        C[axis, axis] = 1.0 / 25e3
+        um = slot(workpiece=everywhere(C))[1]["deflection_workpiece_um"]
+        most = np.maximum(columns[f"force_{name}_max_n"], -columns[f"force_{name}_min_n"])
+        np.testing.assert_allclose(um, 1e3 * most / 25e3, rtol=2e-3, atol=1e-9)
 
 
 def test_a_measured_tip_stands_for_grip_holder_and_spindle() -> None:

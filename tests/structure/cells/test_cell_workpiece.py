@@ -219,11 +219,13 @@ def test_compliance_follows_the_removal():
     steps = StepLines(np.arange(12), np.array(lines), np.full(12, 100.0), 450.0 * np.arange(12))
     rough = step_compliances(steps, states, tolerance=0.02, most=5, spacing=1.0)
     exact = step_compliances(steps, states, tolerance=0.0, most=13, spacing=1.0)
-    assert len(rough.states) == 5
+    assert 5 <= len(rough.states) < 13
     assert exact.states == tuple(range(13))
     alone = [size_of(line_compliances(states[k].build(), steps.lines[k : k + 1]))[0] for k in range(12)]
     np.testing.assert_allclose(size_of(exact.compliance), alone, rtol=1e-9)
     off = np.abs(size_of(rough.compliance) / alone - 1.0)
     assert (off <= rough.uncertainty + 1e-9).all()
     assert rough.uncertainty.max() > 0.02
-    assert (np.diff(size_of(exact.compliance[rough.worst])) <= 0.0).all() or len(rough.worst) == 12
+    top = int(np.argmax(size_of(rough.compliance) * (1.0 + rough.uncertainty)))
+    assert top in rough.worst.tolist()
+    assert size_of(rough.compliance)[top] == pytest.approx(alone[top], rel=1e-9)

@@ -27,7 +27,7 @@ from chipload.structure.cells.states import StepLines
 Floats = NDArray[np.float64]
 
 #: steps between two stocks that are kept
-TOGETHER = 64
+TOGETHER = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +38,12 @@ class CutAhead:
     ----------
     lines : where the steps that cut touch the workpiece
     stocks : (step, removed volume [mm^3], stock before that step), rising; the last is what is left
+    mean : (c, 3) float [N], mean force on the cutter of the steps that cut
     """
 
     lines: StepLines
     stocks: tuple[tuple[int, float, LayeredStock], ...]
+    mean: Floats
 
 
 def cut_ahead(
@@ -56,7 +58,7 @@ def cut_ahead(
     """Run a program through a stock, which changes, and keep where it cuts and what is left every few steps."""
     count = counted(program, cutters, resolution)
     setting = setting_of(cutters, material, resolution, interpolation, None, 2)
-    sums, known = RunningSums(stock.volume()), list[tuple[NDArray[np.int64], Floats, Floats, Floats]]()
+    sums, known = RunningSums(stock.volume()), list[tuple[NDArray[np.int64], Floats, Floats, Floats, Floats]]()
     stocks, volume = [(0, 0.0, stock.copied())], 0.0
     for steps in steps_in_blocks(program, resolution.step_mm, resolution.tolerance, size=TOGETHER):
         progress(sums.steps / count, "where it cuts")
@@ -65,16 +67,21 @@ def cut_ahead(
         removed = volume + np.cumsum([0.0, *columns["chip_volume_mm3"]])
         for c in cuts:
             row = c.step - first
-            known.append((c.step, contact_lines(c), columns["force_n"][row], removed[row]))
+            mean = np.column_stack([columns[f"force_{x}_mean_n"][row] for x in "xyz"])
+            known.append((c.step, contact_lines(c), columns["force_n"][row], removed[row], mean))
         if removed[-1] > volume:
             volume = float(removed[-1])
             stocks.append((sums.steps, volume, stock.copied()))
     stocks.append((count, volume, stocks[-1][2]))
     if not known:
-        return CutAhead(StepLines(np.zeros(0, np.int64), np.zeros((0, 2, 3)), np.zeros(0), np.zeros(0)), tuple(stocks))
-    step, lines, force, before = (np.concatenate([some[k] for some in known]) for k in range(4))
+        none = np.zeros(0)
+        return CutAhead(
+            StepLines(np.zeros(0, np.int64), np.zeros((0, 2, 3)), none, none), tuple(stocks), np.zeros((0, 3))
+        )
+    step, lines, force, before, means = (np.concatenate([some[k] for some in known]) for k in range(5))
     order = np.argsort(step, kind="stable")
-    return CutAhead(StepLines(step[order], lines[order], force[order], before[order]), tuple(stocks))
+    found = StepLines(step[order], lines[order], force[order], before[order])
+    return CutAhead(found, tuple(stocks), means[order])
 
 
 def contact_lines(cuts: Cuts) -> Floats:

@@ -47,7 +47,7 @@ def feed_sections(
         spans = (f"{x['feed_mm_min']['min']:.4g} to {x['feed_mm_min']['max']:.4g}" for x in (before, after))
         rows.append(["feeds that cut [mm/min]", *spans, ""])
     bounds = {check.column.name: f"{check.limit:g}" for check in checks}
-    for name in COMPARED:
+    for name in (name for name in COMPARED if name in before and name in after):
         cells = [f"{before[name]:.4g}", f"{after[name]:.4g}", bounds.get(name, "")]
         rows.append([escape(f"greatest {COLUMNS[name].title}"), *cells])
     body = [

@@ -20,6 +20,7 @@ from chipload.jobs.program.outcome import ProgramResult, SimulationResult
 from chipload.jobs.program.result import APT, OPTIMISED, feeds_name, result_of, speeds_name
 from chipload.jobs.program.rows import motion_rows
 from chipload.jobs.program.stability_figures import stability_sections
+from chipload.jobs.program.workpiece_figures import workpiece_section
 from chipload.program.apt.writer import write_apt
 from chipload.program.motions import spans
 from chipload.program.program import DWELL, RAPID, Program
@@ -139,6 +140,7 @@ def _load_sections(simulation: SimulationResult, time_s: float, figures: dict[st
         f'<p class="note">{SPREAD if torque["mean_sd"] is not None else NO_SPREAD}{escape(rigid)}</p>',
         figure("loads", along(simulation), figures),
     ]
+    body += workpiece_section(simulation, figures)
     chip = simulation.removal.piece
     if chip is not None:
         title = f"step {chip.step}, layer at z = {chip.height:.4g} mm"

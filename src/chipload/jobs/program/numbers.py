@@ -27,7 +27,9 @@ from chipload.units import mm_min_from_mm_s
 Floats = NDArray[np.float64]
 
 #: columns of loads that are compared before and after new feeds
-COMPARED = ("force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um", "cutter_stress_mpa")
+COMPARED = (
+    "force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um", "deflection_workpiece_um", "cutter_stress_mpa",
+)  # fmt: skip
 #: lines that summary.json lists
 MOST_LINES = 2000
 
@@ -210,7 +212,7 @@ def feed_numbers(
     def loads(columns: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
         some = columns["feed_mm_min"][cuts]
         span = {"min": float(some.min()), "max": float(some.max())} if len(some) else None
-        return {k: float(columns[k].max(initial=0.0)) for k in COMPARED} | {"feed_mm_min": span}
+        return {k: float(columns[k].max(initial=0.0)) for k in COMPARED if k in columns} | {"feed_mm_min": span}
 
     return {
         "program": program,

@@ -197,9 +197,20 @@ def _note(program: ProgramResult) -> str:
 
 def _maps(simulation: SimulationResult | None) -> tuple[SurfaceMap, ...]:
     """Gouge below 0 and excess above on the part."""
-    left = None if simulation is None else simulation.left
-    if left is None:
+    if simulation is None:
         return ()
+    maps, left = _bent(simulation), simulation.left
+    if left is None:
+        return maps
     known = np.isfinite(left.distance) & (left.over | (left.distance < 0.0))
     values = np.where(known, left.distance, np.nan)
-    return (SurfaceMap("part", "excess_mm", left.points, values, np.asarray(left.faces, dtype=np.int64)),)
+    return (SurfaceMap("part", "excess_mm", left.points, values, np.asarray(left.faces, dtype=np.int64)), *maps)
+
+
+def _bent(simulation: SimulationResult) -> tuple[SurfaceMap, ...]:
+    """Displacement of the workpiece in its worst step."""
+    bent = None if simulation.workpiece is None else simulation.workpiece.bent
+    if bent is None:
+        return ()
+    um = 1e3 * np.linalg.norm(bent.moved, axis=1)
+    return (SurfaceMap("workpiece", "deflection_workpiece_um", bent.points, um, bent.faces),)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +81,9 @@ def run(
             progress=lambda done, what: progress(share * done, what) if text is None else None,
         )
 
+    def part_of(a: float, b: float) -> Progress:
+        return lambda done, what: progress(a + (b - a) * done, what)
+
     reading = read()
     lines, seconds = line_times(reading, machine)
     simulated, fed, sped = None, None, None
@@ -91,7 +95,8 @@ def run(
             straight(reading.program)
             bodies_of(job, reading, stock, machine, material)
             if simulate:
-                soft = _soft(job, reading, stock, machine, material, progress)
+                soft = _soft(job, reading, stock, machine, material, part_of(share, 0.5 * (1.0 + share)))
+                share = 0.5 * (1.0 + share) if soft is not None else share
                 begin = 0.5 * (1.0 + share)
                 fed, reading = _new_feeds(
                     job, *own, reading, stock, material, machine, read, float(seconds.sum()), soft,
@@ -99,6 +104,9 @@ def run(
                 )  # fmt: skip
                 lines, seconds = line_times(reading, machine)
                 stock = stock_body(job, reading.program)
+        elif simulate:
+            soft = _soft(job, reading, stock, machine, material, part_of(share, 0.6))
+            begin = 0.6 if soft is not None else share
         if job.table.operation[0].speeds is not None:
             own = speeds_changeable(job.program_file, machine, table.dialect)
             straight(reading.program)
@@ -213,9 +221,11 @@ def _new_feeds(
         program, stock, job.cutters, material, fine, interpolation=op.interpolation, times=times, watch=bends,
         engine=op.engine, progress=lambda done, what: progress(0.5 * done, what),
     )  # fmt: skip
-    before = with_soft_errors(with_columns(before, (*watched(gives), *CHECK_COLUMNS)), soft)
+    before = with_columns(before, (*watched(gives), *CHECK_COLUMNS))
     more = bends if limits.keys() & {"deflection_um", "deflection_workpiece_um"} else None
     errors = {name: SPARE * error for name, error in before.resolution_error.items()}
+    errors = with_soft_errors(errors, before.columns, soft)  # the compliance does not change with the feed
+    before = replace(before, resolution_error=with_soft_errors(before.resolution_error, before.columns, soft))
     asked = Asked(op.feeds, limits, fine.rotation, checks, errors, more)
     steps = steps_of(program, op.step_mm, op.tolerance_mm)
     # again, for the greatest feed of each step
@@ -291,7 +301,8 @@ def _simulated(
             times=times, engine=op.engine, progress=removing,
             also=(versions(), sources(), repr((stiffness, job.table.workpiece)), repr(job.table.checks), formed),
         )  # fmt: skip
-    removal = with_soft_errors(with_columns(removal, (*watched(gives, formed=made is not None), *CHECK_COLUMNS)), soft)
+    removal = with_columns(removal, (*watched(gives, formed=made is not None), *CHECK_COLUMNS))
+    removal = replace(removal, resolution_error=with_soft_errors(removal.resolution_error, removal.columns, soft))
     if vibrates is not None:
         removal = with_columns(removal, vibrates.columns)
     touched = collisions(

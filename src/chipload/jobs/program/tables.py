@@ -196,6 +196,7 @@ class WorkpieceTable(Table):
     modulus_gpa: Positive = Field(le=1000.0, description="Young's modulus")
     poisson: NotNegative = Field(lt=0.5, description="Poisson's ratio")
     clamp: tuple[ClampTable, ...] = Field(min_length=1, description="all of them together allow no rigid motion")
+    order: Literal[2, 3] = Field(2, description="of the modes of a cell; 3 costs more and is closer in corners")
     cell_mm: Positive | None = Field(None, description="side of the cells; none: by the thinnest wall that is left")
     states: Count = Field(16, le=200, description="states of removal that are solved at most")
     state_change_percent: Positive = Field(

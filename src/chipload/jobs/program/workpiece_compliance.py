@@ -9,19 +9,21 @@ the finer cells is then at most 1 / (COARSER^2 - 1) = 0.8 of it.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutting.material import Material
 from chipload.errors import Finding, Severity
+from chipload.jobs.program.bent_workpiece import JACK, BentWorkpiece, bent_workpiece
 from chipload.jobs.program.clamped import clamped_volumes, clamps_of, elastic_of
-from chipload.jobs.program.contact_lines import cut_ahead
+from chipload.jobs.program.contact_lines import CutAhead, cut_ahead
 from chipload.jobs.program.job import ProgramJob
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
-from chipload.simulation.removal import Removal, Resolution
+from chipload.simulation.removal import Columns, Resolution
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.grid import CellGrid, grid_over
 from chipload.structure.cells.states import State, StepCompliances, size_of, step_compliances
@@ -49,8 +51,9 @@ class WorkpieceCompliance:
     cell : [mm] longest side of the cells
     unknowns : of the state with most
     error : relative error of the greatest deflection, by cells and states
-    state_change : how far a compliance may lie from that of its own state, relative, among the worst steps
+    state_change : how far the greatest deflection may lie above what was found, as states lie apart, relative
     findings : material that hangs on nothing
+    bent : the workpiece in its worst step; None: nothing is cut
     """
 
     steps: StepCompliances
@@ -60,9 +63,10 @@ class WorkpieceCompliance:
     error: float
     state_change: float
     findings: tuple[Finding, ...]
+    bent: BentWorkpiece | None
 
     @property
-    def numbers(self) -> Mapping[str, float | int]:
+    def numbers(self) -> Mapping[str, Any]:
         """What summary.json says of it."""
         return {
             "states": len(self.steps.states),
@@ -70,7 +74,14 @@ class WorkpieceCompliance:
             "cell_mm": self.cell,
             "thinnest_wall_mm": self.wall,
             "unknowns": self.unknowns,
+            "support": None if self.bent is None else self._support(self.bent),
         }
+
+    @staticmethod
+    def _support(bent: BentWorkpiece) -> Mapping[str, Any]:
+        lowers = 100.0 * (1.0 - bent.after / bent.before) if bent.before > 0.0 else 0.0
+        place, normal = bent.place.round(4).tolist(), bent.normal.round(4).tolist()
+        return {"stiffness_n_um": JACK / 1e3, "place": place, "normal": normal, "lowers_percent": lowers}
 
 
 def workpiece_compliance(
@@ -102,7 +113,7 @@ def workpiece_compliance(
         program, stock.copied(), job.cutters, material, resolution, op.interpolation,
         lambda done, what: progress(0.4 * done, what),
     )  # fmt: skip
-    grid, wall = cells_over(stock, ahead.stocks[-1][2], table.cell_mm)
+    grid, wall = cells_over(stock, ahead.stocks[-1][2], table.cell_mm, table.order)
     most = [0]
 
     def build(then: LayeredStock, cells: CellGrid) -> CellWorkpiece:
@@ -116,16 +127,35 @@ def workpiece_compliance(
         ahead.lines, states, tolerance=share, most=max(table.states, 2), spacing=SPACING * float(grid.size.max()),
         progress=lambda done, what: progress(0.4 + 0.5 * done, what),
     )  # fmt: skip
-    change = float(found.uncertainty[found.worst].max(initial=0.0))
+    deflection = size_of(found.compliance) * ahead.lines.force
+    upper = float((deflection * (1.0 + found.uncertainty)).max(initial=0.0))
+    change = upper / float(deflection.max()) - 1.0 if upper > 0.0 else 0.0
     progress(0.9, "error of the cells")
     error = _cell_error(found, [then for _, _, then in ahead.stocks], grid, build)
+    bent = _bent(found, ahead, grid, build, job) if len(found.worst) else None
     findings: tuple[Finding, ...] = ()
     if found.loose > 1e-6 * stock.volume():
         text = f"{found.loose:.3g} mm3 of the workpiece hang on nothing: they hold no force"
         findings = (Finding("loose-material", 0, text, Severity.UNPROVEN),)
     return WorkpieceCompliance(
-        found, wall, float(grid.size.max()), most[0], float(error + FLOOR + change), change, findings
+        found, wall, float(grid.size.max()), most[0], float(error + FLOOR + change), change, findings, bent
     )
+
+
+def _bent(
+    found: StepCompliances,
+    ahead: CutAhead,
+    grid: CellGrid,
+    build: Callable[[LayeredStock, CellGrid], CellWorkpiece],
+    job: ProgramJob,
+) -> BentWorkpiece:
+    """The workpiece in the state after its worst step, under the force of that step."""
+    row, stock = int(found.worst[0]), ahead.stocks[int(found.after[0])][2]
+    mean = ahead.mean[row]
+    size = float(np.linalg.norm(mean))
+    force = -mean * (float(ahead.lines.force[row]) / size if size > 0.0 else 0.0)
+    away = max(cutter.diameter for cutter in job.cutters.values())
+    return bent_workpiece(build(stock, grid), stock, int(found.step[row]), found.lines[row], force, away)
 
 
 def _cell_error(
@@ -145,13 +175,13 @@ def _cell_error(
     return error
 
 
-def with_soft_errors(removal: Removal, soft: WorkpieceCompliance | None) -> Removal:
-    """A removal whose deflections have the error of the workpiece's compliance beside that of the force."""
-    if soft is None or not removal.resolution_error:
-        return removal
-    force, c = removal.resolution_error["force_n"], removal.columns
-    work, whole = (float(c[name].max(initial=0.0)) for name in ("deflection_workpiece_um", "deflection_um"))
+def with_soft_errors(
+    errors: Mapping[str, float], columns: Columns, soft: WorkpieceCompliance | None
+) -> dict[str, float]:
+    """Relative errors of columns, those of deflections with that of the workpiece's compliance beside the force's."""
+    if soft is None or not errors:
+        return dict(errors)
+    work, whole = (float(columns[name].max(initial=0.0)) for name in ("deflection_workpiece_um", "deflection_um"))
     share = min(work / whole, 1.0) if whole > 0.0 else 0.0
-    errors = {"deflection_workpiece_um": soft.error, "deflection_um": share * soft.error, "form_error_um": soft.error}
-    own = {name: force + error for name, error in errors.items()}
-    return replace(removal, resolution_error={**removal.resolution_error, **own})
+    own = {"deflection_workpiece_um": soft.error, "deflection_um": share * soft.error, "form_error_um": soft.error}
+    return {**errors, **{name: errors["force_n"] + error for name, error in own.items()}}

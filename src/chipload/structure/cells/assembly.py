@@ -5,8 +5,7 @@ a, b modes of a cell, i, j directions; G_ab,ij the integral of dN_a/dx_i dN_b/dx
 K_ai,bj = la G_ij + mu G_ji + mu delta_ij trace(G).
 
 Cells of thick material keep only the modes of their corners: where a block of :data:`BULK` cells in each direction is
-full, and no other cell touches it, the error of order 1 is below that of the thin walls beside it
-(docs/design/workpiece.md).
+full, and no other cell touches it, the error of order 1 is below that of the thin walls (docs/design/workpiece.md).
 
 Reference: [Parvizian2007] for alpha; [Duester2008].
 """

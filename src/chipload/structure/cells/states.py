@@ -6,7 +6,8 @@ its size by its logarithm. An interval whose two states differ most in deflectio
 volume, until none differs by more than the tolerance times the greatest deflection or there are enough states.
 
 Some contact lines are solved, at most :data:`LINES`, no nearer to one another than they must be; a step between two of
-them takes the mean by distance. The worst steps are solved themselves.
+them takes the mean by distance. Then the step whose deflection may be greatest, by the greater of both states, is
+solved in the states just before and after it, again and again until it is one that was.
 """
 
 from __future__ import annotations
@@ -23,7 +24,10 @@ from chipload.structure.cells.workpiece import STATIONS, CellWorkpiece, line_com
 
 #: contact lines that are solved beside those of the worst steps
 LINES = 160
-#: steps that are solved themselves
+#: worst steps that are solved in the states just before and after them: so many pairs of states, and steps with at
+#: least this share of the greatest deflection
+TIGHT, NEAR = 6, 0.7
+#: worst steps that are reported
 WORST = 12
 
 
@@ -185,29 +189,36 @@ def step_compliances(
         spans[a, middle], spans[middle, b] = difference(a, middle), difference(middle, b)
         chosen = sorted([*chosen, middle])
     out, doubt = np.zeros((len(steps.step), len(STATIONS), 3, 3)), np.zeros(len(steps.step))
-    where = np.zeros((len(steps.step), 2), dtype=np.int64)
     for a, b in sorted(spans):
         own, rows = rows_of(a, b), sampled(a, b)
         if not len(own):
             continue
         if not len(rows):
             rows = own[:1]
-        where[own] = a, b
         ends = [_between(steps.lines, own, rows, compliance(k, rows)) for k in (a, b)]
         out[own], doubt[own] = _in_state(steps.removed[own], states[a].removed, states[b].removed, *ends)
-    worst = np.argsort(-size_of(out) * steps.force, kind="stable")[:WORST]
-    later = np.zeros((len(worst), *out.shape[1:]))
-    for k in np.unique(where[worst]).tolist():
-        compliance(k, worst[(where[worst] == k).any(axis=1)])  # one state at a time
-    for a, b in sorted({(int(a), int(b)) for a, b in where[worst]}):
-        own = np.flatnonzero((where[worst] == (a, b)).all(axis=1))
-        rows = worst[own]
-        ends = [compliance(k, rows) for k in (a, b)]
-        later[own] = ends[1]
-        out[rows], doubt[rows] = _in_state(steps.removed[rows], states[a].removed, states[b].removed, *ends)
-    order = np.argsort(-size_of(out[worst]) * steps.force[worst], kind="stable")
+    first = [state.step for state in states]
+    tight = np.full(len(out), -1, dtype=np.int64)
+    later = np.zeros_like(out)
+    for turn in range(TIGHT):
+        progress(1.0, "worst steps of the workpiece")
+        upper = size_of(out) * (1.0 + doubt) * steps.force
+        if not len(upper) or tight[int(upper.argmax())] >= 0:
+            break
+        row = int(upper.argmax())
+        b = min(int(np.searchsorted(first, steps.step[row], side="right")), len(states) - 1)
+        a = max(b - 1, 0)
+        rows = rows_of(a, b)
+        rows = rows[upper[rows] >= NEAR * upper[row]]
+        ends = [compliance(k, rows) for k in ((a, b) if turn % 2 == 0 else (b, a))]
+        low, high = ends if turn % 2 == 0 else ends[::-1]
+        later[rows], tight[rows] = high, b
+        out[rows], doubt[rows] = _in_state(steps.removed[rows], states[a].removed, states[b].removed, low, high)
+        chosen = sorted({*chosen, a, b})
+    worst = np.flatnonzero(tight >= 0)
+    worst = worst[np.argsort(-size_of(out[worst]) * steps.force[worst], kind="stable")][:WORST]
     return StepCompliances(
-        steps.step, steps.lines, out, doubt, worst[order], where[worst[order], 1], later[order],
+        steps.step, steps.lines, out, doubt, worst, tight[worst], later[worst],
         tuple(states[k].step for k in chosen), loose[0],
     )  # fmt: skip
 

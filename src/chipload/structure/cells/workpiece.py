@@ -207,9 +207,8 @@ def line_compliances(work: CellWorkpiece, lines: ArrayLike) -> Array:
     out = np.empty((c, len(STATIONS), 3, 3))
     if not c:
         return out
-    longest = float(np.linalg.norm((ends[:, 1] - ends[:, 0]) / work.grid.size, axis=1).max())
-    count = max(SPREAD, int(np.ceil(PER_CELL * longest)))
-    t = (np.arange(count) + 0.5) / count
+    t = _spread(work, ends)
+    count = len(t)
     spread = _along(work, ends, t)
     mean = csr_array((np.full(c * count, 1.0 / count), np.arange(c * count), np.arange(c + 1) * count))
     loads, stations = csr_array(mean @ spread), _along(work, ends, np.array(STATIONS))
@@ -219,6 +218,25 @@ def line_compliances(work: CellWorkpiece, lines: ArrayLike) -> Array:
         some = near[at : at + ABREAST]
         out[some] = _solved(work, csr_array(loads[some]), stations, some)
     return out
+
+
+def displacements(work: CellWorkpiece, line: ArrayLike, points: ArrayLike) -> Array:
+    """(n, 3, 3) float [mm/N] displacement of points (n, 3) per force that is spread over a contact line (2, 3)."""
+    ends = np.asarray(line, dtype=np.float64).reshape(1, 2, 3)
+    w = _along(work, ends, _spread(work, ends)).mean(axis=0)
+    right = np.zeros((len(work.modes), 3, 3))
+    for d in range(3):
+        right[:, d, d] = w
+    u = work.solve(right.reshape(-1, 3)).reshape(len(work.modes), 9)
+    at = mode_weights(work, np.asarray(points, dtype=np.float64).reshape(-1, 3))
+    return np.asarray((at @ u).reshape(-1, 3, 3))
+
+
+def _spread(work: CellWorkpiece, ends: Array) -> Array:
+    """Shares of contact lines (c, 2, 3) at which their force acts."""
+    longest = float(np.linalg.norm((ends[:, 1] - ends[:, 0]) / work.grid.size, axis=1).max())
+    count = max(SPREAD, int(np.ceil(PER_CELL * longest)))
+    return np.asarray((np.arange(count) + 0.5) / count)
 
 
 def _along(work: CellWorkpiece, ends: Array, t: Array) -> csr_array:

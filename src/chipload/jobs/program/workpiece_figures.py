@@ -1,0 +1,84 @@
+"""The workpiece in the report: bent in its worst step, what limits it, what would help."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+
+from chipload.jobs.program.outcome import SimulationResult
+from chipload.report.figures import FONT, LIMIT, SCALE
+from chipload.report.sheet import figure, table
+
+#: the greatest displacement is drawn as this share of the part's diagonal
+DRAWN = 0.06
+
+
+def workpiece_section(simulation: SimulationResult, figures: dict[str, go.Figure]) -> list[str]:
+    """The part of the report on how far the workpiece gives way; empty: no [workpiece] is stated."""
+    own = simulation.workpiece
+    if own is None:
+        return []
+    c = simulation.removal.columns
+    lines, at = np.unique(c["line"], return_inverse=True)
+    worst = np.zeros(len(lines))
+    np.maximum.at(worst, at.ravel(), c["deflection_workpiece_um"])
+    order = np.argsort(-worst, kind="stable")[:12]
+    rows = [[str(int(lines[k])), f"{worst[k]:.4g}"] for k in order if worst[k] > 0.0]
+    body = [
+        "<h2>Deflection of the workpiece</h2>",
+        f"<p>{len(own.steps.states)} states of removal in cells of {own.cell:.3g} mm, {own.unknowns} unknowns; the "
+        f"thinnest wall left is {own.wall:.3g} mm. The greatest deflection is known to {100.0 * own.error:.2g} %, of "
+        f"which {100.0 * own.state_change:.2g} % is the change between states.</p>",
+        "<h3>Lines that bend it most</h3>",
+        table(["line", "deflection [\u00b5m]"], rows, numbers=(0, 1)),
+    ]
+    bent = own.bent
+    if bent is not None:
+        x, y, z = bent.place
+        line = int(c["line"][bent.step])
+        body += [
+            "<h3>Bent at its worst</h3>",
+            f'<p class="note">In line {line}, under {np.linalg.norm(bent.force):.4g} N; displacement drawn '
+            f"{_scale(simulation):.3g} times.</p>",
+            figure("bent", bent_figure(simulation), figures),
+            f"<p>A support of 10 N/\u00b5m at ({x:.4g}, {y:.4g}, {z:.4g}) lowers the deflection there from "
+            f"{1e3 * bent.before:.3g} to {1e3 * bent.after:.3g} \u00b5m.</p>",
+        ]
+    return body
+
+
+def _scale(simulation: SimulationResult) -> float:
+    assert simulation.workpiece is not None
+    bent = simulation.workpiece.bent
+    assert bent is not None
+    most = float(np.linalg.norm(bent.moved, axis=1).max())
+    return DRAWN * float(np.linalg.norm(np.ptp(bent.points, axis=0))) / most if most > 0.0 else 1.0
+
+
+def bent_figure(simulation: SimulationResult) -> go.Figure:
+    """The part as it bends in its worst step, scaled, coloured by displacement; the contact and the best support."""
+    assert simulation.workpiece is not None
+    bent = simulation.workpiece.bent
+    assert bent is not None
+    um = 1e3 * np.linalg.norm(bent.moved, axis=1)
+    p = (bent.points + _scale(simulation) * bent.moved).astype(np.float32)
+    i, j, k = bent.faces.T
+    out = go.Figure(
+        go.Mesh3d(
+            x=p[:, 0], y=p[:, 1], z=p[:, 2], i=i, j=j, k=k, intensity=um.astype(np.float32), colorscale=SCALE,
+            flatshading=True, lighting={"ambient": 0.9, "diffuse": 0.3},
+            colorbar={"title": {"text": "displacement [\u00b5m]", "side": "right"}, "thickness": 12},
+            hovertemplate="%{intensity:.3g} \u00b5m<extra></extra>",
+        )
+    )  # fmt: skip
+    for name, at, colour in (("contact", bent.line.mean(axis=0), LIMIT), ("support", bent.place, "#111111")):
+        x, y, z = ([float(v)] for v in at)
+        marker = {"size": 5, "color": colour}
+        out.add_trace(go.Scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, name=name))
+    axes = {f"{axis}axis_title": f"{axis} [mm]" for axis in "xyz"}
+    camera = {"eye": {"x": 1.5, "y": -1.3, "z": 1.3}}
+    out.update_layout(
+        template="none", font=FONT, height=520, margin={"l": 0, "r": 0, "t": 0, "b": 0},
+        scene={"aspectmode": "data", "camera": camera, **axes}, legend={"x": 0.0, "y": 1.0},
+    )  # fmt: skip
+    return out

@@ -1,0 +1,149 @@
+"""[workpiece] of a program job: a wall that is finished gives way as a wall, limits, and what is refused."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from chipload import jobs
+from chipload.errors import InputError
+from chipload.jobs.program.result import result_of
+from chipload.jobs.program.run import check, run
+
+#: a wall of 3 mm, 16 mm high and 30 mm long, is made 2.5 mm thin from one side
+PROGRAM = """%
+G21 G90 G17 G54
+T1 M6
+S6000 M3
+G0 X-8. Y-5. Z10.
+G0 Z-8.
+G1 X38. F600.
+G0 Y-20.
+G0 X-8.
+G0 Z-16.
+G0 Y-5.
+G1 X38. F600.
+G0 Z10.
+M30
+%
+"""
+JOB = """
+[program]
+file = "wall.nc"
+[machine]
+name = "vmc-fanuc"
+[stock]
+file = "wall.stl"
+units = "mm"
+layer_mm = 2.0
+[material]
+name = "al7075-t6"
+[[cutter]]
+number = 1
+diameter_mm = 10.0
+flutes = 4
+helix_deg = 30.0
+flute_length_mm = 22.0
+overhang_mm = 30.0
+modulus_gpa = 580.0
+[workpiece]
+modulus_gpa = 70.0
+poisson = 0.33
+states = 4
+[[workpiece.clamp]]
+face = "z-"
+[[operation]]
+kind = "simulate"
+step_mm = 2.0
+tolerance_mm = 0.005
+[limits]
+deflection_workpiece_um = {limit}
+"""
+
+
+def loaded(path: Path):
+    """The program job of a file."""
+    return jobs.load_job(path).job
+
+
+@pytest.fixture
+def job_file(tmp_path: Path) -> Path:
+    whole = trimesh.creation.box(bounds=[[0, -0.5, -20], [30, 2.5, 0]])
+    whole.export(tmp_path / "wall.stl")
+    (tmp_path / "wall.nc").write_text(PROGRAM)
+    (tmp_path / "job.toml").write_text(JOB.format(limit=2000.0))
+    return tmp_path / "job.toml"
+
+
+def changed(job_file: Path, old: str, new: str) -> Path:
+    text = job_file.read_text()
+    assert old in text
+    job_file.write_text(text.replace(old, new))
+    return job_file
+
+
+def test_a_wall_gives_way_as_a_plate(job_file):
+    done = run(loaded(job_file))
+    simulation = done.simulated
+    c = simulation.removal.columns
+    cut = c["deflection_workpiece_um"] > 0.0
+    assert (cut == (c["force_n"] > 0.0)).all()
+    # between the middle of a cantilever that is wide as it is high and one as wide as the plate: its end bends most
+    um, x = c["deflection_workpiece_um"], c["x_mm"]
+    upper = cut & (c["z_mm"] > -9.0)
+    ends, middle = um[upper & ((x < 4.0) | (x > 26.0))], um[upper & (np.abs(x - 15.0) < 4.0)]
+    assert ends.max() > 1.3 * middle.max()
+    # a strip of the plate: F L^3 / (3 E I) over its whole width is the least that the free edge can do
+    force = c["force_normal_n"][upper].max()
+    strip = force * 20.0**3 / (3.0 * 70e3 * 30.0 * 3.0**3 / 12.0)
+    assert 1e3 * strip < ends.max() < 8e3 * strip
+    result = result_of(done)
+    numbers = result.operations[0]
+    assert numbers["deflection_workpiece_um"]["max"] == um.max()
+    assert 2 <= numbers["states"] <= 20
+    assert numbers["thinnest_wall_mm"] == pytest.approx(2.5, rel=0.05)
+    limit = next(check for check in result.limits if check.name == "deflection_workpiece_um")
+    assert limit.resolution_error >= simulation.workpiece.error
+    assert {m.name for m in result.maps} == {"workpiece"}
+    assert 0.0 < numbers["support"]["lowers_percent"] < 100.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("modulus_gpa = 70.0\n", "", "workpiece.modulus_gpa: missing"),
+        ("poisson = 0.33", "poisson = 0.5", "workpiece.poisson"),
+        ('face = "z-"', 'face = "z-"\ndirections = "z"', "motion along x, motion along y, rotation about z are free"),
+        (
+            'face = "z-"',
+            "low_mm = [50.0, 0.0, -20.0]\nhigh_mm = [60.0, 2.0, -18.0]",
+            "workpiece.clamp.0: holds nothing: no stock between (50, 0, -20) and (60, 2, -18) mm: place it on",
+        ),
+        ('face = "z-"', "", "workpiece.clamp.0: state either a face, a box by low_mm and high_mm, or a cylinder"),
+        ('face = "z-"', "point_mm = [1.0, 1.0, -19.0]", "both point_mm and diameter_mm of a cylinder"),
+        ("[workpiece]", "[stiffness]\nwork_n_um = 100.0\n[workpiece]", "stiffness.work_n_um: leave it out"),
+    ],
+)
+def test_what_cannot_be_clamped_is_refused(job_file, old, new, message):
+    path = changed(job_file, old, new)
+    with pytest.raises(InputError, match=re.escape(message)):
+        check(loaded(path))
+
+
+def test_a_limit_needs_a_workpiece(job_file):
+    text = job_file.read_text()
+    job_file.write_text(re.sub(r"\[workpiece\].*?\[\[operation", "[[operation", text, flags=re.DOTALL))
+    with pytest.raises(InputError, match=r"limits.deflection_workpiece_um: needs what the workpiece is made of"):
+        loaded(job_file)
+
+
+def test_cells_wider_than_the_wall_allows_are_refused(job_file):
+    path = changed(job_file, "states = 4", "states = 4\ncell_mm = 8.0")
+    with pytest.raises(
+        InputError, match=r"workpiece.cell_mm = 8: the thinnest wall left is 2.49 mm: at most 2.5 times"
+    ):
+        run(loaded(path))
