@@ -98,7 +98,10 @@ def test_a_slot_in_numbers(job: Path, tmp_path: Path) -> None:
     # 2 mm deep, 30 mm long and half a disc at its end
     assert op["chip_volume_mm3"] == pytest.approx(2.0 * (300.0 + 0.5 * np.pi * 25.0), rel=1e-3)
     assert (summary["capability"], summary["verdict"], op["kind"]) == ("program", "holds", "simulate")
-    names = ("torque_nm", "power_w", "chip_max_mm", "deflection_um", "form_error_um", "gouge_mm", "excess_mm")
+    names = (
+        "torque_nm", "power_w", "chip_max_mm", "deflection_um", "deflection_workpiece_um", "form_error_um", "gouge_mm",
+        "excess_mm",
+    )  # fmt: skip
     assert [x for x in summary["unchecked"] if x.startswith("limit ")] == [f"limit {x}: not stated" for x in names]
     assert op["removed_mm3"] == pytest.approx(op["chip_volume_mm3"], rel=1e-9)
     # the rim meets the stock when the tip is at x = -5, after 0.5 s at 10 mm/s; a step of 0.2 s cuts or does not

@@ -22,7 +22,7 @@ from chipload.jobs.program.speeds import new_speeds, speeds_changeable, stabilit
 from chipload.jobs.program.stiffness import deflecting, stiffness_of, watched, with_columns
 from chipload.jobs.program.tables import LOADS, SimulateTable
 from chipload.jobs.program.workpiece import insides, stock_body
-from chipload.jobs.program.workpiece_compliance import WorkpieceCompliance, with_soft_errors, workpiece_compliance
+from chipload.jobs.program.workpiece_compliance import WorkpieceCompliance, with_compliance_error, workpiece_compliance
 from chipload.jobs.provenance import provenance_of, sources, title_of, versions
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.program import RAPID
@@ -86,34 +86,36 @@ def run(
 
     reading = read()
     lines, seconds = line_times(reading, machine)
-    simulated, fed, sped = None, None, None
+    simulated, feeds, speeds = None, None, None
     if job.simulates:
-        stock, material, begin, soft = stock_body(job, reading.program), material_of(job), share, None
+        stock, material, begin, compliance = stock_body(job, reading.program), material_of(job), share, None
         wants_feeds = job.table.operation[0].feeds is not None
         if wants_feeds:
             own = changeable(job.program_file, machine, table.dialect)
             straight(reading.program)
             bodies_of(job, reading, stock, machine, material)
             if simulate:
-                soft = _soft(job, reading, stock, machine, material, part_of(share, 0.5 * (1.0 + share)))
-                share = 0.5 * (1.0 + share) if soft is not None else share
+                compliance = _compliance_of_workpiece(
+                    job, reading, stock, machine, material, part_of(share, 0.5 * (1.0 + share))
+                )
+                share = 0.5 * (1.0 + share) if compliance is not None else share
                 begin = 0.5 * (1.0 + share)
-                fed, reading = _new_feeds(
-                    job, *own, reading, stock, material, machine, read, float(seconds.sum()), soft,
+                feeds, reading = _new_feeds(
+                    job, *own, reading, stock, material, machine, read, float(seconds.sum()), compliance,
                     lambda done, what: progress(share + (begin - share) * done, what),
                 )  # fmt: skip
                 lines, seconds = line_times(reading, machine)
                 stock = stock_body(job, reading.program)
         elif simulate:
-            soft = _soft(job, reading, stock, machine, material, part_of(share, 0.6))
-            begin = 0.6 if soft is not None else share
+            compliance = _compliance_of_workpiece(job, reading, stock, machine, material, part_of(share, 0.6))
+            begin = 0.6 if compliance is not None else share
         if job.table.operation[0].speeds is not None:
             own = speeds_changeable(job.program_file, machine, table.dialect)
             straight(reading.program)
             bodies_of(job, reading, stock, machine, material)
             if simulate:
                 begin = 0.5 * (1.0 + share)
-                sped, reading = new_speeds(
+                speeds, reading = new_speeds(
                     job, *own, reading, stock, material, machine, read, float(seconds.sum()),
                     lambda done, what: progress(share + (begin - share) * done, what),
                 )  # fmt: skip
@@ -121,7 +123,7 @@ def run(
                 stock = stock_body(job, reading.program)
         if simulate:
             simulated = _simulated(
-                job, reading, stock, machine, material, checkpoint, soft,
+                job, reading, stock, machine, material, checkpoint, compliance,
                 lambda done, what: progress(begin + (1.0 - begin) * done, what),
             )  # fmt: skip
     files: dict[str, Path] = {"program": job.program_file}
@@ -138,7 +140,7 @@ def run(
     provenance = provenance_of(files, job.overrides, machine, metal)
     name = job.program_file.name
     return ProgramResult(
-        title_of(job.path), name, reading, lines, seconds, machine, provenance, simulated, fed, job.cutters, sped
+        title_of(job.path), name, reading, lines, seconds, machine, provenance, simulated, feeds, job.cutters, speeds
     )  # fmt: skip
 
 
@@ -201,7 +203,7 @@ def _new_feeds(
     machine: Machine,
     read: Callable[[str], ProgramReading],
     seconds: float,
-    soft: WorkpieceCompliance | None,
+    compliance: WorkpieceCompliance | None,
     progress: Progress,
 ) -> tuple[FeedResult, ProgramReading]:
     """The text with new feeds, from what the program cuts of a stock, which changes; and what it does then."""
@@ -212,7 +214,7 @@ def _new_feeds(
     limits = {name: limit for name, limit in job.limits.items() if name in LOADS}
     if "spindle" not in job.table.checks.off:
         limits |= spindle_limits(machine, turning)
-    gives = stiffness_of(job.table.stiffness, job.cutters, None if soft is None else soft.steps)
+    gives = stiffness_of(job.table.stiffness, job.cutters, None if compliance is None else compliance.steps)
     bends = with_checks(job.table.checks, material, deflecting(gives, material))
     checks = default_checks(job.table.checks, job.cutters, material, op.confidence)
     program, times = timed(reading, job, machine)
@@ -224,8 +226,10 @@ def _new_feeds(
     before = with_columns(before, (*watched(gives), *CHECK_COLUMNS))
     more = bends if limits.keys() & {"deflection_um", "deflection_workpiece_um"} else None
     errors = {name: SPARE * error for name, error in before.resolution_error.items()}
-    errors = with_soft_errors(errors, before.columns, soft)  # the compliance does not change with the feed
-    before = replace(before, resolution_error=with_soft_errors(before.resolution_error, before.columns, soft))
+    errors = with_compliance_error(errors, before.columns, compliance)  # the compliance does not change with the feed
+    before = replace(
+        before, resolution_error=with_compliance_error(before.resolution_error, before.columns, compliance)
+    )
     asked = Asked(op.feeds, limits, fine.rotation, checks, errors, more)
     steps = steps_of(program, op.step_mm, op.tolerance_mm)
     # again, for the greatest feed of each step
@@ -247,16 +251,16 @@ def _simulated(
     machine: Machine,
     material: Material,
     checkpoint: Checkpoint | None,
-    soft: WorkpieceCompliance | None,
+    compliance: WorkpieceCompliance | None,
     progress: Progress,
 ) -> SimulationResult:
-    """The program, run through the stock of the job; ``soft``: how the workpiece gives way, None: not found yet."""
+    """The program, run through the stock of the job; ``compliance``: of the workpiece, None: not known yet."""
     op: SimulateTable = job.table.operation[0]
     bodies = bodies_of(job, reading, stock, machine, material)
     program, times, fine, part = bodies.program, bodies.times, bodies.resolution, bodies.part
-    if soft is None and job.table.workpiece is not None:
-        soft = _soft(job, reading, stock, machine, material, progress)
-    gives = bodies.stiffness if soft is None else stiffness_of(job.table.stiffness, job.cutters, soft.steps)
+    if compliance is None and job.table.workpiece is not None:
+        compliance = _compliance_of_workpiece(job, reading, stock, machine, material, progress)
+    gives = bodies.stiffness if compliance is None else stiffness_of(job.table.stiffness, job.cutters, compliance.steps)
     points, before, stiffness = bodies.stock_points, insides(stock), job.table.stiffness
     watches = [with_checks(job.table.checks, material, deflecting(gives, material))]
     steps = StepBlocks(program, op.step_mm, op.tolerance_mm)
@@ -274,13 +278,13 @@ def _simulated(
         )  # fmt: skip
         solids["part"] = left.points
     # form error costs as much as the chips, and says little where nothing is known to give way
-    made = left if stiffness is not None or soft is not None or "form_error_um" in job.limits else None
+    made = left if stiffness is not None or compliance is not None or "form_error_um" in job.limits else None
     if made is not None:
         watches.append(forming(made, gives, material))
 
-    vibrates = watch_of(job, material)
-    if vibrates is not None:
-        watches.append(vibrates)
+    stability_watch = watch_of(job, material)
+    if stability_watch is not None:
+        watches.append(stability_watch)
 
     def watch(cuts: Cuts) -> dict[str, NDArray[np.float64]]:
         return {name: values for each in watches for name, values in each(cuts).items()}
@@ -289,7 +293,7 @@ def _simulated(
         progress(SHARE + 0.8 * done, what)
 
     # the different cuts are kept in memory, for the speeds: such a run does not go on where it was stopped
-    if checkpoint is None or vibrates is not None:
+    if checkpoint is None or stability_watch is not None:
         removal = remove(
             program, stock, job.cutters, material, fine, interpolation=op.interpolation, watch=watch, times=times,
             engine=op.engine, progress=removing,
@@ -302,9 +306,11 @@ def _simulated(
             also=(versions(), sources(), repr((stiffness, job.table.workpiece)), repr(job.table.checks), formed),
         )  # fmt: skip
     removal = with_columns(removal, (*watched(gives, formed=made is not None), *CHECK_COLUMNS))
-    removal = replace(removal, resolution_error=with_soft_errors(removal.resolution_error, removal.columns, soft))
-    if vibrates is not None:
-        removal = with_columns(removal, vibrates.columns)
+    removal = replace(
+        removal, resolution_error=with_compliance_error(removal.resolution_error, removal.columns, compliance)
+    )
+    if stability_watch is not None:
+        removal = with_columns(removal, stability_watch.columns)
     touched = collisions(
         steps, job.cutters, solids, op.tolerance_mm, above_only=frozenset(["part"]),
         progress=passing(0.8 + SHARE, "collisions"),
@@ -318,11 +324,11 @@ def _simulated(
     return SimulationResult(
         removal, stock, machine, material, job.limits, job.unchecked, settings, bodies.checks, left, touched,
         compared_with, _no_holder(job), gives.unknown,
-        None if vibrates is None else stability_of(job, vibrates, machine), soft,
+        None if stability_watch is None else stability_of(job, stability_watch, machine), compliance,
     )  # fmt: skip
 
 
-def _soft(
+def _compliance_of_workpiece(
     job: ProgramJob,
     reading: ProgramReading,
     stock: LayeredStock,

@@ -175,13 +175,17 @@ def _cell_error(
     return error
 
 
-def with_soft_errors(
-    errors: Mapping[str, float], columns: Columns, soft: WorkpieceCompliance | None
+def with_compliance_error(
+    errors: Mapping[str, float], columns: Columns, compliance: WorkpieceCompliance | None
 ) -> dict[str, float]:
     """Relative errors of columns, those of deflections with that of the workpiece's compliance beside the force's."""
-    if soft is None or not errors:
+    if compliance is None or not errors:
         return dict(errors)
     work, whole = (float(columns[name].max(initial=0.0)) for name in ("deflection_workpiece_um", "deflection_um"))
     share = min(work / whole, 1.0) if whole > 0.0 else 0.0
-    own = {"deflection_workpiece_um": soft.error, "deflection_um": share * soft.error, "form_error_um": soft.error}
+    own = {
+        "deflection_workpiece_um": compliance.error,
+        "deflection_um": share * compliance.error,
+        "form_error_um": compliance.error,
+    }
     return {**errors, **{name: errors["force_n"] + error for name, error in own.items()}}

@@ -202,17 +202,32 @@ def runs_of(motions: Motions, samples: Samples) -> list[tuple[int, int]]:
 
 def clock(motions: Motions, samples: Samples, time: Floats, programs: list[Program], ends: Floats) -> Floats:
     """(m,) time at the end of every piece [s] from that at the ends of the program's rows; of a LIFT when the cutter is
-    down again. Within a motion time goes as it was planned.
+    down again.
 
-    The program of a run ends with its motions and the way up.
+    Within a motion each piece takes its time at the feed, and what the program takes longer is shared as the planned
+    slowing down. The program of a run ends with its motions and the way up.
+
+    Parameters
+    ----------
+    time : (m,) at the end of every piece within its run, as planned [s]
+    ends : (n,) at the end of every row of all programs [s]
     """
     out, first = np.zeros(len(samples.motion)), 0
     last_piece = np.append(samples.motion[1:] != samples.motion[:-1], True)
     for (a, b), (i, j), program in zip(motions.runs, runs_of(motions, samples), programs, strict=True):
         first += len(program)
         at = ends[first - 2 - (b - a) : first - 1]
-        own = time[i : j + 1]
-        out[i : j + 1] = np.interp(own, own[last_piece[i : j + 1]], at)
+        own, last = time[i : j + 1], np.flatnonzero(last_piece[i : j + 1])
+        scaled = np.interp(own, own[last], at)
+        at_feed = samples.length[i : j + 1] / motions.feed[samples.motion[i : j + 1]]
+        at_feed[0] = 0.0
+        took = np.diff(scaled, prepend=at[0])
+        slow = np.clip(np.diff(own, prepend=own[0]) - at_feed, 0.0, None)
+        begin = np.concatenate([[0], last[:-1] + 1])
+        spare, planned = (np.add.reduceat(v, begin) for v in (took - at_feed, slow))
+        share = np.divide(spare, planned, out=np.full(len(begin), -1.0), where=planned > 0.0)
+        each = np.repeat(share, np.diff(begin, append=len(own)))
+        out[i : j + 1] = at[0] + np.cumsum(np.where(each >= 0.0, at_feed + each * slow, took))
     return out
 
 
