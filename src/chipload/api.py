@@ -322,6 +322,8 @@ def optimise_feeds(
     part: Source | None = None,
     fixture: Tables = (),
     stiffness: Values | None = None,
+    workpiece: Values | None = None,
+    dynamics: Values | None = None,
     checks: Values | None = None,
     folder: str | Path = ".",
     progress: Progress = silent,
@@ -338,7 +340,7 @@ def optimise_feeds(
     cutter : one :class:`chipload.Cutter`, or several
     operation : keys of the ``[[operation]]`` of kind ``simulate``, with its table ``feeds``
     limits : keys of ``[limits]``; at least one of a load
-    part, fixture, stiffness, checks : keys of the table of this name; None: it is left out
+    part, fixture, stiffness, workpiece, dynamics, checks : keys of the table of this name; None: it is left out
     folder : that file names are relative to
     """
     for k, op in enumerate(_tables("operation", operation)):
@@ -347,7 +349,7 @@ def optimise_feeds(
     return _run(
         "program", folder, progress, ("simulate",), program=program, stock=stock, machine=machine, material=material,
         cutter=_cutters(cutter), operation=operation, limits=limits, part=part, fixture=fixture, stiffness=stiffness,
-        checks=checks,
+        workpiece=workpiece, dynamics=dynamics, checks=checks,
     )  # fmt: skip
 
 

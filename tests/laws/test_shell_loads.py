@@ -35,7 +35,7 @@ helix_deg = 0.0
 flute_length_mm = 22.0
 overhang_mm = 30.0
 modulus_gpa = 580.0
-[shell]
+[torque_control.shell]
 mean_radius_mm = 20.0
 length_mm = 40.0
 wall_mm = 2.0
@@ -63,6 +63,7 @@ edge_share = 0.3
 [spindle]
 inertia_kg_m2 = 0.003
 torque_constant_nm_a = 0.15
+torque_constant_error_share = 0.01
 idle_a = [2.0, 0.004]
 stiffness_a_s = 0.5
 reset_a = 5.0
@@ -72,7 +73,7 @@ smoothing_s = 0.02
 noise_a = 0.03
 current_step_a = 0.005
 idle_error_share = 0.01
-[control.override]
+[torque_control.override]
 hold = 0.9
 overload_nm = 2.0
 torque_most_nm = 6.0
@@ -175,7 +176,7 @@ def test_a_thicker_side_in_closed_form(job, program):
 def test_a_hard_spot_and_a_worn_cutter(job, program):
     """Factors 1.1 and 1.3 everywhere, 1.5 in the middle of the spot, 1.25 where half of its ramp is over."""
     made = done(job, program)
-    true = true_loads(made.loads, made.points, Place(job.table.shell), job.table.surprise)
+    true = true_loads(made.loads, made.points, Place(job.table.torque_control.shell), job.table.surprise)
     spot, far = at(made, 180.0), at(made, -60.0)
     assert true.torque_cut[far] == pytest.approx(1.1 * made.loads.torque_cut[far])
     assert true.force_edge[far] == pytest.approx(1.3 * made.loads.force_edge[far])

@@ -121,7 +121,7 @@ def _tracks(program: ProgramResult) -> tuple[Track, ...]:
         (*found, *_rubbing(own)), (feeds_name(program), APT), blocks=lambda: _with_cause(simulation, own),
     )  # fmt: skip
     first = own.before.columns
-    limits = tuple(c for c in program_limits(simulation, first, ORIGINAL) if c.name not in ("gouge_mm", "excess_mm"))
+    limits = _as_posted(program_limits(simulation, first, ORIGINAL), "gouge_mm", "excess_mm")
     before = Track(
         ORIGINAL, TrackKind.PROGRAM, False, own.seconds_before, limits, blocks=lambda: step_rows(simulation, own.before)
     )  # fmt: skip
@@ -140,10 +140,19 @@ def _tracks_of_speeds(program: ProgramResult, speeds: SpeedResult, found: tuple[
     limits = program_limits(simulation, speeds.before.columns, ORIGINAL, speeds.stability)
     before = Track(
         ORIGINAL, TrackKind.PROGRAM, False, speeds.seconds_before,
-        tuple(c for c in limits if c.name not in ("gouge_mm", "excess_mm", "form_error_um")),
+        _as_posted(limits, "gouge_mm", "excess_mm", "form_error_um"),
         blocks=lambda: step_rows(simulation, speeds.before),
     )  # fmt: skip
     return (after, before)
+
+
+def _as_posted(limits: tuple[LimitCheck, ...], *of_part: str) -> tuple[LimitCheck, ...]:
+    """Limits of the program as it was, of which those ``of_part`` are not checked: its surface is not compared."""
+    return tuple(
+        LimitCheck(c.name, c.limit, None, Verdict.UNPROVEN, c.track, reason="the part is compared with the new program")
+        if c.name in of_part else c
+        for c in limits
+    )  # fmt: skip
 
 
 def _found(simulation: SimulationResult) -> tuple[Finding, ...]:
