@@ -21,15 +21,14 @@ DOCS = Path(__file__).parent.parent / "docs"
 CHROMIUM = "/usr/bin/chromium"
 #: figures of the report side by side, each with width and height [pixels]; none: the top of the report
 FIGURES: dict[str, tuple[tuple[str, int, int], ...]] = {
-    "contour": (),
+    "contour": (("along-0", 860, 760),),
     "feeds": (("feeds", 1000, 760),),
     "chatter": (("stability", 500, 460), ("margin", 500, 460)),
     "bracket": (("part", 450, 520), ("loads", 550, 860)),
     "part": (("bent", 700, 480),),
-    "notebooks": (("loads", 960, 860),),
     "tube": (("path", 900, 860),),
     "cone": (("allowable", 900, 380),),
-    "plate": (("depths", 940, 520),),
+    "plate": (("depth", 940, 520),),
     "blade": (("space", 940, 560),),
 }
 #: moves figures into a sheet of their own, above the page

@@ -47,7 +47,7 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
     "plate": (),
     "blade": (),
     "impeller": (),
-    "hecc": (),
+    "hecc": ("operation.0.tolerance_mm=0.5",),
 }
 
 

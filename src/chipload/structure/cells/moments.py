@@ -56,7 +56,7 @@ def section_moments(shapes: NDArray[np.object_], grid: CellGrid) -> Array:
 
     >>> from chipload.structure.cells.grid import grid_over
     >>> m = section_moments(np.array([shapely.box(1, 0, 4, 2)], dtype=object), grid_over((0, 0, 0), (4, 2, 2), 2.0))
-    >>> m[:, 0, 0, 0].tolist()
+    >>> m[:, 0, 0, 0].round(12).tolist()
     [2.0, 4.0]
     """
     n = 2 * grid.order + 1
