@@ -20,10 +20,24 @@ from chipload.program.build import follow, plunge, rapid, retract
 from chipload.program.program import Program
 from chipload.result import Provenance, Verdict
 
+#: folders and files whose tests are quick: `make quick`, marker `core`
+CORE = (
+    "control", "cutter", "cutting", "engagement", "geometry", "machine", "program", "report", "result", "stability",
+    "stock", "test_docs_reference.py", "test_errors.py", "test_extras.py", "test_gallery.py", "test_packages.py",
+    "test_words.py",
+)  # fmt: skip
 EXAMPLES = Path(__file__).parents[1] / "src" / "chipload" / "examples"
 WALL = Contour.from_bulges([[0, 28], [0, 8], [8, 0], [28, 0]], [0, math.tan(math.pi / 8), 0, 0])
 CENTRES = Contour.from_bulges([[5, 28], [5, 8], [8, 5], [28, 5]], [0, math.tan(math.pi / 8), 0, 0])
 BEFORE = Contour.from_bulges([[0.1, 28], [0.1, 8], [8, 0.1], [28, 0.1]], [0, math.tan(math.pi / 8), 0, 0])
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests of :data:`CORE`."""
+    own = Path(__file__).parent
+    for item in items:
+        if item.path.is_relative_to(own) and item.path.relative_to(own).parts[0] in CORE:
+            item.add_marker(pytest.mark.core)
 
 
 def made_strategy(name: str, rows: int = 900) -> StrategyResult:
