@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from chipload.errors import InputError
-from chipload.program.apt.points import read_cl_points
 from chipload.program.apt.reader import read_apt
+from program.apt.cl_points import read_cl_points
 
 SEED = """$$-> MFGNO / X
 PARTNO/ A

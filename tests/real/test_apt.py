@@ -17,11 +17,11 @@ import pytest
 from chipload.machine.kinematics import forward
 from chipload.machine.machine import machine_named
 from chipload.program.apt.cutters import read_cutters
-from chipload.program.apt.points import read_cl_points
 from chipload.program.apt.reader import read_apt_file
 from chipload.program.motions import is_arc, starts
 from chipload.program.program import LINE, RAPID
 from chipload.program.to_axes import to_axes
+from program.apt.cl_points import read_cl_points
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2].parent / "shared" / "data")) / "nc"
 APT = DATA / "apt_dmu50" / "apt"

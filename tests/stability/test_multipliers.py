@@ -17,7 +17,6 @@ from chipload.stability.margin import largest_multipliers, stability_margins
 from chipload.stability.modes import Modes
 from chipload.stability.spectrum._kernels import greatest
 from chipload.stability.variable_pitch import revolution_multiplier
-from chipload.stability.zero_order import zero_order_margin
 from stability.stability_oracles import (
     KR,
     KT,
@@ -34,6 +33,7 @@ from stability.stability_oracles import (
     semi_discretisation,
     shapes,
 )  # fmt: skip
+from stability.zero_order import zero_order_margin
 
 SLOT, HALF, THIN = down(1.0), down(0.5), down(0.05)
 #: |mu| by collocation, to 1e-8

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from chipload.stability.speeds import QuietSpeeds, SpeedWindow, quiet_speeds
     from chipload.stability.surface_error import location_error
     from chipload.stability.variable_pitch import revolution_multiplier
-    from chipload.stability.zero_order import zero_order_margin
 
 __all__ = [
     "CutGroups",
@@ -37,7 +36,6 @@ __all__ = [
     "stability_chart",
     "stability_margins",
     "stable_probability",
-    "zero_order_margin",
 ]
 
 __getattr__, __dir__ = attach(
@@ -52,6 +50,5 @@ __getattr__, __dir__ = attach(
         "probability": "ModeSpread stable_probability",
         "speeds": "QuietSpeeds SpeedWindow quiet_speeds",
         "variable_pitch": "revolution_multiplier",
-        "zero_order": "zero_order_margin",
     },
 )

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from chipload.cutter.cutter import Cutter
-from chipload.engagement.chips.grazing import ellipse_grazing, grazing
 from chipload.engagement.chips.move import Move
 from chipload.engagement.chips.section import depth, section
 from engagement.chips.brute import CUTTERS, inside, random_move
+from engagement.chips.grazing import ellipse_grazing, grazing
 
 LONG = Cutter(10.0, 4, 0.5, 400.0, 500.0, 6e5)
 ANGLES = np.linspace(0.0, 2.0 * math.pi, 37)[:-1] + 0.01

@@ -12,8 +12,8 @@ import pytest
 import shapely
 
 from chipload.engagement.chips.covered import covered
-from chipload.engagement.chips.grazing import grazing
 from engagement.chips.brute import CUTTERS, inside, random_move, sections
+from engagement.chips.grazing import grazing
 
 TOLERANCE, MARGIN, MOVES = 1e-3, 1e-2, 200
 WAYS = ("lerp", "slerp", "machine")

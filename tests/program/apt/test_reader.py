@@ -10,11 +10,11 @@ import pytest
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.program.apt.cutters import read_cutters
-from chipload.program.apt.points import read_cl_points
 from chipload.program.apt.reader import read_apt, read_apt_file
 from chipload.program.apt.writer import write_apt
 from chipload.program.motions import lengths, sweeps
 from chipload.program.program import ARC_CCW, ARC_CW, DWELL, LINE, RAPID
+from program.apt.cl_points import read_cl_points
 
 HEAD = "UNITS/MM\nSPINDL/600,RPM,CLW\nRAPID\nGOTO/0,0,10\nFEDRAT/60,MMPM\n"
 
