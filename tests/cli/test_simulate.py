@@ -100,7 +100,7 @@ def test_a_slot_in_numbers(job: Path, tmp_path: Path) -> None:
     assert (summary["capability"], summary["verdict"], op["kind"]) == ("program", "holds", "simulate")
     names = (
         "torque_nm", "power_w", "chip_max_mm", "deflection_um", "deflection_workpiece_um", "form_error_um", "gouge_mm",
-        "excess_mm",
+        "excess_mm", "stability_margin", "stable_probability", "sle_um",
     )  # fmt: skip
     assert [x for x in summary["unchecked"] if x.startswith("limit ")] == [f"limit {x}: not stated" for x in names]
     assert op["removed_mm3"] == pytest.approx(op["chip_volume_mm3"], rel=1e-9)
