@@ -80,6 +80,9 @@ def test_the_unit_of_length_does_not_matter(cutter: Cutter, seed: int, k: float)
     two = run(tips, axes, scaled(cutter, k), stocks[1], k).columns
     for name, power in (("chip_volume_mm3", 3), *((f, 2) for f in FORCES), ("torque_mean_nm", 3), ("chip_max_mm", 1)):
         size = np.abs(one[name]).max()
-        np.testing.assert_allclose(two[name] / k**power, one[name], rtol=0.0, atol=1e-4 * size, err_msg=name)
-        assert np.median(np.abs(two[name] / k**power - one[name])) <= 1e-13 * size
+        off = np.abs(two[name] / k**power - one[name])
+        # one step, of which rounding changes the chords, may lie between the two
+        assert off.max() <= 1e-4 * size, name
+        assert (off > 1e-5 * size).sum() <= 1, name
+        assert np.median(off) <= 1e-13 * size, name
     assert two["chip_volume_mm3"].sum() / k**3 == pytest.approx(one["chip_volume_mm3"].sum(), rel=1e-6)
