@@ -39,7 +39,7 @@ def test_every_mistake_is_found_with_its_line(folder: Path, tmp_path: Path) -> N
     assert {n for n, x in by.items() if x["state"] == "exceeds"} == {"form_error_um", "gouge_mm"}
     assert by["gouge_mm"]["worst"] == pytest.approx(0.15, abs=1e-9)
     # the way back at x = 31 that is too deep is 10 wide of the 12, and round at its end at y = 30
-    assert op["removed_mm3"] == pytest.approx(VOLUME + 0.15 * 10.0 * 25.0, rel=1e-9)
+    assert op["removed_mm3"] == pytest.approx(VOLUME + 0.15 * 10.0 * 25.0, rel=1e-4)
     (hit,) = op["collisions"]
     # the holder begins 22 over the tip at -5.15, the clamp ends at 18
     assert (hit["line"], hit["into"]) == (by["gouge_mm"]["line"], "fixture 0") == (29, "fixture 0")
@@ -65,7 +65,7 @@ def test_the_corrected_program_holds(folder: Path, tmp_path: Path) -> None:
     op, (track,) = summary["operations"][0], summary["tracks"]
     assert (summary["verdict"], track["findings"], op["collisions"]) == ("holds", [], [])
     assert {x["state"] for x in summary["limits"]} == {"holds"}
-    assert op["removed_mm3"] == pytest.approx(VOLUME, rel=1e-9)
+    assert op["removed_mm3"] == pytest.approx(VOLUME, rel=1e-4)
     assert op["gouge_mm"]["max"] < 1e-9
     keys = (
         "removed_mm3", "time_s", "air_cut_s", "force_n", "torque_nm", "power_w", "deflection_um", "gouge_mm",

@@ -26,7 +26,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for k in range(16):
         words += [f"G1 X{60 if k % 2 == 0 else -10}", f"G1 Y{-15 + 2 * (k + 1)}"]
     (place / "slot.ngc").write_text("\n".join([*words, "G0 Z5", "M2", ""]))
-    (place / "job.toml").write_text(JOB.replace("step_mm = 2.0", "step_mm = 0.5"))
+    (place / "job.toml").write_text(JOB.replace("step_mm = 2.0", "step_mm = 0.2"))
     done = ended(start(place, "whole"))
     assert (done.returncode, done.stderr) == (0, "")
     return place
@@ -76,15 +76,15 @@ def test_a_run_that_was_killed_goes_on_to_the_same_bytes(folder: Path) -> None:
     same(folder, "killed")
 
 
-def test_a_run_by_moves_that_was_killed_goes_on_to_the_same_bytes(folder: Path) -> None:
-    engine = ("--set", 'operation.0.engine="moves"')
-    assert ended(start(folder, "moves", *engine)).returncode == 0
-    killed = stop(folder, "killed-moves", signal.SIGKILL, *engine)
+def test_a_run_by_layers_that_was_killed_goes_on_to_the_same_bytes(folder: Path) -> None:
+    engine = ("--set", 'operation.0.engine="layers"', "--set", "operation.0.step_mm=0.5")
+    assert ended(start(folder, "layers", *engine)).returncode == 0
+    killed = stop(folder, "killed-layers", signal.SIGKILL, *engine)
     assert killed.returncode == -signal.SIGKILL
-    again = ended(start(folder, "killed-moves", *engine))
+    again = ended(start(folder, "killed-layers", *engine))
     assert again.returncode == 0
     assert re.match(r"chipload: goes on after step \d+ of \d+, kept in ", again.stderr)
-    same(folder, "killed-moves", "moves")
+    same(folder, "killed-layers", "layers")
 
 
 def test_ctrl_c_says_what_is_kept_and_how_to_go_on(folder: Path) -> None:
@@ -102,7 +102,7 @@ def test_ctrl_c_says_what_is_kept_and_how_to_go_on(folder: Path) -> None:
 
 def test_another_input_does_not_go_on(folder: Path) -> None:
     stop(folder, "other", signal.SIGKILL)
-    again = ended(start(folder, "other", "--set", "operation.0.tolerance_mm=0.002"))
+    again = ended(start(folder, "other", "--set", "material.name=al6082-t6"))
     assert again.stderr == "chipload: begins again: what was kept is of another input\n"
     other = (folder / "other" / "history.parquet").read_bytes()
     assert other != (folder / "whole" / "history.parquet").read_bytes()

@@ -86,7 +86,9 @@ def test_the_example_cuts_two_pieces_and_as_much_as_the_stock_loses(tmp_path: Pa
     assert op["power_w"]["mean"] > 0.0
     page = (tmp_path / "r" / "report.html").read_text()
     assert "Chips, force, torque, power" in page
-    assert (summary["verdict"], summary["tracks"][0]["findings"]) == ("holds", [])
+    assert summary["verdict"] == "holds"
+    # its axis leans, and moves are those of an upright one
+    assert [(x["code"], x["severity"]) for x in summary["tracks"][0]["findings"]] == [("handed-over", "note")]
     assert {x["severity"] for x in summary["findings"]} <= {"note"}
 
 
@@ -103,7 +105,8 @@ def test_a_slot_in_numbers(job: Path, tmp_path: Path) -> None:
         "excess_mm", "stability_margin", "stable_probability", "sle_um",
     )  # fmt: skip
     assert [x for x in summary["unchecked"] if x.startswith("limit ")] == [f"limit {x}: not stated" for x in names]
-    assert op["removed_mm3"] == pytest.approx(op["chip_volume_mm3"], rel=1e-9)
+    # by moves the stock that is left is found by itself: its outlines have chords
+    assert op["removed_mm3"] == pytest.approx(op["chip_volume_mm3"], rel=1e-4)
     # the rim meets the stock when the tip is at x = -5, after 0.5 s at 10 mm/s; a step of 0.2 s cuts or does not
     assert 0.3 < op["air_cut_s"] <= 0.5
     assert op["air_cut_s"] + op["cutting_s"] == pytest.approx(4.0, rel=1e-12)

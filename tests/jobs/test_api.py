@@ -102,7 +102,8 @@ def test_values_files_and_tables_are_alike(history, tmp_path: Path) -> None:
     found = simulated(
         cutter=TABLE, material=al, machine=vmc, stock={"file": tmp_path / "box.stl", "units": "mm", "layer_mm": 0.5}
     )
-    np.testing.assert_allclose(found["force_n"], history["force_n"], rtol=1e-9)
+    # borders of what was cut before are found to 1e-4 rad at a block's floor, exactly over the faces of a mesh
+    np.testing.assert_allclose(found["force_n"], history["force_n"], rtol=1e-6)
     other = simulated(program=slot(7), cutter={7: TABLE})
     np.testing.assert_array_equal(other["force_n"], history["force_n"])
     assert set(other["tool"].tolist()) == {7}

@@ -297,7 +297,9 @@ def test_a_mirrored_program_has_the_same_margins(tmp_path: Path) -> None:
     two = done(tmp_path, text=mirrored, modes=other).result.in_use[0].columns["stability_margin"]
     wrong = done(tmp_path, text=mirrored, modes=skew).result.in_use[0].columns["stability_margin"]
     assert one.min() < 3.0
-    assert two == pytest.approx(one, rel=1e-6)
+    # where the cutter enters, two instants whose forces differ by less than a thousandth may change places
+    assert two == pytest.approx(one, rel=0.01)
+    assert np.median(abs(two / one - 1.0)) < 1e-6
     assert abs(wrong.min() - one.min()) > 0.05
 
 

@@ -44,7 +44,7 @@ def run(
     program: Program, cutter: Cutter, high: float = 0.0, material: Material = AL, on: str = "vmc", **keys: Any
 ) -> History:
     block = ([0.0, -16.0, -12.0], [30.0, 16.0, high])
-    return simulate(program, block, cutter, material, on, {"force_n": 1e6}, **keys)
+    return simulate(program, block, cutter, material, on, {"force_n": 1e6}, **({"engine": "layers"} | keys))
 
 
 def per_tooth(cutter: Cutter, direction: Any) -> Floats:
@@ -234,3 +234,22 @@ def test_the_energy_balance_of_a_slot_closes(m: float) -> None:
     history = run(path([[-6.0, 0.0, -2.0], [40.0, 0.0, -2.0]]), BALL, step_mm=0.5, material=metal)
     assert list(history.energy_balance) == [1]
     assert history.energy_balance[1] == pytest.approx(0.0, abs=0.02)
+
+
+def test_a_wall_that_a_line_meets_at_its_end_is_within_the_stated_error() -> None:
+    """A cleared field, then a line that runs square into its wall in the last 0.45 mm: its last step looks at 0.97 mm
+    before the end or so, where nothing is cut.
+    """
+    words = []
+    for y in (-8.0, 0.0, 8.0):
+        words += [rapid((-8.0, y, 5.0), SPINDLE, 1, "link"), rapid((-8.0, y, -2.0), SPINDLE, 1, "link")]
+        words += [plunge((15.0, y, -2.0), 2.0, SPINDLE, 1, "clear"), rapid((15.0, y, 5.0), SPINDLE, 1, "link")]
+    words += [rapid((6.0, 0.0, 5.0), SPINDLE, 1, "link"), rapid((6.0, 0.0, -2.0), SPINDLE, 1, "link")]
+    program = Program.join([*words, plunge((15.45, 0.0, -2.0), FEED, SPINDLE, 1, "cut")])
+    coarse, fine = (run(program, FLAT, step_mm=step) for step in (1.0, 0.05))
+    error = coarse.resolution_error["force_n"]
+    peak, truth = (float(history["force_n"].max()) for history in (coarse, fine))
+    assert float(coarse["force_n"][-1]) < 0.1 * truth
+    assert truth > 1.5 * peak
+    assert peak * (1.0 + error) > truth
+    assert float(run(program, FLAT, step_mm=1.0, engine="auto")["force_n"].max()) == pytest.approx(truth, rel=0.03)

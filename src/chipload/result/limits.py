@@ -145,7 +145,10 @@ def state_of(
     if reason:
         return Verdict.UNPROVEN, reason
     if worst + band > limit:
-        return Verdict.UNPROVEN, f"the value is known to {100.0 * error:.2g} %, and the limit lies within that"
+        return (
+            Verdict.UNPROVEN,
+            f"the value is known to {100.0 * error:.{0 if error >= 0.1 else 1}f} %, and the limit lies within that",
+        )
     return Verdict.HOLDS, ""
 
 

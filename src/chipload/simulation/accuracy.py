@@ -22,9 +22,11 @@ for which no loads are computed. FACTOR covers what the finer run is off itself:
 is of first order at least, and the finer ones are at most half as thick, so that it is 2. Where the axis leans slices
 do not end where contact ends, the peak over a rotation comes unevenly, and it is 3. FLOOR, 1 % (2 % where an axis
 leans), is what both runs share: rotations that are looked at, edges of the stock within the tolerance. The steps are
-a worst one of each column, the ones that lose most, others evenly spaced among those in cut, and some that lose
-nothing at the height of a section though the cutter is in the stock. How many: as the earlier steps that they need
-allow, at most SHARE of the steps of the run, but for the first and for short programs.
+a worst one of each column, the ones that lose most, others evenly spaced among those in cut, some that lose nothing at
+the height of a section though the cutter is in the stock, and MISSED of those that lose more than their middle engages:
+a mill that meets a wall at the end of a step, which is seen there only when the step is cut in PARTS instead of halves.
+How many: as the earlier steps that they need allow, at most SHARE of the steps of the run, as many again for the last
+kind, but for the first and for short programs.
 
 By moves the stock has no layers. The earlier steps that reach into the box are made again in the initial body, then the
 step with MORE times the slices and half the angle between rotations, once at the same instants, for f - c, and once in
@@ -64,7 +66,8 @@ Ints = NDArray[np.int64]
 Columns = Mapping[str, NDArray[Any]]
 #: columns of some steps in a stock, which changes
 Remove = Callable[[Steps, LayeredStock, "RunSettings"], Columns]
-#: greatest loads of a step that is computed once more, by column: looked at as in the run, and in its halves
+#: greatest loads of a step that is computed once more, by column: looked at as in the run (none where that is not
+#: compared), and in its parts
 Again = Callable[["Window"], tuple[Mapping[str, float], Mapping[str, float]]]
 
 #: columns that are compared; the others that a limit may hold go with the force
@@ -72,6 +75,8 @@ COMPARED = ("force_n", "torque_nm", "torque_mean_nm", "power_w", "chip_max_mm")
 WITH_FORCE = ("deflection_um", "form_error_um")
 #: earlier steps that are removed again: at most this share of the run's, and this number in a short run
 SHARE, LEAST = 0.05, 60
+#: likewise, for steps that lose more than their middle engages
+MISSED_SHARE, MISSED_LEAST = 0.05, 1000
 #: slices of the corner in the finer run, at least
 FINE = 48
 #: on the difference of the two resolutions, upright and where the axis leans
@@ -85,6 +90,9 @@ MORE = 4
 LOWEST, GROWTH = 5e-4, 1.3
 #: steps that are looked at beside the worst ones
 EVEN, IDLE = 3, 2
+#: by layers: steps that lose most of what their middle does not engage, which of it is this share of what they lose at
+#: least, and into how many parts each is cut
+MISSED, UNLIKE, PARTS = 3, 0.1, 16
 #: rows of columns that are read at once
 ROWS = 65_536
 
@@ -124,13 +132,16 @@ def energy_balance(columns: Columns, ktc: float) -> dict[int, float]:
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """A step that is computed once more: its number, its box, the earlier steps that reach into the box."""
+    """A step that is computed once more: its number, its box, the earlier steps that reach into the box, and into how
+    many parts it is cut.
+    """
 
     step: int
     own: Steps
     low: Floats
     high: Floats
     earlier: tuple[Steps, ...]
+    parts: int = 2
 
     @property
     def upright(self) -> bool:
@@ -167,21 +178,27 @@ def resolution_error(
     one has not
     """
     asked, count = _asked(columns, before)
+    missed = _missed(columns) if setting.moves is None else []
+    asked = list(dict.fromkeys([*asked[:1], *missed, *asked[1:]]))
     found = dict.fromkeys((*COMPARED, *WITH_FORCE), 0.0)
     lost = dict.fromkeys(COMPARED, 0.0)
     worst = {name: float(np.max(columns[name], initial=0.0)) for name in COMPARED}
     budget, spent = max(int(SHARE * count), LEAST), 0
-    windows = {w.step: w for w in _windows(blocks, asked, setting)}
+    left = max(int(MISSED_SHARE * count), MISSED_LEAST)
+    windows = {w.step: replace(w, parts=PARTS if w.step in missed else 2) for w in _windows(blocks, asked, setting)}
     for number, step in enumerate(asked):
         window = windows[step]
-        spent += window.cost
-        if number > 0 and spent > budget:
-            spent -= window.cost
+        if step in missed and window.cost <= left:
+            left -= window.cost
+        elif number == 0 or spent + window.cost <= budget:
+            spent += window.cost
+        else:
             continue
         alike, halves = again(window)
         for name in COMPARED:
             c, w = float(columns[name][step]), worst[name]
-            off = max(halves[name] - w, abs(alike[name] - c) if c >= 0.5 * w else alike[name] - w)
+            same = alike.get(name, c)
+            off = max(halves[name] - w, abs(same - c) if c >= 0.5 * w else same - w)
             lost[name] = max(lost[name], window.factor * off)
     # the flank of a flat mill is cut into slices where its contact changes: exact
     straight = all(c.corner_radius == 0.0 and c.taper == 0.0 and c.bottom == 0.0 for c in _used(windows, setting))
@@ -221,6 +238,15 @@ def _asked(columns: Columns, before: LayeredStock) -> tuple[list[int], int]:
     if len(idle):
         out += idle[((np.arange(IDLE) + 0.5) / IDLE * len(idle)).astype(np.int64)].tolist()
     return list(dict.fromkeys(out)), len(force)
+
+
+def _missed(columns: Columns) -> list[int]:
+    """Steps that lose most of what their middle does not engage, as where a mill meets a wall at the end of a step."""
+    volume = np.where(np.asarray(columns["rapid"]), 0.0, np.asarray(columns["chip_volume_mm3"]))
+    more = volume - np.asarray(columns["engaged_volume_mm3"])
+    more = np.where((more > UNLIKE * volume) & (np.asarray(columns["chip_pieces"]) > 0), more, 0.0)
+    order = np.argsort(-more, kind="stable")[:MISSED]
+    return [int(k) for k in order if more[k] > 0.0]
 
 
 def _among_worst(values: Floats) -> int:
@@ -268,7 +294,7 @@ def layers_again(before: LayeredStock, setting: RunSettings, remove: Remove) -> 
 
     def again(window: Window) -> tuple[Mapping[str, float], Mapping[str, float]]:
         fine = _finer_layers(window, before, setting, remove)
-        return fine, fine
+        return (fine if window.parts == 2 else {}), fine
 
     return again
 
@@ -296,13 +322,13 @@ def moves_again(setting: RunSettings, run: MoveRun, columns: Columns) -> Again:
         volume = float(columns["chip_volume_mm3"][window.step])
         alike = [loads_of(window, window.own, (n, n)) for n in (1, *run.stock.more)]
         same = min(alike, key=lambda each: abs(each[1] - volume))[0]
-        return same, loads_of(window, _halves(window.own), None)[0]
+        return same, loads_of(window, _parts(window.own, window.parts), None)[0]
 
     return again
 
 
 def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, remove: Remove) -> dict[str, float]:
-    """The greatest loads in the halves of a step, in a finer stock."""
+    """The greatest loads in the parts of a step, in a finer stock."""
     tool = int(window.own.tool[0])
     cutter = setting.cutters[tool]
     stock = before.cropped(window.low[:2], window.high[:2])
@@ -337,7 +363,7 @@ def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, re
     for some in window.earlier:
         for _, swept in swept_ahead(some, stock, setting.cutters, setting.interpolation, tolerance, setting.workers):
             stock.remove_many([i for i, _ in swept.met], [shape for _, shape in swept.met], 0.5 * tolerance)
-    columns = remove(_halves(window.own), stock, again)
+    columns = remove(_parts(window.own, window.parts), stock, again)
     return {name: float(columns[name].max()) for name in COMPARED}
 
 
@@ -346,11 +372,11 @@ def _span(stock: LayeredStock, low: float, high: float) -> tuple[int, int]:
     return (layers.start, layers.stop) if layers else (0, stock.layers)
 
 
-def _halves(step: Steps) -> Steps:
-    """One step as two of half its length and time."""
-    p, a = 0.5 * (step.p0 + step.p1), step.a0 + step.a1
-    a = a / np.linalg.norm(a, axis=1)[:, None]
-    both = {f.name: np.repeat(getattr(step, f.name), 2) for f in fields(Steps) if getattr(step, f.name).ndim == 1}
-    both["seconds"] = 0.5 * both["seconds"]
-    ends = {"p0": [step.p0, p], "p1": [p, step.p1], "a0": [step.a0, a], "a1": [a, step.a1]}
-    return Steps(**both, **{name: np.concatenate(v) for name, v in ends.items()})
+def _parts(step: Steps, count: int) -> Steps:
+    """One step as so many of equal length and time; the axis turns evenly enough between its two directions."""
+    t = np.linspace(0.0, 1.0, count + 1)[:, None]
+    p, a = step.p0 + t * (step.p1 - step.p0), step.a0 + t * (step.a1 - step.a0)
+    p[-1], a = step.p1[0], a / np.linalg.norm(a, axis=1)[:, None]
+    alike = {f.name: np.repeat(getattr(step, f.name), count) for f in fields(Steps) if getattr(step, f.name).ndim == 1}
+    alike["seconds"] = alike["seconds"] / count
+    return Steps(**alike, p0=p[:-1], p1=p[1:], a0=a[:-1], a1=a[1:])

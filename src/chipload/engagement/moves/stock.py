@@ -35,7 +35,8 @@ Ints = NDArray[np.int64]
 CELL, CELLS = 0.1, 4_000_000
 #: a step is looked at once every so many cutter radii, at its middle at least
 INSTANT = 0.25
-#: instants of a step that is looked at once and does not cut as the one before it, and of one that enters or leaves
+#: instants of a step that is looked at once and does not cut as the one before it, and of one that enters or leaves;
+#: of longer steps, of each of their parts
 MORE = (3, 25)
 #: most nodes of the net of outlines
 NODES = 1_000_000
@@ -265,11 +266,9 @@ class MoveStock:
         frame = np.where(upright[:, None], [[1.0, 0.0]], u[:, :2] / np.where(upright, 1.0, size)[:, None])
         frame = np.ascontiguousarray(frame)
         flank = np.array([flank_mm[n] for n in self.tools])
-        most = int(np.where(instants == 1, max(self.more), instants).sum())
         many = 16 * max(int(instants.sum()), 1) + 256
         slices, rows, owner = np.empty((many, 6)), np.empty((2 * many, 2)), np.empty(2 * many, dtype=np.int64)
-        entries = most + 1
-        entry, out = np.empty((entries, 3), dtype=np.int64), np.empty((entries, 10))
+        entry, out = np.empty((many, 3), dtype=np.int64), np.empty((many, 10))
         state = np.array([begin, 0, 0, 0, 0, *self.more])
         parts = corner_parts(pieces)
         at, work = 0, work_room(self.grid, self.cutters, pieces, flank)
@@ -299,6 +298,7 @@ class MoveStock:
             else:
                 slices = np.concatenate([slices, np.empty_like(slices)])
                 rows, owner = np.concatenate([rows, np.empty_like(rows)]), np.concatenate([owner, np.empty_like(owner)])
+                entry, out = np.concatenate([entry, np.empty_like(entry)]), np.concatenate([out, np.empty_like(out)])
         _, _, b, k, m, *_ = state.tolist()
         step, out = entry[:m, 0], out[:m]
         return Engaged(

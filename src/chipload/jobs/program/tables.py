@@ -106,7 +106,8 @@ class SimulateTable(Table):
     tolerance_mm: Positive = Field(0.001, le=0.1, description="how far chords may leave the edges of chips")
     interpolation: Literal["slerp", "lerp"] = Field("slerp", description="how the axis turns within a step")
     engine: Literal["auto", "moves", "layers"] = Field(
-        "layers", description="moves: exact, upright axis; layers: any axis; auto: moves where they can do it"
+        "auto",
+        description="auto: moves where they can do it, else layers; moves: exact, upright axis; layers: any axis",
     )
     corner_slices: Count | None = Field(
         None,

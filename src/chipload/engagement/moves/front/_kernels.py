@@ -230,10 +230,10 @@ def run(begin, frame, instants, state, index, work, parts, flank, slices, rows, 
     ----------
     frame : (n, 2) direction in the plan from which psi is counted, of each step
     instants : (n,) at how many times a step is looked at: the middles of so many equal parts of it; steps of one that
-        do not cut as the one before them get more
+        do not cut as the one before them get more, and longer ones that do not cut alike all along
     state : number of the move that is the first step; 1 where the engagement of step ``begin`` is known; rows, slices
-        and entries so far; instants of steps that get more, and of
-        those that enter or leave
+        and entries so far; instants of steps that get more, and of those that enter or leave: of a longer step, of
+        each of its parts
     index : see :func:`chipload.engagement.moves._kernels.what_is`; the moves of these steps are in it
     pieces, flank : slices of a corner, and longest slice of the flank of each cutter [mm]
     slices, rows, owner, out : see :func:`engaged`
@@ -262,6 +262,8 @@ def run(begin, frame, instants, state, index, work, parts, flank, slices, rows, 
             length = math.sqrt(m[3] * m[3] + m[4] * m[4] + m[5] * m[5])
             count = instants[k]
             rate = 0.0
+            least = math.inf
+            most = 0.0
             i = 0
             while i < count:
                 # the middle first: where a step that is looked at once cuts unlike the one before it, also beside
@@ -283,14 +285,19 @@ def run(begin, frame, instants, state, index, work, parts, flank, slices, rows, 
                     if instants[k] == 1 and change > STEADY:
                         count = state[5] if change < JUMP else state[6]
                         j = count // 2
+                now = out[entries, 0] / length if length > 0.0 else 0.0
                 if at[0] > before or out[entries, 8] > 0.0:
                     entry[entries, 0] = k
                     entry[entries, 1] = j
                     entry[entries, 2] = before
                     entries += 1
-                if i == 0 and count == 1 and length > 0.0 and turns(index[6], q, state[0] + n):
+                if instants[k] > 1 and count == instants[k] and length > 0.0:
+                    least = min(least, now)
+                    most = max(most, now)
+                last = i == count - 1 if instants[k] > 1 else i == 0
+                if last and count == instants[k] and length > 0.0 and turns(index[6], q, state[0] + n):
                     # a step that ends in a corner may meet the material at its very end
-                    t = 1.0 - 0.5 / state[6]
+                    t = 1.0 - 0.5 / (count * state[6])
                     for d in range(3):
                         p[d] = m[d] + t * m[3 + d]
                     if entries == len(out):
@@ -305,11 +312,21 @@ def run(begin, frame, instants, state, index, work, parts, flank, slices, rows, 
                     end = out[entries, 0] / length
                     at[0] = rows_before
                     at[1] = slices_before
-                    if abs(end - rate) > STEADY * max(end, rate) or out[entries, 8] > 0.0:
+                    if instants[k] > 1:
+                        least = -math.inf if out[entries, 8] > 0.0 else min(least, end)
+                        most = max(most, end)
+                    elif abs(end - rate) > STEADY * max(end, rate) or out[entries, 8] > 0.0:
                         count = state[6]
                         if entries > state[4]:
                             entry[entries - 1, 1] = count // 2
                 i += 1
+                if i == count == instants[k] and state[5] > 1 and most - least > STEADY * most:
+                    # a long step that does not cut alike all along: once more from its beginning, each part as a step
+                    count *= state[5] if most - least < JUMP * most else state[6]
+                    at[0] = state[2]
+                    at[1] = state[3]
+                    entries = state[4]
+                    i = 0
             if length > 0.0 and count > 0:
                 p[3] = rate
             instants[k] = count
