@@ -12,7 +12,7 @@ in the same run:
 * refactoring: assemble, factor, solve the 61 forces, with our own factors
 * CalculiX: ``ccx`` with the 61 forces, each a step of its own (one and three steps are run, the rest is extrapolated)
 
-Then whole rows again, all states of a pass at once by elimination from both sides (:mod:`chipload.structure.rows`): a
+Then whole rows again, all states of a pass at once by elimination from both sides (``tests/row_elimination.py``): a
 layer of two that goes, and a wall of one layer that is thinned, as the planner has it. ``all`` is everything that it
 takes, a state; ``join`` what one more state takes once both sides are eliminated.
 
@@ -33,13 +33,15 @@ from pathlib import Path
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
 from chipload.structure.grid import from_map
 from chipload.structure.places import normals_of, on_side
 from chipload.structure.removal import cut, prepare, start
-from chipload.structure.rows import row_compliances
 from chipload.structure.solid import SolidWorkpiece, compliance, factorise, loads
 from chipload.structure.unit_loads import compliance as corrected
 from chipload.structure.unit_loads import watch
+from row_elimination import row_compliances
 
 PLACES = 61
 

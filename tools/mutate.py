@@ -49,7 +49,6 @@ FILES: dict[str, tuple[str, ...]] = {
     "structure/spindle.py": ("tests/structure/test_spindle.py",),
     "cutting/force.py": ("tests/cutting/test_force.py", "tests/cutting/test_general.py"),
     "cutting/wall_error.py": ("tests/cutting/test_wall_error.py",),
-    "cutting/oblique.py": ("tests/cutting/test_oblique.py",),
     "cutting/material.py": ("tests/cutting/test_material.py", "tests/cutting/test_size_effect.py"),
     "engagement/contact.py": ("tests/engagement/test_contact.py",),
     "engagement/tooth_engagement.py": ("tests/engagement/test_tooth_engagement.py",),

@@ -10,27 +10,10 @@ from chipload.cutting.material import material_named
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour
 from chipload.machine.machine import machine_named
-from chipload.planning.contour.plan import Finishing, plan_contour
+from chipload.planning.contour.plan import plan_contour
+from finishing import FINISHING, QUARTER
 
-QUARTER = math.tan(math.pi / 8)
-BASE = Finishing(
-    side="inside",
-    milling="down",
-    strategies=("plain", "backward"),
-    use="backward",
-    joint="sharp",
-    radial_depth=0.1,
-    axial_depth=5.0,
-    semifinish_depth=0.5,
-    passes=1,
-    feed=10.0,
-    spindle_speed=314.0,
-    tolerance=0.001,
-    step=0.1,
-    lead=3.0,
-    top=0.0,
-    clearance=5.0,
-)
+BASE = replace(FINISHING, tolerance=0.001)
 SQUARE = Contour.polyline([(0, 0), (40, 0), (40, 30), (0, 30)], closed=True)
 CHAIN = Contour.polyline([(0, 0), (20, 0), (30, 10)])
 

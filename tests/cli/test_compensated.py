@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from chipload.cli import app
-from mill import MILL
+from mill import block_job, simulation
 
 #: along a side of the block: G41 keeps the cutter's centre a radius away from Y = 0
 PATH = """G21 G90 G17 G94
@@ -23,27 +23,7 @@ G40
 G0 Z5
 M2
 """
-JOB = (
-    """[program]
-file = "side.ngc"
-{keys}
-[machine]
-name = "vmc"
-[stock]
-low_mm = [0.0, -20.0, -5.0]
-high_mm = [40.0, 20.0, 0.0]
-layer_mm = 1.0
-[material]
-name = "al7075-t6"
-"""
-    + MILL
-    + """[[operation]]
-kind = "simulate"
-step_mm = 2.0
-[limits]
-force_n = 5000.0
-"""
-)
+JOB = block_job("side.ngc", "[0.0, -20.0, -5.0]", "[40.0, 20.0, 0.0]", simulation("force_n = 5000.0\n"), "{keys}\n")
 #: the centre goes along Y = 7, the cutter of 10 mm from Y = 2 to Y = 12, 2 mm deep, over 40 mm
 REMOVED = 40.0 * 10.0 * 2.0
 

@@ -23,8 +23,10 @@ from chipload.program.program import RAPID
 from chipload.program.read import read_program
 from chipload.structure import beam
 from chipload.structure.shell import Shell, compliance, ritz
+from torque_job import OVERRIDE_AND_LOOP, SPINDLE
 
-JOB = """
+JOB = (
+    """
 [round]
 cutter = 1
 milling = "down"
@@ -71,38 +73,14 @@ ramp_mm = 4.0
 [[surprise]]
 kind = "thinner-wall"
 share = 0.02
-[spindle]
-inertia_kg_m2 = 0.003
-torque_constant_nm_a = 0.15
-torque_constant_error_share = 0.01
-idle_a = [2.0, 0.004]
-stiffness_a_s = 0.5
-reset_a = 5.0
-most_current_a = 40.0
-sensor_lag_s = 0.01
-smoothing_s = 0.02
-noise_a = 0.03
-current_step_a = 0.005
-idle_error_share = 0.01
-[spindle.deviation]
+"""
+    + SPINDLE
+    + """[spindle.deviation]
 torque_constant_percent = 0.5
 idle_percent = 0.5
-[torque_control.override]
-hold = 0.9
-overload_nm = 2.0
-torque_most_nm = 6.0
-light_nm = 0.03
-floor = 0.05
-cap = 1.0
-start = 0.3
-air_override = 1.0
-lost_override = 0.2
-lost_s = 1.0
-[loop]
-period_ms = 10.0
-latency_ms = 50.0
-override_step = 0.01
-acceleration_mm_s2 = 1000.0
+"""
+    + OVERRIDE_AND_LOOP
+    + """acceleration_mm_s2 = 1000.0
 [simulation]
 step_mm = 2.0
 layer_mm = 0.5
@@ -112,6 +90,7 @@ form_error_um = 30.0
 strength_share = 0.9
 torque_over_percent = 5.0
 """
+)
 #: what a run says before it begins
 NOTICE = "chipload: a torque job does not resume: if it is stopped, it begins again\n"
 NAMES = ["constant", "model", "model_not_derated", "pi", "fuzzy", "fuzzy_feedforward"]

@@ -14,31 +14,9 @@ from chipload.cli import app
 from chipload.jobs import load_job
 from chipload.jobs.coarse import coarser
 from chipload.tables import shipped_names
+from mill import SLOT_JOB
 
-JOB = """
-[program]
-file = "slot.ngc"
-[machine]
-name = "vmc"
-[stock]
-low_mm = [0.0, 0.0, -6.0]
-high_mm = [20.0, 10.0, 0.0]
-[material]
-name = "al7075-t6"
-[[cutter]]
-number = 1
-diameter_mm = 6.0
-flutes = 2
-helix_deg = 30.0
-flute_length_mm = 18.0
-overhang_mm = 25.0
-modulus_gpa = 580.0
-[[operation]]
-kind = "simulate"
-step_mm = 0.5
-[limits]
-torque_nm = 5.0
-"""
+JOB = SLOT_JOB.replace("STEP", "0.5")
 
 
 def call(*words: object) -> tuple[int, str, str]:

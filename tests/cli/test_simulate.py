@@ -15,7 +15,7 @@ from chipload import examples
 from chipload.cli import app
 from chipload.cutting.material import material_named
 from chipload.stock.layers import LayeredStock
-from mill import MILL
+from mill import block_job, simulation
 
 SLOT = """G21 G90 G17 G94
 T1 M6
@@ -26,26 +26,7 @@ G1 X30 F600
 G0 Z5
 M2
 """
-JOB = (
-    """[program]
-file = "slot.ngc"
-[machine]
-name = "vmc"
-[stock]
-low_mm = [0.0, -15.0, -5.0]
-high_mm = [50.0, 15.0, 0.0]
-layer_mm = 1.0
-[material]
-name = "al7075-t6"
-"""
-    + MILL
-    + """[[operation]]
-kind = "simulate"
-step_mm = 2.0
-[limits]
-force_n = 1000.0
-"""
-)
+JOB = block_job("slot.ngc", "[0.0, -15.0, -5.0]", "[50.0, 15.0, 0.0]", simulation("force_n = 1000.0\n"))
 
 
 def call(*words):

@@ -8,19 +8,14 @@ import pytest
 import trimesh
 
 from cli.test_simulate import call, states, summary_of
-from mill import MILL
+from mill import MILL, block_job
 
 SLOT = "G21 G90 G17 G94\nT1 M6\nS3000 M3\nG0 X-10 Y0 Z5\nG0 Z-2.1\nG1 X25 F600\nG0 Z5\nM2\n"
-JOB = (
-    """[program]
-file = "slot.ngc"
-[machine]
-name = "vmc"
-[stock]
-low_mm = [0.0, -15.0, -5.0]
-high_mm = [50.0, 15.0, 0.0]
-layer_mm = 1.0
-[part]
+JOB = block_job(
+    "slot.ngc",
+    "[0.0, -15.0, -5.0]",
+    "[50.0, 15.0, 0.0]",
+    """[part]
 file = "part.stl"
 units = "mm"
 spacing_mm = 1.0
@@ -42,7 +37,7 @@ stock_points_mm = 2.0
 force_n = 1000.0
 gouge_mm = 0.02
 excess_mm = 0.1
-"""
+""",
 )
 
 

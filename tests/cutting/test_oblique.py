@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chipload.cutting.oblique import Orthogonal, oblique_coefficients, oblique_material
+import chipload.examples
+from chipload.cutting.material import read_material
 from chipload.errors import InputError
+from oblique import Orthogonal, oblique_coefficients, oblique_material
 
 #: Ti6Al4V, rake in degrees, as [Budak1996] prints it
 TITANIUM = Orthogonal(
@@ -106,3 +109,11 @@ def test_refused(change, message):
             **{**edge, **{k: v for k, v in change.items() if k in edge}},
         )
     assert str(err.value) == message
+
+
+@pytest.mark.parametrize("example", ["plate", "blade"])
+def test_the_titanium_of_the_examples(example):
+    """Rake 0, helix 30 deg, chip 0.03 mm, as its file states; written to 0.1 MPa."""
+    shipped = read_material(Path(chipload.examples.__file__).parent / example / "ti6al4v.toml")
+    made = oblique_material(TITANIUM, 0.0, math.radians(30.0), 0.03)
+    assert shipped.coefficients == pytest.approx(made.coefficients, abs=0.06)

@@ -16,46 +16,19 @@ from chipload.jobs import FinishedJob, load_job, run_job
 from chipload.program.gcode.reader import read_gcode
 from chipload.report.page import page_bytes
 from chipload.result import Verdict
+from mill import made_up_job, made_up_material
 
-MATERIAL = """name = "made up"
-workpiece = "none"
-source = "made up for this test"
-conditions = "none"
-ktc_mpa = 1200.0
-krc_mpa = 500.0
-kac_mpa = 300.0
-kte_n_mm = 14.0
-kre_n_mm = 11.0
-kae_n_mm = 2.0
-"""
-JOB = """[program]
-file = "a.ngc"
-[machine]
-name = "vmc"
-[stock]
-low_mm = [0.0, -20.0, -6.0]
-high_mm = [40.0, 20.0, 0.0]
-layer_mm = 1.5
-[material]
-file = "m.toml"
-[[cutter]]
-number = 1
-diameter_mm = 10.0
-flutes = 2
-helix_deg = 0.0
-flute_length_mm = 20.0
-overhang_mm = 30.0
-modulus_gpa = 580.0
-[[operation]]
-kind = "simulate"
-step_mm = 2.0
-tolerance_mm = 0.002
-[operation.feeds]
+MATERIAL = made_up_material(1200.0, 500.0, 300.0, 14.0, 11.0, 2.0)
+JOB = made_up_job(
+    2,
+    2.0,
+    """[operation.feeds]
 slowest_percent = 10.0
 fastest_percent = 900.0
 change_least_percent = 0.0
 [limits]
-"""
+""",
+)
 HEAD = "G21 G90 G94 G17\nT1 M6\nS3000 M3\n"
 SLOT = HEAD + "G0 X-8 Y0 Z5\nG0 Z-3\nG1 X34 F600 (slot)\nG0 Z5\nM2\n"
 

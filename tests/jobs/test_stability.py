@@ -26,47 +26,20 @@ from chipload.simulation.loads import Cuts
 from chipload.stability.cuts import dynamic_cuts
 from chipload.stability.margin import stability_margins
 from chipload.stability.modes import Modes
+from mill import made_up_job, made_up_material
 
-MATERIAL = """name = "made up"
-workpiece = "none"
-source = "made up for this test"
-conditions = "none"
-ktc_mpa = 700.0
-krc_mpa = 210.0
-kac_mpa = 100.0
-kte_n_mm = 10.0
-kre_n_mm = 12.0
-kae_n_mm = 2.0
-"""
-JOB = """[program]
-file = "a.ngc"
-[machine]
-name = "vmc"
-[stock]
-low_mm = [0.0, -20.0, -6.0]
-high_mm = [40.0, 20.0, 0.0]
-layer_mm = 1.5
-[material]
-file = "m.toml"
-[[cutter]]
-number = 1
-diameter_mm = 10.0
-flutes = 3
-helix_deg = 0.0
-flute_length_mm = 20.0
-overhang_mm = 30.0
-modulus_gpa = 580.0
-[[operation]]
-kind = "simulate"
-step_mm = 4.0
-tolerance_mm = 0.002
-SPEEDS
+MATERIAL = made_up_material(700.0, 210.0, 100.0, 10.0, 12.0, 2.0)
+JOB = made_up_job(
+    3,
+    4.0,
+    """SPEEDS
 [dynamics]
 MODES
 [limits]
 force_n = 5000.0
 LIMITS
-"""
+""",
+)
 MODES = """[[dynamics.mode]]
 frequency_hz = 650.0
 damping_ratio = 0.02

@@ -19,8 +19,10 @@ from chipload.jobs.torque.cut import Place, cut, off_centre, shell_stock, true_l
 from chipload.program.build import helix, plunge, rapid
 from chipload.program.program import Program
 from chipload.structure import beam
+from torque_job import OVERRIDE_AND_LOOP, SPINDLE
 
-JOB = """
+JOB = (
+    """
 [program]
 file = "none.ngc"
 [machine]
@@ -60,35 +62,10 @@ ramp_mm = 5.0
 kind = "worn-cutter"
 share = 0.1
 edge_share = 0.3
-[spindle]
-inertia_kg_m2 = 0.003
-torque_constant_nm_a = 0.15
-torque_constant_error_share = 0.01
-idle_a = [2.0, 0.004]
-stiffness_a_s = 0.5
-reset_a = 5.0
-most_current_a = 40.0
-sensor_lag_s = 0.01
-smoothing_s = 0.02
-noise_a = 0.03
-current_step_a = 0.005
-idle_error_share = 0.01
-[torque_control.override]
-hold = 0.9
-overload_nm = 2.0
-torque_most_nm = 6.0
-light_nm = 0.03
-floor = 0.05
-cap = 1.0
-start = 0.3
-air_override = 1.0
-lost_override = 0.2
-lost_s = 1.0
-[loop]
-period_ms = 10.0
-latency_ms = 50.0
-override_step = 0.01
-[simulation]
+"""
+    + SPINDLE
+    + OVERRIDE_AND_LOOP
+    + """[simulation]
 step_mm = 2.0
 layer_mm = 0.5
 tolerance_mm = 0.002
@@ -97,6 +74,7 @@ form_error_um = 60.0
 strength_share = 0.6
 torque_over_percent = 5.0
 """
+)
 FEED, SPEED, DEPTH, R, FINISHED = 30.0, 628.3185307, 2.0, 5.0, 21.0
 MATERIAL = material_named("al6082-t6")
 CENTRE = FINISHED + R

@@ -18,32 +18,10 @@ from chipload.cli import app
 from chipload.errors import InputError
 from chipload.report.vtk import polyline, triangles
 from chipload.stock.layers import LayeredStock
+from mill import SLOT_JOB
 
 PROGRAM = "G21 G90 G94\nT1 M6\nS3000 M3\nG0 X-8 Y5 Z5\nG1 Z-2 F300\nX28\nG0 Z5\nM5\nM2\n"
-JOB = """
-[program]
-file = "slot.ngc"
-[machine]
-name = "vmc"
-[stock]
-low_mm = [0.0, 0.0, -6.0]
-high_mm = [20.0, 10.0, 0.0]
-[material]
-name = "al7075-t6"
-[[cutter]]
-number = 1
-diameter_mm = 6.0
-flutes = 2
-helix_deg = 30.0
-flute_length_mm = 18.0
-overhang_mm = 25.0
-modulus_gpa = 580.0
-[[operation]]
-kind = "simulate"
-step_mm = 3.0
-[limits]
-torque_nm = 5.0
-"""
+JOB = SLOT_JOB.replace("STEP", "3.0")
 
 
 def call(*words: object) -> tuple[int, str, str]:

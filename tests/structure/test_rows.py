@@ -10,8 +10,8 @@ import pytest
 from chipload.errors import InputError
 from chipload.structure.grid import from_map
 from chipload.structure.places import MeshPlaces, normals_of, on_cut, on_side
-from chipload.structure.rows import row_compliances
 from chipload.structure.solid import SolidWorkpiece, compliance, factorise, full_compliance
+from row_elimination import row_compliances
 
 
 def twisted(layers: int) -> SolidWorkpiece:

@@ -32,7 +32,7 @@ def check_program(
     from chipload.program.read import line_times, read_program, read_tools
 
     table, feed = read_tools(tools) if tools is not None else None, feed_of(feed_mm_min)
-    refused: InputError | None = None
+    refused: list[InputError] = []
     for name in GENERIC if machine is None else (machine,):
         on = machine_of(name)
         try:
@@ -43,11 +43,9 @@ def check_program(
                 )  # fmt: skip
             break
         except InputError as err:
-            # the first refusal is told: that of the simplest machine
-            refused = refused or err
+            refused.append(err)
     else:
-        assert refused is not None
-        raise refused
+        raise refused[0]  # that of the simplest machine
     if machine is None:
         show(f"no machine is stated: read for {on.name}; state yours with --machine, as its limits and times differ")
     broken = set(map(id, reading.violations))

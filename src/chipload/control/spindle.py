@@ -21,6 +21,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -172,17 +173,7 @@ def identify_runs(
     InputError
         The rows are too few, or do not tell the parameters apart (one speed, one torque, no ramp).
     """
-    if not 1 <= idle_terms <= 4:
-        raise InputError(f"spindle.idle_terms = {idle_terms}: must be from 1 to 4")
-    count = sum(len(run.time) for run in runs)
-    if count < 10 * (idle_terms + 2):
-        raise InputError(f"spindle.time: {count} rows: must be at least {10 * (idle_terms + 2)} to identify")
-    scale_w = max(float(np.abs(run.speed).max()) for run in runs)
-    scale_t = max(float(np.abs(np.nan_to_num(run.torque)).max()) for run in runs)
-    if scale_w == 0.0:
-        raise InputError("spindle.speed: the spindle must turn")
-    if scale_t == 0.0 and torque_constant is None:
-        raise InputError("spindle.torque: at least one cut of known torque is needed")
+    scale_w, scale_t = _scales(runs, idle_terms, torque_constant)
     settled = sensor_lag if settled is None else settled
     parts = [_rows(run, sensor_lag, settled, idle_terms, scale_w, scale_t or 1.0) for run in runs]
     design, current = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
@@ -192,50 +183,83 @@ def identify_runs(
     if torque_constant is not None:
         known = design[:, 0] * (scale_t or 1.0) / torque_constant
     free = [k for k in range(idle_terms + 2) if not (k == 0 and torque_constant is not None) and (k != 1 or inertia)]
-    found, _, rank, _ = np.linalg.lstsq(design[:, free], current - known, rcond=1e-10)
-    if rank < len(free):
-        raise InputError(
-            "spindle: torque, acceleration and idle current cannot be told apart: cuts at two speeds and two torques "
-            "are needed, or fewer idle_terms"
-        )
-    left = current - known - design[:, free] @ found
-    freedom = len(left) - len(free)
-    power = float(left @ left)
-    variance = power / freedom
-    rho = min(max(float(left[1:] @ left[:-1]) / power, 0.0), 0.99) if power > 0.0 else 0.0
-    covariance = np.zeros((idle_terms + 2, idle_terms + 2))
-    inner = np.linalg.inv(design[:, free].T @ design[:, free])
-    covariance[np.ix_(free, free)] = variance * (1.0 + rho) / (1.0 - rho) * inner
-    values = np.zeros(idle_terms + 2)
-    values[free] = found
-    per_rate = values[1] / scale_r
+    found = _regression(design, current - known, free)
+    per_rate = found.values[1] / scale_r
     if torque_constant is None:
-        if values[0] <= 0.0:
+        if found.values[0] <= 0.0:
             raise InputError("spindle.torque: a greater torque takes less current: the columns do not belong together")
-        constant = float(scale_t / values[0])
+        constant = float(scale_t / found.values[0])
     else:
         constant = torque_constant
     # delta method: K_T = 1/a, J = b/a
-    jacobian = np.zeros_like(covariance)
+    jacobian = np.zeros_like(found.covariance)
     if torque_constant is None:
         jacobian[0, 0] = -(constant**2) / scale_t
         jacobian[1, 0] = -per_rate * constant**2 / scale_t
     jacobian[1, 1] = constant / scale_r
     jacobian[2:, 2:] = np.diag(scale_w ** -np.arange(idle_terms, dtype=np.float64))
-    spread = np.sqrt(np.diag(jacobian @ covariance @ jacobian.T))
-    light, biased = _light(design[:, 0] * scale_t, constant * left, share) if scale_t > 0.0 else (0.0, 0.0)
+    spread = np.sqrt(np.diag(jacobian @ found.covariance @ jacobian.T))
+    light, biased = _light(design[:, 0] * scale_t, constant * found.left, share) if scale_t > 0.0 else (0.0, 0.0)
     return SpindleMap(
         torque_constant=constant,
         inertia=per_rate * constant,
-        idle=values[2:] / scale_w ** np.arange(idle_terms),
-        half_width=float(student.ppf(0.5 + 0.5 * level, freedom)) * spread,
+        idle=found.values[2:] / scale_w ** np.arange(idle_terms),
+        half_width=float(student.ppf(0.5 + 0.5 * level, found.freedom)) * spread,
         level=level,
         speeds=(min(float(run.speed.min()) for run in runs), max(float(run.speed.max()) for run in runs)),
         light=light,
         biased=biased,
-        residual=math.sqrt(variance),
+        residual=math.sqrt(found.variance),
         sensor_lag=sensor_lag,
     )
+
+
+def _scales(runs: Sequence[Run], idle_terms: int, torque_constant: float | None) -> tuple[float, float]:
+    """Greatest speed [rad/s] and torque [N mm] of logs from which a spindle can be identified."""
+    if not 1 <= idle_terms <= 4:
+        raise InputError(f"spindle.idle_terms = {idle_terms}: must be from 1 to 4")
+    count = sum(len(run.time) for run in runs)
+    if count < 10 * (idle_terms + 2):
+        raise InputError(f"spindle.time: {count} rows: must be at least {10 * (idle_terms + 2)} to identify")
+    speed = max(float(np.abs(run.speed).max()) for run in runs)
+    torque = max(float(np.abs(np.nan_to_num(run.torque)).max()) for run in runs)
+    if speed == 0.0:
+        raise InputError("spindle.speed: the spindle must turn")
+    if torque == 0.0 and torque_constant is None:
+        raise InputError("spindle.torque: at least one cut of known torque is needed")
+    return speed, torque
+
+
+class _Regression(NamedTuple):
+    """Least squares: values (k,), 0 where not free, their covariance (k, k), what is left (n,), its variance."""
+
+    values: Floats
+    covariance: Floats
+    left: Floats
+    freedom: int
+    variance: float
+
+
+def _regression(design: Floats, target: Floats, free: list[int]) -> _Regression:
+    """``target`` (n,) by the ``free`` columns of ``design`` (n, k); what is left is correlated from row to row."""
+    count = design.shape[1]
+    found, _, rank, _ = np.linalg.lstsq(design[:, free], target, rcond=1e-10)
+    if rank < len(free):
+        raise InputError(
+            "spindle: torque, acceleration and idle current cannot be told apart: cuts at two speeds and two torques "
+            "are needed, or fewer idle_terms"
+        )
+    left = target - design[:, free] @ found
+    freedom = len(left) - len(free)
+    power = float(left @ left)
+    variance = power / freedom
+    rho = min(max(float(left[1:] @ left[:-1]) / power, 0.0), 0.99) if power > 0.0 else 0.0
+    covariance = np.zeros((count, count))
+    inner = np.linalg.inv(design[:, free].T @ design[:, free])
+    covariance[np.ix_(free, free)] = variance * (1.0 + rho) / (1.0 - rho) * inner
+    values = np.zeros(count)
+    values[free] = found
+    return _Regression(values, covariance, left, freedom, variance)
 
 
 def _rows(

@@ -133,11 +133,8 @@ class CutterTable(BaseModel):
         kind = path.suffix.lower()
         if kind not in ENDINGS:
             raise InputError(f"cutter.file = {self.file}: must end in {', '.join(ENDINGS)}")
-        if kind in (".fctb", ".p21"):
-            if self.tool is not None:
-                raise InputError(f"cutter.tool is for a file of several tools: leave it out with {self.file}")
-        elif self.tool is None and kind not in (".json", ".tools"):
-            raise InputError(f"cutter.tool is missing: {self.file} holds many: say which")
+        if kind in (".fctb", ".p21") and self.tool is not None:
+            raise InputError(f"cutter.tool is for a file of several tools: leave it out with {self.file}")
         if self.file_unit is not None and kind != ".tbl":
             raise InputError(f"cutter.file_unit is for a tool table (.tbl): leave it out with {self.file}")
         if kind == ".fctb":
@@ -146,7 +143,8 @@ class CutterTable(BaseModel):
             return read_iso13399(path)
         if kind in (".json", ".tools"):
             return self._checked(read_fusion_tool(path, self.tool))
-        assert self.tool is not None
+        if self.tool is None:
+            raise InputError(f"cutter.tool is missing: {self.file} holds many: say which")
         if kind == ".camotics":
             return read_camotics_tool(path, self.tool)
         if self.file_unit is None:

@@ -120,6 +120,26 @@ def edge(mid, half, along, offset, across, sine, cosine, c):
 
 
 @njit(cache=True, nogil=True)
+def first_turn(theta, j, teeth, p, first):
+    """The least theta - 2 pi j / teeth + 2 pi i at which an edge of tooth j that lags by ``first`` is not before p."""
+    turn = theta - TAU * j / teeth
+    turn -= TAU * math.floor(turn / TAU)
+    if turn - first < p:
+        turn += TAU * math.ceil((p + first - turn) / TAU)
+    return turn
+
+
+@njit(cache=True, nogil=True)
+def engaged_part(turn, base, rate, p, q, s1, s2):
+    """The part of the edge s1 .. s2, lagging by base + rate s, that is between p and q at ``turn``; none: s1 .. s1."""
+    if rate > 0.0:
+        return max(s1, (turn - base - q) / rate), min(s2, (turn - base - p) / rate)
+    if turn - base >= q:
+        return s1, s1
+    return s1, s2
+
+
+@njit(cache=True, nogil=True)
 def load(theta, rows, tooth, piece, slices, lo, hi, teeth, c):
     """Force on the cutter along T, n and the axis [N] and torque [N mm] at one rotation, in closed form where the law
     is linear.
@@ -141,18 +161,9 @@ def load(theta, rows, tooth, piece, slices, lo, hi, teeth, c):
         one = tooth[r] >= 0
         for i in range(1 if one else teeth):
             j = tooth[r] if one else i
-            turn = theta - TAU * j / teeth
-            turn -= TAU * math.floor(turn / TAU)
-            if turn - first < p:
-                turn += TAU * math.ceil((p + first - turn) / TAU)
+            turn = first_turn(theta, j, teeth, p, first)
             while turn - last <= q:
-                s1 = sa
-                s2 = sb
-                if rate > 0.0:
-                    s1 = max(sa, (turn - base - q) / rate)
-                    s2 = min(sb, (turn - base - p) / rate)
-                elif turn - first >= q:
-                    s2 = s1
+                s1, s2 = engaged_part(turn, base, rate, p, q, sa, sb)
                 ds = s2 - s1
                 if ds > 0.0:
                     mid = turn - base - 0.5 * rate * (s1 + s2)

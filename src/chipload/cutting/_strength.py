@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from chipload.cutting._kernels import TAU, edge
+from chipload.cutting._kernels import TAU, edge, engaged_part, first_turn
 
 #: longest piece of immersion that is integrated at once [rad]
 PIECE = 0.6
@@ -63,18 +63,9 @@ def in_sections(theta, rows, tooth, piece, slices, lo, hi, teeth, c, heights, ou
         one = tooth[r] >= 0
         for i in range(1 if one else teeth):
             j = tooth[r] if one else i
-            turn = theta - TAU * j / teeth
-            turn -= TAU * math.floor(turn / TAU)
-            if turn - first < p:
-                turn += TAU * math.ceil((p + first - turn) / TAU)
+            turn = first_turn(theta, j, teeth, p, first)
             while turn - last <= q:
-                s1 = rows[r, 2]
-                s2 = rows[r, 3]
-                if rate > 0.0:
-                    s1 = max(s1, (turn - base - q) / rate)
-                    s2 = min(s2, (turn - base - p) / rate)
-                elif turn - first >= q:
-                    s2 = s1
+                s1, s2 = engaged_part(turn, base, rate, p, q, rows[r, 2], rows[r, 3])
                 # pieces between neighbouring sections load those above them
                 b1 = s1
                 for e in range(len(heights)):

@@ -104,8 +104,8 @@ def read_forces(path: str | Path, window: tuple[float, float] | None = None) -> 
     lines = _lines(Path(path), label)
     header, names, units, at, first = _head(lines, label)
     time, columns = _columns(names, units, at, label)
-    rate = _rate(header, label)
-    if time is None and rate is None:
+    stated = _rate(header, label)
+    if time is None and stated is None:
         raise InputError(
             f"{label}: line {at}: no time column and no sampling rate: add a column time_s or a line Sampling rate [Hz]"
         )
@@ -125,7 +125,7 @@ def read_forces(path: str | Path, window: tuple[float, float] | None = None) -> 
             ) from None
         if not all(map(math.isfinite, values)):
             raise InputError(f"{label}: line {number}: a value is not finite: leave the sample out of the window")
-        now = values[time[0]] * time[1] if time is not None else count / (rate or 1.0)
+        now = values[time[0]] * time[1] if time is not None else count / (stated or 1.0)
         if not low - 1e-12 <= now <= high + 1e-12:
             continue
         if len(stamps) >= SAMPLES:
@@ -138,8 +138,7 @@ def read_forces(path: str | Path, window: tuple[float, float] | None = None) -> 
         raise InputError(
             f"{label}: {len(t)} samples in the window {low:g} to {high:g} s: needs 3 or more: widen window_s"
         )
-    rate = _spacing(t, rate, label) if time is not None else rate
-    assert rate is not None
+    rate = stated if time is None and stated is not None else _spacing(t, stated, label)
     measured = Measured(tuple(names[k] for k, _ in columns), force, rate, float(t[0]), header)
     return measured, tuple(_findings(measured, window, float(t[-1])))
 

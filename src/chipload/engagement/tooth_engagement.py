@@ -103,6 +103,19 @@ class ToothEngagement:
     def __len__(self) -> int:
         return len(self.start) - 1
 
+    @property
+    def frames(self) -> Floats:
+        """``frame`` where it is needed.
+
+        Raises
+        ------
+        InputError
+            There is none.
+        """
+        if self.frame is None:
+            raise InputError("tooth engagement: has no frame: needs the rows T, n and A (n, 3, 3) of each step")
+        return self.frame
+
     def chip_max(self) -> Floats:
         """Greatest chip thickness of each step, (n,) float [mm]; 0 where nothing is cut."""
         low, high, _, _, along, offset, across = self.rows.T

@@ -84,23 +84,22 @@ class Isolated:
                 require_extra("cad")
                 self._process = _start()
                 weakref.finalize(self, _kill, self._process)
-                self._ask([self.reader, str(self.file), self.key])
-            return self._ask([function, *values])
+                self._ask(self._process, [self.reader, str(self.file), self.key])
+            return self._ask(self._process, [function, *values])
         except BaseException:
             self.close()
             raise
 
-    def _ask(self, values: list[Any]) -> Any:
-        assert self._process is not None
-        pipe_in, pipe_out = self._process.stdin, self._process.stdout
-        assert pipe_in is not None
-        assert pipe_out is not None
+    def _ask(self, process: subprocess.Popen[bytes], values: list[Any]) -> Any:
+        pipe_in, pipe_out = process.stdin, process.stdout
         try:
+            if pipe_in is None or pipe_out is None:
+                raise EOFError
             pipe_in.write(packed([self._seconds, values]))
             pipe_in.flush()
             kind, answer = unpacked(_Timed(pipe_out, time.monotonic() + PATIENCE * self._seconds))
         except (OSError, EOFError):
-            raise InputError(f"{self.key} = {self.file.name}: {self._why()}") from None
+            raise InputError(f"{self.key} = {self.file.name}: {self._why(process)}") from None
         if kind == "refused":
             raise InputError(str(answer))
         if kind == "memory":
@@ -109,11 +108,10 @@ class Isolated:
             raise InputError(f"{self.key} = {self.file.name}: damaged: the CAD kernel fails on it: {answer}")
         return answer
 
-    def _why(self) -> str:
+    def _why(self, process: subprocess.Popen[bytes]) -> str:
         """How the child ended, in words."""
-        assert self._process is not None
         try:
-            code = self._process.wait(0.5)
+            code = process.wait(0.5)
         except subprocess.TimeoutExpired:
             return self._slow()
         if code == -getattr(signal, "SIGXCPU", 0):

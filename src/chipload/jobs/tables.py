@@ -7,9 +7,13 @@ stated is asked for.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from chipload.errors import InputError
+
+Value = TypeVar("Value")
 
 
 def _only_number(value: Any) -> Any:
@@ -77,6 +81,24 @@ class Table(BaseModel):
     """A table of the file: unknown keys are refused, values do not change."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)
+
+
+def stated(value: Value | None, key: str) -> Value:
+    """The value of a key that another key makes necessary.
+
+    Raises
+    ------
+    InputError
+        It is not stated.
+
+    Examples
+    --------
+    >>> stated(0.2, "wall.edge_share")
+    0.2
+    """
+    if value is None:
+        raise InputError(f"{key}: missing: state it")
+    return value
 
 
 class SourceTable(Table):

@@ -116,8 +116,8 @@ class Compensation:
         a, b, r = self._flat(self._programmed), self._flat(end), self._radius
         if r == 0.0:
             return self._pass(CentreMove(motion, tuple(end), (0.0, 0.0), 0, payload))
-        length = abs(b - a)
-        if self._front is None:
+        length, front = abs(b - a), self._front
+        if front is None:
             if length == 0.0 and self._square:
                 return self._pass(CentreMove(motion, tuple(end), (0.0, 0.0), 0, payload))
             if length <= r and not self._square:
@@ -131,7 +131,7 @@ class Compensation:
             return []
         u = (b - a) / length
         normal = self._side * 1j * r * u
-        return self._corner(_Offset(motion, a + normal, u, b + normal), a, end, payload)
+        return self._corner(front, _Offset(motion, a + normal, u, b + normal), a, end, payload)
 
     def arc(self, end: Sequence[float], centre: tuple[float, float], turns: int, payload: object) -> list[CentreMove]:
         """Motions that are final once an arc to ``end`` (9) about ``centre`` (2), in the plane's axes, is known."""
@@ -144,7 +144,8 @@ class Compensation:
             raise self._gouge(f"an arc of radius {size:.6g} mm", "use a smaller tool")
         outward = (b - o) / abs(b - o)
         e = b + (-r if inside else r) * outward
-        if self._front is None:
+        front = self._front
+        if front is None:
             if abs(b - a) <= r:
                 raise self._short(abs(b - a))
             # its centre is on the normal at its end, as far from the start as from the offset of the end
@@ -156,7 +157,8 @@ class Compensation:
             return self._append(_Offset(ARC, a, 0j, e, o, turns, entry=True), end, payload)
         radial = (a - o) / abs(a - o)
         m = a + (-r if inside else r) * radial
-        return self._corner(_Offset(ARC, m, math.copysign(1.0, turns) * 1j * radial, e, o, turns), a, end, payload)
+        new = _Offset(ARC, m, math.copysign(1.0, turns) * 1j * radial, e, o, turns)
+        return self._corner(front, new, a, end, payload)
 
     def pause(self, payload: object) -> list[CentreMove]:
         """Motions that are final; a pause (DWELL) keeps its place among them."""
@@ -173,10 +175,11 @@ class Compensation:
         done, self._held = [self._out(move) for move in self._held], []
         return done
 
-    def _corner(self, new: _Offset, corner: complex, end: Sequence[float], payload: object) -> list[CentreMove]:
+    def _corner(
+        self, front: _Offset, new: _Offset, corner: complex, end: Sequence[float], payload: object
+    ) -> list[CentreMove]:
         """Join ``new`` to the front; what is final."""
-        front, c = self._front, self._flat(self._centre)
-        assert front is not None
+        c = self._flat(self._centre)
         if front.entry and self._square:
             self._trim(new.m)
             return self._append(new, end, payload)

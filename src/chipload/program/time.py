@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from chipload.machine.feed import corner_speed, limited_speed, move_time, row_time_limited
 from chipload.machine.machine import Machine
+from chipload.machine.trajectory import TrajectoryPlanner
 from chipload.program.commands import ARC, PLANE_AXES, Commands, spirals
 from chipload.program.motions import bases, directions, is_arc, lengths, radii, sweeps
 from chipload.program.path_mode import PathControl, resolved
@@ -103,7 +104,7 @@ def row_times(
     if machine.planner is None:
         least = np.concatenate([[0.0], row_time_limited(machine, axes)])[: len(commands)]
     else:
-        least = _axis_path_times(commands, machine)
+        least = _axis_path_times(commands, machine, machine.planner)
     least = np.where(commands.path_mode[:, 0] == PathControl.UNPLACED, 0.0, least)
     np.add.at(needed, np.searchsorted(lines, commands.line), least)
     total = np.maximum(whole, needed) if machine.planner is None else needed
@@ -111,9 +112,8 @@ def row_times(
     return np.asarray(own + (total - whole)[at] * share)
 
 
-def _axis_path_times(commands: Commands, machine: Machine) -> Floats:
+def _axis_path_times(commands: Commands, machine: Machine, planner: TrajectoryPlanner) -> Floats:
     """(m,) time of each row of commands as LinuxCNC's planner sees it: a path of X Y Z with angles beside."""
-    assert machine.planner is not None
     position = commands.machine()
     arc = (commands.motion == ARC) & ~spirals(commands, ARC_SKEW_MM)
     pair = np.array(PLANE_AXES)[commands.plane]
@@ -132,7 +132,7 @@ def _axis_path_times(commands: Commands, machine: Machine) -> Floats:
         tool=commands.tool, line=commands.line, label=commands.label, labels=commands.labels,
         path_mode=resolved(commands.path_mode, machine.corner_tolerance),
     )  # fmt: skip
-    return planned_times(flat, machine, machine.planner, position[:, 3:])
+    return planned_times(flat, machine, planner, position[:, 3:])
 
 
 def peak_speed(program: Program, machine: Machine) -> Floats:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.errors import InputError
 from chipload.simulation.loads import Cuts
 
 Floats = NDArray[np.float64]
@@ -23,10 +24,15 @@ def flute_fill(cuts: Cuts) -> Floats:
     Parameters
     ----------
     cuts : of a cutter whose ``gullet`` and ``chip_ratio`` are stated
+
+    Raises
+    ------
+    InputError
+        They are not stated.
     """
     cutter, bites = cuts.cutter, cuts.bites
-    assert cutter.gullet is not None
-    assert cutter.chip_ratio is not None
+    if cutter.gullet is None or cutter.chip_ratio is None:
+        raise InputError(f"flute_fill: gullet_mm2 and chip_ratio of cutter {cuts.tool}: missing: state both")
     p, q, a, b, along, offset, across = bites.rows.T
     rho, sine = bites.slices[bites.slice, 1], bites.slices[bites.slice, 3]
     chip = along * (np.cos(p) - np.cos(q)) + across * (np.sin(q) - np.sin(p)) + offset * (q - p)

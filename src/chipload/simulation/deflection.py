@@ -140,14 +140,13 @@ def contacts(removal: Removal) -> Contacts:
     parts = []
     for cuts in _kept(removal):
         bites = cuts.bites
-        assert bites.frame is not None
         owner = np.repeat(np.arange(len(bites)), np.diff(bites.start))
         p, q, a, b, along, offset, across = bites.rows.T
         s0, rho, z0, sk, ck = bites.slices[bites.slice, :5].T
         half = 0.5 * (a + b) - s0
         height, radius = z0 + sk * half, rho
         total, place, weight = np.zeros((len(bites), 3)), np.zeros((len(bites), 3)), np.zeros(len(bites))
-        frame = bites.frame[owner]
+        frame = bites.frames[owner]
         tip = 0.5 * (cuts.way[owner, :3] + cuts.way[owner, 3:6])
         for phi in (p, q):
             h = along * np.sin(phi) + across * np.cos(phi) + offset
@@ -204,21 +203,20 @@ def step_deflections(
         at = np.searchsorted(place.step, cuts.step)
         if not (len(place.step) and (place.step[np.minimum(at, len(place.step) - 1)] == cuts.step).all()):
             raise InputError("step_deflections: the contacts are not those of this removal")
-        assert cuts.bites.frame is not None
         pitch = math.tau if cuts.cutter.runout[0] > 0.0 else math.tau / cuts.cutter.flutes
         count = max(math.ceil(pitch / rotation), 8)
         theta = np.arange(count) * (pitch / count)
-        force = in_work(forces_over_turn(cuts.bites, cuts.cutter, material, theta)[0], cuts.bites.frame)
+        force = in_work(forces_over_turn(cuts.bites, cuts.cutter, material, theta)[0], cuts.bites.frames)
         n = place.normal[at]
         away = np.einsum("cmi,ci->cm", force, n)
         bent = np.einsum("cij,cmj,ci->cm", stiff[at], force, n)
         middle = 0.5 * (cuts.way[:, :3] + cuts.way[:, 3:6])
-        z = np.einsum("ci,ci->c", place.point[at] - middle, cuts.bites.frame[:, 2])
+        z = np.einsum("ci,ci->c", place.point[at] - middle, cuts.bites.frames[:, 2])
         m = len(theta)
         moments = _bent(
             cuts, np.repeat(np.arange(len(cuts)), m), np.tile(theta, len(cuts)), np.repeat(z, m), material, bars
         )
-        swing = np.einsum("cmi,cij->cmj", moments[:, 3:].reshape(-1, m, 2), cuts.bites.frame[:, :2])
+        swing = np.einsum("cmi,cij->cmj", moments[:, 3:].reshape(-1, m, 2), cuts.bites.frames[:, :2])
         pushed = np.einsum("cmi,ci->cm", swing, n)
         for name, values in zip(names, (bent, pushed, bent + pushed, away), strict=True):
             out[name][cuts.step] = values.max(axis=1).clip(0.0)
@@ -269,8 +267,7 @@ def tip_deflections(
         apart = (work * force)[:, :, None]
     else:
         # in the frame of the cutter, as the force is
-        frame = cuts.bites.frame
-        assert frame is not None
+        frame = cuts.bites.frames
         own = np.einsum("nia,nsab,njb->nsij", frame, work, frame)
         apart = np.einsum("nsij,nmj->nmsi", own, force)
     out["deflection_workpiece_um"] = 1e3 * np.linalg.norm(apart, axis=3).max(axis=(1, 2))
@@ -371,7 +368,6 @@ def _made_by(
 ) -> float:
     """Let the steps of one cutter make points where they leave less than ``best``; the greatest deflection seen."""
     cuts = model.cuts
-    assert cuts.bites.frame is not None
     shape = _shape(cuts.cutter)
     room = 16 * len(q) + 64
     while True:
@@ -385,7 +381,7 @@ def _made_by(
         return 0.0
     point, k = owner.T
     d, s, z, sine = moment[:, :4].T
-    frame = cuts.bites.frame[k]
+    frame = cuts.bites.frames[k]
     along, left = (np.einsum("mi,mi->m", moment[:, 11:], frame[:, i]) for i in (0, 1))
     phi = np.arctan2(along, left) % math.tau
     lag = math.tan(cuts.cutter.helix) / cuts.cutter.radius

@@ -103,7 +103,7 @@ def joined(cuts: list[Cuts]) -> Cuts:
 def _joined(bites: list[ToothEngagement]) -> ToothEngagement:
     start = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(b.start) for b in bites]))])
     rows, tooth = (np.concatenate([getattr(b, name) for b in bites]) for name in ("rows", "tooth"))
-    frame = np.concatenate([b.frame for b in bites if b.frame is not None])
+    frame = np.concatenate([b.frames for b in bites])
     if all(b.slices is bites[0].slices or np.array_equal(b.slices, bites[0].slices) for b in bites):
         return ToothEngagement(start, rows, tooth, np.concatenate([b.slice for b in bites]), bites[0].slices, frame)
     # each has slices of its own
@@ -238,15 +238,14 @@ def loads_of_steps(
     seconds: Floats,
 ) -> Floats:
     """(c, len(LOADS)) loads of steps that take ``seconds`` (c,), from :func:`over_turn` of them."""
-    assert bites.frame is not None
     force, torque, _ = turn
     mean, torque_mean = mean_forces(bites, cutter, material)
-    turned = in_work(force, bites.frame)
+    turned = in_work(force, bites.frames)
     left = _left(bites, cuts)
     volume, work = engaged_work(bites, cutter, material, np.abs(spindle) * seconds)
     return np.column_stack(
         [
-            in_work(mean, bites.frame),
+            in_work(mean, bites.frames),
             turned.max(axis=1),
             turned.min(axis=1),
             np.linalg.norm(force, axis=2).max(axis=1),

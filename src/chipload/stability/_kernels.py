@@ -328,6 +328,31 @@ def chatter_hz(angle, tau, w):
     return best
 
 
+@njit(cache=True, nogil=True)
+def cut_motion(k, start, rows, exponents, tau, pitch, w, z, U, per_wave):
+    """Of cut k: cells m of a tooth period, their time h [s], ``matrices`` A (m, 3, 4); ``free_motion`` in a cell."""
+    m = cells_of(tau[k], w, per_wave)
+    h = tau[k] / m
+    A = np.zeros((m, 3, 4))
+    matrices(rows, start[k], start[k + 1], pitch[k], m, exponents, A)
+    free = np.empty((4, len(w)))
+    push = np.empty((3, 2, len(w)))
+    end = np.empty((3, 4, 2))
+    free_motion(w, z, U[k], h, free, push, end)
+    return m, h, A, free, push, end
+
+
+@njit(cache=True, nogil=True)
+def workspace(m, modes, most):
+    """Arrays that ``cell_systems`` (3) and ``arnoldi`` (8) write."""
+    n = 4 * m + 2 * modes
+    room = min(most, n - 1) + 1
+    return (
+        np.empty((m, 4, 8)), np.empty((m, 6, 8)), np.empty(m, np.bool_), np.empty((room, n)), np.empty((room, room)),
+        np.empty((room, room)), np.empty(n), np.empty(n), np.empty(modes), np.empty(modes), np.empty(n),
+    )  # fmt: skip
+
+
 @njit(
     "void(int64, int64, int64[::1], float64[:,::1], float64[::1], float64[::1], float64[::1], float64[::1],"
     " float64[::1], float64[:,:,::1], float64[::1], float64, int64, float64, float64[:,::1])",
@@ -340,24 +365,12 @@ def multipliers(first, last, start, rows, exponents, tau, pitch, w, z, U, gain, 
     """
     modes = len(w)
     for k in range(first, last):
-        m = cells_of(tau[k], w, per_wave)
-        h = tau[k] / m
-        n = 4 * m + 2 * modes
-        A = np.zeros((m, 3, 4))
-        matrices(rows, start[k], start[k + 1], pitch[k], m, exponents, A)
-        free = np.empty((4, modes))
-        push = np.empty((3, 2, modes))
-        end = np.empty((3, 4, 2))
-        free_motion(w, z, U[k], h, free, push, end)
-        ends = np.empty((m, 4, 8))
-        forces = np.empty((m, 6, 8))
-        cuts = np.empty(m, np.bool_)
+        m, h, A, free, push, end = cut_motion(k, start, rows, exponents, tau, pitch, w, z, U, per_wave)
+        ends, forces, cuts, V, H, work, x, y, q, v, scale = workspace(m, modes, most)
         cell_systems(A, gain[k], end, ends, forces, cuts)
-        room = min(most, n - 1) + 1
         best, angle, used = arnoldi(
-            ends, forces, cuts, free, push, U[k], w, h, m, most, tol, np.empty((room, n)), np.empty((room, room)),
-            np.empty((room, room)), np.empty(n), np.empty(n), np.empty(modes), np.empty(modes), np.empty(n),
-        )  # fmt: skip
+            ends, forces, cuts, free, push, U[k], w, h, m, most, tol, V, H, work, x, y, q, v, scale
+        )
         out[k, 0] = best
         out[k, 1] = angle
         out[k, 2] = used
@@ -377,32 +390,10 @@ def margins(first, last, start, rows, exponents, tau, pitch, w, z, U, per_wave, 
     """
     modes = len(w)
     for k in range(first, last):
-        m = cells_of(tau[k], w, per_wave)
-        h = tau[k] / m
-        n = 4 * m + 2 * modes
-        A = np.zeros((m, 3, 4))
-        matrices(rows, start[k], start[k + 1], pitch[k], m, exponents, A)
-        free = np.empty((4, modes))
-        push = np.empty((3, 2, modes))
-        end = np.empty((3, 4, 2))
-        free_motion(w, z, U[k], h, free, push, end)
-        ends = np.empty((m, 4, 8))
-        forces = np.empty((m, 6, 8))
-        cuts = np.empty(m, np.bool_)
-        room = min(most, n - 1) + 1
-        V = np.empty((room, n))
-        H = np.empty((room, room))
-        work = np.empty((room, room))
-        x = np.empty(n)
-        y = np.empty(n)
-        q = np.empty(modes)
-        v = np.empty(modes)
-        scale = np.empty(n)
+        m, h, A, free, push, end = cut_motion(k, start, rows, exponents, tau, pitch, w, z, U, per_wave)
+        ends, forces, cuts, V, H, work, x, y, q, v, scale = workspace(m, modes, most)
         count = 0
-        lo = 0.0
-        l_lo = -1.0
-        hi = 0.0
-        l_hi = 0.0
+        lo, l_lo, hi, l_hi = 0.0, -1.0, 0.0, 0.0
         at_one = 0.0
         gain = 1.0
         look = 0

@@ -53,7 +53,6 @@ def grouped(engagement: ToothEngagement, speed: Floats, powers: bool) -> CutGrou
     speed : (c,) float [rad/s]
     powers : whether the chip thickness counts (coefficients with exponents)
     """
-    assert engagement.frame is not None
     step = np.repeat(np.arange(len(engagement)), np.diff(engagement.start))
     rows, own = engagement.rows, engagement.slices[engagement.slice]
     low = np.floor(rows[:, 0] / IMMERSION + SLACK)
@@ -85,9 +84,9 @@ def grouped(engagement: ToothEngagement, speed: Floats, powers: bool) -> CutGrou
     start = np.concatenate([[0], np.cumsum(np.bincount(step[at], minlength=len(engagement)))])
     slices = engagement.slice[at]
     out = ToothEngagement(start, kept, np.full(len(kept), -1), slices, engagement.slices)
-    T = engagement.frame[:, 0, :2]
+    T = engagement.frames[:, 0, :2]
     angle = np.round(np.arctan2(T[:, 1], T[:, 0]) / DIRECTION) % round(math.tau / DIRECTION)
-    side = np.sign(np.cross(np.pad(T, ((0, 0), (0, 1))), engagement.frame[:, 1])[:, 2])
+    side = np.sign(np.cross(np.pad(T, ((0, 0), (0, 1))), engagement.frames[:, 1])[:, 2])
     heading = np.column_stack([np.cos(angle * DIRECTION), np.sin(angle * DIRECTION)])
     normal = side[:, None] * np.column_stack([-heading[:, 1], heading[:, 0]])
     told = np.column_stack([merged, own[at][:, [1, 3, 4, 6]].round(6), foot[at].round(6), thickness[at]])

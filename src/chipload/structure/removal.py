@@ -230,7 +230,6 @@ def cut(
     stray = e[~np.isin(e, state.region)]
     if len(stray):
         raise InputError(f"cut: element {stray[0]} is not in the region of this removal")
-    assert state.solid.kept is not None
     now = state.solid.kept.copy()
     new = np.broadcast_to(np.asarray(kept, dtype=np.float64), (len(e), 2))
     empty = new[:, 0] >= new[:, 1]
@@ -281,8 +280,6 @@ def cut(
 
 def _cut_elements(base: Factored, solid: SolidWorkpiece) -> tuple[Indices, NDArray[np.bool_], csc_array, csc_array]:
     """Cut elements: their free degrees of freedom, which other elements share, stiffness before and after."""
-    assert base.solid.kept is not None
-    assert solid.kept is not None
     differs = (base.solid.kept != solid.kept).any(axis=1)
     e = np.flatnonzero(differs)
     elements = solid.grid.elements[e]

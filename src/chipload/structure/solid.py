@@ -45,7 +45,7 @@ class SolidWorkpiece:
     density : [tonne/mm^3], 1e-10 .. 3e-8
     fixed : (n, 3) bool, directions in which nodes are held; (n,) bool: in all three; or a list of node numbers
     kept : (m, 2) float, the part lo .. hi of each element's thickness (along k, 0 .. 1) that is there; (0, 0): the
-        element is gone. None: all of it
+        element is gone. (2,) float: the same of every element
     rule : points of integration of the stiffness, 8, 14 or 27
 
     Raises
@@ -59,7 +59,7 @@ class SolidWorkpiece:
     poisson: float
     density: float
     fixed: NDArray[np.bool_] | Indices
-    kept: Array | None = None
+    kept: Array = field(default_factory=lambda: np.array([0.0, 1.0]))
     rule: int = 27
     held: NDArray[np.bool_] = field(init=False)
 
@@ -91,7 +91,8 @@ class SolidWorkpiece:
             held[fixed.astype(np.int64)] = True
         else:
             raise InputError(f"workpiece.fixed of shape {fixed.shape}: must be node numbers, ({n},) or ({n}, 3) bool")
-        kept = np.tile([0.0, 1.0], (m, 1)) if self.kept is None else np.array(self.kept, dtype=np.float64)
+        kept = np.array(self.kept, dtype=np.float64)
+        kept = np.tile(kept, (m, 1)) if kept.shape == (2,) else kept
         if kept.shape != (m, 2):
             raise InputError(f"workpiece.kept of shape {kept.shape}: must be ({m}, 2)")
         bad = ~((kept[:, 0] >= 0.0) & (kept[:, 0] <= kept[:, 1]) & (kept[:, 1] <= 1.0))
@@ -106,7 +107,6 @@ class SolidWorkpiece:
     @property
     def there(self) -> Indices:
         """Numbers of the elements that are not gone."""
-        assert self.kept is not None
         return np.flatnonzero(self.kept[:, 1] > self.kept[:, 0])
 
 
@@ -123,7 +123,6 @@ def _sum(blocks: Array, dofs: Indices, size: int) -> csc_array:
 
 def assemble(solid: SolidWorkpiece) -> csc_array:
     """Stiffness (3 n, 3 n) [N/mm] of the workpiece as if nothing held it."""
-    assert solid.kept is not None
     e = solid.there
     elements = solid.grid.elements[e]
     K = stiffness(solid.grid.nodes[elements], solid.modulus, solid.poisson, solid.rule, solid.kept[e], e)
@@ -132,7 +131,6 @@ def assemble(solid: SolidWorkpiece) -> csc_array:
 
 def assemble_mass(solid: SolidWorkpiece) -> csc_array:
     """Consistent mass (3 n, 3 n) [tonne]."""
-    assert solid.kept is not None
     e = solid.there
     elements = solid.grid.elements[e]
     M = mass(solid.grid.nodes[elements], solid.density, 27, solid.kept[e])

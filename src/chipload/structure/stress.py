@@ -19,7 +19,6 @@ from chipload.structure.solid import SolidWorkpiece
 
 def stresses(solid: SolidWorkpiece, u: ArrayLike, elements: Indices) -> Array:
     """Stress (m, 27, 3, 3) [MPa] at the points of integration of elements (m,), by displacements u (n, 3) [mm]."""
-    assert solid.kept is not None
     nodes = solid.grid.elements[elements]
     g, _ = gradients(solid.grid.nodes[nodes], 27, solid.kept[elements], elements)
     grad = np.einsum("mnc,mpnd->mpcd", np.asarray(u, dtype=np.float64)[nodes], g)

@@ -82,8 +82,8 @@ class ResultView:
                 return
             self.pause()
             self.track = self.result.tracks[k]
-            await self.scene.follow(self.track)
-            await self._tracked()
+            await self.scene.follow(self.result, self.track)
+            await self._tracked(self.result, self.track)
 
     def pick(self, row: int) -> None:
         """A panel asks for a row; below 0: to be told again where it is."""
@@ -96,7 +96,7 @@ class ResultView:
         self.row = int(np.clip(row, 0, len(self.track) - 1))
         self.clock = float(self.track.t[self.row])
         self.slider.set_value(float(abscissa(self.track, self.plots.against.value)[self.row]))
-        self._shown()
+        self._shown(self.track)
 
     def move(self, rows: int) -> None:
         """Some rows on, or back."""
@@ -130,7 +130,8 @@ class ResultView:
     # -- parts --------------------------------------------------------------------------------------------------
     async def _open(self, result: PageResult) -> None:
         self.pause()
-        self.result, self.track = result, result.tracks[0]
+        track = result.tracks[0]
+        self.result, self.track = result, track
         verdict, message = result.result.verdict, result.result.message
         for state in VERDICTS.values():
             self.verdict.classes(remove=f"cl-{state}")
@@ -138,16 +139,14 @@ class ResultView:
         self.word.set_text(verdict.value)
         self.message.set_text(message)
         self.tip.set_text(message)
-        await self.scene.open(result, self.track)
-        await self._tracked()
+        await self.scene.open(result, track)
+        await self._tracked(result, track)
 
-    async def _tracked(self) -> None:
-        assert self.result is not None
-        assert self.track is not None
-        self.limits.open(self.result, self.track)
-        self.plots.open(self.result, self.track)
+    async def _tracked(self, result: PageResult, track: PageTrack) -> None:
+        self.limits.open(result, track)
+        self.plots.open(result, track)
         self._turned()
-        await self.source.open(self.result, self.track)
+        await self.source.open(result, track)
         self.go(0)
 
     def _turned(self) -> None:
@@ -165,7 +164,7 @@ class ResultView:
             return
         self.row = nearest(abscissa(self.track, self.plots.against.value), float(event.args))
         self.clock = float(self.track.t[self.row])
-        self._shown()
+        self._shown(self.track)
 
     def _tick(self) -> None:
         if self.track is None or not self.playing:
@@ -182,9 +181,8 @@ class ResultView:
             self.go(row)
             self.clock = clock
 
-    def _shown(self) -> None:
-        track, k = self.track, self.row
-        assert track is not None
+    def _shown(self, track: PageTrack) -> None:
+        k = self.row
         self.scene.at(k)
         self.plots.at(k)
         self.source.at(k)

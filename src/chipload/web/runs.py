@@ -52,10 +52,12 @@ class Run:
             self.state, self.code, self.message = "failed", 1, f"no process could be started: {err.strerror}"
             return
         self._process = process
-        assert process.stdout is not None
-        assert process.stderr is not None
-        faults = asyncio.create_task(_tail(process.stderr))
-        async for line in process.stdout:
+        told, warned = process.stdout, process.stderr
+        if told is None or warned is None:
+            self.state, self.code, self.message = "failed", 1, "the process has no pipes"
+            return
+        faults = asyncio.create_task(_tail(warned))
+        async for line in told:
             self._take(line)
         code = await process.wait()
         fault = await faults

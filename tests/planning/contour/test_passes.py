@@ -10,37 +10,16 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import material_named
 from chipload.geometry.contour import Contour, Region
 from chipload.machine.machine import machine_named
-from chipload.planning.contour.plan import Finishing, plan_contour
+from chipload.planning.contour.plan import plan_contour
 from chipload.simulation.verify import verify_contour
+from finishing import CORNER, FINISHING, POCKET, QUARTER
 
-QUARTER = math.tan(math.pi / 8)
-CORNER = Contour.from_bulges([(0, 0), (20, 0), (28, 8), (28, 28)], [0, QUARTER, 0, 0])
 #: turns left, then right
 BEND = Contour.from_bulges([(0, 0), (20, 0), (28, 8), (28, 16), (37, 25), (60, 25)], [0, QUARTER, 0, -QUARTER, 0, 0])
-POCKET = Contour.from_bulges(
-    [(8, 0), (40, 0), (48, 8), (48, 30), (40, 38), (8, 38), (0, 30), (0, 8)], [0, QUARTER] * 4, closed=True
-)
 MILL = Cutter(10.0, 4, math.radians(30), 22.0, 35.0, 580e3)
 #: 1 - cos a = s / R on a straight wall
 WANTED_DEG = math.degrees(math.acos(1.0 - 0.1 / 5.0))
-BASE = Finishing(
-    side="inside",
-    milling="down",
-    strategies=("plain", "backward"),
-    use="backward",
-    joint="sharp",
-    radial_depth=0.1,
-    axial_depth=5.0,
-    semifinish_depth=0.5,
-    passes=1,
-    feed=10.0,
-    spindle_speed=314.0,
-    tolerance=0.05,
-    step=0.4,
-    lead=3.0,
-    top=0.0,
-    clearance=5.0,
-)
+BASE = replace(FINISHING, step=0.4)
 #: contour, side, and the depth that roughing must leave for four passes by the backward method
 PLACES = {
     "corner, inside": (CORNER, "inside", 0.8),

@@ -12,39 +12,18 @@ from chipload.geometry.contour import Contour, Region
 from chipload.jobs.contour.outcome import Operation
 from chipload.jobs.contour.result import limits_of
 from chipload.machine.machine import machine_named
-from chipload.planning.contour.plan import Finishing, plan_contour
+from chipload.planning.contour.plan import plan_contour
 from chipload.planning.result import OperationResult
 from chipload.program.gcode.writer import write_gcode
 from chipload.result import Verdict
 from chipload.simulation.verify import verify_contour
+from finishing import CORNER, FINISHING, POCKET
 from rs274 import MISSING, assert_same_motions, rs274_installed, run_rs274
 
-QUARTER = math.tan(math.pi / 8)
-CORNER = Contour.from_bulges([(0, 0), (20, 0), (28, 8), (28, 28)], [0, QUARTER, 0, 0])
-POCKET = Contour.from_bulges(
-    [(8, 0), (40, 0), (48, 8), (48, 30), (40, 38), (8, 38), (0, 30), (0, 8)], [0, QUARTER] * 4, closed=True
-)
 ISLAND = Contour.circle((24, 19), 4.0)
 MACHINE = machine_named("vmc")
 MILL = Cutter(10.0, 4, math.radians(30), 22.0, 35.0, 580e3)
-BASE = Finishing(
-    side="inside",
-    milling="down",
-    strategies=("plain", "backward", "feed"),
-    use="backward",
-    joint="sharp",
-    radial_depth=0.1,
-    axial_depth=5.0,
-    semifinish_depth=0.5,
-    passes=1,
-    feed=10.0,
-    spindle_speed=314.0,
-    tolerance=0.05,
-    step=0.1,
-    lead=3.0,
-    top=0.0,
-    clearance=5.0,
-)
+BASE = replace(FINISHING, strategies=("plain", "backward", "feed"))
 
 
 def plan(contours, cutter=MILL, limits=None, **changes):

@@ -109,8 +109,8 @@ class HalPins:
 
     def _line(self, text: str) -> str | None:
         stdin, stdout = self._process.stdin, self._process.stdout
-        assert stdin is not None
-        assert stdout is not None
+        if stdin is None or stdout is None:
+            return None
         try:
             stdin.write(text + "\n")
             stdin.flush()

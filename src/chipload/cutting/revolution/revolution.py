@@ -45,7 +45,6 @@ def loads_over_turn(
     bites : of n steps, with frames
     left : (n, 3) float
     """
-    assert bites.frame is not None
     away = np.ascontiguousarray(left, dtype=np.float64)
     count = rotations(cutter, rotation)
     alike = cutter.runout[0] == 0.0
@@ -58,25 +57,24 @@ def loads_over_turn(
         theta = np.arange(count * teeth) * (math.tau / (count * teeth))
         table = np.vstack([np.cos(theta), np.sin(theta)])
         _kernels.over_turn(
-            bites.start, bites.rows, bites.tooth, bites.slice, bites.slices, table, bites.frame, cutter.flutes, count,
+            bites.start, bites.rows, bites.tooth, bites.slice, bites.slices, table, bites.frames, cutter.flutes, count,
             alike, np.array(material.law), away, out,
         )  # fmt: skip
         mean = basis @ np.array(material.coefficients)
-        out[:, :3] = in_work(mean[:, :3], bites.frame)
+        out[:, :3] = in_work(mean[:, :3], bites.frames)
         out[:, 10] = mean[:, 3]
     return out[:, :COLUMNS], out[:, COLUMNS:] * (math.tau / teeth / count), basis
 
 
 def _one_by_one(bites: ToothEngagement, cutter: Cutter, material: Material, count: int, left: Floats) -> Floats:
     """(n, 17) the same by the loads at each rotation, for any law; the last two are numbers of rotations."""
-    assert bites.frame is not None
     pitch = math.tau if cutter.runout[0] > 0.0 else math.tau / cutter.flutes
     force, torque = forces_over_turn(bites, cutter, material, np.arange(count) * (pitch / count))
     mean, torque_mean = mean_forces(bites, cutter, material)
-    turned, size = in_work(force, bites.frame), np.linalg.norm(force, axis=2)
+    turned, size = in_work(force, bites.frames), np.linalg.norm(force, axis=2)
     return np.column_stack(
         [
-            in_work(mean, bites.frame),
+            in_work(mean, bites.frames),
             turned.max(axis=1),
             turned.min(axis=1),
             size.max(axis=1),

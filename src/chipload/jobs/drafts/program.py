@@ -144,7 +144,7 @@ def _read(path: Path, known: Known) -> _Chosen:
         dialects = (None, "fanuc", "sinumerik")
     elif ending not in ENDINGS:
         dialects = ("linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt")
-    refused: InputError | None = None
+    refused: list[InputError] = []
     for name in MACHINES if known.machine is None else (known.machine,):
         machine = read_machine(name) if name.lower().endswith(".toml") else machine_named(name)
         best: tuple[int, _Chosen] | None = None
@@ -156,7 +156,7 @@ def _read(path: Path, known: Known) -> _Chosen:
                         path, machine, dialect=dialect, tools=tools, feed=own, text=known.text, setup=Setup()
                     )
                 except InputError as err:
-                    refused = refused or err
+                    refused.append(err)
                     if "feed" not in str(err):
                         break
                     continue
@@ -168,8 +168,7 @@ def _read(path: Path, known: Known) -> _Chosen:
                 break
         if best is not None:
             return best[1]
-    assert refused is not None
-    raise refused
+    raise refused[0]
 
 
 def _cutting(program: Program) -> np.ndarray:

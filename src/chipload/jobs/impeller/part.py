@@ -23,6 +23,7 @@ from chipload.geometry.step_patch import four_sided, patch_of
 from chipload.geometry.step_side import side_of
 from chipload.jobs.impeller.job import ImpellerJob
 from chipload.jobs.impeller.tables import SectionsTable, ShapeTable, StepTable
+from chipload.jobs.tables import stated
 from chipload.planning.impeller.fillets import with_fillets
 from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
@@ -73,8 +74,7 @@ def _without_fillets(job: ImpellerJob) -> Part:
         return _of_step(job.files, part.step, part.blades, part.outer_diameter_mm)
     if part.sections is not None:
         return Part(_of_sections(job.path.parent, part.sections, part.blades, part.outer_diameter_mm))
-    assert part.shape is not None
-    return Part(_of_shape(part.shape, part.blades, part.outer_diameter_mm))
+    return Part(_of_shape(stated(part.shape, "impeller.shape"), part.blades, part.outer_diameter_mm))
 
 
 def _of_shape(given: ShapeTable, blades: int, outer_diameter: float) -> Impeller:
@@ -111,8 +111,8 @@ def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diamet
     def revolved(key: str, side: int) -> Revolved:
         names = getattr(given, key)
         if isinstance(names, str):
-            assert given.unit is not None
-            return Revolved(read_meridian(files[key], given.unit, given.flow.startswith("+")), side)
+            unit = stated(given.unit, "impeller.step.unit")
+            return Revolved(read_meridian(files[key], unit, given.flow.startswith("+")), side)
         at = f"impeller.step.{key}"
         faces = [model.face(name, at) for name in names]
         numbers = [f.number for f in faces]

@@ -122,8 +122,7 @@ def patch_grid(milled: ImpellerResult, way: Partition, op: Searched) -> Ints:
 
 def shade_of(way: Partition, patch: Patch) -> tuple[int, int, int]:
     """A colour by cutter, its shade by table angle."""
-    d = way.divided
-    assert d is not None
+    d = way.division
     base = COLOURS[d.cutters.index(patch.cutter) % len(COLOURS)]
     rgb = np.array([int(base[k : k + 2], 16) for k in (1, 3, 5)], dtype=np.float64)
     angles = sorted({p.table for p in d.patches if p.cutter == patch.cutter})
@@ -136,8 +135,7 @@ def patch_figure(milled: ImpellerResult, way: Partition, op: Searched) -> go.Fig
     """Patches of a surface, unrolled; a colour a cutter, its shade a table angle."""
     grid = patch_grid(milled, way, op)
     numbers = [int(n) for n in np.unique(grid) if n >= 0]
-    d = way.divided
-    assert d is not None
+    d = way.division
     order = {n: k for k, n in enumerate(numbers)}
     z = np.vectorize(lambda n: order.get(n, np.nan), otypes=[float])(grid)
     colours = [f"rgb{shade_of(way, d.patches[n])}" for n in numbers] or ["#ffffff"]

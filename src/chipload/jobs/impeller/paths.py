@@ -54,7 +54,6 @@ def checked_programs(
 
     ``tools`` : how many tool numbers are taken; ``covering`` : of the walls between check points.
     """
-    assert way.divided is not None
     feed = mm_s_from_mm_min(op.feed_mm_min)
     motion = LineMotion(paths.chord_mm, feed, pallet_rate(machine), op.clearance_mm)
     link = Link(
@@ -69,7 +68,7 @@ def checked_programs(
         impeller, way.catalogue, scene, PatchFinish(op.scallop_mm, motion, paths.overrun_mm), link,
         rad_s_from_rpm(op.speed_rpm), table, ahead, workers, tools,
     )  # fmt: skip
-    plan = planned(job, way.divided.patches, progress=lambda done, what: progress(0.8 * done, what))
+    plan = planned(job, way.division.patches, progress=lambda done, what: progress(0.8 * done, what))
     return _checked(job, machine, plan, paths, lambda done, what: progress(0.8 + 0.2 * done, what))
 
 

@@ -91,7 +91,6 @@ def contact_lines(cuts: Cuts) -> Floats:
     lowest to the highest of them; where a step leaves no surface, through the middle of its engagement.
     """
     bites = cuts.bites
-    assert bites.frame is not None
     owner = np.repeat(np.arange(len(bites)), np.diff(bites.start))
     p, q, a, b, along, offset, across = bites.rows.T
     s0, rho, z0, sk = bites.slices[bites.slice, :4].T
@@ -121,4 +120,4 @@ def contact_lines(cuts: Cuts) -> Floats:
     ends = np.repeat(mean[:, None], 2, axis=1)
     ends[known, 0, 2], ends[known, 1, 2] = low[known], high[known]
     tip = 0.5 * (cuts.way[:, :3] + cuts.way[:, 3:6])
-    return np.asarray(tip[:, None] + np.einsum("nei,nij->nej", ends, bites.frame))
+    return np.asarray(tip[:, None] + np.einsum("nei,nij->nej", ends, bites.frames))

@@ -18,7 +18,7 @@ from chipload.cutting.strength import allowed_stress
 from chipload.jobs.checks import upper_loads
 from chipload.jobs.program import part_numbers
 from chipload.jobs.program.outcome import FeedResult, ProgramResult, SimulationResult, SpeedResult
-from chipload.jobs.program.stability import stability_numbers
+from chipload.jobs.program.stability import StabilityResult, stability_numbers
 from chipload.program.motions import lengths
 from chipload.program.program import DWELL, RAPID
 from chipload.result import LimitCheck
@@ -232,11 +232,12 @@ def feed_numbers(
     }
 
 
-def speed_numbers(speeds: SpeedResult, simulation: SimulationResult, time_s: float, program: str) -> dict[str, Any]:
+def speed_numbers(
+    speeds: SpeedResult, stability: StabilityResult, simulation: SimulationResult, time_s: float, program: str
+) -> dict[str, Any]:
     """``speeds`` of the operation in summary.json; ``program`` is the file with them."""
-    assert simulation.stability is not None
     before = stability_numbers(speeds.stability, speeds.before.columns)
-    after = stability_numbers(simulation.stability, simulation.removal.columns)
+    after = stability_numbers(stability, simulation.removal.columns)
     keys = ("margin_min", "line", "chatter_hz", "mode", "speed_rpm")
     return {
         "program": program,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 
 import numpy as np
 import trimesh
@@ -15,6 +16,7 @@ from chipload.jobs.program.job import ProgramJob
 from chipload.jobs.program.stiffness import Stiffness, stiffness_of
 from chipload.jobs.program.tables import SimulateTable
 from chipload.jobs.program.workpiece import fixture_points, part_body, stock_points
+from chipload.jobs.tables import stated
 from chipload.machine.machine import Machine
 from chipload.program.program import RAPID, Program
 from chipload.program.read import ProgramReading, times_of
@@ -87,8 +89,9 @@ def bodies_of(
 
 def material_of(job: ProgramJob) -> Material:
     """The coefficients that the job names."""
-    assert job.material is not None
-    return material_named(job.material) if isinstance(job.material, str) else read_material(job.material)
+    if isinstance(job.material, Path):
+        return read_material(job.material)
+    return material_named(stated(job.material, "material"))
 
 
 def resolution_of(job: ProgramJob, program: Program) -> Resolution:

@@ -34,9 +34,9 @@ def result_of(program: ProgramResult) -> Result:
         if program.feeds is not None:
             time_s, name = float(program.seconds.sum()), feeds_name(program)
             operation["feeds"] = feed_numbers(program.feeds, simulation, tracks[0].limits, time_s, name)
-        if program.speeds is not None:
+        if program.speeds is not None and simulation.stability is not None:
             operation["speeds"] = speed_numbers(
-                program.speeds, simulation, float(program.seconds.sum()), speeds_name(program)
+                program.speeds, simulation.stability, simulation, float(program.seconds.sum()), speeds_name(program)
             )
         operations.append(operation)
     else:
@@ -109,7 +109,7 @@ def _tracks(program: ProgramResult) -> tuple[Track, ...]:
     found = (*broken, *_found(simulation))
     columns = simulation.removal.columns
     if program.speeds is not None:
-        return _tracks_of_speeds(program, program.speeds, found)
+        return _tracks_of_speeds(program, simulation, program.speeds, found)
     if program.feeds is None:
         limits = program_limits(simulation, columns, PROGRAM)
         found = (*_misplaced(simulation, limits), *found)
@@ -128,10 +128,10 @@ def _tracks(program: ProgramResult) -> tuple[Track, ...]:
     return (after, before)
 
 
-def _tracks_of_speeds(program: ProgramResult, speeds: SpeedResult, found: tuple[Finding, ...]) -> tuple[Track, ...]:
+def _tracks_of_speeds(
+    program: ProgramResult, simulation: SimulationResult, speeds: SpeedResult, found: tuple[Finding, ...]
+) -> tuple[Track, ...]:
     """The program with new speeds, then as it was."""
-    simulation = program.simulated
-    assert simulation is not None
     after = Track(
         OPTIMISED, TrackKind.PROGRAM, True, float(program.seconds.sum()),
         program_limits(simulation, simulation.removal.columns, OPTIMISED), found, (speeds_name(program), APT),

@@ -24,6 +24,7 @@ from chipload.jobs.program.tables import LOADS, SimulateTable
 from chipload.jobs.program.workpiece import insides, stock_body
 from chipload.jobs.program.workpiece_compliance import WorkpieceCompliance, with_compliance_error, workpiece_compliance
 from chipload.jobs.provenance import provenance_of, sources, title_of, versions
+from chipload.jobs.tables import stated
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.program import RAPID
 from chipload.program.read import ProgramReading, line_times, read_program, read_tools
@@ -208,7 +209,6 @@ def _new_feeds(
 ) -> tuple[FeedResult, ProgramReading]:
     """The text with new feeds, from what the program cuts of a stock, which changes; and what it does then."""
     op: SimulateTable = job.table.operation[0]
-    assert op.feeds is not None
     fine = resolution_of(job, reading.program)
     turning = np.unique(reading.program.spindle[reading.program.motion != RAPID])
     limits = {name: limit for name, limit in job.limits.items() if name in LOADS}
@@ -230,7 +230,7 @@ def _new_feeds(
     before = replace(
         before, resolution_error=with_compliance_error(before.resolution_error, before.columns, compliance)
     )
-    asked = Asked(op.feeds, limits, fine.rotation, checks, errors, more)
+    asked = Asked(stated(op.feeds, "operation.0.feeds"), limits, fine.rotation, checks, errors, more)
     steps = steps_of(program, op.step_mm, op.tolerance_mm)
     # again, for the greatest feed of each step
     allowed = remove(
@@ -269,9 +269,8 @@ def _simulated(
         return lambda done: progress(share + SHARE * done / bodies.steps, what)
 
     left, solids = None, dict(bodies.fixtures)
-    if part is not None:
-        table = job.table.part
-        assert table is not None
+    table = job.table.part
+    if part is not None and table is not None:
         left = difference(
             steps, job.cutters, part, before, table.spacing_mm, table.excess_range_mm, op.tolerance_mm,
             passing(0.0, "distances to the part"),

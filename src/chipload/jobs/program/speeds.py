@@ -29,6 +29,7 @@ from chipload.jobs.program.stability import (
 )
 from chipload.jobs.program.stiffness import deflecting, stiffness_of, watched, with_columns
 from chipload.jobs.program.tables import SimulateTable
+from chipload.jobs.tables import stated
 from chipload.machine.machine import Machine
 from chipload.program.gcode.feed_words import DIGITS
 from chipload.program.gcode.speed_words import speed_words, with_speeds
@@ -96,8 +97,7 @@ def new_speeds(
         The speeds cannot be changed in the text: the line is named.
     """
     op: SimulateTable = job.table.operation[0]
-    stability = watch_of(job, material)
-    assert stability is not None
+    stability = stated(watch_of(job, material), "dynamics")
     gives = stiffness_of(job.table.stiffness, job.cutters)
     bends = with_checks(job.table.checks, material, deflecting(gives, material))
     program, times = timed(reading, job, machine)

@@ -75,8 +75,7 @@ class StabilityWatch:
     def __call__(self, cuts: Cuts) -> dict[str, Floats]:
         """The columns of some steps of one cutter."""
         out = np.zeros((len(cuts), len(self.columns)))
-        frame, modes = cuts.plain.frame, self.dynamics.modes.get(cuts.tool)
-        assert frame is not None
+        frame, modes = cuts.plain.frames, self.dynamics.modes.get(cuts.tool)
         upright = bool((frame[:, 2, 2] >= UPRIGHT).all())
         if not upright:
             self.leaning.add(cuts.tool)

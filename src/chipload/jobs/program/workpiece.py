@@ -14,6 +14,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.geometry.mesh import read_mesh
 from chipload.jobs.program.job import ProgramJob
+from chipload.jobs.tables import stated
 from chipload.program.motions import lengths
 from chipload.program.program import RAPID, Program
 from chipload.simulation.surface import MOST_POINTS, fine
@@ -80,18 +81,16 @@ def stock_body(job: ProgramJob, program: Program) -> LayeredStock:
     """The stock that the job names: its layers as thin as stated where the cutters come, and some times as thick
     elsewhere; they end where an upright cutter stands while it cuts level.
     """
-    table, folder = job.table.stock, job.path.parent
-    assert table is not None
+    table, folder = stated(job.table.stock, "stock"), job.path.parent
     mesh = job.meshes.get("stock")
     if mesh is None and table.file is not None and table.file.lower().endswith(".npz"):
         return LayeredStock.load(folder / table.file)
     # a tapered cutter is wider above its tip
     tile = TILE * max(c.diameter + 2.0 * c.flute_length * math.tan(c.taper) for c in job.cutters.values())
     if mesh is None and table.file is None:
-        assert table.low_mm is not None
-        assert table.high_mm is not None
-        layer = table.layer_mm or layer_thickness(program, job.cutters, table.high_mm[2])
-        stock = LayeredStock.block(table.low_mm, table.high_mm, COARSE * layer, tile)
+        low, high = stated(table.low_mm, "stock.low_mm"), stated(table.high_mm, "stock.high_mm")
+        layer = table.layer_mm or layer_thickness(program, job.cutters, high[2])
+        stock = LayeredStock.block(low, high, COARSE * layer, tile)
     else:
         if mesh is None:
             mesh = read_mesh(folder / str(table.file), unit=table.units, chord_mm=table.chord_mm)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
+from chipload.jobs.program.bent_workpiece import BentWorkpiece
 from chipload.jobs.program.outcome import SimulationResult
 from chipload.report.figures import FONT, LIMIT, SCALE
 from chipload.report.sheet import figure, table
@@ -39,29 +40,23 @@ def workpiece_section(simulation: SimulationResult, figures: dict[str, go.Figure
         body += [
             "<h3>Bent at its worst</h3>",
             f'<p class="note">In line {line}, under {np.linalg.norm(bent.force):.4g} N; displacement drawn '
-            f"{_scale(simulation):.3g} times.</p>",
-            figure("bent", bent_figure(simulation), figures),
+            f"{_scale(bent):.3g} times.</p>",
+            figure("bent", bent_figure(bent), figures),
             f"<p>A support of 10 N/\u00b5m at ({x:.4g}, {y:.4g}, {z:.4g}) lowers the deflection there from "
             f"{1e3 * bent.before:.3g} to {1e3 * bent.after:.3g} \u00b5m.</p>",
         ]
     return body
 
 
-def _scale(simulation: SimulationResult) -> float:
-    assert simulation.workpiece is not None
-    bent = simulation.workpiece.bent
-    assert bent is not None
+def _scale(bent: BentWorkpiece) -> float:
     most = float(np.linalg.norm(bent.moved, axis=1).max())
     return DRAWN * float(np.linalg.norm(np.ptp(bent.points, axis=0))) / most if most > 0.0 else 1.0
 
 
-def bent_figure(simulation: SimulationResult) -> go.Figure:
+def bent_figure(bent: BentWorkpiece) -> go.Figure:
     """The part as it bends in its worst step, scaled, coloured by displacement; the contact and the best support."""
-    assert simulation.workpiece is not None
-    bent = simulation.workpiece.bent
-    assert bent is not None
     um = 1e3 * np.linalg.norm(bent.moved, axis=1)
-    p = (bent.points + _scale(simulation) * bent.moved).astype(np.float32)
+    p = (bent.points + _scale(bent) * bent.moved).astype(np.float32)
     i, j, k = bent.faces.T
     out = go.Figure(
         go.Mesh3d(

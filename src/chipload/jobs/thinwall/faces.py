@@ -16,6 +16,7 @@ from chipload.geometry.sides import wall_of
 from chipload.geometry.step_faces import ON, Face, Model, Name, read_faces
 from chipload.geometry.step_patch import patch_of
 from chipload.geometry.thin_wall import ThinWall, opposite, through_sections
+from chipload.jobs.tables import FaceName, stated
 from chipload.jobs.thinwall.job import ThinWallJob
 
 Floats = NDArray[np.float64]
@@ -33,13 +34,13 @@ def wall_of_faces(job: ThinWallJob) -> ThinWall:
         The file cannot be read, or the faces are not the sides of a wall.
     """
     w = job.table.wall
-    assert w.front is not None and w.back is not None and w.clamp is not None  # noqa: PT018
     model, fit = read_faces(job.section_files[0], "wall.file"), w.fit_mm or _FIT
-    front, back = model.face(w.front, "wall.front"), model.face(w.back, "wall.back")
+    named: dict[str, FaceName] = {key: stated(getattr(w, key), f"wall.{key}") for key in ("front", "back", "clamp")}
+    front, back = (model.face(named[key], f"wall.{key}") for key in ("front", "back"))
     if front.number == back.number:
         raise InputError(f"wall.back: is face {back.number} as wall.front: state the face opposite")
     taken = [patch_of(f, f"wall.{key}", fit) for f, key in ((front, "front"), (back, "back"))]
-    made = wall_of(taken[0].patch, taken[1].patch, _clamp(model, w.clamp, front, taken[0].patch))
+    made = wall_of(taken[0].patch, taken[1].patch, _clamp(model, named["clamp"], front, taken[0].patch))
     name = f"wall between faces {front.number} and {back.number} of {model.file.name}"
     wall = opposite(through_sections(made, w.edge_share or 0.0, w.span or (0.0, 1.0), name))
     if model.solid:

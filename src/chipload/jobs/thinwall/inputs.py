@@ -20,8 +20,10 @@ from chipload.errors import Finding, InputError
 from chipload.geometry.sections import checked, loft, read_sections
 from chipload.geometry.thin_wall import ThinWall, blade, plate, through_sections
 from chipload.jobs.provenance import title_of
+from chipload.jobs.tables import stated
 from chipload.jobs.thinwall.faces import wall_of_faces
 from chipload.jobs.thinwall.job import ThinWallJob
+from chipload.jobs.thinwall.tables import SHAPES
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.thinwall.blank import SIDES, Blank, FinishSurface
 from chipload.planning.thinwall.depth import DepthRange, Measure
@@ -136,11 +138,10 @@ class WallInputs:
             return self.wall.threshold(self.both(left), SIDES[self.side_numbers[side]], deflection, self.factor)
 
         def measured(left: Sequence[Floats], side: int) -> Threshold:
-            assert self.experiments is not None
-            assert self.job.table.threshold is not None
             u, v = np.meshgrid(*self.places, indexing="ij")
             place = np.stack([u.ravel(), v.ravel()], axis=1)
-            return calibrated(self.experiments, place, self.job.table.threshold.deviations)
+            table = stated(self.job.table.threshold, "threshold")
+            return calibrated(stated(self.experiments, "threshold"), place, table.deviations)
 
         return modelled if self.experiments is None else measured
 
@@ -228,8 +229,7 @@ def read_wall(job: ThinWallJob) -> WallInputs:
 def _shape(job: ThinWallJob) -> ThinWall:
     w = job.table.wall
     if w.shape == "plate":
-        assert w.length_mm is not None and w.height_mm is not None and w.thickness_mm is not None  # noqa: PT018
-        return plate(w.length_mm, w.height_mm, w.thickness_mm)
+        return plate(*(stated(getattr(w, key), f"wall.{key}") for key in SHAPES["plate"][0]))
     if w.shape == "blade":
         value = {key: float(x) for key, x in w.model_dump().items() if isinstance(x, (int, float))}
         return blade(
@@ -242,9 +242,9 @@ def _shape(job: ThinWallJob) -> ThinWall:
         )
     if w.shape == "step":
         return wall_of_faces(job)
-    assert w.unit is not None and w.edge_share is not None  # noqa: PT018
-    made = loft(checked(read_sections(job.section_files, w.unit, columns=w.columns)))
-    return through_sections(made, w.edge_share, w.span or (0.0, 1.0))
+    unit, edge_share = stated(w.unit, "wall.unit"), stated(w.edge_share, "wall.edge_share")
+    made = loft(checked(read_sections(job.section_files, unit, columns=w.columns)))
+    return through_sections(made, edge_share, w.span or (0.0, 1.0))
 
 
 def _wall(job: ThinWallJob, shape: ThinWall) -> tuple[Blank, float]:
@@ -277,8 +277,7 @@ def _step_over(job: ThinWallJob, cutter: Cutter) -> float:
     op = job.operation
     if op.step_over_mm is not None:
         return op.step_over_mm
-    assert op.scallop_um is not None
-    r, h = cutter.corner_radius, op.scallop_um / 1000.0
+    r, h = cutter.corner_radius, stated(op.scallop_um, "operation.0.scallop_um") / 1000.0
     if not math.isclose(2.0 * r, cutter.diameter):
         raise InputError(
             "operation.0.scallop_um: is known for a ball only: state step_over_mm for cutter "

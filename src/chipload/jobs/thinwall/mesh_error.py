@@ -122,11 +122,9 @@ def spread_compliance(solid: SolidWorkpiece, a: Floats, b: Floats, side: int) ->
     """
     grid, factored = solid.grid, factorise(solid)
     i, j, layers = grid.counts
-    assert solid.kept is not None
     kept = solid.kept.reshape(*grid.counts, 2)
     ei, ej = np.minimum(a.astype(np.int64), i - 1), np.minimum(b.astype(np.int64), j - 1)
     gauss, weight = np.polynomial.legendre.leggauss(SPREAD)
-    force = None
     total = np.zeros(len(a))
     parts = []
     for k in range(layers):
@@ -138,11 +136,13 @@ def spread_compliance(solid: SolidWorkpiece, a: Floats, b: Floats, side: int) ->
             share = 0.5 * w * (hi - lo) * _depth(solid, places)
             parts.append((places, share))
             total += share
-    for places, share in parts:
-        normal = normals_of(grid, places, SIDES[side]) * (share / total)[:, None]
-        one = loads(factored, places, normal)
-        force = one if force is None else force + one
-    assert force is not None
+    forces = (
+        loads(factored, places, normals_of(grid, places, SIDES[side]) * (share / total)[:, None])
+        for places, share in parts
+    )
+    force = next(forces)
+    for one in forces:
+        force = force + one
     out = np.empty(len(a))
     for at in range(0, len(a), TOGETHER):
         some = force[:, at : at + TOGETHER].toarray()

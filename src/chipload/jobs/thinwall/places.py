@@ -62,9 +62,7 @@ class Places:
         key = (b"".join(D.tobytes() for D in states), side)
         if key not in self._solved:
             number = self.inputs.side_numbers[side]
-            known = self.inputs.wall.threshold(states, SIDES[number], 1.0).compliance
-            assert known is not None
-            self._solved[key] = known.reshape(self.inputs.wall.shape)
+            self._solved[key] = self.inputs.wall.compliance(states, SIDES[number]).reshape(self.inputs.wall.shape)
         return self._solved[key]
 
     def error(self, side: int) -> Floats:

@@ -153,7 +153,6 @@ def _stress(inputs: WallInputs, left: Sequence[Floats], number: int, columns: Ma
     solid = inputs.wall.state(inputs.both(left))
     grid = solid.grid
     places = on_side(grid, SIDES[number], [columns["u"][k]], [_rows(inputs, float(columns["v"][k])) / grid.counts[1]])
-    assert solid.kept is not None
     places = on_cut(places, solid.kept, SIDES[number])
     force = weights(grid, places).T @ (columns["force_normal_n"][k] * normals_of(grid, places, SIDES[number]))
     foot = np.arange(len(grid.elements)).reshape(grid.counts)[:, 0].ravel()

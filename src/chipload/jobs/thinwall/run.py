@@ -245,7 +245,7 @@ def _variable(tried: _Tried, corrections: tuple[Floats, ...]) -> Variant:
     inputs = places.inputs
     modelled, held = inputs.experiments is None, inputs.deflection
     best: Variant | None = None
-    least: tuple[float, Variant] | None = None
+    least: list[tuple[float, Variant]] = []  # of those that exceed, the one that exceeds least
     share = 1.0
     for turn in range(TRIES):
         threshold_of = (
@@ -261,8 +261,8 @@ def _variable(tried: _Tried, corrections: tuple[Floats, ...]) -> Variant:
         good = not len(one.over) and over <= (1.0 if modelled else 1.0 + OVER)
         if good:
             best = one
-        elif least is None or over < least[0]:
-            least = (over, one)
+        else:
+            least = [min([*least, (over, one)], key=lambda pair: pair[0])]
         if best is not None and turn >= ROUNDS - 1:
             break
         measured = _measured(places, one, inputs.law, corrections)
@@ -270,10 +270,7 @@ def _variable(tried: _Tried, corrections: tuple[Floats, ...]) -> Variant:
             measured = tuple(np.maximum(c, m) for c, m in zip(corrections, measured, strict=True))
             share *= HOLD / over if turn >= ROUNDS - 1 else 1.0
         corrections = measured
-    if best is not None:
-        return best
-    assert least is not None
-    return least[1]
+    return best if best is not None else least[0][1]
 
 
 def _seconds(places: Places, planned: Planned) -> float:

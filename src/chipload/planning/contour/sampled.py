@@ -118,8 +118,7 @@ def mirrored_pass(run: ContourPass, flip: bool) -> ContourPass:
     """The pass in the work frame: reflected in y where ``flip``."""
     if not flip:
         return run
-    parts = [None if c is None else mirrored(c) for c in (run.path, run.lead_in, run.lead_out)]
+    lead_in, lead_out = (None if c is None else mirrored(c) for c in (run.lead_in, run.lead_out))
     seg = run.stock.segments * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0])
     seg = seg[:, [2, 3, 0, 1, 4, 5, 6]] * np.array([1, 1, 1, 1, 1, 1, -1.0])
-    assert parts[0] is not None
-    return ContourPass(run.name, parts[0], parts[1], parts[2], StockBoundary(seg), run.stopped)
+    return ContourPass(run.name, mirrored(run.path), lead_in, lead_out, StockBoundary(seg), run.stopped)

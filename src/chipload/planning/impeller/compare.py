@@ -49,6 +49,19 @@ class Partition:
     certified: bool
     search_s: float = 0.0
 
+    @property
+    def division(self) -> PatchDivision:
+        """``divided`` of a way that is possible.
+
+        Raises
+        ------
+        InputError
+            It is not possible.
+        """
+        if self.divided is None:
+            raise InputError(f"{self.name}: these cutters cannot mill all surfaces: allow more cutters")
+        return self.divided
+
 
 def compared(
     sides: Sequence[ChannelSide],

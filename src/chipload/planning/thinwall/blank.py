@@ -148,16 +148,11 @@ class Blank:
     def surface(self, side: Side) -> FinishSurface:
         """Finish surface of a side."""
         none = np.zeros(self.shape)
-        places = on_cut(self._places(side), self._kept((none, none)), side)
+        places = on_cut(self._places(side), self.state((none, none)).kept, side)
         grid = self.solid.grid
         points, normals = points_of(grid, places), normals_of(grid, places, side)
         shape = (*self.shape, 3)
         return FinishSurface(points.reshape(shape), normals.reshape(shape), self.allowance[SIDES.index(side)])
-
-    def _kept(self, left: Sequence[Floats]) -> Floats:
-        kept = self.state(left).kept
-        assert kept is not None
-        return kept
 
     def threshold(self, left: Sequence[Floats], side: Side, deflection: float, factor: float = 1.0) -> Threshold:
         """Threshold of the places of a side while stock ``left`` is on both.
@@ -167,8 +162,12 @@ class Blank:
         left : two (n, m) float [mm], on k- and k+
         deflection : [mm] that is allowed
         """
+        return modelled(self.compliance(left, side), deflection, factor)
+
+    def compliance(self, left: Sequence[Floats], side: Side) -> Floats:
+        """C_nn of the places of a side while stock ``left`` is on both, (p,) [mm/N]."""
         solid = self.state(left)
-        places = on_cut(self._places(side), self._kept(left), side)
+        places = on_cut(self._places(side), solid.kept, side)
         n = normals_of(solid.grid, places, side)
         clamped = self._clamped(places)
         C = np.full(len(places), np.inf)
@@ -176,7 +175,7 @@ class Blank:
             factorise(solid), MeshPlaces(places.element[~clamped], places.local[~clamped]), n[~clamped]
         )
         C[clamped] = C[~clamped].min()
-        return modelled(C, deflection, factor)
+        return C
 
     def _clamped(self, places: MeshPlaces) -> NDArray[np.bool_]:
         """Places on the clamp itself: they do not give way; the stiffest place stands for them."""

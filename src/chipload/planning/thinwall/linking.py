@@ -181,8 +181,8 @@ def _pass_program(
                     path.line(tip[r, k + 1], axis[r, k + 1], centre[r, k + 1], centre[r, k])
             path.rapid(lifted[r, last], axis[r, last])
             before = (r, last)
-    assert before is not None
-    path.rapid(outside[before], axis[before])
+    if before is not None:
+        path.rapid(outside[before], axis[before])
     return path.pass_program(p.side, pass_motion, label)
 
 

@@ -23,6 +23,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,6 +36,7 @@ from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 #: places of phi at which the row before is looked for, before bisection
 LOOKS = 90
@@ -241,27 +244,90 @@ def engagement_of_depths(posture: CutterPose, depths: ArrayLike, nodes: int = 8)
             f"depth_mm = {d[wrong[0]]:g}: must be above 0 and at most {posture.deepest:.6g}, where the flank begins to "
             "cut: lean the cutter less or take a greater corner radius"
         )
-    r, _, f = posture.cutter.apt[1:4]
-    T, n, A = posture.frame
+    circles = _circles(posture, d, nodes)
+    starts, lengths = _ranges(circles, d)
+    cuts = _cutting(circles, d, starts, lengths)
+    step, node, part = np.nonzero(cuts)
+    low = starts[step, node, part] % math.tau
+    count = np.bincount(step, minlength=len(d))
+    sine, cosine, weight = circles.sine, circles.cosine, circles.weight
+    s_to = np.cumsum(weight, axis=1)
+    s_from = s_to - weight
+    height = posture.cutter.apt[3] - posture.cutter.apt[1] * cosine
+    rate = edge_lag(posture.cutter) * sine
+    lag = np.maximum(edge_lag(posture.cutter) * height - 0.5 * rate * weight, 0.0)
+    table = np.stack([s_from, circles.rho, height, sine, cosine, lag, rate], axis=-1).reshape(-1, 7)
+    rows = np.column_stack(
+        [
+            low,
+            low + lengths[step, node, part],
+            s_from[step, node],
+            s_to[step, node],
+            circles.along[step, node],
+            circles.offset[step, node],
+            0.0 * low,
+        ]
+    )
+    owner = step * sine.shape[1] + node
+    start = np.concatenate([[0], np.cumsum(count)])
+    return ToothEngagement(start, rows, np.full(len(rows), -1), owner, table)
+
+
+class _Circles(NamedTuple):
+    """Circles about the axis, one a node of the profile; arrays of (n, k).
+
+    Parameters
+    ----------
+    posture : of the cutter
+    rho, weight : radius, and length along the profile [mm]; weight 0: none
+    sine, cosine : of kappa
+    along, offset : of the chip thickness [mm]
+    y0, z0 : of the centre [mm]
+    """
+
+    posture: CutterPose
+    rho: Floats
+    weight: Floats
+    sine: Floats
+    cosine: Floats
+    along: Floats
+    offset: Floats
+    y0: Floats
+    z0: Floats
+
+    def height(self, phi: Floats) -> Floats:
+        """Z at angles (n, k, m)."""
+        T, n, _ = self.posture.frame
+        return np.asarray(self.z0[..., None] + self.rho[..., None] * (np.cos(phi) * n[2] + np.sin(phi) * T[2]))
+
+    def over_row_before(self, step: float, phi: Floats) -> Floats:
+        """Height over what the row before, ``step`` beside, has left; above 0: it has left nothing here."""
+        T, n, _ = self.posture.frame
+        y = self.y0[..., None] + self.rho[..., None] * (np.cos(phi) * n[1] + np.sin(phi) * T[1])
+        return np.asarray(self.height(phi) - np.minimum(self.posture.outline(y + step), 1e6))
+
+
+def _circles(posture: CutterPose, d: Floats, nodes: int) -> _Circles:
+    T, _, A = posture.frame
     kappa, rho, weight = _profile(posture, d, nodes)
     sine, cosine = np.sin(kappa), np.cos(kappa)
-    above = -r * cosine  # of the circle over C, along the axis
+    above = -posture.cutter.apt[1] * cosine  # of the circle over C, along the axis
     speed = posture.feed_per_tooth * np.array([1.0, 0.0, 0.0])
     along, offset = sine * float(speed @ T), -cosine * float(speed @ A)
     y0, z0 = (posture.centre[i] + above * A[i] for i in (1, 2))
+    return _Circles(posture, rho, weight, sine, cosine, along, offset, y0, z0)
 
-    def height(phi: Floats) -> Floats:
-        return np.asarray(z0[..., None] + rho[..., None] * (np.cos(phi) * n[2] + np.sin(phi) * T[2]))
 
-    def beside(phi: Floats) -> Floats:
-        """Above 0 where the row before has left nothing."""
-        assert posture.step is not None
-        y = y0[..., None] + rho[..., None] * (np.cos(phi) * n[1] + np.sin(phi) * T[1])
-        return np.asarray(height(phi) - np.minimum(posture.outline(y + posture.step), 1e6))
-
-    breaks = [_roots(0.0 * along, along, offset), _roots(rho * n[2], rho * T[2], z0 - d[:, None])]
+def _ranges(circles: _Circles, d: Floats) -> tuple[Floats, Floats]:
+    """Where the ranges of phi begin between which no border is crossed, and their lengths, (n, k, m) [rad]."""
+    posture = circles.posture
+    T, n, _ = posture.frame
+    breaks = [
+        _roots(0.0 * circles.along, circles.along, circles.offset),
+        _roots(circles.rho * n[2], circles.rho * T[2], circles.z0 - d[:, None]),
+    ]
     if posture.step is not None:
-        breaks.append(_crossings(beside, kappa.shape))
+        breaks.append(_crossings(partial(circles.over_row_before, posture.step), circles.rho.shape))
     ends = np.sort(np.concatenate(breaks, axis=-1), axis=-1)
     first = np.where(np.isfinite(ends[..., :1]), ends[..., :1], 0.0)
     ends = np.where(np.isfinite(ends), ends, first + math.tau)
@@ -271,33 +337,17 @@ def engagement_of_depths(posture: CutterPose, depths: ArrayLike, nodes: int = 8)
     whole = np.isclose(starts[..., 0], first[..., 0] + math.tau)  # no break at all: the whole circle
     starts[..., 0] = np.where(whole, 0.0, starts[..., 0])
     lengths[..., 0] = np.where(whole, math.tau, lengths[..., 0])
-    middle = starts + 0.5 * lengths
-    cuts = along[..., None] * np.sin(middle) + offset[..., None] > 1e-9 * posture.feed_per_tooth
-    cuts &= (height(middle) < d[:, None, None]) & (lengths > SHORT) & (weight > 0.0)[..., None]
+    return starts, lengths
+
+
+def _cutting(circles: _Circles, d: Floats, starts: Floats, lengths: Floats) -> Bools:
+    """(n, k, m) bool, ranges in which the edge is in stock."""
+    posture, middle = circles.posture, starts + 0.5 * lengths
+    cuts = circles.along[..., None] * np.sin(middle) + circles.offset[..., None] > 1e-9 * posture.feed_per_tooth
+    cuts &= (circles.height(middle) < d[:, None, None]) & (lengths > SHORT) & (circles.weight > 0.0)[..., None]
     if posture.step is not None:
-        cuts &= beside(middle) < 0.0
-    step, node, part = np.nonzero(cuts)
-    low = starts[step, node, part] % math.tau
-    count = np.bincount(step, minlength=len(d))
-    s_to = np.cumsum(weight, axis=1)
-    s_from = s_to - weight
-    rate = edge_lag(posture.cutter) * sine
-    lag = np.maximum(edge_lag(posture.cutter) * (f + above) - 0.5 * rate * weight, 0.0)
-    table = np.stack([s_from, rho, f + above, sine, cosine, lag, rate], axis=-1).reshape(-1, 7)
-    rows = np.column_stack(
-        [
-            low,
-            low + lengths[step, node, part],
-            s_from[step, node],
-            s_to[step, node],
-            along[step, node],
-            offset[step, node],
-            0.0 * low,
-        ]
-    )
-    owner = step * kappa.shape[1] + node
-    start = np.concatenate([[0], np.cumsum(count)])
-    return ToothEngagement(start, rows, np.full(len(rows), -1), owner, table)
+        cuts &= circles.over_row_before(posture.step, middle) < 0.0
+    return np.asarray(cuts)
 
 
 def _roots(a: Floats, b: Floats, c: Floats) -> Floats:

@@ -132,10 +132,10 @@ class AptInterpreter:
         p, b = self._point(record)
         if self._unread is not None:
             self.track.gap("apt-cycle", record.line, f"{self._unread} is not read: its hole at {record} is left out")
-        elif self._drilling:
-            self._hole(p, b, record)
+        elif self._drilling and self._cycle is not None:
+            self._hole(self._cycle, p, b, record)
         elif self._circle is not None:
-            self._arc(p, b, record)
+            self._arc(self._circle, p, b, record)
         elif self._rapid:
             self.track.rapid(p, b, record.line)
         else:
@@ -221,9 +221,9 @@ class AptInterpreter:
         if isinstance(found, str):
             self.track.gap("apt-left-out", record.line, f"{record}: {found}: left out")
             return
-        self._circle, end = found
+        circle, end = found
         p = _tuple(R @ (np.multiply(end, self.mm) - t))
-        self._arc(p, b, record)
+        self._arc(circle, p, b, record)
         self._rapid, self._programmed = False, p
 
     def _origin(self, record: AptRecord) -> None:
@@ -233,9 +233,8 @@ class AptInterpreter:
         else:
             self.track.note("apt-unused", record.line, str(record))
 
-    def _arc(self, p: Point, b: Point, record: AptRecord) -> None:
-        assert self._circle is not None
-        circle, self._circle = self._circle, None
+    def _arc(self, circle: Circle, p: Point, b: Point, record: AptRecord) -> None:
+        self._circle = None
         if self._rapid:
             self.track.note("apt-arc", record.line, "RAPID before an arc: it is cut at the feed in force")
         R, t, _ = self._frame()
@@ -274,10 +273,9 @@ class AptInterpreter:
             if found[1]:
                 self.track.gap("apt-cycle", record.line, f"{record}: {', '.join(found[1])} is not read in a cycle")
 
-    def _hole(self, p: Point, b: Point, record: AptRecord) -> None:
+    def _hole(self, cycle: Cycle, p: Point, b: Point, record: AptRecord) -> None:
         """A hole at p against the axis b."""
-        cycle, track, line = self._cycle, self.track, record.line
-        assert cycle is not None
+        track, line = self.track, record.line
         if self._circle is not None:
             raise record.error("CIRCLE before a hole: must not be")
         at, up = np.array(p), np.array(b)

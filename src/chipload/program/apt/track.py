@@ -86,7 +86,7 @@ class AptRows:
             self.note_once("apt-start", line, "the program begins here: no motion leads to the first point")
             self.rapid(p, axis, line)
         else:
-            self._add(LINE, p, axis, _NO_CENTRE, _UP, self._speed(p, axis, line), line)
+            self._add(LINE, p, axis, _NO_CENTRE, _UP, self._speed(math.dist(self.at, p) <= JOIN_MM, axis, line), line)
 
     def arc(self, p: Point, axis: Point, centre: Point, normal: Point, line: int) -> None:
         """A cut counter-clockwise about ``normal`` through ``centre``."""
@@ -99,7 +99,7 @@ class AptRows:
             return
         flip = max(normal, key=abs) < 0.0
         turned = (-normal[0] + 0.0, -normal[1] + 0.0, -normal[2] + 0.0) if flip else normal
-        speed = self._speed(p, axis, line, r)
+        speed = self._speed(False, axis, line)
         self._add(ARC_CW if flip else ARC_CCW, p, axis, middle, turned, speed, line)
 
     def dwell(self, seconds: float, line: int) -> None:
@@ -116,10 +116,8 @@ class AptRows:
         self._rows.append((motion, p, axis, centre, normal, feed, self.spindle, self.tool, line, label))
         self.at, self.axis = p, axis
 
-    def _speed(self, p: Point, axis: Point, line: int, r: float = 0.0) -> float:
-        """Feed of a cut to ``p`` [mm/s], [rad/s] where the tip stands and no arc of radius ``r`` is cut."""
-        assert self.at is not None
-        stands = r == 0.0 and math.dist(self.at, p) <= JOIN_MM
+    def _speed(self, stands: bool, axis: Point, line: int) -> float:
+        """Feed of a cut [mm/s], [rad/s] where the tip ``stands``."""
         if self.stated is None:
             if self.feed is None:
                 raise InputError(f"line {line}: a cutting motion without a feed: no FEDRAT before it: give a feed")

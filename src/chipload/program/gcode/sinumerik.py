@@ -96,8 +96,9 @@ class Sinumerik(Dialect):
         if body.startswith("%") or (body.startswith("$") and "=" not in body):
             return None
         body = re.sub(r"^/[0-9]?\s*", "", body)
-        if _DEFINITION.match(body):
-            _define(body, c)
+        definition = _DEFINITION.match(body)
+        if definition:
+            _define(definition[1], definition[2], c)
             return None
         if len(body) > 4 * LONGEST:
             raise InputError(f"{len(body)} characters: a block has at most {4 * LONGEST}")
@@ -322,11 +323,9 @@ def _swivel(c: Controller, arguments: str) -> None:
     c.once("nc-ignored", "CYCLE800: a plane that is not swivelled")
 
 
-def _define(body: str, c: Controller) -> None:
+def _define(kind: str, names: str, c: Controller) -> None:
     """DEF REAL and INT: names with their values, 0 without one."""
-    found = _DEFINITION.match(body)
-    assert found is not None
-    for part in found[2].split(",") if found[1] in ("REAL", "INT", "BOOL") else []:
+    for part in names.split(",") if kind in ("REAL", "INT", "BOOL") else []:
         name, _, value = part.partition("=")
         if not re.fullmatch(r"\s*[A-Z_][A-Z0-9_]*\s*", name):
             c.once("nc-ignored", f"DEF: {part.strip()[:40]}: is not read")

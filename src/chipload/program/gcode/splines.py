@@ -80,29 +80,29 @@ class Splines:
         weight = words.get("p")
         if weight is not None and not 0.0 < weight <= 1e9:
             raise InputError(f"P{weight:g}: the weight of a control point must be above 0")
-        if self.spline is None:
+        spline = self.spline
+        if spline is None:
             order = integer_of(words.get("l", 3.0), "L")
             if not 2 <= order <= nurbs.HIGHEST_ORDER:
                 raise InputError(f"L{order}: the order of a spline must be from 2 to {nurbs.HIGHEST_ORDER}")
             first = 1.0 if given or weight is None else weight
-            self.spline = Spline(((state.at[0], state.at[1], first),), order, rate)
+            spline = Spline(((state.at[0], state.at[1], first),), order, rate)
             weight = 1.0 if weight is None else weight
         elif weight is None:
             raise InputError("G5.2: P is missing: each control point has its weight")
         elif not given:
             raise InputError("G5.2: a control point needs both X and Y")
         if given:
-            x, y = end(self.c, block)[:2] if state.absolute else self._after(block)
-            points = self.spline.points
+            points = spline.points
+            x, y = end(self.c, block)[:2] if state.absolute else self._after(block, points[-1])
             if len(points) >= nurbs.MOST_CONTROL_POINTS:
                 raise InputError(f"G5.2: more than {nurbs.MOST_CONTROL_POINTS} control points: split the spline")
-            self.spline = replace(self.spline, points=(*points, (x, y, weight)))
+            spline = replace(spline, points=(*points, (x, y, weight)))
+        self.spline = spline
 
-    def _after(self, block: Block) -> tuple[float, float]:
-        assert self.spline is not None
-        x, y, _ = self.spline.points[-1]
-        given = axes(self.c, block)
-        return x + given[0], y + given[1]
+    def _after(self, block: Block, last: tuple[float, float, float]) -> tuple[float, float]:
+        stated = axes(self.c, block)
+        return last[0] + stated[0], last[1] + stated[1]
 
     def _close(self) -> None:
         spline = self.spline

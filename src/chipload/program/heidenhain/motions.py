@@ -145,8 +145,6 @@ def helix(s: ConversationalState, text: str) -> None:
     """CP: about the pole, by IPA or to PA, with a rise along Z."""
     sweep, to = _SPAN.search(text), words.POLAR.search(text)
     sense = _sense(text, "CP")
-    if sweep is None and (to is None or to[2] != "A"):
-        raise InputError("CP: IPA or PA must be given")
     without = words.POLAR.sub(" ", text)
     codes, fast = _read(s, without)
     end, _ = s.ends(without)
@@ -157,9 +155,10 @@ def helix(s: ConversationalState, text: str) -> None:
         angle = math.radians(s.signed(sweep[1], sweep[2]))
         if angle * sense < 0.0:
             raise InputError("CP: IPA and DR have different signs")
-    else:
-        assert to is not None
+    elif to is not None and to[2] == "A":
         angle = sense * ((sense * (math.radians(s.signed(to[3], to[4])) - math.atan2(vy, vx))) % math.tau or math.tau)
+    else:
+        raise InputError("CP: IPA or PA must be given")
     end[0] = x + vx * math.cos(angle) - vy * math.sin(angle)
     end[1] = y + vx * math.sin(angle) + vy * math.cos(angle)
     turns = max(1, math.ceil(abs(angle) / math.tau - 1e-9))

@@ -170,8 +170,9 @@ class _Blocks:
 
     def _carry_out(self, block: str) -> None:
         s, word = self.s, block.split(maxsplit=1)[0]
-        if re.match(r"Q[LR]?\s*\d+\s*=", block):
-            self._assign(block)
+        assigned = re.match(r"(Q[LR]?)\s*(\d+)\s*=\s*(.*)", block)
+        if assigned:
+            self._assign(q_number(assigned[1], assigned[2]), assigned[3].strip())
         elif word == "BEGIN":
             switches.program_word(s, block)
         elif block.startswith(("TOOL DEF", "TOOL CALL")):
@@ -208,10 +209,7 @@ class _Blocks:
         if plain and plain != self.s.labels[-1]:
             self.s.labels.append(plain)
 
-    def _assign(self, block: str) -> None:
-        found = re.match(r"(Q[LR]?)\s*(\d+)\s*=\s*(.*)", block)
-        assert found is not None
-        key, formula = q_number(found[1], found[2]), found[3].strip()
+    def _assign(self, key: int, formula: str) -> None:
         if formula in ("MAX", "FMAX"):
             self.s.q.set(key, MAX)
         else:

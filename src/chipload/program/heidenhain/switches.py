@@ -125,7 +125,8 @@ class Tools:
     def read(self, s: ConversationalState, text: str) -> None:
         """Carry out a block."""
         found = re.match(r'TOOL (DEF|CALL)\s*(?:(\d+)(?:\.\d+)?|("[^"]*")|(Q[LR]?\d+))?', text)
-        assert found is not None
+        if found is None:
+            raise InputError(f"{text[:60]}: must be TOOL DEF or TOOL CALL")
         rest = text[found.end() :]
         number = self._number(s, found)
         if found[1] == "DEF":

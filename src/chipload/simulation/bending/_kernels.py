@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numba import njit
 
-from chipload.cutting._kernels import BESIDE, TAU
+from chipload.cutting._kernels import BESIDE, TAU, engaged_part, first_turn
 from chipload.cutting._strength import NODES, PIECE, WEIGHTS, edge_at, points_of
 
 GOLDEN = 0.6180339887498949
@@ -237,18 +237,9 @@ def bent(theta, z, rows, tooth, piece, slices, lo, hi, teeth, c, bars, out):
         one = tooth[r] >= 0
         for i in range(1 if one else teeth):
             j = tooth[r] if one else i
-            turn = theta - TAU * j / teeth
-            turn -= TAU * math.floor(turn / TAU)
-            if turn - first < p:
-                turn += TAU * math.ceil((p + first - turn) / TAU)
+            turn = first_turn(theta, j, teeth, p, first)
             while turn - last <= q:
-                s1 = rows[r, 2]
-                s2 = rows[r, 3]
-                if rate > 0.0:
-                    s1 = max(s1, (turn - base - q) / rate)
-                    s2 = min(s2, (turn - base - p) / rate)
-                elif turn - first >= q:
-                    s2 = s1
+                s1, s2 = engaged_part(turn, base, rate, p, q, rows[r, 2], rows[r, 3])
                 sine = slices[k, 3]
                 split = slices[k, 0] + (z - slices[k, 2]) / sine if sine > 0.0 else s1
                 for side in range(2):

@@ -50,6 +50,60 @@ def lower(
 
 
 @njit(cache=True, nogil=True)
+def seen_from(middle: Any, tips: Any, axes: Any, k: int, half: float) -> tuple[float, float, float]:
+    """How far the tool sweeps past the ray of half length ``half`` about ``middle`` in move k; from its end the height
+    of ``middle`` along the axis, and the square of its distance from the axis.
+    """
+    ax, ay, az = axes[k, 0], axes[k, 1], axes[k, 2]
+    x, y, z = middle[0] - tips[k, 0], middle[1] - tips[k, 1], middle[2] - tips[k, 2]
+    dx, dy, dz = tips[k, 0] - tips[k - 1, 0], tips[k, 1] - tips[k - 1, 1], tips[k, 2] - tips[k - 1, 2]
+    bx, by, bz = ax - axes[k - 1, 0], ay - axes[k - 1, 1], az - axes[k - 1, 2]
+    long = math.sqrt(dx * dx + dy * dy + dz * dz)
+    far = math.sqrt(x * x + y * y + z * z)
+    h = x * ax + y * ay + z * az
+    return long + math.sqrt(bx * bx + by * by + bz * bz) * (far + long + half), h, far * far - h * h
+
+
+@njit(cache=True, nogil=True)
+def least_of(
+    count: int, tips: Any, axes: Any, k: int, start: float, shape: Any, S: Any, frame: Any, depth: float,
+    height: float, tip: Any, axis: Any,
+) -> tuple[float, int]:  # fmt: skip
+    """The least ``lower`` of the instants 0 .. count of move k, and which it is."""
+    best, at = height, 0
+    for m in range(count + 1):
+        s = lower(m / count, tips, axes, k, start, shape, S, frame, depth, height, tip, axis)
+        if s < best:
+            best, at = s, m
+    return best, at
+
+
+@njit(cache=True, nogil=True)
+def least_near(
+    best: float, at: int, count: int, tol: float, tips: Any, axes: Any, k: int, start: float, shape: Any, S: Any,
+    frame: Any, depth: float, height: float, tip: Any, axis: Any,
+) -> float:  # fmt: skip
+    """The least ``lower`` between the instants beside ``at``, by golden section to ``tol`` [mm]; at most ``best``."""
+    lo, hi = max(at - 1, 0) / count, min(at + 1, count) / count
+    t1, t2 = hi - _GOLDEN * (hi - lo), lo + _GOLDEN * (hi - lo)
+    f1 = lower(t1, tips, axes, k, start, shape, S, frame, depth, height, tip, axis)
+    f2 = lower(t2, tips, axes, k, start, shape, S, frame, depth, height, tip, axis)
+    for _ in range(_STEPS):
+        best = min(best, f1, f2)
+        if abs(f1 - f2) < tol and f1 < height:
+            break
+        if f1 <= f2:
+            hi, t2, f2 = t2, t1, f1
+            t1 = hi - _GOLDEN * (hi - lo)
+            f1 = lower(t1, tips, axes, k, start, shape, S, frame, depth, height, tip, axis)
+        else:
+            lo, t1, f1 = t1, t2, f2
+            t2 = lo + _GOLDEN * (hi - lo)
+            f2 = lower(t2, tips, axes, k, start, shape, S, frame, depth, height, tip, axis)
+    return float(min(best, f1, f2))
+
+
+@njit(cache=True, nogil=True)
 def left(
     points: Any, frames: Any, tips: Any, axes: Any, starts: Any, shapes: Any, cutting: Any, depth: float,
     height: float, step: float, tol: float, first: int, last: int, rest: Any, rest_row: Any, gouge: Any,
@@ -65,53 +119,26 @@ def left(
         S, frame = points[i], frames[i]
         middle = S + 0.5 * (height - depth) * frame[2]
         for k in range(1, n):
-            ax, ay, az = axes[k, 0], axes[k, 1], axes[k, 2]
-            x, y, z = middle[0] - tips[k, 0], middle[1] - tips[k, 1], middle[2] - tips[k, 2]
-            dx, dy, dz = tips[k, 0] - tips[k - 1, 0], tips[k, 1] - tips[k - 1, 1], tips[k, 2] - tips[k - 1, 2]
-            bx, by, bz = ax - axes[k - 1, 0], ay - axes[k - 1, 1], az - axes[k - 1, 2]
-            long = math.sqrt(dx * dx + dy * dy + dz * dz)
-            far = math.sqrt(x * x + y * y + z * z)
-            sweep = long + math.sqrt(bx * bx + by * by + bz * bz) * (far + long + half)
+            sweep, h, d2 = seen_from(middle, tips, axes, k, half)
             slack = sweep + half
-            h = x * ax + y * ay + z * az
             if h < -slack:
                 continue
-            d2 = far * far - h * h
             for part in range(parts):
                 big = shapes[part, 9] + slack
                 if d2 > big * big or h < starts[part] - slack or h > starts[part] + shapes[part, 8] + slack:
                     continue
                 count = max(1, math.ceil(sweep / step))
-                best, at = height, 0
-                for m in range(count + 1):
-                    s = lower(m / count, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis)
-                    if s < best:
-                        best, at = s, m
+                best, at = least_of(
+                    count, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis
+                )
                 if best >= height:
                     continue
                 known = rest[i] if part == 0 and cutting[k] else height
                 if best - 0.1 < known or best < 0.1:
-                    lo, hi = max(at - 1, 0) / count, min(at + 1, count) / count
-                    t1, t2 = hi - _GOLDEN * (hi - lo), lo + _GOLDEN * (hi - lo)
-                    f1 = lower(t1, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis)
-                    f2 = lower(t2, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis)
-                    for _ in range(_STEPS):
-                        best = min(best, f1, f2)
-                        if abs(f1 - f2) < tol and f1 < height:
-                            break
-                        if f1 <= f2:
-                            hi, t2, f2 = t2, t1, f1
-                            t1 = hi - _GOLDEN * (hi - lo)
-                            f1 = lower(
-                                t1, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis
-                            )
-                        else:
-                            lo, t1, f1 = t1, t2, f2
-                            t2 = lo + _GOLDEN * (hi - lo)
-                            f2 = lower(
-                                t2, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis
-                            )
-                    best = min(best, f1, f2)
+                    best = least_near(
+                        best, at, count, tol, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip,
+                        axis,
+                    )  # fmt: skip
                 if part == 0 and cutting[k] and best < rest[i]:
                     rest[i], rest_row[i] = best, k
                 if -best > gouge[i]:
@@ -133,46 +160,22 @@ def lowest(
         S, frame = points[i], frames[i]
         middle = S + 0.5 * (height - depth) * frame[2]
         for k in range(1, n):
-            ax, ay, az = axes[k, 0], axes[k, 1], axes[k, 2]
-            x, y, z = middle[0] - tips[k, 0], middle[1] - tips[k, 1], middle[2] - tips[k, 2]
-            dx, dy, dz = tips[k, 0] - tips[k - 1, 0], tips[k, 1] - tips[k - 1, 1], tips[k, 2] - tips[k - 1, 2]
-            bx, by, bz = ax - axes[k - 1, 0], ay - axes[k - 1, 1], az - axes[k - 1, 2]
-            long = math.sqrt(dx * dx + dy * dy + dz * dz)
-            far = math.sqrt(x * x + y * y + z * z)
-            sweep = long + math.sqrt(bx * bx + by * by + bz * bz) * (far + long + half)
+            sweep, h, d2 = seen_from(middle, tips, axes, k, half)
             slack = sweep + half
-            h = x * ax + y * ay + z * az
-            d2 = far * far - h * h
             for part in range(parts):
                 big = shapes[part, 9] + slack
                 if d2 > big * big or h < starts[part] - slack or h > starts[part] + shapes[part, 8] + slack:
                     continue
                 kind = kinds[part]
                 count = max(1, math.ceil(sweep / step))
-                best, at = height, 0
-                for m in range(count + 1):
-                    s = lower(m / count, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis)
-                    if s < best:
-                        best, at = s, m
+                best, at = least_of(
+                    count, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis
+                )
                 # between two instants a part comes lower by less than this
                 if best >= height or best - 0.05 >= low[i, kind]:
                     continue
-                lo, hi = max(at - 1, 0) / count, min(at + 1, count) / count
-                t1, t2 = hi - _GOLDEN * (hi - lo), lo + _GOLDEN * (hi - lo)
-                f1 = lower(t1, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis)
-                f2 = lower(t2, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis)
-                for _ in range(_STEPS):
-                    best = min(best, f1, f2)
-                    if abs(f1 - f2) < tol and f1 < height:
-                        break
-                    if f1 <= f2:
-                        hi, t2, f2 = t2, t1, f1
-                        t1 = hi - _GOLDEN * (hi - lo)
-                        f1 = lower(t1, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis)
-                    else:
-                        lo, t1, f1 = t1, t2, f2
-                        t2 = lo + _GOLDEN * (hi - lo)
-                        f2 = lower(t2, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis)
-                best = min(best, f1, f2)
+                best = least_near(
+                    best, at, count, tol, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis
+                )
                 if best < low[i, kind]:
                     low[i, kind], rows[i, kind], part_of[i, kind] = best, k, part

@@ -85,19 +85,22 @@ class LeastDistance:
         some : (n,) bool, the steps that count; None: all
         """
         deepest = np.full(len(steps), np.inf)
-        for number in np.unique(steps.tool).tolist() if self._grid is not None else ():
+        grid = self._grid
+        if grid is None:
+            self.done += len(steps)
+            return deepest
+        for number in np.unique(steps.tool).tolist():
             body = self.bodies[number]
             own = np.flatnonzero((steps.tool == number) & (True if some is None else some))
             if len(body.lines):
                 for begin in range(0, len(own), BLOCK):
-                    self._lower(steps, own[begin : begin + BLOCK], body, deepest)
+                    self._lower(grid, steps, own[begin : begin + BLOCK], body, deepest)
         self.done += len(steps)
         return deepest
 
-    def _lower(self, steps: Steps, own: Ints, body: Body, deepest: Floats) -> None:
-        assert self._grid is not None
+    def _lower(self, grid: Grid, steps: Steps, own: Ints, body: Body, deepest: Floats) -> None:
         tips, axes, rows = _places(steps, own, body, self.tolerance)
-        grid, meridian = self._grid, (body.lines, body.arc, body.top, body.widest)
+        meridian = (body.lines, body.arc, body.top, body.widest)
 
         def lowered(span: Ints) -> tuple[Floats, Ints, Ints, Floats]:
             out = self.distance.copy(), self.step.copy(), self.first.copy(), deepest.copy()

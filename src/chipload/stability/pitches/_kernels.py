@@ -22,6 +22,63 @@ def between(a, b, t, out):
         out[k + 2] += 6 * (t - t**2) * b[k] + (3 * t**2 - 2 * t) * b[k + 2]
 
 
+@njit(cache=True, nogil=True)
+def forces_of_waves(A, delay, i, nodes, history, first, last, known, slope):
+    """Force in cell i at the three points of integration: what is ``known`` (3, 2), and its ``slope`` (3, 2, 4) over
+    the state at the end of the cell. ``first``, ``last`` (4,) are room to work.
+    """
+    now = history[nodes + i]
+    known[:] = 0.0
+    slope[:] = 0.0
+    for j in range(len(A)):
+        cuts = False
+        for g in range(3):
+            for c in range(4):
+                cuts = cuts or A[j, i, g, c] != 0.0
+        if not cuts:
+            continue
+        for which in range(2):
+            at = nodes + i + which - delay[j]
+            k = math.floor(at + 1e-9)
+            share = at - k
+            to = first if which == 0 else last
+            if share < 1e-9:
+                to[:] = history[k]
+            else:
+                between(history[k], history[k + 1], share, to)
+        for g in range(3):
+            for a in range(2):
+                for b in range(2):
+                    x = A[j, i, g, 2 * a + b]
+                    known[g, a] += x * (
+                        HERMITE[g, 0] * (now[b] - first[b])
+                        + HERMITE[g, 1] * (now[2 + b] - first[2 + b])
+                        - HERMITE[g, 2] * last[b]
+                        - HERMITE[g, 3] * last[2 + b]
+                    )
+                    slope[g, a, b] += HERMITE[g, 2] * x
+                    slope[g, a, 2 + b] += HERMITE[g, 3] * x
+
+
+@njit(cache=True, nogil=True)
+def begin(column, nodes, U, h, history, q, v):
+    """The unit state of a column: history, modal displacement q and velocity v."""
+    modes = U.shape[1]
+    history[:] = 0.0
+    q[:] = 0.0
+    v[:] = 0.0
+    if column < 4 * nodes:
+        history[column // 4, column % 4] = 1.0
+    elif column < 4 * nodes + modes:
+        q[column - 4 * nodes] = 1.0
+    else:
+        v[column - 4 * nodes - modes] = 1.0
+    for a in range(2):
+        for k in range(modes):
+            history[nodes, a] += U[a, k] * q[k]
+            history[nodes, 2 + a] += h * U[a, k] * v[k]
+
+
 @njit(
     "void(float64[:,:,:,::1], float64[::1], int64, float64[:,::1], float64[:,::1], float64[:,:,::1], float64[:,:,::1],"
     " float64, float64[:,::1])",
@@ -32,7 +89,6 @@ def revolution(A, delay, nodes, U, free, push, end, h, out):
 
     ``A`` (teeth, cells, 3, 4), ``delay`` (teeth,) in cells, ``nodes`` of the history.
     """
-    teeth = len(A)
     cells = A.shape[1]
     modes = U.shape[1]
     n = len(out)
@@ -46,21 +102,8 @@ def revolution(A, delay, nodes, U, free, push, end, h, out):
     q = np.empty(modes)
     v = np.empty(modes)
     for column in range(n):
-        history[:] = 0.0
-        q[:] = 0.0
-        v[:] = 0.0
-        if column < 4 * nodes:
-            history[column // 4, column % 4] = 1.0
-        elif column < 4 * nodes + modes:
-            q[column - 4 * nodes] = 1.0
-        else:
-            v[column - 4 * nodes - modes] = 1.0
-        for a in range(2):
-            for k in range(modes):
-                history[nodes, a] += U[a, k] * q[k]
-                history[nodes, 2 + a] += h * U[a, k] * v[k]
+        begin(column, nodes, U, h, history, q, v)
         for i in range(cells):
-            now = history[nodes + i]
             right[:] = 0.0
             for k in range(modes):
                 a = free[0, k] * q[k] + free[1, k] * v[k]
@@ -73,36 +116,7 @@ def revolution(A, delay, nodes, U, free, push, end, h, out):
             B[:] = 0.0
             for r in range(4):
                 B[r, r] = 1.0
-            known[:] = 0.0
-            slope[:] = 0.0
-            for j in range(teeth):
-                cuts = False
-                for g in range(3):
-                    for c in range(4):
-                        cuts = cuts or A[j, i, g, c] != 0.0
-                if not cuts:
-                    continue
-                for which in range(2):
-                    at = nodes + i + which - delay[j]
-                    k = math.floor(at + 1e-9)
-                    share = at - k
-                    to = first if which == 0 else last
-                    if share < 1e-9:
-                        to[:] = history[k]
-                    else:
-                        between(history[k], history[k + 1], share, to)
-                for g in range(3):
-                    for a in range(2):
-                        for b in range(2):
-                            x = A[j, i, g, 2 * a + b]
-                            known[g, a] += x * (
-                                HERMITE[g, 0] * (now[b] - first[b])
-                                + HERMITE[g, 1] * (now[2 + b] - first[2 + b])
-                                - HERMITE[g, 2] * last[b]
-                                - HERMITE[g, 3] * last[2 + b]
-                            )
-                            slope[g, a, b] += HERMITE[g, 2] * x
-                            slope[g, a, 2 + b] += HERMITE[g, 3] * x
+            forces_of_waves(A, delay, i, nodes, history, first, last, known, slope)
             for g in range(3):
                 for r in range(4):
                     for a in range(2):

@@ -133,69 +133,16 @@ def step_compliances(
     most : states at most
     spacing : least distance [mm] of contact lines that are solved
     """
-    samples = _samples(steps.lines, spacing)
-    solved: dict[int, CellWorkpiece] = {}
-    loose = [0.0]
-    known: dict[tuple[int, int], Array] = {}
-
-    def compliance(k: int, rows: Indices) -> Array:
-        """Of contact lines in state k; kept, its factors only for the one used last."""
-        missing = [r for r in rows.tolist() if (k, r) not in known]
-        if missing:
-            if k not in solved:
-                solved.clear()
-                solved[k] = states[k].build()
-                loose[0] = max(loose[0], solved[k].loose)
-            work = solved[k]
-            for r, c in zip(missing, line_compliances(work, steps.lines[missing]), strict=True):
-                known[k, r] = c
-        return np.array([known[k, r] for r in rows.tolist()]).reshape(-1, len(STATIONS), 3, 3)
-
-    def rows_of(a: int, b: int) -> Indices:
-        return np.arange(*np.searchsorted(steps.step, [states[a].step, states[b].step]))
-
-    def sampled(a: int, b: int) -> Indices:
-        return samples[slice(*np.searchsorted(steps.step[samples], [states[a].step, states[b].step]))]
-
-    def deflection(k: int, rows: Indices) -> Array:
-        return np.asarray(size_of(compliance(k, rows)) * steps.force[rows])
-
-    def difference(a: int, b: int) -> float:
-        """Greatest difference of deflection between both ends of an interval."""
-        rows = sampled(a, b)
-        later, earlier = deflection(b, rows), deflection(a, rows)
-        return float(np.abs(later - earlier).max(initial=0.0))
-
-    chosen = _first_states(states)
-    spans: dict[tuple[int, int], float] = {}
-    for n, (a, b) in enumerate(pairwise(chosen)):
-        progress(n / most, "states of the workpiece")
-        spans[a, b] = difference(a, b)
-    while len(chosen) < most:
-        progress(len(chosen) / most, "states of the workpiece")
-        top = max(deflection(b, sampled(a, b)).max(initial=0.0) for a, b in spans)
-        wide = [(change, a, b) for (a, b), change in spans.items() if change > tolerance * top]
-        middle = None
-        for _, a, b in sorted(wide, reverse=True):
-            volume = 0.5 * (states[a].removed + states[b].removed)
-            between = [k for k in range(a + 1, b) if len(sampled(a, k)) and len(sampled(k, b))]
-            middle = min(between, key=lambda k: abs(states[k].removed - volume), default=None)
-            if middle is not None:
-                break
-        if middle is None:
-            break
-        del spans[a, b]
-        compliance(middle, sampled(a, b))
-        spans[a, middle], spans[middle, b] = difference(a, middle), difference(middle, b)
-        chosen = sorted([*chosen, middle])
+    solver = _Solver(steps, states, _samples(steps.lines, spacing))
+    chosen, spans = _chosen(solver, tolerance, most, progress)
     out, doubt = np.zeros((len(steps.step), len(STATIONS), 3, 3)), np.zeros(len(steps.step))
-    for a, b in sorted(spans):
-        own, rows = rows_of(a, b), sampled(a, b)
+    for a, b in spans:
+        own, rows = solver.rows(a, b), solver.sampled(a, b)
         if not len(own):
             continue
         if not len(rows):
             rows = own[:1]
-        ends = [_between(steps.lines, own, rows, compliance(k, rows)) for k in (a, b)]
+        ends = [_between(steps.lines, own, rows, solver.compliance(k, rows)) for k in (a, b)]
         out[own], doubt[own] = _in_state(steps.removed[own], states[a].removed, states[b].removed, *ends)
     first = [state.step for state in states]
     tight = np.full(len(out), -1, dtype=np.int64)
@@ -208,9 +155,9 @@ def step_compliances(
         row = int(upper.argmax())
         b = min(int(np.searchsorted(first, steps.step[row], side="right")), len(states) - 1)
         a = max(b - 1, 0)
-        rows = rows_of(a, b)
+        rows = solver.rows(a, b)
         rows = rows[upper[rows] >= NEAR * upper[row]]
-        ends = [compliance(k, rows) for k in ((a, b) if turn % 2 == 0 else (b, a))]
+        ends = [solver.compliance(k, rows) for k in ((a, b) if turn % 2 == 0 else (b, a))]
         low, high = ends if turn % 2 == 0 else ends[::-1]
         later[rows], tight[rows] = high, b
         out[rows], doubt[rows] = _in_state(steps.removed[rows], states[a].removed, states[b].removed, low, high)
@@ -219,8 +166,83 @@ def step_compliances(
     worst = worst[np.argsort(-size_of(out[worst]) * steps.force[worst], kind="stable")][:WORST]
     return StepCompliances(
         steps.step, steps.lines, out, doubt, worst, tight[worst], later[worst],
-        tuple(states[k].step for k in chosen), loose[0],
+        tuple(states[k].step for k in chosen), solver.loose,
     )  # fmt: skip
+
+
+class _Solver:
+    """Compliances of contact lines in states; ``samples`` are the rows of the steps that are solved.
+
+    Every compliance is kept, the factors only of the state that was used last.
+    """
+
+    def __init__(self, steps: StepLines, states: Sequence[State], samples: Indices) -> None:
+        self.steps, self.states, self.samples = steps, states, samples
+        self.loose = 0.0
+        self._solved: dict[int, CellWorkpiece] = {}
+        self._known: dict[tuple[int, int], Array] = {}
+
+    def compliance(self, k: int, rows: Indices) -> Array:
+        """(r, s, 3, 3) of contact lines in state k."""
+        missing = [r for r in rows.tolist() if (k, r) not in self._known]
+        if missing:
+            if k not in self._solved:
+                self._solved.clear()
+                self._solved[k] = self.states[k].build()
+                self.loose = max(self.loose, self._solved[k].loose)
+            work = self._solved[k]
+            for r, c in zip(missing, line_compliances(work, self.steps.lines[missing]), strict=True):
+                self._known[k, r] = c
+        return np.array([self._known[k, r] for r in rows.tolist()]).reshape(-1, len(STATIONS), 3, 3)
+
+    def rows(self, a: int, b: int) -> Indices:
+        """Rows of the steps from state a to state b."""
+        return np.arange(*np.searchsorted(self.steps.step, [self.states[a].step, self.states[b].step]))
+
+    def sampled(self, a: int, b: int) -> Indices:
+        """Those of them that are solved."""
+        ends = np.searchsorted(self.steps.step[self.samples], [self.states[a].step, self.states[b].step])
+        return self.samples[slice(*ends)]
+
+    def deflection(self, k: int, rows: Indices) -> Array:
+        """(r,) [mm] under the forces of the steps, in state k."""
+        return np.asarray(size_of(self.compliance(k, rows)) * self.steps.force[rows])
+
+    def difference(self, a: int, b: int) -> float:
+        """Greatest difference of deflection between both ends of an interval [mm]."""
+        rows = self.sampled(a, b)
+        later, earlier = self.deflection(b, rows), self.deflection(a, rows)
+        return float(np.abs(later - earlier).max(initial=0.0))
+
+
+def _chosen(
+    solver: _Solver, tolerance: float, most: int, progress: Progress
+) -> tuple[list[int], list[tuple[int, int]]]:
+    """States that differ by at most ``tolerance`` of the greatest deflection or are ``most``, and their intervals."""
+    states = solver.states
+    chosen = _first_states(states)
+    spans: dict[tuple[int, int], float] = {}
+    for n, (a, b) in enumerate(pairwise(chosen)):
+        progress(n / most, "states of the workpiece")
+        spans[a, b] = solver.difference(a, b)
+    while len(chosen) < most:
+        progress(len(chosen) / most, "states of the workpiece")
+        top = max(solver.deflection(b, solver.sampled(a, b)).max(initial=0.0) for a, b in spans)
+        wide = [(change, a, b) for (a, b), change in spans.items() if change > tolerance * top]
+        middle = None
+        for _, a, b in sorted(wide, reverse=True):
+            volume = 0.5 * (states[a].removed + states[b].removed)
+            between = [k for k in range(a + 1, b) if len(solver.sampled(a, k)) and len(solver.sampled(k, b))]
+            middle = min(between, key=lambda k: abs(states[k].removed - volume), default=None)
+            if middle is not None:
+                break
+        if middle is None:
+            break
+        del spans[a, b]
+        solver.compliance(middle, solver.sampled(a, b))
+        spans[a, middle], spans[middle, b] = solver.difference(a, middle), solver.difference(middle, b)
+        chosen = sorted([*chosen, middle])
+    return chosen, sorted(spans)
 
 
 def _first_states(states: Sequence[State]) -> list[int]:

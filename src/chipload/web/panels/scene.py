@@ -88,14 +88,13 @@ class ScenePanel:
         columns = {c: _called(c) for c in result.columns}
         chosen = self.column.value if self.column.value in columns else None
         self.column.set_options(columns, value=chosen or next((c for c in FIRST if c in columns), result.columns[0]))
-        await self.follow(track)
+        await self.follow(result, track)
 
-    async def follow(self, track: PageTrack) -> None:
+    async def follow(self, result: PageResult, track: PageTrack) -> None:
         """Show another track of the same result."""
-        assert self.result is not None
         self.track = track
         size = 0.25 * float(np.linalg.norm(self.box[1] - self.box[0]))
-        made, unknown = await asyncio.to_thread(cutters_of, self.result, track, size)
+        made, unknown = await asyncio.to_thread(cutters_of, result, track, size)
         for shape in (*self.cutters.values(), *self.marks):
             shape.delete()
         self.cutters = {n: self.view.gltf(self.assets.put(glb)).visible(False) for n, glb in made.items()}

@@ -41,7 +41,7 @@ class SourcePanel:
             self.html.set_content('<div class="cl-none">The text of the program is not in the opened folder.</div>')
             return
         self.name.set_text(self.text.name + (f" \u00b7 {self.text.note}" if self.text.note else ""))
-        self._window(1)
+        self._window(self.text, 1)
 
     def at(self, row: int) -> None:
         """Stand at the line of a row."""
@@ -54,7 +54,7 @@ class SourcePanel:
         last = min(self.first + WINDOW, len(self.text.lines))
         near = line - self.first <= MARGIN and self.first > 0
         if line <= self.first or line > last or near or (last - line < MARGIN and last < len(self.text.lines)):
-            self._window(line)
+            self._window(self.text, line)
         place = f"document.getElementById('c{self.html.id}')"
         ui.run_javascript(
             f"setTimeout(() => {{ const box = {place}; if (!box) return;"
@@ -75,15 +75,14 @@ class SourcePanel:
         before = lines[(lines < here) & (lines > 0)]
         return self.text.row_of(int(before.max())) if len(before) else None
 
-    def _window(self, line: int) -> None:
-        assert self.text is not None
-        count = len(self.text.lines)
+    def _window(self, text: Source, line: int) -> None:
+        count = len(text.lines)
         self.first = max(0, min(line - WINDOW // 2, count - WINDOW))
         last = min(self.first + WINDOW, count)
         out = [f'<div class="cl-none">\u2026 {self.first} lines above</div>'] if self.first else []
         out += [
             f'<div class="cl-line{" cl-now" if k == self.line else ""}" data-line="{k}"><i>{k}</i>'
-            f"{escape(self.text.lines[k - 1][:WIDEST]) or ' '}</div>"
+            f"{escape(text.lines[k - 1][:WIDEST]) or ' '}</div>"
             for k in range(self.first + 1, last + 1)
         ]
         out += [f'<div class="cl-none">\u2026 {count - last} lines below</div>'] if last < count else []

@@ -122,8 +122,6 @@ def row_compliances(
 
 
 def _check(before: SolidWorkpiece, done: SolidWorkpiece) -> None:
-    assert before.kept is not None
-    assert done.kept is not None
     empty = done.kept[:, 0] >= done.kept[:, 1]
     back = ~empty & ((done.kept[:, 0] < before.kept[:, 0]) | (done.kept[:, 1] > before.kept[:, 1]))
     if back.any():
@@ -160,7 +158,6 @@ def _eliminated(
     here: NDArray[np.bool_],
 ) -> CondensedPart:
     """The part with one row more, condensed on the next plane."""
-    assert solid.kept is not None
     grid = solid.grid
     there = row[solid.kept[row, 1] > solid.kept[row, 0]]
     free = ~solid.held.ravel()
@@ -242,7 +239,6 @@ def _factor(K: Array, element: int | None) -> Array:
 
 def _dense(solid: SolidWorkpiece, elements: Indices, at: Indices, size: int) -> Array:
     """Stiffness (size, size) of elements; ``at`` (m, 60) int the rows of their degrees of freedom, -1: held."""
-    assert solid.kept is not None
     xyz = solid.grid.nodes[solid.grid.elements[elements]]
     K = stiffness(xyz, solid.modulus, solid.poisson, solid.rule, solid.kept[elements], elements)
     rows, columns = np.repeat(at, 60, axis=1).ravel(), np.tile(at, (1, 60)).ravel()
