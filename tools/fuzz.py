@@ -7,7 +7,8 @@ are not finite, or the death of the process), **hang** (over 20 s, longer where 
 (over 4 GiB). Faults, hangs and memory must be 0, and the exit code is 1 where they are not.
 
 `--jobs` sets every numeric value of the job of every example to 0, -1, 1e-9, 1e9, nan, inf and a text, loads the job
-and checks it as `chipload check` does; with `--run` it also runs it where the example itself runs in a few seconds.
+and checks it as `chipload check` does; `--jobs --run` does the same to small jobs and runs them too (``fuzz_jobs``). A
+run that goes on as it should for some seconds of the processor ends as **long**.
 """
 
 from __future__ import annotations
@@ -22,21 +23,19 @@ import subprocess
 import sys
 import tempfile
 import time
-import tomllib
 import traceback
 import warnings
 import zlib
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from fuzz_jobs import carry_out, case
 from fuzz_readers import READERS, Nonsense
 
 #: [s] and [bytes] that a case may take
 SLOW, MEMORY = 20.0, 4 << 30
-KINDS = ("cases", "read", "findings", "refused", "fault", "hang", "memory")
+KINDS = ("cases", "read", "findings", "refused", "long", "fault", "hang", "memory")
 #: what is put in the place of a number
 NUMBERS = [
     b"0",
@@ -54,10 +53,6 @@ NUMBERS = [
 #: what is put anywhere
 TOKENS = [b"\0", b"\r", b"\n\n", b"\x1b[2J", b"\xff\xfe", b"[" * 3000, b"(" * 200, b"'", b'"', b"#", b"%", b"=", b",",
           b";", "é\u202e".encode(), b" " * 5000, b"-", b"/*", b"$"]  # fmt: skip
-#: values of jobs
-VALUES = ["0", "-1", "1e-9", "1e9", "nan", "inf", '"text"']
-#: examples that run within a few seconds
-SHORT = ("contour", "pocket")
 
 
 # -- damage -----------------------------------------------------------------------------------------------------
@@ -148,19 +143,18 @@ def serve(reader: str) -> None:
     from chipload.errors import InputError
 
     place = Path(tempfile.mkdtemp(prefix="fuzz-"))
-    jobs = list(job_cases()) if reader in ("jobs", "runs") else []
-    seeds = READERS[reader].seeds() if not jobs else []
+    jobs = reader in ("jobs", "runs")
+    seeds = [] if jobs else READERS[reader].seeds()
     try:
         for line in sys.stdin:
             number, said = int(line), ""
             try:
                 if jobs:
-                    count = job(*jobs[number], place, reader == "runs")
+                    end = carry_out(number, reader == "runs", place)
                 else:
                     path = place / f"case{READERS[reader].suffix}"
                     path.write_bytes(case_of(reader, number, seeds))
-                    count = READERS[reader].read(path)
-                end = "findings" if count else "read"
+                    end = "findings" if READERS[reader].read(path) else "read"
             except InputError as err:
                 end, said = "refused", str(err)
                 if not said or "Traceback" in said:
@@ -177,56 +171,6 @@ def serve(reader: str) -> None:
             out.flush()
     finally:
         shutil.rmtree(place, ignore_errors=True)
-
-
-def leaves(value: Any, at: str = "") -> Iterator[str]:
-    """Dotted places of the numbers of a table; of a list of numbers the list is left out."""
-    if isinstance(value, dict):
-        for key, held in value.items():
-            yield from leaves(held, f"{at}.{key}" if at else key)
-    elif isinstance(value, list):
-        for k, held in enumerate(value):
-            yield from leaves(held, f"{at}.{k}")
-    elif isinstance(value, (int, float)) and not isinstance(value, bool):
-        yield at
-
-
-def job_cases() -> Iterator[tuple[str, str, str]]:
-    """Example, place of a number and what it is set to."""
-    from importlib import resources
-
-    for folder in sorted(resources.files("chipload.examples").iterdir(), key=str):
-        if folder.joinpath("job.toml").is_file():
-            for at in leaves(tomllib.loads(folder.joinpath("job.toml").read_text("utf-8"))):
-                for value in VALUES:
-                    yield folder.name, at, value
-
-
-def job(name: str, at: str, value: str, place: Path, whole: bool) -> int:
-    """Load and check a job with one number changed, or run it; how many limits do not hold."""
-    from chipload.jobs.dispatch import look
-
-    from chipload.examples import copy_example
-    from chipload.jobs import load_job
-
-    folder = place / name
-    if not folder.exists():
-        copy_example(name, folder)
-    read = load_job(folder / "job.toml", [f"{at}={value}"])
-    lines, holds = look(read)
-    if any(word in f" {' '.join(lines)} " for word in (" nan ", " inf ")):
-        raise Nonsense(next(line for line in lines if "nan" in line or "inf" in line))
-    if whole and name in SHORT:
-        from chipload.jobs.dispatch import run
-
-        from chipload.report.folder import write_result
-
-        done = run(read)
-        target = write_result(done, place / "result")
-        text = (target / "summary.json").read_text("utf-8")
-        if re.search(r"\b(NaN|Infinity)\b", text):
-            raise Nonsense("summary.json holds a number that is not finite")
-    return 0 if holds else 1
 
 
 # -- in the parent ----------------------------------------------------------------------------------------------
@@ -319,7 +263,7 @@ def main() -> int:
     ask.add_argument("--first", type=int, default=0, metavar="K", help="number of the first case")
     ask.add_argument("--reader", action="append", choices=[*READERS, "jobs", "runs"], help="only this one; repeatable")
     ask.add_argument("--jobs", action="store_true", help="extreme jobs instead of damaged files")
-    ask.add_argument("--run", action="store_true", help="with --jobs: run the short ones too")
+    ask.add_argument("--run", action="store_true", help="with --jobs: small jobs, which are run too")
     ask.add_argument("--case", type=int, help="only this case, in this process, with its traceback")
     ask.add_argument("--keep", type=Path, metavar="FILE", help="with --case: write the damaged file there")
     ask.add_argument("--serve", help=argparse.SUPPRESS)
@@ -335,8 +279,7 @@ def main() -> int:
     begin = time.monotonic()
     for k, name in enumerate(names):
         share = (begin + given.budget - time.monotonic()) / (len(names) - k)
-        most = min(given.cases, len(list(job_cases())) - given.first) if name in ("jobs", "runs") else given.cases
-        found, worse = campaign(name, given.first, most, time.monotonic() + share)
+        found, worse = campaign(name, given.first, given.cases, time.monotonic() + share)
         print(f"| {name} | {' | '.join(str(found[kind]) for kind in KINDS)} |", flush=True)
         total += found
         bad += worse
@@ -348,10 +291,9 @@ def main() -> int:
 
 def _one(reader: str, number: int, keep: Path | None) -> int:
     if reader in ("jobs", "runs"):
-        case = list(job_cases())[number]
-        print(case)
+        print(case(number, reader == "runs"))
         with tempfile.TemporaryDirectory() as place:
-            print(job(*case, Path(place), reader == "runs"))
+            print(carry_out(number, reader == "runs", Path(place)))
         return 0
     seeds = READERS[reader].seeds()
     with tempfile.TemporaryDirectory() as place:

@@ -1,69 +1,105 @@
 """Mutation run: small changes of physics files, each of which a test should notice.
 
-    python tools/mutate.py --mutants 80 --seed 1 --table docs/design/mutations.md
+    python tools/mutate.py --mutants 300 --seed 1
 
 A mutant changes one operator, comparison, function or number of one file. A sample is drawn at random with a seed, from
-each file in proportion to its possible changes, at least one. Each mutant runs in a copy of the repository, against the
-tests that :data:`FILES` names for its file and the examples of its docstrings, with a time limit. A mutant that ends in
-a failure or beyond the limit is killed; one that survives is listed with its line, unless :data:`EQUIVALENT` says why
-it changes nothing.
+each file in proportion to its possible changes, at least one. Each mutant runs against the tests that call the changed
+function (``mutate_run``), examples of docstrings included; compiled kernels run as the Python that they are written in.
+A change outside every function runs in a copy of the repository. A mutant that ends in a failure or beyond its time is
+killed; one that survives is listed with its line, unless :data:`EQUIVALENT` says why it changes nothing.
+
+What is known is kept in the folder `--kept`: run again, only survivors and new mutants are run, and only tests of
+changed files are mapped.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import hashlib
+import importlib
+import json
 import multiprocessing
 import os
 import random
 import shutil
+import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numba
-import numpy  # noqa: F401
-import pytest
-import scipy.interpolate
-import scipy.linalg
-import scipy.sparse.linalg  # noqa: F401
-import shapely  # noqa: F401
+
+sys.path.insert(0, str(Path(__file__).parent))
+from mutate_run import Collected, collect, function_at, put_in_place
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = "src/chipload/"
 
-#: physics files and the tests that map to each
-FILES: dict[str, tuple[str, ...]] = {
-    "structure/shell.py": ("tests/structure/test_shell.py", "tests/structure/test_shell_stress.py"),
-    "structure/stress.py": ("tests/structure/test_stress.py",),
-    "structure/hexa.py": ("tests/structure/test_hexa.py",),
-    "structure/beam.py": ("tests/structure/test_beam.py",),
-    "structure/modes.py": ("tests/structure/test_modes.py",),
-    "structure/receptance.py": ("tests/structure/test_receptance.py",),
-    "structure/removal.py": ("tests/structure/test_removal.py",),
-    "structure/grid.py": ("tests/structure/test_grid.py",),
-    "structure/places.py": ("tests/structure/test_grid.py", "tests/structure/test_removal.py"),
-    "structure/spindle.py": ("tests/structure/test_spindle.py",),
-    "cutting/force.py": ("tests/cutting/test_force.py", "tests/cutting/test_general.py"),
-    "cutting/wall_error.py": ("tests/cutting/test_wall_error.py",),
-    "cutting/material.py": ("tests/cutting/test_material.py", "tests/cutting/test_size_effect.py"),
-    "engagement/contact.py": ("tests/engagement/test_contact.py",),
-    "engagement/tooth_engagement.py": ("tests/engagement/test_tooth_engagement.py",),
-    "control/limit.py": ("tests/control/test_limit.py",),
-    "control/override.py": ("tests/control/test_override.py",),
-    "control/spindle.py": ("tests/control/test_spindle.py",),
-    "control/wall.py": ("tests/control/test_wall.py",),
-    "planning/thinwall/depth.py": ("tests/planning/thinwall/test_depth.py",),
-    "planning/thinwall/plane_stock.py": ("tests/planning/thinwall/test_depth.py",),
-    "planning/thinwall/threshold.py": ("tests/planning/thinwall/test_threshold.py",),
-    "stock/layers.py": ("tests/stock/test_layers.py",),
-    "stock/planar.py": ("tests/stock/test_planar.py",),
-    "stock/rings.py": ("tests/stock/test_rings.py",),
-    "machine/feed.py": ("tests/machine/test_feed.py",),
-}
+#: physics files
+FILES = (
+    "structure/shell.py",
+    "structure/stress.py",
+    "structure/hexa.py",
+    "structure/beam.py",
+    "structure/modes.py",
+    "structure/receptance.py",
+    "structure/removal.py",
+    "structure/grid.py",
+    "structure/places.py",
+    "structure/spindle.py",
+    "cutting/force.py",
+    "cutting/wall_error.py",
+    "cutting/material.py",
+    "cutting/strength.py",
+    "cutting/band.py",
+    "engagement/contact.py",
+    "engagement/tooth_engagement.py",
+    "control/limit.py",
+    "control/override.py",
+    "control/spindle.py",
+    "control/wall.py",
+    "planning/thinwall/depth.py",
+    "planning/thinwall/plane_stock.py",
+    "planning/thinwall/threshold.py",
+    "stock/layers.py",
+    "stock/planar.py",
+    "stock/rings.py",
+    "machine/feed.py",
+)
+#: compiled kernels of physics
+KERNELS = (
+    "structure/_kernels.py",
+    "cutting/_kernels.py",
+    "cutting/_strength.py",
+    "cutting/revolution/_kernels.py",
+    "cutting/bending/_kernels.py",
+    "stability/_kernels.py",
+    "stability/directional/_kernels.py",
+    "stability/location/_kernels.py",
+    "control/_estimator.py",
+    "control/_override.py",
+    "control/_plant.py",
+    "engagement/_kernels.py",
+)
+#: tests that are collected
+TESTS = (
+    "tests/structure",
+    "tests/cutting",
+    "tests/engagement",
+    "tests/stability",
+    "tests/control",
+    "tests/planning/thinwall",
+    "tests/stock",
+    "tests/machine/test_feed.py",
+    "tests/laws/test_force_laws.py",
+    "tests/laws/test_shell_loads.py",
+    "tests/laws/test_units_of_chips.py",
+)
+#: longest test that takes part, and tests of a mutant together [s]
+LONGEST_S, TOGETHER_S = 10.0, 40.0
 
 #: (file, the line as changed, stripped): why no test can notice it
 EQUIVALENT: dict[tuple[str, str], str] = {
@@ -179,67 +215,122 @@ def sample(count: int, seed: int, files: list[str]) -> list[Mutant]:
     return rng.sample(chosen, min(count, len(chosen)))
 
 
-def _child(copy: str, tests: tuple[str, ...]) -> None:
-    """Run tests in the copy and end with pytest's code; their output is dropped."""
-    sink = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(sink, 1)
-    os.dup2(sink, 2)
-    os.chdir(copy)
-    sys.dont_write_bytecode = True
-    sys.path.insert(0, f"{copy}/src")
-    os.environ["PYTHONPATH"] = f"{copy}/src"
-    os._exit(int(pytest.main(["-x", "-q", "-p", "no:cacheprovider", *tests])))
+@dataclass(frozen=True)
+class Answer:
+    """What became of a mutant: ``killed``, ``survived``, or ``outside`` every function; and its number of tests."""
+
+    end: str
+    tests: int
 
 
-def _passes(copy: Path, tests: tuple[str, ...], limit_s: float) -> bool:
-    """Whether the tests of a file pass in the copy within the time limit; the libraries are imported once for all."""
-    child = multiprocessing.get_context("fork").Process(target=_child, args=(str(copy), tests))
-    child.start()
-    child.join(limit_s)
-    if child.is_alive():
-        child.kill()
-        child.join()
-    return child.exitcode == 0
+def work(mutants: list[Mutant], kept: Path, compiled: bool, tell: Callable[[Mutant, Answer], None]) -> None:
+    """Run mutants in children of this process, which imports chipload and its tests."""
+    numba.config.DISABLE_JIT = not compiled
+    numba.config.CACHE_DIR = str(kept / "numba")
+    os.chdir(ROOT)
+    sys.path.insert(0, str(ROOT / "src"))
+    files = sorted({m.file for m in mutants})
+
+    def every(collected: Collected) -> None:
+        collected.map(kept / ("compiled.json" if compiled else "python.json"))
+        for m in mutants:
+            source = (ROOT / SOURCE / m.file).read_bytes()
+            line = function_at(source, m.line)
+            module = sys.modules["chipload." + m.file.removesuffix(".py").replace("/", ".")]
+            if line is None or not put_in_place(module, source, m.line):
+                names = [n for n, calls in collected.calls.items() if any(f == m.file for f, _ in calls)]
+                names.sort(key=lambda n: collected.seconds[n])
+                _in_a_copy(m, names[:40], kept, compiled, tell)
+                continue
+            tests = collected.tests_of((m.file, line), TOGETHER_S)
+            limit = 20.0 + 6.0 * sum(collected.seconds[t.nodeid] for t in tests)
+            alive = collected.survives(module, m.applied(source), m.line, tests, limit)
+            tell(m, Answer("survived" if alive else "killed", len(tests)))
+
+    words = [*TESTS, *(SOURCE + f for f in files)]
+    for file in files:
+        importlib.import_module("chipload." + file.removesuffix(".py").replace("/", "."))
+    collect(words, kept / "scratch", Collected(ROOT / SOURCE, [*FILES, *KERNELS], LONGEST_S, every))
 
 
-def run(mutants: list[Mutant], report: Path, heading: str, seconds: float) -> None:
-    """Run mutants until the time is over and write the table after each file."""
-    killed: dict[str, int] = {}
-    survived: dict[str, list[str]] = {}
-    same: dict[str, list[str]] = {}
-    begun = time.monotonic()
-    with tempfile.TemporaryDirectory(prefix="mutate-") as folder:
-        copy = Path(folder)
-        numba.config.CACHE_DIR = str(copy / "numba")
+def _in_a_copy(m: Mutant, tests: list[str], kept: Path, compiled: bool, tell: Callable[[Mutant, Answer], None]) -> None:
+    """Run a change outside every function in a copy of the repository, in a process of its own."""
+    copy = kept / "copy"
+    if not copy.exists():
         for name in ("src", "tests"):
             shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__"))
         shutil.copy(ROOT / "pyproject.toml", copy)
-        limits: dict[str, float] = {}
-        for m in mutants:
-            if time.monotonic() - begun > seconds:
-                break
-            tests = (*FILES[m.file], SOURCE + m.file)  # with the examples of its docstrings
-            if m.file not in limits:
-                start = time.monotonic()
-                if not _passes(copy, tests, 600.0):
-                    raise SystemExit(f"{m.file}: its tests fail without a mutant: {' '.join(tests)}")
-                limits[m.file] = 30.0 + 4.0 * (time.monotonic() - start)
-            target = copy / SOURCE / m.file
-            source = target.read_bytes()
-            text = m.text(source)
-            target.write_bytes(m.applied(source))
-            alive = _passes(copy, tests, limits[m.file])
-            target.write_bytes(source)
-            killed.setdefault(m.file, 0)
-            line = f"* `{m.file}:{m.line}`: `{m.before}` becomes `{m.after}` in `{text}`"
-            if not alive:
-                killed[m.file] += 1
-            elif (m.file, text) in EQUIVALENT:
-                same.setdefault(m.file, []).append(f"{line}: equivalent, {EQUIVALENT[m.file, text]}")
-            else:
-                survived.setdefault(m.file, []).append(line)
-            print(f"{'survived' if alive else 'killed':8} {line}", flush=True)
-            report.write_text(_table(killed, survived, same, heading))
+    target, source = copy / SOURCE / m.file, (ROOT / SOURCE / m.file).read_bytes()
+    target.write_bytes(m.applied(source))
+    more = {"PYTHONPATH": f"{copy}/src", "NUMBA_CACHE_DIR": str(copy / "numba"), "PYTHONDONTWRITEBYTECODE": "1"}
+    if not compiled:
+        more["NUMBA_DISABLE_JIT"] = "1"
+    words = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *(tests or [SOURCE + m.file])]
+    try:
+        done = subprocess.run(words, cwd=copy, env=os.environ | more, capture_output=True, timeout=600, check=False)
+        code = done.returncode
+    except subprocess.TimeoutExpired:
+        code = 1
+    target.write_bytes(source)
+    tell(m, Answer("survived" if code in (0, 5) else "killed", len(tests)))
+
+
+def run(mutants: list[Mutant], kept: Path, report: Path, heading: str) -> None:
+    """Run mutants that are not known to be killed, and write the table."""
+    kept.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(kept / "copy", ignore_errors=True)
+    log = kept / "mutants.jsonl"
+    known: dict[str, Answer] = {}
+    for text in log.read_text().splitlines() if log.exists() else ():
+        name, end, tests = json.loads(text)
+        known[name] = Answer(end, tests)
+    todo = [m for m in mutants if known.get(_name(m), Answer("survived", 0)).end != "killed"]
+
+    def tell(m: Mutant, answer: Answer) -> None:
+        with log.open("a") as out:
+            out.write(json.dumps([_name(m), answer.end, answer.tests]) + "\n")
+        text = m.text((ROOT / SOURCE / m.file).read_bytes())
+        print(f"{answer.end:8} {answer.tests:4} {m.file}:{m.line} {m.before} -> {m.after}: {text}", flush=True)
+
+    for compiled, files in ((True, FILES), (False, KERNELS)):
+        some = [m for m in todo if m.file in files]
+        if some:
+            child = multiprocessing.get_context("fork").Process(target=work, args=(some, kept, compiled, tell))
+            child.start()
+            child.join()
+            if child.exitcode:
+                raise SystemExit("the mutation run was not finished")
+    for text in log.read_text().splitlines():
+        name, end, tests = json.loads(text)
+        known[name] = Answer(end, tests)
+    report.write_text(_report(mutants, known, heading))
+
+
+def _name(m: Mutant) -> str:
+    """Of a mutant of a source as it is."""
+    digest = hashlib.sha256((ROOT / SOURCE / m.file).read_bytes()).hexdigest()[:16]
+    return f"{m.file} {digest} {m.start} {m.before} {m.after}"
+
+
+def _report(mutants: list[Mutant], known: dict[str, Answer], heading: str) -> str:
+    """The table of all mutants that were run."""
+    killed: dict[str, int] = {}
+    survived: dict[str, list[str]] = {}
+    same: dict[str, list[str]] = {}
+    for m in mutants:
+        answer = known.get(_name(m))
+        if answer is None:
+            continue
+        killed.setdefault(m.file, 0)
+        text = m.text((ROOT / SOURCE / m.file).read_bytes())
+        line = f"* `{m.file}:{m.line}`: `{m.before}` becomes `{m.after}` in `{text}`"
+        if answer.end == "killed":
+            killed[m.file] += 1
+        elif (m.file, text) in EQUIVALENT:
+            same.setdefault(m.file, []).append(f"{line}: equivalent, {EQUIVALENT[m.file, text]}")
+        else:
+            survived.setdefault(m.file, []).append(f"{line} ({answer.tests} tests call it)")
+    return _table(killed, survived, same, heading)
 
 
 def _table(killed: dict[str, int], survived: dict[str, list[str]], same: dict[str, list[str]], heading: str) -> str:
@@ -276,19 +367,18 @@ def _table(killed: dict[str, int], survived: dict[str, list[str]], same: dict[st
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description="Mutation run over the physics files.")
-    parser.add_argument("--mutants", type=int, default=80)
+    parser.add_argument("--mutants", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--seconds", type=float, default=1e9, help="no mutant is begun after this time")
     parser.add_argument("--table", type=Path, default=ROOT / "docs" / "design" / "mutations.md")
+    parser.add_argument("--kept", type=Path, default=Path(tempfile.gettempdir()) / "chipload-mutants")
     parser.add_argument("--only", nargs="*", default=None, help="files below src/chipload")
     asked = parser.parse_args()
-    files = asked.only if asked.only else list(FILES)
-    mutants = sample(asked.mutants, asked.seed, files)
+    files = asked.only if asked.only else [*FILES, *KERNELS]
     heading = (
         f"Made by `python tools/mutate.py --mutants {asked.mutants} --seed {asked.seed}`; each mutant ran against the "
-        "tests of its file alone."
+        "tests that call the changed function."
     )
-    run(mutants, asked.table, heading, asked.seconds)
+    run(sample(asked.mutants, asked.seed, files), asked.kept, asked.table, heading)
 
 
 if __name__ == "__main__":

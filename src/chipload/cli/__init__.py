@@ -27,11 +27,15 @@ app.registered_commands.sort(key=lambda c: ORDER.index(c.name or getattr(c.callb
 
 def main() -> NoReturn:
     """Entry of the command ``chipload``."""
-    signal.signal(signal.SIGTERM, _stop)
+    for name in ("SIGTERM", "SIGHUP"):
+        # under nohup a terminal that closes is ignored
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _stop)
     app()
     sys.exit(0)
 
 
 def _stop(_number: int, _frame: object) -> NoReturn:
-    """A polite kill stops as Ctrl-C does."""
+    """A polite kill, and a terminal that closes, stop as Ctrl-C does."""
     raise KeyboardInterrupt

@@ -44,7 +44,7 @@ def run(
     """
 
     def work() -> int:
-        from chipload.jobs import load_job, run_job
+        from chipload.jobs import load_job, resume_note, run_job
 
         loaded = load_job(job, sets or ())
         if coarse:
@@ -57,8 +57,8 @@ def run(
         check_target(out)
         if not 0.0 <= keep_s < math.inf:
             raise InputError(f"--keep-s = {keep_s:g}: must be at least 0 s")
-        if not loaded.capability.resumes:
-            say(f"a {loaded.capability.name} job does not resume: if it is stopped, it begins again")
+        if note := resume_note(loaded):
+            say(note)
         with Checkpoint(checkpoint_folder(out), keep_s, fresh=fresh, notice=say) as kept:
             try:
                 with bar() as progress:

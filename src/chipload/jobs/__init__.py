@@ -247,6 +247,15 @@ def run_job(
     return FinishedJob(result, capability.module("figures").presentation_of(outcome), outcome)
 
 
+def resume_note(loaded: LoadedJob) -> str:
+    """What of a job is not kept while it runs, so that it begins again where it is stopped; empty: all is kept."""
+    capability = loaded.capability
+    if not capability.resumes:
+        article = "an" if capability.name[0] in "aeiou" else "a"
+        return f"{article} {capability.name} job does not resume: if it is stopped, it begins again"
+    return str(capability.module("job").resume_note(loaded.job))
+
+
 def unconfirmed(loaded: LoadedJob) -> str:
     """What is said of a job with guesses."""
     count = len(loaded.guesses)

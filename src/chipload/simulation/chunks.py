@@ -12,7 +12,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,19 @@ SUMS = "chipload sums of a simulation 1"
 ARRAYS = {"handed": 1, "numbers": 1, "basis": 2, "rapids": 1, "of": 1, "height": 1, "tip": 2, "axis": 2}
 
 
+class WatchState(Protocol):
+    """What a watch keeps from one step to the next; it belongs to the state of the run."""
+
+    def to_bytes(self) -> bytes:
+        """All that it keeps, as the bytes of an ``.npz`` file."""
+
+    def restore(self, path: Path) -> None:
+        """Keep what :meth:`to_bytes` wrote, in place of what it keeps; InputError: the file is not such a one."""
+
+    def clear(self) -> None:
+        """Keep nothing: the run begins again."""
+
+
 def remove_in_chunks(
     program: Program,
     stock: LayeredStock,
@@ -64,6 +77,7 @@ def remove_in_chunks(
     *,
     interpolation: Interpolation = "slerp",
     watch: Watch | None = None,
+    keeps: WatchState | None = None,
     times: Floats | None = None,
     also: Any = (),
     workers: int = 2,
@@ -75,6 +89,7 @@ def remove_in_chunks(
     Parameters
     ----------
     unfinished : the folder of the run; it holds the columns of the result, and stays until it is discarded
+    keeps : of ``watch``, where it keeps something beside its columns
     times, engine : as of :func:`chipload.simulation.chips.remove`
     also : values of any kind on which the result depends beside the arguments: versions, what ``watch`` uses
 
@@ -115,6 +130,8 @@ def remove_in_chunks(
             found_sums = _read_sums(kept["sums"], cutters)
             if setting.moves is None or "stock" in kept:
                 state = LayeredStock.load(kept["stock"]).state()
+            if keeps is not None:
+                keeps.restore(kept["watch"])
         except (InputError, KeyError) as err:
             unfinished.set_aside(str(err))
             kept = None
@@ -127,12 +144,14 @@ def remove_in_chunks(
             setting.moves.skip(program, resolution.step_mm, sums.steps)
         unfinished.notice(f"goes on after step {sums.steps} of {count}, kept in {unfinished.folder}")
     try:
-        sums, columns = _removed(program, stock, sums, setting, unfinished, count, times, progress)
+        sums, columns = _removed(program, stock, sums, setting, unfinished, count, times, keeps, progress)
     except HandOver as found:
         setting, handed = by_layers(engine, setting, found)
         unfinished.again(f"goes on by layers from the beginning: line {found.line}: {found.why}")
         sums = RunningSums(stock.volume(), handed=handed)
-        sums, columns = _removed(program, stock, sums, setting, unfinished, count, times, progress)
+        if keeps is not None:
+            keeps.clear()
+        sums, columns = _removed(program, stock, sums, setting, unfinished, count, times, keeps, progress)
     if setting.moves is not None:
         setting.moves.finish(stock)
     progress(1.0, "removed")
@@ -148,6 +167,7 @@ def _removed(
     unfinished: Checkpoint,
     count: int,
     times: Floats | None,
+    keeps: WatchState | None,
     progress: Progress,
 ) -> tuple[RunningSums, list[Columns]]:
     """The sums after all steps, and the columns that did not go into files."""
@@ -156,7 +176,8 @@ def _removed(
     def state() -> dict[str, bytes]:
         # the moves come from the program again
         layers = {} if setting.moves is not None else {"stock": stock.to_bytes()}
-        return layers | {"sums": _sums_bytes(sums, cutters)}
+        watched = {} if keeps is None else {"watch": keeps.to_bytes()}
+        return layers | watched | {"sums": _sums_bytes(sums, cutters)}
 
     done = sums.steps
     since, cost, waiting, columns = time.monotonic(), 0.0, 0, list[Columns]()

@@ -23,13 +23,14 @@ def work(job: str, out: str) -> dict[str, Any]:
     """Run the job and write its result; the exit code that `chipload run` has, and what it says."""
     safe = 0
     try:
-        from chipload.jobs import load_job, run_job
+        from chipload.jobs import load_job, resume_note, run_job
         from chipload.report.folder import check_target, checkpoint_folder, write_finished
         from chipload.simulation.checkpoint import Checkpoint
 
         tell = Teller()
         tell(0.0, "reading")
         read = load_job(job)
+        tell(0.0, resume_note(read) or "reading")
         check_target(out)
         with Checkpoint(checkpoint_folder(out)) as kept:
             try:

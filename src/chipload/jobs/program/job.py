@@ -132,3 +132,23 @@ def _contradictions(table: ProgramJobTable) -> Iterator[str]:
     if not table.limits.stated:
         names = ", ".join(ProgramLimitsTable.model_fields)
         yield f"limits: none is stated, so nothing would be checked: state at least one of {names}"
+
+
+def resume_note(job: ProgramJob) -> str:
+    """What is not kept while the job runs; the simulation of the program that comes out is."""
+    if not job.simulates:
+        return ""
+    op = job.table.operation[0]
+    passes = [
+        text
+        for text, there in (
+            ("new feeds", op.feeds is not None),
+            ("new speeds", op.speeds is not None),
+            ("the compliance of the workpiece", job.table.workpiece is not None),
+        )
+        if there
+    ]
+    if not passes:
+        return ""
+    found = " and ".join(passes)
+    return f"what finds {found} does not resume: if it is stopped there, it begins again; the last pass resumes"

@@ -291,8 +291,7 @@ def _simulated(
     def removing(done: float, what: str) -> None:
         progress(SHARE + 0.8 * done, what)
 
-    # the different cuts are kept in memory, for the speeds: such a run does not go on where it was stopped
-    if checkpoint is None or stability_watch is not None:
+    if checkpoint is None:
         removal = remove(
             program, stock, job.cutters, material, fine, interpolation=op.interpolation, watch=watch, times=times,
             engine=op.engine, progress=removing,
@@ -301,8 +300,11 @@ def _simulated(
         formed = None if made is None else (made.points, made.faces, made.distance, made.step)
         removal = remove_in_chunks(
             program, stock, job.cutters, material, fine, checkpoint, interpolation=op.interpolation, watch=watch,
-            times=times, engine=op.engine, progress=removing,
-            also=(versions(), sources(), repr((stiffness, job.table.workpiece)), repr(job.table.checks), formed),
+            keeps=stability_watch, times=times, engine=op.engine, progress=removing,
+            also=(
+                versions(), sources(), repr((stiffness, job.table.workpiece)), repr(job.table.checks), formed,
+                None if stability_watch is None else stability_watch.dynamics,
+            ),
         )  # fmt: skip
     removal = with_columns(removal, (*watched(gives, formed=made is not None), *CHECK_COLUMNS))
     removal = replace(

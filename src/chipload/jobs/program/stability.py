@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from chipload.cutting.material import Material
 from chipload.jobs.program.dynamics import Dynamics
+from chipload.jobs.program.stability_state import asked_bytes, joined, read_asked
 from chipload.machine.machine import Machine
 from chipload.result import LimitCheck, check_limit
 from chipload.result.limits import Columns
@@ -113,6 +115,18 @@ class StabilityWatch:
             columns.append(stable_probability(some, self.dynamics.spread, _relative_covariance(self.material)))
         return zip(*(x.tolist() for x in columns), strict=True)
 
+    def to_bytes(self) -> bytes:
+        """What it was asked so far, for the state of a run."""
+        return asked_bytes(self.known, self.cuts, self.leaning, len(self.columns))
+
+    def restore(self, path: Path) -> None:
+        """Keep what an earlier run was asked."""
+        self.known, self.cuts, self.leaning = read_asked(path, self.dynamics.modes, self.material.exponents)
+
+    def clear(self) -> None:
+        """Keep nothing."""
+        self.known, self.cuts, self.leaning = {}, {}, set()
+
     def parts(self, tool: int) -> DynamicCuts | None:
         """Cuts of a tool that speeds are looked for with; None: it has none."""
         some = self.cuts.get(tool, [])
@@ -123,14 +137,6 @@ class StabilityWatch:
         first = np.argsort(margin, kind="stable")[:NEAREST]
         most = np.argsort(-engaged_edge(whole), kind="stable")[:LARGEST]
         return whole.chosen(np.unique(np.concatenate([first, most])))
-
-
-def joined(some: list[DynamicCuts]) -> DynamicCuts:
-    """Cuts of one tool, one behind the other."""
-    sizes = np.concatenate([np.diff(c.start) for c in some])
-    start = np.concatenate([[0], np.cumsum(sizes)])
-    rows, period, U = (np.concatenate([getattr(c, name) for c in some]) for name in ("rows", "period", "U"))
-    return DynamicCuts(start, rows, some[0].exponents, period, some[0].pitch, some[0].modes, U)
 
 
 def engaged_edge(cuts: DynamicCuts) -> Floats:

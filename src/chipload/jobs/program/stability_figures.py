@@ -13,9 +13,9 @@ from chipload.jobs.program.stability import (
     StabilityResult,
     engaged_edge,
     filled_margins,
-    joined,
     stability_numbers,
 )
+from chipload.jobs.program.stability_state import joined
 from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, STOCK
 from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table

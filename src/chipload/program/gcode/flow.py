@@ -369,6 +369,19 @@ class Flow:
                 self.c.parameters.assign(key, value)
             self.i.execute(block)
 
+    def again(self, line: int) -> None:
+        """Carry out a block of this text once more, from another place; blocks are counted."""
+        self.blocks += 1
+        if self.blocks > self.most_blocks:
+            raise InputError(f"more than {self.most_blocks} blocks: a loop does not end, or most_blocks must be raised")
+        self.c.line = line + 1
+        block = self.dialect.read(self.source.lines[line], self.c)
+        if block is not None:
+            for key, value in block.sets:
+                self.c.parameters.assign(key, value)
+            for some in (block, *block.after):
+                self.i.execute(some)
+
     def enter_macro(self, line: int, label: str, times: int) -> None:
         """Begin a subroutine of the main text with parameters of its own (G65)."""
         self._enter(self.main, line, label, False, times)

@@ -21,7 +21,7 @@ from chipload.program.gcode.flow import Flow
 from chipload.program.gcode.interpreter import BlockInterpreter
 from chipload.program.gcode.offsets import note_unset_offsets
 from chipload.program.gcode.sinumerik import Sinumerik
-from chipload.program.gcode.source import read_source
+from chipload.program.gcode.source import Source, lines_of, read_source
 from chipload.program.gcode.state import nine
 from chipload.program.gcode.tools import ToolTable
 from chipload.progress import Progress, silent
@@ -113,7 +113,8 @@ def read_gcode(
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     text = rule.prepare(text)
     rule.begin(controller, text)
-    source = read_source(text, name)
+    # a Sinumerik has no O-words: ORIWKS and the label OUT: are none
+    source = Source(name, lines_of(text, name)) if dialect == "sinumerik" else read_source(text, name)
     Flow(BlockInterpreter(controller), source, rule, folder, most_blocks, progress).run()
     note_unset_offsets(controller)
     return controller.track.commands(), controller.findings.all()

@@ -8,16 +8,17 @@ CYCLE81 to CYCLE86, with MCALL too, are carried out (:mod:`~chipload.program.gco
 
 TRANS, ATRANS, ROT and AROT about Z are carried out (:mod:`~chipload.program.gcode.frames`).
 
-Refused: jumps and loops. Left out, so that the result is unproven: motions in mirrored, scaled or swivelled coordinates
-until they end, tool vectors (A3 B3 C3), cycles that are not drilling, calls of other programs, curves (CIP, CT,
-splines), values of names that nothing defines. Noted and left out: what does not concern the path. G331 and G332 are
-G33 with the spindle one way and back.
+Jumps and loops are in :mod:`~chipload.program.gcode.sinumerik_flow`. Left out, so that the result is unproven: motions
+in mirrored, scaled or swivelled coordinates until they end, tool vectors (A3 B3 C3), cycles that are not drilling,
+calls of other programs, curves (CIP, CT, splines), values of names that nothing defines. Noted and left out: what does
+not concern the path. G331 and G332 are G33 with the spindle one way and back.
 """
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from chipload.errors import InputError
 from chipload.program.gcode.controller import Controller
@@ -26,8 +27,12 @@ from chipload.program.gcode.expression import integer_of, read_value
 from chipload.program.gcode.frames import further, remove
 from chipload.program.gcode.offsets import choose
 from chipload.program.gcode.sinumerik_cycles import CYCLES, NORMAL, hole_blocks
+from chipload.program.gcode.sinumerik_flow import flow_step
 from chipload.program.gcode.state import AXES, LINEAR, ZERO, nine
 from chipload.program.gcode.words import LONGEST, Block
+
+if TYPE_CHECKING:
+    from chipload.program.gcode.flow import Flow
 
 _TOKEN = re.compile(
     r"""\s*(?:
@@ -40,6 +45,7 @@ _TOKEN = re.compile(
 )
 _WAY = re.compile(r"(AC|IC|DC|ACP|ACN)\((.*)\)\Z", re.DOTALL)
 _R = re.compile(r"R([0-9]+)(?![0-9A-Z_])")
+_LABEL = re.compile(r"^(N[0-9]+\s*)?[A-Z_][A-Z0-9_]*\s*:(?!=)\s*")
 _NAMED = re.compile(r"[A-Z_$][A-Z0-9_$]*")
 _DEFINITION = re.compile(r"DEF\s+(?:CHAN\s+|NCK\s+)?(REAL|INT|BOOL|CHAR|STRING|AXIS|FRAME)\b(.*)")
 FUNCTIONS = ("SIN", "COS", "TAN", "ASIN", "ACOS", "SQRT", "ABS", "EXP", "LN")
@@ -53,7 +59,7 @@ FRAMES = frozenset(
 )
 JUMPS = frozenset(
     """
-    CALL CASE DEF DEFINE ELSE ENDFOR ENDIF ENDLOOP ENDWHILE EXTCALL FOR GOTO GOTOB GOTOC GOTOF IF LOOP
+    CALL CASE DEF DEFINE ELSE ENDFOR ENDIF ENDLOOP ENDWHILE EXTCALL FOR GOTO GOTOB GOTOC GOTOF GOTOS IF LOOP
     REPEAT REPEATB UNTIL WHILE
     """.split()  # noqa: SIM905
 )
@@ -88,6 +94,10 @@ class Sinumerik(Dialect):
     def begin(self, c: Controller, text: str) -> None:
         """Nothing differs at power on."""
 
+    def jump(self, flow: Flow, raw: str) -> bool:
+        """Jumps and loops."""
+        return flow_step(flow, raw, _value)
+
     def read(self, raw: str, c: Controller) -> Block | None:
         """The block of a line, in LinuxCNC's words."""
         body, _, comment = _without_comment(raw)
@@ -95,7 +105,7 @@ class Sinumerik(Dialect):
         block = Block(comments=[comment] if comment else [])
         if body.startswith("%") or (body.startswith("$") and "=" not in body):
             return None
-        body = re.sub(r"^/[0-9]?\s*", "", body)
+        body = _LABEL.sub(r"\1", re.sub(r"^/[0-9]?\s*", "", body))
         definition = _DEFINITION.match(body)
         if definition:
             _define(definition[1], definition[2], c)
@@ -369,7 +379,8 @@ def _keyword(block: Block, c: Controller, word: str, body: str = "") -> None:
     elif word in FRAMES:
         block.frame = word
     elif word in JUMPS:
-        raise InputError(f"{word}: jumps, loops and calls are not read: write out what they do")
+        # what begins a block is read by sinumerik_flow
+        raise NotReadError(f"{word}: is not read here")
     elif word in CURVES or word.startswith(("CYCLE", "POCKET", "SLOT", "HOLES")):
         _left_out(block, c, word)
     elif word in IDLE:

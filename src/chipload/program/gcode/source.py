@@ -9,9 +9,13 @@ from __future__ import annotations
 import re
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from chipload.errors import InputError
 from chipload.program.gcode.words import bare, strip_number
+
+if TYPE_CHECKING:
+    from chipload.program.gcode.sinumerik_flow import Statements
 
 KEYWORDS = (
     "endsub", "endif", "endwhile", "endrepeat", "elseif", "else", "sub", "call", "return", "if", "while", "do",
@@ -47,6 +51,7 @@ class Source:
     subs : line of ``sub`` by label
     numbers : line of a bare ``o`` by label: a subroutine in the manner of Fanuc
     blocks : lines by N word, where GOTO has asked for one
+    statements : jumps and loops of a Sinumerik, where one was reached
     """
 
     name: str
@@ -56,6 +61,7 @@ class Source:
     subs: dict[str, int] = field(default_factory=dict)
     numbers: dict[str, int] = field(default_factory=dict)
     blocks: dict[int, list[int]] | None = None
+    statements: Statements | None = None
 
     def keyword(self, line: int) -> str:
         """Keyword on a line."""
@@ -79,11 +85,17 @@ class Source:
         raise InputError(f"o{key[1]} {self.keyword(line)}: {' or '.join(keywords)} is missing before it")
 
 
-def read_source(text: str, name: str) -> Source:
-    """The lines of a text and its O-words; what cannot be read as one is refused when it is reached."""
+def lines_of(text: str, name: str) -> list[str]:
+    """The lines of a text; too many are refused."""
     lines = text.split("\n")
     if len(lines) > MOST_LINES:
         raise InputError(f"{name}: more than {MOST_LINES} lines")
+    return lines
+
+
+def read_source(text: str, name: str) -> Source:
+    """The lines of a text and its O-words; what cannot be read as one is refused when it is reached."""
+    lines = lines_of(text, name)
     source = Source(name, lines)
     scope, line, at = "", 0, 0
     for found in _CANDIDATE.finditer(text):

@@ -1,9 +1,9 @@
 """Motions of conversational programs: L and LP, C, CR, CT and CP about poles CC, approach and departure.
 
 Notation: ``text`` is a block without its first word; DR+ counter-clockwise; PR, PA polar coordinates about the pole.
-Approaches (APPR) go straight to the start of the contour, departures (DEP), roundings (RND) and chamfers (CHF) are left
-out: findings say so. A motion in the machine's own coordinates (M91) is left out: where they lie in the work is not
-known.
+Approaches (APPR) go straight to the start of the contour, departures (DEP) are left out: findings say so. Roundings
+(RND) and chamfers (CHF) are in :mod:`~chipload.program.heidenhain.corners`; one that the contour has no room for stays
+sharp. A motion in the machine's own coordinates (M91) is left out: where they lie in the work is not known.
 
 Reference: Heidenhain, iTNC 530 User's Manual HEIDENHAIN Conversational, "Programming: Programming Contours".
 """
@@ -17,8 +17,9 @@ import re
 from chipload.errors import InputError
 from chipload.program.commands import LINE, RAPID
 from chipload.program.heidenhain import words
+from chipload.program.heidenhain.corners import Corner
 from chipload.program.heidenhain.formula import NotKnownError
-from chipload.program.heidenhain.state import ConversationalState
+from chipload.program.heidenhain.state import FARTHEST, ConversationalState
 from chipload.program.heidenhain.switches import after, before, m_codes
 
 #: an arc may end so much nearer to its pole than it begins, or farther [mm]
@@ -176,10 +177,25 @@ def approach(s: ConversationalState, text: str) -> None:
     (polar_line if words.POLAR.search(rest) else line)(s, rest)
 
 
-def unread_corner(s: ConversationalState, text: str) -> None:
-    """RND, CHF and DEP: left out."""
-    what = "the departure" if text.startswith("DEP") else "the corner stays sharp: its rounding or chamfer"
-    s.unproven("heidenhain-corner", f"{text[:40]}: {what} is left out")
+def corner(s: ConversationalState, text: str) -> None:
+    """RND and CHF: the corner between the motion before and the next one; the feed is that of the corner alone."""
+    lasting = s.feed
+    s.feed_of(text)
+    feed, s.feed = s.feed if words.FEED.search(text) else None, lasting
+    round_off = text.startswith("RND")
+    found = re.match(rf"(?:RND\s*R|CHF)\s*(\+?)\s*({words.VALUE})", text)
+    if found is None:
+        raise InputError(f"{text!r}: must be RND R and a radius, or CHF and a length")
+    size = s.amount(found[2]) * s.scale
+    if s.left_out:
+        return
+    if not 0.0 < size <= FARTHEST or not s.corner(Corner(round_off, size, feed, text)):
+        s.sharp(text)
+
+
+def departure(s: ConversationalState, text: str) -> None:
+    """DEP: left out."""
+    s.unproven("heidenhain-corner", f"{text[:40]}: the departure is left out")
     s.feed_of(text)
 
 

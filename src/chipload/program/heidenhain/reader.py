@@ -4,7 +4,7 @@ Notation: a block is a line; X Y Z [mm], A B C [rad].
 
 | subject | blocks |
 |---|---|
-| motions (:mod:`~chipload.program.heidenhain.motions`) | L, LP, CC, C, CR, CT, CP with RL, RR, R0; APPR as a line |
+| motions (:mod:`~chipload.program.heidenhain.motions`) | L, LP, CC, C, CR, CT, CP, RND, CHF, RL, RR; APPR as a line |
 | cycles (:mod:`~chipload.program.heidenhain.cycles`) | 1, 7, 9, 200 to 203, 205 to 209, 220, 221, 240, 262 |
 | switches (:mod:`~chipload.program.heidenhain.switches`) | TOOL DEF, TOOL CALL, M functions, FUNCTION TCPM |
 | order (:mod:`~chipload.program.heidenhain.flow`) | labels, REP, FN, Q parameters, CALL PGM of a file beside it |
@@ -35,6 +35,8 @@ __all__ = ["KEPT", "read_heidenhain", "read_heidenhain_file", "tool_definitions"
 
 #: largest text [characters], blocks that may be carried out
 LONGEST_TEXT, MOST_BLOCKS = 100_000_000, 2_000_000
+#: blocks, comments alone, that may stand between a motion and what rounds its end
+AHEAD = 20
 _MOTIONS = {
     "L": motions.line,
     "LP": motions.polar_line,
@@ -147,6 +149,9 @@ class _Blocks:
 
     def _next(self, block: str, at: int) -> int:
         """Carry out a block; returns the next one's index."""
+        blocks = self.flow.text.blocks
+        following = next((b for b in blocks[at + 1 : at + 1 + AHEAD] if b), "")
+        self.s.before_corner = following.startswith(("RND", "CHF"))
         if not block:
             return at + 1
         if block.startswith("LBL"):
@@ -156,7 +161,11 @@ class _Blocks:
         if block.startswith("CALL PGM"):
             return self.flow.call_program(block, at)
         if re.match(r"FN\s*\d+", block):
-            return self.flow.function(block, at)
+            try:
+                return self.flow.function(block, at)
+            except NotKnownError as err:
+                self.s.unproven("heidenhain-jump", f"{err} [taken as no jump: {block[:60]}]")
+                return at + 1
         if re.match(r"END PGM\b|END\b", block):
             back = self.flow.end()
             self.s.ended = back is None
@@ -194,8 +203,10 @@ class _Blocks:
             self._cycle_here(text, word)
         elif word.startswith("PLANE"):
             switches.plane(s, block)
-        elif word in ("RND", "CHF", "DEP"):
-            motions.unread_corner(s, block)
+        elif word in ("RND", "CHF"):
+            motions.corner(s, block)
+        elif word == "DEP":
+            motions.departure(s, block)
         elif block.startswith(_UNUSED) or (word == "FUNCTION" and switches.function_word(s, block)):
             s.note("heidenhain-unused", block[:100])
         elif word == "*":

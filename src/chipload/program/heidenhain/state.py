@@ -14,6 +14,7 @@ from typing import cast
 from chipload.errors import Finding, InputError, Severity
 from chipload.program.commands import ARC, DWELL, LINE, RAPID, XY, Frame, Row
 from chipload.program.compensation import CentreMove, Compensation
+from chipload.program.heidenhain.corners import Corner, Piece, joined
 from chipload.program.heidenhain.formula import NotKnownError, QParameters, q_number
 from chipload.program.heidenhain.words import AXIS, FEED, RETRACT, SETTINGS, TURN_FEED, number, rest_of
 from chipload.units import mm_s_from_mm_min
@@ -65,6 +66,10 @@ class ConversationalState:
         self.side = 0
         self.lag = [0.0, 0.0]
         self._beside: Compensation | None = None
+        #: whether the next block rounds or chamfers the end of this one
+        self.before_corner = False
+        self._waiting: Piece | None = None
+        self._corner: Corner | None = None
 
     # -- findings ---------------------------------------------------------------------------------------------
     def note(self, code: str, text: str, severity: Severity = Severity.NOTE) -> None:
@@ -166,11 +171,13 @@ class ConversationalState:
                 start = [x + d for x, d in zip(self.at[:2], self.lag, strict=True)]
                 self._beside = Compensation(side, radius or 0.0, XY, [*start, *self.at[2:]], square=True)
                 self.lag = [0.0, 0.0]
-        if not side and {0, 1} & moves:
+        if not side and {0, 1} & moves and self.lag != [0.0, 0.0]:
+            self._flush()
             self.lag = [0.0, 0.0]
 
     def end_contour(self) -> None:
         """Carry out what compensation holds back, and leave the tool where it stands."""
+        self._flush()
         if self._beside is not None:
             self._emit(self._beside.finish())
             if self.rows:
@@ -188,22 +195,58 @@ class ConversationalState:
         """RAPID or LINE to the programmed ``end``."""
         feed = 0.0 if motion == RAPID else self.need()
         self._turn_to(complex(end[0] - self.at[0], end[1] - self.at[1]))
+        self._piece(Piece(motion, self.at, end, (0.0, 0.0), 0, feed, self._tail()))
         self.at = end
-        if self._beside is not None:
-            self._emit(self._beside.line(motion, end, (feed, self._tail())))
-        else:
-            self.row(motion, end, feed)
 
     def arc(self, end: list[float], centre: tuple[float, float], turns: int) -> None:
         """ARC to the programmed ``end``."""
         feed = self.need()
         out = complex(end[0] - centre[0], end[1] - centre[1]) * (1j if turns > 0 else -1j)
         self._turn_to(out)
+        self._piece(Piece(ARC, self.at, end, centre, turns, feed, self._tail()))
         self.at = end
-        if self._beside is not None:
-            self._emit(self._beside.arc(end, centre, turns, (feed, self._tail())))
+
+    def corner(self, corner: Corner) -> bool:
+        """Round or chamfer the corner between the piece before and the next one; whether there is one before."""
+        self._corner = corner
+        return self._waiting is not None
+
+    def _piece(self, piece: Piece) -> None:
+        """A piece of the contour; it waits where its end is to be rounded."""
+        before, corner = self._waiting, self._corner
+        self._waiting = self._corner = None
+        if before is not None:
+            made = None if corner is None else joined(before, piece, corner)
+            if corner is not None and made is None:
+                self.sharp(corner.text)
+            for some in (before,) if made is None else made[:-1]:
+                self._carry(some)
+            piece = piece if made is None else made[-1]
+        if self.before_corner and piece.motion != RAPID:
+            self._waiting = piece
         else:
-            self.row(ARC, end, feed, centre, turns)
+            self._carry(piece)
+
+    def sharp(self, text: str) -> None:
+        """Say that a corner stays sharp; ``text`` asked for another."""
+        self.unproven("heidenhain-corner", f"{text[:40]}: the corner stays sharp: its rounding or chamfer is left out")
+
+    def _flush(self) -> None:
+        """Carry out what waits for a corner that does not come."""
+        waiting, corner = self._waiting, self._corner
+        self._waiting = self._corner = None
+        if waiting is not None:
+            if corner is not None:
+                self.sharp(corner.text)
+            self._carry(waiting)
+
+    def _carry(self, piece: Piece) -> None:
+        if self._beside is None:
+            self._row(piece.motion, piece.end, piece.feed, piece.centre, piece.turns, piece.tail)
+        elif piece.motion == ARC:
+            self._emit(self._beside.arc(piece.end, piece.centre, piece.turns, (piece.feed, piece.tail)))
+        else:
+            self._emit(self._beside.line(piece.motion, piece.end, (piece.feed, piece.tail)))
 
     def _turn_to(self, along: complex) -> None:
         if abs(along) > 1e-9:
@@ -211,10 +254,11 @@ class ConversationalState:
 
     def dwell(self, seconds: float) -> None:
         """DWELL where the tool stands."""
+        self._flush()
         if self._beside is not None:
             self._emit(self._beside.pause((seconds, self._tail())))
         else:
-            self.row(DWELL, self.at, seconds)
+            self._row(DWELL, self.at, seconds, (0.0, 0.0), 0, self._tail())
 
     def row(
         self,
@@ -225,8 +269,20 @@ class ConversationalState:
         turns: int = 0,
     ) -> None:
         """A motion of the tool's own centre."""
+        self._flush()
+        self._row(motion, end, feed, centre, turns, self._tail())
+
+    def _row(
+        self,
+        motion: int,
+        end: list[float],
+        feed: float,
+        centre: tuple[float, float],
+        turns: int,
+        tail: tuple[object, ...],
+    ) -> None:
         x, y = end[0] + self.lag[0], end[1] + self.lag[1]
-        self.rows.append((motion, (x, y, *end[2:]), XY, centre, turns, feed, *self._tail()))
+        self.rows.append((motion, (x, y, *end[2:]), XY, centre, turns, feed, *tail))
 
     def _tail(self) -> tuple[object, ...]:
         spindle = self.speed * self.sense
