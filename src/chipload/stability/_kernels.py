@@ -329,18 +329,19 @@ def chatter_hz(angle, tau, w):
 
 
 @njit(
-    "void(int64, int64, int64[::1], float64[:,::1], float64[::1], float64[::1], float64[::1], float64[::1],"
+    "void(int64, int64, int64[::1], float64[:,::1], float64[::1], float64[::1], float64[::1], float64[:,::1],"
     " float64[::1], float64[:,:,::1], float64[::1], float64, int64, float64, float64[:,::1])",
     cache=True, nogil=True,
 )  # fmt: skip
 def multipliers(first, last, start, rows, exponents, tau, pitch, w, z, U, gain, per_wave, most, tol, out):
     """Of the cuts first .. last - 1: modulus and angle of the greatest multiplier, and its dimension: out (n, 3).
 
-    ``start`` (n + 1,) of rows; ``tau`` [s], ``pitch`` [rad], ``U`` (n, 2, M), ``gain`` on the force (n,).
+    ``start`` (n + 1,) of rows; ``tau`` [s], ``pitch`` [rad], ``w`` (n, M), ``U`` (n, 2, M), ``gain`` on the
+    force (n,).
     """
-    modes = len(w)
+    modes = len(z)
     for k in range(first, last):
-        m = cells_of(tau[k], w, per_wave)
+        m = cells_of(tau[k], w[k], per_wave)
         h = tau[k] / m
         n = 4 * m + 2 * modes
         A = np.zeros((m, 3, 4))
@@ -348,14 +349,14 @@ def multipliers(first, last, start, rows, exponents, tau, pitch, w, z, U, gain, 
         free = np.empty((4, modes))
         push = np.empty((3, 2, modes))
         end = np.empty((3, 4, 2))
-        free_motion(w, z, U[k], h, free, push, end)
+        free_motion(w[k], z, U[k], h, free, push, end)
         ends = np.empty((m, 4, 8))
         forces = np.empty((m, 6, 8))
         cuts = np.empty(m, np.bool_)
         cell_systems(A, gain[k], end, ends, forces, cuts)
         room = min(most, n - 1) + 1
         best, angle, used = arnoldi(
-            ends, forces, cuts, free, push, U[k], w, h, m, most, tol, np.empty((room, n)), np.empty((room, room)),
+            ends, forces, cuts, free, push, U[k], w[k], h, m, most, tol, np.empty((room, n)), np.empty((room, room)),
             np.empty((room, room)), np.empty(n), np.empty(n), np.empty(modes), np.empty(modes), np.empty(n),
         )  # fmt: skip
         out[k, 0] = best
@@ -364,7 +365,7 @@ def multipliers(first, last, start, rows, exponents, tau, pitch, w, z, U, gain, 
 
 
 @njit(
-    "void(int64, int64, int64[::1], float64[:,::1], float64[::1], float64[::1], float64[::1], float64[::1],"
+    "void(int64, int64, int64[::1], float64[:,::1], float64[::1], float64[::1], float64[::1], float64[:,::1],"
     " float64[::1], float64[:,:,::1], float64, int64, float64, float64[:,::1])",
     cache=True, nogil=True,
 )  # fmt: skip
@@ -375,9 +376,9 @@ def margins(first, last, start, rows, exponents, tau, pitch, w, z, U, per_wave, 
     A stable cut is looked at at the factors ``ABOVE``; where it is stable at each the factor is the last of them, the
     frequency 0 and the mode -1. The factor is -1 where eigenvalues were not found.
     """
-    modes = len(w)
+    modes = len(z)
     for k in range(first, last):
-        m = cells_of(tau[k], w, per_wave)
+        m = cells_of(tau[k], w[k], per_wave)
         h = tau[k] / m
         n = 4 * m + 2 * modes
         A = np.zeros((m, 3, 4))
@@ -385,7 +386,7 @@ def margins(first, last, start, rows, exponents, tau, pitch, w, z, U, per_wave, 
         free = np.empty((4, modes))
         push = np.empty((3, 2, modes))
         end = np.empty((3, 4, 2))
-        free_motion(w, z, U[k], h, free, push, end)
+        free_motion(w[k], z, U[k], h, free, push, end)
         ends = np.empty((m, 4, 8))
         forces = np.empty((m, 6, 8))
         cuts = np.empty(m, np.bool_)
@@ -415,7 +416,7 @@ def margins(first, last, start, rows, exponents, tau, pitch, w, z, U, per_wave, 
         while True:
             cell_systems(A, gain, end, ends, forces, cuts)
             best, angle, used = arnoldi(
-                ends, forces, cuts, free, push, U[k], w, h, m, most, tol, V, H, work, x, y, q, v, scale
+                ends, forces, cuts, free, push, U[k], w[k], h, m, most, tol, V, H, work, x, y, q, v, scale
             )
             count += 1
             if not best >= 0.0:
@@ -477,4 +478,4 @@ def margins(first, last, start, rows, exponents, tau, pitch, w, z, U, per_wave, 
         if found or at_one >= 0.0:
             mode = strongest_mode(H, V, used, best, angle, scale, m, modes)
             out[k, 2] = mode
-            out[k, 1] = chatter_hz(angle, tau[k], w[mode])
+            out[k, 1] = chatter_hz(angle, tau[k], w[k, mode])

@@ -122,6 +122,7 @@ def step_compliances(
     tolerance: float,
     most: int,
     spacing: float,
+    built: Callable[[int, CellWorkpiece], None] | None = None,
     progress: Progress = silent,
 ) -> StepCompliances:
     """Compliance in the state of every step that cuts.
@@ -132,8 +133,9 @@ def step_compliances(
     tolerance : difference between neighbouring states over the greatest deflection
     most : states at most
     spacing : least distance [mm] of contact lines that are solved
+    built : called with each state that is solved, by its number, each time that it is built
     """
-    samples = _samples(steps.lines, spacing)
+    samples = spaced_rows(steps.lines, spacing, LINES)
     solved: dict[int, CellWorkpiece] = {}
     loose = [0.0]
     known: dict[tuple[int, int], Array] = {}
@@ -146,6 +148,8 @@ def step_compliances(
                 solved.clear()
                 solved[k] = states[k].build()
                 loose[0] = max(loose[0], solved[k].loose)
+                if built is not None:
+                    built(k, solved[k])
             work = solved[k]
             for r, c in zip(missing, line_compliances(work, steps.lines[missing]), strict=True):
                 known[k, r] = c
@@ -195,7 +199,7 @@ def step_compliances(
             continue
         if not len(rows):
             rows = own[:1]
-        ends = [_between(steps.lines, own, rows, compliance(k, rows)) for k in (a, b)]
+        ends = [between_rows(steps.lines, own, rows, compliance(k, rows)) for k in (a, b)]
         out[own], doubt[own] = _in_state(steps.removed[own], states[a].removed, states[b].removed, *ends)
     first = [state.step for state in states]
     tight = np.full(len(out), -1, dtype=np.int64)
@@ -231,8 +235,8 @@ def _first_states(states: Sequence[State]) -> list[int]:
     return sorted({0, *between, len(states) - 1})
 
 
-def _samples(lines: Array, spacing: float) -> Indices:
-    """Rows no nearer to the one before than ``spacing`` [mm], which grows until there are at most :data:`LINES`."""
+def spaced_rows(lines: Array, spacing: float, most: int) -> Indices:
+    """Rows no nearer to the one before than ``spacing`` [mm], which grows until there are at most ``most``."""
     middle = lines.mean(axis=1).tolist()
     while True:
         kept = list(range(min(len(middle), 1)))
@@ -240,18 +244,19 @@ def _samples(lines: Array, spacing: float) -> Indices:
             (x, y, z), (a, b, c) = middle[k], middle[kept[-1]]
             if (x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2 > spacing * spacing:
                 kept.append(k)
-        if len(kept) <= LINES:
+        if len(kept) <= most:
             return np.array(kept, dtype=np.int64)
         spacing *= 1.3
 
 
-def _between(lines: Array, own: Indices, rows: Indices, values: Array) -> Array:
+def between_rows(lines: Array, own: Indices, rows: Indices, values: Array) -> Array:
     """Values of rows ``own`` from those of some of them, the mean of the two beside each by distance."""
     middle = lines.mean(axis=1)
     before = np.clip(np.searchsorted(rows, own, side="right") - 1, 0, len(rows) - 1)
     after = np.minimum(before + 1, len(rows) - 1)
     a, b = (np.linalg.norm(middle[own] - middle[rows[k]], axis=1) for k in (before, after))
-    t = np.divide(a, a + b, out=np.zeros(len(a)), where=a + b > 0.0)[:, None, None, None]
+    t = np.divide(a, a + b, out=np.zeros(len(a)), where=a + b > 0.0)
+    t = t.reshape(-1, *(1,) * (values.ndim - 1))
     return np.asarray((1.0 - t) * values[before] + t * values[after])
 
 
