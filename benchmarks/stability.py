@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "stability"))
 from stability_oracles import HALF, ONE, TAU, TWO, cut_of, down, semi_discretisation
 
 from chipload.stability.chart import stability_chart
-from chipload.stability.cuts import DynamicCuts
+from chipload.stability.cuts import joined
 from chipload.stability.margin import PER_WAVE, largest_multipliers, stability_margins
 from chipload.stability.modes import Modes
 
@@ -34,13 +34,6 @@ def timed(call):
     wall, busy = time.perf_counter(), time.process_time()
     result = call()
     return result, time.perf_counter() - wall, time.process_time() - busy
-
-
-def joined(cuts):
-    """Cuts of one cutter as one."""
-    start = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(c.start) for c in cuts]))])
-    rows, period, U = (np.concatenate([getattr(c, name) for c in cuts]) for name in ("rows", "period", "U"))
-    return DynamicCuts(start, rows, cuts[0].exponents, period, cuts[0].pitch, cuts[0].modes, U)
 
 
 def program(modes):

@@ -16,7 +16,8 @@ from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_
 from chipload.errors import InputError
 from chipload.jobs import FinishedJob, load_job, run_job
 from chipload.jobs.program.dynamics import Dynamics
-from chipload.jobs.program.stability import StabilityResult, StabilityWatch
+from chipload.jobs.program.stability import StabilityResult
+from chipload.jobs.program.stability_watch import StabilityWatch
 from chipload.machine.machine import machine_named
 from chipload.program.gcode.speed_words import SpeedWord, speed_words, with_speeds
 from chipload.report.page import page_bytes

@@ -30,16 +30,16 @@ def zero_order_margin(cuts: DynamicCuts) -> tuple[Floats, Floats]:
     none is found.
     """
     margin, hz = np.full(len(cuts), np.inf), np.zeros(len(cuts))
-    modes = cuts.modes
     for i in range(len(cuts)):
         mean = np.zeros((16, 3, 4))
         _kernels.matrices(cuts.rows, cuts.start[i], cuts.start[i + 1], cuts.pitch, 16, cuts.exponents, mean)
         A = (mean * _kernels.W3[None, :, None]).sum(axis=(0, 1)).reshape(2, 2) / 16.0
         if not A.any():
             continue
-        step = min(float((modes.damping * modes.omega).min()) / FINE, 2.0 * np.pi / cuts.period[i] / PER_LOBE)
-        w = np.arange(RANGE[0] * modes.omega.min(), RANGE[1] * modes.omega.max(), step)
-        share = 1.0 / (modes.omega**2 - w[:, None] ** 2 + 2j * modes.damping * modes.omega * w[:, None])
+        omega = cuts.omega[i]
+        step = min(float((cuts.damping * omega).min()) / FINE, 2.0 * np.pi / cuts.period[i] / PER_LOBE)
+        w = np.arange(RANGE[0] * omega.min(), RANGE[1] * omega.max(), step)
+        share = 1.0 / (omega**2 - w[:, None] ** 2 + 2j * cuts.damping * omega * w[:, None])
         G = np.einsum("ak,wk,bk->wab", cuts.U[i], share, cuts.U[i])
         root = np.linalg.eigvals(A @ G) * (1.0 - np.exp(-1j * w * cuts.period[i]))[:, None]
         for j in range(1, len(w)):  # the two roots, each followed from one frequency to the next

@@ -354,22 +354,23 @@ def workspace(m, modes, most):
 
 
 @njit(
-    "void(int64, int64, int64[::1], float64[:,::1], float64[::1], float64[::1], float64[::1], float64[::1],"
+    "void(int64, int64, int64[::1], float64[:,::1], float64[::1], float64[::1], float64[::1], float64[:,::1],"
     " float64[::1], float64[:,:,::1], float64[::1], float64, int64, float64, float64[:,::1])",
     cache=True, nogil=True,
 )  # fmt: skip
 def multipliers(first, last, start, rows, exponents, tau, pitch, w, z, U, gain, per_wave, most, tol, out):
     """Of the cuts first .. last - 1: modulus and angle of the greatest multiplier, and its dimension: out (n, 3).
 
-    ``start`` (n + 1,) of rows; ``tau`` [s], ``pitch`` [rad], ``U`` (n, 2, M), ``gain`` on the force (n,).
+    ``start`` (n + 1,) of rows; ``tau`` [s], ``pitch`` [rad], ``w`` (n, M), ``U`` (n, 2, M), ``gain`` on the
+    force (n,).
     """
-    modes = len(w)
+    modes = len(z)
     for k in range(first, last):
-        m, h, A, free, push, end = cut_motion(k, start, rows, exponents, tau, pitch, w, z, U, per_wave)
+        m, h, A, free, push, end = cut_motion(k, start, rows, exponents, tau, pitch, w[k], z, U, per_wave)
         ends, forces, cuts, V, H, work, x, y, q, v, scale = workspace(m, modes, most)
         cell_systems(A, gain[k], end, ends, forces, cuts)
         best, angle, used = arnoldi(
-            ends, forces, cuts, free, push, U[k], w, h, m, most, tol, V, H, work, x, y, q, v, scale
+            ends, forces, cuts, free, push, U[k], w[k], h, m, most, tol, V, H, work, x, y, q, v, scale
         )
         out[k, 0] = best
         out[k, 1] = angle
@@ -377,7 +378,7 @@ def multipliers(first, last, start, rows, exponents, tau, pitch, w, z, U, gain, 
 
 
 @njit(
-    "void(int64, int64, int64[::1], float64[:,::1], float64[::1], float64[::1], float64[::1], float64[::1],"
+    "void(int64, int64, int64[::1], float64[:,::1], float64[::1], float64[::1], float64[::1], float64[:,::1],"
     " float64[::1], float64[:,:,::1], float64, int64, float64, float64[:,::1])",
     cache=True, nogil=True,
 )  # fmt: skip
@@ -388,9 +389,9 @@ def margins(first, last, start, rows, exponents, tau, pitch, w, z, U, per_wave, 
     A stable cut is looked at at the factors ``ABOVE``; where it is stable at each the factor is the last of them, the
     frequency 0 and the mode -1. The factor is -1 where eigenvalues were not found.
     """
-    modes = len(w)
+    modes = len(z)
     for k in range(first, last):
-        m, h, A, free, push, end = cut_motion(k, start, rows, exponents, tau, pitch, w, z, U, per_wave)
+        m, h, A, free, push, end = cut_motion(k, start, rows, exponents, tau, pitch, w[k], z, U, per_wave)
         ends, forces, cuts, V, H, work, x, y, q, v, scale = workspace(m, modes, most)
         count = 0
         lo, l_lo, hi, l_hi = 0.0, -1.0, 0.0, 0.0
@@ -406,7 +407,7 @@ def margins(first, last, start, rows, exponents, tau, pitch, w, z, U, per_wave, 
         while True:
             cell_systems(A, gain, end, ends, forces, cuts)
             best, angle, used = arnoldi(
-                ends, forces, cuts, free, push, U[k], w, h, m, most, tol, V, H, work, x, y, q, v, scale
+                ends, forces, cuts, free, push, U[k], w[k], h, m, most, tol, V, H, work, x, y, q, v, scale
             )
             count += 1
             if not best >= 0.0:
@@ -468,4 +469,4 @@ def margins(first, last, start, rows, exponents, tau, pitch, w, z, U, per_wave, 
         if found or at_one >= 0.0:
             mode = strongest_mode(H, V, used, best, angle, scale, m, modes)
             out[k, 2] = mode
-            out[k, 1] = chatter_hz(angle, tau[k], w[mode])
+            out[k, 1] = chatter_hz(angle, tau[k], w[k, mode])

@@ -11,7 +11,7 @@ depth: there the force is scaled in its place.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -165,7 +165,7 @@ def _at_depths(cut: DynamicCuts, speed: Floats, depth: Floats) -> DynamicCuts:
     rate = (rows[:, 3] - rows[:, 2]) / rows[:, 4]
     rows[:, 3] = rows[:, 2] + rate * depth
     rows[:, 4] = depth
-    return DynamicCuts(some.start, rows, some.exponents, cut.pitch / speed, cut.pitch, cut.modes, some.U)
+    return replace(some, rows=rows, period=cut.pitch / speed)
 
 
 def _growth(cut: DynamicCuts, speed: Floats, depth: Floats) -> Floats:
@@ -175,7 +175,7 @@ def _growth(cut: DynamicCuts, speed: Floats, depth: Floats) -> Floats:
         some, gain = _at_depths(cut, speed, depth), np.ones(len(depth))
     else:
         some, gain = cut.chosen(np.zeros(len(depth), dtype=np.int64)).at_speeds(cut.pitch / speed), depth
-    most = 2 * len(cut.modes) + SPARE
+    most = 2 * len(cut.damping) + SPARE
     found = largest_multipliers(some, gain, per_wave=PER_WAVE, most=most, still=STILL)
     return np.log(np.maximum(np.abs(found), TINY))
 

@@ -13,7 +13,8 @@ Reference: [Altintas1995]; [Engin2001] for kappa.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,8 +40,9 @@ class DynamicCuts:
     exponents : (3,) float, of the size effect
     period : (n,) float [s], time between two teeth
     pitch : angle between two teeth [rad]
-    modes : of cutter and work
-    U : (n, 2, M) float, their shapes along T and n of each cut
+    damping : (M,) float, damping ratio of each mode of cutter and work
+    omega : (n, M) float [rad/s], natural frequencies in each cut
+    U : (n, 2, M) float [1/sqrt(t)], shapes along T and n of each cut
     """
 
     start: Ints
@@ -48,7 +50,8 @@ class DynamicCuts:
     exponents: Floats
     period: Floats
     pitch: float
-    modes: Modes
+    damping: Floats
+    omega: Floats
     U: Floats
 
     def __len__(self) -> int:
@@ -59,7 +62,7 @@ class DynamicCuts:
         times = np.array(np.broadcast_to(np.asarray(period, dtype=np.float64), (len(self),)))
         if not ((times > 0.0) & np.isfinite(times)).all():
             raise InputError("stability: the time between two teeth must be above 0 s")
-        return DynamicCuts(self.start, self.rows, self.exponents, times, self.pitch, self.modes, self.U)
+        return replace(self, period=times)
 
     def chosen(self, index: ArrayLike) -> DynamicCuts:
         """Some of the cuts, also several times."""
@@ -67,17 +70,33 @@ class DynamicCuts:
         size = np.diff(self.start)[at]
         start = np.concatenate([[0], np.cumsum(size)])
         row = np.repeat(self.start[at] - start[:-1], size) + np.arange(start[-1])
-        return DynamicCuts(
-            start, np.ascontiguousarray(self.rows[row]), self.exponents, np.ascontiguousarray(self.period[at]),
-            self.pitch, self.modes, np.ascontiguousarray(self.U[at]),
-        )  # fmt: skip
+        period, omega, U = (np.ascontiguousarray(x[at]) for x in (self.period, self.omega, self.U))
+        rows = np.ascontiguousarray(self.rows[row])
+        return replace(self, start=start, rows=rows, period=period, omega=omega, U=U)
+
+    def with_modes(self, damping: ArrayLike, omega: ArrayLike, U: ArrayLike) -> DynamicCuts:
+        """The same cuts with more modes: (m,) damping ratios, (n, m) [rad/s], (n, 2, m) [1/sqrt(t)]."""
+        more = tuple(np.asarray(x, dtype=np.float64) for x in (damping, omega, U))
+        z = np.concatenate([self.damping, more[0]])
+        w, shapes = np.concatenate([self.omega, more[1]], axis=1), np.concatenate([self.U, more[2]], axis=2)
+        return replace(self, damping=z, omega=w, U=np.ascontiguousarray(shapes))
+
+
+def joined(some: Sequence[DynamicCuts]) -> DynamicCuts:
+    """Cuts of one cutter with the same modes, one behind the other."""
+    sizes = np.concatenate([np.diff(c.start) for c in some])
+    start = np.concatenate([[0], np.cumsum(sizes)])
+    rows, period, omega, U = (
+        np.concatenate([getattr(c, name) for c in some]) for name in ("rows", "period", "omega", "U")
+    )
+    return replace(some[0], start=start, rows=rows, period=period, omega=omega, U=U)
 
 
 def dynamic_cuts(
     engagement: ToothEngagement,
     cutter: Cutter,
     material: Material,
-    modes: Modes,
+    modes: Modes | None,
     speed: ArrayLike,
     T: ArrayLike | None = None,
     n: ArrayLike | None = None,
@@ -87,6 +106,7 @@ def dynamic_cuts(
     Parameters
     ----------
     engagement : without runout; one tooth period is that of evenly spaced teeth
+    modes : None: cutter and work are rigid, as far as no modes are added
     speed : () or (n,) float [rad/s], of the spindle, either sign
     T, n : (n, 2) float, in x and y of the machine; None: those of ``engagement.frame``
 
@@ -104,12 +124,16 @@ def dynamic_cuts(
         if engagement.frame is None:
             raise InputError("stability: the tooth engagement has no frames: give T and n")
         T, n = engagement.frame[:, 0, :2], engagement.frame[:, 1, :2]
-    U = modes.in_frames(T, n)
+    if modes is None:
+        U, damping, w = np.zeros((len(np.asarray(T)), 2, 0)), np.zeros(0), np.zeros(0)
+    else:
+        U, damping, w = modes.in_frames(T, n), modes.damping, modes.omega
     if len(U) != len(engagement):
         raise InputError(f"stability: {len(U)} frames for {len(engagement)} cuts: need one each")
     return DynamicCuts(
         np.array(engagement.start), kernel_rows(engagement, material), np.array(material.exponents, dtype=np.float64),
-        np.ascontiguousarray(math.tau / (cutter.flutes * omega)), math.tau / cutter.flutes, modes, U,
+        np.ascontiguousarray(math.tau / (cutter.flutes * omega)), math.tau / cutter.flutes, damping,
+        np.tile(w, (len(U), 1)), U,
     )  # fmt: skip
 
 

@@ -82,12 +82,12 @@ def largest_multipliers(
     factor = np.array(np.broadcast_to(np.asarray(gain, dtype=np.float64), (len(cuts),)))
     out = np.zeros((len(cuts), 3))
     pitch = np.full(len(cuts), cuts.pitch)
-    dimension = 2 * len(cuts.modes) + SPARE_EXACT if most is None else most
+    dimension = 2 * len(cuts.damping) + SPARE_EXACT if most is None else most
 
     def part(first: int, last: int) -> None:
         _kernels.multipliers(
-            first, last, cuts.start, cuts.rows, cuts.exponents, cuts.period, pitch, cuts.modes.omega,
-            np.array(cuts.modes.damping), cuts.U, factor, per_wave, dimension, still, out,
+            first, last, cuts.start, cuts.rows, cuts.exponents, cuts.period, pitch, cuts.omega,
+            np.array(cuts.damping), cuts.U, factor, per_wave, dimension, still, out,
         )  # fmt: skip
 
     shared(part, len(cuts))
@@ -124,8 +124,8 @@ def _margins(cuts: DynamicCuts, per_wave: float) -> Floats:
 
     def part(first: int, last: int) -> None:
         _kernels.margins(
-            first, last, cuts.start, cuts.rows, cuts.exponents, cuts.period, pitch, cuts.modes.omega,
-            np.array(cuts.modes.damping), cuts.U, per_wave, 2 * len(cuts.modes) + SPARE, STILL, out,
+            first, last, cuts.start, cuts.rows, cuts.exponents, cuts.period, pitch, cuts.omega,
+            np.array(cuts.damping), cuts.U, per_wave, 2 * len(cuts.damping) + SPARE, STILL, out,
         )  # fmt: skip
 
     shared(part, len(cuts))

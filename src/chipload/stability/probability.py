@@ -8,7 +8,7 @@ lobe an expansion about the mean is too sure.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +17,6 @@ from scipy.stats import norm, qmc
 from chipload.errors import InputError
 from chipload.stability.cuts import DynamicCuts
 from chipload.stability.margin import PER_WAVE, largest_multipliers
-from chipload.stability.modes import Modes
 
 Floats = NDArray[np.float64]
 
@@ -25,6 +24,8 @@ Floats = NDArray[np.float64]
 SAMPLES = 128
 #: a sampled value is at least this share of the mean
 LEAST = 0.1
+#: and a damping ratio at most
+MOST_DAMPED = 0.5
 #: dimensions of the Krylov space beside two a mode, and how still |mu| is then
 SPARE, STILL = 12, 1e-3
 
@@ -62,7 +63,7 @@ def stable_probability(
     """
     if samples < 2 or samples & (samples - 1):
         raise InputError(f"stable probability: samples = {samples}: must be a power of 2, 2 at least")
-    modes, count = cuts.modes, len(cuts.modes)
+    count = len(cuts.damping)
     values, vectors = np.linalg.eigh(np.asarray(coefficients, dtype=np.float64))
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     points = qmc.Sobol(3 * count + 2, scramble=True, rng=0).random(samples)
@@ -73,13 +74,12 @@ def stable_probability(
             np.maximum(1.0 + s * n[i * count : (i + 1) * count], LEAST)
             for i, s in enumerate((spread.frequency, spread.damping, spread.stiffness))
         )
-        own = Modes(modes.frequency * f, modes.damping * z, modes.stiffness * k, modes.direction)
         tangential, radial = np.maximum(1.0 + root @ n[3 * count :], LEAST)
         rows = cuts.rows.copy()
         rows[:, 5] *= tangential
         rows[:, 6:8] *= radial
         U = np.ascontiguousarray(cuts.U * (f / np.sqrt(k)))
-        some = DynamicCuts(cuts.start, rows, cuts.exponents, cuts.period, cuts.pitch, own, U)
+        some = replace(cuts, rows=rows, damping=np.minimum(cuts.damping * z, MOST_DAMPED), omega=cuts.omega * f, U=U)
         found = largest_multipliers(some, per_wave=PER_WAVE, most=2 * count + SPARE, still=STILL)
         stable += np.abs(found) < 1.0
     return stable / samples

@@ -77,7 +77,7 @@ def wall_errors(cuts: DynamicCuts, rows: Floats) -> tuple[Floats, NDArray[np.boo
 
     def part(first: int, last: int) -> None:
         _kernels.wall_errors(
-            first, last, cuts.start, rows, cuts.period, teeth, cuts.modes.omega, np.array(cuts.modes.damping), cuts.U,
+            first, last, cuts.start, rows, cuts.period, teeth, cuts.omega, np.array(cuts.damping), cuts.U,
             out,
         )  # fmt: skip
 

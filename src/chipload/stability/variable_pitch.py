@@ -49,9 +49,9 @@ def revolution_multiplier(cut: DynamicCuts, pitches: ArrayLike) -> complex:
             f"variable pitch: {np.degrees(pitch).round(6).tolist()} deg: must be {teeth} angles above 0 that add up to "
             "360 deg"
         )
-    turn, modes = float(cut.period[0]) * teeth, cut.modes
-    cells = max(4 * teeth * 3, math.ceil(PER_WAVE * float(modes.omega.max()) * turn / math.tau))
-    h, count = turn / cells, len(modes)
+    turn, omega = float(cut.period[0]) * teeth, cut.omega[0]
+    cells = max(4 * teeth * 3, math.ceil(PER_WAVE * float(omega.max()) * turn / math.tau))
+    h, count = turn / cells, len(omega)
     A = np.zeros((teeth, cells, 3, 4))
     behind = np.concatenate([[0.0], np.cumsum(pitch[1:])])
     for j in range(teeth):
@@ -59,7 +59,7 @@ def revolution_multiplier(cut: DynamicCuts, pitches: ArrayLike) -> complex:
         rows[:, 2:4] += behind[j]
         directional.matrices(rows, 0, len(rows), math.tau, cells, cut.exponents, A[j])
     free, push, end = np.empty((4, count)), np.empty((3, 2, count)), np.empty((3, 4, 2))
-    free_motion(modes.omega, np.array(modes.damping), cut.U[0], h, free, push, end)
+    free_motion(omega, np.array(cut.damping), cut.U[0], h, free, push, end)
     delay = pitch / math.tau * cells
     nodes = math.ceil(float(delay.max()) - 1e-9)
     n = 4 * nodes + 2 * count

@@ -18,6 +18,8 @@ from chipload.structure.cells.workpiece import Elastic
 
 #: thickness of the slab that stands for a face [mm], and N/mm in 1 N/um, MPa in 1 GPa
 SLAB, PER = 0.001, 1000.0
+#: t/mm^3 in 1 kg/m^3
+T_MM3 = 1e-12
 #: sides of the polygon that stands for a circle
 ROUND = 48
 
@@ -32,6 +34,12 @@ def clamp_errors(table: ProgramJobTable) -> Iterator[str]:
         return
     if given:
         yield "stiffness.work_n_um: leave it out: [workpiece] says how the workpiece gives way"
+    if table.workpiece.damping_ratio is not None and table.workpiece.density_kg_m3 is None:
+        yield "workpiece.damping_ratio: needs density_kg_m3, without which the workpiece has no modes"
+    if table.workpiece.density_kg_m3 is not None and table.dynamics is not None:
+        for k, mode in enumerate(table.dynamics.mode):
+            if mode.of == "workpiece":
+                yield f"dynamics.mode.{k}: of the workpiece: leave it out: workpiece.density_kg_m3 gives its modes"
     for k, clamp in enumerate(table.workpiece.clamp):
         key = f"workpiece.clamp.{k}"
         box = (clamp.low_mm is not None, clamp.high_mm is not None)
@@ -53,7 +61,8 @@ def clamps_of(table: WorkpieceTable, stock: LayeredStock) -> tuple[Clamp, ...]:
 
 def elastic_of(table: WorkpieceTable) -> Elastic:
     """What the workpiece is made of."""
-    return Elastic(PER * table.modulus_gpa, table.poisson)
+    density = None if table.density_kg_m3 is None else T_MM3 * table.density_kg_m3
+    return Elastic(PER * table.modulus_gpa, table.poisson, density)
 
 
 def _clamp(table: ClampTable, name: str, stock: LayeredStock) -> Clamp:

@@ -18,6 +18,7 @@ from chipload.errors import InputError
 from chipload.files import read_regular
 from chipload.jobs.messages import table_errors
 from chipload.jobs.program.dynamics_tables import DynamicsTable, ModesFileTable, ModeTable
+from chipload.jobs.program.tables import WorkpieceTable
 from chipload.stability.modes import Modes
 from chipload.stability.probability import ModeSpread
 
@@ -39,6 +40,7 @@ class Dynamics:
     name : of each mode by this number
     unknown : what is not stated and would be needed
     spread : of the modes; None: not stated
+    workpiece_damping : of the modes that [workpiece] gives; None: it gives none
     """
 
     modes: Mapping[int, Modes]
@@ -46,10 +48,18 @@ class Dynamics:
     name: Mapping[int, str]
     unknown: tuple[str, ...]
     spread: ModeSpread | None = None
+    workpiece_damping: float | None = None
+
+    @property
+    def first_followed(self) -> int:
+        """Number of the first mode of the workpiece that is followed."""
+        return max(self.name, default=0) + 1
 
 
-def dynamics_of(table: DynamicsTable, folder: Path, cutters: Mapping[int, Cutter]) -> Dynamics:
-    """Modes of every tool.
+def dynamics_of(
+    table: DynamicsTable, folder: Path, cutters: Mapping[int, Cutter], workpiece: WorkpieceTable | None = None
+) -> Dynamics:
+    """Modes of every tool, and the damping of those of the workpiece.
 
     Raises
     ------
@@ -57,7 +67,8 @@ def dynamics_of(table: DynamicsTable, folder: Path, cutters: Mapping[int, Cutter
         No mode is stated, one states stiffness and mass, names a tool that is not there, or its values cannot be.
     """
     listed = [*table.mode, *(read_modes(folder / table.file) if table.file is not None else ())]
-    if not listed:
+    density = None if workpiece is None else workpiece.density_kg_m3
+    if not listed and density is None:
         raise InputError("dynamics: no mode: state [[dynamics.mode]] or file (chipload tap makes one)")
     unknown: list[str] = []
     known: list[tuple[int, ModeTable, float]] = []
@@ -86,8 +97,15 @@ def dynamics_of(table: DynamicsTable, folder: Path, cutters: Mapping[int, Cutter
         if own:
             modes[tool] = _modes(own)
             number[tool] = tuple(k for k, _, _ in own)
+    damping = None
+    if workpiece is not None:
+        damping = workpiece.damping_ratio
+        if density is None and not any(m.of == "workpiece" for m in listed):
+            unknown.append("density of the workpiece")
+        if density is not None and damping is None:
+            unknown.append("damping of the workpiece")
     names = {k: f"{m.of} {m.frequency_hz:g} Hz" for k, m in enumerate(listed, 1)}
-    return Dynamics(modes, number, names, tuple(dict.fromkeys(unknown)), _spread(table))
+    return Dynamics(modes, number, names, tuple(dict.fromkeys(unknown)), _spread(table), damping)
 
 
 def _spread(table: DynamicsTable) -> ModeSpread | None:

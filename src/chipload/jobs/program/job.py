@@ -71,7 +71,7 @@ def load(path: Path, table: ProgramJobTable, overrides: Sequence[str]) -> Progra
             tools = cutters(table.cutter, folder)
         with errors.collect():
             if table.dynamics is not None and tools:
-                dynamics_of(table.dynamics, folder, tools)
+                dynamics_of(table.dynamics, folder, tools, table.workpiece)
     else:
         errors.texts += [
             f'{key}: not used where a program is only read: add an [[operation]] with kind = "simulate" or leave it out'

@@ -118,7 +118,7 @@ def run(
                 begin = 0.5 * (1.0 + share)
                 speeds, reading = new_speeds(
                     job, *own, reading, stock, material, machine, read, float(seconds.sum()),
-                    lambda done, what: progress(share + (begin - share) * done, what),
+                    compliance, lambda done, what: progress(share + (begin - share) * done, what),
                 )  # fmt: skip
                 lines, seconds = line_times(reading, machine)
                 stock = stock_body(job, reading.program)
@@ -281,7 +281,7 @@ def _simulated(
     if made is not None:
         watches.append(forming(made, gives, material))
 
-    stability_watch = watch_of(job, material)
+    stability_watch = watch_of(job, material, compliance)
     if stability_watch is not None:
         watches.append(stability_watch)
 

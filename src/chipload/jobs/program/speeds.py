@@ -24,11 +24,12 @@ from chipload.jobs.program.preparation import resolution_of, timed
 from chipload.jobs.program.stability import (
     DEFAULT_MARGIN,
     StabilityResult,
-    StabilityWatch,
     rounded_rpm,
 )
+from chipload.jobs.program.stability_watch import StabilityWatch
 from chipload.jobs.program.stiffness import deflecting, stiffness_of, watched, with_columns
 from chipload.jobs.program.tables import SimulateTable
+from chipload.jobs.program.workpiece_compliance import WorkpieceCompliance
 from chipload.jobs.tables import stated
 from chipload.machine.machine import Machine
 from chipload.program.gcode.feed_words import DIGITS
@@ -45,11 +46,12 @@ from chipload.units import rpm_from_rad_s
 GAIN = 0.02
 
 
-def watch_of(job: ProgramJob, material: Material) -> StabilityWatch | None:
+def watch_of(job: ProgramJob, material: Material, workpiece: WorkpieceCompliance | None) -> StabilityWatch | None:
     """What asks for margins; None: no modes are stated."""
     if job.table.dynamics is None:
         return None
-    return StabilityWatch(dynamics_of(job.table.dynamics, job.path.parent, job.cutters), material)
+    dynamics = dynamics_of(job.table.dynamics, job.path.parent, job.cutters, job.table.workpiece)
+    return StabilityWatch(dynamics, material, None if workpiece is None else workpiece.modes)
 
 
 def stability_of(job: ProgramJob, watch: StabilityWatch, machine: Machine) -> StabilityResult:
@@ -87,6 +89,7 @@ def new_speeds(
     machine: Machine,
     read: Callable[[str], ProgramReading],
     seconds: float,
+    workpiece: WorkpieceCompliance | None,
     progress: Progress,
 ) -> tuple[SpeedResult, ProgramReading]:
     """The text with new speeds, from what the program cuts of a stock, which changes; and what it does then.
@@ -97,7 +100,7 @@ def new_speeds(
         The speeds cannot be changed in the text: the line is named.
     """
     op: SimulateTable = job.table.operation[0]
-    stability = stated(watch_of(job, material), "dynamics")
+    stability = stated(watch_of(job, material, workpiece), "dynamics")
     gives = stiffness_of(job.table.stiffness, job.cutters)
     bends = with_checks(job.table.checks, material, deflecting(gives, material))
     program, times = timed(reading, job, machine)

@@ -8,143 +8,36 @@ of the force by the resolution of the simulation.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.cutting.material import Material
-from chipload.jobs.program.dynamics import Dynamics
-from chipload.jobs.program.stability_state import asked_bytes, joined, read_asked
+from chipload.jobs.program.stability_watch import PROBABILITY, StabilityWatch, relative_covariance
 from chipload.machine.machine import Machine
 from chipload.result import LimitCheck, check_limit
 from chipload.result.limits import Columns
-from chipload.simulation.loads import Cuts
-from chipload.stability.cuts import DynamicCuts, dynamic_cuts
-from chipload.stability.grouping import grouped
+from chipload.stability.cuts import joined
 from chipload.stability.margin import MOST_MARGIN, stability_margins
-from chipload.stability.probability import stable_probability
 from chipload.stability.speeds import QuietSpeeds, quiet_speeds
-from chipload.stability.surface_error import force_rows, wall_errors
 from chipload.units import rpm_from_rad_s
 
 Floats = NDArray[np.float64]
 
-#: columns that the watch adds
-STABILITY_COLUMNS = ("stability_margin", "chatter_hz", "chatter_mode", "sle_um")
-#: the one that needs spreads of the modes
-PROBABILITY = "stable_probability"
-#: limits of these, and the margin that is checked where none is stated
+#: limits of stability, and the margin that is checked where none is stated
 STABILITY_LIMITS = ("stability_margin", PROBABILITY, "sle_um")
 DEFAULT_MARGIN = 1.0
 #: relative error of a margin by the map and by rounding what steps cut
 MARGIN_ERROR = 0.01
-#: the axis of the cutter is upright where its z is at least this
-UPRIGHT = 1.0 - 1e-9
-#: cuts of a tool that speeds are looked for with: those nearest to chatter, and those with most edge in cut
-NEAREST, LARGEST = 12, 12
+#: steps with the least margins for which the error of followed frequencies is looked at
+UNSURE = 48
 #: waves of the fastest mode in a tooth period at the least speed that is looked at: slower ones have no pockets
 MOST_WAVES = 20.0
 #: speeds that are looked at, evenly spaced in their logarithm, and how a speed is rounded [1/min]
 SPEEDS, ROUND_RPM = 161, 10.0
-
-
-@dataclass(eq=False)
-class StabilityWatch:
-    """A watch that gives :data:`STABILITY_COLUMNS`, and keeps what it was asked.
-
-    Parameters
-    ----------
-    dynamics : modes by tool
-    material : whose coefficients count
-    """
-
-    dynamics: Dynamics
-    material: Material
-    known: dict[int, dict[bytes, tuple[float, ...]]] = field(default_factory=dict)
-    cuts: dict[int, list[DynamicCuts]] = field(default_factory=dict)
-    leaning: set[int] = field(default_factory=set)
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of the columns."""
-        return STABILITY_COLUMNS if self.dynamics.spread is None else (*STABILITY_COLUMNS, PROBABILITY)
-
-    def __call__(self, cuts: Cuts) -> dict[str, Floats]:
-        """The columns of some steps of one cutter."""
-        out = np.zeros((len(cuts), len(self.columns)))
-        frame, modes = cuts.plain.frames, self.dynamics.modes.get(cuts.tool)
-        upright = bool((frame[:, 2, 2] >= UPRIGHT).all())
-        if not upright:
-            self.leaning.add(cuts.tool)
-        if modes is not None and upright and len(cuts):
-            groups = grouped(cuts.plain, cuts.spindle, any(self.material.exponents))
-            table = self.known.setdefault(cuts.tool, {})
-            new = {key: k for k, key in reversed(list(enumerate(groups.key))) if key not in table}
-            if new:
-                at = np.array(sorted(new.values()))
-                whole = dynamic_cuts(
-                    groups.engagement, cuts.cutter, self.material, modes, cuts.spindle, groups.T, groups.n
-                )
-                some = whole.chosen(at)
-                self.cuts.setdefault(cuts.tool, []).append(some)
-                for k, values in zip(at.tolist(), self._values(some, whole, at, groups.engagement), strict=True):
-                    table[groups.key[k]] = values
-            out = np.array([table[key] for key in groups.key])
-            number = np.array([0, *self.dynamics.number[cuts.tool]])
-            out[:, 2] = number[out[:, 2].astype(np.int64) + 1]
-        return dict(zip(self.columns, out.T.copy(), strict=True))
-
-    def _values(
-        self, some: DynamicCuts, whole: DynamicCuts, at: NDArray[np.int64], engagement: Any
-    ) -> Iterator[tuple[float, ...]]:
-        """The columns of new cuts."""
-        found = stability_margins(some)
-        error = np.zeros(len(some))
-        if not any(self.material.exponents):
-            size = np.diff(whole.start)[at]
-            row = np.concatenate([np.arange(whole.start[k], whole.start[k] + n) for k, n in zip(at, size, strict=True)])
-            rows = np.ascontiguousarray(force_rows(engagement, self.material)[row])
-            error = np.where(found.margin >= 1.0, 1e3 * wall_errors(some, rows)[0], 0.0)
-        columns = [found.margin, found.frequency, found.mode.astype(np.float64), error]
-        if self.dynamics.spread is not None:
-            columns.append(stable_probability(some, self.dynamics.spread, _relative_covariance(self.material)))
-        return zip(*(x.tolist() for x in columns), strict=True)
-
-    def to_bytes(self) -> bytes:
-        """What it was asked so far, for the state of a run."""
-        return asked_bytes(self.known, self.cuts, self.leaning, len(self.columns))
-
-    def restore(self, path: Path) -> None:
-        """Keep what an earlier run was asked."""
-        self.known, self.cuts, self.leaning = read_asked(path, self.dynamics.modes, self.material.exponents)
-
-    def clear(self) -> None:
-        """Keep nothing."""
-        self.known, self.cuts, self.leaning = {}, {}, set()
-
-    def parts(self, tool: int) -> DynamicCuts | None:
-        """Cuts of a tool that speeds are looked for with; None: it has none."""
-        some = self.cuts.get(tool, [])
-        if not some:
-            return None
-        whole = joined(some)
-        margin = np.array([x[0] for x in self.known[tool].values()])
-        first = np.argsort(margin, kind="stable")[:NEAREST]
-        most = np.argsort(-engaged_edge(whole), kind="stable")[:LARGEST]
-        return whole.chosen(np.unique(np.concatenate([first, most])))
-
-
-def engaged_edge(cuts: DynamicCuts) -> Floats:
-    """(n,) length of the edge in cut times its immersion, of each cut [mm rad]."""
-    step = np.repeat(np.arange(len(cuts)), np.diff(cuts.start))
-    return np.asarray(
-        np.bincount(step, (cuts.rows[:, 1] - cuts.rows[:, 0]) * cuts.rows[:, 4], len(cuts)), dtype=np.float64
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,6 +84,23 @@ class StabilityResult:
                 out[tool] = quiet_speeds([parts], np.geomspace(low, high, SPEEDS), self.wanted)
         return out
 
+    @cached_property
+    def frequency_share(self) -> float:
+        """Share by which the least margins fall where followed frequencies are off by their error, either way."""
+        watch, worst = self.watch, 0.0
+        if not watch.follows or watch.workpiece is None:
+            return 0.0
+        for tool, some in sorted(watch.cuts.items()):
+            margin = np.array([x[0] for x in watch.known[tool].values()])
+            first = np.argsort(margin, kind="stable")[:UNSURE]
+            cuts, count = joined(some).chosen(first), watch.workpiece.frequency.shape[1]
+            for sign in (-1.0, 1.0):
+                factor = np.ones(cuts.omega.shape[1])
+                factor[-count:] += sign * watch.workpiece.error
+                off = stability_margins(replace(cuts, omega=cuts.omega * factor)).margin
+                worst = max(worst, 1.0 - float(off.min() / margin[first].min()))
+        return worst
+
     def range_of(self, tool: int) -> tuple[float, float]:
         """Speeds [rad/s] that machine, job and range of the coefficients allow a tool, but for slow ones."""
         per = rpm_from_rad_s(1.0)
@@ -199,7 +109,9 @@ class StabilityResult:
         high = min(high or math.inf, self.machine.spindle_max)
         some = self.watch.cuts.get(tool)
         if some:
-            low = max(low, float(some[0].modes.frequency.max()) * some[0].pitch / MOST_WAVES)
+            stated = self.watch.dynamics.modes.get(tool)
+            fastest = float(stated.frequency.max() if stated is not None else some[0].omega.min() / math.tau)
+            low = max(low, fastest * some[0].pitch / MOST_WAVES)
         radius, measured = self.radii.get(tool, 0.0), self.watch.material.speed
         if measured is not None and radius > 0.0:
             low, high = max(low, measured[0] / radius), min(high, measured[1] / radius)
@@ -231,14 +143,18 @@ def stability_limits(
             check_limit(name, v, {}, track=track, reason="no [dynamics] is stated") for name, v in limits.items()
         )
     limits.setdefault("stability_margin", DEFAULT_MARGIN)
-    spread = float(np.sqrt(np.diag(_relative_covariance(stability.watch.material)).max())) if sigma > 0.0 else 0.0
+    spread = float(np.sqrt(np.diag(relative_covariance(stability.watch.material)).max())) if sigma > 0.0 else 0.0
     margin = np.asarray(columns["stability_margin"]) / (1.0 + sigma * spread)
     columns = {**columns, "stability_margin": margin}
     cutting = cutting_rows(columns)
     reason = direction or stability.reason(np.unique(np.asarray(columns["tool"])[cutting]))
     if not reason and (margin[cutting] == 0.0).any():
         reason = "the margin of some steps is not known"
-    error = MARGIN_ERROR + (errors.get("force_n", 0.0) if math.isfinite(errors.get("force_n", 0.0)) else 0.0)
+    error = (
+        MARGIN_ERROR
+        + stability.frequency_share
+        + (errors.get("force_n", 0.0) if math.isfinite(errors.get("force_n", 0.0)) else 0.0)
+    )
     out = []
     for name, limit in limits.items():
         why = reason
@@ -250,14 +166,6 @@ def stability_limits(
         known = 0.0 if name == PROBABILITY else error
         out.append(check_limit(name, limit, columns, track=track, rows=rows, error=known, reason=why))
     return tuple(out)
-
-
-def _relative_covariance(material: Material) -> Floats:
-    """(2, 2) of the tangential and the radial cutting coefficient, over their sizes; 0: the material does not say."""
-    size = np.abs(np.array(material.coefficients[:2]))
-    if not material.has_band or not (size > 0.0).all():
-        return np.zeros((2, 2))
-    return np.asarray(material.variances[:2, :2] / np.outer(size, size))
 
 
 def cutting_rows(columns: Columns) -> NDArray[np.bool_]:
@@ -296,13 +204,15 @@ def stability_numbers(stability: StabilityResult, columns: Columns) -> dict[str,
         "line": int(columns["line"][k]),
         "tool": tool,
         "chatter_hz": float(columns["chatter_hz"][k]),
-        "mode": dynamics.name.get(number),
+        "mode": stability.watch.name_of(number),
         "speed_rpm": speed,
         "speed_rpm_advised": None,
         "margin_advised": None,
         "windows": [],
         "different_cuts": sum(map(len, stability.watch.known.values())),
     }
+    if stability.watch.follows:
+        out["workpiece_modes"] = _followed_numbers(stability.watch, columns, stability.wanted)
     if quiet is not None:
         best, least = quiet.advised(speed / rpm_from_rad_s(1.0))
         out |= {"speed_rpm_advised": rounded_rpm(best), "margin_advised": least}
@@ -311,6 +221,23 @@ def stability_numbers(stability: StabilityResult, columns: Columns) -> dict[str,
             for w in quiet.windows
         ]
     return out
+
+
+def _followed_numbers(watch: StabilityWatch, columns: Columns, wanted: float) -> dict[str, Any]:
+    """Modes of the workpiece in summary.json, and what its modes before the first cut alone would say."""
+    assert watch.workpiece is not None
+    margin, line = np.asarray(columns["stability_margin"]), np.asarray(columns["line"])
+    steps = np.array(sorted(watch.first_margin), dtype=np.int64)
+    first = np.array([watch.first_margin[k] for k in steps.tolist()])
+    differs = (first < wanted) != (margin[steps] < wanted)
+    k = int(np.argmin(first))
+    return {
+        "frequency_error_percent": 100.0 * watch.workpiece.error,
+        "start_state_margin_min": float(first[k]),
+        "start_state_line": int(line[steps[k]]),
+        "verdict_differs_steps": int(differs.sum()),
+        "verdict_differs_lines": np.unique(line[steps[differs]]).tolist(),
+    }
 
 
 def speed_of(columns: Columns, k: int) -> float:

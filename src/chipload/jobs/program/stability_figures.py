@@ -11,16 +11,16 @@ from plotly.subplots import make_subplots
 from chipload.jobs.program.outcome import SimulationResult, SpeedResult
 from chipload.jobs.program.stability import (
     StabilityResult,
-    engaged_edge,
     filled_margins,
     stability_numbers,
 )
-from chipload.jobs.program.stability_state import joined
+from chipload.jobs.program.stability_watch import engaged_edge
 from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, STOCK
 from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table
 from chipload.result.limits import Columns
 from chipload.stability.chart import StabilityChart, stability_chart
+from chipload.stability.cuts import joined
 from chipload.stability.margin import MOST_MARGIN
 from chipload.units import rpm_from_rad_s
 

@@ -13,29 +13,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chipload.errors import InputError
-from chipload.stability.cuts import DynamicCuts
-from chipload.stability.modes import Modes
+from chipload.stability.cuts import DynamicCuts, joined
 from chipload.stock.shapes import read_shapes, shape_bytes
 
 KIND = "chipload different cuts of a simulation 1"
 #: arrays of the file with their numbers of dimensions
 ARRAYS = {
     "tools": 1, "counts": 1, "pitch": 1, "leaning": 1, "keys": 1, "key_ends": 1, "values": 2, "sizes": 1, "rows": 2,
-    "period": 1, "U": 1,
+    "period": 1, "damping": 1, "modes": 1, "omega": 1, "U": 1, "first_steps": 1, "first_margins": 1,
 }  # fmt: skip
 
 Known = dict[int, dict[bytes, tuple[float, ...]]]
 
 
-def joined(some: list[DynamicCuts]) -> DynamicCuts:
-    """Cuts of one tool, one behind the other."""
-    sizes = np.concatenate([np.diff(c.start) for c in some])
-    start = np.concatenate([[0], np.cumsum(sizes)])
-    rows, period, U = (np.concatenate([getattr(c, name) for c in some]) for name in ("rows", "period", "U"))
-    return DynamicCuts(start, rows, some[0].exponents, period, some[0].pitch, some[0].modes, U)
-
-
-def asked_bytes(known: Known, cuts: Mapping[int, list[DynamicCuts]], leaning: set[int], columns: int) -> bytes:
+def asked_bytes(
+    known: Known,
+    cuts: Mapping[int, list[DynamicCuts]],
+    leaning: set[int],
+    columns: int,
+    first_margin: Mapping[int, float],
+) -> bytes:
     """The file of the different cuts of every tool.
 
     Parameters
@@ -44,6 +41,7 @@ def asked_bytes(known: Known, cuts: Mapping[int, list[DynamicCuts]], leaning: se
     cuts : of every tool
     leaning : tools whose axis is not upright
     columns : number of values of a cut
+    first_margin : by step, with the modes that the workpiece has before its first cut
     """
     whole = {tool: joined(some) for tool, some in cuts.items()}
     keys = [key for tool in whole for key in known[tool]]
@@ -60,51 +58,58 @@ def asked_bytes(known: Known, cuts: Mapping[int, list[DynamicCuts]], leaning: se
         "sizes": np.concatenate([np.diff(c.start) for c in whole.values()]) if whole else none.astype(np.int64),
         "rows": np.concatenate([c.rows for c in whole.values()]) if whole else none.reshape(0, 11),
         "period": np.concatenate([c.period for c in whole.values()]) if whole else none,
+        "damping": np.concatenate([c.damping for c in whole.values()]) if whole else none,
+        "modes": np.array([len(c.damping) for c in whole.values()], dtype=np.int64),
+        "omega": np.concatenate([c.omega.ravel() for c in whole.values()]) if whole else none,
         "U": np.concatenate([c.U.ravel() for c in whole.values()]) if whole else none,
+        "first_steps": np.array(list(first_margin), dtype=np.int64),
+        "first_margins": np.array(list(first_margin.values()), dtype=np.float64),
     }
     return shape_bytes(KIND, arrays, np.empty(0, dtype=object))
 
 
 def read_asked(
-    path: Path, modes: Mapping[int, Modes], exponents: ArrayLike
-) -> tuple[Known, dict[int, list[DynamicCuts]], set[int]]:
-    """What :func:`asked_bytes` wrote: values by key, cuts and leaning tools.
+    path: Path, exponents: ArrayLike
+) -> tuple[Known, dict[int, list[DynamicCuts]], set[int], dict[int, float]]:
+    """What :func:`asked_bytes` wrote: values by key, cuts, leaning tools and the margins with the first modes.
 
     Parameters
     ----------
-    modes : of every tool
     exponents : of the size effect of the material
 
     Raises
     ------
     InputError
-        The file is damaged, or of another job.
+        The file is damaged.
     """
     a, _ = read_shapes(path, KIND, ARRAYS)
     keys, ends, sizes = a["keys"].tobytes(), [0, *a["key_ends"].tolist()], a["sizes"]
-    count, tools = len(a["key_ends"]), a["tools"].tolist()
+    count, tools, numbers = len(a["key_ends"]), a["tools"].tolist(), a["modes"]
     whole = (
-        len(tools) == len(a["counts"]) == len(a["pitch"])
+        len(tools) == len(a["counts"]) == len(a["pitch"]) == len(numbers)
         and count == a["counts"].sum() == len(a["values"]) == len(sizes) == len(a["period"])
         and sizes.sum() == len(a["rows"])
         and ends[-1] == len(keys)
-        and all(tool in modes for tool in tools)
+        and numbers.sum() == len(a["damping"])
+        and 2 * len(a["omega"]) == len(a["U"]) == 2 * int((a["counts"] * numbers).sum())
+        and len(a["first_steps"]) == len(a["first_margins"])
     )
     if not whole:
         raise InputError(f"{path}: damaged: remove its folder")
     known: Known = {}
     cuts: dict[int, list[DynamicCuts]] = {}
-    first, row, at = 0, 0, 0
-    for tool, n, pitch in zip(tools, a["counts"].tolist(), a["pitch"].tolist(), strict=True):
+    first, row, at, mode = 0, 0, 0, 0
+    for tool, n, m, pitch in zip(tools, a["counts"].tolist(), numbers.tolist(), a["pitch"].tolist(), strict=True):
         own = slice(first, first + n)
         start = np.concatenate([[0], np.cumsum(sizes[own])])
-        rows, number = a["rows"][row : row + int(start[-1])], 2 * n * len(modes[tool])
-        U = a["U"][at : at + number].reshape(n, 2, len(modes[tool]))
+        omega, U = a["omega"][at : at + n * m].reshape(n, m), a["U"][2 * at : 2 * (at + n * m)].reshape(n, 2, m)
         some = DynamicCuts(
-            start, rows, np.asarray(exponents, dtype=np.float64), a["period"][own], pitch, modes[tool], U
-        )
+            start, a["rows"][row : row + int(start[-1])], np.asarray(exponents, dtype=np.float64), a["period"][own],
+            pitch, a["damping"][mode : mode + m], omega, U,
+        )  # fmt: skip
         values = [tuple(v) for v in a["values"][own].tolist()]
         known[tool] = dict(zip([keys[ends[k] : ends[k + 1]] for k in range(first, first + n)], values, strict=True))
         cuts[tool] = [some]
-        first, row, at = first + n, row + int(start[-1]), at + number
-    return known, cuts, {int(tool) for tool in a["leaning"].tolist()}
+        first, row, at, mode = first + n, row + int(start[-1]), at + n * m, mode + m
+    margins = dict(zip(a["first_steps"].tolist(), a["first_margins"].tolist(), strict=True))
+    return known, cuts, {int(tool) for tool in a["leaning"].tolist()}, margins

@@ -197,6 +197,13 @@ class WorkpieceTable(Table):
     modulus_gpa: Positive = Field(le=1000.0, description="Young's modulus")
     poisson: NotNegative = Field(lt=0.5, description="Poisson's ratio")
     clamp: tuple[ClampTable, ...] = Field(min_length=1, description="all of them together allow no rigid motion")
+    density_kg_m3: Positive | None = Field(
+        None, ge=500.0, le=25000.0, description="with it the workpiece has natural frequencies, in each state"
+    )
+    damping_ratio: Positive | None = Field(
+        None, lt=0.5, description="of its modes in the clamps; [dynamics] needs it: without it stability is unproven"
+    )
+    modes: Count = Field(4, le=20, description="lowest modes that are followed through the removal")
     order: Literal[2, 3] = Field(2, description="of the modes of a cell; 3 costs more and is closer in corners")
     cell_mm: Positive | None = Field(None, description="side of the cells; none: by the thinnest wall that is left")
     states: Count = Field(16, le=200, description="states of removal that are solved at most")

@@ -25,6 +25,7 @@ from chipload.program.program import Program
 from chipload.progress import Progress, silent
 from chipload.simulation.removal import Columns, Resolution
 from chipload.stock.layers import LayeredStock
+from chipload.structure.cells.followed import FollowedModes, ModesOfStates
 from chipload.structure.cells.grid import CellGrid, grid_over
 from chipload.structure.cells.states import State, StepCompliances, size_of, step_compliances
 from chipload.structure.cells.thickness import cells_over
@@ -38,6 +39,8 @@ COARSER = 1.5
 SPACING = 0.5
 #: error of the cells that is not found so
 FLOOR = 0.01
+#: change of a frequency between two states, over that of the deflection
+FREQUENCY = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +57,7 @@ class WorkpieceCompliance:
     state_change : how far the greatest deflection may lie above what was found, as states lie apart, relative
     findings : material that hangs on nothing
     bent : the workpiece in its worst step; None: nothing is cut
+    modes : of vibration, followed through the removal; None: the density is not stated
     """
 
     steps: StepCompliances
@@ -64,6 +68,7 @@ class WorkpieceCompliance:
     state_change: float
     findings: tuple[Finding, ...]
     bent: BentWorkpiece | None
+    modes: FollowedModes | None = None
 
     @property
     def numbers(self) -> Mapping[str, Any]:
@@ -75,6 +80,19 @@ class WorkpieceCompliance:
             "thinnest_wall_mm": self.wall,
             "unknowns": self.unknowns,
             "support": None if self.bent is None else self._support(self.bent),
+            **({} if self.modes is None else {"natural_frequencies": self._frequencies(self.modes)}),
+        }
+
+    @staticmethod
+    def _frequencies(modes: FollowedModes) -> Mapping[str, Any]:
+        f = modes.state_frequency
+        return {
+            "states": len(modes.states),
+            "start_hz": f[0].tolist(),
+            "end_hz": f[-1].tolist(),
+            "least_hz": f.min(axis=0).tolist(),
+            "greatest_hz": f.max(axis=0).tolist(),
+            "error_percent": 100.0 * modes.error,
         }
 
     @staticmethod
@@ -123,8 +141,10 @@ def workpiece_compliance(
 
     states = [State(k, v, lambda then=then: build(then, grid)) for k, v, then in ahead.stocks]  # type: ignore[misc]
     share = table.state_change_percent / 100.0
+    spacing = SPACING * float(grid.size.max())
+    watch = None if table.density_kg_m3 is None else ModesOfStates(ahead.lines, table.modes, spacing)
     found = step_compliances(
-        ahead.lines, states, tolerance=share, most=max(table.states, 2), spacing=SPACING * float(grid.size.max()),
+        ahead.lines, states, tolerance=share, most=max(table.states, 2), spacing=spacing, built=watch,
         progress=lambda done, what: progress(0.4 + 0.5 * done, what),
     )  # fmt: skip
     deflection = size_of(found.compliance) * ahead.lines.force
@@ -132,13 +152,19 @@ def workpiece_compliance(
     change = upper / float(deflection.max()) - 1.0 if upper > 0.0 else 0.0
     progress(0.9, "error of the cells")
     error = _cell_error(found, [then for _, _, then in ahead.stocks], grid, build)
+    modes = None
+    if watch is not None:
+        modes = watch.followed(
+            states, tolerance=FREQUENCY * share, most=max(table.states, 2), error=0.5 * (error + FLOOR),
+            progress=lambda done, what: progress(0.9 + 0.05 * done, what),
+        )  # fmt: skip
     bent = _bent(found, ahead, grid, build, job) if len(found.worst) else None
     findings: tuple[Finding, ...] = ()
     if found.loose > 1e-6 * stock.volume():
         text = f"{found.loose:.3g} mm3 of the workpiece hang on nothing: they hold no force"
         findings = (Finding("loose-material", 0, text, Severity.UNPROVEN),)
     return WorkpieceCompliance(
-        found, wall, float(grid.size.max()), most[0], float(error + FLOOR + change), change, findings, bent
+        found, wall, float(grid.size.max()), most[0], float(error + FLOOR + change), change, findings, bent, modes
     )
 
 

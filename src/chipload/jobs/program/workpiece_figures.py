@@ -7,8 +7,9 @@ import plotly.graph_objects as go
 
 from chipload.jobs.program.bent_workpiece import BentWorkpiece
 from chipload.jobs.program.outcome import SimulationResult
-from chipload.report.figures import FONT, LIMIT, SCALE
+from chipload.report.figures import FONT, GRID, LIMIT, SCALE
 from chipload.report.sheet import figure, table
+from chipload.structure.cells.followed import FollowedModes
 
 #: the greatest displacement is drawn as this share of the part's diagonal
 DRAWN = 0.06
@@ -33,6 +34,8 @@ def workpiece_section(simulation: SimulationResult, figures: dict[str, go.Figure
         "<h3>Lines that bend it most</h3>",
         table(["line", "deflection [\u00b5m]"], rows, numbers=(0, 1)),
     ]
+    if own.modes is not None:
+        body += _frequencies(own.modes, figures)
     bent = own.bent
     if bent is not None:
         x, y, z = bent.place
@@ -46,6 +49,35 @@ def workpiece_section(simulation: SimulationResult, figures: dict[str, go.Figure
             f"{1e3 * bent.before:.3g} to {1e3 * bent.after:.3g} \u00b5m.</p>",
         ]
     return body
+
+
+def _frequencies(modes: FollowedModes, figures: dict[str, go.Figure]) -> list[str]:
+    """Natural frequencies through the removal."""
+    f = modes.state_frequency
+    rows = [[str(k + 1), *(f"{value:.4g}" for value in (f[0, k], f[:, k].max(), f[-1, k]))] for k in range(f.shape[1])]
+    head = ["mode", "before [Hz]", "greatest [Hz]", "after [Hz]"]
+    return [
+        "<h3>Natural frequencies through the removal</h3>",
+        f'<p class="note">In {len(modes.states)} states, known to {100.0 * modes.error:.2g} %.</p>',
+        table(head, rows, numbers=(0, 1, 2, 3)),
+        figure("frequencies", frequency_figure(modes), figures),
+    ]
+
+
+def frequency_figure(modes: FollowedModes) -> go.Figure:
+    """Natural frequencies of the workpiece over the volume that is removed."""
+    out = go.Figure()
+    for k, f in enumerate(modes.state_frequency.T, 1):
+        out.add_trace(
+            go.Scatter(
+                x=1e-3 * modes.removed, y=f.astype(np.float32), mode="lines+markers", name=f"mode {k}",
+                hovertemplate="%{y:.4g} Hz<extra>mode " + str(k) + "</extra>",
+            )
+        )  # fmt: skip
+    out.update_layout(template="none", font=FONT, height=320, margin={"l": 74, "r": 16, "t": 20, "b": 50})
+    out.update_xaxes(title_text="removed [cm\u00b3]", gridcolor=GRID, zeroline=False)
+    out.update_yaxes(title_text="frequency [Hz]", gridcolor=GRID, rangemode="tozero")
+    return out
 
 
 def _scale(bent: BentWorkpiece) -> float:

@@ -57,15 +57,15 @@ def harmonic(row, q):
 
 
 @njit(
-    "void(int64, int64, int64[::1], float64[:,::1], float64[::1], int64, float64[::1], float64[::1], float64[:,:,::1],"
-    " float64[:,::1])",
+    "void(int64, int64, int64[::1], float64[:,::1], float64[::1], int64, float64[:,::1], float64[::1],"
+    " float64[:,:,::1], float64[:,::1])",
     cache=True, nogil=True,
 )  # fmt: skip
 def wall_errors(first, last, start, rows, tau, teeth, w, z, U, out):
     """Of the cuts first .. last - 1: error of the wall of greatest size [mm], above 0 where material is left, and
     whether a wall is made: out (n, 2).
     """
-    modes = len(w)
+    modes = len(z)
     motion = np.empty(HARMONICS + 1, np.complex128)
     for i in range(first, last):
         out[i, 0] = 0.0
@@ -88,7 +88,7 @@ def wall_errors(first, last, start, rows, tau, teeth, w, z, U, out):
             motion[k] = 0.0
             omega = TAU * k / tau[i]
             for j in range(modes):
-                share = 1.0 / complex(w[j] ** 2 - omega**2, 2.0 * z[j] * w[j] * omega)
+                share = 1.0 / complex(w[i, j] ** 2 - omega**2, 2.0 * z[j] * w[i, j] * omega)
                 motion[k] += U[i, 1, j] * share * (U[i, 0, j] * x + U[i, 1, j] * y)
         for r in range(start[i], start[i + 1]):
             for wall in range(2):

@@ -122,6 +122,7 @@ def step_compliances(
     tolerance: float,
     most: int,
     spacing: float,
+    built: Callable[[int, CellWorkpiece], None] | None = None,
     progress: Progress = silent,
 ) -> StepCompliances:
     """Compliance in the state of every step that cuts.
@@ -132,8 +133,9 @@ def step_compliances(
     tolerance : difference between neighbouring states over the greatest deflection
     most : states at most
     spacing : least distance [mm] of contact lines that are solved
+    built : called with each state that is solved, by its number, each time that it is built
     """
-    solver = _Solver(steps, states, _samples(steps.lines, spacing))
+    solver = _Solver(steps, states, spaced_rows(steps.lines, spacing, LINES), built)
     chosen, spans = _chosen(solver, tolerance, most, progress)
     out, doubt = np.zeros((len(steps.step), len(STATIONS), 3, 3)), np.zeros(len(steps.step))
     for a, b in spans:
@@ -142,7 +144,7 @@ def step_compliances(
             continue
         if not len(rows):
             rows = own[:1]
-        ends = [_between(steps.lines, own, rows, solver.compliance(k, rows)) for k in (a, b)]
+        ends = [between_rows(steps.lines, own, rows, solver.compliance(k, rows)) for k in (a, b)]
         out[own], doubt[own] = _in_state(steps.removed[own], states[a].removed, states[b].removed, *ends)
     first = [state.step for state in states]
     tight = np.full(len(out), -1, dtype=np.int64)
@@ -173,11 +175,18 @@ def step_compliances(
 class _Solver:
     """Compliances of contact lines in states; ``samples`` are the rows of the steps that are solved.
 
-    Every compliance is kept, the factors only of the state that was used last.
+    Every compliance is kept, the factors only of the state that was used last. ``built`` is called with each state that
+    is solved, by its number.
     """
 
-    def __init__(self, steps: StepLines, states: Sequence[State], samples: Indices) -> None:
-        self.steps, self.states, self.samples = steps, states, samples
+    def __init__(
+        self,
+        steps: StepLines,
+        states: Sequence[State],
+        samples: Indices,
+        built: Callable[[int, CellWorkpiece], None] | None = None,
+    ) -> None:
+        self.steps, self.states, self.samples, self.built = steps, states, samples, built
         self.loose = 0.0
         self._solved: dict[int, CellWorkpiece] = {}
         self._known: dict[tuple[int, int], Array] = {}
@@ -190,6 +199,8 @@ class _Solver:
                 self._solved.clear()
                 self._solved[k] = self.states[k].build()
                 self.loose = max(self.loose, self._solved[k].loose)
+                if self.built is not None:
+                    self.built(k, self._solved[k])
             work = self._solved[k]
             for r, c in zip(missing, line_compliances(work, self.steps.lines[missing]), strict=True):
                 self._known[k, r] = c
@@ -253,8 +264,8 @@ def _first_states(states: Sequence[State]) -> list[int]:
     return sorted({0, *between, len(states) - 1})
 
 
-def _samples(lines: Array, spacing: float) -> Indices:
-    """Rows no nearer to the one before than ``spacing`` [mm], which grows until there are at most :data:`LINES`."""
+def spaced_rows(lines: Array, spacing: float, most: int) -> Indices:
+    """Rows no nearer to the one before than ``spacing`` [mm], which grows until there are at most ``most``."""
     middle = lines.mean(axis=1).tolist()
     while True:
         kept = list(range(min(len(middle), 1)))
@@ -262,18 +273,19 @@ def _samples(lines: Array, spacing: float) -> Indices:
             (x, y, z), (a, b, c) = middle[k], middle[kept[-1]]
             if (x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2 > spacing * spacing:
                 kept.append(k)
-        if len(kept) <= LINES:
+        if len(kept) <= most:
             return np.array(kept, dtype=np.int64)
         spacing *= 1.3
 
 
-def _between(lines: Array, own: Indices, rows: Indices, values: Array) -> Array:
+def between_rows(lines: Array, own: Indices, rows: Indices, values: Array) -> Array:
     """Values of rows ``own`` from those of some of them, the mean of the two beside each by distance."""
     middle = lines.mean(axis=1)
     before = np.clip(np.searchsorted(rows, own, side="right") - 1, 0, len(rows) - 1)
     after = np.minimum(before + 1, len(rows) - 1)
     a, b = (np.linalg.norm(middle[own] - middle[rows[k]], axis=1) for k in (before, after))
-    t = np.divide(a, a + b, out=np.zeros(len(a)), where=a + b > 0.0)[:, None, None, None]
+    t = np.divide(a, a + b, out=np.zeros(len(a)), where=a + b > 0.0)
+    t = t.reshape(-1, *(1,) * (values.ndim - 1))
     return np.asarray((1.0 - t) * values[before] + t * values[after])
 
 

@@ -26,7 +26,7 @@ from scipy.spatial import cKDTree
 
 from chipload.errors import InputError
 from chipload.stock.layers import LayeredStock
-from chipload.structure.cells.assembly import LEAST_SHARE, CellModes, modes_of, shares, stiffness
+from chipload.structure.cells.assembly import LEAST_SHARE, CellModes, mass, modes_of, shares, stiffness
 from chipload.structure.cells.clamp import Clamp, clamp_stiffness
 from chipload.structure.cells.grid import Array, CellGrid, Indices, shape_values
 from chipload.structure.cells.moments import stock_moments
@@ -51,15 +51,19 @@ class Elastic:
     ----------
     modulus : Young's modulus [MPa]
     poisson : Poisson's ratio
+    density : [t/mm^3]; None: its mass is not known
     """
 
     modulus: float
     poisson: float
+    density: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse what is no elastic solid."""
         if not 0.0 < self.modulus < np.inf or not 0.0 <= self.poisson < 0.5:
             raise InputError(f"workpiece: modulus {self.modulus:g} MPa: above 0; Poisson {self.poisson:g}: 0 to 0.5")
+        if self.density is not None and not 0.0 < self.density < np.inf:
+            raise InputError(f"workpiece: density {self.density:g} t/mm3: must be above 0")
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +82,7 @@ class CellWorkpiece:
     loose : [mm^3] of material that hangs on nothing and was left out
     clamped : [mm^3] that each clamp holds
     sections : of the stock, on which forces act
+    mass : (3 u, 3 u) sparse [t]; None: the density is not known
     """
 
     grid: CellGrid
@@ -91,6 +96,7 @@ class CellWorkpiece:
     loose: float
     clamped: Array
     sections: StockSections
+    mass: csr_array | None = None
 
     def solve(self, right: Array) -> Array:
         """(3 u, q) displacements of the modes under forces (3 u, q)."""
@@ -133,7 +139,7 @@ def cell_workpiece(
     volume = float(share.sum() * np.prod(grid.size))
     return CellWorkpiece(
         grid, modes, share, csr_array(K), Factors(lu), order, place, volume, loose, springs.volumes,
-        StockSections(stock),
+        StockSections(stock), None if elastic.density is None else mass(grid, modes, moments, elastic.density),
     )  # fmt: skip
 
 
@@ -207,17 +213,21 @@ def line_compliances(work: CellWorkpiece, lines: ArrayLike) -> Array:
     out = np.empty((c, len(STATIONS), 3, 3))
     if not c:
         return out
-    t = _spread(work, ends)
-    count = len(t)
-    spread = _along(work, ends, t)
-    mean = csr_array((np.full(c * count, 1.0 / count), np.arange(c * count), np.arange(c + 1) * count))
-    loads, stations = csr_array(mean @ spread), _along(work, ends, np.array(STATIONS))
+    loads, stations = line_means(work, ends), _along(work, ends, np.array(STATIONS))
     cell = work.grid.cell_of(ends.mean(axis=1))[0]
     near = np.lexsort(cell.T)
     for at in range(0, c, ABREAST):
         some = near[at : at + ABREAST]
         out[some] = _solved(work, csr_array(loads[some]), stations, some)
     return out
+
+
+def line_means(work: CellWorkpiece, lines: Array) -> csr_array:
+    """(c, u) sparse mean of the modes along contact lines (c, 2, 3) [mm]: a force of 1 that is spread evenly."""
+    t = _spread(work, lines)
+    c, count = len(lines), len(t)
+    mean = csr_array((np.full(c * count, 1.0 / count), np.arange(c * count), np.arange(c + 1) * count))
+    return csr_array(mean @ _along(work, lines, t))
 
 
 def displacements(work: CellWorkpiece, line: ArrayLike, points: ArrayLike) -> Array:

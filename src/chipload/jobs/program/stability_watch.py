@@ -1,0 +1,177 @@
+"""The watch that asks for the stability of every step of a simulation, and keeps what it asked.
+
+Steps that cut alike are asked once, see :mod:`chipload.stability.grouping`; where the modes of the workpiece are
+followed through its removal each step has modes of its own and is asked by itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutting.material import Material
+from chipload.jobs.program.dynamics import Dynamics
+from chipload.jobs.program.stability_state import asked_bytes, read_asked
+from chipload.simulation.loads import Cuts
+from chipload.stability.cuts import DynamicCuts, dynamic_cuts, joined
+from chipload.stability.grouping import grouped
+from chipload.stability.margin import stability_margins
+from chipload.stability.probability import stable_probability
+from chipload.stability.surface_error import force_rows, wall_errors
+from chipload.structure.cells.followed import FollowedModes
+
+Floats = NDArray[np.float64]
+
+#: columns that the watch adds
+STABILITY_COLUMNS = ("stability_margin", "chatter_hz", "chatter_mode", "sle_um")
+#: the one that needs spreads of the modes
+PROBABILITY = "stable_probability"
+#: the axis of the cutter is upright where its z is at least this
+UPRIGHT = 1.0 - 1e-9
+#: cuts of a tool that speeds are looked for with: those nearest to chatter, and those with most edge in cut
+NEAREST, LARGEST = 12, 12
+
+
+@dataclass(eq=False)
+class StabilityWatch:
+    """A watch that gives :data:`STABILITY_COLUMNS`, and keeps what it was asked.
+
+    Parameters
+    ----------
+    dynamics : modes by tool
+    material : whose coefficients count
+    workpiece : modes of the workpiece in the state of each step; None: none are known
+    first_margin : of the steps so far, their margin with the modes that the workpiece has before its first cut
+    """
+
+    dynamics: Dynamics
+    material: Material
+    workpiece: FollowedModes | None = None
+    first_margin: dict[int, float] = field(default_factory=dict)
+    known: dict[int, dict[bytes, tuple[float, ...]]] = field(default_factory=dict)
+    cuts: dict[int, list[DynamicCuts]] = field(default_factory=dict)
+    leaning: set[int] = field(default_factory=set)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return STABILITY_COLUMNS if self.dynamics.spread is None else (*STABILITY_COLUMNS, PROBABILITY)
+
+    def __call__(self, cuts: Cuts) -> dict[str, Floats]:
+        """The columns of some steps of one cutter."""
+        out = np.zeros((len(cuts), len(self.columns)))
+        frame, modes = cuts.plain.frames, self.dynamics.modes.get(cuts.tool)
+        upright = bool((frame[:, 2, 2] >= UPRIGHT).all())
+        if not upright:
+            self.leaning.add(cuts.tool)
+        if (modes is not None or self.follows) and upright and len(cuts):
+            groups = grouped(cuts.plain, cuts.spindle, any(self.material.exponents))
+            key = groups.key
+            if self.follows:  # each step has modes of its own
+                key = tuple(own + step.tobytes() for own, step in zip(key, np.asarray(cuts.step), strict=True))
+            table = self.known.setdefault(cuts.tool, {})
+            new = {own: k for k, own in reversed(list(enumerate(key))) if own not in table}
+            if new:
+                at = np.array(sorted(new.values()))
+                whole = dynamic_cuts(
+                    groups.engagement, cuts.cutter, self.material, modes, cuts.spindle, groups.T, groups.n
+                )
+                some, steps = whole.chosen(at), np.asarray(cuts.step)[at]
+                if self.follows:
+                    first = self._with_workpiece(some, steps, frame[at], first=True)
+                    some = self._with_workpiece(some, steps, frame[at])
+                    self.first_margin.update(zip(steps.tolist(), stability_margins(first).margin.tolist(), strict=True))
+                self.cuts.setdefault(cuts.tool, []).append(some)
+                for k, values in zip(at.tolist(), self._values(some, whole, at, groups.engagement), strict=True):
+                    table[key[k]] = values
+            out = np.array([table[own] for own in key])
+            number = np.array([0, *self.numbers(cuts.tool)])
+            out[:, 2] = number[out[:, 2].astype(np.int64) + 1]
+        return dict(zip(self.columns, out.T.copy(), strict=True))
+
+    @property
+    def follows(self) -> bool:
+        """Whether modes of the workpiece are known."""
+        return self.workpiece is not None and self.dynamics.workpiece_damping is not None
+
+    def numbers(self, tool: int) -> tuple[int, ...]:
+        """Number of each mode of the cuts of a tool."""
+        stated, first = self.dynamics.number.get(tool, ()), self.dynamics.first_followed
+        count = self.workpiece.frequency.shape[1] if self.follows and self.workpiece is not None else 0
+        return (*stated, *range(first, first + count))
+
+    def name_of(self, number: int) -> str | None:
+        """What a mode is called."""
+        first = self.dynamics.first_followed
+        return f"workpiece mode {number - first + 1}" if number >= first else self.dynamics.name.get(number)
+
+    def _with_workpiece(
+        self, some: DynamicCuts, steps: NDArray[np.int64], frame: Floats, *, first: bool = False
+    ) -> DynamicCuts:
+        """Cuts with the modes of the workpiece in the state of each step, or before the first cut."""
+        assert self.workpiece is not None
+        hertz, shapes = self.workpiece.at_first(steps) if first else self.workpiece.at(steps)
+        U = np.einsum("cai,cik->cak", frame[:, :2], shapes)
+        damping = np.full(hertz.shape[1], self.dynamics.workpiece_damping)
+        return some.with_modes(damping, math.tau * hertz, U)
+
+    def _values(
+        self, some: DynamicCuts, whole: DynamicCuts, at: NDArray[np.int64], engagement: Any
+    ) -> Iterator[tuple[float, ...]]:
+        """The columns of new cuts."""
+        found = stability_margins(some)
+        error = np.zeros(len(some))
+        if not any(self.material.exponents):
+            size = np.diff(whole.start)[at]
+            row = np.concatenate([np.arange(whole.start[k], whole.start[k] + n) for k, n in zip(at, size, strict=True)])
+            rows = np.ascontiguousarray(force_rows(engagement, self.material)[row])
+            error = np.where(found.margin >= 1.0, 1e3 * wall_errors(some, rows)[0], 0.0)
+        columns = [found.margin, found.frequency, found.mode.astype(np.float64), error]
+        if self.dynamics.spread is not None:
+            columns.append(stable_probability(some, self.dynamics.spread, relative_covariance(self.material)))
+        return zip(*(x.tolist() for x in columns), strict=True)
+
+    def to_bytes(self) -> bytes:
+        """What it was asked so far, for the state of a run."""
+        return asked_bytes(self.known, self.cuts, self.leaning, len(self.columns), self.first_margin)
+
+    def restore(self, path: Path) -> None:
+        """Keep what an earlier run was asked."""
+        self.known, self.cuts, self.leaning, self.first_margin = read_asked(path, self.material.exponents)
+
+    def clear(self) -> None:
+        """Keep nothing."""
+        self.known, self.cuts, self.leaning, self.first_margin = {}, {}, set(), {}
+
+    def parts(self, tool: int) -> DynamicCuts | None:
+        """Cuts of a tool that speeds are looked for with; None: it has none."""
+        some = self.cuts.get(tool, [])
+        if not some:
+            return None
+        whole = joined(some)
+        margin = np.array([x[0] for x in self.known[tool].values()])
+        first = np.argsort(margin, kind="stable")[:NEAREST]
+        most = np.argsort(-engaged_edge(whole), kind="stable")[:LARGEST]
+        return whole.chosen(np.unique(np.concatenate([first, most])))
+
+
+def engaged_edge(cuts: DynamicCuts) -> Floats:
+    """(n,) length of the edge in cut times its immersion, of each cut [mm rad]."""
+    step = np.repeat(np.arange(len(cuts)), np.diff(cuts.start))
+    return np.asarray(
+        np.bincount(step, (cuts.rows[:, 1] - cuts.rows[:, 0]) * cuts.rows[:, 4], len(cuts)), dtype=np.float64
+    )
+
+
+def relative_covariance(material: Material) -> Floats:
+    """(2, 2) of the tangential and the radial cutting coefficient, over their sizes; 0: the material does not say."""
+    size = np.abs(np.array(material.coefficients[:2]))
+    if not material.has_band or not (size > 0.0).all():
+        return np.zeros((2, 2))
+    return np.asarray(material.variances[:2, :2] / np.outer(size, size))
