@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from chipload.cutting._kernels import TAU, edge, engaged_part, first_turn
 
@@ -105,3 +105,41 @@ def in_sections_over_turn(start, rows, tooth, piece, slices, theta, teeth, c, he
     for i in range(len(start) - 1):
         for k in range(len(theta)):
             in_sections(theta[k], rows, tooth, piece, slices, start[i], start[i + 1], teeth, c, heights, out[i, k])
+
+
+@njit(
+    types.void(
+        types.float64[:, :, ::1],
+        *[types.Array(types.float64, 1, "C", readonly=True)] * 2,
+        types.boolean,
+        types.float64[::1],
+    ),
+    cache=True,
+    nogil=True,
+)
+def greatest_stress(loads, heights, diameters, brittle, out):
+    """Greatest equivalent stress of each step in sections above all that cuts: out (n,).
+
+    ``loads`` (n, 8, m): axial force, torque, moments of the axial force, lateral force and its moment about the tip, as
+    :func:`chipload.cutting.levers.levers.lever_loads` of the levers 1 and z gives them.
+    """
+    for i in range(len(loads)):
+        own = loads[i]
+        worst = 0.0
+        for e in range(len(heights)):
+            d = diameters[e]
+            area = math.pi * d * d / 4.0
+            bend = math.pi * d**3 / 32.0
+            for m in range(own.shape[1]):
+                x = heights[e] * own[4, m] - own[6, m] + own[2, m]
+                y = heights[e] * own[5, m] - own[7, m] + own[3, m]
+                bending = math.sqrt(x * x + y * y) / bend
+                axial = own[0, m] / area
+                tau = 0.5 * own[1, m] / bend
+                if brittle:
+                    sigma = max(bending - axial, 0.0)
+                    value = 0.5 * sigma + math.sqrt(0.25 * sigma * sigma + tau * tau)
+                else:
+                    value = math.sqrt((bending + abs(axial)) ** 2 + 3.0 * tau * tau)
+                worst = max(worst, value)
+        out[i] = worst

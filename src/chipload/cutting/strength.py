@@ -33,6 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.strength import ToolMaterial
 from chipload.cutting import _strength
+from chipload.cutting.levers.levers import greatest_height, has_lever_loads, lever_loads
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.errors import InputError
@@ -157,8 +158,15 @@ def cutter_stress(bites: ToothEngagement, cutter: Cutter, material: Material, ro
     pitch = math.tau if cutter.runout[0] > 0.0 else math.tau / cutter.flutes
     count = max(math.ceil(pitch / rotation), 8)
     at = sections_of(cutter)
-    loads = section_loads(bites, cutter, material, np.arange(count) * (pitch / count), at.height)
     brittle = cutter.strength.material_at(cutter.modulus) is ToolMaterial.CARBIDE
+    if has_lever_loads(bites, cutter, material) and greatest_height(bites) <= at.height[0] * (1.0 + 1e-12):
+        # all that cuts is below the sections: the force and its moment about the tip say all
+        out = np.empty(len(bites))
+        _strength.greatest_stress(
+            lever_loads(bites, cutter, material, count, np.eye(4)[:2]), at.height, at.diameter, brittle, out
+        )
+        return cutter.strength.concentration * out
+    loads = section_loads(bites, cutter, material, np.arange(count) * (pitch / count), at.height)
     stress = normal_stress(loads, at.diameter) if brittle else von_mises_stress(loads, at.diameter)
     return np.asarray(cutter.strength.concentration * stress.max(axis=(1, 2), initial=0.0))
 

@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 def is_arc(program: Program) -> NDArray[np.bool_]:
     """(n,) whether each row is an arc."""
-    return np.isin(program.motion, (ARC_CW, ARC_CCW))
+    return np.asarray((program.motion == ARC_CW) | (program.motion == ARC_CCW))
 
 
 def starts(program: Program) -> Floats:
@@ -43,18 +43,23 @@ def bases(normal: Floats) -> tuple[Floats, Floats]:
 
 def arms(program: Program) -> tuple[Floats, Floats]:
     """(n, 2), (n, 2) start and end of each arc from its axis, along e1 and e2 [mm]; 0 for all else."""
-    e1, e2 = bases(program.normal)
-    arc = is_arc(program)[:, None]
-    v0, v1 = (p - program.centre for p in (starts(program), program.p_work))
-    first = np.column_stack([(v0 * e1).sum(axis=1), (v0 * e2).sum(axis=1)])
-    last = np.column_stack([(v1 * e1).sum(axis=1), (v1 * e2).sum(axis=1)])
-    return np.where(arc, first, 0.0), np.where(arc, last, 0.0)
+    first, last = np.zeros((len(program), 2)), np.zeros((len(program), 2))
+    arc = np.flatnonzero(is_arc(program))
+    if len(arc):
+        e1, e2 = bases(program.normal[arc])
+        for out, p in ((first, starts(program)[arc]), (last, program.p_work[arc])):
+            v = p - program.centre[arc]
+            out[arc, 0], out[arc, 1] = (v * e1).sum(axis=1), (v * e2).sum(axis=1)
+    return first, last
 
 
 def rises(program: Program) -> Floats:
     """(n,) how far each arc moves along its normal [mm], 0 for all else."""
-    d = program.p_work - starts(program)
-    return np.where(is_arc(program), (d * program.normal).sum(axis=1), 0.0)
+    out, arc = np.zeros(len(program)), is_arc(program)
+    if arc.any():
+        d = program.p_work[arc] - starts(program)[arc]
+        out[arc] = (d * program.normal[arc]).sum(axis=1)
+    return out
 
 
 def sweeps(program: Program) -> Floats:
@@ -65,6 +70,8 @@ def sweeps(program: Program) -> Floats:
     >>> float(sweeps(Program.join([rapid([1.0, 0.0, 0.0], 0.0, 1, "link"), half]))[1]) / math.pi
     1.0
     """
+    if not is_arc(program).any():
+        return np.zeros(len(program))
     v0, v1 = arms(program)
     turn = np.arctan2(v0[:, 0] * v1[:, 1] - v0[:, 1] * v1[:, 0], (v0 * v1).sum(axis=1))
     sense = np.where(program.motion == ARC_CCW, 1.0, -1.0)
@@ -84,8 +91,10 @@ def radii(program: Program) -> Floats:
 def lengths(program: Program) -> Floats:
     """(n,) length of each row [mm]: chord, arc, or helix sqrt((r sweep)^2 + rise^2)."""
     chord = np.linalg.norm(program.p_work - starts(program), axis=1)
-    bent = np.hypot(radii(program) * sweeps(program), rises(program))
-    return np.where(program.motion == DWELL, 0.0, np.where(is_arc(program), bent, chord))
+    arc = is_arc(program)
+    if arc.any():
+        chord = np.where(arc, np.hypot(radii(program) * sweeps(program), rises(program)), chord)
+    return np.where(program.motion == DWELL, 0.0, chord)
 
 
 def spans(program: Program) -> Floats:

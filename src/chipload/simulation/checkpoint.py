@@ -38,6 +38,8 @@ if sys.platform != "win32":
 EVERY_S = 10.0
 KIND = "chipload unfinished simulation 1"
 LAST, LOCK = "last.json", "lock"
+#: columns that are kept in memory after they were read
+KEPT = 12
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -56,19 +58,34 @@ class _Damaged(Exception):
 
 
 class Stored(Mapping[str, NDArray[Any]]):
-    """Columns in files: a column is read when it is asked for, and not kept.
+    """Columns in files: a column is read when it is asked for; the last :data:`KEPT` stay in memory.
 
     A column that a piece lacks is 0 there.
     """
 
     def __init__(self, folder: Path, parts: Sequence[StoredChunk]) -> None:
         self.files = [(folder / part.file, part.steps) for part in parts]
-        self.names = tuple(dict.fromkeys(name for file, _ in self.files for name in pq.read_schema(file).names))
+        schemas = [pq.read_schema(file).names for file, _ in self.files]
+        self.held = [frozenset(names) for names in schemas]
+        self.names = tuple(dict.fromkeys(name for names in schemas for name in names))
+        self._kept = dict[str, NDArray[Any]]()
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         if name not in self.names:
             raise KeyError(name)
-        return np.concatenate([_read(file, name, count) for file, count in self.files])
+        found = self._kept.pop(name, None)
+        if found is None:
+            found = np.concatenate(
+                [
+                    _read(file, [name], count, held)[name]
+                    for (file, count), held in zip(self.files, self.held, strict=True)
+                ]
+            )
+            found.flags.writeable = False
+        while len(self._kept) >= KEPT:
+            del self._kept[next(iter(self._kept))]
+        self._kept[name] = found
+        return found
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.names)
@@ -78,8 +95,8 @@ class Stored(Mapping[str, NDArray[Any]]):
 
     def pieces(self) -> Iterator[dict[str, NDArray[Any]]]:
         """All columns, piece after piece."""
-        for file, count in self.files:
-            yield {name: _read(file, name, count) for name in self.names}
+        for (file, count), held in zip(self.files, self.held, strict=True):
+            yield _read(file, self.names, count, held)
 
 
 def in_rows(columns: Arrays, size: int) -> Iterator[dict[str, NDArray[Any]]]:
@@ -353,8 +370,7 @@ def _hash(file: Path) -> str:
         return hashlib.file_digest(data, "sha256").hexdigest()
 
 
-def _read(file: Path, name: str, count: int) -> NDArray[Any]:
-    if name not in pq.read_schema(file).names:
-        return np.zeros(count)
-    column = pq.read_table(file, columns=[name]).column(0)
-    return np.asarray(column.to_numpy())
+def _read(file: Path, names: Sequence[str], count: int, held: frozenset[str]) -> dict[str, NDArray[Any]]:
+    """Some columns of a file of ``count`` rows that holds the columns ``held``."""
+    table = pq.read_table(file, columns=[name for name in names if name in held], use_threads=False)
+    return {name: np.asarray(table.column(name).to_numpy()) if name in held else np.zeros(count) for name in names}

@@ -27,6 +27,7 @@ from chipload.cutting.band import deviations, mean_basis
 from chipload.cutting.material import Material
 from chipload.engagement.chips.move import Move
 from chipload.engagement.immersion.immersion import Section
+from chipload.engagement.moves.stock import Engaged
 from chipload.engagement.tooth_engagement import with_runout
 from chipload.errors import Finding, InputError
 from chipload.program.motions import lengths
@@ -44,7 +45,7 @@ from chipload.simulation.loads import (
     loads_of_steps,
     over_turn,
 )
-from chipload.simulation.moves import Engine, HandOver, MoveRun, moved, run_by_moves
+from chipload.simulation.moves import Engine, HandOver, MoveRun, moved, run_by_moves, with_contact
 from chipload.simulation.removal import ChipPieces, Columns, Removal, Resolution, RunningSums, RunSettings, Watch
 from chipload.simulation.shank import axial_overrun
 from chipload.simulation.steps import BLOCK, ROWS, StepBlocks, Steps, steps_in_blocks
@@ -133,9 +134,9 @@ def remove(
             program, resolution.step_mm, resolution.tolerance, size=block_of(setting), times=times
         )  # fmt: skip
         try:
-            for steps in blocks:
+            for steps, contact in with_contact(blocks, setting.moves, setting.workers):
                 progress(sums.steps / count, "removing")
-                sums, some, cuts = remove_block(steps, stock, sums, setting)
+                sums, some, cuts = remove_block(steps, stock, sums, setting, contact)
                 columns.append(some)
                 for bite in cuts if keep else ():
                     kept.setdefault(bite.tool, []).append(bite)
@@ -266,11 +267,13 @@ def counted(program: Program, cutters: Mapping[int, Cutter], resolution: Resolut
 
 
 def remove_block(
-    steps: Steps, stock: LayeredStock, sums: RunningSums, setting: RunSettings
+    steps: Steps, stock: LayeredStock, sums: RunningSums, setting: RunSettings, contact: Engaged | None = None
 ) -> tuple[RunningSums, dict[str, NDArray[Any]], list[Cuts]]:
-    """Take what some steps cut from the stock: the sums after them, their columns, what the teeth cut in them."""
+    """Take what some steps cut from the stock: the sums after them, their columns, what the teeth cut in them;
+    ``contact``: what they engage by moves, where that is known.
+    """
     if setting.moves is not None:
-        return _moved_block(steps, setting.moves, sums, setting)
+        return _moved_block(steps, setting.moves, sums, setting, contact)
     removed, bites, piece = _removed(steps, stock, sums, setting)
     loads, basis, cut = np.zeros((len(steps), len(LOADS))), sums.basis, list[Cuts]()
     watched: dict[str, Floats] = {}
@@ -296,10 +299,10 @@ def remove_block(
 
 
 def _moved_block(
-    steps: Steps, run: MoveRun, sums: RunningSums, setting: RunSettings
+    steps: Steps, run: MoveRun, sums: RunningSums, setting: RunSettings, contact: Engaged | None
 ) -> tuple[RunningSums, dict[str, NDArray[Any]], list[Cuts]]:
     """:func:`remove_block` by moves."""
-    found = moved(steps, run, sums.steps, setting.cutters, setting.material, setting.resolution.rotation)
+    found = moved(steps, run, sums.steps, setting.cutters, setting.material, setting.resolution.rotation, contact)
     watched: dict[str, Floats] = dict(found.bands)
     for cut in found.cuts if setting.watch is not None else ():
         assert setting.watch is not None

@@ -36,7 +36,7 @@ from chipload.simulation.chips import (
     with_accuracy,
     with_engine,
 )
-from chipload.simulation.moves import Engine, HandOver
+from chipload.simulation.moves import Engine, HandOver, with_contact
 from chipload.simulation.removal import ChipPieces, Columns, Removal, Resolution, RunningSums, RunSettings, Watch
 from chipload.simulation.steps import BLOCK, steps_in_blocks
 from chipload.simulation.swept_area import Interpolation
@@ -184,9 +184,9 @@ def _removed(
     blocks = steps_in_blocks(
         program, resolution.step_mm, resolution.tolerance, size=block_of(setting), first=done, times=times
     )
-    for steps in blocks:
+    for steps, contact in with_contact(blocks, setting.moves, setting.workers):
         progress(sums.steps / count, "removing")
-        sums, some, _ = remove_block(steps, stock, sums, setting)
+        sums, some, _ = remove_block(steps, stock, sums, setting, contact)
         columns.append(some)
         waiting += len(steps)
         now = time.monotonic()

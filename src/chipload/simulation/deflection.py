@@ -44,6 +44,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_over_turn, in_work
+from chipload.cutting.levers.levers import greatest_height, has_lever_loads, lever_loads
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import tooth_radii
 from chipload.errors import InputError
@@ -51,7 +52,7 @@ from chipload.progress import Progress, silent
 from chipload.simulation.bending import _kernels
 from chipload.simulation.loads import GRAZES, ONE_SIDE, Cuts
 from chipload.simulation.removal import Removal
-from chipload.structure.spindle import Bar
+from chipload.structure.spindle import Bar, tip_compliance
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -254,12 +255,18 @@ def tip_deflections(
         raise InputError(f"tip_deflections: work = {work:g} mm/N: a compliance must be at least 0")
     pitch = math.tau if cuts.cutter.runout[0] > 0.0 else math.tau / cuts.cutter.flutes
     m = max(math.ceil(pitch / rotation), 8)
-    theta = np.arange(m) * (pitch / m)
     n = len(cuts)
-    moments = _bent(
-        cuts, np.repeat(np.arange(n), m), np.tile(theta, n), np.zeros(n * m), material, {cuts.tool: bars}
-    ).reshape(n, m, 5)
-    force, bent = moments[..., :3], moments[..., 3:]
+    if has_lever_loads(cuts.bites, cuts.cutter, material) and greatest_height(cuts.bites) <= bars[0].length:
+        # the teeth are all on the first bar
+        levers = np.vstack([np.eye(4)[0], tip_compliance(bars)])
+        loads = np.swapaxes(lever_loads(cuts.bites, cuts.cutter, material, m, levers), 1, 2)
+        force, bent = loads[..., [4, 5, 0]], loads[..., 6:]
+    else:
+        theta = np.arange(m) * (pitch / m)
+        moments = _bent(
+            cuts, np.repeat(np.arange(n), m), np.tile(theta, n), np.zeros(n * m), material, {cuts.tool: bars}
+        ).reshape(n, m, 5)
+        force, bent = moments[..., :3], moments[..., 3:]
     out = {"deflection_cutter_um": 1e3 * np.linalg.norm(bent, axis=2).max(axis=1)}
     if work is None:
         return out | {"deflection_um": out["deflection_cutter_um"]}

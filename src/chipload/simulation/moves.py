@@ -11,7 +11,8 @@ What this engine cannot do is handed over: :class:`HandOver` names the line and 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Literal
 
@@ -106,6 +107,10 @@ class MoveRun:
             self.stock.skip(steps.p0[:count], steps.p1[:count], steps.tool[:count])
             count -= len(steps)
 
+    def contact(self, steps: Steps) -> Engaged:
+        """Make some steps: what they engage."""
+        return self.stock.take(steps.p0, steps.p1, steps.tool, corner_pieces=self.corner_pieces, flank_mm=self.flank_mm)
+
     def finish(self, stock: LayeredStock) -> None:
         """Take from the layers what the moves swept of their sections."""
         low = self.stock.lowest()
@@ -153,6 +158,26 @@ def _is_block(stock: LayeredStock) -> bool:
     return bool(abs(stock.volume() - whole) <= 1e-9 * whole)
 
 
+def with_contact(blocks: Iterable[Steps], run: MoveRun | None, workers: int) -> Iterator[tuple[Steps, Engaged | None]]:
+    """Blocks of steps and what they engage; with more than one worker that of the next is found in a thread beside.
+
+    None: without moves, or with one worker, which finds it when it is its turn.
+    """
+    if run is None or workers < 2:
+        for steps in blocks:
+            yield steps, None
+        return
+    waiting = list[tuple[Steps, Future[Engaged]]]()
+    with ThreadPoolExecutor(1) as beside:
+        for steps in blocks:
+            waiting.append((steps, beside.submit(run.contact, steps)))
+            if len(waiting) > 1:
+                before, found = waiting.pop(0)
+                yield before, found.result()
+        for before, found in waiting:
+            yield before, found.result()
+
+
 def moved(
     steps: Steps,
     run: MoveRun,
@@ -160,8 +185,9 @@ def moved(
     cutters: Mapping[int, Cutter],
     material: Material,
     rotation: float,
+    found: Engaged | None = None,
 ) -> Moved:
-    """What some steps remove; ``first`` is the number of the first.
+    """What some steps remove; ``first`` is the number of the first, ``found`` what they engage where that is known.
 
     Raises
     ------
@@ -171,7 +197,7 @@ def moved(
         A cut is made with the spindle at rest.
     """
     n = len(steps)
-    found = run.stock.take(steps.p0, steps.p1, steps.tool, corner_pieces=run.corner_pieces, flank_mm=run.flank_mm)
+    found = run.contact(steps) if found is None else found
     if found.above.any():
         k = int(found.step[int(np.argmax(found.above))])
         tool = int(steps.tool[k])

@@ -270,6 +270,8 @@ def _line(begin: Floats, end: Floats, u: Floats) -> Floats:
 
 def _turned(begin: Floats, end: Floats, angle: Floats, u: Floats) -> Floats:
     """(n, 3) axes along great circles."""
+    if not angle.any():
+        return np.asarray(end / np.linalg.norm(end, axis=1)[:, None])
     small = angle < 1e-12
     over = np.where(small, 1.0, np.sin(angle))
     out = (np.sin((1.0 - u) * angle) / over)[:, None] * begin + (np.sin(u * angle) / over)[:, None] * end

@@ -16,6 +16,7 @@ Reference: [Altintas2012] ch. 2 and 4; [Schmitz2009] ch. 9 for the joint between
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -206,4 +207,30 @@ def chain_compliance(bars: tuple[Bar, ...], z_force: ArrayLike, z_point: ArrayLi
         out = out + bar.flexibility * ((high**3 - low**3) / 3.0 + c * (high**2 - low**2) / 2.0)
         j = bar.joint
         out = out + np.where(end >= top, j.c_ff + j.c_fm * (2.0 * end - a - b) + j.c_mm * (end - a) * (end - b), 0.0)
+    return out
+
+
+def tip_compliance(bars: Sequence[Bar]) -> Array:
+    """(4,) coefficients of the compliance [mm/N] between the tip and a height z [mm] of the first bar: a polynomial.
+
+    With e the height of the end of a bar and s that of its start, z <= e_0:
+
+        C(z, 0) = sum of ((e^3 - s^3) / 3 - (e^2 - s^2) z / 2) / (E I) + z^3 / 6 / (E I)_0
+                  + sum of c_ff + c_fm (2 e - z) + c_mm e (e - z).
+
+    Oracle: :func:`chain_compliance`.
+
+    Examples
+    --------
+    >>> bar = Bar(3.0, 6.0)
+    >>> tip_compliance([bar]).tolist()
+    [54.0, -27.0, 0.0, 1.0]
+    """
+    out, s = np.zeros(4), 0.0
+    for bar in bars:
+        e, j = s + bar.length, bar.joint
+        out[0] += bar.flexibility * (e**3 - s**3) / 3.0 + j.c_ff + 2.0 * j.c_fm * e + j.c_mm * e * e
+        out[1] -= bar.flexibility * (e**2 - s**2) / 2.0 + j.c_fm + j.c_mm * e
+        s = e
+    out[3] = bars[0].flexibility / 6.0
     return out

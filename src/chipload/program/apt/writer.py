@@ -10,9 +10,11 @@ tip stands and the axis turns, the feed is in degrees a minute (DPM).
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
@@ -25,6 +27,8 @@ from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
 HELIX_MM = 1e-9
 #: an arc whose ends are nearer [mm] than this is a GOTO: rounded, they could be one point, and that a full turn
 SHORT_MM = 5e-6
+#: what a number with decimals does without at its end, and a zero below zero
+ZEROS, NEGATIVE_ZERO = re.compile(r"\.?0+(?=[,\n])"), re.compile(r"(?<![\d.])-0(?=[,\n])")
 
 
 def write_apt(
@@ -64,39 +68,44 @@ def write_apt(
     stands = (spans(program) != lengths(program)) | (lengths(program) == 0.0)
     tool: int | None = None
     spindle, feed, label = 0.0, "", -1
+    ends = _points(program.p_work, 6)
+    axes = _points(program.axis, 9) if tilted else []
+    tools, speeds, labels = program.tool.tolist(), program.spindle.tolist(), program.label.tolist()
+    motions, feeds, arcs, turns = program.motion.tolist(), program.feed.tolist(), arc.tolist(), stands.tolist()
+    last = (math.nan, False)
     for k in range(len(program)):
-        if program.tool[k] != tool:
-            tool = int(program.tool[k])
+        if tools[k] != tool:
+            tool = tools[k]
             if cutters is not None and tool not in cutters and tool != 0:
                 raise InputError(f"program row {k}: tool {tool} has no cutter: give its [[cutter]]")
             if cutters is not None and tool in cutters:
                 out.append(cutter_statement(cutters[tool]))
             out.append(f"LOADTL/{tool}")
-        if program.spindle[k] != spindle:
-            spindle = float(program.spindle[k])
+        if speeds[k] != spindle:
+            spindle = speeds[k]
             sense = "CLW" if spindle > 0.0 else "CCLW"
             out.append(f"SPINDL/{_number(abs(rpm_from_rad_s(spindle)), 3)},RPM,{sense}" if spindle else "SPINDL/OFF")
-        if program.label[k] != label:
-            label = int(program.label[k])
+        if labels[k] != label:
+            label = labels[k]
             out.append(f"PPRINT/{_text(program.labels[label])}")
-        if program.motion[k] == DWELL:
-            out.append(f"DELAY/{_number(program.feed[k])}")
+        if motions[k] == DWELL:
+            out.append(f"DELAY/{_number(feeds[k])}")
             continue
-        if program.motion[k] == RAPID:
+        if motions[k] == RAPID:
             out.append("RAPID")
-        else:
-            text = f"{_number(mm_min_from_mm_s(program.feed[k]))},MMPM"
-            if stands[k]:
-                text = f"{_number(60.0 * math.degrees(program.feed[k]))},DPM"
+        elif (feeds[k], turns[k]) != last:
+            last = (feeds[k], turns[k])
+            text = f"{_number(mm_min_from_mm_s(feeds[k]))},MMPM"
+            if turns[k]:
+                text = f"{_number(60.0 * math.degrees(feeds[k]))},DPM"
             if text != feed:
                 out.append(f"FEDRAT/{text}")
                 feed = text
-        end = program.p_work[k]
-        axis = f",{_numbers(program.axis[k], 9)}" if tilted else ""
-        if not arc[k]:
-            out.append(f"GOTO/{_numbers(end)}{axis}")
+        axis = f",{axes[k]}" if tilted else ""
+        if not arcs[k]:
+            out.append(f"GOTO/{ends[k]}{axis}")
             continue
-        n = program.normal[k]
+        end, n = program.p_work[k], program.normal[k]
         centre = program.centre[k] + ((end - program.centre[k]) @ n) * n
         circle = f"CIRCLE/{_numbers(centre)},{_numbers(math.copysign(1.0, sweep[k]) * n, 9)}"
         v = p0[k] - program.centre[k]
@@ -106,7 +115,7 @@ def write_apt(
             a = sweep[k] * piece / pieces
             between = centre + math.cos(a) * v + math.sin(a) * np.cross(n, v)
             out += [circle, f"GOTO/{_numbers(between)}{axis}"]
-        out += [circle, f"GOTO/{_numbers(end)}{axis}"]
+        out += [circle, f"GOTO/{ends[k]}{axis}"]
     out += ["SPINDL/OFF", "FINI"]
     return "\n".join(out) + "\n"
 
@@ -128,6 +137,18 @@ def _number(value: float, decimals: int = 6) -> str:
 
 def _numbers(values: Iterable[float], decimals: int = 6) -> str:
     return ",".join(_number(x, decimals) for x in values)
+
+
+def _points(values: ArrayLike, decimals: int) -> list[str]:
+    """:func:`_numbers` of each row.
+
+    >>> _points([[1.0, -0.5, 100.0], [-1e-9, 0.25, 1e-6]], 6)
+    ['1,-0.5,100', '0,0.25,0.000001']
+    """
+    rows = np.asarray(values, dtype=np.float64)
+    layout = ",".join([f"%.{decimals}f"] * rows.shape[1])
+    text = "\n".join([layout % tuple(row) for row in rows.tolist()]) + "\n"
+    return NEGATIVE_ZERO.sub("0", ZEROS.sub("", text)).splitlines()
 
 
 def _text(text: str) -> str:

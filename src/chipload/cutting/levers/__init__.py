@@ -1,0 +1,1 @@
+"""Loads of the teeth times a lever that depends on the height, over a revolution."""
