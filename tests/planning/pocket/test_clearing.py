@@ -55,7 +55,7 @@ def test_leftover_of_one_straight_cut():
     rest = Remainder(reachable, 3.0)
     rest.take(points[:1], breaks[:1])  # part after part as at once
     rest.take(points, breaks)
-    assert rest.pieces()[0] == pytest.approx(area, abs=1e-9)
+    assert rest.parts()[0] == pytest.approx(area, abs=1e-9)
     x, y, room = rest.widest(centre_region(SQUARE, 3.0).flatten(1e-4))
     # above or below the cut the centre may be from y = 13 to 17, the middle of which is 2 mm from y = 17
     assert 5.0 <= x <= 15.0

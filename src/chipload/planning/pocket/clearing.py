@@ -365,7 +365,7 @@ class _Run:
         """The path with its areas."""
         rows = np.vstack(self.rows)
         kind = rows[:, 2].astype(np.int64)
-        area, contours, places = self._left().pieces()
+        area, contours, places = self._left().parts()
         events = list(self.events)
         for mm2, (x, y) in places:
             events.append(Event("pocket-leftover", x, y, f"{mm2:.4g} mm2 is left that could be reached"))

@@ -51,7 +51,7 @@ class Remainder:
         if len(points):
             self.rest = shapely.difference(self.rest, swept(points, breaks, self.radius))
 
-    def pieces(self) -> tuple[float, tuple[Contour, ...], list[tuple[float, tuple[float, float]]]]:
+    def parts(self) -> tuple[float, tuple[Contour, ...], list[tuple[float, tuple[float, float]]]]:
         """Area [mm^2] left, contours of the pieces that are no mere film, and (area, place) of each, greatest first."""
         solid = [g for g in shapely.get_parts(self.rest) if g.area > 0.0]
         kept = [g for g in solid if not shapely.is_empty(shapely.buffer(g, -0.5 * NARROW * self.radius))]
@@ -82,7 +82,7 @@ class Remainder:
 def leftover(
     reachable: Region, points: Floats, breaks: NDArray[np.bool_], radius: float
 ) -> tuple[float, tuple[Contour, ...], list[tuple[float, tuple[float, float]]]]:
-    """:meth:`Remainder.pieces` of a whole path at once."""
+    """:meth:`Remainder.parts` of a whole path at once."""
     rest = Remainder(reachable, radius)
     rest.take(points, breaks)
-    return rest.pieces()
+    return rest.parts()
