@@ -1,12 +1,16 @@
-"""The front and FreeCAD's Adaptive on real pockets: engagement, length, time and share of the area, side by side.
+"""The pocket planner and FreeCAD's Adaptive on real pockets: engagement, time at one force, path, lifts, area.
 
     python benchmarks/pockets.py [names ...] [--data FOLDER] [--json FILE] [--spacing 0.3] [--no-freecad]
 
 Radial depth R / 5, so that the engagement wanted is acos(0.8) = 36.87 deg. Both paths are asked by the same checker,
 which knows neither planner: the trail of the centre, and the rim point by point, every ``spacing`` R of the cutting
 moves. Bores are taken out first and are no cutting moves. FreeCAD runs in its own process (``freecadcmd``); without it
-its columns are empty. Times are processor
-time, of planning alone.
+its columns are empty.
+
+Machining time is that of the program on the shipped machine `vmc`, by the clock of the product, at the same greatest
+force: the planner's feed is 0.05 mm a tooth, that of Adaptive as much lower as its greatest engagement asks for to keep
+the force (al7075-t6, R deep, 3 teeth, helix 30 deg). Links of both run 0.1 mm off the floor at the machine's greatest
+feed. Size is that of the G-code. Planning time is processor time.
 """
 
 import argparse
@@ -22,12 +26,29 @@ from pathlib import Path
 
 import numpy as np
 
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.force import forces_along
+from chipload.cutting.material import material_named
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.geometry.dxf import read_dxf
-from chipload.planning.pocket.clearing import CUT, ENTRY, LIFT, clear_region, polyline, segment_lengths
+from chipload.machine.machine import machine_named
+from chipload.planning.pocket.clearing import (
+    CUT,
+    ENTRY,
+    LIFT,
+    LINK,
+    ClearingPath,
+    clear_region,
+    polyline,
+    segment_lengths,
+)
 from chipload.planning.pocket.leftover import leftover
+from chipload.planning.pocket.motions import Heights, motions_of, programs_of
 from chipload.planning.pocket.reach import centre_region
+from chipload.program.gcode.writer import write_gcode
+from chipload.program.program import Program
+from chipload.program.time import program_time
 from chipload.simulation.centre_path import CentrePath, rim_engagement
 
 #: drawing -> radius of the cutter [mm]; drawings that no cutter can clear, to be refused, stand last
@@ -60,6 +81,9 @@ POCKETS = {
 }
 #: radial depth / R
 DEPTH = 0.2
+#: feed per tooth of the planner [mm], cutting speed [mm/s], number of teeth
+FEED_PER_TOOTH, CUTTING_SPEED, TEETH = 0.05, 200e3 / 60.0, 3
+MATERIAL, MACHINE = material_named("al7075-t6"), machine_named("vmc")
 #: kinds of a path here: a bore, cutting, along cleared space, raised
 BORE, CUTTING, LINKING, RAISED = 0, 1, 2, 3
 #: a rim that goes this much beyond what was wanted counts as over it [deg]
@@ -94,7 +118,7 @@ with open(os.path.join(folder, "path.json"), "w") as f:
 """
 
 
-def front_path(region, radius):
+def planned_path(region, radius):
     """Rows (n, 8) of the planner's path, segments and kind, and its seconds of processor time."""
     begun = time.process_time()
     path = clear_region(region, radius, math.acos(1.0 - DEPTH))
@@ -134,15 +158,17 @@ def adaptive_path(region, radius, program, tolerance, timeout):
     for part in found["regions"]:
         (cx, cy), (sx, sy) = part["centre"], part["start"]
         a0, r = math.atan2(sy - cy, sx - cx), math.hypot(sx - cx, sy - cy)
-        a = a0 + np.linspace(0.0, 2.0 * math.pi, 181)
-        ring = np.column_stack([cx + r * np.cos(a), cy + r * np.sin(a), np.full(len(a), BORE)])
-        ring[0, 2] = RAISED
+        ring = np.zeros((3, 6))  # two half turns
+        ring[:, 0], ring[:, 1] = cx + r * np.cos(a0 + np.array([0.0, np.pi, 0.0])), cy
+        ring[:, 1] += r * np.sin(a0 + np.array([0.0, np.pi, 0.0]))
+        ring[0, 2], ring[1:, 2:6] = RAISED, (BORE, cx, cy, np.pi)
         rows.append(ring)
         for name, points in part["paths"]:
-            rows.append(np.column_stack([np.array(points).reshape(-1, 2), np.full(len(points), kinds[name])]))
+            p = np.array(points).reshape(-1, 2)
+            rows.append(np.column_stack([p, np.full(len(p), kinds[name]), np.zeros((len(p), 3))]))
     points = np.vstack(rows)
     p = points[:, 0:2]
-    lines = np.column_stack([np.vstack([p[:1], p[:-1]]), p, np.zeros((len(p), 3)), points[:, 2]])
+    lines = np.column_stack([np.vstack([p[:1], p[:-1]]), p, points[:, 3:6], points[:, 2]])
     return lines, found["seconds"]
 
 
@@ -150,6 +176,47 @@ def closed(contour, chord):
     """The corners of a closed contour, chords at most ``chord`` [mm] off, the first one again at the end."""
     p = np.asarray(contour.flatten(chord)).tolist()
     return p if p[0] == p[-1] else [*p, p[0]]
+
+
+def greatest_force(radius, angle, feed_per_tooth):
+    """Greatest force in the plane over a revolution [N], down milling at an engagement [rad], R deep."""
+    cutter = Cutter(2.0 * radius, TEETH, math.radians(30.0), 3.0 * radius, 4.0 * radius, 580e3)
+    loads = forces_along(
+        np.array([math.pi - angle]), np.array([math.pi]), feed_per_tooth, [[1.0, 0.0]], cutter, MATERIAL, radius,
+        spindle_speed=CUTTING_SPEED / radius,
+    )  # fmt: skip
+    return float(loads["force_xy_n"][0])
+
+
+def feed_at_force(radius, angle, force):
+    """Feed per tooth [mm] at which that force is reached at an engagement, at most the planner's; 0: none."""
+    low, high = 0.0, FEED_PER_TOOTH
+    if greatest_force(radius, angle, high) <= force:
+        return high
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if greatest_force(radius, angle, middle) <= force else (low, middle)
+    return low if low > 1e-6 else 0.0
+
+
+def machined(rows, radius, feed_per_tooth):
+    """Time on the machine [s] and bytes of G-code at a feed per tooth; nan, 0 where there is no feed."""
+    if feed_per_tooth <= 0.0:
+        return math.nan, 0
+    kind = np.select([rows[:, 7] == BORE, rows[:, 7] == CUTTING, rows[:, 7] == RAISED], [ENTRY, CUT, LIFT], LINK)
+    keep = (segment_lengths(rows[:, 0:7]) > 1e-9) | (kind == LIFT)
+    kept, kind = rows[keep], kind[keep]
+    n = len(kept)
+    path = ClearingPath(
+        kept[:, 2], kept[:, 3], kept[:, 4:6], kept[:, 6], kind, np.zeros(n), np.zeros(n, dtype=np.int64), (), 1.0, 1.0,
+        0.0, (), {},
+    )  # fmt: skip
+    spindle = CUTTING_SPEED / radius
+    feed = feed_per_tooth * TEETH * spindle / math.tau
+    motions = motions_of(path, Heights(-radius, 0.1 - radius, 0.0, 5.0), feed, MACHINE.feed_max)
+    program = Program.join(programs_of(motions, feed, radius, spindle, 1))
+    text = write_gcode(program, MACHINE, title="pocket", verified=False, comments=[], number=1)
+    return float(program_time(program, MACHINE).sum()), len(text)
 
 
 def measured(rows, seconds, reachable, radius, spacing, workers):
@@ -166,7 +233,14 @@ def measured(rows, seconds, reachable, radius, spacing, workers):
     points, raised = polyline(steps[:, 2:4], steps[:, 4:6], steps[:, 6], kind >= RAISED, 2e-5 * radius)
     left, _, _ = leftover(reachable, points, raised, radius)
     wanted = math.degrees(math.acos(1.0 - DEPTH))
+    limit = greatest_force(radius, math.radians(wanted), FEED_PER_TOOTH)
+    feed = feed_at_force(radius, max(math.radians(wanted), float(np.radians(angle.max()))), limit)
+    time_s, size = machined(rows, radius, feed)
     return {
+        "time_s": time_s,
+        "feed_per_tooth_mm": feed,
+        "gcode_bytes": size,
+        "link_mm": float(leg[kind == LINKING].sum()),
         "seconds": seconds,
         "samples": len(angle),
         "engagement_max_deg": float(angle.max()),
@@ -184,29 +258,34 @@ def measured(rows, seconds, reachable, radius, spacing, workers):
 def table(results, wanted):
     """Markdown: a row a pocket."""
     out = [
-        f"engagement wanted {wanted:.2f} deg; columns front / adaptive",
+        f"engagement wanted {wanted:.2f} deg; columns planner / Adaptive",
         "",
-        "| pocket | R [mm] | greatest [deg] | 95 % [deg] | over by 1 deg [%] | path [m] | lifts | rows | reached [%] "
-        "| time [s] |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "| pocket | R [mm] | greatest [deg] | over by 1 deg [%] | machining at one force [s] | cutting [m] | links [m] "
+        "| lifts | G-code [kB] | reached [%] | planning [s] |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     columns = [
         ("engagement_max_deg", 1.0, ".1f"),
-        ("engagement_95_deg", 1.0, ".1f"),
         ("over_share", 100.0, ".1f"),
-        ("path_mm", 1e-3, ".2f"),
+        ("time_s", 1.0, ".0f"),
+        ("cut_mm", 1e-3, ".2f"),
+        ("link_mm", 1e-3, ".2f"),
         ("lifts", 1, "d"),
-        ("rows", 1, "d"),
+        ("gcode_bytes", 1e-3, ".0f"),
         ("reached", 100.0, ".2f"),
     ]
     for name, r in results.items():
         if "refused" in r:
-            out.append(f"| {name} | {r['radius_mm']:g} | refused: {r['refused']} |" + " |" * 7)
+            out.append(f"| {name} | {r['radius_mm']:g} | refused: {r['refused']} |" + " |" * 8)
             continue
         both = [r["pocket"], r.get("adaptive")]
         cells = [" / ".join(format(x[key] * k, how) if x else "-" for x in both) for key, k, how in columns]
         ratio = " / ".join(f"{x['seconds']:.1f}" if x else "-" for x in both)
         out.append(f"| {name} | {r['radius_mm']:g} | " + " | ".join(cells) + f" | {ratio} |")
+    pairs = [(r["pocket"], r["adaptive"]) for r in results.values() if "pocket" in r and r.get("adaptive")]
+    if pairs:
+        times = [a["time_s"] / b["time_s"] for a, b in pairs if math.isfinite(b["time_s"])]
+        out += ["", f"machining time over that of Adaptive: median {np.median(times):.3f} of {len(times)}"]
     return "\n".join(out)
 
 
@@ -219,7 +298,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="write the results here too")
     parser.add_argument("--spacing", type=float, default=0.3, help="between two places that are asked, / R")
     parser.add_argument("--workers", type=int, default=2, help="threads of the checker")
-    parser.add_argument("--no-freecad", action="store_true", help="the front alone")
+    parser.add_argument("--no-freecad", action="store_true", help="the planner alone")
     parser.add_argument("--tolerance", type=float, default=0.1, help="of Adaptive, 0.1 being its own default")
     parser.add_argument("--timeout", type=float, default=120.0, help="of one run of FreeCAD [s]")
     asked = parser.parse_args()
@@ -238,7 +317,7 @@ def main() -> None:
         try:
             drawing = read_dxf(asked.data / f"{name}.dxf", units_if_unstated="mm")
             region = Region.of([c for c in drawing.contours if c.closed])
-            found = {"pocket": front_path(region, radius)}
+            found = {"pocket": planned_path(region, radius)}
         except InputError as refused:
             print(f"{name}: refused: {refused}", file=sys.stderr, flush=True)
             results[name] = {"radius_mm": radius, "refused": str(refused)}

@@ -9,7 +9,7 @@ from chipload.errors import Cancelled, InputError
 from chipload.geometry.contour import Contour
 from chipload.program.program import ARC_CCW, LINE, RAPID, Program
 from chipload.simulation.material import material_left_of
-from chipload.simulation.verify import FILM_MM, _difference, verify_contour
+from chipload.simulation.verify import MATCH_MM, verify_contour
 
 R, S, RC, Z, SAFE = 5.0, 0.1, 8.0, -6.0, 5.0
 SHALLOW = np.degrees(np.arccos(1 - S / R))
@@ -236,9 +236,41 @@ def test_a_row_at_a_kink_is_held_against_both_headings():
     assert check(135.0).engagement_difference_deg == pytest.approx(45.0, abs=0.01)
 
 
-def test_films_agree_and_nothing_else():
-    """A film of 0.1 um is 0.468 deg at R = 3: below it two engagements agree, above it each difference counts."""
-    film = math.degrees(math.acos(1.0 - FILM_MM / 3.0))
-    assert film == pytest.approx(0.468, abs=1e-3)
-    found, planned = np.array([0.3, 0.0, 0.6, 36.8]), np.array([0.0, 0.4, 0.0, 36.9])
-    assert _difference(found, planned, film) == pytest.approx([0.0, 0.0, 0.6, 0.1])
+def film_planned_as(angle, thickness):
+    """Two passes along one another, the second ``thickness`` deeper: a third along it the plan says ``angle``."""
+    p = program(
+        [
+            (RAPID, 0, 0, SAFE, 0, 0),
+            (LINE, 0, 0, Z, 0, 0),
+            (LINE, 30, 0, Z, 0, 0),
+            (LINE, 30, 0, SAFE, 0, 0),
+            (RAPID, 0, -thickness, SAFE, 0, 0),
+            (LINE, 0, -thickness, Z, 0, 0),
+            (LINE, 30, -thickness, Z, 0, 0),
+        ]
+    )
+    rows = {
+        "x_mm": np.array([15.0, 10.0]),
+        "y_mm": np.array([0.0, -thickness]),
+        "z_mm": np.full(2, Z),
+        "engagement_deg": np.array([180.0, angle]),
+        "pass": np.full(2, "pocket", dtype=object),
+    }
+    return verify(p, rows, stock=None, wall=[], engagement_tolerance_deg=0.01)
+
+
+def test_only_films_that_a_displacement_makes_are_forgiven():
+    """Stock of 0.1 um beside the cutter is 0.362 deg at R = 5 and counts; stock of 0.5 nm, which a displacement by 1 nm
+    makes or takes, does not: it may be planned as 0 or as acos(1 - 0.5 nm / R) = 0.026 deg, not as 0.05 deg.
+    """
+    thin = math.degrees(math.acos(1.0 - 1e-4 / R))
+    assert film_planned_as(thin, 1e-4).verdict == "proved"
+    missed = film_planned_as(0.0, 1e-4)
+    assert missed.verdict == "failed"
+    assert missed.engagement_difference_deg == pytest.approx(thin, abs=1e-4)
+    for angle in (0.0, math.degrees(math.acos(1.0 - 5e-7 / R))):
+        assert film_planned_as(angle, 5e-7).verdict == "proved"
+    # stock on the right displaced one way, on the left the other way
+    beyond = sum(math.degrees(math.acos(1.0 - t / R)) for t in (MATCH_MM + 5e-7, MATCH_MM - 5e-7))
+    assert film_planned_as(beyond + 0.009, 5e-7).verdict == "proved"
+    assert film_planned_as(beyond + 0.011, 5e-7).verdict == "failed"

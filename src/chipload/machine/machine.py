@@ -44,6 +44,7 @@ class Machine:
     torque_curve : (speed [rad/s], torque [N mm]) of the spindle, rising speeds that hold its range, straight between
         them; empty: not known
     note : where its numbers come from and which are assumed
+    jerk : greatest jerk along the path [mm/s^3], > 0; None: not known. A feed schedule keeps it; the clock has none
     planner : settings of LinuxCNC's trajectory planner; None: another controller, judged by its corner tolerance
     tcp_words : blocks that begin and end tool centre point control, ``{tool}`` for the tool's number; None: it has none
 
@@ -68,6 +69,7 @@ class Machine:
     tcp_words: tuple[str, str] | None = None
     torque_curve: tuple[tuple[float, float], ...] = ()
     planner: TrajectoryPlanner | None = None
+    jerk: float | None = None
 
     def __post_init__(self) -> None:
         def need(ok: bool, key: str, value: object, limit: str) -> None:
@@ -93,6 +95,7 @@ class Machine:
         for key, value, factor in (("power_w", self.power_w, 1.0), ("torque_nm", self.torque, 1e-3)):
             need(value is None or 0.0 < value < math.inf, f"spindle.{key}", (value or 0.0) * factor, "must be above 0")
 
+        need(self.jerk is None or 0.0 < self.jerk < math.inf, "jerk_mm_s3", self.jerk, "must be above 0")
         self._check_curve()
 
     def _check_curve(self) -> None:
@@ -165,6 +168,7 @@ def _from_table(label: str, table: Row) -> Machine:
             torque_curve=tuple((rad_s_from_rpm(n), 1e3 * t) for n, t in spindle.get("torque_curve", ())),
             tcp_words=_tcp_words(top),
             planner=_planner(label, top),
+            jerk=float(top["jerk_mm_s3"]) if "jerk_mm_s3" in top else None,
         )
     except InputError as err:
         text = str(err)
@@ -199,8 +203,8 @@ def read_machine(path: str | Path) -> Machine:
     """Read a machine from a TOML file.
 
     Keys: ``name``, ``dialect``, ``decimals``, ``rapid_mm_min``, ``feed_max_mm_min``, ``corner_tolerance_mm``, optional
-    ``note``, ``tcp_on`` and ``tcp_off`` (the words of tool centre point control), and ``chain``, the letters of the
-    axes from the workpiece to the tool (XYZ if left out).
+    ``note``, ``jerk_mm_s3`` (along the path; kept by feed schedules), ``tcp_on`` and ``tcp_off`` (the words of tool
+    centre point control), and ``chain``, the letters of the axes from the workpiece to the tool (XYZ if left out).
 
     In ``[axis.x]`` and the other linear ones: ``min_mm``, ``max_mm``, ``acceleration_mm_s2``, optional
     ``rate_mm_min`` (else the rapid rate), ``direction`` (else the letter's own), ``side`` (`table` or `head`, else

@@ -25,6 +25,7 @@ _MACHINE = {
     "corner_tolerance_mm": _NUMBER,
     "chain?": _TEXT,
     "note?": _TEXT,
+    "jerk_mm_s3?": _NUMBER,
     "tcp_on?": _TEXT,
     "tcp_off?": _TEXT,
 }

@@ -127,7 +127,7 @@ def fill_grid(mot, active, radius, slack, gx, gy, h, nx, ny, cover, count, start
     ``start`` their running sum and ``count`` zeroed: the lists.
     """
     half = h * math.sqrt(0.5)
-    far = radius + half
+    far = radius + half + slack
     near = radius - half - slack
     for i in range(len(mot)):
         if not active[i]:
@@ -200,8 +200,9 @@ def in_stock(px, py, rows):
 
 
 @njit(cache=True, nogil=True)
-def uncut(px, py, k, w, reach, mot, grid, rows, hint):
-    """Whether (px, py) is stock that no centre before the moment (k, w) has come within ``reach`` of.
+def uncut(px, py, k, w, reach, own, apart, mot, grid, rows, hint):
+    """Whether (px, py) is stock that no centre before the moment (k, w) has come within ``reach`` of, nor one of a
+    motion before ``own`` within ``reach + apart``.
 
     ``hint[0]`` is the motion that cut the point asked last; it is tried first.
     """
@@ -213,13 +214,13 @@ def uncut(px, py, k, w, reach, mot, grid, rows, hint):
         if cover[c] < k:
             return False
         last = hint[0]
-        if 0 <= last < k and within(mot, last, 1.0, px, py, reach):
+        if 0 <= last < k and within(mot, last, 1.0, px, py, reach + apart if last < own else reach):
             return False
         for m in range(start[c], start[c + 1]):
             q = items[m]
             if q > k:
                 break
-            if within(mot, q, 1.0 if q < k else w, px, py, reach):
+            if within(mot, q, 1.0 if q < k else w, px, py, reach + apart if q < own else reach):
                 hint[0] = q
                 return False
     return in_stock(px, py, rows)
@@ -230,15 +231,16 @@ def uncut_many(points, k, w, reach, mot, grid, rows, out):
     """:func:`uncut` for every point (m, 2) at its moment."""
     hint = np.full(1, -1, dtype=np.int64)
     for q in range(len(points)):
-        out[q] = uncut(points[q, 0], points[q, 1], k[q], w[q], reach, mot, grid, rows, hint)
+        out[q] = uncut(points[q, 0], points[q, 1], k[q], w[q], reach, 0, 0.0, mot, grid, rows, hint)
 
 
 @njit(cache=True, nogil=True)
-def rim(k, w, centre, heading, radius, reach, sample, precision, mot, grid, rows, first, last, angle, count, phi):
+def rim(k, w, centre, heading, radius, reach, own, apart, sample, precision, mot, grid, rows, first, last, angle, count,
+        phi):  # fmt: skip
     """Fill ``angle``, ``count`` and ``phi`` of the queries first..last.
 
     The rim at ``radius`` about ``centre`` is asked at the immersions ``sample`` (rising from 0 to pi); each change is
-    halved down to ``precision`` [rad].
+    halved down to ``precision`` [rad]. ``own`` and ``apart`` as of :func:`uncut`.
     """
     hint = np.full(1, -1, dtype=np.int64)
     sines = np.sin(sample)
@@ -255,7 +257,8 @@ def rim(k, w, centre, heading, radius, reach, sample, precision, mot, grid, rows
         for j in range(len(sample)):
             s = sines[j]
             c = cosines[j]
-            now = uncut(ox + s * tx - c * ty, oy + s * ty + c * tx, k[q], w[q], reach, mot, grid, rows, hint)
+            x, y = ox + s * tx - c * ty, oy + s * ty + c * tx
+            now = uncut(x, y, k[q], w[q], reach, own[q], apart, mot, grid, rows, hint)
             if j > 0 and now != was:
                 lo = sample[j - 1]
                 hi = sample[j]
@@ -265,7 +268,7 @@ def rim(k, w, centre, heading, radius, reach, sample, precision, mot, grid, rows
                     c = math.cos(mid)
                     x = ox + s * tx - c * ty
                     y = oy + s * ty + c * tx
-                    if uncut(x, y, k[q], w[q], reach, mot, grid, rows, hint) == was:
+                    if uncut(x, y, k[q], w[q], reach, own[q], apart, mot, grid, rows, hint) == was:
                         lo = mid
                     else:
                         hi = mid

@@ -30,6 +30,10 @@ Bools = NDArray[np.bool_]
 
 #: a point counts as cut when a centre came nearer than R minus this [mm]: the wall a cutter has just made lies at R
 TOUCH_MM = 1e-9
+#: what a rim is asked for is displaced by at most so much [mm]
+DISPLACED_MM = 1e-5
+#: length of path [mm] behind the cutter that moves with it
+OWN_MM = 0.01
 #: engaged pieces of the rim that are kept with their ends; ``angle`` always counts all of them
 PIECES = 4
 #: transitions on the rim are halved down to this [rad]
@@ -130,11 +134,11 @@ class CentrePath:
         start = np.zeros(nx * ny + 1, dtype=np.int64)
         box = (float(low[0]), float(low[1]), h, nx, ny)
         none = np.zeros(0, dtype=np.int64)
-        _kernels.fill_grid(mot, active, self.radius, TOUCH_MM, *box, cover, count, start, none, False)
+        _kernels.fill_grid(mot, active, self.radius, DISPLACED_MM, *box, cover, count, start, none, False)
         start[1:] = np.cumsum(count)
         items = np.empty(start[-1], dtype=np.int64)
         count[:] = 0
-        _kernels.fill_grid(mot, active, self.radius, TOUCH_MM, *box, cover, count, start, items, True)
+        _kernels.fill_grid(mot, active, self.radius, DISPLACED_MM, *box, cover, count, start, items, True)
         return (*box, start, items, cover)
 
     @cached_property
@@ -216,6 +220,7 @@ def rim_engagement(
     step_deg: float = 1.0,
     precision: float = PRECISION,
     workers: int = 1,
+    displacement_mm: float = 0.0,
 ) -> Rim:
     """The engaged pieces of the rim at moments of the trail.
 
@@ -227,6 +232,8 @@ def rim_engagement(
         missed, except at both ends of the front half, where pieces of a 128th of it are found
     precision : transitions are halved down to this [rad]
     workers : threads; the answer does not depend on it
+    displacement_mm : how far the path is displaced against what it cut before its last ``OWN_MM``, at most
+        ``DISPLACED_MM``: above 0 gives the least engagement that such a displacement makes, below 0 the greatest
 
     Notes
     -----
@@ -240,10 +247,13 @@ def rim_engagement(
     asked = samples(math.radians(step_deg))
     mot, grid, rows, radius = trail.motions, trail.grid, trail.rows, trail.radius
     cut = np.linspace(0, m, max(workers, 1) + 1).astype(int)
+    begins = np.concatenate([[0.0], np.cumsum(trail.lengths)])
+    behind = begins[k] + w * trail.lengths[k] - OWN_MM
+    own = np.maximum(np.searchsorted(begins, behind, side="right") - 1, 0)
 
     def run(i: int) -> Any:
         _kernels.rim(
-            k, w, centre, heading, radius, radius - TOUCH_MM, asked, precision, mot, grid, rows,
+            k, w, centre, heading, radius, radius - TOUCH_MM, own, displacement_mm, asked, precision, mot, grid, rows,
             cut[i], cut[i + 1], angle, count, phi,
         )  # fmt: skip
 

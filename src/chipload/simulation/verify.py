@@ -27,10 +27,6 @@ Bools = NDArray[np.bool_]
 
 #: a row of the history lies on the program's path within this [mm]
 MATCH_MM = 1e-6
-#: where a rim lies on the edge of an earlier disc there is no one engagement: that this far [mm] before counts too
-BEFORE_MM = 1e-5
-#: engagements with stock no thicker than this [mm] beside the cutter agree: on a wall just made roundings leave films
-FILM_MM = 1e-4
 #: stock that a rapid passes through counts when it is thicker than this [mm]
 RAPID_MM = 1e-6
 #: rows between two calls of ``progress``
@@ -119,6 +115,10 @@ def verify_contour(
     -----
     A row is found on the path by its place: the first place within ``MATCH_MM`` at or after that of the row before
     it. At a joint of two motions, where the heading may jump, it is held against both headings and the nearer counts.
+    So the place of the cutter is known to ``MATCH_MM``. Where the engagement that is found differs from the planned
+    one, the least and the greatest that a displacement by ``MATCH_MM`` makes are found too, and a planned engagement
+    between them agrees: stock of 1 nm beside a cutter of R 5 mm is an engagement of 0.036 deg, and a rim that lies on
+    the edge of an earlier cut is engaged by anything between nothing and the whole of that edge.
     Rows on motions that rise or fall below the stock's top (ramps, plunges) are not compared: that leaves the plan
     unproven, unless ``passes`` leaves them out. Rows above the stock's top must show no engagement.
     """
@@ -334,7 +334,6 @@ def _compare(
     gap = np.where(air, np.abs(columns["engagement_deg"]), 0.0)
     total, finished = max(int((wanted & ~air).sum()), 1), 0
     for level in levels:
-        film = float(np.degrees(np.arccos(1.0 - FILM_MM / level.trail.radius)))
         flat = np.abs(z - level.z) <= LEVEL_MM
         still = (np.abs(z1[k] - z0[k]) > LEVEL_MM) | (length[k] == 0.0)
         one = wanted & flat & ~air & ~still
@@ -347,20 +346,12 @@ def _compare(
                 use = np.flatnonzero(mine[rows])
                 at = rows[use]
                 planned = columns["engagement_deg"][at]
-                off = _difference(_degrees(level.trail, kk[at], ww[at], COARSE_DEG, workers), planned, film)
+                off = np.abs(_degrees(level.trail, kk[at], ww[at], COARSE_DEG, workers) - planned)
                 again = np.flatnonzero(off > tolerance)
                 if len(again):
                     j = at[again]
-                    off[again] = _difference(
-                        _degrees(level.trail, kk[j], ww[j], FINE_DEG, workers), planned[again], film
-                    )
+                    off[again] = _difference(level.trail, kk[j], ww[j], planned[again], tolerance, workers)
                 best[use] = np.minimum(best[use], off)
-            stuck = np.flatnonzero((best > tolerance) & one[rows])
-            if len(stuck):
-                at = rows[stuck]
-                just_before = np.maximum(w[at] - BEFORE_MM / length[k[at]], 0.0)
-                found_there = _degrees(level.trail, k[at], just_before, FINE_DEG, workers)
-                best[stuck] = np.minimum(best[stuck], _difference(found_there, columns["engagement_deg"][at], film))
             gap[rows] = best
             done[rows] = True
             finished += len(rows)
@@ -378,13 +369,20 @@ def _compare(
     return GreatestDistance(float(gap[i]), (float(x[i]), float(y[i])), int(done.sum())), int(done.sum())
 
 
-def _degrees(trail: CentrePath, k: Ints, w: Floats, step_deg: float, workers: int) -> Floats:
-    return np.degrees(rim_engagement(trail, k, w, step_deg=step_deg, workers=workers).angle)
+def _degrees(
+    trail: CentrePath, k: Ints, w: Floats, step_deg: float, workers: int, displacement_mm: float = 0.0
+) -> Floats:
+    rim = rim_engagement(trail, k, w, step_deg=step_deg, workers=workers, displacement_mm=displacement_mm)
+    return np.degrees(rim.angle)
 
 
-def _difference(found: Floats, planned: Floats, film: float) -> Floats:
-    """(m,) |found - planned| [deg]; 0 where both are at most ``film`` [deg]."""
-    return np.where(np.maximum(found, planned) <= film, 0.0, np.abs(found - planned))
+def _difference(trail: CentrePath, k: Ints, w: Floats, planned: Floats, tolerance: float, workers: int) -> Floats:
+    """(m,) |found - planned| [deg]; where a displacement by at most ``MATCH_MM`` makes an engagement within
+    ``tolerance`` of the planned one, only what is between them.
+    """
+    found, low, high = (_degrees(trail, k, w, FINE_DEG, workers, d) for d in (0.0, MATCH_MM, -MATCH_MM))
+    apart = np.maximum(np.maximum(low - planned, planned - high), 0.0)
+    return np.where(apart <= tolerance, np.minimum(apart, np.abs(found - planned)), np.abs(found - planned))
 
 
 def _other_side(k: Ints, w: Floats, length: Floats) -> tuple[Ints, Floats]:

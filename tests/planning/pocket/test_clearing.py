@@ -9,7 +9,7 @@ import shapely
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.planning.pocket.clearing import CUT, ENTRY, LIFT, LINK, clear_region, polyline
-from chipload.planning.pocket.leftover import leftover, swept, widest_left
+from chipload.planning.pocket.leftover import Remainder, leftover, swept
 from chipload.planning.pocket.reach import centre_region, reach_of, widest_places
 from chipload.stock.planar import PlanarStock
 
@@ -52,7 +52,11 @@ def test_leftover_of_one_straight_cut():
     area, contours, places = leftover(reachable, points, breaks, 3.0)
     assert area == pytest.approx(reachable.area - 84.0 - 9.0 * math.pi, rel=1e-4)
     assert len(contours) == len(places) == 2
-    x, y, room = widest_left(reachable, centre_region(SQUARE, 3.0), points, breaks, 3.0)
+    rest = Remainder(reachable, 3.0)
+    rest.take(points[:1], breaks[:1])  # part after part as at once
+    rest.take(points, breaks)
+    assert rest.parts()[0] == pytest.approx(area, abs=1e-9)
+    x, y, room = rest.widest(centre_region(SQUARE, 3.0).flatten(1e-4))
     # above or below the cut the centre may be from y = 13 to 17, the middle of which is 2 mm from y = 17
     assert 5.0 <= x <= 15.0
     assert abs(y - 10.0) == pytest.approx(5.0, abs=0.01)

@@ -1,16 +1,12 @@
 """How fast a pass runs, and its program.
 
-Notation: f0 programmed feed, v speed that the machine reaches, a_line engagement angle on a straight wall, a the one at
-the step. The schedule of the `feed` strategy is f = f0 sin(a_line) / sin(a) (90 deg where a is more: the thickest chip
-is f_z sin(a)), never above f0. v keeps the machine's acceleration along the path and across it, v^2 |kappa| <= a_max,
-and passes a kink as the machine's corner tolerance allows.
-
-Reference: [Uddin2007], strategy 3.
+Notation: v speed that the machine reaches. It keeps the machine's acceleration along the path and across it,
+v^2 |kappa| <= a_max, and passes a kink as the machine's corner tolerance allows. The programmed feeds are those of
+:mod:`.compare`.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,9 +21,6 @@ from chipload.program.program import Program
 
 Floats = NDArray[np.float64]
 
-#: the schedule is written in steps of this share of f0
-FEED_SHARE = 0.01
-
 
 @dataclass(frozen=True, eq=False)
 class Speeds:
@@ -38,17 +31,8 @@ class Speeds:
     time: Floats
 
 
-def speeds(steps: SampledPass, feed: float, machine: Machine, wanted: float | None) -> Speeds:
-    """Programmed and reached speed of every step; ``wanted`` a_line [rad]: the feed schedule, None: f0 throughout.
-
-    The pass begins and ends at rest.
-    """
-    programmed = np.full(len(steps.s), feed)
-    if wanted is not None:
-        wanted = min(wanted, 0.5 * math.pi)
-        a = np.clip(steps.engagement.angle, wanted, 0.5 * math.pi)
-        share = np.floor(math.sin(wanted) / np.sin(a) / FEED_SHARE + 1e-9) * FEED_SHARE
-        programmed = feed * np.maximum(share, FEED_SHARE)
+def speeds(steps: SampledPass, programmed: Floats, machine: Machine) -> Speeds:
+    """Speed that the machine reaches at the ``programmed`` feeds (n,) [mm/s]; the pass begins and ends at rest."""
     acceleration = machine.acceleration_xy
     curve = curvature_speed(steps.curvature, acceleration)
     limit = np.minimum(programmed, curve)

@@ -1,7 +1,7 @@
 """A contour semi-finished and finished by several strategies, side by side.
 
 Notation: R cutter radius, s radial depth of the finish pass, a* = arccos(1 - s/R) its engagement angle along a line,
-f0 the programmed feed; planning frame as in :mod:`.wall`.
+f0 the programmed feed; planning frame as in :mod:`.offsets`.
 
 Reference: [Uddin2007]; `forward` [Stori2000].
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from chipload.geometry.offset import offset
 from chipload.machine.machine import Machine
 from chipload.planning.contour.backward import concave_kinks, leading_curve
 from chipload.planning.contour.blend import eased
+from chipload.planning.contour.compare import FinishPasses, compared, programmed_feeds
 from chipload.planning.contour.forward import forward_pass
 from chipload.planning.contour.moves import Speeds, pass_program, speeds
 from chipload.planning.contour.offsets import Walls, centre_paths, mirrored, run_on, walls_of
@@ -40,6 +41,7 @@ from chipload.planning.contour.passes import (
     with_leads,
 )
 from chipload.planning.contour.sampled import SampledPass, mirrored_pass, sampled, stations
+from chipload.planning.contour.schedule import LEAST_SHARE, straight_force
 from chipload.planning.cost import CutConditions, cost, stacked
 from chipload.planning.link_rows import row_ends, with_links
 from chipload.planning.result import Columns, Event, OperationResult, StrategyResult
@@ -154,11 +156,15 @@ def plan_contour(
     job = _prepared(contours, setting, cutter, material, machine, limits)
     a = setting.engagement(cutter.radius)
     if setting.strategies == ("forward",):
-        return OperationResult("forward", "forward", {"forward": _strategy(job, "forward", _forward_passes(job, a))})
-    results = {}
+        only, _ = _strategy(job, "forward", _forward_passes(job, a))
+        return OperationResult("forward", "forward", {"forward": only})
+    results, finish = {}, {}
     for k, name in enumerate(setting.strategies):
         progress(k / len(setting.strategies), f"contour, {name}")
-        results[name] = _strategy(job, name, _passes(job, a if name == "backward" else None))
+        results[name], finish[name] = _strategy(job, name, _passes(job, a if name == "backward" else None))
+    if len(finish) > 1:
+        equal = compared(finish, setting.use, job.cut, setting.feed, machine)
+        results = {name: replace(r, summary={**r.summary, **equal[name]}) for name, r in results.items()}
     progress(1.0, "contour")
     return OperationResult("contour", setting.use, results)
 
@@ -261,8 +267,8 @@ def _forward_passes(job: _Job, a: float) -> list[ContourPass]:
     return out
 
 
-def _strategy(job: _Job, name: str, planar: list[ContourPass]) -> StrategyResult:
-    """Sample, cost and program the passes of one strategy."""
+def _strategy(job: _Job, name: str, planar: list[ContourPass]) -> tuple[StrategyResult, FinishPasses]:
+    """Sample, cost and program the passes of one strategy; also its finish passes, as they are compared."""
     setting = job.setting
     runs = [mirrored_pass(p, job.flip) for p in planar]
     z, safe_z = setting.top - setting.axial_depth, setting.top + setting.clearance
@@ -272,7 +278,8 @@ def _strategy(job: _Job, name: str, planar: list[ContourPass]) -> StrategyResult
     clocks: list[tuple[SampledPass, Speeds]] = []
     for run in runs:
         steps = sampled(run, job.radius, setting.step)
-        speed = speeds(steps, setting.feed, job.machine, wanted if name == "feed" and run.name == "finish" else None)
+        regulated = wanted if name == "feed" and run.name == "finish" else None
+        speed = speeds(steps, programmed_feeds(steps, job.cut, setting.feed, job.machine, regulated), job.machine)
         makes_wall = (steps.zone == run.name) | (steps.zone == "closing")
         own = cost(
             job.cut, steps.zone, steps.s, speed.time, steps.centre, steps.heading, z, steps.engagement, speed.reached,
@@ -289,6 +296,8 @@ def _strategy(job: _Job, name: str, planar: list[ContourPass]) -> StrategyResult
     events = (*job.events, *_events(job, runs, history, name))
     if name == "backward":
         events = (*events, *_semifinish_overshoots(job, histories))
+    if name == "feed":
+        events = (*events, *_force_above(job, history, on_wall))
     drawn = {
         "stock before": _stock(job).contours,
         "wall" if job.finish else "old surface": tuple(_back(w, job.flip) for w in job.walls.walls),
@@ -296,15 +305,10 @@ def _strategy(job: _Job, name: str, planar: list[ContourPass]) -> StrategyResult
         "finish path": tuple(r.path for r in runs if r.name != "semifinish"),
         "stock": tuple(Contour(c.segments) for r in runs if r.name != "semifinish" for c in _chains(r.stock.segments)),
     }
-    return StrategyResult(
-        name,
-        program,
-        history,
-        _summary(job, name, history, on_wall),
-        events,
-        on_wall,
-        drawn,
-    )
+    summary = {**_summary(job, name, history, on_wall), **_counts(runs, history)}
+    finish = [steps for run, (steps, _) in zip(runs, clocks, strict=True) if run.name == "finish"]
+    done = StrategyResult(name, program, history, summary, events, on_wall, drawn)
+    return done, FinishPasses(tuple(finish), wanted if name == "feed" else None)
 
 
 def _pass_times(
@@ -358,10 +362,23 @@ def _summary(job: _Job, name: str, history: Columns, on_wall: NDArray[np.bool_])
             "signed_max": float(error.max()),
         },
         "feed_mm_min": span("feed_mm_min"),
+        "force_straight_n": straight_force(job.cut, math.radians(wanted), job.setting.feed),
         "time_s": float(history["t_s"][-1]),
         "finish_time_s": float(_elapsed(history, finish)),
         "path_mm": float(history["s_mm"][-1]),
         "deviation_mm": job.deviation,
+    }
+
+
+def _counts(runs: list[ContourPass], history: Columns) -> dict[str, object]:
+    """What the time [s] is spent on, passes in all, and how often the cutter goes up between them."""
+    link = history["pass"] == "link"
+    linked = float(_elapsed(history, link))
+    return {
+        "cutting_s": float(history["t_s"][-1]) - linked,
+        "link_s": linked,
+        "passes": len(runs),
+        "lifts": len(runs) - 1,
     }
 
 
@@ -439,6 +456,20 @@ def _semifinish_overshoots(job: _Job, histories: list[Columns]) -> list[Event]:
             )
             out.append(Event("semifinish-overshoot", float(h["x_mm"][k]), float(h["y_mm"][k]), text))
     return out
+
+
+def _force_above(job: _Job, history: Columns, on_wall: NDArray[np.bool_]) -> list[Event]:
+    """Where no feed down to the least keeps the force of a straight wall: the edge force does not know the feed."""
+    straight = straight_force(job.cut, job.setting.engagement(job.radius), job.setting.feed)
+    force = np.where(on_wall, history["force_xy_n"], 0.0)
+    k = int(force.argmax())
+    if force[k] <= 1.005 * straight:
+        return []
+    text = (
+        f"no feed down to {LEAST_SHARE:.0%} of feed_mm_min holds the force of a straight wall, {straight:.4g} N: "
+        f"{force[k]:.4g} N here, mostly edge force, which does not depend on the feed"
+    )
+    return [Event("feed-least", float(history["x_mm"][k]), float(history["y_mm"][k]), text)]
 
 
 def _thin_stock(job: _Job, runs: list[ContourPass]) -> list[Event]:

@@ -21,6 +21,8 @@ SWEEP, BEND = 2.6, 0.16
 MOST = 256
 #: greatest turn between two places that are looked at [rad]; so near to the limit [rad] the greatest is looked for
 TURN, NEAR = 0.03, 0.02
+#: distance / R of the places at which a segment is held against the centre region
+EVERY = 0.01
 #: engagement above the limit that is none [rad]
 ABOVE = 1e-5
 
@@ -125,11 +127,14 @@ def segment_length(seg):
 
 
 @njit(cache=True, nogil=True)
-def in_region(seg, spacing, slack, grid, flag, edges, rows, row_edges):
-    """Whether a segment stays in the centre region, within ``slack`` to either side."""
-    n = max(1, math.ceil(segment_length(seg) / spacing))
-    for k in range(n):
-        x, y, t = place(seg, (k + 0.5) / n)
+def in_region(seg, R, slack, grid, flag, edges, rows, row_edges):
+    """Whether a segment stays in the centre region, within ``slack`` to either side, asked every 0.01 R.
+
+    Between two places a wall as tight as R and an arc as tight as 0.35 R come nearer by at most 5e-5 R.
+    """
+    n = max(2, math.ceil(segment_length(seg) / (EVERY * R)))
+    for k in range(1, n):
+        x, y, t = place(seg, k / n)
         if allowed(x, y, grid, flag, edges, rows, row_edges):
             continue
         nx, ny = -slack * math.sin(t), slack * math.cos(t)
@@ -169,13 +174,13 @@ def engagement_along(seg, spacing, limit, r, R, grid, head, link, axis, arcs):
 
 
 @njit(cache=True, nogil=True)
-def farthest(p, i, last, guess, tau, spacing, slack, R, seg, grid, flag, edges, rows, row_edges):
+def farthest(p, i, last, guess, tau, slack, R, seg, grid, flag, edges, rows, row_edges):
     """The most vertices after i, up to ``last``, that one segment takes: doubled as long as they fit, then between."""
     good, bad = 1, min(MOST, last - i) + 1
     trial = min(max(2, guess), bad - 1)
     while good + 1 < bad:
         trial = min(bad - 1, max(good + 1, trial))
-        if fitted(p, i, i + trial, tau, R, seg) and in_region(seg, spacing, slack, grid, flag, edges, rows, row_edges):
+        if fitted(p, i, i + trial, tau, R, seg) and in_region(seg, R, slack, grid, flag, edges, rows, row_edges):
             good = trial
             trial = 2 * good if bad > 2 * good else (good + bad) // 2
         else:
@@ -200,7 +205,7 @@ def write_segments(p, i, last, whole, tau, limit, spacing, slack, R, touch, segm
     r = R * (1.0 - touch)
     guess = 4
     while i < last:
-        good = farthest(p, i, last, guess, tau, spacing, slack, R, seg, grid, flag, edges, rows, row_edges)
+        good = farthest(p, i, last, guess, tau, slack, R, seg, grid, flag, edges, rows, row_edges)
         if i + good == last and not whole:
             break
         e = 0.0

@@ -109,14 +109,22 @@ def worst_of_step(ox, oy, th, phi, l, full, r, R, grid, head, link, axis, arcs):
 
 @njit(cache=True, nogil=True)
 def step_allowed(ox, oy, th, phi, l, slack, grid, flag, edges, rows, row_edges):
-    """Whether the step stays in the centre region: end, and middle within ``slack``."""
+    """Whether the step stays in the centre region: its end, and within ``slack`` all of it.
+
+    Asked at every eighth: a wall that bends around the step is no tighter than R, so that between two of them it comes
+    no nearer than (l / 8)^2 / (8 R), 7e-6 R.
+    """
     tx, ty = math.cos(th + phi), math.sin(th + phi)
     if not allowed(ox + l * tx, oy + l * ty, grid, flag, edges, rows, row_edges):
         return False
-    if allowed(ox + 0.5 * l * tx, oy + 0.5 * l * ty, grid, flag, edges, rows, row_edges):
-        return True
-    mx, my = ox + 0.5 * l * tx - slack * ty, oy + 0.5 * l * ty + slack * tx
-    return allowed(mx, my, grid, flag, edges, rows, row_edges)
+    for k in (4, 2, 6, 3, 5, 1, 7):
+        t = 0.125 * k * l
+        x, y = ox + t * tx, oy + t * ty
+        if allowed(x, y, grid, flag, edges, rows, row_edges):
+            continue
+        if not allowed(x - slack * ty, y + slack * tx, grid, flag, edges, rows, row_edges):
+            return False
+    return True
 
 
 @njit(cache=True, nogil=True)
@@ -216,7 +224,7 @@ def arc_engagement(x, y, th, phi, l, r, R, grid, head, link, axis, arcs):
 
 @njit(cache=True, nogil=True)
 def arc_allowed(x, y, th, phi, l, margin, grid, flag, edges, rows, row_edges):
-    """Whether an arc stays in the centre region, by its end and its middle. An end within ``margin`` of a wall on the
+    """Whether an arc stays in the centre region, by every 16th of it. An end within ``margin`` of a wall on the
     right is refused: a straight step reaches the wall itself, so that no film stays on it.
     """
     ex, ey, et = arc_place(x, y, th, phi, l)
@@ -224,8 +232,11 @@ def arc_allowed(x, y, th, phi, l, margin, grid, flag, edges, rows, row_edges):
         return False
     if not allowed(ex + margin * math.sin(et), ey - margin * math.cos(et), grid, flag, edges, rows, row_edges):
         return False
-    ex, ey, _ = arc_place(x, y, th, 0.5 * phi, 0.5 * l)
-    return allowed(ex, ey, grid, flag, edges, rows, row_edges)
+    for k in (8, 4, 12, 2, 6, 10, 14, 1, 3, 5, 7, 9, 11, 13, 15):
+        ex, ey, _ = arc_place(x, y, th, 0.0625 * k * phi, 0.0625 * k * l)
+        if not allowed(ex, ey, grid, flag, edges, rows, row_edges):
+            return False
+    return True
 
 
 @njit(cache=True, nogil=True)
@@ -307,7 +318,7 @@ def line_clear(x0, y0, x1, y1, step, R, touch, grid, head, link, axis, flag, edg
     """Whether a straight link between two freed centres meets no material, nor leaves the centre region.
 
     Discs are tested a spacing d apart, each larger by d^2 / (8 R), so that together they cover the capsule; d is fine
-    near the ends, where the cutter may touch what it came from.
+    near the ends, where the cutter may touch what it came from. The centre is asked for every 0.01 R.
     """
     arcs = np.empty((ARCS, 2))
     dx, dy = x1 - x0, y1 - y0
@@ -315,6 +326,10 @@ def line_clear(x0, y0, x1, y1, step, R, touch, grid, head, link, axis, flag, edg
     if length <= 1e-9:
         return True
     tx, ty = dx / length, dy / length
+    n = math.ceil(length / (0.01 * R))
+    for k in range(1, n):
+        if not allowed(x0 + k * dx / n, y0 + k * dy / n, grid, flag, edges, rows, row_edges):
+            return False
     t = 0.0
     while t < length:
         near = min(t, length - t)

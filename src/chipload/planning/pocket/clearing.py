@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.planning.pocket import _kernels, _pass
-from chipload.planning.pocket.leftover import leftover, widest_left
+from chipload.planning.pocket.leftover import Remainder
 from chipload.planning.pocket.reach import CHORD, Reach, centre_region, reach_of, widest_places
 from chipload.planning.pocket.starts import Starts
 from chipload.planning.result import Event
@@ -58,8 +58,9 @@ FIT, FIT_UP_TO = 2e-4, 8.0
 MARGIN = 2e-3
 #: what is written is looked at every 0.03 R, and keeps this much [rad] below it there
 BETWEEN = 4e-4
-#: what is written may leave the centre region by this part of R: the middle of a chord of a convex wall
-SLACK = 1e-4
+#: what is written may leave the centre region by this part of R, of at most so many mm: the middle of a chord of a
+#: convex wall
+SLACK, SLACK_UP_TO = 1e-4, 4.0
 #: area / R^2 that a pass must take for its start to be used again
 WORTH = 3e-4
 #: part of the reachable area that may be left without another round
@@ -196,6 +197,7 @@ class _Run:
         self.reach: Reach = reach_of(centres, self.stock.grid, CHORD * radius)
         self.reachable = centre_region(centres, -radius)
         self.rows: list[Floats] = []
+        self.remainder, self.taken = Remainder(self.reachable, radius), 0
         self.events: list[Event] = []
         self.starts = Starts(radius, step)
         self.passes = 0
@@ -235,8 +237,9 @@ class _Run:
 
     def enter_elsewhere(self) -> None:
         """Bores into what no pass came to, the widest place first, as long as that clears anything."""
+        allowed = self.centres.flatten(1e-4 * self.radius)
         for _ in range(ENTRIES):
-            x, y, room = widest_left(self.reachable, self.centres, *self._polyline(), self.radius)
+            x, y, room = self._left().widest(allowed)
             if room < LEAST_ROOM * self.radius:
                 break
             before = self.area
@@ -331,7 +334,7 @@ class _Run:
             numbers[:2] = s.capsules, s.used
             reason = _pass.run_pass(
                 state, self.step, self.limit, self.most_engaged, right, TURN_LEFT, IDLE * R,
-                FIT * min(R, FIT_UP_TO), SLACK * R, R, TOUCH, steps, made, at, numbers,
+                FIT * min(R, FIT_UP_TO), SLACK * min(R, SLACK_UP_TO), R, TOUCH, steps, made, at, numbers,
                 s.grid, s.head, s.count, s.link, s.axis, *self.reach.arguments(),
             )  # fmt: skip
             s.capsules, s.used = int(numbers[0]), int(numbers[1])
@@ -343,17 +346,26 @@ class _Run:
                 self.progress(min(0.99, self.area / self.reachable.area), f"front, pass {self.passes + 1}")
         return np.vstack(segments), np.vstack(places), took, int(reason), state[0:2]
 
-    def _polyline(self) -> tuple[Floats, NDArray[np.bool_]]:
-        """The path so far by points beside which it lies at most ``CHORD`` R, and whether the cutter is raised."""
-        rows = np.vstack(self.rows)
-        return polyline(rows[:, 0:2], rows[:, 5:7], rows[:, 7], rows[:, 2] >= LIFT, 2.0 * CHORD * self.radius)
+    def _left(self) -> Remainder:
+        """What the path so far has left."""
+        new = self.rows[max(0, self.taken - 1) :]
+        if self.taken < len(self.rows):
+            rows = np.vstack(new)
+            rows = rows if self.taken == 0 else rows[len(new[0]) - 1 :]
+            raised = rows[:, 2] >= LIFT
+            raised[0] = True
+            sweep = np.where(raised, 0.0, rows[:, 7])
+            points, breaks = polyline(rows[:, 0:2], rows[:, 5:7], sweep, raised, 2.0 * CHORD * self.radius)
+            self.remainder.take(points, breaks)
+            self.taken = len(self.rows)
+        return self.remainder
 
     # -- the end --------------------------------------------------------------------------------------------
     def result(self) -> ClearingPath:
         """The path with its areas."""
         rows = np.vstack(self.rows)
         kind = rows[:, 2].astype(np.int64)
-        area, contours, places = leftover(self.reachable, *self._polyline(), self.radius)
+        area, contours, places = self._left().parts()
         events = list(self.events)
         for mm2, (x, y) in places:
             events.append(Event("pocket-leftover", x, y, f"{mm2:.4g} mm2 is left that could be reached"))

@@ -39,35 +39,50 @@ def swept(points: Floats, breaks: NDArray[np.bool_], radius: float) -> shapely.G
     return shapely.union_all(out)
 
 
+class Remainder:
+    """What is left of a region, less and less of it as a path goes on; each part of the path is taken away once."""
+
+    def __init__(self, reachable: Region, radius: float) -> None:
+        self.radius = radius
+        self.rest: shapely.Geometry = reachable.flatten(1e-5 * radius)
+
+    def take(self, points: Floats, breaks: NDArray[np.bool_]) -> None:
+        """Take away what the discs along a part of the path sweep, as in :func:`swept`."""
+        if len(points):
+            self.rest = shapely.difference(self.rest, swept(points, breaks, self.radius))
+
+    def parts(self) -> tuple[float, tuple[Contour, ...], list[tuple[float, tuple[float, float]]]]:
+        """Area [mm^2] left, contours of the pieces that are no mere film, and (area, place) of each, greatest first."""
+        solid = [g for g in shapely.get_parts(self.rest) if g.area > 0.0]
+        kept = [g for g in solid if not shapely.is_empty(shapely.buffer(g, -0.5 * NARROW * self.radius))]
+        kept.sort(key=lambda g: -g.area)
+        rings = [ring for g in kept for ring in (g.exterior, *g.interiors)]
+        contours = [Contour.polyline(np.asarray(ring.coords)[:-1], closed=True) for ring in rings]
+        places = []
+        for g in kept[:MOST]:
+            p = g.representative_point()
+            places.append((float(g.area), (float(p.x), float(p.y))))
+        return float(self.rest.area), tuple(contours), places
+
+    def widest(self, allowed: shapely.Geometry) -> Place:
+        """(x, y, room) [mm]: the middle of the widest place of what is left where the cutter's centre may go
+        (``allowed``), and its distance from where it may not; room 0 where there is none.
+        """
+        best = (0.0, 0.0, 0.0)
+        for piece in shapely.get_parts(shapely.intersection(self.rest, allowed)):
+            if piece.area > (WORTH * self.radius) ** 2:
+                line = shapely.maximum_inscribed_circle(piece, tolerance=1e-3 * self.radius)
+                x, y = shapely.get_coordinates(line)[0]
+                width, room = shapely.length(line), shapely.distance(shapely.points(x, y), allowed.boundary)
+                if width > best[2]:
+                    best = (float(x), float(y), float(min(room, 10.0 * self.radius)))
+        return best
+
+
 def leftover(
     reachable: Region, points: Floats, breaks: NDArray[np.bool_], radius: float
 ) -> tuple[float, tuple[Contour, ...], list[tuple[float, tuple[float, float]]]]:
-    """Area [mm^2] left, contours of the pieces that are no mere film, and (area, place) of each, greatest first."""
-    rest = shapely.difference(reachable.flatten(1e-5 * radius), swept(points, breaks, radius))
-    solid = [g for g in shapely.get_parts(rest) if g.area > 0.0]
-    pieces = [g for g in solid if not shapely.is_empty(shapely.buffer(g, -0.5 * NARROW * radius))]
-    pieces.sort(key=lambda g: -g.area)
-    rings = [ring for g in pieces for ring in (g.exterior, *g.interiors)]
-    contours = [Contour.polyline(np.asarray(ring.coords)[:-1], closed=True) for ring in rings]
-    places = []
-    for g in pieces[:MOST]:
-        p = g.representative_point()
-        places.append((float(g.area), (float(p.x), float(p.y))))
-    return float(rest.area), tuple(contours), places
-
-
-def widest_left(reachable: Region, centres: Region, points: Floats, breaks: NDArray[np.bool_], radius: float) -> Place:
-    """(x, y, room) [mm]: the middle of the widest place of what is left where the cutter's centre may go, and its
-    distance from where it may not; room 0 where there is none.
-    """
-    rest = shapely.difference(reachable.flatten(1e-4 * radius), swept(points, breaks, radius))
-    allowed = centres.flatten(1e-4 * radius)
-    best = (0.0, 0.0, 0.0)
-    for piece in shapely.get_parts(shapely.intersection(rest, allowed)):
-        if piece.area > (WORTH * radius) ** 2:
-            line = shapely.maximum_inscribed_circle(piece, tolerance=1e-3 * radius)
-            x, y = shapely.get_coordinates(line)[0]
-            width, room = shapely.length(line), shapely.distance(shapely.points(x, y), allowed.boundary)
-            if width > best[2]:
-                best = (float(x), float(y), float(min(room, 10.0 * radius)))
-    return best
+    """:meth:`Remainder.parts` of a whole path at once."""
+    rest = Remainder(reachable, radius)
+    rest.take(points, breaks)
+    return rest.parts()

@@ -1,0 +1,117 @@
+"""Strategies of a contour at equal greatest force, and at equal time of the finish pass.
+
+A strategy that lowers the force at one feed may as well go faster at the old force. So each is run through the same
+finish pass at the feed f0 at which its greatest force is that of a reference, and at the f0 at which its finish pass
+takes as long as that of the reference; the path stays. Force and time come from the force model and from the speed that
+the machine reaches, as in the plan itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutting.force import forces_along
+from chipload.engagement.contact import PIECES
+from chipload.machine.machine import Machine
+from chipload.planning.contour.moves import speeds
+from chipload.planning.contour.sampled import SampledPass
+from chipload.planning.contour.schedule import constant_force, stepped, within_machine
+from chipload.planning.cost import CutConditions
+from chipload.units import mm_min_from_mm_s
+
+Floats = NDArray[np.float64]
+
+#: f0 is looked for between these multiples of the feed of the job, to this share of it
+LOW, HIGH, CLOSE = 0.02, 10.0, 1e-3
+#: steps of a finish pass that the force model is asked for in a comparison
+ASKED = 300
+
+
+@dataclass(frozen=True, eq=False)
+class FinishPasses:
+    """The sampled finish passes of a strategy; ``wanted`` a* [rad] where a feed schedule goes with it."""
+
+    passes: Sequence[SampledPass]
+    wanted: float | None
+
+
+def programmed_feeds(
+    steps: SampledPass, cut: CutConditions, feed: float, machine: Machine, wanted: float | None
+) -> Floats:
+    """(n,) programmed feed of the steps of a pass [mm/s]: f0, or its schedule where ``wanted`` is stated."""
+    if wanted is None:
+        return np.full(len(steps.s), feed)
+    ideal = constant_force(cut, steps.engagement, feed, wanted)
+    return stepped(within_machine(steps.s, ideal, machine.acceleration_xy, machine.jerk), feed)
+
+
+def compared(
+    finish: Mapping[str, FinishPasses], use: str, cut: CutConditions, feed: float, machine: Machine
+) -> dict[str, dict[str, object]]:
+    """By strategy, `at_equal_force` and `at_equal_time` beside the strategy ``use`` at ``feed`` [mm/s].
+
+    None where no feed from ``LOW`` to ``HIGH`` times that of the job does it: the edge force knows no feed.
+    """
+    force, time = force_and_time(finish[use], cut, feed, machine)
+    out: dict[str, dict[str, object]] = {}
+    for name, run in finish.items():
+
+        def at(f0: float, run: FinishPasses = run) -> tuple[float, float]:
+            return force_and_time(run, cut, f0, machine)
+
+        as_strong = _greatest(lambda f, at=at: at(f)[0] <= force * (1.0 + 1e-9), feed)  # type: ignore[misc]
+        as_long = _greatest(lambda f, at=at: at(f)[1] >= time * (1.0 - 1e-9), feed)  # type: ignore[misc]
+        out[name] = {
+            "at_equal_force": None if as_strong is None else _row(as_strong, at(as_strong)),
+            "at_equal_time": None if as_long is None else _row(as_long, at(as_long)),
+        }
+    return out
+
+
+def force_and_time(run: FinishPasses, cut: CutConditions, feed: float, machine: Machine) -> tuple[float, float]:
+    """Greatest force in the plane [N] where the wall is made, and the time of the finish passes [s], at f0 [mm/s]."""
+    force, time = 0.0, 0.0
+    for steps in run.passes:
+        programmed = programmed_feeds(steps, cut, feed, machine, run.wanted)
+        speed = speeds(steps, programmed, machine)
+        made = np.isin(steps.zone, ["finish", "closing"])
+        time += float(np.diff(speed.time, prepend=0.0)[made].sum())
+        k = np.flatnonzero(steps.zone == "finish")
+        if not len(k):
+            continue
+        load = steps.engagement.angle[k] * speed.reached[k]
+        spread = np.linspace(0, len(k) - 1, min(ASKED, len(k))).astype(np.int64)
+        k = np.unique(np.concatenate([k[spread], k[[int(load.argmax()), int(steps.engagement.angle[k].argmax())]]]))
+        met = steps.engagement
+        loads = forces_along(
+            met.phi[k, :, 0], met.phi[k, :, 1], cut.feed_per_tooth(speed.reached[k]), steps.heading[k], cut.cutter,
+            cut.material, cut.axial_depth, spindle_speed=cut.spindle_speed, count=np.clip(met.count[k], 0, PIECES),
+        )  # fmt: skip
+        force = max(force, float(loads["force_xy_n"].max()))
+    return force, time
+
+
+def _greatest(holds: Callable[[float], bool], feed: float) -> float | None:
+    """The greatest f0 at which something holds that holds below it; None where it holds nowhere or everywhere."""
+    low, high = LOW * feed, HIGH * feed
+    if not holds(low) or holds(high):
+        return None
+    if holds(feed):
+        low = feed
+    else:
+        high = feed
+    while high - low > CLOSE * feed:
+        middle = 0.5 * (low + high)
+        if holds(middle):
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def _row(feed: float, found: tuple[float, float]) -> dict[str, float]:
+    return {"feed_mm_min": mm_min_from_mm_s(1.0) * feed, "force_xy_n": found[0], "finish_time_s": found[1]}
