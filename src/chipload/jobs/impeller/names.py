@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.jobs.impeller.outcome import ImpellerResult
+from chipload.jobs.impeller.outcome import Checked, CheckedWay, ImpellerResult
 
 
 def rough_names(milled: ImpellerResult) -> list[str]:
@@ -15,8 +15,27 @@ def rough_names(milled: ImpellerResult) -> list[str]:
 
 def program_name(milled: ImpellerResult, k: int) -> str:
     """File name of the k-th finishing program, from 1, without its ending; its first number is that of the tool."""
-    s = (milled.programs or ())[k - 1].setting
-    return f"{len(milled.roughs or ()) + k}-{_size(s.cutter, s.table)}"
+    return _finish_name(milled, k, (milled.programs or ())[k - 1])
+
+
+def finish_names(milled: ImpellerResult) -> list[tuple[str, Checked]]:
+    """File names of the finishing programs without their endings: of the way that is milled, then of all others."""
+    used = milled.used_way
+    out = [(program_name(milled, k), p) for k, p in enumerate(milled.programs or (), 1)]
+    for way in milled.ways or ():
+        if way is not used:
+            stem = way_stem(way)
+            out += [(f"{stem}-{_finish_name(milled, k, p)}", p) for k, p in enumerate(way.programs, 1)]
+    return out
+
+
+def way_stem(way: CheckedWay) -> str:
+    """What the file names of a way that is not milled begin with."""
+    return f"way-{way.name.replace(' ', '-')}"
+
+
+def _finish_name(milled: ImpellerResult, k: int, p: Checked) -> str:
+    return f"{len(milled.roughs or ()) + k}-{_size(p.setting.cutter, p.setting.table)}"
 
 
 def _size(cutter: CatalogueCutter, table: float) -> str:

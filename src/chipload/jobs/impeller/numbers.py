@@ -31,7 +31,8 @@ def operation_numbers(milled: ImpellerResult) -> dict[str, Any]:
         "certified_within_mm": milled.tolerance,
         **(partition_of(milled, used) if used is not None else {}),
         "hand_picked": None if picked is None else _picked(milled, picked),
-        "ways": [partition_of(milled, way) for way in milled.partitions],
+        "ways": [way_of(milled, way) for way in milled.partitions],
+        "scallop": {"mean_share": None if milled.used_way is None else milled.used_way.scallop},
         "programs": None
         if milled.programs is None
         else [_program(program_name(milled, k), p) for k, p in enumerate(milled.programs, 1)],
@@ -59,6 +60,32 @@ def partition_of(milled: ImpellerResult, way: Partition) -> dict[str, Any]:
         "least_time_any_shape_min": d.bound_any_shape / 60.0,
         "gap": d.gap,
         "patches": [_patch(milled, way, p) for p in d.patches],
+    }
+
+
+def way_of(milled: ImpellerResult, way: Partition) -> dict[str, Any]:
+    """A way with the numbers of its checked programs; path and times are of all channels, without roughing.
+
+    Without programs they are those that the contact points predict, and there is no verdict.
+    """
+    out = partition_of(milled, way)
+    checked = next((w for w in milled.ways or () if w.way is way), None)
+    head = {"in_use": way is milled.used, "predicted_min": out["time_min"], "cutting_min": None, "link_min": None}
+    if checked is None:
+        return {**out, **head, "changes_min": None, "scallop_mean_share": None, "verdict": None, "fails": []}
+    return {
+        **out,
+        **head,
+        "cutters": [_size(c) for c in checked.cutters],
+        "path_mm": checked.path,
+        "predicted_min": checked.predicted / 60.0,
+        "cutting_min": checked.cutting / 60.0,
+        "link_min": checked.links / 60.0,
+        "changes_min": checked.changes / 60.0,
+        "time_min": checked.seconds / 60.0,
+        "scallop_mean_share": checked.scallop,
+        "verdict": "holds" if checked.verified else "exceeds",
+        "fails": list(checked.fails),
     }
 
 

@@ -21,6 +21,7 @@ from chipload.planning.impeller.patch import Patch
 from chipload.planning.impeller.settings import CutterSetting
 from chipload.planning.impeller.surfaces import BODIES, ContactSurface
 from chipload.planning.impeller.tables import IndexTable
+from chipload.program.gcode.writer import Repeat
 from chipload.result import Provenance
 from chipload.simulation.channel.channel import Remainder
 from chipload.simulation.channel.gouges import Gouge
@@ -161,7 +162,10 @@ class Checked:
     allowed : what of it is allowed [mm]
     scallops : of each patch
     findings : what the program asks of the machine that it does not give
-    seconds : predicted time of one channel [s]
+    seconds : time of one channel, as the text takes it on the machine [s]
+    cutting : of that in tracks; the rest is leads, links and rapids [s]
+    between : from the end of one channel to the beginning of the next [s]
+    repeat : how the text goes through all channels; None: it is of one channel
     """
 
     setting: CutterSetting
@@ -170,6 +174,9 @@ class Checked:
     scallops: tuple[Scallop, ...]
     findings: tuple[str, ...]
     seconds: float
+    cutting: float
+    between: float
+    repeat: Repeat | None
 
     @property
     def verified(self) -> bool:
@@ -255,6 +262,76 @@ class Covered:
 
 
 @dataclass(frozen=True, eq=False)
+class CheckedWay:
+    """A way to mill all surfaces with its programs, checked. Times and paths are of all channels, without roughing.
+
+    Parameters
+    ----------
+    way : its patches, as they were chosen
+    programs : one for each cutter at each table angle, of one channel
+    covered : what they leave on each surface
+    blades : how many channels
+    predicted : time that it was chosen by [s]
+    changes : of cutters and of the table [s]
+    """
+
+    way: Partition
+    programs: tuple[Checked, ...]
+    covered: tuple[Covered, ...]
+    blades: int
+    predicted: float
+    changes: float
+
+    @property
+    def name(self) -> str:
+        """`2 cutters`."""
+        return self.way.name
+
+    @property
+    def cutters(self) -> tuple[CatalogueCutter, ...]:
+        """Every cutter of the programs once, with those of rest passes."""
+        return tuple(dict.fromkeys(p.setting.cutter for p in self.programs))
+
+    @property
+    def path(self) -> float:
+        """In the cut [mm]."""
+        return self.blades * math.fsum(p.setting.length for p in self.programs)
+
+    @property
+    def cutting(self) -> float:
+        """Time in the cut [s]."""
+        return self.blades * math.fsum(p.cutting for p in self.programs)
+
+    @property
+    def links(self) -> float:
+        """Time of leads, links and rapids [s]."""
+        between = (self.blades - 1) * math.fsum(p.between for p in self.programs)
+        return self.blades * math.fsum(p.seconds - p.cutting for p in self.programs) + between
+
+    @property
+    def seconds(self) -> float:
+        """Time of all [s]."""
+        return self.cutting + self.links + self.changes
+
+    @property
+    def fails(self) -> tuple[str, ...]:
+        """What does not hold."""
+        return (*(f for p in self.programs for f in p.fails), *(f for c in self.covered for f in c.fails))
+
+    @property
+    def verified(self) -> bool:
+        """Every program holds, and together they leave no more than asked."""
+        return not self.fails
+
+    @property
+    def scallop(self) -> float | None:
+        """Mean height of the scallops as a share of what is asked; None: there are none."""
+        rows = [x for p in self.programs for x in p.scallops]
+        crests = sum(x.crests for x in rows)
+        return math.fsum(x.mean * x.crests for x in rows) / crests / rows[0].asked if crests else None
+
+
+@dataclass(frozen=True, eq=False)
 class ImpellerResult:
     """A whole run.
 
@@ -265,8 +342,7 @@ class ImpellerResult:
     surfaces : in their order
     one : the largest cutter for all surfaces at one table angle, and the index of that; None: there is none
     partitions : the cutter picked by hand where one is stated, then one cutter, two, ...
-    programs : of the way with the least time, checked; None: the job asks for none
-    covered : what the programs leave on each surface
+    ways : each of them with its programs, checked; None: the job asks for none
     roughs : roughing programs, before the others; None: the job asks for none
     settings : keys of the operation, as stated
     outer_diameter : as stated [mm]
@@ -280,8 +356,7 @@ class ImpellerResult:
     surfaces: tuple[Searched, ...]
     one: tuple[CatalogueCutter, int] | None
     partitions: tuple[Partition, ...]
-    programs: tuple[Checked, ...] | None
-    covered: tuple[Covered, ...] | None
+    ways: tuple[CheckedWay, ...] | None
     roughs: tuple[CheckedRough, ...] | None
     settings: Mapping[str, Any]
     outer_diameter: float
@@ -293,10 +368,31 @@ class ImpellerResult:
         return next((way for way in self.partitions if way.name == PICKED), None)
 
     @property
+    def used_way(self) -> CheckedWay | None:
+        """The way that is milled: of those that hold, or else of all, the one whose programs take the least time."""
+        able = [w for w in self.ways or () if w.name != PICKED]
+        return min(able, key=lambda w: (not w.verified, w.seconds), default=None)
+
+    @property
     def used(self) -> Partition | None:
-        """The way with the least time; of equal ones that with fewer cutters. None: nothing mills all."""
+        """The way that is milled; without programs that with the least predicted time; None: nothing mills all.
+
+        Of equal ones that with fewer cutters.
+        """
+        if self.used_way is not None:
+            return self.used_way.way
         able = [way for way in self.partitions if way.name != PICKED and way.divided is not None]
         return min(able, key=lambda way: way.divided.total if way.divided else math.inf, default=None)
+
+    @property
+    def programs(self) -> tuple[Checked, ...] | None:
+        """Finishing programs of the way that is milled; None: the job asks for none."""
+        return None if self.used_way is None else self.used_way.programs
+
+    @property
+    def covered(self) -> tuple[Covered, ...] | None:
+        """What these programs leave on each surface."""
+        return None if self.used_way is None else self.used_way.covered
 
     @property
     def tolerance(self) -> float | None:

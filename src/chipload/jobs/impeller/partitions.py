@@ -34,6 +34,13 @@ def divided_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
         _compared(milled),
         figure("partitions", partitions_figure(milled), figures),
     ]
+    if milled.ways:
+        out += [
+            "<h3>Ways by their programs</h3>",
+            '<p class="note">Every way is written, checked and timed. All channels, without roughing: cut, leads and '
+            "links, changes of cutter and table.</p>",
+            _programmed(milled),
+        ]
     used = milled.used
     if used is None or used.divided is None:
         return [*out, '<p class="no">No way mills all that can be reached.</p>']
@@ -77,6 +84,23 @@ def _compared(milled: ImpellerResult) -> str:
     head = ["way", "cutters [mm]", "reached [%]", "path [mm]", "[%]", "time [min]", "[%]", "changes of cutter + table"]
     head += ["least time [min]", "gap [%]"]
     return table(head, rows, numbers=(2, 3, 4, 5, 6, 7, 8, 9), used=used)
+
+
+def _programmed(milled: ImpellerResult) -> str:
+    """What the programs of each way take."""
+    rows = [
+        [
+            escape(w.name), ", ".join(f"D {c.diameter:g} r {c.corner_radius:g}" for c in w.cutters), f"{w.path:.0f}",
+            *(f"{x / 60.0:.1f}" for x in (w.cutting, w.links, w.changes, w.seconds, w.predicted)),
+            "" if w.scallop is None else f"{100.0 * w.scallop:.0f}",
+            '<span class="ok">verified</span>' if w.verified else '<span class="no">not verified</span>',
+        ]
+        for w in milled.ways or ()
+    ]  # fmt: skip
+    head = ["way", "cutters [mm]", "path [mm]", "cut [min]", "links [min]", "changes [min]", "time [min]"]
+    head += ["predicted [min]", "mean scallop of asked [%]", "check"]
+    used = [w is milled.used_way for w in milled.ways or ()]
+    return table(head, rows, numbers=(2, 3, 4, 5, 6, 7, 8), used=used)
 
 
 def partitions_figure(milled: ImpellerResult) -> go.Figure:

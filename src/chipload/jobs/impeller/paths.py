@@ -7,11 +7,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from chipload.cutter.catalogue import Catalogue
+from chipload.jobs.impeller.channels import between_channels, channel_repeat
 from chipload.jobs.impeller.outcome import Checked, Covered, Scallop
 from chipload.jobs.impeller.tables import ImpellerOperationTable, PathsTable
 from chipload.machine.machine import Machine
-from chipload.planning.impeller.compare import Partition
 from chipload.planning.impeller.coverage import between_lines
 from chipload.planning.impeller.covering.covering import Covering
 from chipload.planning.impeller.floor import patch_of
@@ -20,10 +22,11 @@ from chipload.planning.impeller.lines import LineMotion
 from chipload.planning.impeller.links import Link
 from chipload.planning.impeller.paths import PatchFinish
 from chipload.planning.impeller.programs import pallet_rate, too_fast
-from chipload.planning.impeller.settings import FinishSettings, Milling, PlannedSettings, channel_scene, planned
+from chipload.planning.impeller.settings import FinishSettings, Milling, PlannedSettings, channel_scene
 from chipload.planning.impeller.surfaces import BODIES, ContactSampling
 from chipload.planning.impeller.tables import IndexTable
 from chipload.program.check import check_program
+from chipload.program.program import Program
 from chipload.program.read import times_on
 from chipload.program.to_axes import to_axes
 from chipload.progress import Progress
@@ -45,36 +48,35 @@ _SPACING = 0.6
 _FEW, _BETWEEN = 7, 14
 
 
-def checked_programs(
-    impeller: Impeller, machine: Machine, table: IndexTable, way: Partition,
-    op: ImpellerOperationTable, paths: PathsTable,
-    ahead: float, tools: int, workers: int, progress: Progress, covering: Covering | None = None,
-) -> tuple[tuple[Checked, ...], tuple[Covered, ...]]:  # fmt: skip
-    """A program for each setting of the way with what the check finds; what all of them leave on each surface.
+def finish_settings(
+    impeller: Impeller, machine: Machine, table: IndexTable, catalogue: Catalogue, op: ImpellerOperationTable,
+    paths: PathsTable, ahead: float, tools: int, workers: int, covering: Covering | None = None,
+) -> FinishSettings:  # fmt: skip
+    """What the finishing programs of a job are planned with.
 
     ``tools`` : how many tool numbers are taken; ``covering`` : of the walls between check points.
     """
     feed = mm_s_from_mm_min(op.feed_mm_min)
-    motion = LineMotion(paths.chord_mm, feed, pallet_rate(machine), op.clearance_mm)
+    motion = LineMotion(paths.chord_mm, feed, pallet_rate(machine), op.clearance_mm, scallop=op.scallop_mm)
     link = Link(
         paths.lift_mm, paths.margin_mm, paths.touch_mm, paths.near_mm, mm_s_from_mm_min(paths.link_feed_mm_min),
-        paths.above_mm,
+        paths.above_mm, paths.lead_mm, max(op.rough.blades_mm, op.rough.hub_mm) if op.rough is not None else 0.0,
+        machine.rapid,
     )  # fmt: skip
     scene = channel_scene(
         impeller, ContactSampling((0.0, 1.0), (0.0, 1.0), (2, 2), paths.check_mm, op.near_mm, op.around, ahead)
     )
     scene = replace(scene, covering=covering, known=scene.tree)
-    job = FinishSettings(
-        impeller, way.catalogue, scene, PatchFinish(op.scallop_mm, motion, paths.overrun_mm), link,
+    return FinishSettings(
+        impeller, catalogue, scene, PatchFinish(op.scallop_mm, motion, paths.overrun_mm), link,
         rad_s_from_rpm(op.speed_rpm), table, ahead, workers, tools,
     )  # fmt: skip
-    plan = planned(job, way.division.patches, progress=lambda done, what: progress(0.8 * done, what))
-    return _checked(job, machine, plan, paths, lambda done, what: progress(0.8 + 0.2 * done, what))
 
 
-def _checked(
+def checked_programs(
     job: FinishSettings, machine: Machine, plan: PlannedSettings, paths: PathsTable, progress: Progress
 ) -> tuple[tuple[Checked, ...], tuple[Covered, ...]]:
+    """A program for each setting with what the check finds; what all of them leave on each surface."""
     impeller, asked, settings = job.impeller, job.how.scallop, plan.settings
     millings = [m for s in settings for m in s.millings]
     faces = list(dict.fromkeys((m.patch.body, m.patch.side) for m in millings))
@@ -98,13 +100,21 @@ def _checked(
         gouge = deepest_gouge(
             coarse, program, setting.cutter, _DEPTH, _RESOLUTION * paths.gouge_mm, paths.gouge_mm, workers=job.workers
         )
-        seconds = float(times_on(program, machine).sum())
-        out.append(Checked(setting, gouge, paths.gouge_mm, scallops, tuple(said), seconds))
+        rows = times_on(program, machine)
+        seconds, cutting = float(rows.sum()), float(rows[in_cut(program)].sum())
+        between = between_channels(program, machine, impeller.blades)
+        repeat = channel_repeat(program, machine, job.table, impeller.blades)
+        out.append(Checked(setting, gouge, paths.gouge_mm, scallops, tuple(said), seconds, cutting, between, repeat))
     covered = tuple(
         Covered(face[0], face[1], left, asked, _SPACING, plan.unreached[face])
         for face, left in zip(faces, rest[len(dense) :], strict=True)
     )
     return tuple(out), covered
+
+
+def in_cut(program: Program) -> NDArray[np.bool_]:
+    """(n,) rows of tracks: neither leads nor links."""
+    return np.array([name == "finish" for name in program.labels])[program.label]
 
 
 def _whole(job: FinishSettings, body: int, side: str, millings: Sequence[Milling]) -> SurfacePoints:

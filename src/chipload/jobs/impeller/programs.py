@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.jobs.impeller.names import program_name, rough_names
+from chipload.jobs.impeller.names import finish_names, rough_names
 from chipload.jobs.impeller.outcome import Checked, ImpellerResult
 from chipload.jobs.impeller.proof import contact_points_bytes, proof_bytes
 from chipload.jobs.impeller.roughing_check import CheckedRough
@@ -23,10 +23,10 @@ def program_files(milled: ImpellerResult) -> dict[str, bytes]:
     for stem, cutter, table, checked, program, empty in _programs(milled):
         if empty:
             continue
-        number, title = int(stem.split("-")[0]), f"{milled.title}, {checked.name}"
+        number, title = int(program.tool[0]), f"{milled.title}, {checked.name}"
         text = write_gcode(
             program, milled.machine, title=title, verified=checked.verified,
-            comments=_comments(milled, checked, cutter, table, number), number=100 + number,
+            comments=_comments(milled, checked, cutter, table, number), number=100 + number, repeat=checked.repeat,
         )  # fmt: skip
         out[f"{stem}.{ENDINGS[milled.machine.dialect]}"] = text.encode("ascii")
         cl = write_apt(program, None, title=title, verified=checked.verified)
@@ -37,12 +37,15 @@ def program_files(milled: ImpellerResult) -> dict[str, bytes]:
 def _programs(
     milled: ImpellerResult,
 ) -> Iterator[tuple[str, CatalogueCutter, float, Checked | CheckedRough, Program, bool]]:
-    """Name, cutter, table angle, check and program of all, roughing first; whether there is nothing in it."""
+    """Name, cutter, table angle, check and program of all; whether there is nothing in it.
+
+    Roughing first, then the way that is milled, then every other one.
+    """
     for name, rough in zip(rough_names(milled), milled.roughs or (), strict=True):
         yield name, rough.rough.cutter, rough.rough.table, rough, rough.rough.program, not rough.rough.machined
-    for k, p in enumerate(milled.programs or (), 1):
+    for name, p in finish_names(milled):
         s = p.setting
-        yield program_name(milled, k), s.cutter, s.table, p, s.program, not s.machined
+        yield name, s.cutter, s.table, p, s.program, not s.machined
 
 
 def _comments(
@@ -57,5 +60,12 @@ def _comments(
         f"index table {table.index} {np.degrees(position):.6g} deg before the start, table angle of {checked.name}"
     )
     turn = np.degrees(milled.impeller.pitch)
-    out.append(f"one channel: the others by a pallet offset of {turn:.6f} deg each, {milled.impeller.blades} in all")
+    if checked.repeat is None:
+        out.append(
+            f"one channel: the others by a pallet offset of {turn:.6f} deg each, {milled.impeller.blades} in all"
+        )
+    else:
+        out.append(
+            f"all {milled.impeller.blades} channels: axis {checked.repeat.letter} turned on by {turn:.6f} deg each"
+        )
     return out

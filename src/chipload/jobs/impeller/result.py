@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from chipload.errors import Finding, Severity
-from chipload.jobs.impeller.names import program_name, rough_names
+from chipload.jobs.impeller.names import finish_names, rough_names
 from chipload.jobs.impeller.numbers import operation_numbers
 from chipload.jobs.impeller.outcome import (
     Checked,
@@ -94,12 +94,12 @@ def _roughing(milled: ImpellerResult) -> list[Track]:
 
 
 def _finishing(milled: ImpellerResult) -> list[Track]:
-    out = []
-    for k, p in enumerate(milled.programs or (), 1):
-        name = program_name(milled, k)
+    out, used = [], {id(p) for p in milled.programs or ()}
+    for name, p in finish_names(milled):
         findings = tuple(Finding("machine", 0, text, Severity.EXCEEDS) for text in p.findings)
         limits = (_gouge(name, p), *_scallops(name, p))
-        out.append(_track(milled, name, p.setting.program, p.seconds, limits, findings, not p.setting.machined))
+        in_use = id(p) in used and not name.startswith("way-")
+        out.append(_track(milled, name, p.setting.program, p.seconds, limits, findings, not p.setting.machined, in_use))
     return out
 
 
@@ -111,10 +111,11 @@ def _track(
     limits: tuple[LimitCheck, ...],
     findings: tuple[Finding, ...],
     empty: bool,
+    in_use: bool = True,
 ) -> Track:
     files = () if empty else (f"{name}.{ENDINGS[milled.machine.dialect]}", f"{name}.apt")
     blocks = partial(motion_blocks, program, milled.machine)
-    return Track(name, TrackKind.PROGRAM, True, time_s, limits, findings, files, blocks=blocks)
+    return Track(name, TrackKind.PROGRAM, in_use, time_s, limits, findings, files, blocks=blocks)
 
 
 def _gouge(track: str, checked: Checked | CheckedRough) -> LimitCheck:

@@ -12,6 +12,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
+from chipload.jobs.impeller.channels import between_channels, channel_repeat
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.jobs.impeller.tables import ImpellerOperationTable, PathsTable, RoughTable
 from chipload.machine.machine import Machine
@@ -67,8 +68,9 @@ def checked_roughing(
         rough.depth_mm, rough.step_mm, rough.blades_mm, rough.hub_mm, motion, rough.check_mm, op.around, rough.over_mm
     )
     link = Link(
-        paths.lift_mm, paths.margin_mm, paths.touch_mm, 0.0, mm_s_from_mm_min(paths.link_feed_mm_min), paths.above_mm
-    )
+        paths.lift_mm, paths.margin_mm, paths.touch_mm, 0.0, mm_s_from_mm_min(paths.link_feed_mm_min), paths.above_mm,
+        paths.lift_mm,
+    )  # fmt: skip
     plans = roughed(
         impeller, catalogue, stated, how, link, rad_s_from_rpm(rough.speed_rpm), table, rough.share, ahead, workers,
         lambda done, what: progress(0.6 * done, what),
@@ -83,7 +85,12 @@ def checked_roughing(
         # a further table angle that takes nothing that is left is no program
         if first or taken.before - taken.after > _LEAST * taken.before:
             stock[plan.index] = left
-            out.append(_checked(machine, safe.numbered(len(out) + 1), taken, rough.touch_mm3, paths, walls, workers))
+            numbered = safe.numbered(len(out) + 1)
+            out.append(
+                _checked(
+                    machine, numbered, taken, rough.touch_mm3, paths, walls, workers, table, impeller.blades
+                )
+            )  # fmt: skip
         progress(0.6 + 0.4 * (k + 1) / len(plans), f"check of {k + 1} roughing programs")
     return tuple(out)
 
@@ -108,7 +115,7 @@ def without_touch(
 def _checked(
     machine: Machine, plan: RoughingSetting, taken: ChannelRemoval, touch: float, paths: PathsTable, walls:
     Sequence[SurfacePoints],
-    workers: int,
+    workers: int, table: IndexTable, blades: int,
 ) -> CheckedRough:  # fmt: skip
     program = plan.program
     found = left_on(walls, program, plan.cutter, _HEIGHT, _DEPTH, step=_STEP, workers=workers)
@@ -124,7 +131,8 @@ def _checked(
     seconds = float(times_on(program, machine).sum())
     return CheckedRough(
         plan, gouge, paths.gouge_mm, (stands[0], stands[1]), taken, touch,
-        tuple(said), seconds,
+        tuple(said), seconds, between_channels(program, machine, blades),
+        channel_repeat(program, machine, table, blades),
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from chipload.planning.impeller.rough_settings import RoughingSetting
+from chipload.program.gcode.writer import Repeat
 from chipload.report.sheet import table
 from chipload.simulation.channel.channel import PARTS
 from chipload.simulation.channel.gouges import Gouge
@@ -29,7 +30,9 @@ class CheckedRough:
     taken : from the blank as the programs before it leave it, row by row
     touch : [mm3] that a rapid, and what is above the cutting part, may take in one row
     findings : what the program asks of the machine that it does not give
-    seconds : predicted time of one channel [s]
+    seconds : time of one channel [s]
+    between : from the end of one channel to the beginning of the next [s]
+    repeat : how the text goes through all channels; None: it is of one channel
     """
 
     rough: RoughingSetting
@@ -40,6 +43,8 @@ class CheckedRough:
     touch: float
     findings: tuple[str, ...]
     seconds: float
+    between: float
+    repeat: Repeat | None
 
     @property
     def name(self) -> str:

@@ -15,14 +15,15 @@ from chipload.errors import InputError
 from chipload.jobs.impeller.job import ImpellerJob
 from chipload.jobs.impeller.outcome import ImpellerResult, OneCutter, Searched, unreached_text
 from chipload.jobs.impeller.part import Part, read_part
-from chipload.jobs.impeller.paths import checked_programs, walls_of
+from chipload.jobs.impeller.paths import finish_settings, walls_of
 from chipload.jobs.impeller.roughing import checked_roughing
 from chipload.jobs.impeller.tables import ImpellerOperationTable
+from chipload.jobs.impeller.ways import checked_ways
 from chipload.jobs.provenance import provenance_of, title_of
 from chipload.jobs.tables import Table
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.impeller.answer import Answer, largest_cutters, one_cutter, one_cutter_of
-from chipload.planning.impeller.compare import Partition, compared
+from chipload.planning.impeller.compare import Way, ways_of
 from chipload.planning.impeller.costs import ChannelSide, Terms
 from chipload.planning.impeller.covering.covering import Covering, covering_of, first_edge
 from chipload.planning.impeller.impeller import Impeller
@@ -65,9 +66,10 @@ def run(job: ImpellerJob, progress: Progress = silent) -> ImpellerResult:
     whole = one_cutter_of(pairs, op.clearance_mm, table.spans, WORKERS)
     one = None if whole is None else (catalogue.cutters[whole[0]], whole[1])
     half = part_of(progress, 1, 2)
-    partitions = _partitions(job, done, catalogue, impeller, part_of(half, 0, 2))
+    ways = _ways(job, done, catalogue, impeller, part_of(half, 0, 4))
+    partitions = tuple(way.partition(WORKERS, part_of(half, 1, 4)) for way in ways)
     milled = ImpellerResult(
-        title_of(job.path), impeller, catalogue, machine, tuple(done), one, partitions, None, None, None, _settings(op),
+        title_of(job.path), impeller, catalogue, machine, tuple(done), one, partitions, None, None, _settings(op),
         job.table.impeller.outer_diameter_mm, _provenance(job, machine, catalogue, part),
     )  # fmt: skip
     if op.paths is None or milled.used is None:
@@ -78,11 +80,12 @@ def run(job: ImpellerJob, progress: Progress = silent) -> ImpellerResult:
             impeller, machine, table, catalogue, _rougher(job, catalogue), op, op.paths, op.rough,
             walls_of(impeller, _ahead(job)), _ahead(job), WORKERS, part_of(half, 2, 4),
         )  # fmt: skip
-    programs, covered = checked_programs(
-        impeller, machine, table, milled.used, op, op.paths, _ahead(job), len(roughs or ()), WORKERS,
-        part_of(half, 3, 4) if roughs else part_of(half, 1, 2), covering,
-    )  # fmt: skip
-    return replace(milled, programs=programs, covered=covered, roughs=roughs)
+    how = finish_settings(
+        impeller, machine, table, catalogue, op, op.paths, _ahead(job), len(roughs or ()), WORKERS, covering
+    )
+    checked = checked_ways(ways, partitions, how, machine, op.paths, part_of(half, 3, 4))
+    chosen = {way.name: way.way for way in checked}
+    return replace(milled, ways=checked, roughs=roughs, partitions=tuple(chosen.get(p.name, p) for p in partitions))
 
 
 def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue, part: Part) -> Provenance:
@@ -143,9 +146,9 @@ def _searched(
     return Searched(settings, surface, answer, table, best, op.clearance_mm, took)
 
 
-def _partitions(
+def _ways(
     job: ImpellerJob, done: Sequence[Searched], catalogue: Catalogue, impeller: Impeller, progress: Progress
-) -> tuple[Partition, ...]:
+) -> tuple[Way, ...]:
     """The cutter picked by hand where one is stated, then one cutter, two, ..."""
     op = job.operation
     terms = Terms(
@@ -154,7 +157,7 @@ def _partitions(
     picked = _picked(job, catalogue)
     index = None if picked is None else catalogue.cutters.index(picked)
     sides = [_side(x, x.answer) for x in done]
-    return compared(sides, terms, index, range(1, op.most_cutters + 1), WORKERS, progress)
+    return ways_of(sides, terms, index, range(1, op.most_cutters + 1), WORKERS, progress)
 
 
 def _side(op: Searched, answer: Answer) -> ChannelSide:

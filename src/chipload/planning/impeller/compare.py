@@ -20,7 +20,7 @@ from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.errors import InputError
 from chipload.planning.impeller.answer import largest_cutters
 from chipload.planning.impeller.closed_form import axis_at, contact_limit
-from chipload.planning.impeller.costs import ChannelSide, Terms
+from chipload.planning.impeller.costs import ChannelSide, Costs, Terms
 from chipload.planning.impeller.patches import PatchDivision, costs_of, divided
 from chipload.planning.impeller.scene import Scene
 from chipload.progress import Progress, silent
@@ -63,17 +63,39 @@ class Partition:
         return self.divided
 
 
-def compared(
+@dataclass(frozen=True, eq=False)
+class Way:
+    """One way to mill the sides, not yet divided.
+
+    Parameters
+    ----------
+    name : as of :class:`Partition`
+    costs : of its sides; what is proved, and what is measured, stays in them
+    most : different cutters at most
+    took : time of its own search [s]
+    """
+
+    name: str
+    costs: tuple[Costs, ...]
+    most: int | None
+    took: float = 0.0
+
+    def partition(self, workers: int = 1, progress: Progress = silent) -> Partition:
+        """The way in the least time by its costs as they stand."""
+        sides = [c.side for c in self.costs]
+        found = divided(self.costs, self.most, workers, progress)
+        return Partition(self.name, found, sides[0].answer.catalogue, _share(sides), *_proved(sides), self.took)
+
+
+def ways_of(
     sides: Sequence[ChannelSide],
     terms: Terms,
     hand_picked: int | None = None,
     numbers: Sequence[int | None] = (1, 2, 3),
     workers: int = 1,
     progress: Progress = silent,
-) -> tuple[Partition, ...]:
-    """The sides with the hand-picked cutter (an index in the catalogue), then with so many cutters.
-
-    The hand-picked one goes where it can at all table angles; what it does not reach is its own list.
+) -> tuple[Way, ...]:
+    """The hand-picked cutter (an index in the catalogue) at any table angle, then so many cutters, which share costs.
 
     Raises
     ------
@@ -99,12 +121,33 @@ def compared(
             for s in sides
         ]
         took = time.perf_counter() - begin
-        found = divided(costs_of(own, replace(terms, feed=feed), workers), 1, workers, progress)
-        out.append(Partition("hand-picked", found, picked, _share(own), *_proved(own), took))
+        out.append(Way("hand-picked", costs_of(own, replace(terms, feed=feed), workers), 1, took))
     for m in numbers:
         name = "any cutters" if m is None else f"{m} cutter{'s' if m > 1 else ''}"
-        out.append(Partition(name, divided(costs, m, workers, progress), catalogue, _share(sides), *_proved(sides)))
+        out.append(Way(name, costs, m))
     return tuple(out)
+
+
+def compared(
+    sides: Sequence[ChannelSide],
+    terms: Terms,
+    hand_picked: int | None = None,
+    numbers: Sequence[int | None] = (1, 2, 3),
+    workers: int = 1,
+    progress: Progress = silent,
+) -> tuple[Partition, ...]:
+    """The sides with the hand-picked cutter (an index in the catalogue), then with so many cutters.
+
+    The hand-picked one goes where it can at all table angles; what it does not reach is its own list.
+
+    Raises
+    ------
+    InputError
+        The index is not in the catalogue.
+    """
+    return tuple(
+        way.partition(workers, progress) for way in ways_of(sides, terms, hand_picked, numbers, workers, progress)
+    )
 
 
 def gouges(

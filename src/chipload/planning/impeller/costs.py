@@ -121,6 +121,16 @@ class ChannelSide:
         return np.array(np.gradient(grid, (self.u, self.v)[1 - order], axis=1 - order)).reshape(-1, 3)
 
 
+class Measured(NamedTuple):
+    """What a patch takes in a program [s] beside what its contact points predict; order, cutter, table of its side."""
+
+    order: int
+    cutter: int
+    table: int
+    predicted: float
+    programmed: float
+
+
 class Costs:
     """The times of one side, known or bounded; a memo that grows by :meth:`prove`.
 
@@ -130,6 +140,7 @@ class Costs:
     known : (c, k, t) bool; else ``time`` is a bound from below
     ranges : of what is known and valid, by (c, k, t)
     asked : how many ranges were computed
+    factor : (2, k, t) by what the programs take longer than ``time``, for an order of strips; 1 until it is measured
     """
 
     def __init__(self, side: ChannelSide, tables: Floats, terms: Terms, workers: int = 1) -> None:
@@ -158,13 +169,29 @@ class Costs:
                 w = np.where(w > 0.0, w, free.max(axis=1)).reshape(points, T)
                 self.time[order, :, k] = np.where(allowed[:, k], self._paid(w, np.arange(points), k), np.inf)
         self.time[:, ~reached] = 0.0
+        self.factor: Floats = np.ones((2, K, T))
         self.known = np.array(np.isinf(self.time).all(axis=0), dtype=np.bool_)
         self.known[~reached] = True
 
     def cells(self, order: int) -> Floats:
-        """(strips, cells, k, t) times of an order."""
-        out: Floats = self.time[order][self.side.points(order)]
+        """(strips, cells, k, t) times of an order, as programs take them."""
+        out: Floats = self.time[order][self.side.points(order)] * self.factor[order]
         return out
+
+    def measured(self, rows: Sequence[Measured]) -> None:
+        """Takes the factors from programs; what no program has yet is taken for the mean of its order, or of all."""
+        if not rows:
+            return
+
+        def ratio(some: Sequence[Measured]) -> float:
+            return math.fsum(r.programmed for r in some) / math.fsum(r.predicted for r in some)
+
+        whole = ratio(rows)
+        for order in range(2):
+            own = [r for r in rows if r.order == order]
+            self.factor[order] = ratio(own) if own else whole
+            for key in {(r.cutter, r.table) for r in own}:
+                self.factor[order, key[0], key[1]] = ratio([r for r in own if (r.cutter, r.table) == key])
 
     def prove(self, asked: Sequence[tuple[int, int, int]], workers: int = 1) -> None:
         """Make (c, k, t) known."""

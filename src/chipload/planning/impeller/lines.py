@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,16 +21,20 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
+from chipload.planning.impeller.closed_form import axis_at
 from chipload.planning.impeller.pallet import Turned, pallet_angles
 from chipload.planning.impeller.ranges.ranges import valid_ranges
 from chipload.planning.impeller.refinement import Refinement
 from chipload.planning.impeller.scene import Floats, Ints, Scene
-from chipload.planning.impeller.track import ToolTrack
+from chipload.planning.impeller.step_over import contact_of, width
+from chipload.planning.impeller.track import ToolTrack, posed, written
 
 #: points of a line whose pallet angles are looked for together, and how far from those of the line before [rad]
 _GROUP, _WINDOW = 6, math.radians(10.0)
 #: stations and halvings by which the first line that is reached is looked for
 _KNOTS, _BISECT = 17, 4
+#: n within this of 1: the axis stands along the normal, there is no step-over
+_FLAT = 1e-9
 
 Flags = NDArray[np.bool_]
 
@@ -44,6 +50,7 @@ class LineMotion:
     rate : greatest of the pallet [rad/s]
     clearance : of neck, shank and holder [mm]
     wanted : [rad] by which the pallet keeps away from the ends of its ranges, where they are wide enough
+    scallop : height [mm] at which the pallet is led to a wide step-over; None: it is not, as in roughing
     """
 
     chord: float
@@ -51,6 +58,7 @@ class LineMotion:
     rate: float
     clearance: float
     wanted: float = math.radians(4.0)
+    scallop: float | None = None
 
     def __post_init__(self) -> None:
         for name, unit in (("chord", "mm"), ("feed", "mm/s"), ("rate", "rad/s")):
@@ -144,16 +152,48 @@ class Lines:
         S, N, K, d, at = self.on(q)
         scene = self.scene.at_contacts(S, N, K, self.number)
         step = np.linalg.norm(np.diff(S, axis=0), axis=1)
-        most = self.how.rate * step / self.how.feed
-        pieces = pallet_angles(self._ranges(scene, before), step, most, self.how.wanted, before)
-        if any(a.last == b.first for a, b in itertools.pairwise(pieces)):
+        widths = partial(self._widths, N, K, d)
+        pieces = self._followed(scene, step, before, widths)
+        if np.isfinite(before).any() and any(a.last == b.first for a, b in itertools.pairwise(pieces)):
             # a line that can be followed with other angles than those of the line before
-            ranges = self._valid(scene, np.arange(len(q)), self.pallets)
-            pieces = min((pieces, pallet_angles(ranges, step, most, self.how.wanted)), key=len)
+            free = np.full(len(q), np.nan)
+            pieces = min((pieces, self._followed(scene, step, free, widths)), key=len)
         pallet = np.full(len(q), np.nan)
         for piece in pieces:
             pallet[piece.first : piece.last] = piece.pallet
         return Line(q, at, S, N, K, d, pieces, pallet)
+
+    def _followed(
+        self, scene: Scene, step: Floats, before: Floats, widths: Callable[[Ints, Floats], Floats]
+    ) -> tuple[Turned, ...]:
+        """Pieces of a line with their pallet angles, near those ``before``: of ranges at the check points.
+
+        Where the cutter, as it then stands, meets a wall between them, the ranges there are taken exactly.
+        """
+        most = self.how.rate * step / self.how.feed
+        ranges = list(self._ranges(replace(scene, covering=None, known=scene.tree), before))
+        exact = np.zeros(len(before), dtype=np.bool_)
+        while True:
+            pieces = pallet_angles(tuple(ranges), step, most, self.how.wanted, before, widths)
+            met = self._met(scene.contact, scene.normal, pieces) & ~exact
+            if not met.any():
+                return pieces
+            for k, r in zip(np.flatnonzero(met), self._ranges(scene, before, met), strict=True):
+                ranges[k] = r
+            exact |= met
+
+    def _widths(self, N: Floats, K: Floats, d: Floats, point: Ints, pallet: Floats) -> Floats:
+        """Step-overs (k,) [mm] of points (k,) of a line at pallet angles (k,); 0 where the axis has no lean to it."""
+        if self.how.scallop is None:
+            return np.ones(len(point))
+        T = axis_at(self.table, pallet)
+        n = (N[point] * T).sum(axis=1)
+        out = np.zeros(len(point))
+        ok = np.flatnonzero((n >= 0.0) & (n < 1.0 - _FLAT))
+        at = point[ok]
+        contact = contact_of(N[at], T[ok], d[at], K[at])
+        out[ok] = width(contact, self.cutter.rho, self.cutter.corner_radius, self.how.scallop)
+        return out
 
     def border(self, Q: tuple[float, float], need: Flags | None = None) -> Floats:
         """Q at every station from Q[0] towards Q[1] where the cutter first reaches the surface, evened out.
@@ -273,13 +313,24 @@ class Lines:
             np.column_stack([u, v]),
         )
 
-    def _ranges(self, scene: Scene, before: Floats) -> tuple[Floats, ...]:
-        """Ranges of every point, near the angles of the line ``before`` first, else everywhere."""
-        n = len(before)
-        out: list[Floats] = [np.zeros((0, 2))] * n
-        left = np.ones(n, dtype=np.bool_)
-        for a in range(0, n, _GROUP):
-            group = np.arange(a, min(a + _GROUP, n))
+    def _met(self, S: Floats, N: Floats, pieces: tuple[Turned, ...]) -> Flags:
+        """(n,) whether the cutter, as it stands at a station, meets a wall between the check points."""
+        out = np.zeros(len(S), dtype=np.bool_)
+        covering = self.scene.covering
+        if covering is None:
+            return out
+        for piece in pieces:
+            own = slice(piece.first, piece.last)
+            tips, axes = posed(S[own], N[own], self.table, written(piece.pallet), self.cutter)
+            out[own] = covering.met(self.cutter, tips, axes, self.how.clearance) > 0.0
+        return out
+
+    def _ranges(self, scene: Scene, before: Floats, which: Flags | None = None) -> tuple[Floats, ...]:
+        """Ranges of every point of ``which``, near the angles of the line ``before`` first, else everywhere."""
+        points = np.arange(len(before)) if which is None else np.flatnonzero(which)
+        out: dict[int, Floats] = {}
+        for a in range(0, len(points), _GROUP):
+            group = points[a : a + _GROUP]
             known = before[group]
             if not np.isfinite(known).all():
                 continue
@@ -288,13 +339,11 @@ class Lines:
             if high - low > math.pi or not spans:
                 continue
             got = self._valid(scene, group, spans)
-            for k, r in zip(group, got, strict=True):
-                out[k], left[k] = r, not len(r)
-        rest = np.flatnonzero(left)
+            out |= {int(k): r for k, r in zip(group, got, strict=True) if len(r)}
+        rest = np.array([k for k in points if int(k) not in out], dtype=np.int64)
         if len(rest):
-            for k, r in zip(rest, self._valid(scene, rest, self.pallets), strict=True):
-                out[k] = r
-        return tuple(out)
+            out |= {int(k): r for k, r in zip(rest, self._valid(scene, rest, self.pallets), strict=True)}
+        return tuple(out[int(k)] for k in points)
 
     def _valid(self, scene: Scene, points: Ints, spans: tuple[tuple[float, float], ...]) -> tuple[Floats, ...]:
         got = valid_ranges(scene, self.cutter, self.table, self.how.clearance, spans, points, workers=self.workers)

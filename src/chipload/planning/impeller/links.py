@@ -4,17 +4,24 @@ Notation: p tip [mm], T axis, N normal at the contact; alpha table angle, H(alph
 nothing of the part lies, whatever the pallet angle: the part is within a body of revolution, H = max of r sin(alpha) +
 z cos(alpha). With its tip above H the cutter is clear wherever it stands.
 
-The cutter leaves a track along N + T, T or N by the lift, and comes to one the same way back: on these it touches, so
-that they are looked at in small steps, and may be as deep as ``touch``. Where a channel is too narrow for that it goes
-up along T to H at once, and may be as deep as ``touch`` all the way, which is proved. From a lift it goes straight to
-the lifted beginning of the next track where that is near and proved clear (``clear/``), else up along T to H, round,
-and down.
+Tracks that end and begin close together are one pass: the cutter stays down between them (``passes.py``). Passes are
+milled in the order that a tour over their ends gives (``tour.py``).
+
+The cutter leaves a pass along N + T, T or N by the lift, and comes to one the same way back: on these it touches, so
+that they are looked at in small steps, and may be as deep as ``touch``. The first ``lead`` of a lift is at the feed of
+the cut. Where a channel is too narrow for a lift it goes up along T to H at once, and may be as deep as ``touch`` all
+the way, which is proved. From a lift it goes straight to the lifted beginning of the next pass where that is near and
+proved clear (``clearance/``), else up along T to H, round, and down. The way up and down is along the spindle: it is
+rapid where it is proved clear of what roughing leaves on the walls as well, else at the feed of links.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,13 +29,16 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.planning.impeller.clearance.clearance import between, clearance, moves_clear
 from chipload.planning.impeller.closed_form import axis_at
+from chipload.planning.impeller.passes import Joint, Pass, joined, single
 from chipload.planning.impeller.scene import Floats, Ints, Scene
+from chipload.planning.impeller.tour import tour
 from chipload.planning.impeller.track import ToolTrack, pallet_of, written
 from chipload.program.program import LINE, RAPID
 
 _SMALL = 24  # places at which a lift is looked at
 _TURN = math.radians(3.0)  # of the pallet in one row above the part
 _LIFTS = (1.0, 0.5, 0.25)  # of the lift that are tried
+_OVER = 0.5  # [s] of ramps and turns of the pallet on a way over the part, when ways are compared
 
 
 @dataclass(frozen=True)
@@ -43,6 +53,9 @@ class Link:
     near : longest direct link [mm]
     feed : of links and lifts [mm/s]
     above : of the safe height over the part [mm], > 0
+    lead : of a lift that is at the feed of the cut [mm], > 0
+    allowance : that may stand on the walls [mm]: rapids keep the margin from that
+    rapid : speed of rapids [mm/s], by which ways are compared
     """
 
     lift: float
@@ -51,6 +64,9 @@ class Link:
     near: float
     feed: float
     above: float
+    lead: float = 1.0
+    allowance: float = 0.0
+    rapid: float = 400.0
 
     def __post_init__(self) -> None:
         if not (0.0 < self.margin < self.lift < math.inf and 0.0 <= self.touch < self.margin):
@@ -60,6 +76,8 @@ class Link:
             )
         if not (self.near >= 0.0 and 0.0 < self.feed < math.inf and 0.0 < self.above < math.inf):
             raise InputError("link: must be near at least 0, feed and above above 0")
+        if not (0.0 < self.lead < math.inf and 0.0 <= self.allowance < math.inf and 0.0 < self.rapid < math.inf):
+            raise InputError("link: must be lead and rapid above 0, allowance at least 0")
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +116,7 @@ class Linked:
     refused : (number of the track, why) of tracks that the cutter cannot come to or leave: they are not in the moves
     direct, retracts : how many links go straight and how many over the part
     track : (n,) of each move the number of the track that it leads to, mills or leaves; -1: none
+    stayed : how many links stay down on the surface
     """
 
     moves: Moves
@@ -105,6 +124,7 @@ class Linked:
     direct: int
     retracts: int
     track: Ints
+    stayed: int = 0
 
 
 def safe_height(points: Floats, table: float) -> float:
@@ -128,8 +148,10 @@ def linked(
     rate: float = math.inf,
     one_way: bool = False,
     outline: Floats | None = None,
+    joint: Joint | None = None,
+    stages: Sequence[int] = (),
 ) -> Linked:
-    """Every track in order, each from its nearer end, with what is between.
+    """Every track with what is between: in the order given where ``one_way``, else in that of a tour.
 
     Parameters
     ----------
@@ -139,57 +161,93 @@ def linked(
     rate : greatest of the pallet [rad/s]: rows on which it would be faster are fed more slowly
     one_way : each track in its own direction, never from its end; nothing but ways over the part is rapid
     outline : (k, 3) more points that the safe height is above, as of the blank
+    joint : what the cutter mills between two tracks where it stays down; None: it does not
+    stages : numbers of tracks before which all others are milled, ascending, as the first rest pass
     """
     T = axis_at(table, 0.0)
     points = scene.check if outline is None else np.vstack([scene.check, outline])
     top = safe_height(points, table) + how.above
     job = _Job(scene, cutter, table, how, clear_of, top)
+    passes, stayed = [single(k, t, label) for k, t in enumerate(tracks)], 0
+    if joint is not None and not one_way:
+        # a lifted link: both leads, both lifts, up and down again
+        seconds = 2.0 * how.lead / feed + 2.0 * max(how.lift - how.lead, 0.0) / how.feed + _OVER
+        passes, stayed = joined(tracks, joint, seconds * feed, label)
+    if not one_way:
+        passes = _toured(job, passes, stages)
     parts: list[Moves] = []
     of: list[int] = []
     refused: list[tuple[int, str]] = []
     direct = retracts = 0
-    away: tuple[Floats, Floats] | None = None  # lifted pose at the end of the last track
+    away: _Pose | None = None  # lifted pose at the end of the last pass
 
     def add(number: int, *moves: Moves) -> None:
         for move in moves:
             parts.append(move)
             of.extend([number] * len(move.tip))
 
-    for number, given in enumerate(tracks):
-        track = given
-        if away is not None and not one_way:
-            ends = [float(np.linalg.norm(given.tip[k] - away[0])) for k in (0, -1)]
-            track = given if ends[0] <= ends[1] else given.back()
-        begin, end = job.away(track, 0), job.away(track, -1)
+    for one in passes:
+        begin, end = job.away(one, 0), job.away(one, -1)
         if begin is None or end is None:
-            refused.append((number, "no way off the surface at its " + ("beginning" if begin is None else "end")))
+            why = "no way off the surface at its " + ("beginning" if begin is None else "end")
+            refused += [(k, why) for k in one.numbers]
             continue
-        there = begin[-1]
-        over = job.over(there, track.axis[0])
-        short = None if away is None else job.direct(away, (there, track.axis[0]))
+        first, last = int(one.of[0]), int(one.of[-1])
+        short = None if away is None or one_way else job.direct(away, begin)
         if short is not None:
-            add(number, Moves.of(LINE, short[0], short[1], how.feed, "link"))
+            add(first, Moves.of(LINE, short[0], short[1], how.feed, "link"))
             direct += 1
         else:
-            if away is not None:
-                up = job.over(*away)
-                add(of[-1], job.up(up, away[1], one_way))
-                add(number, job.round((up, away[1]), (over, track.axis[0])))
-                retracts += 1
+            over = job.over(begin.tip, begin.axis)
+            if away is None:
+                add(first, Moves.of(RAPID, over[None], begin.axis[None], 0.0, "link"))
             else:
-                add(number, Moves.of(RAPID, over[None], track.axis[:1], 0.0, "link"))
-            add(number, Moves.of(LINE, there[None], track.axis[:1], how.feed, "link"))
-        add(number, *(Moves.of(LINE, p[None], track.axis[:1], how.feed, "link") for p in begin[-2::-1]))
-        add(number, Moves.of(LINE, track.tip[:1], track.axis[:1], feed, "lead"))
-        add(number, Moves.of(LINE, track.tip[1:], track.axis[1:], feed, label))
-        add(number, Moves.of(LINE, end[0][None], track.axis[-1:], feed, "lead"))
-        add(number, *(Moves.of(LINE, p[None], track.axis[-1:], how.feed, "link") for p in end[1:]))
-        away = (end[-1], track.axis[-1])
+                up = job.over(away.tip, away.axis)
+                add(of[-1], job.along(up, away.axis, one_way or not away.free))
+                add(first, job.round((up, away.axis), (over, begin.axis)))
+                retracts += 1
+            add(first, job.along(begin.tip, begin.axis, one_way or not begin.free))
+        add(first, *(Moves.of(LINE, p[None], begin.axis[None], how.feed, "link") for p in begin.way[-2::-1]))
+        add(first, Moves.of(LINE, one.tip[:1], one.axis[:1], feed, "lead"))
+        for a, b, kind in one.runs():
+            add(int(one.of[a]), Moves.of(LINE, one.tip[a:b], one.axis[a:b], feed, kind))
+        add(last, Moves.of(LINE, end.way[0][None], end.axis[None], feed, "lead"))
+        add(last, *(Moves.of(LINE, p[None], end.axis[None], how.feed, "link") for p in end.way[1:]))
+        away = end
     if away is not None:
-        add(of[-1], job.up(job.over(*away), away[1], one_way))
+        add(of[-1], job.along(job.over(away.tip, away.axis), away.axis, one_way or not away.free))
     else:
         add(-1, Moves.of(RAPID, (top * T)[None], T[None], 0.0, "link"))
-    return Linked(_within_rate(Moves.join(parts), rate), tuple(refused), direct, retracts, np.array(of))
+    return Linked(_within_rate(Moves.join(parts), rate), tuple(refused), direct, retracts, np.array(of), stayed)
+
+
+def _toured(job: _Job, passes: Sequence[Pass], stages: Sequence[int]) -> list[Pass]:
+    """The passes in the order of a tour, stage after stage."""
+    edges = [0, *stages, math.inf]
+    out: list[Pass] = []
+    for a, b in itertools.pairwise(edges):
+        some = [x for x in passes if a <= x.numbers[0] < b]
+        if not some:
+            continue
+        ends = np.array([[x.tip[0], x.tip[-1]] for x in some])
+        axes = np.array([[x.axis[0], x.axis[-1]] for x in some])
+        start = None if not out else (out[-1].tip[-1], out[-1].axis[-1])
+        order = tour(ends, axes, job.top, job.how.near, job.how.feed, job.how.rapid, start)
+        out += [some[k] if forth else some[k].back() for k, forth in order]
+    return out
+
+
+class _Pose(NamedTuple):
+    """A way off the end of a pass: its tips, the last where it ends; the axis; whether it is clear of allowances."""
+
+    way: tuple[Floats, ...]
+    axis: Floats
+    free: bool
+
+    @property
+    def tip(self) -> Floats:
+        """The last tip."""
+        return self.way[-1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,25 +259,33 @@ class _Job:
     clear_of: float
     top: float
 
-    def away(self, track: ToolTrack, k: int) -> tuple[Floats, ...] | None:
-        """Tips on the way off the end ``k`` of a track, the last with a clear way up; None: there is none."""
+    def away(self, track: Pass, k: int) -> _Pose | None:
+        """The way off the end ``k`` of a pass, whose last tip has a clear way up; None: there is none."""
         p, T, N = track.tip[k], track.axis[k], track.normal[k]
         share = np.arange(1, _SMALL + 1)[:, None] / _SMALL
+        found: _Pose | None = None
         for size in _LIFTS:
             for way in (N + T, T, N, N + 2.0 * T, 2.0 * N + T):
-                step = self.how.lift * size * way / np.linalg.norm(way)
+                length = self.how.lift * size
+                step = length * way / np.linalg.norm(way)
                 tips = p + share * step
                 got, _ = clearance(
                     self.scene, self.cutter, tips, np.tile(T, (_SMALL, 1)), self.how.lift + 1.0, self.clear_of
                 )
                 if got.min() < -self.how.touch or got[-1] <= self.how.margin:
                     continue
-                if self._up(tips[-1], T, self.how.margin):
-                    return (tips[-1],)
+                lead = min(self.how.lead / length, 1.0)
+                tips_off = (p + step,) if lead == 1.0 else (p + lead * step, p + step)
+                if got[-1] > self.how.margin + self.how.allowance and self._up(
+                    tips[-1], T, self.how.margin + self.how.allowance
+                ):
+                    return _Pose(tips_off, T, True)
+                if found is None and self._up(tips[-1], T, self.how.margin):
+                    found = _Pose(tips_off, T, False)
         # too narrow for a lift: up along the axis as it stands, where it may touch what it touches now
-        if not self._up(p, T, -self.how.touch):
-            return None
-        return p + min(self.how.lift, self._rise(p, T)) * T, self.over(p, T)
+        if found is not None or not self._up(p, T, -self.how.touch):
+            return found
+        return _Pose((p + min(self.how.lead, self._rise(p, T)) * T, self.over(p, T)), T, False)
 
     def _rise(self, tip: Floats, axis: Floats) -> float:
         return max(self.top - float(tip @ axis), 0.0)
@@ -233,23 +299,29 @@ class _Job:
         up: Floats = tip + self._rise(tip, axis) * axis
         return up
 
-    def up(self, tip: Floats, axis: Floats, fed: bool) -> Moves:
-        """The way up along the axis, ``fed``: not in rapid, for the blank may stand there."""
+    def along(self, tip: Floats, axis: Floats, fed: bool) -> Moves:
+        """The way up or down along the axis, ``fed``: not in rapid, for the blank may stand there."""
         motion, feed = (LINE, self.how.feed) if fed else (RAPID, 0.0)
         return Moves.of(motion, tip[None], axis[None], feed, "link")
 
-    def direct(self, a: tuple[Floats, Floats], b: tuple[Floats, Floats]) -> tuple[Floats, Floats] | None:
-        """Tips and axes of a straight link, None: too far or not clear. The axis stays at the table angle."""
-        if np.linalg.norm(b[0] - a[0]) > self.how.near:
+    def direct(self, a: _Pose, b: _Pose) -> tuple[Floats, Floats] | None:
+        """Tips and axes of a straight link, None: too far, slower than over the part, or not clear.
+
+        The axis stays at the table angle.
+        """
+        far = float(np.linalg.norm(b.tip - a.tip))
+        rise = self._rise(a.tip, a.axis) + self._rise(b.tip, b.axis)
+        speed = self.how.rapid if a.free and b.free else self.how.feed
+        if far > self.how.near or far / self.how.feed > rise / speed + _OVER:
             return None
-        B0, B1 = pallet_of(self.table, a[1]), pallet_of(self.table, b[1])
+        B0, B1 = pallet_of(self.table, a.axis), pallet_of(self.table, b.axis)
         turn = (B1 - B0 + math.pi) % math.tau - math.pi
         count = max(1, math.ceil(abs(turn) / _TURN))
         share = np.arange(1, count + 1) / count
-        tips = a[0] + share[:, None] * (b[0] - a[0])
-        axes = np.vstack([axis_at(self.table, written(B0 + share[:-1] * turn)).reshape(-1, 3), b[1][None]])
+        tips = a.tip + share[:, None] * (b.tip - a.tip)
+        axes = np.vstack([axis_at(self.table, written(B0 + share[:-1] * turn)).reshape(-1, 3), b.axis[None]])
         ok = moves_clear(
-            self.scene, self.cutter, np.vstack([a[0], tips]), np.vstack([a[1], axes]), self.how.margin, self.clear_of
+            self.scene, self.cutter, np.vstack([a.tip, tips]), np.vstack([a.axis, axes]), self.how.margin, self.clear_of
         )
         return (tips, axes) if ok.all() else None
 
@@ -270,6 +342,8 @@ class _Job:
 
 def _within_rate(moves: Moves, rate: float) -> Moves:
     """The moves, fed so that the pallet keeps its rate."""
+    if math.isinf(rate):
+        return moves
     B = np.arctan2(moves.axis[:, 1], moves.axis[:, 0])
     turn = np.abs((np.diff(B, prepend=B[:1]) + math.pi) % math.tau - math.pi)
     length = np.linalg.norm(np.diff(moves.tip, axis=0, prepend=moves.tip[:1]), axis=1)

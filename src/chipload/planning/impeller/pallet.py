@@ -6,12 +6,14 @@ between is valid at one of the two ends, and where the pallet can go that far in
 the least cost are found by dynamic programming, O(n K^2), and then drawn smooth within their ranges.
 
 The cost of a point is (1 - depth / wanted)^2 of a state nearer than ``wanted`` to an end of its range, a share of the
-angle from the state that is preferred, and the square of the turn over the length of the step.
+angle from the state that is preferred, how much longer the path is than with the widest step-over at that point, and
+the square of the turn over the length of the step.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +24,8 @@ from chipload.planning.impeller.scene import Floats, Ints
 _STEP, _MOST, _FEWEST = math.radians(2.0), 60, 5
 #: how strongly a preferred angle draws, and a turn of one radian in one millimetre
 _DRAW, _TURN = 0.3, 4000.0
+#: how strongly a wide step-over draws; a step-over of less than this share of the widest counts as this
+_WIDE, _LEAST = 2.0, 0.05
 _ROUNDS = 60
 _INSET = 0.02  # of its width: a range is not used nearer to its ends
 
@@ -41,6 +45,7 @@ def pallet_angles(
     most: Floats,
     wanted: float = math.radians(4.0),
     preferred: Floats | None = None,
+    widths: Callable[[Ints, Floats], Floats] | None = None,
 ) -> tuple[Turned, ...]:
     """Pieces of a line with a continuous pallet angle in each.
 
@@ -51,6 +56,7 @@ def pallet_angles(
     most : (n - 1,) float [rad], furthest that the pallet goes in each step
     wanted : [rad] to be away from the ends of a range, where it is wide enough
     preferred : (n,) float [rad], B near which to stay, as on the line before; nan: none
+    widths : step-overs (k,) [mm] of points (k,) at pallet angles (k,); None: all are alike
 
     Examples
     --------
@@ -63,6 +69,8 @@ def pallet_angles(
     joined = [_joined(r) for r in ranges]
     draw = np.full(len(ranges), np.nan) if preferred is None else preferred
     states = [_states(r, wanted, p) for r, p in zip(joined, draw, strict=True)]
+    if widths is not None:
+        _add_paths(states, widths)
     out: list[Turned] = []
     i = 0
     while i < len(ranges):
@@ -94,6 +102,21 @@ def _states(ranges: Floats, wanted: float, preferred: float) -> Floats:
             cost = cost + _DRAW * np.abs(_near(B - preferred))
         rows.append(np.column_stack([B, cost, np.full(count, k)]))
     return np.vstack(rows) if rows else np.zeros((0, 3))
+
+
+def _add_paths(states: list[Floats], widths: Callable[[Ints, Floats], Floats]) -> None:
+    """Adds to the cost of the states how much longer the path is than with the widest step-over of the point."""
+    point = np.repeat(np.arange(len(states)), [len(s) for s in states])
+    if not len(point):
+        return
+    w = widths(point, np.concatenate([s[:, 0] for s in states]))
+    first = 0
+    for s in states:
+        own = w[first : first + len(s)]
+        first += len(s)
+        most = float(own.max(initial=0.0))
+        if most > 0.0:
+            s[:, 1] += _WIDE * (most / np.maximum(own, _LEAST * most) - 1.0)
 
 
 def _near(angle: Floats) -> Floats:

@@ -25,7 +25,8 @@ class Patch:
     table : alpha [rad]
     at : (k, 2) u and v of its contact points
     ranges : for each contact point (m, 2) valid pallet angles [rad]; m = 0: unreachable with every cutter
-    path, time : predicted, of one such side [mm], [s]
+    path : predicted from the step-over at its contact points, of one such side [mm]
+    time : predicted, of one such side, with links where programs have told what they take [s]
     area : that is milled [mm2]
     part : range of the other parameter; not 0..1 where no cutter at one table angle mills a whole strip
     """

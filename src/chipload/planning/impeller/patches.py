@@ -164,11 +164,12 @@ def _patch(costs: Costs, steps: Sequence[Step]) -> Patch:
     part = (0.0, 1.0) if min(cells) < 0 else (float(other[min(cells)]), float(other[max(cells) + 1]))
     grid = np.stack(np.meshgrid(side.u, side.v, indexing="ij"), axis=-1).reshape(-1, 2)
     reached = [c for c in points if side.answer.cutter[c] >= 0]
-    time = float(costs.time[order, reached, k, t].sum())
+    bare = float(costs.time[order, reached, k, t].sum())
+    time = bare * float(costs.factor[order, k, t])
     none = np.zeros((0, 2))
     return Patch(
         side.body, side.side, "uv"[order], float(edges[min(strips)]), float(edges[max(strips) + 1]), k,
         float(costs.tables[t]), grid[points], tuple(costs.ranges.get((c, k, t), none) for c in points),
-        time * float(costs.terms.feeds(len(costs.catalogue.cutters))[k]), time,
+        bare * float(costs.terms.feeds(len(costs.catalogue.cutters))[k]), time,
         float(side.area[reached].sum()), part,
     )  # fmt: skip

@@ -17,6 +17,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from chipload.cutter.catalogue import CatalogueCutter
@@ -33,6 +34,9 @@ from chipload.progress import Progress, silent
 
 _MENDS, _ROUNDS, _FINE = 3, 12, 0.5
 _LINES = 5000
+#: of how far a pass stays below the scallop, how far from the border the outermost lines lie
+_INSIDE = 0.9
+_USED = 0.8  # of what is aimed at, the mean crest that is enough
 _STILL = 5e-3  # share by which a step may still change
 
 
@@ -94,7 +98,7 @@ def finishing(
     tracks: list[ToolTrack] = []
     missed: list[UnreachedSpan] = []
     q = job.border(Q, need)
-    line = job.line(q, np.full(len(p), np.nan))
+    line = step.first(q, Q[0])
     if (q > Q[0]).any():
         missed.append(job.strip(q, Q[0]))
     use = np.ones(len(p), dtype=np.bool_)
@@ -104,7 +108,7 @@ def finishing(
         missed += gone
         progress(float(np.clip((line.q.min() - Q[0]) / (Q[1] - Q[0]), 0.0, 1.0)), f"{number_of + 1} lines")
         open_ = line.q < Q[1]
-        if not open_[need].any():
+        if not open_[need].any() or step.reaches(line, Q[1]):
             return Tracks(tuple(tracks), tuple(missed), number_of + 1)
         line = step.next(line, Q[1])
         # where the line before has reached the border there is nothing left
@@ -123,6 +127,34 @@ class _Stepper:
     aim: float
     need: Flags
 
+    def first(self, q: Floats, border: float) -> Line:
+        """The first line: as far inside the border as its pass stays below the scallop on its side.
+
+        Where the cutter does not reach the border, at ``q``, the line lies there.
+        """
+        line = self.lines.line(q, np.full(len(q), np.nan))
+        if not (q == border).all() or not np.isfinite(line.pallet).any():
+            return line
+        w = np.full(len(q), np.inf)
+        for _ in range(_MENDS):
+            _, behind = self._reach(line)
+            w = np.minimum(w, self._even(_INSIDE * behind))
+            inside = self.lines.line(q + self._dq(line, w), line.pallet)
+            if len(inside.pieces) > len(line.pieces):
+                break
+            _, behind = self._reach(inside)
+            known = np.isfinite(behind)
+            if (behind[known] >= w[known]).all() and known.sum() >= np.isfinite(line.pallet).sum():
+                return inside
+            w = np.where(known, np.minimum(w, behind), w)
+        return line
+
+    def reaches(self, line: Line, border: float) -> bool:
+        """Whether the pass of a line stays below the scallop to the border, all along: no further line is needed."""
+        ahead, _ = self._reach(line)
+        w = _INSIDE * ahead[self.need]
+        return bool(np.isfinite(w).all() and (line.q + self._dq(line, _INSIDE * ahead))[self.need].min() >= border)
+
     def next(self, line: Line, end: float) -> Line:
         """The next line towards ``end``, so that the scallop between is as high as asked.
 
@@ -131,15 +163,24 @@ class _Stepper:
         ahead, behind = self._reach(line)
         w = self._even(ahead + behind)
         B, out = line.pallet, line
+        best: tuple[float, Line] | None = None
         for _ in range(_MENDS):
             w = self._step(line, w, B)
             out = self.lines.line(self._moved(line, w, end), B)
             crest = self._crest(line, out.q, out.pallet)
-            off = crest > self.scallop * (0.5 + 0.5 * self.aim)
-            if not off.any() or not np.isfinite(out.pallet).any():
+            if not np.isfinite(out.pallet).any():
                 break
             B = out.pallet
-        return out
+            if (crest > self.scallop * (0.5 + 0.5 * self.aim)).any():
+                continue
+            # what is used of the scallop where the line is not at the border
+            inner = np.isfinite(crest) & (out.q < end)
+            share = float(crest[inner].mean() / self.scallop) if inner.any() else 1.0
+            if best is None or share > best[0]:
+                best = share, out
+            if share > _USED * self.aim:
+                break
+        return out if best is None else best[1]
 
     def _moved(self, line: Line, w: Floats, end: float) -> Floats:
         out: Floats = np.minimum(line.q + self._dq(line, w), end)
@@ -179,7 +220,7 @@ class _Stepper:
             points, normals, (one[0], two[0]), (one[1], two[1]), self.lines.cutter.rho, self.lines.cutter.corner_radius
         )
         near = np.pad(np.where(np.isfinite(fine), fine, -np.inf), sub // 2, constant_values=-np.inf)
-        worst = np.array([near[k * sub : k * sub + sub + 1].max() for k in range(n)])
+        worst = sliding_window_view(near, sub + 1)[::sub].max(axis=1)
         both = np.isfinite(line.pallet) & np.isfinite(pallet) & np.isfinite(worst)
         return np.where(both & self.need, worst, np.nan)
 

@@ -9,21 +9,25 @@ scene of a channel the surfaces are numbered as :meth:`Impeller.scene` does for 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.geometry.bspline import BSplinePatch as Surface
+from chipload.planning.impeller.assignment import Changes
 from chipload.planning.impeller.floor import patch_of
 from chipload.planning.impeller.impeller import FILLET, Impeller
 from chipload.planning.impeller.lines import Tracks
 from chipload.planning.impeller.links import Link, Linked, linked
+from chipload.planning.impeller.passes import surface_joint
 from chipload.planning.impeller.patch import Patch
 from chipload.planning.impeller.paths import PatchFinish, finishing
 from chipload.planning.impeller.programs import program_of
+from chipload.planning.impeller.refinement import Refinement
 from chipload.planning.impeller.rest_machining import (
     Pair,
     RestPasses,
@@ -46,6 +50,8 @@ NUMBERS |= {(body, f"{side} fillet"): FILLET + n for (body, side), n in NUMBERS.
 _FLOOR = 2
 #: rest passes take what is left above this share of the scallop: the count is of points, and not exact
 _AIM = 0.95
+#: so many settings are brought into the best order; more of them on and on to the nearest
+_EXACT = 7
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +108,10 @@ class CutterSetting:
         """Of the path in the cut [mm]."""
         return math.fsum(t.length for t in self.machined)
 
+    def numbered(self, tool: int) -> CutterSetting:
+        """The same with another tool number."""
+        return replace(self, program=replace(self.program, tool=np.full(len(self.program), tool)))
+
 
 @dataclass(frozen=True, eq=False)
 class PlannedSettings:
@@ -152,6 +162,10 @@ class FinishSettings:
         """Where the pallet may stand [rad]."""
         return tuple((float(a), float(b)) for a, b in self.table.spans)
 
+    def with_catalogue(self, catalogue: Catalogue) -> FinishSettings:
+        """The same with the cutters of another catalogue."""
+        return replace(self, catalogue=catalogue)
+
     def milling(self, patch: Patch) -> Milling:
         """The finishing path of a patch."""
         strips, part = (patch.low, patch.high), patch.part
@@ -170,28 +184,58 @@ class FinishSettings:
         """The surface with its parameters."""
         return patch_of(self.impeller, BODIES[body], side, self.ahead)
 
+    def mender(self, body: int, side: str, pair: Pair) -> Refinement:
+        """Puts points between those of a track, or of a way between two of them."""
+        motion = self.how.motion
+        return Refinement(
+            self.surface(body, side), self.scene, _number(body, side), self.catalogue.cutters[pair[0]], pair[1],
+            motion.chord, motion.clearance,
+        )  # fmt: skip
+
     def setting(self, pair: Pair, millings: Sequence[Milling], rests: Sequence[RestPasses], tool: int) -> CutterSetting:
         """The tracks of a cutter at a table angle, linked; ``tool`` its number."""
         cutter, alpha = self.catalogue.cutters[pair[0]], pair[1]
         tracks = (*(t for m in millings for t in m.tracks.tracks), *(t for r in rests for t in r.tracks))
         motion = self.how.motion
-        moves = linked(tracks, self.scene, cutter, alpha, motion.feed, self.link, motion.clearance, rate=motion.rate)
+        owners = [(m.patch.body, m.patch.side, m.tracks.tracks) for m in millings]
+        owners += [(r.body, r.side, r.tracks) for r in rests]
+        menders = [x for body, side, rows in owners for x in [self.mender(body, side, pair)] * len(rows)]
+        moves = linked(
+            tracks, self.scene, cutter, alpha, motion.feed, self.link, motion.clearance, rate=motion.rate,
+            joint=surface_joint(menders), stages=(sum(len(m.tracks.tracks) for m in millings),) if rests else (),
+        )  # fmt: skip
         program = program_of(moves.moves, self.spindle, self.tools + tool)
         return CutterSetting(cutter, alpha, tuple(millings), tuple(rests), moves, program)
 
 
+#: what a milling is known by: surface, order of its strips, box, cutter, table angle
+MillingKey = tuple[object, ...]
+
+
 def planned(
-    job: FinishSettings, patches: Sequence[Patch], rounds: int = 8, progress: Progress = silent
+    job: FinishSettings,
+    patches: Sequence[Patch],
+    changes: Changes,
+    rounds: int = 8,
+    progress: Progress = silent,
+    known: dict[MillingKey, Milling] | None = None,
 ) -> PlannedSettings:
-    """The settings of patches, in the order in which their first patches stand, then those of rest passes alone.
+    """The settings of patches with their rest passes, in the order in which changes take least.
 
     Parameters
     ----------
+    changes : what a change of cutter and a setting of the table take
     rounds : most times that what is left is looked at and milled with rest passes
+    known : millings that are planned already; those that are planned here are added
     """
     groups: dict[Pair, list[Milling]] = {}
+    known = {} if known is None else known
     for done, patch in enumerate(patches):
-        groups.setdefault((patch.cutter, patch.table), []).append(job.milling(patch))
+        key = _key(job.catalogue, patch)
+        if key not in known:
+            known[key] = job.milling(patch)
+        milling = replace(known[key], patch=patch)
+        groups.setdefault((patch.cutter, patch.table), []).append(milling)
         progress(0.8 * (done + 1) / len(patches), f"paths of {done + 1} patches")
     settings = {pair: job.setting(pair, rows, (), k) for k, (pair, rows) in enumerate(groups.items(), 1)}
     faces = _faces(job, [m for rows in groups.values() for m in rows])
@@ -227,7 +271,41 @@ def planned(
         cell = _cells(face)
         area[face.body, face.side] = float(cell[over > h].sum())
         lost_area[face.body, face.side] = float(cell[(over > h) & lost].sum())
-    return PlannedSettings(tuple(settings.values()), area, lost_area)
+    order = setting_order(list(settings), changes)
+    numbered = tuple(settings[pair].numbered(job.tools + k) for k, pair in enumerate(order, 1))
+    return PlannedSettings(numbered, area, lost_area)
+
+
+def _key(catalogue: Catalogue, patch: Patch) -> MillingKey:
+    c = catalogue.cutters[patch.cutter]
+    at = patch.at[:, 1 if patch.order == "u" else 0]
+    ends = (float(at.min()), float(at.max()))
+    return (patch.body, patch.side, patch.order, patch.low, patch.high, patch.part, ends, c, patch.table)
+
+
+def setting_order(pairs: Sequence[Pair], changes: Changes) -> list[Pair]:
+    """Cutters at table angles in the order in which changes take least: exact for up to seven, else on to the nearest.
+
+    >>> setting_order([(0, 1.0), (1, 0.5), (0, 0.5)], Changes(60.0, 300.0))
+    [(0, 1.0), (0, 0.5), (1, 0.5)]
+    """
+    if len(pairs) <= _EXACT:
+        return list(min(itertools.permutations(pairs), key=lambda some: change_time(some, changes)))
+    order, left = [pairs[0]], list(pairs[1:])
+    while left:
+        order.append(min(left, key=lambda pair: change_time((order[-1], pair), changes)))
+        left.remove(order[-1])
+    return order
+
+
+def change_time(pairs: Sequence[Pair], changes: Changes) -> float:
+    """What the changes from each to the next take [s].
+
+    >>> change_time([(0, 1.0), (1, 0.5), (0, 0.5)], Changes(60.0, 300.0))
+    420.0
+    """
+    two = list(itertools.pairwise(pairs))
+    return changes.cutter * sum(a[0] != b[0] for a, b in two) + changes.table * sum(a[1] != b[1] for a, b in two)
 
 
 def _number(body: int, side: str) -> int:

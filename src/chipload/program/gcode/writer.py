@@ -13,6 +13,7 @@ First comes whether the program was verified. The same program gives the same by
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from chipload.errors import InputError
 from chipload.machine.machine import Machine
@@ -25,6 +26,22 @@ VERIFIED = "chipload: verified by independent simulation"
 NOT_VERIFIED = "NOT VERIFIED: no simulation has checked this program"
 
 
+@dataclass(frozen=True)
+class Repeat:
+    """A program that is carried out ``count`` times, the k-th time with a rotary axis offset by k turn / count.
+
+    Parameters
+    ----------
+    letter : of the axis
+    count : at least 1
+    turn_deg : the whole turn with its sign, as 360 or -360
+    """
+
+    letter: str
+    count: int
+    turn_deg: float
+
+
 def write_gcode(
     program: Program,
     machine: Machine,
@@ -34,6 +51,7 @@ def write_gcode(
     comments: Sequence[str] = (),
     number: int = 1,
     line_step: int = 0,
+    repeat: Repeat | None = None,
 ) -> str:
     """The text of a program for a machine: :func:`~chipload.program.to_axes.to_axes`, then :func:`write_commands`.
 
@@ -44,8 +62,9 @@ def write_gcode(
     """
     commands, _ = to_axes(program, machine)
     return write_commands(
-        commands, machine, title=title, verified=verified, comments=comments, number=number, line_step=line_step
-    )
+        commands, machine, title=title, verified=verified, comments=comments, number=number, line_step=line_step,
+        repeat=repeat,
+    )  # fmt: skip
 
 
 def write_commands(
@@ -58,6 +77,7 @@ def write_commands(
     number: int = 1,
     line_step: int = 0,
     words: Sequence[tuple[int, str]] = (),
+    repeat: Repeat | None = None,
 ) -> str:
     """The text of commands for the controller of ``machine``.
 
@@ -71,12 +91,13 @@ def write_commands(
     line_step : step of N words; 0 writes none
     words : (line, block) in rising lines: blocks that stand before the first motion of that line of the source, or
         of a later one; those that are no comment are written as they are
+    repeat : the program at other positions of a rotary axis as well, in a loop; None: once
 
     Raises
     ------
     InputError
         A tool does not begin with a rapid, a feed rounds to 0, the number is out of range, the controller has no word
-        for tool centre point control.
+        for tool centre point control; a program of several tools is to be repeated.
     """
     fanuc = machine.dialect == "fanuc"
     if not 1 <= number <= 9999:
@@ -85,11 +106,30 @@ def write_commands(
     head = [f"O{number:04d} {comment(said, fanuc)}" if fanuc else comment(said, fanuc)]
     head += [comment(text, fanuc) for text in (title, *comments)]
     blocks = [*_modes(machine), *Blocks(commands, machine, words).text()]
+    if repeat is not None:
+        blocks = _repeated(blocks, repeat, fanuc)
     blocks += ["M5", "M30" if fanuc else "M2"]
     if line_step > 0:
         blocks = [x if x.startswith("(") else f"N{line_step * (k + 1)} {x}" for k, x in enumerate(blocks)]
     lines = ["%", *head, *blocks, "%"] if fanuc else [*head, *blocks]
     return "\n".join(lines) + "\n"
+
+
+def _repeated(blocks: list[str], repeat: Repeat, fanuc: bool) -> list[str]:
+    """The blocks from the first rapid on in a loop, each time with another work offset of the rotary axis."""
+    changes = sum(" M6" in block for block in blocks)
+    if changes > 1:
+        raise InputError(f"repeat: the program changes tools {changes} times: must be of one tool")
+    first = next(k for k, block in enumerate(blocks) if block.startswith("G0 "))
+    turn, count = decimal(repeat.turn_deg, 9, fanuc), repeat.count
+    axis = repeat.letter
+    if fanuc:
+        head = ["#100=0", f"WHILE [#100 LT {count}] DO1", f"G52 {axis}[#100*{turn}/{count}]"]
+        tail = ["#100=#100+1", "END1", f"G52 {axis}0."]
+    else:
+        head = ["#<turn> = 0", f"o100 repeat [{count}]", f"G52 {axis}[#<turn> * {turn} / {count}]"]
+        tail = ["#<turn> = [#<turn> + 1]", "o100 endrepeat", f"G52 {axis}0"]
+    return [*blocks[:first], *head, *blocks[first:], *tail]
 
 
 def _modes(machine: Machine) -> list[str]:

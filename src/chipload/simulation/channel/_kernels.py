@@ -21,6 +21,47 @@ _STEPS = 14
 
 
 @njit(cache=True, nogil=True)
+def groups_of(tips: Any, axes: Any, size: int, out: Any) -> None:
+    """Moves in groups of ``size``: rows (g, 8) of ``out``, a ball round their tips, centre and radius, the mean axis,
+    and the greatest length of the difference of an axis from it. Move k goes from k - 1 to k.
+    """
+    n = len(tips)
+    for g in range(len(out)):
+        first, last = 1 + g * size, min(1 + (g + 1) * size, n)
+        for j in range(8):
+            out[g, j] = 0.0
+        count = last - first + 1
+        for k in range(first - 1, last):
+            for j in range(3):
+                out[g, j] += tips[k, j] / count
+                out[g, 4 + j] += axes[k, j] / count
+        norm = math.sqrt(out[g, 4] ** 2 + out[g, 5] ** 2 + out[g, 6] ** 2)
+        for j in range(3):
+            # axes that cancel have no mean: any direction will do, for their difference from it is measured
+            out[g, 4 + j] = out[g, 4 + j] / norm if norm > 1e-9 else axes[first, j]
+        for k in range(first - 1, last):
+            ball = spread = 0.0
+            for j in range(3):
+                ball += (tips[k, j] - out[g, j]) ** 2
+                spread += (axes[k, j] - out[g, 4 + j]) ** 2
+            out[g, 3] = max(out[g, 3], math.sqrt(ball))
+            out[g, 7] = max(out[g, 7], math.sqrt(spread))
+
+
+@njit(cache=True, nogil=True)
+def out_of_reach(group: Any, middle: Any, half: float, widest: float, lowest_start: float) -> bool:
+    """Whether no move of a group can meet the ray of half the length ``half`` round its ``middle``."""
+    x, y, z = middle[0] - group[0], middle[1] - group[1], middle[2] - group[2]
+    far = math.sqrt(x * x + y * y + z * z)
+    h = x * group[4] + y * group[5] + z * group[6]
+    slack = group[3] + far * group[7] + half
+    if h < lowest_start - slack:
+        return True
+    away = math.sqrt(max(far * far - h * h, 0.0))
+    return away > widest + slack
+
+
+@njit(cache=True, nogil=True)
 def lower(
     t: float, tips: Any, axes: Any, k: int, start: float, shape: Any, S: Any, frame: Any, depth: float, height: float,
     tip: Any, axis: Any,
@@ -105,7 +146,8 @@ def least_near(
 
 @njit(cache=True, nogil=True)
 def left(
-    points: Any, frames: Any, tips: Any, axes: Any, starts: Any, shapes: Any, cutting: Any, depth: float,
+    points: Any, frames: Any, tips: Any, axes: Any, groups: Any, size: int, starts: Any, shapes: Any, cutting: Any,
+    depth: float,
     height: float, step: float, tol: float, first: int, last: int, rest: Any, rest_row: Any, gouge: Any,
     gouge_row: Any, gouge_part: Any,
 ) -> None:  # fmt: skip
@@ -115,10 +157,19 @@ def left(
     tip, axis = np.empty(3), np.empty(3)
     n, parts = len(tips), len(shapes)
     half = 0.5 * (height + depth)
+    widest, least = 0.0, height
+    for part in range(parts):
+        widest, least = max(widest, shapes[part, 9]), min(least, starts[part])
     for i in range(first, last):
         S, frame = points[i], frames[i]
         middle = S + 0.5 * (height - depth) * frame[2]
-        for k in range(1, n):
+        k = 0
+        while k + 1 < n:
+            k += 1
+            # the moves of a group are left out together
+            if (k - 1) % size == 0 and out_of_reach(groups[(k - 1) // size], middle, half, widest, least):
+                k += size - 1
+                continue
             sweep, h, d2 = seen_from(middle, tips, axes, k, half)
             slack = sweep + half
             if h < -slack:
@@ -147,7 +198,8 @@ def left(
 
 @njit(cache=True, nogil=True)
 def lowest(
-    points: Any, frames: Any, tips: Any, axes: Any, starts: Any, shapes: Any, kinds: Any, depth: float, height: float,
+    points: Any, frames: Any, tips: Any, axes: Any, groups: Any, size: int, starts: Any, shapes: Any, kinds: Any,
+    depth: float, height: float,
     step: float, tol: float, low: Any, rows: Any, part_of: Any,
 ) -> None:  # fmt: skip
     """The least s of the ray of each point in the parts of each of the ``kinds`` 0..2, into ``low`` (n, 3), which holds
@@ -156,10 +208,19 @@ def lowest(
     tip, axis = np.empty(3), np.empty(3)
     n, parts = len(tips), len(shapes)
     half = 0.5 * (height + depth)
+    widest, least = 0.0, height
+    for part in range(parts):
+        widest, least = max(widest, shapes[part, 9]), min(least, starts[part])
     for i in range(len(points)):
         S, frame = points[i], frames[i]
         middle = S + 0.5 * (height - depth) * frame[2]
-        for k in range(1, n):
+        k = 0
+        while k + 1 < n:
+            k += 1
+            # the moves of a group are left out together
+            if (k - 1) % size == 0 and out_of_reach(groups[(k - 1) // size], middle, half, widest, least):
+                k += size - 1
+                continue
             sweep, h, d2 = seen_from(middle, tips, axes, k, half)
             slack = sweep + half
             for part in range(parts):

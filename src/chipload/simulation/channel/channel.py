@@ -38,6 +38,8 @@ PARTS = ("cutting part", "neck", "shank", "holder")
 ENDLESS = 500.0
 #: longest piece of a row [mm] that is looked at as one
 PIECE = 4.0
+#: moves that are left out together where none of them can meet a ray
+GROUP = 12
 _BLOCK = 512
 
 
@@ -195,6 +197,7 @@ def left_on(
         raise InputError("channel: height, depth, step and tol: must be above 0")
     starts, shapes, kinds = tool_parts(cutter)
     tips, axes, of = parted_moves(program)
+    groups = move_groups(tips, axes)
     cutting = (program.motion == LINE)[of]
     out = []
     total, done = sum(len(w.points) for w in walls), 0
@@ -209,7 +212,7 @@ def left_on(
             gouge: Floats = gouge, row: Ints = row, part: Ints = part,
         ) -> None:  # fmt: skip
             _kernels.left(
-                w.points, frames, tips, axes, starts, shapes, cutting, depth, height, step, tol, first,
+                w.points, frames, tips, axes, groups, GROUP, starts, shapes, cutting, depth, height, step, tol, first,
                 min(first + _BLOCK, len(w.points)), rest, rest_row, gouge, row, part,
             )  # fmt: skip
 
@@ -233,6 +236,13 @@ def parted_moves(program: Program) -> tuple[Floats, Floats, Ints]:
     axes = program.axis[before] * (1.0 - share) + program.axis[of] * share
     axes /= np.linalg.norm(axes, axis=1)[:, None]
     return np.ascontiguousarray(tips), np.ascontiguousarray(axes), of
+
+
+def move_groups(tips: Floats, axes: Floats) -> Floats:
+    """(g, 8) float: bounds of every :data:`GROUP` moves, as :func:`_kernels.groups_of`."""
+    out = np.empty((max(0, math.ceil((len(tips) - 1) / GROUP)), 8))
+    _kernels.groups_of(tips, axes, GROUP, out)
+    return out
 
 
 def frames_of(normals: Floats) -> Floats:

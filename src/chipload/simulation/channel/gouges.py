@@ -29,7 +29,15 @@ from chipload.errors import InputError
 from chipload.program.motions import is_arc
 from chipload.program.program import Program
 from chipload.simulation.channel import _kernels
-from chipload.simulation.channel.channel import PARTS, SurfacePoints, frames_of, parted_moves, tool_parts
+from chipload.simulation.channel.channel import (
+    GROUP,
+    PARTS,
+    SurfacePoints,
+    frames_of,
+    move_groups,
+    parted_moves,
+    tool_parts,
+)
 
 Floats = NDArray[np.float64]
 
@@ -125,6 +133,7 @@ def deepest_gouge(
     if not (depth > 0.0 and resolution > 0.0 and limit > 0.0):
         raise InputError("channel: depth, resolution and limit: must be above 0")
     tips, axes, of = parted_moves(program)
+    groups = move_groups(tips, axes)
     cells = _first(walls)
     best = Gouge(0.0, 0.0, "", (0.0, 0.0, 0.0), -1, 0)
     settled, looked = 0.0, 0
@@ -149,7 +158,7 @@ def deepest_gouge(
             last = min(first + _BLOCK, len(points))
             frames = frames_of(normals[first:last])
             _kernels.lowest(
-                points[first:last], frames, tips, axes, starts, shapes, kinds, depth, height, step, tol,
+                points[first:last], frames, tips, axes, groups, GROUP, starts, shapes, kinds, depth, height, step, tol,
                 low[first:last], row[first:last], part[first:last],
             )  # fmt: skip
 

@@ -1,0 +1,201 @@
+"""Every way with its programs: divided, planned, timed, divided again by what the programs take, and checked.
+
+Notation: a way is one set of cutters, as in ``planning/impeller/compare.py``. Contact points predict the time of a
+patch from the step-over alone. What its program takes on the machine, with links and rest passes, over what they
+predict is a factor of its surface, order of strips, cutter and table angle; divided again with these factors, the way
+is chosen by the time that programs take. Of all rounds the quickest is kept.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from chipload.jobs.impeller.outcome import Checked, CheckedWay, Covered
+from chipload.jobs.impeller.paths import checked_programs
+from chipload.jobs.impeller.tables import PathsTable
+from chipload.machine.machine import Machine
+from chipload.planning.impeller.assignment import Changes
+from chipload.planning.impeller.compare import Partition, Way
+from chipload.planning.impeller.costs import Costs, Measured
+from chipload.planning.impeller.patch import Patch
+from chipload.planning.impeller.settings import (
+    CutterSetting,
+    FinishSettings,
+    Milling,
+    MillingKey,
+    PlannedSettings,
+    change_time,
+    planned,
+    setting_order,
+)
+from chipload.program.read import times_on
+from chipload.progress import Progress
+
+#: how often ways are divided at most
+_ROUNDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class _Planned:
+    """A way that is planned: its division, what it was chosen by [s], its settings, their time of all channels [s]."""
+
+    partition: Partition
+    predicted: float
+    plan: PlannedSettings
+    seconds: float
+
+
+@dataclass(eq=False)
+class _Memory:
+    """What ways share: planned millings, row times and checks of the same programs."""
+
+    millings: dict[MillingKey, Milling] = field(default_factory=dict)
+    checks: dict[str, tuple[tuple[Checked, ...], tuple[Covered, ...]]] = field(default_factory=dict)
+
+
+def checked_ways(
+    ways: Sequence[Way],
+    first: Sequence[Partition],
+    job: FinishSettings,
+    machine: Machine,
+    paths: PathsTable,
+    progress: Progress,
+) -> tuple[CheckedWay, ...]:
+    """Each way that mills all, with the programs of its best round.
+
+    Parameters
+    ----------
+    first : the ways divided by what their contact points predict
+    job : what programs are planned with; the catalogue is that of each way
+    """
+    memory = _Memory()
+    best: dict[str, _Planned] = {}
+    rows: dict[int, list[tuple[int, Measured]]] = {}
+    partitions: Sequence[Partition] = first
+    for turn in range(_ROUNDS):
+        moved = False
+        for k, (way, partition) in enumerate(zip(ways, partitions, strict=True)):
+            if partition.divided is None or (turn and _same(partition, best[way.name].partition)):
+                continue
+            moved = True
+            done = (turn + k / len(ways)) / _ROUNDS
+            plan = _planned(way, partition, job, machine, memory, lambda x, what, done=done: progress(0.8 * done, what))
+            for number, row in _measured(way.costs, plan, machine):
+                rows.setdefault(id(way.costs), []).append((number, row))
+            if way.name not in best or plan.seconds < best[way.name].seconds:
+                best[way.name] = plan
+        if not moved:
+            break
+        for way in ways:
+            for number, costs in enumerate(way.costs):
+                costs.measured([row for n, row in rows.get(id(way.costs), []) if n == number])
+        if turn + 1 < _ROUNDS:
+            partitions = [way.partition(job.workers) for way in ways]
+            for way, partition in zip(ways, partitions, strict=True):
+                # what was planned is now known by its programs
+                kept = best.get(way.name)
+                if kept is not None and _same(partition, kept.partition):
+                    best[way.name] = _Planned(partition, _predicted(way, partition), kept.plan, kept.seconds)
+    out = []
+    for k, way in enumerate(ways):
+        if way.name in best:
+            out.append(_checked(way, best[way.name], job, machine, paths, memory))
+        progress(0.8 + 0.2 * (k + 1) / len(ways), f"check of the programs of {way.name}")
+    return tuple(out)
+
+
+def _changes(way: Way) -> Changes:
+    terms = way.costs[0].terms
+    return Changes(terms.cutter_change, terms.table_change)
+
+
+def _predicted(way: Way, partition: Partition) -> float:
+    """Time of all channels by the costs as they stand, with one program for each cutter at each table angle [s]."""
+    assert partition.divided is not None
+    pairs = list(dict.fromkeys((p.cutter, p.table) for p in partition.divided.patches))
+    return partition.divided.milling + change_time(setting_order(pairs, _changes(way)), _changes(way))
+
+
+def _planned(
+    way: Way, partition: Partition, job: FinishSettings, machine: Machine, memory: _Memory, progress: Progress
+) -> _Planned:
+    assert partition.divided is not None
+    own = job.with_catalogue(partition.catalogue)
+    plan = planned(own, partition.divided.patches, _changes(way), progress=progress, known=memory.millings)
+    each = [float(times_on(s.program, machine).sum()) for s in plan.settings]
+    seconds = way.costs[0].terms.repeats * sum(each) + _change_time(plan.settings, way)
+    return _Planned(partition, _predicted(way, partition), plan, seconds)
+
+
+def _change_time(settings: Sequence[CutterSetting], way: Way) -> float:
+    cutters = list(dict.fromkeys(s.cutter for s in settings))
+    return change_time([(cutters.index(s.cutter), s.table) for s in settings], _changes(way))
+
+
+def _same(a: Partition, b: Partition) -> bool:
+    """Whether two divisions have the same patches."""
+
+    def key(p: Patch) -> tuple[object, ...]:
+        return (p.body, p.side, p.order, p.low, p.high, p.part, p.cutter, p.table)
+
+    if a.divided is None or b.divided is None:
+        return a.divided is b.divided
+    return [key(p) for p in a.divided.patches] == [key(p) for p in b.divided.patches]
+
+
+def _measured(costs: Sequence[Costs], done: _Planned, machine: Machine) -> list[tuple[int, Measured]]:
+    """For each patch the number of its side, and what its program takes; rest passes count to the patch they mend."""
+    taken: dict[int, float] = {}
+    millings = [m for s in done.plan.settings for m in s.millings]
+    for s in done.plan.settings:
+        seconds = times_on(s.program, machine)
+        owners = [m for m in s.millings for _ in m.tracks.tracks]
+        owners += [_mended(r.body, r.side, r.box, millings) for r in s.rests for _ in r.tracks]
+        for number, time in zip(s.linked.track.tolist(), seconds.tolist(), strict=True):
+            if number >= 0:
+                owner = id(owners[number].patch)
+                taken[owner] = taken.get(owner, 0.0) + time
+    out = []
+    for m in millings:
+        number = next(k for k, c in enumerate(costs) if (c.side.body, c.side.side) == (m.patch.body, m.patch.side))
+        own = costs[number]
+        table = int(np.abs(own.tables - m.patch.table).argmin())
+        bare = m.patch.path / float(own.terms.feeds(len(own.catalogue.cutters))[m.patch.cutter])
+        row = Measured("uv".index(m.patch.order), m.patch.cutter, table, bare, taken.get(id(m.patch), 0.0))
+        out.append((number, row))
+    return out
+
+
+def _mended(
+    body: int, side: str, box: tuple[tuple[float, float], tuple[float, float]], millings: Sequence[Milling]
+) -> Milling:
+    """The patch of a surface in which the middle of a box lies, or is nearest to."""
+    at = np.array([0.5 * (low + high) for low, high in box])
+
+    def away(m: Milling) -> float:
+        low, high = np.array(m.box).T
+        return float(np.linalg.norm(np.maximum(np.maximum(low - at, at - high), 0.0)))
+
+    return min((m for m in millings if (m.patch.body, m.patch.side) == (body, side)), key=away)
+
+
+def _checked(
+    way: Way, done: _Planned, job: FinishSettings, machine: Machine, paths: PathsTable, memory: _Memory
+) -> CheckedWay:
+    own = job.with_catalogue(done.partition.catalogue)
+    text = hashlib.sha256()
+    for s in done.plan.settings:
+        for column in (s.program.motion, s.program.p_work, s.program.axis, s.program.feed):
+            text.update(np.ascontiguousarray(column).tobytes())
+        text.update(repr(s.cutter).encode())
+    key = text.hexdigest()
+    if key not in memory.checks:
+        memory.checks[key] = checked_programs(own, machine, done.plan, paths, lambda _done, _what: None)
+    programs, covered = memory.checks[key]
+    repeats = way.costs[0].terms.repeats
+    changes = _change_time([p.setting for p in programs], way)
+    return CheckedWay(done.partition, programs, covered, repeats, done.predicted, changes)
