@@ -157,6 +157,12 @@ def test_the_verdict_is_what_was_measured(result, what):
     ]
     assert len(defaults) == 3
     assert (track["verdict"] == "exceeds") == (not kept)
+    assert found["verdict"] == track["verdict"]
+    assert what["verdict"] == summary["verdict"]
+    rows = {x["name"]: x["verdict"] for x in summary["tracks"]}
+    for name in NAMES:
+        assert what["controllers"][name]["verdict"] == rows[name]
+        assert what["with_latency"]["controllers"][name]["verdict"] == rows[f"{name}, 50 ms"]
     both = (what["controllers"], what["with_latency"]["controllers"])
     assert all(x["fuzzy_feedforward"]["torque_nm_max"] < x["fuzzy"]["torque_nm_max"] for x in both)
 

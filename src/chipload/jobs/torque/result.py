@@ -5,6 +5,8 @@ The verdict stands on the fuzzy controller with the model of the cut and the lat
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from chipload.control.override import STATUS
@@ -23,11 +25,16 @@ def result_of(outcome: TorqueResult) -> Result:
     """The result: the controller in use with its latency first, then the others, then all without latency."""
     tracks = [_track(outcome, case, name) for case in reversed(outcome.cases) for name in case.runs]
     tracks.sort(key=lambda track: not track.in_use)
-    return Result(
+    numbers = operation_numbers(outcome)
+    verdicts = {track.name: track.verdict.value for track in tracks}
+    for case, part in zip(outcome.cases, (numbers, numbers.get("with_latency", {})), strict=False):
+        for name in case.runs:
+            part["controllers"][name]["verdict"] = verdicts[track_name(case, name)]
+    result = Result(
         capability="torque",
         title=outcome.title,
         tracks=tuple(tracks) or (_not_run(outcome),),
-        operations=(operation_numbers(outcome),),
+        operations=(numbers,),
         findings=_findings(outcome),
         unchecked=(
             *unchecked_checks(outcome.checks),
@@ -39,6 +46,7 @@ def result_of(outcome: TorqueResult) -> Result:
         provenance=outcome.provenance,
         note=_note(outcome),
     )
+    return replace(result, operations=({**numbers, "verdict": result.verdict.value},))
 
 
 def track_name(case: Case, controller: str) -> str:
