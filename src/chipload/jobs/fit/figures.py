@@ -106,10 +106,10 @@ def _errors(done: FitResult) -> str:
                 feed,
                 c.use,
                 CHANNELS[k],
-                f"{c.mean[k]:.4g}",
+                f"{c.forces.mean[k]:.4g}",
                 f"{_text_of(c.predicted.mean[k])} &plusmn; {_text_of(c.predicted.half[0, k], '?')}",
                 _text_of(c.mean_percent[k]),
-                f"{c.low[k]:.4g} to {c.high[k]:.4g}",
+                f"{c.forces.low[k]:.4g} to {c.forces.high[k]:.4g}",
                 f"{_text_of(c.predicted.low[k])} to {_text_of(c.predicted.high[k])}",
                 _text_of(c.peak_percent[k]),
             ]
@@ -146,7 +146,7 @@ def _means(done: FitResult) -> go.Figure:
             mine = [c for c in done.comparisons if c.use == use and c.cut.measured[k]]
             out.add_trace(
                 go.Scatter(
-                    x=[c.cut.feed_per_tooth(flutes) for c in mine], y=[c.mean[k] for c in mine], mode="markers",
+                    x=[c.cut.feed_per_tooth(flutes) for c in mine], y=[c.forces.mean[k] for c in mine], mode="markers",
                     name=f"{CHANNELS[k]}, measured, {use}", showlegend=bool(mine),
                     marker={"color": colour, "size": 10, "symbol": symbol, "line": {"width": 2}},
                 )

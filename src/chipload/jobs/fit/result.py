@@ -119,11 +119,11 @@ def numbers(done: FitResult) -> dict[str, Any]:
 def _measurement(c: Comparison) -> dict[str, Any]:
     model = c.predicted
     rows = {
-        "mean": (c.mean, model.mean, model.half[0]),
-        "high": (c.high, model.high, model.half[1]),
-        "low": (c.low, model.low, model.half[2]),
-        "band_high": (c.band_high, model.band_high, model.half[3]),
-        "band_low": (c.band_low, model.band_low, model.half[4]),
+        "mean": (c.forces.mean, model.mean, model.half[0]),
+        "high": (c.forces.high, model.high, model.half[1]),
+        "low": (c.forces.low, model.low, model.half[2]),
+        "band_high": (c.forces.band_high, model.band_high, model.half[3]),
+        "band_low": (c.forces.band_low, model.band_low, model.half[4]),
     }
     return {
         "file": c.cut.name,
@@ -136,7 +136,7 @@ def _measurement(c: Comparison) -> dict[str, Any]:
             f"{key}_n": {"measured": _named(seen), "model": _named(says), "half_95": _named(half)}
             for key, (seen, says, half) in rows.items()
         },
-        "plane_max_n": {"measured": _number(c.plane), "model": _number(model.resultant)},
+        "plane_max_n": {"measured": _number(c.forces.plane), "model": _number(model.resultant)},
         "mean_error_percent": _named(c.mean_percent),
         "peak_error_percent": _named(c.peak_percent),
     }

@@ -15,7 +15,7 @@ from chipload.cutting.measured import read_forces
 from chipload.cutting.turns import MeasuredCut, turns_of
 from chipload.errors import Finding, InputError, Severity
 from chipload.jobs.fit.job import CHANNELS, FitJob
-from chipload.jobs.fit.outcome import Comparison, FitResult
+from chipload.jobs.fit.outcome import Comparison, FitResult, MeasuredForces
 from chipload.jobs.provenance import hashes, title_of, versions
 from chipload.progress import Progress, silent
 from chipload.result import Provenance
@@ -121,7 +121,8 @@ def _compared(fit: Fit, cut: MeasuredCut, use: str) -> Comparison:
     theta = np.linspace(0.0, math.tau, TURN, endpoint=False)
     band = turns.amplitude[0].real + 2.0 * (np.exp(1j * np.outer(theta, k)) @ turns.amplitude[1:]).real
     return Comparison(
-        cut, use, turns, said, mean, high, low, band.max(axis=0), band.min(axis=0), float(turns.plane.mean()),
+        cut, use, turns, said,
+        MeasuredForces(mean, high, low, band.max(axis=0), band.min(axis=0), float(turns.plane.mean())),
         aligned(fit, cut, turns), _percent(said.mean, mean),
         _percent(np.where(larger, said.high, said.low), np.where(larger, high, low)),
     )  # fmt: skip
