@@ -83,7 +83,7 @@ def checked_ways(
                 continue
             moved = True
             done = (turn + k / len(ways)) / _ROUNDS
-            plan = _planned(way, partition, job, machine, memory, lambda x, what, done=done: progress(0.8 * done, what))
+            plan = _planned(way, partition, job, machine, memory, _standing(progress, 0.8 * done))
             for number, row in _measured(way.costs, plan, machine):
                 rows.setdefault(id(way.costs), []).append((number, row))
             if way.name not in best or plan.seconds < best[way.name].seconds:
@@ -108,6 +108,11 @@ def checked_ways(
     return tuple(out)
 
 
+def _standing(progress: Progress, share: float) -> Progress:
+    """What tells of a part that the whole stands at ``share``."""
+    return lambda _, what: progress(share, what)
+
+
 def _changes(way: Way) -> Changes:
     terms = way.costs[0].terms
     return Changes(terms.cutter_change, terms.table_change)
@@ -115,17 +120,15 @@ def _changes(way: Way) -> Changes:
 
 def _predicted(way: Way, partition: Partition) -> float:
     """Time of all channels by the costs as they stand, with one program for each cutter at each table angle [s]."""
-    assert partition.divided is not None
-    pairs = list(dict.fromkeys((p.cutter, p.table) for p in partition.divided.patches))
-    return partition.divided.milling + change_time(setting_order(pairs, _changes(way)), _changes(way))
+    pairs = list(dict.fromkeys((p.cutter, p.table) for p in partition.division.patches))
+    return partition.division.milling + change_time(setting_order(pairs, _changes(way)), _changes(way))
 
 
 def _planned(
     way: Way, partition: Partition, job: FinishSettings, machine: Machine, memory: _Memory, progress: Progress
 ) -> _Planned:
-    assert partition.divided is not None
     own = job.with_catalogue(partition.catalogue)
-    plan = planned(own, partition.divided.patches, _changes(way), progress=progress, known=memory.millings)
+    plan = planned(own, partition.division.patches, _changes(way), progress=progress, known=memory.millings)
     each = [float(times_on(s.program, machine).sum()) for s in plan.settings]
     seconds = way.costs[0].terms.repeats * sum(each) + _change_time(plan.settings, way)
     return _Planned(partition, _predicted(way, partition), plan, seconds)

@@ -58,14 +58,13 @@ def tour(
             np.concatenate([axes.reshape(-1, 3), start[1][None]]),
         )
         first = _ways(*both, top, near, feed, rapid)[-1, :-1]
-    best: tuple[float, list[int]] | None = None
+    best: tuple[float, list[int]] = (math.inf, [])
     begins = np.argsort(first, kind="stable")
     for begin in begins[np.unique(np.linspace(0, len(begins) - 1, min(len(begins), _STARTS)).round().astype(int))]:
         order = _nearest(cost, int(begin), n)
         total, order = _turned(cost, first, order)
-        if best is None or total < best[0] - 1e-9:
+        if total < best[0] - 1e-9:
             best = total, order
-    assert best is not None
     return [(k // 2, k % 2 == 0) for k in best[1]]
 
 
