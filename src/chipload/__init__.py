@@ -9,22 +9,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from chipload.api import (
-        check_job,
-        fit_coefficients,
-        hold_torque,
-        load_result,
-        optimise_feeds,
-        plan_contour,
-        plan_impeller,
-        plan_pocket,
-        plan_thin_wall,
-        read_machine,
-        read_material,
-        read_program,
-        run_job,
-        write_result,
-    )
+    from chipload.api.jobs import check_job, load_result, run_job, write_result
+    from chipload.api.loads import fit_coefficients, hold_torque, optimise_feeds
+    from chipload.api.planning import plan_contour, plan_impeller, plan_pocket, plan_thin_wall
+    from chipload.api.reading import read_machine, read_material, read_program
     from chipload.cutter.table import CutterTable as Cutter
     from chipload.cutting.material import Material
     from chipload.errors import Finding, InputError
@@ -74,7 +62,7 @@ __all__ = [
     "write_result",
 ]
 
-#: module and name of what is not in ``chipload.api``
+#: module and name of each that is not a function of ``chipload.api``
 _PLACES = {
     "COLUMNS": ("chipload.result.columns", "COLUMNS"),
     "Contour": ("chipload.geometry.contour", "Contour"),
@@ -93,6 +81,18 @@ _PLACES = {
     "simulate": ("chipload.jobs.program.api", "simulate"),
 }
 
+#: module of ``chipload.api`` of each function
+_FUNCTIONS = {
+    name: module
+    for module, names in {
+        "jobs": "check_job load_result run_job write_result",
+        "loads": "fit_coefficients hold_torque optimise_feeds",
+        "planning": "plan_contour plan_impeller plan_pocket plan_thin_wall",
+        "reading": "read_machine read_material read_program",
+    }.items()
+    for name in names.split()
+}
+
 
 def __getattr__(name: str) -> Any:
     """Import what is asked for."""
@@ -104,7 +104,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'chipload' has no attribute {name!r}")
     from importlib import import_module
 
-    module, own = _PLACES.get(name, ("chipload.api", name))
+    module, own = _PLACES.get(name) or (f"chipload.api.{_FUNCTIONS[name]}", name)
     value = globals()[name] = getattr(import_module(module), own)
     return value
 

@@ -35,17 +35,17 @@ def test_proposed_filled_in_and_read_back(job: Path) -> None:
     assert all(r["deflection_um"] == r["normal_force_n"] == r["too_much"] == "" for r in rows)
     # corners are always among the places
     inputs = read_wall(load_job(job).job)
-    corners = {(u, v) for u in (0.0, 1.0) for v in (inputs.foot, 1.0)}
+    corners = {(u, v) for u in (0.0, 1.0) for v in (inputs.body.foot, 1.0)}
     at = np.array([(float(r["u"]), float(r["v"])) for r in rows])
     assert all(np.abs(at - c).sum(axis=1).min() < 1e-6 for c in corners)
     thresholds = inputs.finished_threshold()
-    u, v = np.meshgrid(*inputs.places, indexing="ij")
+    u, v = np.meshgrid(*inputs.body.places, indexing="ij")
     places = np.column_stack([u.ravel(), v.ravel()])
 
     def bears(r):
         near = np.abs(places - (float(r["u"]), float(r["v"]))).sum(axis=1)
         assert near.min() < 1e-6
-        return float(thresholds.force.ravel()[near.argmin()]) / inputs.factor
+        return float(thresholds.force.ravel()[near.argmin()]) / inputs.depths.factor
 
     for r in rows:
         force = 1.1 * float(r["expected_normal_force_n"])

@@ -72,7 +72,7 @@ def made(feeds, cutter, *, noise=4.0, seed=1, turns=20, per_turn=64, arc=(0.0, m
 
 
 def inside(fit):
-    return (fit.interval[:, 0] <= X) & (fit.interval[:, 1] >= X)
+    return (fit.coefficients.interval[:, 0] <= X) & (fit.coefficients.interval[:, 1] >= X)
 
 
 # -- average ----------------------------------------------------------------------------------------------------
@@ -84,8 +84,8 @@ def test_average_against_the_textbook(arc):
         force = np.tile(textbook(X, arc, 4, 2.5, c), (640, 1))
         cuts.append(MeasuredCut("c", 6400.0, force, c * 4 * SPEED / math.tau, SPEED, arc, 2.5))
     fit = fit_average(cuts, MILL)
-    assert np.allclose(fit.values, X, rtol=1e-9)
-    assert np.allclose(fit.r2, 1.0)
+    assert np.allclose(fit.coefficients.values, X, rtol=1e-9)
+    assert np.allclose(fit.channels.r2, 1.0)
     assert fit.identified.all()
 
 
@@ -104,16 +104,16 @@ def test_slot_formula_of_the_textbook():
 def test_average_with_noise_and_two_feeds():
     fit = fit_average(made((0.03, 0.12), MILL), MILL)
     assert inside(fit).sum() >= 5
-    assert np.allclose(fit.values, X, rtol=0.15, atol=2.0)
+    assert np.allclose(fit.coefficients.values, X, rtol=0.15, atol=2.0)
     assert any("two feeds" in note for note in fit.notes)
-    assert fit.freedom == 19
+    assert fit.search.freedom == 19
 
 
 def test_average_of_one_feed_does_not_separate():
     fit = fit_average(made((0.05,), MILL), MILL)
     assert not fit.identified.any()
-    assert np.isnan(fit.values).all()
-    assert np.isnan(fit.covariance).all()
+    assert np.isnan(fit.coefficients.values).all()
+    assert np.isnan(fit.coefficients.covariance).all()
     assert "not identified by these measurements: Ktc, Krc, Kac, Kte, Kre, Kae" in fit.notes[-1]
 
 
@@ -121,8 +121,8 @@ def test_axis_not_measured():
     cuts = [replace(c, force=np.where([True, True, False], c.force, np.nan)) for c in made((0.03, 0.1), MILL)]
     for fit in (fit_average(cuts, MILL), fit_instantaneous(cuts, MILL, band=12 * SPEED)):
         assert fit.identified.tolist() == [True, True, False, True, True, False]
-        assert np.isnan(fit.values[[2, 5]]).all()
-        assert np.isfinite(fit.covariance[np.ix_([0, 1, 3, 4], [0, 1, 3, 4])]).all()
+        assert np.isnan(fit.coefficients.values[[2, 5]]).all()
+        assert np.isfinite(fit.coefficients.covariance[np.ix_([0, 1, 3, 4], [0, 1, 3, 4])]).all()
         assert "not identified by these measurements: Kac, Kae" in fit.notes
         said = predict(fit, cuts[0])
         assert np.isfinite(said.mean[:2]).all()
@@ -135,9 +135,9 @@ def test_instantaneous_recovers_coefficients_phase_speed_and_runout(teeth):
     mill = replace(MILL, flutes=teeth, runout=(0.011, 0.7) if teeth > 2 else (0.011, 0.0))
     cuts = made((0.03, 0.1), mill, speed=1.0013, turns=30)
     fit = fit_instantaneous(cuts, replace(mill, runout=(0.0, 0.0)), band=12 * SPEED)
-    assert fit.converged
+    assert fit.search.converged
     assert inside(fit).sum() >= 5
-    assert np.allclose(fit.values[:2], X[:2], rtol=0.05)
+    assert np.allclose(fit.coefficients.values[:2], X[:2], rtol=0.05)
     assert np.allclose([t.speed for t in fit.turns], 1.0013 * SPEED, rtol=1e-4)
     if teeth == 2:
         assert math.isclose(fit.cutter.runout[0], 0.011, rel_tol=0.03)
@@ -150,7 +150,7 @@ def test_instantaneous_recovers_coefficients_phase_speed_and_runout(teeth):
         assert abs(off) < 0.05
     # the scatter about the model is the noise
     assert np.all(np.array([t.scatter for t in fit.turns]) < 5.0)
-    assert np.all(fit.r2 > 0.99)
+    assert np.all(fit.channels.r2 > 0.99)
 
 
 def test_one_feed_and_an_arc():
@@ -167,10 +167,10 @@ def test_zero_of_the_amplifier():
     cuts = made((0.03, 0.12), mill, off=25.0, noise=2.0, turns=40)
     plain = fit_instantaneous(cuts, mill, band=12 * SPEED, runout=False)
     sought = fit_instantaneous(cuts, mill, band=12 * SPEED, runout=False, zero=True)
-    assert abs(plain.values[4] - X[4]) > 3.0
-    assert abs(sought.values[4] - X[4]) < 1.0
+    assert abs(plain.coefficients.values[4] - X[4]) > 3.0
+    assert abs(sought.coefficients.values[4] - X[4]) < 1.0
     assert inside(sought).sum() >= 5
-    assert np.allclose(sought.zero, 25.0, atol=3.0)
+    assert np.allclose(sought.channels.zero, 25.0, atol=3.0)
 
 
 def test_four_teeth_in_a_slot_with_a_free_zero():
@@ -190,9 +190,9 @@ def test_ringing_dynamometer():
         shown = np.fft.irfft(spectrum, axis=0) + np.random.default_rng(3).normal(0.0, 3.0, (1280, 3))
         cuts.append(replace(cut, force=shown))
     fit = fit_instantaneous(cuts, mill, band=5 * SPEED, ringing=(8.4 * SPEED, None, None))
-    assert math.isclose(fit.resonance[0, 0], 9.0 * SPEED, rel_tol=0.01)
-    assert math.isclose(fit.resonance[0, 1], 0.06, rel_tol=0.2)
-    assert np.isnan(fit.resonance[1:]).all()
+    assert math.isclose(fit.channels.resonance[0, 0], 9.0 * SPEED, rel_tol=0.01)
+    assert math.isclose(fit.channels.resonance[0, 1], 0.06, rel_tol=0.2)
+    assert np.isnan(fit.channels.resonance[1:]).all()
     assert inside(fit).sum() >= 5
     said = predict(fit, cuts[1])
     turns = turns_of(cuts[1], 8)

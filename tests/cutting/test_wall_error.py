@@ -175,6 +175,6 @@ def test_refuses_what_is_no_straight_flank():
             ToothEngagement(flat.start, flat.rows, flat.tooth, flat.slice, edge), MILL, AL, [1.0], milling="down"
         )
     assert str(err.value) == (
-        "bites: row 0: rho = 4 mm, sin(kappa) = 0.6: the wall's error is known for a straight flank only, rho = 5 mm "
-        "and sin(kappa) = 1"
+        "tooth engagement: row 0: rho = 4 mm, sin(kappa) = 0.6: the wall's error is known for a straight flank only, "
+        "rho = 5 mm and sin(kappa) = 1"
     )

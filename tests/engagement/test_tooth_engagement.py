@@ -116,23 +116,23 @@ def test_the_thickest_chip(low, width, along, across, offset):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"rows": np.zeros((1, 6))}, "bites: rows of shape (1, 6): need (b, 7) finite numbers"),
-        ({"slices": np.zeros((1, 6))}, "bites: slices of shape (1, 6): need (k, 7) finite numbers"),
-        ({"start": [0, 2]}, "bites: 1 rows, 1 teeth, start up to 2: must agree"),
-        ({"slice": [1]}, "bites: slice of shape (1,): need (1,) from 0 to 0"),
+        ({"rows": np.zeros((1, 6))}, "tooth engagement: rows of shape (1, 6): need (b, 7) finite numbers"),
+        ({"slices": np.zeros((1, 6))}, "tooth engagement: slices of shape (1, 6): need (k, 7) finite numbers"),
+        ({"start": [0, 2]}, "tooth engagement: 1 rows, 1 teeth, start up to 2: must agree"),
+        ({"slice": [1]}, "tooth engagement: slice of shape (1,): need (1,) from 0 to 0"),
         (
             {"rows": [[6.5, 7.0, 0.0, 1.0, 0.1, 0.0, 0.0]]},
-            "bites: row 0: 6.5 to 7 rad: must begin within 0 to 2 pi and rise by at most 2 pi",
+            "tooth engagement: row 0: 6.5 to 7 rad: must begin within 0 to 2 pi and rise by at most 2 pi",
         ),
         (
             {"rows": [[1.0, 8.0, 0.0, 1.0, 0.1, 0.0, 0.0]]},
-            "bites: row 0: 1 to 8 rad: must begin within 0 to 2 pi and rise by at most 2 pi",
+            "tooth engagement: row 0: 1 to 8 rad: must begin within 0 to 2 pi and rise by at most 2 pi",
         ),
-        ({"rows": [[1.0, 2.0, 2.0, 1.0, 0.1, 0.0, 0.0]]}, "bites: row 0: s from 2 to 1 mm: must rise"),
-        ({"frame": np.eye(3)}, "bites: frame of shape (3, 3): need (1, 3, 3) finite numbers"),
+        ({"rows": [[1.0, 2.0, 2.0, 1.0, 0.1, 0.0, 0.0]]}, "tooth engagement: row 0: s from 2 to 1 mm: must rise"),
+        ({"frame": np.eye(3)}, "tooth engagement: frame of shape (3, 3): need (1, 3, 3) finite numbers"),
         (
             {"slices": [[0.0, 5.0, 0.0, 1.0, 0.0, -0.1, 0.1]]},
-            "bites: slice 0: rho = 5, lag = -0.1, rate = 0.1: must be at least 0",
+            "tooth engagement: slice 0: rho = 5, lag = -0.1, rate = 0.1: must be at least 0",
         ),
     ],
 )

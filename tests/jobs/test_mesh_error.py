@@ -67,19 +67,19 @@ def test_the_error_covers_what_much_finer_elements_find(tmp_path, name, elements
     """Three layers of elements of a quarter of the size; the error is no more than 0.05 greater than what they find."""
     places = wall_of(tmp_path, name, elements)
     inputs = places.inputs
-    used = places.compliance([np.zeros(places.shape) for _ in inputs.side_numbers], 0)
-    u, v = inputs.places
-    i, j, _ = inputs.wall.solid.grid.counts
-    up = np.concatenate([np.linspace(0.0, inputs.foot, inputs.wall.foot + 1)[:-1], v])
+    used = places.compliance([np.zeros(places.shape) for _ in inputs.body.side_numbers], 0)
+    u, v = inputs.body.places
+    i, j, _ = inputs.body.wall.solid.grid.counts
+    up = np.concatenate([np.linspace(0.0, inputs.body.foot, inputs.body.wall.foot + 1)[:-1], v])
     rows = np.interp(np.linspace(0.0, j, 4 * j + 1), np.arange(j + 1), up)
     solid = finished_wall(
-        inputs.shape,
-        inputs.allowance,
+        inputs.body.shape,
+        inputs.body.allowance,
         np.linspace(0.0, 1.0, 4 * i + 1),
         rows,
-        4 * inputs.wall.foot,
+        4 * inputs.body.wall.foot,
         3,
-        inputs.wall.solid,
+        inputs.body.wall.solid,
     )
     upper = np.arange(len(v))[len(v) // 2 :]
     a, b = np.meshgrid(u * 4 * i, np.maximum(np.interp(v[upper], rows, np.arange(len(rows))), ABOVE), indexing="ij")

@@ -201,15 +201,15 @@ def test_a_cutter_that_would_break_exceeds(done):
 
 def test_one_clock(finished, folder, done):
     """Time of a variant, end of its history, and its written program with the length of the cutter."""
-    tools = {1: done.cutter}
+    tools = {1: done.planning.cutter}
     for track in finished.result.tracks:
         columns = track.columns
         assert track.time_s == pytest.approx(columns["t_s"][-1], rel=1e-3)
         assert track.time_s == pytest.approx(columns["duration_s"].sum(), rel=1e-3)
         table = folder.parent / "tools.tbl"
         table.write_text(f"T1 P1 D{tools[1].diameter:g} Z{tools[1].overhang:g}\n")
-        read = read_program(folder / track.programs[0], done.machine, tools=read_tools(table))
-        assert times_of(read, done.machine).sum() == pytest.approx(track.time_s, rel=1e-3)
+        read = read_program(folder / track.programs[0], done.planning.machine, tools=read_tools(table))
+        assert times_of(read, done.planning.machine).sum() == pytest.approx(track.time_s, rel=1e-3)
 
 
 def test_files(folder, done):

@@ -57,8 +57,8 @@ def test_one_side_is_cut_and_all_of_its_stock_taken(done):
     fillet, scallop = 2.0 / 3.0 * 0.2 * np.sqrt(2.0 * 4.0 * 0.2), 0.04
     expected = 8.0 * (5.0 * (0.2 - scallop / 3.0) + fillet)
     for one in done.variants.values():
-        assert {m.side for m in one.maps} == {0}
+        assert {m.side for m in one.plan.maps} == {0}
         assert [f.side for f in one.finish] == [0]
         assert one.columns["chip_volume_mm3"].sum() == pytest.approx(expected, rel=0.04)
-        assert one.passes_otherwise is None
+        assert one.plan.passes_otherwise is None
     assert done.variants["variable"].columns["force_over_allowable"].max() <= 1.01

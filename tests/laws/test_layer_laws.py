@@ -60,20 +60,23 @@ def at(history: History, x: float) -> dict[str, float]:
     return {name: float(c[name][k]) for name in (*COLUMNS, "x_mm", "z_mm")}
 
 
-def close(found: dict[str, float], exact: Sum, stated: Mapping[str, float]) -> None:
-    """Within 2 % of the mean torque, 3 % of the peaks; the chip, taken at the middle of slices, as stated."""
-    assert found["torque_mean_nm"] == pytest.approx(exact.torque_mean_nm, rel=0.02)
-    assert found["torque_nm"] == pytest.approx(exact.torque_nm, rel=0.03)
-    assert found["force_n"] == pytest.approx(exact.force_n, rel=0.03)
-    assert found["chip_max_mm"] == pytest.approx(exact.chip_max_mm, rel=0.03 + stated["chip_max_mm"])
+def off(found: dict[str, float], exact: Sum, stated: Mapping[str, float]) -> dict[str, float]:
+    """Relative errors above 2 % of the mean torque, 3 % of the peaks; of the chip, taken at the middle of slices, above
+    what is stated.
+    """
+    most = {"torque_mean_nm": 0.02, "torque_nm": 0.03, "force_n": 0.03, "chip_max_mm": 0.03 + stated["chip_max_mm"]}
+    errors = {name: abs(found[name] / getattr(exact, name) - 1.0) for name in most}
+    return {name: error for name, error in errors.items() if not error <= most[name]}
 
 
-def covered(history: History, exact: Sum, k: int) -> None:
-    """The true loads lie within the stated error of those of step k."""
-    stated = history.resolution_error
-    for name in COLUMNS:
-        value = float(history.columns[name][k])
-        assert abs(getattr(exact, name) - value) <= stated[name] * value + 2e-3 * value, (name, stated[name])
+def uncovered(history: History, exact: Sum, k: int) -> dict[str, float]:
+    """True loads that do not lie within the stated error of those of step k."""
+    stated, values = history.resolution_error, {name: float(history.columns[name][k]) for name in COLUMNS}
+    return {
+        name: getattr(exact, name)
+        for name, value in values.items()
+        if not abs(getattr(exact, name) - value) <= stated[name] * value + 2e-3 * value
+    }
 
 
 @pytest.mark.parametrize(
@@ -100,7 +103,7 @@ def test_a_straight_slot(cutter: Cutter, depth: float, step: float) -> None:
     points = [[begin, 0, -depth], [10.0, 0, -depth], [10.0 + length, 0, -depth]]
     history = run(path([points[0], points[1]]) if step >= 0.1 else path(points), cutter, step_mm=step)
     exact = edge_sum(cutter, (0, 0, -depth), (0, 0, 1), per_tooth(cutter, (1, 0, 0)), lambda p: p[..., 2] < 0.0, AL)
-    close(at(history, 9.0 if step < 3.0 else 7.0), exact, history.resolution_error)
+    assert off(at(history, 9.0 if step < 3.0 else 7.0), exact, history.resolution_error) == {}
 
 
 def test_points_of_a_program_however_near_cost_the_same() -> None:
@@ -109,7 +112,7 @@ def test_points_of_a_program_however_near_cost_the_same() -> None:
     for apart in (0.2, 0.1, 0.02):
         x = np.concatenate([[-10.0, 5.0], np.arange(5.0, 7.0, apart)[1:]])
         history = run(path([[v, 0.0, -1.0] for v in x]), BALL)
-        close(at(history, 6.5), exact, history.resolution_error)
+        assert off(at(history, 6.5), exact, history.resolution_error) == {}
 
 
 @pytest.mark.parametrize("cutter", [BALL, BULL, TAPER], ids=["ball", "bull", "taper"])
@@ -121,7 +124,7 @@ def test_a_ramp(cutter: Cutter, slope: float) -> None:
     found = at(history, 22.0)
     tip = (found["x_mm"] - 0.25, 0.0, begin + slope * (found["x_mm"] - 0.25 - 2.0))
     exact = edge_sum(cutter, tip, (0, 0, 1), per_tooth(cutter, (1, 0, slope)), lambda p: p[..., 2] < 0.0, AL)
-    close(found, exact, history.resolution_error)
+    assert off(found, exact, history.resolution_error) == {}
 
 
 @pytest.mark.parametrize("cutter", [BALL, BULL, FLAT], ids=["ball", "bull", "flat"])
@@ -131,7 +134,7 @@ def test_a_plunge(cutter: Cutter) -> None:
     k = int(np.argmax(c["z_mm"] <= -2.0))
     tip = (15.0, 0.0, float(c["z_mm"][k]) + 0.25)
     exact = edge_sum(cutter, tip, (0, 0, 1), per_tooth(cutter, (0, 0, -1)), lambda p: p[..., 2] < 0.0, AL)
-    close({name: float(c[name][k]) for name in COLUMNS}, exact, history.resolution_error)
+    assert off({name: float(c[name][k]) for name in COLUMNS}, exact, history.resolution_error) == {}
 
 
 @pytest.mark.parametrize("lean", [(0.3, 0.0), (0.0, 0.3), (-0.2, 0.2)])
@@ -145,10 +148,10 @@ def test_a_slot_with_a_leaning_axis(cutter: Cutter, lean: tuple[float, float]) -
     c = history.columns
     k = int(np.flatnonzero(c["x_mm"] >= 14.0)[0])
     exact = edge_sum(cutter, (0, 0, -1.5), axis, per_tooth(cutter, (1, 0, 0)), lambda p: p[..., 2] < 0.0, AL)
-    covered(history, exact, k)
+    assert uncovered(history, exact, k) == {}
     found = {name: float(c[name][k]) for name in COLUMNS}
     if cutter is BALL:
-        close(found, exact, history.resolution_error)
+        assert off(found, exact, history.resolution_error) == {}
 
 
 def test_an_arc_removes_what_pappus_says() -> None:
@@ -187,10 +190,10 @@ def test_a_finishing_raster(depth: float, over: float, layer: float | None) -> N
     tip, way = (0.0, 0.0, -depth), per_tooth(BALL, (1, 0, 0))
     exact = edge_sum(BALL, tip, (0, 0, 1), way, lambda p: raster(p, 2, over, depth), AL)
     if layer is None:
-        close({name: float(c[name][k]) for name in COLUMNS}, exact, history.resolution_error)
+        assert off({name: float(c[name][k]) for name in COLUMNS}, exact, history.resolution_error) == {}
     # the worst step is one of the first row, a slot
     slot = edge_sum(BALL, tip, (0, 0, 1), way, lambda p: p[..., 2] < 0.0, AL)
-    covered(history, slot, int(np.flatnonzero((c["x_mm"] > 9.0) & (c["z_mm"] == -depth))[0]))
+    assert uncovered(history, slot, int(np.flatnonzero((c["x_mm"] > 9.0) & (c["z_mm"] == -depth))[0])) == {}
 
 
 @pytest.mark.parametrize(
@@ -207,7 +210,7 @@ def test_a_finishing_raster(depth: float, over: float, layer: float | None) -> N
 def test_coarse_settings_state_the_error_that_they_make(cutter: Cutter, depth: float, keys: dict[str, Any]) -> None:
     history = run(path([[-12.0, 0.0, -depth], [20.0, 0.0, -depth]]), cutter, step_mm=0.5, **keys)
     exact = edge_sum(cutter, (0, 0, -depth), (0, 0, 1), per_tooth(cutter, (1, 0, 0)), lambda p: p[..., 2] < 0.0, AL)
-    covered(history, exact, int(np.flatnonzero(history.columns["x_mm"] > 15.0)[0]))
+    assert uncovered(history, exact, int(np.flatnonzero(history.columns["x_mm"] > 15.0)[0])) == {}
 
 
 def test_a_shallow_ramp_removes_what_it_sweeps_or_says_that_it_does_not() -> None:

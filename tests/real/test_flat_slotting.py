@@ -90,7 +90,7 @@ def test_signs_and_teeth(tmp_path):
 
 def test_means_of_the_third_feed(tmp_path):
     done = run(job(tmp_path))
-    assert done.fit.converged
+    assert done.fit.search.converged
     third = next(c for c in done.comparisons if c.use == "predict")
     assert np.all(np.abs(third.mean_percent) < 5.0), third.mean_percent
     # the measured mean lies in the band
@@ -98,7 +98,7 @@ def test_means_of_the_third_feed(tmp_path):
     # at 300 mm/min the second tooth is all but out of the cut: 2 e close to f_z = 0.025 mm
     assert 0.011 < done.fit.cutter.runout[0] < 0.013
     assert math.isclose(done.fit.turns[0].speed * 60.0 / math.tau, 6000.0, rel_tol=1e-4)
-    assert 600.0 < done.fit.values[0] < 1000.0
+    assert 600.0 < done.fit.coefficients.values[0] < 1000.0
     # peaks: across within 12 %; along the feed and the axis the dynamometer rings more than an oscillator explains
     assert abs(third.peak_percent[1]) < 12.0
     assert 20.0 < third.peak_percent[0] < 40.0
@@ -112,7 +112,7 @@ def test_means_without_runout_are_no_straight_line(tmp_path):
     third = cuts[1].force[:10_000].mean(axis=0)
     line = 0.5 * (cuts[0].force[:10_000].mean(axis=0) + cuts[2].force[:10_000].mean(axis=0))
     c = 900.0 / 12_000.0
-    n = 2 * 3.0 / 4 * fit.values[0] * c + 2 * 3.0 / math.pi * fit.values[3]
+    n = 2 * 3.0 / 4 * fit.coefficients.values[0] * c + 2 * 3.0 / math.pi * fit.coefficients.values[3]
     assert math.isclose(n, line[1], rel_tol=1e-3)
     off = (line - third) / np.abs(third) * 100.0
     assert abs(off[1]) < 1.0

@@ -144,12 +144,18 @@ def test_open_chain_bounds_a_half_plane():
 @pytest.mark.parametrize(
     ("make", "text"),
     [
-        (lambda: CentrePath(np.zeros((2, 3)), 1.0), "trail: segments of shape (2, 3): need (n, 7) finite numbers"),
-        (lambda: CentrePath(np.zeros((1, 7)), 0.0), "trail: radius = 0 mm: must be above 0"),
-        (lambda: CentrePath(np.zeros((1, 7)), 1.0, None, [False]), "trail: 0 of 1 motions cut: need at least one"),
+        (
+            lambda: CentrePath(np.zeros((2, 3)), 1.0),
+            "centre path: segments of shape (2, 3): need (n, 7) finite numbers",
+        ),
+        (lambda: CentrePath(np.zeros((1, 7)), 0.0), "centre path: radius = 0 mm: must be above 0"),
+        (
+            lambda: CentrePath(np.zeros((1, 7)), 1.0, None, [False]),
+            "centre path: 0 of 1 motions cut: need at least one",
+        ),
         (
             lambda: rim_engagement(CentrePath(np.zeros((1, 7)), 1.0), [1], [0.0]),
-            "trail: moments must be motions 0..0 and shares 0..1",
+            "centre path: moments must be motions 0..0 and shares 0..1",
         ),
     ],
 )

@@ -64,7 +64,7 @@ def init(
         job = write_draft(draft, folder)
         show(draft.title)
         for note in draft.notes:
-            show(f"noticed: {note}")
+            show(f"found: {note}")
         for guess in draft.guesses:
             show(f"guess: {guess}")
         show(f"written: {job}: {len(draft.guesses)} guesses to confirm; then chipload run {job} --out result")

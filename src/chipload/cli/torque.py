@@ -165,7 +165,7 @@ def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
     from chipload.control.identification import aliased
     from chipload.units import rpm_from_rad_s
 
-    f, level = found.found, f"{100.0 * found.found.level:g} %"
+    f, level, sensor = found.found, f"{100.0 * found.found.level:g} %", found.sensor
     power = found.source == "power"
     unit, scale = ("N m", 1e-3) if power else ("A", 1.0)
     name = "efficiency" if power else "torque constant"
@@ -181,21 +181,22 @@ def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
             f"{scale * float(x):.4g}{' w' if k else ''} +- {scale * float(h):.2g}"
             for k, (x, h) in enumerate(zip(f.idle, f.half_width[2:], strict=True))
         )
-        + f" {unit}, w in rad/s, drift {60.0 * scale * found.drift:.3g} +- {60.0 * scale * found.drift_half_width:.2g} "
-        f"{unit}/min",
+        + f" {unit}, w in rad/s, drift {60.0 * scale * found.idle.rate:.3g} +- "
+        f"{60.0 * scale * found.idle.half_width:.2g} {unit}/min",
         f"inertia: {1e-6 * f.inertia * 1e3:.4g} kg m2 +- {1e-6 * float(f.half_width[1]) * 1e3:.2g}"
         if found.inertia_found and found.constant_known is not None
         else "inertia: not known" + ("" if found.inertia_found else ": the speed does not change"),
-        f"lag: {1e3 * found.lag:.3g} ms, {1e3 * found.lag_interval[0]:.3g} to {1e3 * found.lag_interval[1]:.3g}; noise "
-        f"{scale * found.noise:.3g} {unit}, step {scale * found.step:.3g} {unit}",
+        f"lag: {1e3 * sensor.lag:.3g} ms, {1e3 * sensor.lag_interval[0]:.3g} to {1e3 * sensor.lag_interval[1]:.3g}; "
+        f"noise {scale * sensor.noise:.3g} {unit}, step {scale * sensor.step:.3g} {unit}",
     ]
     if found.constant_known is not None:
         least, most = (1e-3 * x for x in found.torque)
         out.append(
             f"holds for torques from {least:.3g} to {most:.4g} N m, {low:.5g} to {high:.5g} rpm, below "
-            f"{found.bandwidth:.3g} Hz"
+            f"{sensor.bandwidth:.3g} Hz"
             if most < math.inf
-            else f"holds for torques above {least:.3g} N m, below {found.bandwidth:.3g} Hz; no cut above that is logged"
+            else f"holds for torques above {least:.3g} N m, below {sensor.bandwidth:.3g} Hz; no cut above that is "
+            "logged"
         )
     torque = "N m" if found.constant_known is not None else unit
     per = 1e-3 if found.constant_known is not None else scale
@@ -210,10 +211,10 @@ def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
         out.append(text)
     if flutes is not None:
         passing = flutes * found.cut_speed / math.tau
-        seen = aliased(passing, 1.0 / found.period)
-        inside = seen < found.bandwidth
+        seen = aliased(passing, 1.0 / sensor.period)
+        inside = seen < sensor.bandwidth
         out.append(
-            f"tooth passing frequency {passing:.4g} Hz: readings at {1.0 / found.period:.4g} Hz show it at "
+            f"tooth passing frequency {passing:.4g} Hz: readings at {1.0 / sensor.period:.4g} Hz show it at "
             f"{seen:.3g} Hz, " + ("inside the bandwidth: it looks like a torque" if inside else "above the bandwidth")
         )
     return out

@@ -61,6 +61,43 @@ class LogPrediction:
 
 
 @dataclass(frozen=True, eq=False)
+class SensorReading:
+    """How the sensor of a spindle shows what it measures.
+
+    Parameters
+    ----------
+    lag, lag_interval : of the sensor [s]
+    smoothing : a revolution, at least one reading [s]
+    noise, step : of a reading [A], of power [N mm]
+    period : between two readings [s]
+    bandwidth : [Hz]
+    """
+
+    lag: float
+    lag_interval: tuple[float, float]
+    smoothing: float
+    noise: float
+    step: float
+    period: float
+    bandwidth: float
+
+
+@dataclass(frozen=True, eq=False)
+class IdleDrift:
+    """How the idle current changes over the logs.
+
+    Parameters
+    ----------
+    rate, half_width : of its growth [A/s]
+    error : share by which it may differ: interval and drift over the logs
+    """
+
+    rate: float
+    half_width: float
+    error: float
+
+
+@dataclass(frozen=True, eq=False)
 class IdentifiedSpindle:
     """What the logs tell of a spindle.
 
@@ -69,15 +106,8 @@ class IdentifiedSpindle:
     source : ``current`` or ``power``
     found : the map; of power in the units of the head of this file
     constant_known : the torque constant was stated, not identified; None: it is not known, and `found` has 1
-    lag, lag_interval : of the sensor [s]
     inertia_found : the speed changes, so that the inertia and the slope of the idle map are known
-    smoothing : a revolution, at least one reading [s]
-    noise, step : of a reading [A], of power [N mm]
-    drift, drift_half_width : of the idle current [A/s]
-    idle_error : share by which the idle current may differ: interval and drift over the logs
     torque : (least, greatest) that the estimate holds for [N mm]; the greatest is inf where no cut says so
-    bandwidth : [Hz]
-    period : between two readings [s]
     cut_speed : of the spindle in the cut, its median [rad/s]
     predictions : logs, each predicted from the others
     """
@@ -85,18 +115,10 @@ class IdentifiedSpindle:
     source: str
     found: SpindleMap
     constant_known: bool | None
-    lag: float
-    lag_interval: tuple[float, float]
     inertia_found: bool
-    smoothing: float
-    noise: float
-    step: float
-    drift: float
-    drift_half_width: float
-    idle_error: float
+    sensor: SensorReading
+    idle: IdleDrift
     torque: tuple[float, float]
-    bandwidth: float
-    period: float
     cut_speed: float
     predictions: tuple[LogPrediction, ...]
 
@@ -184,18 +206,18 @@ def identify_spindle(
         source=source,
         found=found,
         constant_known=True if torque_constant is not None else False if cuts_known else None,
-        lag=lag,
-        lag_interval=interval,
         inertia_found=changes,
-        smoothing=smoothing,
-        noise=noise,
-        step=step,
-        drift=drift,
-        drift_half_width=drift_width,
-        idle_error=idle_error,
+        sensor=SensorReading(
+            lag=lag,
+            lag_interval=interval,
+            smoothing=smoothing,
+            noise=noise,
+            step=step,
+            period=period,
+            bandwidth=min(bandwidth(lag, smoothing), 0.5 / period),
+        ),
+        idle=IdleDrift(drift, drift_width, idle_error),
         torque=(max(least, found.biased), greatest if cuts_known else math.inf),
-        bandwidth=min(bandwidth(lag, smoothing), 0.5 / period),
-        period=period,
         cut_speed=cut_speed,
         predictions=_predict_each(runs, names, lag, torque_constant, constant, level, smoothing),
     )

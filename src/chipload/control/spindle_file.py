@@ -52,7 +52,7 @@ def write_spindle(found: IdentifiedSpindle, logs: dict[str, str]) -> str:
     # power over speed in N mm
     unit = 1e3 if power else 1.0
     idle = [float(x) / unit for x in (*f.idle, 0.0)[:2]]
-    noise, step = found.noise / unit * (found.cut_speed if power else 1.0), found.step / unit
+    noise, step = found.sensor.noise / unit * (found.cut_speed if power else 1.0), found.sensor.step / unit
     known = found.constant_known is not None
     lines = ["# identified by chipload spindle", f'input = "{found.source}"']
     if found.constant_known is None:
@@ -67,22 +67,22 @@ def write_spindle(found: IdentifiedSpindle, logs: dict[str, str]) -> str:
     elif not found.inertia_found:
         lines.append("# the inertia is not known: the speed did not change in the logs")
     lines += [
-        f"sensor_lag_s = {found.lag:.4g}",
-        f"smoothing_s = {found.smoothing:.4g}        # a revolution",
+        f"sensor_lag_s = {found.sensor.lag:.4g}",
+        f"smoothing_s = {found.sensor.smoothing:.4g}        # a revolution",
         f"{'noise_w' if power else 'noise_a'} = {noise:.4g}",
         f"{'power_step_w' if power else 'current_step_a'} = {step * (found.cut_speed if power else 1.0):.4g}",
-        f"idle_error_share = {found.idle_error:.3g}",
+        f"idle_error_share = {found.idle.error:.3g}",
         "",
         "[range]                     # where the estimate holds",
         *([f"torque_nm = [{', '.join(f'{1e-3 * x:.4g}' for x in found.torque if x < math.inf)}]"] if known else []),
         f"speed_rpm = [{f.speeds[0] * rpm_from_rad_s(1.0):.5g}, {f.speeds[1] * rpm_from_rad_s(1.0):.5g}]",
-        f"bandwidth_hz = {found.bandwidth:.4g}",
+        f"bandwidth_hz = {found.sensor.bandwidth:.4g}",
         "",
         f"[interval]                  # half widths at {100.0 * f.level:g} %",
         f"torque_constant_share = {found.constant_error:.3g}",
         f"idle = [{', '.join(f'{float(x) / unit:.3g}' for x in f.half_width[2:])}]",
-        f"sensor_lag_s = [{found.lag_interval[0]:.4g}, {found.lag_interval[1]:.4g}]",
-        f"drift_per_min = [{60.0 * found.drift / unit:.3g}, {60.0 * found.drift_half_width / unit:.3g}]",
+        f"sensor_lag_s = [{found.sensor.lag_interval[0]:.4g}, {found.sensor.lag_interval[1]:.4g}]",
+        f"drift_per_min = [{60.0 * found.idle.rate / unit:.3g}, {60.0 * found.idle.half_width / unit:.3g}]",
     ]
     torque, per = ("nm", 1e-3) if known or power else ("a", 1.0)
     for k, answer in enumerate(found.predictions):

@@ -50,54 +50,87 @@ _MORE = tuple(replace(_PLAIN, **{name: getattr(_PLAIN, name) + step}) for name, 
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
-    """Coefficients with what is known of them.
+class FittedCoefficients:
+    """Coefficients x with what is known of them.
 
     Parameters
     ----------
-    method : ``average`` or ``instantaneous``
     values : (6,) float, x; NaN where not identified
     covariance : (6, 6) float; NaN where not identified
     interval : (6, 2) float, 95 %
-    cutter : with the runout that was found, or was given
-    cuts, turns : that were fitted
+    linear : (6,) float, x with some value where it is not identified
+    """
+
+    values: Floats
+    covariance: Floats
+    interval: Floats
+    linear: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class FittedChannels:
+    """What the three channels of the dynamometer showed.
+
+    Parameters
+    ----------
     phase : (f,) float [rad], theta_0 of each cut; NaN by the average method
     zero : (f, 3) float [N] of each cut; 0 where it is not sought
     resonance : (3, 2) float, w0 [rad/s] and zeta of each channel; NaN: rigid
     residual : (3,) float [N] standard deviation of what the model leaves, in the band; NaN: not measured
     r2 : (3,) float, share of the variance that the model explains
-    freedom : observations less parameters
-    harmonics : how many count
-    converged : whether the search ended by itself
-    notes : what the reader must know
-    linear : (6,) float, x with some value where it is not identified; ``parameters`` (p,) and ``spread`` (p, p): runout
-        and x as fitted and their covariance, for the bands
     """
 
-    method: str
-    values: Floats
-    covariance: Floats
-    interval: Floats
-    cutter: Cutter
-    cuts: tuple[MeasuredCut, ...]
-    turns: tuple[Turns, ...]
     phase: Floats
     zero: Floats
     resonance: Floats
     residual: Floats
     r2: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class FitSearch:
+    """How the coefficients were found.
+
+    Parameters
+    ----------
+    parameters, spread : (p,) and (p, p) float, runout and x as fitted and their covariance, for the bands
+    freedom : observations less parameters
+    harmonics : how many count
+    converged : whether the search ended by itself
+    """
+
+    parameters: Floats
+    spread: Floats
     freedom: int
     harmonics: int
     converged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Force coefficients that were identified.
+
+    Parameters
+    ----------
+    method : ``average`` or ``instantaneous``
+    cutter : with the runout that was found, or was given
+    cuts, turns : that were fitted
+    notes : what the reader must know
+    """
+
+    method: str
+    cutter: Cutter
+    cuts: tuple[MeasuredCut, ...]
+    turns: tuple[Turns, ...]
+    coefficients: FittedCoefficients
+    channels: FittedChannels
+    search: FitSearch
     notes: tuple[str, ...]
-    linear: Floats
-    parameters: Floats
-    spread: Floats
 
     @property
     def identified(self) -> NDArray[np.bool_]:
         """(6,) which coefficients the measurement determines."""
-        return np.asarray(np.isfinite(self.values))
+        return np.asarray(np.isfinite(self.coefficients.values))
 
     @property
     def known(self) -> NDArray[np.bool_]:
@@ -213,12 +246,12 @@ def fit_average(cuts: Sequence[MeasuredCut], cutter: Cutter) -> Fit:
             residual[channel] = math.sqrt(float(np.mean(left[mine] ** 2)))
             total = float(np.sum((seen[mine] - seen[mine].mean()) ** 2))
             r2[channel] = 1.0 - float(np.sum(left[mine] ** 2)) / total if total > 0.0 else math.nan
-    return concluded(
-        "average", cuts, turns, cutter, linear, identified, np.concatenate([runout_of(cutter), linear]),
-        padded(spread, 2), max(freedom, 0), notes,
-        phase=np.full(len(cuts), np.nan), zero=np.zeros((len(cuts), 3)), resonance=np.full((3, 2), np.nan),
-        residual=residual, r2=r2, harmonics=0, converged=True,
-    )  # fmt: skip
+    seen_by = FittedChannels(
+        np.full(len(cuts), np.nan), np.zeros((len(cuts), 3)), np.full((3, 2), np.nan), residual, r2
+    )
+    found = np.concatenate([runout_of(cutter), linear])
+    search = FitSearch(found, padded(spread, 2), max(freedom, 0), 0, True)
+    return concluded("average", cuts, turns, cutter, linear, identified, seen_by, search, notes)
 
 
 def solved(a: Floats, y: Floats) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
@@ -260,32 +293,22 @@ def concluded(
     cutter: Cutter,
     linear: Floats,
     identified: NDArray[np.bool_],
-    parameters: Floats,
-    spread: Floats,
-    freedom: int,
+    channels: FittedChannels,
+    search: FitSearch,
     notes: list[str],
-    *,
-    phase: Floats,
-    zero: Floats,
-    resonance: Floats,
-    residual: Floats,
-    r2: Floats,
-    harmonics: int,
-    converged: bool,
 ) -> Fit:
     """A fit with its intervals; what is not identified becomes NaN."""
-    if freedom < 1:
+    if search.freedom < 1:
         notes.append("as many coefficients as observations: no interval can be stated")
     values = np.where(identified, linear, np.nan)
-    covariance = np.where(np.outer(identified, identified), spread[2:, 2:], np.nan)
-    half = _student(freedom) * np.sqrt(np.diagonal(covariance))
+    covariance = np.where(np.outer(identified, identified), search.spread[2:, 2:], np.nan)
+    half = _student(search.freedom) * np.sqrt(np.diagonal(covariance))
     lost = [name for name, ok in zip(NAMES, identified, strict=True) if not ok]
     if lost:
         notes.append(f"not identified by these measurements: {', '.join(lost)}")
-    return Fit(
-        method, values, covariance, np.column_stack([values - half, values + half]), cutter, tuple(cuts), turns, phase,
-        zero, resonance, residual, r2, freedom, harmonics, converged, tuple(notes), linear, parameters, spread,
-    )  # fmt: skip
+    interval = np.column_stack([values - half, values + half])
+    coefficients = FittedCoefficients(values, covariance, interval, linear)
+    return Fit(method, cutter, tuple(cuts), turns, coefficients, channels, search, tuple(notes))
 
 
 def _student(freedom: int) -> float:
@@ -297,7 +320,9 @@ def predicted(fit: Fit, cut: MeasuredCut, theta: Floats, resonance: Floats | Non
     """Forces that the coefficients give over a turn of a cut, as the dynamometer shows them: (m, 3) float [N] on the
     cutter at the rotations theta (m,); ``resonance`` None: that of the fit.
     """
-    return _turned(fit, cut, fit.parameters, theta, None, fit.resonance if resonance is None else resonance)
+    return _turned(
+        fit, cut, fit.search.parameters, theta, None, fit.channels.resonance if resonance is None else resonance
+    )
 
 
 def _turned(fit: Fit, cut: MeasuredCut, p: Floats, theta: Floats, harmonics: int | None, resonance: Floats) -> Floats:
@@ -328,14 +353,16 @@ def _mean(fit: Fit, cut: MeasuredCut, p: Floats) -> Floats:
 
 def _banded(fit: Fit, said: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
     """What is said at the fitted parameters, and the half width of its 95 % band, by differences."""
-    p = fit.parameters
+    p = fit.search.parameters
     values = said(p)
     slopes = np.zeros((*values.shape, len(p)))
-    for j, sd in enumerate(np.sqrt(np.diagonal(fit.spread))):
+    for j, sd in enumerate(np.sqrt(np.diagonal(fit.search.spread))):
         if sd > 0.0:
             d = np.where(np.arange(len(p)) == j, 0.1 * sd, 0.0)
             slopes[..., j] = (said(p + d) - said(p - d)) / (0.2 * sd)
-    return values, _student(fit.freedom) * np.sqrt(np.einsum("...j,jk,...k->...", slopes, fit.spread, slopes))
+    return values, _student(fit.search.freedom) * np.sqrt(
+        np.einsum("...j,jk,...k->...", slopes, fit.search.spread, slopes)
+    )
 
 
 def predict(fit: Fit, cut: MeasuredCut) -> Prediction:
@@ -343,8 +370,8 @@ def predict(fit: Fit, cut: MeasuredCut) -> Prediction:
     theta = np.linspace(0.0, math.tau, TURN, endpoint=False)
 
     def said(p: Floats) -> Floats:
-        whole = _turned(fit, cut, p, theta, None, fit.resonance)
-        band = _turned(fit, cut, p, theta, max(fit.harmonics, 1), fit.resonance)
+        whole = _turned(fit, cut, p, theta, None, fit.channels.resonance)
+        band = _turned(fit, cut, p, theta, max(fit.search.harmonics, 1), fit.channels.resonance)
         return np.stack([_mean(fit, cut, p), whole.max(axis=0), whole.min(axis=0), band.max(axis=0), band.min(axis=0)])
 
     values, half = _banded(fit, said)
@@ -357,7 +384,9 @@ def predict(fit: Fit, cut: MeasuredCut) -> Prediction:
 def aligned(fit: Fit, cut: MeasuredCut, turns: Turns, parts: int = 720) -> float:
     """theta_0 of a cut at which its harmonics lie nearest to those that the fit says, of ``parts`` tried [rad]."""
     k = np.arange(len(turns.amplitude), dtype=np.float64)
-    said = (unit_harmonics(cut, fit.cutter, len(k) - 1) @ fit.linear) * dynamometer(fit.resonance, k * cut.speed)
+    said = (unit_harmonics(cut, fit.cutter, len(k) - 1) @ fit.coefficients.linear) * dynamometer(
+        fit.channels.resonance, k * cut.speed
+    )
     some = cut.measured & fit.known
     if not some.any():
         return 0.0

@@ -33,6 +33,8 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.fit import (
     LOOSE,
     Fit,
+    FitSearch,
+    FittedChannels,
     as_real,
     concluded,
     dynamometer,
@@ -292,12 +294,10 @@ def _concluded(problem: _Problem, q: Floats, converged: bool) -> Fit:
     elif m == 0:
         spread = padded(spread, 2)
     zero = x[6:].reshape(f, 3) if problem.seek_zero else np.zeros((f, 3))
-    return concluded(
-        "instantaneous", problem.cuts, problem.turns, runout, linear, identified,
-        np.concatenate([runout_of(runout), linear]), spread, len(y) - int(sure.sum()), notes,
-        phase=np.mod(q[:f], math.tau), zero=zero, resonance=problem.resonance, residual=residual, r2=r2,
-        harmonics=problem.harmonics, converged=converged,
-    )  # fmt: skip
+    channels = FittedChannels(np.mod(q[:f], math.tau), zero, problem.resonance, residual, r2)
+    found = np.concatenate([runout_of(runout), linear])
+    search = FitSearch(found, spread, len(y) - int(sure.sum()), problem.harmonics, converged)
+    return concluded("instantaneous", problem.cuts, problem.turns, runout, linear, identified, channels, search, notes)
 
 
 def _quality(problem: _Problem, q: Floats, x: Floats) -> tuple[Floats, Floats]:

@@ -54,7 +54,7 @@ def _arrays(bites: ToothEngagement, cutter: Cutter) -> tuple[Any, ...]:
     """Tooth engagement as the kernels take them, after a check that the cutter has their teeth."""
     top = int(bites.tooth.max(initial=-1))
     if top >= cutter.flutes:
-        raise InputError(f"bites: tooth {top}: must be below cutter.flutes = {cutter.flutes}")
+        raise InputError(f"tooth engagement: tooth {top}: must be below cutter.flutes = {cutter.flutes}")
     return bites.start, bites.rows, bites.tooth, bites.slice, bites.slices
 
 

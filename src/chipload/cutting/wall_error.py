@@ -65,8 +65,8 @@ def _straight(bites: ToothEngagement, cutter: Cutter) -> Floats:
     bad = np.flatnonzero(~((np.abs(own[:, 3] - 1.0) <= 1e-12) & (np.abs(own[:, 1] - cutter.radius) <= 1e-9)))
     if len(bad):
         raise InputError(
-            f"bites: row {bad[0]}: rho = {own[bad[0], 1]:g} mm, sin(kappa) = {own[bad[0], 3]:g}: the wall's error is "
-            f"known for a straight flank only, rho = {cutter.radius:g} mm and sin(kappa) = 1"
+            f"tooth engagement: row {bad[0]}: rho = {own[bad[0], 1]:g} mm, sin(kappa) = {own[bad[0], 3]:g}: the wall's "
+            f"error is known for a straight flank only, rho = {cutter.radius:g} mm and sin(kappa) = 1"
         )
     rows = bites.rows.copy()
     rows[:, 2:4] += (own[:, 2] - own[:, 0])[:, None]

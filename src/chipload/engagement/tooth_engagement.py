@@ -68,33 +68,41 @@ class ToothEngagement:
         piece = np.ascontiguousarray(self.slice, dtype=np.int64)
         slices = np.ascontiguousarray(self.slices, dtype=np.float64)
         if rows.ndim != 2 or rows.shape[1] != 7 or not np.isfinite(rows).all():
-            raise InputError(f"bites: rows of shape {rows.shape}: need (b, 7) finite numbers")
+            raise InputError(f"tooth engagement: rows of shape {rows.shape}: need (b, 7) finite numbers")
         if slices.ndim != 2 or slices.shape[1] != 7 or not np.isfinite(slices).all():
-            raise InputError(f"bites: slices of shape {slices.shape}: need (k, 7) finite numbers")
+            raise InputError(f"tooth engagement: slices of shape {slices.shape}: need (k, 7) finite numbers")
         if len(tooth) != len(rows) or start[0] != 0 or start[-1] != len(rows) or (np.diff(start) < 0).any():
-            raise InputError(f"bites: {len(rows)} rows, {len(tooth)} teeth, start up to {start[-1]}: must agree")
+            raise InputError(
+                f"tooth engagement: {len(rows)} rows, {len(tooth)} teeth, start up to {start[-1]}: must agree"
+            )
         if piece.shape != (len(rows),) or not ((piece >= 0) & (piece < len(slices))).all():
-            raise InputError(f"bites: slice of shape {piece.shape}: need ({len(rows)},) from 0 to {len(slices) - 1}")
+            raise InputError(
+                f"tooth engagement: slice of shape {piece.shape}: need ({len(rows)},) from 0 to {len(slices) - 1}"
+            )
         bad = np.flatnonzero(~(slices[:, [1, 5, 6]] >= 0.0).all(axis=1))
         if len(bad):
             rho, lag, rate = slices[bad[0], [1, 5, 6]]
             raise InputError(
-                f"bites: slice {bad[0]}: rho = {rho:g}, lag = {lag:g}, rate = {rate:g}: must be at least 0"
+                f"tooth engagement: slice {bad[0]}: rho = {rho:g}, lag = {lag:g}, rate = {rate:g}: must be at least 0"
             )
         low, turn, high = rows[:, 0], rows[:, 1] - rows[:, 0], math.tau + _SLACK
         bad = np.flatnonzero(~((low >= 0.0) & (low <= math.tau) & (turn >= 0.0) & (turn <= high)))
         if len(bad):
             ends = f"{rows[bad[0], 0]:g} to {rows[bad[0], 1]:g} rad"
-            raise InputError(f"bites: row {bad[0]}: {ends}: must begin within 0 to 2 pi and rise by at most 2 pi")
+            raise InputError(
+                f"tooth engagement: row {bad[0]}: {ends}: must begin within 0 to 2 pi and rise by at most 2 pi"
+            )
         bad = np.flatnonzero(~(rows[:, 2] <= rows[:, 3]))
         if len(bad):
             ends = f"s from {rows[bad[0], 2]:g} to {rows[bad[0], 3]:g} mm"
-            raise InputError(f"bites: row {bad[0]}: {ends}: must rise")
+            raise InputError(f"tooth engagement: row {bad[0]}: {ends}: must rise")
         checked = {"start": start, "rows": rows, "tooth": tooth, "slice": piece, "slices": slices}
         if self.frame is not None:
             frame = np.ascontiguousarray(self.frame, dtype=np.float64)
             if frame.shape != (len(start) - 1, 3, 3) or not np.isfinite(frame).all():
-                raise InputError(f"bites: frame of shape {frame.shape}: need ({len(start) - 1}, 3, 3) finite numbers")
+                raise InputError(
+                    f"tooth engagement: frame of shape {frame.shape}: need ({len(start) - 1}, 3, 3) finite numbers"
+                )
             checked["frame"] = frame
         for name, value in checked.items():
             value.setflags(write=False)

@@ -78,12 +78,12 @@ class CentrePath:
     def __post_init__(self) -> None:
         seg = np.array(self.segments, dtype=np.float64)
         if seg.ndim != 2 or seg.shape[1] != 7 or not np.isfinite(seg).all():
-            raise InputError(f"trail: segments of shape {seg.shape}: need (n, 7) finite numbers")
+            raise InputError(f"centre path: segments of shape {seg.shape}: need (n, 7) finite numbers")
         if not (self.radius > 0.0 and math.isfinite(self.radius)):
-            raise InputError(f"trail: radius = {self.radius:g} mm: must be above 0")
+            raise InputError(f"centre path: radius = {self.radius:g} mm: must be above 0")
         active = np.ones(len(seg), dtype=np.bool_) if self.active is None else np.array(self.active, dtype=np.bool_)
         if active.shape != (len(seg),) or not active.any():
-            raise InputError(f"trail: {int(active.sum())} of {len(seg)} motions cut: need at least one")
+            raise InputError(f"centre path: {int(active.sum())} of {len(seg)} motions cut: need at least one")
         for a in (seg, active):
             a.setflags(write=False)
         object.__setattr__(self, "segments", seg)
@@ -179,9 +179,9 @@ class CentrePath:
         k = np.ascontiguousarray(np.atleast_1d(np.asarray(motion, dtype=np.int64)))
         w = np.ascontiguousarray(np.atleast_1d(np.asarray(share, dtype=np.float64)))
         if len(k) != len(w):
-            raise InputError(f"trail: {len(k)} motions but {len(w)} shares: need one each")
+            raise InputError(f"centre path: {len(k)} motions but {len(w)} shares: need one each")
         if len(k) and (k.min() < 0 or k.max() >= len(self.segments) or not ((w >= 0.0) & (w <= 1.0)).all()):
-            raise InputError(f"trail: moments must be motions 0..{len(self.segments) - 1} and shares 0..1")
+            raise InputError(f"centre path: moments must be motions 0..{len(self.segments) - 1} and shares 0..1")
         return k, w
 
 
@@ -287,7 +287,7 @@ def flat_motions(program: Program) -> Floats:
     upright = np.abs(program.normal[:, 2]) > 1.0 - 1e-12
     if (arc & ~upright).any():
         k = int(np.flatnonzero(arc & ~upright)[0])
-        raise InputError(f"trail: the arc of row {k} is not in the XY plane: write it as chords first")
+        raise InputError(f"centre path: the arc of row {k} is not in the XY plane: write it as chords first")
     centre = program.centre[:, 0:2]
     v0, v1 = before - centre, p - centre
     a0, a1 = np.arctan2(v0[:, 1], v0[:, 0]), np.arctan2(v1[:, 1], v1[:, 0])

@@ -304,10 +304,10 @@ def _moved_block(
     """:func:`remove_block` by moves."""
     found = moved(steps, run, sums.steps, setting.cutters, setting.material, setting.resolution.rotation, contact)
     watched: dict[str, Floats] = dict(found.bands)
-    for cut in found.cuts if setting.watch is not None else ():
-        assert setting.watch is not None
-        for name, values in setting.watch(cut).items():
-            watched.setdefault(name, np.zeros(len(steps)))[cut.step - sums.steps] = values
+    if setting.watch is not None:
+        for cut in found.cuts:
+            for name, values in setting.watch(cut).items():
+                watched.setdefault(name, np.zeros(len(steps)))[cut.step - sums.steps] = values
     columns = {**_columns(steps, found.removed, found.loads, sums), **watched}
     return _after(sums, steps, found.removed, columns, sums.basis + found.basis, sums.piece), columns, found.cuts
 

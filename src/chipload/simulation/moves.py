@@ -226,8 +226,7 @@ def moved(
         weight = 1.0 / found.instants[entries]
         _together(loads, step, each, weight)
         if material.has_band:
-            assert bites.frame is not None
-            some = turned_basis(mean, bites.frame)
+            some = turned_basis(mean, bites.frames)
             basis = basis + np.tensordot(steps.seconds[step] * weight, some, 1)
             own, values = _bands(bites, cutter, material, step, each, at, some * weight[:, None, None], spindle)
             for name, column in zip(BANDS, values, strict=True):
@@ -400,8 +399,7 @@ def _cuts(
 
 def _part(bites: ToothEngagement, kept: Ints) -> ToothEngagement:
     """Some of the steps."""
-    assert bites.frame is not None
     count = np.diff(bites.start)[kept]
     start = np.concatenate([[0], np.cumsum(count)])
     row = np.arange(start[-1]) - np.repeat(start[:-1], count) + np.repeat(bites.start[kept], count)
-    return ToothEngagement(start, bites.rows[row], bites.tooth[row], bites.slice[row], bites.slices, bites.frame[kept])
+    return ToothEngagement(start, bites.rows[row], bites.tooth[row], bites.slice[row], bites.slices, bites.frames[kept])

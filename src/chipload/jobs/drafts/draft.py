@@ -119,7 +119,7 @@ class Draft:
             "delete `confirm = true` of its table. `chipload run --accept` takes all guesses as they are.",
             "All keys: chipload's docs/jobs.md.",
         ]
-        notes = ["", "Noticed in the file:", *(f"* {note}" for note in self.notes)] if self.notes else []
+        notes = ["", "Found in the file:", *(f"* {note}" for note in self.notes)] if self.notes else []
         comments = "\n".join(f"# {plain_line(line)}".rstrip() for line in (*head, *notes))
         return "\n\n".join([comments, *(t.text() for t in self.tables)]) + "\n"
 

@@ -57,17 +57,17 @@ def sections(done: FitResult, figures: dict[str, go.Figure]) -> list[str]:
     """Sections of the report."""
     fit = done.fit
     rows = [
-        [name, _text_of(fit.values[k], "not identified"), _span(fit.interval[k]), unit]
+        [name, _text_of(fit.coefficients.values[k], "not identified"), _span(fit.coefficients.interval[k]), unit]
         for k, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True))
     ]
-    known: dict[str, str] = {"method": fit.method, "degrees of freedom": str(fit.freedom)}
+    known: dict[str, str] = {"method": fit.method, "degrees of freedom": str(fit.search.freedom)}
     if fit.method == "instantaneous":
-        known["harmonics of the spindle that count"] = str(fit.harmonics)
+        known["harmonics of the spindle that count"] = str(fit.search.harmonics)
         known["runout"] = f"{fit.cutter.runout[0] * 1000.0:.3g} µm"
-        for key, (w0, zeta) in zip(CHANNELS, fit.resonance, strict=True):
+        for key, (w0, zeta) in zip(CHANNELS, fit.channels.resonance, strict=True):
             rings = f"{w0 / math.tau:.4g} Hz, damping {zeta:.3g}" if math.isfinite(w0) else "taken as rigid"
             known[f"dynamometer, {key}"] = rings
-    for key, left, r2 in zip(CHANNELS, fit.residual, fit.r2, strict=True):
+    for key, left, r2 in zip(CHANNELS, fit.channels.residual, fit.channels.r2, strict=True):
         known[f"left over, {key}"] = f"{_text_of(left)} N, R2 {_text_of(r2)}"
     return [
         "<h2>Coefficients</h2>",
@@ -106,10 +106,10 @@ def _errors(done: FitResult) -> str:
                 feed,
                 c.use,
                 CHANNELS[k],
-                f"{c.mean[k]:.4g}",
+                f"{c.forces.mean[k]:.4g}",
                 f"{_text_of(c.predicted.mean[k])} &plusmn; {_text_of(c.predicted.half[0, k], '?')}",
                 _text_of(c.mean_percent[k]),
-                f"{c.low[k]:.4g} to {c.high[k]:.4g}",
+                f"{c.forces.low[k]:.4g} to {c.forces.high[k]:.4g}",
                 f"{_text_of(c.predicted.low[k])} to {_text_of(c.predicted.high[k])}",
                 _text_of(c.peak_percent[k]),
             ]
@@ -146,7 +146,7 @@ def _means(done: FitResult) -> go.Figure:
             mine = [c for c in done.comparisons if c.use == use and c.cut.measured[k]]
             out.add_trace(
                 go.Scatter(
-                    x=[c.cut.feed_per_tooth(flutes) for c in mine], y=[c.mean[k] for c in mine], mode="markers",
+                    x=[c.cut.feed_per_tooth(flutes) for c in mine], y=[c.forces.mean[k] for c in mine], mode="markers",
                     name=f"{CHANNELS[k]}, measured, {use}", showlegend=bool(mine),
                     marker={"color": colour, "size": 10, "symbol": symbol, "line": {"width": 2}},
                 )

@@ -22,24 +22,30 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
-    """A cut beside its prediction.
+class MeasuredForces:
+    """What was measured of a cut, (3,) [N], as in the prediction; ``plane`` greatest in-plane force [N]."""
 
-    ``mean``, ``high``, ``low``, ``band_high``, ``band_low`` (3,) [N] measured, as in the prediction; errors in percent
-    of the measured, (3,): ``mean_percent``, and ``peak_percent`` of the larger peak; ``plane`` greatest in-plane force
-    measured [N]; ``phase`` rotation of tooth 0 at the first sample [rad].
-    """
-
-    cut: MeasuredCut
-    use: str
-    turns: Turns
-    predicted: Prediction
     mean: Floats
     high: Floats
     low: Floats
     band_high: Floats
     band_low: Floats
     plane: float
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A cut beside its prediction.
+
+    Errors in percent of the measured, (3,): ``mean_percent``, and ``peak_percent`` of the larger peak; ``phase``
+    rotation of tooth 0 at the first sample [rad].
+    """
+
+    cut: MeasuredCut
+    use: str
+    turns: Turns
+    predicted: Prediction
+    forces: MeasuredForces
     phase: float
     mean_percent: Floats
     peak_percent: Floats

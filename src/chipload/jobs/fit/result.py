@@ -30,7 +30,7 @@ def result_of(done: FitResult) -> Result:
         _track(done, c, c.cut.name if names[c.cut.name] == 1 else f"{c.cut.name} {k}")
         for k, c in enumerate(done.comparisons)
     )
-    ktc, krc = done.fit.values[:2]
+    ktc, krc = done.fit.coefficients.values[:2]
     return Result(
         capability="fit",
         title=done.title,
@@ -91,23 +91,27 @@ def numbers(done: FitResult) -> dict[str, Any]:
         "method": fit.method,
         "coefficients": {
             f"{name.lower()}_{unit.lower().replace('/', '_')}": {
-                "value": _number(fit.values[k]),
+                "value": _number(fit.coefficients.values[k]),
                 "identified": bool(fit.identified[k]),
-                "low_95": _number(fit.interval[k, 0]),
-                "high_95": _number(fit.interval[k, 1]),
-                "sd": _number(math.sqrt(fit.covariance[k, k]) if fit.covariance[k, k] >= 0.0 else math.nan),
+                "low_95": _number(fit.coefficients.interval[k, 0]),
+                "high_95": _number(fit.coefficients.interval[k, 1]),
+                "sd": _number(
+                    math.sqrt(fit.coefficients.covariance[k, k])
+                    if fit.coefficients.covariance[k, k] >= 0.0
+                    else math.nan
+                ),
             }
             for k, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True))
         },
-        "covariance": [[_number(v) for v in row] for row in fit.covariance],
-        "degrees_of_freedom": fit.freedom,
-        "harmonics": fit.harmonics,
+        "covariance": [[_number(v) for v in row] for row in fit.coefficients.covariance],
+        "degrees_of_freedom": fit.search.freedom,
+        "harmonics": fit.search.harmonics,
         "runout_mm": _number(size),
         "runout_deg": _number(math.degrees(direction)) if fit.cutter.flutes > 2 else None,
-        "residual_sd_n": _named(fit.residual),
-        "r2": _named(fit.r2),
-        "dynamometer_hz": _named(fit.resonance[:, 0] / math.tau),
-        "dynamometer_damping": _named(fit.resonance[:, 1]),
+        "residual_sd_n": _named(fit.channels.residual),
+        "r2": _named(fit.channels.r2),
+        "dynamometer_hz": _named(fit.channels.resonance[:, 0] / math.tau),
+        "dynamometer_damping": _named(fit.channels.resonance[:, 1]),
         "measurements": [_measurement(c) for c in done.comparisons],
     }
 
@@ -115,11 +119,11 @@ def numbers(done: FitResult) -> dict[str, Any]:
 def _measurement(c: Comparison) -> dict[str, Any]:
     model = c.predicted
     rows = {
-        "mean": (c.mean, model.mean, model.half[0]),
-        "high": (c.high, model.high, model.half[1]),
-        "low": (c.low, model.low, model.half[2]),
-        "band_high": (c.band_high, model.band_high, model.half[3]),
-        "band_low": (c.band_low, model.band_low, model.half[4]),
+        "mean": (c.forces.mean, model.mean, model.half[0]),
+        "high": (c.forces.high, model.high, model.half[1]),
+        "low": (c.forces.low, model.low, model.half[2]),
+        "band_high": (c.forces.band_high, model.band_high, model.half[3]),
+        "band_low": (c.forces.band_low, model.band_low, model.half[4]),
     }
     return {
         "file": c.cut.name,
@@ -132,7 +136,7 @@ def _measurement(c: Comparison) -> dict[str, Any]:
             f"{key}_n": {"measured": _named(seen), "model": _named(says), "half_95": _named(half)}
             for key, (seen, says, half) in rows.items()
         },
-        "plane_max_n": {"measured": _number(c.plane), "model": _number(model.resultant)},
+        "plane_max_n": {"measured": _number(c.forces.plane), "model": _number(model.resultant)},
         "mean_error_percent": _named(c.mean_percent),
         "peak_error_percent": _named(c.peak_percent),
     }

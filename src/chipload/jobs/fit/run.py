@@ -15,7 +15,7 @@ from chipload.cutting.measured import read_forces
 from chipload.cutting.turns import MeasuredCut, turns_of
 from chipload.errors import Finding, InputError, Severity
 from chipload.jobs.fit.job import CHANNELS, FitJob
-from chipload.jobs.fit.outcome import Comparison, FitResult
+from chipload.jobs.fit.outcome import Comparison, FitResult, MeasuredForces
 from chipload.jobs.provenance import hashes, title_of, versions
 from chipload.progress import Progress, silent
 from chipload.result import Provenance
@@ -83,7 +83,7 @@ def run(job: FitJob, progress: Progress = silent) -> FitResult:
     comparisons = tuple(_compared(fit, cut, use) for cut, use in zip(cuts, uses, strict=True))
     material, why = _material(job, fit)
     notes = tuple(Finding("fit-note", 0, text) for text in fit.notes)
-    if not fit.converged:
+    if not fit.search.converged:
         text = "the search for runout and phase did not end: widen the windows"
         notes = (Finding("fit-not-converged", 0, text, Severity.UNPROVEN), *notes)
     progress(1.0, "fitted")
@@ -114,14 +114,15 @@ def _provenance(job: FitJob) -> Provenance:
 
 def _compared(fit: Fit, cut: MeasuredCut, use: str) -> Comparison:
     said = predict(fit, cut)
-    turns = turns_of(cut, fit.harmonics or min(8, math.floor(0.8 * math.pi * cut.rate / cut.speed)))
+    turns = turns_of(cut, fit.search.harmonics or min(8, math.floor(0.8 * math.pi * cut.rate / cut.speed)))
     mean, high, low = (x.mean(axis=0) for x in (turns.mean, turns.high, turns.low))
     larger = np.abs(high) >= np.abs(low)
     k = np.arange(1, len(turns.amplitude))
     theta = np.linspace(0.0, math.tau, TURN, endpoint=False)
     band = turns.amplitude[0].real + 2.0 * (np.exp(1j * np.outer(theta, k)) @ turns.amplitude[1:]).real
     return Comparison(
-        cut, use, turns, said, mean, high, low, band.max(axis=0), band.min(axis=0), float(turns.plane.mean()),
+        cut, use, turns, said,
+        MeasuredForces(mean, high, low, band.max(axis=0), band.min(axis=0), float(turns.plane.mean())),
         aligned(fit, cut, turns), _percent(said.mean, mean),
         _percent(np.where(larger, said.high, said.low), np.where(larger, high, low)),
     )  # fmt: skip
@@ -136,7 +137,7 @@ def _percent(said: Floats, seen: Floats) -> Floats:
 def _material(job: FitJob, fit: Fit) -> tuple[Material | None, tuple[Finding, ...]]:
     """The material, or why there is none."""
     table = job.table
-    values = fit.values.copy()
+    values = fit.coefficients.values.copy()
     source = table.source
     if not fit.identified[[2, 5]].any() and table.axial is not None:
         values[2], values[5] = table.axial.kac_mpa, table.axial.kae_n_mm
@@ -153,8 +154,8 @@ def _material(job: FitJob, fit: Fit) -> tuple[Material | None, tuple[Finding, ..
     numbers: dict[str, Any] = {name: float(f"{v:.6g}") for name, v in zip(NAMES, values, strict=True)}
     covariance: Any = None
     found: tuple[Finding, ...] = ()
-    if np.isfinite(fit.covariance).all():
-        covariance = tuple(tuple(float(f"{v:.9g}") for v in row) for row in fit.covariance)
+    if np.isfinite(fit.coefficients.covariance).all():
+        covariance = tuple(tuple(float(f"{v:.9g}") for v in row) for row in fit.coefficients.covariance)
     else:
         text = "how sure the coefficients are is not written: the covariance of all six is not known"
         found = (Finding("fit-covariance", 0, text),)

@@ -61,7 +61,7 @@ def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
         "lines",
         "asked [mm]",
         "most between passes [mm]",
-        "mean crest [mm]",
+        "mean scallop height [mm]",
         "of asked [%]",
     ]
     scallop += ["crests", "of the patch within [%]"]

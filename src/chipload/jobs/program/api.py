@@ -111,19 +111,12 @@ def simulate(
     >>> str(slot.verdict), round(slot.numbers["removed_mm3"], 6)
     ('holds', 200.0)
     """
-    on = _machine(machine)
-    metal = _material(material)
-    reading = _reading(program, on, dialect, feed_mm_min, tolerance_mm)
-    cutters = _cutters(cutter, reading.program)
-    if not isinstance(program, Program):
-        # what the text states about its tools is held against the cutters, and compensation takes their diameters
-        reading = _reading(program, on, dialect, feed_mm_min, tolerance_mm, cutters)
+    on, metal = _machine(machine), _material(material)
+    reading, cutters = _with_cutters(program, on, dialect, feed_mm_min, tolerance_mm, cutter)
     smallest = min(c.diameter for c in cutters.values())
     meshes: dict[str, trimesh.Trimesh] = {}
-    files: dict[str, Path] = {}
     name = Path(VALUE) if isinstance(program, Program) else Path(program)
-    if not isinstance(program, Program):
-        files["program"] = name
+    files = {} if isinstance(program, Program) else {"program": name}
     finest = {"step_mm": STEP * smallest if step_mm is None else step_mm, "tolerance_mm": tolerance_mm}
     table: dict[str, Any] = {
         "program": {"file": name.name or VALUE},
@@ -136,16 +129,36 @@ def simulate(
         "checks": dict(checks or {}),
     }
     layers = stock if isinstance(stock, LayeredStock) else None
+    if layers is not None and layer_mm is not None:
+        raise InputError("layer_mm: the stock has its own layers: leave it out")
     if layers is None:
         table["stock"] = _solid(stock, layer_mm, meshes, files)
-    elif layer_mm is not None:
-        raise InputError("layer_mm: the stock has its own layers: leave it out")
-    if part is not None:
-        table["part"] = _body("part", part, TargetTable, SPACING * smallest, meshes, files)
-    table["fixture"] = tuple(
-        _body(f"fixture {k}", body, FixtureTable, SPACING * smallest, meshes, files) for k, body in enumerate(fixtures)
-    )
+    table |= _bodies(part, fixtures, SPACING * smallest, meshes, files)
     made = _table(table, ProgramJobTable)
+    _require_sources(made)
+    job = ProgramJob(
+        path=Path(name).absolute(), table=made, program_file=name, tools_file=None, machine=on.name, overrides=(),
+        cutters=cutters, material=metal.name, meshes=meshes,
+    )  # fmt: skip
+    provenance = provenance_of(files, (), on, (metal,))
+    return History(simulate_read(job, reading, on, metal, _copy(layers), provenance, progress))
+
+
+def _bodies(
+    part: Body | None,
+    fixtures: Sequence[Body],
+    spacing: float,
+    meshes: dict[str, trimesh.Trimesh],
+    files: dict[str, Path],
+) -> dict[str, Any]:
+    """The tables of the part, if there is one, and of the fixtures."""
+    found = {} if part is None else {"part": _body("part", part, TargetTable, spacing, meshes, files)}
+    of_fixtures = (_body(f"fixture {k}", body, FixtureTable, spacing, meshes, files) for k, body in enumerate(fixtures))
+    return {**found, "fixture": tuple(of_fixtures)}
+
+
+def _require_sources(made: ProgramJobTable) -> None:
+    """Refuse limits of what nothing is stated of, and speeds, which only a text has."""
     for key in ("form_error_um", "gouge_mm", "excess_mm"):
         if made.part is None and getattr(made.limits, key) is not None:
             raise InputError(f"limits.{key}: needs the part that should come out: give part or leave it out")
@@ -154,12 +167,23 @@ def simulate(
             raise InputError(f"limits.{key}: needs modes of vibration: give dynamics or leave it out")
     if made.operation[0].speeds is not None:
         raise InputError("speeds: are changed in the text of a job's program: write a job (chipload run)")
-    job = ProgramJob(
-        path=Path(name).absolute(), table=made, program_file=name, tools_file=None, machine=on.name, overrides=(),
-        cutters=cutters, material=metal.name, meshes=meshes,
-    )  # fmt: skip
-    provenance = provenance_of(files, (), on, (metal,))
-    return History(simulate_read(job, reading, on, metal, _copy(layers), provenance, progress))
+
+
+def _with_cutters(
+    program: Program | str | Path,
+    machine: Machine,
+    dialect: str | None,
+    feed: float | None,
+    tolerance: float,
+    cutter: Cutters,
+) -> tuple[ProgramReading, dict[int, Cutter]]:
+    """The program on its machine, and its cutters by tool number."""
+    reading = _reading(program, machine, dialect, feed, tolerance)
+    cutters = _cutters(cutter, reading.program)
+    if isinstance(program, Program):
+        return reading, cutters
+    # what the text states about its tools is held against the cutters, and compensation takes their diameters
+    return _reading(program, machine, dialect, feed, tolerance, cutters), cutters
 
 
 def _reading(

@@ -211,8 +211,10 @@ def stability_numbers(stability: StabilityResult, columns: Columns) -> dict[str,
         "windows": [],
         "different_cuts": sum(map(len, stability.watch.known.values())),
     }
-    if stability.watch.follows:
-        out["workpiece_modes"] = _followed_numbers(stability.watch, columns, stability.wanted)
+    workpiece = stability.watch.workpiece
+    if stability.watch.follows and workpiece is not None:
+        followed = _followed_numbers(stability.watch, columns, stability.wanted)
+        out["workpiece_modes"] = {"frequency_error_percent": 100.0 * workpiece.error, **followed}
     if quiet is not None:
         best, least = quiet.advised(speed / rpm_from_rad_s(1.0))
         out |= {"speed_rpm_advised": rounded_rpm(best), "margin_advised": least}
@@ -225,14 +227,12 @@ def stability_numbers(stability: StabilityResult, columns: Columns) -> dict[str,
 
 def _followed_numbers(watch: StabilityWatch, columns: Columns, wanted: float) -> dict[str, Any]:
     """Modes of the workpiece in summary.json, and what its modes before the first cut alone would say."""
-    assert watch.workpiece is not None
     margin, line = np.asarray(columns["stability_margin"]), np.asarray(columns["line"])
     steps = np.array(sorted(watch.first_margin), dtype=np.int64)
     first = np.array([watch.first_margin[k] for k in steps.tolist()])
     differs = (first < wanted) != (margin[steps] < wanted)
     k = int(np.argmin(first))
     return {
-        "frequency_error_percent": 100.0 * watch.workpiece.error,
         "start_state_margin_min": float(first[k]),
         "start_state_line": int(line[steps[k]]),
         "verdict_differs_steps": int(differs.sum()),

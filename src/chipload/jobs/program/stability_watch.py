@@ -83,9 +83,9 @@ class StabilityWatch:
                     groups.engagement, cuts.cutter, self.material, modes, cuts.spindle, groups.T, groups.n
                 )
                 some, steps = whole.chosen(at), np.asarray(cuts.step)[at]
-                if self.follows:
-                    first = self._with_workpiece(some, steps, frame[at], first=True)
-                    some = self._with_workpiece(some, steps, frame[at])
+                if self.follows and self.workpiece is not None:
+                    first = self._with_modes(some, *self.workpiece.at_first(steps), frame[at])
+                    some = self._with_modes(some, *self.workpiece.at(steps), frame[at])
                     self.first_margin.update(zip(steps.tolist(), stability_margins(first).margin.tolist(), strict=True))
                 self.cuts.setdefault(cuts.tool, []).append(some)
                 for k, values in zip(at.tolist(), self._values(some, whole, at, groups.engagement), strict=True):
@@ -111,12 +111,8 @@ class StabilityWatch:
         first = self.dynamics.first_followed
         return f"workpiece mode {number - first + 1}" if number >= first else self.dynamics.name.get(number)
 
-    def _with_workpiece(
-        self, some: DynamicCuts, steps: NDArray[np.int64], frame: Floats, *, first: bool = False
-    ) -> DynamicCuts:
-        """Cuts with the modes of the workpiece in the state of each step, or before the first cut."""
-        assert self.workpiece is not None
-        hertz, shapes = self.workpiece.at_first(steps) if first else self.workpiece.at(steps)
+    def _with_modes(self, some: DynamicCuts, hertz: Floats, shapes: Floats, frame: Floats) -> DynamicCuts:
+        """Cuts with the modes of the workpiece, of each step."""
         U = np.einsum("cai,cik->cak", frame[:, :2], shapes)
         damping = np.full(hertz.shape[1], self.dynamics.workpiece_damping)
         return some.with_modes(damping, math.tau * hertz, U)

@@ -22,7 +22,7 @@ def presentation_of(walled: ThinWallResult) -> Presentation:
 def program_files(walled: ThinWallResult) -> dict[str, bytes]:
     """The program of each variant for the machine and as CL data; verified only the one in use, where it holds."""
     out: dict[str, bytes] = {}
-    c = walled.cutter
+    c = walled.planning.cutter
     for k, (name, one) in enumerate(walled.variants.items()):
         bad = failures_of(walled, one)
         released = name == USED and not bad
@@ -32,13 +32,13 @@ def program_files(walled: ThinWallResult) -> dict[str, bytes]:
         said += [
             f"T{c.number}: D {c.diameter:g} mm, corner {c.corner_radius:g} mm, {c.flutes} flutes, overhang "
             f"{c.overhang:g} mm",
-            f"Z 0 is the clamp, X along the wall, its sides towards Y+ and Y-; machine {walled.machine.name}",
+            f"Z 0 is the clamp, X along the wall, its sides towards Y+ and Y-; machine {walled.planning.machine.name}",
             f"G43 H{c.number} must be the overhang of {c.overhang:g} mm: the rotary axes turn about it",
         ]
         text = write_commands(
-            one.commands, walled.machine, title=title, verified=released, comments=said, number=100 + k
+            one.commands, walled.planning.machine, title=title, verified=released, comments=said, number=100 + k
         )
         stem = program_name(0, name)
-        out[f"{stem}.{ENDINGS[walled.machine.dialect]}"] = text.encode("ascii")
+        out[f"{stem}.{ENDINGS[walled.planning.machine.dialect]}"] = text.encode("ascii")
         out[f"{stem}.apt"] = write_apt(one.program, {c.number: c}, title=title, verified=released).encode("ascii")
     return out

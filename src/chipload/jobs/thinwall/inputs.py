@@ -47,47 +47,77 @@ GOUGE = 0.003
 
 
 @dataclass(frozen=True, eq=False)
-class WallInputs:
-    """Everything that planning and proof need, in mm, s, rad, N.
+class WallBody:
+    """The wall and its stock, in mm.
 
     Attributes
     ----------
+    shape : finished
+    allowance : on k- and k+
     side_numbers : of the sides that have stock, 0 for k-, 1 for k+
     foot : share of v that keeps its stock
-    places : u (n,) and v (m,) of the wall's places
-    law, even_law : F_n of depths on stock with the slope, and on even stock, both with cusps of ``scallop`` [mm]
-    experiments : None: thresholds are modelled
-    findings : while they were read
+    wall : its finite elements
+    places : u (n,) and v (m,) of them
     """
 
-    job: ThinWallJob
-    title: str
     shape: ThinWall
     allowance: tuple[float, float]
     side_numbers: tuple[int, ...]
     foot: float
     wall: Blank
     places: tuple[Floats, Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class WallCut:
+    """How the wall is cut, in mm, s, rad, N; rows leave cusps of ``scallop``, ``measure`` of the force counts."""
+
     cutter: Cutter
     material: Material
     machine: Machine
     posture: CutterPose
     pass_motion: PassMotion
     step_over: float
-    law: ForceTable
-    even_law: ForceTable
     scallop: float
     measure: Measure
+
+
+@dataclass(frozen=True, eq=False)
+class DepthRules:
+    """From what the depths of cut follow.
+
+    Attributes
+    ----------
+    law, even_law : F_n of depths on stock with the slope, and on even stock, both with cusps
+    slope : greatest change of depth along the surface
+    deflection : that is allowed [mm]
+    factor : of the thresholds, at most 1
+    experiments : None: thresholds are modelled
+    """
+
+    law: ForceTable
+    even_law: ForceTable
     slope: float
     deflection: float
     factor: float
     experiments: Experiments | None
+
+
+@dataclass(frozen=True, eq=False)
+class WallInputs:
+    """Everything that planning and proof need; ``findings``: while it was read."""
+
+    job: ThinWallJob
+    title: str
+    body: WallBody
+    cut: WallCut
+    depths: DepthRules
     findings: tuple[Finding, ...]
 
     @property
     def top(self) -> float:
         """Height of the wall [mm]."""
-        minus, plus = self.shape.sides(np.linspace(0.0, 1.0, 65), 1.0)
+        minus, plus = self.body.shape.sides(np.linspace(0.0, 1.0, 65), 1.0)
         return float(max(minus[:, 2].max(), plus[:, 2].max()))
 
     @property
@@ -98,30 +128,30 @@ class WallInputs:
     @property
     def foot_height(self) -> float:
         """Highest point of the foot [mm]."""
-        minus, plus = self.shape.sides(np.linspace(0.0, 1.0, 65), self.foot)
+        minus, plus = self.body.shape.sides(np.linspace(0.0, 1.0, 65), self.body.foot)
         return float(max(minus[:, 2].max(), plus[:, 2].max()))
 
     def coarse(self, side: int) -> FinishSurface:
         """Finish surface at the places."""
-        return self._surface(side, *self.places)
+        return self._surface(side, *self.body.places)
 
     def fine(self, side: int) -> FineSide:
         """Finish surface at contact points: a step apart along the wall, a row apart up it."""
-        u, v = np.linspace(0.0, 1.0, 65), np.linspace(self.foot, 1.0, 33)
+        u, v = np.linspace(0.0, 1.0, 65), np.linspace(self.body.foot, 1.0, 33)
         p = self._surface(side, u, v).points
         along = np.linalg.norm(np.diff(p, axis=0), axis=2).sum(axis=0).max()
         up = np.linalg.norm(np.diff(p, axis=1), axis=2).sum(axis=1).max()
         n = max(math.ceil(along / self.job.operation.step_mm), self._pieces(side), 2) + 1
-        m = math.ceil(up / abs(self.step_over)) + 1
-        u, v = np.linspace(0.0, 1.0, n), np.linspace(self.foot, 1.0, m)
+        m = math.ceil(up / abs(self.cut.step_over)) + 1
+        u, v = np.linspace(0.0, 1.0, n), np.linspace(self.body.foot, 1.0, m)
         return FineSide(self._surface(side, u, v), u, v)
 
     def _pieces(self, side: int) -> int:
         """Straight pieces along a row that stay within the chord's tolerance: the sag of one falls as its square."""
-        u, v = np.meshgrid(np.linspace(0.0, 1.0, 65), np.linspace(self.foot, 1.0, 17), indexing="ij")
-        p = self.shape.sides(u, v)[side]
+        u, v = np.meshgrid(np.linspace(0.0, 1.0, 65), np.linspace(self.body.foot, 1.0, 17), indexing="ij")
+        p = self.body.shape.sides(u, v)[side]
         a, b = p[:-1], p[1:]
-        middle = self.shape.sides(0.5 * (u[:-1] + u[1:]), v[1:])[side]
+        middle = self.body.shape.sides(0.5 * (u[:-1] + u[1:]), v[1:])[side]
         along = (b - a) / np.linalg.norm(b - a, axis=-1, keepdims=True)
         off = middle - a - ((middle - a) * along).sum(axis=-1, keepdims=True) * along
         sag = float(np.linalg.norm(off, axis=-1).max())
@@ -129,40 +159,46 @@ class WallInputs:
 
     def _surface(self, side: int, u: Floats, v: Floats) -> FinishSurface:
         a, b = np.meshgrid(u, v, indexing="ij")
-        return FinishSurface(self.shape.sides(a, b)[side], self.shape.normals(a, b)[side], self.allowance[side])
+        return FinishSurface(
+            self.body.shape.sides(a, b)[side], self.body.shape.normals(a, b)[side], self.body.allowance[side]
+        )
 
     def threshold(self, deflection: float) -> ThresholdOf:
         """Thresholds of the sides with stock under a deflection that is allowed [mm]."""
 
         def modelled(left: Sequence[Floats], side: int) -> Threshold:
-            return self.wall.threshold(self.both(left), SIDES[self.side_numbers[side]], deflection, self.factor)
+            return self.body.wall.threshold(
+                self.both(left), SIDES[self.body.side_numbers[side]], deflection, self.depths.factor
+            )
 
         def measured(left: Sequence[Floats], side: int) -> Threshold:
-            u, v = np.meshgrid(*self.places, indexing="ij")
+            u, v = np.meshgrid(*self.body.places, indexing="ij")
             place = np.stack([u.ravel(), v.ravel()], axis=1)
             table = stated(self.job.table.threshold, "threshold")
-            return calibrated(stated(self.experiments, "threshold"), place, table.deviations)
+            return calibrated(stated(self.depths.experiments, "threshold"), place, table.deviations)
 
-        return modelled if self.experiments is None else measured
+        return modelled if self.depths.experiments is None else measured
 
     def finished_threshold(self) -> Threshold:
         """Thresholds of the first side with stock when the wall is finished."""
-        return self.threshold(self.deflection)([np.zeros(self.wall.shape) for _ in self.side_numbers], 0)
+        return self.threshold(self.depths.deflection)(
+            [np.zeros(self.body.wall.shape) for _ in self.body.side_numbers], 0
+        )
 
     def both(self, left: Sequence[Floats]) -> list[Floats]:
         """Stock on k- and k+ of stock on the sides that have any."""
-        out = [np.zeros(self.wall.shape), np.zeros(self.wall.shape)]
-        for number, D in zip(self.side_numbers, left, strict=True):
+        out = [np.zeros(self.body.wall.shape), np.zeros(self.body.wall.shape)]
+        for number, D in zip(self.body.side_numbers, left, strict=True):
             out[number] = D
         return out
 
     def stock_mesh(self) -> trimesh.Trimesh:
         """The workpiece before it is cut."""
-        return self.shape.mesh(FACETS, self.allowance)
+        return self.body.shape.mesh(FACETS, self.body.allowance)
 
     def finished_mesh(self) -> trimesh.Trimesh:
         """The finished wall, from the clamp up."""
-        return self.shape.mesh(FACETS, (0.0, 0.0))
+        return self.body.shape.mesh(FACETS, (0.0, 0.0))
 
 
 def read_wall(job: ThinWallJob) -> WallInputs:
@@ -202,26 +238,32 @@ def read_wall(job: ThinWallJob) -> WallInputs:
     return WallInputs(
         job=job,
         title=title_of(job.path),
-        shape=shape,
-        allowance=table.wall.allowance_mm,
-        side_numbers=tuple(k for k, a in enumerate(table.wall.allowance_mm) if a > 0.0),
-        foot=foot,
-        wall=wall,
-        places=(np.linspace(0.0, 1.0, wall.shape[0]), np.linspace(foot, 1.0, wall.shape[1])),
-        cutter=cutter,
-        material=material,
-        machine=machine,
-        posture=posture,
-        pass_motion=PassMotion(posture, feed, machine.rapid, spindle, op.clearance_mm),
-        step_over=step,
-        law=law,
-        even_law=even,
-        scallop=scallop,
-        measure="greatest",
-        slope=op.slope,
-        deflection=table.limits.deflection_workpiece_um / 1000.0,
-        factor=1.0 - op.reserve,
-        experiments=experiments,
+        body=WallBody(
+            shape=shape,
+            allowance=table.wall.allowance_mm,
+            side_numbers=tuple(k for k, a in enumerate(table.wall.allowance_mm) if a > 0.0),
+            foot=foot,
+            wall=wall,
+            places=(np.linspace(0.0, 1.0, wall.shape[0]), np.linspace(foot, 1.0, wall.shape[1])),
+        ),
+        cut=WallCut(
+            cutter=cutter,
+            material=material,
+            machine=machine,
+            posture=posture,
+            pass_motion=PassMotion(posture, feed, machine.rapid, spindle, op.clearance_mm),
+            step_over=step,
+            scallop=scallop,
+            measure="greatest",
+        ),
+        depths=DepthRules(
+            law=law,
+            even_law=even,
+            slope=op.slope,
+            deflection=table.limits.deflection_workpiece_um / 1000.0,
+            factor=1.0 - op.reserve,
+            experiments=experiments,
+        ),
         findings=findings,
     )
 

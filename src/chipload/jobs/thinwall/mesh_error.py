@@ -43,18 +43,22 @@ def mesh_error(inputs: WallInputs, used: Floats, side: int) -> Floats:
     ----------
     side : index in the sides with stock
     """
-    wall, (u, v) = inputs.wall, inputs.places
+    wall, (u, v) = inputs.body.wall, inputs.body.places
     i, j, _ = wall.solid.grid.counts
-    up = np.concatenate([np.linspace(0.0, inputs.foot, wall.foot + 1)[:-1], v])
+    up = np.concatenate([np.linspace(0.0, inputs.body.foot, wall.foot + 1)[:-1], v])
     assert len(up) == j + 1
     spread = []
     for times in (1, 2):
         along = np.linspace(0.0, 1.0, times * i + 1)
         rows = np.interp(np.linspace(0.0, j, times * j + 1), np.arange(j + 1), up)
-        solid = finished_wall(inputs.shape, inputs.allowance, along, rows, times * wall.foot, times, wall.solid)
+        solid = finished_wall(
+            inputs.body.shape, inputs.body.allowance, along, rows, times * wall.foot, times, wall.solid
+        )
         a, b = np.meshgrid(u * times * i, np.interp(v, rows, np.arange(len(rows))), indexing="ij")
         b = np.maximum(b, times * wall.foot + ABOVE)
-        spread.append(spread_compliance(solid, a.ravel(), b.ravel(), inputs.side_numbers[side]).reshape(used.shape))
+        spread.append(
+            spread_compliance(solid, a.ravel(), b.ravel(), inputs.body.side_numbers[side]).reshape(used.shape)
+        )
     change = spread[1] - spread[0]
     most = spread[1] + (change + np.abs(change)) / 3.0
     return np.maximum(most / used - 1.0, 0.0)

@@ -104,16 +104,35 @@ class Help:
 
 
 @dataclass(frozen=True, eq=False)
+class VariantPlan:
+    """The plan of a variant.
+
+    Attributes
+    ----------
+    order : of the sides
+    passes_otherwise : passes in the other order, None: one side
+    limit : deflection [mm] that it was planned under; infinite: none
+    maps : a pass each, in the order of cutting
+    force, deflection : greatest [N], [mm]; None: compliance not known
+    infeasible : places that bear nothing
+    """
+
+    order: str
+    passes_otherwise: int | None
+    limit: float
+    maps: tuple[PassMap, ...]
+    force: float
+    deflection: float | None
+    infeasible: tuple[Help, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Variant:
     """One variant.
 
     Attributes
     ----------
     name : ``variable``, ``constant`` or ``unconstrained``
-    order : of the sides
-    passes_otherwise : passes in the other order, None: one side
-    held : deflection [mm] that it was planned under; infinite: none
-    maps : a pass each, in the order of cutting
     program : the whole of it
     commands : on the machine
     beyond : what the machine does not give
@@ -121,16 +140,11 @@ class Variant:
     columns : a row a step of the simulation
     finish : a finished side each
     shape : the simulated stock beside the finished wall
-    planned_force, planned_deflection : greatest [N], [mm]; None: compliance not known
-    infeasible : places that bear nothing
     stress : greatest equivalent stress at the clamp [MPa] under the simulated forces
     """
 
     name: str
-    order: str
-    passes_otherwise: int | None
-    held: float
-    maps: tuple[PassMap, ...]
+    plan: VariantPlan
     program: Program
     commands: Commands
     beyond: tuple[Finding, ...]
@@ -138,9 +152,6 @@ class Variant:
     columns: Mapping[str, NDArray[Any]]
     finish: tuple[Finish, ...]
     shape: Shape
-    planned_force: float
-    planned_deflection: float | None
-    infeasible: tuple[Help, ...]
     stress: float
 
     @property
@@ -167,42 +178,64 @@ class Variant:
 
 
 @dataclass(frozen=True, eq=False)
+class WallGeometry:
+    """The wall of a result.
+
+    Attributes
+    ----------
+    shape : finished
+    allowance : [mm] on k- and k+
+    stock, finished : (vertices (n, 3), faces (m, 3)) of the workpiece before, and of the finished wall
+    """
+
+    shape: ThinWall
+    allowance: tuple[float, float]
+    stock: tuple[Floats, NDArray[np.int64]]
+    finished: tuple[Floats, NDArray[np.int64]]
+
+
+@dataclass(frozen=True, eq=False)
+class WallPlanning:
+    """What the plans were made from.
+
+    Attributes
+    ----------
+    cutter, machine : of the operation
+    threshold_source, threshold_text : ``modelled`` or ``calibrated``, and a sentence
+    reserve : share by which the planner kept below the thresholds
+    step_over : [mm]
+    feed_per_tooth : [mm]
+    """
+
+    cutter: Cutter
+    machine: Machine
+    threshold_source: str
+    threshold_text: str
+    reserve: float
+    step_over: float
+    feed_per_tooth: float
+
+
+@dataclass(frozen=True, eq=False)
 class ThinWallResult:
     """A thin wall, cut.
 
     Attributes
     ----------
     title : of the job
-    wall : its finished shape
-    allowance : [mm] on k- and k+
-    stock, finished : (vertices (n, 3), faces (m, 3)) of the workpiece before, and of the finished wall
-    cutter, machine : of the operation
     limits, unchecked : stated limits by name, and names of those that are not stated
-    threshold_source, threshold_text : ``modelled`` or ``calibrated``, and a sentence
-    reserve : share by which the planner kept below the thresholds
-    step_over : [mm]
-    feed_per_tooth : [mm]
     variants : by name
-    findings : what was noticed
+    findings : what was found
     settings : JSON values
     checks : what is checked beside the stated limits
     provenance : where the numbers come from
     """
 
     title: str
-    wall: ThinWall
-    allowance: tuple[float, float]
-    stock: tuple[Floats, NDArray[np.int64]]
-    finished: tuple[Floats, NDArray[np.int64]]
-    cutter: Cutter
-    machine: Machine
+    geometry: WallGeometry
+    planning: WallPlanning
     limits: Mapping[str, float]
     unchecked: tuple[str, ...]
-    threshold_source: str
-    threshold_text: str
-    reserve: float
-    step_over: float
-    feed_per_tooth: float
     variants: Mapping[str, Variant]
     findings: tuple[Finding, ...]
     settings: Mapping[str, Any]

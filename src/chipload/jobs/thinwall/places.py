@@ -53,7 +53,7 @@ class Places:
 
     def coarse(self, left: Sequence[Floats]) -> list[Floats]:
         """Stock at the places of the elements, of stock at these."""
-        v = self.inputs.places[1]
+        v = self.inputs.body.places[1]
         return [np.array([np.interp(v, self.v, row) for row in D]) for D in left]
 
     def compliance(self, left: Sequence[Floats], side: int) -> Floats:
@@ -61,8 +61,10 @@ class Places:
         states = self.inputs.both(self.coarse(left))
         key = (b"".join(D.tobytes() for D in states), side)
         if key not in self._solved:
-            number = self.inputs.side_numbers[side]
-            self._solved[key] = self.inputs.wall.compliance(states, SIDES[number]).reshape(self.inputs.wall.shape)
+            number = self.inputs.body.side_numbers[side]
+            self._solved[key] = self.inputs.body.wall.compliance(states, SIDES[number]).reshape(
+                self.inputs.body.wall.shape
+            )
         return self._solved[key]
 
     def error(self, side: int) -> Floats:
@@ -82,26 +84,27 @@ class Places:
         u, v = (x.ravel() for x in np.meshgrid(self.u, self.v, indexing="ij"))
 
         def limited(left: Sequence[Floats], side: int) -> Threshold:
-            C = between(self.inputs.places, self.compliance(left, side), u, v)
+            C = between(self.inputs.body.places, self.compliance(left, side), u, v)
             if spare:
-                C *= 1.0 + error_at(self.inputs.places, self.error(side), u, v)
+                C *= 1.0 + error_at(self.inputs.body.places, self.error(side), u, v)
             return modelled(C, deflection, factor)
 
         def measured(left: Sequence[Floats], side: int) -> Threshold:
-            known = replace(self.inputs, places=self.grid).threshold(deflection)(left, side)
+            inputs = replace(self.inputs, body=replace(self.inputs.body, places=self.grid))
+            known = inputs.threshold(deflection)(left, side)
             return replace(known, force=factor * known.force, factor=factor * known.factor)
 
-        return limited if self.inputs.experiments is None else measured
+        return limited if self.inputs.depths.experiments is None else measured
 
 
 def places_of(inputs: WallInputs) -> Places:
     """The places; as many rows as the side with most of them has."""
-    u = inputs.places[0]
-    v = max((inputs.fine(s).v for s in inputs.side_numbers), key=len)
+    u = inputs.body.places[0]
+    v = max((inputs.fine(s).v for s in inputs.body.side_numbers), key=len)
     a, b = np.meshgrid(u, v, indexing="ij")
     surfaces = tuple(
-        FinishSurface(inputs.shape.sides(a, b)[s], inputs.shape.normals(a, b)[s], inputs.allowance[s])
-        for s in inputs.side_numbers
+        FinishSurface(inputs.body.shape.sides(a, b)[s], inputs.body.shape.normals(a, b)[s], inputs.body.allowance[s])
+        for s in inputs.body.side_numbers
     )
     return Places(inputs, u, v, surfaces)
 

@@ -77,7 +77,7 @@ def wall_stock(inputs: WallInputs) -> LayeredStock:
     InputError
         There are too many layers.
     """
-    op, cutter = inputs.job.operation, inputs.cutter
+    op, cutter = inputs.job.operation, inputs.cut.cutter
     stock = LayeredStock.of_mesh(inputs.stock_mesh(), COARSE * op.layer_mm, TILE * cutter.diameter)
     low = inputs.foot_height - cutter.corner_radius
     stock.refine(max(low, float(stock.bounds[0])), float(stock.bounds[-1]), op.layer_mm)
@@ -88,7 +88,7 @@ def resolution_of(inputs: WallInputs, legs: Sequence[PassProgram]) -> Resolution
     """How fine the simulation looks: a row of the passes is a step."""
     op = inputs.job.operation
     longest = max(float(np.linalg.norm(np.diff(leg.program.p_work, axis=0), axis=1).max()) for leg in legs)
-    return Resolution(max(longest, op.step_mm), op.tolerance_mm, op.corner_slices, 0.5 * inputs.cutter.radius)
+    return Resolution(max(longest, op.step_mm), op.tolerance_mm, op.corner_slices, 0.5 * inputs.cut.cutter.radius)
 
 
 def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats, progress: Progress) -> Proof:
@@ -99,11 +99,11 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
     times : (n,) float [s], time of each row of all passes, one after another, on the machine
     """
     inputs = places.inputs
-    cutter = inputs.cutter
+    cutter = inputs.cut.cutter
     stock, fine = wall_stock(inputs), resolution_of(inputs, legs)
     bars = {cutter.number: tool_bars(cutter)}
-    law = inputs.law if plan.name == "variable" else inputs.even_law
-    left = [np.full(places.shape, inputs.allowance[s]) for s in inputs.side_numbers]
+    law = inputs.depths.law if plan.name == "variable" else inputs.depths.even_law
+    left = [np.full(places.shape, inputs.body.allowance[s]) for s in inputs.body.side_numbers]
     parts: list[dict[str, NDArray[Any]]] = []
     thresholds: list[Floats] = []
     finish: dict[int, Finish] = {}
@@ -114,7 +114,7 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
             leg.program,
             stock,
             {cutter.number: cutter},
-            inputs.material,
+            inputs.cut.material,
             fine,
             keep=True,
             accuracy=False,
@@ -122,13 +122,13 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
             progress=lambda part, what, k=k: progress((k + part) / len(legs), f"pass {k + 1} of {len(legs)}"),  # type: ignore[misc]
         )
         left[p.side] = p.low
-        number = inputs.side_numbers[p.side]
+        number = inputs.body.side_numbers[p.side]
         C = places.compliance(left, p.side)
-        F_th = places.threshold(inputs.deflection, 1.0, spare=False)(left, p.side).force.reshape(places.shape)
+        F_th = places.threshold(inputs.depths.deflection, 1.0, spare=False)(left, p.side).force.reshape(places.shape)
         thresholds.append(F_th)
         error = places.error(p.side)
         columns = _columns(places, removal, leg, C, F_th, error, bars)
-        u, v = np.clip(columns["u"], 0.0, 1.0), np.clip(columns["v"], inputs.foot, 1.0)
+        u, v = np.clip(columns["u"], 0.0, 1.0), np.clip(columns["v"], inputs.body.foot, 1.0)
         share = RegularGridInterpolator(places.grid, plan.corrections[p.side])(np.column_stack([u, v]))
         columns["force_normal_planned_n"] = share * law.force(columns["depth_mm"])
         columns["t_s"] = columns["t_s"] + time
@@ -150,7 +150,7 @@ def _stress(inputs: WallInputs, left: Sequence[Floats], number: int, columns: Ma
     k = int(np.argmax(columns["force_normal_n"] * columns["contact_z_mm"]))
     if not columns["force_normal_n"][k] > 0.0:
         return 0.0
-    solid = inputs.wall.state(inputs.both(left))
+    solid = inputs.body.wall.state(inputs.both(left))
     grid = solid.grid
     places = on_side(grid, SIDES[number], [columns["u"][k]], [_rows(inputs, float(columns["v"][k])) / grid.counts[1]])
     places = on_cut(places, solid.kept, SIDES[number])
@@ -161,8 +161,8 @@ def _stress(inputs: WallInputs, left: Sequence[Floats], number: int, columns: Ma
 
 def _rows(inputs: WallInputs, v: float) -> float:
     """How many rows of elements a parameter v lies above the clamp."""
-    j = inputs.wall.solid.grid.counts[1]
-    return float(np.interp(v, [0.0, inputs.foot, 1.0], [0.0, inputs.wall.foot + 1e-9, j]))
+    j = inputs.body.wall.solid.grid.counts[1]
+    return float(np.interp(v, [0.0, inputs.body.foot, 1.0], [0.0, inputs.body.wall.foot + 1e-9, j]))
 
 
 def _columns(
@@ -189,16 +189,16 @@ def _columns(
         touched(removal, int(leg.program.line[0]), leg.contact, leg.points, leg.normals, known, within)
         for within in JUDGED
     ]
-    uv = [(np.clip(x[:, 0], 0.0, 1.0), np.clip(x[:, 1], inputs.foot, 1.0)) for _, x in spots]
-    gives = np.stack([between(inputs.places, C, u, v) for u, v in uv])
-    if inputs.experiments is None:
-        allowable = inputs.deflection / gives
+    uv = [(np.clip(x[:, 0], 0.0, 1.0), np.clip(x[:, 1], inputs.body.foot, 1.0)) for _, x in spots]
+    gives = np.stack([between(inputs.body.places, C, u, v) for u, v in uv])
+    if inputs.depths.experiments is None:
+        allowable = inputs.depths.deflection / gives
     else:
         allowable = np.stack([between(places.grid, F_th, u, v) for u, v in uv])
-    unsure = np.stack([error_at(inputs.places, error, u, v) for u, v in uv]).max(axis=0)
+    unsure = np.stack([error_at(inputs.body.places, error, u, v) for u, v in uv]).max(axis=0)
     place, values = spots[MIDDLE]
     u, v = uv[MIDDLE]
-    found = step_deflections(removal, inputs.material, place, work=gives.max(axis=0), bars=bars)
+    found = step_deflections(removal, inputs.cut.material, place, work=gives.max(axis=0), bars=bars)
     weakest, each = allowable.argmin(axis=0), np.arange(len(u))
     threshold = allowable[weakest, each]
     judged = np.stack([spot.point for spot, _ in spots])[weakest, each]
@@ -208,7 +208,7 @@ def _columns(
         "deflection_um": 1000.0 * found["deflection_mm"],
         "force_normal_n": found["force_normal_n"],
     }
-    columns |= check_columns(inputs.job.table.checks, removal.cuts, inputs.material, columns["deflection_um"])
+    columns |= check_columns(inputs.job.table.checks, removal.cuts, inputs.cut.material, columns["deflection_um"])
     at = place.step
     for name, given in (
         ("u", u),
@@ -232,19 +232,19 @@ def _finish(
 ) -> Finish:
     """Form error of a side by its last pass."""
     u, v = np.meshgrid(
-        np.linspace(0.02, 0.98, POINTS[0]), np.linspace(inputs.foot, 1.0, POINTS[1] + 1)[1:], indexing="ij"
+        np.linspace(0.02, 0.98, POINTS[0]), np.linspace(inputs.body.foot, 1.0, POINTS[1] + 1)[1:], indexing="ij"
     )
-    points, normals = inputs.shape.sides(u, v)[number], inputs.shape.normals(u, v)[number]
+    points, normals = inputs.body.shape.sides(u, v)[number], inputs.body.shape.normals(u, v)[number]
     found = form_error(
         removal,
-        inputs.material,
+        inputs.cut.material,
         points.reshape(-1, 3),
         normals.reshape(-1, 3),
-        work=between(inputs.places, C, u.ravel(), v.ravel()),
+        work=between(inputs.body.places, C, u.ravel(), v.ravel()),
         bars=bars,
-        near=0.5 * inputs.allowance[number],
+        near=0.5 * inputs.body.allowance[number],
     )
-    unsure = error_at(inputs.places, error, u.ravel(), v.ravel())
+    unsure = error_at(inputs.body.places, error, u.ravel(), v.ravel())
     shape = u.shape
     return Finish(
         number,
@@ -258,14 +258,14 @@ def _finish(
 
 def _shape(inputs: WallInputs, stock: LayeredStock, legs: Sequence[PassProgram]) -> Shape:
     """Path and stock beside the finished wall."""
-    length, height, _ = inputs.shape.size()
+    length, height, _ = inputs.body.shape.size()
     u, v = np.meshgrid(
         np.linspace(0.0, 1.0, round(length / CLOUD) + 1),
         np.linspace(0.0, 1.0, round(height / CLOUD) + 1),
         indexing="ij",
     )
-    cloud = np.concatenate([p.reshape(-1, 3) for p in inputs.shape.sides(u, v)])
-    gap = nearest(Program.join([leg.program for leg in legs]), inputs.cutter, cloud)
-    found = beside(stock, inputs.finished_mesh(), inputs.foot_height + inputs.cutter.corner_radius)
+    cloud = np.concatenate([p.reshape(-1, 3) for p in inputs.body.shape.sides(u, v)])
+    gap = nearest(Program.join([leg.program for leg in legs]), inputs.cut.cutter, cloud)
+    found = beside(stock, inputs.finished_mesh(), inputs.foot_height + inputs.cut.cutter.corner_radius)
     at = found.at if found.gouge > -gap.distance else gap.at
     return Shape(found.gouge, found.left, at, found.points, gap.distance)

@@ -65,7 +65,7 @@ def limits_of(walled: ThinWallResult, one: Variant) -> tuple[LimitCheck, ...]:
     gouge, tolerance = max(one.shape.gouge, -one.shape.nearest, 0.0), float(walled.settings["gouge_tolerance_mm"])
     place = (float(one.shape.at[0]), float(one.shape.at[1]), float(one.shape.at[2]))
     out.append(LimitCheck("gouge_mm", tolerance, gouge, state_of(gouge, tolerance)[0], one.name, place=place))
-    return (*out, *default_limits(walled.checks, walled.machine, c, one.name, {}))
+    return (*out, *default_limits(walled.checks, walled.planning.machine, c, one.name, {}))
 
 
 def mesh_error_of(walled: ThinWallResult, name: str, columns: Mapping[str, NDArray[Any]]) -> float:
@@ -73,7 +73,7 @@ def mesh_error_of(walled: ThinWallResult, name: str, columns: Mapping[str, NDArr
 
     Thresholds that experiments gave have none of it.
     """
-    if name not in OF_COMPLIANCE or (name == "force_over_allowable" and walled.threshold_source != "modelled"):
+    if name not in OF_COMPLIANCE or (name == "force_over_allowable" and walled.planning.threshold_source != "modelled"):
         return 0.0
     values = np.abs(columns[name])
     return _growth(values, columns["compliance_error"])
@@ -88,10 +88,10 @@ def _growth(values: Floats, error: Floats) -> float:
 def findings_of(walled: ThinWallResult, one: Variant) -> tuple[Finding, ...]:
     """What was found in a variant beside its limits."""
     out = list(one.beyond)
-    if one.infeasible:
-        worst = min(one.infeasible, key=lambda h: h.force_allowable_n)
+    if one.plan.infeasible:
+        worst = min(one.plan.infeasible, key=lambda h: h.force_allowable_n)
         text = (
-            f"{len(one.infeasible)} places do not allow even the smallest depth of cut: allowable force "
+            f"{len(one.plan.infeasible)} places do not allow even the smallest depth of cut: allowable force "
             f"{worst.force_allowable_n:.4g} N, needed {worst.force_n:.4g} N: {helps(worst)}"
         )
         out.append(Finding("thinwall-infeasible", 0, text, Severity.EXCEEDS, worst.at))
@@ -122,7 +122,7 @@ def _track(walled: ThinWallResult, one: Variant) -> Track:
         time_s=one.seconds,
         limits=limits_of(walled, one),
         findings=findings_of(walled, one),
-        programs=(f"{stem}.{ENDINGS[walled.machine.dialect]}", f"{stem}.apt"),
+        programs=(f"{stem}.{ENDINGS[walled.planning.machine.dialect]}", f"{stem}.apt"),
         blocks=in_memory({name: values for name, values in columns.items() if name not in DROPPED}),
     )
 
@@ -149,12 +149,12 @@ def _operation(walled: ThinWallResult, v: Variant) -> dict[str, Any]:
     return {
         "kind": "thinwall",
         "in_use": USED,
-        "wall": walled.wall.name,
-        "threshold_source": walled.threshold_source,
-        "threshold": walled.threshold_text,
-        "reserve": walled.reserve,
-        "step_over_mm": walled.step_over,
-        "feed_per_tooth_mm": walled.feed_per_tooth,
+        "wall": walled.geometry.shape.name,
+        "threshold_source": walled.planning.threshold_source,
+        "threshold": walled.planning.threshold_text,
+        "reserve": walled.planning.reserve,
+        "step_over_mm": walled.planning.step_over,
+        "feed_per_tooth_mm": walled.planning.feed_per_tooth,
         "time_constant_over_variable": c.seconds / v.seconds,
         "variants": {name: _variant(one) for name, one in walled.variants.items()},
         "infeasible": [
@@ -167,7 +167,7 @@ def _operation(walled: ThinWallResult, v: Variant) -> dict[str, Any]:
                 "diameter_mm": h.diameter_mm,
                 "helps": helps(h),
             }
-            for h in v.infeasible
+            for h in v.plan.infeasible
         ],
         "settings": dict(walled.settings),
     }
@@ -179,21 +179,21 @@ def _variant(one: Variant) -> dict[str, Any]:
     known = cuts & (c["force_normal_planned_n"] > 0.0)
     ratio = c["force_normal_n"][known] / c["force_normal_planned_n"][known]
     return {
-        "passes": len(one.maps),
+        "passes": len(one.plan.maps),
         "time_min": one.seconds / 60.0,
         "deflection_workpiece_um_max": 1000.0 * one.deflection,
         "form_error_um_max": 1000.0 * one.error,
         "force_normal_n_max": one.force,
-        "order": one.order,
-        "passes_in_the_other_order": one.passes_otherwise,
+        "order": one.plan.order,
+        "passes_in_the_other_order": one.plan.passes_otherwise,
         "planned": {
-            "deflection_workpiece_um_allowed": 1000.0 * one.held if np.isfinite(one.held) else None,
-            "deflection_workpiece_um_max": None if one.planned_deflection is None else 1000.0 * one.planned_deflection,
-            "force_normal_n_max": one.planned_force,
+            "deflection_workpiece_um_allowed": 1000.0 * one.plan.limit if np.isfinite(one.plan.limit) else None,
+            "deflection_workpiece_um_max": None if one.plan.deflection is None else 1000.0 * one.plan.deflection,
+            "force_normal_n_max": one.plan.force,
         },
         "depth_mm": {
-            "min": min(float(m.depth[m.depth > 0.0].min()) for m in one.maps if (m.depth > 0.0).any()),
-            "max": max(float(m.depth.max()) for m in one.maps),
+            "min": min(float(m.depth[m.depth > 0.0].min()) for m in one.plan.maps if (m.depth > 0.0).any()),
+            "max": max(float(m.depth.max()) for m in one.plan.maps),
         },
         "contact_points": int(cuts.sum()),
         "force_over_allowable_max": float(c["force_over_allowable"].max(initial=0.0)),
@@ -230,7 +230,7 @@ def _maps(walled: ThinWallResult) -> list[SurfaceMap]:
         for one in walled.variants.values()
         for f in one.finish
     ]
-    for k, m in enumerate(walled.variants[USED].maps):
+    for k, m in enumerate(walled.variants[USED].plan.maps):
         for column, values in (("depth_mm", m.depth), ("force_allowable_n", m.threshold)):
             name = f"{column}, pass {k + 1}, side {m.side + 1}"
             points = np.asarray(m.points).reshape(-1, 3)

@@ -16,7 +16,16 @@ from chipload.jobs.checks import default_checks
 from chipload.jobs.provenance import provenance_of, title_of
 from chipload.jobs.thinwall.inputs import WallInputs, read_wall
 from chipload.jobs.thinwall.job import ThinWallJob
-from chipload.jobs.thinwall.outcome import OVER, Help, PassMap, ThinWallResult, Variant
+from chipload.jobs.thinwall.outcome import (
+    OVER,
+    Help,
+    PassMap,
+    ThinWallResult,
+    Variant,
+    VariantPlan,
+    WallGeometry,
+    WallPlanning,
+)
 from chipload.jobs.thinwall.places import Places, places_of
 from chipload.jobs.thinwall.proof import Proof, prove, resolution_of, wall_stock
 from chipload.machine.limits import limit_findings
@@ -91,32 +100,37 @@ def run(job: ThinWallJob, progress: Progress = silent) -> ThinWallResult:
         "yield_mpa": job.table.workpiece.yield_mpa,
         "simulated_tries": tried.variable,
     }
+    cut = inputs.cut
     return ThinWallResult(
         title=title_of(job.path),
-        wall=inputs.shape,
-        allowance=inputs.allowance,
-        stock=(np.asarray(body.vertices), np.asarray(body.faces)),
-        finished=(np.asarray(finished.vertices), np.asarray(finished.faces)),
-        cutter=inputs.cutter,
-        machine=inputs.machine,
+        geometry=WallGeometry(
+            shape=inputs.body.shape,
+            allowance=inputs.body.allowance,
+            stock=(np.asarray(body.vertices), np.asarray(body.faces)),
+            finished=(np.asarray(finished.vertices), np.asarray(finished.faces)),
+        ),
+        planning=WallPlanning(
+            cutter=cut.cutter,
+            machine=cut.machine,
+            threshold_source=text.source,
+            threshold_text=text.text,
+            reserve=job.operation.reserve,
+            step_over=abs(cut.step_over),
+            feed_per_tooth=cut.posture.feed_per_tooth,
+        ),
         limits=job.limits,
         unchecked=job.unchecked,
-        threshold_source=text.source,
-        threshold_text=text.text,
-        reserve=job.operation.reserve,
-        step_over=abs(inputs.step_over),
-        feed_per_tooth=inputs.posture.feed_per_tooth,
         variants=made,
         findings=_findings(inputs),
         settings=settings,
-        checks=default_checks(job.table.checks, {inputs.cutter.number: inputs.cutter}, inputs.material, 0.5),
+        checks=default_checks(job.table.checks, {cut.cutter.number: cut.cutter}, cut.material, 0.5),
         provenance=_provenance(job, inputs),
     )
 
 
 def _thick_enough(inputs: WallInputs) -> None:
     """Refuse a finished wall that is thinner than what is cut off it at once."""
-    thickness, deepest = inputs.shape.size()[2], min(inputs.law.limits.greatest, max(inputs.allowance))
+    thickness, deepest = inputs.body.shape.size()[2], min(inputs.depths.law.limits.greatest, max(inputs.body.allowance))
     if not thickness >= deepest:
         raise InputError(
             f"wall: {thickness:.4g} mm thick where it is thinnest, thinner than a cut of {deepest:g} mm: state less "
@@ -140,17 +154,17 @@ def check(job: ThinWallJob) -> tuple[list[str], bool]:
     program = Program.join([leg.program for leg in legs])
     _on_machine(inputs, program)
     wall_stock(inputs)
-    count = counted(program, {inputs.cutter.number: inputs.cutter}, resolution_of(inputs, legs))
-    length, height, thickness = inputs.shape.size()
-    nodes = len(inputs.wall.solid.grid.nodes)
-    bearing = inputs.finished_threshold()
+    count = counted(program, {inputs.cut.cutter.number: inputs.cut.cutter}, resolution_of(inputs, legs))
+    length, height, thickness = inputs.body.shape.size()
+    nodes = len(inputs.body.wall.solid.grid.nodes)
+    bearing, law = inputs.finished_threshold(), inputs.depths.law
     lines = [
         *map(str, _findings(inputs)),
-        f"{job.path.name}: {inputs.shape.name}: {length:.4g} mm long, {height:.4g} mm high, at least "
-        f"{thickness:.4g} mm thick; {len(inputs.wall.solid.grid.elements)} elements, {nodes} nodes",
-        f"threshold of the finished side {SIDES[inputs.side_numbers[0]]}, {bearing.source}: {bearing.force.min():.4g} "
-        f"to {bearing.force.max():.4g} N; normal force {inputs.law.forces[0]:.4g} N at {inputs.law.depths[0]:g} mm, "
-        f"{inputs.law.forces[-1]:.4g} N at {inputs.law.depths[-1]:g} mm",
+        f"{job.path.name}: {inputs.body.shape.name}: {length:.4g} mm long, {height:.4g} mm high, at least "
+        f"{thickness:.4g} mm thick; {len(inputs.body.wall.solid.grid.elements)} elements, {nodes} nodes",
+        f"threshold of the finished side {SIDES[inputs.body.side_numbers[0]]}, {bearing.source}: "
+        f"{bearing.force.min():.4g} to {bearing.force.max():.4g} N; normal force {law.forces[0]:.4g} N at "
+        f"{law.depths[0]:g} mm, {law.forces[-1]:.4g} N at {law.depths[-1]:g} mm",
         f"{VARIANTS} variants or more; the unconstrained one: {estimate(count, 0)}",
     ]
     return lines, True
@@ -170,13 +184,14 @@ def propose(
     InputError
         A file cannot be read, values do not go together, or a site bears not even the smallest depth.
     """
-    inputs = replace(read_wall(job), experiments=None)
-    u, v = np.meshgrid(*inputs.places, indexing="ij")
-    points = inputs.coarse(inputs.side_numbers[0]).points.reshape(-1, 3)
+    inputs = read_wall(job)
+    inputs = replace(inputs, depths=replace(inputs.depths, experiments=None))
+    u, v = np.meshgrid(*inputs.body.places, indexing="ij")
+    points = inputs.coarse(inputs.body.side_numbers[0]).points.reshape(-1, 3)
     places = np.column_stack([u.ravel(), v.ravel()])
     modelled = inputs.finished_threshold().force.ravel()
     return propose_cuts(
-        places, points, modelled, inputs.law, sites, scatter, bracket=bracket, steps=steps, repeats=repeats,
+        places, points, modelled, inputs.depths.law, sites, scatter, bracket=bracket, steps=steps, repeats=repeats,
         progress=progress,
     )  # fmt: skip
 
@@ -206,7 +221,9 @@ class _Tried:
 
 def _unlimited(places: Places) -> Planned:
     inputs = places.inputs
-    return unlimited(places.surfaces, places.threshold(inputs.deflection, inputs.factor), inputs.even_law)
+    return unlimited(
+        places.surfaces, places.threshold(inputs.depths.deflection, inputs.depths.factor), inputs.depths.even_law
+    )
 
 
 def _constant(tried: _Tried, free: Variant) -> tuple[Variant, tuple[Floats, ...]]:
@@ -214,12 +231,12 @@ def _constant(tried: _Tried, free: Variant) -> tuple[Variant, tuple[Floats, ...]
     corrections of the force in even stock that the greatest one gave.
     """
     places = tried.places
-    inputs, law = places.inputs, places.inputs.even_law
-    threshold_of = places.threshold(inputs.deflection, inputs.factor)
+    inputs, law = places.inputs, places.inputs.depths.even_law
+    threshold_of = places.threshold(inputs.depths.deflection, inputs.depths.factor)
     at_most = _measured(places, free, law, tuple(np.ones(places.shape) for _ in places.surfaces))
     corrections = at_most
     for turn in range(CONSTANTS):
-        planned = even(places.surfaces, threshold_of, law, inputs.deflection, corrections)
+        planned = even(places.surfaces, threshold_of, law, inputs.depths.deflection, corrections)
         constant = tried.prove(planned, 0.4)
         if not len(constant.over) or turn == CONSTANTS - 1 or _smallest(places, planned):
             break
@@ -230,7 +247,9 @@ def _constant(tried: _Tried, free: Variant) -> tuple[Variant, tuple[Floats, ...]
 
 def _smallest(places: Places, planned: Planned) -> bool:
     """Whether the passes are as thin as they may be."""
-    return max(float(p.depth.max()) for p in planned.plan.passes) <= places.inputs.law.limits.smallest * (1.0 + 1e-9)
+    return max(float(p.depth.max()) for p in planned.plan.passes) <= places.inputs.depths.law.limits.smallest * (
+        1.0 + 1e-9
+    )
 
 
 def _variable(tried: _Tried, corrections: tuple[Floats, ...]) -> Variant:
@@ -243,15 +262,19 @@ def _variable(tried: _Tried, corrections: tuple[Floats, ...]) -> Variant:
     """
     places = tried.places
     inputs = places.inputs
-    modelled, held = inputs.experiments is None, inputs.deflection
+    modelled, held = inputs.depths.experiments is None, inputs.depths.deflection
     best: Variant | None = None
     least: list[tuple[float, Variant]] = []  # of those that exceed, the one that exceeds least
     share = 1.0
     for turn in range(TRIES):
         threshold_of = (
-            places.threshold(share * held, inputs.factor) if modelled else places.threshold(held, share * inputs.factor)
+            places.threshold(share * held, inputs.depths.factor)
+            if modelled
+            else places.threshold(held, share * inputs.depths.factor)
         )
-        planned = limited_to(places.surfaces, threshold_of, inputs.law, inputs.slope, share * held, corrections)
+        planned = limited_to(
+            places.surfaces, threshold_of, inputs.depths.law, inputs.depths.slope, share * held, corrections
+        )
         if best is not None and _seconds(places, planned) > FASTER * best.seconds:
             break
         one = tried.prove(planned, 0.4)
@@ -265,7 +288,7 @@ def _variable(tried: _Tried, corrections: tuple[Floats, ...]) -> Variant:
             least = [min([*least, (over, one)], key=lambda pair: pair[0])]
         if best is not None and turn >= ROUNDS - 1:
             break
-        measured = _measured(places, one, inputs.law, corrections)
+        measured = _measured(places, one, inputs.depths.law, corrections)
         if not good:
             measured = tuple(np.maximum(c, m) for c, m in zip(corrections, measured, strict=True))
             share *= HOLD / over if turn >= ROUNDS - 1 else 1.0
@@ -293,13 +316,13 @@ def _measured(places: Places, one: Variant, law: ForceTable, before: tuple[Float
 
 def _linked(inputs: WallInputs, plan: Plan, places: tuple[Floats, Floats] | None = None) -> tuple[PassProgram, ...]:
     """The way of a plan at these places, u and v; None: those of the elements."""
-    sides = [inputs.fine(s) for s in inputs.side_numbers]
-    cutter = inputs.cutter
-    allowance = max(inputs.allowance)
+    sides = [inputs.fine(s) for s in inputs.body.side_numbers]
+    cutter = inputs.cut.cutter
+    allowance = max(inputs.body.allowance)
     reach = math.sqrt(2.0 * cutter.corner_radius * allowance)
-    sag = SAG * (inputs.pass_motion.clearance - allowance)
+    sag = SAG * (inputs.cut.pass_motion.clearance - allowance)
     margins = Margins(BEYOND + reach, inputs.top + SAFE * cutter.radius, sag)
-    return link_passes(plan.passes, sides, places or inputs.places, inputs.pass_motion, margins)
+    return link_passes(plan.passes, sides, places or inputs.body.places, inputs.cut.pass_motion, margins)
 
 
 def _variant(places: Places, planned: Planned, program: Program, run: _OnMachine, proof: Proof) -> Variant:
@@ -310,10 +333,15 @@ def _variant(places: Places, planned: Planned, program: Program, run: _OnMachine
     )
     return Variant(
         plan.name,
-        planned.order,
-        planned.passes_otherwise,
-        planned.deflection,
-        maps,
+        VariantPlan(
+            planned.order,
+            planned.passes_otherwise,
+            planned.deflection,
+            maps,
+            plan.force_max,
+            plan.deflection_max,
+            _infeasible(places, plan, planned.deflection) if plan.name == "variable" else (),
+        ),
         program,
         run.commands,
         run.exceeding,
@@ -321,9 +349,6 @@ def _variant(places: Places, planned: Planned, program: Program, run: _OnMachine
         proof.columns,
         proof.finish,
         proof.shape,
-        plan.force_max,
-        plan.deflection_max,
-        _infeasible(places, plan, planned.deflection) if plan.name == "variable" else (),
         proof.stress,
     )
 
@@ -339,8 +364,8 @@ class _OnMachine:
 
 def _on_machine(inputs: WallInputs, program: Program) -> _OnMachine:
     """What the axes do for a program."""
-    machine: Machine = inputs.machine
-    lengths = {inputs.cutter.number: inputs.cutter.overhang}
+    machine: Machine = inputs.cut.machine
+    lengths = {inputs.cut.cutter.number: inputs.cut.cutter.overhang}
     commands, _ = to_axes(program, machine, tool_lengths=lengths)
     axes = axes_of(commands, machine)
     broken = [*check_program(program, machine), *limit_findings(machine, axes, commands.line, placed=False)]
@@ -361,18 +386,20 @@ def _infeasible(places: Places, plan: Plan, held: float) -> tuple[Help, ...]:
                 key = (side, i, j)
                 least[key] = min(least.get(key, math.inf), float(force[i, j]))
     keys = sorted(least)
-    limits = inputs.law.limits
-    plane = float(normal_force(inputs.posture, inputs.material, [limits.smallest], measure=inputs.measure)[0])
-    share = plane / float(inputs.law.forces[0])  # what helps is asked of plane stock
-    if inputs.experiments is None:  # the plan may be held to less than the limit
-        least = {key: force * inputs.deflection / held for key, force in least.items()}
+    limits = inputs.depths.law.limits
+    plane = float(
+        normal_force(inputs.cut.posture, inputs.cut.material, [limits.smallest], measure=inputs.cut.measure)[0]
+    )
+    share = plane / float(inputs.depths.law.forces[0])  # what helps is asked of plane stock
+    if inputs.depths.experiments is None:  # the plan may be held to less than the limit
+        least = {key: force * inputs.depths.deflection / held for key, force in least.items()}
     shares = [share / float(plan.corrections[side][i, j]) for side, i, j in keys]
     asked = largest_depths(
-        inputs.posture,
-        inputs.material,
+        inputs.cut.posture,
+        inputs.cut.material,
         [s * least[k] for s, k in zip(shares, keys, strict=True)],
         limits,
-        measure=inputs.measure,
+        measure=inputs.cut.measure,
     )
     out = []
     for one in asked.infeasible:
@@ -385,8 +412,8 @@ def _infeasible(places: Places, plan: Plan, held: float) -> tuple[Help, ...]:
 
 def _findings(inputs: WallInputs) -> tuple[Finding, ...]:
     """What asks more of the coefficients than they were measured for, and what the experiments' reader noticed."""
-    speed = inputs.pass_motion.spindle * inputs.cutter.radius * math.sin(inputs.posture.beta)
-    asked = beyond(inputs.material, inputs.posture.feed_per_tooth, speed)
+    speed = inputs.cut.pass_motion.spindle * inputs.cut.cutter.radius * math.sin(inputs.cut.posture.beta)
+    asked = beyond(inputs.cut.material, inputs.cut.posture.feed_per_tooth, speed)
     beyond_range = (Finding("chip-beyond-coefficients", 0, text, Severity.UNPROVEN) for text in asked)
     return (*beyond_range, *inputs.findings)
 
@@ -397,4 +424,4 @@ def _provenance(job: ThinWallJob, inputs: WallInputs) -> Provenance:
     files |= {k: v for k, v in named.items() if isinstance(v, Path)}
     files |= {f"section {k}": f for k, f in enumerate(job.section_files)}
     files |= {f"cutter {k}": job.path.parent / c.file for k, c in enumerate(job.table.cutter) if c.file is not None}
-    return provenance_of(files, job.overrides, inputs.machine, (inputs.material,))
+    return provenance_of(files, job.overrides, inputs.cut.machine, (inputs.cut.material,))

@@ -20,8 +20,8 @@ def scene_bytes(walled: ThinWallResult) -> bytes:
     """scene.glb."""
     scene = trimesh.Scene()
     for (vertices, faces), name, colour in (
-        (walled.finished, "wall", WALL),
-        (walled.stock, "stock", STOCK),
+        (walled.geometry.finished, "wall", WALL),
+        (walled.geometry.stock, "stock", STOCK),
     ):
         mesh = trimesh.Trimesh(vertices, faces, process=False)
         mesh.visual.face_colors = np.tile(np.array(colour, dtype=np.uint8), (len(faces), 1))
@@ -63,7 +63,7 @@ def _path(one: Variant, deepest: float) -> Any:
 def _tool(walled: ThinWallResult) -> Any:
     """The cutter at the first contact point of the variant in use."""
     program = walled.variants[USED].program
-    c = walled.cutter
+    c = walled.planning.cutter
     k = int(np.flatnonzero(program.feed > 0.0)[0])
     z = np.linspace(0.0, c.flute_length, 33)
     outline = np.column_stack([c.radius_at(z), z])

@@ -24,14 +24,15 @@ MAPS = 12
 def sections_of(walled: ThinWallResult, figures: dict[str, go.Figure]) -> list[str]:
     """The sections of the report; figures are put among ``figures``."""
     used = walled.variants[USED]
-    c = walled.cutter
-    length, height, thickness = walled.wall.size()
+    c = walled.planning.cutter
+    geometry, planning = walled.geometry, walled.planning
+    length, height, thickness = geometry.shape.size()
     body = [
-        f"<h2>Operation 0: {escape(walled.wall.name)}</h2>",
+        f"<h2>Operation 0: {escape(geometry.shape.name)}</h2>",
         f"<p>{length:.4g} mm long, {height:.4g} mm high, at least {thickness:.4g} mm thick when finished, clamped at "
-        f"z = 0; {walled.allowance[0]:g} and {walled.allowance[1]:g} mm of stock on its sides. Cutter {c.number}: "
-        f"D {c.diameter:g} mm, corner {c.corner_radius:g} mm, {c.flutes} flutes; rows {walled.step_over:.4g} mm apart, "
-        f"{walled.feed_per_tooth:.4g} mm a tooth.</p>",
+        f"z = 0; {geometry.allowance[0]:g} and {geometry.allowance[1]:g} mm of stock on its sides. Cutter {c.number}: "
+        f"D {c.diameter:g} mm, corner {c.corner_radius:g} mm, {c.flutes} flutes; rows {planning.step_over:.4g} mm "
+        f"apart, {planning.feed_per_tooth:.4g} mm a tooth.</p>",
         f'<p class="note">{escape(", ".join(f"{k} {value_text(v)}" for k, v in walled.settings.items()))}</p>',
         "<h3>Variants</h3>",
         '<p class="note">Variable: the greatest depth that each place allows. Constant: one depth everywhere '
@@ -40,19 +41,19 @@ def sections_of(walled: ThinWallResult, figures: dict[str, go.Figure]) -> list[s
         _variants(walled),
         figure("bars", _bars(walled), figures),
         "<h3>Allowable normal force</h3>",
-        f"<p>{escape(walled.threshold_text[:1].upper() + walled.threshold_text[1:])}. The planner keeps "
-        f"{100.0 * walled.reserve:g} % below it; its force is corrected, place by place, by what the simulation of "
+        f"<p>{escape(planning.threshold_text[:1].upper() + planning.threshold_text[1:])}. The planner keeps "
+        f"{100.0 * planning.reserve:g} % below it; its force is corrected, place by place, by what the simulation of "
         f"the plan before found: the simulated force is {_agreement(used)} of the planned one.</p>",
         figure("threshold", _thresholds(used), figures),
         "<h3>Depth of each pass</h3>",
-        f'<p class="note">Variable, in the order of cutting; sides {escape(used.order)}.'
-        f"{f' The first {MAPS} of {len(used.maps)} passes.' if len(used.maps) > MAPS else ''}</p>",
+        f'<p class="note">Variable, in the order of cutting; sides {escape(used.plan.order)}.'
+        f"{f' The first {MAPS} of {len(used.plan.maps)} passes.' if len(used.plan.maps) > MAPS else ''}</p>",
         figure(
             "depth",
             maps(
-                [m.depth for m in used.maps[:MAPS]],
-                [m.points for m in used.maps[:MAPS]],
-                [f"pass {k + 1}, side {m.side + 1}" for k, m in enumerate(used.maps[:MAPS])],
+                [m.depth for m in used.plan.maps[:MAPS]],
+                [m.points for m in used.plan.maps[:MAPS]],
+                [f"pass {k + 1}, side {m.side + 1}" for k, m in enumerate(used.plan.maps[:MAPS])],
                 "mm",
             ),
             figures,
@@ -61,7 +62,7 @@ def sections_of(walled: ThinWallResult, figures: dict[str, go.Figure]) -> list[s
         figure("along", along(walled), figures),
         "<h3>The finished surface</h3>",
         '<p class="note">Form error by the deflection of cutter and wall at the moment each point is made; blue: '
-        "material is left. Cusps between rows are not in it. Every pass meets what the passes before "
+        "material is left. Scallops between rows are not in it. Every pass meets what the passes before "
         "were planned to leave.</p>",
     ]
     finish = [(f"{name}, side {f.side + 1}", f) for name, v in walled.variants.items() for f in v.finish]
@@ -96,7 +97,7 @@ def _variants(walled: ThinWallResult) -> str:
             [
                 f'<span class="dot" style="background:{COLOURS[name]}"></span>{name}'
                 + (" <b>in use</b>" if name == USED else ""),
-                str(len(one.maps)),
+                str(len(one.plan.maps)),
                 f"{one.seconds / 60.0:.4g}",
                 f"{1000.0 * one.deflection:.4g}",
                 f"{1000.0 * one.error:.4g}",
@@ -115,7 +116,7 @@ def _bars(walled: ThinWallResult) -> go.Figure:
     return bars(
         {
             "time [min]": {n: o.seconds / 60.0 for n, o in v.items()},
-            "passes": {n: float(len(o.maps)) for n, o in v.items()},
+            "passes": {n: float(len(o.plan.maps)) for n, o in v.items()},
             "workpiece deflection [µm]": {n: 1000.0 * o.deflection for n, o in v.items()},
             "form error [µm]": {n: 1000.0 * o.error for n, o in v.items()},
         }
@@ -139,8 +140,8 @@ def _agreement(one: Variant) -> str:
 def _thresholds(one: Variant) -> go.Figure:
     """The last pass of each side, on the finished wall, and the first."""
     chosen, titles = [], []
-    for side in sorted({m.side for m in one.maps}):
-        own = [(k, m) for k, m in enumerate(one.maps) if m.side == side]
+    for side in sorted({m.side for m in one.plan.maps}):
+        own = [(k, m) for k, m in enumerate(one.plan.maps) if m.side == side]
         for word, (k, m) in (("first", own[0]), ("last", own[-1])):
             chosen.append(m)
             titles.append(f"{SIDE_NAMES[m.side].split(',')[0]}, {word} pass ({k + 1})")
@@ -148,7 +149,7 @@ def _thresholds(one: Variant) -> go.Figure:
 
 
 def _infeasible(one: Variant) -> list[str]:
-    if not one.infeasible:
+    if not one.plan.infeasible:
         return ["<h3>Places that allow no cut</h3>", "<p>None: every place allows at least the smallest depth.</p>"]
     rows = [
         [
@@ -160,7 +161,7 @@ def _infeasible(one: Variant) -> list[str]:
             "" if h.diameter_mm is None else f"{h.diameter_mm:.4g}",
             escape(helps(h)),
         ]
-        for h in sorted(one.infeasible, key=lambda h: h.force_allowable_n)[:LISTED]
+        for h in sorted(one.plan.infeasible, key=lambda h: h.force_allowable_n)[:LISTED]
     ]
     head = [
         "side",
@@ -171,7 +172,7 @@ def _infeasible(one: Variant) -> list[str]:
         "cutter D [mm]",
         "remedy",
     ]
-    more = len(one.infeasible) - len(rows)
+    more = len(one.plan.infeasible) - len(rows)
     note = [f'<p class="note">{more} more in summary.json.</p>'] if more > 0 else []
     return ["<h3>Places that allow no cut</h3>", table(head, rows, numbers=(0, 1, 2, 3, 4, 5)), *note]
 

@@ -138,8 +138,8 @@ def space(walled: ThinWallResult, one: Variant) -> go.Figure:
     """The finished wall, the workpiece before, and the contact points coloured by depth."""
     out = go.Figure()
     for (vertices, faces), name, colour, opacity in (
-        (walled.finished, "finished wall", "#8b97a6", 1.0),
-        (walled.stock, "stock", "#d6aa6e", 0.22),
+        (walled.geometry.finished, "finished wall", "#8b97a6", 1.0),
+        (walled.geometry.stock, "stock", "#d6aa6e", 0.22),
     ):
         x, y, z = vertices.astype(np.float32).T
         i, j, k = faces.astype(np.int32).T

@@ -17,6 +17,7 @@ from chipload.control.wall import Loads, two_parts
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.errors import InputError, Severity
+from chipload.jobs.tables import stated
 from chipload.jobs.torque.job import TorqueJob
 from chipload.jobs.torque.tables import RoundTable, ShellTable, SurpriseTable
 from chipload.machine.machine import Machine
@@ -121,12 +122,10 @@ def program_of(job: TorqueJob, machine: Machine, progress: Progress = silent) ->
         It cannot be read, does not hold on the machine, leans its axis, or changes its spindle speed while it cuts.
     """
     if job.program_file is None:
-        ask = job.table.round
-        assert ask is not None
+        ask = stated(job.table.round, "round")
         program = round_program(ask, Place(job.shell), job.cutters[ask.cutter])
     else:
-        table = job.table.program
-        assert table is not None
+        table = stated(job.table.program, "program")
         feed = mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None
         reading = read_program(
             job.program_file, machine, dialect=table.dialect, feed=feed, tolerance=table.tolerance_mm,
@@ -347,16 +346,13 @@ def true_loads(loads: Loads, points: Floats, place: Place, surprises: tuple[Surp
     around = place.outer(middle[:, 2])
     for x in surprises:
         if x.kind == "worn-cutter":
-            assert x.edge_share is not None
             cut *= 1.0 + x.share
-            edge *= 1.0 + x.edge_share
+            edge *= 1.0 + stated(x.edge_share, "surprise.edge_share")
         elif x.kind == "hard-spot":
-            assert x.at_deg is not None
-            assert x.width_mm is not None
-            assert x.ramp_mm is not None
-            turn = np.arctan2(middle[:, 1], middle[:, 0]) - math.radians(x.at_deg)
+            width, ramp = stated(x.width_mm, "surprise.width_mm"), stated(x.ramp_mm, "surprise.ramp_mm")
+            turn = np.arctan2(middle[:, 1], middle[:, 0]) - math.radians(stated(x.at_deg, "surprise.at_deg"))
             away = around * np.abs(np.angle(np.exp(1j * turn)))
-            there = np.clip((0.5 * x.width_mm - away) / x.ramp_mm + 1.0, 0.0, 1.0)
+            there = np.clip((0.5 * width - away) / ramp + 1.0, 0.0, 1.0)
             cut *= 1.0 + x.share * there
             edge *= 1.0 + x.share * there
     return Loads(loads.torque_edge * edge, loads.torque_cut * cut, loads.force_edge * edge, loads.force_cut * cut)
@@ -367,9 +363,9 @@ def off_centre(stock_mm: float, surprises: tuple[SurpriseTable, ...]) -> tuple[f
     x = y = 0.0
     for one in surprises:
         if one.kind == "thicker-side":
-            assert one.at_deg is not None
-            x += one.share * stock_mm * math.cos(math.radians(one.at_deg))
-            y += one.share * stock_mm * math.sin(math.radians(one.at_deg))
+            at = math.radians(stated(one.at_deg, "surprise.at_deg"))
+            x += one.share * stock_mm * math.cos(at)
+            y += one.share * stock_mm * math.sin(at)
     return x, y
 
 

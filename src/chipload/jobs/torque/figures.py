@@ -13,7 +13,7 @@ from chipload.control.fuzzy import FuzzyTable
 from chipload.jobs.torque import torque_figures as drawn
 from chipload.jobs.torque.files import HAL, PATH, program_files
 from chipload.jobs.torque.numbers import operation_numbers
-from chipload.jobs.torque.outcome import HELD, Case, TorqueResult
+from chipload.jobs.torque.outcome import HELD, Case, Estimate, TorqueResult
 from chipload.jobs.torque.scene import scene_bytes
 from chipload.report.presentation import Presentation
 from chipload.report.sheet import figure, items, table
@@ -28,12 +28,12 @@ def presentation_of(outcome: TorqueResult) -> Presentation:
 
 def _sections(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
     body = _limit(outcome, figures)
-    if outcome.cases:
+    if outcome.control.cases:
         body += _controllers(outcome, figures)
     body += _wall(outcome, figures)
-    if outcome.estimate is not None:
-        body += _estimate(outcome, figures)
-    body += _rules(outcome.table, figures)
+    if outcome.control.estimate is not None:
+        body += _estimate(outcome.control.estimate, outcome, figures)
+    body += _rules(outcome.control.table, figures)
     return [
         *body,
         "<h2>On a machine</h2>",
@@ -50,8 +50,8 @@ def _limit(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
     what = operation_numbers(outcome)
     where = what["torque_limit"]
     why = {
-        "deflection": f"its deflection of {outcome.limits['form_error_um']:g} µm",
-        "strength": f"{outcome.limits['strength_share']:g} of its strength of {outcome.strength:g} MPa",
+        "deflection": f"its deflection of {outcome.job.limits['form_error_um']:g} µm",
+        "strength": f"{outcome.job.limits['strength_share']:g} of its strength of {outcome.wall.strength:g} MPa",
         "stated": "the limit that the job states",
     }[outcome.source]
     place = ", ".join(f"{round(x, 3) + 0.0:g}" for x in where["place"])
@@ -59,10 +59,10 @@ def _limit(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
     if outcome.attainable:
         body.append(
             f"<p>The limit is <b>{what['torque_limit_nm']:.4g} N m</b>, mean over a revolution. It comes from {why}, "
-            f"at ({place}) mm: the wall of {outcome.thinnest:.4g} mm (as thin as the tolerance lets it be) and the "
-            f"cutter allow {where['force_n']:.4g} N along the normal there. Elsewhere the wall allows more, up to "
+            f"at ({place}) mm: the wall of {outcome.wall.thinnest:.4g} mm (as thin as the tolerance lets it be) and "
+            f"the cutter allow {where['force_n']:.4g} N along the normal there. Elsewhere the wall allows more, up to "
             f"{where['relief_max']:.3g} times as much torque; the controller holds the same share of what is allowable "
-            f"everywhere, {where['held_nm']:.4g} N m here. The wall as it really is, {outcome.real:.4g} mm, would "
+            f"everywhere, {where['held_nm']:.4g} N m here. The wall as it really is, {outcome.wall.real:.4g} mm, would "
             f"allow {where['true_wall_nm']:.4g} N m. The closed formula of one tooth, which knows no engagement, says "
             f"{where['one_tooth_formula_nm']:.3g} N m.</p>"
         )
@@ -72,8 +72,8 @@ def _limit(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
             f"<p>What the program leaves lies {said['min']:.3g} to {said['max']:.3g} µm from the finished surface of "
             "the job, without deflection.</p>"
         )
-    spindle = [f"spindle: {name} {value:+g}" for name, value in asdict(outcome.deviation).items() if value]
-    surprises = [*outcome.surprises, *spindle] or ["none"]
+    spindle = [f"spindle: {name} {value:+g}" for name, value in asdict(outcome.control.deviation).items() if value]
+    surprises = [*outcome.job.surprises, *spindle] or ["none"]
     return [
         *body,
         figure("allowable", drawn.allowable(outcome), figures),
@@ -84,7 +84,7 @@ def _limit(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
 
 def _controllers(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
     body = ["<h2>Controllers</h2>"]
-    for case in outcome.cases:
+    for case in outcome.control.cases:
         by = outcome.compared(case)
         title = (
             f"{1e3 * case.loop.latency:g} ms latency, steps of {100.0 * case.quantum:g} %"
@@ -99,7 +99,7 @@ def _controllers(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[s
             f"{by['of_possible_percent']:.3g} % of what is physically possible; form error "
             f"{by['form_error_change_percent']:+.3g} % against the constant feed's.</p>",
         ]
-    plain, late = outcome.cases
+    plain, late = outcome.control.cases
     lost = late.runs[HELD].outcome.time - plain.runs[HELD].outcome.time
     body += [
         f"<p>Latency and steps cost {lost:.3g} s with the model, and move its greatest torque from "
@@ -117,7 +117,8 @@ def _controllers(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[s
 
 def _table(outcome: TorqueResult, case: Case) -> str:
     rows = []
-    most = 1e-3 * outcome.torque * (1.0 + 1e-2 * outcome.limits["torque_over_percent"])
+    torque_nm = 1e-3 * outcome.allowable.torque
+    most = torque_nm * (1.0 + 1e-2 * outcome.job.limits["torque_over_percent"])
     for name, run in case.runs.items():
         n = run.numbers()
 
@@ -127,11 +128,11 @@ def _table(outcome: TorqueResult, case: Case) -> str:
         rows.append([
             f'<span class="dot" style="background:{drawn.COLOURS[name]}"></span>{drawn.NAMES[name]}',
             f"{n['time_s']:.2f}",
-            cell(100.0 * n["torque_nm_max"] / (1e-3 * outcome.torque), 100.0 * most / (1e-3 * outcome.torque)),
+            cell(100.0 * n["torque_nm_max"] / torque_nm, 100.0 * most / torque_nm),
             f"{n['torque_raw_nm_max']:.4g}",
             f"{n['torque_over_limit_s']:.3f}",
-            cell(n["form_error_um_max"], outcome.limits["form_error_um"], ".3g"),
-            cell(n["stress_mpa_max"], outcome.limits["strength_share"] * outcome.strength, ".3g"),
+            cell(n["form_error_um_max"], outcome.job.limits["form_error_um"], ".3g"),
+            cell(n["stress_mpa_max"], outcome.job.limits["strength_share"] * outcome.wall.strength, ".3g"),
             f"{n['override_min']:.2f} to {n['override_max']:.2f}",
             str(n["ended"]),
         ])  # fmt: skip
@@ -140,33 +141,33 @@ def _table(outcome: TorqueResult, case: Case) -> str:
         "override", "ended",
     )  # fmt: skip
     units = (
-        f'<p class="note">Torque at most {100.0 * most / (1e-3 * outcome.torque):.4g} % of what is allowable; form '
+        f'<p class="note">Torque at most {100.0 * most / torque_nm:.4g} % of what is allowable; form '
         "error in µm, at most "
-        f"{outcome.limits['form_error_um']:g}; stress in MPa, at most "
-        f"{outcome.limits['strength_share'] * outcome.strength:g}.</p>"
+        f"{outcome.job.limits['form_error_um']:g}; stress in MPa, at most "
+        f"{outcome.job.limits['strength_share'] * outcome.wall.strength:g}.</p>"
     )
-    rows.append(["torque at its limit at every instant", f"{outcome.ideal_time:.2f}", "100", *[""] * 6])
+    rows.append(["torque at its limit at every instant", f"{outcome.control.ideal_time:.2f}", "100", *[""] * 6])
     used = [*(name == HELD for name in case.runs), False]
     return table(head, rows, numbers=(1, 2, 3, 4, 5, 6), used=used) + units
 
 
 def _wall(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
-    solid, whole = outcome.solid, float(outcome.oval.share.sum())
+    solid, whole = outcome.wall.solid, float(outcome.wall.oval.share.sum())
     rows = [
         [f"{p.s:.4g}", f"{1e3 * p.shell:.4g}", f"{1e3 * p.solid:.4g}", f"{100.0 * (p.solid / p.shell - 1.0):+.2f}"]
         for p in solid.places
     ]
     a, b, c = solid.counts
-    share = 100.0 * float(outcome.oval.share[1]) / whole
+    share = 100.0 * float(outcome.wall.oval.share[1]) / whole
     beam = (
-        f"A beam with shear gives {1e3 * outcome.oval.beam:.3g} µm: it is wrong by {whole / outcome.oval.beam:.3g} "
-        "times."
-        if outcome.oval.beam is not None
+        f"A beam with shear gives {1e3 * outcome.wall.oval.beam:.3g} µm: it is wrong by "
+        f"{whole / outcome.wall.oval.beam:.3g} times."
+        if outcome.wall.oval.beam is not None
         else f"There is no beam for a cone; its first harmonic, which a beam would have, is {share:.3g} % of it."
     )
     return [
         "<h2>Compliance of the wall</h2>",
-        f"<p>Under 1 N at the free end the wall of {outcome.thinnest:.4g} mm is deflected by "
+        f"<p>Under 1 N at the free end the wall of {outcome.wall.thinnest:.4g} mm is deflected by "
         f"{1e3 * whole:.4g} µm, nearly all of it by becoming oval. {beam}</p>",
         figure("oval", drawn.ovalised(outcome), figures),
         "<h3>Second opinion: the same wall by finite elements</h3>",
@@ -176,9 +177,7 @@ def _wall(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
     ]
 
 
-def _estimate(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
-    e = outcome.estimate
-    assert e is not None
+def _estimate(e: Estimate, outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
     rows = [
         ["noise of the estimate, from its sensor, closed form [N m]", f"{1e-3 * e.noise:.3g}"],
         ["the same, seen in the run [N m]", f"{1e-3 * e.seen:.3g}"],

@@ -13,6 +13,7 @@ from chipload.control.fuzzy import write_fuzzy
 from chipload.control.hal import HalJob
 from chipload.control.hal_file import write_hal
 from chipload.control.linuxcnc.path import write_path
+from chipload.control.override import Override
 from chipload.jobs.torque.outcome import TorqueResult
 from chipload.program.gcode.writer import write_commands, write_gcode
 from chipload.program.motions import is_arc
@@ -37,34 +38,33 @@ CONTROLLER_FILES = (PATH, TABLE, HAL)
 
 def program_files(outcome: TorqueResult) -> dict[str, bytes]:
     """All files by name."""
-    machine, ending = outcome.machine, ENDINGS[outcome.machine.dialect]
-    commands, _ = to_axes(outcome.program, machine)
+    machine, ending = outcome.job.machine, ENDINGS[outcome.job.machine.dialect]
+    commands, _ = to_axes(outcome.job.program, machine)
     takes = [(0, "M52 P1")] if machine.dialect == "linuxcnc" else []
-    title = f"{outcome.title}, programmed feeds, to be run beside chipload hal"
+    title = f"{outcome.job.title}, programmed feeds, to be run beside chipload hal"
     text = write_commands(commands, machine, title=title, verified=False, words=takes)
     out = {f"0-override.{ending}": text.encode("ascii")}
-    if not outcome.attainable:
+    if not outcome.attainable or outcome.control.controller is None:
         return out
-    fed = feed_forward(outcome)
-    title = f"{outcome.title}, feeds that the planned torque allows, nothing is measured"
+    fed = feed_forward(outcome, outcome.control.controller)
+    title = f"{outcome.job.title}, feeds that the planned torque allows, nothing is measured"
     out[f"0-feedforward.{ending}"] = write_gcode(fed, machine, title=title, verified=False).encode("ascii")
-    case = outcome.cases[-1]
+    case = outcome.control.cases[-1]
     job = HalJob(
-        path=outcome.path, override=case.runs["fuzzy_feedforward"].config, table=outcome.table, source="plant",
-        spindle=outcome.spindle, acceleration=case.loop.acceleration, period=case.loop.period,
+        path=outcome.allowable.path, override=case.runs["fuzzy_feedforward"].config, table=outcome.control.table,
+        source="plant", spindle=outcome.control.spindle, acceleration=case.loop.acceleration, period=case.loop.period,
         latency=case.loop.latency, modelled=True, window=WINDOW_MM, away=AWAY_MM,
-        deviation=outcome.deviation, told_from=outcome.told_from,
+        deviation=outcome.control.deviation, told_from=outcome.control.told_from,
     )  # fmt: skip
-    out[PATH] = write_path(outcome.path).encode("ascii")
-    out[TABLE] = write_fuzzy(outcome.table).encode("ascii")
+    out[PATH] = write_path(outcome.allowable.path).encode("ascii")
+    out[TABLE] = write_fuzzy(outcome.control.table).encode("ascii")
     out[HAL] = write_hal(job, PATH, TABLE).encode("ascii")
     return out
 
 
-def planned_override(outcome: TorqueResult) -> Floats:
+def planned_override(outcome: TorqueResult, config: Override) -> Floats:
     """(n,) override of each step that the model alone allows, in whole steps, rounded down but not below the floor."""
-    told, config = outcome.path.over_relief, outcome.controller
-    assert config is not None
+    told = outcome.allowable.path.over_relief
     with np.errstate(divide="ignore", invalid="ignore"):
         rows = np.where(told.cut > 0.0, (config.torque_ref - told.edge) / told.cut, np.inf)
     rows = np.where((told.cut == 0.0) & (told.edge > config.torque_ref), 0.0, rows)
@@ -73,10 +73,10 @@ def planned_override(outcome: TorqueResult) -> Floats:
     return np.asarray(np.maximum(whole, config.floor))
 
 
-def feed_forward(outcome: TorqueResult) -> Program:
+def feed_forward(outcome: TorqueResult, config: Override) -> Program:
     """The program with its cutting rows in pieces of one feed each; arcs stay arcs."""
-    p, override = outcome.program, planned_override(outcome)
-    arc, points, at = is_arc(p), outcome.path.points, 0
+    p, override = outcome.job.program, planned_override(outcome, config)
+    arc, points, at = is_arc(p), outcome.allowable.path.points, 0
     row_of, end, feed = [], [], []
     for k in range(len(p)):
         if p.motion[k] in (RAPID, DWELL) or k == 0:

@@ -11,34 +11,34 @@ from chipload.jobs.torque.outcome import Case, TorqueResult
 
 def operation_numbers(outcome: TorqueResult) -> dict[str, Any]:
     """The operation in summary.json."""
-    low, high = outcome.surface or (None, None)
+    low, high = outcome.wall.surface or (None, None)
     answer: dict[str, Any] = {
         "kind": "torque",
-        "program": {"file": outcome.program_name, "motions": len(outcome.program)},
-        "torque_limit_nm": 1e-3 * outcome.torque,
+        "program": {"file": outcome.job.program_name, "motions": len(outcome.job.program)},
+        "torque_limit_nm": 1e-3 * outcome.allowable.torque,
         "torque_limit": {
             "source": outcome.source,
-            "force_n": outcome.limit.force,
-            "s_mm": float(outcome.path.model.s[outcome.limit.step + 1]),
-            "place": outcome.path.points[outcome.limit.step + 1].tolist(),
-            "held_nm": 0.0 if outcome.controller is None else 1e-3 * outcome.controller.torque_ref,
-            "true_wall_nm": 1e-3 * outcome.true_torque,
-            "one_tooth_formula_nm": 1e-3 * outcome.one_tooth,
-            "relief_max": float(outcome.path.relief.max()),
+            "force_n": outcome.allowable.limit.force,
+            "s_mm": float(outcome.allowable.path.model.s[outcome.allowable.limit.step + 1]),
+            "place": outcome.allowable.path.points[outcome.allowable.limit.step + 1].tolist(),
+            "held_nm": 0.0 if outcome.control.controller is None else 1e-3 * outcome.control.controller.torque_ref,
+            "true_wall_nm": 1e-3 * outcome.allowable.true_torque,
+            "one_tooth_formula_nm": 1e-3 * outcome.allowable.one_tooth,
+            "relief_max": float(outcome.allowable.path.relief.max()),
         },
-        "torque_planned_nm_max": 1e-3 * float(outcome.path.model.torque(1.0).max()),
-        "torque_true_nm_max": 1e-3 * float(outcome.path.truth.torque(1.0).max()),
-        "path_mm": float(outcome.path.model.s[-1]),
+        "torque_planned_nm_max": 1e-3 * float(outcome.allowable.path.model.torque(1.0).max()),
+        "torque_true_nm_max": 1e-3 * float(outcome.allowable.path.truth.torque(1.0).max()),
+        "path_mm": float(outcome.allowable.path.model.s[-1]),
         "surface_off_um": None if low is None or high is None else {"min": 1e3 * low, "max": 1e3 * high},
         "wall": {
-            "planned_mm": outcome.wall.thickness,
-            "limit_made_for_mm": outcome.thinnest,
-            "real_mm": outcome.real,
+            "planned_mm": outcome.wall.shell.thickness,
+            "limit_made_for_mm": outcome.wall.thinnest,
+            "real_mm": outcome.wall.real,
         },
-        "surprises": list(outcome.surprises),
+        "surprises": list(outcome.job.surprises),
     }
-    if outcome.cases:
-        plain, late = outcome.cases
+    if outcome.control.cases:
+        plain, late = outcome.control.cases
         answer |= {
             "controllers": _controllers(plain),
             "compared": outcome.compared(plain),
@@ -57,9 +57,9 @@ def operation_numbers(outcome: TorqueResult) -> dict[str, Any]:
                 },
             },
         }
-    answer["ideal_time_s"] = outcome.ideal_time if outcome.ideal_time < math.inf else None
-    if outcome.estimate is not None:
-        e = outcome.estimate
+    answer["ideal_time_s"] = outcome.control.ideal_time if outcome.control.ideal_time < math.inf else None
+    if outcome.control.estimate is not None:
+        e = outcome.control.estimate
         answer["estimate"] = {
             "noise_nm": 1e-3 * e.noise,
             "noise_seen_nm": 1e-3 * e.seen,
@@ -74,25 +74,26 @@ def operation_numbers(outcome: TorqueResult) -> dict[str, Any]:
             "tooth_passing_hz": e.aliased[0],
             "tooth_passing_seen_hz": e.aliased[1],
         }
-    answer["spindle_deviation"] = asdict(outcome.deviation)
+    answer["spindle_deviation"] = asdict(outcome.control.deviation)
     answer["second_opinion"] = {
-        "elements": {"half_round": outcome.solid.counts[0], "along": outcome.solid.counts[1],
-                     "through": outcome.solid.counts[2], "nodes_each": 20},
-        "nodes": outcome.solid.nodes,
+        "elements": {"half_round": outcome.wall.solid.counts[0], "along": outcome.wall.solid.counts[1],
+                     "through": outcome.wall.solid.counts[2], "nodes_each": 20},
+        "nodes": outcome.wall.solid.nodes,
         "places": [
-            {"s_mm": p.s, "shell_um_n": 1e3 * p.shell, "hexahedra_um_n": 1e3 * p.solid} for p in outcome.solid.places
+            {"s_mm": p.s, "shell_um_n": 1e3 * p.shell, "hexahedra_um_n": 1e3 * p.solid}
+            for p in outcome.wall.solid.places
         ],
-        "apart_percent_max": 100.0 * outcome.solid.apart,
+        "apart_percent_max": 100.0 * outcome.wall.solid.apart,
     }  # fmt: skip
-    whole = float(outcome.oval.share.sum())
+    whole = float(outcome.wall.oval.share.sum())
     answer["ovalisation"] = {
-        "s_mm": outcome.oval_s,
+        "s_mm": outcome.wall.oval_s,
         "whole_um_n": 1e3 * whole,
-        "beam_um_n": None if outcome.oval.beam is None else 1e3 * outcome.oval.beam,
-        "shell_over_beam": None if outcome.oval.beam is None else whole / outcome.oval.beam,
-        "first_harmonic_share": float(outcome.oval.share[1] / whole),
+        "beam_um_n": None if outcome.wall.oval.beam is None else 1e3 * outcome.wall.oval.beam,
+        "shell_over_beam": None if outcome.wall.oval.beam is None else whole / outcome.wall.oval.beam,
+        "first_harmonic_share": float(outcome.wall.oval.share[1] / whole),
     }
-    answer["settings"] = dict(outcome.settings)
+    answer["settings"] = dict(outcome.job.settings)
     return answer
 
 

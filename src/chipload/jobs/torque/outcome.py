@@ -144,51 +144,98 @@ class Estimate:
 
 
 @dataclass(frozen=True, eq=False)
-class TorqueResult:
-    """The whole result.
+class TorqueInputs:
+    """What the job states, and what it was read from.
 
     Parameters
     ----------
     title, program_name : of the job and its program
-    wall : as planned, at its finished thickness
-    thinnest, real : the wall that the limit is made for, and the one that the surprises leave [mm]
-    strength : [MPa]
     limits : stated limits by name
     unchecked : names of those that are not stated
-    limit : of torque, from the wall alone
-    torque : the limit that is kept [N mm], the least of that and the stated one; 0: not attainable
-    true_torque : what the wall as it really is would bear [N mm]
-    one_tooth : the limit by the closed formula of one tooth [N mm], to compare
-    path : with what is planned and what is true
-    cases : the loop without latency, and as stated; none where no torque is allowable
-    controller : of the verdict; None: likewise
-    told_from : what the spindle was identified from
-    deviation : of the real spindle from what is believed
-    ideal_time : with the feed at the limit at every instant [s]; inf where no torque is allowable
-    steps : (n,) columns of the planned path by name
-    remedy : what would make a torque allowable, where none is
-    oval : harmonics at the free end; solid : second opinion
-    checks, check_table, step_checks : what is checked beside the stated limits, its table, and the steps for it
-    surface : least and greatest distance of what is left from the finished surface [mm]; None: no whole layer was cut
+    settings : the keys of the job but cutters and surprises
+    surprises : a text each
+    checks, check_table : what is checked beside the stated limits, and its table
     """
 
     title: str
     program_name: str
     program: Program
     machine: Machine
-    wall: Shell
+    limits: Mapping[str, float]
+    unchecked: tuple[str, ...]
+    settings: Mapping[str, Any]
+    surprises: tuple[str, ...]
+    checks: DefaultChecks
+    check_table: ChecksTable
+    provenance: Provenance
+
+
+@dataclass(frozen=True, eq=False)
+class ShellWall:
+    """The wall.
+
+    Parameters
+    ----------
+    shell : as planned, at its finished thickness
+    thinnest, real : the wall that the limit is made for, and the one that the surprises leave [mm]
+    strength : [MPa]
+    tolerance : by which it may be thinner [mm]
+    oval : harmonics under a force at ``oval_s`` [mm] along the wall, its free end
+    solid : second opinion
+    surface : least and greatest distance of what is left from the finished surface [mm]; None: no whole layer was cut
+    stock : as it is after the program
+    """
+
+    shell: Shell
     thinnest: float
     real: float
     strength: float
-    limits: Mapping[str, float]
-    unchecked: tuple[str, ...]
     tolerance: float
+    oval: Ovalisation
+    oval_s: float
+    solid: SolidComparison
+    surface: tuple[float, float] | None
+    stock: LayeredStock
+
+
+@dataclass(frozen=True, eq=False)
+class AllowableTorque:
+    """The limit of torque along the path.
+
+    Parameters
+    ----------
+    limit : of torque, from the wall alone
+    torque : the limit that is kept [N mm], the least of that and the stated one; 0: not attainable
+    true_torque : what the wall as it really is would bear [N mm]
+    one_tooth : the limit by the closed formula of one tooth [N mm], to compare
+    remedy : what would make a torque allowable, where none is
+    path : with what is planned and what is true
+    steps : (n,) columns of the planned path by name
+    """
+
     limit: PathLimit
     torque: float
     true_torque: float
     one_tooth: float
+    remedy: str
     path: ToolPath
     steps: Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class ControlComparison:
+    """The controllers, and what they were compared with.
+
+    Parameters
+    ----------
+    cases : the loop without latency, and as stated; none where no torque is allowable
+    controller : of the verdict; None: likewise
+    told_from : what the spindle was identified from
+    deviation : of the real spindle from what is believed
+    estimate : of the torque, in the case of the verdict; None: likewise
+    ideal_time : with the feed at the limit at every instant [s]; inf where no torque is allowable
+    """
+
     cases: tuple[Case, ...]
     controller: Override | None
     table: FuzzyTable
@@ -197,36 +244,41 @@ class TorqueResult:
     deviation: SpindleDeviation
     estimate: Estimate | None
     ideal_time: float
-    remedy: str
-    oval: Ovalisation
-    oval_s: float
-    solid: SolidComparison
-    surface: tuple[float, float] | None
-    surprises: tuple[str, ...]
-    stock: LayeredStock
-    findings: tuple[Finding, ...]
-    settings: Mapping[str, Any]
-    checks: DefaultChecks
-    check_table: ChecksTable
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueResult:
+    """The whole result.
+
+    Parameters
+    ----------
+    step_checks : the steps for the checks beside the stated limits
+    findings : of the simulations of the plan and of the truth
+    """
+
+    job: TorqueInputs
+    wall: ShellWall
+    allowable: AllowableTorque
+    control: ControlComparison
     step_checks: StepChecks
-    provenance: Provenance
+    findings: tuple[Finding, ...]
 
     @property
     def attainable(self) -> bool:
         """Whether there is a torque that the wall bears."""
-        return self.torque > 0.0
+        return self.allowable.torque > 0.0
 
     @property
     def source(self) -> str:
         """Where the limit of torque comes from: `deflection`, `strength` or `stated`."""
-        return "stated" if self.torque < self.limit.torque else self.limit.by
+        return "stated" if self.allowable.torque < self.allowable.limit.torque else self.allowable.limit.by
 
     def compared(self, case: Case) -> dict[str, float]:
         """How much shorter than the constant feed and than the model alone, the share of what is possible, and by how
         much the error differs from the constant feed's, all in percent.
         """
         held, plain, model = case.runs[HELD], case.runs[PLAIN], case.runs[MODEL]
-        saved, possible = plain.outcome.time - held.outcome.time, plain.outcome.time - self.ideal_time
+        saved, possible = plain.outcome.time - held.outcome.time, plain.outcome.time - self.control.ideal_time
         return {
             "shorter_percent": 100.0 * (1.0 - held.outcome.time / plain.outcome.time),
             "shorter_than_model_percent": 100.0 * (1.0 - held.outcome.time / model.outcome.time),

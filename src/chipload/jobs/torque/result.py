@@ -23,7 +23,7 @@ from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
 
 def result_of(outcome: TorqueResult) -> Result:
     """The result: the controller in use with its latency first, then the others, then all without latency."""
-    tracks = [_track(outcome, case, name) for case in reversed(outcome.cases) for name in case.runs]
+    tracks = [_track(outcome, case, name) for case in reversed(outcome.control.cases) for name in case.runs]
     tracks.sort(key=lambda track: not track.in_use)
     numbers = operation_numbers(outcome)
     verdicts = {track.name: track.verdict.value for track in tracks}
@@ -32,18 +32,18 @@ def result_of(outcome: TorqueResult) -> Result:
             part["controllers"][name]["verdict"] = verdicts[track_name(case, name)]
     result = Result(
         capability="torque",
-        title=outcome.title,
+        title=outcome.job.title,
         tracks=tuple(tracks) or (_not_run(outcome),),
         operations=(numbers,),
         findings=_findings(outcome),
         unchecked=(
-            *unchecked_checks(outcome.checks),
-            *(f"limit {name}: not stated" for name in outcome.unchecked),
-            *(() if outcome.cases else ("cutter strength, chips and spindle: no controller was run",)),
+            *unchecked_checks(outcome.job.checks),
+            *(f"limit {name}: not stated" for name in outcome.job.unchecked),
+            *(() if outcome.control.cases else ("cutter strength, chips and spindle: no controller was run",)),
             "chatter and runout beyond that of the cutter: not calculated",
             "the wall has one thickness, that at the end of the cut",
         ),
-        provenance=outcome.provenance,
+        provenance=outcome.job.provenance,
         note=_note(outcome),
     )
     return replace(result, operations=({**numbers, "verdict": result.verdict.value},))
@@ -56,8 +56,8 @@ def track_name(case: Case, controller: str) -> str:
 
 def limits_of(outcome: TorqueResult, columns: Columns, track: str) -> tuple[LimitCheck, ...]:
     """Every limit of the job against a controller, then those that are checked by default."""
-    stated = (check_limit(name, limit, columns, track=track) for name, limit in outcome.limits.items())
-    return (*stated, *default_limits(outcome.checks, outcome.machine, columns, track, {}))
+    stated = (check_limit(name, limit, columns, track=track) for name, limit in outcome.job.limits.items())
+    return (*stated, *default_limits(outcome.job.checks, outcome.job.machine, columns, track, {}))
 
 
 def _real(case: Case) -> bool:
@@ -68,15 +68,15 @@ def _real(case: Case) -> bool:
 def _track(outcome: TorqueResult, case: Case, name: str) -> Track:
     run, track = case.runs[name], track_name(case, name)
     columns = _columns(outcome, run)
-    used = name == HELD and case is outcome.cases[-1]
+    used = name == HELD and case is outcome.control.cases[-1]
     return Track(
         name=track,
         kind=TrackKind.CONTROLLER,
         in_use=used,
         time_s=run.outcome.time,
         limits=limits_of(outcome, columns, track),
-        findings=(*_run_findings(case, run), *chip_findings(outcome.checks, columns)),
-        programs=(f"0-override.{ENDINGS[outcome.machine.dialect]}",) if used else (),
+        findings=(*_run_findings(case, run), *chip_findings(outcome.job.checks, columns)),
+        programs=(f"0-override.{ENDINGS[outcome.job.machine.dialect]}",) if used else (),
         parameters={"latency_s": case.loop.latency, "override_step": case.quantum},
         blocks=in_memory(columns),
     )
@@ -85,15 +85,17 @@ def _track(outcome: TorqueResult, case: Case, name: str) -> Track:
 def _not_run(outcome: TorqueResult) -> Track:
     """No torque is allowable: every limit stays unproven."""
     reason = "no torque is allowable, so no controller was run"
-    limits = (LimitCheck(name, x, None, Verdict.UNPROVEN, HELD, reason=reason) for name, x in outcome.limits.items())
+    limits = (
+        LimitCheck(name, x, None, Verdict.UNPROVEN, HELD, reason=reason) for name, x in outcome.job.limits.items()
+    )
     return Track(HELD, TrackKind.CONTROLLER, True, None, tuple(limits))
 
 
 def _columns(outcome: TorqueResult, run: ControllerRun) -> Columns:
     """(n,) columns of a controller, a row a step of it."""
-    o, path = run.outcome, outcome.path
+    o, path = run.outcome, outcome.allowable.path
     relief = np.interp(o.s, path.model.s, path.relief)
-    over = 100.0 * np.maximum(o.torque / (outcome.torque * relief) - 1.0, 0.0)
+    over = 100.0 * np.maximum(o.torque / (outcome.allowable.torque * relief) - 1.0, 0.0)
     return {
         "t_s": o.t,
         "duration_s": np.diff(o.t, prepend=0.0),
@@ -104,13 +106,13 @@ def _columns(outcome: TorqueResult, run: ControllerRun) -> Columns:
         "override_state": np.array([STATUS[k] for k in o.status], dtype=object),
         "torque_nm": 1e-3 * o.torque,
         "torque_measured_nm": 1e-3 * o.measured,
-        "torque_allowable_nm": 1e-3 * outcome.torque * relief,
+        "torque_allowable_nm": 1e-3 * outcome.allowable.torque * relief,
         "torque_over_percent": over,
         "form_error_um": 1e3 * run.error,
         "stress_mpa": run.stress,
-        "strength_share": run.stress / outcome.strength,
+        "strength_share": run.stress / outcome.wall.strength,
         "spindle_rpm": rpm_from_rad_s(1.0) * o.speed,
-        **check_columns(outcome.step_checks, path.model.s, o, run.ratio, 1e3 * run.deflection, outcome.check_table),
+        **check_columns(outcome.step_checks, path.model.s, o, run.ratio, 1e3 * run.deflection, outcome.job.check_table),
     }
 
 
@@ -136,23 +138,24 @@ def _findings(outcome: TorqueResult) -> tuple[Finding, ...]:
     """What was found in the whole result."""
     out = [Finding(f.code, f.line, f.text, Severity.EXCEEDS, f.place, f.row) for f in outcome.findings]
     if not outcome.attainable:
+        limit = outcome.allowable.limit
         text = (
-            f"no torque is allowable: at step {outcome.limit.step} the edge force alone exceeds the "
-            f"{outcome.limit.force:.4g} N that the wall allows by its {outcome.limit.by}: {outcome.remedy}"
+            f"no torque is allowable: at step {limit.step} the edge force alone exceeds the "
+            f"{limit.force:.4g} N that the wall allows by its {limit.by}: {outcome.allowable.remedy}"
         )
         out.append(Finding("no-allowable-torque", 0, text, Severity.EXCEEDS))
-    elif outcome.surface is None:
+    elif outcome.wall.surface is None:
         out.append(Finding("wall-not-finished", 0, "the program finishes no part of the wall", Severity.EXCEEDS))
-    elif outcome.surface[0] < -outcome.tolerance:
-        text = f"the program cuts {-1e3 * outcome.surface[0]:.4g} µm into the wall"
+    elif outcome.wall.surface[0] < -outcome.wall.tolerance:
+        text = f"the program cuts {-1e3 * outcome.wall.surface[0]:.4g} µm into the wall"
         out.append(Finding("wall-gouged", 0, text, Severity.EXCEEDS))
     return tuple(out)
 
 
 def _note(outcome: TorqueResult) -> str:
-    if not outcome.cases:
+    if not outcome.control.cases:
         return ""
-    case = outcome.cases[-1]
+    case = outcome.control.cases[-1]
     by = outcome.compared(case)
     return (
         f"With {1e3 * case.loop.latency:g} ms latency {by['shorter_percent']:.3g} % shorter than the constant feed "

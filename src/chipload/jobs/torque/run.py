@@ -41,10 +41,14 @@ from chipload.jobs.torque.cut import (
 from chipload.jobs.torque.job import TorqueJob
 from chipload.jobs.torque.outcome import (
     HELD,
+    AllowableTorque,
     Case,
     ComplianceComparison,
+    ControlComparison,
     Estimate,
+    ShellWall,
     SolidComparison,
+    TorqueInputs,
     TorqueResult,
 )
 from chipload.jobs.torque.remedies import remedy_text
@@ -79,7 +83,7 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
     """
     machine, material, table, program, spindle = opened(job)
     a = allowable(job, program, material, machine, lambda done, what: progress(0.65 * done, what))
-    ask, shell, place, torque = job.table.limits, wall_of(job), Place(job.shell), a.torque
+    shell, place, torque = wall_of(job), Place(job.shell), a.torque
     progress(0.7, "controllers")
     controller: Override | None = None
     cases: tuple[Case, ...] = ()
@@ -92,43 +96,57 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
     progress(0.9, "second opinion")
     low, high = _finished(place, a.real)
     return TorqueResult(
+        job=_inputs(job, program, machine, material),
+        wall=ShellWall(
+            shell=shell,
+            thinnest=a.thin.shell.thickness,
+            real=a.true.shell.thickness,
+            strength=job.shell.strength_mpa,
+            tolerance=job.shell.wall_tolerance_mm,
+            oval=ovalisation(a.thin, a.thin.shell.length),
+            oval_s=a.thin.shell.length,
+            solid=_second_opinion(a.thin, a.width, a.planned),
+            surface=surface_off(a.real.stock, place.outer, low, high),
+            stock=a.real.stock,
+        ),
+        allowable=AllowableTorque(
+            limit=a.limit,
+            torque=torque,
+            true_torque=path_limit(a.loads, a.response, *allowed(job)).torque,
+            one_tooth=_one_tooth(a.limit, a.planned, material, job),
+            remedy="" if torque > 0.0 else remedy_text(job, a.thin.shell, a.planned, a.limit),
+            path=a.path,
+            steps=_step_columns(a),
+        ),
+        control=ControlComparison(
+            cases=cases,
+            controller=controller,
+            table=table,
+            spindle=spindle,
+            told_from=told_from(job, spindle),
+            deviation=deviation_of(job),
+            estimate=_estimate(job, cases, spindle, controller) if controller is not None else None,
+            ideal_time=shortest_time,
+        ),
+        step_checks=step_checks(a.real, a.loads, material, _fastest(cases)),
+        findings=(*a.planned.removal.findings, *a.real.removal.findings),
+    )
+
+
+def _inputs(job: TorqueJob, program: Program, machine: Machine, material: Material) -> TorqueInputs:
+    """What the job states."""
+    ask = job.table.limits
+    return TorqueInputs(
         title=title_of(job.path),
         program_name=job.program_file.name if job.program_file is not None else "made: down the wall and once round",
         program=program,
         machine=machine,
-        wall=shell,
-        thinnest=a.thin.shell.thickness,
-        real=a.true.shell.thickness,
-        strength=job.shell.strength_mpa,
         limits=ask.stated,
         unchecked=ask.unstated,
-        tolerance=job.shell.wall_tolerance_mm,
-        limit=a.limit,
-        torque=torque,
-        true_torque=path_limit(a.loads, a.response, *allowed(job)).torque,
-        one_tooth=_one_tooth(a.limit, a.planned, material, job),
-        path=a.path,
-        steps=_step_columns(a),
-        cases=cases,
-        controller=controller,
-        table=table,
-        spindle=spindle,
-        told_from=told_from(job, spindle),
-        deviation=deviation_of(job),
-        estimate=_estimate(job, cases, spindle, controller) if controller is not None else None,
-        ideal_time=shortest_time,
-        remedy="" if torque > 0.0 else remedy_text(job, a.thin.shell, a.planned, a.limit),
-        oval=ovalisation(a.thin, a.thin.shell.length),
-        oval_s=a.thin.shell.length,
-        solid=_second_opinion(a.thin, a.width, a.planned),
-        surface=surface_off(a.real.stock, place.outer, low, high),
-        surprises=tuple(_text_of(x.model_dump(exclude_none=True)) for x in job.table.surprise),
-        stock=a.real.stock,
-        findings=(*a.planned.removal.findings, *a.real.removal.findings),
         settings=job.table.model_dump(exclude_none=True, exclude={"cutter", "surprise"}),
+        surprises=tuple(_text_of(x.model_dump(exclude_none=True)) for x in job.table.surprise),
         checks=default_checks(job.table.checks, job.cutters, material, 0.5),
         check_table=job.table.checks,
-        step_checks=step_checks(a.real, a.loads, material, _fastest(cases)),
         provenance=_provenance(job, machine, material),
     )
 

@@ -15,15 +15,15 @@ SCENE_ROWS = 4000
 def scene_bytes(outcome: TorqueResult) -> bytes:
     """scene.glb: what is left of the stock, and the path coloured by the torque over the allowable one."""
     scene = trimesh.Scene()
-    stock = outcome.stock.mesh()
+    stock = outcome.wall.stock.mesh()
     stock.visual.face_colors = (168, 122, 58, 255)
     scene.add_geometry(stock, node_name="stock", geom_name="stock")
-    path = outcome.path
+    path = outcome.allowable.path
     rows = np.unique(np.linspace(0, len(path.points) - 1, min(len(path.points), SCENE_ROWS)).astype(np.int64))
     share = np.zeros(len(rows))
-    if outcome.cases:
-        o = outcome.cases[-1].runs[HELD].outcome
-        most = outcome.torque * path.relief[rows]
+    if outcome.control.cases:
+        o = outcome.control.cases[-1].runs[HELD].outcome
+        most = outcome.allowable.torque * path.relief[rows]
         share = np.interp(path.model.s[rows], o.s, o.torque) / most
     colours = engagement_colours(share, max(1.0, float(share.max(initial=0.0))))
     entities = [trimesh.path.entities.Line(np.array([k, k + 1]), color=colours[k + 1]) for k in range(len(rows) - 1)]

@@ -41,12 +41,17 @@ def along(outcome: TorqueResult, case: Case, by: str) -> go.Figure:
     """Torque over what is allowable, override, feed and form error of every controller, by ``path`` or ``time``."""
     titles = ("torque / allowable", "override", "feed [mm/min]", "form error [µm]")
     figure = make_subplots(rows=4, cols=1, shared_xaxes=True, vertical_spacing=0.03)
-    path = outcome.path
+    path = outcome.allowable.path
     for name, run in case.runs.items():
         o = run.outcome
         x = o.s if by == "path" else o.t
         relief = np.interp(o.s, path.model.s, path.relief)
-        values = (o.torque / (outcome.torque * relief), o.override, mm_min_from_mm_s(1.0) * o.feed, 1e3 * run.error)
+        values = (
+            o.torque / (outcome.allowable.torque * relief),
+            o.override,
+            mm_min_from_mm_s(1.0) * o.feed,
+            1e3 * run.error,
+        )
         for row, (y, title) in enumerate(zip(values, titles, strict=True), start=1):
             keep = thinned(y, LINE_POINTS // 4)
             figure.add_trace(
@@ -58,7 +63,7 @@ def along(outcome: TorqueResult, case: Case, by: str) -> go.Figure:
                 ),
                 row=row, col=1,
             )  # fmt: skip
-    for row, limit in ((1, 1.0), (4, outcome.limits["form_error_um"])):
+    for row, limit in ((1, 1.0), (4, outcome.job.limits["form_error_um"])):
         said = {"text": f"limit {limit:.4g}", "font": {"color": LIMIT, "size": 11}}
         line = {"color": LIMIT, "width": 1.2, "dash": "dash"}
         figure.add_hline(y=limit, line=line, annotation=said, annotation_position="top left", row=row, col=1)
@@ -71,7 +76,7 @@ def along(outcome: TorqueResult, case: Case, by: str) -> go.Figure:
 
 def allowable(outcome: TorqueResult) -> go.Figure:
     """Torque at the programmed feed, planned and true, against the allowable one along the path."""
-    path = outcome.path
+    path = outcome.allowable.path
     s = path.model.s
     lines: list[tuple[str, Floats, str, Any]] = [
         ("planned", path.model.torque(1.0), STOCK, "solid"),
@@ -79,7 +84,7 @@ def allowable(outcome: TorqueResult) -> go.Figure:
         ("of the edge alone, planned", path.model.edge, "#8a8f98", "dot"),
     ]
     if outcome.attainable:
-        lines.append(("allowable for the wall", outcome.torque * path.relief, LIMIT, "dash"))
+        lines.append(("allowable for the wall", outcome.allowable.torque * path.relief, LIMIT, "dash"))
     figure = go.Figure()
     for name, y, colour, dash in lines:
         keep = thinned(y, LINE_POINTS)
@@ -93,20 +98,20 @@ def allowable(outcome: TorqueResult) -> go.Figure:
 
 def ovalised(outcome: TorqueResult) -> go.Figure:
     """The rim under the cutter's force, and what each harmonic adds, against a beam."""
-    oval, shell = outcome.oval, outcome.wall
+    oval, shell = outcome.wall.oval, outcome.wall.shell
     figure = make_subplots(
         rows=1, cols=2, specs=[[{"type": "polar"}, {"type": "xy"}]], column_widths=[0.45, 0.55],
         subplot_titles=("rim, pushed inwards at 0 deg", "normal deflection under 1 N, by harmonic [µm]"),
     )  # fmt: skip
-    radius = float(shell.radius_at(outcome.oval_s))
+    radius = float(shell.radius_at(outcome.wall.oval_s))
     scale = EXAGGERATED * radius / float(np.abs(oval.rim).max())
     degrees = np.degrees(oval.theta)
     shapes = [
         ("round", np.full(len(degrees), radius), "#8a8f98", "dot"),
         ("shell", radius - scale * oval.rim, "#0b7a75", "solid"),
     ]
-    if outcome.oval.beam is not None:
-        shapes.append(("beam", radius - scale * outcome.oval.beam * np.cos(oval.theta), LIMIT, "dash"))
+    if outcome.wall.oval.beam is not None:
+        shapes.append(("beam", radius - scale * outcome.wall.oval.beam * np.cos(oval.theta), LIMIT, "dash"))
     for name, r, colour, dash in shapes:
         style = {"color": colour, "width": 2.0, "dash": dash}
         figure.add_trace(go.Scatterpolar(r=r, theta=degrees, mode="lines", name=name, line=style), row=1, col=1)
@@ -114,12 +119,12 @@ def ovalised(outcome: TorqueResult) -> go.Figure:
     figure.add_trace(
         go.Bar(x=n, y=1e3 * oval.share[:16], name="of the shell", marker={"color": "#0b7a75"}), row=1, col=2
     )
-    if outcome.oval.beam is not None:
+    if outcome.wall.oval.beam is not None:
         style = {"color": LIMIT, "width": 1.4, "dash": "dash"}
-        whole = f"a beam with shear, in all {1e3 * outcome.oval.beam:.3g} µm"
+        whole = f"a beam with shear, in all {1e3 * outcome.wall.oval.beam:.3g} µm"
         ends = [-0.5, float(n[-1]) + 0.5]
         figure.add_trace(
-            go.Scatter(x=ends, y=[1e3 * outcome.oval.beam] * 2, mode="lines", line=style, name=whole), row=1, col=2
+            go.Scatter(x=ends, y=[1e3 * outcome.wall.oval.beam] * 2, mode="lines", line=style, name=whole), row=1, col=2
         )
     figure.update_xaxes(title_text="harmonic round the wall (1: as a beam, 2: oval)", dtick=1, row=1, col=2)
     figure.update_polars(radialaxis={"visible": False})
@@ -138,7 +143,7 @@ def answers(table: FuzzyTable) -> go.Figure:
 
 def measured(outcome: TorqueResult) -> go.Figure:
     """Measured against true torque of the controller of the verdict, and what is not trusted."""
-    run_of = outcome.cases[-1].runs[HELD]
+    run_of = outcome.control.cases[-1].runs[HELD]
     run = run_of.outcome
     keep = np.unique(np.linspace(0, len(run.t) - 1, min(len(run.t), 3000)).astype(np.int64))
     figure = go.Figure(

@@ -29,9 +29,9 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.planning.impeller.clearance.clearance import between, clearance, moves_clear
 from chipload.planning.impeller.closed_form import axis_at
+from chipload.planning.impeller.pass_order import pass_order
 from chipload.planning.impeller.passes import Joint, Pass, joined, single
 from chipload.planning.impeller.scene import Floats, Ints, Scene
-from chipload.planning.impeller.tour import tour
 from chipload.planning.impeller.track import ToolTrack, pallet_of, written
 from chipload.program.program import LINE, RAPID
 
@@ -207,12 +207,12 @@ def linked(
                 add(first, job.round((up, away.axis), (over, begin.axis)))
                 retracts += 1
             add(first, job.along(begin.tip, begin.axis, one_way or not begin.free))
-        add(first, *(Moves.of(LINE, p[None], begin.axis[None], how.feed, "link") for p in begin.way[-2::-1]))
+        add(first, *(Moves.of(LINE, p[None], begin.axis[None], how.feed, "link") for p in begin.tips[-2::-1]))
         add(first, Moves.of(LINE, one.tip[:1], one.axis[:1], feed, "lead"))
         for a, b, kind in one.runs():
             add(int(one.of[a]), Moves.of(LINE, one.tip[a:b], one.axis[a:b], feed, kind))
-        add(last, Moves.of(LINE, end.way[0][None], end.axis[None], feed, "lead"))
-        add(last, *(Moves.of(LINE, p[None], end.axis[None], how.feed, "link") for p in end.way[1:]))
+        add(last, Moves.of(LINE, end.tips[0][None], end.axis[None], feed, "lead"))
+        add(last, *(Moves.of(LINE, p[None], end.axis[None], how.feed, "link") for p in end.tips[1:]))
         away = end
     if away is not None:
         add(of[-1], job.along(job.over(away.tip, away.axis), away.axis, one_way or not away.free))
@@ -232,7 +232,7 @@ def _toured(job: _Job, passes: Sequence[Pass], stages: Sequence[int]) -> list[Pa
         ends = np.array([[x.tip[0], x.tip[-1]] for x in some])
         axes = np.array([[x.axis[0], x.axis[-1]] for x in some])
         start = None if not out else (out[-1].tip[-1], out[-1].axis[-1])
-        order = tour(ends, axes, job.top, job.how.near, job.how.feed, job.how.rapid, start)
+        order = pass_order(ends, axes, job.top, job.how.near, job.how.feed, job.how.rapid, start)
         out += [some[k] if forth else some[k].back() for k, forth in order]
     return out
 
@@ -240,14 +240,14 @@ def _toured(job: _Job, passes: Sequence[Pass], stages: Sequence[int]) -> list[Pa
 class _Pose(NamedTuple):
     """A way off the end of a pass: its tips, the last where it ends; the axis; whether it is clear of allowances."""
 
-    way: tuple[Floats, ...]
+    tips: tuple[Floats, ...]
     axis: Floats
     free: bool
 
     @property
     def tip(self) -> Floats:
         """The last tip."""
-        return self.way[-1]
+        return self.tips[-1]
 
 
 @dataclass(frozen=True, eq=False)

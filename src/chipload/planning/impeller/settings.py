@@ -290,7 +290,8 @@ def setting_order(pairs: Sequence[Pair], changes: Changes) -> list[Pair]:
     [(0, 1.0), (0, 0.5), (1, 0.5)]
     """
     if len(pairs) <= _EXACT:
-        return list(min(itertools.permutations(pairs), key=lambda some: change_time(some, changes)))
+        orders = [list(some) for some in itertools.permutations(pairs)]
+        return min(orders, key=lambda some: change_time(some, changes))
     order, left = [pairs[0]], list(pairs[1:])
     while left:
         order.append(min(left, key=lambda pair: change_time((order[-1], pair), changes)))

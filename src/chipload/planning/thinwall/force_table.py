@@ -64,7 +64,7 @@ def law_of(
 def law_on_stock(
     posture: CutterPose, material: Material, limits: DepthRange, *, slope: float, scallop: float, measure: Measure
 ) -> ForceTable:
-    """Table of F_n on stock that is not plane: deeper below the contact point, with cusps of the pass before on it.
+    """Table of F_n on stock that is not plane: deeper below the contact point, with scallops of the pass before on it.
 
     Within the reach sqrt(2 r (d + c)) of the cutter stock whose depth changes with a slope of at most L, and that has
     cusps of at most c, is nowhere deeper than d + c + L sqrt(2 r (d + c)). The force is taken there, so that it is
@@ -87,7 +87,7 @@ def law_on_stock(
     deepest = float(met(np.array(limits.greatest)))
     if deepest > posture.deepest:
         raise InputError(
-            f"depth_max_mm = {limits.greatest:g}: the cutter meets stock of {deepest:.4g} mm with cusps of "
+            f"depth_max_mm = {limits.greatest:g}: the cutter meets stock of {deepest:.4g} mm with scallops of "
             f"{scallop:.3g} mm and a slope of {slope:g}: must be at most {posture.deepest:.4g}, where the flank "
             "begins to cut"
         )

@@ -224,7 +224,7 @@ def constant(
     """
     if not depth > 0.0:
         raise InputError(
-            f"passes: constant depth_mm = {depth:g}: must be above 0; a place of the wall bears no cut at all: allow "
+            f"passes: constant depth_mm = {depth:g}: must be above 0; a place of the wall allows no cut at all: allow "
             "more deflection, less feed or a smaller step-over"
         )
     number = [math.ceil(s.allowance / depth - 1e-9) for s in surfaces]

@@ -126,10 +126,10 @@ def _allowable_force(cuts: list[_Row], label: str, findings: list[Finding]) -> f
             "shallower there"
         )
     if not failed:
-        text = f"u = {u:g}, v = {v:g}: no cut was too much: {max(below):.4g} N is taken; it may bear more"
+        text = f"u = {u:g}, v = {v:g}: no cut was too much: {max(below):.4g} N is taken; it may allow more"
         findings.append(Finding("series-never-too-much", line, text))
     if any(not c.too_much and c.force >= least for c in cuts):
-        text = f"u = {u:g}, v = {v:g}: a greater force was borne than the {least:.4g} N that was too much"
+        text = f"u = {u:g}, v = {v:g}: {least:.4g} N was too much, and a greater force was not"
         findings.append(Finding("series-overlaps", line, text))
     return max(below)
 

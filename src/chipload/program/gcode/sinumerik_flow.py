@@ -104,13 +104,14 @@ def statements_of(source: Source) -> Statements:
     out, open_ones = Statements(), list[int]()
     for k, raw in enumerate(source.lines):
         body = _plain(raw)
-        head = _HEAD.match(body)
-        assert head is not None
-        if head[1]:
-            out.labels.setdefault(f"N{int(head[1][:12])}", []).append(k)
-        if head[2]:
-            out.labels.setdefault(head[2], []).append(k)
-        found = _WORD.match(body, head.end())
+        begin = 0
+        if head := _HEAD.match(body):
+            begin = head.end()
+            if head[1]:
+                out.labels.setdefault(f"N{int(head[1][:12])}", []).append(k)
+            if head[2]:
+                out.labels.setdefault(head[2], []).append(k)
+        found = _WORD.match(body, begin)
         if found is None:
             continue
         out.at[k] = one = Statement(found[1], found[2].strip())
@@ -260,11 +261,10 @@ def _repeat(flow: Flow, some: Statements, one: Statement, value: Value) -> int:
     if not 0 <= count <= MOST_TIMES:
         raise InputError(f"{one.word} P={count}: must be from 0 to {MOST_TIMES}")
     names = one.rest[: times.start() if times is not None else None].split()
-    places = [next(iter(some.labels.get(name, [])), None) for name in names]
-    if not 1 <= len(places) <= 2 or None in places:
+    places = [some.labels[name][0] for name in names if some.labels.get(name)]
+    if not 1 <= len(names) <= 2 or len(places) < len(names):
         raise NotReadError(f"{' '.join(names)[:40]}: no section of the text")
     first = places[0]
-    assert first is not None
     if one.word == "REPEAT" and len(places) == 1 and first < line:
         # the section ends here: it is run again as it stands
         left = some.left.get(line, count)
@@ -274,7 +274,6 @@ def _repeat(flow: Flow, some: Statements, one: Statement, value: Value) -> int:
         del some.left[line]
         return line + 1
     last = first if one.word == "REPEATB" else places[-1]
-    assert last is not None
     if any(first <= k <= last for k in some.at):
         raise NotReadError(f"{one.word}: a section with jumps of its own")
     for _ in range(count):

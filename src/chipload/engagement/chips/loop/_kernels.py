@@ -65,6 +65,34 @@ def loops(cps, cas, K, heights, first, tol, vmin, buf, count, knots, whole):
 
 
 @njit(cache=True, nogil=True)
+def _time_of(s, begins, stops, opens, closes):
+    """Time at the share s of the knots: a section that begins or ends as a point grows with the root of time, in which
+    the knots are even.
+    """
+    length = stops - begins
+    if opens and closes:
+        return begins + length * math.sin(0.25 * TAU * s) ** 2
+    if opens:
+        return begins + length * s * s
+    if closes:
+        return stops - length * (1.0 - s) * (1.0 - s)
+    return begins + length * s
+
+
+@njit(cache=True, nogil=True)
+def _rate_of(t, begins, stops, opens, closes):
+    """Rate of ``_time_of`` over the share, at time t."""
+    length = stops - begins
+    if opens and closes:
+        return 0.5 * TAU * math.sqrt((t - begins) * (stops - t))
+    if opens:
+        return 2.0 * math.sqrt(length * (t - begins))
+    if closes:
+        return 2.0 * math.sqrt(length * (stops - t))
+    return length
+
+
+@njit(cache=True, nogil=True)
 def loop(cp, ca, K, h, tol, vmin, knots, ends, rows, buf, whole):
     """The covered area where its boundary is one loop: count of edges; NOTHING, GENERAL, FULL or UNSETTLED, which more
     ``knots`` in time may mend. ``ends`` as of ``levels``; ``rows`` (k, 7) is room to work in; ``whole`` (1,).
@@ -87,30 +115,13 @@ def loop(cp, ca, K, h, tol, vmin, knots, ends, rows, buf, whole):
     grid = np.empty((knots, NODES))
     last = knots - 1
     for i in range(knots):
-        # a section that begins as a point grows with the root of time: even knots in that root
-        s = i / last
-        if opens and closes:
-            t = begins + length * math.sin(0.25 * TAU * s) ** 2
-        elif opens:
-            t = begins + length * s * s
-        elif closes:
-            t = stops - length * (1.0 - s) * (1.0 - s)
-        else:
-            t = begins + length * s
-        t = ta if i == 0 else (tb if i == last else t)
+        t = ta if i == 0 else (tb if i == last else _time_of(i / last, begins, stops, opens, closes))
         if not instant(cp, ca, K, h, t, S[i], C[i]):
             return GENERAL
         count[i], around[i] = roots(S[i], K, C[i], vmin, R[i], sign[i], grid[i])
         if count[i] < 0 or count[i] > 2:
             return GENERAL
-        if opens and closes:
-            rate = 0.5 * TAU * math.sqrt((t - begins) * (stops - t))
-        elif opens:
-            rate = 2.0 * math.sqrt(length * (t - begins))
-        elif closes:
-            rate = 2.0 * math.sqrt(length * (stops - t))
-        else:
-            rate = length
+        rate = _rate_of(t, begins, stops, opens, closes)
         for k in range(NODES):
             grid[i, k] *= rate
     if not _settled(grid, 1.0 / last, tol):

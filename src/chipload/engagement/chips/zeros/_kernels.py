@@ -116,21 +116,8 @@ def _corner(S, K, C, i, row):
 
 
 @njit(cache=True, nogil=True)
-def roots(S, K, C, vmin, R, sign, grid):
-    """Where V changes sign around the section, in order of theta: rows into ``R``, +1 from inward to outward.
-
-    Speeds under ``vmin`` take the sign before them. Returns (count, sign of V where count is 0; 0: |V| < vmin all
-    round). ``grid`` (NODES,) takes V at even angles.
-    """
-    if S[22] < 0.0:
-        around = R[0]
-        for i in range(NODES):
-            grid[i] = point_at(S, K, i * (TAU / NODES), _COS[i], _SIN[i], around)
-        return _circle_roots(S, vmin, R, sign)
-    th = np.empty(NODES + 16)
-    vv = np.empty(NODES + 16)
-    at = np.empty(NODES + 16, np.int64)
-    row = np.empty(7)
+def _sampled(S, K, C, th, vv, at, row, grid):
+    """Angles ``th`` with V ``vv`` at even nodes and, before and after, at corners ``at`` (-1: a node); how many."""
     n = 0
     nc = int(S[20])
     k = 0
@@ -153,6 +140,46 @@ def roots(S, K, C, vmin, R, sign, grid):
         th[n + 1], vv[n + 1], at[n + 1] = C[k, 0], vr, k
         n += 2
         k += 1
+    return n
+
+
+@njit(cache=True, nogil=True)
+def _one_zero(S, K, C, th, vv, at, last, i, n, here, now, out):
+    """The one sign change from ``here`` to ``now`` among samples ``last`` .. i that may be near zero, into ``out``;
+    false: there is none.
+    """
+    j = last
+    while j != i:
+        m = (j + 1) % n
+        if (vv[j] > 0.0) == (here > 0) and (vv[m] > 0.0) == (now > 0):
+            if at[j] >= 0 and at[j] == at[m]:
+                _corner(S, K, C, at[j], out)
+            else:
+                hi = th[m] if th[m] > th[j] else th[m] + TAU
+                _zero(S, K, th[j], vv[j], hi, vv[m], out)
+                out[2] %= TAU
+            return True
+        j = m
+    return False
+
+
+@njit(cache=True, nogil=True)
+def roots(S, K, C, vmin, R, sign, grid):
+    """Where V changes sign around the section, in order of theta: rows into ``R``, +1 from inward to outward.
+
+    Speeds under ``vmin`` take the sign before them. Returns (count, sign of V where count is 0; 0: |V| < vmin all
+    round). ``grid`` (NODES,) takes V at even angles.
+    """
+    if S[22] < 0.0:
+        around = R[0]
+        for i in range(NODES):
+            grid[i] = point_at(S, K, i * (TAU / NODES), _COS[i], _SIN[i], around)
+        return _circle_roots(S, vmin, R, sign)
+    th = np.empty(NODES + 16)
+    vv = np.empty(NODES + 16)
+    at = np.empty(NODES + 16, np.int64)
+    row = np.empty(7)
+    n = _sampled(S, K, C, th, vv, at, row, grid)
     start = -1
     for i in range(n):
         if abs(vv[i]) >= vmin:
@@ -172,21 +199,7 @@ def roots(S, K, C, vmin, R, sign, grid):
         if now != here:
             if count + 2 > MAX_ROOTS:
                 return -1, 0
-            done = False
-            j = last
-            while j != i:  # the one sign change among nodes that may be near zero
-                m = (j + 1) % n
-                if (vv[j] > 0.0) == (here > 0) and (vv[m] > 0.0) == (now > 0):
-                    if at[j] >= 0 and at[j] == at[m]:
-                        _corner(S, K, C, at[j], R[count])
-                    else:
-                        hi = th[m] if th[m] > th[j] else th[m] + TAU
-                        _zero(S, K, th[j], vv[j], hi, vv[m], R[count])
-                        R[count, 2] %= TAU
-                    done = True
-                    break
-                j = m
-            if not done:
+            if not _one_zero(S, K, C, th, vv, at, last, i, n, here, now, R[count]):
                 return -1, 0
             sign[count] = now
             count += 1

@@ -21,7 +21,7 @@ _ROUNDS = 30
 _OVER, _RATE = 0.5, 2.0
 
 
-def tour(
+def pass_order(
     ends: Floats,
     axes: Floats,
     top: float,
@@ -46,7 +46,7 @@ def tour(
 
     >>> side = np.array([[[0.0, k, 0.0], [9.0, k, 0.0]] for k in (0.0, 2.0, 1.0)])
     >>> up = np.tile([0.0, 0.0, 1.0], (3, 2, 1))
-    >>> tour(side, up, 50.0, 5.0, 20.0, 400.0)
+    >>> pass_order(side, up, 50.0, 5.0, 20.0, 400.0)
     [(0, True), (2, False), (1, True)]
     """
     n = len(ends)
@@ -57,23 +57,22 @@ def tour(
             np.concatenate([ends.reshape(-1, 3), start[0][None]]),
             np.concatenate([axes.reshape(-1, 3), start[1][None]]),
         )
-        first = _ways(*both, top, near, feed, rapid)[-1, :-1]
-    best: tuple[float, list[int]] | None = None
+        first = _moves(*both, top, near, feed, rapid)[-1, :-1]
+    best: tuple[float, list[int]] = (math.inf, [])
     begins = np.argsort(first, kind="stable")
     for begin in begins[np.unique(np.linspace(0, len(begins) - 1, min(len(begins), _STARTS)).round().astype(int))]:
         order = _nearest(cost, int(begin), n)
         total, order = _turned(cost, first, order)
-        if best is None or total < best[0] - 1e-9:
+        if total < best[0] - 1e-9:
             best = total, order
-    assert best is not None
     return [(k // 2, k % 2 == 0) for k in best[1]]
 
 
 def _times(ends: Floats, axes: Floats, top: float, near: float, feed: float, rapid: float) -> Floats:
-    return _ways(ends.reshape(-1, 3), axes.reshape(-1, 3), top, near, feed, rapid)
+    return _moves(ends.reshape(-1, 3), axes.reshape(-1, 3), top, near, feed, rapid)
 
 
-def _ways(tips: Floats, axes: Floats, top: float, near: float, feed: float, rapid: float) -> Floats:
+def _moves(tips: Floats, axes: Floats, top: float, near: float, feed: float, rapid: float) -> Floats:
     """(m, m) time [s] from end to end."""
     far = np.linalg.norm(tips[:, None] - tips[None], axis=2)
     rise = np.clip(top - (tips * axes).sum(axis=1), 0.0, None)

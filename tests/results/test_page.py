@@ -1,0 +1,66 @@
+"""Every example's result in a browser: verdict, limits and program texts of each track, the track in use first."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import pytest
+
+from chipload.result import load_result
+from results.test_examples import NAMES
+from web.conftest import browser  # noqa: F401
+from web_served import Served
+
+#: of many tracks the page shows these
+MOST = 4
+SHOWN = "name => document.querySelector('.cl-tracks .q-field__native')?.innerText.startsWith(name)"
+CELLS = "[...document.querySelectorAll('.cl-limits tbody tr')].map(r => [...r.cells].map(c => c.textContent.trim()))"
+
+
+@pytest.fixture(scope="module")
+def served(example) -> Iterator[Served]:
+    """The page of the folder that holds the results."""
+    page = Served(example("trunnion").folder.parent)
+    yield page
+    page.end()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_page_states_what_the_summary_states(example, browser, served, name):  # noqa: F811
+    done = example(name)
+    summary = json.loads((done.folder / "summary.json").read_text())
+    tracks = sorted((t for t in summary["tracks"] if t["rows"]), key=lambda t: not t["in_use"])
+    if not tracks:
+        return  # a search without programs has no page: tests/results/test_examples.py
+    columns = {c.name: c.column for t in load_result(done.folder).tracks for c in t.limits}
+    page = browser.new_page(viewport={"width": 1280, "height": 720})
+    try:
+        page.set_default_timeout(60_000)
+        page.goto(served.address(f"?show={name}"))
+        page.wait_for_selector(".cl-word", state="visible")
+        assert (page.inner_text(".cl-word"), page.inner_text(".cl-message")) == (summary["verdict"], summary["message"])
+        assert tracks[0]["in_use"]
+        for k, track in enumerate(tracks[:MOST]):
+            if k:
+                page.keyboard.press("t")
+            page.wait_for_function(
+                "end => document.querySelector('.cl-where').textContent.includes(end)",
+                arg=f"step 1 of {track['rows']}",
+            )
+            if len(tracks) > 1:
+                page.wait_for_function(SHOWN, arg=track["name"])
+            expected = [
+                (columns[c["name"]].label, "not known" if c["worst"] is None else f"{c['worst']:.4g}",
+                 f"{c['limit']:g} {c['unit']}".strip(), c["state"])
+                for c in track["limits"]
+            ]  # fmt: skip
+            assert sorted((c[0], c[1], c[2], c[4]) for c in page.evaluate(CELLS)) == sorted(expected)
+            if track["programs"]:
+                page.wait_for_function(
+                    "names => names.some(n => document.querySelector('.cl-file').textContent.startsWith(n))",
+                    arg=[*track["programs"], *(p.name for p in (done.loaded.job.path.parent).iterdir())],
+                )
+                assert page.locator(".cl-line").count() > 1
+    finally:
+        page.close()
