@@ -92,6 +92,9 @@ def operation_numbers(outcome: TorqueResult) -> dict[str, Any]:
         "shell_over_beam": None if outcome.oval.beam is None else whole / outcome.oval.beam,
         "first_harmonic_share": float(outcome.oval.share[1] / whole),
     }
+    answer["energy_balance"] = {
+        name: {str(tool): value for tool, value in each.items()} for name, each in outcome.energy_balance.items()
+    }
     answer["settings"] = dict(outcome.settings)
     return answer
 

@@ -170,6 +170,7 @@ class TorqueResult:
     oval : harmonics at the free end; solid : second opinion
     checks, check_table, step_checks : what is checked beside the stated limits, its table, and the steps for it
     surface : least and greatest distance of what is left from the finished surface [mm]; None: no whole layer was cut
+    energy_balance : work over the specific energy of the volume removed, less 1, by tool number: as planned, and real
     """
 
     title: str
@@ -210,6 +211,7 @@ class TorqueResult:
     check_table: ChecksTable
     step_checks: StepChecks
     provenance: Provenance
+    energy_balance: Mapping[str, Mapping[int, float]]
 
     @property
     def attainable(self) -> bool:

@@ -35,6 +35,7 @@ def result_of(outcome: TorqueResult) -> Result:
             *(() if outcome.cases else ("cutter strength, chips and spindle: no controller was run",)),
             "chatter and runout beyond that of the cutter: not calculated",
             "the wall has one thickness, that at the end of the cut",
+            "error of the loads by layers and steps: not estimated",
         ),
         provenance=outcome.provenance,
         note=_note(outcome),
