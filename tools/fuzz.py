@@ -3,7 +3,7 @@
 Case k of a reader is a seed with one to four damages, all chosen by k and the reader's name: a case can be made again
 with `--reader NAME --case K --keep FILE`. Each case is read in a child process. It ends as **read** (without a word),
 **findings** (read, and something was noticed), **refused** (``InputError``), **fault** (another exception, numbers that
-are not finite, or the death of the process), **hang** (over 20 s, longer where the processor is shared) or **memory**
+are not finite, or the death of the process), **hang** (over 20 s of the processor, or 400 s of the clock) or **memory**
 (over 4 GiB). Faults, hangs and memory must be 0, and the exit code is 1 where they are not.
 
 `--jobs` sets every numeric value of the job of every example to 0, -1, 1e-9, 1e9, nan, inf and a text, loads the job
@@ -35,6 +35,8 @@ from fuzz_readers import READERS, Nonsense
 
 #: [s] and [bytes] that a case may take
 SLOW, MEMORY = 20.0, 4 << 30
+#: times as long by the clock, for a process that waits or sleeps
+MOST_WAIT = 20.0
 KINDS = ("cases", "read", "findings", "refused", "long", "fault", "hang", "memory")
 #: what is put in the place of a number
 NUMBERS = [
@@ -197,11 +199,13 @@ class Child:
             pipe_in.flush()
             with selectors.DefaultSelector() as ready:
                 ready.register(pipe_out, selectors.EVENT_READ)
-                # a child that starts first imports; where processes wait for the processor, so does this one
-                shared = max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
-                if not ready.select(patience * shared + (60.0 if fresh else 0.0)):
-                    self.close()
-                    return "hang", f"more than {patience:g} s"
+                # a child that starts first imports; where it waits for the processor, its own time counts
+                allowed = self._spent() + patience + (60.0 if fresh else 0.0)
+                until = time.monotonic() + MOST_WAIT * patience
+                while not ready.select(patience):
+                    if self._spent() > allowed or time.monotonic() > until:
+                        self.close()
+                        return "hang", f"more than {patience:g} s"
             line = pipe_out.readline()
         except OSError:
             line = b""
@@ -214,6 +218,15 @@ class Child:
             self.close()
             return "memory", said
         return end, said
+
+    def _spent(self) -> float:
+        """Seconds of the processor of the process and its children; elsewhere than on Linux, of the clock."""
+        assert self.process is not None
+        try:
+            fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
+        except OSError:
+            return time.monotonic()
+        return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
 
     def _peak(self) -> int:
         """Most memory that the process had [bytes], as Linux says it; elsewhere its own limit has to do."""

@@ -37,7 +37,7 @@ def test_a_case_is_the_same_each_time(tmp_path: Path) -> None:
 ])  # fmt: skip
 def test_each_end_is_told_from_the_others(tmp_path: Path, body: str, end: str) -> None:
     """The tool itself, with a reader that ends in a known way."""
-    for name in ("fuzz.py", "plate.step"):
+    for name in ("fuzz.py", "fuzz_jobs.py", "plate.step"):
         (tmp_path / name).write_bytes(TOOL.with_name(name).read_bytes())
     text = TOOL.with_name("fuzz_readers.py").read_text("utf-8")
     text = text.replace("def _meridian(path: Path) -> int:\n", f"def _meridian(path: Path) -> int:\n    {body}\n")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import json
 import os
 import re
@@ -35,8 +34,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def start(place: Path, out: str, *more: str, file: str = "job.toml") -> subprocess.Popen[str]:
     words = [*COMMAND, "run", str(place / file), "--out", str(place / out), *more]
-    # what starts the tests in the background may have it ignore Ctrl-C, which is handed down
-    heard = functools.partial(signal.signal, signal.SIGINT, signal.default_int_handler)
+
+    # what starts the tests in the background may have it ignore these, which is handed down
+    def heard() -> None:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
     return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heard)
 
 

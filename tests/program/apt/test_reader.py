@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from chipload.cutter.cutter import Cutter
-from chipload.errors import InputError
+from chipload.errors import InputError, Severity
 from chipload.program.apt.cutters import read_cutters
 from chipload.program.apt.reader import read_apt, read_apt_file
 from chipload.program.apt.writer import write_apt
@@ -297,3 +297,14 @@ def test_tables():
     ):
         with pytest.raises(InputError, match=message):
             read_cl_points(text, feed=2.0, spindle=0.0, tool=1)
+
+
+def test_pecks_of_a_cycle_without_pecks_are_left_out_and_said():
+    """CYCLE/DRILL with INCR: the hole is drilled in one go, and a finding on its line says so."""
+    head = "UNITS/MM\nLOADTL/1\nSPINDL/1000,RPM,CLW\nFEDRAT/100,MMPM\nGOTO/0,0,5\n"
+    plain, _ = read_apt(f"{head}CYCLE/DRILL,DEPTH,5,CLEAR,2\nGOTO/0,0,0\nCYCLE/OFF\nFINI\n")
+    pecks, findings = read_apt(f"{head}CYCLE/DRILL,DEPTH,5,INCR,1,CLEAR,2\nGOTO/0,0,0\nCYCLE/OFF\nFINI\n")
+    assert pecks.p_work.tolist() == plain.p_work.tolist()
+    (found,) = [f for f in findings if f.severity >= Severity.UNPROVEN]
+    assert found.line == 6
+    assert "pecks" in found.text

@@ -13,6 +13,7 @@ from chipload.jobs.checks import chip_findings, default_limits, unchecked_checks
 from chipload.jobs.thinwall.outcome import OVER, USED, Finish, ThinWallResult, Variant, helps
 from chipload.report.programs import ENDINGS, program_name
 from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict, check_limit, in_memory, state_of
+from chipload.simulation.accuracy import energy_balance
 
 Floats = NDArray[np.float64]
 
@@ -20,6 +21,8 @@ Floats = NDArray[np.float64]
 LISTED = 100
 #: columns of the plan that the history does not keep
 DROPPED = ("u", "v", "side", "label", "compliance_error")
+#: in place of a specific energy [MPa]: some step of a wall always has engaged edge
+ENGAGED = 1.0
 #: limits that are proportional to the compliance of the wall
 OF_COMPLIANCE = ("deflection_workpiece_um", "deflection_um", "force_over_allowable")
 
@@ -40,6 +43,7 @@ def result_of(walled: ThinWallResult) -> Result:
             *(f"limit {name}: not stated" for name in walled.unchecked),
             "holder, clamp and machine: no collision check",
             "chatter: not calculated",
+            "error of the loads by layers and steps: not estimated",
             "tangential forces do not bend the wall; a bent wall is not cut less deep",
         ),
         provenance=walled.provenance,
@@ -196,6 +200,7 @@ def _variant(one: Variant) -> dict[str, Any]:
             "max": max(float(m.depth.max()) for m in one.plan.maps),
         },
         "contact_points": int(cuts.sum()),
+        "energy_balance": {str(tool): x for tool, x in energy_balance(c, ENGAGED).items()},
         "force_over_allowable_max": float(c["force_over_allowable"].max(initial=0.0)),
         "force_over_planned": {"median": float(np.median(ratio)), "max": float(ratio.max())} if len(ratio) else None,
         "over_threshold": len(one.over),

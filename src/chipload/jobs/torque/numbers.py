@@ -93,6 +93,9 @@ def operation_numbers(outcome: TorqueResult) -> dict[str, Any]:
         "shell_over_beam": None if outcome.wall.oval.beam is None else whole / outcome.wall.oval.beam,
         "first_harmonic_share": float(outcome.wall.oval.share[1] / whole),
     }
+    answer["energy_balance"] = {
+        name: {str(tool): value for tool, value in each.items()} for name, each in outcome.energy_balance.items()
+    }
     answer["settings"] = dict(outcome.job.settings)
     return answer
 

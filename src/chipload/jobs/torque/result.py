@@ -27,7 +27,7 @@ def result_of(outcome: TorqueResult) -> Result:
     tracks.sort(key=lambda track: not track.in_use)
     numbers = operation_numbers(outcome)
     verdicts = {track.name: track.verdict.value for track in tracks}
-    for case, part in zip(outcome.cases, (numbers, numbers.get("with_latency", {})), strict=False):
+    for case, part in zip(outcome.control.cases, (numbers, numbers.get("with_latency", {})), strict=False):
         for name in case.runs:
             part["controllers"][name]["verdict"] = verdicts[track_name(case, name)]
     result = Result(
@@ -42,6 +42,7 @@ def result_of(outcome: TorqueResult) -> Result:
             *(() if outcome.control.cases else ("cutter strength, chips and spindle: no controller was run",)),
             "chatter and runout beyond that of the cutter: not calculated",
             "the wall has one thickness, that at the end of the cut",
+            "error of the loads by layers and steps: not estimated",
         ),
         provenance=outcome.job.provenance,
         note=_note(outcome),

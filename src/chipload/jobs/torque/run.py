@@ -58,6 +58,7 @@ from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
 from chipload.result import Provenance
+from chipload.simulation.accuracy import energy_balance
 from chipload.simulation.chips import counted
 from chipload.simulation.estimate import estimate
 from chipload.stock.rings import surface_off
@@ -130,6 +131,10 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
         ),
         step_checks=step_checks(a.real, a.loads, material, _fastest(cases)),
         findings=(*a.planned.removal.findings, *a.real.removal.findings),
+        energy_balance={
+            name: energy_balance(cut.removal.columns, material.Ktc)
+            for name, cut in (("planned", a.planned), ("real", a.real))
+        },
     )
 
 

@@ -143,6 +143,10 @@ def read_cycle(record: AptRecord, mm: float) -> tuple[Cycle, tuple[str, ...]] | 
         else:
             raise record.error(f"{word} is said twice: take one out")
         k += 2
+    if kind not in PECKS and {"first", "step"} & values.keys():
+        unread.append("pecks")
+        values.pop("first", None)
+        values.pop("step", None)
     clear = values.pop("clear", None)
     if clear is not None:
         values["rapto"] = clear - abs(values["rapto"]) if "rapto" in values else clear
