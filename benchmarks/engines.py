@@ -1,20 +1,24 @@
-"""The engine of moves: moves a second, error against a converged setting, and against the layers.
+"""The engines: steps a second, error against a converged setting and against one another, beside another simulator.
 
-    python benchmarks/engines.py [--moves 20000] [--job 1000000] [--check]
+    python benchmarks/engines.py [--moves 20000] [--job 1000000] [--real 1500] [--planned FOLDER] [--check] [--write]
 
 Programs: finishing by a ball nose over a wave (``benchmarks/simulation.py``), roughing by a flat mill in levels of
-2 mm, rows 3 mm apart, moves of 1 mm. Times are processor seconds of the calling process without compiling, the median
-of three; "geometry" is the contact alone, "loads" with forces, torque, power and their bands of every move, "their
-error" with energy balance and resolution error of the run. Errors are those of a move's volume and loads against slices
-eight times as many, percentiles over the moves that cut more than a fifth of the median.
+2 mm, rows 3 mm apart, moves of 1 mm, and those of ``benchmarks/engine_programs.py``: bear and cameo of CAMotics, the
+boat of LinuxCNC, the contour, the pocket and a roughing of the impeller of the examples. Times are processor seconds
+of the calling process without compiling, the median of three; "geometry" is the contact alone, "loads" with forces,
+torque, power and their bands of every move, "their error" with energy balance and resolution error of the run. Errors
+are those of a move's volume and loads against slices eight times as many, percentiles over the moves that cut more
+than a fifth of the median; of the programs of others, what layers differ by from moves, step by step.
 ``--job`` adds the finishing program as a job of the command line: reading, stress, deflection, report and all; goals
-are those of 10^6 moves by their number. The table has goal, value and share of the goal; ``--check`` exits 1 where one
-is missed by more than 20 %.
+are those of 10^6 moves by their number. ``--real`` takes so many rows of each other program, 0 leaves them out.
+The table has goal, value and share of the goal; ``--check`` exits 1 where one is missed by more than 20 %, ``--write``
+puts the tables into docs/design/engines.md.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 import resource
 import statistics
@@ -22,77 +26,54 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+from engine_programs import Case, head, made, of_examples, of_others, upright
 from numpy.typing import NDArray
+from simulators import freecad
 
-from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import material_named
 from chipload.engagement.moves.stock import MoveStock
-from chipload.program.program import LINE, RAPID, Program
 from chipload.simulation.chips import remove
 from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
-from simulation import BALL, finishing
 
 Floats = NDArray[np.float64]
-FLAT = Cutter(10.0, 3, math.radians(30.0), 25.0, 40.0, 6e5)
 ALLOY = material_named("al7075-t6")
 #: goals: moves a second with loads, p99 of the greatest force [%], seconds of 10^6 moves, memory [MB]
 GOALS = {"finishing": (20_000.0, 3.0), "roughing": (40_000.0, 2.0)}
 MILLION_S, MILLION_MB = 120.0, 1000.0
+#: steps a second by engine: of the boat in five axes and of the bear by layers; moves over PathSim
+BOAT, BEAR, PEER = {"moves": 3000.0, "layers": 1000.0}, 1500.0, 5.0
 #: energy balance: sum of the chips against the converged one [%]
 VOLUME = 0.2
 #: slices of a corner of a job that states none
 SLICES = 24
-
-
-def roughing(moves: int) -> Program:
-    """Levels of 2 mm in rows there and back over a block of 120 x 60 mm."""
-    rows, along = 21, 134
-    k = np.arange(moves + 1)
-    at, row, level = k % along, k // along % rows, k // (along * rows)
-    x = -7.0 + np.where((k // along) % 2 == 0, at, along - 1 - at)
-    y = np.where(level % 2 == 0, 3.0 * row, 3.0 * (rows - 1 - row))
-    z = -2.0 * (level + 1.0)
-    n = len(k)
-    motion = np.full(n, LINE)
-    motion[0] = RAPID
-    up = np.tile([0.0, 0.0, 1.0], (n, 1))
-    return Program(
-        motion=motion, p_work=np.column_stack([x, y, z]), axis=up, centre=np.zeros((n, 3)), normal=up,
-        turns=np.zeros(n, dtype=int), feed=np.where(motion == RAPID, 0.0, 20.0), spindle=np.full(n, 1000.0),
-        tool=np.ones(n, dtype=int), line=k + 1, label=np.zeros(n, dtype=int), labels=("rough",),
-    )  # fmt: skip
-
-
-def case(name: str, moves: int) -> tuple[Program, Cutter, tuple[float, ...], tuple[float, ...]]:
-    """Program, cutter and corners of the block."""
-    if name == "finishing":
-        program = finishing(moves)
-        return program, BALL, (-6.0, -6.0, -8.0), (106.0, float(program.p_work[:, 1].max()) + 6.0, 0.0)
-    deep = 2.0 * (moves // (134 * 21) + 1) + 1.0
-    return roughing(moves), FLAT, (0.0, 0.0, -deep), (120.0, 60.0, 0.0)
+#: what is compared, and between which lines of the design note the tables stand
+COLUMNS = ("chip_volume_mm3", "force_n", "torque_nm", "torque_mean_nm", "chip_max_mm")
+NOTE = Path(__file__).parents[1] / "docs" / "design" / "engines.md"
+BEGIN, END = "<!-- benchmarks/engines.py --write -->", "<!-- end -->"
 
 
 def simulated(
     name: str, moves: int, pieces: int, flank: float, accuracy: bool = False
 ) -> tuple[float, dict[str, NDArray[np.generic]]]:
     """Processor seconds and columns."""
-    program, cutter, low, high = case(name, moves)
-    stock = LayeredStock.block(low, high, 2.0, 32.0)
+    case = made(name, moves)
+    stock = LayeredStock.block(case.low, case.high, 2.0, 32.0)
     fine = Resolution(step_mm=3.0, tolerance=1e-3, corner_pieces=pieces, flank_mm=flank)
     begun = time.process_time()
-    removal = remove(program, stock, {1: cutter}, ALLOY, fine, engine="moves", accuracy=accuracy)
+    removal = remove(case.program, stock, case.cutters, ALLOY, fine, engine="moves", accuracy=accuracy)
     return time.process_time() - begun, dict(removal.columns)
 
 
 def geometry(name: str, moves: int) -> float:
     """Processor seconds of the contact alone."""
-    program, cutter, low, high = case(name, moves)
-    stock = MoveStock(np.array(low), np.array(high), {1: cutter})
-    p = np.asarray(program.p_work)
+    case = made(name, moves)
+    stock, cutter = MoveStock(np.array(case.low), np.array(case.high), case.cutters), case.cutters[1]
+    p = np.asarray(case.program.p_work)
     begun = time.process_time()
     for at in range(0, moves, 512):
         a, b = p[at : min(at + 512, moves)], p[at + 1 : min(at + 512, moves) + 1]
@@ -131,7 +112,7 @@ force_n = 1500.0
 
 def command_line(moves: int) -> tuple[float, float]:
     """Processor seconds and peak memory [MB] of ``chipload run`` of a finishing program: reading, checks, report."""
-    program = finishing(moves)
+    program = made("finishing", moves).program
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         rows = [f"X{x:.3f} Y{y:.3f} Z{z:.4f}" for x, y, z in program.p_work[1:].tolist()]
@@ -143,9 +124,46 @@ def command_line(moves: int) -> tuple[float, float]:
     return used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0
 
 
+def both(case: Case) -> tuple[dict[str, float], dict[str, list[float]], str]:
+    """Steps a second by engine, p50, p95, p99 [%] by which layers differ from moves in a column, and why not."""
+    rates, columns, why = dict[str, float](), dict[str, dict[str, NDArray[np.generic]]](), ""
+    smallest = min(c.radius for c in case.cutters.values())
+    fine = Resolution(case.step_mm, 0.01, SLICES // 2, 0.5 * smallest)
+    for engine in ("moves", "layers"):
+        if engine == "moves" and not upright(case.program):
+            why = "the axis is not upright"
+            continue
+        stock = LayeredStock.block(case.low, case.high, case.layer_mm, 4.0 * smallest)
+        remove(head(case.program, 12), stock.copied(), case.cutters, ALLOY, fine, engine=engine, accuracy=False)
+        begun = time.process_time()
+        removal = remove(case.program, stock, case.cutters, ALLOY, fine, engine=engine, accuracy=False)
+        columns[engine] = dict(removal.columns)
+        rates[engine] = len(removal.columns["line"]) / (time.process_time() - begun)
+    errors = {}
+    if len(columns) == 2:
+        known, some = columns["moves"], columns["layers"]
+        errors = {name: p_of(some[name], known[name]) for name in COLUMNS[:3]}
+    return rates, errors, why
+
+
+def beside_pathsim(moves: int) -> tuple[float, float] | None:
+    """Processor seconds of the finishing program by moves with loads, over those of FreeCAD's PathSim, geometry alone,
+    with a pitch of 0.2 mm; and of ours. None: there is no FreeCAD.
+    """
+    case = made("finishing", moves)
+    peer = freecad(case.program.p_work, np.array(case.low), np.array(case.high), case.cutters[1], 0.2)
+    if peer is None:
+        return None
+    own = simulated("finishing", moves, SLICES, 2.0)[0]
+    return own / peer[0], own
+
+
 def p_of(some: Floats, known: Floats) -> list[float]:
     """p50, p95, p99 [%] of the moves that count."""
-    big = known > 0.2 * np.median(known[known > 0.0])
+    cuts = known > 0.0
+    big = known > 0.2 * float(np.median(known[cuts])) if cuts.any() else cuts
+    if not big.any():
+        return [math.nan] * 3
     return [float(p) for p in np.percentile(100.0 * np.abs(some[big] / known[big] - 1.0), [50, 95, 99])]
 
 
@@ -155,41 +173,91 @@ def row(work: str, goal: float, found: float, unit: str, least: bool) -> tuple[s
     return f"| {work} | {goal:,.4g} {unit} | {found:,.4g} {unit} | {share:.2f} |", share < (0.8 if least else 1.0 / 1.2)
 
 
+def tabled(title: str, head: str, rows: list[str]) -> str:
+    """A table under its title."""
+    lines = [head, "|" + "---|" * (head.count("|") - 1), *rows]
+    return "\n".join([title, "", *lines] if title else lines)
+
+
+def written(text: str) -> None:
+    """Put the tables into the design note."""
+    note = NOTE.read_text()
+    before, _, rest = note.partition(BEGIN)
+    NOTE.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{rest.partition(END)[2]}")
+
+
+def of_programs(cases: Iterable[Case], table: list[tuple[str, bool]]) -> tuple[list[str], list[str]]:
+    """Rows of the rates and of the differences between the engines; goals go to ``table``."""
+    rates, errors = [], []
+    for case in cases:
+        each, by_column, why = both(case)
+        for engine, rate in each.items():
+            if case.name == "boat, five axes":
+                table.append(row(f"{case.name}, by {engine}", BOAT[engine], rate, "/s", True))
+            elif case.name == "bear" and engine == "layers":
+                table.append(row("bear, by layers", BEAR, rate, "/s", True))
+        if case.name == "boat, five axes" and "moves" not in each:
+            table.append((f"| {case.name}, by moves | {BOAT['moves']:,.4g} /s | handed over | 0 |", True))
+        found = " | ".join(f"{each[e]:,.0f}" if e in each else why for e in ("moves", "layers"))
+        rates.append(f"| {case.name} | {case.kind} | {len(case.program)} | {found} |")
+        for column, values in by_column.items():
+            errors.append(f"| {case.name} | {case.kind} | {column} | " + " | ".join(f"{v:.2f}" for v in values) + " |")
+    return rates, errors
+
+
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--moves", type=int, default=20_000)
     parser.add_argument("--few", type=int, default=4000, help="moves of the converged setting")
     parser.add_argument("--job", type=int, default=0, help="moves of a job by the command line, as 1000000")
+    parser.add_argument("--real", type=int, default=1500, help="rows of each program of others; 0: none")
+    parser.add_argument("--planned", type=Path, help="folder of the planned examples; none: they are left out")
     parser.add_argument("--check", action="store_true")
+    parser.add_argument("--write", action="store_true", help="put the tables into docs/design/engines.md")
     args = parser.parse_args()
-    table, errors = [], []
+    table, errors, alone = list[tuple[str, bool]](), list[str](), list[str]()
     for name, (rate, worst) in GOALS.items():
-        _, cutter, _, _ = case(name, 10)
-        flank = 0.5 * cutter.radius
+        flank = 0.5 * made(name, 10).cutters[1].radius
         simulated(name, 300, SLICES, flank)
         each = statistics.median(simulated(name, args.moves, SLICES, flank)[0] for _ in range(3))
-        alone = statistics.median(geometry(name, args.moves) for _ in range(3))
+        contact = statistics.median(geometry(name, args.moves) for _ in range(3))
         stated = statistics.median(simulated(name, args.moves, SLICES, flank, accuracy=True)[0] for _ in range(3))
         some = simulated(name, args.few, SLICES, flank)[1]
-        known = simulated(name, args.few, 8 * SLICES, cutter.radius / 16.0)[1]
+        known = simulated(name, args.few, 8 * SLICES, flank / 8.0)[1]
         force = max(p_of(some["force_n"], known["force_n"])[2], 1e-3)
         table.append(row(f"{name}, {args.moves} moves with loads", rate, args.moves / each, "/s", True))
         table.append(row(f"{name}, p99 of the peak force", worst, force, "%", False))
-        print(f"{name}: geometry {args.moves / alone:.0f}/s, with the error of the run {args.moves / stated:.0f}/s")
-        for column in ("chip_volume_mm3", "force_n", "torque_nm", "torque_mean_nm", "chip_max_mm"):
+        alone.append(
+            f"| {name} | {args.moves / contact:,.0f} | {args.moves / each:,.0f} | {args.moves / stated:,.0f} |"
+        )
+        for column in COLUMNS:
             p = " | ".join(f"{v:.2f}" for v in p_of(some[column], known[column]))
             errors.append(f"| {name} | {column} | {p} |")
         total = abs(some["chip_volume_mm3"].sum() / known["chip_volume_mm3"].sum() - 1.0)
         table.append(row(f"{name}, sum of the chips", VOLUME, max(100.0 * total, 1e-4), "%", False))
+    cases: list[Iterable[Case]] = [of_others(args.real)] if args.real else []
+    cases += [of_examples(args.planned, args.real)] if args.real and args.planned else []
+    rates, differences = of_programs(itertools.chain(*cases), table)
+    peer = beside_pathsim(args.moves) if args.real else None
+    if peer is not None:
+        table.append(row("finishing with loads over PathSim without", PEER, peer[0], "times", False))
     if args.job:
         seconds, used = command_line(args.job)
         share = args.job / 1e6
         table.append(row(f"job of {args.job} moves by the command line", MILLION_S * share, seconds, "s", False))
         table.append(row("its memory", MILLION_MB, used, "MB", False))
-    print("\n| work | goal | measured | share of the goal |\n|---|---|---|---|")
-    print("\n".join(line for line, _ in table))
-    print("\n| program | column | p50 [%] | p95 [%] | p99 [%] |\n|---|---|---|---|---|")
-    print("\n".join(errors))
+    p = "p50 [%] | p95 [%] | p99 [%] |"
+    parts = [
+        tabled("", "| work | goal | measured | share of the goal |", [line for line, _ in table]),
+        tabled("Moves a second of the moves engine:", "| program | contact | with loads | with their error |", alone),
+        tabled("Error of a move against slices eight times as many:", f"| program | column | {p}", errors),
+        tabled("Steps a second of other programs:", "| program | cutter | rows | moves | layers |", rates),
+        tabled("What layers differ by from moves in a step:", f"| program | cutter | column | {p}", differences),
+    ]
+    text = "\n\n".join(parts[: 5 if rates else 3])
+    print(text)
+    if args.write:
+        written(text)
     if args.check and any(missed for _, missed in table):
         sys.exit(1)
 

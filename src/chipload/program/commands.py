@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.program.path_mode import mode_column
+from chipload.program.path_mode import frozen_column, mode_column
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -74,7 +74,9 @@ class Frame:
         c, s = math.cos(self.rotation), math.sin(self.rotation)
         x, y = c * p[:, 0] - s * p[:, 1], s * p[:, 0] + c * p[:, 1]
         p[:, 0], p[:, 1] = x, y
-        return p + self.offset + self.tool
+        p += self.offset
+        p += self.tool
+        return p
 
     def from_machine(self, axes: Floats) -> Floats:
         """(n, 9) in this frame from (n, 9) of the machine's axes."""
@@ -152,12 +154,11 @@ class Commands:
         for f in fields(self):
             if f.name in ("frames", "labels", "path_mode"):
                 continue
-            column = np.array(getattr(self, f.name), dtype=kinds.get(f.name, np.int64))
+            column = frozen_column(getattr(self, f.name), kinds.get(f.name, np.int64))
             if column.shape != shapes.get(f.name, (n,)):
                 raise InputError(f"commands.{f.name}: shape {column.shape}: must be {shapes.get(f.name, (n,))}")
             if not np.isfinite(column).all():
                 raise InputError(f"commands.{f.name}: a value is not a finite number")
-            column.setflags(write=False)
             object.__setattr__(self, f.name, column)
         most = {"motion": PROBE, "plane": YZ, "frame": len(self.frames) - 1, "label": len(self.labels) - 1}
         for name, top in most.items():
@@ -170,6 +171,8 @@ class Commands:
 
     def machine(self) -> Floats:
         """(n, 9) positions of the machine's own axes [mm, rad], offsets and the tool's length put in."""
+        if len(self.frames) == 1:
+            return self.frames[0].to_machine(self.position)
         out = np.zeros((len(self), 9))
         for k, frame in enumerate(self.frames):
             rows = self.frame == k

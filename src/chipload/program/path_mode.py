@@ -8,9 +8,10 @@ short lines may leave their points (the "naive CAM detector" of LinuxCNC).
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
 
@@ -40,6 +41,19 @@ UNSTATED: PathMode = (float(PathControl.MACHINE), 0.0, 0.0)
 FREE: PathMode = (float(PathControl.CONTINUOUS), 0.0, 0.0)
 
 
+def frozen_column(value: ArrayLike, kind: type) -> NDArray[Any]:
+    """The values as an array that nobody can change: itself where that is so already, else a copy."""
+    column: NDArray[Any] = np.asarray(value, dtype=kind)
+    owner: Any = column if column is value or column.base is value else None
+    while isinstance(owner, np.ndarray):
+        if owner.flags.writeable:
+            column = column.copy()
+            break
+        owner = owner.base
+    column.setflags(write=False)
+    return column
+
+
 def mode_column(name: str, values: object, n: int) -> Floats:
     """(n, 3) float, the column of a program of ``n`` rows; None: not stated.
 
@@ -48,14 +62,13 @@ def mode_column(name: str, values: object, n: int) -> Floats:
     InputError
         The shape is wrong, a control is unknown, a tolerance is negative or no number.
     """
-    column = np.zeros((n, 3)) if values is None else np.array(values, dtype=np.float64)
+    column = frozen_column(np.zeros((n, 3)) if values is None else np.asarray(values), float)
     if column.shape != (n, 3):
         raise InputError(f"{name}.path_mode: shape {column.shape}: must be {(n, 3)}")
     if not np.isfinite(column).all() or (column < 0.0).any():
         raise InputError(f"{name}.path_mode: a tolerance must be finite and at least 0 mm")
     if not np.isin(column[:, 0], [float(c) for c in PathControl]).all():
         raise InputError(f"{name}.path_mode: a control is unknown: must be one of PathControl")
-    column.setflags(write=False)
     return column
 
 

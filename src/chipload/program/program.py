@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.program.path_mode import mode_column
+from chipload.program.path_mode import frozen_column, mode_column
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -92,7 +92,7 @@ class Program:
             if f.name in ("labels", "path_mode"):
                 continue
             kind = np.float64 if f.name in (*_VECTORS, "feed", "spindle") else np.int64
-            column = np.array(getattr(self, f.name), dtype=kind)
+            column = frozen_column(getattr(self, f.name), kind)
             shape = (n, 3) if f.name in _VECTORS else (n,)
             if column.shape != shape:
                 raise InputError(
@@ -100,7 +100,6 @@ class Program:
                 )
             if not np.isfinite(column).all():
                 raise InputError(f"program.{f.name}: a value is not a finite number")
-            column.setflags(write=False)
             object.__setattr__(self, f.name, column)
         cuts = (self.motion == LINE) | (self.motion == ARC_CW) | (self.motion == ARC_CCW)
         if (self.feed[cuts] <= 0.0).any():
@@ -111,13 +110,13 @@ class Program:
                 raise InputError(f"program.{name}: must be unit vectors")
         if n and self.turns.min() < 0:
             raise InputError(f"program.turns = {self.turns.min()}: must be at least 0")
-        arc = (self.motion[1:] == ARC_CW) | (self.motion[1:] == ARC_CCW)
-        r0, r1 = (_from_axis(p, self.centre[1:], self.normal[1:]) for p in (self.p_work[:-1], self.p_work[1:]))
-        skew = np.where(arc, np.abs(r1 - r0), 0.0)
+        arc = np.flatnonzero((self.motion[1:] == ARC_CW) | (self.motion[1:] == ARC_CCW)) + 1
+        r0, r1 = (_from_axis(self.p_work[rows], self.centre[arc], self.normal[arc]) for rows in (arc - 1, arc))
+        skew = np.abs(r1 - r0)
         if len(skew) and skew.max() > ARC_SKEW_MM:
             k = int(skew.argmax())
             raise InputError(
-                f"program row {k + 1}: an arc starts {r0[k]:.6g} mm from its centre and ends {r1[k]:.6g} mm from it: "
+                f"program row {arc[k]}: an arc starts {r0[k]:.6g} mm from its centre and ends {r1[k]:.6g} mm from it: "
                 f"must agree within {ARC_SKEW_MM:g} mm"
             )
 

@@ -48,23 +48,50 @@ def add(acc, m0, m1, at, step, back, table, first, last, p, q, w, size, arm, rat
     The edge lies at the immersions theta - last .. theta - first, of which p .. q cut; ``size`` its length [mm] where
     it does not lag, ``rate`` [rad/mm] its lag.
     """
+    straight = last - first < STRAIGHT
+    # rotations at which all of the edge cuts
+    k0 = m0 if straight else min(max(math.ceil((p + last - back) / step), m0), m1)
+    k1 = m1 if straight else max(min(math.floor((q + first - back) / step) + 1, m1), k0)
+    if k0 > m0:
+        add_part(acc, m0, k0, at, step, back, table, first, last, p, q, w, arm, rate)
+    if k1 > k0:
+        add_whole(acc, k0, k1, at, table, 0.5 * (first + last), 0.5 * (last - first), w, size, arm)
+    if m1 > k1:
+        add_part(acc, k1, m1, at, step, back, table, first, last, p, q, w, arm, rate)
+
+
+@njit(cache=True, nogil=True)
+def add_whole(acc, m0, m1, at, table, mid, half, w, size, arm):
+    """:func:`add` where all of the edge cuts, half an angle to both sides of the lag ``mid``: closed forms over it."""
+    at_, bt, ct, ar, br, cr = size * w[0], size * w[1], size * w[2], size * w[3], size * w[4], size * w[5]
+    a0, a1, a2 = size * w[6], size * w[7], size * w[8]
+    one = 1.0
+    two = 1.0
+    if half > 0.5 * STRAIGHT:
+        one = math.sin(half) / half
+        two = one * math.cos(half)
+    cl = math.cos(mid)
+    sl = math.sin(mid)
+    for m in range(m0, m1):
+        x = table[0, at + m]
+        y = table[1, at + m]
+        C = x * cl + y * sl
+        S = y * cl - x * sl
+        co = C * one
+        si = S * one
+        sc = S * C * two
+        ss = 0.5 - (0.5 - S * S) * two
+        cc = 1.0 - ss
+        acc[0, m] -= at_ * co + (bt + cr) * sc + ct * cc + ar * si + br * ss
+        acc[1, m] += at_ * si + bt * ss + (ct - br) * sc - ar * co - cr * cc
+        acc[2, m] -= a0 + a1 * si + a2 * co
+        acc[3, m] += arm * (at_ + bt * si + ct * co)
+
+
+@njit(cache=True, nogil=True)
+def add_part(acc, m0, m1, at, step, back, table, first, last, p, q, w, arm, rate):
+    """:func:`add` where the edge may be cut off at an end."""
     at_, bt, ct, ar, br, cr, a0, a1, a2 = w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7], w[8]
-    if last - first < STRAIGHT:
-        mid = 0.5 * (first + last)
-        cl = math.cos(mid)
-        sl = math.sin(mid)
-        for m in range(m0, m1):
-            x = table[0, at + m]
-            y = table[1, at + m]
-            C = x * cl + y * sl
-            S = y * cl - x * sl
-            t = at_ + bt * S + ct * C
-            r = ar + br * S + cr * C
-            acc[0, m] -= size * (t * C + r * S)
-            acc[1, m] += size * (t * S - r * C)
-            acc[2, m] -= size * (a0 + a1 * S + a2 * C)
-            acc[3, m] += size * arm * t
-        return
     cf = math.cos(first)
     sf = math.sin(first)
     cl = math.cos(last)

@@ -176,7 +176,7 @@ class MoveStock:
         self.level = np.empty((cells, 3))
         self.level[:] = (self.high[2], self.high[2], self.low[2])
         self.lists = np.zeros((cells, 4), dtype=np.int64)
-        self.kept, self.reach = np.empty(1 << 16, dtype=np.int32), np.empty(1 << 16)
+        self.kept, self.reach = np.empty(1 << 16, dtype=np.int32), np.empty(1 << 16, dtype=np.float32)
         self.used = np.zeros(1, dtype=np.int64)
         self.moves, self.of, self.count = np.empty((1024, 6)), np.empty(1024, dtype=np.int64), 0
         self.body, self.more = body, MORE
@@ -226,9 +226,9 @@ class MoveStock:
         self.count = end
 
     def _grow(self) -> None:
-        """Twice the room for lists, less what is no longer needed."""
-        need = 2 * int(self.lists[:, 1].sum()) + 4 * len(self.kept) // 2
-        kept, reach = np.empty(need, dtype=np.int32), np.empty(need)
+        """Room for lists half as long again, less what is no longer needed."""
+        need = (1 << 17) + 3 * int(self.lists[:, 1].sum()) // 2
+        kept, reach = np.empty(need, dtype=np.int32), np.empty(need, dtype=np.float32)
         self.used[0] = _kernels.packed(self.lists, self.kept, self.reach, kept, reach, self.level)
         self.kept, self.reach = kept, reach
 

@@ -135,6 +135,10 @@ class MotionRows:
         position[:, 3:6] = np.radians(position[:, 3:6])
         motion = table[:, 0].astype(np.int64)
         assert not (turns[motion != ARC] != 0).any()
+        line = table[:, 11].astype(np.int64)
+        del table
+        for column in (motion, position, centre, turns, line):
+            column.setflags(write=False)  # Commands keeps them as they are
         return Commands(
             motion=motion,
             position=position,
@@ -146,7 +150,7 @@ class MotionRows:
             tool=np.array(columns[2], dtype=np.int64)[which],
             tcp=np.array(columns[3], dtype=np.bool_)[which],
             frame=np.array(columns[4], dtype=np.int64)[which],
-            line=table[:, 11].astype(np.int64),
+            line=line,
             label=np.array(columns[6], dtype=np.int64)[which],
             frames=tuple(datum.frame() for datum in self._frames) or (Frame(),),
             labels=tuple(self._labels),
