@@ -11,7 +11,8 @@ from chipload.cutting.material import material_named
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour
 from chipload.machine.machine import machine_named
-from chipload.planning.pocket.plan import Clearing, plan_pocket
+from chipload.planning.pocket.plan import plan_pocket
+from chipload.planning.pocket.request import Clearing
 from chipload.program.program import ARC_CCW, LINE, RAPID
 from chipload.simulation.verify import verify_contour
 

@@ -14,7 +14,8 @@ from chipload.geometry.dxf import read_dxf
 from chipload.machine.feed import move_time
 from chipload.machine.machine import machine_named
 from chipload.planning.pocket.clearing import CUT, clear_region
-from chipload.planning.pocket.plan import Clearing, plan_pocket
+from chipload.planning.pocket.plan import plan_pocket
+from chipload.planning.pocket.request import Clearing
 from chipload.simulation.centre_path import CentrePath, rim_engagement
 
 CAD = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[3] / "shared" / "data")) / "cad"

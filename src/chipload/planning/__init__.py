@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from chipload.planning.impeller.answer import largest_cutters
     from chipload.planning.impeller.impeller import Impeller
     from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
-    from chipload.planning.pocket.plan import Clearing, plan_pocket
+    from chipload.planning.pocket.plan import plan_pocket
+    from chipload.planning.pocket.request import Clearing
     from chipload.planning.result import OperationResult, StrategyResult
     from chipload.planning.thinwall.blank import FinishSurface
     from chipload.planning.thinwall.depth import DepthRange
@@ -37,7 +38,8 @@ __getattr__, __dir__ = attach(
     __name__,
     {
         "contour.plan": "Finishing plan_contour",
-        "pocket.plan": "Clearing plan_pocket",
+        "pocket.plan": "plan_pocket",
+        "pocket.request": "Clearing",
         "result": "OperationResult StrategyResult",
         "impeller.impeller": "Impeller",
         "impeller.parametric": "ImpellerShape impeller_of",

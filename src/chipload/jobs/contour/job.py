@@ -87,19 +87,43 @@ def _contradictions(table: ContourJobTable, cutters: Mapping[int, Cutter]) -> It
             known = ", ".join(str(n) for n in sorted(cutters))
             yield f"{at}.cutter = {op.cutter}: no [[cutter]] has this number: state one of {known}"
         cutter = cutters.get(op.cutter)
-        if cutter is not None and op.radial_depth_mm >= cutter.diameter:
+        if op.kind == "pocket":
+            yield from _wrong_pocket(at, k, table, cutters)
+        if cutter is not None and op.radial_depth_mm is not None and op.radial_depth_mm >= cutter.diameter:
             yield (
                 f"{at}.radial_depth_mm = {op.radial_depth_mm:g}: must be below the cutter's diameter_mm = "
                 f"{cutter.diameter:g}: take several passes or a larger cutter"
             )
-        if cutter is not None and op.axial_depth_mm > cutter.flute_length:
+        key, depth = ("axial_depth_mm", op.axial_depth_mm) if op.depth_mm is None else ("depth_mm", op.depth_mm)
+        if cutter is not None and depth > cutter.flute_length:
             yield (
-                f"{at}.axial_depth_mm = {op.axial_depth_mm:g}: must be at most the cutter's flute_length_mm = "
+                f"{at}.{key} = {depth:g}: must be at most the cutter's flute_length_mm = "
                 f"{cutter.flute_length:g}: take several depths or a longer cutter"
             )
     if not table.limits.stated:
         names = ", ".join(ContourLimitsTable.model_fields)
         yield f"limits: none is stated, so nothing would be checked: state at least one of {names}"
+
+
+def _wrong_pocket(at: str, k: int, table: ContourJobTable, cutters: Mapping[int, Cutter]) -> Iterator[str]:
+    """What the keys of a pocket contradict."""
+    op = table.operation[k]
+    if (op.radial_depth_mm is None) == (op.engagement_deg is None):
+        state = "missing" if op.radial_depth_mm is None else "stated twice"
+        yield f"{at}.radial_depth_mm and {at}.engagement_deg: {state}: state one of them"
+    if op.side in ("left", "right"):
+        yield f"{at}.side = '{op.side}': must be inside or outside of a pocket"
+    if op.rest_of is None:
+        return
+    if op.rest_of >= k or table.operation[op.rest_of].kind != "pocket":
+        yield f"{at}.rest_of = {op.rest_of}: must be the number of an earlier pocket operation, from 0"
+        return
+    larger, own = cutters.get(table.operation[op.rest_of].cutter), cutters.get(op.cutter)
+    if larger is not None and own is not None and own.diameter >= larger.diameter:
+        yield (
+            f"{at}.rest_of = {op.rest_of}: its cutter of {larger.diameter:g} mm must be larger than this one of "
+            f"{own.diameter:g} mm"
+        )
 
 
 def _wrong_strategies(at: str, op: OperationTable) -> Iterator[str]:

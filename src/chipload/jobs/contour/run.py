@@ -5,6 +5,8 @@ Nothing is written here: the outcome is a value, and the report room writes it.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,17 +15,20 @@ import numpy as np
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named, need_directions, read_material
 from chipload.errors import Finding, InputError, Severity
+from chipload.geometry.chains import Drawing
 from chipload.geometry.contour import Contour, Region
 from chipload.geometry.dxf import read_dxf
 from chipload.geometry.step import read_step_face
 from chipload.jobs.checks import default_checks
+from chipload.jobs.contour.advice import greatest_engagement
 from chipload.jobs.contour.job import ContourJob
 from chipload.jobs.contour.outcome import ContourResult, Operation, Verification
 from chipload.jobs.contour.tables import OperationTable
 from chipload.jobs.provenance import provenance_of, title_of
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.contour.plan import Finishing, check_contour, plan_contour
-from chipload.planning.pocket.plan import LINK_LIFT_MM, Clearing, check_pocket, plan_pocket
+from chipload.planning.pocket.plan import check_pocket, plan_pocket
+from chipload.planning.pocket.request import LINK_LIFT_MM, Clearing, LargerCutter
 from chipload.planning.result import OperationResult, StrategyResult
 from chipload.program.check import check_program
 from chipload.progress import Progress, silent
@@ -43,6 +48,7 @@ class Inputs:
     """What a job names, read: contours [mm], machine, material, and what the readers noticed."""
 
     contours: tuple[Contour, ...]
+    stock: tuple[Contour, ...]
     machine: Machine
     material: Material
     findings: tuple[Finding, ...]
@@ -61,7 +67,7 @@ def read_inputs(job: ContourJob) -> Inputs:
     for name in ("force_xy_n", "form_error_um"):
         if name in job.limits:
             need_directions(material, f"limits.{name}")
-    contours, findings = _read_part(job)
+    contours, stock, findings = _read_part(job)
     for k, op in enumerate(job.operations):
         speed = rad_s_from_rpm(op.speed_rpm)
         if not machine.spindle_min * (1.0 - 1e-9) <= speed <= machine.spindle_max * (1.0 + 1e-9):
@@ -70,7 +76,7 @@ def read_inputs(job: ContourJob) -> Inputs:
                 f"{job.path.name}: operation.{k}.speed_rpm = {op.speed_rpm:g}: machine {machine.name} turns from "
                 f"{low:g} to {high:g} rpm: state a speed between them"
             )
-    return Inputs(contours, machine, material, findings)
+    return Inputs(contours, stock, machine, material, findings)
 
 
 def run(job: ContourJob, progress: Progress = silent) -> ContourResult:
@@ -117,7 +123,8 @@ def check(job: ContourJob) -> tuple[list[str], bool]:
         f"machine {inputs.machine.name}, material {inputs.material.name}"
     ]
     for k, op in enumerate(job.operations):
-        cutter, setting = job.cutters[op.cutter], _setting(job, op)
+        op, _ = _resolved(job, inputs, op)
+        cutter, setting = job.cutters[op.cutter], _setting(job, inputs, op)
         if isinstance(setting, Clearing):
             what = f"{check_pocket(inputs.contours, setting, cutter):.6g} mm2"
         else:
@@ -132,7 +139,9 @@ def check(job: ContourJob) -> tuple[list[str], bool]:
 
 def _operation(job: ContourJob, inputs: Inputs, op: OperationTable, progress: Progress) -> Operation:
     cutter = job.cutters[op.cutter]
+    op, advice = _resolved(job, inputs, op)
     result = _plan(job, inputs, op, cutter, lambda done, what: progress(0.5 * done, what))
+    result = replace(result, findings=(*result.findings, *advice))
     verifications, machine_findings = {}, {}
     for k, (name, strategy) in enumerate(result.strategies.items()):
         start = 0.5 + 0.5 * k / len(result.strategies)
@@ -147,14 +156,14 @@ def _operation(job: ContourJob, inputs: Inputs, op: OperationTable, progress: Pr
     settings = {k: v for k, v in op.model_dump().items() if v is not None}
     checks = default_checks(job.table.checks, {cutter.number: cutter}, inputs.material, 0.5)
     return Operation(
-        result, settings, cutter, job.table.stock.top_mm, op.axial_depth_mm, verifications, machine_findings,
-        job.limits, checks,
+        result, settings, cutter, job.table.stock.top_mm, op.depth_mm or op.axial_depth_mm, verifications,
+        machine_findings, job.limits, checks,
     )  # fmt: skip
 
 
 def _plan(job: ContourJob, inputs: Inputs, op: OperationTable, cutter: Cutter, progress: Progress) -> OperationResult:
     """Call the planner of the operation's kind."""
-    setting = _setting(job, op)
+    setting = _setting(job, inputs, op)
     if isinstance(setting, Clearing):
         return plan_pocket(
             inputs.contours, setting, cutter, inputs.material, inputs.machine, limits=job.limits, progress=progress
@@ -164,13 +173,40 @@ def _plan(job: ContourJob, inputs: Inputs, op: OperationTable, cutter: Cutter, p
     )
 
 
-def _setting(job: ContourJob, op: OperationTable) -> Finishing | Clearing:
+def _rigid(job: ContourJob) -> tuple[float, float]:
+    return job.table.checks.deflection_of_feed, job.table.checks.deflection_of_depth
+
+
+def _resolved(job: ContourJob, inputs: Inputs, op: OperationTable) -> tuple[OperationTable, tuple[str, ...]]:
+    """The operation with its radial depth, and how it was found where it is not stated."""
+    if op.engagement_deg is None:
+        return op, ()
+    cutter = job.cutters[op.cutter]
+    found: tuple[str, ...] = ()
+    if op.engagement_deg == "limit":
+        checks = default_checks(job.table.checks, {cutter.number: cutter}, inputs.material, 0.5)
+        advice = greatest_engagement(op, cutter, inputs.material, inputs.machine, job.limits, checks, _rigid(job))
+        angle, found = advice.engagement, (advice.text,)
+    else:
+        angle = math.radians(op.engagement_deg)
+    return op.model_copy(update={"radial_depth_mm": cutter.radius * (1.0 - math.cos(angle))}), found
+
+
+def _larger(job: ContourJob, op: OperationTable) -> LargerCutter | None:
+    """The cutter whose rest an operation cuts."""
+    if op.rest_of is None:
+        return None
+    before = job.operations[op.rest_of]
+    return LargerCutter(job.cutters[before.cutter].radius, before.allowance_mm or 0.0)
+
+
+def _setting(job: ContourJob, inputs: Inputs, op: OperationTable) -> Finishing | Clearing:
     """What an operation asks of its planner."""
-    rigid = (job.table.checks.deflection_of_feed, job.table.checks.deflection_of_depth)
+    rigid, radial = _rigid(job), op.radial_depth_mm or 0.0
     if op.kind == "pocket":
         return Clearing(
             milling=op.milling,
-            radial_depth=op.radial_depth_mm,
+            radial_depth=radial,
             axial_depth=op.axial_depth_mm,
             feed=mm_s_from_mm_min(op.feed_mm_min),
             spindle_speed=rad_s_from_rpm(op.speed_rpm),
@@ -181,6 +217,11 @@ def _setting(job: ContourJob, op: OperationTable) -> Finishing | Clearing:
             rigid=rigid,
             link_feed=None if op.link_feed_mm_min is None else mm_s_from_mm_min(op.link_feed_mm_min),
             link_lift=LINK_LIFT_MM if op.link_lift_mm is None else op.link_lift_mm,
+            depth=op.depth_mm,
+            stock=inputs.stock,
+            around=op.side == "outside",
+            holes=op.holes_mm or (),
+            larger=_larger(job, op),
         )
     forward = op.kind == "forward"
     strategies: tuple[str, ...] = ("forward",) if forward else tuple(op.strategies or ())
@@ -190,7 +231,7 @@ def _setting(job: ContourJob, op: OperationTable) -> Finishing | Clearing:
         strategies=strategies,
         use=op.use if op.use is not None and not forward else strategies[0],
         joint=op.joint or "sharp",
-        radial_depth=op.radial_depth_mm,
+        radial_depth=radial,
         axial_depth=op.axial_depth_mm,
         semifinish_depth=op.semifinish_depth_mm or 0.0,
         passes=op.passes or 1,
@@ -221,7 +262,7 @@ def verify(
     leave = op.tolerance_mm or 0.0
     gouge = leave if op.joint == "clothoid" else 0.0
     if op.kind == "pocket":
-        leave, gouge = op.radial_depth_mm, CHORDS_MM
+        leave, gouge = op.radial_depth_mm or 0.0, CHORDS_MM
     names = np.asarray(strategy.history["pass"]).astype(str)
     left_out = int(np.isin(names, NOT_LEVEL).sum())
     told = verify_contour(
@@ -257,16 +298,18 @@ def verify(
 
 
 # -- reading ----------------------------------------------------------------------------------------------------
-def _read_part(job: ContourJob) -> tuple[tuple[Contour, ...], tuple[Finding, ...]]:
-    """Contours of the drawing or of the planar face, and what its reader noticed."""
+def _read_part(job: ContourJob) -> tuple[tuple[Contour, ...], tuple[Contour, ...], tuple[Finding, ...]]:
+    """Contours of the drawing or of the planar face, those of the stock's outline, and what the reader noticed."""
     part = job.table.part
     ending = job.part_file.suffix.lower()
+    if part.stock_layers and ending != ".dxf":
+        raise InputError(f"part.stock_layers: {part.file} has no layers: only a drawing (.dxf) has")
     if ending == ".dxf":
         drawing = read_dxf(
             job.part_file,
             units=part.units,
             units_if_unstated=part.units_if_unstated,
-            layers=part.layers or None,
+            layers=(*part.layers, *part.stock_layers) if part.layers else None,
             join_mm=part.join_mm,
             tolerance_mm=part.tolerance_mm,
         )
@@ -276,7 +319,23 @@ def _read_part(job: ContourJob) -> tuple[tuple[Contour, ...], tuple[Finding, ...
         )
     else:
         raise InputError(f"part.file = {part.file}: must end in .dxf, .step or .stp")
-    return drawing.contours, tuple(replace(f, text=f"part: {f.text}") for f in drawing.findings)
+    outline, contours = _stock_outline(part.stock_layers, drawing) if part.stock_layers else ((), drawing.contours)
+    return contours, outline, tuple(replace(f, text=f"part: {f.text}") for f in drawing.findings)
+
+
+def _stock_outline(layers: Sequence[str], drawing: Drawing) -> tuple[tuple[Contour, ...], tuple[Contour, ...]]:
+    """The contours on the layers of the stock, and the others."""
+    wanted = {name.casefold() for name in layers}
+    known = {name.casefold() for name in drawing.layers}
+    for name in layers:
+        if name.casefold() not in known:
+            raise InputError(f"part.stock_layers: no contour on layer {name!r}; layers there are: {sorted(known)}")
+    pairs = list(zip(drawing.contours, drawing.layers, strict=True))
+    outline = tuple(c for c, layer in pairs if layer.casefold() in wanted)
+    rest = tuple(c for c, layer in pairs if layer.casefold() not in wanted)
+    if not rest:
+        raise InputError("part.stock_layers: every contour is on these layers: name those of the stock only")
+    return outline, rest
 
 
 def _provenance(job: ContourJob, inputs: Inputs) -> Provenance:

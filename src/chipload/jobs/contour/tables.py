@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -21,6 +21,8 @@ from chipload.jobs.tables import (
     Unit,
 )
 
+Engagement = Annotated[float, Field(ge=2.0, le=150.0)]
+Hole = tuple[Number, Number, Positive]
 Strategy = Literal["plain", "backward", "feed"]
 
 
@@ -33,6 +35,9 @@ class PartTable(Table):
     layers: tuple[Text, ...] = Field((), description="layers that are read; none: all")
     join_mm: NotNegative = Field(0.01, le=10.0, description="gaps up to this are closed and reported")
     tolerance_mm: Positive = Field(0.001, le=1.0, description="how far arcs may leave splines and ellipses")
+    stock_layers: tuple[Text, ...] = Field(
+        (), description="layers of a drawing that hold the outline of the stock of a pocket; none: material everywhere"
+    )
     face_z_mm: Number | None = Field(None, description="height of the planar face of a STEP file")
 
 
@@ -48,13 +53,15 @@ class OperationTable(Table):
     kind: Literal["contour", "forward", "pocket"]
     cutter: Count = Field(description="number of a [[cutter]]")
     milling: Literal["down", "up"]
-    radial_depth_mm: Positive = Field(description="depth of cut across the wall")
-    axial_depth_mm: Positive = Field(description="depth of cut along the axis")
+    radial_depth_mm: Positive | None = Field(None, description="depth of cut across the wall")
+    axial_depth_mm: Positive = Field(description="depth of cut along the axis; of a pocket, the greatest of a level")
     feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's centre")
     speed_rpm: Positive = Field(le=1e6, description="spindle speed")
     step_mm: Positive = Field(le=10.0, description="step of the history")
     clearance_mm: Positive = Field(description="height of rapids above the top of the stock")
-    side: Literal["inside", "outside", "left", "right"] | None = None
+    side: Literal["inside", "outside", "left", "right"] | None = Field(
+        None, description="where the cutter runs; outside of a pocket: around the contours, within the stock"
+    )
     strategies: tuple[Strategy, ...] | None = None
     use: Strategy | None = Field(None, description="the strategy whose program is released")
     joint: Literal["sharp", "clothoid"] | None = None
@@ -68,6 +75,19 @@ class OperationTable(Table):
     )
     link_lift_mm: NotNegative | None = Field(
         None, description="how far links stay off the floor, where they are long enough; none: 0.1"
+    )
+    engagement_deg: Literal["limit"] | Engagement | None = Field(
+        None,
+        description="engagement that a pocket keeps, instead of radial_depth_mm; limit: the greatest within all limits",
+    )
+    depth_mm: Positive | None = Field(
+        None, description="of the pocket, cut in equal levels of at most axial_depth_mm; none: one level"
+    )
+    holes_mm: tuple[Hole, ...] | None = Field(
+        None, description="pre-drilled holes to enter by, as deep as the pocket: x, y, diameter of each"
+    )
+    rest_of: int | None = Field(
+        None, ge=0, description="number of an earlier pocket operation, from 0: only what its larger cutter left is cut"
     )
 
 
@@ -94,13 +114,13 @@ class ContourJobTable(Table):
 
 
 #: keys that every planned operation needs
-ALWAYS = {"kind", "cutter", "milling", "radial_depth_mm", "axial_depth_mm", "feed_mm_min", "speed_rpm", "step_mm"}
+ALWAYS = {"kind", "cutter", "milling", "axial_depth_mm", "feed_mm_min", "speed_rpm", "step_mm"}
 
 
 #: keys that each kind needs beside those that all need
 NEEDS: Mapping[str, tuple[str, ...]] = {
-    "contour": ("side", "strategies", "joint", "semifinish_depth_mm", "tolerance_mm", "lead_mm"),
-    "forward": ("side", "lead_mm"),
+    "contour": ("side", "strategies", "joint", "radial_depth_mm", "semifinish_depth_mm", "tolerance_mm", "lead_mm"),
+    "forward": ("side", "radial_depth_mm", "lead_mm"),
     "pocket": (),
 }
 
@@ -109,5 +129,15 @@ NEEDS: Mapping[str, tuple[str, ...]] = {
 MAY: Mapping[str, tuple[str, ...]] = {
     "contour": ("use", "passes"),
     "forward": ("passes",),
-    "pocket": ("allowance_mm", "link_feed_mm_min", "link_lift_mm"),
+    "pocket": (
+        "side",
+        "radial_depth_mm",
+        "engagement_deg",
+        "depth_mm",
+        "holes_mm",
+        "rest_of",
+        "allowance_mm",
+        "link_feed_mm_min",
+        "link_lift_mm",
+    ),
 }

@@ -13,7 +13,7 @@ whole of each step.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.planning.pocket import _kernels, _pass
+from chipload.planning.pocket.free_space import edge_places, take_free
 from chipload.planning.pocket.leftover import Remainder
 from chipload.planning.pocket.reach import CHORD, Reach, centre_region, reach_of, widest_places
 from chipload.planning.pocket.starts import Starts
@@ -129,6 +130,7 @@ def clear_region(
     milling: Literal["down", "up"] = "down",
     step: float | None = None,
     allowance: float = 0.0,
+    free: Sequence[Region] = (),
     progress: Progress = silent,
 ) -> ClearingPath:
     """Path that clears ``region`` with a cutter of ``radius`` [mm], never engaged by more than ``engagement`` [rad].
@@ -137,24 +139,30 @@ def clear_region(
     ----------
     step : greatest step [mm], <= R / 4; 0.06 R where none is given
     allowance : [mm] left on every wall, >= 0
+    free : regions without material; passes begin at their edges, bores come only where these do not lead
 
     Raises
     ------
     InputError
-        An argument is out of its range, or the cutter does not fit into the region anywhere.
+        An argument is out of its range, the cutter does not fit into the region anywhere, or nothing is left to clear.
     """
     step = STEP * radius if step is None else step
     centres = require_clearing(region, radius, engagement, milling, step, allowance)
     if milling == "up":
         return _mirrored_path(
             clear_region(
-                _mirrored(region), radius, engagement, milling="down", step=step, allowance=allowance, progress=progress
+                _mirrored(region), radius, engagement, milling="down", step=step, allowance=allowance,
+                free=[_mirrored(r) for r in free], progress=progress,
             )
-        )
-    run = _Run(centres, radius, engagement, step, progress)
-    for x, y, room in widest_places(centres, CHORD * radius):
-        run.enter(x, y, room)
+        )  # fmt: skip
+    run = _Run(centres, radius, engagement, step, free, progress)
+    if free:
+        run.begin_at_edges(free)
         run.clear()
+    else:
+        for x, y, room in widest_places(centres, CHORD * radius):
+            run.enter(x, y, room)
+            run.clear()
     run.enter_elsewhere()
     return run.result()
 
@@ -188,16 +196,20 @@ def require_clearing(
 class _Run:
     """The state of one clearing: stock, path so far, places to go on from."""
 
-    def __init__(self, centres: Region, radius: float, limit: float, step: float, progress: Progress) -> None:
+    def __init__(
+        self, centres: Region, radius: float, limit: float, step: float, free: Sequence[Region], progress: Progress
+    ) -> None:
         xmin, ymin, xmax, ymax = centres.bounds
         self.centres, self.radius, self.step = centres, radius, step
         self.most_engaged, self.limit = limit - BETWEEN, limit - MARGIN
         self.progress = progress
         self.stock = PlanarStock((xmin - radius, ymin - radius, xmax + radius, ymax + radius), radius)
         self.reach: Reach = reach_of(centres, self.stock.grid, CHORD * radius)
+        take_free(self.stock, free, radius)
         self.reachable = centre_region(centres, -radius)
         self.rows: list[Floats] = []
-        self.remainder, self.taken = Remainder(self.reachable, radius), 0
+        self.remainder, self.taken = Remainder(self.reachable, radius, free), 0
+        self.whole = self.remainder.rest.area
         self.events: list[Event] = []
         self.starts = Starts(radius, step)
         self.passes = 0
@@ -234,6 +246,18 @@ class _Run:
             Event("pocket-entry", x, y, f"helical bore of diameter {2.0 * (R + rh):.4g} mm: a full slot by its nature")
         )
         self.starts.add(np.column_stack([x + rh * np.cos(a), y + rh * np.sin(a)]), a + 0.5 * math.pi)
+
+    def begin_at_edges(self, free: Sequence[Region]) -> None:
+        """Let passes begin wherever the cutter may stand along the edge of free space."""
+        for region in free:
+            for points, headings in edge_places(region, self.radius, self.step):
+                inside = np.array([self.reach.holds(x, y, self.stock.grid) for x, y in points.tolist()])
+                cut = np.flatnonzero(np.diff(inside.astype(np.int64))) + 1
+                for run in np.split(np.arange(len(points)), cut):
+                    if inside[run[0]]:
+                        self.starts.add(points[run], headings[run])
+        if len(self.starts.p):
+            self.at = self.starts.p[0].copy()
 
     def enter_elsewhere(self) -> None:
         """Bores into what no pass came to, the widest place first, as long as that clears anything."""
@@ -300,11 +324,11 @@ class _Run:
         """One pass from the start k; whether it took enough for the start to be tried again."""
         for x, y, heading in self.starts.candidates(k):
             start = np.array([x, y])
-            clear = self._linked(start)  # of what is there before the pass
+            clear = bool(self.rows) and self._linked(start)  # of what is there before the pass
             segments, places, took, reason, at = self._pass(x, y, heading)
             if not len(segments):
                 continue
-            if np.hypot(*(start - self.at)) > 1e-9:
+            if not self.rows or np.hypot(*(start - self.at)) > 1e-9:
                 self.add(start[None, :], LINK if clear else LIFT)
             self.passes += 1
             self.add(segments[:, 2:4], CUT, segments[:, 7], segments[:, 4:7])
@@ -317,7 +341,7 @@ class _Run:
                 )
                 self.events.append(Event("pocket-blocked", float(at[0]), float(at[1]), text))
             self.starts.add(places[:, 0:2], places[:, 2])
-            self.progress(min(0.99, self.area / self.reachable.area), f"front, pass {self.passes}")
+            self.progress(min(0.99, self.area / self.whole), f"front, pass {self.passes}")
             return took > WORTH * self.radius**2
         return False
 
@@ -343,7 +367,7 @@ class _Run:
             took += float(numbers[4])
             self.steps += int(numbers[5])
             if reason == _pass.RUNNING:
-                self.progress(min(0.99, self.area / self.reachable.area), f"front, pass {self.passes + 1}")
+                self.progress(min(0.99, self.area / self.whole), f"front, pass {self.passes + 1}")
         return np.vstack(segments), np.vstack(places), took, int(reason), state[0:2]
 
     def _left(self) -> Remainder:
@@ -363,6 +387,8 @@ class _Run:
     # -- the end --------------------------------------------------------------------------------------------
     def result(self) -> ClearingPath:
         """The path with its areas."""
+        if not self.rows:
+            raise InputError("nothing is left for the cutter to clear: free space covers all that it can reach")
         rows = np.vstack(self.rows)
         kind = rows[:, 2].astype(np.int64)
         area, contours, places = self._left().parts()
@@ -370,7 +396,7 @@ class _Run:
         for mm2, (x, y) in places:
             events.append(Event("pocket-leftover", x, y, f"{mm2:.4g} mm2 is left that could be reached"))
         names = {"entry": ENTRY, "cut": CUT, "link": LINK, "lift": LIFT}
-        whole = self.reachable.area
+        whole = self.whole
         path = ClearingPath(
             x=rows[:, 0],
             y=rows[:, 1],

@@ -6,6 +6,8 @@ corners lie on the circle, so that it is less than the truth by at most 2e-5 R.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -42,9 +44,11 @@ def swept(points: Floats, breaks: NDArray[np.bool_], radius: float) -> shapely.G
 class Remainder:
     """What is left of a region, less and less of it as a path goes on; each part of the path is taken away once."""
 
-    def __init__(self, reachable: Region, radius: float) -> None:
+    def __init__(self, reachable: Region, radius: float, free: Sequence[Region] = ()) -> None:
         self.radius = radius
         self.rest: shapely.Geometry = reachable.flatten(1e-5 * radius)
+        for region in free:
+            self.rest = shapely.difference(self.rest, region.flatten(1e-5 * radius))
 
     def take(self, points: Floats, breaks: NDArray[np.bool_]) -> None:
         """Take away what the discs along a part of the path sweep, as in :func:`swept`."""

@@ -7,6 +7,7 @@ which the history has a row at its end.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -15,10 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.engagement.contact import PIECES, Engagement
+from chipload.geometry.contour import Region
 from chipload.machine.feed import corner_speed, curvature_speed, limited_speed
 from chipload.machine.machine import Machine
 from chipload.planning.pocket import _replay
 from chipload.planning.pocket.clearing import CUT, ENTRY, LIFT, LINK, ClearingPath, segment_lengths
+from chipload.planning.pocket.free_space import take_free
 from chipload.program.build import helix, plunge, rapid, retract, rows
 from chipload.program.program import ARC_CCW, ARC_CW, LINE, Program
 from chipload.stock.planar import PlanarStock
@@ -151,13 +154,16 @@ def places(seg: Floats, share: Floats) -> tuple[Floats, Floats]:
     return at, d / np.where(length == 0.0, 1.0, length)[:, None]
 
 
-def replayed(motions: Motions, samples: Samples, radius: float) -> tuple[Engagement, Floats]:
+def replayed(
+    motions: Motions, samples: Samples, radius: float, free: Sequence[Region] = ()
+) -> tuple[Engagement, Floats]:
     """The engaged arcs at the end of every piece, from the stock as the motions before it left it, and the greatest
-    engagement (m,) [rad] along it. O(m).
+    engagement (m,) [rad] along it; ``free`` regions hold no material. O(m).
     """
     c = samples.centre
     low, high = c.min(axis=0) - 2.0 * radius, c.max(axis=0) + 2.0 * radius
     stock = PlanarStock((low[0], low[1], high[0], high[1]), radius)
+    take_free(stock, free, radius)
     m = len(c)
     angle, most, count, phi = np.zeros(m), np.zeros(m), np.zeros(m, dtype=np.int64), np.zeros((m, PIECES, 2))
     cuts = (motions.kind == CUT) | (motions.kind == ENTRY)
@@ -233,6 +239,19 @@ def clock(motions: Motions, samples: Samples, time: Floats, programs: list[Progr
     return out
 
 
+def bore_turns(radius: float, depth: float) -> int:
+    """Turns of a helical bore ``depth`` [mm] deep, the axis on a circle of ``radius`` [mm]."""
+    return max(1, math.ceil(depth / (math.tau * radius * math.tan(HELIX))))
+
+
+def bore_pitch(motions: Motions, depth: float) -> float:
+    """Greatest depth [mm] that a turn of any bore goes down."""
+    first = np.array([a + 1 for a, b in motions.runs if b > a and motions.kind[a + 1] == ENTRY])
+    seg = motions.segments[first]
+    radii = np.hypot(seg[:, 0] - seg[:, 4], seg[:, 1] - seg[:, 5])
+    return max(depth / bore_turns(r, depth) for r in radii.tolist())
+
+
 def programs_of(motions: Motions, setting_feed: float, depth: float, spindle: float, tool: int) -> list[Program]:
     """A program a run: rapid above the stock, helical bore from its top or straight down where it is clear, the motions
     at depth, up.
@@ -244,8 +263,7 @@ def programs_of(motions: Motions, setting_feed: float, depth: float, spindle: fl
         parts = [rapid([*at, h.safe], spindle, tool, "link")]
         if b > a and motions.kind[a + 1] == ENTRY:
             xc, yc, sweep = seg[0, 4:7]
-            around = math.tau * math.hypot(at[0] - xc, at[1] - yc)
-            turns = math.ceil(depth / (around * math.tan(HELIX)))
+            turns = bore_turns(math.hypot(at[0] - xc, at[1] - yc), depth)
             parts.append(plunge([*at, h.top], setting_feed, spindle, tool, "entry"))
             parts.append(
                 helix(at, (float(xc), float(yc)), (h.top, h.floor), depth / turns, setting_feed, spindle, tool, "entry",

@@ -33,6 +33,10 @@ class Reach:
     row_edges: NDArray[np.int64]
     flag: NDArray[np.int8]
 
+    def holds(self, x: float, y: float, grid: Floats) -> bool:
+        """Whether the centre may be at a place."""
+        return bool(_kernels.allowed(x, y, grid, *self.arguments()))
+
     def arguments(self) -> tuple[NDArray[Any], ...]:
         """What the kernels take."""
         return self.flag, self.edges, self.rows, self.row_edges

@@ -1,0 +1,97 @@
+"""Space that is free of material before the cutter begins: outside of the stock, pre-drilled holes, what a larger
+cutter cleared.
+
+Notation: R [mm] cutter radius. A free region is swept by the cutter itself: along its parallels at R, 2 R, 3 R ... from
+its boundary, which together reach every place of it that a disc of radius R can. A place that none can (an inner corner
+of the stock's outline) would stay material for the planner, and not for the machine: it is refused.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import InputError
+from chipload.geometry.contour import Contour, Region
+from chipload.geometry.offset import offset_region
+from chipload.stock.planar import PlanarStock
+
+Floats = NDArray[np.float64]
+
+#: how far outside of the stock the plane is swept, in R
+BAND = 4.0
+#: part of the area of a free region that a disc of radius R need not reach
+CORNERS = 1e-6
+
+
+def parallels(region: Region, radius: float) -> list[tuple[Contour, ...]]:
+    """Contours at R, 2 R, 3 R ... inside a region, until nothing is left of it."""
+    out, inner = [], region
+    for k in range(1, 10_000):
+        inner = offset_region(region, k * radius)
+        if not inner.contours:
+            break
+        out.append(inner.contours)
+    return out
+
+
+def take_free(stock: PlanarStock, regions: Sequence[Region], radius: float) -> None:
+    """Take the free regions out of the stock."""
+    for region in regions:
+        for contours in parallels(region, radius):
+            for contour in contours:
+                stock.remove_segments(contour.segments)
+
+
+def edge_places(region: Region, radius: float, step: float) -> list[tuple[Floats, Floats]]:
+    """Points (n, 2) and headings (n,) of a cutter that goes along the boundary of a free region, a pair a contour."""
+    out = []
+    for contour in offset_region(region, radius).contours:
+        s = np.linspace(0.0, contour.length, max(8, math.ceil(contour.length / step)))
+        points, tangents, _ = contour.at(s)
+        out.append((points, np.arctan2(tangents[:, 1], tangents[:, 0])))
+    return out
+
+
+def outside_of(stock: Region, radius: float) -> Region:
+    """The band ``BAND`` R wide around the outline of the stock."""
+    outer = offset_region(stock, -BAND * radius)
+    return _reached(
+        Region.of([*outer.contours, *stock.contours]), radius, "part.stock_layers: the outline of the stock"
+    )
+
+
+def hole(x: float, y: float, diameter: float, radius: float) -> Region:
+    """A pre-drilled hole.
+
+    Raises
+    ------
+    InputError
+        It is no wider than the cutter.
+    """
+    if not diameter > 2.0 * radius:
+        raise InputError(
+            f"operation.holes_mm: a hole of diameter {diameter:g} mm: must be above the cutter's diameter_mm = "
+            f"{2.0 * radius:g}: drill a larger one or leave it out"
+        )
+    return Region.of([Contour.circle((x, y), 0.5 * diameter)])
+
+
+def cleared_by(region: Region, radius: float, allowance: float) -> Region:
+    """What a cutter of ``radius`` can clear of a region: its opening, ``allowance`` off the walls [mm]."""
+    return offset_region(offset_region(region, radius + allowance), -radius)
+
+
+def _reached(region: Region, radius: float, what: str) -> Region:
+    """The region, if a disc of radius R reaches all of it beside the stock."""
+    opened = offset_region(offset_region(region, radius), -radius)
+    missed = region.area - opened.area
+    if missed > CORNERS * region.area:
+        raise InputError(
+            f"{what} has inner corners that the cutter of radius {radius:g} mm does not reach ({missed:.4g} mm2): "
+            "round them off by that radius"
+        )
+    return region

@@ -1,0 +1,157 @@
+"""What is asked of a pocket: depths, feeds, walls, and where there is no material before the cutter begins.
+
+Notation: R cutter radius, s radial depth, a* = arccos(1 - s/R) the engagement that is held.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from chipload.cutting.rigid import OF_DEPTH, OF_FEED
+from chipload.cutting.wall_error import Milling
+from chipload.errors import InputError
+from chipload.geometry.contour import Contour, Region
+from chipload.geometry.offset import offset_region
+from chipload.planning.pocket.clearing import STEP
+from chipload.planning.pocket.free_space import cleared_by, hole, outside_of
+from chipload.planning.pocket.motions import Heights
+
+#: height of a link above the floor where none is stated [mm]
+LINK_LIFT_MM = 0.1
+#: how far beside the stock the centre may go around a part that stands in it, in R
+AROUND = 1.05
+
+
+@dataclass(frozen=True)
+class LargerCutter:
+    """A cutter that cleared the same contours before: radius and what it left on the walls [mm]."""
+
+    radius: float
+    allowance: float
+
+
+@dataclass(frozen=True)
+class Clearing:
+    """What the engineer asks of a pocket; mm, mm/s, rad/s, as in :class:`chipload.planning.contour.plan.Finishing`.
+
+    Parameters
+    ----------
+    step : greatest step, taken as 0.06 R where it is less (the engagement is kept along the whole of each step)
+    allowance : left on the walls
+    link_feed : of links through cleared space [mm/s], None: the machine's greatest
+    link_lift : how far links stay off the floor, where they are long enough
+    depth : of the pocket, cut in equal depths of at most ``axial_depth``; None: one of ``axial_depth``
+    stock : outline of the stock, closed contours; none: material everywhere
+    around : the contours are those of a part that stands in the stock, which is cleared around it
+    holes : (x, y, diameter) of pre-drilled holes as deep as the pocket
+    larger : what cleared the contours before; None: nothing did
+    """
+
+    milling: Milling
+    radial_depth: float
+    axial_depth: float
+    feed: float
+    spindle_speed: float
+    top: float
+    clearance: float
+    step: float
+    allowance: float = 0.0
+    rigid: tuple[float, float] = (OF_FEED, OF_DEPTH)
+    link_feed: float | None = None
+    link_lift: float = LINK_LIFT_MM
+    depth: float | None = None
+    stock: tuple[Contour, ...] = ()
+    around: bool = False
+    holes: tuple[tuple[float, float, float], ...] = ()
+    larger: LargerCutter | None = None
+
+    @property
+    def depths(self) -> tuple[float, ...]:
+        """The axial depth of each level, equal ones."""
+        whole = self.axial_depth if self.depth is None else self.depth
+        count = max(1, math.ceil(whole / self.axial_depth - 1e-9))
+        return (whole / count,) * count
+
+    @property
+    def levels(self) -> list[Heights]:
+        """The heights of the program at each depth, from above."""
+        out, top = [], self.top
+        for depth in self.depths:
+            floor = top - depth
+            out.append(Heights(floor, min(floor + self.link_lift, top), top, self.top + self.clearance))
+            top = floor
+        return out
+
+    @property
+    def heights(self) -> Heights:
+        """The heights at the first depth."""
+        return self.levels[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """A request laid out in the plane.
+
+    Parameters
+    ----------
+    region : inside of which the cutter may go
+    free : regions without material
+    engagement : that is held [rad]
+    step : [mm]
+    """
+
+    region: Region
+    free: tuple[Region, ...]
+    engagement: float
+    step: float
+
+
+def laid_out(contours: Sequence[Contour], setting: Clearing, radius: float) -> Asked:
+    """The region, what is free of material, the engagement that is held and the step.
+
+    Raises
+    ------
+    InputError
+        The radial depth is not below the diameter, a contour is open, a hole is no wider than the cutter, a part is to
+        be cleared around and no stock is stated.
+    """
+    if not 0.0 < setting.radial_depth < 2.0 * radius:
+        raise InputError(
+            f"operation.radial_depth_mm = {setting.radial_depth:g}: must be above 0 and below the cutter's "
+            f"diameter_mm = {2.0 * radius:g}"
+        )
+    drawn = Region.of(Region(tuple(contours)).contours)
+    free: list[Region] = []
+    region = drawn
+    if setting.stock:
+        stock = Region.of(Region(setting.stock).contours)
+        free.append(outside_of(stock, radius))
+        if setting.around:
+            beside = offset_region(stock, -(radius + setting.allowance + AROUND * radius))
+            region = Region.of([*beside.contours, *drawn.contours])
+    elif setting.around:
+        raise InputError("operation.side = 'outside': needs part.stock_layers: state the layers of the stock's outline")
+    free += [hole(x, y, diameter, radius) for x, y, diameter in setting.holes]
+    if setting.larger is not None:
+        before = cleared_by(drawn, setting.larger.radius, setting.larger.allowance)
+        if not before.contours:
+            raise InputError(f"operation.rest_of: the larger cutter, radius {setting.larger.radius:g} mm, fits nowhere")
+        free.append(before)
+    wanted = math.acos(1.0 - setting.radial_depth / radius)
+    return Asked(region, tuple(free), wanted, min(max(setting.step, STEP * radius), 0.25 * radius))
+
+
+def material_before(asked: Asked, setting: Clearing, radius: float) -> tuple[Contour, ...]:
+    """The contours of the material that the first motion meets; none where it is everywhere."""
+    if not asked.free:
+        return ()
+    inner = asked.free[1:] if setting.stock else asked.free
+    outer: Sequence[Contour] = setting.stock
+    if not outer:
+        xmin, ymin, xmax, ymax = asked.region.bounds
+        m = 8.0 * radius
+        box = [(xmin - m, ymin - m), (xmax + m, ymin - m), (xmax + m, ymax + m), (xmin - m, ymax + m)]
+        outer = (Contour.polyline(box, closed=True),)
+    return Region.of([*outer, *(c for region in inner for c in region.contours)]).contours

@@ -1,0 +1,273 @@
+"""Pockets by the job file: levels, open sides, parts that stand in the stock, holes to enter by, rest machining, and
+the engagement that the limits allow. Every plan is checked by the simulation, which knows no planner.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import ezdxf
+import numpy as np
+import pytest
+import shapely
+
+from chipload.errors import InputError
+from chipload.jobs import load_job
+from chipload.jobs.contour.run import check, run
+from chipload.program.program import ARC_CCW, ARC_CW, LINE
+from chipload.result import Verdict
+
+JOB = """
+[part]
+file = "part.dxf"
+units = "mm"
+{part}
+[stock]
+top_mm = 0.0
+[machine]
+name = "vmc"
+[material]
+name = "al7075-t6"
+[[cutter]]
+number = 1
+diameter_mm = 8.0
+flutes = 3
+helix_deg = 30.0
+flute_length_mm = 20.0
+overhang_mm = 28.0
+modulus_gpa = 580.0
+[[cutter]]
+number = 2
+diameter_mm = 5.0
+flutes = 3
+helix_deg = 30.0
+flute_length_mm = 15.0
+overhang_mm = 20.0
+modulus_gpa = 580.0
+{operations}
+[limits]
+{limits}
+"""
+OPERATION = """
+[[operation]]
+kind = "pocket"
+cutter = {cutter}
+milling = "down"
+axial_depth_mm = 4.0
+feed_mm_min = 955.0
+speed_rpm = 7960.0
+step_mm = 0.4
+clearance_mm = 5.0
+{more}
+"""
+SQUARE = [(0, 0), (30, 0), (30, 24), (0, 24)]
+
+
+def written(folder: Path, drawn, *operations: str, part: str = "", limits: str = "engagement_deg = 60.0") -> Path:
+    """A job in ``folder``; ``drawn`` are closed outlines by layer, a circle as (x, y, radius)."""
+    doc = ezdxf.new()
+    for layer, outlines in drawn.items():
+        for outline in outlines:
+            if len(outline) == 3 and not isinstance(outline[0], tuple):
+                doc.modelspace().add_circle(outline[:2], outline[2], dxfattribs={"layer": layer})
+            else:
+                doc.modelspace().add_lwpolyline(outline, close=True, dxfattribs={"layer": layer})
+    doc.saveas(folder / "part.dxf")
+    path = folder / "job.toml"
+    path.write_text(JOB.format(part=part, operations="".join(operations), limits=limits))
+    return path
+
+
+def operation(more: str, cutter: int = 1) -> str:
+    return OPERATION.format(cutter=cutter, more=more)
+
+
+def done(path: Path):
+    job = load_job(path)
+    outcome = run(getattr(job, "job", job))
+    for op in outcome.operations:
+        for found in op.verifications.values():
+            assert found.verdict is Verdict.HOLDS, found.text
+        for strategy in op.result.strategies.values():
+            assert not [e.text for e in strategy.events if e.failure]
+    return [op.result.strategies["pocket"] for op in outcome.operations], outcome
+
+
+def checked(path: Path):
+    job = load_job(path)
+    return check(getattr(job, "job", job))
+
+
+def swept(program, radius, z):
+    """What the level motions at height z sweep, arcs by chords."""
+    lines = []
+    p = program.p_work
+    for k in np.flatnonzero(np.isin(program.motion, (LINE, ARC_CW, ARC_CCW))):
+        if k == 0 or abs(p[k, 2] - z) > 1e-6 or abs(p[k - 1, 2] - z) > 1e-6:
+            continue
+        a, b, c = p[k - 1, :2], p[k, :2], program.centre[k, :2]
+        if program.motion[k] == LINE:
+            lines.append(shapely.linestrings([a, b]) if np.hypot(*(b - a)) > 0 else shapely.points(a))
+            continue
+        t0, t1 = (math.atan2(*(x - c)[::-1]) for x in (a, b))
+        sweep = (t1 - t0) % math.tau if program.motion[k] == ARC_CCW else -((t0 - t1) % math.tau)
+        t = t0 + sweep * np.linspace(0.0, 1.0, 33)
+        lines.append(shapely.linestrings(c + math.hypot(*(a - c)) * np.column_stack([np.cos(t), np.sin(t)])))
+    return shapely.union_all(shapely.buffer(np.array(lines), radius, quad_segs=64))
+
+
+def test_levels(tmp_path):
+    """10 mm in levels of at most 4: three of 3.333 mm, each the same path, and three times the cutting time."""
+    (one,), _ = done(written(tmp_path, {"part": [SQUARE]}, operation("radial_depth_mm = 1.2")))
+    (three,), outcome = done(written(tmp_path, {"part": [SQUARE]}, operation("radial_depth_mm = 1.2\ndepth_mm = 10.0")))
+    assert three.summary["levels"] == 3
+    floors = three.program.p_work[:, 2]
+    for k, z in enumerate((-10.0 / 3.0, -20.0 / 3.0, -10.0)):
+        at = np.isclose(floors, z, atol=1e-9)
+        assert at.any()
+        assert swept(three.program, 4.0, z).area == pytest.approx(swept(one.program, 4.0, -4.0).area, rel=1e-6), k
+    assert three.summary["cutting_s"] == pytest.approx(3.0 * one.summary["cutting_s"], rel=1e-3)
+    assert three.summary["passes"] == 3 * one.summary["passes"]
+    assert three.summary["lifts"] == 3 * (one.summary["lifts"] + 1) - 1
+    assert outcome.operations[0].depth == 10.0
+    assert (np.diff(three.history["t_s"]) >= -1e-9).all()
+
+
+def test_a_part_that_stands_in_the_stock(tmp_path):
+    """A boss of 6 mm in a block of 40 x 30: all around it is cut from the open sides, no bore, and the boss stays."""
+    (boss,), _ = done(
+        written(
+            tmp_path,
+            {"STOCK": [[(0, 0), (40, 0), (40, 30), (0, 30)]], "part": [(20, 15, 6)]},
+            operation('radial_depth_mm = 1.2\nside = "outside"'),
+            part='stock_layers = ["STOCK"]',
+        )
+    )
+    assert not [e for e in boss.events if e.code == "pocket-entry"]
+    cut = swept(boss.program, 4.0, -4.0)
+    stock, kept = shapely.box(0, 0, 40, 30), shapely.buffer(shapely.points(20, 15), 6.0, quad_segs=256)
+    assert shapely.intersection(cut, kept).area < 2e-2
+    assert shapely.difference(shapely.difference(stock, kept), cut).area < 0.003 * stock.area
+    # outside of the stock nothing is cut: down there the engagement is 0
+    h = boss.history
+    away = (h["x_mm"] < -4.0) | (h["x_mm"] > 44.0) | (h["y_mm"] < -4.0) | (h["y_mm"] > 34.0)
+    assert h["engagement_deg"][away].max(initial=0.0) == 0.0
+
+
+def test_a_pocket_open_to_one_side(tmp_path):
+    """A pocket drawn beyond the edge of the stock is entered from there."""
+    (pocket,), _ = done(
+        written(
+            tmp_path,
+            {"STOCK": [[(0, 0), (40, 0), (40, 30), (0, 30)]], "part": [[(-10, 6), (22, 6), (22, 24), (-10, 24)]]},
+            operation("radial_depth_mm = 1.2"),
+            part='stock_layers = ["STOCK"]',
+        )
+    )
+    assert not [e for e in pocket.events if e.code == "pocket-entry"]
+    wanted = shapely.intersection(shapely.box(0, 0, 40, 30), shapely.box(-10, 6, 22, 24))
+    missing = shapely.difference(wanted, swept(pocket.program, 4.0, -4.0)).area
+    corners = 2.0 * (1.0 - math.pi / 4.0) * 16.0
+    assert missing == pytest.approx(corners + pocket.summary["leftover_mm2"], abs=0.05)
+    assert pocket.summary["leftover_mm2"] < 0.003 * wanted.area
+
+
+def test_a_hole_to_enter_by(tmp_path):
+    """No bore, and the first cut is made from the hole."""
+    (pocket,), _ = done(
+        written(tmp_path, {"part": [SQUARE]}, operation("radial_depth_mm = 1.2\nholes_mm = [[15.0, 12.0, 10.0]]"))
+    )
+    assert not [e for e in pocket.events if e.code == "pocket-entry"]
+    assert pocket.summary["entry_s"] < 1.0
+    first = np.flatnonzero(pocket.history["pass"] == "pocket")[0]
+    x, y = pocket.history["x_mm"][first], pocket.history["y_mm"][first]
+    assert math.hypot(x - 15.0, y - 12.0) < 2.5
+
+
+def test_what_a_larger_cutter_left(tmp_path):
+    """The corners of a square: (1 - pi/4) (R^2 - r^2) each, and nothing else is cut."""
+    (large, small), _ = done(
+        written(
+            tmp_path,
+            {"part": [SQUARE]},
+            operation("radial_depth_mm = 1.2"),
+            operation("radial_depth_mm = 0.6\nrest_of = 0", cutter=2),
+        )
+    )
+    assert small.summary["reachable_mm2"] == pytest.approx(4.0 * (1.0 - math.pi / 4.0) * (16.0 - 6.25), rel=1e-3)
+    assert small.summary["cutting_s"] < 0.2 * large.summary["cutting_s"]
+    both = shapely.union(swept(large.program, 4.0, -4.0), swept(small.program, 2.5, -4.0))
+    left = shapely.difference(shapely.box(0, 0, 30, 24), both).area - 4.0 * (1.0 - math.pi / 4.0) * 6.25
+    assert 0.0 < left <= large.summary["leftover_mm2"] + small.summary["leftover_mm2"] + 0.05
+    assert small.summary["leftover_mm2"] < 0.005 * 30 * 24
+
+
+@pytest.mark.parametrize(
+    ("limits", "by"), [("force_xy_n = 260.0", "force_xy_n"), ("torque_nm = 0.9\nengagement_deg = 90.0", "torque_nm")]
+)
+def test_the_engagement_that_the_limits_allow(tmp_path, limits, by):
+    """The limit is used, and nowhere exceeded."""
+    (pocket,), outcome = done(
+        written(tmp_path, {"part": [SQUARE]}, operation('engagement_deg = "limit"'), limits=limits)
+    )
+    (text,) = outcome.operations[0].result.findings
+    assert f"by {by}" in text
+    limit = float(limits.split("\n")[0].split("=")[1])
+    cut = pocket.history["pass"] == "pocket"
+    assert 0.6 * limit < pocket.history[by][cut].max() <= limit
+    (tighter,), _ = done(
+        written(
+            tmp_path, {"part": [SQUARE]}, operation('engagement_deg = "limit"'),
+            limits=limits.replace(str(limit), str(0.9 * limit)),
+        )
+    )  # fmt: skip
+    assert tighter.summary["engagement_deg"]["wanted"] < pocket.summary["engagement_deg"]["wanted"]
+
+
+def test_an_engagement_that_is_stated(tmp_path):
+    path = written(tmp_path, {"part": [SQUARE]}, operation("engagement_deg = 40.0"))
+    (pocket,), _ = done(path)
+    assert pocket.summary["engagement_deg"]["wanted"] == pytest.approx(40.0)
+
+
+@pytest.mark.parametrize(
+    ("more", "drawn", "part", "text"),
+    [
+        ("", {"part": [SQUARE]}, "", "operation.0.radial_depth_mm and operation.0.engagement_deg: missing: state one"),
+        (
+            "radial_depth_mm = 1.0\nengagement_deg = 30.0", {"part": [SQUARE]}, "",
+            "operation.0.radial_depth_mm and operation.0.engagement_deg: stated twice: state one",
+        ),
+        ("radial_depth_mm = 1.0\nrest_of = 0", {"part": [SQUARE]}, "", "operation.0.rest_of = 0: must be the number"),
+        (
+            'radial_depth_mm = 1.0\nside = "outside"', {"part": [SQUARE]}, "",
+            "operation.side = 'outside': needs part.stock_layers",
+        ),
+        (
+            "radial_depth_mm = 1.0\nholes_mm = [[15.0, 12.0, 8.0]]", {"part": [SQUARE]}, "",
+            "operation.holes_mm: a hole of diameter 8 mm: must be above the cutter's diameter_mm = 8",
+        ),
+        (
+            "radial_depth_mm = 1.0", {"part": [SQUARE]}, 'stock_layers = ["raw"]',
+            "part.stock_layers: no contour on layer 'raw'",
+        ),
+        (
+            'radial_depth_mm = 1.0\nside = "outside"',
+            {"raw": [[(0, 0), (40, 0), (40, 20), (20, 20), (20, 40), (0, 40)]], "part": [(10, 10, 3)]},
+            'stock_layers = ["raw"]', "the outline of the stock has inner corners that the cutter of radius 4 mm",
+        ),
+        ("radial_depth_mm = 1.0\ndepth_mm = 25.0", {"part": [SQUARE]}, "", "operation.0.depth_mm = 25: must be at"),
+    ],
+)  # fmt: skip
+def test_refused(tmp_path, more, drawn, part, text):
+    path = written(tmp_path, drawn, operation(more), part=part)
+    with pytest.raises(InputError) as err:
+        checked(path)
+    assert text in str(err.value)
+
+
+def test_no_engagement_holds(tmp_path):
+    path = written(tmp_path, {"part": [SQUARE]}, operation('engagement_deg = "limit"'), limits="force_xy_n = 5.0")
+    with pytest.raises(InputError, match=r"no engagement from 2 deg holds the limits: force_xy_n 16.26 of 5: lower"):
+        checked(path)
