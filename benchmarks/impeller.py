@@ -34,7 +34,7 @@ from chipload.planning.impeller.costs import ChannelSide, Terms
 from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.search import limits
-from chipload.planning.impeller.surfaces import Sampling3, surface_of
+from chipload.planning.impeller.surfaces import ContactSampling, surface_of
 
 HECC = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[1].parent / "shared" / "data")) / "blades/nasa_hecc"
 HECC = HECC / "HECC_Vaned_Configuration/Coordinates"
@@ -248,7 +248,7 @@ def divide(title, impeller, catalogue, picked, tables, names, how, terms) -> Non
 
 def patches() -> None:
     wide, tall, flat = (0.03, 0.97), (0.30, 0.98), (0.15, 0.85)
-    how = Sampling3(wide, tall, (10, 10), 2.0, 2.0)
+    how = ContactSampling(wide, tall, (10, 10), 2.0, 2.0)
     names = [("blade", "plus", wide, tall), ("blade", "minus", wide, tall), ("blade", "floor", wide, flat)]
     catalogue = catalogue_named("wu2019")
     picked = next(k for k, c in enumerate(catalogue.cutters) if c.corner_radius == 1.5)
@@ -259,7 +259,7 @@ def patches() -> None:
     if not HECC.is_dir():
         return
     wide, tall = (0.05, 0.95), (0.20, 0.98)
-    how = Sampling3(wide, tall, (7, 4), 5.0, 2.0, ahead=10.0)
+    how = ContactSampling(wide, tall, (7, 4), 5.0, 2.0, ahead=10.0)
     names = [
         (b, s, wide, flat if s == "floor" else tall) for b in ("blade", "splitter") for s in ("plus", "minus", "floor")
     ]

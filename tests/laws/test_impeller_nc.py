@@ -5,12 +5,14 @@ Our own reading here is a few regular expressions: neither the writer nor the re
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from tests.rs274 import MISSING, canonical, rs274_installed
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
+from chipload.jobs.impeller.channels import channel_repeat
 from chipload.machine.kinematics import forward
 from chipload.machine.machine import machine_named
 from chipload.planning.impeller.lines import LineMotion
@@ -23,6 +25,7 @@ from chipload.planning.impeller.roughing import RoughingSettings
 from chipload.planning.impeller.tables import index_table
 from chipload.program.gcode.writer import write_gcode
 from chipload.program.program import RAPID
+from chipload.program.read import read_program
 
 MACHINE = machine_named("horizontal-b")
 CUTTER = CatalogueCutter(12.0, 2.0, cutting_length=45.0, reach=60.0, holder_diameter=30.0)
@@ -146,3 +149,73 @@ def test_linuxcnc_reads_every_motion_as_written(written):
     # it prints four decimals
     assert np.abs(np.array(calls)[:, 1:] - rows[:, 1:6]).max() <= 0.5001e-4
     assert (np.array(calls)[:, 0] == rows[:, 0]).all()
+
+
+BLADES = 11
+
+
+def by_machine(rows):
+    """Tips and axes of rows X Y Z [mm] A B [deg]."""
+    q = np.zeros((len(rows), 9))
+    q[:, :3], q[:, 3:5] = rows[:, :3], np.radians(rows[:, 3:5])
+    return forward(MACHINE, q)
+
+
+@pytest.mark.skipif(not rs274_installed(), reason=MISSING)
+def test_linuxcnc_goes_through_every_channel(written):
+    """The loop of the text, carried out by LinuxCNC: each channel is the first, turned round the part."""
+    program, _ = written
+    repeat = channel_repeat(program, MACHINE, index_table(MACHINE), BLADES)
+    text = write_gcode(program, MACHINE, title="impeller", verified=False, repeat=repeat)
+    shift, rows = np.zeros(5), []
+    for name, words in canonical(text):
+        if name == "SET_G92_OFFSET":
+            shift = np.array([float(x) for x in words[:5]])
+        elif name in ("STRAIGHT_TRAVERSE", "STRAIGHT_FEED"):
+            rows.append(np.array([float(x) for x in words[:5]]) + shift)
+    assert (shift == 0.0).all(), "the offset is taken back at the end"
+    assert len(rows) % BLADES == 0
+    each = np.array(rows).reshape(BLADES, -1, 5)
+    # to the next channel at the height at which the last one ends, above the part
+    assert each[1:, 0, 2] == pytest.approx(each[:-1, -1, 2], abs=1e-4)
+    assert each[1:, 0, 2] == pytest.approx(each[1:, 1, 2], abs=1e-4)
+    # the first row of all is over the start, from wherever the machine stands
+    tips, axes = by_machine(each[0, 1:])
+    for k in range(BLADES):
+        p, T = by_machine(each[k, 1:])
+        c, s = math.cos(math.tau * k / BLADES), math.sin(math.tau * k / BLADES)
+        R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        # it prints four decimals: of degrees 2e-4 mm at the rim
+        assert np.abs(p - tips @ R.T).max() <= 5e-4
+        assert np.abs(T - axes @ R.T).max() <= 5e-6
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "fanuc"])
+def test_every_channel_is_read_back(written, tmp_path, dialect):
+    program, _ = written
+    machine = replace(MACHINE, dialect=dialect)
+    repeat = channel_repeat(program, machine, index_table(machine), BLADES)
+    path = tmp_path / "all.nc"
+    path.write_text(write_gcode(program, machine, title="impeller", verified=False, repeat=repeat))
+    once = tmp_path / "one.nc"
+    once.write_text(write_gcode(program, machine, title="impeller", verified=False))
+    q, one = (read_program(x, machine, dialect=dialect).axes for x in (path, once))
+    assert len(q) == BLADES * len(one)
+    turn = (q.reshape(BLADES, -1, 9) - one)[:, :, 4]
+    assert np.degrees(turn) == pytest.approx(np.tile(360.0 / BLADES * np.arange(BLADES)[:, None], len(one)), abs=1e-6)
+    # but the first row, before which Z is nowhere
+    rest = np.delete((q.reshape(BLADES, -1, 9) - one)[:, 1:], 4, axis=2)
+    assert np.abs(rest).max() <= 1e-9
+
+
+def test_a_pallet_with_ends_is_not_turned_beyond_them(impeller):
+    program = finished(impeller)
+    short = replace(
+        MACHINE,
+        chain=replace(
+            MACHINE.chain,
+            axes=tuple(replace(a, low=-math.pi, high=math.pi) if a.letter == "B" else a for a in MACHINE.chain.axes),
+        ),
+    )
+    assert channel_repeat(program, short, index_table(MACHINE), BLADES) is None
+    assert channel_repeat(program, MACHINE, index_table(MACHINE), BLADES) is not None

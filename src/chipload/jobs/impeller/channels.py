@@ -23,7 +23,7 @@ from chipload.program.to_axes import to_axes
 def channel_repeat(program: Program, machine: Machine, table: IndexTable, blades: int) -> Repeat | None:
     """The loop over all channels; None: the pallet's axis has ends, and does not turn so far."""
     axis = machine.chain.axis(table.pallet)
-    if not axis.endless:
+    if math.isfinite(axis.low) or math.isfinite(axis.high):
         commands, _ = to_axes(program, machine)
         q = commands.position[:, axis.column]
         on = table.sense * math.tau * (blades - 1) / blades

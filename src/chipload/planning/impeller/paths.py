@@ -32,7 +32,9 @@ from chipload.planning.impeller.scene import Floats, Scene
 from chipload.planning.impeller.track import ToolTrack, posed
 from chipload.progress import Progress, silent
 
-_MENDS, _ROUNDS, _FINE = 3, 12, 0.5
+_MENDS, _ROUNDS = 3, 12
+#: distance of the places at which a crest is looked for [mm], and while a step is sought
+_FINE, _COARSE = 0.5, 1.5
 _LINES = 5000
 #: of how far a pass stays below the scallop, how far from the border the outermost lines lie
 _INSIDE = 0.9
@@ -190,7 +192,7 @@ class _Stepper:
         """The step at which the crest is as high as aimed, if the next line is milled at these pallet angles."""
         aim = self.aim * self.scallop
         for _ in range(_ROUNDS):
-            crest = self._crest(line, self._moved(line, w, 1.0), pallet)
+            crest = self._crest(line, self._moved(line, w, 1.0), pallet, _COARSE)
             ratio = np.clip(np.sqrt(aim / np.clip(crest, 0.1 * aim, None)), 0.6, 1.3)
             if not np.isfinite(ratio).any() or (np.nanmin(ratio) > 0.99 and np.nanmax(ratio) < 1.03):
                 break
@@ -204,11 +206,14 @@ class _Stepper:
                 break
         return w
 
-    def _crest(self, line: Line, q: Floats, pallet: Floats) -> Floats:
-        """(n,) crest between a line and one at q, the highest near each station; nan: one of them is not milled."""
+    def _crest(self, line: Line, q: Floats, pallet: Floats, fine: float = _FINE) -> Floats:
+        """(n,) crest between a line and one at q, the highest near each station; nan: one of them is not milled.
+
+        ``fine`` : distance of the places along the line at which it is looked for [mm]
+        """
         n = len(q)
         length = float(np.linalg.norm(np.diff(line.S, axis=0), axis=1).mean())
-        sub = 2 * max(1, math.ceil(0.5 * length / _FINE))
+        sub = 2 * max(1, math.ceil(0.5 * length / fine))
         at = np.arange((n - 1) * sub + 1) / sub
         p, q0, q1 = (np.interp(at, np.arange(n), x) for x in (self.lines.p, line.q, q))
         B0, B1 = (_blended(x, at) for x in (line.pallet, pallet))
@@ -216,10 +221,10 @@ class _Stepper:
         P, Q = np.repeat(p, len(share)), (q0[:, None] + share * (q1 - q0)[:, None]).ravel()
         points, normals = (x.reshape(len(at), len(share), 3) for x in self.lines.facing(P, Q))
         one, two = self._poses(*self.lines.facing(p, q0), B0), self._poses(*self.lines.facing(p, q1), B1)
-        fine = scallop_heights(
+        heights = scallop_heights(
             points, normals, (one[0], two[0]), (one[1], two[1]), self.lines.cutter.rho, self.lines.cutter.corner_radius
         )
-        near = np.pad(np.where(np.isfinite(fine), fine, -np.inf), sub // 2, constant_values=-np.inf)
+        near = np.pad(np.where(np.isfinite(heights), heights, -np.inf), sub // 2, constant_values=-np.inf)
         worst = sliding_window_view(near, sub + 1)[::sub].max(axis=1)
         both = np.isfinite(line.pallet) & np.isfinite(pallet) & np.isfinite(worst)
         return np.where(both & self.need, worst, np.nan)
