@@ -7,7 +7,10 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding, Severity
+from chipload.report.presentation import Blank
+from chipload.report.removal import removal_bytes
 from chipload.result import LimitCheck, Provenance, Result, Track, TrackKind, Verdict, in_memory
 from chipload.result.history import write_history
 from chipload.result.summary import summary_bytes
@@ -104,4 +107,43 @@ def make_result(folder: Path, job: str = "square", program: bytes = PROGRAM.enco
         made = trimesh.Scene()
         made.add_geometry(box, node_name="stock", geom_name="stock")
         (folder / "scene.glb").write_bytes(made.export(file_type="glb", extension_webp=False))
+    return folder
+
+
+#: the cutter of :func:`make_cut_result`, with a holder, and the stock that it goes round in, 2 mm deep
+MILL = Cutter(8.0, 2, 0.5, 12.0, 20.0, 6e5, holder=((20.0, 24.0),))
+STOCK = trimesh.creation.box(bounds=[[-10.0, -10.0, -12.0], [50.0, 50.0, 0.0]])
+#: what a corner of the path adds to the strips along its sides: a quarter disc outside less a square inside [mm^2]
+CORNER = 4.0 * np.pi - 16.0
+#: volume of the stock [mm^3] before the first row, at the middle of the path, at its end
+VOLUMES = (
+    43_200.0,
+    43_200.0 - 2.0 * (79.2 * 8.0 + 16.0 * np.pi + CORNER),
+    43_200.0 - 2.0 * (160.0 * 8.0 + 4.0 * CORNER),
+)
+
+
+def make_cut_result(folder: Path) -> Path:
+    """The square cut into a block, its stock at every row, and a clamp that the holder runs into at row 60."""
+    one = square_result("cut")
+    track = one.tracks[0]
+    at = (float(X[60]), float(Y[60]), -2.0)
+    hit = Finding("collision", 8, "shank or holder goes 1.5 mm into fixture 0", Severity.EXCEEDS, at, 60)
+    listed = {"what": "shank or holder", "into": "fixture 0", "depth_mm": 1.5, "line": 8, "place": list(at), "t_s": 6.1}
+    result = replace(
+        one,
+        tracks=(replace(track, limits=track.limits[1:], findings=(hit,)),),
+        operations=({"kind": "simulate", "collisions": [{**listed, "tool": 1}]},),
+    )
+    write_by_hand(result, folder)
+    made = trimesh.Scene()
+    for name, low, high, colour in (
+        ("stock", (-10.0, -10.0, -12.0), (50.0, 50.0, -2.0), (168, 122, 58, 255)),
+        ("fixture 0", (46.0, 2.0, 0.0), (56.0, 16.0, 24.0), (92, 122, 150, 255)),
+    ):
+        box = trimesh.creation.box(bounds=[low, high])
+        box.visual.face_colors = colour
+        made.add_geometry(box, node_name=name, geom_name=name)
+    (folder / "scene.glb").write_bytes(made.export(file_type="glb", extension_webp=False))
+    (folder / "removal.npz").write_bytes(removal_bytes(result, {"program": Blank(STOCK, {1: MILL})}))
     return folder

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from square import PROGRAM, make_result
+from square import PROGRAM, make_cut_result, make_result
 from web_served import Served
 
 CHROMIUM = Path("/usr/bin/chromium")
@@ -23,6 +23,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("opened")
     (root / "square.ngc").write_text(PROGRAM)
     make_result(root / "square")
+    make_cut_result(root / "cut")
     make_result(root / "bare", job="<img src=x onerror='window.hacked=1'>", scene=False)
     path = root / "bare" / "summary.json"
     hostile = json.loads(path.read_text())
@@ -114,7 +115,7 @@ def shared(browser: object, served: Served) -> Iterator[object]:
     page = windows("?show=square")
     page.wait_for_selector(".cl-limits", state="visible")
     page.wait_for_function("document.querySelectorAll('.cl-figure .trace').length > 0")
-    page.wait_for_selector(".cl-legend .cl-bar")
+    page.wait_for_selector(".cv-ramp")
     page.wait_for_selector(".cl-now")
     page.wait_for_timeout(500)
     yield page

@@ -107,7 +107,7 @@ def test_the_address_with_the_token_gives_a_cookie_and_leads_to_one_without(serv
 )
 def test_another_user_of_this_computer_is_refused(served, cookie) -> None:
     given = cookie and cookie.format(port=served.port, token=served.token)
-    paths = ["/", "/?token=", "/?token=x", f"/?show={served.token}", "/report?name=square", "/shape/00.glb"]
+    paths = ["/", "/?token=", "/?token=x", f"/?show={served.token}", "/report?name=square", "/shape/00.bin"]
     paths += [f"/report?name=square&token={served.token}", "/_nicegui/3/static/nicegui.js"]
     for path in paths:
         status, headers, body = ask(served, path, cookie=given)
@@ -162,7 +162,7 @@ def test_nothing_outside_the_folder_is_served(served, name) -> None:
 
 
 def test_no_other_file_has_an_address(served) -> None:
-    for path in ("/square/summary.json", "/../square/report.html", "/shape/../../square/report.html", "/shape/00.glb",
+    for path in ("/square/summary.json", "/../square/report.html", "/shape/../../square/report.html", "/shape/00.bin",
                  "/_nicegui/3/static/../../../etc/passwd", "/%2e%2e/outside0/secret.txt"):  # fmt: skip
         status, _, body = ask(served, path)
         assert status in (403, 404, 405), path

@@ -177,6 +177,7 @@ def test_the_page_lists_the_limits_and_the_time_of_each_track(opened, page_of, n
         assert len(t) == track["rows"]
         assert (np.diff(t) >= 0.0).all()
         assert t[-1] == pytest.approx(track["time_s"], rel=1e-3)
+        page.keyboard.press("Home")
         ends = f" of {t[-1]:.5g} s \u00b7 step 1 of {len(t)}"
         page.wait_for_function("e => document.querySelector('.cl-where').textContent.includes(e)", arg=ends)
         if len(tracks) > 1:

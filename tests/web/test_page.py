@@ -15,13 +15,14 @@ def settle(page, row):
     page.wait_for_function("r => document.querySelector('.cl-where').textContent.includes(r)", arg=f"step {row + 1} of")
 
 
+def state(page):
+    """What the 3D view draws."""
+    return page.evaluate("chiploadViewer.of(document.querySelector('.cl-stage').id).state()")
+
+
 def cutter(page):
-    """Where the moved group of the scene is."""
-    return page.evaluate(
-        """() => { const name = Object.keys(window).find(x => x.startsWith('scene_'));
-        const moved = window[name].children.filter(o => o.type == 'Group' && o.visible && o.position.length() > 0);
-        return moved.map(o => [o.position.x, o.position.y, o.position.z])[0] }"""
-    )
+    """Where the tool of the 3D view stands."""
+    return state(page)["tip"]
 
 
 def stands_at(page, row):
@@ -44,7 +45,7 @@ def test_what_the_folder_holds_is_listed_and_opened(window) -> None:
     page = window("")
     page.wait_for_selector(".cl-entry")
     names = page.locator(".cl-what").all_inner_texts()
-    assert names == ["contour/job.toml", "bare", "link", "square"]
+    assert names == ["contour/job.toml", "bare", "cut", "link", "square"]
     page.locator(".cl-entry", has_text="square").get_by_text("Show").click()
     page.wait_for_selector(".cl-limits", state="visible")
     assert page.inner_text(".cl-word") == "exceeds"
@@ -152,19 +153,19 @@ def test_the_scene_is_not_blank_and_a_column_changes_its_colours(square, pixels)
     drawn = np.abs(before.astype(int) - BACKGROUND).max(axis=2) > 8
     assert drawn.mean() > 0.1
     assert len(np.unique(before.reshape(-1, 3), axis=0)) > 60
-    assert page.inner_text(".cl-legend .cl-red") == "red: above 800"
+    assert page.inner_text(".cv-red") == "red and thick: above 800"
     red = ((before[..., 0] > 170) & (before[..., 1] < 60) & (before[..., 2] < 60)).sum()
     assert red > 20
-    assert page.inner_text(".cl-ends").split() == [f"{FORCE.min():.4g}", f"{FORCE.max():.4g}"]
+    assert page.inner_text(".cv-ends").split() == [f"{FORCE.min():.4g}", f"{FORCE.max():.4g}"]
     page.click(".cl-colour")
     page.get_by_role("option", name="feed [mm/min]").click()
-    page.wait_for_function("document.querySelector('.cl-title').textContent.includes('feed')")
+    page.wait_for_function("document.querySelector('.cv-title').textContent.includes('feed')")
     # the keys are the page's again after a list was open
     page.keyboard.press("ArrowRight")
     settle(page, 1)
     page.keyboard.press("Home")
     settle(page, 0)
-    assert page.inner_text(".cl-ends").split() == [f"{FEED.min():.4g}", f"{FEED.max():.4g}"]
+    assert page.inner_text(".cv-ends").split() == [f"{FEED.min():.4g}", f"{FEED.max():.4g}"]
     after = scene_pixels(page, pixels)
     assert (np.abs(after.astype(int) - before).max(axis=2) > 40).sum() > 200
     for name in ("stock", "path", "cutter"):

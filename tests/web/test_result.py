@@ -16,20 +16,20 @@ from chipload.errors import Finding, InputError
 from chipload.jobs.contour.figures import presentation_of
 from chipload.jobs.contour.result import result_of
 from chipload.program.apt.reader import read_apt
+from chipload.report.colouring import POINTS, WORDS, drawn_rows
 from chipload.report.folder import write_result
+from chipload.report.view import parts_of
 from chipload.result import Track, TrackKind, Verdict, in_memory
 from chipload.web import plots, scene
 from chipload.web.asset_cache import CAPACITY, AssetCache
 from chipload.web.checks import bound_of, findings, limits, row_of
 from chipload.web.cutters import UNKNOWN, cutters_of
 from chipload.web.folder_access import find_by_hash, list_folder, open_path, resolve_name
-from chipload.web.glb import Shape, glb_bytes
 from chipload.web.page import target_in
 from chipload.web.panels.limits import finding_list, limit_table
-from chipload.web.panels.scene import frame, legend
 from chipload.web.result import TextColumn, open_result
 from chipload.web.source import followed, source_of
-from square import CL, FEED, FORCE, LINE, PROGRAM, ROWS, X, Y, make_result, square_result, two_variants, write_by_hand
+from square import CL, FORCE, LINE, PROGRAM, ROWS, X, Y, make_result, square_result, two_variants, write_by_hand
 
 
 @pytest.fixture
@@ -39,74 +39,55 @@ def root(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def parsed(glb: bytes) -> tuple[dict, bytes]:
-    """Tree and numbers of a GLB, read by the format's own words."""
-    magic, version, length = struct.unpack_from("<4sII", glb)
-    assert (magic, version, length) == (b"glTF", 2, len(glb))
-    size, kind = struct.unpack_from("<I4s", glb, 12)
-    assert kind == b"JSON"
-    tree = json.loads(glb[20 : 20 + size])
-    more, kind = struct.unpack_from("<I4s", glb, 20 + size)
-    assert kind == b"BIN\0"
-    return tree, glb[28 + size : 28 + size + more]
+def parsed(document: bytes) -> tuple[dict, object]:
+    """Header of a document of the view, and a reader of its arrays, by the words of its format."""
+    assert document[:4] == b"CLV1"
+    size = struct.unpack_from("<I", document, 4)[0]
+    kinds = {"f4": "<f4", "u4": "<u4", "u2": "<u2", "u1": "u1"}
 
+    def array(b: dict) -> np.ndarray:
+        return np.frombuffer(document, kinds[b["t"]], b["n"], 8 + size + b["at"])
 
-def column_of(tree: dict, blob: bytes, k: int) -> np.ndarray:
-    accessor = tree["accessors"][k]
-    view = tree["bufferViews"][accessor["bufferView"]]
-    kind = {5126: "<f4", 5125: "<u4", 5123: "<u2"}[accessor["componentType"]]
-    wide = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]]
-    data = np.frombuffer(blob[view["byteOffset"] : view["byteOffset"] + view["byteLength"]], dtype=kind)
-    return data.reshape(accessor["count"], wide) if wide > 1 else data
+    return json.loads(document[8 : 8 + size]), array
 
 
 def test_a_path_keeps_its_places_and_its_red(root: Path) -> None:
     r = open_result(root, "r")
-    glb, scale = scene.path_glb(r, r.tracks[0], "force_n")
-    assert (scale.low, scale.high, scale.limit) == (FORCE.min(), FORCE.max(), 800.0)
-    tree, blob = parsed(glb)
-    attributes = tree["meshes"][0]["primitives"][0]["attributes"]
-    middle = column_of(tree, blob, attributes["POSITION"]).reshape(ROWS, 3, 3).mean(axis=1)
-    assert middle[:, 0] == pytest.approx(X, abs=1e-4)
-    assert middle[:, 1] == pytest.approx(Y, abs=1e-4)
-    colours = column_of(tree, blob, attributes["COLOR_0"])[::3].astype(float) / 65535.0
-    red = colours[:, 0] > 0.5
-    red &= colours[:, 1] < 0.05
-    assert np.flatnonzero(red).tolist() == np.flatnonzero(FORCE > 800.0).tolist()
-    _, scale = scene.path_glb(r, r.tracks[0], "pass")
-    assert scale.words == (("square", scene.WORDS[0]),)
+    shown = scene.page_scene(r, r.tracks[0], scene.bodies(r), "force_n")
+    header, array = parsed(shown.document)
+    c, path = header["colouring"], header["path"]
+    assert (c["low"], c["high"], c["limit"], c["label"], c["unit"]) == (FORCE.min(), FORCE.max(), 800.0, "force", "N")
+    for points in (array(c["points"]), array(path["points"])):
+        assert points.reshape(ROWS, 3)[:, 0] == pytest.approx(X, abs=1e-4)
+        assert points.reshape(ROWS, 3)[:, 1] == pytest.approx(Y, abs=1e-4)
+    assert array(c["values"]) == pytest.approx(FORCE)
+    assert np.flatnonzero(array(c["above"])).tolist() == np.flatnonzero(FORCE > 800.0).tolist()
+    assert array(path["t"]) == pytest.approx(0.1 * np.arange(1, ROWS + 1))
+    assert [(m["row"], m["kind"]) for m in header["marks"]] == [(120, "limit")]
+    assert [(b["name"], b["kind"], b["index"]["n"] // 3) for b in header["bodies"]] == [("stock", "stock", 12)]
+    # a box of 60 x 60 x 10, and the path within it
+    assert (header["low"], header["high"]) == ([-10.0, -10.0, -12.0], [50.0, 50.0, -2.0])
+    assert "does not change with the slider" in shown.notice
+    words = scene.colouring(r, r.tracks[0], "pass", None)
+    assert words.words == (("square", WORDS[0]),)
 
 
-def test_a_tube_has_its_radius_and_its_gaps() -> None:
-    points = np.array([[0.0, 0, 0], [10.0, 0, 0], [20.0, 5, 0], [30.0, 5, 9]])
-    shape = scene.tube(points, np.array([False, False, True, False]), np.zeros((4, 4), dtype=np.uint8), 0.5)
-    rings = shape.vertices.reshape(4, 3, 3)
-    assert np.linalg.norm(rings - points[:, None], axis=2) == pytest.approx(0.5)
-    assert rings[0, :, 0] == pytest.approx(0.0, abs=1e-12)
-    joined = {tuple(sorted({int(v) // 3 for v in face})) for face in shape.faces}
-    assert joined == {(0, 1), (2, 3)}
-
-
-def test_a_cutter_is_its_profile_turned() -> None:
-    ball = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=5.0, shank_diameter=8.0)
-    tree, blob = parsed(scene.cutter_glb(ball))
-    flutes, shank = (column_of(tree, blob, m["primitives"][0]["attributes"]["POSITION"]) for m in tree["meshes"])
-    rho, z = np.hypot(flutes[:, 0], flutes[:, 1]), flutes[:, 2]
-    low = z < 5.0
-    assert np.hypot(rho[low], z[low] - 5.0) == pytest.approx(5.0, abs=1e-5)
-    assert (float(z.min()), float(z.max())) == pytest.approx((0.0, 20.0))
-    top = np.hypot(shank[:, 0], shank[:, 1])[shank[:, 2] > 20.0]
-    assert float(top.max()) == pytest.approx(4.0)
-    assert float(shank[:, 2].max()) == pytest.approx(30.0)
+def test_a_cutter_is_its_profile() -> None:
+    ball = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=5.0, shank_diameter=8.0, holder=((40.0, 32.0),))
+    (_, flutes), (_, shank), (_, holder) = parts_of(ball)
+    low = flutes[:, 1] < 5.0
+    assert np.hypot(flutes[low, 0], flutes[low, 1] - 5.0) == pytest.approx(5.0, abs=1e-5)
+    assert (flutes[:, 1].min(), flutes[:, 1].max()) == pytest.approx((0.0, 20.0))
+    assert (shank[2:, 0].max(), shank[:, 1].max()) == pytest.approx((4.0, 30.0))
+    assert (holder[:, 0].max(), holder[:, 1].min(), holder[:, 1].max()) == (16.0, 30.0, 70.0)
 
 
 def test_the_cutter_comes_from_the_cl_data_else_a_pointer_stands_for_it(root: Path) -> None:
     r = open_result(root, "r")
     made, unknown = cutters_of(r, r.tracks[0], 25.0)
-    tree, blob = parsed(made[0])
-    p = column_of(tree, blob, 0)
     assert unknown == ""
-    assert (float(np.hypot(p[:, 0], p[:, 1]).max()), float(p[:, 2].max())) == pytest.approx((4.0, 25.0))
+    assert [kind for kind, _ in made[0]] == ["flutes"]
+    assert made[0][0][1].max(axis=0) == pytest.approx((4.0, 25.0))
     (root / "r" / "0-program.apt").unlink()
     made, unknown = cutters_of(r, r.tracks[0], 25.0)
     assert unknown == UNKNOWN
@@ -139,6 +120,8 @@ def test_the_tracks_of_a_planned_result(outcome, tmp_path: Path) -> None:
     assert "plain is not in use" in found
     assert "not checked: limit torque_nm: not stated" in found
     assert {b.name for b in scene.bodies(r)[0]} == {"0-wall", "0-stock"}
+    # its stock before is closed, and is shown at every row
+    assert len(scene.stock_of(r, plain).rows) > 10
     # the path jumps from the end of one pass to the beginning of the next, as its length shows
     assert np.flatnonzero(plain.apart).tolist() == [900]
 
@@ -245,8 +228,8 @@ def test_a_million_rows_keep_their_extremes(tmp_path: Path) -> None:
     assert (np.nanmax(drawn["y"]), np.nanmin(drawn["y"])) == (5000.0, -70.0)
     assert drawn["x"][int(np.nanargmax(drawn["y"]))] == t[123_456]
     assert np.isnan(drawn["y"]).any()
-    rows = scene.shown_rows(track, r.column(track, "force_n"))
-    assert len(rows) < 1.2 * scene.POINTS
+    rows = drawn_rows(scene.view_path(track), values)
+    assert len(rows) < 1.2 * POINTS
     assert {0, n - 1, 123_456, 777_777} <= set(rows.tolist())
 
 
@@ -303,17 +286,6 @@ def test_a_scene_that_cannot_be_read_is_said(root: Path) -> None:
     assert scene.bodies(open_result(root, "r"))[1] == "This result has no scene: only its path is shown."
 
 
-def test_of_a_box_its_twelve_edges_are_left(root: Path) -> None:
-    body = scene.bodies(open_result(root, "r"))[0][0]
-    tree, blob = parsed(scene.edges_glb(body))
-    primitive = tree["meshes"][0]["primitives"][0]
-    p = column_of(tree, blob, primitive["attributes"]["POSITION"])
-    ends = p[column_of(tree, blob, primitive["indices"])].reshape(-1, 2, 3)
-    assert primitive["mode"] == 1
-    assert sorted(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).tolist()) == [10.0] * 4 + [60.0] * 8
-    assert (body.low.tolist(), body.high.tolist()) == ([-10.0, -10.0, -12.0], [50.0, 50.0, -2.0])
-
-
 def test_texts_are_escaped(root: Path) -> None:
     path = root / "r" / "summary.json"
     summary = json.loads(path.read_text())
@@ -324,40 +296,18 @@ def test_texts_are_escaped(root: Path) -> None:
     path.write_text(json.dumps(summary))
     r = open_result(root, "r")
     html = limit_table(r.tracks[0]) + finding_list(findings(r, r.tracks[0]))
-    html += legend("<i>_n", scene.Scale(0.0, 1.0, None, (("<u>", "#000000"),)))
-    for tag in ("<b>", "<img", "<i>", "<u>", "<s>"):
+    for tag in ("<b>", "<img", "<s>"):
         assert tag not in html
     assert "&lt;img src=x" in html
-
-
-def test_the_frame_of_an_axis_is_a_rotation() -> None:
-    rng = np.random.default_rng(3)
-    for axis in (*np.eye(3), *-np.eye(3), *rng.normal(size=(20, 3))):
-        R = frame(axis)
-        assert pytest.approx(np.eye(3), abs=1e-12) == R @ R.T
-        assert np.linalg.det(R) == pytest.approx(1.0)
-        assert R[:, 2] == pytest.approx(axis / np.linalg.norm(axis))
 
 
 def test_the_asset_cache_forgets_the_oldest() -> None:
     assets = AssetCache()
     first = assets.put(b"a" * (CAPACITY // 2))
     second = assets.put(b"b" * (CAPACITY // 2))
-    key = first.removeprefix("/shape/").removesuffix(".glb")
+    key = first.removeprefix("/shape/").removesuffix(".bin")
     assert assets.get(key) is not None
     assets.put(b"c")
     assert assets.get(key) is None
-    assert assets.get(second.removeprefix("/shape/").removesuffix(".glb")) is not None
+    assert assets.get(second.removeprefix("/shape/").removesuffix(".bin")) is not None
     assert assets.get("../../etc/passwd") is None
-
-
-def test_opacity_and_lines_of_a_file() -> None:
-    clear = Shape(np.eye(3), np.array([[0, 1, 2]]), np.array([255, 0, 0, 128], dtype=np.uint8))
-    lines = Shape(np.eye(3), np.array([[0, 1], [1, 2]]), np.full((3, 4), 255, dtype=np.uint8), lit=False)
-    tree, blob = parsed(glb_bytes([clear, lines]))
-    assert [m["alphaMode"] for m in tree["materials"]] == ["BLEND", "OPAQUE"]
-    assert tree["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] == pytest.approx([1.0, 0.0, 0.0, 128 / 255])
-    assert [m["primitives"][0]["mode"] for m in tree["meshes"]] == [4, 1]
-    assert column_of(tree, blob, tree["meshes"][1]["primitives"][0]["indices"]).tolist() == [0, 1, 1, 2]
-    assert "extensions" in tree["materials"][1]
-    assert np.array(FEED).min() == 240.0

@@ -18,6 +18,7 @@ from chipload.files import cannot_write, exchanged, fresh_folder, read_regular, 
 from chipload.progress import Progress, silent
 from chipload.report.page import page_bytes
 from chipload.report.presentation import Content, Presentation
+from chipload.report.removal import REMOVAL, removal_bytes
 from chipload.result import Result
 from chipload.result.history import maps_bytes, write_history
 from chipload.result.load import HISTORY, MAPS, SUMMARY
@@ -29,7 +30,7 @@ LARGEST_SUMMARY = 100_000_000
 #: files and who makes them
 Makers = list[tuple[str, Callable[[], Content]]]
 #: files that every result has
-NAMES = (SUMMARY, HISTORY, MAPS, "scene.glb", "report.html")
+NAMES = (SUMMARY, HISTORY, MAPS, REMOVAL, "scene.glb", "report.html")
 #: endings of programs and of further files
 SUFFIXES = (".ngc", ".nc", ".apt", ".npz", ".parquet", ".csv", ".toml")
 
@@ -113,6 +114,9 @@ def write_result(result: Result, presentation: Presentation, out: str | Path, pr
         ("scene.glb", presentation.scene),
         ("report.html", lambda: page_bytes(result, presentation)),
     ]
+    blanks = presentation.blanks()
+    if blanks:
+        makers.append((REMOVAL, lambda: removal_bytes(result, blanks)))
     if result.maps:
         makers.append((MAPS, lambda: maps_bytes(result)))
     return write_files(makers, out, presentation.files, progress=progress)

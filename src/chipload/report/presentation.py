@@ -7,9 +7,20 @@ from dataclasses import dataclass, field
 from typing import IO
 
 import plotly.graph_objects as go
+import trimesh
+
+from chipload.cutter.cutter import Cutter
 
 #: content of a file, or what writes it bit by bit
 Content = bytes | Callable[[IO[bytes]], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Blank:
+    """What a track begins with: the closed ``mesh`` [mm] of its stock, and its ``cutters`` by tool number."""
+
+    mesh: trimesh.Trimesh
+    cutters: Mapping[int, Cutter]
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,8 +32,10 @@ class Presentation:
     sections : puts figures into a mapping by name and returns HTML between the limits and the findings of the report
     scene : scene.glb
     files : programs and other files by name
+    blanks : of tracks by their names, from which the stock is shown at every row
     """
 
     sections: Callable[[dict[str, go.Figure]], list[str]]
     scene: Callable[[], bytes]
     files: Callable[[], Mapping[str, Content]] = field(default=dict)
+    blanks: Callable[[], Mapping[str, Blank]] = field(default=dict)

@@ -10,6 +10,7 @@ Floats = NDArray[np.float64]
 #: shades of engagement on a path
 SHADES = 24
 WALL, STOCK, TOOL = (86, 96, 112, 255), (214, 170, 110, 110), (178, 186, 196, 255)
+FIXTURE = (92, 122, 150, 255)
 #: rows of a history that the scene shows at most
 ROWS = 40_000
 

@@ -316,6 +316,14 @@ class LayeredStock:
         out.cut = self.cut.copy()
         return out
 
+    def body(self) -> trimesh.Trimesh:
+        """What is there as one closed mesh [mm]: the part or the block itself where nothing was removed yet."""
+        if self.part is not None and not self.cut.any():
+            return self.part
+        low, high = ([float(axis[k]) for axis in (self.xs, self.ys, self.bounds)] for k in (0, -1))
+        whole = math.prod(b - a for a, b in zip(low, high, strict=True))
+        return self.mesh() if self.volume() < whole * (1.0 - 1e-12) else trimesh.creation.box(bounds=[low, high])
+
     def mesh(self) -> trimesh.Trimesh:
         """What is left as one closed mesh [mm], the prism of each layer by itself, z up."""
         return prisms([polygons(self.section(i)) for i in range(self.layers)], self.bounds)

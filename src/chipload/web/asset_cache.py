@@ -10,7 +10,7 @@ CAPACITY = 200_000_000
 
 
 class AssetCache:
-    """GLB files by their hash."""
+    """Documents of the 3D view by their hash."""
 
     def __init__(self) -> None:
         self._kept: OrderedDict[str, bytes] = OrderedDict()
@@ -22,7 +22,7 @@ class AssetCache:
         self._kept.move_to_end(key)
         while len(self._kept) > 1 and sum(map(len, self._kept.values())) > CAPACITY:
             self._kept.popitem(last=False)
-        return f"/shape/{key}.glb"
+        return f"/shape/{key}.bin"
 
     def get(self, key: str) -> bytes | None:
         """A file that was put here."""

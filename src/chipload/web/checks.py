@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, Severity
+from chipload.report.colouring import beyond, lowest_limit
 from chipload.result import COLUMNS, LimitCheck, Verdict
 from chipload.web.result import PageResult, PageTrack, TextColumn
 
@@ -44,18 +45,13 @@ def label_and_unit(column: str) -> tuple[str, str]:
 
 def bound_of(result: PageResult, track: PageTrack, column: str) -> Bound | None:
     """The lowest limit of a column; values beyond what the check calls the worst were not part of it."""
-    check = min((c for c in track.own.limits if c.column.name == column), key=lambda c: c.limit, default=None)
+    check = lowest_limit(track.own.limits, column)
     if check is None or column not in result.columns:
         return None
     values = result.column(track, column)
     if isinstance(values, TextColumn):
         return None
-    size = np.abs(np.nan_to_num(values)) if check.column.signed else np.nan_to_num(values)
-    above = size < check.limit if check.column.least else size > check.limit
-    if check.worst is not None:
-        worst = check.worst * (1.0 + 1e-9 * (-1.0 if check.column.least else 1.0))
-        above &= size >= worst if check.column.least else size <= worst
-    return Bound(check.limit, above)
+    return Bound(check.limit, beyond(values, check))
 
 
 def limits(track: PageTrack) -> list[LimitCheck]:

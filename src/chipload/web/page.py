@@ -56,6 +56,7 @@ class Page:
         self.own: Run | None = None
         self.seen: Run | None = runs.now if runs.now is not None and runs.now.over else None
         ui.add_css(resources.files(__package__).joinpath("page.css").read_text("utf-8"))
+        ui.add_head_html('<script src="/viewer.js"></script>')
         ui.colors(primary="#2f5d8a")
         with ui.element("div").classes("cl-page"):
             self._header()

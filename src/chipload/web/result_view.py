@@ -6,7 +6,6 @@ The row is the one thing that moves: slider, plots, lines, table and keys set it
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -23,8 +22,8 @@ from chipload.web.panels.source import SourcePanel
 from chipload.web.plots import abscissa
 from chipload.web.result import PageResult, PageTrack
 
-#: seconds between two pictures, and that a whole track takes where no speed is chosen
-TICK, WHOLE = 0.08, 30.0
+#: seconds that a whole track takes where no speed is chosen
+WHOLE = 30.0
 SPEEDS = {0: "30 s", 1: "\u00d71", 10: "\u00d710", 100: "\u00d7100"}
 #: classes of a verdict
 VERDICTS = {Verdict.HOLDS: "ok", Verdict.UNPROVEN: "may", Verdict.EXCEEDS: "no"}
@@ -38,7 +37,7 @@ class ResultView:
     def __init__(self, assets: AssetCache) -> None:
         self.result: PageResult | None = None
         self.track: PageTrack | None = None
-        self.row, self.clock, self.before = 0, 0.0, 0.0
+        self.row = 0
         self.playing = False
         self.turn = asyncio.Lock()
         with ui.element("div").classes("cl-verdict") as self.verdict:
@@ -48,10 +47,10 @@ class ResultView:
                 self.tip = ui.tooltip("").classes("cl-tip")
         with ui.element("div").classes("cl-body"):
             with ui.element("div").classes("cl-left"):
-                self.scene = ScenePanel(assets, self.pick)
+                self.scene = ScenePanel(assets, self._viewed)
                 self.plots = PlotPanel(self.pick, self._turned)
             with ui.element("div").classes("cl-right"):
-                self.limits = LimitPanel(self.pick)
+                self.limits = LimitPanel(self.find)
                 self.source = SourcePanel(self.pick)
         with ui.element("div").classes("cl-foot"):
             self._button("first_page", "to the beginning (Home)", lambda: self.go(0))
@@ -66,9 +65,10 @@ class ResultView:
             self.slider = ui.slider(min=0.0, max=1.0, step=0.001, value=0.0).props("dense").classes("cl-slider")
             self.slider.mark("slider")
             self.slider.on("update:model-value", self._slid, throttle=0.05)
+            # the 3D view follows at once, the other panels when the server has answered
+            self.slider.on("update:model-value", js_handler=self.scene.slide)
             self.slider.on("change", js_handler=RELEASE)
             self.where = ui.label("").classes("cl-where").mark("where")
-        self.timer = ui.timer(TICK, self._tick, active=False)
 
     async def open(self, result: PageResult) -> None:
         """Show a result from the beginning of its first track."""
@@ -85,6 +85,21 @@ class ResultView:
             await self.scene.follow(self.result, self.track)
             await self._tracked(self.result, self.track)
 
+    def first(self) -> None:
+        """Stand at the worst that was found, or at the beginning."""
+        self.go(self.row)
+        if self.scene.marks:
+            self.scene.show(0)
+
+    def find(self, row: int) -> None:
+        """A limit or a finding asks for its row: what touches there is shown."""
+        self.pause()
+        self.go(row)
+        found = [k for k, m in enumerate(self.scene.marks) if m.row == row]
+        touching = [k for k in found if self.scene.marks[k].bodies]
+        if found:
+            self.scene.show((touching or found)[0])
+
     def pick(self, row: int) -> None:
         """A panel asks for a row; below 0: to be told again where it is."""
         self.go(row if row >= 0 else self.row)
@@ -94,8 +109,8 @@ class ResultView:
         if self.track is None:
             return
         self.row = int(np.clip(row, 0, len(self.track) - 1))
-        self.clock = float(self.track.t[self.row])
         self.slider.set_value(float(abscissa(self.track, self.plots.against.value)[self.row]))
+        self.scene.at(self.row)
         self._shown(self.track)
 
     def move(self, rows: int) -> None:
@@ -117,15 +132,17 @@ class ResultView:
         elif self.track is not None:
             if self.row >= len(self.track) - 1:
                 self.go(0)
-            self.playing, self.before = True, time.monotonic()
-            self.play.props("icon=pause")
-            self.timer.activate()
+            self.playing = True
+            self.play.props("icon=pause aria-label=pause")
+            t, speed = self.track.t, float(self.speed.value or 0)
+            self.scene.play(speed if speed > 0.0 else max(float(t[-1] - t[0]), 1e-3) / WHOLE)
 
     def pause(self) -> None:
         """Stop playing."""
+        if self.playing:
+            self.scene.play(0.0)
         self.playing = False
-        self.play.props("icon=play_arrow")
-        self.timer.deactivate()
+        self.play.props("icon=play_arrow aria-label=play")
 
     # -- parts --------------------------------------------------------------------------------------------------
     async def _open(self, result: PageResult) -> None:
@@ -144,16 +161,19 @@ class ResultView:
 
     async def _tracked(self, result: PageResult, track: PageTrack) -> None:
         self.limits.open(result, track)
-        self.plots.open(result, track)
+        marks = self.scene.marks
+        self.row = marks[0].row if marks else 0
+        self.plots.open(result, track, self.row)
         self._turned()
         await self.source.open(result, track)
-        self.go(0)
+        self.first()
 
     def _turned(self) -> None:
         """The slider counts as the plots do."""
         if self.track is None:
             return
         x = abscissa(self.track, self.plots.against.value)
+        self.scene.against(self.plots.against.value)
         low, high = float(x[0]), float(x[-1]) if x[-1] > x[0] else float(x[0]) + 1.0
         self.slider.props.update({"min": low, "max": high, "step": (high - low) / STEPS})
         self.slider.update()
@@ -162,28 +182,27 @@ class ResultView:
     def _slid(self, event: Any) -> None:
         if self.track is None or not isinstance(event.args, (int, float)):
             return
+        self.pause()
         self.row = nearest(abscissa(self.track, self.plots.against.value), float(event.args))
-        self.clock = float(self.track.t[self.row])
         self._shown(self.track)
 
-    def _tick(self) -> None:
-        if self.track is None or not self.playing:
+    def _viewed(self, row: int, playing: bool) -> None:
+        """The 3D view stands at a row: it plays, or its path was clicked."""
+        if self.track is None:
             return
-        now = time.monotonic()
-        t, speed = self.track.t, float(self.speed.value or 0)
-        rate = speed if speed > 0.0 else float(t[-1] - t[0]) / WHOLE
-        self.clock, self.before = self.clock + rate * (now - self.before), now
-        row, clock = int(np.searchsorted(t, self.clock)), self.clock
-        if row >= len(t) - 1:
-            self.pause()
-            self.go(len(t) - 1)
-        elif row != self.row:
+        if not playing and not self.playing:
             self.go(row)
-            self.clock = clock
+            return
+        if not self.playing:  # a message that was on its way when it was stopped
+            return
+        self.row = int(np.clip(row, 0, len(self.track) - 1))
+        self.slider.set_value(float(abscissa(self.track, self.plots.against.value)[self.row]))
+        self._shown(self.track)
+        if not playing:
+            self.pause()
 
     def _shown(self, track: PageTrack) -> None:
         k = self.row
-        self.scene.at(k)
         self.plots.at(k)
         self.source.at(k)
         x, y, z = track.place[k].tolist()

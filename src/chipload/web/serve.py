@@ -116,6 +116,7 @@ def _application(opened: OpenedFolder, port: int, token: str) -> Any:
     from nicegui import app, ui
     from starlette.responses import FileResponse, PlainTextResponse, Response
 
+    from chipload.report.view import viewer_script
     from chipload.web.asset_cache import AssetCache
     from chipload.web.guard import SANDBOX, Guard
     from chipload.web.page import Page, Runs
@@ -125,12 +126,16 @@ def _application(opened: OpenedFolder, port: int, token: str) -> Any:
     logging.getLogger("nicegui").setLevel(logging.ERROR)
     runs, assets = Runs(), AssetCache()
 
-    @app.get("/shape/{key}.glb")
+    @app.get("/shape/{key}.bin")
     def shape(key: str) -> Response:
         data = assets.get(key)
         if data is None:
             return PlainTextResponse("not here\n", status_code=404)
-        return Response(data, media_type="model/gltf-binary", headers={"cache-control": "no-store"})
+        return Response(data, media_type="application/octet-stream", headers={"cache-control": "no-store"})
+
+    @app.get("/viewer.js")
+    def viewer() -> Response:
+        return Response(viewer_script(), media_type="text/javascript", headers={"cache-control": "no-cache"})
 
     @app.get("/report")
     def report(name: str) -> Response:

@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 from chipload.jobs.contour.outcome import ContourResult, Operation
 from chipload.jobs.contour.pass_figures import COLOURS, along, plan, space
 from chipload.jobs.contour.programs import program_files
-from chipload.jobs.contour.scene import scene_bytes
+from chipload.jobs.contour.scene import blanks_of, scene_bytes
 from chipload.machine.machine import Machine
 from chipload.planning.result import StrategyResult
 from chipload.report.page import state_cell
@@ -21,7 +21,12 @@ from chipload.report.sheet import figure, items, table, value_text
 
 def presentation_of(outcome: ContourResult) -> Presentation:
     """The presentation of planned operations."""
-    return Presentation(partial(_sections, outcome), partial(scene_bytes, outcome), partial(program_files, outcome))
+    return Presentation(
+        partial(_sections, outcome),
+        partial(scene_bytes, outcome),
+        partial(program_files, outcome),
+        partial(blanks_of, outcome),
+    )
 
 
 def _sections(outcome: ContourResult, figures: dict[str, go.Figure]) -> list[str]:

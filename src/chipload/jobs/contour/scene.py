@@ -10,6 +10,8 @@ import trimesh
 from numpy.typing import NDArray
 
 from chipload.jobs.contour.outcome import ContourResult, Operation
+from chipload.jobs.contour.result import track_name
+from chipload.report.presentation import Blank
 from chipload.report.scene import ROWS, STOCK, TOOL, WALL, engagement_colours
 from chipload.report.shape import merged, pieces, ribbon, slab
 
@@ -23,6 +25,24 @@ def scene_bytes(outcome: ContourResult) -> bytes:
         _add(scene, f"{k}-", op)
     glb: bytes = scene.export(file_type="glb", extension_webp=False, tree_postprocessor=_declare_units)
     return glb
+
+
+def blanks_of(outcome: ContourResult) -> dict[str, Blank]:
+    """What each strategy begins with: the prism over its stock, or, where it begins in the solid, over a box."""
+    out = {}
+    for k, op in enumerate(outcome.operations):
+        for name, strategy in op.result.strategies.items():
+            before = strategy.drawn.get("stock before", ())
+            if before:
+                vertices, faces = slab(before, op.top - op.depth, op.top)
+                mesh = trimesh.Trimesh(vertices, faces, process=True)
+            else:
+                rows = np.column_stack([strategy.history[x] for x in ("x_mm", "y_mm")])
+                low, high = rows.min(axis=0) - 2.0 * op.cutter.radius, rows.max(axis=0) + 2.0 * op.cutter.radius
+                mesh = trimesh.creation.box(bounds=[[*low, op.top - op.depth], [*high, op.top]])
+            if mesh.is_watertight:
+                out[track_name(outcome, k, name)] = Blank(mesh, {op.cutter.number: op.cutter})
+    return out
 
 
 def _declare_units(tree: dict[str, Any]) -> None:

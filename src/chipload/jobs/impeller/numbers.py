@@ -29,7 +29,7 @@ def operation_numbers(milled: ImpellerResult) -> dict[str, Any]:
         **{key: sum(row[key] for row in rows) for key in ("cc_points", "check_points", "unreachable", "search_s")},
         "certified": all(row["certified"] for row in rows),
         "certified_within_mm": milled.tolerance,
-        **(way_of(milled, used) if used is not None else {}),
+        **(partition_of(milled, used) if used is not None else {}),
         "hand_picked": None if picked is None else _picked(milled, picked),
         "ways": [checked_numbers(milled, way) for way in milled.partitions],
         "scallop": {"mean_share": None if milled.used_checked is None else milled.used_checked.scallop},

@@ -26,7 +26,8 @@ from chipload.program.motions import spans
 from chipload.program.program import DWELL, RAPID, Program
 from chipload.report.diagram import diagram_figure
 from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, SCALE, SPACE_POINTS, STOCK
-from chipload.report.presentation import Content, Presentation
+from chipload.report.presentation import Blank, Content, Presentation
+from chipload.report.scene import FIXTURE
 from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table
 from chipload.result import Verdict
@@ -62,8 +63,19 @@ SLOWEST = 12
 def presentation_of(program: ProgramResult) -> Presentation:
     """The presentation of a program's result."""
     return Presentation(
-        lambda figures: _sections(program, figures), lambda: scene_bytes(program), lambda: _files(program)
+        lambda figures: _sections(program, figures),
+        lambda: scene_bytes(program),
+        lambda: _files(program),
+        lambda: _blanks(program),
     )
+
+
+def _blanks(program: ProgramResult) -> dict[str, Blank]:
+    """The stock before, the same for every track."""
+    simulated = program.simulated
+    if simulated is None or simulated.blank is None:
+        return {}
+    return {track.name: Blank(simulated.blank, program.cutters) for track in result_of(program).tracks}
 
 
 def _files(program: ProgramResult) -> dict[str, Content]:
@@ -310,6 +322,10 @@ def scene_bytes(read: ProgramResult) -> bytes:
         stock = read.simulated.stock.mesh()
         stock.visual.face_colors = (168, 122, 58, 255)
         scene.add_geometry(stock, node_name="stock", geom_name="stock")
+        for name, mesh in read.simulated.fixtures.items():
+            body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+            body.visual.face_colors = FIXTURE
+            scene.add_geometry(body, node_name=name, geom_name=name)
         left, columns = read.simulated.left, read.simulated.removal.columns
         if left is not None:
             scene.add_geometry(

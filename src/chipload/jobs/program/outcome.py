@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
@@ -44,6 +45,8 @@ class SimulationResult:
     rigid : what was not stated of what gives way, and counts as rigid
     stability : margins and quiet speeds; None: no modes are stated
     workpiece : how far the workpiece gives way where it is cut; None: no [workpiece] is stated
+    blank : the stock before
+    fixtures : what no tool may touch, by name
     """
 
     removal: Removal
@@ -61,6 +64,8 @@ class SimulationResult:
     rigid: tuple[str, ...] = ()
     stability: StabilityResult | None = None
     workpiece: WorkpieceCompliance | None = None
+    blank: trimesh.Trimesh | None = None
+    fixtures: Mapping[str, trimesh.Trimesh] = field(default_factory=dict)
 
     @property
     def errors(self) -> Mapping[str, float]:

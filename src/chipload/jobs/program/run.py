@@ -21,7 +21,7 @@ from chipload.jobs.program.preparation import bodies_of, material_of, resolution
 from chipload.jobs.program.speeds import new_speeds, speeds_changeable, stability_of, watch_of
 from chipload.jobs.program.stiffness import deflecting, stiffness_of, watched, with_columns
 from chipload.jobs.program.tables import LOADS, SimulateTable
-from chipload.jobs.program.workpiece import insides, stock_body
+from chipload.jobs.program.workpiece import fixture_meshes, insides, stock_body
 from chipload.jobs.program.workpiece_compliance import WorkpieceCompliance, with_compliance_error, workpiece_compliance
 from chipload.jobs.provenance import provenance_of, sources, title_of, versions
 from chipload.jobs.tables import stated
@@ -262,6 +262,7 @@ def _simulated(
         compliance = _compliance_of_workpiece(job, reading, stock, machine, material, progress)
     gives = bodies.stiffness if compliance is None else stiffness_of(job.table.stiffness, job.cutters, compliance.steps)
     points, before, stiffness = bodies.stock_points, insides(stock), job.table.stiffness
+    blank = stock.body()
     watches = [with_checks(job.table.checks, material, deflecting(gives, material))]
     steps = StepBlocks(program, op.step_mm, op.tolerance_mm)
 
@@ -325,7 +326,8 @@ def _simulated(
     return SimulationResult(
         removal, stock, machine, material, job.limits, job.unchecked, settings, bodies.checks, left, touched,
         compared_with, _no_holder(job), gives.unknown,
-        None if stability_watch is None else stability_of(job, stability_watch, machine), compliance,
+        None if stability_watch is None else stability_of(job, stability_watch, machine), compliance, blank,
+        fixture_meshes(job),
     )  # fmt: skip
 
 

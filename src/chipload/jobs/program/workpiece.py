@@ -38,13 +38,21 @@ def part_body(job: ProgramJob) -> trimesh.Trimesh | None:
 
 def fixture_points(job: ProgramJob) -> dict[str, NDArray[np.float64]]:
     """Points of the fixtures by name."""
+    spacing = [table.spacing_mm for table in job.table.fixture]
+    return {
+        name: fine(mesh, spacing[k], f"fixture.{k}")[0] for k, (name, mesh) in enumerate(fixture_meshes(job).items())
+    }
+
+
+def fixture_meshes(job: ProgramJob) -> dict[str, trimesh.Trimesh]:
+    """The fixtures by name."""
     out = {}
     for k, table in enumerate(job.table.fixture):
         path, key = job.path.parent / table.file, f"fixture.{k}.file"
         mesh = job.meshes.get(f"fixture {k}")
         if mesh is None:
             mesh = read_mesh(path, unit=table.units, chord_mm=table.chord_mm, key=key)
-        out[f"fixture {k}"] = fine(mesh, table.spacing_mm, f"fixture.{k}")[0]
+        out[f"fixture {k}"] = mesh
     return out
 
 

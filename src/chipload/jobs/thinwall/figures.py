@@ -4,19 +4,33 @@ from __future__ import annotations
 
 from functools import partial
 
+import trimesh
+
 from chipload.jobs.thinwall.outcome import USED, ThinWallResult
 from chipload.jobs.thinwall.result import failures_of
 from chipload.jobs.thinwall.scene import scene_bytes
 from chipload.jobs.thinwall.sections import sections_of
 from chipload.program.apt.writer import write_apt
 from chipload.program.gcode.writer import write_commands
-from chipload.report.presentation import Presentation
+from chipload.report.presentation import Blank, Presentation
 from chipload.report.programs import ENDINGS, program_name
 
 
 def presentation_of(walled: ThinWallResult) -> Presentation:
     """The presentation of a thin wall."""
-    return Presentation(partial(sections_of, walled), partial(scene_bytes, walled), partial(program_files, walled))
+    return Presentation(
+        partial(sections_of, walled),
+        partial(scene_bytes, walled),
+        partial(program_files, walled),
+        partial(_blanks, walled),
+    )
+
+
+def _blanks(walled: ThinWallResult) -> dict[str, Blank]:
+    """The workpiece before, the same for every variant."""
+    mesh = trimesh.Trimesh(*walled.geometry.stock, process=True)
+    cutters = {walled.planning.cutter.number: walled.planning.cutter}
+    return {name: Blank(mesh, cutters) for name in walled.variants} if mesh.is_watertight else {}
 
 
 def program_files(walled: ThinWallResult) -> dict[str, bytes]:

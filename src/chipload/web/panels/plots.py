@@ -41,10 +41,10 @@ class PlotPanel:
             self.figure = ui.plotly({"data": [], "layout": {}, "config": {}}).classes("cl-figure")
             self.figure.on("plotly_click", self._clicked, js_handler=CLICK)
 
-    def open(self, result: PageResult, track: PageTrack) -> None:
-        """Show a track."""
+    def open(self, result: PageResult, track: PageTrack, row: int = 0) -> None:
+        """Show a track, the cursor at a row."""
         same = self.result is result
-        self.result, self.track, self.row = result, track, 0
+        self.result, self.track, self.row = result, track, row
         if not same:
             options = {c: _called(c) for c in result.columns}
             kept = [c for c in self.columns.value or [] if c in options]

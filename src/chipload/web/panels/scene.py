@@ -1,58 +1,48 @@
-"""The 3D view: bodies, the path in the colours of a column, the cutter at the row, marks where a limit is exceeded."""
+"""The 3D view: bodies, the stock at the row, the path in the colours of a column, the cutter, marks.
+
+The view itself runs in the browser (viewer/src, built into report/viewer/viewer.js): it moves by itself while a track
+is played and tells the row. Here are its controls, and what it is told.
+"""
 
 from __future__ import annotations
 
 import asyncio
-import math
+import json
 from collections.abc import Callable
-from html import escape
+from functools import partial
 from typing import Any
 
-import numpy as np
 from nicegui import ui
-from numpy.typing import NDArray
 
-from chipload.report.figures import SCALE
-from chipload.result import Verdict
+from chipload.report.colouring import FIRST, POINTS
+from chipload.report.view import ViewMark, colouring_document
 from chipload.web.asset_cache import AssetCache
-from chipload.web.checks import label_and_unit, limits, row_of
-from chipload.web.cutters import cutters_of
+from chipload.web.checks import label_and_unit
 from chipload.web.panels import RELEASE
 from chipload.web.result import PageResult, PageTrack
-from chipload.web.scene import POINTS, Body, Scale, bodies, edges_glb, path_glb, radius
+from chipload.web.scene import PageScene, bodies, colouring, page_scene, view_path
 
-Floats = NDArray[np.float64]
-
-BACKGROUND = "#eef1f5"
-MARK = "#c81e1e"
-#: the box that leaves of bodies their edges
-CLEAR = "see through"
-#: opening of the camera from below to above, width of the view by its height at least, and room around a box
-FOV_DEG, ASPECT, MORE = 36.0, 2.0, 1.06
-#: directions that the camera looks from
-VIEWS = {"iso": (0.62, -1.0, 0.78), "top": (0.0, -0.001, 1.0), "front": (0.0, -1.0, 0.02), "side": (1.0, 0.0, 0.02)}
-#: columns that a path is coloured by first, where the history has them
-FIRST = ("engagement_deg", "force_n", "force_xy_n", "deflection_um", "form_error_um", "feed_mm_min")
+#: names of views and what is said of them
+VIEWS = {"iso": "from a corner", "top": "from above", "front": "from the front", "side": "from the side"}
+#: boxes that are no bodies
+GLASS, DRAPE = "see through", "values on stock"
+#: planes that cut the picture away
+SECTIONS = {"": "no section", "x": "section X", "y": "section Y", "z": "section Z"}
 
 
 class ScenePanel:
     """The 3D view of a result."""
 
-    def __init__(self, assets: AssetCache, pick: Callable[[int], None]) -> None:
-        self.assets, self.pick = assets, pick
+    def __init__(self, assets: AssetCache, picked: Callable[[int, bool], None]) -> None:
+        self.assets, self.picked = assets, picked
         self.result: PageResult | None = None
         self.track: PageTrack | None = None
-        self.box: tuple[Floats, Floats] = (np.zeros(3), np.ones(3))
-        self.view: Any = None
-        self.path: Any = None
-        self.cutters: dict[int, Any] = {}
-        self.marks: list[Any] = []
-        self.layers: dict[str, Any] = {}
+        self.scene: PageScene | None = None
+        self.found: Any = ((), "")
         self.seen: dict[str, bool] = {}
-        self.bodies: tuple[Body, ...] = ()
-        self.bodies_notice = ""
         with ui.element("div").classes("cl-panel cl-space") as self.frame:
             self.stage = ui.element("div").classes("cl-stage")
+            self.stage.on("viewrow", self._moved, js_handler="(e) => emit(e.detail)")
             with ui.element("div").classes("cl-over cl-over-left"):
                 self.column = ui.select({}, label="path coloured by", on_change=self._recoloured).props(
                     "dense options-dense outlined hide-bottom-space"
@@ -60,182 +50,153 @@ class ScenePanel:
                 self.column.on("popup-hide", js_handler=RELEASE)
                 self.boxes = ui.element("div").classes("cl-layers")
             with ui.element("div").classes("cl-over cl-over-right"):
-                for name in VIEWS:
-                    ui.button(name, on_click=lambda n=name: self.view_from(n)).props("flat dense no-caps size=sm").on(
-                        "mousedown.prevent"
-                    )
-            self.legend = ui.html("", sanitize=True).classes("cl-over cl-legend")
+                for name, meaning in VIEWS.items():
+                    self._button(name, f"look {meaning}", partial(self.view_from, name))
+                self._button("measure", "measure between two places", self._measure).mark("measure")
+                self._button("picture", "save the picture (PNG)", lambda: self._call("save('chipload.png')"))
+                self._button("video", "record a video (WebM) until pressed again", lambda: self._call("record()"))
+            with ui.element("div").classes("cl-over cl-section"):
+                self.axis = ui.select(SECTIONS, value="", on_change=self._section).props(
+                    'dense options-dense borderless aria-label="section plane"'
+                ).classes("cl-axis").mark("section")  # fmt: skip
+                self.axis.on("popup-hide", js_handler=RELEASE)
+                self.share = ui.slider(min=0.0, max=1.0, step=0.005, value=0.5, on_change=self._section).props(
+                    'dense aria-label="place of the section"'
+                ).classes("cl-share-slider")  # fmt: skip
+                self.share.on("change", js_handler=RELEASE)
+                self.share.set_visibility(False)
             self.notice = ui.label("").classes("cl-over cl-notice")
+        self.measures = False
+
+    @property
+    def view_id(self) -> str:
+        """The element that the view fills."""
+        return f"c{self.stage.id}"
+
+    @property
+    def slide(self) -> str:
+        """JavaScript that takes the value of the slider."""
+        return (
+            f"(v) => {{ const e = document.getElementById('{self.view_id}');"
+            f" chiploadViewer.of('{self.view_id}').abscissa(v, e.dataset.against || 'time'); }}"
+        )
+
+    @property
+    def marks(self) -> tuple[ViewMark, ...]:
+        """Places that are marked in the view."""
+        return () if self.scene is None else self.scene.marks
+
+    def against(self, what: str) -> None:
+        """What the slider counts: time or path."""
+        self.stage.props(f"data-against={what}")
 
     async def open(self, result: PageResult, track: PageTrack) -> None:
         """Show a result from its beginning."""
         self.result, self.track = result, track
-        found, notice = await asyncio.to_thread(bodies, result)
-        lows = [t.place.min(axis=0) for t in result.tracks] + [b.low for b in found]
-        highs = [t.place.max(axis=0) for t in result.tracks] + [b.high for b in found]
-        self.box = (np.min(lows, axis=0), np.max(highs, axis=0))
-        size = max(float(np.linalg.norm(self.box[1] - self.box[0])), 1e-3)
-        self.stage.clear()
-        self.path, self.cutters, self.marks, self.layers = None, {}, [], {}
-        with self.stage:
-            camera = ui.scene.perspective_camera(fov=FOV_DEG, near=size * 2e-3, far=size * 60.0)
-            self.view = ui.scene(grid=False, camera=camera, background_color=BACKGROUND, fps=25).classes("cl-scene")
-            self.view.axes_helper(0.12 * size)
-        self.bodies = found
-        await self._bodies()
-        self.bodies_notice = notice
-        self.view_from("iso", 0.0)
+        self.found = await asyncio.to_thread(bodies, result)
         columns = {c: _called(c) for c in result.columns}
         chosen = self.column.value if self.column.value in columns else None
+        self.track = None
         self.column.set_options(columns, value=chosen or next((c for c in FIRST if c in columns), result.columns[0]))
-        await self.follow(result, track)
+        await self.follow(result, track, keep=False)
 
-    async def follow(self, result: PageResult, track: PageTrack) -> None:
+    async def follow(self, result: PageResult, track: PageTrack, *, keep: bool = True) -> None:
         """Show another track of the same result."""
         self.track = track
-        size = 0.25 * float(np.linalg.norm(self.box[1] - self.box[0]))
-        made, unknown = await asyncio.to_thread(cutters_of, result, track, size)
-        for shape in (*self.cutters.values(), *self.marks):
-            shape.delete()
-        self.cutters = {n: self.view.gltf(self.assets.put(glb)).visible(False) for n, glb in made.items()}
+        scene = await asyncio.to_thread(page_scene, result, track, self.found, str(self.column.value))
+        if track is not self.track:
+            return
+        self.scene = scene
         few = f"The path is drawn by some {POINTS} of its {len(track)} steps." if len(track) > POINTS else ""
-        self.notice.set_text(" ".join(t for t in (self.bodies_notice, unknown, few) if t))
-        self.marks = []
-        mark = 4.0 * radius(track)
-        for check in limits(track):
-            row = row_of(track, check)
-            if check.state is Verdict.EXCEEDS and row is not None:
-                with self.view:
-                    ball = self.view.sphere(mark, 16, 12).material(MARK).move(*track.place[row].tolist())
-                self.marks.append(ball)
-        self._boxes()
-        await self._colour()
+        self.notice.set_text(" ".join(t for t in (scene.notice, few) if t))
+        url = self.assets.put(scene.document)
+        self._boxes(scene)
+        ui.run_javascript(
+            f"chiploadViewer.open('{self.view_id}', '{url}', {json.dumps(keep)}).then(() => {{"
+            + "".join(self._layer(name, self.seen[name]) for name in self.seen)
+            + "})"
+        )
 
     def at(self, row: int) -> None:
-        """Put the cutter at a row."""
-        if self.track is None:
-            return
-        number = int(self.track.tool[row]) if self.track.tool is not None else 0
-        number = number if number in self.cutters else 0
-        for n, shape in self.cutters.items():
-            shape.visible(n == number and self.seen.get("cutter", True))
-        shape = self.cutters.get(number)
-        if shape is not None:
-            shape.move(*self.track.place[row].tolist())
-            shape.rotate_R(frame(self.track.axis[row]).tolist())
+        """Stand at a row."""
+        if self.track is not None:
+            self._call(f"go({int(row)})")
 
-    def view_from(self, name: str, seconds: float = 0.4) -> None:
+    def show(self, mark: int) -> None:
+        """Show what touches at a mark."""
+        self._call(f"show({int(mark)})")
+
+    def play(self, rate: float) -> None:
+        """Play, in seconds of the machine in a second; 0 stops."""
+        self._call(f"play({rate!r})")
+
+    def view_from(self, name: str) -> None:
         """Look from a side, at everything."""
-        if self.view is None:
-            return
-        middle = 0.5 * (self.box[0] + self.box[1])
-        eye = seen_from(*self.box, np.array(VIEWS[name]))
-        x, y, z = middle.tolist()
-        self.view.move_camera(*eye.tolist(), x, y, z, 0, 0, 1, duration=seconds)
+        self._call(f"look({json.dumps(name)})")
+
+    # -- parts --------------------------------------------------------------------------------------------------
+    def _call(self, what: str) -> None:
+        if self.track is not None:
+            ui.run_javascript(f"window.chiploadViewer && chiploadViewer.of('{self.view_id}').{what}")
+
+    def _moved(self, event: Any) -> None:
+        detail = event.args
+        if isinstance(detail, dict) and isinstance(detail.get("row"), int):
+            self.picked(detail["row"], bool(detail.get("playing")))
 
     async def _recoloured(self) -> None:
-        if self.view is not None:
-            await self._colour()
-
-    async def _colour(self) -> None:
-        result, track, column = self.result, self.track, self.column.value
-        if result is None or track is None or not isinstance(column, str):
+        result, track, column, scene = self.result, self.track, self.column.value, self.scene
+        if result is None or track is None or scene is None or not isinstance(column, str):
             return
-        glb, scale = await asyncio.to_thread(path_glb, result, track, column)
-        if (track, column) != (self.track, self.column.value):
-            return
-        if self.path is not None:
-            self.path.delete()
-        self.path = self.view.gltf(self.assets.put(glb)).visible(self.seen.get("path", True))
-        self.legend.set_content(legend(column, scale))
 
-    async def _bodies(self) -> None:
-        """The bodies, as they are or their edges."""
-        clear, found = self.seen.get(CLEAR, False), self.bodies
-        made = await asyncio.to_thread(lambda: [edges_glb(b) if clear else b.glb for b in found])
-        if found is not self.bodies:
-            return
-        for layer in self.layers.values():
-            layer.delete()
-        for body, glb in zip(found, made, strict=True):
-            layer = self.view.gltf(self.assets.put(glb))
-            self.layers[body.name] = layer.visible(self.seen.get(body.name, True))
+        def document() -> bytes:
+            return colouring_document(colouring(result, track, column, scene.removal), view_path(track))
 
-    def _boxes(self) -> None:
+        data = await asyncio.to_thread(document)
+        if (track, column) == (self.track, self.column.value):
+            ui.run_javascript(f"chiploadViewer.paint('{self.view_id}', '{self.assets.put(data)}')")
+
+    def _boxes(self, scene: PageScene) -> None:
+        """A box for each thing that can be hidden."""
+        names = [*scene.bodies, "path", "cutter"]
+        if scene.marks:
+            names.append("marks")
+        more = [GLASS] if scene.bodies else []
+        if scene.removal is not None:
+            more.append(DRAPE)
+        self.seen = {n: self.seen.get(n, True) for n in names} | {n: self.seen.get(n, False) for n in more}
         self.boxes.clear()
         with self.boxes:
-            if self.layers:
-                ui.checkbox(CLEAR, value=self.seen.get(CLEAR, False)).props("dense size=xs").on_value_change(
-                    lambda e: self._see(CLEAR, bool(e.value))
-                )
-            for name in (*self.layers, "path", "cutter"):
-                ui.checkbox(_plain(name), value=self.seen.get(name, True)).props("dense size=xs").on_value_change(
-                    lambda e, n=name: self._see(n, bool(e.value))
+            for name, on in self.seen.items():
+                ui.checkbox(_plain(name), value=on, on_change=lambda e, n=name: self._see(n, bool(e.value))).props(
+                    "dense size=xs"
                 )
 
-    async def _see(self, name: str, wanted: bool) -> None:
+    def _see(self, name: str, wanted: bool) -> None:
         self.seen[name] = wanted
-        if name == CLEAR:
-            await self._bodies()
-        elif name == "path" and self.path is not None:
-            self.path.visible(wanted)
-        elif name == "cutter":
-            for shape in self.cutters.values():
-                shape.visible(False)
-            self.pick(-1)
-        elif name in self.layers:
-            self.layers[name].visible(wanted)
+        if self.track is not None:
+            ui.run_javascript(self._layer(name, wanted))
 
+    def _layer(self, name: str, on: bool) -> str:
+        view, value = f"chiploadViewer.of('{self.view_id}')", json.dumps(on)
+        special = {GLASS: "glass", DRAPE: "drape"}.get(name)
+        return f"{view}.{special}({value});" if special else f"{view}.layer({json.dumps(name)}, {value});"
 
-def seen_from(low: Floats, high: Floats, away: Floats) -> Floats:
-    """(3,) where a camera stands [mm] that looks along -``away`` at the middle of a box and sees all of it.
+    def _section(self) -> None:
+        axis, share = str(self.axis.value or ""), float(self.share.value or 0.0)
+        self.share.set_visibility(bool(axis))
+        self._call(f"section({json.dumps(axis)}, {share!r})")
 
-    >>> eye = seen_from(np.array([-1.0, -1.0, -1.0]), np.array([1.0, 1.0, 1.0]), np.array([0.0, -1.0, 0.0]))
-    >>> eye.round(3).tolist()
-    [0.0, -4.322, 0.0]
-    """
-    e = away / np.linalg.norm(away)
-    right = np.cross([0.0, 0.0, 1.0], e)
-    right /= np.linalg.norm(right)
-    up = np.cross(e, right)
-    signs = np.array(np.meshgrid([-0.5, 0.5], [-0.5, 0.5], [-0.5, 0.5])).reshape(3, 8).T
-    corners = signs * np.maximum(high - low, 1e-3)
-    half = math.tan(0.5 * math.radians(FOV_DEG))
-    wide = np.maximum(np.abs(corners @ up) / half, np.abs(corners @ right) / (half * ASPECT))
-    return np.asarray(0.5 * (low + high) + MORE * float((corners @ e + wide).max()) * e)
+    def _measure(self) -> None:
+        self.measures = not self.measures
+        self._call(f"measuring({json.dumps(self.measures)})")
 
-
-def frame(axis: Floats) -> Floats:
-    """(3, 3) a rotation that takes z to a unit vector.
-
-    >>> (frame(np.array([1.0, 0.0, 0.0])) @ [0.0, 0.0, 1.0]).round(12).tolist()
-    [1.0, 0.0, 0.0]
-    """
-    length = float(np.linalg.norm(axis))
-    w = np.asarray(axis) / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
-    other = np.array([1.0, 0.0, 0.0]) if abs(w[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    v = np.cross(w, other)
-    v /= np.linalg.norm(v)
-    return np.column_stack([np.cross(v, w), v, w])
-
-
-def legend(column: str, scale: Scale) -> str:
-    """The scale of the colours as HTML."""
-    word, unit = label_and_unit(column)
-    title = escape(f"{word} [{unit}]" if unit else word)
-    if scale.words:
-        rows = "".join(
-            f'<div><span class="cl-dot" style="background:{colour}"></span>{escape(text)}</div>'
-            for text, colour in scale.words[:12]
-        )
-        return f'<div class="cl-title">{title}</div>{rows}'
-    stops = ", ".join(f"{colour} {100.0 * float(str(share)):g}%" for share, colour in SCALE)
-    above = scale.limit is not None and scale.high > scale.limit
-    red = f'<div class="cl-red">red: above {scale.limit:g}</div>' if above else ""
-    return (
-        f'<div class="cl-title">{title}</div><div class="cl-bar" style="background:linear-gradient(to right, {stops})">'
-        f'</div><div class="cl-ends"><span>{scale.low:.4g}</span><span>{scale.high:.4g}</span></div>{red}'
-    )
+    def _button(self, text: str, tip: str, act: Callable[[], None]) -> Any:
+        button = ui.button(text, on_click=lambda: act()).props(f'flat dense no-caps size=sm aria-label="{tip}"')
+        button.on("mousedown.prevent")
+        with button:
+            ui.tooltip(tip)
+        return button
 
 
 def _called(column: str) -> str:

@@ -1,0 +1,143 @@
+"""The bodies of a scene.glb for the 3D view. A body of very many triangles is drawn with fewer, and by how much that
+moves its surface is stated; none is left out.
+"""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: triangles of one body that are drawn; halvings of the width of the cells in which vertices are joined
+TRIANGLES, HALVINGS = 400_000, 12
+#: nodes of a scene that the view draws itself
+OWN = ("path", "rapids", "cutter")
+#: kinds of bodies by how their names begin
+KINDS = ("stock", "part", "fixture", "wall")
+PLAIN = (168, 176, 186, 255)
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A body of a scene.
+
+    Parameters
+    ----------
+    name : of its node
+    kind : one of :data:`KINDS`, or `body`
+    vertices, faces : (v, 3) [mm], (f, 3)
+    colours : (4,) sRGB of all, or (v, 4)
+    triangles : that the scene has of it
+    moved_mm : how far drawing it with fewer triangles moves its vertices at most
+    """
+
+    name: str
+    kind: str
+    vertices: Floats
+    faces: Ints
+    colours: NDArray[np.uint8]
+    triangles: int
+    moved_mm: float = 0.0
+
+    @property
+    def low(self) -> Floats:
+        """Lower corner [mm]."""
+        return np.asarray(self.vertices.min(axis=0))
+
+    @property
+    def high(self) -> Floats:
+        """Upper corner [mm]."""
+        return np.asarray(self.vertices.max(axis=0))
+
+
+def scene_bodies(glb: bytes, most: int = TRIANGLES) -> tuple[Body, ...]:
+    """The bodies of a scene.glb beside path and cutter, none with more than ``most`` triangles.
+
+    Raises
+    ------
+    Exception
+        Of any kind: the file cannot be read.
+    """
+    scene = trimesh.load(io.BytesIO(glb), file_type="glb", force="scene")
+    out = []
+    for node in scene.graph.nodes_geometry:
+        transform, geometry = scene.graph[node]
+        mesh = scene.geometry[geometry]
+        if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces) and not _own(str(node)):
+            out.append(_body(str(node), mesh.copy().apply_transform(transform), most))
+    return tuple(out)
+
+
+def bodies_note(bodies: tuple[Body, ...]) -> str:
+    """A sentence for each body that is drawn with fewer triangles; empty: none is."""
+    return " ".join(
+        f"{b.name} has {b.triangles} triangles: drawn with {len(b.faces)}, within {b.moved_mm:.2g} mm."
+        for b in bodies
+        if len(b.faces) != b.triangles
+    )
+
+
+def fewer_triangles(
+    vertices: Floats, faces: Ints, colours: NDArray[np.uint8], most: int
+) -> tuple[Floats, Ints, NDArray[np.uint8], float]:
+    """At most ``most`` triangles of a mesh: vertices in one cell of a grid become their mean; the last value is how far
+    a vertex moves at most [mm].
+    """
+    low, size = vertices.min(axis=0), float(np.ptp(vertices, axis=0).max())
+    wide, narrow, best = size, 0.0, None
+    for _ in range(HALVINGS):
+        cell = 0.5 * (wide + narrow)
+        key = np.floor((vertices - low) / max(cell, 1e-9)).astype(np.int64)
+        _, number = np.unique(key, axis=0, return_inverse=True)
+        joined = number.ravel()[faces]
+        solid = (joined[:, 0] != joined[:, 1]) & (joined[:, 1] != joined[:, 2]) & (joined[:, 2] != joined[:, 0])
+        # two triangles of the same corners cover each other
+        kept = np.unique(np.sort(joined[solid], axis=1), axis=0, return_index=True)[1]
+        if len(kept) <= most:
+            wide, best = cell, (number.ravel(), joined[solid][np.sort(kept)])
+        else:
+            narrow = cell
+    if best is None:
+        return vertices, faces, colours, 0.0
+    number, index = best
+    count = np.bincount(number).astype(np.float64)
+    mean = np.stack([np.bincount(number, vertices[:, i]) / count for i in range(3)], axis=1)
+    first = np.unique(number, return_index=True)[1]
+    moved = float(np.linalg.norm(mean[number] - vertices, axis=1).max())
+    return mean, index, colours if colours.ndim == 1 else colours[first], moved
+
+
+def _body(name: str, mesh: trimesh.Trimesh, most: int) -> Body:
+    visual = mesh.visual
+    colours = np.asarray(visual.to_color().vertex_colors if visual.kind == "texture" else visual.vertex_colors)
+    each = colours.reshape(-1, 4).astype(np.uint8)
+    if len(each) != len(mesh.vertices):
+        each = np.tile(np.array([PLAIN], dtype=np.uint8), (len(mesh.vertices), 1))
+    vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
+    painted, triangles, moved = (each[0] if (each == each[0]).all() else each), len(faces), 0.0
+    if triangles > most:
+        vertices, faces, painted, moved = fewer_triangles(vertices, faces, painted, most)
+    plain = _plain(name)
+    kind = next((k for k in KINDS if plain.startswith(k)), "body")
+    return Body(name, kind, vertices, faces, painted, triangles, moved)
+
+
+def _plain(name: str) -> str:
+    """A node's name without the number of its operation."""
+    head, _, tail = name.partition("-")
+    return tail if head.isdigit() and tail else name
+
+
+def _own(name: str) -> bool:
+    """Whether the view draws a node itself.
+
+    >>> [_own(n) for n in ("0-path-plain", "rapids", "0-wall", "stock", "1-cutter")]
+    [True, True, False, False, True]
+    """
+    return _plain(name).startswith(OWN)

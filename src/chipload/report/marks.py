@@ -1,0 +1,66 @@
+"""Places that the 3D view marks: limits that are exceeded, collisions with the bodies that touch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import Finding
+from chipload.report.view import ViewMark
+from chipload.result import LimitCheck, Result, Track, Verdict
+
+#: collisions that are marked at most
+MARKED = 200
+#: code of the finding of a collision
+COLLISION = "collision"
+
+
+def marks_of(
+    result: Result, track: Track, row: Callable[[LimitCheck | Finding], int | None], place: NDArray[np.float64]
+) -> tuple[ViewMark, ...]:
+    """The marks of a track, the worst limit first, then collisions, the deepest first.
+
+    Parameters
+    ----------
+    row : of a check or a finding in the history; None: it has none
+    place : (n, 3) [mm] of each row
+    """
+    out = []
+    worst = [c for c in track.limits if c.state is Verdict.EXCEEDS and c.worst is not None]
+    for c in sorted(worst, key=lambda c: -_share(c)):
+        k = row(c)
+        if k is not None:
+            text = f"{c.column.label} {c.worst:.4g} {c.column.unit}, limit {c.limit:g}"
+            out.append(ViewMark(k, _at(place[k]), text, "limit"))
+    touched = []
+    for f in track.findings:
+        k = row(f) if f.code == COLLISION else None
+        if k is not None:
+            touched.append(_collision(result, track, f, k, place))
+    touched.sort(key=lambda m: -m.depth_mm)
+    return (*out, *touched[:MARKED])
+
+
+def _collision(result: Result, track: Track, f: Finding, k: int, place: NDArray[np.float64]) -> ViewMark:
+    """The mark of a collision: which bodies touch, and how deep, is in the numbers of the operation."""
+    at = f.place if f.place is not None else _at(place[k])
+    operation = result.operations[track.operation] if track.operation < len(result.operations) else {}
+    text = f"line {f.line}: {f.text}" if f.line else f.text
+    for one in operation.get("collisions") or ():
+        if one.get("line") == f.line and np.allclose(one.get("place"), at, atol=1e-6):
+            return ViewMark(k, at, text, COLLISION, (str(one["what"]), str(one["into"])), float(one["depth_mm"]))
+    return ViewMark(k, at, text, COLLISION)
+
+
+def _share(c: LimitCheck) -> float:
+    """How far beyond its limit a value is."""
+    value = abs(c.worst or 0.0)
+    if c.column.least:
+        return c.limit / value if value > 0.0 else np.inf
+    return value / c.limit if c.limit > 0.0 else np.inf
+
+
+def _at(p: NDArray[np.float64]) -> tuple[float, float, float]:
+    return float(p[0]), float(p[1]), float(p[2])

@@ -1,0 +1,124 @@
+"""removal.npz: the stock of each track at all its rows, made from the blank and the history, and read again."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import InputError
+from chipload.report.presentation import Blank
+from chipload.report.view import parts_of
+from chipload.result import Result, Track
+from chipload.simulation.removal_mesh import RemovalMesh, ToolPath, removal_mesh
+
+Floats = NDArray[np.float64]
+
+#: the file
+REMOVAL = "removal.npz"
+#: arrays of a track in it
+ARRAYS = ("low", "high", "corners", "seen", "rows", "volumes", "cell")
+#: columns that it is made from
+PLACE, AXIS = ("x_mm", "y_mm", "z_mm"), ("axis_x", "axis_y", "axis_z")
+#: tracks of a result whose stock is kept, those in use first
+TRACKS = 6
+
+
+def removal_meshes(result: Result, blanks: Mapping[str, Blank]) -> dict[int, RemovalMesh]:
+    """The stock over the rows of tracks that have a blank, by the number of the track."""
+    order = sorted(range(len(result.tracks)), key=lambda k: not result.tracks[k].in_use)
+    out = {}
+    for k in [k for k in order if result.tracks[k].name in blanks][:TRACKS]:
+        blank = blanks[result.tracks[k].name]
+        path = tool_path(result.tracks[k], blank)
+        if path is not None:
+            out[k] = removal_mesh(blank.mesh, path, blank.cutters)
+    return out
+
+
+def tool_path(track: Track, blank: Blank) -> ToolPath | None:
+    """Where the tool of a track stands at each row; None: it has no history, or no place."""
+    parts: dict[str, list[NDArray[Any]]] = {}
+    for block in track.blocks():
+        for name in (*PLACE, *AXIS, "s_mm", "tool"):
+            if name in block:
+                parts.setdefault(name, []).append(np.asarray(block[name]))
+    columns = {name: np.concatenate(arrays) for name, arrays in parts.items()}
+    if not set(PLACE) <= set(columns) or len(columns[PLACE[0]]) == 0:
+        return None
+    tip = np.column_stack([columns[c] for c in PLACE]).astype(np.float64)
+    n = len(tip)
+    axis = np.column_stack([columns[c] for c in AXIS]) if set(AXIS) <= set(columns) else np.zeros((0, 3))
+    if len(axis) == 0 or np.isnan(axis).any():
+        axis = np.tile([0.0, 0.0, 1.0], (n, 1))
+    only = next(iter(blank.cutters)) if len(blank.cutters) == 1 else 0
+    tool = columns["tool"].astype(np.int64) if "tool" in columns else np.full(n, only, dtype=np.int64)
+    return ToolPath(tip, axis, tool, breaks(tip, columns.get("s_mm")))
+
+
+def breaks(place: Floats, s: NDArray[Any] | None) -> NDArray[np.bool_]:
+    """(n,) whether a row does not go on from the row before: the path must be longer by their distance."""
+    if s is None:
+        return np.zeros(len(place), dtype=np.bool_)
+    leap = np.linalg.norm(np.diff(place, axis=0, prepend=place[:1]), axis=1)
+    along = np.maximum.accumulate(np.nan_to_num(np.asarray(s, dtype=np.float64)))
+    apart = leap > np.diff(along, prepend=along[:1]) * (1.0 + 1e-6) + 1e-3
+    return np.asarray(apart & (np.arange(len(place)) > 0))
+
+
+def removal_bytes(result: Result, blanks: Mapping[str, Blank]) -> bytes:
+    """The file: the stock of each track, and the parts of its cutters."""
+    sink = io.BytesIO()
+    arrays: dict[str, NDArray[Any]] = {}
+    for k, mesh in removal_meshes(result, blanks).items():
+        arrays |= {f"{k}-{name}": getattr(mesh, name) for name in ARRAYS}
+        for number, cutter in blanks[result.tracks[k].name].cutters.items():
+            for n, (kind, profile) in enumerate(parts_of(cutter)):
+                arrays[f"{k}-cutter-{number}-{n}-{kind}"] = profile
+    np.savez_compressed(sink, **arrays)  # type: ignore[arg-type]
+    return sink.getvalue()
+
+
+def read_cutter_parts(path: Path, track: int) -> dict[int, list[tuple[str, Floats]]]:
+    """Parts of the cutters of a track by tool number; empty: the file has none.
+
+    Raises
+    ------
+    InputError
+        It cannot be read.
+    """
+    out: dict[int, list[tuple[int, str, Floats]]] = {}
+    try:
+        with np.load(path, allow_pickle=False) as held:
+            for name in held.files:
+                words = name.split("-")
+                if len(words) == 5 and words[:2] == [str(track), "cutter"]:
+                    out.setdefault(int(words[2]), []).append((int(words[3]), words[4], held[name]))
+    except (OSError, ValueError, KeyError, EOFError) as err:
+        raise InputError(f"{path.name}: cannot be read: {err}: run the job again") from None
+    return {number: [(kind, p) for _, kind, p in sorted(parts, key=lambda x: x[0])] for number, parts in out.items()}
+
+
+def read_removal(path: Path, track: int) -> RemovalMesh | None:
+    """The stock of a track; None: the file has none.
+
+    Raises
+    ------
+    InputError
+        It cannot be read.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as held:
+            if f"{track}-corners" not in held:
+                return None
+            arrays = {name: held[f"{track}-{name}"] for name in ARRAYS}
+    except (OSError, ValueError, KeyError, EOFError) as err:
+        raise InputError(f"{path.name}: cannot be read: {err}: run the job again") from None
+    corners, seen = arrays["corners"], arrays["seen"]
+    if corners.ndim != 3 or corners.shape[1:] != (4, 3) or seen.shape != (len(corners), 2):
+        raise InputError(f"{path.name}: damaged: its parts do not fit each other: run the job again")
+    return RemovalMesh(**arrays)

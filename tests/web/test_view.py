@@ -1,0 +1,174 @@
+"""The 3D view in a real browser: stock at the slider, what touches, what is drawn, measured and saved."""
+
+import base64
+
+import numpy as np
+import pytest
+
+from square import ROWS, VOLUMES, T
+
+VIEW = "chiploadViewer.of(document.querySelector('.cl-stage').id)"
+
+
+@pytest.fixture(scope="module")
+def cut(browser, served):
+    """The page of a result with stock, clamp and holder."""
+    page = browser.new_page(viewport={"width": 1280, "height": 720})
+    page.set_default_timeout(120_000)
+    wrong = []
+    page.on("pageerror", lambda e: wrong.append(str(e)))
+    page.goto(served.address("?show=cut"))
+    page.wait_for_selector(".cv-ramp")
+    page.wait_for_selector(".cl-now")
+    yield page
+    page.close()
+    assert wrong == []
+
+
+def state(page):
+    return page.evaluate(f"{VIEW}.state()")
+
+
+def settle(page, row):
+    page.wait_for_function(f"r => {VIEW}.state().row == r", arg=row)
+
+
+def red(picture):
+    """Pixels as red as what touches, which no other thing of this result is."""
+    rgb = picture.astype(int)
+    return (rgb[..., 0] > 110) & (rgb[..., 1] < 60) & (rgb[..., 2] < 60)
+
+
+def stage(page, pixels):
+    """The picture of the view alone."""
+    data = page.evaluate(f"{VIEW}.picture()")
+    return pixels(base64.b64decode(data.split(",", 1)[1]))
+
+
+def test_the_first_view_is_the_worst_finding_with_what_touches_in_red(cut, pixels) -> None:
+    page = cut
+    settle(page, 60)
+    assert page.inner_text(".cv-note") == "line 8: shank or holder goes 1.5 mm into fixture 0"
+    touching = red(stage(page, pixels)).sum()
+    assert touching > 1500
+    page.keyboard.press("ArrowRight")
+    settle(page, 61)
+    # the marks stay, the bodies are no longer red
+    assert red(stage(page, pixels)).sum() < 0.3 * touching
+    page.locator(".cl-found").get_by_text("shank or holder goes").click()
+    settle(page, 60)
+    page.wait_for_function("document.querySelector('.cv-note').textContent.includes('1.5 mm')")
+    assert red(stage(page, pixels)).sum() == pytest.approx(touching, rel=0.2)
+
+
+def test_the_stock_at_three_moments_has_the_volume_of_what_was_cut(cut, pixels) -> None:
+    page, pictures = cut, []
+    page.evaluate(f"{VIEW}.look('iso')")
+    for row, volume in ((-1, VOLUMES[0]), (ROWS // 2 - 1, VOLUMES[1]), (ROWS - 1, VOLUMES[2])):
+        page.evaluate(f"{VIEW}.go({row})")
+        shown = state(page)["stock"]
+        assert shown["volume"] == pytest.approx(volume, rel=0.01)
+        removed = VOLUMES[0] - shown["volume"]
+        assert removed == pytest.approx(VOLUMES[0] - volume, abs=0.05 * (VOLUMES[0] - VOLUMES[2]))
+        pictures.append(stage(page, pixels))
+    for a, b in ((0, 1), (1, 2)):
+        assert (np.abs(pictures[a].astype(int) - pictures[b]).max(axis=2) > 40).sum() > 300
+    page.keyboard.press("Home")
+    settle(page, 0)
+
+
+def test_the_slider_moves_the_stock_without_the_server(cut) -> None:
+    page = cut
+    page.evaluate(f"{VIEW}.abscissa({T[150]})")
+    at_once = state(page)
+    assert at_once["tip"] == pytest.approx([0.0, 39.2, -2.0], abs=0.01)
+    assert at_once["stock"]["frame"] > 60
+    before = at_once["frames"]
+    page.evaluate(f"{VIEW}.abscissa(0.55)")
+    # between two rows the tool stands between their places
+    assert state(page)["tip"][0] == pytest.approx(0.5 * (0.8 * 5 + 0.8 * 6), abs=1e-3)
+    page.wait_for_function(f"n => {VIEW}.state().frames > n", arg=before)
+
+
+def test_playing_moves_by_itself_and_the_panels_follow(cut) -> None:
+    page = cut
+    page.keyboard.press("Home")
+    settle(page, 0)
+    page.keyboard.press("Space")
+    page.wait_for_function(f"{VIEW}.state().row > 20")
+    page.wait_for_function("Number(document.querySelector('.cl-where').textContent.match(/step (\\d+)/)[1]) > 15")
+    page.keyboard.press("Space")
+    page.wait_for_function(f"!{VIEW}.playing")
+    page.keyboard.press("Home")
+    settle(page, 0)
+
+
+def test_bodies_and_triangles_are_those_of_the_scene(cut) -> None:
+    shown = state(cut)
+    # the stock of the scene is replaced by the stock at the slider
+    assert shown["bodies"] == [["fixture 0", 12]]
+    assert shown["segments"] == ROWS
+    labels = cut.locator(".cl-layers").inner_text()
+    for name in ("stock", "fixture 0", "path", "cutter", "marks", "see through", "values on stock"):
+        assert name in labels
+    assert "frames" in cut.inner_text(".cl-notice")
+
+
+def test_a_section_see_through_and_values_change_the_picture(cut, pixels) -> None:
+    page = cut
+    page.keyboard.press("End")
+    settle(page, ROWS - 1)
+    page.evaluate(f"{VIEW}.look('iso')")
+    whole = stage(page, pixels)
+    for on, off in (
+        ("section('y', 0.6)", "section('', 0.5)"),
+        ("glass(true)", "glass(false)"),
+        ("drape(true)", "drape(false)"),
+        ("layer('stock', false)", "layer('stock', true)"),
+    ):
+        page.evaluate(f"{VIEW}.{on}")
+        other = stage(page, pixels)
+        assert (np.abs(whole.astype(int) - other).max(axis=2) > 25).sum() > 500, on
+        page.evaluate(f"{VIEW}.{off}")
+    assert (np.abs(whole.astype(int) - stage(page, pixels)).max(axis=2) > 25).sum() < 50
+
+
+def test_a_length_is_measured_on_the_stock(cut) -> None:
+    page = cut
+    page.evaluate(f"{VIEW}.look('top'); {VIEW}.layer('path', false); {VIEW}.layer('cutter', false)")
+    page.locator("button", has_text="measure").click()
+    page.wait_for_function("document.querySelector('.cv-note').textContent == 'click two places'")
+    # two corners of the box, by the places that the view itself projects them to
+    places = page.evaluate(
+        f"""() => {{ const v = {VIEW}, b = v.host.getBoundingClientRect();
+        return [[-9, -9, 0], [49, -9, 0]].map(p => {{
+          const q = v.camera.position.clone().set(...p).project(v.camera);
+          return [b.x + (q.x + 1) * b.width / 2, b.y + (1 - q.y) * b.height / 2]; }}); }}"""
+    )
+    for x, y in places:
+        page.mouse.click(x, y)
+    page.wait_for_function("document.querySelector('.cv-note').textContent.includes('mm')")
+    said = page.inner_text(".cv-note")
+    assert float(said.split()[0]) == pytest.approx(58.0, rel=0.03)
+    page.locator("button", has_text="measure").click()
+    page.evaluate(f"{VIEW}.layer('path', true); {VIEW}.layer('cutter', true)")
+
+
+def test_values_under_the_pointer_and_a_saved_picture(cut) -> None:
+    page = cut
+    page.evaluate(f"{VIEW}.look('top')")
+    x, y = page.evaluate(
+        f"""() => {{ const v = {VIEW}, b = v.host.getBoundingClientRect();
+        const q = v.camera.position.clone().set(24, 40, -2).project(v.camera);
+        return [b.x + (q.x + 1) * b.width / 2, b.y + (1 - q.y) * b.height / 2]; }}"""
+    )
+    page.mouse.move(x, y)
+    page.wait_for_function("getComputedStyle(document.querySelector('.cv-tip')).display == 'block'")
+    said = page.inner_text(".cv-tip")
+    # the third side goes from (40, 40) to (0, 40): line 9 of the program
+    assert "line 9" in said
+    assert "force" in said
+    assert "Y 40.000" in said
+    with page.expect_download() as saved:
+        page.locator("button", has_text="picture").click()
+    assert saved.value.suggested_filename == "chipload.png"

@@ -1,0 +1,123 @@
+/** The stock at any frame: all quads at once, each drawn in the frames in which it is seen; nothing is sent again. */
+
+import * as THREE from "three";
+import { Document, Removal, Rgb } from "./document";
+
+const RAW = new THREE.Color(0xb98a4e), CUT = new THREE.Color(0xc3cad3), CAP = new THREE.Color(0x8d6a3b);
+
+export class Stock {
+  readonly mesh: THREE.Mesh;
+  readonly group = new THREE.Group();
+  readonly rows: Uint32Array;
+  frame = -1;
+  private readonly seen: Uint16Array;
+  private readonly low: THREE.Vector3;
+  private readonly uniforms = {
+    frame: { value: 0 }, raw: { value: RAW }, cap: { value: CAP }, shades: { value: null as THREE.Texture | null },
+    size: { value: 1 }, glass: { value: 0 },
+  };
+
+  constructor(doc: Document, removal: Removal) {
+    const corners = doc.u2(removal.corners);
+    this.seen = doc.u2(removal.seen);
+    this.rows = doc.u4(removal.rows);
+    this.low = new THREE.Vector3(...removal.low);
+    const count = this.seen.length / 2;
+    const scale = removal.low.map((a, i) => (removal.high[i] - a) / 65535);
+    const position = new Float32Array(count * 12), seen = new Float32Array(count * 8);
+    const index = new Uint32Array(count * 6);
+    for (let k = 0; k < corners.length; k++) position[k] = removal.low[k % 3] + corners[k] * scale[k % 3];
+    for (let q = 0; q < count; q++) {
+      const last = this.seen[2 * q + 1] === 65535 ? 1e9 : this.seen[2 * q + 1];
+      for (let n = 0; n < 4; n++) { seen[8 * q + 2 * n] = this.seen[2 * q]; seen[8 * q + 2 * n + 1] = last; }
+      index.set([4 * q, 4 * q + 1, 4 * q + 2, 4 * q, 4 * q + 2, 4 * q + 3], 6 * q);
+    }
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
+    geometry.setAttribute("seen", new THREE.BufferAttribute(seen, 2));
+    geometry.setIndex(new THREE.BufferAttribute(index, 1));
+    geometry.computeBoundingSphere();
+    const material = new THREE.MeshStandardMaterial({
+      roughness: 0.75, metalness: 0.0, flatShading: true, side: THREE.DoubleSide,
+    });
+    material.onBeforeCompile = (shader) => this.dress(shader);
+    this.mesh = new THREE.Mesh(geometry, material);
+    this.mesh.renderOrder = 2;
+    this.group.add(this.mesh);
+    this.shade(null);
+    this.at(0);
+  }
+
+  /** Stand at a row; true where that changes the picture. Row -1: before the first. */
+  at(row: number): boolean {
+    let a = 0, b = this.rows.length;
+    while (a < b) { const m = (a + b) >> 1; if (this.rows[m] <= row) a = m + 1; else b = m; }
+    const changed = a !== this.frame;
+    this.frame = a;
+    this.uniforms.frame.value = a;
+    return changed;
+  }
+
+  /** Colours of what was cut in each frame; null: one colour for all that was cut. */
+  shade(colours: Rgb[] | null): void {
+    const all = colours ?? [[CUT.r, CUT.g, CUT.b].map((x) => 255 * x ** (1 / 2.2)) as Rgb];
+    const data = new Uint8Array(all.length * 4);
+    all.forEach((c, k) => data.set([c[0], c[1], c[2], 255], 4 * k));
+    const texture = new THREE.DataTexture(data, all.length, 1);
+    texture.colorSpace = THREE.SRGBColorSpace;
+    texture.needsUpdate = true;
+    this.uniforms.shades.value?.dispose();
+    this.uniforms.shades.value = texture;
+    this.uniforms.size.value = all.length;
+  }
+
+  /** Draw it as glass: its outline shows, and what is behind it too. */
+  glass(on: boolean): void {
+    const material = this.mesh.material as THREE.MeshStandardMaterial;
+    material.transparent = on;
+    material.depthWrite = !on;
+    this.uniforms.glass.value = on ? 1 : 0;
+    material.needsUpdate = true;
+  }
+
+  /** Whether a triangle that a ray has met is drawn now. */
+  shows(face: number): boolean {
+    const q = face >> 1;
+    return this.seen[2 * q] <= this.frame && (this.frame < this.seen[2 * q + 1] || this.seen[2 * q + 1] === 65535);
+  }
+
+  /** Volume within what is drawn, and number of its triangles. */
+  measured(): { volume: number; triangles: number } {
+    const p = this.mesh.geometry.getAttribute("position"), i = this.mesh.geometry.getIndex()!;
+    const a = new THREE.Vector3(), b = new THREE.Vector3(), c = new THREE.Vector3();
+    let six = 0, triangles = 0;
+    for (let f = 0; f < i.count / 3; f++) {
+      if (!this.shows(f)) continue;
+      [a, b, c].forEach((v, n) => v.fromBufferAttribute(p, i.getX(3 * f + n)).sub(this.low));
+      six += a.dot(b.cross(c));
+      triangles++;
+    }
+    return { volume: six / 6, triangles };
+  }
+
+  private dress(shader: THREE.WebGLProgramParametersWithUniforms): void {
+    Object.assign(shader.uniforms, this.uniforms);
+    shader.vertexShader = shader.vertexShader
+      .replace("#include <common>", "#include <common>\nattribute vec2 seen; uniform float frame; varying float born;")
+      .replace("#include <project_vertex>", `#include <project_vertex>
+        born = seen.x;
+        if (frame < seen.x || frame >= seen.y) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);`);
+    shader.fragmentShader = shader.fragmentShader
+      .replace("#include <common>", `#include <common>
+        uniform vec3 raw; uniform vec3 cap; uniform sampler2D shades; uniform float size; uniform float glass;
+        varying float born;`)
+      .replace("#include <color_fragment>", `#include <color_fragment>
+        diffuseColor.rgb = born < 0.5 ? raw : texture2D(shades, vec2((born - 0.5) / size, 0.5)).rgb;`)
+      .replace("#include <opaque_fragment>", `
+        if (glass > 0.5) {
+          float edge = 1.0 - abs(dot(normalize(normal), normalize(vViewPosition)));
+          diffuseColor.a = gl_FrontFacing ? 0.10 + 0.45 * edge * edge : 0.05;
+        } else if (!gl_FrontFacing) outgoingLight = cap;
+        #include <opaque_fragment>`);
+  }
+}

@@ -1,0 +1,448 @@
+/** The 3D view of a result, for the page and the report: bodies, stock at a row, path, cutter, marks, measures. */
+
+import * as THREE from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { HIT, Solid, Tool } from "./bodies";
+import { SIZE, ViewCube } from "./cube";
+import { Colouring, Document, Header, Mark, Rgb, fetched, unpacked } from "./document";
+import { Overlay, number } from "./overlay";
+import { ToolPath, coloured } from "./path";
+import { Stock } from "./stock";
+
+const BACKGROUND = 0xeef1f5, FOV = 36, NEAR = 14;
+const VIEWS: Record<string, [number, number, number]> = {
+  iso: [0.62, -1, 0.78], top: [0, -0.001, 1], front: [0, -1, 0.02], side: [1, 0, 0.02], below: [0, -0.001, -1],
+};
+type Layer = "stock" | "path" | "cutter" | "marks" | string;
+
+export class View {
+  readonly overlay: Overlay;
+  header!: Header;
+  stock: Stock | null = null;
+  path!: ToolPath;
+  solids: Solid[] = [];
+  row = -1;
+  frames = 0;
+  private readonly renderer: THREE.WebGLRenderer;
+  private readonly scene = new THREE.Scene();
+  private readonly camera = new THREE.PerspectiveCamera(FOV, 1, 0.1, 1000);
+  private readonly controls: OrbitControls;
+  private readonly cube = new ViewCube();
+  private tools = new Map<number, Tool>();
+  private readonly marks = new THREE.Group();
+  private readonly measure = new THREE.Group();
+  private colouring: Colouring | null = null;
+  private picks: THREE.Vector3[] | null = null;
+  private hidden = new Set<Layer>();
+  private plane: THREE.Plane | null = null;
+  private dirty = true;
+  private draped = false;
+  private shades: Rgb[] | null = null;
+  private place = 0;
+  private rate = 0;
+  private wanted = 0;
+  private pending = -1;
+  private told = 0;
+  private before = 0;
+  private recorder: MediaRecorder | null = null;
+  private peers: View[] = [];
+
+  constructor(readonly host: HTMLElement) {
+    this.overlay = new Overlay(host);
+    this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
+    this.renderer.localClippingEnabled = true;
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    const canvas = this.renderer.domElement;
+    canvas.setAttribute("role", "img");
+    canvas.setAttribute("aria-label", "3D view");
+    canvas.tabIndex = -1;
+    this.overlay.root.prepend(canvas);
+    this.scene.background = new THREE.Color(BACKGROUND);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8d99a8, 1.5), this.camera, this.marks, this.measure);
+    const lamp = new THREE.DirectionalLight(0xffffff, 1.7);
+    lamp.position.set(0.4, 0.7, 1);
+    this.camera.add(lamp);
+    this.camera.up.set(0, 0, 1);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = false;
+    this.controls.addEventListener("change", () => { this.dirty = true; this.follow(); });
+    canvas.addEventListener("pointermove", (e) => this.hover(e));
+    canvas.addEventListener("pointerleave", () => this.overlay.values(""));
+    let down: [number, number] = [0, 0];
+    canvas.addEventListener("pointerdown", (e) => { down = [e.clientX, e.clientY]; });
+    canvas.addEventListener("click", (e) => {
+      if (Math.hypot(e.clientX - down[0], e.clientY - down[1]) < 5) this.click(e);
+    });
+    new ResizeObserver(() => { this.dirty = true; }).observe(host);
+    const loop = (now: number) => {
+      if (!host.isConnected) { this.renderer.dispose(); return; }
+      this.advance(now);
+      if (this.dirty) this.draw();
+      requestAnimationFrame(loop);
+    };
+    requestAnimationFrame(loop);
+  }
+
+  /** Show a document; `keep` leaves the camera where it is. */
+  load(doc: Document, keep = false): void {
+    const h = (this.header = doc.header);
+    for (const s of this.solids) this.scene.remove(s.group);
+    if (this.stock) this.scene.remove(this.stock.group);
+    if (this.path) this.scene.remove(this.path.group);
+    for (const t of this.tools.values()) this.scene.remove(t.group);
+    this.solids = h.bodies.map((b) => new Solid(doc, b));
+    this.stock = h.removal ? new Stock(doc, h.removal) : null;
+    this.path = new ToolPath(doc, h.path);
+    this.tools = new Map(Object.entries(h.cutters).map(([n, parts]) => [Number(n), new Tool(parts)]));
+    this.scene.add(...this.solids.map((s) => s.group), this.path.group, ...[...this.tools.values()].map((t) => t.group));
+    if (this.stock) this.scene.add(this.stock.group);
+    this.marks.clear();
+    const size = this.size();
+    for (const m of h.marks) {
+      const ball = new THREE.Mesh(new THREE.SphereGeometry(size * 0.008, 16, 12), new THREE.MeshBasicMaterial({ color: HIT }));
+      ball.position.set(...m.at);
+      ball.renderOrder = 5;
+      this.marks.add(ball);
+    }
+    this.colour(doc, h.colouring);
+    this.row = -1;
+    this.go(this.wanted);
+    this.layers();
+    if (!keep) this.look("iso");
+    if (this.pending >= 0) { this.show(this.pending); this.pending = -1; }
+  }
+
+  /** Colour the path, and what was cut, by a column. */
+  colour(doc: Document | null, c: Colouring | null): void {
+    this.colouring = c;
+    this.path.colour(doc, c, this.header);
+    this.path.clip(this.plane ? [this.plane] : []);
+    this.overlay.legend(this.header, c);
+    this.shades = doc && c?.frames
+      ? coloured(doc.f4(c.frames), c.frames_above ? doc.u1(c.frames_above) : null, c, this.header) : null;
+    this.stock?.shade(this.draped ? this.shades : null);
+    this.dirty = true;
+  }
+
+  /** Show the values of the column on what was cut there. */
+  drape(on: boolean): void {
+    this.draped = on;
+    this.stock?.shade(on ? this.shades : null);
+    this.dirty = true;
+  }
+
+  /** Stand at a row of the history. */
+  go(row: number): void {
+    this.wanted = row;
+    if (this.path) this.stand(this.path.place(row), row);
+  }
+
+  /** Stand where time (or path) has a value. */
+  abscissa(value: number, against: "time" | "path" = "time"): void {
+    if (!this.header) return;
+    this.stand(this.path.at(against === "time" ? this.path.t : this.path.s, value));
+  }
+
+  /** Play: seconds of the machine in a second; 0 stops. */
+  play(rate: number): void {
+    this.rate = rate;
+    this.before = performance.now();
+  }
+
+  get playing(): boolean { return this.rate > 0; }
+
+  layer(name: Layer, on: boolean): void {
+    if (on) this.hidden.delete(name); else this.hidden.add(name);
+    this.layers();
+  }
+
+  /** See through bodies: their edges and maps stay. */
+  glass(on: boolean): void {
+    this.stock?.glass(on);
+    for (const s of this.solids) s.glass(on);
+    this.section(this.cut.axis, this.cut.share);
+    this.dirty = true;
+  }
+
+  private cut: { axis: string; share: number } = { axis: "", share: 0.5 };
+
+  /** Cut away what lies beyond a plane across x, y or z at a share of the box; "": nothing. */
+  section(axis: string, share: number): void {
+    this.cut = { axis, share };
+    if (!this.header) return;
+    const k = "xyz".indexOf(axis), { low, high } = this.header;
+    this.plane = null;
+    if (axis && k >= 0) {
+      const normal = new THREE.Vector3().setComponent(k, -1);
+      // from the side that the camera looks from in the first view
+      if (k === 1) normal.negate();
+      const at = low[k] + share * (high[k] - low[k]);
+      this.plane = new THREE.Plane(normal, k === 1 ? -at : at);
+    }
+    const planes = this.plane ? [this.plane] : [];
+    for (const s of this.solids) s.clip(planes);
+    if (this.stock) (this.stock.mesh.material as THREE.Material).clippingPlanes = planes;
+    this.path.clip(planes);
+    this.dirty = true;
+  }
+
+  look(name: string): void {
+    if (!this.header) return;
+    const away = new THREE.Vector3(...(VIEWS[name] ?? VIEWS.iso)).normalize();
+    this.lookFrom(away);
+  }
+
+  /** Show a mark: the tool stands there, what touches is red, the camera comes near. */
+  show(k: number, near = true): void {
+    if (!this.header) { this.pending = k; return; }
+    const mark = this.header.marks[k];
+    if (!mark) return;
+    this.go(mark.row);
+    this.touch(mark);
+    if (!near) return;
+    const to = new THREE.Vector3(...mark.at), away = this.camera.position.clone().sub(this.controls.target).normalize();
+    this.controls.target.copy(to);
+    this.camera.position.copy(to).addScaledVector(away, 0.75 * this.size());
+    this.controls.update();
+    this.dirty = true;
+  }
+
+  /** Measure between clicks, or stop. */
+  measuring(on: boolean): void {
+    this.picks = on ? [] : null;
+    this.measure.clear();
+    this.overlay.message(on ? "click two places" : "");
+    this.dirty = true;
+  }
+
+  /** The picture as a PNG (a data address). */
+  picture(): string {
+    this.draw();
+    return this.renderer.domElement.toDataURL("image/png");
+  }
+
+  save(name: string, url = this.picture()): void {
+    const a = document.createElement("a");
+    a.href = url;
+    a.download = name;
+    a.click();
+  }
+
+  /** Record what is shown as WebM until called again; false where the browser cannot. */
+  record(): boolean {
+    if (this.recorder) { this.recorder.stop(); this.recorder = null; return false; }
+    if (!("MediaRecorder" in window)) { this.overlay.message("this browser records no video: save pictures"); return false; }
+    const parts: Blob[] = [];
+    this.recorder = new MediaRecorder(this.renderer.domElement.captureStream(30), { mimeType: "video/webm" });
+    this.recorder.ondataavailable = (e) => { parts.push(e.data); };
+    this.recorder.onstop = () => this.save("chipload.webm", URL.createObjectURL(new Blob(parts, { type: "video/webm" })));
+    this.recorder.start();
+    return true;
+  }
+
+  /** Follow another view's camera, and it this one's. */
+  link(other: View): void { this.peers.push(other); other.peers.push(this); this.follow(); }
+
+  /** What is drawn, for tests: triangles of all bodies, volume of the stock, place of the tool. */
+  state(): Record<string, unknown> {
+    const tip = this.path.tip(this.place, new THREE.Vector3()).toArray();
+    return {
+      row: this.row, tip, bodies: this.solids.map((s) => [s.body.name, s.body.index.n / 3]), frames: this.frames,
+      stock: this.stock ? { frame: this.stock.frame, ...this.stock.measured() } : null, segments: this.path.drawn.length / 3,
+    };
+  }
+
+  // -- parts ---------------------------------------------------------------------------------------------------
+  private size(): number {
+    const { low, high } = this.header;
+    return Math.max(Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]), 1e-3);
+  }
+
+  private lookFrom(away: THREE.Vector3): void {
+    const low = new THREE.Vector3(...this.header.low), high = new THREE.Vector3(...this.header.high);
+    const middle = low.clone().add(high).multiplyScalar(0.5);
+    const up = Math.abs(away.z) > 0.999 ? new THREE.Vector3(0, Math.sign(away.z), 0) : new THREE.Vector3(0, 0, 1);
+    const right = new THREE.Vector3().crossVectors(up, away).normalize(), top = new THREE.Vector3().crossVectors(away, right);
+    const half = Math.tan(THREE.MathUtils.degToRad(FOV / 2)), aspect = Math.max(this.aspect(), 0.2);
+    let far = 0;
+    for (let n = 0; n < 8; n++) {
+      const p = new THREE.Vector3(n & 1 ? high.x : low.x, n & 2 ? high.y : low.y, n & 4 ? high.z : low.z).sub(middle);
+      far = Math.max(far, p.dot(away) + Math.max(Math.abs(p.dot(top)) / half, Math.abs(p.dot(right)) / (half * aspect)));
+    }
+    const size = this.size();
+    this.camera.near = size * 2e-3;
+    this.camera.far = size * 40;
+    this.controls.target.copy(middle);
+    this.camera.position.copy(middle).addScaledVector(away, 1.06 * far);
+    if (Math.abs(away.z) > 0.999) this.camera.position.y -= 1e-3 * far;
+    this.controls.update();
+    this.dirty = true;
+  }
+
+  private aspect(): number { return this.host.clientWidth / Math.max(this.host.clientHeight, 1); }
+
+  private layers(): void {
+    const seen = (name: Layer) => !this.hidden.has(name);
+    if (!this.path) return;
+    for (const s of this.solids) s.group.visible = seen(s.body.name);
+    if (this.stock) this.stock.group.visible = seen("stock");
+    this.path.group.visible = seen("path");
+    this.marks.visible = seen("marks");
+    this.stand(this.place, this.row);
+    this.dirty = true;
+  }
+
+  private stand(place: number, row?: number): void {
+    this.place = place;
+    const k = Math.floor(place), now = row ?? this.path.rows[k];
+    if (now !== this.row) this.touch(null);
+    this.row = now;
+    const number = this.path.tool[k], own = this.tools.get(number) ?? this.tools.get(0);
+    for (const tool of this.tools.values()) tool.group.visible = tool === own && !this.hidden.has("cutter");
+    if (own) {
+      this.path.tip(place, own.group.position);
+      own.group.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), this.path.axis(place, new THREE.Vector3()));
+    }
+    this.stock?.at(now);
+    this.dirty = true;
+  }
+
+  private touch(mark: Mark | null): void {
+    for (const s of this.solids) s.hit(mark !== null && mark.bodies.includes(s.body.name));
+    for (const t of this.tools.values()) t.hit(mark && mark.kind === "collision" ? mark.bodies[0] : "");
+    this.overlay.message(mark ? mark.text : this.picks ? "click two places" : "");
+    this.dirty = true;
+  }
+
+  private advance(now: number): void {
+    if (this.rate <= 0 || !this.path) return;
+    const t = this.path.t, k = Math.floor(this.place), n = Math.min(k + 1, t.length - 1);
+    const clock = t[k] + (this.place - k) * (t[n] - t[k]) + this.rate * (now - this.before) / 1000;
+    this.before = now;
+    const over = clock >= t[t.length - 1];
+    this.stand(over ? t.length - 1 : this.path.at(t, clock));
+    if (over) this.rate = 0;
+    if (over || now - this.told > 100) {
+      this.told = now;
+      this.tell("viewrow", { row: this.row, playing: this.rate > 0 });
+    }
+  }
+
+  private tell(name: string, detail: unknown): void { this.host.dispatchEvent(new CustomEvent(name, { detail })); }
+
+  private follow(): void {
+    for (const p of this.peers) {
+      p.camera.position.copy(this.camera.position);
+      p.controls.target.copy(this.controls.target);
+      p.camera.lookAt(p.controls.target);
+      p.dirty = true;
+    }
+  }
+
+  private draw(): void {
+    const w = this.host.clientWidth, h = this.host.clientHeight;
+    if (w < 2 || h < 2 || !this.header) return;
+    this.dirty = false;
+    this.frames++;
+    const size = this.renderer.getSize(new THREE.Vector2());
+    if (size.x !== w || size.y !== h) {
+      this.renderer.setSize(w, h, false);
+      this.camera.aspect = w / h;
+      this.camera.updateProjectionMatrix();
+    }
+    this.camera.updateProjectionMatrix();
+    this.renderer.setViewport(0, 0, w, h);
+    this.renderer.render(this.scene, this.camera);
+    const away = this.camera.position.clone().sub(this.controls.target);
+    this.cube.draw(this.renderer, away, this.camera.up, w, 4);
+    this.overlay.ruler((2 * away.length() * Math.tan(THREE.MathUtils.degToRad(FOV / 2))) / h);
+  }
+
+  /** Drawn point of the path within some pixels of the pointer, the nearest to the camera. */
+  private near(x: number, y: number): number {
+    const w = this.host.clientWidth, h = this.host.clientHeight, v = new THREE.Vector3();
+    let best = -1, closest = NEAR * NEAR;
+    const p = this.path.drawn;
+    for (let k = 0; k < p.length / 3; k++) {
+      v.set(p[3 * k], p[3 * k + 1], p[3 * k + 2]).project(this.camera);
+      if (v.z > 1) continue;
+      const far = ((v.x + 1) * w / 2 - x) ** 2 + ((1 - v.y) * h / 2 - y) ** 2;
+      if (far < closest) { closest = far; best = k; }
+    }
+    return best;
+  }
+
+  private hover(e: PointerEvent): void {
+    if (e.buttons || !this.header || this.hidden.has("path")) { this.overlay.values(""); return; }
+    const box = this.host.getBoundingClientRect(), x = e.clientX - box.left, y = e.clientY - box.top;
+    const k = this.near(x, y);
+    if (k < 0) { this.overlay.values(""); return; }
+    const row = this.path.drawnRows[k], d = this.path.place(row), p = this.path.drawn, c = this.colouring, v = this.path.values;
+    const lines = [`step ${row + 1}` + (this.path.line ? `, line ${this.path.line[d]}` : "")];
+    if (c && v) lines.push(`${c.label} ${c.words.length ? c.words.find((_, i) => i === v[k])?.[0] ?? "" : number(v[k])} ${c.unit}`);
+    lines.push(`X ${p[3 * k].toFixed(3)}  Y ${p[3 * k + 1].toFixed(3)}  Z ${p[3 * k + 2].toFixed(3)}`, `${number(this.path.t[d])} s`);
+    this.overlay.values(lines.join("\n"), x, y);
+  }
+
+  private click(e: MouseEvent): void {
+    const box = this.host.getBoundingClientRect(), x = e.clientX - box.left, y = e.clientY - box.top;
+    const fromRight = box.width - 4 - x, fromBottom = box.height - 4 - y;
+    if (fromRight > 0 && fromRight < SIZE && fromBottom > 0 && fromBottom < SIZE) {
+      const side = this.cube.side(1 - (2 * fromRight) / SIZE, (2 * fromBottom) / SIZE - 1);
+      if (side) { this.lookFrom(side); this.follow(); return; }
+    }
+    if (this.picks) { this.pick(x, y); return; }
+    const k = this.hidden.has("path") ? -1 : this.near(x, y);
+    if (k >= 0) this.tell("viewrow", { row: this.path.drawnRows[k], playing: false });
+  }
+
+  private pick(x: number, y: number): void {
+    const ray = new THREE.Raycaster();
+    ray.setFromCamera(new THREE.Vector2(2 * x / this.host.clientWidth - 1, 1 - 2 * y / this.host.clientHeight), this.camera);
+    const meshes = this.solids.filter((s) => s.group.visible).map((s) => s.mesh as THREE.Object3D);
+    if (this.stock?.group.visible) meshes.push(this.stock.mesh);
+    const hit = ray.intersectObjects(meshes, false).find((i) =>
+      (i.object !== this.stock?.mesh || this.stock.shows(i.faceIndex!)) && (!this.plane || this.plane.distanceToPoint(i.point) >= 0));
+    if (!hit || !this.picks) return;
+    if (this.picks.length === 2) { this.picks.length = 0; this.measure.clear(); }
+    this.picks.push(hit.point);
+    const ball = new THREE.Mesh(new THREE.SphereGeometry(this.size() * 0.005, 12, 8), new THREE.MeshBasicMaterial({ color: 0x1b4fd0, depthTest: false }));
+    ball.position.copy(hit.point);
+    ball.renderOrder = 9;
+    this.measure.add(ball);
+    if (this.picks.length === 2) {
+      const [a, b] = this.picks, d = b.clone().sub(a);
+      const line = new THREE.Line(new THREE.BufferGeometry().setFromPoints([a, b]), new THREE.LineBasicMaterial({ color: 0x1b4fd0, depthTest: false }));
+      line.renderOrder = 9;
+      this.measure.add(line);
+      this.overlay.message(`${number(d.length())} mm   dX ${number(d.x)}  dY ${number(d.y)}  dZ ${number(d.z)}`);
+    }
+    this.dirty = true;
+  }
+}
+
+const views = new Map<string, View>();
+
+/** The view in an element, made where it is not there yet. */
+export function of(id: string): View {
+  const host = document.getElementById(id)!;
+  let view = views.get(id);
+  if (!view || view.host !== host) views.set(id, (view = new View(host)));
+  return view;
+}
+
+/** Show the document of an address in an element. */
+export async function open(id: string, url: string, keep = false): Promise<void> { of(id).load(await fetched(url), keep); }
+
+/** Colour the path of a view by the document of an address. */
+export async function paint(id: string, url: string): Promise<void> {
+  const doc = await fetched(url), view = of(id);
+  view.colour(doc, doc.header.colouring);
+}
+
+/** Show a document that the page itself holds as text. */
+export async function unpack(id: string, text: string): Promise<View> {
+  const doc = await unpacked(text), view = of(id);
+  view.load(doc);
+  return view;
+}
