@@ -1,0 +1,54 @@
+"""The command that asks an MTConnect agent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from chipload.cli.app import Debug, app
+from chipload.errors import InputError
+from chipload.terminal import guarded, show
+
+
+@app.command()
+def mtconnect(
+    source: Annotated[
+        str, typer.Argument(metavar="SOURCE", help="address of an agent, as http://127.0.0.1:5000, or an XML file")
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help=".toml: the machine; .csv: a log of its spindle")],
+    device: Annotated[str | None, typer.Option("--device", help="name of the device, where there are several")] = None,
+    component: Annotated[
+        str | None, typer.Option("--component", help="name of the spindle, where several components turn")
+    ] = None,
+    debug: Debug = False,
+) -> None:
+    """Read a machine's limits, or a log of its spindle, from an MTConnect agent.
+
+    A machine's file holds what the agent states; what it leaves open is a comment to be filled in. A log is for
+    `chipload spindle`.
+    """
+
+    def work() -> int:
+        from chipload.files import write_whole
+        from chipload.machine.mtconnect import described, document, machine_text, samples
+
+        ending = out.suffix.lower()
+        if ending == ".toml":
+            if component is not None:
+                raise InputError("--component: of a log: leave it out, or write --out spindle.csv")
+            found = described(document(source, "probe"), device)
+            write_whole(out, machine_text(found).encode("utf-8"))
+            show(f"{found.name}: axes {', '.join(sorted(found.travel)) or 'none'}; fill in the comments of {out}")
+        elif ending == ".csv":
+            text, findings = samples(source, device, component)
+            write_whole(out, text.encode("ascii"))
+            for f in findings:
+                show(f.text)
+            show(f"{text.count(chr(10)) - 1} rows: {text.splitlines()[0]}")
+        else:
+            raise InputError(f"--out {out}: must end with .toml (the machine) or .csv (a log of its spindle)")
+        return 0
+
+    guarded(work, debug)

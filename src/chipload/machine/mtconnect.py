@@ -1,0 +1,319 @@
+"""A machine that an MTConnect agent describes, and the samples of its spindle.
+
+An agent answers ``/probe`` with what the device is (MTConnectDevices) and ``/sample`` with what it measured
+(MTConnectStreams); either may also be a file. What is read: of a device its linear axes with the limits of their
+position, of the component that turns as spindle the limits of its speed, the greatest path feed; of samples the
+spindle's speed, current, power and torque and the path feed. Values have the units of the standard (ANSI/MTC1.4,
+Part 2: millimetre, revolution/minute, ampere, watt, newton metre, millimetre/second).
+
+A description does not say how fast axes accelerate, how rotary axes are mounted, nor what the controller reads: keys of
+the machine's file that it leaves open are written as comments, and the file is refused until they are filled in.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import urllib.error
+import urllib.request
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from xml.etree import ElementTree
+
+from chipload.errors import Finding, InputError
+from chipload.files import read_regular
+
+Element = ElementTree.Element
+
+#: of a document [bytes], and seconds that an agent may take to answer
+MOST_BYTES, WAIT_S = 1 << 26, 20.0
+#: most samples in an answer, and most answers that are asked for
+COUNT, ANSWERS = 10_000, 1_000
+#: types of samples -> column of the log and the factor to its unit
+TYPES = {
+    "RotaryVelocity": ("speed_rpm", 1.0),
+    "SpindleSpeed": ("speed_rpm", 1.0),
+    "Amperage": ("current_a", 1.0),
+    "AmperageAC": ("current_a", 1.0),
+    "AmperageDC": ("current_a", 1.0),
+    "Wattage": ("power_w", 1.0),
+    "Torque": ("torque_nm", 1.0),
+    "PathFeedrate": ("feed_mm_min", 60.0),
+}
+#: the columns in their order
+COLUMNS = ("speed_rpm", "current_a", "power_w", "torque_nm", "feed_mm_min")
+#: kinds of values that were asked for and not measured
+WANTED = ("COMMANDED", "PROGRAMMED", "OVERRIDE", "TARGET", "JOG", "RAPID")
+#: components that may be the spindle
+TURNING = ("Rotary", "Spindle")
+
+
+@dataclass(frozen=True)
+class Described:
+    """What a device says of itself.
+
+    Parameters
+    ----------
+    name : of the device
+    travel : least and greatest position [mm] of each linear axis by its letter; None: not stated
+    speed : least and greatest speed of the spindle [rpm]; None: not stated
+    feed : greatest path feed [mm/min]; None: not stated
+    rotary : names of the other axes that turn
+    """
+
+    name: str
+    travel: Mapping[str, tuple[float | None, float | None]]
+    speed: tuple[float | None, float | None]
+    feed: float | None
+    rotary: tuple[str, ...]
+
+
+def document(source: str, path: str = "", query: str = "") -> Element:
+    """The XML of a file, or of an agent's answer.
+
+    Parameters
+    ----------
+    source : a file, or the address of an agent, as ``http://127.0.0.1:5000``
+    path, query : that an agent is asked for, as ``probe``
+
+    Raises
+    ------
+    InputError
+        It cannot be read, is no XML of MTConnect, or the agent reports an error.
+    """
+    if source.startswith(("http://", "https://")):
+        address = f"{source.rstrip('/')}/{path}{query}"
+        try:
+            with urllib.request.urlopen(address, timeout=WAIT_S) as answer:
+                data = answer.read(MOST_BYTES + 1)
+        except (OSError, ValueError, urllib.error.URLError) as err:
+            raise InputError(f"MTConnect {address}: no answer: {err}: start the agent or give a file") from None
+        if len(data) > MOST_BYTES:
+            raise InputError(f"MTConnect {address}: more than {MOST_BYTES} bytes: ask for fewer samples")
+        label = f"MTConnect {address}"
+    else:
+        label = f"MTConnect {source}"
+        data = read_regular(Path(source), label, MOST_BYTES, "cut it into parts")
+    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
+        raise InputError(f"{label}: a document type: MTConnect has none, and entities are not read")
+    try:
+        root = ElementTree.fromstring(data)
+    except ElementTree.ParseError as err:
+        raise InputError(f"{label}: not XML: {err}") from None
+    if _kind(root) == "MTConnectError":
+        said = "; ".join((e.text or "").strip() for e in root.iter() if _kind(e) == "Error")
+        raise InputError(f"{label}: the agent reports: {said or 'an error'}")
+    if not _kind(root).startswith("MTConnect"):
+        raise InputError(f"{label}: the document is a {_kind(root)}: MTConnectDevices or MTConnectStreams is read")
+    return root
+
+
+def described(root: Element, name: str | None = None) -> Described:
+    """The device of a description.
+
+    Parameters
+    ----------
+    root : of MTConnectDevices
+    name : of the device; None: the only one
+
+    Raises
+    ------
+    InputError
+        There is no such device, or several and none is named.
+    """
+    devices = [e for e in root.iter() if _kind(e) == "Device"]
+    if not devices:
+        raise InputError("MTConnect: the document describes no device: give the answer to /probe")
+    names = [d.get("name") or d.get("uuid") or "device" for d in devices]
+    if name is None and len(devices) > 1:
+        raise InputError(f"MTConnect: {len(devices)} devices: state --device, one of {', '.join(names)}")
+    if name is not None and name not in names:
+        raise InputError(f"MTConnect: no device {name}: there are {', '.join(names)}")
+    device = devices[0 if name is None else names.index(name)]
+    travel: dict[str, tuple[float | None, float | None]] = {}
+    speed: tuple[float | None, float | None] = (None, None)
+    rotary = []
+    for part in device.iter():
+        own = part.get("name") or ""
+        letter = (part.get("nativeName") or own)[:1].upper()
+        if _kind(part) == "Linear" and letter in "XYZ" and letter and letter not in travel:
+            travel[letter] = _limits(part, ("POSITION",))
+        elif _kind(part) in TURNING:
+            turns = any(
+                i.get("type") in ("ROTARY_VELOCITY", "SPINDLE_SPEED") for i in _own(part) if _kind(i) == "DataItem"
+            )
+            if turns and speed == (None, None):
+                speed = _limits(part, ("ROTARY_VELOCITY", "SPINDLE_SPEED"))
+            elif not turns:
+                rotary.append(own)
+    feeds = [f for p in device.iter() if _kind(p) == "Path" if (f := _limits(p, ("PATH_FEEDRATE",))[1]) is not None]
+    return Described(names[devices.index(device)], travel, speed, 60.0 * max(feeds) if feeds else None, tuple(rotary))
+
+
+def machine_text(found: Described) -> str:
+    """The machine's file (TOML): what is known stands, what is not is a comment to be filled in."""
+
+    def line(key: str, value: float | None, what: str = "") -> str:
+        return f"{key} = {value!r}" if value is not None else f"# {key} =        # not stated by the agent{what}"
+
+    quoted = found.name.replace("\\", " ").replace('"', "'")
+    lines = [
+        f"# {' '.join(quoted.split())}, as its MTConnect agent describes it. Fill in what is a comment: a machine's",
+        "# limits are never guessed. Travel is that of the cutter's tip in the work frame: move it by the work offset.",
+        f'name = "{" ".join(quoted.split())}"',
+        "# dialect =        # linuxcnc, fanuc, sinumerik or heidenhain",
+        "decimals = 3",
+        "# rapid_mm_min =        # not stated by an agent",
+        line("feed_max_mm_min", found.feed),
+        "# corner_tolerance_mm =        # of the controller's path mode",
+    ]
+    if found.rotary:
+        lines.append(
+            f"# axes that turn, without their mounting: {', '.join(' '.join(n.split()) for n in found.rotary)}"
+        )
+    for letter in "XYZ":
+        low, high = found.travel.get(letter, (None, None))
+        lines += [
+            "", f"[axis.{letter.lower()}]", line("min_mm", low), line("max_mm", high),
+            "# acceleration_mm_s2 =        # not stated by an agent",
+        ]  # fmt: skip
+    lines += [
+        "", "[spindle]", line("min_rpm", found.speed[0]), line("max_rpm", found.speed[1]),
+        "# power_w =        # from the data sheet", "# torque_nm =        # likewise",
+    ]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def samples(source: str, device: str | None = None, component: str | None = None) -> tuple[str, list[Finding]]:
+    """The log of a spindle (CSV), as :func:`chipload.control.logs.read_log` reads it.
+
+    Parameters
+    ----------
+    source : a file with streams, or the address of an agent, all of whose buffer is asked for
+    device : its name; None: the only one
+    component : name or id of what turns as spindle; None: the only one that states a speed
+
+    Raises
+    ------
+    InputError
+        There is no speed of a spindle, none of current and power, or more than one spindle and none is named.
+
+    Notes
+    -----
+    A row is written where the current (or the power) is reported; the other columns have their last value. Rows before
+    all columns are known, and where one is unavailable, are left out: finding ``mtconnect-unavailable``.
+    """
+    found = sorted(_events(source, device, component))
+    if not found:
+        raise InputError(f"MTConnect {source}: no sample of a spindle: its speed and its current or power are needed")
+    there = [c for c in COLUMNS if any(e[2] == c and e[3] is not None for e in found)]
+    load = next((c for c in ("current_a", "power_w") if c in there), None)
+    if load is None or "speed_rpm" not in there:
+        missing = "speed (RotaryVelocity)" if load is not None else "current (Amperage) or power (Wattage)"
+        raise InputError(f"MTConnect {source}: no sample of the spindle's {missing}: add it to the agent's device file")
+    out = io.StringIO()
+    rows = csv.writer(out, lineterminator="\n")
+    rows.writerow(["time_s", *there])
+    last: dict[str, float | None] = {}
+    first, left, written = found[0][0], 0, -math.inf
+    for time, _, column, value in found:
+        last[column] = value
+        if column != load:
+            continue
+        values = [last.get(c) for c in there]
+        if any(v is None for v in values) or time <= written:
+            left += 1
+            continue
+        written = time
+        rows.writerow([f"{time - first:.6f}", *(f"{v:.9g}" for v in values if v is not None)])
+    if written == -math.inf:
+        raise InputError(f"MTConnect {source}: at no time are {', '.join(there)} known together")
+    text = f"{left} samples are left out: a column is not yet known or unavailable, or time does not rise"
+    return out.getvalue(), [Finding("mtconnect-unavailable", 0, text)] if left else []
+
+
+def _events(source: str, device: str | None, component: str | None) -> Iterator[tuple[float, int, str, float | None]]:
+    """Time [s], sequence, column and value of each sample of the spindle and of the path."""
+    spindles: set[str] = set()
+    for root in _answers(source):
+        for stream in (e for e in root.iter() if _kind(e) == "DeviceStream"):
+            if device is not None and stream.get("name") != device:
+                continue
+            for part in (e for e in stream if _kind(e) == "ComponentStream"):
+                names = {part.get("name"), part.get("componentId"), part.get("component")} - {None}
+                items = [i for group in part if _kind(group) == "Samples" for i in group if _kind(i) in TYPES]
+                items = [i for i in items if i.get("subType") not in WANTED]
+                turning = part.get("component") in TURNING
+                if turning and component is not None and component not in names:
+                    continue
+                if turning and any(TYPES[_kind(i)][0] == "speed_rpm" for i in items):
+                    spindles.add(str(part.get("name") or part.get("componentId")))
+                    if component is None and len(spindles) > 1:
+                        names_of = ", ".join(sorted(spindles))
+                        raise InputError(f"MTConnect {source}: spindles {names_of}: state --component, one of them")
+                for item in items:
+                    column, factor = TYPES[_kind(item)]
+                    if turning or part.get("component") == "Path":
+                        yield _time(item, source), int(item.get("sequence", "0")), column, _value(item, factor)
+
+
+def _answers(source: str) -> Iterator[Element]:
+    """Documents with streams: the file, or all of an agent's buffer, answer by answer."""
+    root = document(source, "sample", f"?count={COUNT}")
+    for _ in range(ANSWERS):
+        yield root
+        header = next((e for e in root if _kind(e) == "Header"), None)
+        following, last = (
+            int(header.get(k, "0")) if header is not None else 0 for k in ("nextSequence", "lastSequence")
+        )
+        if not source.startswith("http") or following > last:
+            return
+        root = document(source, "sample", f"?from={following}&count={COUNT}")
+
+
+def _time(item: Element, source: str) -> float:
+    text = item.get("timestamp", "")
+    try:
+        return datetime.fromisoformat(text).timestamp()
+    except ValueError:
+        raise InputError(f"MTConnect {source}: timestamp {text!r}: must be a date and time of ISO 8601") from None
+
+
+def _value(item: Element, factor: float) -> float | None:
+    """None: unavailable."""
+    try:
+        value = factor * float((item.text or "").strip())
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _kind(element: Element) -> str:
+    """The name of an element without its namespace."""
+    return element.tag.rsplit("}", 1)[-1]
+
+
+def _own(part: Element) -> Iterator[Element]:
+    """What belongs to a component and not to one inside it."""
+    for child in part:
+        if _kind(child) != "Components":
+            yield child
+            yield from _own(child)
+
+
+def _limits(part: Element, types: tuple[str, ...]) -> tuple[float | None, float | None]:
+    """Least and greatest value of the types of data that a component states, as constraint or specification."""
+    low: float | None = None
+    high: float | None = None
+    for item in _own(part):
+        if _kind(item) not in ("DataItem", "Specification") or item.get("type") not in types:
+            continue
+        for bound in item.iter():
+            if _kind(bound) in ("Minimum", "Maximum"):
+                value = _value(bound, 1.0)
+                low = value if _kind(bound) == "Minimum" and low is None else low
+                high = value if _kind(bound) == "Maximum" and high is None else high
+    return low, high
