@@ -45,6 +45,8 @@ def start(place: Path, out: str, *more: str, file: str = "job.toml") -> subproce
 
 def ended(process: subprocess.Popen[str]) -> subprocess.CompletedProcess[str]:
     out, err = process.communicate(timeout=500)
+    # on a slow computer it tells the time left
+    err = re.sub(r"^chipload: \d+ %, .*\n", "", err, flags=re.MULTILINE)
     return subprocess.CompletedProcess(process.args, process.returncode, out, err)
 
 

@@ -113,7 +113,7 @@ def result(tmp_path_factory) -> Path:
     (folder / "job.toml").write_text(JOB)
     code, out, err = call("run", folder / "job.toml", "--out", folder / "r", "--debug")
     assert code in (0, 3), out + err
-    assert err == NOTICE
+    assert err.startswith(NOTICE)  # on a slow computer it tells the time left
     return folder / "r"
 
 
@@ -132,6 +132,11 @@ def test_every_controller_twice(what):
     lost = what["with_latency"]["lost"]["fuzzy_feedforward"]["time_s"]
     late, plain = (x["fuzzy_feedforward"]["time_s"] for x in (what["with_latency"]["controllers"], what["controllers"]))
     assert lost == pytest.approx(late - plain)
+
+
+def test_work_is_that_of_the_volume(what):
+    assert set(what["energy_balance"]) == {"planned", "real"}
+    assert all(abs(each["1"]) < 0.05 for each in what["energy_balance"].values())
 
 
 def test_the_verdict_is_what_was_measured(result, what):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter, lsim
 
-from chipload.control.spindle import estimate, first_order, identify, idle_map
+from chipload.control.spindle import _light, estimate, first_order, identify, idle_map
 from chipload.errors import InputError
 
 KT, INERTIA, IDLE, LAG = 300.0, 50.0, (2.0, 0.004), 0.05
@@ -143,3 +143,12 @@ def test_refused():
     spindle = identify(TIME, speed, current, torque, LAG)
     with pytest.raises(InputError, match="must be odd"):
         estimate(replace(spindle), TIME, speed, current, average=4)
+
+
+def test_below_which_torque_the_error_is_too_great_by_hand():
+    """Twelve bands of 1 N mm; errors of 1 up to 3 N mm exceed a fifth of the torque; at 3 they are of either sign."""
+    torque = np.repeat(np.arange(1.0, 13.0), 6)
+    error = np.where(torque <= 3.0, 1.0, 0.0)
+    error[torque == 3.0] *= [1.0, -1.0] * 3
+    assert _light(torque, error, 0.2) == (3.0, 2.0)
+    assert _light(torque, error, 0.6) == (1.0, 1.0)

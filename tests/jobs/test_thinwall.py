@@ -68,6 +68,8 @@ def test_summary_has_what_is_compared(done, operation):
     for one in operation["variants"].values():
         for key in ("passes", "time_min", "deflection_workpiece_um_max", "form_error_um_max", "force_normal_n_max"):
             assert one[key] > 0.0
+        # Ktc times the volume is the work of the torque, by another computation
+        assert abs(one["energy_balance"]["1"]) < 0.05
     assert operation["threshold_source"] == "modelled"
     assert operation["infeasible"] == []
     assert operation["reserve"] == 0.1

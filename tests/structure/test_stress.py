@@ -23,6 +23,16 @@ def test_cantilever():
     assert stresses(solid, u, first).shape == (1, 27, 3, 3)
 
 
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_an_even_stretch_is_as_great_on_the_faces(axis):
+    """u = 1e-3 x along one axis: E 1e-3 everywhere, drawn out to the faces too."""
+    grid = plate(2.0, 40.0, 1.0, (1, 2, 1))
+    solid = SolidWorkpiece(grid, 2e5, 0.0, 7.8e-9, grid.side("j-"))
+    u = np.zeros_like(grid.nodes)
+    u[:, axis] = 1e-3 * grid.nodes[:, axis]
+    assert greatest(solid, u, np.array([0, 1])) == pytest.approx(200.0, rel=1e-9)
+
+
 def test_equivalent_stress():
     """Shear alone: sqrt(3) tau; equal in all directions: none."""
     shear = np.zeros((3, 3))
