@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -146,7 +147,8 @@ def of_examples(folder: Path, rows: int) -> Iterator[Case]:
         if not rough:
             continue
         program = read_program(rough[0], machine_named("vmc" if name != "impeller" else "horizontal-b")).program
-        yield _in_block(name, head(program, rows), cutters_of(rough[0].read_text()))
+        cutters = cutters_of(rough[0].read_text()) or cutter_named(rough[0].name)
+        yield _in_block(name, head(program, rows), cutters)
 
 
 def cutters_of(text: str) -> dict[int, Cutter]:
@@ -157,11 +159,26 @@ def cutters_of(text: str) -> dict[int, Cutter]:
     }
 
 
+def cutter_named(name: str) -> dict[int, Cutter]:
+    """The cutter that the name of an impeller's program states, as ``1-rough-D26r2-90deg``, with flutes of 60 mm."""
+    found = re.search(r"D([.0-9]+)r([.0-9]+)", name)
+    assert found is not None, name
+    return {1: Cutter(float(found[1]), 3, math.radians(30.0), 60.0, 80.0, 6e5, float(found[2]))}
+
+
 def _in_block(name: str, program: Program, cutters: dict[int, Cutter]) -> Case:
-    """A program in the block round its way at a feed."""
+    """A program in the block round its way at a feed, turned so that the mean of its axes stands along z."""
+    up = program.axis.mean(axis=0) / np.linalg.norm(program.axis.mean(axis=0))
+    first = np.eye(3)[0] if np.allclose(up, UP) else np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
+    first = first / np.linalg.norm(first)
+    turned = np.array([first, np.cross(up, first), up]).T
+    axis = program.axis @ turned
+    vectors = {name: getattr(program, name) @ turned for name in ("p_work", "centre", "normal")}
+    program = replace(program, axis=axis / np.linalg.norm(axis, axis=1)[:, None], **vectors)
     way = program.p_work[program.motion != RAPID]
     wide = 2.0 * max(c.radius for c in cutters.values())
     deep = max(5.0, 0.2 * float(np.ptp(way[:, 2])))
     low = (*(way[:, :2].min(axis=0) - wide).tolist(), float(way[:, 2].min()) - 1.0)
     high = (*(way[:, :2].max(axis=0) + wide).tolist(), float(way[:, 2].min()) + deep)
-    return Case(name, "flat", program, cutters, low, high, 1.0, 1.0)
+    kind = "bull nose" if any(c.corner_radius > 0.0 for c in cutters.values()) else "flat"
+    return Case(name, kind, program, cutters, low, high, 1.0, 1.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 
@@ -250,11 +250,25 @@ def load_error(errors: Mapping[str, float], column: str) -> float:
     return errors.get(column, errors.get("force_n", 0.0) if column in WITH_FORCE else 0.0)
 
 
-def upper_loads(columns: Columns, sigma: float) -> dict[str, NDArray[np.float64]]:
-    """The columns with ``sigma`` standard deviations added to those that have a band."""
-    if sigma == 0.0:
-        return dict(columns)
-    return {name: _upper(name, columns, sigma) if name in BANDED else values for name, values in columns.items()}
+def upper_loads(columns: Columns, sigma: float) -> Columns:
+    """The columns with ``sigma`` standard deviations added to those that have a band, when they are asked for."""
+    return columns if sigma == 0.0 else _UpperLoads(columns, sigma)
+
+
+class _UpperLoads(Mapping[str, NDArray[np.float64]]):
+    """Columns that are read, and have their bands added, when they are asked for."""
+
+    def __init__(self, columns: Columns, sigma: float) -> None:
+        self._columns, self._sigma = columns, sigma
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        return _upper(name, self._columns, self._sigma) if name in BANDED else self._columns[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
 
 
 def _upper(name: str, columns: Columns, sigma: float) -> NDArray[np.float64]:

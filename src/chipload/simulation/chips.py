@@ -146,7 +146,7 @@ def remove(
     progress(1.0, "removed")
     cut = tuple(joined(kept[number]) for number in sorted(kept))
     if setting.moves is not None:
-        setting.moves.finish(stock)
+        setting.moves.finish(stock, setting.workers)
     return with_accuracy(removal_of(program, stock, material, sums, stacked(columns), cut), program, before, setting)
 
 

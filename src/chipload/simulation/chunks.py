@@ -153,7 +153,7 @@ def remove_in_chunks(
             keeps.clear()
         sums, columns = _removed(program, stock, sums, setting, unfinished, count, times, keeps, progress)
     if setting.moves is not None:
-        setting.moves.finish(stock)
+        setting.moves.finish(stock, setting.workers)
     progress(1.0, "removed")
     every: Columns = unfinished.columns() if unfinished.parts else stacked(columns)
     return with_accuracy(removal_of(program, stock, material, sums, every), program, before, setting)

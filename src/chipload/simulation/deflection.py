@@ -259,7 +259,11 @@ def tip_deflections(
     if has_lever_loads(cuts.bites, cuts.cutter, material) and greatest_height(cuts.bites) <= bars[0].length:
         # the teeth are all on the first bar
         levers = np.vstack([np.eye(4)[0], tip_compliance(bars)])
-        loads = np.swapaxes(lever_loads(cuts.bites, cuts.cutter, material, m, levers), 1, 2)
+        loads = lever_loads(cuts.bites, cuts.cutter, material, m, levers)
+        if work is None:
+            most = 1e3 * np.hypot(loads[:, 6], loads[:, 7]).max(axis=1)
+            return {"deflection_cutter_um": most, "deflection_um": most}
+        loads = np.swapaxes(loads, 1, 2)
         force, bent = loads[..., [4, 5, 0]], loads[..., 6:]
     else:
         theta = np.arange(m) * (pitch / m)

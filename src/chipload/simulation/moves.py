@@ -111,11 +111,12 @@ class MoveRun:
         """Make some steps: what they engage."""
         return self.stock.take(steps.p0, steps.p1, steps.tool, corner_pieces=self.corner_pieces, flank_mm=self.flank_mm)
 
-    def finish(self, stock: LayeredStock) -> None:
-        """Take from the layers what the moves swept of their sections."""
+    def finish(self, stock: LayeredStock, workers: int) -> None:
+        """Take from the layers what the moves swept of their sections; found in so many threads."""
         low = self.stock.lowest()
         at = [i for i, z in enumerate(stock.heights.tolist()) if z > low]
-        shapes = [self.stock.outlines(float(stock.heights[i]), 0.5 * self.tolerance) for i in at]
+        with ThreadPoolExecutor(workers) as pool:
+            shapes = list(pool.map(lambda i: self.stock.outlines(float(stock.heights[i]), 0.5 * self.tolerance), at))
         stock.remove_many([i for i, s in zip(at, shapes, strict=True) if not s.is_empty], [s for s in shapes if s])
 
 

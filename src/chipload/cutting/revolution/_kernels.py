@@ -52,12 +52,10 @@ def add(acc, m0, m1, at, step, back, table, first, last, p, q, w, size, arm, rat
     # rotations at which all of the edge cuts
     k0 = m0 if straight else min(max(math.ceil((p + last - back) / step), m0), m1)
     k1 = m1 if straight else max(min(math.floor((q + first - back) / step) + 1, m1), k0)
-    if k0 > m0:
-        add_part(acc, m0, k0, at, step, back, table, first, last, p, q, w, arm, rate)
     if k1 > k0:
         add_whole(acc, k0, k1, at, table, 0.5 * (first + last), 0.5 * (last - first), w, size, arm)
-    if m1 > k1:
-        add_part(acc, k1, m1, at, step, back, table, first, last, p, q, w, arm, rate)
+    if k1 - k0 < m1 - m0:
+        add_part(acc, m0, k0, k1, m1, at, step, back, table, first, last, p, q, w, arm, rate)
 
 
 @njit(cache=True, nogil=True)
@@ -89,8 +87,8 @@ def add_whole(acc, m0, m1, at, table, mid, half, w, size, arm):
 
 
 @njit(cache=True, nogil=True)
-def add_part(acc, m0, m1, at, step, back, table, first, last, p, q, w, arm, rate):
-    """:func:`add` where the edge may be cut off at an end."""
+def add_part(acc, m0, k0, k1, m1, at, step, back, table, first, last, p, q, w, arm, rate):
+    """:func:`add` where the edge is cut off at an end: from ``m0`` to ``k0`` and from ``k1`` to ``m1``."""
     at_, bt, ct, ar, br, cr, a0, a1, a2 = w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7], w[8]
     cf = math.cos(first)
     sf = math.sin(first)
@@ -101,7 +99,8 @@ def add_part(acc, m0, m1, at, step, back, table, first, last, p, q, w, arm, rate
     cq = math.cos(q)
     sq = math.sin(q)
     over = 1.0 / rate
-    for m in range(m0, m1):
+    for i in range(m1 - m0 - (k1 - k0)):
+        m = m0 + i if i < k0 - m0 else i + m0 + k1 - k0
         x = table[0, at + m]
         y = table[1, at + m]
         theta = back + step * m
