@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.jobs.impeller.outcome import Checked, CheckedWay, ImpellerResult
+from chipload.jobs.impeller.outcome import Checked, CheckedPartition, ImpellerResult
 
 
 def rough_names(milled: ImpellerResult) -> list[str]:
@@ -20,16 +20,16 @@ def program_name(milled: ImpellerResult, k: int) -> str:
 
 def finish_names(milled: ImpellerResult) -> list[tuple[str, Checked]]:
     """File names of the finishing programs without their endings: of the way that is milled, then of all others."""
-    used = milled.used_way
+    used = milled.used_checked
     out = [(program_name(milled, k), p) for k, p in enumerate(milled.programs or (), 1)]
-    for way in milled.ways or ():
+    for way in milled.checked or ():
         if way is not used:
-            stem = way_stem(way)
+            stem = stem_of(way)
             out += [(f"{stem}-{_finish_name(milled, k, p)}", p) for k, p in enumerate(way.programs, 1)]
     return out
 
 
-def way_stem(way: CheckedWay) -> str:
+def stem_of(way: CheckedPartition) -> str:
     """What the file names of a way that is not milled begin with."""
     return f"way-{way.name.replace(' ', '-')}"
 

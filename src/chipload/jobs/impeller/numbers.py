@@ -29,10 +29,10 @@ def operation_numbers(milled: ImpellerResult) -> dict[str, Any]:
         **{key: sum(row[key] for row in rows) for key in ("cc_points", "check_points", "unreachable", "search_s")},
         "certified": all(row["certified"] for row in rows),
         "certified_within_mm": milled.tolerance,
-        **(way_of(milled, used) if used is not None else {}),
+        **(checked_of(milled, used) if used is not None else {}),
         "hand_picked": None if picked is None else _picked(milled, picked),
-        "ways": [way_of(milled, way) for way in milled.partitions],
-        "scallop": {"mean_share": None if milled.used_way is None else milled.used_way.scallop},
+        "ways": [checked_of(milled, way) for way in milled.partitions],
+        "scallop": {"mean_share": None if milled.used_checked is None else milled.used_checked.scallop},
         "programs": None
         if milled.programs is None
         else [_program(program_name(milled, k), p) for k, p in enumerate(milled.programs, 1)],
@@ -63,13 +63,13 @@ def partition_of(milled: ImpellerResult, way: Partition) -> dict[str, Any]:
     }
 
 
-def way_of(milled: ImpellerResult, way: Partition) -> dict[str, Any]:
+def checked_of(milled: ImpellerResult, way: Partition) -> dict[str, Any]:
     """A way with the numbers of its checked programs; path and times are of all channels, without roughing.
 
     Without programs they are those that the contact points predict, and there is no verdict.
     """
     out = partition_of(milled, way)
-    checked = next((w for w in milled.ways or () if w.way is way), None)
+    checked = next((w for w in milled.checked or () if w.partition is way), None)
     head = {"in_use": way is milled.used, "predicted_min": out["time_min"], "cutting_min": None, "link_min": None}
     if checked is None:
         return {**out, **head, "changes_min": None, "scallop_mean_share": None, "verdict": None, "fails": []}

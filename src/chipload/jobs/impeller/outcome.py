@@ -262,12 +262,12 @@ class Covered:
 
 
 @dataclass(frozen=True, eq=False)
-class CheckedWay:
+class CheckedPartition:
     """A way to mill all surfaces with its programs, checked. Times and paths are of all channels, without roughing.
 
     Parameters
     ----------
-    way : its patches, as they were chosen
+    partition : its patches, as they were chosen
     programs : one for each cutter at each table angle, of one channel
     covered : what they leave on each surface
     blades : how many channels
@@ -275,7 +275,7 @@ class CheckedWay:
     changes : of cutters and of the table [s]
     """
 
-    way: Partition
+    partition: Partition
     programs: tuple[Checked, ...]
     covered: tuple[Covered, ...]
     blades: int
@@ -285,7 +285,7 @@ class CheckedWay:
     @property
     def name(self) -> str:
         """`2 cutters`."""
-        return self.way.name
+        return self.partition.name
 
     @property
     def cutters(self) -> tuple[CatalogueCutter, ...]:
@@ -342,7 +342,7 @@ class ImpellerResult:
     surfaces : in their order
     one : the largest cutter for all surfaces at one table angle, and the index of that; None: there is none
     partitions : the cutter picked by hand where one is stated, then one cutter, two, ...
-    ways : each of them with its programs, checked; None: the job asks for none
+    checked : each way with its programs, checked; None: the job asks for none
     roughs : roughing programs, before the others; None: the job asks for none
     settings : keys of the operation, as stated
     outer_diameter : as stated [mm]
@@ -356,7 +356,7 @@ class ImpellerResult:
     surfaces: tuple[Searched, ...]
     one: tuple[CatalogueCutter, int] | None
     partitions: tuple[Partition, ...]
-    ways: tuple[CheckedWay, ...] | None
+    checked: tuple[CheckedPartition, ...] | None
     roughs: tuple[CheckedRough, ...] | None
     settings: Mapping[str, Any]
     outer_diameter: float
@@ -368,9 +368,9 @@ class ImpellerResult:
         return next((way for way in self.partitions if way.name == PICKED), None)
 
     @property
-    def used_way(self) -> CheckedWay | None:
+    def used_checked(self) -> CheckedPartition | None:
         """The way that is milled: of those that hold, or else of all, the one whose programs take the least time."""
-        able = [w for w in self.ways or () if w.name != PICKED]
+        able = [w for w in self.checked or () if w.name != PICKED]
         return min(able, key=lambda w: (not w.verified, w.seconds), default=None)
 
     @property
@@ -379,20 +379,20 @@ class ImpellerResult:
 
         Of equal ones that with fewer cutters.
         """
-        if self.used_way is not None:
-            return self.used_way.way
+        if self.used_checked is not None:
+            return self.used_checked.partition
         able = [way for way in self.partitions if way.name != PICKED and way.divided is not None]
         return min(able, key=lambda way: way.divided.total if way.divided else math.inf, default=None)
 
     @property
     def programs(self) -> tuple[Checked, ...] | None:
         """Finishing programs of the way that is milled; None: the job asks for none."""
-        return None if self.used_way is None else self.used_way.programs
+        return None if self.used_checked is None else self.used_checked.programs
 
     @property
     def covered(self) -> tuple[Covered, ...] | None:
         """What these programs leave on each surface."""
-        return None if self.used_way is None else self.used_way.covered
+        return None if self.used_checked is None else self.used_checked.covered
 
     @property
     def tolerance(self) -> float | None:

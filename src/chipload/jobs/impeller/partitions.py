@@ -34,7 +34,7 @@ def divided_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
         _compared(milled),
         figure("partitions", partitions_figure(milled), figures),
     ]
-    if milled.ways:
+    if milled.checked:
         out += [
             "<h3>Ways by their programs</h3>",
             '<p class="note">Every way is written, checked and timed. All channels, without roughing: cut, leads and '
@@ -95,11 +95,11 @@ def _programmed(milled: ImpellerResult) -> str:
             "" if w.scallop is None else f"{100.0 * w.scallop:.0f}",
             '<span class="ok">verified</span>' if w.verified else '<span class="no">not verified</span>',
         ]
-        for w in milled.ways or ()
+        for w in milled.checked or ()
     ]  # fmt: skip
     head = ["way", "cutters [mm]", "path [mm]", "cut [min]", "links [min]", "changes [min]", "time [min]"]
     head += ["predicted [min]", "mean scallop of asked [%]", "check"]
-    used = [w is milled.used_way for w in milled.ways or ()]
+    used = [w is milled.used_checked for w in milled.checked or ()]
     return table(head, rows, numbers=(2, 3, 4, 5, 6, 7, 8), used=used)
 
 

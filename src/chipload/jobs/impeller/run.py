@@ -15,15 +15,15 @@ from chipload.errors import InputError
 from chipload.jobs.impeller.job import ImpellerJob
 from chipload.jobs.impeller.outcome import ImpellerResult, OneCutter, Searched, unreached_text
 from chipload.jobs.impeller.part import Part, read_part
+from chipload.jobs.impeller.partition_programs import checked_partitions
 from chipload.jobs.impeller.paths import finish_settings, walls_of
 from chipload.jobs.impeller.roughing import checked_roughing
 from chipload.jobs.impeller.tables import ImpellerOperationTable
-from chipload.jobs.impeller.ways import checked_ways
 from chipload.jobs.provenance import provenance_of, title_of
 from chipload.jobs.tables import Table
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.impeller.answer import Answer, largest_cutters, one_cutter, one_cutter_of
-from chipload.planning.impeller.compare import Way, ways_of
+from chipload.planning.impeller.compare import CutterChoice, cutter_choices
 from chipload.planning.impeller.costs import ChannelSide, Terms
 from chipload.planning.impeller.covering.covering import Covering, covering_of, first_edge
 from chipload.planning.impeller.impeller import Impeller
@@ -66,7 +66,7 @@ def run(job: ImpellerJob, progress: Progress = silent) -> ImpellerResult:
     whole = one_cutter_of(pairs, op.clearance_mm, table.spans, WORKERS)
     one = None if whole is None else (catalogue.cutters[whole[0]], whole[1])
     half = part_of(progress, 1, 2)
-    ways = _ways(job, done, catalogue, impeller, part_of(half, 0, 4))
+    ways = _choices(job, done, catalogue, impeller, part_of(half, 0, 4))
     partitions = tuple(way.partition(WORKERS, part_of(half, 1, 4)) for way in ways)
     milled = ImpellerResult(
         title_of(job.path), impeller, catalogue, machine, tuple(done), one, partitions, None, None, _settings(op),
@@ -83,9 +83,9 @@ def run(job: ImpellerJob, progress: Progress = silent) -> ImpellerResult:
     how = finish_settings(
         impeller, machine, table, catalogue, op, op.paths, _ahead(job), len(roughs or ()), WORKERS, covering
     )
-    checked = checked_ways(ways, partitions, how, machine, op.paths, part_of(half, 3, 4))
-    chosen = {way.name: way.way for way in checked}
-    return replace(milled, ways=checked, roughs=roughs, partitions=tuple(chosen.get(p.name, p) for p in partitions))
+    checked = checked_partitions(ways, partitions, how, machine, op.paths, part_of(half, 3, 4))
+    chosen = {one.name: one.partition for one in checked}
+    return replace(milled, checked=checked, roughs=roughs, partitions=tuple(chosen.get(p.name, p) for p in partitions))
 
 
 def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue, part: Part) -> Provenance:
@@ -146,9 +146,9 @@ def _searched(
     return Searched(settings, surface, answer, table, best, op.clearance_mm, took)
 
 
-def _ways(
+def _choices(
     job: ImpellerJob, done: Sequence[Searched], catalogue: Catalogue, impeller: Impeller, progress: Progress
-) -> tuple[Way, ...]:
+) -> tuple[CutterChoice, ...]:
     """The cutter picked by hand where one is stated, then one cutter, two, ..."""
     op = job.operation
     terms = Terms(
@@ -157,7 +157,7 @@ def _ways(
     picked = _picked(job, catalogue)
     index = None if picked is None else catalogue.cutters.index(picked)
     sides = [_side(x, x.answer) for x in done]
-    return ways_of(sides, terms, index, range(1, op.most_cutters + 1), WORKERS, progress)
+    return cutter_choices(sides, terms, index, range(1, op.most_cutters + 1), WORKERS, progress)
 
 
 def _side(op: Searched, answer: Answer) -> ChannelSide:

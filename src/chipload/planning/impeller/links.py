@@ -5,7 +5,7 @@ nothing of the part lies, whatever the pallet angle: the part is within a body o
 z cos(alpha). With its tip above H the cutter is clear wherever it stands.
 
 Tracks that end and begin close together are one pass: the cutter stays down between them (``passes.py``). Passes are
-milled in the order that a tour over their ends gives (``tour.py``).
+milled in the order that takes little time over their ends (``pass_order.py``).
 
 The cutter leaves a pass along N + T, T or N by the lift, and comes to one the same way back: on these it touches, so
 that they are looked at in small steps, and may be as deep as ``touch``. The first ``lead`` of a lift is at the feed of
@@ -29,9 +29,9 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.planning.impeller.clearance.clearance import between, clearance, moves_clear
 from chipload.planning.impeller.closed_form import axis_at
+from chipload.planning.impeller.pass_order import pass_order
 from chipload.planning.impeller.passes import Joint, Pass, joined, single
 from chipload.planning.impeller.scene import Floats, Ints, Scene
-from chipload.planning.impeller.tour import tour
 from chipload.planning.impeller.track import ToolTrack, pallet_of, written
 from chipload.program.program import LINE, RAPID
 
@@ -174,7 +174,7 @@ def linked(
         seconds = 2.0 * how.lead / feed + 2.0 * max(how.lift - how.lead, 0.0) / how.feed + _OVER
         passes, stayed = joined(tracks, joint, seconds * feed, label)
     if not one_way:
-        passes = _toured(job, passes, stages)
+        passes = _in_order(job, passes, stages)
     parts: list[Moves] = []
     of: list[int] = []
     refused: list[tuple[int, str]] = []
@@ -207,12 +207,12 @@ def linked(
                 add(first, job.round((up, away.axis), (over, begin.axis)))
                 retracts += 1
             add(first, job.along(begin.tip, begin.axis, one_way or not begin.free))
-        add(first, *(Moves.of(LINE, p[None], begin.axis[None], how.feed, "link") for p in begin.way[-2::-1]))
+        add(first, *(Moves.of(LINE, p[None], begin.axis[None], how.feed, "link") for p in begin.tips[-2::-1]))
         add(first, Moves.of(LINE, one.tip[:1], one.axis[:1], feed, "lead"))
         for a, b, kind in one.runs():
             add(int(one.of[a]), Moves.of(LINE, one.tip[a:b], one.axis[a:b], feed, kind))
-        add(last, Moves.of(LINE, end.way[0][None], end.axis[None], feed, "lead"))
-        add(last, *(Moves.of(LINE, p[None], end.axis[None], how.feed, "link") for p in end.way[1:]))
+        add(last, Moves.of(LINE, end.tips[0][None], end.axis[None], feed, "lead"))
+        add(last, *(Moves.of(LINE, p[None], end.axis[None], how.feed, "link") for p in end.tips[1:]))
         away = end
     if away is not None:
         add(of[-1], job.along(job.over(away.tip, away.axis), away.axis, one_way or not away.free))
@@ -221,7 +221,7 @@ def linked(
     return Linked(_within_rate(Moves.join(parts), rate), tuple(refused), direct, retracts, np.array(of), stayed)
 
 
-def _toured(job: _Job, passes: Sequence[Pass], stages: Sequence[int]) -> list[Pass]:
+def _in_order(job: _Job, passes: Sequence[Pass], stages: Sequence[int]) -> list[Pass]:
     """The passes in the order of a tour, stage after stage."""
     edges = [0, *stages, math.inf]
     out: list[Pass] = []
@@ -232,7 +232,7 @@ def _toured(job: _Job, passes: Sequence[Pass], stages: Sequence[int]) -> list[Pa
         ends = np.array([[x.tip[0], x.tip[-1]] for x in some])
         axes = np.array([[x.axis[0], x.axis[-1]] for x in some])
         start = None if not out else (out[-1].tip[-1], out[-1].axis[-1])
-        order = tour(ends, axes, job.top, job.how.near, job.how.feed, job.how.rapid, start)
+        order = pass_order(ends, axes, job.top, job.how.near, job.how.feed, job.how.rapid, start)
         out += [some[k] if forth else some[k].back() for k, forth in order]
     return out
 
@@ -240,14 +240,14 @@ def _toured(job: _Job, passes: Sequence[Pass], stages: Sequence[int]) -> list[Pa
 class _Pose(NamedTuple):
     """A way off the end of a pass: its tips, the last where it ends; the axis; whether it is clear of allowances."""
 
-    way: tuple[Floats, ...]
+    tips: tuple[Floats, ...]
     axis: Floats
     free: bool
 
     @property
     def tip(self) -> Floats:
         """The last tip."""
-        return self.way[-1]
+        return self.tips[-1]
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,7 +58,7 @@ def out_of_reach(group: Any, middle: Any, half: float, widest: float, lowest_sta
     if h < lowest_start - slack:
         return True
     away = math.sqrt(max(far * far - h * h, 0.0))
-    return away > widest + slack
+    return bool(away > widest + slack)
 
 
 @njit(cache=True, nogil=True)

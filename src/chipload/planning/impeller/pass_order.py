@@ -21,7 +21,7 @@ _ROUNDS = 30
 _OVER, _RATE = 0.5, 2.0
 
 
-def tour(
+def pass_order(
     ends: Floats,
     axes: Floats,
     top: float,
@@ -46,7 +46,7 @@ def tour(
 
     >>> side = np.array([[[0.0, k, 0.0], [9.0, k, 0.0]] for k in (0.0, 2.0, 1.0)])
     >>> up = np.tile([0.0, 0.0, 1.0], (3, 2, 1))
-    >>> tour(side, up, 50.0, 5.0, 20.0, 400.0)
+    >>> pass_order(side, up, 50.0, 5.0, 20.0, 400.0)
     [(0, True), (2, False), (1, True)]
     """
     n = len(ends)
@@ -57,7 +57,7 @@ def tour(
             np.concatenate([ends.reshape(-1, 3), start[0][None]]),
             np.concatenate([axes.reshape(-1, 3), start[1][None]]),
         )
-        first = _ways(*both, top, near, feed, rapid)[-1, :-1]
+        first = _times_between(*both, top, near, feed, rapid)[-1, :-1]
     best: tuple[float, list[int]] | None = None
     begins = np.argsort(first, kind="stable")
     for begin in begins[np.unique(np.linspace(0, len(begins) - 1, min(len(begins), _STARTS)).round().astype(int))]:
@@ -70,10 +70,10 @@ def tour(
 
 
 def _times(ends: Floats, axes: Floats, top: float, near: float, feed: float, rapid: float) -> Floats:
-    return _ways(ends.reshape(-1, 3), axes.reshape(-1, 3), top, near, feed, rapid)
+    return _times_between(ends.reshape(-1, 3), axes.reshape(-1, 3), top, near, feed, rapid)
 
 
-def _ways(tips: Floats, axes: Floats, top: float, near: float, feed: float, rapid: float) -> Floats:
+def _times_between(tips: Floats, axes: Floats, top: float, near: float, feed: float, rapid: float) -> Floats:
     """(m, m) time [s] from end to end."""
     far = np.linalg.norm(tips[:, None] - tips[None], axis=2)
     rise = np.clip(top - (tips * axes).sum(axis=1), 0.0, None)

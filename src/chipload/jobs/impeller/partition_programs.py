@@ -14,12 +14,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from chipload.jobs.impeller.outcome import Checked, CheckedWay, Covered
+from chipload.jobs.impeller.outcome import Checked, CheckedPartition, Covered
 from chipload.jobs.impeller.paths import checked_programs
 from chipload.jobs.impeller.tables import PathsTable
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.assignment import Changes
-from chipload.planning.impeller.compare import Partition, Way
+from chipload.planning.impeller.compare import CutterChoice, Partition
 from chipload.planning.impeller.costs import Costs, Measured
 from chipload.planning.impeller.patch import Patch
 from chipload.planning.impeller.settings import (
@@ -57,14 +57,14 @@ class _Memory:
     checks: dict[str, tuple[tuple[Checked, ...], tuple[Covered, ...]]] = field(default_factory=dict)
 
 
-def checked_ways(
-    ways: Sequence[Way],
+def checked_partitions(
+    ways: Sequence[CutterChoice],
     first: Sequence[Partition],
     job: FinishSettings,
     machine: Machine,
     paths: PathsTable,
     progress: Progress,
-) -> tuple[CheckedWay, ...]:
+) -> tuple[CheckedPartition, ...]:
     """Each way that mills all, with the programs of its best round.
 
     Parameters
@@ -83,7 +83,7 @@ def checked_ways(
                 continue
             moved = True
             done = (turn + k / len(ways)) / _ROUNDS
-            plan = _planned(way, partition, job, machine, memory, lambda x, what, done=done: progress(0.8 * done, what))
+            plan = _planned(way, partition, job, machine, memory, _from(progress, 0.8 * done))
             for number, row in _measured(way.costs, plan, machine):
                 rows.setdefault(id(way.costs), []).append((number, row))
             if way.name not in best or plan.seconds < best[way.name].seconds:
@@ -108,12 +108,17 @@ def checked_ways(
     return tuple(out)
 
 
-def _changes(way: Way) -> Changes:
+def _from(progress: Progress, done: float) -> Progress:
+    """Tells what is done, at the same share of all."""
+    return lambda _, what: progress(done, what)
+
+
+def _changes(way: CutterChoice) -> Changes:
     terms = way.costs[0].terms
     return Changes(terms.cutter_change, terms.table_change)
 
 
-def _predicted(way: Way, partition: Partition) -> float:
+def _predicted(way: CutterChoice, partition: Partition) -> float:
     """Time of all channels by the costs as they stand, with one program for each cutter at each table angle [s]."""
     assert partition.divided is not None
     pairs = list(dict.fromkeys((p.cutter, p.table) for p in partition.divided.patches))
@@ -121,7 +126,7 @@ def _predicted(way: Way, partition: Partition) -> float:
 
 
 def _planned(
-    way: Way, partition: Partition, job: FinishSettings, machine: Machine, memory: _Memory, progress: Progress
+    way: CutterChoice, partition: Partition, job: FinishSettings, machine: Machine, memory: _Memory, progress: Progress
 ) -> _Planned:
     assert partition.divided is not None
     own = job.with_catalogue(partition.catalogue)
@@ -131,7 +136,7 @@ def _planned(
     return _Planned(partition, _predicted(way, partition), plan, seconds)
 
 
-def _change_time(settings: Sequence[CutterSetting], way: Way) -> float:
+def _change_time(settings: Sequence[CutterSetting], way: CutterChoice) -> float:
     cutters = list(dict.fromkeys(s.cutter for s in settings))
     return change_time([(cutters.index(s.cutter), s.table) for s in settings], _changes(way))
 
@@ -154,7 +159,7 @@ def _measured(costs: Sequence[Costs], done: _Planned, machine: Machine) -> list[
     for s in done.plan.settings:
         seconds = times_on(s.program, machine)
         owners = [m for m in s.millings for _ in m.tracks.tracks]
-        owners += [_mended(r.body, r.side, r.box, millings) for r in s.rests for _ in r.tracks]
+        owners += [_patch_of_rest(r.body, r.side, r.box, millings) for r in s.rests for _ in r.tracks]
         for number, time in zip(s.linked.track.tolist(), seconds.tolist(), strict=True):
             if number >= 0:
                 owner = id(owners[number].patch)
@@ -170,7 +175,7 @@ def _measured(costs: Sequence[Costs], done: _Planned, machine: Machine) -> list[
     return out
 
 
-def _mended(
+def _patch_of_rest(
     body: int, side: str, box: tuple[tuple[float, float], tuple[float, float]], millings: Sequence[Milling]
 ) -> Milling:
     """The patch of a surface in which the middle of a box lies, or is nearest to."""
@@ -184,8 +189,8 @@ def _mended(
 
 
 def _checked(
-    way: Way, done: _Planned, job: FinishSettings, machine: Machine, paths: PathsTable, memory: _Memory
-) -> CheckedWay:
+    way: CutterChoice, done: _Planned, job: FinishSettings, machine: Machine, paths: PathsTable, memory: _Memory
+) -> CheckedPartition:
     own = job.with_catalogue(done.partition.catalogue)
     text = hashlib.sha256()
     for s in done.plan.settings:
@@ -198,4 +203,4 @@ def _checked(
     programs, covered = memory.checks[key]
     repeats = way.costs[0].terms.repeats
     changes = _change_time([p.setting for p in programs], way)
-    return CheckedWay(done.partition, programs, covered, repeats, done.predicted, changes)
+    return CheckedPartition(done.partition, programs, covered, repeats, done.predicted, changes)
