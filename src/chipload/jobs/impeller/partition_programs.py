@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -36,7 +36,7 @@ from chipload.program.read import times_on
 from chipload.progress import Progress
 
 #: how often ways are divided at most
-_ROUNDS = 3
+_ROUNDS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,13 +93,13 @@ def checked_partitions(
         for way in ways:
             for number, costs in enumerate(way.costs):
                 costs.measured([row for n, row in rows.get(id(way.costs), []) if n == number])
+        # what was planned is now known by its programs
+        for way in ways:
+            if way.name in best:
+                kept = best[way.name]
+                best[way.name] = replace(kept, predicted=_predicted(way, kept.partition))
         if turn + 1 < _ROUNDS:
             partitions = [way.partition(job.workers) for way in ways]
-            for way, partition in zip(ways, partitions, strict=True):
-                # what was planned is now known by its programs
-                kept = best.get(way.name)
-                if kept is not None and _same(partition, kept.partition):
-                    best[way.name] = _Planned(partition, _predicted(way, partition), kept.plan, kept.seconds)
     out = []
     for k, way in enumerate(ways):
         if way.name in best:
@@ -121,8 +121,21 @@ def _changes(way: CutterChoice) -> Changes:
 def _predicted(way: CutterChoice, partition: Partition) -> float:
     """Time of all channels by the costs as they stand, with one program for each cutter at each table angle [s]."""
     assert partition.divided is not None
-    pairs = list(dict.fromkeys((p.cutter, p.table) for p in partition.divided.patches))
-    return partition.divided.milling + change_time(setting_order(pairs, _changes(way)), _changes(way))
+    patches = partition.divided.patches
+    pairs = list(dict.fromkeys((p.cutter, p.table) for p in patches))
+    milling = 0.0
+    for p in patches:
+        costs, order, table, bare = _place(way.costs, p)
+        milling += bare * float(costs.factor[order, p.cutter, table])
+    repeats = way.costs[0].terms.repeats
+    return repeats * milling + change_time(setting_order(pairs, _changes(way)), _changes(way))
+
+
+def _place(costs: Sequence[Costs], p: Patch) -> tuple[Costs, int, int, float]:
+    """Costs of the side of a patch, its order and table angle there, and what its contact points predict [s]."""
+    own = next(c for c in costs if (c.side.body, c.side.side) == (p.body, p.side))
+    bare = p.path / float(own.terms.feeds(len(own.catalogue.cutters))[p.cutter])
+    return own, "uv".index(p.order), int(np.abs(own.tables - p.table).argmin()), bare
 
 
 def _planned(
@@ -166,11 +179,9 @@ def _measured(costs: Sequence[Costs], done: _Planned, machine: Machine) -> list[
                 taken[owner] = taken.get(owner, 0.0) + time
     out = []
     for m in millings:
-        number = next(k for k, c in enumerate(costs) if (c.side.body, c.side.side) == (m.patch.body, m.patch.side))
-        own = costs[number]
-        table = int(np.abs(own.tables - m.patch.table).argmin())
-        bare = m.patch.path / float(own.terms.feeds(len(own.catalogue.cutters))[m.patch.cutter])
-        row = Measured("uv".index(m.patch.order), m.patch.cutter, table, bare, taken.get(id(m.patch), 0.0))
+        own, order, table, bare = _place(costs, m.patch)
+        number = next(k for k, c in enumerate(costs) if c is own)
+        row = Measured(order, m.patch.cutter, table, bare, taken.get(id(m.patch), 0.0))
         out.append((number, row))
     return out
 
