@@ -1,8 +1,9 @@
 """The largest cutters of the paper's problem, certified, against its own sampled test; and cost against both numbers.
 
-    python benchmarks/impeller.py [--patches] [--large [--out FOLDER]]
+    python benchmarks/impeller.py [--patches] [--programs RESULT] [--large [--out FOLDER]]
 
 `--patches`: instead, one, two, three cutters against one picked by hand, on that impeller and on NASA's HECC.
+`--programs`: the table of every way by its programs, of the result folder of the example.
 `--large`: cost against both numbers; a picture of it in the folder.
 
 Reference: [Wu2019]: 100 contact points, 2900 check points, 15 table angles, 36 diameters. The impeller is the one by
@@ -13,6 +14,7 @@ valid one. Ours finds the largest cutter of every contact point with proof (``be
 too (``every``); the whole answer adds the second corner radius and the exact ranges of B.
 """
 
+import json
 import math
 import os
 import sys
@@ -269,9 +271,25 @@ def patches() -> None:
     divide("HECC", hecc(), catalogue, picked, TABLES[::2], names, how, terms)
 
 
+def programs(folder: str) -> None:
+    """The table of the ways of a result of the example `impeller`, by their verified programs."""
+    (op,) = json.loads((Path(folder) / "summary.json").read_text())["operations"]
+    print("| way | cutters [mm] | path [m] | cut [min] | links [min] | changes [min] | time [min] | predicted [min] | "
+          "mean scallop of asked | verdict |\n|---|---|---:|---:|---:|---:|---:|---:|---:|---|")  # fmt: skip
+    for way in op["ways"]:
+        used = ", ".join(f"D {c['diameter_mm']:g} r {c['corner_radius_mm']:g}" for c in way["cutters"])
+        keys = ("cutting_min", "link_min", "changes_min", "time_min", "predicted_min")
+        times = " | ".join(f"{way[key]:.1f}" for key in keys)
+        name = f"**{way['name']}**" if way["in_use"] else way["name"]
+        print(f"| {name} | {used} | {way['path_mm'] / 1e3:.2f} | {times} | {way['scallop_mean_share']:.0%} | "
+              f"{way['verdict']} |")  # fmt: skip
+
+
 if __name__ == "__main__":
     if "--patches" in sys.argv:
         patches()
+    elif "--programs" in sys.argv:
+        programs(sys.argv[sys.argv.index("--programs") + 1])
     else:
         paper()
     if "--large" in sys.argv:

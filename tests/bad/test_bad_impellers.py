@@ -111,7 +111,11 @@ def test_a_file_that_is_missing(hecc):
         ("channel_mm = 24.185", "channel_mm = 30.0",
          "shape: must be hub_radius + blade_height < outer_radius, outlet_height < height, blades thick"),
         ("margin_mm = 0.1", "margin_mm = 9.0",
-         "job.toml: operation.0.paths.margin_mm = 9: must be above touch_mm = 0.01 and below lift_mm = 8"),
+         "job.toml: operation.0.paths.margin_mm = 9: must be above touch_mm = 0.01 and below lift_mm = 3"),
+        ("lead_mm = 1.0", "lead_mm = 4.0", "job.toml: operation.0.paths.lead_mm = 4: must be at most lift_mm = 3"),
+        ("lead_mm = 1.0", "lead_mm = 0.3",
+         "job.toml: operation.0.paths.lead_mm = 0.3: must be at least the allowance of roughing, 0.5 mm, which stands "
+         "beside a pass"),
         ("scallop_mm = 0.1", "scallop_inch = 0.004",
          "job.toml: operation.0.scallop_inch: unknown key; did you mean scallop_mm?"),
         ("blades = 11", "blades = 1", "job.toml: impeller.blades = 1: must be at least 2 (how many, evenly round; as "

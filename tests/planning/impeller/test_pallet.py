@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 
 from chipload.planning.impeller.pallet import pallet_angles
 
@@ -46,3 +47,20 @@ def test_split_where_nothing_is_valid_and_where_the_pallet_is_too_slow():
     assert [t.last - t.first for t in slow] == [2, 2, 2, 2]
     for piece in slow:
         assert np.abs(np.diff(piece.pallet)).max() <= 1e-4
+
+
+def test_led_to_a_wide_step_over_where_the_ranges_allow_it():
+    ranges = tuple(np.array([[0.0, 2.0]]) for _ in range(20))
+    free = np.full(20, np.nan)
+    (only,) = pallet_angles(
+        ranges, np.ones(19), np.full(19, 0.5), 0.05, free, lambda _, B: 1.0 + 9.0 * np.exp(-((B - 1.4) ** 2))
+    )
+    assert only.pallet == pytest.approx(np.full(20, 1.4), abs=0.1)
+    # where the wide angles end the pallet goes on at others
+    short = tuple(np.array([[0.0, 2.0 if k < 10 else 0.9]]) for k in range(20))
+    (only,) = pallet_angles(
+        short, np.ones(19), np.full(19, 0.5), 0.05, free, lambda _, B: 1.0 + 9.0 * np.exp(-((B - 1.4) ** 2))
+    )
+    assert only.last == 20
+    assert only.pallet[0] > 1.2
+    assert only.pallet[-1] <= 0.9

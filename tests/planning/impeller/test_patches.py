@@ -11,7 +11,7 @@ from chipload.errors import InputError
 from chipload.planning.impeller.answer import largest_cutters, one_cutter
 from chipload.planning.impeller.closed_form import axis_at
 from chipload.planning.impeller.compare import clear_somewhere, compared, gouges
-from chipload.planning.impeller.costs import STEP, ChannelSide, Terms
+from chipload.planning.impeller.costs import STEP, ChannelSide, Costs, Measured, Terms
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.patches import costs_of, divided
 from chipload.planning.impeller.scene import Scene
@@ -221,3 +221,15 @@ def test_refused(sides):
         compared(sides, TERMS, 4)
     with pytest.raises(InputError, match="contact point 0: the axis is at"):
         gouges(s.scene, 0, SHOP.cutters[0], math.pi / 2, math.atan2(-s.scene.normal[0][1], -s.scene.normal[0][0]))
+
+
+def test_what_programs_take_leads_the_next_division():
+    costs = Costs.__new__(Costs)
+    costs.factor = np.ones((2, 3, 2))
+    costs.measured([])
+    assert (costs.factor == 1.0).all()
+    costs.measured([Measured(0, 1, 0, 10.0, 30.0), Measured(0, 1, 0, 30.0, 30.0), Measured(0, 2, 1, 10.0, 50.0)])
+    # two patches of one cutter at one angle together; what has no program yet as the mean of its order, or of all
+    assert costs.factor[0, 1, 0] == 1.5
+    assert costs.factor[0, 2, 1] == 5.0
+    assert costs.factor[0, 0, 0] == costs.factor[1, 1, 0] == 110.0 / 50.0

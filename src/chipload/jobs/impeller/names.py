@@ -24,12 +24,12 @@ def finish_names(milled: ImpellerResult) -> list[tuple[str, Checked]]:
     out = [(program_name(milled, k), p) for k, p in enumerate(milled.programs or (), 1)]
     for way in milled.checked or ():
         if way is not used:
-            stem = partition_stem(way)
+            stem = stem_of(way)
             out += [(f"{stem}-{_finish_name(milled, k, p)}", p) for k, p in enumerate(way.programs, 1)]
     return out
 
 
-def partition_stem(way: CheckedPartition) -> str:
+def stem_of(way: CheckedPartition) -> str:
     """What the file names of a way that is not milled begin with."""
     return f"way-{way.name.replace(' ', '-')}"
 

@@ -29,9 +29,9 @@ def operation_numbers(milled: ImpellerResult) -> dict[str, Any]:
         **{key: sum(row[key] for row in rows) for key in ("cc_points", "check_points", "unreachable", "search_s")},
         "certified": all(row["certified"] for row in rows),
         "certified_within_mm": milled.tolerance,
-        **(partition_of(milled, used) if used is not None else {}),
+        **(checked_of(milled, used) if used is not None else {}),
         "hand_picked": None if picked is None else _picked(milled, picked),
-        "ways": [checked_numbers(milled, way) for way in milled.partitions],
+        "ways": [checked_of(milled, way) for way in milled.partitions],
         "scallop": {"mean_share": None if milled.used_checked is None else milled.used_checked.scallop},
         "programs": None
         if milled.programs is None
@@ -63,7 +63,7 @@ def partition_of(milled: ImpellerResult, way: Partition) -> dict[str, Any]:
     }
 
 
-def checked_numbers(milled: ImpellerResult, way: Partition) -> dict[str, Any]:
+def checked_of(milled: ImpellerResult, way: Partition) -> dict[str, Any]:
     """A way with the numbers of its checked programs; path and times are of all channels, without roughing.
 
     Without programs they are those that the contact points predict, and there is no verdict.

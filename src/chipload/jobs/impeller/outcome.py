@@ -342,7 +342,7 @@ class ImpellerResult:
     surfaces : in their order
     one : the largest cutter for all surfaces at one table angle, and the index of that; None: there is none
     partitions : the cutter picked by hand where one is stated, then one cutter, two, ...
-    checked : each of them with its programs, checked; None: the job asks for none
+    checked : each way with its programs, checked; None: the job asks for none
     roughs : roughing programs, before the others; None: the job asks for none
     settings : keys of the operation, as stated
     outer_diameter : as stated [mm]

@@ -12,10 +12,10 @@ import numpy as np
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named, read_catalogue
 from chipload.errors import InputError
-from chipload.jobs.impeller.checked_partitions import checked_partitions
 from chipload.jobs.impeller.job import ImpellerJob
 from chipload.jobs.impeller.outcome import ImpellerResult, OneCutter, Searched, unreached_text
 from chipload.jobs.impeller.part import Part, read_part
+from chipload.jobs.impeller.partition_programs import checked_partitions
 from chipload.jobs.impeller.paths import finish_settings, walls_of
 from chipload.jobs.impeller.roughing import checked_roughing
 from chipload.jobs.impeller.tables import ImpellerOperationTable
@@ -23,7 +23,7 @@ from chipload.jobs.provenance import provenance_of, title_of
 from chipload.jobs.tables import Table
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.impeller.answer import Answer, largest_cutters, one_cutter, one_cutter_of
-from chipload.planning.impeller.compare import PartitionChoice, choices_of
+from chipload.planning.impeller.compare import CutterChoice, cutter_choices
 from chipload.planning.impeller.costs import ChannelSide, Terms
 from chipload.planning.impeller.covering.covering import Covering, covering_of, first_edge
 from chipload.planning.impeller.impeller import Impeller
@@ -84,7 +84,7 @@ def run(job: ImpellerJob, progress: Progress = silent) -> ImpellerResult:
         impeller, machine, table, catalogue, op, op.paths, _ahead(job), len(roughs or ()), WORKERS, covering
     )
     checked = checked_partitions(ways, partitions, how, machine, op.paths, part_of(half, 3, 4))
-    chosen = {way.name: way.partition for way in checked}
+    chosen = {one.name: one.partition for one in checked}
     return replace(milled, checked=checked, roughs=roughs, partitions=tuple(chosen.get(p.name, p) for p in partitions))
 
 
@@ -148,7 +148,7 @@ def _searched(
 
 def _choices(
     job: ImpellerJob, done: Sequence[Searched], catalogue: Catalogue, impeller: Impeller, progress: Progress
-) -> tuple[PartitionChoice, ...]:
+) -> tuple[CutterChoice, ...]:
     """The cutter picked by hand where one is stated, then one cutter, two, ..."""
     op = job.operation
     terms = Terms(
@@ -157,7 +157,7 @@ def _choices(
     picked = _picked(job, catalogue)
     index = None if picked is None else catalogue.cutters.index(picked)
     sides = [_side(x, x.answer) for x in done]
-    return choices_of(sides, terms, index, range(1, op.most_cutters + 1), WORKERS, progress)
+    return cutter_choices(sides, terms, index, range(1, op.most_cutters + 1), WORKERS, progress)
 
 
 def _side(op: Searched, answer: Answer) -> ChannelSide:

@@ -51,7 +51,7 @@ class Partition:
 
     @property
     def division(self) -> PatchDivision:
-        """``divided`` of a way that is possible.
+        """``divided`` of a partition that is possible.
 
         Raises
         ------
@@ -64,7 +64,7 @@ class Partition:
 
 
 @dataclass(frozen=True, eq=False)
-class PartitionChoice:
+class CutterChoice:
     """One way to mill the sides, not yet divided.
 
     Parameters
@@ -87,14 +87,14 @@ class PartitionChoice:
         return Partition(self.name, found, sides[0].answer.catalogue, _share(sides), *_proved(sides), self.took)
 
 
-def choices_of(
+def cutter_choices(
     sides: Sequence[ChannelSide],
     terms: Terms,
     hand_picked: int | None = None,
     numbers: Sequence[int | None] = (1, 2, 3),
     workers: int = 1,
     progress: Progress = silent,
-) -> tuple[PartitionChoice, ...]:
+) -> tuple[CutterChoice, ...]:
     """The hand-picked cutter (an index in the catalogue) at any table angle, then so many cutters, which share costs.
 
     Raises
@@ -121,10 +121,10 @@ def choices_of(
             for s in sides
         ]
         took = time.perf_counter() - begin
-        out.append(PartitionChoice("hand-picked", costs_of(own, replace(terms, feed=feed), workers), 1, took))
+        out.append(CutterChoice("hand-picked", costs_of(own, replace(terms, feed=feed), workers), 1, took))
     for m in numbers:
         name = "any cutters" if m is None else f"{m} cutter{'s' if m > 1 else ''}"
-        out.append(PartitionChoice(name, costs, m))
+        out.append(CutterChoice(name, costs, m))
     return tuple(out)
 
 
@@ -146,7 +146,8 @@ def compared(
         The index is not in the catalogue.
     """
     return tuple(
-        way.partition(workers, progress) for way in choices_of(sides, terms, hand_picked, numbers, workers, progress)
+        way.partition(workers, progress)
+        for way in cutter_choices(sides, terms, hand_picked, numbers, workers, progress)
     )
 
 

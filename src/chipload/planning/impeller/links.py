@@ -5,7 +5,7 @@ nothing of the part lies, whatever the pallet angle: the part is within a body o
 z cos(alpha). With its tip above H the cutter is clear wherever it stands.
 
 Tracks that end and begin close together are one pass: the cutter stays down between them (``passes.py``). Passes are
-milled in the order that a tour over their ends gives (``tour.py``).
+milled in the order that takes little time over their ends (``pass_order.py``).
 
 The cutter leaves a pass along N + T, T or N by the lift, and comes to one the same way back: on these it touches, so
 that they are looked at in small steps, and may be as deep as ``touch``. The first ``lead`` of a lift is at the feed of
@@ -174,7 +174,7 @@ def linked(
         seconds = 2.0 * how.lead / feed + 2.0 * max(how.lift - how.lead, 0.0) / how.feed + _OVER
         passes, stayed = joined(tracks, joint, seconds * feed, label)
     if not one_way:
-        passes = _toured(job, passes, stages)
+        passes = _in_order(job, passes, stages)
     parts: list[Moves] = []
     of: list[int] = []
     refused: list[tuple[int, str]] = []
@@ -221,7 +221,7 @@ def linked(
     return Linked(_within_rate(Moves.join(parts), rate), tuple(refused), direct, retracts, np.array(of), stayed)
 
 
-def _toured(job: _Job, passes: Sequence[Pass], stages: Sequence[int]) -> list[Pass]:
+def _in_order(job: _Job, passes: Sequence[Pass], stages: Sequence[int]) -> list[Pass]:
     """The passes in the order of a tour, stage after stage."""
     edges = [0, *stages, math.inf]
     out: list[Pass] = []

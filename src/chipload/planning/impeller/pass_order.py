@@ -57,7 +57,7 @@ def pass_order(
             np.concatenate([ends.reshape(-1, 3), start[0][None]]),
             np.concatenate([axes.reshape(-1, 3), start[1][None]]),
         )
-        first = _moves(*both, top, near, feed, rapid)[-1, :-1]
+        first = _times_between(*both, top, near, feed, rapid)[-1, :-1]
     best: tuple[float, list[int]] = (math.inf, [])
     begins = np.argsort(first, kind="stable")
     for begin in begins[np.unique(np.linspace(0, len(begins) - 1, min(len(begins), _STARTS)).round().astype(int))]:
@@ -69,10 +69,10 @@ def pass_order(
 
 
 def _times(ends: Floats, axes: Floats, top: float, near: float, feed: float, rapid: float) -> Floats:
-    return _moves(ends.reshape(-1, 3), axes.reshape(-1, 3), top, near, feed, rapid)
+    return _times_between(ends.reshape(-1, 3), axes.reshape(-1, 3), top, near, feed, rapid)
 
 
-def _moves(tips: Floats, axes: Floats, top: float, near: float, feed: float, rapid: float) -> Floats:
+def _times_between(tips: Floats, axes: Floats, top: float, near: float, feed: float, rapid: float) -> Floats:
     """(m, m) time [s] from end to end."""
     far = np.linalg.norm(tips[:, None] - tips[None], axis=2)
     rise = np.clip(top - (tips * axes).sum(axis=1), 0.0, None)

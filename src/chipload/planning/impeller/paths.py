@@ -32,13 +32,13 @@ from chipload.planning.impeller.scene import Floats, Scene
 from chipload.planning.impeller.track import ToolTrack, posed
 from chipload.progress import Progress, silent
 
-_MENDS, _ROUNDS = 3, 12
+_MENDS, _ROUNDS = 4, 12
 #: distance of the places at which a crest is looked for [mm], and while a step is sought
 _FINE, _COARSE = 0.5, 1.5
 _LINES = 5000
 #: of how far a pass stays below the scallop, how far from the border the outermost lines lie
 _INSIDE = 0.9
-_USED = 0.8  # of what is aimed at, the mean crest that is enough
+_USED = 0.9  # of what is aimed at, the mean crest that is enough
 _STILL = 5e-3  # share by which a step may still change
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -299,7 +299,7 @@ def setting_order(pairs: Sequence[Pair], changes: Changes) -> list[Pair]:
     return order
 
 
-def change_time(pairs: Sequence[Pair], changes: Changes) -> float:
+def change_time(pairs: Iterable[Pair], changes: Changes) -> float:
     """What the changes from each to the next take [s].
 
     >>> change_time([(0, 1.0), (1, 0.5), (0, 0.5)], Changes(60.0, 300.0))

@@ -15,6 +15,7 @@ by a ball of that radius they still contain themselves, if they begin lower by w
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 
@@ -38,8 +39,8 @@ Floats = NDArray[np.float64]
 SUNK = 0.2
 #: nodes in a leaf of the tree
 _LEAF = 96
-#: first width of the cells over the one of a plane wall, and by what it is lessened
-_FIRST, _LESS = 0.98, 0.94
+#: first width of the cells over the one of a plane wall; of the width that is right to first order, what is taken
+_FIRST, _LESS = 0.98, 0.995
 #: nodes nearer to the contact than this are tried one by one [mm]
 _NEAR = 1.0
 #: of a part of B for which nodes are collected at once [rad]
@@ -161,13 +162,31 @@ def covering_of(
     """
     sunk, edge = SUNK * tolerance, first_edge(impeller, tolerance, corner, around)
     while True:
-        parts = _walls(impeller, around, hub_range, edge)
-        reach, bend = max(x.reach for x in parts), max(x.bend for x in parts)
+        sides, hub = _each(impeller, around, hub_range, edge)
+        made = [*itertools.chain.from_iterable(sides), hub]
+        reach, bend = max(x.reach for x in made), max(x.bend for x in made)
         if depth_of(corner, reach, bend, sunk) <= tolerance:
             break
-        edge *= _LESS
+        edge *= _lessened(corner, reach, bend, sunk, tolerance)
+    parts = [*_round(impeller, around, sides), hub]
     points = np.concatenate([x.points - sunk * x.normals for x in parts])
     return Covering(points, tolerance, corner, reach, bend, sunk)
+
+
+def _lessened(corner: float, reach: float, bend: float, sunk: float, tolerance: float) -> float:
+    """By what the cells are made narrower: the reach goes with their width, the bend with its square.
+
+    >>> round(_lessened(2.0, 0.5, 0.0, 0.0, 0.04), 3)
+    0.793
+    """
+    low, high = 0.1, 1.0
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        if depth_of(corner, middle * reach, middle * middle * bend, sunk) <= tolerance:
+            low = middle
+        else:
+            high = middle
+    return _LESS * low
 
 
 def first_edge(impeller: Impeller, tolerance: float, corner: float, around: int) -> float:
@@ -203,19 +222,25 @@ def _area(impeller: Impeller, around: int) -> float:
     return each * (2 + 2 * around + bodies) / bodies + ring
 
 
-def _walls(impeller: Impeller, around: int, hub_range: tuple[float, float], edge: float) -> list[Nodes]:
+def _each(
+    impeller: Impeller, around: int, hub_range: tuple[float, float], edge: float
+) -> tuple[list[list[Nodes]], Nodes]:
+    """Nodes of the sides of each body once, and of the hub under all of them."""
     bodies = len(impeller.bodies)
     first, last = -1 - around, bodies + around
     out = []
     for index in range(bodies):
         blades = [impeller.body(index), *([impeller.fillet(index)] if impeller.fillets else [])]
-        made = [patch_nodes(side, edge) for blade in blades for side in (blade.plus, blade.minus)]
-        for k in range(first, last + 1):
-            if k % bodies == index:
-                out += [turned(x, impeller.pitch * (k // bodies)) for x in made]
+        out.append([patch_nodes(side, edge) for blade in blades for side in (blade.plus, blade.minus)])
     s = np.linspace(*hub_range, 41)
     begin = impeller.across(first, s, [0.0])[:, 0]
     width = impeller.pitch * math.ceil((last - first) / bodies)
     low, high = float(begin.min()), float(begin.max()) + width
-    out.append(hub_nodes(impeller.hub, hub_range, (low, min(high, low + math.tau)), edge))
-    return out
+    return out, hub_nodes(impeller.hub, hub_range, (low, min(high, low + math.tau)), edge)
+
+
+def _round(impeller: Impeller, around: int, sides: list[list[Nodes]]) -> list[Nodes]:
+    """The nodes of every body round the channels."""
+    bodies = len(impeller.bodies)
+    numbers = range(-1 - around, bodies + around + 1)
+    return [turned(x, impeller.pitch * (k // bodies)) for k in numbers for x in sides[k % bodies]]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from chipload.jobs.impeller.paths import checked_programs
 from chipload.jobs.impeller.tables import PathsTable
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.assignment import Changes
-from chipload.planning.impeller.compare import Partition, PartitionChoice
+from chipload.planning.impeller.compare import CutterChoice, Partition
 from chipload.planning.impeller.costs import Costs, Measured
 from chipload.planning.impeller.patch import Patch
 from chipload.planning.impeller.settings import (
@@ -36,7 +36,7 @@ from chipload.program.read import times_on
 from chipload.progress import Progress
 
 #: how often ways are divided at most
-_ROUNDS = 3
+_ROUNDS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class _Memory:
 
 
 def checked_partitions(
-    ways: Sequence[PartitionChoice],
+    ways: Sequence[CutterChoice],
     first: Sequence[Partition],
     job: FinishSettings,
     machine: Machine,
@@ -83,7 +83,7 @@ def checked_partitions(
                 continue
             moved = True
             done = (turn + k / len(ways)) / _ROUNDS
-            plan = _planned(way, partition, job, machine, memory, _standing(progress, 0.8 * done))
+            plan = _planned(way, partition, job, machine, memory, _from(progress, 0.8 * done))
             for number, row in _measured(way.costs, plan, machine):
                 rows.setdefault(id(way.costs), []).append((number, row))
             if way.name not in best or plan.seconds < best[way.name].seconds:
@@ -93,13 +93,13 @@ def checked_partitions(
         for way in ways:
             for number, costs in enumerate(way.costs):
                 costs.measured([row for n, row in rows.get(id(way.costs), []) if n == number])
+        # what was planned is now known by its programs
+        for way in ways:
+            if way.name in best:
+                kept = best[way.name]
+                best[way.name] = replace(kept, predicted=_predicted(way, kept.partition))
         if turn + 1 < _ROUNDS:
             partitions = [way.partition(job.workers) for way in ways]
-            for way, partition in zip(ways, partitions, strict=True):
-                # what was planned is now known by its programs
-                kept = best.get(way.name)
-                if kept is not None and _same(partition, kept.partition):
-                    best[way.name] = _Planned(partition, _predicted(way, partition), kept.plan, kept.seconds)
     out = []
     for k, way in enumerate(ways):
         if way.name in best:
@@ -108,29 +108,37 @@ def checked_partitions(
     return tuple(out)
 
 
-def _standing(progress: Progress, share: float) -> Progress:
-    """What tells of a part that the whole stands at ``share``."""
-    return lambda _, what: progress(share, what)
+def _from(progress: Progress, done: float) -> Progress:
+    """Tells what is done, at the same share of all."""
+    return lambda _, what: progress(done, what)
 
 
-def _changes(way: PartitionChoice) -> Changes:
+def _changes(way: CutterChoice) -> Changes:
     terms = way.costs[0].terms
     return Changes(terms.cutter_change, terms.table_change)
 
 
-def _predicted(way: PartitionChoice, partition: Partition) -> float:
+def _predicted(way: CutterChoice, partition: Partition) -> float:
     """Time of all channels by the costs as they stand, with one program for each cutter at each table angle [s]."""
-    pairs = list(dict.fromkeys((p.cutter, p.table) for p in partition.division.patches))
-    return partition.division.milling + change_time(setting_order(pairs, _changes(way)), _changes(way))
+    patches = partition.division.patches
+    pairs = list(dict.fromkeys((p.cutter, p.table) for p in patches))
+    milling = 0.0
+    for p in patches:
+        costs, order, table, bare = _place(way.costs, p)
+        milling += bare * float(costs.factor[order, p.cutter, table])
+    repeats = way.costs[0].terms.repeats
+    return repeats * milling + change_time(setting_order(pairs, _changes(way)), _changes(way))
+
+
+def _place(costs: Sequence[Costs], p: Patch) -> tuple[Costs, int, int, float]:
+    """Costs of the side of a patch, its order and table angle there, and what its contact points predict [s]."""
+    own = next(c for c in costs if (c.side.body, c.side.side) == (p.body, p.side))
+    bare = p.path / float(own.terms.feeds(len(own.catalogue.cutters))[p.cutter])
+    return own, "uv".index(p.order), int(np.abs(own.tables - p.table).argmin()), bare
 
 
 def _planned(
-    way: PartitionChoice,
-    partition: Partition,
-    job: FinishSettings,
-    machine: Machine,
-    memory: _Memory,
-    progress: Progress,
+    way: CutterChoice, partition: Partition, job: FinishSettings, machine: Machine, memory: _Memory, progress: Progress
 ) -> _Planned:
     own = job.with_catalogue(partition.catalogue)
     plan = planned(own, partition.division.patches, _changes(way), progress=progress, known=memory.millings)
@@ -139,7 +147,7 @@ def _planned(
     return _Planned(partition, _predicted(way, partition), plan, seconds)
 
 
-def _change_time(settings: Sequence[CutterSetting], way: PartitionChoice) -> float:
+def _change_time(settings: Sequence[CutterSetting], way: CutterChoice) -> float:
     cutters = list(dict.fromkeys(s.cutter for s in settings))
     return change_time([(cutters.index(s.cutter), s.table) for s in settings], _changes(way))
 
@@ -162,23 +170,21 @@ def _measured(costs: Sequence[Costs], done: _Planned, machine: Machine) -> list[
     for s in done.plan.settings:
         seconds = times_on(s.program, machine)
         owners = [m for m in s.millings for _ in m.tracks.tracks]
-        owners += [_refined(r.body, r.side, r.box, millings) for r in s.rests for _ in r.tracks]
+        owners += [_patch_of_rest(r.body, r.side, r.box, millings) for r in s.rests for _ in r.tracks]
         for number, time in zip(s.linked.track.tolist(), seconds.tolist(), strict=True):
             if number >= 0:
                 owner = id(owners[number].patch)
                 taken[owner] = taken.get(owner, 0.0) + time
     out = []
     for m in millings:
-        number = next(k for k, c in enumerate(costs) if (c.side.body, c.side.side) == (m.patch.body, m.patch.side))
-        own = costs[number]
-        table = int(np.abs(own.tables - m.patch.table).argmin())
-        bare = m.patch.path / float(own.terms.feeds(len(own.catalogue.cutters))[m.patch.cutter])
-        row = Measured("uv".index(m.patch.order), m.patch.cutter, table, bare, taken.get(id(m.patch), 0.0))
+        own, order, table, bare = _place(costs, m.patch)
+        number = next(k for k, c in enumerate(costs) if c is own)
+        row = Measured(order, m.patch.cutter, table, bare, taken.get(id(m.patch), 0.0))
         out.append((number, row))
     return out
 
 
-def _refined(
+def _patch_of_rest(
     body: int, side: str, box: tuple[tuple[float, float], tuple[float, float]], millings: Sequence[Milling]
 ) -> Milling:
     """The patch of a surface in which the middle of a box lies, or is nearest to."""
@@ -192,7 +198,7 @@ def _refined(
 
 
 def _checked(
-    way: PartitionChoice, done: _Planned, job: FinishSettings, machine: Machine, paths: PathsTable, memory: _Memory
+    way: CutterChoice, done: _Planned, job: FinishSettings, machine: Machine, paths: PathsTable, memory: _Memory
 ) -> CheckedPartition:
     own = job.with_catalogue(done.partition.catalogue)
     text = hashlib.sha256()
