@@ -203,6 +203,33 @@ def test_what_a_larger_cutter_left(tmp_path):
     assert small.summary["leftover_mm2"] < 0.005 * 30 * 24
 
 
+def test_a_finish_pass_of_the_walls(tmp_path):
+    """The same cutter takes the 0.2 mm that it left, at no more than the engagement asked for, in the corners too."""
+    (rough, finish), _ = done(
+        written(
+            tmp_path,
+            {"part": [SQUARE, (15, 12, 2)]},
+            operation("radial_depth_mm = 1.2\nallowance_mm = 0.2"),
+            operation("radial_depth_mm = 1.2\nrest_of = 0"),
+        )
+    )
+    assert finish.summary["reachable_mm2"] == pytest.approx(_ring(0.2), rel=1e-3)
+    assert finish.summary["engagement_deg"]["max"] <= math.degrees(math.acos(1.0 - 1.2 / 4.0))
+    assert finish.summary["cutting_s"] < 0.35 * rough.summary["cutting_s"]
+    cut = shapely.union(swept(rough.program, 4.0, -4.0), swept(finish.program, 4.0, -4.0))
+    assert shapely.intersection(cut, shapely.buffer(shapely.points(15, 12), 2.0, quad_segs=256)).area < 5e-3
+
+
+def _ring(allowance: float) -> float:
+    """What a disc of 4 mm reaches of the square with its island, less what it reaches so far off their walls."""
+
+    def area(off: float) -> float:
+        free = shapely.difference(shapely.box(0, 0, 30, 24), shapely.buffer(shapely.points(15, 12), 2.0, quad_segs=256))
+        return float(shapely.buffer(shapely.buffer(free, -4.0 - off, quad_segs=256), 4.0, quad_segs=256).area)
+
+    return area(0.0) - area(allowance)
+
+
 @pytest.mark.parametrize(
     ("limits", "by"), [("force_xy_n = 260.0", "force_xy_n"), ("torque_nm = 0.9\nengagement_deg = 90.0", "torque_nm")]
 )

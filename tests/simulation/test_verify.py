@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chipload.errors import Cancelled, InputError
-from chipload.geometry.contour import Contour
+from chipload.geometry.contour import Contour, Region
 from chipload.program.program import ARC_CCW, LINE, RAPID, Program
 from chipload.simulation.material import material_left_of
 from chipload.simulation.verify import MATCH_MM, verify_contour
@@ -274,3 +274,26 @@ def test_only_films_that_a_displacement_makes_are_forgiven():
     beyond = sum(math.degrees(math.acos(1.0 - t / R)) for t in (MATCH_MM + 5e-7, MATCH_MM - 5e-7))
     assert film_planned_as(beyond + 0.009, 5e-7).verdict == "proved"
     assert film_planned_as(beyond + 0.011, 5e-7).verdict == "failed"
+
+
+def test_the_edge_of_the_stock_is_displaced_too():
+    """The rim runs along the straight edge of the stock, 0.5 nm deep in it: planned as nothing or as that, no more; a
+    depth of 0.1 um counts.
+    """
+
+    def check(angle, depth):
+        p = program([(RAPID, 0, 0, SAFE, 0, 0), (LINE, 0, 0, Z, 0, 0), (LINE, 30, 0, Z, 0, 0)])
+        rows = {
+            "x_mm": np.array([15.0]),
+            "y_mm": np.array([0.0]),
+            "z_mm": np.full(1, Z),
+            "engagement_deg": np.array([angle]),
+            "pass": np.full(1, "pocket", dtype=object),
+        }
+        edge = depth - R
+        box = Contour.polyline([(-20, -30), (50, -30), (50, edge), (-20, edge)], closed=True)
+        return verify(p, rows, stock=Region.of([box]), wall=[], engagement_tolerance_deg=0.01).verdict
+
+    thin = math.degrees(math.acos(1.0 - 5e-7 / R))
+    assert check(0.0, 5e-7) == check(thin, 5e-7) == "proved"
+    assert check(0.1, 5e-7) == check(0.0, 1e-4) == "failed"

@@ -202,7 +202,8 @@ def in_stock(px, py, rows):
 @njit(cache=True, nogil=True)
 def uncut(px, py, k, w, reach, own, apart, mot, grid, rows, hint):
     """Whether (px, py) is stock that no centre before the moment (k, w) has come within ``reach`` of, nor one of a
-    motion before ``own`` within ``reach + apart``.
+    motion before ``own`` within ``reach + apart``. The stock's own boundary is displaced by ``apart`` as well: above 0
+    inwards, below 0 outwards.
 
     ``hint[0]`` is the motion that cut the point asked last; it is tried first.
     """
@@ -223,7 +224,15 @@ def uncut(px, py, k, w, reach, own, apart, mot, grid, rows, hint):
             if within(mot, q, 1.0 if q < k else w, px, py, reach + apart if q < own else reach):
                 hint[0] = q
                 return False
-    return in_stock(px, py, rows)
+    if apart == 0.0 or rows[2] == 0:
+        return in_stock(px, py, rows)
+    # four points, one of which at least is displaced by |apart| across any boundary
+    d = abs(apart) * math.sqrt(2.0)
+    held = 0
+    for dx, dy in ((d, 0.0), (-d, 0.0), (0.0, d), (0.0, -d)):
+        if in_stock(px + dx, py + dy, rows):
+            held += 1
+    return held == 4 if apart > 0.0 else held > 0
 
 
 @njit(cache=True, nogil=True)

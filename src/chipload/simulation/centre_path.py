@@ -232,8 +232,9 @@ def rim_engagement(
         missed, except at both ends of the front half, where pieces of a 128th of it are found
     precision : transitions are halved down to this [rad]
     workers : threads; the answer does not depend on it
-    displacement_mm : how far the path is displaced against what it cut before its last ``OWN_MM``, at most
-        ``DISPLACED_MM``: above 0 gives the least engagement that such a displacement makes, below 0 the greatest
+    displacement_mm : how far the path is displaced against the initial stock and what it cut before its last
+        ``OWN_MM``, at most ``DISPLACED_MM``: above 0 gives the least engagement that such a displacement makes, below
+        0 the greatest
 
     Notes
     -----

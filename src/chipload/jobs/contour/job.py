@@ -118,11 +118,15 @@ def _wrong_pocket(at: str, k: int, table: ContourJobTable, cutters: Mapping[int,
     if op.rest_of >= k or table.operation[op.rest_of].kind != "pocket":
         yield f"{at}.rest_of = {op.rest_of}: must be the number of an earlier pocket operation, from 0"
         return
-    larger, own = cutters.get(table.operation[op.rest_of].cutter), cutters.get(op.cutter)
-    if larger is not None and own is not None and own.diameter >= larger.diameter:
+    before = table.operation[op.rest_of]
+    larger, own = cutters.get(before.cutter), cutters.get(op.cutter)
+    if larger is None or own is None:
+        return
+    left, leaves = before.allowance_mm or 0.0, op.allowance_mm or 0.0
+    if own.diameter > larger.diameter or (own.diameter == larger.diameter and leaves >= left):
         yield (
-            f"{at}.rest_of = {op.rest_of}: its cutter of {larger.diameter:g} mm must be larger than this one of "
-            f"{own.diameter:g} mm"
+            f"{at}.rest_of = {op.rest_of}: its cutter of {larger.diameter:g} mm leaves nothing for this one of "
+            f"{own.diameter:g} mm: state a smaller cutter, or less allowance_mm than its {left:g}"
         )
 
 

@@ -44,6 +44,7 @@ class Operation:
     machine_findings : by strategy, what its program asks of the machine that it does not give
     limits : of the job, by name
     checks : what is checked beside the limits; None: nothing
+    inserted : name and text of the program that the finish path came from, with the semi-finish passes; else ""
     """
 
     result: OperationResult
@@ -55,6 +56,7 @@ class Operation:
     machine_findings: Mapping[str, tuple[Finding, ...]] = field(default_factory=dict)
     limits: Mapping[str, float] = field(default_factory=dict)
     checks: DefaultChecks | None = None
+    inserted: tuple[str, str] = ("", "")
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,15 @@ def program_files(outcome: ContourResult) -> dict[str, bytes]:
             out[f"{stem}.{ending}"] = text.encode("ascii")
             cl = write_apt(strategy.program, {op.cutter.number: op.cutter}, title=title, verified=verified)
             out[f"{stem}.apt"] = cl.encode("ascii")
+        name, text = op.inserted
+        if text:
+            out[inserted_name(k, name)] = text.encode("utf-8")
     return out
+
+
+def inserted_name(operation: int, name: str) -> str:
+    """Name of the file of a program with inserted semi-finish passes."""
+    return f"{operation}-semifinish-{name}"
 
 
 def _comments(outcome: ContourResult, op: Operation, name: str) -> list[str]:

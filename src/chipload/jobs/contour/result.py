@@ -126,10 +126,15 @@ def _track(outcome: ContourResult, k: int, op: Operation, name: str) -> Track:
         time_s=float(strategy.summary["time_s"]),
         limits=limits_of(outcome.machine, op, strategy, track),
         findings=findings_of(op, name),
-        programs=(f"{stem}.{ENDINGS[outcome.machine.dialect]}", f"{stem}.apt"),
+        programs=(f"{stem}.{ENDINGS[outcome.machine.dialect]}", f"{stem}.apt", *_inserted(k, op, name)),
         operation=k,
         blocks=in_memory(steps_of(op, strategy)),
     )
+
+
+def _inserted(k: int, op: Operation, name: str) -> tuple[str, ...]:
+    """The program that the finish path came from, with semi-finish passes; of the strategy in use."""
+    return (f"{k}-semifinish-{op.inserted[0]}",) if op.inserted[1] and name == op.result.use else ()
 
 
 def _operation(k: int, op: Operation) -> dict[str, Any]:

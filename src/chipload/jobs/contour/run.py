@@ -21,6 +21,13 @@ from chipload.geometry.dxf import read_dxf
 from chipload.geometry.step import read_step_face
 from chipload.jobs.checks import default_checks
 from chipload.jobs.contour.advice import greatest_engagement
+from chipload.jobs.contour.finish_program import (
+    FinishProgram,
+    finish_contours,
+    is_program,
+    read_finish,
+    with_semifinish,
+)
 from chipload.jobs.contour.job import ContourJob
 from chipload.jobs.contour.outcome import ContourResult, Operation, Verification
 from chipload.jobs.contour.tables import OperationTable
@@ -40,6 +47,8 @@ from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 ENGAGEMENT_DEG, GOUGE_MM, CHORDS_MM = 0.05, 1e-4, 1e-3
 #: passes that descend or rise, whose engagement the simulation in the plane cannot compare; their path it does follow
 NOT_LEVEL = ("entry", "ramp")
+_NO_CONTOURS: tuple[Contour, ...] = ()
+_NO_FINDINGS: tuple[Finding, ...] = ()
 VERDICTS = {"proved": Verdict.HOLDS, "failed": Verdict.EXCEEDS, "unproven": Verdict.UNPROVEN}
 
 
@@ -49,6 +58,7 @@ class Inputs:
 
     contours: tuple[Contour, ...]
     stock: tuple[Contour, ...]
+    finish: FinishProgram | None
     machine: Machine
     material: Material
     findings: tuple[Finding, ...]
@@ -67,7 +77,17 @@ def read_inputs(job: ContourJob) -> Inputs:
     for name in ("force_xy_n", "form_error_um"):
         if name in job.limits:
             need_directions(material, f"limits.{name}")
-    contours, stock, findings = _read_part(job)
+    finish, stock, findings = None, _NO_CONTOURS, _NO_FINDINGS
+    if is_program(job.part_file):
+        if any(op.kind != "contour" for op in job.operations) or len(job.operations) != 1:
+            raise InputError(
+                f"part.file = {job.table.part.file}: a program is the finish path of one operation contour"
+            )
+        op = job.operations[0]
+        finish = read_finish(job.part_file, machine, job.table.part.lines, job.table.stock.top_mm)
+        contours = finish_contours(finish, job.cutters[op.cutter], op.milling, op.side)
+    else:
+        contours, stock, findings = _read_part(job)
     for k, op in enumerate(job.operations):
         speed = rad_s_from_rpm(op.speed_rpm)
         if not machine.spindle_min * (1.0 - 1e-9) <= speed <= machine.spindle_max * (1.0 + 1e-9):
@@ -76,7 +96,7 @@ def read_inputs(job: ContourJob) -> Inputs:
                 f"{job.path.name}: operation.{k}.speed_rpm = {op.speed_rpm:g}: machine {machine.name} turns from "
                 f"{low:g} to {high:g} rpm: state a speed between them"
             )
-    return Inputs(contours, stock, machine, material, findings)
+    return Inputs(contours, stock, finish, machine, material, findings)
 
 
 def run(job: ContourJob, progress: Progress = silent) -> ContourResult:
@@ -157,8 +177,16 @@ def _operation(job: ContourJob, inputs: Inputs, op: OperationTable, progress: Pr
     checks = default_checks(job.table.checks, {cutter.number: cutter}, inputs.material, 0.5)
     return Operation(
         result, settings, cutter, job.table.stock.top_mm, op.depth_mm or op.axial_depth_mm, verifications,
-        machine_findings, job.limits, checks,
+        machine_findings, job.limits, checks, _inserted(inputs, result),
     )  # fmt: skip
+
+
+def _inserted(inputs: Inputs, result: OperationResult) -> tuple[str, str]:
+    """Name and text of the program that the finish path came from, with the semi-finish passes; "", "": none."""
+    finish = inputs.finish
+    if finish is None or not finish.text:
+        return "", ""
+    return finish.file.name, with_semifinish(finish, result.strategies[result.use].program, inputs.machine)
 
 
 def _plan(job: ContourJob, inputs: Inputs, op: OperationTable, cutter: Cutter, progress: Progress) -> OperationResult:
@@ -318,7 +346,7 @@ def _read_part(job: ContourJob) -> tuple[tuple[Contour, ...], tuple[Contour, ...
             job.part_file, z_mm=part.face_z_mm, join_mm=part.join_mm, tolerance_mm=part.tolerance_mm
         )
     else:
-        raise InputError(f"part.file = {part.file}: must end in .dxf, .step or .stp")
+        raise InputError(f"part.file = {part.file}: must end in .dxf, .step or .stp, or be a program")
     outline, contours = _stock_outline(part.stock_layers, drawing) if part.stock_layers else ((), drawing.contours)
     return contours, outline, tuple(replace(f, text=f"part: {f.text}") for f in drawing.findings)
 

@@ -27,7 +27,7 @@ Strategy = Literal["plain", "backward", "feed"]
 
 
 class PartTable(Table):
-    """What is to be made: a drawing (DXF) or a model (STEP)."""
+    """What is to be made: a drawing (DXF), a model (STEP), or the finish path of a program (NC, CL data)."""
 
     file: Text
     units: Unit | None = Field(None, description="overrides the units of the drawing")
@@ -37,6 +37,10 @@ class PartTable(Table):
     tolerance_mm: Positive = Field(0.001, le=1.0, description="how far arcs may leave splines and ellipses")
     stock_layers: tuple[Text, ...] = Field(
         (), description="layers of a drawing that hold the outline of the stock of a pocket; none: material everywhere"
+    )
+    lines: tuple[Count, Count] | None = Field(
+        None,
+        description="first and last line of a program that make the wall; none: all that cuts below the stock's top",
     )
     face_z_mm: Number | None = Field(None, description="height of the planar face of a STEP file")
 

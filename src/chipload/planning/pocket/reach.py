@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,8 @@ Floats = NDArray[np.float64]
 
 #: chords leave the arcs of the centre region by at most this part of R, to its inside
 CHORD = 1e-5
+#: parts that the way between them begins at, one after the other
+STARTS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +89,9 @@ def reach_of(centres: Region, grid: Floats, chord: float) -> Reach:
 
 
 def widest_places(centres: Region, chord: float) -> list[tuple[float, float, float]]:
-    """(x, y, radius) [mm] of the largest circle in each separate part of the centre region, from left to right."""
+    """(x, y, radius) [mm] of the largest circle in each separate part of the centre region, the parts in the order of a
+    short way between them.
+    """
     rings = [shapely.make_valid(shapely.polygons(inner_points(c, chord))) for c in centres.contours]
     outer = [g for g, c in zip(rings, centres.contours, strict=True) if c.area > 0.0]
     holes = [g for g, c in zip(rings, centres.contours, strict=True) if c.area <= 0.0]
@@ -100,4 +105,39 @@ def widest_places(centres: Region, chord: float) -> list[tuple[float, float, flo
         (x, y), _ = shapely.get_coordinates(line)
         radius = float(shapely.distance(shapely.points(x, y), part.boundary))
         out.append((float(x), float(y), radius))
-    return sorted(out)
+    return [out[k] for k in shortest_order(np.array([p[:2] for p in out]).reshape(-1, 2))]
+
+
+def shortest_order(points: Floats) -> list[int]:
+    """Order in which an open way visits all points (n, 2): the nearest next, from every first one, each improved by
+    turning stretches of it round (2-opt) as long as that shortens it; the shortest, of equal ones the first.
+
+    >>> shortest_order(np.array([[0.0, 0.0], [3.0, 0.0], [1.0, 0.0], [2.0, 0.0]]))
+    [0, 2, 3, 1]
+    """
+    n = len(points)
+    far = np.hypot(*(points[:, None] - points[None]).T)
+    best: tuple[float, list[int]] = (math.inf, [])
+    for first in range(min(n, STARTS)):
+        order, left = [first], set(range(n)) - {first}
+        while left:
+            order.append(min(left, key=lambda k: (far[order[-1], k], k)))
+            left.remove(order[-1])
+        shorter = True
+        while shorter:
+            shorter = False
+            for i in range(n - 1):
+                for j in range(i + 1, n):
+                    before = (far[order[i - 1], order[i]] if i else 0.0) + (
+                        far[order[j], order[j + 1]] if j + 1 < n else 0.0
+                    )
+                    after = (far[order[i - 1], order[j]] if i else 0.0) + (
+                        far[order[i], order[j + 1]] if j + 1 < n else 0.0
+                    )
+                    if after < before - 1e-9:
+                        order[i : j + 1] = order[i : j + 1][::-1]
+                        shorter = True
+        length = sum(float(far[a, b]) for a, b in pairwise(order))
+        if length < best[0] - 1e-9:
+            best = (length, order)
+    return best[1]

@@ -1,0 +1,156 @@
+"""A contour whose finish path comes from an NC program: the plan of its drawing, and a text that reads back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chipload.errors import InputError
+from chipload.geometry.contour import Region
+from chipload.jobs import load_job
+from chipload.jobs.contour.programs import program_files
+from chipload.jobs.contour.result import result_of
+from chipload.jobs.contour.run import check, run
+from chipload.machine.machine import machine_named
+from chipload.program.program import RAPID
+from chipload.program.read import read_program
+from chipload.result import Verdict
+from chipload.simulation.centre_path import CentrePath, rim_engagement
+
+#: a wall with an inside corner of 8 mm, finished by a cutter of 10 mm; a hole is drilled before, a chamfer cut after it
+PROGRAM = """(finish pass of another CAM)
+G21 G17 G90 G40 G49 G80 G55
+T7 M6
+S2000 M3
+G0 X10. Y20. Z10.
+G1 Z-3. F100.
+G0 Z10.
+T1 M6
+S3000 M3
+G0 X-7. Y12. Z10.
+Z2.
+G1 Z-5. F300.
+G3 X0. Y5. I7. F600.
+G1 X20.
+G3 X23. Y8. J3.
+G1 Y28.
+G1 X20. Y30.
+G0 Z10.
+G1 X0. Y0. F900.
+M5
+M2
+"""
+WALL = (14, 16)
+JOB = """
+[part]
+file = "finish.ngc"
+lines = [{first}, {last}]
+[stock]
+top_mm = 0.0
+[machine]
+name = "{machine}"
+[material]
+name = "al7075-t6"
+[[cutter]]
+number = 1
+diameter_mm = 10.0
+flutes = 4
+helix_deg = 30.0
+flute_length_mm = 22.0
+overhang_mm = 35.0
+modulus_gpa = 580.0
+[[operation]]
+kind = "contour"
+cutter = 1
+side = "{side}"
+milling = "down"
+strategies = ["plain", "backward"]
+use = "backward"
+joint = "sharp"
+radial_depth_mm = 0.1
+semifinish_depth_mm = 0.5
+axial_depth_mm = 5.0
+feed_mm_min = 600.0
+speed_rpm = 3000.0
+tolerance_mm = 0.05
+step_mm = 0.1
+lead_mm = 3.0
+clearance_mm = 5.0
+[limits]
+engagement_deg = 13.0
+"""
+
+
+def job(folder: Path, text: str = PROGRAM, lines=WALL, side="left", machine="vmc"):
+    (folder / "finish.ngc").write_text(text)
+    path = folder / "job.toml"
+    path.write_text(JOB.format(first=lines[0], last=lines[1], side=side, machine=machine))
+    loaded = load_job(path)
+    return getattr(loaded, "job", loaded)
+
+
+@pytest.fixture(scope="module")
+def outcome(tmp_path_factory):
+    return run(job(tmp_path_factory.mktemp("finish")))
+
+
+def test_the_corner_is_that_of_the_drawing(outcome):
+    (op,) = outcome.operations
+    for name, most in (("plain", 18.7375), ("backward", 12.902)):
+        h = op.result.strategies[name].history
+        assert h["engagement_deg"][h["pass"] == "finish"].max() == pytest.approx(most, abs=2e-3)
+        assert op.verifications[name].verdict is Verdict.HOLDS, op.verifications[name].text
+
+
+def test_the_text_is_the_old_one_with_passes_inserted(outcome, tmp_path):
+    """Every old line is there in its order; the new ones stand behind line 11, the last at a safe height."""
+    name, text = outcome.operations[0].inserted
+    assert name == "finish.ngc"
+    old, new = PROGRAM.split("\n"), text.split("\n")
+    added = len(new) - len(old)
+    assert added > 5
+    assert new[:11] == old[:11]
+    assert new[11 + added :] == old[11:]
+    assert program_files(outcome)["0-semifinish-finish.ngc"] == text.encode()
+    assert "0-semifinish-finish.ngc" in result_of(outcome).tracks[0].programs
+
+
+def test_the_finish_pass_of_the_text_keeps_the_engagement(outcome, tmp_path):
+    """The text alone, read again: its own finish lines behind the new passes, in the stock that roughing left."""
+    file = tmp_path / "again.ngc"
+    file.write_text(outcome.operations[0].inserted[1])
+    p = read_program(file, machine_named("vmc")).program
+    stock = outcome.operations[0].result.strategies["backward"].drawn["stock before"]
+    trail = CentrePath.of_program(p, 5.0, Region(tuple(stock)), -5.0)
+    line = np.array(outcome.operations[0].inserted[1].split("\n"))
+    for words, least, most in (("G1 X20.", 11.4, 12.95), ("G3 X23. Y8. J3.", 11.4, 12.95)):
+        number = int(np.flatnonzero(line == words)[-1]) + 1
+        (k,) = np.flatnonzero((p.line == number) & (p.motion != RAPID))
+        share = np.linspace(0.3, 1.0, 40)
+        a = np.degrees(rim_engagement(trail, np.full(40, k), share, step_deg=0.25).angle)
+        assert least <= a.min()
+        assert a.max() <= most
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"side": "right"}, "operation.side = 'right': the path of finish.ngc with milling = 'down' is on the left of"),
+        ({"lines": (1, 6)}, "nothing cuts level below the stock's top in lines 1 to 6"),
+        ({"text": PROGRAM.replace("G1 Y28.", "G0 Z3.\nG0 Z-5.\nG1 Y28."), "lines": (14, 18)}, "the cut is interrupted"),
+        ({"text": PROGRAM.replace("T1 M6", "T3 M6")}, "line 14 is cut by tool 3, the operation has cutter = 1"),
+    ],
+)
+def test_refused(tmp_path, changes, text):
+    made = job(tmp_path, **changes)
+    with pytest.raises(InputError) as err:
+        check(made)
+    assert text in str(err.value)
+
+
+def test_incremental_words_are_not_written_back(tmp_path):
+    made = job(tmp_path, PROGRAM.replace("M5\nM2", "G91\nG0 Z5.\nG90\nM5\nM2"))
+    with pytest.raises(InputError, match=r"not written back: the text states G91"):
+        run(made)
