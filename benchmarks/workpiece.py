@@ -3,7 +3,8 @@
     python benchmarks/workpiece.py [CELL_MM ORDER]     2.5 and 2, if none are stated
 
 Measured: moments of the stock, building (moments, assembly, clamps, factors), the same after a piece of a wall was
-cut (a new state), 1,000 contact lines, its lowest modes, and the factors by minimum degree instead of nested dissection.
+cut (a new state), 1,000 contact lines, its lowest modes, and the factors by minimum degree instead of nested
+dissection.
 Where CalculiX (ccx) is installed, beside it: a state with one load, in quadratic bricks of 2 x 2 x 1.5 mm, one through
 the walls, whose compliance of the long wall is that of cells of order 3 to 1.5 %.
 """
