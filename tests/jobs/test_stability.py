@@ -347,6 +347,23 @@ def test_spreads_of_the_modes_give_a_probability(tmp_path: Path) -> None:
     assert check_of(chatters, "stable_probability").state is Verdict.EXCEEDS
 
 
+def test_windows_that_are_quiet_with_some_probability(tmp_path: Path) -> None:
+    """A surer window lies within a less sure one, and a program posted at its middle is as sure."""
+    spreads = "frequency_percent = 2.0\ndamping_percent = 15.0\nstiffness_percent = 5.0\n"
+    text = TEXT.replace("S9000", "S6000").replace("Z-1.5", "Z-3").replace("F1350", "F900")
+    numbers = done(tmp_path, text=text, modes=spreads + MODES).result.operations[0]["stability"]
+    half, sure = numbers["windows_50_percent"], numbers["windows_95_percent"]
+    assert sure
+    assert all(any(a["low_rpm"] <= b["low_rpm"] and b["high_rpm"] <= a["high_rpm"] for a in half) for b in sure)
+    width = [sum(w["high_rpm"] - w["low_rpm"] for w in some) for some in (half, sure)]
+    assert 0.0 < width[1] < width[0]
+    best = max(sure, key=lambda w: w["high_rpm"] - w["low_rpm"])
+    rpm = round(0.5 * (best["low_rpm"] + best["high_rpm"]))
+    faster = text.replace("S6000", f"S{rpm}").replace("F900", f"F{0.15 * rpm:.0f}")
+    again = done(tmp_path, text=faster, modes=spreads + MODES)
+    assert again.result.operations[0]["stability"]["stable_probability"] >= 0.95
+
+
 def test_a_probability_needs_all_three_spreads(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="state all of frequency_percent, damping_percent, stiffness_percent"):
         done(tmp_path, modes="damping_percent = 20.0\n" + MODES)

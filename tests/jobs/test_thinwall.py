@@ -64,7 +64,7 @@ def operation(folder):
 
 
 def test_summary_has_what_is_compared(done, operation):
-    assert set(operation["variants"]) == {"variable", "constant", "unconstrained"}
+    assert set(operation["variants"]) == {"variable", "constant", "unconstrained", "least_error", "compensated"}
     for one in operation["variants"].values():
         for key in ("passes", "time_min", "deflection_workpiece_um_max", "form_error_um_max", "force_normal_n_max"):
             assert one[key] > 0.0
@@ -81,6 +81,8 @@ def test_all_stock_is_taken_and_nothing_else(done):
     fillet, scallop = 2.0 / 3.0 * 0.2 * math.sqrt(2.0 * 4.0 * 0.2), 0.04
     expected = 2.0 * 8.0 * (5.0 * (0.2 - scallop / 3.0) + fillet)
     for one in done.variants.values():
+        if one.shift > 0.0:  # its path is moved into the wall
+            continue
         volume = one.columns["chip_volume_mm3"].sum()
         assert volume == pytest.approx(expected, rel=0.04)
         assert one.shape.gouge <= 0.001
@@ -99,6 +101,25 @@ def test_variable_is_held_to_the_limit(finished, done, operation):
         assert f"bends the wall by {1e3 * constant.deflection:.4g} µm" in finished.result.note
     assert operation["time_constant_over_variable"] == pytest.approx(constant.seconds / variable.seconds)
     assert done.variants["unconstrained"].deflection >= variable.deflection
+
+
+def test_less_error_in_the_time_of_the_constant_depth(done):
+    least, constant = done.variants["least_error"], done.variants["constant"]
+    assert least.seconds <= constant.seconds * 1.001
+    assert least.deflection <= constant.deflection * 1.03
+    assert least.error_rms <= constant.error_rms * (1.0 + 1e-9)
+
+
+def test_a_path_that_is_moved_leaves_a_fraction_of_the_error(done, operation):
+    """The stock is cut lower by what the wall gives way: of a rigid wall the moved path would be a gouge as deep."""
+    moved, plain = done.variants["compensated"], done.variants["variable"]
+    assert moved.error_rms < 0.4 * plain.error_rms
+    assert moved.error < 0.9 * plain.error
+    assert 0.5 * plain.error < moved.shift <= 0.06
+    assert moved.shape.gouge == pytest.approx(moved.shift, rel=0.35)
+    numbers = operation["variants"]["compensated"]
+    assert numbers["moved_um_max"] == pytest.approx(1e3 * moved.shift)
+    assert moved.seconds == pytest.approx(plain.seconds, rel=0.05)
 
 
 def test_deflection_is_force_over_threshold_times_the_limit(done):

@@ -194,5 +194,55 @@ def in_time(periods, steps, teeth, st, ex, depth, kt, kr, w, z, U, rpm):
     return (t * size[half:]).sum() / (t * t).sum()
 
 
+@njit(cache=True)
+def with_loss_of_contact(periods, steps, teeth, st, ex, depth, feed, kt, kr, w, z, U, rpm):
+    """Greatest displacement (periods,) [mm] in each tooth period of a cut whose teeth leave the material where the chip
+    would be below 0, and the share of engaged moments without contact. Each tooth meets the surface that the last one
+    to cut there left.
+    """
+    M = len(w)
+    dt = 60.0 / (rpm * teeth) / steps
+    q = np.zeros(M)
+    v = np.zeros(M)
+    surface = np.zeros((teeth, steps))
+    size = np.zeros(periods)
+    off = 0
+    engaged = 0
+    for p in range(periods):
+        for i in range(steps):
+            x = 0.0
+            y = 0.0
+            for k in range(M):
+                x += U[0, k] * q[k]
+                y += U[1, k] * q[k]
+            size[p] = max(size[p], math.hypot(x, y))
+            ft = 0.0
+            fn = 0.0
+            for j in range(teeth):
+                phi = ((i + 0.5) / steps + j) * TAU / teeth
+                if st < phi < ex:
+                    s = math.sin(phi)
+                    c = math.cos(phi)
+                    h = feed * s + s * x + c * y - surface[j, i]
+                    engaged += 1
+                    if h > 0.0:
+                        ft -= depth * h * (kt * c + kr * s)
+                        fn -= depth * h * (kr * c - kt * s)
+                        surface[j, i] = s * x + c * y
+                    else:
+                        off += 1
+                        surface[j, i] -= feed * s
+            for k in range(M):
+                f = (U[0, k] * ft + U[1, k] * fn) / w[k] ** 2
+                wd = w[k] * math.sqrt(1 - z[k] ** 2)
+                e = math.exp(-z[k] * w[k] * dt)
+                c = math.cos(wd * dt)
+                s = math.sin(wd * dt)
+                a = q[k] - f
+                q[k] = f + e * (a * (c + z[k] * w[k] / wd * s) + v[k] * s / wd)
+                v[k] = e * (v[k] * (c - z[k] * w[k] / wd * s) - a * w[k] ** 2 / wd * s)
+    return size, off / engaged
+
+
 #: engaged arcs of down milling: a slot, half, a twentieth of the diameter
 SLOT, HALF, THIN = down(1.0), down(0.5), down(0.05)

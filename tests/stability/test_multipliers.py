@@ -32,6 +32,7 @@ from stability.stability_oracles import (
     mill,
     semi_discretisation,
     shapes,
+    with_loss_of_contact,
 )  # fmt: skip
 from stability.zero_order import zero_order_margin
 
@@ -210,6 +211,30 @@ def test_a_simulation_in_time_agrees_on_200_random_cuts():
     assert near < 30
     assert 40 < unstable < 160
     assert np.quantile(errors, 0.9) < 0.04
+
+
+@pytest.mark.parametrize(("rpm", "depth", "grows"), [(6000, 2.0, False), (9000, 2.0, False), (9000, 3.0, True)])
+def test_where_teeth_lose_contact_chatter_stays_bounded(rpm, depth, grows):
+    """A disturbance of an unstable cut would grow without bound; with loss of contact its motion grows with the feed
+    alone. A stable cut settles to the forced motion, which repeats itself in each tooth period.
+    """
+    exact = math.log(abs(largest_multipliers(cut_of(TWO, rpm, depth, HALF))[0]))
+    assert (exact > 0.0) == grows
+    w, z, U = shapes(TWO)
+
+    def motion(feed):
+        return with_loss_of_contact(400, 240, 3, *HALF, depth, feed, KT, KR, w, z, np.ascontiguousarray(U), rpm)
+
+    size, off = motion(0.05)
+    twice, _ = motion(0.1)
+    np.testing.assert_allclose(twice[-50:], 2.0 * size[-50:], rtol=0.02 if not grows else 0.4)
+    late, before = size[-100:].max(), size[-200:-100].max()
+    assert late == pytest.approx(before, rel=0.2 if grows else 1e-6)
+    if grows:
+        assert off > 0.02
+    else:
+        # the motion of a tooth period repeats itself
+        assert np.ptp(size[-50:]) < 1e-6 * late
 
 
 def test_the_margin_is_the_factor_at_which_the_multiplier_is_one():

@@ -43,23 +43,18 @@ class QuietSpeeds:
     speed : (s,) float [rad/s]
     margin : (s,) float, least of all cuts
     wanted : margin that is asked for
+    cut : (s,) int, number of the cut that has it, over all that were looked at
     """
 
     speed: Floats
     margin: Floats
     wanted: float
+    cut: NDArray[np.int64] | None = None
 
     @property
     def windows(self) -> tuple[SpeedWindow, ...]:
         """Ranges of speeds with the wanted margin, by speed."""
-        good = np.concatenate([[False], self.margin >= self.wanted, [False]])
-        edges = np.flatnonzero(np.diff(good.astype(np.int8))).reshape(-1, 2)
-        out = []
-        for a, b in edges.tolist():
-            k = a + int(np.argmax(self.margin[a:b]))
-            low, high, best = (float(self.speed[i]) for i in (a, b - 1, k))
-            out.append(SpeedWindow(low, high, best, float(self.margin[k])))
-        return tuple(out)
+        return speed_windows(self.speed, self.margin, self.wanted)
 
     def advised(self, present: float) -> tuple[float, float]:
         """Speed to take [rad/s] and its least margin.
@@ -75,6 +70,22 @@ class QuietSpeeds:
         order = np.lexsort((np.abs(self.speed - present), -far, ~good))
         k = int(order[0])
         return float(self.speed[k]), float(self.margin[k])
+
+
+def speed_windows(speed: Floats, value: Floats, wanted: float) -> tuple[SpeedWindow, ...]:
+    """Ranges of speeds (s,) in which values (s,) are at least what is wanted, by speed.
+
+    >>> [(w.low, w.high) for w in speed_windows(np.arange(1.0, 6.0), np.array([1.0, 2.0, 2.0, 0.0, 2.0]), 1.5)]
+    [(2.0, 3.0), (5.0, 5.0)]
+    """
+    good = np.concatenate([[False], value >= wanted, [False]])
+    edges = np.flatnonzero(np.diff(good.astype(np.int8))).reshape(-1, 2)
+    out = []
+    for a, b in edges.tolist():
+        k = a + int(np.argmax(value[a:b]))
+        low, high, best = (float(speed[i]) for i in (a, b - 1, k))
+        out.append(SpeedWindow(low, high, best, float(value[k])))
+    return tuple(out)
 
 
 def quiet_speeds(parts: Sequence[DynamicCuts], speed: ArrayLike, wanted: float) -> QuietSpeeds:
@@ -96,12 +107,14 @@ def quiet_speeds(parts: Sequence[DynamicCuts], speed: ArrayLike, wanted: float) 
         raise InputError("quiet speeds: no cut: nothing to look at")
     if speeds.ndim != 1 or not len(speeds) or not (speeds[0] > 0.0 and (np.diff(speeds) > 0.0).all()):
         raise InputError("quiet speeds: speeds must rise from above 0 rad/s")
-    least = np.full(len(speeds), np.inf)
+    least, own, before = np.full(len(speeds), np.inf), np.zeros(len(speeds), dtype=np.int64), 0
     for cuts in parts:
         if not len(cuts):
             continue
         some = cuts.chosen(np.repeat(np.arange(len(cuts)), len(speeds)))
         some = some.at_speeds(np.tile(cuts.pitch / speeds, len(cuts)))
         found = stability_margins(some).margin.reshape(len(cuts), len(speeds))
+        own = np.where(found.min(axis=0) < least, before + found.argmin(axis=0), own)
         least = np.minimum(least, found.min(axis=0))
-    return QuietSpeeds(speeds, least, wanted)
+        before += len(cuts)
+    return QuietSpeeds(speeds, least, wanted, own)

@@ -21,6 +21,7 @@ from chipload.cutter.table import CutterTable, cutter_from_table
 from chipload.cutting.material import Material, material_named, read_material
 from chipload.errors import InputError
 from chipload.jobs.messages import Errors, table_errors
+from chipload.jobs.program.clamped import clamp_errors
 from chipload.jobs.program.history import History
 from chipload.jobs.program.job import ProgramJob
 from chipload.jobs.program.run import simulate_read
@@ -64,6 +65,7 @@ def simulate(
     fixtures: Sequence[Body] = (),
     stiffness: Mapping[str, float] | None = None,
     dynamics: Mapping[str, Any] | None = None,
+    workpiece: Mapping[str, Any] | None = None,
     checks: Mapping[str, Any] | None = None,
     step_mm: float | None = None,
     layer_mm: float | None = None,
@@ -86,6 +88,8 @@ def simulate(
     fixtures : what no tool may touch, likewise
     stiffness : keys of ``[stiffness]``; what is not stated leaves deflections unproven
     dynamics : keys of ``[dynamics]``, as ``{"mode": ({"frequency_hz": 812.0, ...},)}``; each step then has a margin
+    workpiece : keys of ``[workpiece]``, as ``{"modulus_gpa": 70.0, "poisson": 0.33, "clamp": ({"face": "z-"},)}``;
+        how far the workpiece gives way in its clamps, in the state of each step
     checks : keys of ``[checks]``, which are made unless one is false, as ``{"cutter_strength": False}``
     step_mm : longest step of the tip; None: a quarter of the smallest diameter
     layer_mm : thickness of the layers of a block or a mesh; None: from depths of cut and cutters
@@ -126,6 +130,7 @@ def simulate(
         "limits": dict(limits),
         "stiffness": None if stiffness is None else dict(stiffness),
         "dynamics": None if dynamics is None else dict(dynamics),
+        "workpiece": None if workpiece is None else dict(workpiece),
         "checks": dict(checks or {}),
     }
     layers = stock if isinstance(stock, LayeredStock) else None
@@ -165,6 +170,9 @@ def _require_sources(made: ProgramJobTable) -> None:
     for key in ("stability_margin", "stable_probability", "sle_um"):
         if made.dynamics is None and getattr(made.limits, key) is not None:
             raise InputError(f"limits.{key}: needs modes of vibration: give dynamics or leave it out")
+    errors = Errors()
+    errors.texts += clamp_errors(made)
+    errors.refuse()
     if made.operation[0].speeds is not None:
         raise InputError("speeds: are changed in the text of a job's program: write a job (chipload run)")
 

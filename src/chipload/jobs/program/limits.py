@@ -39,8 +39,23 @@ def program_limits(
         *stability_limits(
             own, simulation.limits, columns, track, simulation.errors, direction, simulation.checks.sigma
         ),
+        *_yield_limit(simulation, columns, track),
         *default_limits(simulation.checks, simulation.machine, columns, track, simulation.errors),
     )
+
+
+def _yield_limit(simulation: SimulationResult, columns: Columns, track: str) -> tuple[LimitCheck, ...]:
+    """The stress of the workpiece against its yield stress, where that is stated."""
+    own = None if simulation.workpiece is None else simulation.workpiece.strained
+    if simulation.workpiece is None or own is None:
+        return ()
+    force = simulation.errors.get("force_n", 0.0)
+    # a stress converges more slowly than a displacement
+    error = 2.0 * simulation.workpiece.error + (force if math.isfinite(force) else 0.0)
+    state, why = state_of(own.stress, own.strength, error)
+    k = own.step
+    line, t = int(columns["line"][k]), float(columns["t_s"][k])
+    return (LimitCheck("stress_mpa", own.strength, own.stress, state, track, k, line, own.place, t, error, why),)
 
 
 def spindle_limits(machine: Machine, speeds: ArrayLike = ()) -> dict[str, float]:

@@ -22,7 +22,8 @@ from chipload.result import LimitCheck, check_limit
 from chipload.result.limits import Columns
 from chipload.stability.cuts import joined
 from chipload.stability.margin import MOST_MARGIN, stability_margins
-from chipload.stability.speeds import QuietSpeeds, quiet_speeds
+from chipload.stability.probability import stable_probability
+from chipload.stability.speeds import QuietSpeeds, quiet_speeds, speed_windows
 from chipload.units import rpm_from_rad_s
 
 Floats = NDArray[np.float64]
@@ -34,6 +35,8 @@ DEFAULT_MARGIN = 1.0
 MARGIN_ERROR = 0.01
 #: steps with the least margins for which the error of followed frequencies is looked at
 UNSURE = 48
+#: probabilities of stability [%] that windows of speeds are given at, where spreads of the modes are stated
+SURE = (50, 95)
 #: waves of the fastest mode in a tooth period at the least speed that is looked at: slower ones have no pockets
 MOST_WAVES = 20.0
 #: speeds that are looked at, evenly spaced in their logarithm, and how a speed is rounded [1/min]
@@ -82,6 +85,21 @@ class StabilityResult:
             low, high = self.range_of(tool)
             if parts is not None and high > low:
                 out[tool] = quiet_speeds([parts], np.geomspace(low, high, SPEEDS), self.wanted)
+        return out
+
+    @cached_property
+    def sure(self) -> Mapping[int, Floats]:
+        """Probability of stability over the speeds of :attr:`quiet`, by tool: that of the cut with the least margin at
+        each; empty: spreads of the modes are not stated.
+        """
+        spread, out = self.watch.dynamics.spread, {}
+        if spread is not None:
+            for tool, quiet in self.quiet.items():
+                parts = self.watch.parts(tool)
+                assert parts is not None
+                assert quiet.cut is not None
+                some = parts.chosen(quiet.cut).at_speeds(parts.pitch / quiet.speed)
+                out[tool] = stable_probability(some, spread, relative_covariance(self.watch.material))
         return out
 
     @cached_property
@@ -222,6 +240,12 @@ def stability_numbers(stability: StabilityResult, columns: Columns) -> dict[str,
             {"low_rpm": rpm_from_rad_s(w.low), "high_rpm": rpm_from_rad_s(w.high), "margin": w.margin}
             for w in quiet.windows
         ]
+        if tool in stability.sure:
+            for share in SURE:
+                out[f"windows_{share}_percent"] = [
+                    {"low_rpm": rpm_from_rad_s(w.low), "high_rpm": rpm_from_rad_s(w.high), "probability": w.margin}
+                    for w in speed_windows(quiet.speed, stability.sure[tool], 0.01 * share)
+                ]
     return out
 
 

@@ -10,6 +10,7 @@ from plotly.subplots import make_subplots
 
 from chipload.jobs.program.outcome import SimulationResult, SpeedResult
 from chipload.jobs.program.stability import (
+    SURE,
     StabilityResult,
     filled_margins,
     stability_numbers,
@@ -68,6 +69,16 @@ def stability_sections(
             f'<p class="note">Speeds at which the least margin of its steps is at least {stability.wanted:g}.</p>',
             table(head, cells, numbers=(0, 1, 2)),
         ]
+    for share in SURE:
+        some = what.get(f"windows_{share}_percent")
+        if some is not None:
+            cells = [[f"{w['low_rpm']:.5g}", f"{w['high_rpm']:.5g}", f"{w['probability']:.3g}"] for w in some]
+            body += [
+                f"<h3>Speeds that are quiet with {share} %</h3>",
+                '<p class="note">Probability of the cut that is nearest to chatter at each speed, by the stated '
+                "spreads of the modes and those of the coefficients.</p>",
+                table(["from [rpm]", "to [rpm]", "greatest probability"], cells, numbers=(0, 1, 2)),
+            ]
     tool = int(what["tool"])
     drawn = worst_chart(stability, tool)
     if drawn is not None:

@@ -203,6 +203,9 @@ class WorkpieceTable(Table):
     damping_ratio: Positive | None = Field(
         None, lt=0.5, description="of its modes in the clamps; [dynamics] needs it: without it stability is unproven"
     )
+    yield_mpa: Positive | None = Field(
+        None, ge=10.0, le=5000.0, description="stress up to which it springs back; with it that is a limit"
+    )
     modes: Count = Field(4, le=20, description="lowest modes that are followed through the removal")
     order: Literal[2, 3] = Field(2, description="of the modes of a cell; 3 costs more and is closer in corners")
     cell_mm: Positive | None = Field(None, description="side of the cells; none: by the thinnest wall that is left")

@@ -28,8 +28,9 @@ from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.followed import FollowedModes, ModesOfStates
 from chipload.structure.cells.grid import CellGrid, grid_over
 from chipload.structure.cells.states import State, StepCompliances, size_of, step_compliances
+from chipload.structure.cells.stress import greatest_stress
 from chipload.structure.cells.thickness import cells_over
-from chipload.structure.cells.workpiece import CellWorkpiece, cell_workpiece, line_compliances
+from chipload.structure.cells.workpiece import CellWorkpiece, Elastic, cell_workpiece, line_compliances
 
 Floats = NDArray[np.float64]
 
@@ -41,6 +42,18 @@ SPACING = 0.5
 FLOOR = 0.01
 #: change of a frequency between two states, over that of the deflection
 FREQUENCY = 0.5
+#: steps with most deflection, and with most force, whose stress is looked at
+STRAINED = 6
+
+
+@dataclass(frozen=True)
+class StrainedStep:
+    """The row of the history whose force strains the workpiece most, its stress and the yield stress [MPa]."""
+
+    step: int
+    stress: float
+    place: tuple[float, float, float]
+    strength: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +71,7 @@ class WorkpieceCompliance:
     findings : material that hangs on nothing
     bent : the workpiece in its worst step; None: nothing is cut
     modes : of vibration, followed through the removal; None: the density is not stated
+    strained : the step that strains it most, of those looked at; None: the yield stress is not stated
     """
 
     steps: StepCompliances
@@ -69,6 +83,7 @@ class WorkpieceCompliance:
     findings: tuple[Finding, ...]
     bent: BentWorkpiece | None
     modes: FollowedModes | None = None
+    strained: StrainedStep | None = None
 
     @property
     def numbers(self) -> Mapping[str, Any]:
@@ -80,6 +95,7 @@ class WorkpieceCompliance:
             "thinnest_wall_mm": self.wall,
             "unknowns": self.unknowns,
             "support": None if self.bent is None else self._support(self.bent),
+            **({} if self.strained is None else {"stress_mpa_max": self.strained.stress}),
             **({} if self.modes is None else {"natural_frequencies": self._frequencies(self.modes)}),
         }
 
@@ -159,13 +175,58 @@ def workpiece_compliance(
             progress=lambda done, what: progress(0.9 + 0.05 * done, what),
         )  # fmt: skip
     bent = _bent(found, ahead, grid, build, job) if len(found.worst) else None
+    strained = None
+    if table.yield_mpa is not None and len(found.step):
+        strained = _strained(found, ahead, grid, build, elastic, table.yield_mpa)
     findings: tuple[Finding, ...] = ()
     if found.loose > 1e-6 * stock.volume():
         text = f"{found.loose:.3g} mm3 of the workpiece hang on nothing: they hold no force"
         findings = (Finding("loose-material", 0, text, Severity.UNPROVEN),)
     return WorkpieceCompliance(
-        found, wall, float(grid.size.max()), most[0], float(error + FLOOR + change), change, findings, bent, modes
+        found,
+        wall,
+        float(grid.size.max()),
+        most[0],
+        float(error + FLOOR + change),
+        change,
+        findings,
+        bent,
+        modes,
+        strained,
     )
+
+
+def _strained(
+    found: StepCompliances,
+    ahead: CutAhead,
+    grid: CellGrid,
+    build: Callable[[LayeredStock, CellGrid], CellWorkpiece],
+    elastic: Elastic,
+    strength: float,
+) -> StrainedStep:
+    """The step with the greatest stress among those that bend the workpiece most and those with most force."""
+    lines = ahead.lines
+    order = np.argsort(-size_of(found.compliance) * lines.force, kind="stable")
+    rows = np.unique(np.concatenate([order[:STRAINED], np.argsort(-lines.force, kind="stable")[:STRAINED]]))
+    first = np.array([step for step, _, _ in ahead.stocks])
+    after = np.minimum(np.searchsorted(first, lines.step[rows], side="right"), len(first) - 1)
+    away = float(grid.size.max())
+    best = StrainedStep(int(lines.step[rows[0]]), 0.0, (0.0, 0.0, 0.0), strength)
+    for state in np.unique(after).tolist():
+        work = build(ahead.stocks[state][2], grid)
+        for row in rows[after == state].tolist():
+            one = greatest_stress(work, elastic, lines.lines[row], _force(ahead, row), away)
+            if one.stress > best.stress:
+                x, y, z = one.place.tolist()
+                best = StrainedStep(int(lines.step[row]), one.stress, (x, y, z), strength)
+    return best
+
+
+def _force(ahead: CutAhead, row: int) -> Floats:
+    """(3,) greatest force of a step on the workpiece [N], along the mean of its revolution."""
+    mean = ahead.mean[row]
+    size = float(np.linalg.norm(mean))
+    return np.asarray(-mean * (float(ahead.lines.force[row]) / size if size > 0.0 else 0.0))
 
 
 def _bent(
@@ -177,9 +238,7 @@ def _bent(
 ) -> BentWorkpiece:
     """The workpiece in the state after its worst step, under the force of that step."""
     row, stock = int(found.worst[0]), ahead.stocks[int(found.after[0])][2]
-    mean = ahead.mean[row]
-    size = float(np.linalg.norm(mean))
-    force = -mean * (float(ahead.lines.force[row]) / size if size > 0.0 else 0.0)
+    force = _force(ahead, row)
     away = max(cutter.diameter for cutter in job.cutters.values())
     return bent_workpiece(build(stock, grid), stock, int(found.step[row]), found.lines[row], force, away)
 

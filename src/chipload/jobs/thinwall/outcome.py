@@ -61,6 +61,7 @@ class Finish:
     rigid : (n, m) float [mm], what a rigid cutter leaves: cusps
     made : (n, m) bool, whether a step of the simulation comes to the point
     unsure : (n, m) float, relative error of the compliance by its mesh
+    parameters : (n,), (m,) float, u and v of the points
     """
 
     side: int
@@ -69,6 +70,7 @@ class Finish:
     rigid: Floats
     made: NDArray[np.bool_]
     unsure: Floats
+    parameters: tuple[Floats, Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +134,7 @@ class Variant:
 
     Attributes
     ----------
-    name : ``variable``, ``constant`` or ``unconstrained``
+    name : ``variable``, ``constant``, ``unconstrained``, ``least_error`` or ``compensated``
     program : the whole of it
     commands : on the machine
     beyond : what the machine does not give
@@ -141,6 +143,7 @@ class Variant:
     finish : a finished side each
     shape : the simulated stock beside the finished wall
     stress : greatest equivalent stress at the clamp [MPa] under the simulated forces
+    shift : greatest way [mm] by which the last passes were moved against the form error
     """
 
     name: str
@@ -153,6 +156,7 @@ class Variant:
     finish: tuple[Finish, ...]
     shape: Shape
     stress: float
+    shift: float = 0.0
 
     @property
     def over(self) -> NDArray[np.int64]:
@@ -170,6 +174,12 @@ class Variant:
     def error(self) -> float:
         """Greatest size of the form error by deflection [mm]."""
         return max((float(np.abs(f.error[f.made]).max(initial=0.0)) for f in self.finish), default=0.0)
+
+    @property
+    def error_rms(self) -> float:
+        """Root mean square of the form error by deflection [mm]."""
+        known = np.concatenate([f.error[f.made].ravel() for f in self.finish] or [np.zeros(1)])
+        return float(np.sqrt(np.mean(known**2))) if len(known) else 0.0
 
     @property
     def force(self) -> float:

@@ -44,6 +44,8 @@ TILE = 1.0
 COARSE = 8.0
 #: places of a step at which the wall is judged: its beginning, middle and end
 JUDGED, MIDDLE = (0.0, 0.5, 1.0), 1
+#: variants whose stock is even
+EVEN = ("constant", "unconstrained")
 #: points of a finished side, along and up
 POINTS = (33, 25)
 #: points of the finished wall that the path is held against are so far apart [mm]
@@ -102,12 +104,13 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
     cutter = inputs.cut.cutter
     stock, fine = wall_stock(inputs), resolution_of(inputs, legs)
     bars = {cutter.number: tool_bars(cutter)}
-    law = inputs.depths.law if plan.name == "variable" else inputs.depths.even_law
+    law = inputs.depths.even_law if plan.name in EVEN else inputs.depths.law
     left = [np.full(places.shape, inputs.body.allowance[s]) for s in inputs.body.side_numbers]
     parts: list[dict[str, NDArray[Any]]] = []
     thresholds: list[Floats] = []
     finish: dict[int, Finish] = {}
     time = way = stress = 0.0
+    last = {p.side: k for k, p in enumerate(plan.passes)}
     ends = np.cumsum([len(leg.program) for leg in legs])
     for k, (p, leg, own) in enumerate(zip(plan.passes, legs, np.split(times, ends[:-1]), strict=True)):
         removal = remove(
@@ -137,7 +140,7 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
         columns["pass"] = np.full(len(columns["t_s"]), leg.program.labels[0], dtype=object)
         parts.append(columns)
         stress = max(stress, _stress(inputs, places.coarse(left), number, columns))
-        if float(p.low.max()) <= 1e-9:
+        if k == last[p.side]:
             finish[number] = _finish(inputs, removal, number, C, error, bars)
     whole = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(inputs, stock, legs), stress)
@@ -231,9 +234,8 @@ def _finish(
     inputs: WallInputs, removal: Removal, number: int, C: Floats, error: Floats, bars: Mapping[int, Any]
 ) -> Finish:
     """Form error of a side by its last pass."""
-    u, v = np.meshgrid(
-        np.linspace(0.02, 0.98, POINTS[0]), np.linspace(inputs.body.foot, 1.0, POINTS[1] + 1)[1:], indexing="ij"
-    )
+    parameters = np.linspace(0.02, 0.98, POINTS[0]), np.linspace(inputs.body.foot, 1.0, POINTS[1] + 1)[1:]
+    u, v = np.meshgrid(*parameters, indexing="ij")
     points, normals = inputs.body.shape.sides(u, v)[number], inputs.body.shape.normals(u, v)[number]
     found = form_error(
         removal,
@@ -253,6 +255,7 @@ def _finish(
         found.gap.reshape(shape),
         found.made.reshape(shape),
         unsure.reshape(shape),
+        parameters,
     )
 
 

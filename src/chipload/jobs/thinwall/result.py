@@ -68,7 +68,10 @@ def limits_of(walled: ThinWallResult, one: Variant) -> tuple[LimitCheck, ...]:
     out.append(LimitCheck("stress_mpa", strength, one.stress, state_of(one.stress, strength)[0], one.name))
     gouge, tolerance = max(one.shape.gouge, -one.shape.nearest, 0.0), float(walled.settings["gouge_tolerance_mm"])
     place = (float(one.shape.at[0]), float(one.shape.at[1]), float(one.shape.at[2]))
-    out.append(LimitCheck("gouge_mm", tolerance, gouge, state_of(gouge, tolerance)[0], one.name, place=place))
+    state, why = state_of(gouge, tolerance + one.shift)[0], ""
+    if one.shift > 0.0 and state is Verdict.HOLDS:
+        state, why = Verdict.UNPROVEN, "the path is moved: it is compared within its greatest shift only"
+    out.append(LimitCheck("gouge_mm", tolerance + one.shift, gouge, state, one.name, place=place, reason=why))
     return (*out, *default_limits(walled.checks, walled.planning.machine, c, one.name, {}))
 
 
@@ -187,6 +190,7 @@ def _variant(one: Variant) -> dict[str, Any]:
         "time_min": one.seconds / 60.0,
         "deflection_workpiece_um_max": 1000.0 * one.deflection,
         "form_error_um_max": 1000.0 * one.error,
+        "form_error_um_rms": 1000.0 * one.error_rms,
         "force_normal_n_max": one.force,
         "order": one.plan.order,
         "passes_in_the_other_order": one.plan.passes_otherwise,
@@ -225,6 +229,7 @@ def _variant(one: Variant) -> dict[str, Any]:
         "scallop_um_max": 1000.0 * max((float(f.rigid[f.made].max(initial=0.0)) for f in one.finish), default=0.0),
         "steps": len(c["line"]),
         "program": program_name(0, one.name),
+        "moved_um_max": 1000.0 * one.shift,
     }
 
 

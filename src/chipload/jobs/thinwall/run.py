@@ -14,6 +14,7 @@ from chipload.cutting.material import beyond
 from chipload.errors import Finding, InputError, Severity
 from chipload.jobs.checks import default_checks
 from chipload.jobs.provenance import provenance_of, title_of
+from chipload.jobs.thinwall.comparison import compensated, least_error
 from chipload.jobs.thinwall.inputs import WallInputs, read_wall
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.outcome import (
@@ -62,6 +63,9 @@ ROUNDS = 3
 TRIES = 6
 #: these are held to this share of what would just do
 HOLD = 0.97
+#: share of the limit that a plan is to use; one that uses less is raised to this share of it, with its error, and
+#: simulated, in so many turns at most
+USED_SHARE, FULL, RAISES = 0.95, 0.99, 4
 #: a plan is worth another simulation if it takes at most this share of the best one's time
 FASTER = 0.97
 #: constant depths that are simulated at most, until one holds
@@ -90,7 +94,7 @@ def run(job: ThinWallJob, progress: Progress = silent) -> ThinWallResult:
     free = tried.prove(_unlimited(tried.places), 0.25)
     constant, corrections = _constant(tried, free)
     variable = _variable(tried, corrections)
-    made = {"variable": variable, "constant": constant, "unconstrained": free}
+    made = {"variable": variable, "constant": constant, "unconstrained": free, **_compared(tried, variable, constant)}
     progress(1.0, "proved")
     body, finished = inputs.stock_mesh(), inputs.finished_mesh()
     text = inputs.finished_threshold()
@@ -203,6 +207,8 @@ class _Tried:
         self.places, self.progress = places, progress
         self.done = PLANNING
         self.variable = 0
+        self.planned: dict[str, Planned] = {}
+        self.corrections: tuple[Floats, ...] = ()
 
     def prove(self, planned: Planned, share: float) -> Variant:
         """Write and simulate a plan, which takes this share of what is left to do."""
@@ -265,7 +271,7 @@ def _variable(tried: _Tried, corrections: tuple[Floats, ...]) -> Variant:
     modelled, held = inputs.depths.experiments is None, inputs.depths.deflection
     best: Variant | None = None
     least: list[tuple[float, Variant]] = []  # of those that exceed, the one that exceeds least
-    share = 1.0
+    share, raised = 1.0, False
     for turn in range(TRIES):
         threshold_of = (
             places.threshold(share * held, inputs.depths.factor)
@@ -275,25 +281,51 @@ def _variable(tried: _Tried, corrections: tuple[Floats, ...]) -> Variant:
         planned = limited_to(
             places.surfaces, threshold_of, inputs.depths.law, inputs.depths.slope, share * held, corrections
         )
-        if best is not None and _seconds(places, planned) > FASTER * best.seconds:
+        if best is not None and not raised and _seconds(places, planned) > FASTER * best.seconds:
             break
         one = tried.prove(planned, 0.4)
         # with the error of the mesh, as the limit is checked
         unsure = one.columns["compliance_error"] if modelled else 0.0
         over = float((one.columns["force_over_allowable"] * (1.0 + unsure)).max())
         good = not len(one.over) and over <= (1.0 if modelled else 1.0 + OVER)
-        if good:
-            best = one
-        else:
+        if good and (best is None or one.seconds < best.seconds):
+            best, tried.planned["variable"], tried.corrections = one, planned, corrections
+        elif not good:
             least = [min([*least, (over, one)], key=lambda pair: pair[0])]
-        if best is not None and turn >= ROUNDS - 1:
+        used = best is not None and (not modelled or best.deflection >= USED_SHARE * held)
+        if best is not None and turn >= ROUNDS - 1 and (used or turn >= RAISES):
             break
         measured = _measured(places, one, inputs.depths.law, corrections)
         if not good:
             measured = tuple(np.maximum(c, m) for c, m in zip(corrections, measured, strict=True))
             share *= HOLD / over if turn >= ROUNDS - 1 else 1.0
+        # what is left of the limit is used
+        raised = good and not used
+        share *= FULL / over if raised else 1.0
         corrections = measured
-    return best if best is not None else least[0][1]
+    if best is not None:
+        return best
+    tried.planned["variable"], tried.corrections = planned, corrections
+    return least[0][1]
+
+
+def _compared(tried: _Tried, variable: Variant, constant: Variant) -> dict[str, Variant]:
+    """Variants that the job asks for beside the three."""
+    places, op, out = tried.places, tried.places.inputs.job.operation, {}
+    if op.least_error:
+        out["least_error"] = least_error(
+            places, tried.corrections, constant.seconds, lambda planned: _seconds(places, planned),
+            lambda planned: tried.prove(planned, 0.4),
+        )  # fmt: skip
+    if op.compensate_um is not None:
+        out["compensated"] = compensated(
+            places,
+            tried.planned["variable"],
+            variable,
+            1e-3 * op.compensate_um,
+            lambda planned: tried.prove(planned, 0.4),
+        )
+    return out
 
 
 def _seconds(places: Places, planned: Planned) -> float:

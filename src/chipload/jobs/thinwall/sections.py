@@ -36,8 +36,9 @@ def sections_of(walled: ThinWallResult, figures: dict[str, go.Figure]) -> list[s
         f'<p class="note">{escape(", ".join(f"{k} {value_text(v)}" for k, v in walled.settings.items()))}</p>',
         "<h3>Variants</h3>",
         '<p class="note">Variable: the greatest depth that each place allows. Constant: one depth everywhere '
-        "under the same limit. Unconstrained: the greatest depth, whatever the deflection. Numbers are those of the "
-        "simulation; the time is that of the machine.</p>",
+        "under the same limit. Unconstrained: the greatest depth, whatever the deflection. Least error: variable "
+        "depths in the time of the constant one. Compensated: the variable plan, its last passes moved against the "
+        "form error. Numbers are those of the simulation; the time is that of the machine.</p>",
         _variants(walled),
         figure("bars", _bars(walled), figures),
         "<h3>Allowable normal force</h3>",
@@ -87,7 +88,15 @@ def sections_of(walled: ThinWallResult, figures: dict[str, go.Figure]) -> list[s
 
 
 def _variants(walled: ThinWallResult) -> str:
-    head = ["variant", "passes", "time [min]", "workpiece deflection [µm]", "form error [µm]", "force [N]"]
+    head = [
+        "variant",
+        "passes",
+        "time [min]",
+        "workpiece deflection [µm]",
+        "form error [µm]",
+        "its rms [µm]",
+        "force [N]",
+    ]
     head += ["force over allowable", "stress [MPa]", "limits", "program"]
     rows = []
     for name, one in walled.variants.items():
@@ -101,6 +110,7 @@ def _variants(walled: ThinWallResult) -> str:
                 f"{one.seconds / 60.0:.4g}",
                 f"{1000.0 * one.deflection:.4g}",
                 f"{1000.0 * one.error:.4g}",
+                f"{1000.0 * one.error_rms:.4g}",
                 f"{one.force:.4g}",
                 f"{one.columns['force_over_allowable'].max(initial=0.0):.3f}",
                 f"{one.stress:.4g}",
@@ -108,7 +118,7 @@ def _variants(walled: ThinWallResult) -> str:
                 f"<code>{program_name(0, name)}</code>" + (" verified" if name == USED and not bad else ""),
             ]
         )
-    return table(head, rows, numbers=(1, 2, 3, 4, 5, 6, 7), used=[name == USED for name in walled.variants])
+    return table(head, rows, numbers=(1, 2, 3, 4, 5, 6, 7, 8), used=[name == USED for name in walled.variants])
 
 
 def _bars(walled: ThinWallResult) -> go.Figure:

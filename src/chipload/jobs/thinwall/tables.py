@@ -137,6 +137,10 @@ class WallOperationTable(Table):
     clearance_mm: Positive = Field(description="from the surface between two pieces of the path")
     step_mm: Positive = Field(le=10.0, description="from contact point to contact point, a step of the simulation")
     chord_mm: Positive = Field(0.005, le=0.1, description="how far rows may leave the surface between contact points")
+    least_error: bool = Field(False, description="also plan the least form error in the time of the constant depth")
+    compensate_um: Positive | None = Field(
+        None, le=200.0, description="also move the last passes against their form error, by at most this"
+    )
     layer_mm: Positive = Field(le=1.0, description="thickness of the layers of the simulation")
     tolerance_mm: Positive = Field(0.001, le=0.05, description="how far chords may leave the edges of chips")
     corner_slices: Count = Field(48, le=400, description="slices of the corner radius in the simulation")

@@ -16,7 +16,8 @@ from chipload.report.shape import thinned
 
 Floats = NDArray[np.float64]
 
-COLOURS = {"variable": "#0b7a75", "constant": "#3457a6", "unconstrained": "#c9821a"}
+COLOURS = {"variable": "#0b7a75", "constant": "#3457a6", "unconstrained": "#c9821a", "least_error": "#7a4fa3",
+           "compensated": "#b3437d"}  # fmt: skip
 #: blue where material is left, red where it is cut away, white where neither
 BOTH = [[0.0, "#b3261e"], [0.5, "#ffffff"], [1.0, "#3457a6"]]
 SIDE_NAMES = ("side 1, towards +y", "side 2, towards -y")
@@ -102,7 +103,7 @@ def along(walled: ThinWallResult) -> go.Figure:
         ("deflection_cutter_um", 1.0, "cutter deflection [µm]", None),
     )
     out = make_subplots(rows=len(rows), cols=1, shared_xaxes=True, vertical_spacing=0.03)
-    for name in ("unconstrained", "constant", "variable"):
+    for name in ("unconstrained", "constant", "least_error", "compensated", "variable"):
         if name not in walled.variants:
             continue
         c = walled.variants[name].columns

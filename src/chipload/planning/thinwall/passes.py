@@ -124,7 +124,8 @@ def _ones(surfaces: Sequence[FinishSurface], corrections: Sequence[Floats] | Non
     return tuple(corrections)
 
 
-def _made(side: int, low: Floats, high: Floats, threshold: Threshold, law: ForceTable, c: Floats) -> WallPass:
+def planned_pass(side: int, low: Floats, high: Floats, threshold: Threshold, law: ForceTable, c: Floats) -> WallPass:
+    """A pass from the stock before it to that after it, with the force that is planned there."""
     depth = high - low
     force = np.where(depth > NOTHING, c * law.force(np.maximum(depth, NOTHING)), 0.0)
     return WallPass(side, low, high, threshold, force, force > threshold.force.reshape(low.shape) * (1.0 + 1e-9))
@@ -182,7 +183,7 @@ def variable(
             infeasible |= {(side, int(i), int(j)) for i, j in np.argwhere(weak)}
             depth = lower_envelope(surfaces[side].points, np.maximum(depth, law.limits.smallest), slope)
             high = _no_sliver(D[side], D[side] + depth, a, law.limits.smallest)
-            done.append(_made(side, D[side], high, threshold, law, c[side]))
+            done.append(planned_pass(side, D[side], high, threshold, law, c[side]))
             D[side] = high
             progress(
                 min(float(np.mean([(d / s.allowance).mean() for d, s in zip(D, surfaces, strict=True)])), 1.0), "passes"
@@ -235,6 +236,6 @@ def constant(
     done = []
     for k, side in turns:
         high = np.full_like(D[side], surfaces[side].allowance * (k + 1) / number[side])
-        done.append(_made(side, D[side], high, threshold_of(D, side), law, c[side]))
+        done.append(planned_pass(side, D[side], high, threshold_of(D, side), law, c[side]))
         D[side] = high
     return Plan(name, tuple(reversed(done)), (), c)

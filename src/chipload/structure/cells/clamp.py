@@ -102,9 +102,11 @@ def clamp_stiffness(
         volume = float(moments[..., 0, 0, 0].sum() * np.prod(grid.size) / 8.0)
         if not volume > 0.0:
             x0, y0, x1, y1 = clamp.region.outline.bounds
+            cut = first is not None and first[k] > 0.0
             raise InputError(
-                f"{clamp.name}: holds nothing: no stock between ({x0:g}, {y0:g}, {clamp.region.low:g}) and "
-                f"({x1:g}, {y1:g}, {clamp.region.high:g}) mm: place it on the stock"
+                f"{clamp.name}: holds nothing{' after the program has cut it away' if cut else ''}: no stock between "
+                f"({x0:g}, {y0:g}, {clamp.region.low:g}) and ({x1:g}, {y1:g}, {clamp.region.high:g}) mm: place it on "
+                f"{'what is left of the stock' if cut else 'the stock'}"
             )
         held = np.diag(clamp.directions.astype(np.float64))
         size = float(grid.size.min())

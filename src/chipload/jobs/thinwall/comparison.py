@@ -1,0 +1,132 @@
+"""What a plan is compared with, where the job asks for it: the least form error in the same time, a moved path.
+
+The variable plan takes less time at one deflection. Its dual has the time of the constant plan and spends it on less
+form error, which is that of the last pass of each side: that pass is held to ever smaller shares of the limit, until
+the time is spent. Places that bear not even that get the smallest depth, whose edge force rules.
+
+Compensation moves the last pass of each side by the form error that is predicted for it, to the other side (mirrored),
+by no more than is stated; it is simulated, and moved again by what was found. What remains is the error less the way
+that the path was moved. The cut is that much deeper than planned, so that force and deflection are found too great
+rather than too small: a real wall yields, and is cut less deep.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
+
+from chipload.jobs.thinwall.outcome import Finish, Variant
+from chipload.jobs.thinwall.places import Places
+from chipload.planning.thinwall.passes import NOTHING, planned_pass
+from chipload.planning.thinwall.threshold import Threshold
+from chipload.planning.thinwall.variants import PlannedVariant, limited_to
+
+Floats = NDArray[np.float64]
+
+#: shares of the deflection limit that the last passes of the plan of least error are held to, one after the other
+SHARES = (1.0, 0.85, 0.72, 0.6, 0.5, 0.42, 0.35)
+#: times that a path is moved and simulated
+MOVES = 2
+
+
+def least_error(
+    places: Places,
+    corrections: tuple[Floats, ...],
+    seconds: float,
+    time_of: Callable[[PlannedVariant], float],
+    prove: Callable[[PlannedVariant], Variant],
+) -> Variant:
+    """Variable depths with the least form error in a time.
+
+    Parameters
+    ----------
+    corrections : of the law's forces
+    seconds : that it may take
+    time_of : time of a plan [s]
+    prove : writes and simulates one
+    """
+    inputs = places.inputs
+    limited = places.threshold(inputs.depths.deflection, inputs.depths.factor)
+
+    def planned(share: float) -> PlannedVariant:
+        def threshold_of(left: Sequence[Floats], side: int) -> Threshold:
+            found = limited(left, side)
+            last = float(left[side].max()) <= NOTHING
+            return replace(found, force=share * found.force, factor=share * found.factor) if last else found
+
+        return limited_to(
+            places.surfaces, threshold_of, inputs.depths.law, inputs.depths.slope, inputs.depths.deflection, corrections
+        )
+
+    best = planned(SHARES[0])
+    for share in SHARES[1:]:
+        one = planned(share)
+        if time_of(one) > seconds:
+            break
+        best = one
+    return prove(replace(best, plan=replace(best.plan, name="least_error")))
+
+
+def compensated(
+    places: Places, planned: PlannedVariant, before: Variant, most: float, prove: Callable[[PlannedVariant], Variant]
+) -> Variant:
+    """A plan whose last passes are moved against their form error.
+
+    Parameters
+    ----------
+    planned, before : the plan, and what its simulation found
+    most : [mm] by which the path may be moved
+    prove : writes and simulates a plan
+    """
+    error = before.finish
+    found: list[Variant] = []
+    for _ in range(MOVES):
+        shift = [_shift(places, error, side, most) for side in range(len(places.surfaces))]
+        one = prove(_moved(places, planned, shift))
+        error = one.finish
+        left = tuple(_remaining(places, f, shift) for f in one.finish)
+        found.append(replace(one, finish=left, shift=max(float(np.abs(o).max()) for o in shift)))
+    return min(found, key=lambda one: one.error)
+
+
+def _between(at: tuple[Floats, Floats], values: Floats, to: tuple[Floats, Floats]) -> Floats:
+    """Bilinear values at other parameters; beyond the outermost ones theirs."""
+    inner = [np.clip(x, own[0], own[-1]) for x, own in zip(to, at, strict=True)]
+    found = RegularGridInterpolator(at, values)(np.stack(np.meshgrid(*inner, indexing="ij"), axis=-1))
+    return np.asarray(found, dtype=np.float64)
+
+
+def _side(places: Places, finish: Finish) -> int:
+    """Number of a finished side among those with stock."""
+    return places.inputs.body.side_numbers.index(finish.side)
+
+
+def _shift(places: Places, finish: Sequence[Finish], side: int, most: float) -> Floats:
+    """(n, m) float [mm] by which the path of a side is moved into the wall, at the places."""
+    for f in finish:
+        if _side(places, f) == side:
+            known = np.where(f.made, f.error, 0.0)
+            return np.clip(_between(f.parameters, known, places.grid), -most, most)
+    return np.zeros(places.shape)
+
+
+def _moved(places: Places, planned: PlannedVariant, shift: Sequence[Floats]) -> PlannedVariant:
+    """The plan with the last pass of each side moved."""
+    plan, law = planned.plan, places.inputs.depths.law
+    passes = [
+        planned_pass(p.side, p.low - shift[p.side], p.high, p.threshold, law, plan.corrections[p.side])
+        if float(p.low.max()) <= NOTHING
+        else p
+        for p in plan.passes
+    ]
+    return replace(planned, plan=replace(plan, name="compensated", passes=tuple(passes)))
+
+
+def _remaining(places: Places, finish: Finish, shift: Sequence[Floats]) -> Finish:
+    """A finished side with the error that is left of a moved path."""
+    moved = _between(places.grid, shift[_side(places, finish)], finish.parameters)
+    return replace(finish, error=finish.error - moved, rigid=finish.rigid + moved)
