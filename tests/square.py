@@ -10,7 +10,7 @@ import trimesh
 from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding, Severity
 from chipload.report.presentation import Blank
-from chipload.report.removal import removal_bytes
+from chipload.report.removal import removal_bytes, removal_meshes
 from chipload.result import LimitCheck, Provenance, Result, Track, TrackKind, Verdict, in_memory
 from chipload.result.history import write_history
 from chipload.result.summary import summary_bytes
@@ -145,5 +145,6 @@ def make_cut_result(folder: Path) -> Path:
         box.visual.face_colors = colour
         made.add_geometry(box, node_name=name, geom_name=name)
     (folder / "scene.glb").write_bytes(made.export(file_type="glb", extension_webp=False))
-    (folder / "removal.npz").write_bytes(removal_bytes(result, {"program": Blank(STOCK, {1: MILL})}))
+    blanks = {"program": Blank(STOCK, {1: MILL})}
+    (folder / "removal.npz").write_bytes(removal_bytes(result, removal_meshes(result, blanks), blanks))
     return folder

@@ -8,29 +8,34 @@ Needs Chromium and playwright, and as long as the examples take. Look at what ch
 from __future__ import annotations
 
 import argparse
+import re
+import signal
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Browser, Page, sync_playwright
 
 from chipload.examples import copy_example
 
 DOCS = Path(__file__).parent.parent / "docs"
 CHROMIUM = "/usr/bin/chromium"
+FLAGS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox")
 #: figures of the report side by side, each with width and height [pixels]; none: the top of the report
 FIGURES: dict[str, tuple[tuple[str, int, int], ...]] = {
     "contour": (("along-0", 860, 760),),
     "feeds": (("feeds", 1000, 760),),
     "chatter": (("stability", 500, 460), ("margin", 500, 460)),
-    "bracket": (("part", 450, 520), ("loads", 550, 860)),
+    "bracket": (("view3d", 620, 640), ("loads", 500, 860)),
     "part": (("bent", 700, 480),),
     "tube": (("path", 900, 860),),
     "cone": (("allowable", 900, 380),),
     "plate": (("depth", 940, 520),),
     "blade": (("space", 940, 560),),
 }
+#: the picture of the page, and the example that it shows
+PAGE, SHOWN = "page", "bracket"
 #: moves figures into a sheet of their own, above the page
 SHEET = """(wanted) => {
     const sheet = document.createElement('div');
@@ -48,6 +53,7 @@ SHEET = """(wanted) => {
 RESIZE = """async (wanted) => {
     for (const [name, width, height] of wanted) {
         const figure = document.getElementById(name);
+        if (!figure.data) continue;
         await Plotly.newPlot(figure, figure.data, {...figure.layout, width, height}, {displayModeBar: false});
     }
 }"""
@@ -69,24 +75,50 @@ def photograph(page: Page, report: Path, name: str) -> None:
     page.locator("#sheet").screenshot(path=out)
 
 
+def photograph_page(chromium: Browser, folder: Path) -> None:
+    """Write docs/page.png: the page of a result."""
+    words = [sys.executable, "-m", "chipload", "view", str(folder), "--no-open"]
+    server = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    try:
+        assert server.stdout is not None
+        address = next(found[0] for line in server.stdout if (found := re.search(r"http://\S+", line)))
+        page = chromium.new_page(viewport={"width": 1280, "height": 720})
+        page.set_default_timeout(120_000)
+        page.goto(f"{address}&show=result")
+        page.wait_for_selector(".cv-ramp")
+        page.wait_for_selector(".cl-now")
+        page.wait_for_timeout(4000)
+        page.screenshot(path=DOCS / f"{PAGE}.png")
+        page.close()
+    finally:
+        server.send_signal(signal.SIGINT)
+        server.wait(30)
+
+
 def main() -> int:
     """Run the examples and make their pictures."""
     parser = argparse.ArgumentParser(description="Make the pictures of the documentation anew.")
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(FIGURES)}")
-    names = parser.parse_args().names or list(FIGURES)
-    unknown = set(names) - set(FIGURES)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join((PAGE, *FIGURES))}")
+    names = parser.parse_args().names or [PAGE, *FIGURES]
+    unknown = set(names) - {PAGE, *FIGURES}
     if unknown:
-        parser.error(f"{', '.join(sorted(unknown))}: must be of {', '.join(FIGURES)}")
+        parser.error(f"{', '.join(sorted(unknown))}: must be of {', '.join((PAGE, *FIGURES))}")
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=["--use-gl=angle", "--no-sandbox"])
+        chromium = playwright.chromium.launch(
+            executable_path=CHROMIUM,
+            args=list(FLAGS),
+        )
         page = chromium.new_page(viewport={"width": 860, "height": 1266})
         for name in names:
-            job = copy_example(name, Path(folder) / name)
+            job = copy_example(SHOWN if name == PAGE else name, Path(folder) / name)
             words = [sys.executable, "-m", "chipload", "run", str(job / "job.toml"), "--out", str(job / "result")]
             code = subprocess.run(words, check=False).returncode
             if code not in (0, 3):
                 return code
-            photograph(page, job / "result" / "report.html", name)
+            if name == PAGE:
+                photograph_page(chromium, job)
+            else:
+                photograph(page, job / "result" / "report.html", name)
             print(f"docs/{name}.png", flush=True)
         chromium.close()
     return 0

@@ -29,7 +29,7 @@ function face(text: string, colour: string): THREE.Texture {
 }
 
 /** How far a side's letters are turned so that they stand upright where z is up. */
-const TURNS = [Math.PI / 2, -Math.PI / 2, Math.PI, 0, Math.PI / 2, Math.PI / 2];
+const TURNS = [Math.PI / 2, -Math.PI / 2, Math.PI, 0, 0, 0];
 
 export class ViewCube {
   private readonly scene = new THREE.Scene();

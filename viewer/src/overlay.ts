@@ -20,7 +20,14 @@ const STYLE = `
 .cv-tip { display: none; white-space: pre; font-size: 11.5px; font-variant-numeric: tabular-nums; z-index: 3; }
 .cv-note { left: 50%; top: 46px; transform: translateX(-50%); color: #b01818; font-weight: 600; max-width: 70%; }
 .cv-note:empty { display: none; }
-@media (max-width: 600px) { .cv-bar { min-width: 120px; max-width: 46%; } .cv-scale { display: none; } }
+.cv-box { height: 520px; border: 1px solid #d9dde2; }
+.cv-controls { display: flex; flex-wrap: wrap; gap: 4px 12px; align-items: center; padding: 4px 0; font-size: 13px; }
+.cv-controls button, .cv-controls select { font: inherit; padding: 3px 10px; }
+.cv-controls input[type=range] { flex: 1; min-width: 160px; }
+.cv-print { display: none; width: 100%; }
+@media print { .cv-box, .cv-controls { display: none; } .cv-print { display: block; } }
+@media (max-width: 600px) { .cv-bar { min-width: 120px; max-width: 46%; } .cv-scale { display: none; }
+  .cv-note { top: auto; bottom: 84px; left: 4px; transform: none; max-width: 68%; } }
 `;
 
 export function number(x: number): string {

@@ -4,7 +4,7 @@ import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { HIT, Solid, Tool } from "./bodies";
 import { SIZE, ViewCube } from "./cube";
-import { Colouring, Document, Header, Mark, Rgb, fetched, unpacked } from "./document";
+import { Colouring, Document, Header, Mark, Rgb, fetched } from "./document";
 import { Overlay, number } from "./overlay";
 import { ToolPath, coloured } from "./path";
 import { Stock } from "./stock";
@@ -427,7 +427,7 @@ const views = new Map<string, View>();
 export function of(id: string): View {
   const host = document.getElementById(id)!;
   let view = views.get(id);
-  if (!view || view.host !== host) views.set(id, (view = new View(host)));
+  if (!view || !host.contains(view.host)) views.set(id, (view = new View(host)));
   return view;
 }
 
@@ -440,9 +440,14 @@ export async function paint(id: string, url: string): Promise<void> {
   view.colour(doc, doc.header.colouring);
 }
 
-/** Show a document that the page itself holds as text. */
-export async function unpack(id: string, text: string): Promise<View> {
-  const doc = await unpacked(text), view = of(id);
-  view.load(doc);
-  return view;
+/** Fill an element with the view of a document that is held as text, and its controls. */
+export async function report(id: string, text: string): Promise<void> {
+  const host = document.getElementById(id)!;
+  try {
+    const { panel } = await import("./panel");
+    const view = await panel(host, text);
+    views.set(id, view);
+  } catch (e) {
+    host.textContent = `The 3D view cannot be shown: ${e instanceof Error ? e.message : e}`;
+  }
 }

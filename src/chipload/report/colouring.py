@@ -39,26 +39,31 @@ def lowest_limit(limits: Sequence[LimitCheck], column: str) -> LimitCheck | None
     return min((c for c in limits if c.column.name == column), key=lambda c: c.limit, default=None)
 
 
-def drawn_rows(path: ViewPath, values: Floats) -> Ints:
+def drawn_rows(path: ViewPath, values: Floats, points: int = POINTS) -> Ints:
     """(m,) rows that a drawn path goes through: extremes of place and value, and where it breaks."""
     n = len(path.t)
-    if n <= POINTS:
+    if n <= points:
         return np.arange(n)
     filled = np.where(np.isfinite(values), values, 0.0)
-    keep = [thinned(path.place[:, k], POINTS // 4) for k in range(3)] + [thinned(filled, POINTS // 4)]
+    keep = [thinned(path.place[:, k], points // 4) for k in range(3)] + [thinned(filled, points // 4)]
     gaps = np.flatnonzero(path.apart)
-    if len(gaps) <= POINTS:
+    if len(gaps) <= points:
         keep += [gaps, gaps - 1]
     return np.unique(np.concatenate(keep))
 
 
 def colouring_of(
-    column: str, values: Floats, path: ViewPath, check: LimitCheck | None, removal: RemovalMesh | None
+    column: str,
+    values: Floats,
+    path: ViewPath,
+    check: LimitCheck | None,
+    removal: RemovalMesh | None,
+    points: int = POINTS,
 ) -> Colouring:
-    """The colours of a column of numbers."""
+    """The colours of a column of numbers; the path is drawn through about ``points`` rows at most."""
     known = COLUMNS.get(column)
     label, unit = (known.label, known.unit) if known is not None else (column.replace("_", " "), "")
-    rows = drawn_rows(path, values)
+    rows = drawn_rows(path, values, points)
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
     above = beyond(values, check) if check is not None else np.zeros(len(values), dtype=np.bool_)

@@ -10,6 +10,7 @@ import contextlib
 import json
 import os
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import IO
 
@@ -18,7 +19,8 @@ from chipload.files import cannot_write, exchanged, fresh_folder, read_regular, 
 from chipload.progress import Progress, silent
 from chipload.report.page import page_bytes
 from chipload.report.presentation import Content, Presentation
-from chipload.report.removal import REMOVAL, removal_bytes
+from chipload.report.removal import REMOVAL, removal_bytes, removal_meshes
+from chipload.report.view_section import view_section
 from chipload.result import Result
 from chipload.result.history import maps_bytes, write_history
 from chipload.result.load import HISTORY, MAPS, SUMMARY
@@ -108,15 +110,16 @@ def write_result(result: Result, presentation: Presentation, out: str | Path, pr
     def history(file: IO[bytes]) -> None:
         rows.update(write_history(result, file))
 
+    scene, blanks = cache(presentation.scene), presentation.blanks()
+    meshes = cache(lambda: removal_meshes(result, blanks))
     makers: Makers = [
         (HISTORY, lambda: history),
         (SUMMARY, lambda: summary_bytes(result, rows)),
-        ("scene.glb", presentation.scene),
-        ("report.html", lambda: page_bytes(result, presentation)),
+        ("scene.glb", scene),
+        ("report.html", lambda: page_bytes(result, presentation, view_section(result, scene(), meshes(), blanks))),
     ]
-    blanks = presentation.blanks()
     if blanks:
-        makers.append((REMOVAL, lambda: removal_bytes(result, blanks)))
+        makers.append((REMOVAL, lambda: removal_bytes(result, meshes(), blanks)))
     if result.maps:
         makers.append((MAPS, lambda: maps_bytes(result)))
     return write_files(makers, out, presentation.files, progress=progress)

@@ -20,7 +20,7 @@ COLLISION = "collision"
 def marks_of(
     result: Result, track: Track, row: Callable[[LimitCheck | Finding], int | None], place: NDArray[np.float64]
 ) -> tuple[ViewMark, ...]:
-    """The marks of a track, the worst limit first, then collisions, the deepest first.
+    """The marks of a track: collisions, the deepest first, then limits, the worst first.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def marks_of(
         if k is not None:
             touched.append(_collision(result, track, f, k, place))
     touched.sort(key=lambda m: -m.depth_mm)
-    return (*out, *touched[:MARKED])
+    return (*touched[:MARKED], *out)
 
 
 def _collision(result: Result, track: Track, f: Finding, k: int, place: NDArray[np.float64]) -> ViewMark:

@@ -6,7 +6,7 @@ not checked, and where the numbers come from.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from html import escape
 
@@ -15,6 +15,8 @@ import plotly.graph_objects as go
 from chipload.errors import Finding, Severity
 from chipload.report.presentation import Presentation
 from chipload.report.sheet import definitions, framed, heading, items, table
+from chipload.report.view import viewer_script
+from chipload.report.view_section import DATA, VIEW
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict
 
 #: findings and limits that the report lists
@@ -34,8 +36,8 @@ HEADINGS = {
 }
 
 
-def page_bytes(result: Result, presentation: Presentation) -> bytes:
-    """report.html."""
+def page_bytes(result: Result, presentation: Presentation, view: Sequence[str] = ()) -> bytes:
+    """report.html; ``view``: HTML of the 3D view, empty: it has none."""
     figures: dict[str, go.Figure] = {}
     verdict = result.verdict
     body = [
@@ -43,6 +45,7 @@ def page_bytes(result: Result, presentation: Presentation) -> bytes:
         "<h2>Limits</h2>",
         *limits_table(result.tracks),
         *tracks_table(result.tracks),
+        *view,
         *presentation.sections(figures),
         *findings_table("Findings", _findings(result)),
         "<h2>Not checked</h2>",
@@ -50,7 +53,8 @@ def page_bytes(result: Result, presentation: Presentation) -> bytes:
         "<h2>Provenance</h2>",
         definitions(asdict(result.provenance)),
     ]
-    return framed(result.title, verdict.value, body, figures)
+    shown = (VIEW, DATA, viewer_script()) if view else None
+    return framed(result.title, verdict.value, body, figures, shown)
 
 
 def limits_table(tracks: Iterable[Track]) -> list[str]:

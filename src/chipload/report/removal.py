@@ -70,11 +70,11 @@ def breaks(place: Floats, s: NDArray[Any] | None) -> NDArray[np.bool_]:
     return np.asarray(apart & (np.arange(len(place)) > 0))
 
 
-def removal_bytes(result: Result, blanks: Mapping[str, Blank]) -> bytes:
+def removal_bytes(result: Result, meshes: Mapping[int, RemovalMesh], blanks: Mapping[str, Blank]) -> bytes:
     """The file: the stock of each track, and the parts of its cutters."""
     sink = io.BytesIO()
     arrays: dict[str, NDArray[Any]] = {}
-    for k, mesh in removal_meshes(result, blanks).items():
+    for k, mesh in meshes.items():
         arrays |= {f"{k}-{name}": getattr(mesh, name) for name in ARRAYS}
         for number, cutter in blanks[result.tracks[k].name].cutters.items():
             for n, (kind, profile) in enumerate(parts_of(cutter)):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import json
+import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
@@ -45,6 +47,18 @@ code { font: 12.5px ui-monospace, "DejaVu Sans Mono", monospace; }
 .figure { width: 100%; margin: 4px 0 6px; }
 @media print { body { background: white; } main { max-width: none; padding: 0; } .figure, table { break-inside: avoid; }
   h2, h3 { break-after: avoid; } }
+@media (max-width: 760px) { main { padding: 12px 10px 32px; } table { display: block; overflow-x: auto; }
+  .figure { max-width: 100%; overflow: hidden; } dl { display: block; } dd { margin: 0 0 6px 12px; } }
+"""
+#: unpacks a script that the file holds compressed
+_LIBRARIES = """
+async function library(id) {
+  const data = Uint8Array.from(atob(document.getElementById(id).textContent), c => c.charCodeAt(0));
+  const stream = new Blob([data]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const script = document.createElement("script");
+  script.textContent = await new Response(stream).text();
+  document.head.append(script);
+}
 """
 #: runs in the page: each figure is drawn when it comes near the window, and all of them before printing
 _DRAW = """
@@ -68,20 +82,48 @@ def style() -> str:
     return _STYLE
 
 
-def framed(title: str, word: str, body: Sequence[str], figures: Mapping[str, go.Figure]) -> bytes:
-    """The whole file: ``title: word`` in the window's bar, the body, the figures that are drawn when they are seen."""
+def framed(
+    title: str,
+    word: str,
+    body: Sequence[str],
+    figures: Mapping[str, go.Figure],
+    view: tuple[str, str, str] | None = None,
+) -> bytes:
+    """The whole file: ``title: word`` in the window's bar, the body, the figures that are drawn when they are seen.
+
+    Parameters
+    ----------
+    view : elements of the 3D view and of its document, and the script that shows it; None: there is none
+    """
     # "<" cannot end the element when written as an escape of JSON
     data = json.dumps({k: json.loads(f.to_json()) for k, f in figures.items()}, separators=(",", ":"))
     data = data.replace("<", "\\u003c")
+    wait = 'await library("plotly");' if figures else ""
     html = (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{escape(title)}: {word}</title>"
         f"<style>{_STYLE}</style></head>\n<body><main>\n{chr(10).join(body)}\n</main>\n"
-        f"<script>{get_plotlyjs()}</script>\n"
-        f'<script id="figures" type="application/json">{data}</script>\n<script>{_DRAW}</script>\n</body></html>\n'
+        f"<script>{_LIBRARIES}</script>\n{_shown_view(view)}{_library('plotly', get_plotlyjs()) if figures else ''}"
+        f'<script id="figures" type="application/json">{data}</script>\n'
+        f"<script>(async () => {{ {wait} {_DRAW} }})();</script>\n"
+        "</body></html>\n"
     )
     return html.encode()
+
+
+def _library(name: str, script: str) -> str:
+    """A script, compressed: a browser unpacks it itself."""
+    data = base64.b64encode(zlib.compress(script.encode(), 9)).decode()
+    return f'<script id="{name}" type="text/plain">{data}</script>\n'
+
+
+def _shown_view(view: tuple[str, str, str] | None) -> str:
+    if view is None:
+        return ""
+    place, data, script = view
+    call = f'chiploadViewer.report("{place}", document.getElementById("{data}").textContent)'
+    return _library("viewer", script) + f'<script>library("viewer").then(() => {call});</script>\n'
 
 
 def heading(title: str, banner: str, word: str, message: str) -> list[str]:

@@ -94,7 +94,9 @@ class ViewMark:
 
 @dataclass(frozen=True, eq=False)
 class ViewScene:
-    """All that a view shows: ``cutters`` are parts (kind, profile) by tool number, 0 for every other."""
+    """All that a view shows: ``cutters`` are parts (kind, profile) by tool number, 0 for every other; ``columns`` other
+    colours to choose from.
+    """
 
     title: str
     bodies: Sequence[Body]
@@ -103,6 +105,7 @@ class ViewScene:
     cutters: Mapping[int, Sequence[tuple[str, Floats]]]
     marks: Sequence[ViewMark]
     colouring: Colouring | None
+    columns: Sequence[Colouring] = ()
 
 
 class Buffers:
@@ -120,8 +123,8 @@ class Buffers:
         return out
 
 
-def scene_document(scene: ViewScene) -> bytes:
-    """The document of a scene."""
+def scene_document(scene: ViewScene, kept: int = KEPT) -> bytes:
+    """The document of a scene, with ``kept`` rows of the path at most."""
     out = Buffers()
     path, removal = scene.path, scene.removal
     low, high = _box(scene)
@@ -132,7 +135,7 @@ def scene_document(scene: ViewScene) -> bytes:
         "scale": SCALE,
         "bodies": [_body(body, out) for body in scene.bodies],
         "removal": None if removal is None else _removal(removal, out),
-        "path": _path(path, out),
+        "path": _path(path, out, kept),
         "cutters": {
             str(n): [{"kind": kind, "profile": np.round(p, 6).tolist()} for kind, p in parts]
             for n, parts in scene.cutters.items()
@@ -142,6 +145,7 @@ def scene_document(scene: ViewScene) -> bytes:
             for m in scene.marks
         ],
         "colouring": None if scene.colouring is None else _colouring(scene.colouring, path, out),
+        "columns": [_colouring(c, path, out) for c in scene.columns],
     }
     return _document(header, out)
 
@@ -226,9 +230,9 @@ def _removal(removal: RemovalMesh, out: Buffers) -> dict[str, Any]:
     }
 
 
-def _path(path: ViewPath, out: Buffers) -> dict[str, Any]:
+def _path(path: ViewPath, out: Buffers, kept: int) -> dict[str, Any]:
     n = len(path.t)
-    rows = np.arange(n) if n <= KEPT else np.unique(np.linspace(0, n - 1, KEPT).astype(np.int64))
+    rows = np.arange(n) if n <= kept else np.unique(np.linspace(0, n - 1, kept).astype(np.int64))
     upright = bool((np.abs(path.axis - [0.0, 0.0, 1.0]) < 1e-9).all())
     return {
         "count": n,

@@ -26,7 +26,7 @@ Ints = NDArray[np.int64]
 #: cells along the longest side of the stock, and of the smallest cutter's diameter, at most
 LONGEST, ACROSS = 200, 32
 #: cells of a stock, and rays times poses, at most
-CELLS, WORK = 1_500_000, 30_000_000
+CELLS, WORK = 1_500_000, 12_000_000
 #: frames at most; distance of two instants in radii of the cutter, turn of the path or the axis between them [rad]
 FRAMES, APART, TURN = 320, 0.3, 0.03
 

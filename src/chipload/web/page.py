@@ -56,7 +56,7 @@ class Page:
         self.own: Run | None = None
         self.seen: Run | None = runs.now if runs.now is not None and runs.now.over else None
         ui.add_css(resources.files(__package__).joinpath("page.css").read_text("utf-8"))
-        ui.add_head_html('<script src="/viewer.js"></script>')
+        ui.add_head_html('<script>document.documentElement.lang = "en"</script><script src="/viewer.js"></script>')
         ui.colors(primary="#2f5d8a")
         with ui.element("div").classes("cl-page"):
             self._header()
@@ -98,6 +98,7 @@ class Page:
             self.stage.set_visibility(True)
             title = result.result.title or "result"
             self.title.set_text(title)
+            ui.page_title(f"{result.result.verdict.value}: {title} - chipload")
             self.name.set_text(self._called(name))
             options = {k: t.title for k, t in enumerate(result.tracks)}
             self.tracks.set_options(options, value=0)
@@ -117,10 +118,10 @@ class Page:
     def _header(self) -> None:
         with ui.element("div").classes("cl-header"):
             _button("Open", self._open, "folder_open").mark("open")
-            self.title = ui.label("chipload").classes("cl-name")
+            self.title = ui.label("chipload").classes("cl-name").props("role=heading aria-level=1")
             self.name = ui.label("").classes("cl-path")
             self.tracks = ui.select({0: ""}, value=0, on_change=self._tracked).props(
-                "dense options-dense outlined hide-bottom-space"
+                'dense options-dense outlined hide-bottom-space aria-label="track"'
             ).classes("cl-tracks").mark("track")  # fmt: skip
             self.tracks.on("popup-hide", js_handler=RELEASE)
             self.tracks.set_visibility(False)
@@ -136,18 +137,18 @@ class Page:
     def _bar(self) -> None:
         """Where a run is."""
         with ui.element("div").classes("cl-run").mark("run") as self.bar:
-            self.bar_text = ui.label("").classes("cl-run-text").mark("run-text")
+            self.bar_text = ui.label("").classes("cl-run-text").props("role=status").mark("run-text")
             self.bar_line = ui.linear_progress(0.0, show_value=False, size="8px").classes("cl-run-line")
             self.bar_stop = ui.button("Stop", on_click=self.runs.stop).props("outline dense no-caps color=red")
             self.bar_stop.mark("stop")
             self.bar_close = ui.button(icon="close", on_click=lambda: self.bar.set_visibility(False)).props(
-                "flat dense round size=sm"
+                "flat dense round size=sm aria-label=close"
             )
         self.bar.set_visibility(False)
 
     def _dialog(self, title: str) -> tuple[Any, Any]:
         with ui.dialog() as dialog, ui.card().classes("cl-dialog"):
-            ui.label(title).classes("cl-dialog-title")
+            ui.label(title).classes("cl-dialog-title").props("role=heading aria-level=2")
             box = ui.element("div").classes("cl-list")
         return dialog, box
 
@@ -334,6 +335,7 @@ def target_in(root: Any, out: str) -> Any:
 def _button(text: str, act: Any, icon: str | None = None, tip: str = "") -> Any:
     button = ui.button(text, on_click=act, icon=icon).props("flat dense no-caps size=md").on("mousedown.prevent")
     if tip:
+        button.props(f'aria-label="{tip}"')
         with button:
             ui.tooltip(tip)
     return button

@@ -42,7 +42,7 @@ class ResultView:
         self.turn = asyncio.Lock()
         with ui.element("div").classes("cl-verdict") as self.verdict:
             self.word = ui.label("").classes("cl-word").mark("verdict")
-            self.message = ui.label("").classes("cl-message")
+            self.message = ui.label("").classes("cl-message").props("role=status")
             with self.message:
                 self.tip = ui.tooltip("").classes("cl-tip")
         with ui.element("div").classes("cl-body"):
@@ -58,11 +58,17 @@ class ResultView:
             self.play = self._button("play_arrow", "play (Space)", self.toggle).mark("play")
             self._button("chevron_right", "on (\u2192)", lambda: self.move(1))
             self._button("last_page", "to the end (End)", lambda: self.go(len(self.track or ()) - 1))
-            self.speed = ui.select(SPEEDS, value=0).props("dense options-dense borderless").classes("cl-speed")
+            self.speed = (
+                ui.select(SPEEDS, value=0)
+                .props('dense options-dense borderless aria-label="speed"')
+                .classes("cl-speed")
+            )
             self.speed.on("popup-hide", js_handler=RELEASE)
             with self.speed:
                 ui.tooltip("the whole in 30 s, or times as fast as the machine")
-            self.slider = ui.slider(min=0.0, max=1.0, step=0.001, value=0.0).props("dense").classes("cl-slider")
+            self.slider = (
+                ui.slider(min=0.0, max=1.0, step=0.001, value=0.0).props('dense aria-label="step"').classes("cl-slider")
+            )
             self.slider.mark("slider")
             self.slider.on("update:model-value", self._slid, throttle=0.05)
             # the 3D view follows at once, the other panels when the server has answered
@@ -133,7 +139,7 @@ class ResultView:
             if self.row >= len(self.track) - 1:
                 self.go(0)
             self.playing = True
-            self.play.props("icon=pause aria-label=pause")
+            self.play.props('icon=pause aria-label="pause (Space)"')
             t, speed = self.track.t, float(self.speed.value or 0)
             self.scene.play(speed if speed > 0.0 else max(float(t[-1] - t[0]), 1e-3) / WHOLE)
 
@@ -142,7 +148,7 @@ class ResultView:
         if self.playing:
             self.scene.play(0.0)
         self.playing = False
-        self.play.props("icon=play_arrow aria-label=play")
+        self.play.props('icon=play_arrow aria-label="play (Space)"')
 
     # -- parts --------------------------------------------------------------------------------------------------
     async def _open(self, result: PageResult) -> None:
@@ -211,7 +217,8 @@ class ResultView:
         self.where.set_text(f"{clock}step {k + 1} of {len(track)}{line} \u00b7 X {x:.3f} Y {y:.3f} Z {z:.3f}")
 
     def _button(self, icon: str, tip: str, act: Callable[[], None]) -> Any:
-        button = ui.button(icon=icon, on_click=lambda: act()).props("flat dense round size=sm").on("mousedown.prevent")
+        button = ui.button(icon=icon, on_click=lambda: act()).props(f'flat dense round size=sm aria-label="{tip}"')
+        button.on("mousedown.prevent")
         with button:
             ui.tooltip(tip)
         return button

@@ -9,7 +9,7 @@ from html import escape
 import plotly.graph_objects as go
 
 from chipload.jobs.contour.outcome import ContourResult, Operation
-from chipload.jobs.contour.pass_figures import COLOURS, along, plan, space
+from chipload.jobs.contour.pass_figures import COLOURS, along, plan
 from chipload.jobs.contour.programs import program_files
 from chipload.jobs.contour.scene import blanks_of, scene_bytes
 from chipload.machine.machine import Machine
@@ -51,8 +51,6 @@ def _operation(machine: Machine, k: int, op: Operation, figures: dict[str, go.Fi
         '<p class="note">The pass is coloured by engagement, dashed lines are passes before it, diamonds are events, '
         "crosses exceed a limit. Click a name to show or hide it.</p>",
         figure(f"plan-{k}", plan(machine, op), figures),
-        "<h3>Path</h3>",
-        figure(f"space-{k}", space(op), figures),
     ]
     return out + (["<h3>Findings of the planner</h3>", items(result.findings)] if result.findings else [])
 

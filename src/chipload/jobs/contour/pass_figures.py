@@ -28,11 +28,10 @@ from chipload.report.figures import (
     PLAN_POINTS,
     SCALE,
     SHADES,
-    SPACE_POINTS,
     STOCK,
     WALL,
 )
-from chipload.report.shape import CHORD_MM, cap, merged, pieces, ribbon, thinned
+from chipload.report.shape import CHORD_MM, pieces, thinned
 from chipload.result import COLUMNS, LimitCheck, Verdict
 
 Floats = NDArray[np.float64]
@@ -137,61 +136,6 @@ def plan(machine: Machine, operation: Operation) -> go.Figure:
     figure.update_xaxes(title_text="x [mm]")
     figure.update_layout(legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0})
     return _styled(figure, 640, {"l": 64, "r": 16, "t": 60, "b": 44})
-
-
-def space(operation: Operation) -> go.Figure:
-    """Wall and stock raised from the plane, the paths in space coloured by engagement."""
-    figure = go.Figure()
-    used = operation.result.strategies[operation.result.use]
-    low, high = operation.top - operation.depth, operation.top
-    wall = used.drawn.get("wall", ())
-    closed = [c for c in wall if c.closed]
-    floor = [cap(closed, low)] if closed else []
-    for name, parts, colour, opacity in (
-        ("floor", floor, "#c3cad3", 0.55),
-        ("wall", [ribbon(c, low, high) for c in wall], "#8b97a6", 0.9),
-        ("stock", [ribbon(c, low, high) for c in used.drawn.get("stock", ())], "#d6aa6e", 0.35),
-    ):
-        vertices, faces = merged(parts)
-        if len(faces):
-            x, y, z = vertices.astype(np.float32).T
-            i, j, k = faces.astype(np.int32).T
-            figure.add_trace(
-                go.Mesh3d(
-                    x=x, y=y, z=z, i=i, j=j, k=k, name=name, color=colour, opacity=opacity, flatshading=True,
-                    hoverinfo="skip", showlegend=True,
-                    lighting={"ambient": 0.75, "diffuse": 0.5, "specular": 0.05, "roughness": 1.0},
-                )
-            )  # fmt: skip
-    scale = _scale(operation)
-    for name, strategy in operation.result.strategies.items():
-        h = strategy.history
-        keep = thinned(np.asarray(h["engagement_deg"], dtype=np.float64), SPACE_POINTS)
-        piece = pieces(h)[keep]
-        apart = np.flatnonzero(piece[1:] != piece[:-1]) + 1
-        columns = (np.asarray(h[c], dtype=np.float64)[keep] for c in ("x_mm", "y_mm", "z_mm"))
-        x, y, z = (np.insert(c, apart, np.nan).astype(np.float32) for c in columns)
-        shade = np.insert(np.asarray(h["engagement_deg"])[keep], apart, 0.0)
-        line = _shade(shade, scale, name == operation.result.use)
-        figure.add_trace(
-            go.Scatter3d(
-                x=x, y=y, z=z, mode="lines", name=f"{name}: path", line={**line, "width": 5},
-                visible=True if name == operation.result.use else "legendonly",
-                hovertemplate="(%{x:.3f}, %{y:.3f}, %{z:.3f})<extra></extra>",
-            )
-        )  # fmt: skip
-    axis = {"showbackground": False, "gridcolor": GRID, "zerolinecolor": GRID, "color": "#5f6b7a"}
-    figure.update_layout(
-        scene={
-            "aspectmode": "data",
-            "xaxis": {**axis, "title": "x [mm]"},
-            "yaxis": {**axis, "title": "y [mm]"},
-            "zaxis": {**axis, "title": "z [mm]", "nticks": 4},
-            "camera": {"eye": {"x": 0.85, "y": -1.65, "z": 1.4}, "center": {"x": 0.0, "y": 0.0, "z": -0.1}},
-        },
-        legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0},
-    )
-    return _styled(figure, 620, {"l": 0, "r": 0, "t": 40, "b": 0})
 
 
 # -- parts ------------------------------------------------------------------------------------------------------

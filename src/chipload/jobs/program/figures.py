@@ -25,7 +25,7 @@ from chipload.program.apt.writer import write_apt
 from chipload.program.motions import spans
 from chipload.program.program import DWELL, RAPID, Program
 from chipload.report.diagram import diagram_figure
-from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, SCALE, SPACE_POINTS, STOCK
+from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, SPACE_POINTS, STOCK
 from chipload.report.presentation import Blank, Content, Presentation
 from chipload.report.scene import FIXTURE
 from chipload.report.shape import thinned
@@ -110,9 +110,6 @@ def _sections(program: ProgramResult, figures: dict[str, go.Figure]) -> list[str
         f"<h2>{escape(program.name)} on {escape(program.machine.name)}</h2>",
         f"<p>{what['motions']} motions, {what['cutting_mm']:.5g} mm at feed and {what['rapid_mm']:.5g} mm of rapids, "
         f"{time_s / 60.0:.4g} min; {box} mm; tools {escape(', '.join(map(str, what['tools'])))}.</p>",
-        "<h3>Path</h3>",
-        '<p class="note">The path of the tip in the workpiece frame, coloured by feed; rapids in red.</p>',
-        figure("space", space(program.reading.program), figures),
         "<h3>Feed over time</h3>",
         figure("feed", feed_figure(program), figures),
         "<h3>Slowest lines</h3>",
@@ -221,40 +218,6 @@ def along(simulation: SimulationResult) -> go.Figure:
         font=FONT,
         margin={"l": 74, "r": 16, "t": 30, "b": 46},
         legend={"orientation": "h", "y": 1.01, "yanchor": "bottom", "x": 0.0},
-    )
-    return out
-
-
-def space(program: Program) -> go.Figure:
-    """The path of the tip, coloured by feed."""
-    points, rapid = _drawn(program)
-    feeds = _drawn_feeds(program)
-    step = -(-len(points) // SPACE_POINTS)
-    keep = np.unique(np.concatenate([np.arange(0, len(points), step), [len(points) - 1]]))
-    p, fast, feed = points[keep].astype(np.float32), rapid[keep], feeds[keep].astype(np.float32)
-    out = go.Figure()
-    lines = {"color": feed, "colorscale": SCALE, "width": 3}
-    lines |= {"colorbar": {"title": {"text": "feed [mm/min]", "side": "right"}, "thickness": 12}, "showscale": True}
-    cut = np.where(fast[:, None], np.nan, p)
-    for k in np.flatnonzero(~fast[1:] & fast[:-1]):
-        cut[k] = p[k]
-    out.add_trace(go.Scatter3d(x=cut[:, 0], y=cut[:, 1], z=cut[:, 2], mode="lines", line=lines, name="feed"))
-    away = np.where(fast[:, None], p, np.nan)
-    for k in np.flatnonzero(fast[1:] & ~fast[:-1]):
-        away[k] = p[k]
-    red = {"color": LIMIT, "width": 1}
-    out.add_trace(go.Scatter3d(x=away[:, 0], y=away[:, 1], z=away[:, 2], mode="lines", line=red, name="rapid"))
-    camera = {"eye": {"x": 1.6, "y": -1.6, "z": 1.2}}
-    axes = {f"{x}axis": {"title": f"{x.upper()} [mm]", "gridcolor": GRID} for x in "xyz"}
-    scene = {"aspectmode": "data", "camera": camera, **axes}
-    out.update_layout(
-        template="none",
-        height=520,
-        font=FONT,
-        scene=scene,
-        margin={"l": 0, "r": 0, "t": 10, "b": 0},
-        showlegend=True,
-        legend={"x": 0.0, "y": 1.0},
     )
     return out
 

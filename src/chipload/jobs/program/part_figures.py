@@ -16,16 +16,15 @@ import trimesh
 from numpy.typing import NDArray
 
 from chipload.jobs.program import part_numbers
-from chipload.report.figures import FONT
-from chipload.report.sheet import figure, table
+from chipload.report.sheet import table
 from chipload.simulation.surface import Collision, Difference
 
 Floats = NDArray[np.float64]
 
 #: colours from the deepest gouge over finished to the highest excess, and of what is not known
 GOUGE, DONE, EXCESS, UNKNOWN = (178, 24, 43), (236, 236, 232), (33, 102, 172), (250, 246, 225)
-#: triangles and collisions that the page shows
-MOST_FACES, LISTED = 60_000, 200
+#: collisions that the report shows
+LISTED = 200
 
 
 def colours(left: Difference, span: float) -> NDArray[np.uint8]:
@@ -51,31 +50,6 @@ def coloured_mesh(left: Difference, span: float) -> trimesh.Trimesh:
     return mesh
 
 
-def part_figure(left: Difference, span: float) -> go.Figure:
-    """The part in space, coloured by what is left on it; of many triangles those that show most."""
-    faces = left.faces
-    if len(faces) > MOST_FACES:
-        known = np.where(np.isfinite(left.distance), np.abs(left.distance), -1.0)
-        keep = np.argsort(-known[faces].max(axis=1), kind="stable")[:MOST_FACES]
-        faces = faces[np.sort(keep)]
-    used, back = np.unique(faces, return_inverse=True)
-    p, corner = left.points[used].astype(np.float32), back.reshape(-1, 3)
-    rgb = [f"rgb({r},{g},{b})" for r, g, b, _ in colours(left, span)[used].tolist()]
-    said = np.where(np.isfinite(left.distance[used]), left.distance[used], np.nan)
-    out = go.Figure(
-        go.Mesh3d(
-            x=p[:, 0], y=p[:, 1], z=p[:, 2], i=corner[:, 0], j=corner[:, 1], k=corner[:, 2], vertexcolor=rgb,
-            customdata=said.astype(np.float32), flatshading=True, lighting={"ambient": 0.75, "diffuse": 0.4},
-            hovertemplate="%{customdata:.4f} mm<br>x %{x:.3f} y %{y:.3f} z %{z:.3f}<extra></extra>",
-        )
-    )  # fmt: skip
-    out.update_layout(
-        template="none", font=FONT, height=560, margin={"l": 0, "r": 0, "t": 0, "b": 0},
-        scene={"aspectmode": "data", "xaxis_title": "x [mm]", "yaxis_title": "y [mm]", "zaxis_title": "z [mm]"},
-    )  # fmt: skip
-    return out
-
-
 def section(
     left: Difference | None,
     collisions: tuple[Collision, ...],
@@ -98,9 +72,8 @@ def section(
             f"<p>Of {what['part_under_stock']} points of the part that had stock over them "
             f"{100.0 * what['part_reached_share']:.3g} % lie within {left.look:g} mm of the tool's way; over the "
             "others there is more.</p>",
-            f'<p class="note">Red is cut too deep, blue stands over the part, in full colour by {span:.3g} mm; pale: '
-            "more than was looked for.</p>",
-            figure("part", part_figure(left, span), figures),
+            '<p class="note">On the part in the view above, red is cut too deep, blue stands over the part, in full '
+            f"colour by {span:.3g} mm; pale: more than was looked for.</p>",
         ]
     if compared_with:
         body += [

@@ -24,8 +24,13 @@ class LimitPanel:
 
     def __init__(self, pick: Callable[[int], None]) -> None:
         self.pick = pick
-        with ui.element("div").classes("cl-panel cl-tables"):
-            self.html = ui.html("", sanitize=True).classes("cl-scroll").on("click", self._clicked, js_handler=CLICK)
+        with ui.element("div").classes("cl-panel cl-tables").props('role=region aria-label="limits and findings"'):
+            self.html = (
+                ui.html("", sanitize=True)
+                .classes("cl-scroll")
+                .props("tabindex=0")
+                .on("click", self._clicked, js_handler=CLICK)
+            )
             self.html.mark("limits")
 
     def open(self, result: PageResult, track: PageTrack) -> None:
@@ -58,7 +63,9 @@ def limit_table(track: PageTrack) -> str:
             f"<td class=n>{least}{c.limit:g} {unit}</td>"
             f'<td>{bar}</td><td class=cl-{state}>{c.state.value}</td><td class=w title="{where}">{where}</td></tr>'
         )
-    head = "<tr><th>limit</th><th class=n>worst</th><th class=n>limit</th><th></th><th>state</th><th>where</th></tr>"
+    head = (
+        "<tr><th>limit</th><th class=n>worst</th><th class=n>limit</th><th>share</th><th>state</th><th>where</th></tr>"
+    )
     return f'<table class="cl-limits"><thead>{head}</thead><tbody>{"".join(out)}</tbody></table>'
 
 

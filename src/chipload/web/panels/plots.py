@@ -29,10 +29,10 @@ class PlotPanel:
         self.track: PageTrack | None = None
         self.row, self.drawn = 0, -1
         self.bounds: dict[str, Bound | None] = {}
-        with ui.element("div").classes("cl-panel cl-plots"):
+        with ui.element("div").classes("cl-panel cl-plots").props('role=region aria-label="plots"'):
             with ui.element("div").classes("cl-head"):
                 self.columns = ui.select({}, multiple=True, on_change=self._changed).props(
-                    f"dense options-dense borderless use-chips hide-bottom-space max-values={MOST}"
+                    f"dense options-dense borderless use-chips hide-bottom-space max-values={MOST} aria-label=columns"
                 ).classes("cl-columns").mark("columns")  # fmt: skip
                 self.columns.on("popup-hide", js_handler=RELEASE)
                 self.against = ui.toggle({"time": "time", "path": "path"}, value="time", on_change=self._turned).props(

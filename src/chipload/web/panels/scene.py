@@ -7,6 +7,7 @@ is played and tells the row. Here are its controls, and what it is told.
 from __future__ import annotations
 
 import asyncio
+import html
 import json
 from collections.abc import Callable
 from functools import partial
@@ -40,7 +41,7 @@ class ScenePanel:
         self.scene: PageScene | None = None
         self.found: Any = ((), "")
         self.seen: dict[str, bool] = {}
-        with ui.element("div").classes("cl-panel cl-space") as self.frame:
+        with ui.element("div").classes("cl-panel cl-space").props('role=region aria-label="3D view"') as self.frame:
             self.stage = ui.element("div").classes("cl-stage")
             self.stage.on("viewrow", self._moved, js_handler="(e) => emit(e.detail)")
             with ui.element("div").classes("cl-over cl-over-left"):
@@ -168,9 +169,9 @@ class ScenePanel:
         self.boxes.clear()
         with self.boxes:
             for name, on in self.seen.items():
-                ui.checkbox(_plain(name), value=on, on_change=lambda e, n=name: self._see(n, bool(e.value))).props(
-                    "dense size=xs"
-                )
+                box = ui.checkbox(_plain(name), value=on, on_change=lambda e, n=name: self._see(n, bool(e.value)))
+                box.props(f'dense size=xs aria-label="{html.escape(_plain(name))}"')
+                box.on("update:model-value", js_handler=RELEASE)
 
     def _see(self, name: str, wanted: bool) -> None:
         self.seen[name] = wanted

@@ -26,9 +26,9 @@ class SourcePanel:
         self.pick = pick
         self.text: Source | None = None
         self.first, self.line = 0, 0
-        with ui.element("div").classes("cl-panel cl-source"):
+        with ui.element("div").classes("cl-panel cl-source").props('role=region aria-label="program"'):
             self.name = ui.label("").classes("cl-head cl-file")
-            self.html = ui.html("", sanitize=True).classes("cl-scroll cl-code").on(
+            self.html = ui.html("", sanitize=True).classes("cl-scroll cl-code").props("tabindex=0").on(
                 "click", self._clicked, js_handler=CLICK
             ).mark("source")  # fmt: skip
 

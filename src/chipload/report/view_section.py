@@ -1,0 +1,113 @@
+"""The 3D view of report.html: bodies, stock at every row, path, cutter of the track in use, in the file itself."""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from collections.abc import Mapping
+from html import escape
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import Finding
+from chipload.report.bodies import bodies_note, scene_bodies
+from chipload.report.colouring import FIRST, colouring_of, lowest_limit
+from chipload.report.marks import marks_of
+from chipload.report.presentation import Blank
+from chipload.report.removal import AXIS, PLACE, breaks
+from chipload.report.view import Colouring, ViewPath, ViewScene, parts_of, pointer_parts, scene_document
+from chipload.result import LimitCheck, Result, Track
+from chipload.simulation.removal_mesh import RemovalMesh
+
+#: rows of a path that are kept, points that it is drawn through, columns to choose from, triangles of a body
+KEPT, POINTS, COLUMNS_SHOWN, TRIANGLES = 12_000, 6_000, 3, 60_000
+#: how a file of glTF begins; another scene holds no body
+GLTF = b"glTF"
+#: element of the view, and of its document
+VIEW, DATA = "view3d", "view3d-data"
+
+
+def view_section(
+    result: Result, scene_glb: bytes, meshes: Mapping[int, RemovalMesh], blanks: Mapping[str, Blank]
+) -> list[str]:
+    """HTML of the view of the first track in use that has a place; empty: there is none."""
+    found = _first(result)
+    if found is None:
+        return []
+    k, track, columns = found
+    path = _path(columns)
+    removal = meshes.get(k)
+    bodies = scene_bodies(scene_glb, TRIANGLES) if scene_glb.startswith(GLTF) else ()
+    if removal is not None:
+        bodies = tuple(b for b in bodies if b.kind != "stock")
+    blank = blanks.get(track.name)
+    size = max(0.25 * float(np.linalg.norm(np.ptp(path.place, axis=0))), 1.0)
+    parts = {n: parts_of(c) for n, c in blank.cutters.items()} if blank is not None else {}
+    parts = {0: next(iter(parts.values()))} if len(parts) == 1 else {0: pointer_parts(size), **parts}
+
+    def row(item: LimitCheck | Finding) -> int | None:
+        return item.row if item.row is not None and item.row < len(path.t) else None
+
+    colours = _colours(track, columns, path, removal)
+    scene = ViewScene(
+        result.title, bodies, removal, path, parts, marks_of(result, track, row, path.place),
+        colours[0] if colours else None, colours,
+    )  # fmt: skip
+    data = base64.b64encode(zlib.compress(scene_document(scene, KEPT), 9)).decode()
+    notes = [bodies_note(bodies)]
+    if removal is not None:
+        notes.append(f"The stock is drawn in cells of {float(removal.cell.max()):.2g} mm.")
+    if len(path.t) > POINTS:
+        notes.append(f"The path is drawn by some {POINTS} of its {len(path.t)} steps.")
+    said = f"{escape(track.name)}. Drag turns, the wheel zooms, the right button shifts. {escape(' '.join(notes))}"
+    return [
+        "<h2>In space</h2>",
+        f'<p class="note">{said}</p>',
+        f'<div id="{VIEW}" class="view3d"><p class="note">The view needs a browser with scripts and WebGL.</p></div>',
+        f'<script id="{DATA}" type="text/plain">{data}</script>',
+    ]
+
+
+def _first(result: Result) -> tuple[int, Track, dict[str, NDArray[Any]]] | None:
+    """Number, track and columns of the first track that has a place, those in use before the others."""
+    for k, track in sorted(enumerate(result.tracks), key=lambda item: not item[1].in_use):
+        columns = _columns(track)
+        if len(columns.get(PLACE[0], ())):
+            return k, track, columns
+    return None
+
+
+def _columns(track: Track) -> dict[str, NDArray[Any]]:
+    """The columns of a track that the view needs."""
+    wanted = {*PLACE, *AXIS, "t_s", "s_mm", "tool", "line", *FIRST}
+    parts: dict[str, list[NDArray[Any]]] = {}
+    for block in track.blocks():
+        for name in wanted & set(block):
+            parts.setdefault(name, []).append(np.asarray(block[name]))
+    return {name: np.concatenate(arrays) for name, arrays in parts.items()}
+
+
+def _path(columns: Mapping[str, NDArray[Any]]) -> ViewPath:
+    place = np.column_stack([columns[c] for c in PLACE]).astype(np.float64)
+    n = len(place)
+    axis = np.column_stack([columns[c] for c in AXIS]) if set(AXIS) <= set(columns) else np.zeros((0, 3))
+    if len(axis) == 0 or np.isnan(axis).any():
+        axis = np.tile([0.0, 0.0, 1.0], (n, 1))
+    rising = [np.maximum.accumulate(np.nan_to_num(columns.get(c, np.arange(n)).astype(float))) for c in ("t_s", "s_mm")]
+    tool = columns["tool"].astype(np.int64) if "tool" in columns else np.zeros(n, dtype=np.int64)
+    line = columns["line"].astype(np.int64) if "line" in columns else None
+    return ViewPath(place, axis, rising[0], rising[1], np.maximum(tool, 0), line, breaks(place, columns.get("s_mm")))
+
+
+def _colours(
+    track: Track, columns: Mapping[str, NDArray[Any]], path: ViewPath, removal: RemovalMesh | None
+) -> list[Colouring]:
+    """Columns to choose from: those with a limit first."""
+    limited = [c.column.name for c in track.limits]
+    usable = [c for c in FIRST if c in columns and np.isfinite(columns[c].astype(float)).any()]
+    order = sorted(usable, key=lambda c: c not in limited)[:COLUMNS_SHOWN]
+    return [
+        colouring_of(c, columns[c].astype(float), path, lowest_limit(track.limits, c), removal, POINTS) for c in order
+    ]

@@ -1,0 +1,70 @@
+"""The page for keyboards, readers of the screen and small windows."""
+
+from pathlib import Path
+
+import pytest
+
+#: checks accessibility in a browser; there after `npm install` in viewer/, not part of the package
+AXE = Path(__file__).parents[2] / "viewer" / "node_modules" / "axe-core" / "axe.min.js"
+VIEW = "chiploadViewer.of(document.querySelector('.cl-stage').id)"
+
+
+@pytest.fixture(scope="module")
+def cut(browser, served):
+    page = browser.new_page(viewport={"width": 1280, "height": 720}, has_touch=True)
+    page.set_default_timeout(120_000)
+    page.goto(served.address("?show=cut"))
+    page.wait_for_selector(".cv-ramp")
+    page.wait_for_selector(".cl-now")
+    yield page
+    page.close()
+
+
+def test_nothing_lies_beside_a_narrow_window(cut) -> None:
+    for width, height in ((420, 800), (1280, 720), (1920, 1080)):
+        cut.set_viewport_size({"width": width, "height": height})
+        cut.wait_for_timeout(500)
+        assert cut.evaluate("document.documentElement.scrollWidth") == width
+        for part in (".cl-header", ".cl-verdict", ".cl-space", ".cl-plots", ".cl-tables", ".cl-source", ".cl-foot"):
+            box = cut.locator(part).bounding_box()
+            assert box["x"] >= 0.0
+            assert box["x"] + box["width"] <= width + 0.5
+            assert box["width"] > 100.0
+    cut.set_viewport_size({"width": 1280, "height": 720})
+
+
+def test_the_window_says_what_it_shows_and_every_control_has_a_name(cut) -> None:
+    assert cut.title() == "exceeds: cut - chipload"
+    assert cut.evaluate("document.documentElement.lang") == "en"
+    assert cut.get_by_role("heading", level=1).inner_text() == "cut"
+    assert cut.locator(".cl-message[role=status]").inner_text().startswith("Exceeds")
+    for name in ("3D view", "plots", "limits and findings", "program"):
+        assert cut.get_by_role("region", name=name).count() == 1
+    nameless = cut.evaluate(
+        """[...document.querySelectorAll('button, [role=slider], [role=checkbox], a[href]')]
+        .filter(e => e.offsetParent && !(e.getAttribute('aria-label') || e.textContent.trim()))
+        .map(e => e.outerHTML.slice(0, 120))"""
+    )
+    assert nameless == []
+
+
+def test_space_plays_whatever_was_clicked_before(cut) -> None:
+    for text in ("marks", "values on stock", "values on stock", "marks"):
+        cut.locator(".cl-layers").get_by_text(text).click()
+    cut.keyboard.press("Home")
+    cut.wait_for_function(f"{VIEW}.row == 0")
+    cut.keyboard.press("Space")
+    cut.wait_for_function(f"{VIEW}.row > 3")
+    cut.keyboard.press("Space")
+    cut.wait_for_function(f"!{VIEW}.playing")
+
+
+def test_axe_finds_nothing_serious(cut) -> None:
+    if not AXE.exists():
+        pytest.skip("no axe-core: npm install in viewer/")
+    cut.evaluate(AXE.read_text())
+    found = cut.evaluate("axe.run(document, {resultTypes: ['violations']}).then(r => r.violations)")
+    serious = [
+        (v["id"], [n["html"][:200] for n in v["nodes"]]) for v in found if v["impact"] in ("serious", "critical")
+    ]
+    assert serious == []

@@ -1,0 +1,105 @@
+"""The 3D view of report.html, opened as a file of its own in a browser: it shows, moves, prints, and asks nobody."""
+
+import base64
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chipload.report.page import page_bytes
+from chipload.report.presentation import Blank, Presentation
+from chipload.report.removal import removal_meshes
+from chipload.report.view_section import view_section
+from square import MILL, ROWS, STOCK, VOLUMES, make_cut_result, square_result
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """report.html of the square that is cut."""
+    folder = make_cut_result(tmp_path_factory.mktemp("report") / "r")
+    result, blanks = square_result("cut"), {"program": Blank(STOCK, {1: MILL})}
+    glb = (folder / "scene.glb").read_bytes()
+    view = view_section(result, glb, removal_meshes(result, blanks), blanks)
+    path = folder / "report.html"
+    path.write_bytes(page_bytes(result, Presentation(lambda _: [], lambda: glb), view))
+    return path
+
+
+@pytest.fixture
+def page(browser, written):
+    page = browser.new_page(viewport={"width": 1000, "height": 900})
+    page.set_default_timeout(120_000)
+    asked, wrong = [], []
+    page.on("request", lambda r: asked.append(r.url))
+    page.on("pageerror", lambda e: wrong.append(str(e)))
+    page.goto(written.as_uri())
+    page.wait_for_selector(".view3d canvas")
+    page.wait_for_function("document.querySelector('.cv-print')?.src.length > 1000")
+    yield page
+    page.close()
+    assert wrong == []
+    assert [u for u in asked if not u.startswith(("data:", "blob:")) and u != written.as_uri()] == []
+
+
+VIEW = "chiploadViewer.of('view3d')"
+
+
+def test_the_report_shows_the_stock_at_its_slider_and_the_worst_first(page) -> None:
+    state = page.evaluate(f"{VIEW}.state()")
+    # the force exceeds its limit most at row 120
+    assert state["row"] == 120
+    assert page.inner_text(".cv-note") == "force 900 N, limit 800"
+    slider = page.locator("input[type=range]")
+    for share, volume in ((0.0, VOLUMES[0]), (1.0, VOLUMES[2])):
+        slider.evaluate(
+            "(e, s) => { e.value = Number(e.min) + s * (e.max - e.min); e.dispatchEvent(new Event('input')); }", share
+        )
+        state = page.evaluate(f"{VIEW}.state()")
+        assert state["row"] == (0 if share == 0.0 else ROWS - 1)
+        assert state["stock"]["volume"] == pytest.approx(volume, rel=0.01)
+    page.get_by_role("button", name="play").click()
+    # it begins again, since it stood at the end, and goes on by itself
+    page.wait_for_function(f"{VIEW}.row < {ROWS - 1}")
+    page.wait_for_function(f"{VIEW}.row > 3")
+
+
+def test_it_prints_a_picture_and_does_not_scroll_sideways(page, pixels) -> None:
+    page.emulate_media(media="print")
+    assert page.locator(".cv-print").is_visible()
+    assert not page.locator(".cv-box").is_visible()
+    picture = pixels(page.locator(".cv-print").screenshot())
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 100
+    assert len(page.pdf()) > 20_000
+    page.emulate_media(media="screen")
+    for width in (420, 1280):
+        page.set_viewport_size({"width": width, "height": 800})
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_a_long_report_stays_small() -> None:
+    one = square_result("long")
+    n, own = 100_000, one.tracks[0]
+    turn = np.linspace(0.0, 80.0 * np.pi, n)
+    wide = np.linspace(2.0, 20.0, n)
+    table = {
+        "t_s": 0.01 * np.arange(n),
+        "s_mm": np.cumsum(wide * 80.0 * np.pi / n) + np.arange(n) * 1e-3,
+        "x_mm": 20.0 + wide * np.cos(turn),
+        "y_mm": 20.0 + wide * np.sin(turn),
+        "z_mm": -2.0 - np.sin(turn * 7.0),
+        "line": np.arange(n) // 10,
+        "tool": np.ones(n, dtype=np.int64),
+        "force_n": 300.0 + 100.0 * np.sin(np.arange(n)) * np.random.default_rng(1).random(n),
+    }
+    result = replace(one, tracks=(replace(own, limits=(), findings=(), blocks=lambda: iter([table])),))
+    blanks = {"program": Blank(STOCK, {1: MILL})}
+    view = view_section(result, _empty(), removal_meshes(result, blanks), blanks)
+    report = page_bytes(result, Presentation(lambda _: [], _empty), view)
+    assert len(report) < 6_000_000 - 2_000_000  # figures bring plotly, 2 MB
+    assert base64.b64decode(view[3].split(">")[1].split("<")[0])
+
+
+def _empty() -> bytes:
+    import trimesh
+
+    return trimesh.Scene([trimesh.creation.box()]).export(file_type="glb", extension_webp=False)
