@@ -45,7 +45,7 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
     "tube": (),
     "cone": (),
     "plate": (),
-    "blade": (),
+    "blade": ("operation.0.least_error=false",),
     "impeller": (),
     "hecc": ("operation.0.tolerance_mm=0.5",),
 }

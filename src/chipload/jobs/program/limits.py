@@ -52,10 +52,10 @@ def _yield_limit(simulation: SimulationResult, columns: Columns, track: str) -> 
     force = simulation.errors.get("force_n", 0.0)
     # a stress converges more slowly than a displacement
     error = 2.0 * simulation.workpiece.error + (force if math.isfinite(force) else 0.0)
-    state, why = state_of(own.stress, own.strength, error)
-    k = own.step
+    k, stress, place = own.worst(np.asarray(columns["force_n"], dtype=np.float64))
+    state, why = state_of(stress, own.strength, error)
     line, t = int(columns["line"][k]), float(columns["t_s"][k])
-    return (LimitCheck("stress_mpa", own.strength, own.stress, state, track, k, line, own.place, t, error, why),)
+    return (LimitCheck("stress_mpa", own.strength, stress, state, track, k, line, place, t, error, why),)
 
 
 def spindle_limits(machine: Machine, speeds: ArrayLike = ()) -> dict[str, float]:

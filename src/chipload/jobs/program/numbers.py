@@ -147,7 +147,9 @@ def workpiece(simulation: SimulationResult) -> dict[str, Any]:
     k = int(np.argmax(c["deflection_workpiece_um"]))
     place = [float(c[f"{x}_mm"][k]) for x in "xyz"]
     worst = {"max": float(c["deflection_workpiece_um"][k]), "line": int(c["line"][k]), "place": place}
-    return {"deflection_workpiece_um": worst, **simulation.workpiece.numbers}
+    strained = simulation.workpiece.strained
+    stress = {} if strained is None else {"stress_mpa_max": strained.worst(c["force_n"])[1]}
+    return {"deflection_workpiece_um": worst, **stress, **simulation.workpiece.numbers}
 
 
 def form_error(simulation: SimulationResult) -> dict[str, Any]:

@@ -46,14 +46,29 @@ FREQUENCY = 0.5
 STRAINED = 6
 
 
-@dataclass(frozen=True)
-class StrainedStep:
-    """The row of the history whose force strains the workpiece most, its stress and the yield stress [MPa]."""
+@dataclass(frozen=True, eq=False)
+class StrainedSteps:
+    """Steps whose stress in the workpiece is known.
 
-    step: int
-    stress: float
-    place: tuple[float, float, float]
+    Attributes
+    ----------
+    step : (c,) int, rows of the history
+    per_force : (c,) float [MPa/N], greatest stress per force of the step
+    place : (c, 3) float [mm], where that is
+    strength : yield stress [MPa]
+    """
+
+    step: NDArray[np.int64]
+    per_force: Floats
+    place: Floats
     strength: float
+
+    def worst(self, force: Floats) -> tuple[int, float, tuple[float, float, float]]:
+        """Row, stress [MPa] and place of the greatest stress under the greatest force of each step (n,) [N]."""
+        stress = self.per_force * force[self.step]
+        k = int(np.argmax(stress))
+        x, y, z = self.place[k].tolist()
+        return int(self.step[k]), float(stress[k]), (x, y, z)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +86,7 @@ class WorkpieceCompliance:
     findings : material that hangs on nothing
     bent : the workpiece in its worst step; None: nothing is cut
     modes : of vibration, followed through the removal; None: the density is not stated
-    strained : the step that strains it most, of those looked at; None: the yield stress is not stated
+    strained : stress of the steps that bend it most and of those with most force; None: no yield stress is stated
     """
 
     steps: StepCompliances
@@ -83,7 +98,7 @@ class WorkpieceCompliance:
     findings: tuple[Finding, ...]
     bent: BentWorkpiece | None
     modes: FollowedModes | None = None
-    strained: StrainedStep | None = None
+    strained: StrainedSteps | None = None
 
     @property
     def numbers(self) -> Mapping[str, Any]:
@@ -95,7 +110,6 @@ class WorkpieceCompliance:
             "thinnest_wall_mm": self.wall,
             "unknowns": self.unknowns,
             "support": None if self.bent is None else self._support(self.bent),
-            **({} if self.strained is None else {"stress_mpa_max": self.strained.stress}),
             **({} if self.modes is None else {"natural_frequencies": self._frequencies(self.modes)}),
         }
 
@@ -203,23 +217,23 @@ def _strained(
     build: Callable[[LayeredStock, CellGrid], CellWorkpiece],
     elastic: Elastic,
     strength: float,
-) -> StrainedStep:
-    """The step with the greatest stress among those that bend the workpiece most and those with most force."""
+) -> StrainedSteps:
+    """Stress of the steps that bend the workpiece most, and of those with most force."""
     lines = ahead.lines
     order = np.argsort(-size_of(found.compliance) * lines.force, kind="stable")
     rows = np.unique(np.concatenate([order[:STRAINED], np.argsort(-lines.force, kind="stable")[:STRAINED]]))
     first = np.array([step for step, _, _ in ahead.stocks])
     after = np.minimum(np.searchsorted(first, lines.step[rows], side="right"), len(first) - 1)
     away = float(grid.size.max())
-    best = StrainedStep(int(lines.step[rows[0]]), 0.0, (0.0, 0.0, 0.0), strength)
+    per_force, place = np.zeros(len(rows)), np.zeros((len(rows), 3))
     for state in np.unique(after).tolist():
         work = build(ahead.stocks[state][2], grid)
-        for row in rows[after == state].tolist():
-            one = greatest_stress(work, elastic, lines.lines[row], _force(ahead, row), away)
-            if one.stress > best.stress:
-                x, y, z = one.place.tolist()
-                best = StrainedStep(int(lines.step[row]), one.stress, (x, y, z), strength)
-    return best
+        for k in np.flatnonzero(after == state).tolist():
+            force = _force(ahead, int(rows[k]))
+            found_one = greatest_stress(work, elastic, lines.lines[rows[k]], force, away)
+            size = float(np.linalg.norm(force))
+            per_force[k], place[k] = found_one.stress / size if size > 0.0 else 0.0, found_one.place
+    return StrainedSteps(lines.step[rows], per_force, place, strength)
 
 
 def _force(ahead: CutAhead, row: int) -> Floats:
