@@ -25,6 +25,7 @@ KEYS = {
     "machine/machine.Machine": "a machine's file",
     "planning/contour/plan.Finishing": "[[operation]] of kind contour, in mm, s and rad",
     "planning/impeller/rough_settings.RoughingSetting": "[operation.rough]",
+    "planning/pocket/request.Clearing": "[[operation]] of kind pocket, in mm, s and rad",
     "result/summary.LimitModel": "summary.json",
     "result/summary.Summary": "summary.json",
 }

@@ -54,7 +54,7 @@ def test_exit_code_and_first_lines_say_whether_it_is_verified(result):
     tracks = {track["name"]: track for track in summary["tracks"]}
     # the other ways are written and checked too, but released is the quickest that holds
     assert all(track["in_use"] == (not name.startswith("way-")) for name, track in tracks.items())
-    texts = sorted(out.glob("[0-9]*.ngc"))
+    texts = sorted(p for p in out.glob("[0-9]*.ngc") if not p.stem.endswith("-all"))
     assert len(texts) == len(op["programs"]) > 0
     for text, program in zip(texts, op["programs"], strict=True):
         assert text.stem == program["program"]
@@ -76,7 +76,8 @@ def test_every_way_is_written_checked_and_timed(result):
     tracks = {track["name"]: track for track in summary["tracks"]}
     for name, way in ways.items():
         stem = "[0-9]" if way["in_use"] else f"way-{name.replace(' ', '-')}-"
-        texts = sorted(p.stem for p in out.glob(f"{stem}*.ngc"))
+        texts = sorted(p.stem for p in out.glob(f"{stem}*.ngc") if not p.stem.endswith("-all"))
+        assert all((out / f"{text}-all.ngc").is_file() for text in texts)
         assert texts
         assert way["time_min"] == pytest.approx(way["cutting_min"] + way["link_min"] + way["changes_min"])
         # the tracks are of one channel; between two of eleven the pallet turns on
@@ -142,7 +143,11 @@ def test_the_axes_lead_the_cutter_along_the_blade(result):
     machine, impeller = machine_named("horizontal-b"), impeller_of(ImpellerShape())
     u, v = (x.ravel() for x in np.meshgrid(np.linspace(0.25, 0.5, 300), np.linspace(0.4, 0.8, 200), indexing="ij"))
     cloud = impeller.blade.plus.at(u, v)
-    for text, program in zip(sorted(out.glob("[0-9]*.ngc")), summary["operations"][0]["programs"], strict=True):
+    for text, program in zip(
+        sorted(p for p in out.glob("[0-9]*.ngc") if not p.stem.endswith("-all")),
+        summary["operations"][0]["programs"],
+        strict=True,
+    ):
         q, rows, finish = np.zeros(9), [], False
         for line in text.read_text().splitlines():
             if line.startswith("("):
@@ -173,7 +178,7 @@ def test_roughing_comes_first_and_leaves_the_allowance(tmp_path):
     summary = json.loads((tmp_path / "out" / "summary.json").read_bytes())
     (op,), tracks = summary["operations"], {track["name"]: track for track in summary["tracks"]}
     roughs = op["roughing"]["programs"]
-    names = sorted(p.name for p in (tmp_path / "out").glob("[0-9]*.ngc"))
+    names = sorted(p.name for p in (tmp_path / "out").glob("[0-9]*deg.ngc"))
     assert len(names) == len(roughs) + len(op["programs"])
     assert [n.startswith(f"{k}-rough-") for k, n in enumerate(names, 1)] == [True] * len(roughs) + [False] * len(
         op["programs"]

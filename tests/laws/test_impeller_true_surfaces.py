@@ -118,7 +118,7 @@ def tool_of(diameter):
 
 def test_no_program_of_any_way_gouges_the_true_surfaces_in_any_channel(result, points):
     out, summary = result
-    programs = sorted(out.glob("*.ngc"))
+    programs = sorted(out.glob("*-all.ngc"))
     (op,) = summary["operations"]
     assert len(programs) >= len(op["ways"]) == 2
     for path in programs:

@@ -92,13 +92,15 @@ def _wrong_paths(op: ImpellerOperationTable) -> Iterator[str]:
             f"operation.0.paths.margin_mm = {paths.margin_mm:g}: must be above touch_mm = {paths.touch_mm:g} and below "
             f"lift_mm = {paths.lift_mm:g}"
         )
-    if paths is not None and paths.lead_mm > paths.lift_mm:
+    if paths is not None and paths.lead_mm is not None and paths.lead_mm > paths.lift_mm:
         yield f"operation.0.paths.lead_mm = {paths.lead_mm:g}: must be at most lift_mm = {paths.lift_mm:g}"
-    if rough is not None and paths is not None and paths.lead_mm < max(rough.blades_mm, rough.hub_mm):
-        yield (
-            f"operation.0.paths.lead_mm = {paths.lead_mm:g}: must be at least the allowance of roughing, "
-            f"{max(rough.blades_mm, rough.hub_mm):g} mm, which stands beside a pass"
-        )
+    if rough is not None and paths is not None and paths.lead_mm is not None:
+        stands = max(rough.blades_mm, rough.hub_mm)
+        if paths.lead_mm < stands:
+            yield (
+                f"operation.0.paths.lead_mm = {paths.lead_mm:g}: must be at least the allowance of roughing, "
+                f"{stands:g} mm, which stands beside a pass"
+            )
     if rough is not None and paths is None:
         yield "operation.0.rough: takes its links from [operation.paths]: state that too"
     if rough is not None and (rough.diameter_mm is None) != (rough.corner_radius_mm is None):

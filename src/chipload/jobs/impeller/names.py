@@ -7,6 +7,9 @@ import numpy as np
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.jobs.impeller.outcome import Checked, CheckedPartition, ImpellerResult
 
+#: what the name of a text that goes through all channels ends with
+ALL = "-all"
+
 
 def rough_names(milled: ImpellerResult) -> list[str]:
     """File names of the roughing programs without their endings."""

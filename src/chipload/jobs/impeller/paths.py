@@ -34,6 +34,8 @@ from chipload.simulation.channel.channel import Remainder, SurfacePoints, left_o
 from chipload.simulation.channel.gouges import deepest_gouge
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
+#: of a lift at the feed of the cut where the job does not state it [mm]
+_LEAD = 1.0
 #: of the gouge that is allowed, how near its depth is found
 _RESOLUTION = 0.2
 #: points of the walls by which their cells are laid out, and where roughing is looked at, along and up
@@ -58,10 +60,11 @@ def finish_settings(
     """
     feed = mm_s_from_mm_min(op.feed_mm_min)
     motion = LineMotion(paths.chord_mm, feed, pallet_rate(machine), op.clearance_mm, scallop=op.scallop_mm)
+    stands = max(op.rough.blades_mm, op.rough.hub_mm) if op.rough is not None else 0.0
+    lead = paths.lead_mm if paths.lead_mm is not None else min(max(_LEAD, stands), paths.lift_mm)
     link = Link(
         paths.lift_mm, paths.margin_mm, paths.touch_mm, paths.near_mm, mm_s_from_mm_min(paths.link_feed_mm_min),
-        paths.above_mm, paths.lead_mm, max(op.rough.blades_mm, op.rough.hub_mm) if op.rough is not None else 0.0,
-        machine.rapid,
+        paths.above_mm, lead, stands, machine.rapid,
     )  # fmt: skip
     scene = channel_scene(
         impeller, ContactSampling((0.0, 1.0), (0.0, 1.0), (2, 2), paths.check_mm, op.near_mm, op.around, ahead)

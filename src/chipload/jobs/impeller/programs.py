@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.jobs.impeller.names import finish_names, rough_names
+from chipload.jobs.impeller.names import ALL, finish_names, rough_names
 from chipload.jobs.impeller.outcome import Checked, ImpellerResult
 from chipload.jobs.impeller.proof import contact_points_bytes, proof_bytes
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.program.apt.writer import write_apt
-from chipload.program.gcode.writer import write_gcode
+from chipload.program.gcode.writer import Repeat, write_gcode
 from chipload.program.program import Program
 from chipload.report.programs import ENDINGS
 
@@ -24,11 +24,14 @@ def program_files(milled: ImpellerResult) -> dict[str, bytes]:
         if empty:
             continue
         number, title = int(program.tool[0]), f"{milled.title}, {checked.name}"
-        text = write_gcode(
-            program, milled.machine, title=title, verified=checked.verified,
-            comments=_comments(milled, checked, cutter, table, number), number=100 + number, repeat=checked.repeat,
-        )  # fmt: skip
-        out[f"{stem}.{ENDINGS[milled.machine.dialect]}"] = text.encode("ascii")
+        for name, repeat in ((stem, None), (f"{stem}{ALL}", checked.repeat)):
+            if name != stem and repeat is None:
+                continue
+            text = write_gcode(
+                program, milled.machine, title=title, verified=checked.verified,
+                comments=_comments(milled, checked, cutter, table, number, repeat), number=100 + number, repeat=repeat,
+            )  # fmt: skip
+            out[f"{name}.{ENDINGS[milled.machine.dialect]}"] = text.encode("ascii")
         cl = write_apt(program, None, title=title, verified=checked.verified)
         out[f"{stem}.apt"] = cl.encode("ascii")
     return out
@@ -49,8 +52,9 @@ def _programs(
 
 
 def _comments(
-    milled: ImpellerResult, checked: Checked | CheckedRough, c: CatalogueCutter, alpha: float, number: int
-) -> list[str]:
+    milled: ImpellerResult, checked: Checked | CheckedRough, c: CatalogueCutter, alpha: float, number: int,
+    repeat: Repeat | None,
+) -> list[str]:  # fmt: skip
     """What the man at the machine must know."""
     table = milled.surfaces[0].table
     position = float(table.position[np.abs(table.angle - alpha).argmin()])
@@ -60,12 +64,10 @@ def _comments(
         f"index table {table.index} {np.degrees(position):.6g} deg before the start, table angle of {checked.name}"
     )
     turn = np.degrees(milled.impeller.pitch)
-    if checked.repeat is None:
+    if repeat is None:
         out.append(
             f"one channel: the others by a pallet offset of {turn:.6f} deg each, {milled.impeller.blades} in all"
         )
     else:
-        out.append(
-            f"all {milled.impeller.blades} channels: axis {checked.repeat.letter} turned on by {turn:.6f} deg each"
-        )
+        out.append(f"all {milled.impeller.blades} channels: axis {repeat.letter} turned on by {turn:.6f} deg each")
     return out

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from chipload.errors import Finding, Severity
-from chipload.jobs.impeller.names import finish_names, rough_names
+from chipload.jobs.impeller.names import ALL, finish_names, rough_names
 from chipload.jobs.impeller.numbers import operation_numbers
 from chipload.jobs.impeller.outcome import (
     Checked,
@@ -88,7 +88,16 @@ def _surface_findings(op: Searched) -> tuple[Finding, ...]:
 def _roughing(milled: ImpellerResult) -> list[Track]:
     names = rough_names(milled)
     return [
-        _track(milled, name, r.rough.program, r.seconds, (_gouge(name, r),), _rough_findings(r), not r.rough.machined)
+        _track(
+            milled,
+            name,
+            r.rough.program,
+            r.seconds,
+            (_gouge(name, r),),
+            _rough_findings(r),
+            not r.rough.machined,
+            r.repeat is not None,
+        )
         for name, r in zip(names, milled.roughs or (), strict=True)
     ]
 
@@ -99,7 +108,19 @@ def _finishing(milled: ImpellerResult) -> list[Track]:
         findings = tuple(Finding("machine", 0, text, Severity.EXCEEDS) for text in p.findings)
         limits = (_gouge(name, p), *_scallops(name, p))
         in_use = id(p) in used and not name.startswith("way-")
-        out.append(_track(milled, name, p.setting.program, p.seconds, limits, findings, not p.setting.machined, in_use))
+        out.append(
+            _track(
+                milled,
+                name,
+                p.setting.program,
+                p.seconds,
+                limits,
+                findings,
+                not p.setting.machined,
+                p.repeat is not None,
+                in_use,
+            )
+        )
     return out
 
 
@@ -111,9 +132,11 @@ def _track(
     limits: tuple[LimitCheck, ...],
     findings: tuple[Finding, ...],
     empty: bool,
+    repeats: bool,
     in_use: bool = True,
 ) -> Track:
-    files = () if empty else (f"{name}.{ENDINGS[milled.machine.dialect]}", f"{name}.apt")
+    ending = ENDINGS[milled.machine.dialect]
+    files = () if empty else (f"{name}.{ending}", f"{name}.apt", *((f"{name}{ALL}.{ending}",) if repeats else ()))
     blocks = partial(motion_blocks, program, milled.machine)
     return Track(name, TrackKind.PROGRAM, in_use, time_s, limits, findings, files, blocks=blocks)
 

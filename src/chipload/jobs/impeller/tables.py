@@ -116,7 +116,11 @@ class PathsTable(Table):
     chord_mm: Positive = Field(le=1.0, description="how far the tip may leave its path between two rows")
     overrun_mm: NotNegative = Field(1.0, description="of lines beyond the ends of their patch, where they can")
     lift_mm: Positive = Field(description="off the surface at the ends of a line")
-    lead_mm: Positive = Field(1.0, description="of a lift that is fed at the feed of the cut, at most lift_mm")
+    lead_mm: Positive | None = Field(
+        None,
+        description="of a lift that is fed at the feed of the cut, at most lift_mm; none: 1 mm, or the allowance of "
+        "roughing where that is more, or lift_mm where that is less",
+    )
     margin_mm: Positive = Field(description="that links keep from the part, rapids from the allowances on it too")
     touch_mm: NotNegative = Field(description="how deep a lift may touch the check points")
     near_mm: NotNegative = Field(description="longest direct link")

@@ -41,6 +41,8 @@ SUNK = 0.2
 _LEAF = 96
 #: first width of the cells over the one of a plane wall; of the width that is right to first order, what is taken
 _FIRST, _LESS = 0.98, 0.995
+#: at once they are made narrower by no more than this share: the widest reach may be of another wall then
+_STEP = 0.94
 #: nodes nearer to the contact than this are tried one by one [mm]
 _NEAR = 1.0
 #: of a part of B for which nodes are collected at once [rad]
@@ -167,7 +169,7 @@ def covering_of(
         reach, bend = max(x.reach for x in made), max(x.bend for x in made)
         if depth_of(corner, reach, bend, sunk) <= tolerance:
             break
-        edge *= _lessened(corner, reach, bend, sunk, tolerance)
+        edge *= max(_lessened(corner, reach, bend, sunk, tolerance), _STEP)
     parts = [*_round(impeller, around, sides), hub]
     points = np.concatenate([x.points - sunk * x.normals for x in parts])
     return Covering(points, tolerance, corner, reach, bend, sunk)
