@@ -19,7 +19,7 @@ from chipload.cli import app
 FOLDER = Path(__file__).parents[2] / "docs" / "tutorials"
 PAGES = sorted(path.stem for path in FOLDER.glob("*.md") if path.stem != "index")
 #: pages whose commands take over 20 s of processor time together
-SLOW = {"workpiece"}
+SLOW = {"workpiece", "thin_wall"}
 NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 
 
