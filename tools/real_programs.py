@@ -47,7 +47,7 @@ HEAD = """# Real programs, run whole
 Files of other people, each run from its beginning to its end by `chipload simulate FILE`. What a file does not state
 (cutter, stock, machine) is guessed, so that no verdict is better than `unproven`, and a gouge or a rapid through stock
 may be that of a guessed stock. `make real` runs all of them and writes this page; times are processor times of one run,
-the compiling of kernels included where a run was the first. A row that says *{not_run}* waits for the next `make real`.
+the compiling of kernels included where a run was the first. A row with *{not_run}* waits for the next `make real`.
 
 | file | kind | verdict | first reason | time [s] |
 |---|---|---|---|---:|
