@@ -3,7 +3,8 @@
     python benchmarks/sweep.py [--jobs 200] [--write]
 
 The job is a slot of 36 mm; step and limit vary. ``--write`` puts the table into docs/sweep.md. Times are by the clock,
-since the work is in other processes, all in one run, with the start of the processes.
+since the work is in other processes, all in one run, with the start of the processes. A case holds what chipload was
+when it ran: do not edit the source meanwhile.
 """
 
 from __future__ import annotations
@@ -132,6 +133,8 @@ def main() -> None:
     print(text)
     if chosen.write:
         page = PAGE.read_text(encoding="utf-8")
+        if BEGIN not in page:
+            page += f"\n## Measured\n\nBy `python benchmarks/sweep.py --write`, times by the clock.\n\n{BEGIN}{END}\n"
         made = re.sub(f"{BEGIN}.*{END}", lambda _: f"{BEGIN}\n\n{text}\n\n{END}", page, flags=re.DOTALL)
         PAGE.write_text(made, encoding="utf-8")
 
