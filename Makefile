@@ -1,4 +1,4 @@
-# make demo | test | quick | docs | package | reference | lock
+# make demo | test | quick | docs | real | package | reference | lock
 SHELL := /bin/bash
 PYTHON ?= $(shell /usr/bin/python3 -c 'import sys; print("/usr/bin/python3" if sys.version_info >= (3, 11) else "python3")' 2>/dev/null || echo python3)
 VENV := .venv
@@ -7,7 +7,7 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 export NO_MKDOCS_2_WARNING := 1
 export NUMBA_CACHE_DIR := $(CURDIR)/$(VENV)/numba
 
-.PHONY: setup test quick docs package demo reference lock
+.PHONY: setup test quick docs real package demo reference lock
 .DELETE_ON_ERROR:
 
 # what runs jobs and shows the page
@@ -39,6 +39,10 @@ quick: setup
 
 docs: setup
 	$(BIN)/mkdocs build --strict --site-dir site
+
+# every real file of docs/real_programs.md, run whole; CHIPLOAD_DATA is their folder. Hours: for the night
+real: setup
+	$(BIN)/python tools/real_programs.py
 
 # the wheel and the source archive; the wheel runs a job in an environment of its own, away from the checkout
 package: setup

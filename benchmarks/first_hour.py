@@ -155,8 +155,8 @@ never better than unproven and lists the keys that it changed.
 ## Twelve files of others
 
 Made by `python benchmarks/first_hour.py --write`, processor time of `init` and `run` together. An edit is one changed
-line of job.toml. A verdict rests on the guesses that were accepted; it says that the way from the file to the result is
-whole, not that these programs are right for a real workpiece.
+line of job.toml. A verdict rests on the guesses that were accepted; it shows that the way from the file to the result
+is whole, not that these programs are right for a real workpiece.
 
 | file | kind | guesses | edits | verdict | time [s] |
 |---|---|---:|---|---|---:|

@@ -72,6 +72,7 @@ def test_cutters_and_examples() -> None:
         ("material", "material my-material: Ktc 800, Krc 200, Kac 150"),
         ("machine", "machine my-machine: X -300 to 300"),
         ("catalogue", "catalogue my-catalogue: 2 cutters, 10 to 16 mm"),
+        ("controller", "rules of a fuzzy controller: my-controller"),
         ("fixture", "a closed mesh of 12 triangles, 101500 mm3"),
     ],
 )

@@ -37,18 +37,20 @@ def init(
     material: Annotated[bool, typer.Option("--material", help="write a template of a material into DIR")] = False,
     machine: Annotated[bool, typer.Option("--machine", help="write a template of a machine into DIR")] = False,
     catalogue: Annotated[bool, typer.Option("--catalogue", help="write a template of a catalogue into DIR")] = False,
+    controller: Annotated[bool, typer.Option("--controller", help="write a template of a torque controller")] = False,
     fixture: Annotated[bool, typer.Option("--fixture", help="write a block as a fixture (STL) into DIR")] = False,
     debug: Debug = False,
 ) -> None:
     """Write a job for a file: what the file states, and guesses for the rest, which you confirm.
 
     A job that is there is not overwritten. `chipload init --material DIR` writes a template of a material instead;
-    likewise --machine, --catalogue and --fixture.
+    likewise --machine, --catalogue, --controller and --fixture.
     """
 
     def work() -> int:
-        wanted = {"material": material, "machine": machine, "catalogue": catalogue, "fixture": fixture}
-        kinds = [kind for kind, asked in wanted.items() if asked]
+        asked = (material, machine, catalogue, controller, fixture)
+        names = ("material", "machine", "catalogue", "controller", "fixture")
+        kinds = [name for name, wanted in zip(names, asked, strict=True) if wanted]
         if kinds:
             if folder is not None:
                 raise InputError(f"{file}: a template needs no file: chipload init --{kinds[0]} DIR")
@@ -77,10 +79,14 @@ def _templates(kinds: list[str], folder: Path) -> int:
     """Write templates and say how a job names them."""
     from chipload.jobs.drafts.templates import write_template
 
+    tables = {
+        "fixture": '[[fixture]] file = "{}", units = "mm", spacing_mm = 2.0',
+        "controller": '[torque_control] file = "{}"',
+    }
     for kind in kinds:
         path = write_template(kind, folder)
-        table = f'[[{kind}]] file = "{path.name}", units = "mm", spacing_mm = 2.0' if kind == "fixture" else ""
-        show(f"written: {path}; in the job: {table or f'[{kind}] file = {chr(34)}{path.name}{chr(34)}'}")
+        named = tables.get(kind, f'[{kind}] file = "{{}}"').format(path.name)
+        show(f"written: {path}; in the job: {named}")
     return 0
 
 

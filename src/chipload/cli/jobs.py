@@ -131,7 +131,7 @@ def cuts(
     sets: Sets = None,
     debug: Debug = False,
 ) -> None:
-    """Propose calibration cuts for a job with a [wall]: what it bears, measured; [threshold] file reads the table."""
+    """Propose calibration cuts for a job with a [wall], to measure its allowable force; [threshold] names the table."""
 
     def work() -> int:
         from chipload.jobs import load_job

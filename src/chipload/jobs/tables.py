@@ -123,7 +123,7 @@ class Limits(Table):
 
 
 class ChecksTable(Table):
-    """Checks that are made unless a key says false; the report lists what is switched off."""
+    """Checks that are made unless a key is false; the report lists what is switched off."""
 
     cutter_strength: bool = Field(True, strict=True, description="stress of the cutter against its strength")
     flute_length: bool = Field(True, strict=True, description="no shank in material above the flutes")

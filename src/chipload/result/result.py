@@ -5,16 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from html import escape
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.errors import Finding
+from chipload.errors import Finding, InputError
+from chipload.lazy import require_extra
 from chipload.result.columns import COLUMNS
 from chipload.result.limits import LimitCheck
 from chipload.result.track import Track
 from chipload.result.verdict import Verdict
+
+if TYPE_CHECKING:
+    import pandas
 
 Floats = NDArray[np.float64]
 
@@ -149,6 +154,32 @@ class Result:
         found = list(dict.fromkeys(texts[self.verdict])) or ["no limit was checked"]
         more = f"; and {len(found) - 1} more" if len(found) > 1 else ""
         return f"{self.verdict.value.capitalize()}: {found[0]}{more}."
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the message and a table of the limits."""
+        rows = "".join(
+            f"<tr><td>{escape(track.name)}</td><td>{escape(check.text)}</td><td>{check.state.value}</td></tr>"
+            for track in self.in_use
+            for check in track.limits
+        )
+        return f"<p><b>{escape(self.message)}</b></p><table>{rows}</table>"
+
+    def to_pandas(self, track: str = "") -> pandas.DataFrame:
+        """The history of a track as a table of pandas; no name: the first in use. Needs ``chipload[notebook]``.
+
+        Raises
+        ------
+        InputError
+            There is no track of that name, or pandas is not installed.
+        """
+        require_extra("notebook")
+        import pandas
+
+        names = [one.name for one in self.tracks]
+        if not names or (track and track not in names):
+            raise InputError(f"track {track!r}: is not in the result: it has {', '.join(names) or 'none'}")
+        columns = self.track(track or names[0]).columns
+        return pandas.DataFrame({name: np.array(values) for name, values in columns.items()})
 
     def track(self, name: str) -> Track:
         """The track of a name.

@@ -1,4 +1,4 @@
-"""Templates of the files that a job names: material, machine, catalogue, fixture; each is read back by chipload."""
+"""Templates of the files that a job names: material, machine, catalogue, controller, fixture; each is read back."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from chipload.files import cannot_write, write_whole
 
 #: kinds of templates and their files
 TEMPLATES = {
-    "material": "material.toml", "machine": "machine.toml", "catalogue": "catalogue.toml", "fixture": "fixture.stl",
+    "material": "material.toml", "machine": "machine.toml", "catalogue": "catalogue.toml",
+    "controller": "controller.toml", "fixture": "fixture.stl",
 }  # fmt: skip
 #: corners of the block of the fixture [mm]: a vice jaw beside a workpiece at x = 0
 JAW = ((-30.0, -50.0, -40.0), (-1.0, 50.0, -5.0))

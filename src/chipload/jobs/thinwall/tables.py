@@ -1,4 +1,4 @@
-"""A job that cuts a thin wall: a plate or a blade with stock on its sides, as deep in each place as the wall bears."""
+"""A job that cuts a thin wall: a plate or a blade with stock on its sides, as deep at each place as the wall allows."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ class WorkpieceTable(Table):
 
 
 class ThresholdTable(Table):
-    """Experiments that say which force a place bears; without it the threshold is modelled."""
+    """Experiments that find the allowable force of a place; without them the threshold is modelled."""
 
     file: Text = Field(description="CSV: u, v, normal_force_n, and deflection_um where that was measured")
     deviations: NotNegative = Field(description="standard deviations of its scatter that are kept as reserve")

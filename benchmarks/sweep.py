@@ -1,0 +1,143 @@
+"""A sweep of many small jobs on one process, on two, on a Dask cluster, and with a worker killed: times, equal bytes.
+
+    python benchmarks/sweep.py [--jobs 200] [--write]
+
+The job is a slot of 36 mm; step and limit vary. ``--write`` puts the table into docs/sweep.md. Times are by the clock,
+since the work is in other processes, all in one run, with the start of the processes. A case holds what chipload was
+when it ran: do not edit the source meanwhile.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import re
+import signal
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from hashlib import sha256
+from pathlib import Path
+
+from chipload.sweep.run import run_sweep
+
+PAGE = Path(__file__).parents[1] / "docs" / "sweep.md"
+BEGIN, END = "<!-- benchmarks/sweep.py -->", "<!-- end -->"
+PROGRAM = "G21 G90 G94\nT1 M6\nS3000 M3\nG0 X-8 Y5 Z5\nG1 Z-2 F300\nX28\nG0 Z5\nM2\n"
+JOB = """[program]
+file = "slot.ngc"
+[machine]
+name = "vmc"
+[stock]
+low_mm = [0.0, 0.0, -6.0]
+high_mm = [20.0, 10.0, 0.0]
+[material]
+name = "al7075-t6"
+[[cutter]]
+number = 1
+diameter_mm = 6.0
+flutes = 2
+helix_deg = 30.0
+flute_length_mm = 18.0
+overhang_mm = 25.0
+modulus_gpa = 580.0
+[[operation]]
+kind = "simulate"
+step_mm = 0.5
+[limits]
+torque_nm = 5.0
+"""
+
+
+def tree(folder: Path) -> str:
+    """One hash of the names and bytes of all cases."""
+    out = sha256()
+    for path in sorted((folder / "cases").rglob("*")):
+        if path.is_file():
+            out.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes())
+    return out.hexdigest()
+
+
+@contextmanager
+def one_killed(cases: Path) -> Iterator[None]:
+    """Kill one worker with SIGKILL as soon as two cases are done."""
+    done = threading.Event()
+
+    def watch() -> None:
+        while not done.wait(0.05):
+            workers = multiprocessing.active_children()
+            if workers and len(list(cases.glob("*.json"))) >= 2:
+                os.kill(workers[0].pid or 0, signal.SIGKILL)
+                return
+
+    thread = threading.Thread(target=watch)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()
+
+
+def measured(run: Callable[[], object], out: Path) -> tuple[float, str]:
+    """Time by the clock [s] and hash of the cases."""
+    begin = time.perf_counter()
+    run()
+    return time.perf_counter() - begin, tree(out)
+
+
+def table(jobs: int) -> list[str]:
+    """The rows: where it ran, time, share of the first, whether the bytes are those of the first."""
+    from distributed import LocalCluster
+
+    rows: list[tuple[str, float, str]] = []
+    with tempfile.TemporaryDirectory(prefix="chipload-sweep-") as above:
+        folder = Path(above)
+        (folder / "slot.ngc").write_text(PROGRAM)
+        job = folder / "job.toml"
+        job.write_text(JOB)
+        steps = ",".join(f"{0.4 + 0.02 * k:.2f}" for k in range(10))
+        limits = ",".join(f"{0.2 + 0.05 * k:.2f}" for k in range(-(-jobs // 10)))
+        over = (f"operation.0.step_mm={steps}", f"limits.torque_nm={limits}")
+
+        def of(name: str, **where: object) -> None:
+            out = folder / name
+            rows.append((name, *measured(lambda: run_sweep(job, over, out, **where), out)))
+
+        of("one process")
+        of("two processes", workers=2)
+        with one_killed(folder / "two, one killed" / "cases"):
+            of("two, one killed", workers=2)
+        with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+            of("Dask, two workers", dask=cluster.scheduler_address)
+    first = rows[0]
+    return [
+        f"| {name} | {seconds:.1f} | {seconds / first[1]:.2f} | {'the same' if found == first[2] else 'DIFFERENT'} |"
+        for name, seconds, found in rows
+    ]
+
+
+def main() -> None:
+    """Print the table, or write it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--jobs", type=int, default=200, help="a multiple of 10")
+    parser.add_argument("--write", action="store_true", help="into docs/sweep.md")
+    chosen = parser.parse_args()
+    head = f"| {chosen.jobs // 10 * 10} jobs on | time [s] | of one process | bytes of all cases |"
+    lines = [head, "|---|---:|---:|---|", *table(chosen.jobs)]
+    load = f"Load of the computer while it ran: {os.getloadavg()[1]:.0f}, on {os.cpu_count()} cores."
+    text = "\n".join([*lines, "", load])
+    print(text)
+    if chosen.write:
+        page = PAGE.read_text(encoding="utf-8")
+        if BEGIN not in page:
+            page += f"\n## Measured\n\nBy `python benchmarks/sweep.py --write`, times by the clock.\n\n{BEGIN}{END}\n"
+        made = re.sub(f"{BEGIN}.*{END}", lambda _: f"{BEGIN}\n\n{text}\n\n{END}", page, flags=re.DOTALL)
+        PAGE.write_text(made, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
