@@ -124,9 +124,9 @@ modulus_gpa = 580.0
 milling = "slot"
 axial_depth_mm = 2.0
 [channels]
-feed = "fx"
-across = "fy"
-axis = "fz"
+feed = "fx_n"
+across = "fy_n"
+axis = "fz_n"
 on = "work"
 [dynamometer]
 feed_hz = 2000.0
@@ -139,7 +139,7 @@ def _forces() -> bytes:
     t = np.arange(4000) * 5e-5
     waves = [120.0 + 80.0 * np.cos(math.tau * 100.0 * t + k) for k in range(3)]
     rows = "\n".join(f"{a:.5f},{b:.3f},{c:.3f},{d:.3f}" for a, b, c, d in zip(t, *waves, strict=True))
-    return f"t_s,fx,fy,fz\n{rows}\n".encode()
+    return f"t_s,fx_n,fy_n,fz_n\n{rows}\n".encode()
 
 
 def _drawing() -> bytes:

@@ -102,7 +102,9 @@ def case(
         code, said, before = run.ended(how)
         found[how.name] += not before
         found["went on"] += "goes on after step" in said
-        found["faults"] += code == 1 or "Traceback" in said
+        if code == 1 or "Traceback" in said:
+            found["faults"] += 1
+            print(f"{' '.join(words[:2])}: {how.name}: code {code}: {said[-500:]}", file=sys.stderr, flush=True)
     code, said, _ = Run([*words, str(out)], messages).ended()
     found["went on"] += "goes on after step" in said
     found["faults"] += code not in DONE

@@ -109,6 +109,11 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "planning/thinwall/depth.py",
         "open_ = np.flatnonzero(high + low > tolerance)",
     ): "the search goes on longer, to the same depth",
+    ("structure/shell.py", "scale = 1.0 * np.sqrt(np.diag(stiffness))"): "any scale gives the same inverse",
+    (
+        "machine/feed.py",
+        "dt = np.where(moving, 2.0 * step / np.where(moving, total, 1.1), 0.0)",
+    ): "the number stands where nothing is taken",
     ("structure/shell.py", "stiffness[held, held] = 1.1"): "what is held has no load",
     (
         "stock/planar.py",

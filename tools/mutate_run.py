@@ -60,6 +60,8 @@ def live_functions(module: ModuleType) -> Iterator[FunctionType]:
         elif isinstance(value, type) and value.__module__ == module.__name__:
             for part in list(vars(value).values()):
                 yield from of(part)
+        elif hasattr(value, "py_func"):
+            return  # compiled: its Python is not what runs
         elif hasattr(value, "__wrapped__"):
             yield from of(value.__wrapped__)
         elif isinstance(value, FunctionType) and value.__code__.co_filename == module.__file__:

@@ -152,3 +152,18 @@ def test_below_which_torque_the_error_is_too_great_by_hand():
     error[torque == 3.0] *= [1.0, -1.0] * 3
     assert _light(torque, error, 0.2) == (3.0, 2.0)
     assert _light(torque, error, 0.6) == (1.0, 1.0)
+
+
+@pytest.mark.parametrize("terms", [1, 2, 4])
+def test_ten_rows_for_each_parameter_are_needed(terms):
+    speed, torque = cuts()
+    few = slice(0, 10 * (terms + 2) - 1)
+    with pytest.raises(InputError, match=rf"{few.stop} rows: must be at least {few.stop + 1} to identify"):
+        identify(TIME[few], speed[few], speed[few], torque[few], sensor_lag=LAG, idle_terms=terms)
+
+
+def test_a_lag_of_a_ramp_at_uneven_times():
+    """x = c t through a lag tau, from rest: y = c (t - tau (1 - exp(-t / tau))), exact at every time."""
+    time = np.array([0.0, 0.01, 0.03, 0.035, 0.1, 0.11, 0.3, 0.9])
+    exact = 7.0 * (time - LAG * (1.0 - np.exp(-time / LAG)))
+    np.testing.assert_allclose(first_order(7.0 * time, time, LAG), exact, rtol=1e-12)

@@ -276,3 +276,15 @@ def test_as_linuxcnc_does_it(arcs, plane):
         assert [(row[0], row[-1]) for row in got] == [(row[0], row[-1]) for row in want], text
         assert np.allclose(np.array(got), np.array(want), rtol=0.0, atol=2e-4), text
     assert 3 < refused < 25
+
+
+@pytest.mark.parametrize("radius", [1e-61, 1e-12, -1e-61])
+def test_a_radius_that_coordinates_do_not_show_counts_as_none(radius):
+    def path(r):
+        beside = Compensation(1, r, XY, [0.0] * 9)
+        out = []
+        for end in ([20.0, 0.0], [20.0, 20.0], [0.0, 20.0]):
+            out += beside.line(LINE, [*end, *[0.0] * 7], None)
+        return [(m.motion, tuple(m.end)) for m in [*out, *beside.finish()]]
+
+    assert path(radius) == path(0.0)

@@ -184,3 +184,11 @@ def test_outside_the_wall_is_refused(tube):
     assert str(err.value) == "shell: s = 58 mm with a patch of 5 mm: must lie on the wall, from 0 to 60"
     with pytest.raises(InputError, match="not in balance"):
         ritz(replace(TUBE, ends="free"))
+
+
+def test_beam_of_a_tube_by_hand():
+    """Radius 20, wall 1, length 60 mm, E 70 GPa, nu 0.33: I = pi r^3 t = 25132.74 mm^4, A = 2 pi r t = 125.6637 mm^2,
+    shear factor of a thin tube 2 (1 + nu) / (4 + 3 nu) = 2.66 / 4.99, G = 70000 / 2.66 = 26315.79 MPa: bending
+    60^3 / (3 E I) = 4.092556e-5, shear 60 / (0.5330661 x 26315.79 x 125.6637) = 3.403642e-5 mm/N."""
+    tube = Shell(20.0, 60.0, 1.0, 70e3, 0.33)
+    assert beam_compliance(tube, 60.0) == pytest.approx(4.092556e-5 + 3.403642e-5, rel=1e-5)

@@ -33,6 +33,17 @@ def test_an_even_stretch_is_as_great_on_the_faces(axis):
     assert greatest(solid, u, np.array([0, 1])) == pytest.approx(200.0, rel=1e-9)
 
 
+@pytest.mark.parametrize("b", [-1e-3, 1e-3])
+def test_bending_and_pull_are_greatest_on_one_face(b):
+    """u_y = y (a - b z), u_z = b y^2 / 2: no shear, sigma_y = E (a - b z), greatest on one face alone."""
+    grid = plate(2.0, 40.0, 1.0, (1, 2, 1))
+    solid = SolidWorkpiece(grid, 2e5, 0.0, 7.8e-9, grid.side("j-"))
+    a, (y, z) = 2e-3, grid.nodes[:, 1:].T
+    u = np.column_stack([0.0 * y, y * (a - b * z), 0.5 * b * y**2])
+    exact = 2e5 * max(a - b * z.min(), a - b * z.max())
+    assert greatest(solid, u, np.array([0, 1])) == pytest.approx(exact, rel=1e-9)
+
+
 def test_equivalent_stress():
     """Shear alone: sqrt(3) tau; equal in all directions: none."""
     shear = np.zeros((3, 3))

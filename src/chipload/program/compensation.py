@@ -27,6 +27,8 @@ from chipload.program.commands import ARC, DWELL, PLANE_AXES, RAPID, YZ
 
 #: a change of direction below this is no corner [rad]
 SMOOTH = 0.05
+#: a smaller radius counts as none [mm]
+LEAST_RADIUS = 1e-9
 
 
 class CentreMove(NamedTuple):
@@ -92,7 +94,8 @@ class Compensation:
         if plane == YZ:
             raise InputError("radius compensation: not in the plane YZ (G19): select G17 or G18")
         self._side = side if radius >= 0.0 else -side
-        self._radius = abs(radius)
+        # beside a contour of metres a smaller radius is lost in the coordinates
+        self._radius = abs(radius) if abs(radius) >= LEAST_RADIUS else 0.0
         self._first, self._second, self._along = PLANE_AXES[plane]
         self._shift = complex(*shift)
         self._slack, self._square = slack, square

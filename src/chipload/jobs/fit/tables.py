@@ -46,8 +46,8 @@ class MeasurementTable(Table):
 
     file: Text
     use: Literal["fit", "predict"]
-    feed_mm_min: Positive
-    speed_rpm: Positive
+    feed_mm_min: Positive = Field(le=100_000.0)
+    speed_rpm: Positive = Field(le=1_000_000.0)
     window_s: tuple[Number, Number] | None = None
     channels: ChannelsTable | None = None
 
