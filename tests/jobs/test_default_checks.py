@@ -17,7 +17,7 @@ from chipload.cutting.material import material_named
 from chipload.cutting.strength import cutter_stress
 from chipload.engagement.tooth_engagement import engagement_of_arcs
 from chipload.errors import InputError
-from chipload.jobs.checks import DefaultChecks
+from chipload.jobs.checks import DefaultChecks, upper_loads
 from chipload.jobs.program.history import History
 from chipload.jobs.program.tables import ChecksTable
 from chipload.program.build import plunge, rapid
@@ -152,3 +152,19 @@ def test_every_cutter_has_its_own_allowed_stress() -> None:
     assert checks.allowed_stress([2, 1, 0]).tolist() == [1625.0, 1500.0, math.inf]
     assert ChecksTable().off == ()
     assert ChecksTable(spindle=False).off == ("spindle",)
+
+
+def test_upper_loads_are_made_when_they_are_asked_for() -> None:
+    class Once(dict[str, np.ndarray]):
+        def __getitem__(self, name: str) -> np.ndarray:
+            asked.append(name)
+            return super().__getitem__(name)
+
+    asked: list[str] = []
+    columns = Once(force_n=np.array([100.0, 50.0]), force_sd_n=np.array([10.0, 0.0]), line=np.array([1, 2]))
+    upper = upper_loads(columns, 2.0)
+    assert asked == []
+    assert upper["force_n"].tolist() == [120.0, 50.0]
+    assert sorted(upper) == ["force_n", "force_sd_n", "line"]
+    assert upper["line"].tolist() == [1, 2]
+    assert upper_loads(columns, 0.0) is columns

@@ -189,6 +189,17 @@ def all_bytes(removal: Removal, stock: LayeredStock) -> list[bytes]:
     return [repr(whole).encode(), stock.to_bytes(), *(np.ascontiguousarray(c[k]).tobytes() for k in c)]
 
 
+def test_workers_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("chipload.simulation.chips.BLOCK", 3)
+    every = []
+    for workers in (1, 2):
+        stock = block()
+        removal = run(zigzag(), stock=stock, keep=True, watch=watch, workers=workers)
+        every.append(all_bytes(removal, stock))
+        assert removal.columns["chip_volume_mm3"].any()
+    assert every[0] == every[1]
+
+
 def watch(cuts: Cuts) -> dict[str, Floats]:
     return {"own": cuts.plain.chip_max() + cuts.way[:, 0]}
 

@@ -109,12 +109,11 @@ def directions(program: Program) -> tuple[Floats, Floats]:
     """(n, 3), (n, 3) unit directions of travel at the start and the end of each row; 0 where it has no length."""
     d = program.p_work - starts(program)
     first, last = d.copy(), d.copy()
-    arc, sweep = is_arc(program), sweeps(program)
-    e1, e2 = bases(program.normal)
-    along = rises(program)[:, None] * program.normal
+    arc = np.flatnonzero(is_arc(program))
+    e1, e2 = bases(program.normal[arc])
+    along, sweep = rises(program)[arc, None] * program.normal[arc], sweeps(program)[arc, None]
     for out, v in zip((first, last), arms(program), strict=True):
-        around = sweep[:, None] * (v[:, :1] * e2 - v[:, 1:] * e1) + along
-        out[arc] = around[arc]
+        out[arc] = sweep * (v[arc, :1] * e2 - v[arc, 1:] * e1) + along
         size = np.linalg.norm(out, axis=1)
         out /= np.where(size > 0.0, size, 1.0)[:, None]
     still = lengths(program) == 0.0

@@ -43,7 +43,7 @@ FREE: PathMode = (float(PathControl.CONTINUOUS), 0.0, 0.0)
 
 def frozen_column(value: ArrayLike, kind: type) -> NDArray[Any]:
     """The values as an array that nobody can change: itself where that is so already, else a copy."""
-    column: NDArray[Any] = np.asarray(value, dtype=kind)
+    column: NDArray[Any] = np.asarray(value, dtype=kind, order="C")
     owner: Any = column if column is value or column.base is value else None
     while isinstance(owner, np.ndarray):
         if owner.flags.writeable:

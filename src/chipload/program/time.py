@@ -171,20 +171,19 @@ def _speeds(program: Program, machine: Machine) -> _Speeds:
     first, last = directions(program)
     arc = is_arc(program)
     speed = np.where(program.motion == RAPID, machine.rapid, np.minimum(program.feed, machine.feed_max))
-    e1, e2 = bases(program.normal)
-    climb = np.abs((first * program.normal).sum(axis=1))
-    level = np.sqrt(np.maximum(0.0, 1.0 - climb**2))
-    swing = np.hypot(e1, e2)
     along = np.abs(first)
-    along[arc] = (level[:, None] * swing + climb[:, None] * np.abs(program.normal))[arc]
     limit = np.array(machine.acceleration)
+    at = np.flatnonzero(arc)
+    normal = program.normal[at]
+    swing = np.hypot(*bases(normal))
+    climb = np.abs((first[at] * normal).sum(axis=1))
+    level = np.sqrt(np.maximum(0.0, 1.0 - climb**2))
+    along[at] = level[:, None] * swing + climb[:, None] * np.abs(normal)
     with np.errstate(divide="ignore"):
         a = (limit / along).min(axis=1)
-        inward = (limit / swing).min(axis=1)
-    r = np.where(arc, radii(program), np.inf)
-    turning = arc & (sweeps(program) != 0.0)
-    with np.errstate(divide="ignore"):
-        speed = np.where(turning, np.minimum(speed, np.sqrt(inward * r) / level), speed)
+        inward = (limit / swing).min(axis=1, initial=np.inf)
+        around = np.minimum(speed[at], np.sqrt(inward * radii(program)[at]) / level)
+    speed[at] = np.where(sweeps(program)[at] != 0.0, around, speed[at])
     # joints between rows that have a length
     here, there = row[:-1], row[1:]
     cos = (last[here] * first[there]).sum(axis=1)
