@@ -96,10 +96,9 @@ class StabilityResult:
         if spread is not None:
             for tool, quiet in self.quiet.items():
                 parts = self.watch.parts(tool)
-                assert parts is not None
-                assert quiet.cut is not None
-                some = parts.chosen(quiet.cut).at_speeds(parts.pitch / quiet.speed)
-                out[tool] = stable_probability(some, spread, relative_covariance(self.watch.material))
+                if parts is not None and quiet.cut is not None:
+                    some = parts.chosen(quiet.cut).at_speeds(parts.pitch / quiet.speed)
+                    out[tool] = stable_probability(some, spread, relative_covariance(self.watch.material))
         return out
 
     @cached_property
