@@ -128,16 +128,11 @@ def simulate(
         "material": {"name": metal.name},
         "operation": ({"kind": "simulate", **finest, **settings},),
         "limits": dict(limits),
-        "stiffness": None if stiffness is None else dict(stiffness),
-        "dynamics": None if dynamics is None else dict(dynamics),
-        "workpiece": None if workpiece is None else dict(workpiece),
         "checks": dict(checks or {}),
     }
-    layers = stock if isinstance(stock, LayeredStock) else None
-    if layers is not None and layer_mm is not None:
-        raise InputError("layer_mm: the stock has its own layers: leave it out")
-    if layers is None:
-        table["stock"] = _solid(stock, layer_mm, meshes, files)
+    stated = {"stiffness": stiffness, "dynamics": dynamics, "workpiece": workpiece}
+    table |= {key: dict(of) for key, of in stated.items() if of is not None}
+    table |= _stock(stock, layer_mm, meshes, files)
     table |= _bodies(part, fixtures, SPACING * smallest, meshes, files)
     made = _table(table, ProgramJobTable)
     _require_sources(made)
@@ -146,7 +141,18 @@ def simulate(
         cutters=cutters, material=metal.name, meshes=meshes,
     )  # fmt: skip
     provenance = provenance_of(files, (), on, (metal,))
-    return History(simulate_read(job, reading, on, metal, _copy(layers), provenance, progress))
+    return History(simulate_read(job, reading, on, metal, _copy(stock), provenance, progress))
+
+
+def _stock(
+    stock: Stock, layer_mm: float | None, meshes: dict[str, trimesh.Trimesh], files: dict[str, Path]
+) -> dict[str, Any]:
+    """The table of the stock; layers have none."""
+    if not isinstance(stock, LayeredStock):
+        return {"stock": _solid(stock, layer_mm, meshes, files)}
+    if layer_mm is not None:
+        raise InputError("layer_mm: the stock has its own layers: leave it out")
+    return {}
 
 
 def _bodies(
@@ -304,9 +310,9 @@ def _table(values: Mapping[str, Any], kind: type[Model]) -> Model:
         raise
 
 
-def _copy(stock: LayeredStock | None) -> LayeredStock | None:
-    """The same layers, so that those of the caller stay as they are."""
-    if stock is None:
+def _copy(stock: Stock) -> LayeredStock | None:
+    """The same layers, so that those of the caller stay as they are; None: the stock is stated in another way."""
+    if not isinstance(stock, LayeredStock):
         return None
     out = LayeredStock(stock.bounds, stock.xs, stock.ys, stock.tiles, stock.part)
     out.restore(stock.state())
