@@ -94,7 +94,7 @@ def test_means_of_the_third_feed(tmp_path):
     third = next(c for c in done.comparisons if c.use == "predict")
     assert np.all(np.abs(third.mean_percent) < 5.0), third.mean_percent
     # the measured mean lies in the band
-    assert np.all(np.abs(third.predicted.mean - third.mean) < third.predicted.half[0])
+    assert np.all(np.abs(third.predicted.mean - third.forces.mean) < third.predicted.half[0])
     # at 300 mm/min the second tooth is all but out of the cut: 2 e close to f_z = 0.025 mm
     assert 0.011 < done.fit.cutter.runout[0] < 0.013
     assert math.isclose(done.fit.turns[0].speed * 60.0 / math.tau, 6000.0, rel_tol=1e-4)
