@@ -41,28 +41,28 @@ def inputs(tmp_path_factory):
 
 def test_shape(inputs):
     """Span 68 mm by the file (67.9 along the stacking), chord about 56 mm; thinner towards the tip."""
-    length, height, thin = inputs.shape.size()
+    length, height, thin = inputs.body.shape.size()
     assert 40.0 < length < 56.0
     assert 55.0 < height < 70.0
-    root, tip = (float(inputs.shape.thickness(0.5, v)) for v in (0.05, 0.95))
+    root, tip = (float(inputs.body.shape.thickness(0.5, v)) for v in (0.05, 0.95))
     assert 0.3 < thin < tip < root < 6.0
 
 
 def test_bears_least_at_the_tip(inputs):
-    none = [np.zeros(inputs.wall.shape)] * 2
-    force = inputs.threshold(inputs.deflection)(none, 0).force.reshape(inputs.wall.shape)
+    none = [np.zeros(inputs.body.wall.shape)] * 2
+    force = inputs.threshold(inputs.depths.deflection)(none, 0).force.reshape(inputs.body.wall.shape)
     assert np.unravel_index(force.argmin(), force.shape)[1] == force.shape[1] - 1
     assert force[:, 0].min() > 20.0 * force[:, -1].max()
 
 
 def test_a_pass_is_reached_and_does_not_gouge(inputs):
-    surfaces = [inputs.coarse(s) for s in inputs.side_numbers]
-    plan = constant(surfaces, inputs.threshold(inputs.deflection), inputs.even_law, 0.3)
+    surfaces = [inputs.coarse(s) for s in inputs.body.side_numbers]
+    plan = constant(surfaces, inputs.threshold(inputs.depths.deflection), inputs.depths.even_law, 0.3)
     legs = _linked(inputs, plan)
     u, v = np.meshgrid(np.linspace(0.0, 1.0, 161), np.linspace(0.0, 1.0, 201), indexing="ij")
-    cloud = np.concatenate([p.reshape(-1, 3) for p in inputs.shape.sides(u, v)])
+    cloud = np.concatenate([p.reshape(-1, 3) for p in inputs.body.shape.sides(u, v)])
     for leg in legs:
-        gap = nearest(leg.program, inputs.cutter, cloud)
+        gap = nearest(leg.program, inputs.cut.cutter, cloud)
         assert gap.distance > -0.02
     moved = _on_machine(inputs, legs[-1].program)
     assert moved.exceeding == ()

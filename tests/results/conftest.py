@@ -26,7 +26,7 @@ from chipload.jobs import LoadedJob, load_job
 from chipload.result import Result, Summary, load_result, read_summary
 
 EXAMPLES = Path(chipload.examples.__file__).parent
-#: what makes a slow example shorter: coarser steps and layers; its kind, its limits and its files stay
+#: what makes a slow example shorter: coarser steps and layers, less of a surface; its kind, its limits and its files stay
 SHORTER: Mapping[str, tuple[str, ...]] = {
     "contour": ("operation.0.step_mm=0.2",),
     "pocket": ("operation.0.step_mm=0.6",),
@@ -44,9 +44,12 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
     "trunnion": (),
     "tube": (),
     "cone": (),
-    "plate": (),
+    "plate": ("operation.0.least_error=false",),
     "blade": ("operation.0.least_error=false",),
-    "impeller": (),
+    "impeller": (
+        "operation.0.most_cutters=1",
+        *(f"surface.{k}.{key}" for k in range(3) for key in ("along=[0.42, 0.58]", "points=[6, 5]")),
+    ),
     "hecc": ("operation.0.tolerance_mm=0.5",),
 }
 
