@@ -26,7 +26,7 @@ from chipload.jobs import LoadedJob, load_job
 from chipload.result import Result, Summary, load_result, read_summary
 
 EXAMPLES = Path(chipload.examples.__file__).parent
-#: what makes a slow example shorter: coarser steps and layers, less of a surface; its kind, its limits and its files stay
+#: what makes a slow example shorter: coarser steps and layers, less of a surface; its kind, limits and files stay
 SHORTER: Mapping[str, tuple[str, ...]] = {
     "contour": ("operation.0.step_mm=0.2",),
     "pocket": ("operation.0.step_mm=0.6",),
