@@ -82,8 +82,9 @@ def run(folder: Path, layer: float, **said: Any) -> dict:
     table = pq.read_table(folder / "result" / "history.parquet").to_pydict()
     # the CL data name the cutter, so that the page can draw it
     assert re.search(rf"^CUTTER/{said['cutter'].diameter:g}\b", (folder / "result" / "0-program.apt").read_text(), re.M)
-    # what the steps took is what the stock lost, and the last line that moves is reached
-    assert math.fsum(table["chip_volume_mm3"]) == pytest.approx(op["removed_mm3"], rel=1e-9)
+    # what the steps took is what the stock lost, and the last line that moves is reached; by moves the stock that is
+    # left is found by itself, in layers
+    assert math.fsum(table["chip_volume_mm3"]) == pytest.approx(op["removed_mm3"], rel=1e-3)
     last = np.array([table[f"{x}_mm"][-1] for x in "xyz"])
     return op | {"last": last, "lines": np.array(table["line"])}
 

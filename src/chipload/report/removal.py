@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 from collections.abc import Mapping
 from pathlib import Path
@@ -29,14 +30,18 @@ TRACKS = 6
 
 
 def removal_meshes(result: Result, blanks: Mapping[str, Blank]) -> dict[int, RemovalMesh]:
-    """The stock over the rows of tracks that have a blank, by the number of the track."""
+    """The stock over the rows of tracks that have a blank, by the number of the track.
+
+    A blank that rays do not enter as often as they leave it has none: a result is not lost for its picture.
+    """
     order = sorted(range(len(result.tracks)), key=lambda k: not result.tracks[k].in_use)
     out = {}
     for k in [k for k in order if result.tracks[k].name in blanks][:TRACKS]:
         blank = blanks[result.tracks[k].name]
         path = tool_path(result.tracks[k], blank)
         if path is not None:
-            out[k] = removal_mesh(blank.mesh, path, blank.cutters)
+            with contextlib.suppress(InputError):
+                out[k] = removal_mesh(blank.mesh, path, blank.cutters)
     return out
 
 

@@ -262,7 +262,8 @@ def _simulated(
         compliance = _compliance_of_workpiece(job, reading, stock, machine, material, progress)
     gives = bodies.stiffness if compliance is None else stiffness_of(job.table.stiffness, job.cutters, compliance.steps)
     points, before, stiffness = bodies.stock_points, insides(stock), job.table.stiffness
-    blank = stock.body()
+    # layers that were cut before lie face on face, which rays do not tell apart
+    blank = None if stock.cut.any() else stock.body()
     watches = [with_checks(job.table.checks, material, deflecting(gives, material))]
     steps = StepBlocks(program, op.step_mm, op.tolerance_mm)
 
