@@ -282,6 +282,16 @@ def test_other_texts_are_to_be_converted_first(tmp_path: Path, name: str, kind: 
         done(tmp_path, SLOT, "force_n = 620.0\n", job=JOB.replace("a.ngc", name))
 
 
+def test_the_thickest_chip_of_a_ramp_is_not_that_of_its_greatest_force(tmp_path: Path) -> None:
+    """The cutter rises out of the block: its chip is thickest before its force is greatest (found by random ways)."""
+    text = HEAD + "G0 X-9 Y0\nG0 Z-2\nF500\nG1 X-2.40 Y-7.97 Z0.94\nG0 Z9\nM2\n"
+    job = JOB.replace("helix_deg = 0.0\n", "helix_deg = 30.0\nrunout_mm = 0.01\nrunout_deg = 20.0\n")
+    read = done(tmp_path, text, "chip_max_mm = 0.026\n", job=job)
+    before, after = read.outcome.feeds.before.columns, read.outcome.simulated.removal.columns
+    assert before["chip_max_mm"].max() > 0.08
+    assert 0.024 < after["chip_max_mm"].max() <= 0.026
+
+
 @settings(max_examples=6, deadline=None, phases=[Phase.generate])
 @given(st.data())
 def test_what_is_said_to_hold_holds(tmp_path_factory, data) -> None:

@@ -59,6 +59,8 @@ def test_one_side_is_cut_and_all_of_its_stock_taken(done):
     for one in done.variants.values():
         assert {m.side for m in one.plan.maps} == {0}
         assert [f.side for f in one.finish] == [0]
-        assert one.columns["chip_volume_mm3"].sum() == pytest.approx(expected, rel=0.04)
+        # the path that is moved against the form error cuts deeper in the rigid simulation
+        taken = expected + one.shift * 8.0 * 5.0 if one.name == "compensated" else expected
+        assert 0.96 * expected <= one.columns["chip_volume_mm3"].sum() <= 1.04 * taken
         assert one.plan.passes_otherwise is None
     assert done.variants["variable"].columns["force_over_allowable"].max() <= 1.01

@@ -129,12 +129,29 @@ def straight(program: Program) -> None:
         )
 
 
-def watching(steps: Steps, asked: Asked, cutters: Mapping[int, Cutter], material: Material, machine: Machine) -> Watch:
-    """A watch that says of each step that cuts the greatest factor within the limits and what holds it."""
+def watching(
+    steps: Steps,
+    asked: Asked,
+    cutters: Mapping[int, Cutter],
+    material: Material,
+    machine: Machine,
+    before: Mapping[str, NDArray[Any]],
+) -> Watch:
+    """A watch that says of each step that cuts the greatest factor within the limits and what holds it.
+
+    ``before`` are the columns at the programmed feeds. A watch gets the instant of a step with the greatest force;
+    where another has a thicker chip or more torque its loads are raised to that, in the same ratio at any feed.
+    """
     least, most, by = _bounds(steps, asked.table, cutters, machine)
 
     def watch(cuts: Cuts) -> dict[str, Floats]:
         low, high = least[cuts.step], most[cuts.step]
+        there = greatest_loads(cuts, material, asked.rotation, False)
+        beyond = {
+            name: np.maximum(np.divide(before[name][cuts.step], x, out=np.ones(len(x)), where=x > 0.0), 1.0)
+            for name, x in there.items()
+            if name in before
+        }
 
         def ratios(factor: Floats) -> Floats:
             moved = at_feeds(cuts, factor)
@@ -146,7 +163,11 @@ def watching(steps: Steps, asked: Asked, cutters: Mapping[int, Cutter], material
             upper = upper_loads(loads, asked.checks.sigma)
             limits = {**asked.limits, STRESS: allowed_stress(moved.cutter)}
             return np.array(
-                [upper[column_of(name).name] * (1.0 + asked.error(name)) / limits[name] for name in asked.held]
+                [
+                    upper[column] * beyond.get(column, 1.0) * (1.0 + asked.error(name)) / limits[name]
+                    for name in asked.held
+                    for column in (column_of(name).name,)
+                ]
             )
 
         factor = greatest_factor(lambda k: np.asarray(ratios(k).max(axis=0)), low, high)

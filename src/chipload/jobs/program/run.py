@@ -235,7 +235,7 @@ def _new_feeds(
     # again, for the greatest feed of each step
     allowed = remove(
         program, stock_body(job, reading.program), job.cutters, material, fine, interpolation=op.interpolation,
-        times=times, watch=watching(steps, asked, job.cutters, material, machine), accuracy=False,
+        times=times, watch=watching(steps, asked, job.cutters, material, machine, before.columns), accuracy=False,
         engine=op.engine, progress=lambda done, what: progress(0.5 + 0.5 * done, what),
     )  # fmt: skip
     return with_new_feeds(
