@@ -27,7 +27,7 @@ FIGURES: dict[str, tuple[tuple[str, int, int], ...]] = {
     "contour": (("along-0", 860, 760),),
     "feeds": (("feeds", 1000, 760),),
     "chatter": (("stability", 500, 460), ("margin", 500, 460)),
-    "bracket": (("view3d", 620, 640), ("loads", 500, 860)),
+    "bracket": (("view3d", 560, 640), ("loads", 430, 860)),
     "part": (("bent", 700, 480),),
     "tube": (("path", 900, 860),),
     "cone": (("allowable", 900, 380),),

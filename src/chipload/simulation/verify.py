@@ -27,6 +27,8 @@ Bools = NDArray[np.bool_]
 
 #: a row of the history lies on the program's path within this [mm]
 MATCH_MM = 1e-6
+#: where a rim lies on the edge of an earlier disc there is no one engagement: that this far [mm] before counts too
+BEFORE_MM = 1e-5
 #: stock that a rapid passes through counts when it is thicker than this [mm]
 RAPID_MM = 1e-6
 #: rows between two calls of ``progress``
@@ -352,6 +354,12 @@ def _compare(
                     j = at[again]
                     off[again] = _difference(level.trail, kk[j], ww[j], planned[again], tolerance, workers)
                 best[use] = np.minimum(best[use], off)
+            stuck = np.flatnonzero((best > tolerance) & one[rows])
+            if len(stuck):
+                at = rows[stuck]
+                just_before = np.maximum(w[at] - BEFORE_MM / length[k[at]], 0.0)
+                there = _degrees(level.trail, k[at], just_before, FINE_DEG, workers)
+                best[stuck] = np.minimum(best[stuck], np.abs(there - columns["engagement_deg"][at]))
             gap[rows] = best
             done[rows] = True
             finished += len(rows)
