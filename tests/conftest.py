@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +26,7 @@ CORE = (
     "stock", "test_docs_reference.py", "test_errors.py", "test_extras.py", "test_gallery.py", "test_packages.py",
     "test_words.py",
 )  # fmt: skip
+CHROMIUM = Path("/usr/bin/chromium")
 EXAMPLES = Path(__file__).parents[1] / "src" / "chipload" / "examples"
 WALL = Contour.from_bulges([[0, 28], [0, 8], [8, 0], [28, 0]], [0, math.tan(math.pi / 8), 0, 0])
 CENTRES = Contour.from_bulges([[5, 28], [5, 8], [8, 5], [28, 5]], [0, math.tan(math.pi / 8), 0, 0])
@@ -38,6 +39,19 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.path.is_relative_to(own) and item.path.relative_to(own).parts[0] in CORE:
             item.add_marker(pytest.mark.core)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[object]:
+    """Chromium without a window. One for all tests: a second one in the same process is refused."""
+    if not CHROMIUM.exists():
+        pytest.skip("no chromium: the page is not opened in a browser")
+    playwright = pytest.importorskip("playwright.sync_api", reason="no playwright: the page is not opened in a browser")
+    flags = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    with playwright.sync_playwright() as p:
+        chromium = p.chromium.launch(executable_path=str(CHROMIUM), args=flags)
+        yield chromium
+        chromium.close()
 
 
 def made_strategy(name: str, rows: int = 900) -> StrategyResult:

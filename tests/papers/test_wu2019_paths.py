@@ -3,9 +3,9 @@
 The oracle of the pallet angles is the gouge test of the source, check point by check point.
 """
 
+import importlib.util
 import math
 import re
-import sys
 from pathlib import Path
 
 import pytest
@@ -14,8 +14,12 @@ from chipload.planning.impeller.compare import gouges
 from chipload.planning.impeller.ranges.ranges import valid_ranges
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "benchmarks"))
-import wu2019  # noqa: E402
+# by its path: other benchmarks are named as folders of tests are
+_SPEC = importlib.util.spec_from_file_location("wu2019", ROOT / "benchmarks" / "wu2019.py")
+assert _SPEC is not None
+assert _SPEC.loader is not None
+wu2019 = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(wu2019)
 
 SOURCE = (677.23, 1196.33)
 

@@ -9,7 +9,6 @@ import pytest
 
 from chipload.result import load_result
 from results.test_examples import NAMES
-from web.conftest import browser  # noqa: F401
 from web_served import Served
 
 #: of many tracks the page shows these
@@ -26,9 +25,8 @@ def served(example) -> Iterator[Served]:
     page.end()
 
 
-# the tracks of torque control, one a controller and latency, are those of tests/web/test_contract.py
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in ("tube", "cone")])
-def test_the_page_states_what_the_summary_states(example, browser, served, name):  # noqa: F811
+@pytest.mark.parametrize("name", NAMES)
+def test_the_page_states_what_the_summary_states(example, browser, served, name):
     done = example(name)
     summary = json.loads((done.folder / "summary.json").read_text())
     tracks = sorted((t for t in summary["tracks"] if t["rows"]), key=lambda t: not t["in_use"])

@@ -13,7 +13,6 @@ import pytest
 from square import PROGRAM, make_cut_result, make_result
 from web_served import Served
 
-CHROMIUM = Path("/usr/bin/chromium")
 EXAMPLES = Path(__file__).parents[2] / "src" / "chipload" / "examples"
 
 
@@ -57,19 +56,6 @@ def served(folder: Path) -> Iterator[Served]:
     yield page
     with contextlib.suppress(Exception):
         page.end()
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[object]:
-    """Chromium without a window."""
-    if not CHROMIUM.exists():
-        pytest.skip("no chromium: the page is not opened in a browser")
-    playwright = pytest.importorskip("playwright.sync_api", reason="no playwright: the page is not opened in a browser")
-    flags = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-    with playwright.sync_playwright() as p:
-        chromium = p.chromium.launch(executable_path=str(CHROMIUM), args=flags)
-        yield chromium
-        chromium.close()
 
 
 class Windows:

@@ -112,7 +112,7 @@ def simulate(
     >>> path = [rapid([-6, 0, -1], 300.0, 1, "link"), plunge([30, 0, -1], 8.0, 300.0, 1, "cut")]
     >>> block = ([0, -9, -5], [20, 9, 0])
     >>> slot = simulate(Program.join(path), block, mill, "al7075-t6", "vmc", {"force_n": 500.0}, step_mm=6.0)
-    >>> str(slot.verdict), round(slot.numbers["removed_mm3"], 6)
+    >>> str(slot.verdict), round(slot.numbers["removed_mm3"], 3)
     ('holds', 200.0)
     """
     on, metal = _machine(machine), _material(material)

@@ -179,7 +179,7 @@ def _lessened(corner: float, reach: float, bend: float, sunk: float, tolerance: 
     """By what the cells are made narrower: the reach goes with their width, the bend with its square.
 
     >>> round(_lessened(2.0, 0.5, 0.0, 0.0, 0.04), 3)
-    0.793
+    0.792
     """
     low, high = 0.1, 1.0
     for _ in range(30):
