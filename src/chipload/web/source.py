@@ -127,7 +127,7 @@ def followed(place: Floats, program: Program) -> Ints:
 
 def _read_axes(path: Path, result: PageResult) -> Program | None:
     """The program of a shipped machine that moves straight axes only."""
-    name = result.result.provenance.machine
+    name = result.result.provenance.machine.partition(": ")[0]
     if name not in machine_names():
         return None
     return read_program(path, machine_named(name)).program
