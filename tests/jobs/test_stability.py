@@ -27,6 +27,7 @@ from chipload.simulation.loads import Cuts
 from chipload.stability.cuts import dynamic_cuts
 from chipload.stability.margin import stability_margins
 from chipload.stability.modes import Modes
+from chipload.stability.process_damping import ProcessDamping
 from mill import made_up_job, made_up_material
 
 MATERIAL = made_up_material(700.0, 210.0, 100.0, 10.0, 12.0, 2.0)
@@ -369,3 +370,26 @@ def test_a_probability_needs_all_three_spreads(tmp_path: Path) -> None:
         done(tmp_path, modes="damping_percent = 20.0\n" + MODES)
     with pytest.raises(InputError, match=r"limits\.stable_probability: needs spreads"):
         done(tmp_path, limits="stable_probability = 0.9")
+
+
+def test_process_damping_counts_where_it_is_stated(tmp_path):
+    """At a low speed a worn edge damps; the margin is that of the same cut asked directly, and the report says so."""
+    slow = TEXT.replace("S9000", "S2400").replace("F1350", "F360")
+    stated = "[dynamics.process_damping]\nindentation_n_mm3 = 3e4\nwear_land_mm = 0.05\nfriction = 0.3\n"
+    found = {}
+    for name, more in (("bare", ""), ("worn", stated)):
+        (tmp_path / name).mkdir()
+        one = done(tmp_path / name, text=slow, modes=MODES + more)
+        found[name] = one.result.operations[0]["stability"]
+        assert ("process damping is counted" in page_bytes(one.result, one.presentation).decode()) == bool(more)
+    assert found["bare"]["process_damping"] is None
+    assert found["worn"]["process_damping"] == {"indentation": 3e4, "wear_land": 0.05, "friction": 0.3}
+    cutter = Cutter(10.0, 3, 0.0, 20.0, 30.0, 5.8e5)
+    metal = Material("m", 700.0, 210.0, 100.0, 10.0, 12.0, 2.0, source="made up for tests")
+    modes = Modes([650.0, 720.0], [0.02, 0.025], [5000.0, 7000.0], [[1.0, 0.0], [0.0, 1.0]])
+    met = engagement_of_arcs([math.pi / 2], [math.pi], 0.05, cutter, 1.5)
+    cut = dynamic_cuts(
+        met, cutter, metal, modes, 2400 * OMEGA, [[1.0, 0.0]], [[0.0, 1.0]], ProcessDamping(3e4, 0.05, 0.3)
+    )
+    assert found["worn"]["margin_min"] == pytest.approx(float(stability_margins(cut).margin[0]), rel=0.01)
+    assert found["worn"]["margin_min"] > 1.1 * found["bare"]["margin_min"]

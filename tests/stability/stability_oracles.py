@@ -33,10 +33,11 @@ def mill(teeth=3, helix=0.0, length=60.0):
     return Cutter(10.0, teeth, math.radians(helix), length, length + 20.0, 6e5)
 
 
-def cut_of(modes, rpm, depth, arc, *, teeth=3, helix=0.0, metal=METAL, T=(1.0, 0.0), n=(0.0, 1.0), feed=0.05):
+def cut_of(modes, rpm, depth, arc, *, teeth=3, helix=0.0, metal=METAL, T=(1.0, 0.0), n=(0.0, 1.0), feed=0.05,
+           process=None):  # fmt: skip
     cutter = mill(teeth, helix)
     met = engagement_of_arcs([arc[0]], [arc[1]], feed, cutter, depth)
-    return dynamic_cuts(met, cutter, metal, modes, rpm * TAU / 60.0, [T], [n])
+    return dynamic_cuts(met, cutter, metal, modes, rpm * TAU / 60.0, [T], [n], process)
 
 
 def shapes(modes):
@@ -45,18 +46,18 @@ def shapes(modes):
     return w, np.array(modes.damping), modes.direction.T * w / np.sqrt(modes.stiffness)
 
 
-def matrix(theta, teeth, arc, depth):
+def matrix(theta, teeth, arc, depth, kt=KT, kr=KR):
     out = np.zeros((2, 2))
     for j in range(teeth):
         phi = (theta + j * TAU / teeth) % TAU
         if arc[0] < phi < arc[1]:
             s, c = math.sin(phi), math.cos(phi)
-            out -= depth * np.outer([KT * c + KR * s, KR * c - KT * s], [s, c])
+            out -= depth * np.outer([kt * c + kr * s, kr * c - kt * s], [s, c])
     return out
 
 
-def collocation(modes, rpm, depth, arc, teeth=3, n=24):
-    """Multiplier by Chebyshev collocation on the smooth pieces of a tooth period."""
+def collocation(modes, rpm, depth, arc, teeth=3, n=24, rubbing=0.0, friction=0.0):
+    """Multiplier by Chebyshev collocation on the smooth pieces of a tooth period; ``rubbing`` C_p [N s/mm^2]."""
     w, z, U = shapes(modes)
     period, pitch, M = 60.0 / (teeth * rpm), TAU / teeth, len(w)
     L = np.block([[np.zeros((M, M)), np.eye(M)], [-np.diag(w**2), -np.diag(2 * z * w)]])
@@ -80,9 +81,11 @@ def collocation(modes, rpm, depth, arc, teeth=3, n=24):
             theta = a + (b - a) * (0.5 * (x[i] + 1) if i < n else 1.0 - 1e-12)
             B = np.zeros((S, S))
             B[M:, :M] = U.T @ matrix(theta, teeth, arc, depth) @ U
+            V = np.zeros((S, S))
+            V[M:, M:] = U.T @ matrix(theta, teeth, arc, depth, friction * rubbing, rubbing) @ U
             for j in range(n + 1):
                 left[r, at + j * S : at + (j + 1) * S] += D[i, j] * 2 / dt * np.eye(S)
-            left[r, r] -= L + B
+            left[r, r] -= L + B + V
             right[r, r] -= B
     return np.abs(np.linalg.eigvals(np.linalg.solve(left, right))).max()
 

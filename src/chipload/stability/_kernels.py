@@ -5,7 +5,8 @@ from the work [mm], q'' + 2 z w q' + w^2 q = U^T F. A tooth period tau has m equ
 (r, h r') at the m nodes of the last period, then q, then q': 4 m + 2 M numbers. In a cell the difference
 D(t) = r(t) - r(t - tau) is the cubic Hermite of its ends, the force A D is taken at three Gauss points, the modes
 answer exactly: order 4 in h. What D is at the end follows from a 4 x 4 system for each cell, solved once for all
-applications of the map.
+applications of the map. Process damping adds the force C r', r' the slope of the cubic Hermite of r; r is D and what
+was there a period before, so that with it a cell also needs its delayed start and end.
 
 Oracles: Chebyshev collocation, semi-discretisation, many frequencies and a simulation in time, in tests/stability.
 """
@@ -23,6 +24,8 @@ from chipload.stability.spectrum._kernels import greatest
 TAU = 2.0 * math.pi
 #: the Hermite polynomials of value and slope at the start, value and slope at the end, at the Gauss points
 HERMITE = np.array([[2 * t**3 - 3 * t**2 + 1, t**3 - 2 * t**2 + t, -2 * t**3 + 3 * t**2, t**3 - t**2] for t in G3])
+#: and their slopes, over the length of the cell
+SLOPES = np.array([[6 * t**2 - 6 * t, 3 * t**2 - 4 * t + 1, 6 * t - 6 * t**2, 3 * t**2 - 2 * t] for t in G3])
 #: fewest cells of a period
 FEWEST = 12
 #: multiplier below which its logarithm does not matter
@@ -107,17 +110,22 @@ def solve4(B, X, n):
 
 
 @njit(cache=True, nogil=True)
-def cell_systems(A, gain, end, ends, forces, cuts):
+def cell_systems(A, C, gain, h, end, ends, forces, cuts):
     """For each cell: ``ends`` (m, 4, 8) the difference at its end from that at its start and from free less delayed
     end; ``forces`` (m, 6, 8) at the Gauss points from the differences at both ends; ``cuts`` (m,) whether A is not 0.
+
+    With process damping C (m, 3, 4), which ``gain`` does not count for, both have 8 columns more: from the delayed
+    start and end. Without it C has no cells.
     """
+    damped = len(C) > 0
+    columns = ends.shape[2]
     B = np.empty((4, 4))
-    X = np.empty((4, 8))
+    X = np.empty((4, columns))
     for i in range(len(A)):
         cuts[i] = False
         for g in range(3):
             for c in range(4):
-                if A[i, g, c] != 0.0:
+                if A[i, g, c] != 0.0 or (damped and C[i, g, c] != 0.0):
                     cuts[i] = True
         if not cuts[i]:
             continue
@@ -131,20 +139,37 @@ def cell_systems(A, gain, end, ends, forces, cuts):
                 for c in range(4):
                     forces[i, 2 * g + a, 2 * c] = HERMITE[g, c] * gain * A[i, g, 2 * a]
                     forces[i, 2 * g + a, 2 * c + 1] = HERMITE[g, c] * gain * A[i, g, 2 * a + 1]
+                    if damped:
+                        for b in range(2):
+                            x = SLOPES[g, c] / h * C[i, g, 2 * a + b]
+                            forces[i, 2 * g + a, 2 * c + b] += x
+                            forces[i, 2 * g + a, 8 + 2 * c + b] = x
             for r in range(4):
+                x = forces[i, 2 * g]
+                y = forces[i, 2 * g + 1]
                 for c in range(4):
-                    x = forces[i, 2 * g]
-                    y = forces[i, 2 * g + 1]
                     X[r, c] += end[g, r, 0] * x[c] + end[g, r, 1] * y[c]
                     B[r, c] -= end[g, r, 0] * x[4 + c] + end[g, r, 1] * y[4 + c]
-        solve4(B, X, 8)
+                for c in range(8, columns):
+                    X[r, c] += end[g, r, 0] * x[c] + end[g, r, 1] * y[c]
+        solve4(B, X, columns)
         ends[i] = X
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def of_delayed(row, x, at, p0, p1, p2, p3):
+    """What process damping adds to a row of ``ends`` or ``forces``: by the delayed start, in x, and end of a cell."""
+    return (
+        row[8] * x[at] + row[9] * x[at + 1] + row[10] * x[at + 2] + row[11] * x[at + 3]
+        + row[12] * p0 + row[13] * p1 + row[14] * p2 + row[15] * p3
+    )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, fastmath=True)
 def apply_map(x, y, ends, forces, cuts, free, push, U, h, m, q, v):
     """The state y one tooth period after the state x; q, v (M,) are room to work in."""
     modes = len(q)
+    damped = ends.shape[2] > 8
     r0 = 0.0
     r1 = 0.0
     r2 = 0.0
@@ -184,23 +209,11 @@ def apply_map(x, y, ends, forces, cuts, free, push, U, h, m, q, v):
             r2 = f2
             r3 = f3
             continue
-        d0 = r0 - x[4 * i]
-        d1 = r1 - x[4 * i + 1]
-        d2 = r2 - x[4 * i + 2]
-        d3 = r3 - x[4 * i + 3]
-        p0 = n0
-        p1 = n1
-        p2 = n2
-        p3 = n3
+        d0, d1, d2, d3 = r0 - x[4 * i], r1 - x[4 * i + 1], r2 - x[4 * i + 2], r3 - x[4 * i + 3]
+        p0, p1, p2, p3 = n0, n1, n2, n3
         if i < m - 1:
-            p0 = x[4 * i + 4]
-            p1 = x[4 * i + 5]
-            p2 = x[4 * i + 6]
-            p3 = x[4 * i + 7]
-        e0 = f0 - p0
-        e1 = f1 - p1
-        e2 = f2 - p2
-        e3 = f3 - p3
+            p0, p1, p2, p3 = x[4 * i + 4], x[4 * i + 5], x[4 * i + 6], x[4 * i + 7]
+        e0, e1, e2, e3 = f0 - p0, f1 - p1, f2 - p2, f3 - p3
         s = ends[i]
         c0 = s[0, 0] * d0 + s[0, 1] * d1 + s[0, 2] * d2 + s[0, 3] * d3
         c0 += s[0, 4] * e0 + s[0, 5] * e1 + s[0, 6] * e2 + s[0, 7] * e3
@@ -211,11 +224,19 @@ def apply_map(x, y, ends, forces, cuts, free, push, U, h, m, q, v):
         c3 = s[3, 0] * d0 + s[3, 1] * d1 + s[3, 2] * d2 + s[3, 3] * d3
         c3 += s[3, 4] * e0 + s[3, 5] * e1 + s[3, 6] * e2 + s[3, 7] * e3
         t = forces[i]
+        if damped:
+            c0 += of_delayed(s[0], x, 4 * i, p0, p1, p2, p3)
+            c1 += of_delayed(s[1], x, 4 * i, p0, p1, p2, p3)
+            c2 += of_delayed(s[2], x, 4 * i, p0, p1, p2, p3)
+            c3 += of_delayed(s[3], x, 4 * i, p0, p1, p2, p3)
         for g in range(3):
             a = t[2 * g, 0] * d0 + t[2 * g, 1] * d1 + t[2 * g, 2] * d2 + t[2 * g, 3] * d3
             a += t[2 * g, 4] * c0 + t[2 * g, 5] * c1 + t[2 * g, 6] * c2 + t[2 * g, 7] * c3
             b = t[2 * g + 1, 0] * d0 + t[2 * g + 1, 1] * d1 + t[2 * g + 1, 2] * d2 + t[2 * g + 1, 3] * d3
             b += t[2 * g + 1, 4] * c0 + t[2 * g + 1, 5] * c1 + t[2 * g + 1, 6] * c2 + t[2 * g + 1, 7] * c3
+            if damped:
+                a += of_delayed(t[2 * g], x, 4 * i, p0, p1, p2, p3)
+                b += of_delayed(t[2 * g + 1], x, 4 * i, p0, p1, p2, p3)
             for k in range(modes):
                 f = U[0, k] * a + U[1, k] * b
                 q[k] += push[g, 0, k] * f
@@ -329,46 +350,53 @@ def chatter_hz(angle, tau, w):
 
 
 @njit(cache=True, nogil=True)
-def cut_motion(k, start, rows, exponents, tau, pitch, w, z, U, per_wave):
-    """Of cut k: cells m of a tooth period, their time h [s], ``matrices`` A (m, 3, 4); ``free_motion`` in a cell."""
+def cut_motion(k, start, rows, damped, exponents, tau, pitch, w, z, U, per_wave):
+    """Of cut k: cells m of a tooth period, their time h [s], ``matrices`` A (m, 3, 4) and of process damping C [N s/mm]
+    (m, 3, 4), without cells where there is none; ``free_motion`` in a cell.
+    """
     m = cells_of(tau[k], w, per_wave)
     h = tau[k] / m
     A = np.zeros((m, 3, 4))
     matrices(rows, start[k], start[k + 1], pitch[k], m, exponents, A)
+    C = np.zeros((m if len(damped) else 0, 3, 4))
+    if len(damped):
+        matrices(damped, start[k], start[k + 1], pitch[k], m, np.zeros(3), C)
+        C *= tau[k] / pitch[k]
     free = np.empty((4, len(w)))
     push = np.empty((3, 2, len(w)))
     end = np.empty((3, 4, 2))
     free_motion(w, z, U[k], h, free, push, end)
-    return m, h, A, free, push, end
+    return m, h, A, C, free, push, end
 
 
 @njit(cache=True, nogil=True)
-def workspace(m, modes, most):
-    """Arrays that ``cell_systems`` (3) and ``arnoldi`` (8) write."""
+def workspace(m, modes, most, columns):
+    """Arrays that ``cell_systems`` (3) and ``arnoldi`` (8) write; ``columns`` 8, or 16 with process damping."""
     n = 4 * m + 2 * modes
     room = min(most, n - 1) + 1
     return (
-        np.empty((m, 4, 8)), np.empty((m, 6, 8)), np.empty(m, np.bool_), np.empty((room, n)), np.empty((room, room)),
-        np.empty((room, room)), np.empty(n), np.empty(n), np.empty(modes), np.empty(modes), np.empty(n),
+        np.empty((m, 4, columns)), np.empty((m, 6, columns)), np.empty(m, np.bool_), np.empty((room, n)),
+        np.empty((room, room)), np.empty((room, room)), np.empty(n), np.empty(n), np.empty(modes), np.empty(modes),
+        np.empty(n),
     )  # fmt: skip
 
 
 @njit(
-    "void(int64, int64, int64[::1], float64[:,::1], float64[::1], float64[::1], float64[::1], float64[:,::1],"
-    " float64[::1], float64[:,:,::1], float64[::1], float64, int64, float64, float64[:,::1])",
+    "void(int64, int64, int64[::1], float64[:,::1], float64[:,::1], float64[::1], float64[::1], float64[::1],"
+    " float64[:,::1], float64[::1], float64[:,:,::1], float64[::1], float64, int64, float64, float64[:,::1])",
     cache=True, nogil=True,
 )  # fmt: skip
-def multipliers(first, last, start, rows, exponents, tau, pitch, w, z, U, gain, per_wave, most, tol, out):
+def multipliers(first, last, start, rows, damped, exponents, tau, pitch, w, z, U, gain, per_wave, most, tol, out):
     """Of the cuts first .. last - 1: modulus and angle of the greatest multiplier, and its dimension: out (n, 3).
 
-    ``start`` (n + 1,) of rows; ``tau`` [s], ``pitch`` [rad], ``w`` (n, M), ``U`` (n, 2, M), ``gain`` on the
-    force (n,).
+    ``start`` (n + 1,) of rows; ``damped`` (b, 11) rows of process damping at 1 rad/s, or none; ``tau`` [s], ``pitch``
+    [rad], ``w`` (n, M), ``U`` (n, 2, M), ``gain`` on the force (n,).
     """
     modes = len(z)
     for k in range(first, last):
-        m, h, A, free, push, end = cut_motion(k, start, rows, exponents, tau, pitch, w[k], z, U, per_wave)
-        ends, forces, cuts, V, H, work, x, y, q, v, scale = workspace(m, modes, most)
-        cell_systems(A, gain[k], end, ends, forces, cuts)
+        m, h, A, C, free, push, end = cut_motion(k, start, rows, damped, exponents, tau, pitch, w[k], z, U, per_wave)
+        ends, forces, cuts, V, H, work, x, y, q, v, scale = workspace(m, modes, most, 16 if len(C) else 8)
+        cell_systems(A, C, gain[k], h, end, ends, forces, cuts)
         best, angle, used = arnoldi(
             ends, forces, cuts, free, push, U[k], w[k], h, m, most, tol, V, H, work, x, y, q, v, scale
         )
@@ -378,11 +406,11 @@ def multipliers(first, last, start, rows, exponents, tau, pitch, w, z, U, gain, 
 
 
 @njit(
-    "void(int64, int64, int64[::1], float64[:,::1], float64[::1], float64[::1], float64[::1], float64[:,::1],"
-    " float64[::1], float64[:,:,::1], float64, int64, float64, float64[:,::1])",
+    "void(int64, int64, int64[::1], float64[:,::1], float64[:,::1], float64[::1], float64[::1], float64[::1],"
+    " float64[:,::1], float64[::1], float64[:,:,::1], float64, int64, float64, float64[:,::1])",
     cache=True, nogil=True,
 )  # fmt: skip
-def margins(first, last, start, rows, exponents, tau, pitch, w, z, U, per_wave, most, tol, out):
+def margins(first, last, start, rows, damped, exponents, tau, pitch, w, z, U, per_wave, most, tol, out):
     """Of the cuts first .. last - 1: the factor on the force at which the greatest multiplier has the modulus 1, the
     frequency there [Hz], the mode from 0, log|mu| at the factor 1, and evaluations: out (n, 5).
 
@@ -391,8 +419,8 @@ def margins(first, last, start, rows, exponents, tau, pitch, w, z, U, per_wave, 
     """
     modes = len(z)
     for k in range(first, last):
-        m, h, A, free, push, end = cut_motion(k, start, rows, exponents, tau, pitch, w[k], z, U, per_wave)
-        ends, forces, cuts, V, H, work, x, y, q, v, scale = workspace(m, modes, most)
+        m, h, A, C, free, push, end = cut_motion(k, start, rows, damped, exponents, tau, pitch, w[k], z, U, per_wave)
+        ends, forces, cuts, V, H, work, x, y, q, v, scale = workspace(m, modes, most, 16 if len(C) else 8)
         count = 0
         lo, l_lo, hi, l_hi = 0.0, -1.0, 0.0, 0.0
         at_one = 0.0
@@ -405,7 +433,7 @@ def margins(first, last, start, rows, exponents, tau, pitch, w, z, U, per_wave, 
         best = 0.0
         angle = 0.0
         while True:
-            cell_systems(A, gain, end, ends, forces, cuts)
+            cell_systems(A, C, gain, h, end, ends, forces, cuts)
             best, angle, used = arnoldi(
                 ends, forces, cuts, free, push, U[k], w[k], h, m, most, tol, V, H, work, x, y, q, v, scale
             )

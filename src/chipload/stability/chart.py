@@ -165,7 +165,10 @@ def _at_depths(cut: DynamicCuts, speed: Floats, depth: Floats) -> DynamicCuts:
     rate = (rows[:, 3] - rows[:, 2]) / rows[:, 4]
     rows[:, 3] = rows[:, 2] + rate * depth
     rows[:, 4] = depth
-    return replace(some, rows=rows, period=cut.pitch / speed)
+    damped = some.damped.copy()
+    if len(damped):
+        damped[:, 3:5] = rows[:, 3:5]
+    return replace(some, rows=rows, period=cut.pitch / speed, damped=damped)
 
 
 def _growth(cut: DynamicCuts, speed: Floats, depth: Floats) -> Floats:
@@ -175,6 +178,10 @@ def _growth(cut: DynamicCuts, speed: Floats, depth: Floats) -> Floats:
         some, gain = _at_depths(cut, speed, depth), np.ones(len(depth))
     else:
         some, gain = cut.chosen(np.zeros(len(depth), dtype=np.int64)).at_speeds(cut.pitch / speed), depth
+        if len(some.damped):
+            damped = some.damped.copy()
+            damped[:, 5:8] *= np.repeat(depth, np.diff(some.start))[:, None]
+            some = replace(some, damped=damped)
     most = 2 * len(cut.damping) + SPARE
     found = largest_multipliers(some, gain, per_wave=PER_WAVE, most=most, still=STILL)
     return np.log(np.maximum(np.abs(found), TINY))

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,9 +24,15 @@ from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.errors import InputError
 from chipload.stability.modes import Modes
+from chipload.stability.process_damping import ProcessDamping
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+
+def no_rows() -> Floats:
+    """Rows of no process damping."""
+    return np.zeros((0, 11))
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +49,7 @@ class DynamicCuts:
     damping : (M,) float, damping ratio of each mode of cutter and work
     omega : (n, M) float [rad/s], natural frequencies in each cut
     U : (n, 2, M) float [1/sqrt(t)], shapes along T and n of each cut
+    damped : (b, 11) float, as :meth:`chipload.stability.process_damping.ProcessDamping.rows`; (0, 11): none
     """
 
     start: Ints
@@ -53,6 +60,7 @@ class DynamicCuts:
     damping: Floats
     omega: Floats
     U: Floats
+    damped: Floats = field(default_factory=no_rows)
 
     def __len__(self) -> int:
         return len(self.period)
@@ -72,7 +80,8 @@ class DynamicCuts:
         row = np.repeat(self.start[at] - start[:-1], size) + np.arange(start[-1])
         period, omega, U = (np.ascontiguousarray(x[at]) for x in (self.period, self.omega, self.U))
         rows = np.ascontiguousarray(self.rows[row])
-        return replace(self, start=start, rows=rows, period=period, omega=omega, U=U)
+        damped = np.ascontiguousarray(self.damped[row]) if len(self.damped) else self.damped
+        return replace(self, start=start, rows=rows, period=period, omega=omega, U=U, damped=damped)
 
     def with_modes(self, damping: ArrayLike, omega: ArrayLike, U: ArrayLike) -> DynamicCuts:
         """The same cuts with more modes: (m,) damping ratios, (n, m) [rad/s], (n, 2, m) [1/sqrt(t)]."""
@@ -86,10 +95,10 @@ def joined(some: Sequence[DynamicCuts]) -> DynamicCuts:
     """Cuts of one cutter with the same modes, one behind the other."""
     sizes = np.concatenate([np.diff(c.start) for c in some])
     start = np.concatenate([[0], np.cumsum(sizes)])
-    rows, period, omega, U = (
-        np.concatenate([getattr(c, name) for c in some]) for name in ("rows", "period", "omega", "U")
+    rows, period, omega, U, damped = (
+        np.concatenate([getattr(c, name) for c in some]) for name in ("rows", "period", "omega", "U", "damped")
     )
-    return replace(some[0], start=start, rows=rows, period=period, omega=omega, U=U)
+    return replace(some[0], start=start, rows=rows, period=period, omega=omega, U=U, damped=damped)
 
 
 def dynamic_cuts(
@@ -100,6 +109,7 @@ def dynamic_cuts(
     speed: ArrayLike,
     T: ArrayLike | None = None,
     n: ArrayLike | None = None,
+    process: ProcessDamping | None = None,
 ) -> DynamicCuts:
     """Cuts of a cutter at their speeds.
 
@@ -109,6 +119,7 @@ def dynamic_cuts(
     modes : None: cutter and work are rigid, as far as no modes are added
     speed : () or (n,) float [rad/s], of the spindle, either sign
     T, n : (n, 2) float, in x and y of the machine; None: those of ``engagement.frame``
+    process : damping by worn edges; None: none is counted
 
     Raises
     ------
@@ -130,10 +141,11 @@ def dynamic_cuts(
         U, damping, w = modes.in_frames(T, n), modes.damping, modes.omega
     if len(U) != len(engagement):
         raise InputError(f"stability: {len(U)} frames for {len(engagement)} cuts: need one each")
+    rows = kernel_rows(engagement, material)
     return DynamicCuts(
-        np.array(engagement.start), kernel_rows(engagement, material), np.array(material.exponents, dtype=np.float64),
+        np.array(engagement.start), rows, np.array(material.exponents, dtype=np.float64),
         np.ascontiguousarray(math.tau / (cutter.flutes * omega)), math.tau / cutter.flutes, damping,
-        np.tile(w, (len(U), 1)), U,
+        np.tile(w, (len(U), 1)), U, no_rows() if process is None else process.rows(engagement, rows),
     )  # fmt: skip
 
 

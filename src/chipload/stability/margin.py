@@ -86,7 +86,7 @@ def largest_multipliers(
 
     def part(first: int, last: int) -> None:
         _kernels.multipliers(
-            first, last, cuts.start, cuts.rows, cuts.exponents, cuts.period, pitch, cuts.omega,
+            first, last, cuts.start, cuts.rows, cuts.damped, cuts.exponents, cuts.period, pitch, cuts.omega,
             np.array(cuts.damping), cuts.U, factor, per_wave, dimension, still, out,
         )  # fmt: skip
 
@@ -124,7 +124,7 @@ def _margins(cuts: DynamicCuts, per_wave: float) -> Floats:
 
     def part(first: int, last: int) -> None:
         _kernels.margins(
-            first, last, cuts.start, cuts.rows, cuts.exponents, cuts.period, pitch, cuts.omega,
+            first, last, cuts.start, cuts.rows, cuts.damped, cuts.exponents, cuts.period, pitch, cuts.omega,
             np.array(cuts.damping), cuts.U, per_wave, 2 * len(cuts.damping) + SPARE, STILL, out,
         )  # fmt: skip
 

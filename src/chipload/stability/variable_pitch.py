@@ -49,6 +49,8 @@ def revolution_multiplier(cut: DynamicCuts, pitches: ArrayLike) -> complex:
             f"variable pitch: {np.degrees(pitch).round(6).tolist()} deg: must be {teeth} angles above 0 that add up to "
             "360 deg"
         )
+    if len(cut.damped):
+        raise InputError("variable pitch: with process damping: leave one of them out")
     turn, omega = float(cut.period[0]) * teeth, cut.omega[0]
     cells = max(4 * teeth * 3, math.ceil(PER_WAVE * float(omega.max()) * turn / math.tau))
     h, count = turn / cells, len(omega)

@@ -21,6 +21,7 @@ from chipload.jobs.program.dynamics_tables import DynamicsTable, ModesFileTable,
 from chipload.jobs.program.tables import WorkpieceTable
 from chipload.stability.modes import Modes
 from chipload.stability.probability import ModeSpread
+from chipload.stability.process_damping import ProcessDamping
 
 #: N/mm in 1 N/um, t in 1 kg
 PER_UM, PER_KG = 1000.0, 1e-3
@@ -41,6 +42,7 @@ class Dynamics:
     unknown : what is not stated and would be needed
     spread : of the modes; None: not stated
     workpiece_damping : of the modes that [workpiece] gives; None: it gives none
+    process : damping by worn edges; None: none is counted
     """
 
     modes: Mapping[int, Modes]
@@ -49,6 +51,7 @@ class Dynamics:
     unknown: tuple[str, ...]
     spread: ModeSpread | None = None
     workpiece_damping: float | None = None
+    process: ProcessDamping | None = None
 
     @property
     def first_followed(self) -> int:
@@ -105,7 +108,13 @@ def dynamics_of(
         if density is not None and damping is None:
             unknown.append("damping of the workpiece")
     names = {k: f"{m.of} {m.frequency_hz:g} Hz" for k, m in enumerate(listed, 1)}
-    return Dynamics(modes, number, names, tuple(dict.fromkeys(unknown)), _spread(table), damping)
+    return Dynamics(modes, number, names, tuple(dict.fromkeys(unknown)), _spread(table), damping, _process(table))
+
+
+def _process(table: DynamicsTable) -> ProcessDamping | None:
+    """Damping by worn edges, where it is stated."""
+    stated = table.process_damping
+    return None if stated is None else ProcessDamping(stated.indentation_n_mm3, stated.wear_land_mm, stated.friction)
 
 
 def _spread(table: DynamicsTable) -> ModeSpread | None:

@@ -28,6 +28,14 @@ class ModeTable(Table):
     direction: Direction = Field(description="x, y or [x, y] of the machine")
 
 
+class ProcessDampingTable(Table):
+    """Damping by a worn edge that rubs, most at low speeds; without it none is counted, which is the safe side."""
+
+    indentation_n_mm3: Positive = Field(description="force per volume that the edge displaces, of workpiece and edge")
+    wear_land_mm: Positive = Field(description="width of the wear land: state the least that it will have")
+    friction: NotNegative = Field(0.0, description="between edge and workpiece")
+
+
 class DynamicsTable(Table):
     """How cutter and workpiece vibrate: with it every step has a stability margin."""
 
@@ -39,6 +47,7 @@ class DynamicsTable(Table):
     )  # fmt: skip
     damping_percent: NotNegative | None = Field(None, lt=100.0, description="of the damping ratios")
     stiffness_percent: NotNegative | None = Field(None, lt=100.0, description="of the stiffnesses")
+    process_damping: ProcessDampingTable | None = Field(None, description="by worn edges; none: not counted")
 
 
 class ModesFileTable(Table):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -207,7 +207,10 @@ def stability_numbers(stability: StabilityResult, columns: Columns) -> dict[str,
     margin = np.asarray(columns["stability_margin"])
     known = np.flatnonzero(margin > 0.0)
     dynamics = stability.watch.dynamics
-    out: dict[str, Any] = {"margin_wanted": stability.wanted, "not_stated": list(dynamics.unknown)}
+    process = None if dynamics.process is None else asdict(dynamics.process)
+    out: dict[str, Any] = {
+        "margin_wanted": stability.wanted, "not_stated": list(dynamics.unknown), "process_damping": process,
+    }  # fmt: skip
     if not len(known):
         empty = dict.fromkeys(("margin_min", "line", "tool", "chatter_hz", "mode", "speed_rpm", "speed_rpm_advised"))
         return {**out, **empty, "stable_probability": None, "margin_advised": None, "windows": [], "different_cuts": 0}

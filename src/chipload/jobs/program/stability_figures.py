@@ -50,9 +50,14 @@ def stability_sections(
     if what["speed_rpm_advised"] is not None:
         advised = f"{what['speed_rpm_advised']:g}, margin {what['margin_advised']:.4g}"
         rows.append(["speed with the greatest margin [rpm]", advised])
+    process = stability.watch.dynamics.process
+    left_out = "" if process is not None else ", process damping is left out"
+    if process is not None:
+        land = f"wear land {process.wear_land:g} mm, {process.indentation:g} N/mm3, friction {process.friction:g}"
+        rows.append(["process damping is counted", land])
     body += [
         '<p class="note">The margin is the factor on the cutting force at which a step begins to chatter; below 1 it '
-        "chatters. Runout is left out, the axial direction is rigid.</p>",
+        f"chatters. Runout is left out, the axial direction is rigid{left_out}.</p>",
         table(["", ""], rows),
     ]
     if speeds is not None:

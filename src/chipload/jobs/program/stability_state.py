@@ -16,11 +16,11 @@ from chipload.errors import InputError
 from chipload.stability.cuts import DynamicCuts, joined
 from chipload.stock.shapes import read_shapes, shape_bytes
 
-KIND = "chipload different cuts of a simulation 1"
+KIND = "chipload different cuts of a simulation 2"
 #: arrays of the file with their numbers of dimensions
 ARRAYS = {
     "tools": 1, "counts": 1, "pitch": 1, "leaning": 1, "keys": 1, "key_ends": 1, "values": 2, "sizes": 1, "rows": 2,
-    "period": 1, "damping": 1, "modes": 1, "omega": 1, "U": 1, "first_steps": 1, "first_margins": 1,
+    "damped": 2, "period": 1, "damping": 1, "modes": 1, "omega": 1, "U": 1, "first_steps": 1, "first_margins": 1,
 }  # fmt: skip
 
 Known = dict[int, dict[bytes, tuple[float, ...]]]
@@ -57,6 +57,7 @@ def asked_bytes(
         "values": np.array(values).reshape(len(keys), columns),
         "sizes": np.concatenate([np.diff(c.start) for c in whole.values()]) if whole else none.astype(np.int64),
         "rows": np.concatenate([c.rows for c in whole.values()]) if whole else none.reshape(0, 11),
+        "damped": np.concatenate([c.damped for c in whole.values()]) if whole else none.reshape(0, 11),
         "period": np.concatenate([c.period for c in whole.values()]) if whole else none,
         "damping": np.concatenate([c.damping for c in whole.values()]) if whole else none,
         "modes": np.array([len(c.damping) for c in whole.values()], dtype=np.int64),
@@ -89,6 +90,7 @@ def read_asked(
         len(tools) == len(a["counts"]) == len(a["pitch"]) == len(numbers)
         and count == a["counts"].sum() == len(a["values"]) == len(sizes) == len(a["period"])
         and sizes.sum() == len(a["rows"])
+        and len(a["damped"]) in (0, len(a["rows"]))
         and ends[-1] == len(keys)
         and numbers.sum() == len(a["damping"])
         and 2 * len(a["omega"]) == len(a["U"]) == 2 * int((a["counts"] * numbers).sum())
@@ -105,7 +107,7 @@ def read_asked(
         omega, U = a["omega"][at : at + n * m].reshape(n, m), a["U"][2 * at : 2 * (at + n * m)].reshape(n, 2, m)
         some = DynamicCuts(
             start, a["rows"][row : row + int(start[-1])], np.asarray(exponents, dtype=np.float64), a["period"][own],
-            pitch, a["damping"][mode : mode + m], omega, U,
+            pitch, a["damping"][mode : mode + m], omega, U, a["damped"][row : row + int(start[-1])],
         )  # fmt: skip
         values = [tuple(v) for v in a["values"][own].tolist()]
         known[tool] = dict(zip([keys[ends[k] : ends[k + 1]] for k in range(first, first + n)], values, strict=True))

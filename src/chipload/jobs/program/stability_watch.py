@@ -80,8 +80,9 @@ class StabilityWatch:
             if new:
                 at = np.array(sorted(new.values()))
                 whole = dynamic_cuts(
-                    groups.engagement, cuts.cutter, self.material, modes, cuts.spindle, groups.T, groups.n
-                )
+                    groups.engagement, cuts.cutter, self.material, modes, cuts.spindle, groups.T, groups.n,
+                    self.dynamics.process,
+                )  # fmt: skip
                 some, steps = whole.chosen(at), np.asarray(cuts.step)[at]
                 if self.follows and self.workpiece is not None:
                     first = self._with_modes(some, *self.workpiece.at_first(steps), frame[at])
