@@ -353,6 +353,10 @@ def test_windows_that_are_quiet_with_some_probability(tmp_path: Path) -> None:
     spreads = "frequency_percent = 2.0\ndamping_percent = 15.0\nstiffness_percent = 5.0\n"
     text = TEXT.replace("S9000", "S6000").replace("Z-1.5", "Z-3").replace("F1350", "F900")
     numbers = done(tmp_path, text=text, modes=spreads + MODES).result.operations[0]["stability"]
+    shares = list(numbers["variance_shares"].values())
+    assert shares == sorted(shares, reverse=True)
+    assert sum(shares) == pytest.approx(1.0)
+    assert next(iter(numbers["variance_shares"])).startswith("frequency of cutter ")
     half, sure = numbers["windows_50_percent"], numbers["windows_95_percent"]
     assert sure
     assert all(any(a["low_rpm"] <= b["low_rpm"] and b["high_rpm"] <= a["high_rpm"] for a in half) for b in sure)

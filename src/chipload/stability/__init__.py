@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from chipload.stability.grouping import CutGroups, grouped
     from chipload.stability.margin import StabilityMargins, largest_multipliers, stability_margins
     from chipload.stability.modes import Modes
-    from chipload.stability.probability import ModeSpread, stable_probability
+    from chipload.stability.probability import ModeSpread, stable_probability, variance_shares
+    from chipload.stability.process_damping import ProcessDamping
     from chipload.stability.speeds import QuietSpeeds, SpeedWindow, quiet_speeds
     from chipload.stability.surface_error import location_error
     from chipload.stability.variable_pitch import revolution_multiplier
@@ -22,6 +23,7 @@ __all__ = [
     "DynamicCuts",
     "ModeSpread",
     "Modes",
+    "ProcessDamping",
     "QuietSpeeds",
     "SpeedWindow",
     "StabilityChart",
@@ -36,6 +38,7 @@ __all__ = [
     "stability_chart",
     "stability_margins",
     "stable_probability",
+    "variance_shares",
 ]
 
 __getattr__, __dir__ = attach(
@@ -47,7 +50,8 @@ __getattr__, __dir__ = attach(
         "surface_error": "location_error",
         "margin": "StabilityMargins largest_multipliers stability_margins",
         "modes": "Modes",
-        "probability": "ModeSpread stable_probability",
+        "probability": "ModeSpread stable_probability variance_shares",
+        "process_damping": "ProcessDamping",
         "speeds": "QuietSpeeds SpeedWindow quiet_speeds",
         "variable_pitch": "revolution_multiplier",
     },

@@ -22,7 +22,7 @@ from chipload.result import LimitCheck, check_limit
 from chipload.result.limits import Columns
 from chipload.stability.cuts import joined
 from chipload.stability.margin import MOST_MARGIN, stability_margins
-from chipload.stability.probability import stable_probability
+from chipload.stability.probability import stable_probability, variance_shares
 from chipload.stability.speeds import QuietSpeeds, quiet_speeds, speed_windows
 from chipload.units import rpm_from_rad_s
 
@@ -100,6 +100,19 @@ class StabilityResult:
                     some = parts.chosen(quiet.cut).at_speeds(parts.pitch / quiet.speed)
                     out[tool] = stable_probability(some, spread, relative_covariance(self.watch.material))
         return out
+
+    def variance_shares(self, tool: int) -> dict[str, float]:
+        """What makes the cut of a tool that is nearest to chatter unsure: shares of the variance, greatest first."""
+        spread, parts = self.watch.dynamics.spread, self.watch.parts(tool)
+        if spread is None or parts is None:
+            return {}
+        worst = parts.chosen([int(np.argmin(stability_margins(parts).margin))])
+        modes, cutting = variance_shares(worst, spread, relative_covariance(self.watch.material))
+        out = {"cutting coefficients": cutting}
+        for number, shares in zip(self.watch.numbers(tool), modes.tolist(), strict=True):
+            for what, share in zip(("frequency", "damping ratio", "stiffness"), shares, strict=True):
+                out[f"{what} of {self.watch.name_of(number)}"] = share
+        return dict(sorted(out.items(), key=lambda item: -item[1]))
 
     @cached_property
     def frequency_share(self) -> float:
@@ -231,6 +244,8 @@ def stability_numbers(stability: StabilityResult, columns: Columns) -> dict[str,
         "windows": [],
         "different_cuts": sum(map(len, stability.watch.known.values())),
     }
+    if dynamics.spread is not None:
+        out["variance_shares"] = stability.variance_shares(tool)
     workpiece = stability.watch.workpiece
     if stability.watch.follows and workpiece is not None:
         followed = _followed_numbers(stability.watch, columns, stability.wanted)

@@ -29,6 +29,8 @@ from chipload.units import rpm_from_rad_s
 BEFORE, AFTER = "#c9821a", "#3457a6"
 #: speeds and depths of the chart, and its greatest depth in depths of the cut
 SPEEDS, DEPTHS, DEEPEST = 240, 60, 3.0
+#: values that are listed by what they make unsure
+MEASURED = 6
 
 
 def stability_sections(
@@ -84,6 +86,13 @@ def stability_sections(
                 "spreads of the modes and those of the coefficients.</p>",
                 table(["from [rpm]", "to [rpm]", "greatest probability"], cells, numbers=(0, 1, 2)),
             ]
+    if what.get("variance_shares"):
+        cells = [[escape(name), f"{100.0 * share:.0f}"] for name, share in what["variance_shares"].items()]
+        body += [
+            "<h3>What to measure next</h3>",
+            '<p class="note">Of the cut that is nearest to chatter: how much of its uncertainty each value makes.</p>',
+            table(["value", "share of the variance [%]"], cells[:MEASURED], numbers=(1,)),
+        ]
     tool = int(what["tool"])
     drawn = worst_chart(stability, tool)
     if drawn is not None:
