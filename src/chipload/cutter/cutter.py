@@ -47,6 +47,8 @@ class Cutter:
     bottom : alpha [rad], 0 <= alpha, alpha + beta < 90 deg
     taper : beta [rad], 0 <= beta
     runout : (offset [mm], direction [rad] from tooth 0): the axis of the teeth beside that of the spindle
+    pitch : angle [rad] by which each tooth follows the one before it in the cut, tooth 0 first (it follows the last
+        one), together a revolution; empty: all alike
     shank_diameter : [mm]; None: as the diameter
     holder : (length, diameter) [mm] of its parts, upwards from the overhang; empty: not known
     tip_stiffness : [N/mm] of the tip across the axis under a slow force, measured in the machine; None: not known
@@ -75,6 +77,7 @@ class Cutter:
     bottom: float = 0.0
     taper: float = 0.0
     runout: tuple[float, float] = (0.0, 0.0)
+    pitch: tuple[float, ...] = ()
     shank_diameter: float | None = None
     holder: tuple[tuple[float, float], ...] = ()
     tip_stiffness: float | None = None
@@ -144,6 +147,7 @@ class Cutter:
                 f"must be {touching:.6g}, where the corner touches bottom and flank; leave it out",
             )
         need(self.runout[0] >= 0.0, "runout_mm", self.runout[0], "must be at least 0")
+        self._check_pitch()
         shank = self.shank_diameter
         need(shank is None or shank > 0.0, "shank_diameter_mm", shank or 0.0, "must be above 0")
         for k, part in enumerate(self.holder):
@@ -163,6 +167,36 @@ class Cutter:
         need(0.0 < factor <= 1.0, "fluted_factor", factor, "must be above 0 and at most 1 (0.8 is usual for end mills)")
         check_material(self.strength, self.modulus)
         need(self.number >= 0, "number", self.number, "must be at least 0")
+
+    def _check_pitch(self) -> None:
+        if not self.pitch:
+            return
+        degrees = [math.degrees(x) for x in self.pitch]
+        if (
+            len(degrees) != self.flutes
+            or not all(5.0 <= x < 360.0 for x in degrees)
+            or abs(sum(degrees) - 360.0) > 0.01
+        ):
+            raise InputError(
+                f"cutter.pitch_deg = {[round(x, 6) for x in degrees]}: must be {self.flutes} angles of at least 5, one "
+                f"a tooth, that add up to 360: they add up to {sum(degrees):g}"
+            )
+
+    @property
+    def teeth_alike(self) -> bool:
+        """Whether every tooth cuts as the others do: no runout, and one pitch."""
+        return self.flutes == 1 or (self.runout[0] == 0.0 and not self.pitch)
+
+    @property
+    def tooth_angles(self) -> NDArray[np.float64]:
+        """Angle of each tooth behind tooth 0, (N,) float [rad].
+
+        >>> mill = Cutter(10.0, 3, 0.5, 20.0, 30.0, 6e5, pitch=tuple(np.radians([130.0, 110.0, 120.0])))
+        >>> np.degrees(mill.tooth_angles).round(9).tolist()
+        [0.0, 110.0, 230.0]
+        """
+        pitch = np.array(self.pitch) if self.pitch else np.full(self.flutes, math.tau / self.flutes)
+        return np.asarray(np.concatenate([[0.0], np.cumsum(pitch[1:])]))
 
     @property
     def radius(self) -> float:

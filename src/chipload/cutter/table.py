@@ -59,6 +59,9 @@ class CutterTable(BaseModel):
     taper_deg: float | None = None
     runout_mm: float | None = None
     runout_deg: float | None = None
+    pitch_deg: Annotated[tuple[float, ...] | None, BeforeValidator(_rows)] = Field(
+        None, description="angle of each tooth to the one before it, tooth 0 first, together 360; none: all alike"
+    )
     shank_diameter_mm: float | None = None
     holder_mm: Annotated[tuple[tuple[float, float], ...] | None, BeforeValidator(_rows)] = Field(
         None, description="length and diameter of the holder's parts, upwards from the overhang"
@@ -111,6 +114,7 @@ class CutterTable(BaseModel):
             bottom=math.radians(values.get("bottom_deg", 0.0)),
             taper=math.radians(values.get("taper_deg", 0.0)),
             runout=(values.get("runout_mm", 0.0), math.radians(values.get("runout_deg", 0.0))),
+            pitch=tuple(math.radians(x) for x in values.get("pitch_deg", ())),
             shank_diameter=values.get("shank_diameter_mm"),
             holder=tuple(tuple(part) for part in values.get("holder_mm", ())),
             tip_stiffness=1000.0 * values["tip_n_um"] if "tip_n_um" in values else None,

@@ -155,7 +155,7 @@ def cutter_stress(bites: ToothEngagement, cutter: Cutter, material: Material, ro
     """
     if not 0.0 < rotation <= math.radians(15.0):
         raise InputError(f"rotation = {math.degrees(rotation):g} deg: must be above 0 and at most 15")
-    pitch = math.tau if cutter.runout[0] > 0.0 else math.tau / cutter.flutes
+    pitch = math.tau / cutter.flutes if cutter.teeth_alike else math.tau
     count = max(math.ceil(pitch / rotation), 8)
     at = sections_of(cutter)
     brittle = cutter.strength.material_at(cutter.modulus) is ToolMaterial.CARBIDE

@@ -78,6 +78,11 @@ def _beam(cutter: Cutter, fluted_factor: float | None) -> Floats:
     return np.array([cutter.overhang, cutter.flute_length, *flexibilities(cutter, fluted_factor)])
 
 
+def _check_teeth(cutter: Cutter) -> None:
+    if cutter.pitch:
+        raise InputError("cutter.pitch_deg: the error of a planned wall is known for evenly spaced teeth: leave it out")
+
+
 def _check_work(work_compliance: float) -> None:
     if not 0.0 <= work_compliance < math.inf:
         raise InputError(f"work_compliance = {work_compliance:g} mm/N: must be at least 0 (0 is rigid)")
@@ -114,6 +119,7 @@ def wall_profile(
     if heights.ndim != 1 or not ((heights >= 0.0) & (heights <= cutter.overhang)).all():
         raise InputError(f"z: must be heights from 0 to cutter.overhang_mm = {cutter.overhang:g}")
     _check_work(work_compliance)
+    _check_teeth(cutter)
     phi_wall = _wall_immersion(milling)
     out = np.zeros((len(bites), len(heights)))
     _kernels.wall_profiles(
@@ -182,6 +188,7 @@ def wall_error_along(
     if heights < 3:
         raise InputError(f"heights = {heights}: must be at least 3")
     _check_work(work_compliance)
+    _check_teeth(cutter)
     phi_wall = _wall_immersion(milling)
     bites = engagement_of_arcs(
         phi_in, phi_out, feed_per_tooth, cutter, axial_depth, count=count, clockwise=spindle == "cw"

@@ -269,13 +269,14 @@ def engage(centres, headings, r, seg, box, first, last, angle, count, phi):
 
 
 @njit(cache=True, nogil=True)
-def runout_engagement(whole, every, sine, radii, sizes, rows, tooth, fill):
+def runout_engagement(whole, every, sine, radii, turns, sizes, rows, tooth, fill):
     """Tooth engagement of each tooth for teeth of unlike radii. With g the thickness of a bite of every tooth: the
     lower envelope
     of N lines in g, where positive, and then the immersions at which g lies between its corners.
 
-    ``whole`` (b, 7) and ``every`` (b,) the bites and their teeth, ``sine`` (b,) sin(kappa), ``radii`` (N,) [mm]. First
-    call (fill False) counts into ``sizes``, the second fills ``rows`` and ``tooth``.
+    ``whole`` (b, 7) and ``every`` (b,) the bites and their teeth, ``sine`` (b,) sin(kappa), ``radii`` (N,) [mm],
+    ``turns`` (N, N) the m of each tooth by the number of teeth before it, from 1. First call (fill False) counts into
+    ``sizes``, the second fills ``rows`` and ``tooth``.
     """
     teeth = len(radii)
     at = 0
@@ -306,11 +307,11 @@ def runout_engagement(whole, every, sine, radii, sizes, rows, tooth, fill):
                 end = top
                 after = line
                 for m in range(1, line):
-                    cross = ((radii[j] - radii[(j - m) % teeth]) * sine[i] - d) / (line - m)
+                    cross = ((radii[j] - radii[(j - m) % teeth]) * sine[i] - d) / (turns[j, line - 1] - turns[j, m - 1])
                     if cross < end:
                         end = cross
                         after = m
-                first = max(g, -d / line)
+                first = max(g, -d / turns[j, line - 1])
                 if end > first:
                     outer = PI if first <= offset - swing else math.acos((first - offset) / swing)
                     inner = 0.0
@@ -329,9 +330,9 @@ def runout_engagement(whole, every, sine, radii, sizes, rows, tooth, fill):
                                     rows[at, 1] = q - back
                                     rows[at, 2] = whole[i, 2]
                                     rows[at, 3] = whole[i, 3]
-                                    rows[at, 4] = line * whole[i, 4]
-                                    rows[at, 5] = line * offset + d
-                                    rows[at, 6] = line * whole[i, 6]
+                                    rows[at, 4] = turns[j, line - 1] * whole[i, 4]
+                                    rows[at, 5] = turns[j, line - 1] * offset + d
+                                    rows[at, 6] = turns[j, line - 1] * whole[i, 6]
                                     tooth[at] = j
                                 at += 1
                 if after == line:

@@ -5,15 +5,18 @@ is normal to the axis; n = Rot(+90 deg about A) T, mirrored where the spindle ru
 immersion, counted in the sense of the spindle from n, so that pi/2 is T (up milling 0 .. a, down milling pi - a .. pi);
 u = cos(phi) n + sin(phi) T the radial direction; s [mm] along the cutter's profile and kappa the angle of its outward
 normal nu = sin(kappa) u - cos(kappa) A with the downward axis, as in :mod:`chipload.cutter.slices`; f_z [mm] feed per
-tooth; N teeth; j tooth, each a pitch 2 pi / N behind the one before it; r_j = R + e cos(lambda - 2 pi j / N) its radius
-with the runout (e, lambda), lambda counted from tooth 0 towards tooth 1; h [mm] chip thickness along nu.
+tooth; N teeth; j tooth, each its pitch p_j behind the one before it, 2 pi / N where all are alike, and so a_j behind
+tooth 0; r_j = R + e cos(lambda - a_j) its radius with the runout (e, lambda), lambda counted from tooth 0 towards tooth
+1; h [mm] chip thickness along nu.
 
 A bite is a range of immersion and of the profile in which h = along sin(phi) + across cos(phi) + offset, at least 0. A
 motion f a tooth of the point on the edge gives along = sin(kappa) f.T, across = sin(kappa) f.n and
 offset = -cos(kappa) f.A: a plunge is an offset on the bottom.
 
 Reference: [Altintas2012] ch. 2 for h = f_z sin(phi); [Kline1983] for runout: a tooth cuts what the N teeth before it
-left over, h_j = min over m = 1 .. N of m h + (r_j - r_(j-m)) sin(kappa), where positive; else it does not touch.
+left over, h_j = min over m = 1 .. N of m h + (r_j - r_(j-m)) sin(kappa), where positive; else it does not touch. With
+unlike pitches m is the angle of the m pitches before tooth j over 2 pi / N, and the tooth is later by its angle behind
+an even one, which is kept as a lag of its slices.
 Differs from source: the phase of the offset does not lag with the helix, a tooth has one radius over its depth.
 The volume a revolution removes does not depend on runout: sum over j of h_j = N h.
 """
@@ -143,20 +146,20 @@ def tooth_radii(cutter: Cutter) -> Floats:
     [0.01, -0.01]
     """
     offset, direction = cutter.runout
-    j = np.arange(cutter.flutes)
-    return np.asarray(offset * np.cos(direction - math.tau * j / cutter.flutes))
+    return np.asarray(offset * np.cos(direction - cutter.tooth_angles))
 
 
 def with_runout(bites: ToothEngagement, cutter: Cutter) -> ToothEngagement:
     """The bites of every tooth by itself, as the cutter's runout makes them; those of one tooth stay.
 
     Each bite of every tooth, with the thickness h that it would have without runout, becomes for tooth j the ranges of
-    immersion in which one of the lines m h + (r_j - r_(j-m)) sin(kappa) is the lowest, and positive.
+    immersion in which one of the lines m h + (r_j - r_(j-m)) sin(kappa) is the lowest, and positive. Teeth that are not
+    evenly spaced take h by their pitch.
 
     Returns
     -------
     ToothEngagement
-        ``bites`` itself where there is no runout.
+        ``bites`` itself where all teeth are alike.
 
     Examples
     --------
@@ -167,18 +170,31 @@ def with_runout(bites: ToothEngagement, cutter: Cutter) -> ToothEngagement:
     >>> each.tooth.tolist(), each.rows[:, 4:].tolist()
     ([0], [[0.02, 0.0, 0.0]])
     """
-    if cutter.runout[0] == 0.0 or cutter.flutes == 1:
+    if cutter.teeth_alike:
         return bites
-    radii = tooth_radii(cutter)
+    radii, turns = tooth_radii(cutter), _turns(cutter)
     sine = bites.slices[bites.slice, 3]
     sizes = np.zeros(len(bites.rows), dtype=np.int64)
     none = np.empty((0, 7))
-    _kernels.runout_engagement(bites.rows, bites.tooth, sine, radii, sizes, none, np.empty(0, np.int64), False)
+    _kernels.runout_engagement(bites.rows, bites.tooth, sine, radii, turns, sizes, none, np.empty(0, np.int64), False)
     rows = np.empty((int(sizes.sum()), 7))
     tooth = np.empty(len(rows), dtype=np.int64)
-    _kernels.runout_engagement(bites.rows, bites.tooth, sine, radii, sizes, rows, tooth, True)
+    _kernels.runout_engagement(bites.rows, bites.tooth, sine, radii, turns, sizes, rows, tooth, True)
     start = np.concatenate([[0], np.cumsum(sizes)])[bites.start]
-    return ToothEngagement(start, rows, tooth, np.repeat(bites.slice, sizes), bites.slices, bites.frame)
+    own, slices = np.repeat(bites.slice, sizes), bites.slices
+    if cutter.pitch:
+        late = cutter.tooth_angles - math.tau / cutter.flutes * np.arange(cutter.flutes)
+        own, count = own + tooth * len(slices), len(slices)
+        slices = np.tile(slices, (cutter.flutes, 1))
+        slices[:, 5] += np.repeat(late - late.min(), count)
+    return ToothEngagement(start, rows, tooth, own, slices, bites.frame)
+
+
+def _turns(cutter: Cutter) -> Floats:
+    """(N, N) float: of tooth j and m = 1 .. N, the angle of the m pitches before it over 2 pi / N."""
+    N = cutter.flutes
+    pitch = np.array(cutter.pitch) * N / math.tau if cutter.pitch else np.ones(N)
+    return np.array([[pitch[(j - np.arange(m)) % N].sum() for m in range(1, N + 1)] for j in range(N)])
 
 
 def engagement_of_arcs(

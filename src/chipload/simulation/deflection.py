@@ -204,7 +204,7 @@ def step_deflections(
         at = np.searchsorted(place.step, cuts.step)
         if not (len(place.step) and (place.step[np.minimum(at, len(place.step) - 1)] == cuts.step).all()):
             raise InputError("step_deflections: the contacts are not those of this removal")
-        pitch = math.tau if cuts.cutter.runout[0] > 0.0 else math.tau / cuts.cutter.flutes
+        pitch = math.tau / cuts.cutter.flutes if cuts.cutter.teeth_alike else math.tau
         count = max(math.ceil(pitch / rotation), 8)
         theta = np.arange(count) * (pitch / count)
         force = in_work(forces_over_turn(cuts.bites, cuts.cutter, material, theta)[0], cuts.bites.frames)
@@ -253,7 +253,7 @@ def tip_deflections(
     """
     if isinstance(work, float) and not 0.0 <= work < math.inf:
         raise InputError(f"tip_deflections: work = {work:g} mm/N: a compliance must be at least 0")
-    pitch = math.tau if cuts.cutter.runout[0] > 0.0 else math.tau / cuts.cutter.flutes
+    pitch = math.tau / cuts.cutter.flutes if cuts.cutter.teeth_alike else math.tau
     m = max(math.ceil(pitch / rotation), 8)
     n = len(cuts)
     if has_lever_loads(cuts.bites, cuts.cutter, material) and greatest_height(cuts.bites) <= bars[0].length:
@@ -398,7 +398,7 @@ def _made_by(
     lag = math.tan(cuts.cutter.helix) / cuts.cutter.radius
     radii = tooth_radii(cuts.cutter)
     widest = 0.0
-    for j in range(cuts.cutter.flutes if cuts.cutter.runout[0] > 0.0 else 1):
+    for j in range(1 if cuts.cutter.teeth_alike else cuts.cutter.flutes):
         there, made = np.empty(count), np.empty(count, dtype=np.bool_)
         b = cuts.bites
         _kernels.points_in_engagement(
@@ -406,7 +406,7 @@ def _made_by(
         )
         if lag > 0.0:
             there = phi
-        theta = there + lag * z + math.tau * j / cuts.cutter.flutes
+        theta = there + lag * z + cuts.cutter.tooth_angles[j]
         loads = _bent(cuts, k, theta, z, model.material, model.bars)
         force = np.einsum("mi,mij->mj", loads[:, :3], frame)
         bent = np.einsum("mi,mij->mj", loads[:, 3:], frame[:, :2])

@@ -222,7 +222,7 @@ def bands_of_steps(
 
 def over_turn(bites: ToothEngagement, cutter: Cutter, material: Material, rotation: float) -> OverTurn:
     """Force and torque at rotations at most ``rotation`` apart, and these rotations [rad]."""
-    pitch = math.tau if cutter.runout[0] > 0.0 else math.tau / cutter.flutes
+    pitch = math.tau / cutter.flutes if cutter.teeth_alike else math.tau
     count = max(math.ceil(pitch / rotation), 8)
     theta = np.asarray(np.arange(count) * (pitch / count), dtype=np.float64)
     return *forces_over_turn(bites, cutter, material, theta), theta

@@ -24,7 +24,7 @@ FIXED = 4
 
 def has_lever_loads(bites: ToothEngagement, cutter: Cutter, material: Material) -> bool:
     """Whether :func:`lever_loads` can take them: a linear law, and teeth that are alike where there is no runout."""
-    return not any(material.exponents) and (cutter.runout[0] > 0.0 or not bool((bites.tooth >= 0).any()))
+    return not any(material.exponents) and (not cutter.teeth_alike or not bool((bites.tooth >= 0).any()))
 
 
 def greatest_height(bites: ToothEngagement) -> float:
@@ -61,7 +61,7 @@ def lever_loads(bites: ToothEngagement, cutter: Cutter, material: Material, coun
     [0.0, 1100.0, 0.0, 0.0, -70.0, 220.0, -70.0, 220.0]
     """
     polys = np.ascontiguousarray(levers, dtype=np.float64)
-    alike = cutter.runout[0] == 0.0
+    alike = cutter.teeth_alike
     whole = count * (cutter.flutes if alike else 1)
     theta = np.arange(whole) * (math.tau / whole)
     table = np.vstack([np.cos(theta), np.sin(theta)])

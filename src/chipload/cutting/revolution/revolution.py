@@ -28,7 +28,7 @@ def rotations(cutter: Cutter, rotation: float) -> int:
     """Number of rotations, at most ``rotation`` [rad] apart, over the pitch of the teeth, or over the revolution where
     they have runout.
     """
-    pitch = math.tau if cutter.runout[0] > 0.0 else math.tau / cutter.flutes
+    pitch = math.tau / cutter.flutes if cutter.teeth_alike else math.tau
     return max(math.ceil(pitch / rotation), 8)
 
 
@@ -47,7 +47,7 @@ def loads_over_turn(
     """
     away = np.ascontiguousarray(left, dtype=np.float64)
     count = rotations(cutter, rotation)
-    alike = cutter.runout[0] == 0.0
+    alike = cutter.teeth_alike
     teeth = cutter.flutes if alike else 1
     basis = mean_basis(bites, cutter, material)
     if any(material.exponents) or (alike and bool((bites.tooth >= 0).any())):
@@ -68,7 +68,7 @@ def loads_over_turn(
 
 def _one_by_one(bites: ToothEngagement, cutter: Cutter, material: Material, count: int, left: Floats) -> Floats:
     """(n, 17) the same by the loads at each rotation, for any law; the last two are numbers of rotations."""
-    pitch = math.tau if cutter.runout[0] > 0.0 else math.tau / cutter.flutes
+    pitch = math.tau / cutter.flutes if cutter.teeth_alike else math.tau
     force, torque = forces_over_turn(bites, cutter, material, np.arange(count) * (pitch / count))
     mean, torque_mean = mean_forces(bites, cutter, material)
     turned, size = in_work(force, bites.frames), np.linalg.norm(force, axis=2)

@@ -133,7 +133,7 @@ def normal_force(
     out = np.empty(len(d))
     N = posture.frame[:, 2]
     cutter = posture.cutter
-    turn = math.tau / (1 if cutter.runout[0] > 0.0 else cutter.flutes)
+    turn = math.tau / (cutter.flutes if cutter.teeth_alike else 1)
     theta = np.linspace(0.0, turn, max(8, math.ceil(math.degrees(turn) / step_deg)), endpoint=False)
     for at in range(0, len(d), BLOCK):
         bites = engagement_of_depths(posture, d[at : at + BLOCK], nodes or (8 if measure == "mean" else 16))
