@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -397,3 +398,23 @@ def test_process_damping_counts_where_it_is_stated(tmp_path):
     )
     assert found["worn"]["margin_min"] == pytest.approx(float(stability_margins(cut).margin[0]), rel=0.01)
     assert found["worn"]["margin_min"] > 1.1 * found["bare"]["margin_min"]
+
+
+def test_teeth_that_are_not_evenly_spaced_have_a_margin_of_their_own(tmp_path):
+    """The margin of the program is that of the cut asked directly; where the vibration leaves the wall is not known."""
+    (tmp_path / "m.toml").write_text(MATERIAL)
+    (tmp_path / "a.ngc").write_text(TEXT)
+    job = JOB.replace("MODES", MODES).replace("LIMITS", "sle_um = 500.0").replace("SPEEDS", "")
+    (tmp_path / "job.toml").write_text(job.replace("helix_deg", "pitch_deg = [104, 120, 136]\nhelix_deg", 1))
+    one = run_job(load_job(tmp_path / "job.toml"))
+    found = one.result.operations[0]["stability"]
+    cutter = Cutter(10.0, 3, 0.0, 20.0, 30.0, 5.8e5, pitch=tuple(np.radians([104.0, 120.0, 136.0])))
+    metal = Material("m", 700.0, 210.0, 100.0, 10.0, 12.0, 2.0, source="made up for tests")
+    modes = Modes([650.0, 720.0], [0.02, 0.025], [5000.0, 7000.0], [[1.0, 0.0], [0.0, 1.0]])
+    met = engagement_of_arcs([math.pi / 2], [math.pi], 0.05, replace(cutter, pitch=()), 1.5)
+    cut = dynamic_cuts(met, cutter, metal, modes, 9000 * OMEGA, [[1.0, 0.0]], [[0.0, 1.0]])
+    assert found["margin_min"] == pytest.approx(float(stability_margins(cut).margin[0]), rel=0.02)
+    assert found["margin_min"] != pytest.approx(library_margin(9000, 1.5), rel=0.05)
+    assert found["windows"]
+    check = check_of(one, "sle_um")
+    assert (check.state, check.reason) == (Verdict.UNPROVEN, "the teeth of tool 1 are not evenly spaced")

@@ -6,6 +6,7 @@ Straight teeth, evenly spaced, one engaged arc st .. ex; T, n as everywhere; K t
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -38,6 +39,11 @@ def cut_of(modes, rpm, depth, arc, *, teeth=3, helix=0.0, metal=METAL, T=(1.0, 0
     cutter = mill(teeth, helix)
     met = engagement_of_arcs([arc[0]], [arc[1]], feed, cutter, depth)
     return dynamic_cuts(met, cutter, metal, modes, rpm * TAU / 60.0, [T], [n], process)
+
+
+def with_pitches(cut, pitches):
+    """The cut by teeth that are not evenly spaced."""
+    return replace(cut, pitches=tuple(pitches))
 
 
 def shapes(modes):

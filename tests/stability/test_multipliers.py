@@ -16,7 +16,6 @@ from chipload.stability.directional._kernels import G3, W3, matrices
 from chipload.stability.margin import largest_multipliers, stability_margins
 from chipload.stability.modes import Modes
 from chipload.stability.spectrum._kernels import greatest
-from chipload.stability.variable_pitch import revolution_multiplier
 from stability.stability_oracles import (
     KR,
     KT,
@@ -33,6 +32,7 @@ from stability.stability_oracles import (
     semi_discretisation,
     shapes,
     with_loss_of_contact,
+    with_pitches,
 )  # fmt: skip
 from stability.zero_order import zero_order_margin
 
@@ -130,7 +130,7 @@ def test_a_flip_that_zero_order_misses_by_63_percent_is_told_by_its_frequency():
 
 def test_more_teeth_periods_are_powers_and_coefficients_scale():
     a = abs(largest_multipliers(cut_of(TWO, 6000, 2.0, HALF))[0])
-    even = revolution_multiplier(cut_of(TWO, 6000, 2.0, HALF), [TAU / 3] * 3)
+    even = largest_multipliers(with_pitches(cut_of(TWO, 6000, 2.0, HALF), [TAU / 3] * 3))[0]
     assert abs(even) == pytest.approx(a**3, rel=1e-5)
     twice = Material("twice", 2 * KT, 2 * KR, 0.0, 0.0, 0.0, 0.0, source="made up for tests")
     one, two = (stability_margins(cut_of(ONE, 8000, 0.5, HALF, metal=m)).margin[0] for m in (METAL, twice))
@@ -177,9 +177,27 @@ def test_feed_directions_turn_with_the_modes():
     ],
 )
 def test_teeth_that_are_not_evenly_spaced(pitches, depth, size):
-    assert abs(revolution_multiplier(cut_of(TWO, 6000, depth, HALF), np.radians(pitches))) == pytest.approx(
-        size, abs=2e-4
-    )
+    assert abs(
+        largest_multipliers(with_pitches(cut_of(TWO, 6000, depth, HALF), np.radians(pitches)))[0]
+    ) == pytest.approx(size, abs=2e-4)
+
+
+@pytest.mark.parametrize(("rpm", "depth"), [(6000, 2.0), (8000, 1.5), (9000, 4.0), (4000, 12.0)])
+def test_margins_of_teeth_that_are_not_evenly_spaced(rpm, depth):
+    """Even pitches have the margin of even teeth; at the margin of others |mu| is 1, and the mode is one of both."""
+    cut = cut_of(TWO, rpm, depth, HALF)
+    even, usual = stability_margins(with_pitches(cut, [TAU / 3] * 3)), stability_margins(cut)
+    assert even.margin[0] == pytest.approx(usual.margin[0], rel=4e-3)
+    assert even.growth[0] == pytest.approx(usual.growth[0], abs=1e-3)
+    assert even.mode[0] == usual.mode[0]
+    assert even.frequency[0] == pytest.approx(usual.frequency[0], abs=60.0 / TAU)
+    uneven = with_pitches(cut, np.radians([104.0, 120.0, 136.0]))
+    found = stability_margins(uneven)
+    if found.margin[0] < 3.0:
+        assert abs(largest_multipliers(uneven, found.margin)[0]) == pytest.approx(1.0, abs=0.02)
+        assert abs(found.frequency[0] - TWO.frequency[found.mode[0]]) < 0.2 * TWO.frequency[0]
+    else:
+        assert abs(largest_multipliers(uneven, 3.0)[0]) < 1.0
 
 
 def test_a_simulation_in_time_agrees_on_200_random_cuts():
@@ -345,7 +363,7 @@ def test_what_the_functions_cannot_use_is_refused():
         (lambda: critical_depth(cut, 0.0), "deepest_mm = 0"),
         (lambda: stability_chart(cut.chosen([0, 0]), [1.0, 2.0], [1.0, 2.0]), "2 cuts: must be one"),
         (lambda: stability_chart(cut, [2.0, 1.0], [1.0, 2.0]), "speeds: must be"),
-        (lambda: revolution_multiplier(cut, [1.0, 2.0, 3.0]), "add up to 360 deg"),
+        (lambda: largest_multipliers(with_pitches(cut, [1.0, 2.0, 3.0])), "add up to 360 deg"),
         (lambda: cut.at_speeds(0.0), "above 0 s"),
         (lambda: dynamic_cuts(met, mill(), METAL, ONE, 0.0, [[1, 0]], [[0, 1]]), "spindle speed of 0"),
         (lambda: dynamic_cuts(met, mill(), METAL, ONE, 9.0), "has no frames"),

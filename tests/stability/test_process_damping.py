@@ -10,8 +10,7 @@ from chipload.errors import InputError
 from chipload.stability.chart import critical_depth
 from chipload.stability.margin import largest_multipliers, stability_margins
 from chipload.stability.process_damping import ProcessDamping
-from chipload.stability.variable_pitch import revolution_multiplier
-from stability.stability_oracles import KR, ONE, TAU, TWO, collocation, cut_of, down
+from stability.stability_oracles import KR, ONE, TAU, TWO, collocation, cut_of, down, with_pitches
 
 SLOT, HALF, THIN = down(1.0), down(0.5), down(0.05)
 RADIUS, LAND = 5.0, 0.05
@@ -74,5 +73,7 @@ def test_the_critical_depth_counts_it_at_every_depth():
 def test_what_cannot_be_is_refused():
     with pytest.raises(InputError, match=r"process_damping.wear_land_mm = 0: must be from 0.0001 to 1"):
         ProcessDamping(1e4, 0.0)
-    with pytest.raises(InputError, match="with process damping"):
-        revolution_multiplier(cut_of(ONE, 6000, 1.0, HALF, process=ProcessDamping(1e4, 0.05)), [TAU / 3] * 3)
+    with pytest.raises(InputError, match=r"not known with cutter.pitch_deg"):
+        largest_multipliers(
+            with_pitches(cut_of(ONE, 6000, 1.0, HALF, process=ProcessDamping(1e4, 0.05)), [TAU / 3] * 3)
+        )

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from chipload.stability.process_damping import ProcessDamping
     from chipload.stability.speeds import QuietSpeeds, SpeedWindow, quiet_speeds
     from chipload.stability.surface_error import location_error
-    from chipload.stability.variable_pitch import revolution_multiplier
 
 __all__ = [
     "CutGroups",
@@ -34,7 +33,6 @@ __all__ = [
     "largest_multipliers",
     "location_error",
     "quiet_speeds",
-    "revolution_multiplier",
     "stability_chart",
     "stability_margins",
     "stable_probability",
@@ -53,6 +51,5 @@ __getattr__, __dir__ = attach(
         "probability": "ModeSpread stable_probability variance_shares",
         "process_damping": "ProcessDamping",
         "speeds": "QuietSpeeds SpeedWindow quiet_speeds",
-        "variable_pitch": "revolution_multiplier",
     },
 )

@@ -251,13 +251,9 @@ def apply_map(x, y, ends, forces, cuts, free, push, U, h, m, q, v):
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def arnoldi(ends, forces, cuts, free, push, U, w, h, m, most, tol, V, H, room, x, y, q, v, scale):
-    """Modulus and angle of the greatest multiplier, and the dimension of the Krylov space, kept in ``V`` (rows) and
-    ``H``. It ends where the modulus moved by less than ``tol`` over two dimensions, 6 at least, ``most`` at most.
-    """
+def scaled(U, w, h, m, scale):
+    """Factors (4 m + 2 M,) that make the parts of a state of like size: history, slopes, q, q'."""
     modes = len(w)
-    n = 4 * m + 2 * modes
-    most = min(most, n - 1)
     fastest = w.max()
     for i in range(m):
         scale[4 * i] = 1.0 / math.sqrt(m)
@@ -268,20 +264,69 @@ def arnoldi(ends, forces, cuts, free, push, U, w, h, m, most, tol, V, H, room, x
         size = math.hypot(U[0, k], U[1, k]) + 1e-12 * np.abs(U).max()
         scale[4 * m + k] = size
         scale[4 * m + modes + k] = size / w[k]
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def first_vector(v):
+    """A unit vector that is always the same."""
     seed = 12345.0
     norm = 0.0
-    for i in range(n):
+    for i in range(len(v)):
         seed = (seed * 16807.0) % 2147483647.0
-        V[0, i] = seed / 2147483647.0 - 0.5
-        norm += V[0, i] ** 2
+        v[i] = seed / 2147483647.0 - 0.5
+        norm += v[i] ** 2
     norm = math.sqrt(norm)
+    for i in range(len(v)):
+        v[i] /= norm
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def next_vector(V, H, j, y):
+    """Make y orthogonal to the rows 0 .. j of V, twice; what is taken goes into H, the norm of the rest is returned."""
+    n = V.shape[1]
+    for _ in range(2):
+        for row in range(j + 1):
+            dot = 0.0
+            for i in range(n):
+                dot += V[row, i] * y[i]
+            H[row, j] += dot
+            for i in range(n):
+                y[i] -= dot * V[row, i]
+    norm = 0.0
     for i in range(n):
-        V[0, i] /= norm
-    best = 0.0
-    angle = 0.0
-    old = -1.0
-    older = -2.0
+        norm += y[i] * y[i]
+    norm = math.sqrt(norm)
+    H[j + 1, j] = norm
+    return norm
+
+
+@njit(cache=True, nogil=True)
+def settled(H, j, norm, most, tol, room, state):
+    """Whether the greatest multiplier after j + 1 dimensions is the one that is kept. ``state``: modulus and angle, and
+    the modulus one and two dimensions before.
+    """
+    last = j == most - 1 or norm < 1e-12
+    if last or j >= 3:
+        state[0], state[1] = greatest(H, j + 1, room)
+        moved = abs(state[0] - state[2]) + abs(state[2] - state[3])
+        if last or (j >= 5 and moved < tol * max(state[0], 0.1)):
+            return True
+        state[3] = state[2]
+        state[2] = state[0]
+    return False
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def arnoldi(ends, forces, cuts, free, push, U, w, h, m, most, tol, V, H, room, x, y, q, v, scale):
+    """Modulus and angle of the greatest multiplier, and the dimension of the Krylov space, kept in ``V`` (rows) and
+    ``H``. It ends where the modulus moved by less than ``tol`` over two dimensions, 6 at least, ``most`` at most.
+    """
+    n = 4 * m + 2 * len(w)
+    most = min(most, n - 1)
+    scaled(U, w, h, m, scale)
+    first_vector(V[0])
     H[:] = 0.0
+    state = np.array([0.0, 0.0, -1.0, -2.0])
     used = 0
     for j in range(most):
         for i in range(n):
@@ -289,31 +334,13 @@ def arnoldi(ends, forces, cuts, free, push, U, w, h, m, most, tol, V, H, room, x
         apply_map(x, y, ends, forces, cuts, free, push, U, h, m, q, v)
         for i in range(n):
             y[i] *= scale[i]
-        for _ in range(2):
-            for row in range(j + 1):
-                dot = 0.0
-                for i in range(n):
-                    dot += V[row, i] * y[i]
-                H[row, j] += dot
-                for i in range(n):
-                    y[i] -= dot * V[row, i]
-        norm = 0.0
-        for i in range(n):
-            norm += y[i] * y[i]
-        norm = math.sqrt(norm)
-        H[j + 1, j] = norm
+        norm = next_vector(V, H, j, y)
         used = j + 1
-        last = j == most - 1 or norm < 1e-12
-        if last or j >= 3:
-            best, angle = greatest(H, j + 1, room)
-            moved = abs(best - old) + abs(old - older)
-            if last or (j >= 5 and moved < tol * max(best, 0.1)):
-                break
-            older = old
-            old = best
+        if settled(H, j, norm, most, tol, room, state):
+            break
         for i in range(n):
             V[j + 1, i] = y[i] / norm
-    return best, angle, used
+    return state[0], state[1], used
 
 
 @njit(cache=True, nogil=True)

@@ -50,6 +50,7 @@ class DynamicCuts:
     omega : (n, M) float [rad/s], natural frequencies in each cut
     U : (n, 2, M) float [1/sqrt(t)], shapes along T and n of each cut
     damped : (b, 11) float, as :meth:`chipload.stability.process_damping.ProcessDamping.rows`; (0, 11): none
+    pitches : (N,) angles [rad] of each tooth to the one before it; empty: all are ``pitch``
     """
 
     start: Ints
@@ -61,6 +62,7 @@ class DynamicCuts:
     omega: Floats
     U: Floats
     damped: Floats = field(default_factory=no_rows)
+    pitches: tuple[float, ...] = ()
 
     def __len__(self) -> int:
         return len(self.period)
@@ -115,7 +117,7 @@ def dynamic_cuts(
 
     Parameters
     ----------
-    engagement : without runout; one tooth period is that of evenly spaced teeth
+    engagement : without runout, of evenly spaced teeth; the pitches of others are those of the cutter
     modes : None: cutter and work are rigid, as far as no modes are added
     speed : () or (n,) float [rad/s], of the spindle, either sign
     T, n : (n, 2) float, in x and y of the machine; None: those of ``engagement.frame``
@@ -146,6 +148,7 @@ def dynamic_cuts(
         np.array(engagement.start), rows, np.array(material.exponents, dtype=np.float64),
         np.ascontiguousarray(math.tau / (cutter.flutes * omega)), math.tau / cutter.flutes, damping,
         np.tile(w, (len(U), 1)), U, no_rows() if process is None else process.rows(engagement, rows),
+        cutter.pitch,
     )  # fmt: skip
 
 

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipload.errors import InputError
 from chipload.stability import _kernels
 from chipload.stability.cuts import DynamicCuts
+from chipload.stability.variable_pitch import revolution_multipliers
 
 Floats = NDArray[np.float64]
 
@@ -32,6 +33,8 @@ FINER = (15.0, 25.0)
 SPARE, STILL = 24, 1e-4
 #: the same where values are printed
 SPARE_EXACT, STILL_EXACT = 60, 1e-10
+#: how far the margin of teeth that are not evenly spaced is closed in
+CLOSED = 2e-3
 #: cuts that one thread takes at once, and most threads
 CHUNK, MOST_THREADS = 32, 8
 
@@ -65,7 +68,8 @@ def largest_multipliers(
     most: int | None = None,
     still: float = STILL_EXACT,
 ) -> NDArray[np.complex128]:
-    """Multiplier of greatest modulus of each cut, of a pair the one above the real axis, (n,) complex.
+    """Multiplier of greatest modulus of each cut, of a pair the one above the real axis, (n,) complex; of a tooth
+    period, or of a revolution where teeth are not evenly spaced.
 
     Parameters
     ----------
@@ -80,9 +84,12 @@ def largest_multipliers(
         An eigenvalue was not found.
     """
     factor = np.array(np.broadcast_to(np.asarray(gain, dtype=np.float64), (len(cuts),)))
+    dimension = 2 * len(cuts.damping) + SPARE_EXACT if most is None else most
+    if cuts.pitches:
+        found = revolution_multipliers(cuts, factor, per_wave, dimension, still, shared)
+        return np.asarray(found[:, 0] * np.exp(1j * found[:, 1]))
     out = np.zeros((len(cuts), 3))
     pitch = np.full(len(cuts), cuts.pitch)
-    dimension = 2 * len(cuts.damping) + SPARE_EXACT if most is None else most
 
     def part(first: int, last: int) -> None:
         _kernels.multipliers(
@@ -106,6 +113,8 @@ def stability_margins(cuts: DynamicCuts) -> StabilityMargins:
     InputError
         An eigenvalue was not found in the finest cells either.
     """
+    if cuts.pitches:
+        return _revolution_margins(cuts)
     out = np.full((len(cuts), 5), -1.0)
     for per_wave in (PER_WAVE, *FINER):
         lost = np.flatnonzero(~(out[:, 0] >= 0.0))
@@ -115,6 +124,57 @@ def stability_margins(cuts: DynamicCuts) -> StabilityMargins:
     if not (out[:, 0] >= 0.0).all():
         raise InputError("stability: a multiplier was not found: check frequency and damping of the modes")
     return StabilityMargins(out[:, 0], out[:, 1], out[:, 2].astype(np.int64), out[:, 3])
+
+
+def _revolution_margins(cuts: DynamicCuts) -> StabilityMargins:
+    """Of teeth that are not evenly spaced: all cuts together from gain to gain, then by bisection and regula falsi."""
+    n, teeth = len(cuts), len(cuts.pitches)
+    most = 2 * len(cuts.damping) + SPARE
+    last = np.zeros((n, 4))
+
+    def growth(which: NDArray[np.int64], gain: Floats) -> Floats:
+        last[which] = revolution_multipliers(cuts.chosen(which), gain, PER_WAVE, most, STILL, shared)
+        return np.asarray(np.log(np.maximum(last[which, 0], _kernels.TINY)) / teeth)
+
+    every = np.arange(n)
+    at_one = growth(every, np.ones(n))
+    low, high = np.ones(n), np.ones(n)
+    g_low, g_high = at_one.copy(), at_one.copy()
+    stable, looked = at_one < 0.0, 0
+    for factor in (*_kernels.ABOVE.tolist(),):
+        which = np.flatnonzero(stable & (g_high < 0.0))
+        if len(which):
+            low[which], g_low[which] = high[which], g_high[which]
+            high[which] = factor
+            g_high[which] = growth(which, high[which])
+    while looked < _kernels.DOWN and (g_low >= 0.0).any():
+        which = np.flatnonzero(g_low >= 0.0)
+        high[which], g_high[which] = low[which], g_low[which]
+        low[which] *= _kernels.BELOW
+        g_low[which] = growth(which, low[which])
+        looked += 1
+    open_ = (g_low < 0.0) & (g_high >= 0.0)
+    for k in range(_kernels.CLOSING):
+        which = np.flatnonzero(open_ & (high - low > CLOSED * high))
+        if not len(which):
+            break
+        a, b, fa, fb = low[which], high[which], g_low[which], g_high[which]
+        middle = 0.5 * (a + b) if k % 3 == 2 else (a * fb - b * fa) / (fb - fa)
+        middle = np.clip(middle, a + 0.05 * (b - a), b - 0.05 * (b - a))
+        value = growth(which, middle)
+        up = value >= 0.0
+        high[which], g_high[which] = np.where(up, middle, b), np.where(up, value, fb)
+        low[which], g_low[which] = np.where(up, a, middle), np.where(up, fa, value)
+    margin = np.where(g_high < 0.0, MOST_MARGIN, low)
+    found = np.flatnonzero(g_high >= 0.0)
+    frequency, mode = np.zeros(n), np.full(n, -1)
+    if len(found):
+        growth(found, margin[found])
+        mode[found] = last[found, 3].astype(np.int64)
+        for k in found.tolist():
+            omega = float(cuts.omega[k, mode[k]])
+            frequency[k] = _kernels.chatter_hz(last[k, 1], teeth * float(cuts.period[k]), omega)
+    return StabilityMargins(margin, frequency, mode, at_one)
 
 
 def _margins(cuts: DynamicCuts, per_wave: float) -> Floats:

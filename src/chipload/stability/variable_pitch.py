@@ -2,71 +2,64 @@
 
 Notation: pitch of tooth j, the angle by which it follows the tooth before it; its delay is pitch / Omega. The state is
 (r, h r') at the nodes of the longest delay, then q, q'; where a delayed time lies between nodes, r is the cubic Hermite
-there. The map is built column by column: for charts of one cutter, not for programs.
+there. A revolution costs some times what the periods of even teeth cost together.
 
-Each tooth is taken to cut the same engagement with the same nominal thickness. Straight ahead of the force model,
-stability does not depend on that where the coefficients have no exponent.
+Each tooth cuts the same engagement; what it cuts is thicker or thinner by its pitch, which counts only where the
+coefficients have exponents.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.stability._kernels import free_motion
 from chipload.stability.cuts import DynamicCuts
-from chipload.stability.directional import _kernels as directional
 from chipload.stability.pitches import _kernels
 
-#: cells of the map in a wave of the fastest mode
-PER_WAVE = 12.0
+Floats = NDArray[np.float64]
+
 #: how near to a revolution the pitches must add up [rad]
-SUM = 1e-9
+SUM = 1e-3
 
 
-def revolution_multiplier(cut: DynamicCuts, pitches: ArrayLike) -> complex:
-    """Greatest multiplier of the map of one revolution.
+def revolution_multipliers(
+    cuts: DynamicCuts, gain: Floats, per_wave: float, most: int, still: float, shared: Callable[..., None]
+) -> Floats:
+    """(n, 4) modulus and angle of the greatest multiplier of the map of one revolution, the dimension of its Krylov
+    space, and the mode of greatest share.
 
     Parameters
     ----------
-    cut : one; its time between two teeth is that of even pitches
-    pitches : (N,) float [rad], of each tooth to the one before it; together a revolution
+    cuts : with ``pitches``; their time between two teeth is that of even pitches
+    gain, per_wave, most, still : as of :func:`chipload.stability.margin.largest_multipliers`
+    shared : calls a function of first and last on chunks of the cuts
 
     Raises
     ------
     InputError
-        There are more cuts than one, or the pitches do not make a revolution of the cutter's teeth.
+        The pitches do not make a revolution of the cutter's teeth, or there is process damping.
     """
-    pitch = np.asarray(pitches, dtype=np.float64)
-    if len(cut) != 1:
-        raise InputError(f"variable pitch: {len(cut)} cuts: must be one")
-    teeth = round(math.tau / cut.pitch)
+    pitch = np.asarray(cuts.pitches, dtype=np.float64)
+    teeth = round(math.tau / cuts.pitch)
     if pitch.shape != (teeth,) or not (pitch > 0.0).all() or abs(pitch.sum() - math.tau) > SUM:
         raise InputError(
             f"variable pitch: {np.degrees(pitch).round(6).tolist()} deg: must be {teeth} angles above 0 that add up to "
             "360 deg"
         )
-    if len(cut.damped):
-        raise InputError("variable pitch: with process damping: leave one of them out")
-    turn, omega = float(cut.period[0]) * teeth, cut.omega[0]
-    cells = max(4 * teeth * 3, math.ceil(PER_WAVE * float(omega.max()) * turn / math.tau))
-    h, count = turn / cells, len(omega)
-    A = np.zeros((teeth, cells, 3, 4))
-    behind = np.concatenate([[0.0], np.cumsum(pitch[1:])])
-    for j in range(teeth):
-        rows = cut.rows.copy()
-        rows[:, 2:4] += behind[j]
-        directional.matrices(rows, 0, len(rows), math.tau, cells, cut.exponents, A[j])
-    free, push, end = np.empty((4, count)), np.empty((3, 2, count)), np.empty((3, 4, 2))
-    free_motion(omega, np.array(cut.damping), cut.U[0], h, free, push, end)
-    delay = pitch / math.tau * cells
-    nodes = math.ceil(float(delay.max()) - 1e-9)
-    n = 4 * nodes + 2 * count
-    out = np.zeros((n, n))
-    _kernels.revolution(A, delay, nodes, np.ascontiguousarray(cut.U[0]), free, push, end, h, out)
-    found = np.linalg.eigvals(out)
-    greatest = found[np.argmax(np.abs(found))]
-    return complex(greatest.real, abs(greatest.imag))
+    if len(cuts.damped):
+        raise InputError("dynamics.process_damping: not known with cutter.pitch_deg: leave one of them out")
+    pitch = pitch * (math.tau / pitch.sum())
+    out = np.zeros((len(cuts), 4))
+
+    def part(first: int, last: int) -> None:
+        _kernels.multipliers(
+            first, last, cuts.start, cuts.rows, cuts.exponents, teeth * cuts.period, pitch, cuts.omega,
+            np.array(cuts.damping), cuts.U, gain, per_wave, most, still, out,
+        )  # fmt: skip
+
+    shared(part, len(cuts))
+    return out

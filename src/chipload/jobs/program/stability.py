@@ -192,6 +192,9 @@ def stability_limits(
             why = "where a step chatters the error is not a number"
         if name == "sle_um" and any(stability.watch.material.exponents):
             why = f"material {stability.watch.material.name} has a size effect"
+        uneven = [t for t in np.unique(np.asarray(columns["tool"])[cutting]).tolist() if stability.watch.uneven(int(t))]
+        if name == "sle_um" and uneven:
+            why = f"the teeth of tool {int(uneven[0])} are not evenly spaced"
         rows = cutting if name == "sle_um" else margin > 0.0
         known = 0.0 if name == PROBABILITY else error
         out.append(check_limit(name, limit, columns, track=track, rows=rows, error=known, reason=why))

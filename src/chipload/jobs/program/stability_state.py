@@ -21,6 +21,7 @@ KIND = "chipload different cuts of a simulation 2"
 ARRAYS = {
     "tools": 1, "counts": 1, "pitch": 1, "leaning": 1, "keys": 1, "key_ends": 1, "values": 2, "sizes": 1, "rows": 2,
     "damped": 2, "period": 1, "damping": 1, "modes": 1, "omega": 1, "U": 1, "first_steps": 1, "first_margins": 1,
+    "teeth": 1, "pitches": 1,
 }  # fmt: skip
 
 Known = dict[int, dict[bytes, tuple[float, ...]]]
@@ -63,6 +64,8 @@ def asked_bytes(
         "modes": np.array([len(c.damping) for c in whole.values()], dtype=np.int64),
         "omega": np.concatenate([c.omega.ravel() for c in whole.values()]) if whole else none,
         "U": np.concatenate([c.U.ravel() for c in whole.values()]) if whole else none,
+        "teeth": np.array([len(c.pitches) for c in whole.values()], dtype=np.int64),
+        "pitches": np.array([x for c in whole.values() for x in c.pitches], dtype=np.float64),
         "first_steps": np.array(list(first_margin), dtype=np.int64),
         "first_margins": np.array(list(first_margin.values()), dtype=np.float64),
     }
@@ -95,23 +98,27 @@ def read_asked(
         and numbers.sum() == len(a["damping"])
         and 2 * len(a["omega"]) == len(a["U"]) == 2 * int((a["counts"] * numbers).sum())
         and len(a["first_steps"]) == len(a["first_margins"])
+        and len(a["teeth"]) == len(tools)
+        and a["teeth"].sum() == len(a["pitches"])
     )
     if not whole:
         raise InputError(f"{path}: damaged: remove its folder")
     known: Known = {}
     cuts: dict[int, list[DynamicCuts]] = {}
-    first, row, at, mode = 0, 0, 0, 0
-    for tool, n, m, pitch in zip(tools, a["counts"].tolist(), numbers.tolist(), a["pitch"].tolist(), strict=True):
+    first, row, at, mode, tooth = 0, 0, 0, 0, 0
+    each = zip(tools, a["counts"].tolist(), numbers.tolist(), a["pitch"].tolist(), a["teeth"].tolist(), strict=True)
+    for tool, n, m, pitch, teeth in each:
         own = slice(first, first + n)
         start = np.concatenate([[0], np.cumsum(sizes[own])])
         omega, U = a["omega"][at : at + n * m].reshape(n, m), a["U"][2 * at : 2 * (at + n * m)].reshape(n, 2, m)
         some = DynamicCuts(
             start, a["rows"][row : row + int(start[-1])], np.asarray(exponents, dtype=np.float64), a["period"][own],
             pitch, a["damping"][mode : mode + m], omega, U, a["damped"][row : row + int(start[-1])],
+            tuple(a["pitches"][tooth : tooth + teeth].tolist()),
         )  # fmt: skip
         values = [tuple(v) for v in a["values"][own].tolist()]
         known[tool] = dict(zip([keys[ends[k] : ends[k + 1]] for k in range(first, first + n)], values, strict=True))
         cuts[tool] = [some]
-        first, row, at, mode = first + n, row + int(start[-1]), at + n * m, mode + m
+        first, row, at, mode, tooth = first + n, row + int(start[-1]), at + n * m, mode + m, tooth + teeth
     margins = dict(zip(a["first_steps"].tolist(), a["first_margins"].tolist(), strict=True))
     return known, cuts, {int(tool) for tool in a["leaning"].tolist()}, margins

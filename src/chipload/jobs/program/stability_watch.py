@@ -36,6 +36,8 @@ PROBABILITY = "stable_probability"
 UPRIGHT = 1.0 - 1e-9
 #: cuts of a tool that speeds are looked for with: those nearest to chatter, and those with most edge in cut
 NEAREST, LARGEST = 12, 12
+#: the same of a cutter whose teeth are not evenly spaced, of which each takes some times as long
+UNEVEN = (4, 2)
 
 
 @dataclass(eq=False)
@@ -96,6 +98,10 @@ class StabilityWatch:
             out[:, 2] = number[out[:, 2].astype(np.int64) + 1]
         return dict(zip(self.columns, out.T.copy(), strict=True))
 
+    def uneven(self, tool: int) -> bool:
+        """Whether the teeth of a tool are not evenly spaced."""
+        return any(c.pitches for c in self.cuts.get(tool, []))
+
     @property
     def follows(self) -> bool:
         """Whether modes of the workpiece are known."""
@@ -124,7 +130,7 @@ class StabilityWatch:
         """The columns of new cuts."""
         found = stability_margins(some)
         error = np.zeros(len(some))
-        if not any(self.material.exponents):
+        if not any(self.material.exponents) and not some.pitches:
             size = np.diff(whole.start)[at]
             row = np.concatenate([np.arange(whole.start[k], whole.start[k] + n) for k, n in zip(at, size, strict=True)])
             rows = np.ascontiguousarray(force_rows(engagement, self.material)[row])
@@ -153,8 +159,9 @@ class StabilityWatch:
             return None
         whole = joined(some)
         margin = np.array([x[0] for x in self.known[tool].values()])
-        first = np.argsort(margin, kind="stable")[:NEAREST]
-        most = np.argsort(-engaged_edge(whole), kind="stable")[:LARGEST]
+        near, large = (NEAREST, LARGEST) if not whole.pitches else UNEVEN
+        first = np.argsort(margin, kind="stable")[:near]
+        most = np.argsort(-engaged_edge(whole), kind="stable")[:large]
         return whole.chosen(np.unique(np.concatenate([first, most])))
 
 
