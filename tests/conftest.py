@@ -13,7 +13,7 @@ import pytest
 from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding
 from chipload.geometry.contour import Contour
-from chipload.jobs.contour.outcome import ContourResult, Operation, Verification
+from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
 from chipload.machine.machine import machine_named
 from chipload.planning.result import Event, OperationResult, StrategyResult
 from chipload.program.build import follow, plunge, rapid, retract
@@ -99,7 +99,7 @@ def made_outcome(use: str = "backward", verdict: Verdict = Verdict.HOLDS, rows: 
     names = ("plain", "backward", "feed")
     result = OperationResult("contour", use, {n: made_strategy(n, rows) for n in names}, ("made by formula",))
     cutter = Cutter(10.0, 4, math.radians(30.0), 22.0, 35.0, 5.8e5)
-    checks = {n: Verification(verdict, "1800 rows compared", {"gouge_mm": 0.0}) for n in names}
+    checks = {n: PlanVerification(verdict, "1800 rows compared", {"gouge_mm": 0.0}) for n in names}
     settings = {"kind": "contour", "use": use, "feed_mm_min": 600.0}
     limits = {"engagement_deg": 13.0, "force_xy_n": 200.0}
     return ContourResult(

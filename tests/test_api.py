@@ -198,7 +198,7 @@ def test_a_program_runs_with_the_cutter_of_a_job(tmp_path):
     ("function", "capability"),
     [
         ("plan_contour", "contour"), ("plan_pocket", "contour"), ("plan_impeller", "impeller"),
-        ("plan_thin_wall", "thinwall"), ("hold_torque", "torque"), ("optimise_feeds", "program"),
+        ("plan_thin_wall", "thinwall"), ("hold_torque", "torque"), ("optimise_feeds", "feeds"),
     ],
 )  # fmt: skip
 def test_every_table_of_the_job_is_a_parameter(function, capability):

@@ -13,7 +13,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.examples import copy_example
 from chipload.jobs import check_job, load_job
-from chipload.jobs.program.workpiece import stock_points
+from chipload.jobs.simulation.workpiece import stock_points
 from chipload.program.build import rapid, rows
 from chipload.program.program import LINE, Program
 from chipload.simulation.chips import counted

@@ -71,7 +71,7 @@ def test_exit_code_and_first_lines_say_whether_it_is_verified(result):
 def test_every_way_is_written_checked_and_timed(result):
     *_, out, summary = result
     (op,) = summary["operations"]
-    ways = {way["name"]: way for way in op["ways"]}
+    ways = {way["name"]: way for way in op["partitions"]}
     assert set(ways) == {"hand-picked", "1 cutter"}
     tracks = {track["name"]: track for track in summary["tracks"]}
     for name, way in ways.items():
@@ -134,7 +134,7 @@ def test_the_scallop_is_as_asked(result):
         for patch in program["patches"]:
             assert patch["scallop_greatest_mm"] <= 0.1
             assert patch["scallop_mean_share"] >= 0.5
-            assert patch["crests"] > 0
+            assert patch["scallops"] > 0
 
 
 def test_the_axes_lead_the_cutter_along_the_blade(result):

@@ -19,7 +19,7 @@ from chipload.engagement.tooth_engagement import engagement_of_arcs
 from chipload.errors import InputError
 from chipload.jobs.checks import DefaultChecks, upper_loads
 from chipload.jobs.program.history import History
-from chipload.jobs.program.tables import ChecksTable
+from chipload.jobs.tables import ChecksTable
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
 from chipload.result import LimitCheck, Verdict

@@ -17,8 +17,8 @@ import pytest
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.errors import InputError
-from chipload.jobs.program.stiffness import deflecting, stiffness_of
-from chipload.jobs.program.tables import StiffnessTable
+from chipload.jobs.simulation.stiffness import deflecting, stiffness_of
+from chipload.jobs.simulation.tables import StiffnessTable
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
 from chipload.simulation.chips import remove

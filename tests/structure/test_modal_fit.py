@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from chipload.cli import app
 from chipload.errors import InputError
-from chipload.jobs.program.dynamics import read_modes
+from chipload.jobs.simulation.dynamics import read_modes
 from chipload.structure.modal_fit import fit_modes
 from chipload.structure.receptance import Receptance
 from chipload.structure.receptance_files import read_receptance

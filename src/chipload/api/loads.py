@@ -33,17 +33,13 @@ def hold_torque(
 ) -> FinishedJob:
     """Simulate the control of the cutting torque on a thin tube or cone.
 
-    Result and errors are those of :func:`plan_contour`.
+    Result, errors and parameters that are not named here are those of :func:`plan_contour`.
 
     Parameters
     ----------
-    torque_control, spindle, loop, simulation, limits : keys of the table of this name
-    machine, material : a shipped name, a file, or keys of the table
-    cutter : one :class:`chipload.Cutter`, or several
+    torque_control, spindle, loop, simulation : keys of the table of this name
     program, round : a program that exists (its file or keys), or keys of ``[round]`` by which one is made
     surprise : keys of a ``[[surprise]]``, or several
-    checks : keys of ``[checks]``: which default checks are switched off; None: all are made
-    folder : that file names are relative to
     """
     return run_tables(
         "torque", folder, progress, torque_control=torque_control, program=program, round=round, machine=machine,
@@ -72,24 +68,20 @@ def optimise_feeds(
 ) -> FinishedJob:
     """Give the lines of a program the greatest feeds that its limits of loads allow; the path stays.
 
-    Result and errors are those of :func:`plan_contour`.
+    Result, errors and parameters that are not named here are those of :func:`plan_contour`.
 
     Parameters
     ----------
     program : the program's file, or keys of ``[program]``
-    stock : keys of ``[stock]``
-    machine, material : a shipped name, a file, or keys of the table
-    cutter : one :class:`chipload.Cutter`, or several
     operation : keys of the ``[[operation]]`` of kind ``simulate``, with its table ``feeds``
     limits : keys of ``[limits]``; at least one of a load
-    part, fixture, stiffness, workpiece, dynamics, checks : keys of the table of this name; None: it is left out
-    folder : that file names are relative to
+    part, fixture, stiffness, workpiece, dynamics : keys of the table of this name; None: it is left out
     """
     for k, op in enumerate(tables_of("operation", operation)):
         if op.get("feeds") is None:
             raise InputError(f"operation.{k}.feeds: missing: state the range of the new feeds; without it use simulate")
     return run_tables(
-        "program", folder, progress, ("simulate",), program=program, stock=stock, machine=machine, material=material,
+        "feeds", folder, progress, ("simulate",), program=program, stock=stock, machine=machine, material=material,
         cutter=cutters_of(cutter), operation=operation, limits=limits, part=part, fixture=fixture, stiffness=stiffness,
         workpiece=workpiece, dynamics=dynamics, checks=checks,
     )  # fmt: skip

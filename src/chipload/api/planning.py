@@ -140,18 +140,13 @@ def plan_thin_wall(
 ) -> FinishedJob:
     """Plan the semi-finishing and finishing of a thin wall so that its deflection stays below a limit.
 
-    Result and errors are those of :func:`plan_contour`.
+    Result, errors and parameters that are not named here are those of :func:`plan_contour`.
 
     Parameters
     ----------
     wall, workpiece : keys of ``[wall]`` and ``[workpiece]``
-    machine, material : a shipped name, a file, or keys of the table
-    cutter : one :class:`chipload.Cutter`, or several
     operation : keys of the ``[[operation]]``
-    limits : keys of ``[limits]``
     threshold : measured calibration cuts: a file, or keys of ``[threshold]``; None: the threshold is calculated
-    checks : keys of ``[checks]``: which default checks are switched off; None: all are made
-    folder : that file names are relative to
     """
     return run_tables(
         "thinwall", folder, progress, wall=wall, workpiece=workpiece, machine=machine, material=material,

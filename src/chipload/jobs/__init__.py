@@ -24,7 +24,7 @@ from chipload.files import read_regular
 from chipload.jobs.confirm import guesses_of, take_confirm
 from chipload.jobs.messages import Errors, left_missing, renamed_tables, table_errors
 from chipload.jobs.override import override
-from chipload.jobs.sources import cutter_errors, source_errors
+from chipload.jobs.sources import cutter_errors, entries_of, source_errors
 from chipload.progress import Progress, silent
 from chipload.tables import LARGEST_FILE, parsed, require_sound
 
@@ -44,12 +44,14 @@ class Capability:
     key : the table that only its job files have
     table : name of the table of the whole file, in ``tables``
     resumes : whether a run that was stopped goes on from its checkpoint
+    inner : the table of an operation that only its job files have; empty: ``key`` alone tells them
     """
 
     name: str
     key: str
     table: str
     resumes: bool = False
+    inner: str = ""
 
     def module(self, part: str) -> ModuleType:
         """A file of its folder, imported when it is needed."""
@@ -64,6 +66,7 @@ class Capability:
 #: every capability; a job file belongs to the first whose table it has
 CAPABILITIES = (
     Capability("torque", "torque_control", "TorqueJobTable"),
+    Capability("feeds", "program", "FeedsJobTable", resumes=True, inner="feeds"),
     Capability("program", "program", "ProgramJobTable", resumes=True),
     Capability("impeller", "impeller", "ImpellerJobTable"),
     Capability("thinwall", "wall", "ThinWallJobTable"),
@@ -127,7 +130,7 @@ def load_job(path: str | Path, overrides: Sequence[str] = ()) -> LoadedJob:
     path = Path(path).absolute()
     data = read_regular(path, str(path), LARGEST_FILE, "not a job")
     raw = parsed(path.name, data)
-    return _loaded(_capability_of(raw), path, raw, overrides, data)
+    return _loaded(_capability_of(raw, overrides), path, raw, overrides, data)
 
 
 def job_of(
@@ -147,14 +150,19 @@ def job_of(
         As :func:`load_job`.
     """
     raw = plain(values)
-    own = next((c for c in CAPABILITIES if c.name == capability), None) or _capability_of(raw)
+    own = next((c for c in CAPABILITIES if c.name == capability), None) or _capability_of(raw, overrides)
     data = json.dumps(raw, sort_keys=True).encode()
     return _loaded(own, Path(folder).absolute() / own.name, raw, overrides, data)
 
 
-def _capability_of(raw: Mapping[str, Any]) -> Capability:
-    """The first capability whose table a job has."""
-    return next((c for c in CAPABILITIES if c.key in raw), CAPABILITIES[-1])
+def _capability_of(raw: Mapping[str, Any], overrides: Sequence[str]) -> Capability:
+    """The first capability whose tables a job has, in its file or by its overrides."""
+    inner = {key for _, entry in entries_of(raw, "operation") for key in entry}
+    for text in overrides:
+        table, _, rest = text.strip().partition(".")
+        if table == "operation":
+            inner.add(rest.partition(".")[2].partition(".")[0])
+    return next((c for c in CAPABILITIES if c.key in raw and (not c.inner or c.inner in inner)), CAPABILITIES[-1])
 
 
 def plain(value: Any) -> Any:

@@ -15,16 +15,19 @@ from pydantic import BaseModel
 from chipload.errors import Finding, InputError, Severity
 from chipload.jobs import FinishedJob, LoadedJob
 
-#: by capability: dotted key of the job -> factor, and the greatest value
+#: of jobs that simulate a program: dotted key of the job -> factor, and the greatest value
+SIMULATION: Mapping[str, tuple[float, float]] = {
+    "operation.step_mm": (8.0, 100.0),
+    "operation.tolerance_mm": (20.0, 0.1),
+    "stock.layer_mm": (4.0, 1e3),
+    "stock.chord_mm": (5.0, 1.0),
+    "part.spacing_mm": (3.0, 1e3),
+    "fixture.spacing_mm": (3.0, 1e3),
+}
+#: the same by capability
 FACTORS: Mapping[str, Mapping[str, tuple[float, float]]] = {
-    "program": {
-        "operation.step_mm": (8.0, 100.0),
-        "operation.tolerance_mm": (20.0, 0.1),
-        "stock.layer_mm": (4.0, 1e3),
-        "stock.chord_mm": (5.0, 1.0),
-        "part.spacing_mm": (3.0, 1e3),
-        "fixture.spacing_mm": (3.0, 1e3),
-    },
+    "program": SIMULATION,
+    "feeds": SIMULATION,
     "contour": {"operation.step_mm": (10.0, 10.0)},
     # steps stay: longer ones miss what the teeth of a thin pass cut; films stay far below the least depth of cut
     "thinwall": {
@@ -73,7 +76,7 @@ def coarser(loaded: LoadedJob) -> tuple[str, ...]:
                 # a tolerance that is above what is coarse stays
                 new = max(min(scaled, most), value) if factor > 1.0 else max(scaled, 1)
                 out.append(f"{'.'.join(path)}={format_value(int(new) if isinstance(value, int) else new)}")
-    if loaded.capability.name == "program":
+    if factors is SIMULATION:
         out += _of_program(loaded)
     return tuple(out)
 

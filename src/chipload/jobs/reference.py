@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from chipload.cutter.table import NEEDED, CutterTable
-from chipload.jobs import CAPABILITIES
+from chipload.jobs import CAPABILITIES, Capability
 from chipload.jobs.tables import SourceTable
 
 HEAD = """# The job file
@@ -61,7 +61,8 @@ value is written; they are no recommendation.
 """
 #: kinds of jobs, commonest first, and what each is for
 KINDS = {
-    "program": "Jobs that run a program: simulate it, optimise its feeds",
+    "program": "Jobs that run a program: simulate it, choose its spindle speeds",
+    "feeds": "Jobs that give a program new feeds",
     "contour": "Jobs that plan contours and pockets",
     "thinwall": "Jobs that cut a thin wall",
     "impeller": "Jobs that mill an impeller",
@@ -114,6 +115,9 @@ def reference() -> str:
     for capability in (by_name[name] for name in KINDS):
         root = capability.root
         out.append(f"\n## {KINDS[capability.name]}\n")
+        if capability.inner:
+            out += _variant(capability, next(c for c in CAPABILITIES if c.key == capability.key and not c.inner))
+            continue
         many = "tuple" in str(root.model_fields[capability.key].annotation)
         out.append(f"Such a job has a table `{f'[[{capability.key}]]' if many else f'[{capability.key}]'}`.")
         out.append(_summary(root) + "\n")
@@ -127,6 +131,18 @@ def reference() -> str:
             heading = f"[[{name}]]" if many else f"[{name}]"
             out += [f"\n### `{heading}`\n", _summary(table) + "\n", *_rows(table, name)]
     return "\n".join(out) + "\n"
+
+
+def _variant(capability: Capability, plain: Capability) -> Iterator[str]:
+    """A kind of job that has the tables of another one, and one in its operation."""
+    own = _table_in(capability.root.model_fields["operation"].annotation)
+    inner = None if own is None else _table_in(own.model_fields[capability.inner].annotation)
+    yield f"Such a job has the tables of jobs with `[{plain.key}]`, and a table `[operation.{capability.inner}]`."
+    yield _summary(capability.root) + "\n"
+    if inner is not None:
+        yield f"\n### `[operation.{capability.inner}]`\n"
+        yield _summary(inner) + "\n"
+        yield from _rows(inner, capability.inner)
 
 
 def _rows(table: type[BaseModel], name: str, prefix: str = "", tables: bool = True) -> Iterator[str]:

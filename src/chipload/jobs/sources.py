@@ -48,6 +48,19 @@ def sources_of(table: Any, folder: Path, *keys: str) -> dict[str, str | Path]:
     return out
 
 
+def sources_and_cutters(
+    table: Any, folder: Path, errors: Errors, *keys: str
+) -> tuple[dict[str, str | Path], dict[int, Cutter]]:
+    """The sources of several tables of a job, and its cutters by number; what is wrong is put among ``errors``."""
+    sources: dict[str, str | Path] = {}
+    tools: dict[int, Cutter] = {}
+    with errors.collect():
+        sources = sources_of(table, folder, *keys)
+    with errors.collect():
+        tools = cutters(table.cutter, folder)
+    return sources, tools
+
+
 def entries_of(values: Mapping[str, Any], key: str) -> Iterator[tuple[int, Mapping[str, Any]]]:
     """The tables of a list in a file, with their number; what is no table is left out."""
     found = values.get(key)

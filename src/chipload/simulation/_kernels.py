@@ -1,4 +1,4 @@
-"""Compiled loops over the trail of the cutter's centre; arrays and scalars only.
+"""Compiled loops over the path of the cutter's centre; arrays and scalars only.
 
 Notation: a **motion** is a row ``[x0, y0, x1, y1, xc, yc, sweep, rho, a0]`` of ``mot``: a segment as in
 :mod:`chipload.geometry.contour`, its radius and start angle; of zero length it is a point. A **moment** is a motion k
@@ -303,7 +303,7 @@ def rim(k, w, centre, heading, radius, reach, own, apart, sample, precision, mot
 
 @njit(cache=True, nogil=True)
 def centre_path_distance(points, radius, slack, mot, active, grid, out):
-    """Distance from each point (m, 2) to the whole trail: exact where it is above ``radius + slack``, else at most
+    """Distance from each point (m, 2) to the whole path: exact where it is above ``radius + slack``, else at most
     ``slack`` above the least.
     """
     gx, gy, h, nx, ny, start, items, _ = grid

@@ -1,4 +1,4 @@
-"""The trail of the cutter's centre, and what of the rim meets uncut stock: engagement without any boundary.
+"""The path of the cutter's centre, and what of the rim meets uncut stock: engagement without any boundary.
 
 Notation: R cutter radius, O centre, T unit feed direction, n = Rot(+90 deg) T; a moment is a motion and the share
 (0..1) of it that has been travelled; immersion phi [rad] counts from n clockwise, 0..pi the front half of the rim.
@@ -91,10 +91,10 @@ class CentrePath:
 
     @staticmethod
     def of_program(program: Program, radius: float, stock: Region | None, level_mm: float) -> CentrePath:
-        """The trail at the height ``level_mm`` [mm]: motions with both ends at or below it cut, of one that comes
-        from above or leaves upwards the end at or below it is a point of the trail.
+        """The centre path at the height ``level_mm`` [mm]: motions with both ends at or below it cut, of one that comes
+        from above or leaves upwards the end at or below it is a point of the centre path.
 
-        Motion k of the trail is row k of the program.
+        Motion k of the path is row k of the program.
         """
         seg = flat_motions(program)
         z1 = program.p_work[:, 2]
@@ -157,7 +157,7 @@ class CentrePath:
     def uncut(self, points: ArrayLike, motion: ArrayLike, share: ArrayLike) -> Bools:
         """(m,) whether each of ``points`` (m, 2) [mm] is still stock at its moment.
 
-        A point at R of the trail, within ``TOUCH_MM``, is uncut.
+        A point at R of the path, within ``TOUCH_MM``, is uncut.
         """
         p = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 2)
         k, w = self._moments(motion, share)
@@ -167,7 +167,7 @@ class CentrePath:
         return out
 
     def distance(self, points: ArrayLike) -> Floats:
-        """(m,) distance [mm] from ``points`` (m, 2) to the whole trail where it is above R; where it is not, some
+        """(m,) distance [mm] from ``points`` (m, 2) to the whole path where it is above R; where it is not, some
         value not above R + ``TOUCH_MM``.
         """
         p = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 2)
@@ -222,7 +222,7 @@ def rim_engagement(
     workers: int = 1,
     displacement_mm: float = 0.0,
 ) -> Rim:
-    """The engaged pieces of the rim at moments of the trail.
+    """The engaged pieces of the rim at moments of the path.
 
     Parameters
     ----------

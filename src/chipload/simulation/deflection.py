@@ -287,7 +287,7 @@ def tip_deflections(
 
 
 def form_error(
-    removal: Removal,
+    removal: Removal | Sequence[Cuts],
     material: Material,
     points: ArrayLike,
     normals: ArrayLike,
@@ -303,7 +303,7 @@ def form_error(
 
     Parameters
     ----------
-    removal : made with ``keep``
+    removal : made with ``keep``, or some of its cuts; ``step`` of the answer counts as theirs does
     points, normals : (p, 3) float [mm] and unit, out of the part, in the frame of the program
     work : compliance of the work at the points in the state of removal in which they are made, (p,) [mm/N] normal or
         (p, 3, 3); None: rigid
@@ -322,26 +322,6 @@ def form_error(
     -----
     Every step that may win is looked at: those whose distance is within twice the greatest deflection of the least.
     """
-    return form_error_of(
-        _kept(removal), material, points, normals, work=work, bars=bars, near=near, facing=facing, reach=reach,
-        progress=progress,
-    )  # fmt: skip
-
-
-def form_error_of(
-    all_cuts: Sequence[Cuts],
-    material: Material,
-    points: ArrayLike,
-    normals: ArrayLike,
-    *,
-    work: ArrayLike | None,
-    bars: Mapping[int, tuple[Bar, ...]] | None,
-    near: float,
-    facing: float = FACING,
-    reach: float = REACH,
-    progress: Progress = silent,
-) -> FormError:
-    """:func:`form_error` by some of the cuts of a program; ``step`` counts as their ``step`` does."""
     q, n = (np.ascontiguousarray(np.atleast_2d(np.asarray(v, dtype=np.float64))) for v in (points, normals))
     if q.ndim != 2 or q.shape[1] != 3 or n.shape != q.shape or not (np.isfinite(q).all() and np.isfinite(n).all()):
         raise InputError(f"form_error: points {q.shape}, normals {n.shape}: need (p, 3) finite numbers, one of each")
@@ -350,6 +330,7 @@ def form_error_of(
     if not 0.0 < near < math.inf:
         raise InputError(f"form_error: near_mm = {near:g}: must be above 0")
     stiff = _work(work, n, "form_error")
+    all_cuts = _kept(removal) if isinstance(removal, Removal) else removal
     least = np.full(len(q), np.inf)
     for cuts in all_cuts:
         _kernels.least_gaps(q, n, cuts.way, _shape(cuts.cutter), near, facing, least)

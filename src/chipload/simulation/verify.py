@@ -1,4 +1,4 @@
-"""Proves or refutes a plan in the plane by the trail of the cutter's centre alone.
+"""Proves or refutes a plan in the plane by the path of the cutter's centre alone.
 
 Notation: R cutter radius. Compared are the planned engagement against that of the rim with the uncut stock, the
 finished wall against the path (gouge, excess), and rapids below the stock's top against what still stands there.
@@ -47,7 +47,7 @@ class Verification:
     and where; `unproven`, none failed but something could not be compared, ``reasons`` say what.
     ``engagement_difference_deg`` the greatest |planned - found| and its centre; ``gouge_mm`` and ``excess_mm`` the
     greatest and their places on the wall; ``rapids`` the centres [mm] of rapids that meet stock;
-    ``compared`` rows of the history held against the trail; ``samples`` points and moments looked at;
+    ``compared`` rows of the history held against the centre path; ``samples`` points and moments looked at;
     ``text`` one line that says what was compared.
     """
 
@@ -67,11 +67,11 @@ class Verification:
 
 @dataclass(frozen=True, eq=False)
 class _Level:
-    """One height of the program: its trail, and what lies above it up to ``top``."""
+    """One height of the program: its centre path, and what lies above it up to ``top``."""
 
     z: float
     top: float
-    trail: CentrePath
+    centre_path: CentrePath
 
 
 def verify_contour(
@@ -91,7 +91,7 @@ def verify_contour(
     workers: int = 1,
     progress: Progress = silent,
 ) -> Verification:
-    """Hold a planned program against the trail of its own motions.
+    """Hold a planned program against the path of its own motions.
 
     Parameters
     ----------
@@ -140,14 +140,8 @@ def verify_contour(
         levels = _levels(program, radius, stock, stock_top_mm)
         if not levels:
             open_.append("the program has no level cutting motion below the stock's top")
-        progress(0.05, "trail")
-        for level in levels:
-            found, asked = _rapids(program, level, step_mm)
-            hits += found
-            samples += asked
-        if hits:
-            x, y = hits[0]
-            failed.append(f"rapid through stock at ({x:.4f}, {y:.4f}), {len(hits)} motions in all")
+        progress(0.05, "centre path")
+        hits, samples = _rapids_through_stock(program, levels, step_mm, failed)
         progress(0.15, "rapids")
         if wall:
             cleft, remains, asked = _wall(levels, wall, material, step_mm)
@@ -165,10 +159,26 @@ def verify_contour(
             failed.append(_exceeds("engagement differs by", difference, "deg", engagement_tolerance_deg))
     except Cancelled:
         open_.append("stopped before the end")
-    compared_with = f"{compared} of {len(columns['x_mm'])} rows against the trail of {len(program)} motions"
+    compared_with = f"{compared} of {len(columns['x_mm'])} rows against the centre path of {len(program)} motions"
     return _verification(
         compared_with, bool(wall), difference, cleft, remains, hits, (compared, samples), failed, open_
     )
+
+
+def _rapids_through_stock(
+    program: Program, levels: Sequence[_Level], step: float, failed: list[str]
+) -> tuple[list[Place], int]:
+    """Places of rapids in the stock of the levels, and how many points were checked; adds findings to ``failed``."""
+    hits: list[Place] = []
+    samples = 0
+    for level in levels:
+        found, asked = _rapids(program, level, step)
+        hits += found
+        samples += asked
+    if hits:
+        x, y = hits[0]
+        failed.append(f"rapid through stock at ({x:.4f}, {y:.4f}), {len(hits)} motions in all")
+    return hits, samples
 
 
 def _verification(
@@ -220,8 +230,8 @@ def _wall(
     cleft = remains = GreatestDistance(0.0, (0.0, 0.0), 0)
     samples = 0
     for level in levels:
-        cleft = max(cleft, gouge(level.trail, wall, material, step), key=lambda v: v.value_mm)
-        remains = max(remains, excess(level.trail, wall, step), key=lambda v: v.value_mm)
+        cleft = max(cleft, gouge(level.centre_path, wall, material, step), key=lambda v: v.value_mm)
+        remains = max(remains, excess(level.centre_path, wall, step), key=lambda v: v.value_mm)
         samples += cleft.samples + remains.samples
     return cleft, remains, samples
 
@@ -276,7 +286,7 @@ def _rapids(program: Program, level: _Level, step: float) -> tuple[list[Place], 
     asked = 0
     if not len(at):
         return hits, asked
-    trail, path = level.trail, CentrePath(flat_motions(program), level.trail.radius)
+    trail, path = level.centre_path, CentrePath(flat_motions(program), level.centre_path.radius)
     reach = trail.radius - RAPID_MM
     front = np.linspace(0.0, np.pi, 181)
     around = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
@@ -348,17 +358,17 @@ def _compare(
                 use = np.flatnonzero(mine[rows])
                 at = rows[use]
                 planned = columns["engagement_deg"][at]
-                off = np.abs(_degrees(level.trail, kk[at], ww[at], COARSE_DEG, workers) - planned)
+                off = np.abs(_degrees(level.centre_path, kk[at], ww[at], COARSE_DEG, workers) - planned)
                 again = np.flatnonzero(off > tolerance)
                 if len(again):
                     j = at[again]
-                    off[again] = _difference(level.trail, kk[j], ww[j], planned[again], tolerance, workers)
+                    off[again] = _difference(level.centre_path, kk[j], ww[j], planned[again], tolerance, workers)
                 best[use] = np.minimum(best[use], off)
             stuck = np.flatnonzero((best > tolerance) & one[rows])
             if len(stuck):
                 at = rows[stuck]
                 just_before = np.maximum(w[at] - BEFORE_MM / length[k[at]], 0.0)
-                there = _degrees(level.trail, k[at], just_before, FINE_DEG, workers)
+                there = _degrees(level.centre_path, k[at], just_before, FINE_DEG, workers)
                 best[stuck] = np.minimum(best[stuck], np.abs(there - columns["engagement_deg"][at]))
             gap[rows] = best
             done[rows] = True

@@ -1,4 +1,4 @@
-"""What a trail did to the part's wall: where it gouged, and what it left standing.
+"""What a centre path did to the part's wall: where it gouged, and what it left standing.
 
 Notation: R cutter radius; d the distance from the cutter's centre to the wall, negative on the side of the material.
 The gouge is R - d along the path, the excess the distance from the wall to the path less R.
@@ -94,7 +94,7 @@ def gouge(trail: CentrePath, wall: Sequence[Contour], material: str, step_mm: fl
 
 
 def excess(trail: CentrePath, wall: Sequence[Contour], step_mm: float = 0.05) -> GreatestDistance:
-    """The greatest stock left on the wall, max(0, distance from the wall's point to the trail - R), and that point.
+    """The greatest stock left on the wall, max(0, distance from the wall's point to the path - R), and that point.
 
     The wall is sampled at most every ``step_mm`` [mm] and at its joints; each distance is exact.
 

@@ -195,7 +195,7 @@ class Page:
 
     def _listed(self, found: list[FolderEntry], all_seen: bool) -> None:
         if not all_seen:
-            ui.label(f"The folder holds more than {ENTRIES} files: only so many were looked at.").classes("cl-note")
+            ui.label(f"The folder holds more than {ENTRIES} files: only so many were read.").classes("cl-note")
         if not found:
             ui.label("This folder holds no result and no job. `chipload example` copies one.").classes("cl-note")
         for f in found:

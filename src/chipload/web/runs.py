@@ -1,7 +1,7 @@
 """A job runs in a process of its own: it tells where it is, can be stopped, and ends when the page does.
 
 Notation: the process writes a JSON value a line: ``{"done": 0..1, "what": text}`` while it works and at its end
-``{"code": exit code of `chipload run`, "says": text}``. It stops when its input closes, so that no run outlives the
+``{"code": exit code of `chipload run`, "message": text}``. It stops when its input closes, so that no run outlives the
 page.
 """
 
@@ -86,7 +86,7 @@ class Run:
         with contextlib.suppress(ValueError, TypeError, AttributeError):
             values = json.loads(line)
             if "code" in values:
-                self.code, self.message = int(values["code"]), str(values["says"])
+                self.code, self.message = int(values["code"]), str(values["message"])
             else:
                 self.done, self.what = float(values["done"]), str(values["what"])
 

@@ -39,19 +39,19 @@ def work(job: str, out: str) -> dict[str, Any]:
             finally:
                 safe = kept.safe
             kept.discard()
-        return {"code": done.result.verdict.exit_code, "says": done.result.message}
+        return {"code": done.result.verdict.exit_code, "message": done.result.message}
     except InputError as err:
-        return {"code": 2, "says": str(err)}
+        return {"code": 2, "message": str(err)}
     except OutputError as err:
-        return {"code": 4, "says": str(err)}
+        return {"code": 4, "message": str(err)}
     except OSError as err:
         known = is_full(err)
-        return {"code": 4 if known else 1, "says": str(cannot_write("the disk", err)) if known else _fault(err)}
+        return {"code": 4 if known else 1, "message": str(cannot_write("the disk", err)) if known else _fault(err)}
     except (KeyboardInterrupt, Cancelled):
         why = f"{safe} steps are kept: the next run goes on from there" if safe else "nothing was written"
-        return {"code": 130, "says": f"stopped: {why}"}
+        return {"code": 130, "message": f"stopped: {why}"}
     except Exception as err:
-        return {"code": 1, "says": _fault(err)}
+        return {"code": 1, "message": _fault(err)}
 
 
 def _fault(err: Exception) -> str:

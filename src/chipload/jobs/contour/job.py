@@ -10,7 +10,7 @@ from typing import Any
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.contour.tables import ALWAYS, MAY, NEEDS, ContourJobTable, ContourLimitsTable, OperationTable
 from chipload.jobs.messages import Errors
-from chipload.jobs.sources import Limited, cutters, entries_of, sources_of
+from chipload.jobs.sources import Limited, entries_of, sources_and_cutters
 
 
 @dataclass(frozen=True)
@@ -53,12 +53,7 @@ def load(path: Path, table: ContourJobTable, overrides: Sequence[str]) -> Contou
     """
     folder, errors = path.parent, Errors()
     errors.texts += missing(table.model_dump(exclude_none=True))
-    sources: dict[str, str | Path] = {}
-    tools: dict[int, Cutter] = {}
-    with errors.collect():
-        sources = sources_of(table, folder, "machine", "material")
-    with errors.collect():
-        tools = cutters(table.cutter, folder)
+    sources, tools = sources_and_cutters(table, folder, errors, "machine", "material")
     errors.texts += _contradictions(table, tools)
     errors.refuse()
     return ContourJob(

@@ -15,7 +15,7 @@ from chipload.result import Provenance, Verdict
 
 
 @dataclass(frozen=True)
-class Verification:
+class PlanVerification:
     """What the simulation, which knows no planner, finds of one strategy.
 
     Parameters
@@ -52,7 +52,7 @@ class Operation:
     cutter: Cutter
     top: float
     depth: float
-    verifications: Mapping[str, Verification]
+    verifications: Mapping[str, PlanVerification]
     machine_findings: Mapping[str, tuple[Finding, ...]] = field(default_factory=dict)
     limits: Mapping[str, float] = field(default_factory=dict)
     checks: DefaultChecks | None = None

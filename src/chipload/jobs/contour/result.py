@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from chipload.errors import Finding, Severity
 from chipload.jobs.checks import chip_findings, default_limits, unchecked_checks
-from chipload.jobs.contour.outcome import ContourResult, Operation, Verification
+from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
 from chipload.machine.machine import Machine
 from chipload.planning.result import Event, StrategyResult
 from chipload.report.programs import ENDINGS, program_name
@@ -154,7 +154,7 @@ def _operation(k: int, op: Operation) -> dict[str, Any]:
     }
 
 
-def _verification(check: Verification | None) -> dict[str, Any] | None:
+def _verification(check: PlanVerification | None) -> dict[str, Any] | None:
     return None if check is None else {"verdict": check.verdict, "message": check.text, **check.numbers}
 
 

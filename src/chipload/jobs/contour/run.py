@@ -29,7 +29,7 @@ from chipload.jobs.contour.finish_program import (
     with_semifinish,
 )
 from chipload.jobs.contour.job import ContourJob
-from chipload.jobs.contour.outcome import ContourResult, Operation, Verification
+from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
 from chipload.jobs.contour.tables import OperationTable
 from chipload.jobs.provenance import provenance_of, title_of
 from chipload.machine.machine import Machine, machine_named, read_machine
@@ -276,7 +276,7 @@ def _setting(job: ContourJob, inputs: Inputs, op: OperationTable) -> Finishing |
 
 def verify(
     strategy: StrategyResult, op: OperationTable, cutter: Cutter, top: float, progress: Progress
-) -> Verification:
+) -> PlanVerification:
     """Let the simulation, which knows no planner, hold the program of one strategy against its history.
 
     The planner says in ``drawn`` what the program starts from (`stock before`, closed contours; a front starts in the
@@ -284,7 +284,7 @@ def verify(
     """
     before = strategy.drawn.get("stock before", ())
     if not before and op.kind != "pocket":
-        return Verification(Verdict.UNPROVEN, "the planner does not say what stock the program starts from")
+        return PlanVerification(Verdict.UNPROVEN, "the planner does not say what stock the program starts from")
     # eased joints may leave the drawn wall to either side, a cutter may leave stock in a corner; the path of a pocket
     # lies within a tolerance of its region, and what it leaves over is judged by its area, which the planner reports
     leave = op.tolerance_mm or 0.0
@@ -308,7 +308,7 @@ def verify(
         workers=2,
         progress=progress,
     )
-    return Verification(
+    return PlanVerification(
         VERDICTS[told.verdict],
         "; ".join((told.text, *told.reasons)),
         {

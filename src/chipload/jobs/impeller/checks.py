@@ -50,7 +50,7 @@ def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
     patches = [
         [
             str(k), f"{BODIES[m.patch.body]} {m.patch.side}", str(m.tracks.lines), f"{s.asked:g}", f"{s.greatest:.4f}",
-            f"{s.mean:.4f}", f"{100.0 * s.mean / s.asked:.0f}", str(s.crests), f"{100.0 * s.covered:.1f}",
+            f"{s.mean:.4f}", f"{100.0 * s.mean / s.asked:.0f}", str(s.count), f"{100.0 * s.covered:.1f}",
         ]
         for k, p in enumerate(milled.programs, 1)
         for m, s in zip(p.setting.millings, p.scallops, strict=True)
@@ -64,7 +64,7 @@ def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
         "mean scallop height [mm]",
         "of asked [%]",
     ]
-    scallop += ["crests", "of the patch within [%]"]
+    scallop += ["scallops", "of the patch within [%]"]
     turn = np.degrees(milled.impeller.pitch)
     left = [
         [

@@ -31,7 +31,7 @@ def operation_numbers(milled: ImpellerResult) -> dict[str, Any]:
         "certified_within_mm": milled.tolerance,
         **(checked_of(milled, used) if used is not None else {}),
         "hand_picked": None if picked is None else _picked(milled, picked),
-        "ways": [checked_of(milled, way) for way in milled.partitions],
+        "partitions": [checked_of(milled, way) for way in milled.partitions],
         "scallop": {"mean_share": None if milled.used_checked is None else milled.used_checked.scallop},
         "programs": None
         if milled.programs is None
@@ -150,7 +150,7 @@ def _program(name: str, p: Checked) -> dict[str, Any]:
                 "scallop_greatest_mm": s.greatest,
                 "scallop_mean_mm": s.mean,
                 "scallop_mean_share": s.mean / s.asked,
-                "crests": s.crests,
+                "scallops": s.count,
                 "covered_share": s.covered,
             }
             for m, s in zip(p.setting.millings, p.scallops, strict=True)
@@ -174,8 +174,8 @@ def _finished(milled: ImpellerResult) -> dict[str, Any]:
     """What all programs leave together."""
     programs, covered = milled.programs or (), milled.covered or ()
     scallops = [x for p in programs for x in p.scallops]
-    crests = sum(x.crests for x in scallops)
-    mean = sum(x.mean * x.crests for x in scallops) / crests if crests else None
+    crests = sum(x.count for x in scallops)
+    mean = sum(x.mean * x.count for x in scallops) / crests if crests else None
     return {
         "path_mm": float(sum(p.setting.length for p in programs)),
         "time_min": sum(p.seconds for p in programs) / 60.0,

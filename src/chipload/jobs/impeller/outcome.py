@@ -135,14 +135,14 @@ class Limiting:
 
 @dataclass(frozen=True)
 class Scallop:
-    """What the check measures on a patch: ``asked``, greatest rest between two passes, mean height of the crests [mm],
-    how many crests, the share of the patch on which no more than asked is left.
+    """What the check measures on a patch: ``asked``, greatest rest between two passes, mean height of the scallops
+    [mm], how many there are, the share of the patch on which no more than asked is left.
     """
 
     asked: float
     greatest: float
     mean: float
-    crests: int
+    count: int
     covered: float
 
     @property
@@ -327,8 +327,8 @@ class CheckedPartition:
     def scallop(self) -> float | None:
         """Mean height of the scallops as a share of what is asked; None: there are none."""
         rows = [x for p in self.programs for x in p.scallops]
-        crests = sum(x.crests for x in rows)
-        return math.fsum(x.mean * x.crests for x in rows) / crests / rows[0].asked if crests else None
+        count = sum(x.count for x in rows)
+        return math.fsum(x.mean * x.count for x in rows) / count / rows[0].asked if count else None
 
 
 @dataclass(frozen=True, eq=False)

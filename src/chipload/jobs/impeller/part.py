@@ -41,14 +41,14 @@ AGAINST_Z |= {key.replace("-", "+"): _OVER @ R for key, R in AGAINST_Z.items()}
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class ImpellerPart:
     """An impeller, and what its faces became and its fillets take, a line each."""
 
     impeller: Impeller
     faces: tuple[str, ...] = ()
 
 
-def read_part(job: ImpellerJob) -> Part:
+def read_part(job: ImpellerJob) -> ImpellerPart:
     """The impeller of a job.
 
     Raises
@@ -65,16 +65,16 @@ def read_part(job: ImpellerJob) -> Part:
     names = [(b, f"{k} fillet") for b in BODIES[: len(made.bodies)] for k in ("plus", "minus")]
     left = [" ".join(name) for name in names if name not in milled]
     not_milled = (f"not milled, for no [[surface]] names it: {', '.join(left)}",) if left else ()
-    return Part(made, (*plain.faces, *said, *not_milled))
+    return ImpellerPart(made, (*plain.faces, *said, *not_milled))
 
 
-def _without_fillets(job: ImpellerJob) -> Part:
+def _without_fillets(job: ImpellerJob) -> ImpellerPart:
     part = job.table.impeller
     if part.step is not None:
         return _of_step(job.files, part.step, part.blades, part.outer_diameter_mm)
     if part.sections is not None:
-        return Part(_of_sections(job.path.parent, part.sections, part.blades, part.outer_diameter_mm))
-    return Part(_of_shape(stated(part.shape, "impeller.shape"), part.blades, part.outer_diameter_mm))
+        return ImpellerPart(_of_sections(job.path.parent, part.sections, part.blades, part.outer_diameter_mm))
+    return ImpellerPart(_of_shape(stated(part.shape, "impeller.shape"), part.blades, part.outer_diameter_mm))
 
 
 def _of_shape(given: ShapeTable, blades: int, outer_diameter: float) -> Impeller:
@@ -104,7 +104,7 @@ def _of_sections(folder: Path, given: SectionsTable, blades: int, outer_diameter
     return Impeller(main, splitter, hub, shroud, blades)
 
 
-def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diameter: float) -> Part:
+def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diameter: float) -> ImpellerPart:
     model, R = read_faces(files["step"], "impeller.step.file"), AGAINST_Z[given.flow]
     said: list[str] = []
 
@@ -152,7 +152,7 @@ def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diamet
     main, splitter = blade(given.plus, given.minus, ""), None
     if given.splitter_plus is not None and given.splitter_minus is not None:
         splitter = blade(given.splitter_plus, given.splitter_minus, "splitter_")
-    return Part(Impeller(main, splitter, hub, shroud, blades), tuple(said))
+    return ImpellerPart(Impeller(main, splitter, hub, shroud, blades), tuple(said))
 
 
 def _faces(model: Model, names: Names, key: str) -> list[Face]:

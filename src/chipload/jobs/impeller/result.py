@@ -145,7 +145,7 @@ def _gouge(track: str, checked: Checked | CheckedRough) -> LimitCheck:
     """The bound of the deepest gouge; its error is down to what was found."""
     gouge, limit = checked.gouge, checked.allowed
     if math.isinf(gouge.bound):
-        why = "a sharp corner or rim of the tool may gouge between the points that are looked at"
+        why = "a sharp corner or rim of the tool may gouge between the points that are checked"
         state = Verdict.EXCEEDS if gouge.found > limit else Verdict.UNPROVEN
         return LimitCheck("gouge_mm", limit, gouge.found, state, track, reason="" if gouge.found > limit else why)
     if gouge.bound <= limit or gouge.found > limit:

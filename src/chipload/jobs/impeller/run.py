@@ -14,7 +14,7 @@ from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_name
 from chipload.errors import InputError
 from chipload.jobs.impeller.job import ImpellerJob
 from chipload.jobs.impeller.outcome import ImpellerResult, OneCutter, Searched, unreached_text
-from chipload.jobs.impeller.part import Part, read_part
+from chipload.jobs.impeller.part import ImpellerPart, read_part
 from chipload.jobs.impeller.partition_programs import checked_partitions
 from chipload.jobs.impeller.paths import finish_settings, walls_of
 from chipload.jobs.impeller.roughing import checked_roughing
@@ -88,7 +88,7 @@ def run(job: ImpellerJob, progress: Progress = silent) -> ImpellerResult:
     return replace(milled, checked=checked, roughs=roughs, partitions=tuple(chosen.get(p.name, p) for p in partitions))
 
 
-def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue, part: Part) -> Provenance:
+def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue, part: ImpellerPart) -> Provenance:
     files = dict(job.files)
     files |= {key: p for key, p in (("machine", job.machine), ("catalogue", job.catalogue)) if not isinstance(p, str)}
     own = provenance_of(files, job.overrides, machine)

@@ -1,1 +1,1 @@
-"""A program that exists: read, simulated, its feeds optimised."""
+"""A program that exists: read, simulated, given new spindle speeds."""

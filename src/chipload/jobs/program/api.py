@@ -21,12 +21,13 @@ from chipload.cutter.table import CutterTable, cutter_from_table
 from chipload.cutting.material import Material, material_named, read_material
 from chipload.errors import InputError
 from chipload.jobs.messages import Errors, table_errors
-from chipload.jobs.program.clamped import clamp_errors
 from chipload.jobs.program.history import History
-from chipload.jobs.program.job import ProgramJob
 from chipload.jobs.program.run import simulate_read
-from chipload.jobs.program.tables import FixtureTable, ProgramJobTable, SolidTable, TargetTable
+from chipload.jobs.program.tables import ProgramJobTable
 from chipload.jobs.provenance import provenance_of
+from chipload.jobs.simulation.clamped import clamp_errors
+from chipload.jobs.simulation.job import ProgramJob
+from chipload.jobs.simulation.tables import FixtureTable, SolidTable, TargetTable
 from chipload.jobs.tables import Table
 from chipload.machine.ini import read_ini
 from chipload.machine.machine import Machine, machine_named, read_machine

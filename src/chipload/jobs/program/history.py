@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.jobs.program.outcome import ProgramResult
 from chipload.jobs.program.result import result_of
+from chipload.jobs.simulation.outcome import ProgramResult
 from chipload.lazy import require_extra
 from chipload.result import Result, Verdict
 from chipload.stock.layers import LayeredStock

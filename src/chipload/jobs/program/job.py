@@ -1,53 +1,14 @@
-"""A job that runs a program which exists: read, and with an operation run through a stock."""
+"""A job that reads a program, and with an operation runs it through a stock."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-import trimesh
+from chipload.jobs.program.tables import ProgramJobTable
+from chipload.jobs.simulation.job import ProgramJob, missing, note_of_passes, program_job
 
-from chipload.cutter.cutter import Cutter
-from chipload.jobs.messages import Errors
-from chipload.jobs.program.clamped import clamp_errors
-from chipload.jobs.program.dynamics import dynamics_of
-from chipload.jobs.program.tables import LOADS, ProgramJobTable, ProgramLimitsTable
-from chipload.jobs.sources import Limited, cutters, sources_of
-
-
-@dataclass(frozen=True)
-class ProgramJob(Limited):
-    """A job that runs a program; paths are absolute.
-
-    Parameters
-    ----------
-    path : the job file
-    table : its values
-    program_file : NC text or CL data
-    tools_file : tool table; None: none
-    machine : a shipped name or a file
-    overrides : the `--set` texts that were applied
-    cutters : by number; empty where the program is not simulated
-    material : a shipped name or a file; None where the program is not simulated
-    meshes : what stands for the files of ``stock``, ``part``, ``fixture 0`` and so on
-    """
-
-    path: Path
-    table: ProgramJobTable
-    program_file: Path
-    tools_file: Path | None
-    machine: str | Path
-    overrides: tuple[str, ...]
-    cutters: Mapping[int, Cutter]
-    material: str | Path | None
-    meshes: Mapping[str, trimesh.Trimesh] = field(default_factory=dict)
-
-    @property
-    def simulates(self) -> bool:
-        """Whether the program is run through a stock."""
-        return bool(self.table.operation)
+__all__ = ["load", "missing", "resume_note"]
 
 
 def load(path: Path, table: ProgramJobTable, overrides: Sequence[str]) -> ProgramJob:
@@ -58,97 +19,10 @@ def load(path: Path, table: ProgramJobTable, overrides: Sequence[str]) -> Progra
     InputError
         Keys do not go together.
     """
-    folder, errors = path.parent, Errors()
-    named = [key for key in ("machine", "material") if getattr(table, key) is not None]
-    sources: dict[str, str | Path] = {}
-    tools: dict[int, Cutter] = {}
-    errors.texts += missing(table.model_dump(exclude_none=True))
-    with errors.collect():
-        sources = sources_of(table, folder, *named)
-    if table.operation:
-        errors.texts += _contradictions(table)
-        with errors.collect():
-            tools = cutters(table.cutter, folder)
-        with errors.collect():
-            if table.dynamics is not None and tools:
-                dynamics_of(table.dynamics, folder, tools, table.workpiece)
-    else:
-        errors.texts += [
-            f'{key}: not used where a program is only read: add an [[operation]] with kind = "simulate" or leave it out'
-            for key in ("stock", "part", "fixture", "material", "cutter", "stiffness", "dynamics", "workpiece")
-            if getattr(table, key)
-        ]
-    errors.refuse()
-    tool_table = table.program.tools
-    return ProgramJob(
-        path,
-        table,
-        folder / table.program.file,
-        None if tool_table is None else folder / tool_table,
-        sources["machine"],
-        tuple(overrides),
-        tools,
-        sources.get("material"),
-    )
-
-
-def missing(values: Mapping[str, Any]) -> list[str]:
-    """The tables that a simulation lacks; ``values`` are those of the file."""
-    if not values.get("operation"):
-        return []
-    needs = ("stock", "material", "cutter")
-    return [f"{key}: missing: state it (kind = simulate needs it)" for key in needs if not values.get(key)]
-
-
-def _contradictions(table: ProgramJobTable) -> Iterator[str]:
-    """What values of a simulation contradict, and that nothing is checked at all."""
-    stock = table.stock
-    if stock is not None:
-        block = (stock.low_mm is not None, stock.high_mm is not None)
-        if any(block) == (stock.file is not None) or any(block) != all(block):
-            yield "stock: state either low_mm and high_mm of a block, or a file"
-        saved = stock.file is not None and stock.file.lower().endswith(".npz")
-        if saved and stock.layer_mm is not None:
-            yield "stock.layer_mm: leave it out: the layers of an earlier result stay"
-    yield from clamp_errors(table)
-    for key in ("form_error_um", "gouge_mm", "excess_mm"):
-        if table.part is None and getattr(table.limits, key) is not None:
-            yield f"limits.{key}: needs the part that should come out: state [part] or leave it out"
-    if table.dynamics is None:
-        for key in ("stability_margin", "stable_probability", "sle_um"):
-            if getattr(table.limits, key) is not None:
-                yield f"limits.{key}: needs modes of vibration: state [dynamics] or leave it out"
-        if table.operation[0].speeds is not None:
-            yield "operation.0.speeds: needs modes of vibration: state [dynamics] or leave it out"
-    elif table.limits.stable_probability is not None and table.dynamics.frequency_percent is None:
-        yield "limits.stable_probability: needs spreads: state frequency_percent, damping_percent and stiffness_percent"
-    if table.operation[0].speeds is not None and table.operation[0].feeds is not None:
-        yield "operation.0.speeds: with feeds: ask for speeds first, then for feeds of the new program"
-    if table.operation[0].feeds is not None and not any(getattr(table.limits, name) is not None for name in LOADS):
-        yield (
-            f"operation.0.feeds: no limit of a load is stated, so nothing would hold them: state at least one of "
-            f"{', '.join(LOADS)} in [limits]"
-        )
-    if not table.limits.stated:
-        names = ", ".join(ProgramLimitsTable.model_fields)
-        yield f"limits: none is stated, so nothing would be checked: state at least one of {names}"
+    return program_job(ProgramJob, path, table, overrides)
 
 
 def resume_note(job: ProgramJob) -> str:
     """What is not kept while the job runs; the simulation of the program that comes out is."""
-    if not job.simulates:
-        return ""
-    op = job.table.operation[0]
-    passes = [
-        text
-        for text, there in (
-            ("new feeds", op.feeds is not None),
-            ("new speeds", op.speeds is not None),
-            ("the compliance of the workpiece", job.table.workpiece is not None),
-        )
-        if there
-    ]
-    if not passes:
-        return ""
-    found = " and ".join(passes)
-    return f"what finds {found} does not resume: if it is stopped there, it begins again; the last pass resumes"
+    changes = job.simulates and job.table.operation[0].speeds is not None
+    return note_of_passes(job, *(("new speeds",) if changes else ()))

@@ -8,28 +8,21 @@ the wanted speeds and feeds; what then holds is said by simulating it from fresh
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chipload.cutting.material import Material
 from chipload.errors import InputError
 from chipload.jobs.checks import CHECK_COLUMNS, with_checks
-from chipload.jobs.program.dynamics import dynamics_of
-from chipload.jobs.program.feeds import changeable, read_as
-from chipload.jobs.program.job import ProgramJob
-from chipload.jobs.program.outcome import SpeedResult, ToolSpeed
-from chipload.jobs.program.preparation import resolution_of, timed
-from chipload.jobs.program.stability import (
-    DEFAULT_MARGIN,
-    StabilityResult,
-    rounded_rpm,
-)
-from chipload.jobs.program.stability_watch import StabilityWatch
-from chipload.jobs.program.stiffness import deflecting, stiffness_of, watched, with_columns
-from chipload.jobs.program.tables import SimulateTable
-from chipload.jobs.program.workpiece_compliance import WorkpieceCompliance
+from chipload.jobs.simulation.job import ProgramJob
+from chipload.jobs.simulation.outcome import SpeedResult, ToolSpeed
+from chipload.jobs.simulation.preparation import resolution_of, timed
+from chipload.jobs.simulation.program_text import differing, read_as
+from chipload.jobs.simulation.run import text_to_change
+from chipload.jobs.simulation.stability import StabilityResult, rounded_rpm, stability_of, watch_of
+from chipload.jobs.simulation.stiffness import deflecting, stiffness_of, watched, with_columns
+from chipload.jobs.simulation.tables import SimulateTable
+from chipload.jobs.simulation.workpiece_compliance import WorkpieceCompliance
 from chipload.jobs.tables import stated
 from chipload.machine.machine import Machine
 from chipload.program.gcode.feed_words import DIGITS
@@ -46,24 +39,9 @@ from chipload.units import rpm_from_rad_s
 GAIN = 0.02
 
 
-def watch_of(job: ProgramJob, material: Material, workpiece: WorkpieceCompliance | None) -> StabilityWatch | None:
-    """What asks for margins; None: no modes are stated."""
-    if job.table.dynamics is None:
-        return None
-    dynamics = dynamics_of(job.table.dynamics, job.path.parent, job.cutters, job.table.workpiece)
-    return StabilityWatch(dynamics, material, None if workpiece is None else workpiece.modes)
-
-
-def stability_of(job: ProgramJob, watch: StabilityWatch, machine: Machine) -> StabilityResult:
-    """The result of a watch that has seen every step."""
-    wanted = max(job.limits.get("stability_margin", DEFAULT_MARGIN), DEFAULT_MARGIN)
-    radii = {n: c.radius for n, c in job.cutters.items()}
-    asked = job.table.operation[0].speeds
-    speeds = (None, None) if asked is None else (asked.least_rpm, asked.most_rpm)
-    return StabilityResult(watch, machine, wanted, radii, speeds)
-
-
-def speeds_changeable(path: Path, machine: Machine, dialect: str | None) -> tuple[str, str]:
+def text_with_speeds(
+    job: ProgramJob, reading: ProgramReading, stock: LayeredStock, machine: Machine, material: Material
+) -> tuple[str, str]:
     """The text of a program whose speeds can be changed, and its dialect.
 
     Raises
@@ -71,12 +49,9 @@ def speeds_changeable(path: Path, machine: Machine, dialect: str | None) -> tupl
     InputError
         They cannot be changed in the text; the message says what to do.
     """
-    try:
-        text, kind = changeable(path, machine, dialect)
-    except InputError as err:
-        raise InputError(str(err).replace("operation.0.feeds", "operation.0.speeds")) from None
+    text, dialect = text_to_change(job, reading, stock, machine, material, "speeds")
     speed_words(text)
-    return text, kind
+    return text, dialect
 
 
 def new_speeds(
@@ -118,7 +93,7 @@ def new_speeds(
     new = _new_text(text, reading.program, {t.tool: t.rpm for t in tools})
     after = read(read_as(new))
     _same(reading.program, after.program, {t.tool: t.rpm for t in tools})
-    return SpeedResult(new, dialect, tools, before, found, seconds), after
+    return SpeedResult(new, dialect, before, seconds, tools, found), after
 
 
 def _advised(stability: StabilityResult, program: Program) -> tuple[ToolSpeed, ...]:
@@ -175,10 +150,7 @@ def _same(old: Program, new: Program, wanted: Mapping[int, float]) -> None:
     """Refuse a new text that is not the old program at the wanted speeds and with its feed per tooth."""
     wrong, at = len(old) != len(new), 0
     if not wrong:
-        off: NDArray[np.bool_] = np.zeros(len(old), dtype=np.bool_)
-        for name in ("motion", "p_work", "axis", "centre", "normal", "turns", "tool", "line"):
-            differs = np.asarray(getattr(old, name)) != np.asarray(getattr(new, name))
-            off |= differs if differs.ndim == 1 else differs.any(axis=1)
+        off = differing(old, new, "motion", "p_work", "axis", "centre", "normal", "turns", "tool", "line")
         moves = (old.motion != RAPID) & (old.motion != DWELL)
         factor = np.ones(len(old))
         for tool, rpm in wanted.items():

@@ -9,7 +9,7 @@ from typing import Any
 
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
-from chipload.jobs.sources import Limited, cutters, sources_of
+from chipload.jobs.sources import Limited, sources_and_cutters
 from chipload.jobs.thinwall.tables import (
     EVERY,
     SHAPES,
@@ -57,13 +57,8 @@ def load(path: Path, table: ThinWallJobTable, overrides: Sequence[str]) -> ThinW
         Keys do not go together.
     """
     folder, errors = path.parent, Errors()
-    sources: dict[str, str | Path] = {}
-    tools: dict[int, Cutter] = {}
     errors.texts += missing(table.model_dump(exclude_none=True))
-    with errors.collect():
-        sources = sources_of(table, folder, "machine", "material")
-    with errors.collect():
-        tools = cutters(table.cutter, folder)
+    sources, tools = sources_and_cutters(table, folder, errors, "machine", "material")
     errors.texts += _contradictions(table, tools)
     errors.refuse()
     wall = table.wall

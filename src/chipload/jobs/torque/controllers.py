@@ -22,7 +22,7 @@ from chipload.control.plant import Loop, comparison
 from chipload.control.spindle_model import Spindle, SpindleDeviation
 from chipload.control.wall import WallPath, wall_error
 from chipload.jobs.torque.job import TorqueJob
-from chipload.jobs.torque.outcome import MODEL, MODEL_FULL, PLAIN, Case, ControllerRun
+from chipload.jobs.torque.outcome import MODEL, MODEL_FULL, PLAIN, ControllerCase, ControllerRun
 from chipload.jobs.torque.spindle import deviation_of, wrong_side
 from chipload.jobs.torque.step_checks import feed_ratio
 from chipload.progress import Progress
@@ -63,7 +63,7 @@ def tuned(job: TorqueJob, config: Override, path: ToolPath, spindle: Spindle, lo
 def cases_of(
     job: TorqueJob, path: ToolPath, controller: Override, table: FuzzyTable, spindle: Spindle, torque: float,
     walls: tuple[WallPath, WallPath, WallPath], acceleration: float, progress: Progress,
-) -> tuple[Case, ...]:  # fmt: skip
+) -> tuple[ControllerCase, ...]:  # fmt: skip
     """Every controller without latency, and with what the job states."""
     ask = job.table.loop
     period = 1e-3 * ask.period_ms
@@ -72,7 +72,7 @@ def cases_of(
         loop = Loop(acceleration, period, latency, min(1e-3, period), seed=ask.seed)
         config = tuned(job, replace(controller, quantum=quantum), path, spindle, loop)
         runs = compared(path, config, player(path, table, spindle, deviation_of(job), loop, torque, walls), torque)
-        out.append(Case(loop, quantum, runs))
+        out.append(ControllerCase(loop, quantum, runs))
         progress(0.75 + 0.05 * k, "controllers")
     return tuple(out)
 

@@ -13,7 +13,7 @@ from chipload.control.fuzzy import FuzzyTable
 from chipload.jobs.torque import torque_figures as drawn
 from chipload.jobs.torque.files import HAL, PATH, program_files
 from chipload.jobs.torque.numbers import operation_numbers
-from chipload.jobs.torque.outcome import HELD, Case, Estimate, TorqueResult
+from chipload.jobs.torque.outcome import HELD, ControllerCase, SpindleEstimate, TorqueResult
 from chipload.jobs.torque.scene import scene_bytes
 from chipload.report.presentation import Presentation
 from chipload.report.sheet import figure, items, table
@@ -115,7 +115,7 @@ def _controllers(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[s
     return body
 
 
-def _table(outcome: TorqueResult, case: Case) -> str:
+def _table(outcome: TorqueResult, case: ControllerCase) -> str:
     rows = []
     torque_nm = 1e-3 * outcome.allowable.torque
     most = torque_nm * (1.0 + 1e-2 * outcome.job.limits["torque_over_percent"])
@@ -177,7 +177,7 @@ def _wall(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
     ]
 
 
-def _estimate(e: Estimate, outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
+def _estimate(e: SpindleEstimate, outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
     rows = [
         ["noise of the estimate, from its sensor, closed form [N m]", f"{1e-3 * e.noise:.3g}"],
         ["the same, seen in the run [N m]", f"{1e-3 * e.seen:.3g}"],

@@ -11,7 +11,7 @@ from typing import Any
 from chipload.control.spindle_file import IDENTIFIED
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
-from chipload.jobs.sources import cutters, entries_of, sources_of
+from chipload.jobs.sources import entries_of, sources_and_cutters
 from chipload.jobs.torque.tables import RoundTable, ShellTable, SurpriseTable, TorqueJobTable
 
 ONE_PROGRAM = "state a [program] with a file, or a [round] that is made"
@@ -65,15 +65,10 @@ def load(path: Path, table: TorqueJobTable, overrides: Sequence[str]) -> TorqueJ
         Keys do not go together.
     """
     folder, errors = path.parent, Errors()
-    sources: dict[str, str | Path] = {}
-    tools: dict[int, Cutter] = {}
     errors.texts += missing(table.model_dump(exclude_none=True))
     if table.program is not None and table.round is not None:
         errors.add(f"program, round: both are stated: {ONE_PROGRAM}")
-    with errors.collect():
-        sources = sources_of(table, folder, "machine", "material")
-    with errors.collect():
-        tools = cutters(table.cutter, folder)
+    sources, tools = sources_and_cutters(table, folder, errors, "machine", "material")
     errors.texts += _wrong_shell(table)
     if table.round is not None and tools:
         errors.texts += _wrong_round(table, table.round, tools)

@@ -6,7 +6,7 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-from chipload.jobs.torque.outcome import Case, TorqueResult
+from chipload.jobs.torque.outcome import ControllerCase, TorqueResult
 
 
 def operation_numbers(outcome: TorqueResult) -> dict[str, Any]:
@@ -100,5 +100,5 @@ def operation_numbers(outcome: TorqueResult) -> dict[str, Any]:
     return answer
 
 
-def _controllers(case: Case) -> dict[str, Any]:
+def _controllers(case: ControllerCase) -> dict[str, Any]:
     return {name: run.numbers() for name, run in case.runs.items()}

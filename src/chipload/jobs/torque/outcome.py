@@ -80,7 +80,7 @@ class ControllerRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class ControllerCase:
     """All controllers in one loop: its latency [s] and the step of the override that the machine takes."""
 
     loop: Loop
@@ -112,7 +112,7 @@ class SolidComparison:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class SpindleEstimate:
     """How far the torque that is estimated from the spindle is to be trusted.
 
     Parameters
@@ -236,13 +236,13 @@ class ControlComparison:
     ideal_time : with the feed at the limit at every instant [s]; inf where no torque is allowable
     """
 
-    cases: tuple[Case, ...]
+    cases: tuple[ControllerCase, ...]
     controller: Override | None
     table: FuzzyTable
     spindle: Spindle
     told_from: Literal["current", "power"]
     deviation: SpindleDeviation
-    estimate: Estimate | None
+    estimate: SpindleEstimate | None
     ideal_time: float
 
 
@@ -275,7 +275,7 @@ class TorqueResult:
         """Where the limit of torque comes from: `deflection`, `strength` or `stated`."""
         return "stated" if self.allowable.torque < self.allowable.limit.torque else self.allowable.limit.by
 
-    def compared(self, case: Case) -> dict[str, float]:
+    def compared(self, case: ControllerCase) -> dict[str, float]:
         """How much shorter than the constant feed and than the model alone, the share of what is possible, and by how
         much the error differs from the constant feed's, all in percent.
         """

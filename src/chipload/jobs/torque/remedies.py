@@ -26,7 +26,7 @@ THICKEST, SHORTEST = 0.2, 0.1
 
 
 @dataclass(frozen=True)
-class Place:
+class HardestPlace:
     """A step whose edge force is too much: ends of its depth of cut along the wall [mm], C_t [mm/N], F_e [N]."""
 
     near: float
@@ -41,7 +41,7 @@ def remedies(job: TorqueJob, shell: Shell, planned: Cut, limit: PathLimit) -> li
     k = limit.step
     depth, tolerance, modes = float(planned.far[k] - planned.near[k]), job.shell.wall_tolerance_mm, ritz(shell)
 
-    def allowed(modes: Ritz, *changed: Place) -> bool:
+    def allowed(modes: Ritz, *changed: HardestPlace) -> bool:
         return all(_allowed(job, modes, at) >= MARGIN * at.edge for at in changed)
 
     def shallower(share: float) -> bool:
@@ -79,12 +79,12 @@ def remedies(job: TorqueJob, shell: Shell, planned: Cut, limit: PathLimit) -> li
     return out
 
 
-def _hardest(planned: Cut, limit: PathLimit) -> list[Place]:
+def _hardest(planned: Cut, limit: PathLimit) -> list[HardestPlace]:
     """The step of the limit, and those with the greatest edge force, alone and times the compliance of the cutter."""
     edge = planned.loads.force_edge * (planned.far > planned.near)
     rows = {limit.step, int(np.argmax(edge)), int(np.argmax(edge * planned.tool)), int(np.argmax(edge * planned.far))}
     return [
-        Place(*(float(x[k]) for x in (planned.near, planned.far, planned.tool, planned.loads.force_edge)))
+        HardestPlace(*(float(x[k]) for x in (planned.near, planned.far, planned.tool, planned.loads.force_edge)))
         for k in sorted(rows)
     ]
 
@@ -100,7 +100,7 @@ def remedy_text(job: TorqueJob, shell: Shell, planned: Cut, limit: PathLimit) ->
     return f"no feed would do; one of these would: {'; '.join(found)}; or a sharper cutter"
 
 
-def _allowed(job: TorqueJob, modes: Ritz, place: Place) -> float:
+def _allowed(job: TorqueJob, modes: Ritz, place: HardestPlace) -> float:
     """F_lim at a place [N]."""
     width = contact_width(job.shell.stock_mm, job.cutters)
     near, far, tool = (np.array([x]) for x in (place.near, place.far, place.tool))

@@ -13,7 +13,7 @@ from chipload.control.override import STATUS
 from chipload.errors import Finding, Severity
 from chipload.jobs.checks import chip_findings, default_limits, unchecked_checks
 from chipload.jobs.torque.numbers import operation_numbers
-from chipload.jobs.torque.outcome import HELD, PLAIN, Case, ControllerRun, TorqueResult
+from chipload.jobs.torque.outcome import HELD, PLAIN, ControllerCase, ControllerRun, TorqueResult
 from chipload.jobs.torque.step_checks import check_columns
 from chipload.report.programs import ENDINGS
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, check_limit, in_memory
@@ -50,7 +50,7 @@ def result_of(outcome: TorqueResult) -> Result:
     return replace(result, operations=({**numbers, "verdict": result.verdict.value},))
 
 
-def track_name(case: Case, controller: str) -> str:
+def track_name(case: ControllerCase, controller: str) -> str:
     """Name of the track of a controller: with its latency, if the loop has one."""
     return f"{controller}, {1e3 * case.loop.latency:g} ms" if _real(case) else controller
 
@@ -61,12 +61,12 @@ def limits_of(outcome: TorqueResult, columns: Columns, track: str) -> tuple[Limi
     return (*stated, *default_limits(outcome.job.checks, outcome.job.machine, columns, track, {}))
 
 
-def _real(case: Case) -> bool:
+def _real(case: ControllerCase) -> bool:
     """Whether the loop has latency or steps, as on a machine."""
     return bool(case.loop.latency or case.quantum)
 
 
-def _track(outcome: TorqueResult, case: Case, name: str) -> Track:
+def _track(outcome: TorqueResult, case: ControllerCase, name: str) -> Track:
     run, track = case.runs[name], track_name(case, name)
     columns = _columns(outcome, run)
     used = name == HELD and case is outcome.control.cases[-1]
@@ -117,7 +117,7 @@ def _columns(outcome: TorqueResult, run: ControllerRun) -> Columns:
     }
 
 
-def _run_findings(case: Case, run: ControllerRun) -> tuple[Finding, ...]:
+def _run_findings(case: ControllerCase, run: ControllerRun) -> tuple[Finding, ...]:
     """What was found in a run beside its limits."""
     out, o, plain = [], run.outcome, case.runs[PLAIN].outcome
     if not o.finished:

@@ -42,12 +42,12 @@ from chipload.jobs.torque.job import TorqueJob
 from chipload.jobs.torque.outcome import (
     HELD,
     AllowableTorque,
-    Case,
     ComplianceComparison,
     ControlComparison,
-    Estimate,
+    ControllerCase,
     ShellWall,
     SolidComparison,
+    SpindleEstimate,
     TorqueInputs,
     TorqueResult,
 )
@@ -87,7 +87,7 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
     shell, place, torque = wall_of(job), Place(job.shell), a.torque
     progress(0.7, "controllers")
     controller: Override | None = None
-    cases: tuple[Case, ...] = ()
+    cases: tuple[ControllerCase, ...] = ()
     shortest_time = math.inf
     if torque > 0.0:
         require_resolved(job, spindle, torque)
@@ -278,7 +278,9 @@ def _one_tooth(limit: PathLimit, planned: Cut, material: Material, job: TorqueJo
     return float(torque_limit(limit.force, radius, depth, material, min(mean / peak, 1.0)).torque)
 
 
-def _estimate(job: TorqueJob, cases: tuple[Case, ...], spindle: Spindle, controller: Override) -> Estimate:
+def _estimate(
+    job: TorqueJob, cases: tuple[ControllerCase, ...], spindle: Spindle, controller: Override
+) -> SpindleEstimate:
     case = cases[-1]
     found = case.runs[HELD].outcome
     share = min(case.loop.period / spindle.smoothing, 1.0) if spindle.smoothing > 0.0 else 1.0
@@ -286,7 +288,7 @@ def _estimate(job: TorqueJob, cases: tuple[Case, ...], spindle: Spindle, control
     later = slice(min(len(found.t) // 10, 50), None)
     cutting = found.torque > 0.0
     passing = max(c.flutes for c in job.cutters.values()) * spindle.speed / math.tau
-    return Estimate(
+    return SpindleEstimate(
         noise=spindle.torque_constant * spindle.noise * math.sqrt(share / (2.0 - share)),
         seen=float(np.std((found.measured - behind)[later])),
         behind=float(np.abs(behind - found.torque)[later].max()),
@@ -317,7 +319,7 @@ def _second_opinion(modes: Ritz, width: float, planned: Cut) -> SolidComparison:
     return SolidComparison(tuple(out), wall.counts, len(wall.factored.solid.grid.nodes))
 
 
-def _fastest(cases: tuple[Case, ...]) -> float:
+def _fastest(cases: tuple[ControllerCase, ...]) -> float:
     """Greatest feed over the programmed one that any controller reaches, at least 1."""
     return max((float(run.ratio.max()) for case in cases for run in case.runs.values()), default=1.0)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from chipload.control.fuzzy import FuzzyTable, surface
-from chipload.jobs.torque.outcome import HELD, Case, TorqueResult
+from chipload.jobs.torque.outcome import HELD, ControllerCase, TorqueResult
 from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, SCALE, STOCK
 from chipload.report.shape import thinned
 from chipload.units import mm_min_from_mm_s
@@ -37,7 +37,7 @@ NAMES = {
 EXAGGERATED = 0.35
 
 
-def along(outcome: TorqueResult, case: Case, by: str) -> go.Figure:
+def along(outcome: TorqueResult, case: ControllerCase, by: str) -> go.Figure:
     """Torque over what is allowable, override, feed and form error of every controller, by ``path`` or ``time``."""
     titles = ("torque / allowable", "override", "feed [mm/min]", "form error [µm]")
     figure = make_subplots(rows=4, cols=1, shared_xaxes=True, vertical_spacing=0.03)

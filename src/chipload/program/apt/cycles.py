@@ -141,7 +141,7 @@ def read_cycle(record: AptRecord, mm: float) -> tuple[Cycle, tuple[str, ...]] | 
         elif _LENGTHS[word] not in values:
             values[_LENGTHS[word]] = value * mm
         else:
-            raise record.error(f"{word} is said twice: take one out")
+            raise record.error(f"{word} is stated twice: take one out")
         k += 2
     if kind not in PECKS and {"first", "step"} & values.keys():
         unread.append("pecks")

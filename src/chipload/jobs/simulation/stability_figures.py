@@ -8,14 +8,14 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from chipload.jobs.program.outcome import SimulationResult, SpeedResult
-from chipload.jobs.program.stability import (
+from chipload.jobs.simulation.outcome import SimulationResult, SpeedResult
+from chipload.jobs.simulation.stability import (
     SURE,
     StabilityResult,
     filled_margins,
     stability_numbers,
 )
-from chipload.jobs.program.stability_watch import engaged_edge
+from chipload.jobs.simulation.stability_watch import engaged_edge
 from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, STOCK
 from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table

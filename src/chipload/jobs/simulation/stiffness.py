@@ -17,7 +17,7 @@ import numpy as np
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.errors import InputError
-from chipload.jobs.program.tables import StiffnessTable
+from chipload.jobs.simulation.tables import StiffnessTable
 from chipload.simulation.chip_space import flute_fill
 from chipload.simulation.deflection import tip_deflections
 from chipload.simulation.loads import Cuts, Floats

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from chipload.cutting.material import Material
 from chipload.errors import Finding, Severity
-from chipload.jobs.program.bent_workpiece import JACK, BentWorkpiece, bent_workpiece
-from chipload.jobs.program.clamped import clamped_volumes, clamps_of, elastic_of
-from chipload.jobs.program.contact_lines import CutAhead, cut_ahead
-from chipload.jobs.program.job import ProgramJob
+from chipload.jobs.simulation.bent_workpiece import JACK, BentWorkpiece, bent_workpiece
+from chipload.jobs.simulation.clamped import clamped_volumes, clamps_of, elastic_of
+from chipload.jobs.simulation.contact_lines import CutAhead, cut_ahead
+from chipload.jobs.simulation.job import ProgramJob
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
 from chipload.simulation.removal import Columns, Resolution

@@ -1,4 +1,4 @@
-"""The part of the report about new feeds, and the text of the program with them."""
+"""How the result of new feeds is presented: a part of the report of a simulation, and the new text."""
 
 from __future__ import annotations
 
@@ -9,9 +9,14 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from chipload.jobs.program.numbers import COMPARED, exceeding, feed_numbers
-from chipload.jobs.program.outcome import FeedResult, SimulationResult, SpeedResult
+from chipload.jobs.feeds.numbers import COMPARED, exceeding, feed_numbers
+from chipload.jobs.feeds.outcome import FeedResult, FeedsProgram
+from chipload.jobs.feeds.result import result_of
+from chipload.jobs.simulation.figures import program_presentation
+from chipload.jobs.simulation.outcome import SimulationResult
+from chipload.jobs.simulation.result import changed_name
 from chipload.report.figures import FONT, GRID, LIMIT, LINE_POINTS
+from chipload.report.presentation import Presentation
 from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table
 from chipload.result import COLUMNS, LimitCheck
@@ -28,6 +33,16 @@ CAUSES = {
 }
 #: lines that the report lists
 LISTED = 60
+
+
+def presentation_of(program: FeedsProgram) -> Presentation:
+    """The presentation of a program with new feeds."""
+    result, name = result_of(program), changed_name(program, "feeds")
+    own, checks, time_s = program.feeds, result.in_use[0].limits, float(program.seconds.sum())
+    return program_presentation(
+        program, result, {name: own},
+        lambda figures: feed_sections(own, program.simulated, checks, time_s, name, figures),
+    )  # fmt: skip
 
 
 def feed_sections(
@@ -115,21 +130,3 @@ def along(feeds: FeedResult, simulation: SimulationResult, checks: Sequence[Limi
         legend={"orientation": "h", "y": 1.01, "yanchor": "bottom", "x": 0.0},
     )  # fmt: skip
     return out
-
-
-def program_text(feeds: FeedResult | SpeedResult, unless: str | None) -> str:
-    """The text; where it does not hold, ``unless`` says why behind the words of its first line; no line is added.
-
-    A line of ``%`` alone is passed over, and Sinumerik's paths.
-    """
-    if unless is None:
-        return feeds.text
-    plain = "".join(ch if ch.isascii() and ch.isprintable() and ch not in "()" else "_" for ch in unless)
-    said = f"; NOT VERIFIED: {plain}" if feeds.dialect == "sinumerik" else f"(NOT VERIFIED: {plain})"
-    lines = feeds.text.split("\n")
-    for k, line in enumerate(lines):
-        body = line.rstrip()
-        if body and not body.startswith(("%", ";$")):
-            lines[k] = f"{body} {said}{line[len(body) :]}"
-            break
-    return "\n".join(lines)

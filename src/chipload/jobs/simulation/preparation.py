@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from chipload.cutting.material import Material, material_named, read_material
 from chipload.jobs.checks import DefaultChecks, default_checks
-from chipload.jobs.program.clamped import require_clamped
-from chipload.jobs.program.job import ProgramJob
-from chipload.jobs.program.stiffness import Stiffness, stiffness_of
-from chipload.jobs.program.tables import SimulateTable
-from chipload.jobs.program.workpiece import fixture_points, part_body, stock_points
+from chipload.jobs.simulation.clamped import require_clamped
+from chipload.jobs.simulation.job import ProgramJob
+from chipload.jobs.simulation.stiffness import Stiffness, stiffness_of
+from chipload.jobs.simulation.tables import SimulateTable
+from chipload.jobs.simulation.workpiece import fixture_points, part_body, stock_points
 from chipload.jobs.tables import stated
 from chipload.machine.machine import Machine
 from chipload.program.program import RAPID, Program

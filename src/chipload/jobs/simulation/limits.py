@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chipload.jobs.checks import DIRECTED, default_limits, load_error, upper_loads
-from chipload.jobs.program.outcome import SimulationResult
-from chipload.jobs.program.stability import STABILITY_LIMITS, StabilityResult, stability_limits
+from chipload.jobs.simulation.outcome import SimulationResult
+from chipload.jobs.simulation.stability import STABILITY_LIMITS, StabilityResult, stability_limits
 from chipload.machine.machine import Machine
 from chipload.result import LimitCheck, Verdict, check_limit, column_of, state_of
 from chipload.result.limits import Columns

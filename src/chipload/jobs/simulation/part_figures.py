@@ -15,7 +15,7 @@ import plotly.graph_objects as go
 import trimesh
 from numpy.typing import NDArray
 
-from chipload.jobs.program import part_numbers
+from chipload.jobs.simulation import part_numbers
 from chipload.report.sheet import table
 from chipload.simulation.surface import Collision, Difference
 

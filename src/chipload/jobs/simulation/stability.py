@@ -16,7 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.jobs.program.stability_watch import PROBABILITY, StabilityWatch, relative_covariance
+from chipload.cutting.material import Material
+from chipload.jobs.simulation.dynamics import dynamics_of
+from chipload.jobs.simulation.job import ProgramJob
+from chipload.jobs.simulation.stability_watch import PROBABILITY, StabilityWatch, relative_covariance
+from chipload.jobs.simulation.workpiece_compliance import WorkpieceCompliance
 from chipload.machine.machine import Machine
 from chipload.result import LimitCheck, check_limit
 from chipload.result.limits import Columns
@@ -293,3 +297,20 @@ def speed_of(columns: Columns, k: int) -> float:
 def rounded_rpm(speed: float) -> float:
     """A speed [rad/s] as it is written [1/min]."""
     return ROUND_RPM * round(rpm_from_rad_s(speed) / ROUND_RPM)
+
+
+def watch_of(job: ProgramJob, material: Material, workpiece: WorkpieceCompliance | None) -> StabilityWatch | None:
+    """What asks for margins; None: no modes are stated."""
+    if job.table.dynamics is None:
+        return None
+    dynamics = dynamics_of(job.table.dynamics, job.path.parent, job.cutters, job.table.workpiece)
+    return StabilityWatch(dynamics, material, None if workpiece is None else workpiece.modes)
+
+
+def stability_of(job: ProgramJob, watch: StabilityWatch, machine: Machine) -> StabilityResult:
+    """The result of a watch that has seen every step."""
+    wanted = max(job.limits.get("stability_margin", DEFAULT_MARGIN), DEFAULT_MARGIN)
+    radii = {n: c.radius for n, c in job.cutters.items()}
+    asked = job.table.operation[0].speeds
+    speeds = (None, None) if asked is None else (asked.least_rpm, asked.most_rpm)
+    return StabilityResult(watch, machine, wanted, radii, speeds)

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from chipload.jobs.program.tables import ClampTable, ProgramJobTable, WorkpieceTable
+from chipload.jobs.simulation.tables import ClampTable, SimulationJobTable, WorkpieceTable
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.assembly import modes_of, shares
 from chipload.structure.cells.clamp import Clamp, clamp_stiffness
@@ -24,7 +24,7 @@ T_MM3 = 1e-12
 ROUND = 48
 
 
-def clamp_errors(table: ProgramJobTable) -> Iterator[str]:
+def clamp_errors(table: SimulationJobTable) -> Iterator[str]:
     """What keys of the workpiece contradict."""
     limited = table.limits.deflection_workpiece_um is not None
     given = table.stiffness is not None and table.stiffness.work_n_um is not None
@@ -33,7 +33,7 @@ def clamp_errors(table: ProgramJobTable) -> Iterator[str]:
     if table.workpiece is None:
         return
     if given:
-        yield "stiffness.work_n_um: leave it out: [workpiece] says how the workpiece gives way"
+        yield "stiffness.work_n_um: leave it out: [workpiece] states its compliance"
     if table.workpiece.damping_ratio is not None and table.workpiece.density_kg_m3 is None:
         yield "workpiece.damping_ratio: needs density_kg_m3, without which the workpiece has no modes"
     if table.workpiece.density_kg_m3 is not None and table.dynamics is not None:

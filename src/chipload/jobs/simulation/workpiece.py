@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.geometry.mesh import read_mesh
-from chipload.jobs.program.job import ProgramJob
+from chipload.jobs.simulation.job import ProgramJob
 from chipload.jobs.tables import stated
 from chipload.program.motions import lengths
 from chipload.program.program import RAPID, Program

@@ -18,8 +18,8 @@ import trimesh
 from numpy.typing import NDArray
 
 from chipload.cutting.material import Material
-from chipload.jobs.program.stiffness import Stiffness
-from chipload.simulation.deflection import form_error_of
+from chipload.jobs.simulation.stiffness import Stiffness
+from chipload.simulation.deflection import form_error
 from chipload.simulation.loads import Cuts
 from chipload.simulation.surface import Difference
 
@@ -54,7 +54,7 @@ def forming(left: Difference, stiffness: Stiffness, material: Material) -> Calla
         if len(some):
             work = _work(stiffness, left, some)
             bars = {cuts.tool: stiffness.bars[cuts.tool]}
-            found = form_error_of(
+            found = form_error(
                 [cuts], material, left.points[some], normals[some], work=work, bars=bars, near=2.0 * NEAR
             )
             own = np.flatnonzero(found.made & found.at_edge)

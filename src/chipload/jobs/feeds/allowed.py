@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,18 +19,16 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.cutting.strength import allowed_stress, cutter_stress
-from chipload.errors import InputError
-from chipload.files import read_regular
 from chipload.jobs.checks import DefaultChecks, load_error, upper_loads
-from chipload.jobs.program.outcome import FeedResult
-from chipload.jobs.program.tables import FeedsTable
+from chipload.jobs.feeds.outcome import FeedResult
+from chipload.jobs.feeds.tables import FeedsTable
+from chipload.jobs.feeds.verify import require_same, rubbing_lines, speeds_of, tooth_feeds
 from chipload.machine.feed import row_time_limited
 from chipload.machine.machine import Machine
 from chipload.planning.feeds import KEPT, SLOWEST, LineFeeds, StepContact, calmed, greatest_factor, line_feeds
 from chipload.program.gcode.feed_words import DIGITS, with_feeds
-from chipload.program.gcode.reader import LARGEST_FILE
-from chipload.program.program import DWELL, RAPID, Program
-from chipload.program.read import ProgramReading, dialect_of
+from chipload.program.program import DWELL, RAPID
+from chipload.program.read import ProgramReading
 from chipload.program.time import peak_speed, program_time
 from chipload.result import column_of
 from chipload.simulation.loads import Cuts, at_feeds, greatest_loads
@@ -44,8 +41,6 @@ Ints = NDArray[np.int64]
 
 #: what holds a line beside limits, whose codes follow
 FASTEST, MACHINE, AIR, LIMITED = 0, 1, 2, 3
-#: dialects whose texts take new F words
-WORDS = ("linuxcnc", "fanuc", "sinumerik")
 #: the limit, and the column, of the stress of a cutter
 STRESS = "cutter_stress_mpa"
 #: columns of the removal in which a watch says what each step allows
@@ -53,7 +48,7 @@ _FACTOR, _BY = "feed_factor", "feed_by"
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class FeedRequest:
     """What the job asks of feeds.
 
     Parameters
@@ -85,53 +80,9 @@ class Asked:
         return error if math.isfinite(error) else 0.0
 
 
-def changeable(path: Path, machine: Machine, dialect: str | None) -> tuple[str, str]:
-    """The text of a program whose feeds can be changed, byte by byte as in the file, and its dialect.
-
-    Raises
-    ------
-    InputError
-        Its feeds cannot be changed in the text; the message says what to do.
-    """
-    kind = dialect_of(path, machine, dialect)
-    if kind not in WORDS:
-        raise InputError(
-            f"operation.0.feeds: {path.name} is {kind}: feeds are changed in NC texts of LinuxCNC, Fanuc or Sinumerik: "
-            "convert it first (chipload convert)"
-        )
-    text = read_regular(path, path.name, LARGEST_FILE).decode("utf-8", "surrogateescape")
-    lone = text.replace("\r\n", "\n").find("\r")
-    if lone >= 0:
-        raise InputError(f"{path.name}: a line ends with CR alone: write LF or CR LF to change its feeds")
-    with_feeds(text, {})
-    return text, kind
-
-
-def read_as(text: str) -> str:
-    """The text as a reader of the file gets it."""
-    return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
-
-
-def straight(program: Program) -> None:
-    """Refuse what runs a line twice: it has one feed word.
-
-    Raises
-    ------
-    InputError
-        A line comes again after another one.
-    """
-    back = np.flatnonzero(np.diff(program.line[program.line > 0]) < 0)
-    if len(back):
-        line = int(program.line[program.line > 0][back[0]])
-        raise InputError(
-            f"line {line}: the program goes back behind it: feeds are changed only in a text that runs straight "
-            "through: convert it first (chipload convert)"
-        )
-
-
 def watching(
     steps: Steps,
-    asked: Asked,
+    asked: FeedRequest,
     cutters: Mapping[int, Cutter],
     material: Material,
     machine: Machine,
@@ -184,7 +135,7 @@ def with_new_feeds(
     steps: Steps,
     before: Removal,
     allowed: Mapping[str, NDArray[Any]],
-    asked: Asked,
+    asked: FeedRequest,
     cutters: Mapping[int, Cutter],
     machine: Machine,
     read: Callable[[str], ProgramReading],
@@ -218,7 +169,7 @@ def with_new_feeds(
     factor, useful = _wanted(lines, reading, machine, asked.table)
     new = with_feeds(text, dict(zip(lines.line.tolist(), factor.tolist(), strict=True)))
     after = read(new)
-    _same(reading.program, after.program, lines.line, factor)
+    require_same(reading.program, after.program, lines.line, factor)
     names = {FASTEST: "fastest", MACHINE: "machine", AIR: "air", SLOWEST: "slowest", KEPT: "programmed"}
     names |= {LIMITED + k: name for k, name in enumerate(asked.held)}
     held = np.where((useful < lines.allowed) & (lines.by != SLOWEST), MACHINE, lines.by)
@@ -229,7 +180,7 @@ def with_new_feeds(
         factor=factor,
         by=tuple(names[k] for k in held.tolist()),
         before=before,
-        rubs=_rubs(lines, factor, steps, cuts, asked.table, cutters),
+        rubs=rubbing_lines(lines, factor, steps, cuts, asked.table, cutters),
         tooth_feed_least=asked.table.tooth_feed_least_mm,
         seconds_before=seconds,
     )
@@ -240,7 +191,7 @@ def _bounds(
     steps: Steps, table: FeedsTable, cutters: Mapping[int, Cutter], machine: Machine
 ) -> tuple[Floats, Floats, Ints]:
     """The least and the greatest factor of each step that the job and the machine allow, and what holds the latter."""
-    speed = _speed(steps)
+    speed = speeds_of(steps)
     n = len(steps)
     most, by = np.full(n, 0.01 * table.fastest_percent), np.full(n, FASTEST)
     with np.errstate(divide="ignore"):
@@ -250,26 +201,8 @@ def _bounds(
         by, most = np.where(able < most, MACHINE, by), np.minimum(able, most)
         least = np.full(n, 0.01 * table.slowest_percent)
         if table.tooth_feed_least_mm is not None:
-            least = np.maximum(least, table.tooth_feed_least_mm / _tooth_feed(steps, cutters))
+            least = np.maximum(least, table.tooth_feed_least_mm / tooth_feeds(steps, cutters))
     return np.minimum(least, most), most, by
-
-
-def _speed(steps: Steps) -> Floats:
-    """(n,) speed of the tip [mm/s]; 0 where it stands and in rapids."""
-    length = np.linalg.norm(steps.p1 - steps.p0, axis=1)
-    moves = steps.seconds > 0.0
-    return np.asarray(np.where(moves, length / np.where(moves, steps.seconds, 1.0), 0.0))
-
-
-def _tooth_feed(steps: Steps, cutters: Mapping[int, Cutter]) -> Floats:
-    """(n,) feed per tooth [mm]; inf where the spindle stands or the tip does."""
-    flutes = np.ones(len(steps))
-    for number in np.unique(steps.tool).tolist():
-        if number in cutters:
-            flutes[steps.tool == number] = cutters[number].flutes
-    speed = _speed(steps)
-    turns = (speed > 0.0) & (steps.spindle != 0.0)
-    return np.asarray(np.where(turns, math.tau * speed / np.where(turns, flutes * np.abs(steps.spindle), 1.0), np.inf))
 
 
 def _in_air(lines: LineFeeds, steps: Steps, feeds: NDArray[np.bool_], table: FeedsTable, machine: Machine) -> LineFeeds:
@@ -278,7 +211,7 @@ def _in_air(lines: LineFeeds, steps: Steps, feeds: NDArray[np.bool_], table: Fee
     allowed, by = np.where(air, 1.0, lines.allowed), np.where(air, KEPT, lines.by)
     if table.air_mm_min is not None:
         asked, fastest = mm_s_from_mm_min(table.air_mm_min), np.zeros(len(lines.line))
-        np.maximum.at(fastest, np.searchsorted(lines.line, steps.line[feeds]), _speed(steps)[feeds])
+        np.maximum.at(fastest, np.searchsorted(lines.line, steps.line[feeds]), speeds_of(steps)[feeds])
         faster = air & (fastest > 0.0) & (fastest < min(asked, machine.feed_max))
         allowed = np.where(faster, min(asked, machine.feed_max) / np.where(faster, fastest, 1.0), allowed)
         by = np.where(faster, MACHINE if asked > machine.feed_max else AIR, by)
@@ -321,41 +254,3 @@ def _by_rates(lines: LineFeeds, reading: ProgramReading, machine: Machine) -> Fl
         known = np.isin(line, lines.line)
         np.add.at(total, np.searchsorted(lines.line, line[known]), seconds[known])
     return np.asarray(np.where(rates > 0.0, path / np.where(rates > 0.0, rates, 1.0), np.inf))
-
-
-def _same(old: Program, new: Program, line: Ints, factor: Floats) -> None:
-    """Refuse a new text that is not the old program at the wanted feeds, which rounding makes slower by a digit."""
-    at, wrong = 0, len(old) != len(new)
-    if not wrong:
-        off = np.zeros(len(old), dtype=np.bool_)
-        for name in ("motion", "p_work", "axis", "centre", "normal", "turns", "spindle", "tool", "line"):
-            differs = np.asarray(getattr(old, name)) != np.asarray(getattr(new, name))
-            off |= differs if differs.ndim == 1 else differs.any(axis=1)
-        off |= (old.motion == DWELL) & (old.feed != new.feed)
-        moves = np.isin(old.line, line) & (old.motion != RAPID) & (old.motion != DWELL)
-        wanted = old.feed[moves] * factor[np.searchsorted(line, old.line[moves])]
-        rounded = 1.0 - 1.01 * 10.0 ** (1 - DIGITS)
-        off[moves] |= (new.feed[moves] > wanted * (1.0 + 1e-9)) | (new.feed[moves] < wanted * rounded)
-        wrong, at = bool(off.any()), int(old.line[np.argmax(off)])
-    if wrong:
-        where = f"line {at}: " if at else ""
-        raise InputError(f"{where}its feed cannot be set by a word of its own: convert the program first")
-
-
-def _rubs(
-    lines: LineFeeds,
-    factor: Floats,
-    steps: Steps,
-    cuts: NDArray[np.bool_],
-    table: FeedsTable,
-    cutters: Mapping[int, Cutter],
-) -> tuple[tuple[int, float], ...]:
-    """Lines that cut below the least feed per tooth, and their feeds per tooth [mm]."""
-    if table.tooth_feed_least_mm is None:
-        return ()
-    new = _tooth_feed(steps, cutters)[cuts] * factor[np.searchsorted(lines.line, steps.line[cuts])]
-    low = new < table.tooth_feed_least_mm * (1.0 - 2.0 * 10.0 ** (1 - DIGITS))
-    worst: dict[int, float] = {}
-    for line, feed in zip(steps.line[cuts][low].tolist(), new[low].tolist(), strict=True):
-        worst[line] = min(worst.get(line, math.inf), feed)
-    return tuple(sorted(worst.items()))

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutting.material import Material
-from chipload.jobs.program.dynamics import Dynamics
-from chipload.jobs.program.stability_state import asked_bytes, read_asked
+from chipload.jobs.simulation.dynamics import Dynamics
+from chipload.jobs.simulation.stability_state import asked_bytes, read_asked
 from chipload.simulation.loads import Cuts
 from chipload.stability.cuts import DynamicCuts, dynamic_cuts, joined
 from chipload.stability.grouping import grouped

@@ -17,8 +17,8 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.files import read_regular
 from chipload.jobs.messages import table_errors
-from chipload.jobs.program.dynamics_tables import DynamicsTable, ModesFileTable, ModeTable
-from chipload.jobs.program.tables import WorkpieceTable
+from chipload.jobs.simulation.dynamics_tables import DynamicsTable, ModesFileTable, ModeTable
+from chipload.jobs.simulation.tables import WorkpieceTable
 from chipload.stability.modes import Modes
 from chipload.stability.probability import ModeSpread
 from chipload.stability.process_damping import ProcessDamping

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
-from chipload.jobs.program.bent_workpiece import BentWorkpiece
-from chipload.jobs.program.outcome import SimulationResult
+from chipload.jobs.simulation.bent_workpiece import BentWorkpiece
+from chipload.jobs.simulation.outcome import SimulationResult
 from chipload.report.figures import FONT, GRID, LIMIT, SCALE
 from chipload.report.sheet import figure, table
 from chipload.structure.cells.followed import FollowedModes

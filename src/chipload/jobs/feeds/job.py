@@ -1,0 +1,51 @@
+"""A job that gives a program new feeds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from chipload.jobs.feeds.tables import FeedsJobTable, FeedsOperationTable
+from chipload.jobs.simulation.job import ProgramJob, missing, note_of_passes, program_job
+from chipload.jobs.simulation.tables import LOADS
+
+__all__ = ["FeedsJob", "load", "missing", "resume_note"]
+
+
+@dataclass(frozen=True)
+class FeedsJob(ProgramJob):
+    """A job that gives a program new feeds; see :class:`ProgramJob`."""
+
+    table: FeedsJobTable
+
+    @property
+    def operation(self) -> FeedsOperationTable:
+        """Its operation."""
+        return self.table.operation[0]
+
+
+def load(path: Path, table: FeedsJobTable, overrides: Sequence[str]) -> FeedsJob:
+    """The job of a table that was read.
+
+    Raises
+    ------
+    InputError
+        Keys do not go together, or no limit would hold the feeds.
+    """
+    return program_job(FeedsJob, path, table, overrides, _contradictions(table))
+
+
+def _contradictions(table: FeedsJobTable) -> Iterator[str]:
+    if table.operation[0].speeds is not None:
+        yield "operation.0.speeds: with feeds: ask for speeds first, then for feeds of the new program"
+    if not any(getattr(table.limits, name) is not None for name in LOADS):
+        yield (
+            f"operation.0.feeds: no limit of a load is stated, so nothing would hold them: state at least one of "
+            f"{', '.join(LOADS)} in [limits]"
+        )
+
+
+def resume_note(job: FeedsJob) -> str:
+    """What is not kept while the job runs; the simulation of the program that comes out is."""
+    return note_of_passes(job, "new feeds")

@@ -1,0 +1,92 @@
+"""The numbers of new feeds in summary.json."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.jobs.checks import upper_loads
+from chipload.jobs.feeds.outcome import FeedResult
+from chipload.jobs.simulation.outcome import SimulationResult
+from chipload.result import LimitCheck
+
+#: columns of loads that are compared before and after new feeds
+COMPARED = (
+    "force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um", "deflection_workpiece_um", "cutter_stress_mpa",
+)  # fmt: skip
+#: lines that summary.json lists
+MOST_LINES = 2000
+
+
+def exceeding(feeds: FeedResult, simulation: SimulationResult, checks: Sequence[LimitCheck]) -> list[dict[str, Any]]:
+    """Lines that exceed a limit of a load after all: the worst step of each."""
+    c, before, out = simulation.removal.columns, feeds.before.columns, []
+    factor = dict(zip(feeds.line.tolist(), zip(feeds.factor.tolist(), feeds.by, strict=True), strict=True))
+    place = np.column_stack([c[f"{x}_mm"] for x in "xyz"])
+    for check in checks:
+        column = check.column.name
+        if column not in before or column in ("axial_overrun_mm", "deflection_share"):
+            continue
+        values = upper_loads(c, simulation.checks.sigma)[column]
+        allowed = simulation.checks.allowed_stress(c["tool"]) if column == "cutter_stress_mpa" else check.limit
+        over = np.flatnonzero(values > allowed)
+        order = over[np.argsort(-values[over], kind="stable")]
+        lines, first = np.unique(c["line"][order], return_index=True)
+        for line, k in zip(lines.tolist(), order[first].tolist(), strict=True):
+            times, by = factor.get(line, (1.0, "programmed"))
+            out.append(
+                {
+                    "line": line,
+                    "limit": check.name,
+                    "allowed": check.limit,
+                    "worst": float(values[k]),
+                    "before": float(before[column][k]),
+                    "feed_mm_min": float(c["feed_mm_min"][k]),
+                    "factor": times,
+                    "slowest": by == "slowest",
+                    "place": place[k].tolist(),
+                    "t_s": float(c["t_s"][k]),
+                }
+            )
+    return sorted(out, key=lambda x: (x["line"], x["limit"]))
+
+
+def feed_numbers(
+    feeds: FeedResult, simulation: SimulationResult, checks: Sequence[LimitCheck], time_s: float, program: str
+) -> dict[str, Any]:
+    """``feeds`` of the operation in summary.json.
+
+    Parameters
+    ----------
+    checks : limits of the program with its new feeds
+    time_s : time of that program
+    program : its file
+    """
+    c, listed = simulation.removal.columns, exceeding(feeds, simulation, checks)
+    cuts = (c["chip_pieces"] > 0) & ~c["rapid"]
+
+    def loads(columns: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+        some = columns["feed_mm_min"][cuts]
+        span = {"min": float(some.min()), "max": float(some.max())} if len(some) else None
+        return {k: float(columns[k].max(initial=0.0)) for k in COMPARED if k in columns} | {"feed_mm_min": span}
+
+    return {
+        "program": program,
+        "time_before_s": feeds.seconds_before,
+        "time_after_s": time_s,
+        "before": loads(feeds.before.columns),
+        "after": loads(c),
+        "lines": len(feeds.line),
+        "lines_changed": int((feeds.factor != 1.0).sum()),
+        "lines_slower": int((feeds.factor < 1.0).sum()),
+        "lines_faster": int((feeds.factor > 1.0).sum()),
+        "by": dict(sorted(Counter(feeds.by).items())),
+        "still_exceeding": listed[:MOST_LINES],
+        "still_exceeding_count": len(listed),
+        "rubbing": [{"line": line, "tooth_feed_mm": feed} for line, feed in feeds.rubs[:MOST_LINES]],
+        "rubbing_count": len(feeds.rubs),
+    }

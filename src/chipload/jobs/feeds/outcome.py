@@ -1,0 +1,43 @@
+"""New feeds of a program, and the program with them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.jobs.simulation.outcome import ChangedText, Floats, ProgramResult, SimulationResult
+
+
+@dataclass(frozen=True, eq=False)
+class FeedResult(ChangedText):
+    """New feeds of a program; see :class:`ChangedText`.
+
+    Parameters
+    ----------
+    line : (m,) int, lines that move at a feed
+    factor : (m,) float, the new feed of each over the programmed one
+    by : (m,) what holds each: a limit by its name or ``fastest``, ``machine``, ``air``, ``slowest``, ``programmed``
+    rubs : lines that cut below the least feed per tooth, and their feeds per tooth [mm]
+    tooth_feed_least : [mm]; None: none is asked for
+    """
+
+    line: NDArray[np.int64]
+    factor: Floats
+    by: tuple[str, ...]
+    rubs: tuple[tuple[int, float], ...]
+    tooth_feed_least: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class FeedsProgram(ProgramResult):
+    """A program with new feeds, simulated; see :class:`ProgramResult`.
+
+    Parameters
+    ----------
+    feeds : how it came to them
+    """
+
+    simulated: SimulationResult = field(kw_only=True)
+    feeds: FeedResult = field(kw_only=True)

@@ -1,0 +1,50 @@
+"""The result of a program with new feeds: the tracks before and after, their limits, the lines that rub."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from chipload.errors import Finding, Severity
+from chipload.jobs.feeds.numbers import feed_numbers
+from chipload.jobs.feeds.outcome import FeedResult, FeedsProgram
+from chipload.jobs.simulation.outcome import SimulationResult
+from chipload.jobs.simulation.result import changed_name, changed_tracks, program_result
+from chipload.jobs.simulation.rows import step_rows
+from chipload.result import Result
+from chipload.result.limits import Columns
+
+
+def result_of(program: FeedsProgram) -> Result:
+    """The result of a program with new feeds."""
+    simulation, own = program.simulated, program.feeds
+    time_s, name = float(program.seconds.sum()), changed_name(program, "feeds")
+    tracks = changed_tracks(
+        program, simulation, own, name, "gouge_mm", "excess_mm",
+        found=_rubbing(own), blocks=lambda: _with_cause(simulation, own),
+    )  # fmt: skip
+    numbers = {"feeds": feed_numbers(own, simulation, tracks[0].limits, time_s, name)}
+    note = f"The program takes {time_s:.4g} s, before {own.seconds_before:.4g} s."
+    return program_result("feeds", program, tracks, numbers, note)
+
+
+def _rubbing(feeds: FeedResult) -> tuple[Finding, ...]:
+    """Lines that cut below the least feed per tooth."""
+    least = feeds.tooth_feed_least
+    return tuple(
+        Finding("rubbing", line, f"feed per tooth {feed:.3g} mm is less than {least:g} mm", Severity.EXCEEDS)
+        for line, feed in feeds.rubs
+    )
+
+
+def _with_cause(simulation: SimulationResult, feeds: FeedResult) -> Iterator[Columns]:
+    """The rows with what limits the feed of each."""
+    by = np.array([*feeds.by, ""], dtype=object)
+    for block in step_rows(simulation):
+        line, known = block["line"], np.zeros(len(block["line"]), dtype=np.bool_)
+        at = np.zeros(len(line), dtype=np.int64)
+        if len(feeds.line):
+            at = np.searchsorted(feeds.line, line).clip(0, len(feeds.line) - 1)
+            known = (feeds.line[at] == line) & ~block["rapid"]
+        yield {**block, "feed_limited_by": by[np.where(known, at, len(feeds.by))]}

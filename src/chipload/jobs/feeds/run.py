@@ -1,0 +1,128 @@
+"""A job that gives a program new feeds: simulated as it is, given its feeds, simulated again from fresh stock."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from chipload.cutting.material import Material
+from chipload.jobs.checks import CHECK_COLUMNS, default_checks, with_checks
+from chipload.jobs.feeds.allowed import FeedRequest, watching, with_new_feeds
+from chipload.jobs.feeds.job import FeedsJob
+from chipload.jobs.feeds.outcome import FeedResult, FeedsProgram
+from chipload.jobs.simulation.limits import spindle_limits
+from chipload.jobs.simulation.preparation import material_of, resolution_of, timed
+from chipload.jobs.simulation.program_text import read_as
+from chipload.jobs.simulation.run import (
+    check_lines,
+    compliance_of_workpiece,
+    machine_of,
+    program_of,
+    read_for,
+    simulated,
+    text_to_change,
+)
+from chipload.jobs.simulation.stiffness import deflecting, stiffness_of, watched, with_columns
+from chipload.jobs.simulation.tables import LOADS
+from chipload.jobs.simulation.workpiece import stock_body
+from chipload.jobs.simulation.workpiece_compliance import WorkpieceCompliance, with_compliance_error
+from chipload.machine.machine import Machine
+from chipload.program.program import RAPID
+from chipload.program.read import ProgramReading, line_times
+from chipload.progress import Progress, part_of, silent
+from chipload.simulation.checkpoint import Checkpoint
+from chipload.simulation.chips import remove
+from chipload.simulation.steps import steps_of
+from chipload.stock.layers import LayeredStock
+
+#: resolution error that new feeds leave room for, over that at the programmed feeds: at the new ones other steps have
+#: the worst loads, whose error is not yet known (example feeds: 1.07 % before, 1.51 % after)
+SPARE = 2.0
+
+
+def run(job: FeedsJob, progress: Progress = silent, checkpoint: Checkpoint | None = None) -> FeedsProgram:
+    """Simulate the program of a job, give it new feeds, and simulate its new text from fresh stock.
+
+    Parameters
+    ----------
+    checkpoint : the folder that keeps what is finished of the last simulation; None: all is kept in memory
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, the controller would refuse the program, its feeds cannot be changed in the text, or the
+        stock and the cutters cannot be used.
+    """
+    machine, share = machine_of(job), 0.1
+    reading = read_for(job, machine, part_of(progress, 0.0, share))
+    stock, material = stock_body(job, reading.program), material_of(job)
+    text, dialect = text_to_change(job, reading, stock, machine, material, "feeds")
+    compliance = compliance_of_workpiece(job, reading, stock, machine, material, part_of(progress, share, 0.55))
+    share = 0.55 if compliance is not None else share
+    begin = 0.5 * (1.0 + share)
+    feeds, reading = _new_feeds(
+        job, text, dialect, reading, stock, material, machine, compliance, part_of(progress, share, begin)
+    )
+    stock = stock_body(job, reading.program)
+    last = part_of(progress, begin, 1.0)
+    done = program_of(
+        job, machine, reading, simulated(job, reading, stock, machine, material, checkpoint, compliance, last)
+    )
+    return FeedsProgram(**vars(done), feeds=feeds)
+
+
+def check(job: FeedsJob) -> tuple[list[str], bool]:
+    """What the files of a job hold, and what its simulations need; nothing is cut, errors are those of :func:`run`."""
+    machine = machine_of(job)
+    reading = read_for(job, machine)
+    text_to_change(job, reading, stock_body(job, reading.program), machine, material_of(job), "feeds")
+    return check_lines(job, program_of(job, machine, reading), 2)
+
+
+def _new_feeds(
+    job: FeedsJob,
+    text: str,
+    dialect: str,
+    reading: ProgramReading,
+    stock: LayeredStock,
+    material: Material,
+    machine: Machine,
+    compliance: WorkpieceCompliance | None,
+    progress: Progress,
+) -> tuple[FeedResult, ProgramReading]:
+    """The text with new feeds, from what the program cuts of a stock, which changes; and what it does then."""
+    op, seconds = job.operation, float(line_times(reading, machine)[1].sum())
+    fine = resolution_of(job, reading.program)
+    turning = np.unique(reading.program.spindle[reading.program.motion != RAPID])
+    limits = {name: limit for name, limit in job.limits.items() if name in LOADS}
+    if "spindle" not in job.table.checks.off:
+        limits |= spindle_limits(machine, turning)
+    gives = stiffness_of(job.table.stiffness, job.cutters, None if compliance is None else compliance.steps)
+    bends = with_checks(job.table.checks, material, deflecting(gives, material))
+    checks = default_checks(job.table.checks, job.cutters, material, op.confidence)
+    program, times = timed(reading, job, machine)
+    # as it is: what its loads are, and how well they are known
+    before = remove(
+        program, stock, job.cutters, material, fine, interpolation=op.interpolation, times=times, watch=bends,
+        engine=op.engine, progress=part_of(progress, 0.0, 0.5),
+    )  # fmt: skip
+    before = with_columns(before, (*watched(gives), *CHECK_COLUMNS))
+    more = bends if limits.keys() & {"deflection_um", "deflection_workpiece_um"} else None
+    errors = {name: SPARE * error for name, error in before.resolution_error.items()}
+    errors = with_compliance_error(errors, before.columns, compliance)  # the compliance does not change with the feed
+    before = replace(
+        before, resolution_error=with_compliance_error(before.resolution_error, before.columns, compliance)
+    )
+    asked = FeedRequest(op.feeds, limits, fine.rotation, checks, errors, more)
+    steps = steps_of(program, op.step_mm, op.tolerance_mm)
+    # again, for the greatest feed of each step
+    allowed = remove(
+        program, stock_body(job, reading.program), job.cutters, material, fine, interpolation=op.interpolation,
+        times=times, watch=watching(steps, asked, job.cutters, material, machine, before.columns), accuracy=False,
+        engine=op.engine, progress=part_of(progress, 0.5, 1.0),
+    )  # fmt: skip
+    return with_new_feeds(
+        text, dialect, reading, steps, before, allowed.columns, asked, job.cutters, machine,
+        lambda new: read_for(job, machine, text=read_as(new)), seconds,
+    )  # fmt: skip

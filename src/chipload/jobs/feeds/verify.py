@@ -1,0 +1,80 @@
+"""A text with new feeds against what was asked: the same program at the wanted feeds, and no line that rubs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.errors import InputError
+from chipload.jobs.feeds.tables import FeedsTable
+from chipload.jobs.simulation.program_text import differing
+from chipload.planning.feeds import LineFeeds
+from chipload.program.gcode.feed_words import DIGITS
+from chipload.program.program import DWELL, RAPID, Program
+from chipload.simulation.steps import Steps
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def require_same(old: Program, new: Program, line: Ints, factor: Floats) -> None:
+    """Refuse a new text that is not the old program at the wanted feeds, which rounding makes slower by a digit.
+
+    Raises
+    ------
+    InputError
+        It is another program: the line is named.
+    """
+    at, wrong = 0, len(old) != len(new)
+    if not wrong:
+        off = differing(old, new, "motion", "p_work", "axis", "centre", "normal", "turns", "spindle", "tool", "line")
+        off |= (old.motion == DWELL) & (old.feed != new.feed)
+        moves = np.isin(old.line, line) & (old.motion != RAPID) & (old.motion != DWELL)
+        wanted = old.feed[moves] * factor[np.searchsorted(line, old.line[moves])]
+        rounded = 1.0 - 1.01 * 10.0 ** (1 - DIGITS)
+        off[moves] |= (new.feed[moves] > wanted * (1.0 + 1e-9)) | (new.feed[moves] < wanted * rounded)
+        wrong, at = bool(off.any()), int(old.line[np.argmax(off)])
+    if wrong:
+        where = f"line {at}: " if at else ""
+        raise InputError(f"{where}its feed cannot be set by a word of its own: convert the program first")
+
+
+def rubbing_lines(
+    lines: LineFeeds,
+    factor: Floats,
+    steps: Steps,
+    cuts: NDArray[np.bool_],
+    table: FeedsTable,
+    cutters: Mapping[int, Cutter],
+) -> tuple[tuple[int, float], ...]:
+    """Lines that cut below the least feed per tooth, and their feeds per tooth [mm]."""
+    if table.tooth_feed_least_mm is None:
+        return ()
+    new = tooth_feeds(steps, cutters)[cuts] * factor[np.searchsorted(lines.line, steps.line[cuts])]
+    low = new < table.tooth_feed_least_mm * (1.0 - 2.0 * 10.0 ** (1 - DIGITS))
+    worst: dict[int, float] = {}
+    for line, feed in zip(steps.line[cuts][low].tolist(), new[low].tolist(), strict=True):
+        worst[line] = min(worst.get(line, math.inf), feed)
+    return tuple(sorted(worst.items()))
+
+
+def speeds_of(steps: Steps) -> Floats:
+    """(n,) speed of the tip [mm/s]; 0 where it stands and in rapids."""
+    length = np.linalg.norm(steps.p1 - steps.p0, axis=1)
+    moves = steps.seconds > 0.0
+    return np.asarray(np.where(moves, length / np.where(moves, steps.seconds, 1.0), 0.0))
+
+
+def tooth_feeds(steps: Steps, cutters: Mapping[int, Cutter]) -> Floats:
+    """(n,) feed per tooth [mm]; inf where the spindle stands or the tip does."""
+    flutes = np.ones(len(steps))
+    for number in np.unique(steps.tool).tolist():
+        if number in cutters:
+            flutes[steps.tool == number] = cutters[number].flutes
+    speed = speeds_of(steps)
+    turns = (speed > 0.0) & (steps.spindle != 0.0)
+    return np.asarray(np.where(turns, math.tau * speed / np.where(turns, flutes * np.abs(steps.spindle), 1.0), np.inf))

@@ -1,0 +1,304 @@
+"""How the result of a simulated program is presented: sections of the report, scene, programs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from html import escape
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+import trimesh
+from numpy.typing import NDArray
+from plotly.subplots import make_subplots
+
+from chipload.jobs.simulation import part_figures
+from chipload.jobs.simulation.numbers import operation_numbers, program_numbers
+from chipload.jobs.simulation.outcome import ChangedText, ProgramResult, SimulationResult, SpeedResult
+from chipload.jobs.simulation.program_text import program_text
+from chipload.jobs.simulation.result import APT
+from chipload.jobs.simulation.rows import motion_rows
+from chipload.jobs.simulation.stability_figures import stability_sections
+from chipload.jobs.simulation.workpiece_figures import workpiece_section
+from chipload.program.apt.writer import write_apt
+from chipload.program.motions import spans
+from chipload.program.program import DWELL, RAPID, Program
+from chipload.report.diagram import diagram_figure
+from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, SPACE_POINTS, STOCK
+from chipload.report.presentation import Blank, Content, Presentation
+from chipload.report.scene import FIXTURE
+from chipload.report.shape import thinned
+from chipload.report.sheet import figure, table
+from chipload.result import Result, Verdict
+from chipload.result.motions import chords_of
+from chipload.units import mm_min_from_mm_s
+
+Floats = NDArray[np.float64]
+
+SPREAD = "\u00b1 is twice the standard deviation that the spread of the material's coefficients gives."
+NO_SPREAD = "The material states neither a spread nor a covariance of its coefficients, so the forces have no band."
+#: rows of the figure: lines (column, name, colour), the title of their axis, and the limit
+ROWS = (
+    (
+        (
+            ("force_x_mean_n", "x, mean", "#3457a6"),
+            ("force_y_mean_n", "y, mean", "#0b7a75"),
+            ("force_z_mean_n", "z, mean", "#c9821a"),
+            ("force_n", "greatest size", INK),
+        ),
+        "force [N]",
+        "force_n",
+    ),
+    ((("torque_mean_nm", "mean", "#8a8f98"), ("torque_nm", "greatest", INK)), "torque [N m]", "torque_nm"),
+    ((("power_w", "mean over a turn", INK),), "power [W]", "power_w"),
+    ((("chip_max_mm", "thickest", INK),), "chip [mm]", "chip_max_mm"),
+    ((("deflection_um", "cutter from workpiece", INK),), "deflection [\u00b5m]", "deflection_um"),
+    ((("rate", "removed", STOCK),), "removal [mm\u00b3/s]", ""),
+)
+#: lines that the report lists as slowest
+SLOWEST = 12
+
+
+def program_presentation(
+    program: ProgramResult,
+    result: Result,
+    changed: Mapping[str, ChangedText] = MappingProxyType({}),
+    sections: Callable[[dict[str, go.Figure]], list[str]] = lambda figures: [],
+) -> Presentation:
+    """The presentation of a program's result.
+
+    Parameters
+    ----------
+    changed : texts with other words, by the name of their file
+    sections : of the report, before those of every program
+    """
+    speeds = next((text for text in changed.values() if isinstance(text, SpeedResult)), None)
+    return Presentation(
+        lambda figures: [*sections(figures), *_sections(program, speeds, figures)],
+        lambda: scene_bytes(program),
+        lambda: _files(program, result, changed),
+        lambda: _blanks(program, result),
+    )
+
+
+def _blanks(program: ProgramResult, result: Result) -> dict[str, Blank]:
+    """The stock before, the same for every track."""
+    simulated = program.simulated
+    if simulated is None or simulated.blank is None:
+        return {}
+    return {track.name: Blank(simulated.blank, program.cutters) for track in result.tracks}
+
+
+def _files(program: ProgramResult, result: Result, changed: Mapping[str, ChangedText]) -> dict[str, Content]:
+    """CL data of the program, the stock that it leaves, and its own text where that is new."""
+    path = program.reading.program
+    tools = set(np.unique(path.tool).tolist())
+    known = program.cutters if tools - {0} <= set(program.cutters) else None
+    text = write_apt(path, known, title=f"{program.title}, {program.name}", verified=False)
+    files: dict[str, Content] = {APT: text.encode("ascii")}
+    why = None if result.verdict is Verdict.HOLDS else result.message
+    files |= {name: program_text(own, why).encode("utf-8", "surrogateescape") for name, own in changed.items()}
+    if program.simulated is not None:
+        files["stock.npz"] = program.simulated.stock.to_bytes()
+    return files
+
+
+def _sections(program: ProgramResult, speeds: SpeedResult | None, figures: dict[str, go.Figure]) -> list[str]:
+    what, time_s = program_numbers(program), float(program.seconds.sum())
+    low, high = what["box_mm"]["low"], what["box_mm"]["high"]
+    box = ", ".join(f"{x} {a:.4g} to {b:.4g}" for x, a, b in zip("XYZ", low, high, strict=True))
+    body = [
+        f"<h2>{escape(program.name)} on {escape(program.machine.name)}</h2>",
+        f"<p>{what['motions']} motions, {what['cutting_mm']:.5g} mm at feed and {what['rapid_mm']:.5g} mm of rapids, "
+        f"{time_s / 60.0:.4g} min; {box} mm; tools {escape(', '.join(map(str, what['tools'])))}.</p>",
+        "<h3>Feed over time</h3>",
+        figure("feed", feed_figure(program), figures),
+        "<h3>Slowest lines</h3>",
+        _slowest(program),
+    ]
+    if program.simulated is not None:
+        body += _load_sections(program.simulated, time_s, figures)
+        body += stability_sections(program.simulated, speeds, figures)
+    return body
+
+
+def _load_sections(simulation: SimulationResult, time_s: float, figures: dict[str, go.Figure]) -> list[str]:
+    """Chips, forces, torque, power, deflection, the part, collisions."""
+    what, c = operation_numbers(simulation, time_s), simulation.removal.columns
+    force, torque, power = what["force_n"], what["torque_nm"], what["power_w"]
+    rows = [
+        [f"force {x} on the cutter [N]", _mean(force[x]), f"{force[x]['max']:.4g}", f"{force[x]['min']:.4g}"]
+        for x in "xyz"
+    ]
+    rows += [["normal force on the surface that is left [N]", "", f"{force['normal_max']:.4g}", ""]]
+    rows += [["torque [N m]", _mean(torque), f"{torque['max']:.4g}", ""]]
+    rows += [["power [W]", f"{power['mean']:.4g}", f"{power['max']:.4g}", ""]]
+    if what["form_error_um"]["points"]:
+        ends = (f"{what['form_error_um'][key]:.4g}" for key in ("greatest", "least"))
+        rows += [["form error of the part [\u00b5m]", "", *ends]]
+    rows += [["deflection [\u00b5m]", "", f"{what['deflection_um']['max']:.4g}", ""]]
+    rigid = ""
+    if simulation.rigid:
+        rigid = f" Deflections are lower bounds: {', '.join(simulation.rigid)} not stated and taken as rigid."
+    body = [
+        "<h2>Chips, force, torque, power</h2>",
+        f"<p>{what['steps']} steps; {what['chip_volume_mm3']:.6g} mm\u00b3 of chips, stock less by "
+        f"{what['removed_mm3']:.6g} mm\u00b3; {what['cutting_s']:.4g} s in cut, {what['air_cut_s']:.4g} s "
+        f"in air; greatest chip thickness {what['chip_max_mm']['max']:.4g} mm; "
+        f"{what['films_mm3']:.2g} mm\u00b3 in films thinner than the tolerance.</p>",
+        table(["", "mean", "greatest", "least"], rows, numbers=(1, 2, 3)),
+        f'<p class="note">{SPREAD if torque["mean_sd"] is not None else NO_SPREAD}{escape(rigid)}</p>',
+        figure("loads", along(simulation), figures),
+    ]
+    body += workpiece_section(simulation, figures)
+    chip = simulation.removal.piece
+    if chip is not None:
+        title = f"step {chip.step}, layer at z = {chip.height:.4g} mm"
+        drawn = diagram_figure(chip.move, chip.cutter, chip.height, chip.before, title=title)
+        body += [
+            "<h3>A chip</h3>",
+            f'<p class="note">The chip with most pieces ({len(chip.chips)}): how the covered area is built (left: '
+            "angle around the edge across, time in the step up) and which part of it was material (right).</p>",
+            figure("chip", drawn, figures),
+        ]
+    body += part_figures.section(
+        simulation.left, simulation.collisions.found, c, simulation.collisions.compared_with, figures
+    )
+    return body
+
+
+def _mean(values: Mapping[str, Any]) -> str:
+    """A mean, with twice its standard deviation where that is known."""
+    sd = values["mean_sd"]
+    return f"{values['mean']:.4g}" if sd is None else f"{values['mean']:.4g} \u00b1 {2.0 * sd:.2g}"
+
+
+def along(simulation: SimulationResult) -> go.Figure:
+    """Force, torque, power, chip thickness, deflection and removal against time."""
+    columns = simulation.removal.columns
+    seconds, of = columns["seconds"], columns["line"]
+    t = columns["t_s"] - 0.5 * columns["duration_s"]
+    out = make_subplots(rows=len(ROWS), cols=1, shared_xaxes=True, vertical_spacing=0.03)
+    for row, (lines, title, limit) in enumerate(ROWS, start=1):
+        for column, name, colour in lines:
+            if column == "rate":
+                y = np.where(seconds > 0.0, columns["chip_volume_mm3"] / np.where(seconds > 0.0, seconds, 1.0), 0.0)
+            else:
+                y = np.asarray(columns[column], dtype=np.float64)
+            keep = thinned(y, LINE_POINTS)
+            out.add_trace(
+                go.Scatter(
+                    x=t[keep].astype(np.float32),
+                    y=y[keep].astype(np.float32),
+                    name=name,
+                    mode="lines",
+                    line={"color": colour, "width": 1.3},
+                    customdata=of[keep],
+                    hovertemplate=f"{name}: %{{y:.4g}}, line %{{customdata}}<extra>{title}</extra>",
+                    showlegend=row == 1,
+                ),
+                row=row,
+                col=1,
+            )
+        if limit in simulation.limits:
+            text = {"text": f"limit {simulation.limits[limit]:g}", "font": {"color": LIMIT, "size": 11}}
+            line = {"color": LIMIT, "width": 1.2, "dash": "dash"}
+            out.add_hline(
+                y=simulation.limits[limit],
+                line=line,
+                annotation=text,
+                annotation_position="top left",
+                row=row,
+                col=1,
+            )
+        out.update_yaxes(title_text=title, row=row, col=1)
+    out.update_xaxes(gridcolor=GRID, zeroline=False)
+    out.update_yaxes(gridcolor=GRID, zerolinecolor=GRID)
+    out.update_xaxes(title_text="time at the commanded feed [s]", row=len(ROWS), col=1)
+    out.update_layout(
+        template="none",
+        height=1050,
+        font=FONT,
+        margin={"l": 74, "r": 16, "t": 30, "b": 46},
+        legend={"orientation": "h", "y": 1.01, "yanchor": "bottom", "x": 0.0},
+    )
+    return out
+
+
+def feed_figure(read: ProgramResult) -> go.Figure:
+    """Programmed feed against time, motion after motion."""
+    columns = motion_rows(read)
+    t, feed = np.asarray(columns["t_s"]) / 60.0, np.asarray(columns["feed_mm_min"])
+    step = -(-len(t) // SPACE_POINTS)
+    out = go.Figure(
+        go.Scatter(
+            x=t[::step].astype(np.float32), y=feed[::step].astype(np.float32), mode="lines", line_shape="vh",
+            line={"color": STOCK, "width": 1.2},
+            customdata=columns["line"][::step], hovertemplate="line %{customdata}: %{y:.5g} mm/min<extra></extra>",
+        )
+    )  # fmt: skip
+    out.update_layout(template="none", height=260, font=FONT, margin={"l": 70, "r": 20, "t": 10, "b": 50})
+    out.update_xaxes(title="time [min]", gridcolor=GRID)
+    out.update_yaxes(title="feed [mm/min]", gridcolor=GRID, rangemode="tozero")
+    return out
+
+
+def _drawn(program: Program) -> tuple[Floats, NDArray[np.bool_]]:
+    """Points with arcs as chords, and whether a rapid leads to each."""
+    chords = chords_of(program)
+    return np.asarray(chords.p_work), np.asarray(chords.motion == RAPID)
+
+
+def _drawn_feeds(program: Program) -> Floats:
+    chords = chords_of(program)
+    moving = (chords.motion != RAPID) & (chords.motion != DWELL) & (spans(chords) > 0.0)
+    return np.where(moving, mm_min_from_mm_s(1.0) * chords.feed, 0.0)
+
+
+def _runs(chosen: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """(first, past the last) of each run of chosen rows that has a row before it."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
+    return [(max(int(a), 1), int(b)) for a, b in edges.reshape(-1, 2) if b > 1]
+
+
+def _slowest(read: ProgramResult) -> str:
+    order = np.argsort(-read.seconds, kind="stable")[:SLOWEST]
+    whole = max(float(read.seconds.sum()), 1e-300)
+    rows = [
+        [str(int(read.lines[k])), f"{read.seconds[k]:.4g}", f"{100.0 * read.seconds[k] / whole:.3g}"]
+        for k in order
+        if read.seconds[k] > 0.0
+    ]
+    return table(["line", "time [s]", "of all [%]"], rows, numbers=(1, 2))
+
+
+def scene_bytes(read: ProgramResult) -> bytes:
+    """scene.glb: rapids and cutting motions as lines, what is left of the stock; lengths are mm, Z is up."""
+    points, rapid = _drawn(read.reading.program)
+    scene = trimesh.Scene()
+    for name, chosen, colour in (("rapids", rapid, (179, 38, 30, 255)), ("path", ~rapid, (34, 120, 132, 255))):
+        entities = [
+            trimesh.path.entities.Line(np.arange(a - 1, b), color=np.array(colour, dtype=np.uint8))
+            for a, b in _runs(chosen)
+        ]
+        if entities:
+            path = trimesh.path.Path3D(entities=entities, vertices=points, process=False)
+            scene.add_geometry(path, node_name=name, geom_name=name)
+    if read.simulated is not None:
+        stock = read.simulated.stock.mesh()
+        stock.visual.face_colors = (168, 122, 58, 255)
+        scene.add_geometry(stock, node_name="stock", geom_name="stock")
+        for name, mesh in read.simulated.collisions.fixtures.items():
+            body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+            body.visual.face_colors = FIXTURE
+            scene.add_geometry(body, node_name=name, geom_name=name)
+        left, columns = read.simulated.left, read.simulated.removal.columns
+        if left is not None:
+            scene.add_geometry(
+                part_figures.coloured_mesh(left, part_figures.span_of(left, columns)),
+                node_name="part",
+                geom_name="part",
+            )
+    glb: bytes = scene.export(file_type="glb", extension_webp=False)
+    return glb

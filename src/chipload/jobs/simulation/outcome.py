@@ -1,0 +1,156 @@
+"""What running a program gives: what it does on the machine and in the stock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.jobs.checks import DefaultChecks
+from chipload.jobs.simulation.stability import StabilityResult
+from chipload.jobs.simulation.tables import ProgramLimitsTable
+from chipload.jobs.simulation.workpiece_compliance import WorkpieceCompliance
+from chipload.machine.machine import Machine
+from chipload.program.read import ProgramReading
+from chipload.result import Provenance
+from chipload.simulation.removal import Removal
+from chipload.simulation.surface import Collision, Difference
+from chipload.stock.layers import LayeredStock
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionCheck:
+    """What cutter, shank and holder were held against, and what they ran into.
+
+    Parameters
+    ----------
+    found : what ran into what
+    compared_with : names of what they were held against
+    no_holder : tools whose holder is not stated
+    fixtures : what no tool may touch, by name
+    """
+
+    found: tuple[Collision, ...] = ()
+    compared_with: tuple[str, ...] = ()
+    no_holder: tuple[int, ...] = ()
+    fixtures: Mapping[str, trimesh.Trimesh] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class SimulationResult:
+    """A program that was run through a stock.
+
+    Parameters
+    ----------
+    removal : what every step removed and what it cost
+    stock : as it is afterwards
+    machine : whose spindle has to give torque and power
+    limit_table : limits of the job
+    settings : the keys of the operation
+    checks : made beside the stated limits, with the cutters and the material
+    collisions : what ran into what
+    left : what is left on the part; None: no part is stated
+    rigid : what was not stated of what gives way, and counts as rigid
+    stability : margins and quiet speeds; None: no modes are stated
+    workpiece : how far the workpiece gives way where it is cut; None: no [workpiece] is stated
+    blank : the stock before
+    """
+
+    removal: Removal
+    stock: LayeredStock
+    machine: Machine
+    limit_table: ProgramLimitsTable
+    settings: Mapping[str, Any]
+    checks: DefaultChecks
+    collisions: CollisionCheck = field(default_factory=CollisionCheck)
+    left: Difference | None = None
+    rigid: tuple[str, ...] = ()
+    stability: StabilityResult | None = None
+    workpiece: WorkpieceCompliance | None = None
+    blank: trimesh.Trimesh | None = None
+
+    @property
+    def limits(self) -> Mapping[str, float]:
+        """Limits that are stated, by name."""
+        return self.limit_table.stated
+
+    @property
+    def errors(self) -> Mapping[str, float]:
+        """Relative error of columns by the resolution of the simulation."""
+        return self.removal.resolution_error
+
+
+@dataclass(frozen=True, eq=False)
+class ChangedText:
+    """The text of a program with other words, and the program before.
+
+    Parameters
+    ----------
+    text : the program with them
+    dialect : of the text
+    before : what the program removes as it was
+    seconds_before : time of the program as it was [s]
+    """
+
+    text: str
+    dialect: str
+    before: Removal
+    seconds_before: float
+
+
+@dataclass(frozen=True)
+class ToolSpeed:
+    """A new spindle speed of a tool [1/min], and the least margin that its steps are expected to have with it."""
+
+    tool: int
+    before: tuple[float, ...]
+    rpm: float
+    margin: float
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedResult(ChangedText):
+    """New spindle speeds of a program; see :class:`ChangedText`.
+
+    Parameters
+    ----------
+    tools : what each tool has
+    stability : margins at the programmed speeds
+    """
+
+    tools: tuple[ToolSpeed, ...]
+    stability: StabilityResult
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramResult:
+    """A program that was read for a machine.
+
+    Parameters
+    ----------
+    title : name of the job
+    name : of the program's file
+    reading : what it does
+    lines, seconds : (m,) lines of the source that move, and their times [s]
+    machine : that it was read for
+    provenance : where the numbers come from
+    simulated : what the program does to its stock; None: it was only read
+    cutters : by tool number; empty: not known
+    """
+
+    title: str
+    name: str
+    reading: ProgramReading
+    lines: NDArray[np.int64]
+    seconds: Floats
+    machine: Machine
+    provenance: Provenance
+    simulated: SimulationResult | None = None
+    cutters: Mapping[int, Cutter] = field(default_factory=dict)

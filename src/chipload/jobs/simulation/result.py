@@ -1,0 +1,173 @@
+"""The result of a simulated program: its track, limits and findings, and the tracks before and after a change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chipload.errors import Finding, Severity
+from chipload.jobs.checks import chip_findings, unchecked_checks
+from chipload.jobs.simulation.limits import program_limits
+from chipload.jobs.simulation.numbers import operation_numbers, program_numbers
+from chipload.jobs.simulation.outcome import ChangedText, ProgramResult, SimulationResult
+from chipload.jobs.simulation.rows import step_rows
+from chipload.jobs.simulation.stability import StabilityResult
+from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict
+from chipload.result.limits import Columns
+from chipload.simulation.placement import stock_placement
+
+#: names of the tracks of a program as it was, and with another text
+ORIGINAL, OPTIMISED = "original", "optimised"
+#: CL data of every program
+APT = "0-program.apt"
+
+
+def program_result(
+    capability: str, program: ProgramResult, tracks: tuple[Track, ...], numbers: Mapping[str, Any], note: str = ""
+) -> Result:
+    """The result of a program.
+
+    Parameters
+    ----------
+    tracks : the one in use first
+    numbers : of the operation, beside those of the simulation and the program
+    note : what the report says below the message
+    """
+    simulation = program.simulated
+    own = {"kind": "read"} if simulation is None else operation_numbers(simulation, float(program.seconds.sum()))
+    return Result(
+        capability=capability,
+        title=program.title,
+        tracks=tracks,
+        operations=({**own, **numbers, "program": program_numbers(program)},),
+        findings=program.reading.findings,
+        unchecked=unchecked(program),
+        provenance=program.provenance,
+        maps=maps_of(simulation),
+        note=note,
+    )
+
+
+def changed_tracks(
+    program: ProgramResult,
+    simulation: SimulationResult,
+    changed: ChangedText,
+    name: str,
+    *not_compared: str,
+    found: tuple[Finding, ...] = (),
+    stability: StabilityResult | None = None,
+    blocks: Callable[[], Iterator[Columns]] | None = None,
+) -> tuple[Track, Track]:
+    """A program with another text, then as it was.
+
+    Parameters
+    ----------
+    name : of the file with the new text
+    not_compared : limits that are checked after the change alone
+    found : beside what the simulation found
+    stability : of the program as it was; None: that of the simulation
+    blocks : rows of the history after the change; None: those of the simulation
+    """
+    after = Track(
+        OPTIMISED, TrackKind.PROGRAM, True, float(program.seconds.sum()),
+        program_limits(simulation, simulation.removal.columns, OPTIMISED), (*findings_of(program, simulation), *found),
+        (name, APT), blocks=blocks or (lambda: step_rows(simulation)),
+    )  # fmt: skip
+    limits = program_limits(simulation, changed.before.columns, ORIGINAL, stability)
+    before = Track(
+        ORIGINAL, TrackKind.PROGRAM, False, changed.seconds_before, as_posted(limits, *not_compared),
+        blocks=lambda: step_rows(simulation, changed.before),
+    )  # fmt: skip
+    return (after, before)
+
+
+def changed_name(program: ProgramResult, what: str) -> str:
+    """File of the program with its new ``what``."""
+    return f"0-{what}{Path(program.name).suffix}"
+
+
+def unchecked(program: ProgramResult) -> tuple[str, ...]:
+    """What was not checked: limits that are not stated, and bodies that nothing was compared with."""
+    simulation = program.simulated
+    if simulation is None:
+        return ("removal, engagement, forces and collisions: the program was read, not simulated",)
+    # where modes are stated a margin of 1 is checked
+    always = () if simulation.stability is None else ("stability_margin",)
+    missing = [name for name in simulation.limit_table.unstated if name not in always]
+    out = [*unchecked_checks(simulation.checks), *(f"limit {name}: not stated" for name in missing)]
+    if simulation.left is None:
+        out.append("gouge and excess: no [part] is stated")
+    if "stock" not in simulation.collisions.compared_with:
+        out.append("shank and holder against the stock: stock_points_mm is not stated")
+    if not any(name.startswith("fixture") for name in simulation.collisions.compared_with):
+        out.append("fixtures: none is stated")
+    if simulation.collisions.no_holder:
+        out.append(f"holders of tools {', '.join(map(str, simulation.collisions.no_holder))}: not stated")
+    if simulation.rigid:
+        out.append(f"compliance that is not stated counts as rigid: {', '.join(simulation.rigid)}")
+    return tuple(out)
+
+
+def findings_of(program: ProgramResult, simulation: SimulationResult) -> tuple[Finding, ...]:
+    """What the machine cannot do, then what the simulation found."""
+    return (*(exceeding(f) for f in program.reading.violations), *simulation_findings(simulation))
+
+
+def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:
+    """What the simulation found beside limits: rapids in material, collisions, chips beyond the coefficients."""
+    out = [exceeding(f) if f.code == "rapid-cuts" else f for f in simulation.removal.findings]
+    for c in simulation.collisions.found:
+        place = (float(c.at[0]), float(c.at[1]), float(c.at[2]))
+        text = f"{c.what} goes {c.depth_mm:.3g} mm into {c.into}"
+        out.append(Finding("collision", c.line, text, Severity.EXCEEDS, place, int(c.step)))
+    if simulation.workpiece is not None:
+        out += simulation.workpiece.findings
+    return (*out, *chip_findings(simulation.checks, simulation.removal.columns))
+
+
+def misplaced(simulation: SimulationResult, limits: tuple[LimitCheck, ...]) -> tuple[Finding, ...]:
+    """The likely cause, if a limit is exceeded because the stock does not lie where the program cuts."""
+    if all(check.state is not Verdict.EXCEEDS for check in limits):
+        return ()
+    stock = simulation.stock
+    low, high = (np.array([stock.xs[k], stock.ys[k], stock.bounds[k]], dtype=np.float64) for k in (0, -1))
+    found = stock_placement(simulation.removal.columns, (low, high), simulation.checks.cutters)
+    return () if found is None else (exceeding(found),)
+
+
+def as_posted(limits: tuple[LimitCheck, ...], *of_part: str) -> tuple[LimitCheck, ...]:
+    """Limits of the program as it was, of which those ``of_part`` are not checked: its surface is not compared."""
+    return tuple(
+        LimitCheck(c.name, c.limit, None, Verdict.UNPROVEN, c.track, reason="the part is compared with the new program")
+        if c.name in of_part else c
+        for c in limits
+    )  # fmt: skip
+
+
+def exceeding(f: Finding) -> Finding:
+    """A finding that counts as a limit that is exceeded."""
+    return Finding(f.code, f.line, f.text, Severity.EXCEEDS, f.place, f.row)
+
+
+def maps_of(simulation: SimulationResult | None) -> tuple[SurfaceMap, ...]:
+    """Gouge below 0 and excess above on the part."""
+    if simulation is None:
+        return ()
+    maps, left = _bent(simulation), simulation.left
+    if left is None:
+        return maps
+    known = np.isfinite(left.distance) & (left.over | (left.distance < 0.0))
+    values = np.where(known, left.distance, np.nan)
+    return (SurfaceMap("part", "excess_mm", left.points, values, np.asarray(left.faces, dtype=np.int64)), *maps)
+
+
+def _bent(simulation: SimulationResult) -> tuple[SurfaceMap, ...]:
+    """Displacement of the workpiece in its worst step."""
+    bent = None if simulation.workpiece is None else simulation.workpiece.bent
+    if bent is None:
+        return ()
+    um = 1e3 * np.linalg.norm(bent.moved, axis=1)
+    return (SurfaceMap("workpiece", "deflection_workpiece_um", bent.points, um, bent.faces),)

@@ -1,0 +1,223 @@
+"""Read the program of a job, find the compliance of its workpiece, run it through its stock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutting.material import Material
+from chipload.errors import Severity, worst_severity
+from chipload.jobs.checks import CHECK_COLUMNS, with_checks
+from chipload.jobs.provenance import provenance_of, sources, title_of, versions
+from chipload.jobs.simulation.form_error import forming
+from chipload.jobs.simulation.job import ProgramJob
+from chipload.jobs.simulation.outcome import CollisionCheck, ProgramResult, SimulationResult
+from chipload.jobs.simulation.preparation import bodies_of, material_of, resolution_of, timed
+from chipload.jobs.simulation.program_text import changeable, straight
+from chipload.jobs.simulation.stability import stability_of, watch_of
+from chipload.jobs.simulation.stiffness import deflecting, stiffness_of, watched, with_columns
+from chipload.jobs.simulation.tables import SimulateTable
+from chipload.jobs.simulation.workpiece import fixture_meshes, insides, stock_body
+from chipload.jobs.simulation.workpiece_compliance import (
+    WorkpieceCompliance,
+    with_compliance_error,
+    workpiece_compliance,
+)
+from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.program.read import ProgramReading, line_times, read_program, read_tools
+from chipload.program.setup import Setup
+from chipload.progress import Progress, silent
+from chipload.simulation.checkpoint import Checkpoint
+from chipload.simulation.chips import remove
+from chipload.simulation.chunks import remove_in_chunks
+from chipload.simulation.estimate import estimate
+from chipload.simulation.loads import Cuts
+from chipload.simulation.steps import StepBlocks
+from chipload.simulation.surface import collisions, difference, in_stock
+from chipload.stock.layers import LayeredStock
+from chipload.units import mm_s_from_mm_min
+
+#: of a simulation, what one pass over its steps beside the removal takes
+SHARE = 0.2 / 3.0
+
+
+def machine_of(job: ProgramJob) -> Machine:
+    """The machine that the job names."""
+    return machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
+
+
+def read_for(job: ProgramJob, machine: Machine, progress: Progress = silent, text: str | None = None) -> ProgramReading:
+    """Read the program of a job for a machine; ``text`` in place of its file."""
+    table = job.table.program
+    return read_program(
+        job.program_file,
+        machine,
+        dialect=table.dialect,
+        tools=read_tools(job.tools_file) if job.tools_file is not None else None,
+        feed=mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None,
+        tolerance=table.tolerance_mm,
+        text=text,
+        setup=Setup(table.parameters, table.work_offsets, job.cutters, table.placed_in),
+        comments=table.tool_comments,
+        progress=progress,
+    )
+
+
+def program_of(
+    job: ProgramJob, machine: Machine, reading: ProgramReading, simulated: SimulationResult | None = None
+) -> ProgramResult:
+    """The program of a job that was read, with its times, and with what its numbers come from."""
+    lines, seconds = line_times(reading, machine)
+    files: dict[str, Path] = {"program": job.program_file}
+    named = {"machine": job.machine, "tools": job.tools_file, "material": job.material}
+    fixtures = {f"fixture {k}": f for k, f in enumerate(job.table.fixture)}
+    if job.table.dynamics is not None and job.table.dynamics.file is not None:
+        named["modes"] = job.path.parent / job.table.dynamics.file
+    for name, solid in {"stock": job.table.stock, "part": job.table.part, **fixtures}.items():
+        if solid is not None and solid.file is not None:
+            named[name] = job.path.parent / solid.file
+    files |= {k: v for k, v in named.items() if isinstance(v, Path)}
+    files |= {f"cutter {k}": job.path.parent / c.file for k, c in enumerate(job.table.cutter) if c.file is not None}
+    metal = (simulated.checks.material,) if simulated is not None else ()
+    provenance = provenance_of(files, job.overrides, machine, metal)
+    name = job.program_file.name
+    return ProgramResult(title_of(job.path), name, reading, lines, seconds, machine, provenance, simulated, job.cutters)
+
+
+def check_lines(job: ProgramJob, done: ProgramResult, passes: int) -> tuple[list[str], bool]:
+    """What the program and the other files of a job hold, and what its simulation in so many passes needs."""
+    needs = []
+    if job.simulates:
+        stock, material = stock_body(job, done.reading.program), material_of(job)
+        bodies = bodies_of(job, done.reading, stock, done.machine, material)
+        needs = [estimate(passes * bodies.steps, len(done.reading.program))]
+    found = [str(f) for f in (*done.reading.findings, *done.reading.violations)]
+    count = len(done.reading.violations)
+    message = f"{count} finding{'s' if count > 1 else ''} exceed the limits" if count else "the limits hold"
+    holds = not count and worst_severity(done.reading.findings) < Severity.UNPROVEN
+    return [*found, f"{job.path.name}: read; {message} of machine {done.machine.name}", *needs], holds
+
+
+def text_to_change(
+    job: ProgramJob, reading: ProgramReading, stock: LayeredStock, machine: Machine, material: Material, key: str
+) -> tuple[str, str]:
+    """The text of a program whose words ``key`` of the operation changes, and its dialect.
+
+    Raises
+    ------
+    InputError
+        The text or the simulation cannot be used.
+    """
+    own = changeable(job.program_file, machine, job.table.program.dialect, f"operation.0.{key}")
+    straight(reading.program, key)
+    bodies_of(job, reading, stock, machine, material)
+    return own
+
+
+def simulated(
+    job: ProgramJob,
+    reading: ProgramReading,
+    stock: LayeredStock,
+    machine: Machine,
+    material: Material,
+    checkpoint: Checkpoint | None,
+    compliance: WorkpieceCompliance | None,
+    progress: Progress,
+) -> SimulationResult:
+    """The program, run through the stock of the job; ``compliance``: of the workpiece, None: not known yet."""
+    op: SimulateTable = job.table.operation[0]
+    bodies = bodies_of(job, reading, stock, machine, material)
+    program, times, fine, part = bodies.program, bodies.times, bodies.resolution, bodies.part
+    if compliance is None and job.table.workpiece is not None:
+        compliance = compliance_of_workpiece(job, reading, stock, machine, material, progress)
+    gives = bodies.stiffness if compliance is None else stiffness_of(job.table.stiffness, job.cutters, compliance.steps)
+    points, before, stiffness = bodies.stock_points, insides(stock), job.table.stiffness
+    # layers that were cut before lie face on face, which rays do not tell apart
+    blank = None if stock.cut.any() else stock.body()
+    watches = [with_checks(job.table.checks, material, deflecting(gives, material))]
+    steps = StepBlocks(program, op.step_mm, op.tolerance_mm)
+
+    def passing(share: float, what: str) -> Callable[[int], None]:
+        return lambda done: progress(share + SHARE * done / bodies.steps, what)
+
+    left, solids = None, dict(bodies.fixtures)
+    table = job.table.part
+    if part is not None and table is not None:
+        left = difference(
+            steps, job.cutters, part, before, table.spacing_mm, table.excess_range_mm, op.tolerance_mm,
+            passing(0.0, "distances to the part"),
+        )  # fmt: skip
+        solids["part"] = left.points
+    # form error costs as much as the chips, and says little where nothing is known to give way
+    made = left if stiffness is not None or compliance is not None or "form_error_um" in job.limits else None
+    if made is not None:
+        watches.append(forming(made, gives, material))
+
+    stability_watch = watch_of(job, material, compliance)
+    if stability_watch is not None:
+        watches.append(stability_watch)
+
+    def watch(cuts: Cuts) -> dict[str, NDArray[np.float64]]:
+        return {name: values for each in watches for name, values in each(cuts).items()}
+
+    def removing(done: float, what: str) -> None:
+        progress(SHARE + 0.8 * done, what)
+
+    if checkpoint is None:
+        removal = remove(
+            program, stock, job.cutters, material, fine, interpolation=op.interpolation, watch=watch, times=times,
+            engine=op.engine, progress=removing,
+        )  # fmt: skip
+    else:
+        formed = None if made is None else (made.points, made.faces, made.distance, made.step)
+        removal = remove_in_chunks(
+            program, stock, job.cutters, material, fine, checkpoint, interpolation=op.interpolation, watch=watch,
+            keeps=stability_watch, times=times, engine=op.engine, progress=removing,
+            also=(
+                versions(), sources(), repr((stiffness, job.table.workpiece)), repr(job.table.checks), formed,
+                None if stability_watch is None else stability_watch.dynamics,
+            ),
+        )  # fmt: skip
+    removal = with_columns(removal, (*watched(gives, formed=made is not None), *CHECK_COLUMNS))
+    removal = replace(
+        removal, resolution_error=with_compliance_error(removal.resolution_error, removal.columns, compliance)
+    )
+    if stability_watch is not None:
+        removal = with_columns(removal, stability_watch.columns)
+    touched = collisions(
+        steps, job.cutters, solids, op.tolerance_mm, above_only=frozenset(["part"]),
+        progress=passing(0.8 + SHARE, "collisions"),
+    )  # fmt: skip
+    if points is not None:
+        touched += in_stock(
+            steps, job.cutters, points, op.tolerance_mm, passing(0.8 + 2.0 * SHARE, "holders in the stock")
+        )  # fmt: skip
+    settings = {k: v for k, v in op.model_dump().items() if v is not None}
+    compared_with = (*solids, *(["stock"] if points is not None else []))
+    return SimulationResult(
+        removal, stock, machine, job.table.limits, settings, bodies.checks,
+        CollisionCheck(touched, compared_with, _no_holder(job), fixture_meshes(job)), left, gives.unknown,
+        None if stability_watch is None else stability_of(job, stability_watch, machine), compliance, blank,
+    )  # fmt: skip
+
+
+def compliance_of_workpiece(
+    job: ProgramJob,
+    reading: ProgramReading,
+    stock: LayeredStock,
+    machine: Machine,
+    material: Material,
+    progress: Progress,
+) -> WorkpieceCompliance | None:
+    """How the workpiece gives way where the program cuts it; None: no [workpiece] is stated."""
+    program, _ = timed(reading, job, machine)
+    return workpiece_compliance(job, program, stock, material, resolution_of(job, program), progress)
+
+
+def _no_holder(job: ProgramJob) -> tuple[int, ...]:
+    """Tools whose holder is not stated."""
+    return tuple(n for n, c in sorted(job.cutters.items()) if not c.holder)
