@@ -31,7 +31,7 @@ from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_name
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.sections import checked, loft, read_meridian, read_sections
 from chipload.planning.impeller.answer import largest_cutters
-from chipload.planning.impeller.compare import compared
+from chipload.planning.impeller.compare import cutter_choices
 from chipload.planning.impeller.costs import ChannelSide, Terms
 from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
@@ -226,7 +226,7 @@ def divide(title, impeller, catalogue, picked, tables, names, how, terms) -> Non
     print(f"\n{title}: {sum(len(s.area) for s in sides)} contact points, scallop {terms.scallop} mm; searched in "
           f"{time.perf_counter() - begun:.1f} s; not reached: {', '.join(unreached)}")  # fmt: skip
     begun = time.perf_counter()
-    ways = compared(sides, terms, picked, (1, 2, 3), workers=2)
+    ways = [x.partition(2) for x in cutter_choices(sides, terms, picked, (1, 2, 3), workers=2)]
     print(f"patches in {time.perf_counter() - begun:.1f} s")
     base = ways[0].divided
     for way in ways:

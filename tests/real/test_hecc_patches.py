@@ -11,7 +11,7 @@ from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.sections import checked, loft, read_meridian, read_sections
 from chipload.planning.impeller.answer import largest_cutters
-from chipload.planning.impeller.compare import compared, gouges
+from chipload.planning.impeller.compare import cutter_choices, gouges
 from chipload.planning.impeller.costs import ChannelSide, Terms
 from chipload.planning.impeller.impeller import Impeller
 
@@ -42,7 +42,8 @@ def test_patches_of_blade_and_splitter():
         area = np.linalg.norm(np.cross(np.gradient(grid, axis=0), np.gradient(grid, axis=1)), axis=2).ravel()
         answer = largest_cutters(scene, Catalogue("long", tuple(LONG)), TABLES, 0.5)
         sides.append(ChannelSide(body, side, scene, u, v, area, answer, 0.5))
-    ways = compared(sides, Terms(10.0, 0.05, 60.0, 30.0, 15), 0, (1, 2))
+    choices = cutter_choices(sides, Terms(10.0, 0.05, 60.0, 30.0, 15), 0, (1, 2))
+    ways = [choice.partition() for choice in choices]
     totals = [w.divided.total for w in ways]
     # the hand-picked one reaches the same points here, and is one of the catalogue
     assert [w.share for w in ways[1:]] == [ways[0].share] * 2

@@ -54,15 +54,7 @@ def check_job(
 
 
 def write_result(job: FinishedJob, out: str | Path) -> Path:
-    """Write the folder that ``chipload run`` writes, whole or not at all, and return it.
-
-    Raises
-    ------
-    InputError
-        The folder holds something else than an older result.
-    OutputError
-        It cannot be written.
-    """
+    """Write the folder that ``chipload run`` writes, whole or not at all; errors are those of ``FinishedJob.save``."""
     return job.save(out)
 
 

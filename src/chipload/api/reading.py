@@ -38,12 +38,7 @@ def read_machine(name: str | Path) -> Machine:
 
 
 def read_material(name: str | Path) -> Material:
-    """Read force coefficients: a shipped material by its name, or a TOML file.
-
-    Raises
-    ------
-    InputError
-        There is none of this name, or the file cannot be read.
+    """Read force coefficients: a shipped material by its name, or a TOML file. Errors are those of read_machine.
 
     Examples
     --------

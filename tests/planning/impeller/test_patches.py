@@ -10,7 +10,7 @@ from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_name
 from chipload.errors import InputError
 from chipload.planning.impeller.answer import largest_cutters, one_cutter
 from chipload.planning.impeller.closed_form import axis_at
-from chipload.planning.impeller.compare import clear_somewhere, compared, gouges
+from chipload.planning.impeller.compare import clear_somewhere, cutter_choices, gouges
 from chipload.planning.impeller.costs import STEP, ChannelSide, Costs, Measured, Terms
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.patches import costs_of, divided
@@ -174,7 +174,7 @@ def test_what_nothing_reaches_is_listed():
 
 
 def test_hand_picked_beside_one_and_two(sides):
-    ways = compared(sides, TERMS, 0, (1, 2, None))
+    ways = [choice.partition() for choice in cutter_choices(sides, TERMS, 0, (1, 2, None))]
     assert [w.name for w in ways] == ["hand-picked", "1 cutter", "2 cutters", "any cutters"]
     picked, *others = (w.divided for w in ways)
     totals = [d.total for d in others]
@@ -182,9 +182,8 @@ def test_hand_picked_beside_one_and_two(sides):
     # it is one of the catalogue
     assert others[0].total <= picked.total
     assert [w.share for w in ways] == [1.0] * 4
-    assert picked.total == pytest.approx(
-        compared(sides, Terms((2.0, 9.0, 9.0, 9.0), 0.1, 40.0, 15.0, 3), 0, ())[0].divided.total
-    )
+    (alone,) = cutter_choices(sides, Terms((2.0, 9.0, 9.0, 9.0), 0.1, 40.0, 15.0, 3), 0, ())
+    assert picked.total == pytest.approx(alone.partition().divided.total)
 
 
 def test_the_answer_is_clear_everywhere_and_the_next_size_is_not():
@@ -218,7 +217,7 @@ def test_refused(sides):
     with pytest.raises(InputError, match="feed_mm_s: 2 numbers: must be one or 4"):
         costs_of(sides, Terms((1.0, 2.0), 0.1, 1.0, 1.0))
     with pytest.raises(InputError, match="hand_picked = 4: must be an index of the 4 cutters"):
-        compared(sides, TERMS, 4)
+        cutter_choices(sides, TERMS, 4)
     with pytest.raises(InputError, match="contact point 0: the axis is at"):
         gouges(s.scene, 0, SHOP.cutters[0], math.pi / 2, math.atan2(-s.scene.normal[0][1], -s.scene.normal[0][0]))
 

@@ -128,29 +128,6 @@ def cutter_choices(
     return tuple(out)
 
 
-def compared(
-    sides: Sequence[ChannelSide],
-    terms: Terms,
-    hand_picked: int | None = None,
-    numbers: Sequence[int | None] = (1, 2, 3),
-    workers: int = 1,
-    progress: Progress = silent,
-) -> tuple[Partition, ...]:
-    """The sides with the hand-picked cutter (an index in the catalogue), then with so many cutters.
-
-    The hand-picked one goes where it can at all table angles; what it does not reach is its own list.
-
-    Raises
-    ------
-    InputError
-        The index is not in the catalogue.
-    """
-    return tuple(
-        way.partition(workers, progress)
-        for way in cutter_choices(sides, terms, hand_picked, numbers, workers, progress)
-    )
-
-
 def gouges(
     scene: Scene, point: int, cutter: CatalogueCutter, table: float, pallet: float, clearance: float = 0.0
 ) -> tuple[int, float] | None:

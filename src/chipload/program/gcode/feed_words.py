@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from chipload.errors import InputError
 
 #: comments, texts and names, in which no word stands
-_SHUT = re.compile(r"\([^)\n]*\)?|;[^\n]*|\"[^\"\n]*\"?|<[^>\n]*>?")
+COMMENTS = re.compile(r"\([^)\n]*\)?|;[^\n]*|\"[^\"\n]*\"?|<[^>\n]*>?")
 #: an F word that is a number, or the beginning of one that is calculated
 _F = re.compile(
     r"(?<![A-Za-z_])[Ff]\s*=?\s*"
@@ -55,7 +55,7 @@ def with_feeds(text: str, lines: Mapping[int, float]) -> str:
     old, now = math.nan, ""
     units, stated_in = {"length": "mm", "time": "94"}, dict[str, str]()
     for number, raw in enumerate(text.split("\n"), 1):
-        open_text = _SHUT.sub(lambda found: " " * len(found[0]), raw)
+        open_text = COMMENTS.sub(lambda found: " " * len(found[0]), raw)
         _straight(raw, open_text, number)
         word, factor = _feed_word(open_text, number), lines.get(number)
         if word is not None:

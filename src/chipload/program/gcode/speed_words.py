@@ -12,10 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from chipload.errors import InputError
-from chipload.program.gcode.feed_words import with_feeds
+from chipload.program.gcode.feed_words import COMMENTS, with_feeds
 
-#: comments, texts and names, in which no word stands
-_SHUT = re.compile(r"\([^)\n]*\)?|;[^\n]*|\"[^\"\n]*\"?|<[^>\n]*>?")
 #: an S word with its number, also ``S1=6000``, or the beginning of one that is calculated
 _S = re.compile(
     r"(?<![A-Za-z_])[Ss](?:\d+\s*=\s*|\s*=?\s*)"
@@ -87,7 +85,7 @@ def with_speeds(text: str, speeds: Mapping[int, float], feeds: Mapping[int, floa
 def _found(text: str) -> list[tuple[int, re.Match[str]]]:
     out = []
     for line, raw in enumerate(text.split("\n"), 1):
-        open_text = _SHUT.sub(lambda found: " " * len(found[0]), raw)
+        open_text = COMMENTS.sub(lambda found: " " * len(found[0]), raw)
         if _SURFACE.search(open_text):
             raise InputError(f"line {line}: G96: a constant surface speed has no spindle speed that could be changed")
         words = list(_S.finditer(open_text))
@@ -105,7 +103,7 @@ def _per_turn(text: str) -> set[int]:
     """Lines whose feed is counted per revolution."""
     out, time = set(), "94"
     for line, raw in enumerate(text.split("\n"), 1):
-        for found in _TIME.finditer(_SHUT.sub(" ", raw)):
+        for found in _TIME.finditer(COMMENTS.sub(" ", raw)):
             time = found[1]
         if time == "95":
             out.add(line)
