@@ -54,7 +54,7 @@ class Simulated:
         self.path, self.t, self.s, self.v, self.left, self.torque = path, 0.0, 0.0, 0.0, gone_after, torque
         self.sent, self.said = [], []
 
-    def exchange(self, feed, beat, torque, status, s):
+    def exchange(self, feed, beat, torque, status, s, limit):
         self.left -= 1
         if self.left < 0:
             return None

@@ -40,9 +40,9 @@ class WithSpindle(Simulated):
         self.w, self.sensed, self.constant, self.change = SPINDLE.speed, 4.512, constant, change
         self.summed, self.noise, self.greatest = 4.512, np.random.default_rng(0), 0.0
 
-    def exchange(self, feed, beat, torque, status, s):
+    def exchange(self, feed, beat, torque, status, s, limit):
         before = self.s
-        seen = super().exchange(feed, beat, torque, status, s)
+        seen = super().exchange(feed, beat, torque, status, s, limit)
         if seen is None:
             return None
         kt = SPINDLE.torque_constant * self.constant

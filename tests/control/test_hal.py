@@ -137,8 +137,8 @@ def test_off_the_path_it_is_air():
     """Beside the path there is no cut to be simulated, and the place stays."""
 
     class Aside(Simulated):
-        def exchange(self, feed, beat, torque, status, s):
-            seen = super().exchange(feed, beat, torque, status, s)
+        def exchange(self, feed, beat, torque, status, s, limit):
+            seen = super().exchange(feed, beat, torque, status, s, limit)
             return None if seen is None else seen._replace(z=seen.z + 1.0)
 
     machine = Aside(PATH, gone_after=100)
@@ -166,8 +166,8 @@ def test_a_machine_that_goes_back():
     """Taken away from the path and put down before a step: what lies ahead is asked anew."""
 
     class Back(Simulated):
-        def exchange(self, feed, beat, torque, status, s):
-            seen = super().exchange(feed, beat, torque, status, s)
+        def exchange(self, feed, beat, torque, status, s, limit):
+            seen = super().exchange(feed, beat, torque, status, s, limit)
             if self.t == pytest.approx(6.0):
                 self.s = 2.0
             return seen._replace(z=seen.z + 5.0) if 6.0 < self.t < 6.2 else seen

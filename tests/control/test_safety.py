@@ -59,7 +59,7 @@ class Cutting:
         self.t = self.s = self.v = self.lagged = 0.0
         self.k, self.sent, self.true = 0, [], []
 
-    def exchange(self, feed, beat, torque, status, s):
+    def exchange(self, feed, beat, torque, status, s, limit):
         self.left -= 1
         if self.left < 0:
             return None

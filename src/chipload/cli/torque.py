@@ -16,6 +16,7 @@ from chipload.errors import InputError
 from chipload.terminal import EXCEEDED, guarded, show
 
 if TYPE_CHECKING:
+    from chipload.control.hal import HalJob
     from chipload.control.identification import IdentifiedSpindle
 
 #: share of pairs below which a cut is not told from air
@@ -44,6 +45,10 @@ def hal(
     python: Annotated[
         str, typer.Option("--python", help="the interpreter that LinuxCNC's modules belong to")
     ] = "/usr/bin/python3",
+    panel: Annotated[
+        Path | None,
+        typer.Option("--panel", metavar="FILE", help="write the panel (PyVCP, .xml) and its .hal beside it, and leave"),
+    ] = None,
     debug: Debug = False,
 ) -> None:
     """Hold the torque on a LinuxCNC that runs: a component in HAL that sends the override; Ctrl-C ends it.
@@ -66,6 +71,8 @@ def hal(
             missing, there = ("--speed-pin", name_of) if speed_pin is None else (name_of, "--speed-pin")
             raise InputError(f"{missing}: missing: with {there} state both: the torque is told from current and speed")
         job, sources = load_hal(file), {}
+        if panel is not None:
+            return _write_panel(job, panel, name, out)
         if measured is not None and speed_pin is not None:
             job = replace(job, source="current" if power_pin is None else "power")
             sources = {"current-in": measured, "speed-in": speed_pin}
@@ -90,6 +97,24 @@ def hal(
         return 0 if record.ended == "path" else EXCEEDED
 
     guarded(work, debug)
+
+
+def _write_panel(job: HalJob, file: Path, name: str, out: Path | None) -> int:
+    """The panel of a controller and the lines of HAL that connect it."""
+    from chipload.control.linuxcnc.panel import panel_hal, panel_xml
+    from chipload.files import write_whole
+
+    if out is not None:
+        raise InputError("--panel, --out: a panel is written without a run: state one of them")
+    if file.suffix.lower() != ".xml":
+        raise InputError(f"--panel {file}: must end with .xml: its lines of HAL stand beside it, in .hal")
+    wires = file.with_suffix(".hal")
+    write_whole(file, panel_xml(job).encode("utf-8"))
+    write_whole(wires, panel_hal(name).encode("utf-8"))
+    show(f"written: {file}, {wires}")
+    show(f"under AXIS: [DISPLAY] PYVCP = {file.name}, [HAL] POSTGUI_HALFILE = {wires.name}")
+    show(f"by itself: loadusr -Wn pyvcp pyvcp -c pyvcp {file.name}, then source {wires.name}")
+    return 0
 
 
 @app.command()

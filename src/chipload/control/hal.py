@@ -216,9 +216,10 @@ def control(
     cut = _Cut(job.spindle, real, job.deviation.drift(job.spindle), job.source, at_speed(real))
     s, row, beat, on, due = float(path.model.s[0]), 0, False, False, clock()
     sent, status, ended = 0.0, Status.RUN, Ended.ASKED
+    told_torque, limit = 0.0, 1e-3 * config.torque_ref * float(path.relief[0])
     rows: list[tuple[float, ...]] = []
     while not stop():
-        seen = machine.exchange(sent, beat, 1e-3 * cut.state.filtered, STATUS.index(status), s)
+        seen = machine.exchange(sent, beat, told_torque, STATUS.index(status), s, limit)
         beat = not beat
         if seen is None:
             ended = Ended.GONE
@@ -247,6 +248,7 @@ def control(
             expected = cut.state.expected / relief
             reading = Reading(torque / relief, seconds, trusted, actual, expected, most_allowed, not on)
             sent, status, state = step(config, job.table, state, reading)
+            told_torque, limit = 1e-3 * torque if math.isfinite(torque) else 0.0, 1e-3 * config.torque_ref * relief
             rows.append((seen.time, s, seen.velocity, sent, seen.feed, true.edge + true.cut, torque,
                          STATUS.index(status), away, relief, cut.current, speed))  # fmt: skip
             if s >= path.model.s[-1] - 1e-3 and seen.velocity == 0.0 and status not in STOPS:

@@ -15,15 +15,21 @@ from importlib import resources
 from types import TracebackType
 from typing import NamedTuple, Protocol
 
+from chipload.control.override import STATUS
 from chipload.errors import InputError
 
-#: name, type, direction of the pins; lengths in machine units, which must be mm, torque in N m, velocity in mm/s
+#: name, type, direction of the pins; lengths in machine units, which must be mm, torque in N m, velocity in mm/s;
+#: `load` is the torque in percent of the limit that is held, one pin `why-...` is on; each has a signal
+#: `<component>-<pin>`
 PINS: tuple[tuple[str, str, str], ...] = (
     ("feed", "float", "out"),
     ("beat", "bit", "out"),
     ("torque", "float", "out"),
     ("status", "s32", "out"),
     ("s", "float", "out"),
+    ("limit", "float", "out"),
+    ("load", "float", "out"),
+    *((f"why-{status}", "bit", "out") for status in STATUS),
     ("x", "float", "in"),
     ("y", "float", "in"),
     ("z", "float", "in"),
@@ -33,8 +39,6 @@ PINS: tuple[tuple[str, str, str], ...] = (
     ("current-in", "float", "in"),
     ("speed-in", "float", "in"),
 )
-#: pins that each have a signal of the name `<component>-<pin>`
-SIGNALS = ("feed", "beat", "x", "y", "z", "velocity", "torque-in", "feed-in", "current-in", "speed-in")
 
 
 class PinValues(NamedTuple):
@@ -56,8 +60,11 @@ class PinValues(NamedTuple):
 class ControlledMachine(Protocol):
     """Whatever takes an override and says where it is."""
 
-    def exchange(self, feed: float, beat: bool, torque: float, status: int, s: float) -> PinValues | None:
-        """Set the out pins, read the in pins; None: the machine is gone."""
+    def exchange(self, feed: float, beat: bool, torque: float, status: int, s: float, limit: float) -> PinValues | None:
+        """Set the out pins, read the in pins; None: the machine is gone.
+
+        ``torque`` is what the controller is told, 0 without a reading, ``limit`` what it holds at this place [N m].
+        """
 
 
 class HalPins:
@@ -92,7 +99,7 @@ class HalPins:
             )  # fmt: skip
         except OSError as err:
             raise InputError(f"--python = {python}: cannot be run: {err.strerror}") from None
-        signals = {pin: f"{name}-{pin}" for pin in SIGNALS}
+        signals = {pin: f"{name}-{pin}" for pin, _, _ in PINS}
         answer = self._line(
             json.dumps({"name": name, "pins": PINS, "signals": signals, "sources": dict(sources or {})})
         )
@@ -101,9 +108,11 @@ class HalPins:
             why = (self._process.communicate()[1].strip().splitlines() or ["no answer"])[-1]
             raise InputError(f"hal component {name}: not taken: {why}: start LinuxCNC first, with its own Python")
 
-    def exchange(self, feed: float, beat: bool, torque: float, status: int, s: float) -> PinValues | None:
+    def exchange(self, feed: float, beat: bool, torque: float, status: int, s: float, limit: float) -> PinValues | None:
         """Set the out pins, read the in pins; None: the component is gone."""
-        answer = self._line(f"{feed!r} {int(beat)} {torque!r} {status} {s!r}")
+        load = 100.0 * torque / limit if limit > 0.0 else 0.0
+        why = " ".join(str(int(k == status)) for k in range(len(STATUS)))
+        answer = self._line(f"{feed!r} {int(beat)} {torque!r} {status} {s!r} {limit!r} {load!r} {why}")
         words = answer.split() if answer is not None else []
         return PinValues(*map(float, words)) if len(words) == len(PinValues._fields) else None
 
