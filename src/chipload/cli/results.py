@@ -60,15 +60,28 @@ def export(
     csv: Annotated[bool, typer.Option("--csv", help="history.csv: a row a step, units in the names")] = False,
     vtk: Annotated[bool, typer.Option("--vtk", help="paths .vtp, maps .vtu, stock .vtu and .stl: ParaView")] = False,
     sheet: Annotated[bool, typer.Option("--sheet", help="setup.html: one page to be printed")] = False,
+    load_monitor: Annotated[
+        str | None,
+        typer.Option(
+            "--load-monitor",
+            metavar="FORMAT",
+            help="reference loads of the spindle: csv, a row a section; heidenhain, AFC-LOAD of each tool",
+        ),
+    ] = None,
+    spindle: Annotated[
+        Path | None,
+        typer.Option("--spindle", metavar="FILE", help="written by chipload spindle --power: the motor's power"),
+    ] = None,
     debug: Debug = False,
 ) -> None:
-    """Write a result as CSV, VTK and a setup sheet for the machine; without an option, all of them."""
+    """Write a result as CSV, VTK and a setup sheet for the machine; without an option, these three."""
 
     def work() -> int:
         from chipload.report.export import KINDS, export_result
 
         asked = [kind for kind, wanted in zip(KINDS, (csv, vtk, sheet), strict=True) if wanted]
-        for name in export_result(result, out, asked or KINDS):
+        kinds = asked if asked or load_monitor is not None else KINDS
+        for name in export_result(result, out, kinds, load_monitor, spindle):
             show(f"written: {out / name}")
         return 0
 

@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 
 from chipload.errors import InputError
 from chipload.files import cannot_write, fresh_folder
+from chipload.report.load_monitor import MONITORS, afc_table, load_csv, sections_of
 from chipload.report.presentation import Content
 from chipload.report.setup_sheet import setup_sheet
 from chipload.report.vtk import polyline, triangles
@@ -28,11 +29,15 @@ KINDS = ("csv", "vtk", "sheet")
 ROWS = 65_536
 
 
-def export_result(folder: Path, out: Path, kinds: Sequence[str] = KINDS) -> tuple[str, ...]:
+def export_result(
+    folder: Path, out: Path, kinds: Sequence[str] = KINDS, monitor: str | None = None, spindle: Path | None = None
+) -> tuple[str, ...]:
     """Write a result folder as other files into a new or empty folder; whole or not at all.
 
     ``csv``: history.csv, a row a step, units in the names of the columns. ``vtk``: the path of each track with all its
     numbers (.vtp), surface maps (.vtu), the stock that is left (.vtu and .stl). ``sheet``: setup.html, one page.
+    ``monitor``: reference loads for a load monitor, ``csv`` or ``heidenhain``; ``spindle``: the file that tells the
+    motor's power.
 
     Returns
     -------
@@ -53,10 +58,22 @@ def export_result(folder: Path, out: Path, kinds: Sequence[str] = KINDS) -> tupl
         files |= _vtk(result, folder)
     if "sheet" in kinds:
         files["setup.html"] = lambda: setup_sheet(result)
+    if monitor is not None:
+        files |= _load_monitor(result, monitor, spindle)
+    elif spindle is not None:
+        raise InputError("--spindle: belongs to --load-monitor: state both")
     if not files:
         raise InputError(f"{folder}: nothing to export: name one of {', '.join(KINDS)}")
     _write(files, out)
     return tuple(files)
+
+
+def _load_monitor(result: Result, monitor: str, spindle: Path | None) -> dict[str, Callable[[], Content]]:
+    if monitor not in MONITORS:
+        raise InputError(f"--load-monitor {monitor}: must be one of {', '.join(MONITORS)}")
+    sections = sections_of(result, spindle)
+    content = load_csv(sections) if monitor == "csv" else afc_table(sections)
+    return {MONITORS[monitor]: lambda: content}
 
 
 def _csv(history: Path, file: IO[bytes]) -> None:
