@@ -11,10 +11,10 @@ from plotly.subplots import make_subplots
 
 from chipload.jobs.program.numbers import COMPARED, exceeding, feed_numbers
 from chipload.jobs.program.outcome import FeedResult, SimulationResult, SpeedResult
-from chipload.report.figures import FONT, GRID, LIMIT, LINE_POINTS
-from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table
 from chipload.result import COLUMNS, LimitCheck
+from chipload.result.style import FONT, GRID, LIMIT, LINE_POINTS
+from chipload.result.thinning import thinned
 
 #: colours of the program as it was, and with its new feeds
 BEFORE, AFTER = "#c9821a", "#3457a6"
