@@ -49,7 +49,7 @@ stiffness_percent = 20.0
 [[dynamics.mode]]
 frequency_hz = 900.0
 damping_ratio = 0.03
-stiffness_n_um = 20.0
+stiffness_n_um = 1.5
 direction = "y"
 [[operation]]
 kind = "simulate"
