@@ -1,4 +1,4 @@
-"""chipload plans and proves CNC milling of the parts that are hard to mill.
+"""chipload simulates, checks and plans CNC milling of parts that are hard to mill.
 
 The public names are those of ``__all__``. Each is imported when it is asked for, so that ``import chipload`` stays
 light. Units stand in the names of keys and columns, as in the job file: ``Cutter(diameter_mm=10, ...)``.

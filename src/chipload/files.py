@@ -120,9 +120,9 @@ def cannot_write(target: str | Path, err: OSError) -> OutputError:
     """What is said where ``target`` cannot be written.
 
     >>> str(cannot_write("a.nc", OSError(errno.ENOSPC, "No space left on device")))
-    'a.nc: cannot be written: No space left on device: free space; the same command goes on'
+    'a.nc: cannot be written: No space left on device: free space; the same command continues'
     """
-    remedy = "free space; the same command goes on" if is_full(err) else "name another place"
+    remedy = "free space; the same command continues" if is_full(err) else "name another place"
     return OutputError(f"{target}: cannot be written: {err.strerror or err}: {remedy}")
 
 

@@ -14,13 +14,18 @@ from chipload.errors import InputError
 EXTRAS: Mapping[str, tuple[str, str]] = {
     "cad": ("OCP", "reading STEP files"),
     "web": ("nicegui", "the page in the browser"),
-    "notebook": ("pandas", "tables in a notebook"),
+    "notebook": ("pandas", "a table of pandas or a dataset of xarray"),
     "cluster": ("distributed", "a sweep on a Dask cluster"),
 }
 
 
-def require_extra(extra: str) -> None:
+def require_extra(extra: str, module: str = "") -> None:
     """Refuse what needs an extra of the package that is not installed.
+
+    Parameters
+    ----------
+    extra : name of the extra
+    module : that is needed; empty: the first that the extra installs
 
     Raises
     ------
@@ -29,8 +34,8 @@ def require_extra(extra: str) -> None:
 
     >>> require_extra("web")
     """
-    module, use = EXTRAS[extra]
-    if find_spec(module) is None:
+    first, use = EXTRAS[extra]
+    if find_spec(module or first) is None:
         raise InputError(f"{use} needs the extra {extra!r}, which is not installed: pip install 'chipload[{extra}]'")
 
 

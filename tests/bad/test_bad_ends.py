@@ -70,7 +70,7 @@ def test_stdout_that_is_full(bracket: Path) -> None:
         done = command("check", bracket, stdout=full, capture_output=False, stderr=subprocess.PIPE)
     assert done.returncode == 4
     assert done.stderr == (
-        "chipload: stdout: cannot be written: No space left on device: free space; the same command goes on\n"
+        "chipload: stdout: cannot be written: No space left on device: free space; the same command continues\n"
     )
 
 
@@ -191,7 +191,7 @@ def test_input_that_is_refused_before_the_work_begins_leaves_what_was_kept(tmp_p
 
 
 def test_a_full_disk_ends_with_its_own_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The report cannot be written: what was simulated is kept, and with space the same command goes on to its end."""
+    """The report cannot be written: what was simulated is kept; with free space the same command continues."""
     copy_example("chips", tmp_path / "job")
     words = ["run", str(tmp_path / "job" / "job.toml"), "--out", str(tmp_path / "out"), "--keep-s", "0"]
 
@@ -202,12 +202,12 @@ def test_a_full_disk_ends_with_its_own_code(tmp_path: Path, monkeypatch: pytest.
         patch.setattr(folder, "_write", full)
         ended = CliRunner().invoke(app, words)
     assert ended.exit_code == 4, ended.output
-    assert "cannot be written: No space left on device: free space; the same command goes on" in ended.output
+    assert "cannot be written: No space left on device: free space; the same command continues" in ended.output
     assert not (tmp_path / "out").exists()
     assert (tmp_path / "out.unfinished" / LAST).exists()
     again = CliRunner().invoke(app, words)
     assert again.exit_code in (0, 3), again.output
-    assert "goes on after step" in again.output
+    assert "continues after step" in again.output
     assert not (tmp_path / "out.unfinished").exists()
 
 

@@ -106,7 +106,7 @@ def test_a_fault_in_the_middle_leaves_the_older_result(
 
     monkeypatch.setattr(folder, "page_bytes", fail)
     expected = OutputError if isinstance(fault, OSError) else type(fault)
-    said = f"--out {out}: cannot be written: No space left on device: free space; the same command goes on"
+    said = f"--out {out}: cannot be written: No space left on device: free space; the same command continues"
     with pytest.raises(expected, match=re.escape(said) if isinstance(fault, OSError) else None):
         written(outcome("backward"), out)
     assert {p.name: p.read_bytes() for p in out.iterdir()} == before
@@ -159,5 +159,5 @@ def test_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", code, str(conftest), str(out)], capture_output=True, text=True, timeout=120, check=True
     )
-    assert done.stdout == f"--out {out}: cannot be written: File too large: free space; the same command goes on\n"
+    assert done.stdout == f"--out {out}: cannot be written: File too large: free space; the same command continues\n"
     assert list(tmp_path.iterdir()) == []

@@ -78,7 +78,7 @@ def test_a_run_that_was_killed_goes_on_to_the_same_bytes(folder: Path) -> None:
     assert (folder / "killed.unfinished" / "last.json").exists()
     again = ended(start(folder, "killed"))
     assert again.returncode == 0
-    found = re.fullmatch(r"chipload: goes on after step (\d+) of (\d+), kept in \S+killed.unfinished\n", again.stderr)
+    found = re.fullmatch(r"chipload: continues after step (\d+) of (\d+), kept in \S+killed.unfinished\n", again.stderr)
     assert found is not None
     assert 0 < int(found[1]) < int(found[2])
     same(folder, "killed")
@@ -91,7 +91,7 @@ def test_a_run_by_layers_that_was_killed_goes_on_to_the_same_bytes(folder: Path)
     assert killed.returncode == -signal.SIGKILL
     again = ended(start(folder, "killed-layers", *engine))
     assert again.returncode == 0
-    assert re.match(r"chipload: goes on after step \d+ of \d+, kept in ", again.stderr)
+    assert re.match(r"chipload: continues after step \d+ of \d+, kept in ", again.stderr)
     same(folder, "killed-layers", "layers")
 
 
@@ -126,7 +126,7 @@ def test_a_run_with_modes_that_was_killed_goes_on_to_the_same_bytes(folder: Path
     assert list((folder / "killed-modes.unfinished").glob("watch-*.npz"))
     again = ended(start(folder, "killed-modes", file="modes.toml"))
     assert again.returncode in (0, 3)
-    assert re.match(r"chipload: goes on after step \d+ of \d+, kept in ", again.stderr)
+    assert re.match(r"chipload: continues after step \d+ of \d+, kept in ", again.stderr)
     same(folder, "killed-modes", "modes")
     # the modes belong to the input
     stop(folder, "other-modes", signal.SIGKILL, file="modes.toml")
@@ -140,7 +140,7 @@ def test_ctrl_c_says_what_is_kept_and_how_to_go_on(folder: Path, how: signal.Sig
     stopped = stop(folder, "stopped", how)
     assert stopped.returncode == 130
     assert re.fullmatch(
-        r"chipload: stopped: \d+ steps are kept in stopped.unfinished: the same command goes on from there, with "
+        r"chipload: stopped: \d+ steps are kept in stopped.unfinished: the same command continues from there, with "
         r"--fresh it begins again\n",
         stopped.stderr,
     )

@@ -351,7 +351,7 @@ def test_check(job):
         ("[round]", '[program]\nfile = "x.ngc"\n[round]', "program, round: both are stated"),
         ("acceleration_mm_s2 = 1000.0", "acceleration_mm_s2 = 9000.0", "must be at most 3000, that of machine vmc"),
         ("cutter = 1", "cutter = 2", "round.cutter = 2: no [[cutter]] has this number"),
-        ("hold = 0.9\n", "", "override.hold: missing: state it (share of the limit of torque that is held)"),
+        ("hold = 0.9\n", "", "override.hold: missing: state it (set point, as a share of the limit of torque)"),
         ("form_error_um = 30.0\n", "", "limits.form_error_um: missing: state it"),
         ("torque_over_percent = 5.0\n", "", "limits.torque_over_percent: missing: state it"),
         ("idle_error_share = 0.01\n", "", "spindle.idle_error_share: missing: state it"),

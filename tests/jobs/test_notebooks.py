@@ -1,4 +1,4 @@
-"""The notebooks that are shipped run, and say what closed forms and symmetry say."""
+"""The notebooks that are shipped run, and their last cells agree with closed forms and symmetry."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NAMES = sorted(p.stem for p in FOLDER.glob("*.ipynb"))
 
 
 def ran(name: str) -> tuple[Any, list[Any]]:
-    """What the last cell of a notebook says, and all outputs."""
+    """The value of the last cell of a notebook, and all outputs."""
     book = nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
     place = {"metadata": {"path": str(FOLDER)}}
     nbclient.NotebookClient(book, timeout=300, kernel_name="python3", resources=place).execute()
@@ -74,3 +74,25 @@ def test_wall() -> None:
     assert said["weaker_by"] == pytest.approx(after / before)
     # more than a beam whose upper half is 2/3 as thick, 7/8 + 27/8 / 8; less than if all of it were
     assert 7.0 / 8.0 + 27.0 / 64.0 < said["weaker_by"] < 27.0 / 8.0
+
+
+def test_contour() -> None:
+    found, out = ran("contour")
+    # radial depth 0.1 on a straight wall; in the corner the centre runs on a radius of 3 and the stock begins at 7.9
+    assert found["straight_deg"] == pytest.approx(math.degrees(math.acos(1.0 - 0.1 / 5.0)), abs=0.01)
+    corner = math.degrees(math.acos((7.9**2 - 3.0**2 - 5.0**2) / (2.0 * 3.0 * 5.0)))
+    assert found["corner_deg"] == pytest.approx(corner, abs=0.02)
+    assert found["straight_deg"] < found["backward_deg"] < 13.0 < found["corner_deg"]
+    assert found["verdict"] == "holds"
+    assert set(found["time_s"]) == {"backward", "plain", "feed"}
+    assert "<table>" in out[0].data["text/html"]
+
+
+def test_torque() -> None:
+    found, _ = ran("torque")
+    own, over = found["in_use"], found["over_percent"]
+    assert over[own] <= 0.0
+    # whatever takes less time exceeds the allowable torque
+    assert all(over[name] > 0.0 for name, t in found["time_s"].items() if t < found["time_s"][own])
+    assert len(over) == 6
+    assert sum(value <= 0.0 for value in over.values()) == 3

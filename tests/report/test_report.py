@@ -26,11 +26,12 @@ from chipload.jobs.contour.scene import scene_bytes
 from chipload.planning.result import Event, StrategyResult
 from chipload.report.folder import write_result
 from chipload.report.page import limits_table, page_bytes
-from chipload.report.shape import pieces, slab, thinned
+from chipload.report.shape import pieces, slab
 from chipload.result import Verdict
 from chipload.result.history import write_history
 from chipload.result.load import load_result
 from chipload.result.summary import summary_bytes
+from chipload.result.thinning import thinned
 
 Maker = Callable[..., ContourResult]
 

@@ -133,7 +133,7 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_bytes(
     assert found == whole
     assert done[0] > shares[-1] - 0.2
     assert len(said) == 1
-    assert said[0].startswith("goes on after step ")
+    assert said[0].startswith("continues after step ")
 
 
 def test_one_worker_and_two_give_the_same_bytes(tmp_path: Path, whole: list[bytes]) -> None:
@@ -243,7 +243,7 @@ def test_a_run_that_was_killed_before_its_result_was_written_simulates_nothing(t
         again = remove_in_chunks(some_rows(), stock, CUTTERS, MATERIAL, ROUGH, kept)
         assert np.array_equal(again.columns["force_n"], force)
     assert (again.volume_after, stock.volume()) == (first.volume_after, first.volume_after)
-    assert said[0].startswith(f"goes on after step {len(force)} of {len(force)}")
+    assert said[0].startswith(f"continues after step {len(force)} of {len(force)}")
 
 
 def test_rows_of_uneven_pieces(tmp_path: Path) -> None:

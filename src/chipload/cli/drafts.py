@@ -1,4 +1,4 @@
-"""Commands for what a user has before there is a job: init and simulate."""
+"""Commands for files without a job: init and simulate."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ File = Annotated[
 
 MachineOf = Annotated[
     str | None,
-    typer.Option("--on", metavar="MACHINE", help="a shipped machine, or a file (.toml); else guessed"),
+    typer.Option("--on", metavar="MACHINE", help="a shipped machine, or a file (.toml); default: guessed"),
 ]
 
 
@@ -30,7 +30,7 @@ MachineOf = Annotated[
 def init(
     file: File,
     folder: Annotated[
-        Path | None, typer.Argument(metavar="DIR", help="where job.toml is written; of a template: leave FILE out")
+        Path | None, typer.Argument(metavar="DIR", help="folder for job.toml or for a template (without FILE)")
     ] = None,
     for_machine: MachineOf = None,
     tools: Tools = None,
@@ -41,10 +41,10 @@ def init(
     fixture: Annotated[bool, typer.Option("--fixture", help="write a block as a fixture (STL) into DIR")] = False,
     debug: Debug = False,
 ) -> None:
-    """Write a job for a file: what the file states, and guesses for the rest, which you confirm.
+    """Write a job for a file, with guesses to confirm for all that the file does not state.
 
-    A job that is there is not overwritten. `chipload init --material DIR` writes a template of a material instead;
-    likewise --machine, --catalogue, --controller and --fixture.
+    An existing job is not overwritten. `chipload init --material DIR` writes a commented template of a material;
+    --machine, --catalogue, --controller and --fixture work likewise.
     """
 
     def work() -> int:
@@ -76,7 +76,7 @@ def init(
 
 
 def _templates(kinds: list[str], folder: Path) -> int:
-    """Write templates and say how a job names them."""
+    """Write templates and show how a job names them."""
     from chipload.jobs.drafts.templates import write_template
 
     tables = {
@@ -94,14 +94,14 @@ def _templates(kinds: list[str], folder: Path) -> int:
 def simulate(
     file: File,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="the result folder; none: the verdict alone")
+        Path | None, typer.Option("--out", metavar="DIR", help="the result folder; default: only the verdict is shown")
     ] = None,
     machine: MachineName = None,
     tools: Tools = None,
     sets: Sets = None,
     debug: Debug = False,
 ) -> None:
-    """A first look at a file without a job: what `init` guesses is taken as it is, so that nothing is proven."""
+    """Run a file without a job. The guesses of `init` are accepted, so the verdict is never better than unproven."""
 
     def work() -> int:
         from tempfile import TemporaryDirectory

@@ -20,27 +20,32 @@ KEEP_S = 10.0
 @app.command()
 def run(
     job: JobFile,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="the result folder; appears whole or not at all")],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="the result folder; written completely or not at all")
+    ],
     sets: Sets = None,
     fresh: Annotated[
-        bool, typer.Option("--fresh", help="throw away what an earlier run of a program kept when it was stopped")
+        bool, typer.Option("--fresh", help="discard the checkpoint of a stopped run and start again")
     ] = False,
     keep_s: Annotated[
         float,
         typer.Option(
             "--keep-s",
-            help="seconds of simulation between two states from which a stopped run can go on; 0: as often as possible",
+            help="seconds between two checkpoints of a simulation; 0: as often as possible",
         ),
     ] = KEEP_S,
     accept: Accept = False,
     coarse: Annotated[
-        bool, typer.Option("--coarse", help="a first answer with larger steps in about a tenth of the time; unproven")
+        bool,
+        typer.Option(
+            "--coarse", help="larger steps, about a tenth of the time; the verdict is never better than unproven"
+        ),
     ] = False,
     debug: Debug = False,
 ) -> None:
-    """Plan a job and prove its programs, or read the program that it names; write the result folder.
+    """Run a job: plan or read its programs, simulate and check them; write the result folder.
 
-    A simulation that was stopped goes on where it was when the same command is given again.
+    The same command continues a simulation that was stopped.
     """
 
     def work() -> int:
@@ -74,7 +79,7 @@ def run(
                 if not kept.safe:
                     raise
                 raise Cancelled(
-                    f"{kept.safe} steps are kept in {kept.folder.name}: the same command goes on from there, with "
+                    f"{kept.safe} steps are kept in {kept.folder.name}: the same command continues from there, with "
                     "--fresh it begins again"
                 ) from None
             kept.discard()
@@ -90,11 +95,13 @@ def run(
 @app.command()
 def fit(
     file: Annotated[Path, typer.Argument(metavar="FIT", help="the fit (TOML): measured cuts, cutter, engagement")],
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="the result folder; appears whole or not at all")],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="the result folder; written completely or not at all")
+    ],
     sets: Sets = None,
     debug: Debug = False,
 ) -> None:
-    """Identify force coefficients from measured forces; write a material, its intervals and what it predicts."""
+    """Identify force coefficients from measured forces; write a material with intervals, and its predictions."""
 
     def work() -> int:
         from chipload.jobs import load_job, run_job
@@ -120,14 +127,12 @@ def fit(
 @app.command()
 def cuts(
     job: JobFile,
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="the table (CSV), to be filled in")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="the table (CSV) for the measured values")],
     sites: Annotated[int, typer.Option("--sites", help="places on the wall, at least 4")] = 6,
-    repeats: Annotated[
-        int, typer.Option("--repeats", help="places that are cut twice, which says how they scatter")
-    ] = 2,
-    steps: Annotated[int, typer.Option("--steps", help="depths below and above what the model says, each")] = 2,
+    repeats: Annotated[int, typer.Option("--repeats", help="places that are cut twice, to find the scatter")] = 2,
+    steps: Annotated[int, typer.Option("--steps", help="depths below and above that of the model, each")] = 2,
     bracket: Annotated[float, typer.Option("--bracket", help="factor from force to force")] = 1.25,
-    scatter_percent: Annotated[float, typer.Option("--scatter-percent", help="expected of one cut")] = 5.0,
+    scatter_percent: Annotated[float, typer.Option("--scatter-percent", help="expected scatter of a single cut")] = 5.0,
     sets: Sets = None,
     debug: Debug = False,
 ) -> None:

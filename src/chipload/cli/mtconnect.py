@@ -15,7 +15,7 @@ from chipload.terminal import guarded, show
 @app.command()
 def mtconnect(
     source: Annotated[
-        str, typer.Argument(metavar="SOURCE", help="address of an agent, as http://127.0.0.1:5000, or an XML file")
+        str, typer.Argument(metavar="SOURCE", help="address of an agent, e.g. http://127.0.0.1:5000, or an XML file")
     ],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help=".toml: the machine; .csv: a log of its spindle")],
     device: Annotated[str | None, typer.Option("--device", help="name of the device, where there are several")] = None,

@@ -44,10 +44,11 @@ def check(
     sets: Sets = None,
     debug: Debug = False,
 ) -> None:
-    """Read any file as a run would and list all that is wrong; nothing is run or written.
+    """Read a job or any file that a job names, and list all errors. Nothing is run or written.
 
-    A job with all that it names; a program as its controller does, on machine vmc (or one with the rotary axes that it
-    needs) where none is stated; a fit; the faces of a STEP file; a drawing, mesh, machine, material or tool table.
+    FILE is a job, which is read with all files that it names; a program, which is read as its controller reads it, on
+    machine vmc (or one with the rotary axes that it needs) if none is stated; a fit; a STEP file, whose faces are
+    listed; or a drawing, mesh, machine, material or tool table.
     """
 
     def work() -> int:
@@ -82,20 +83,20 @@ def check(
 def convert(
     source: Annotated[Path, typer.Argument(metavar="PROGRAM", help="NC text or CL data")],
     target: Annotated[
-        Path, typer.Argument(metavar="FILE", help="what is written; its ending says what: .ngc, .nc, .apt")
+        Path, typer.Argument(metavar="FILE", help="the new file; its ending determines the format: .ngc, .nc, .apt")
     ],
     machine: MachineName = None,
     from_machine: Annotated[
-        str | None, typer.Option("--from", metavar="MACHINE", help="the machine of the source, if another")
+        str | None, typer.Option("--from", metavar="MACHINE", help="the machine of the source, if it is another one")
     ] = None,
     tools: Tools = None,
     dialect: DialectName = None,
     feed_mm_min: FeedIfUnsaid = None,
     tolerance_mm: ToleranceMm = TOLERANCE_MM,
-    tcp: Annotated[bool, typer.Option("--tcp", help="tell the controller the tip while rotary axes move")] = False,
+    tcp: Annotated[bool, typer.Option("--tcp", help="program the tip (TCP) while rotary axes move")] = False,
     debug: Debug = False,
 ) -> None:
-    """Write a program for a machine, or as CL data; it is not verified, and its first line says so."""
+    """Convert a program for another machine, or to CL data. The new program is not verified; its first line says so."""
 
     def work() -> int:
         from chipload.files import write_whole

@@ -1,4 +1,4 @@
-"""Commands that show what there is: example and view."""
+"""Commands that copy examples and show or export results."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from chipload.terminal import guarded, show
 
 @app.command()
 def example(
-    name: Annotated[str | None, typer.Argument(help="the example; none: list them")] = None,
-    folder: Annotated[Path | None, typer.Argument(metavar="DIR", help="where it is copied to")] = None,
+    name: Annotated[str | None, typer.Argument(help="name of the example; default: list all")] = None,
+    folder: Annotated[Path | None, typer.Argument(metavar="DIR", help="folder for the copy")] = None,
     debug: Debug = False,
 ) -> None:
-    """List the examples, or copy one out."""
+    """Copy an example; without a name, list them."""
 
     def work() -> int:
         from chipload.examples import copy_example, example_titles
@@ -38,11 +38,11 @@ def example(
 @app.command()
 def view(
     path: Annotated[Path, typer.Argument(metavar="PATH", help="a result folder, a job, or a folder that holds them")],
-    port: Annotated[int | None, typer.Option("--port", min=1, max=65535, help="else 8170, or a free one")] = None,
+    port: Annotated[int | None, typer.Option("--port", min=1, max=65535, help="default: 8170, or a free port")] = None,
     open_browser: Annotated[bool, typer.Option("--open/--no-open", help="open the page in the browser")] = True,
     debug: Debug = False,
 ) -> None:
-    """Show results and jobs of a folder in the browser, run jobs there; only for this computer; Ctrl-C ends it."""
+    """Show results and run jobs of a folder in the browser, on this computer only. Ctrl-C ends it."""
 
     def work() -> int:
         from chipload.web.serve import serve
@@ -57,9 +57,9 @@ def view(
 def export(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="a result folder of chipload run")],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="a new or empty folder for the files")],
-    csv: Annotated[bool, typer.Option("--csv", help="history.csv: a row a step, units in the names")] = False,
+    csv: Annotated[bool, typer.Option("--csv", help="history.csv: a row for each step, units in the names")] = False,
     vtk: Annotated[bool, typer.Option("--vtk", help="paths .vtp, maps .vtu, stock .vtu and .stl: ParaView")] = False,
-    sheet: Annotated[bool, typer.Option("--sheet", help="setup.html: one page to be printed")] = False,
+    sheet: Annotated[bool, typer.Option("--sheet", help="setup.html: one page to print")] = False,
     load_monitor: Annotated[
         str | None,
         typer.Option(

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @app.command()
 def machines(debug: Debug = False) -> None:
-    """List the machines that come with chipload: axes, travel, feed, spindle, where the numbers come from."""
+    """List the machines that come with chipload: axes, travel, feed, spindle, source of the numbers."""
     guarded(lambda: _shown("machines"), debug)
 
 
@@ -33,7 +33,7 @@ def cutters(debug: Debug = False) -> None:
 
 @app.command()
 def examples(debug: Debug = False) -> None:
-    """List the examples; chipload example NAME DIR copies one."""
+    """List the examples. `chipload example NAME DIR` copies one."""
     guarded(lambda: _shown("examples"), debug)
 
 

@@ -15,25 +15,31 @@ from chipload.terminal import EXCEEDED, bar, guarded, show
 @app.command()
 def sweep(
     job: JobFile,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="the folder of the sweep; a stopped one goes on")],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="the folder of the sweep; a stopped sweep continues")
+    ],
     over: Annotated[
         list[str] | None,
-        typer.Option("--over", metavar="KEY.PATH=A,B,C", help="values of a key; repeatable: all combinations are run"),
+        typer.Option("--over", metavar="KEY.PATH=A,B,C", help="values of a key; repeatable; all combinations are run"),
     ] = None,
     samples: Annotated[
-        int, typer.Option("--samples", help="samples of the force coefficients for each combination; 0: as stated")
+        int,
+        typer.Option("--samples", help="samples of force coefficients and modes for each combination; 0: as stated"),
     ] = 0,
-    seed: Annotated[int, typer.Option("--seed", help="of the samples")] = 1,
+    seed: Annotated[int, typer.Option("--seed", help="seed of the samples")] = 1,
     confidence: Annotated[
         float, typer.Option("--confidence", help="share of the samples in which a combination must hold")
     ] = 0.95,
     workers: Annotated[int, typer.Option("--workers", help="processes on this computer")] = 1,
     dask: Annotated[
-        str | None, typer.Option("--dask", metavar="ADDRESS", help="a Dask scheduler, as tcp://host:8786, instead")
+        str | None,
+        typer.Option(
+            "--dask", metavar="ADDRESS", help="address of a Dask scheduler, e.g. tcp://host:8786, in place of --workers"
+        ),
     ] = None,
     debug: Debug = False,
 ) -> None:
-    """Run a job for all combinations of some values; write a table, a plot and the job that holds in the least time."""
+    """Run a job for all combinations of values; write a table, a plot and the fastest job that holds."""
 
     def work() -> int:
         from chipload.sweep.cases import Samples
@@ -47,7 +53,7 @@ def sweep(
                     confidence=confidence, progress=progress,
                 )  # fmt: skip
         except (KeyboardInterrupt, Cancelled):
-            raise Cancelled("finished cases are kept: the same command goes on") from None
+            raise Cancelled("finished cases are kept: the same command continues") from None
         for file in write_sweep(done, job, out):
             show(f"written: {file}")
         show(done.message)

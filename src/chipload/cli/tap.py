@@ -14,21 +14,21 @@ from chipload.terminal import guarded, show
 @app.command()
 def tap(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FRF...", help="receptances (CSV, .frf, .uff), one a direction")
+        list[Path], typer.Argument(metavar="FRF...", help="receptances (CSV, .frf, .uff), one for each direction")
     ],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="the modes (TOML), for [dynamics] file")],
     direction: Annotated[
-        list[str] | None, typer.Option("--direction", help="x or y of the machine, for each file in its order")
+        list[str] | None, typer.Option("--direction", help="x or y of the machine, one for each file in order")
     ] = None,
     unit: Annotated[
-        str | None, typer.Option("--unit", help="m/N, mm/N, um/N, m/s/N or m/s2/N, where the file does not state it")
+        str | None, typer.Option("--unit", help="m/N, mm/N, um/N, m/s/N or m/s2/N, if the file does not state it")
     ] = None,
     tool: Annotated[int | None, typer.Option("--tool", min=0, help="tool number; none: every tool")] = None,
     from_hz: Annotated[float | None, typer.Option("--from-hz", min=0.0, help="lowest frequency of the fit")] = None,
     to_hz: Annotated[float | None, typer.Option("--to-hz", min=0.0, help="highest frequency of the fit")] = None,
     debug: Debug = False,
 ) -> None:
-    """Fit modes to hammer tests of a tool's tip; refused where they do not fit."""
+    """Fit modes to hammer tests at the tip of a tool; a poor fit is refused."""
 
     def work() -> int:
         from chipload.files import write_whole

@@ -26,24 +26,28 @@ TOLD_APART = 0.8
 @app.command()
 def hal(
     file: Annotated[Path, typer.Argument(metavar="HAL", help="the controller (TOML): path, override, spindle")],
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="what happened, step by step (CSV)")] = None,
-    name: Annotated[str, typer.Option("--name", help="of the component; its pins and signals begin so")] = "chipload",
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="log of every period (CSV)")] = None,
+    name: Annotated[
+        str, typer.Option("--name", help="name of the component, and prefix of its pins and signals")
+    ] = "chipload",
     current_pin: Annotated[
         str | None,
         typer.Option(
-            "--current-pin", metavar="PIN", help="pin or signal with the spindle's current [A], as vfd.current"
+            "--current-pin", metavar="PIN", help="pin or signal with the spindle's current [A], e.g. vfd.current"
         ),
     ] = None,
     power_pin: Annotated[
         str | None,
-        typer.Option("--power-pin", metavar="PIN", help="the same of its power [W], in the place of the current"),
+        typer.Option("--power-pin", metavar="PIN", help="pin or signal with its power [W], in place of the current"),
     ] = None,
     speed_pin: Annotated[
         str | None,
-        typer.Option("--speed-pin", metavar="PIN", help="of the spindle's speed [rev/s], as spindle.0.speed-in"),
+        typer.Option(
+            "--speed-pin", metavar="PIN", help="pin or signal with the spindle's speed [rev/s], e.g. spindle.0.speed-in"
+        ),
     ] = None,
     python: Annotated[
-        str, typer.Option("--python", help="the interpreter that LinuxCNC's modules belong to")
+        str, typer.Option("--python", help="the Python interpreter that has LinuxCNC's modules")
     ] = "/usr/bin/python3",
     panel: Annotated[
         Path | None,
@@ -51,10 +55,10 @@ def hal(
     ] = None,
     debug: Debug = False,
 ) -> None:
-    """Hold the torque on a LinuxCNC that runs: a component in HAL that sends the override; Ctrl-C ends it.
+    """Control the torque on a running LinuxCNC: a HAL component that sets the feed override. Ctrl-C ends it.
 
-    The torque is estimated from the spindle's current and speed (--current-pin, --speed-pin); else by the `source` of
-    the file.
+    The torque is estimated from the spindle's current and speed (--current-pin, --speed-pin). Without these options the
+    file states the `source`.
     """
 
     def work() -> int:
@@ -119,34 +123,36 @@ def _write_panel(job: HalJob, file: Path, name: str, out: Path | None) -> int:
 
 @app.command()
 def spindle(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="logs (CSV) of cuts and air runs")],
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="logs (CSV) of cuts and of the idle spindle")],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="the spindle (TOML), for [spindle] file of a job")],
     columns: Annotated[
         Path | None,
-        typer.Option("--columns", metavar="FILE", help="names and units of the columns (TOML), if they are not known"),
+        typer.Option(
+            "--columns", metavar="FILE", help="names and units of the columns (TOML), if the log does not state them"
+        ),
     ] = None,
     air: Annotated[
         list[Path] | None, typer.Option("--air", metavar="LOG", help="a log in which nothing is cut; repeatable")
     ] = None,
-    power: Annotated[bool, typer.Option("--power", help="read the column of power, not the one of current")] = False,
+    power: Annotated[bool, typer.Option("--power", help="use the column of power, not that of current")] = False,
     torque_constant_nm_a: Annotated[
-        float | None, typer.Option("--torque-constant-nm-a", help="that is known, from the data sheet")
+        float | None, typer.Option("--torque-constant-nm-a", help="torque constant of the data sheet")
     ] = None,
     efficiency: Annotated[
-        float | None, typer.Option("--efficiency", help="of the spindle, that is known; with --power")
+        float | None, typer.Option("--efficiency", help="efficiency of the spindle, if known; with --power")
     ] = None,
     sensor_lag_s: Annotated[
-        float | None, typer.Option("--sensor-lag-s", help="time constant of the sensor, that is known")
+        float | None, typer.Option("--sensor-lag-s", help="time constant of the sensor, if known")
     ] = None,
     flutes: Annotated[
-        int | None, typer.Option("--flutes", help="of the cutter: names the tooth passing frequency")
+        int | None, typer.Option("--flutes", help="flutes of the cutter, for the tooth passing frequency")
     ] = None,
     debug: Debug = False,
 ) -> None:
-    """Identify a spindle from logs: what torque its current or power means, over which range, how surely.
+    """Identify a spindle from logs: its torque for a current or power, the valid range and the intervals.
 
-    Columns that are known by name: time_s, speed_rpm, current_a or power_w, torque_nm (0 in the air). Each log is
-    predicted from the others. Exit code 3: the spindle does not tell cuts from air.
+    Columns that are known by name: time_s, speed_rpm, current_a or power_w, torque_nm (0 for the idle spindle). Each
+    log is predicted from the others. Exit code 3: the current does not distinguish a cut from the idle spindle.
     """
 
     def work() -> int:

@@ -94,7 +94,7 @@ class Override:
     error_span, change_span : e and d at which the sets end
     pi_gain, pi_rate : dq = pi_gain d + pi_rate e dt; pi_rate [1/s]
     overload_steps, stuck_steps, air_steps, settle_steps : in steps
-    low_share, low_steps : a reading below that share of the prediction is not believed, and so many of them stop
+    low_share, low_steps : a reading below this share of the prediction is rejected, and so many of them stop
     off_path_steps : a load off the path stops after so many
     gap_s : a longer time between steps counts as a start [s], at most 10
     quantum : step of the override that the controller takes; 0: any value

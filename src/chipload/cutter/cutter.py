@@ -53,7 +53,7 @@ class Cutter:
     holder : (length, diameter) [mm] of its parts, upwards from the overhang; empty: not known
     tip_stiffness : [N/mm] of the tip across the axis under a slow force, measured in the machine; None: not known
     gullet : area between two teeth in a section across the axis [mm^2]; None: not known
-    chip_ratio : volume that chips fill over what they are cut from, >= 1; with ``gullet`` or not at all
+    chip_ratio : volume of loose chips over the volume cut, >= 1; with ``gullet`` or not at all
     fluted_factor : equivalent diameter of the fluted part over the diameter, in bending and torsion, (0, 1]
     strength : what its material carries
     number : tool number, >= 0; 0: what is in the spindle where a program names no tool

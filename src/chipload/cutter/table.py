@@ -70,7 +70,7 @@ class CutterTable(BaseModel):
         None, description="measured stiffness of the tip across the axis; in place of grip, holder and spindle"
     )
     gullet_mm2: float | None = Field(None, description="area between two teeth in a section across the axis")
-    chip_ratio: float | None = Field(None, description="volume that chips fill over what they are cut from")
+    chip_ratio: float | None = Field(None, description="volume of loose chips over the volume cut")
     fluted_factor: float | None = Field(None, description="equivalent diameter of the fluted part over diameter_mm")
     tool_material: Literal["carbide", "hss"] | None = Field(None, description="none: by modulus_gpa, steel below 350")
     strength_mpa: float | None = Field(None, description="rupture strength of carbide, yield strength of steel")
@@ -78,7 +78,9 @@ class CutterTable(BaseModel):
     stress_concentration: float | None = Field(None, description="stress at a notch over that of a smooth bar")
     file: str | None = Field(None, description=f"tool data: {', '.join(ENDINGS)}")
     tool: int | None = Field(None, description="number of the tool in the file, where it holds several")
-    file_unit: Literal["mm", "inch"] | None = Field(None, description="of a tool table (.tbl), which does not say it")
+    file_unit: Literal["mm", "inch"] | None = Field(
+        None, description="unit of a tool table (.tbl), which does not state it"
+    )
 
     def cutter(self, folder: str | Path = ".") -> Cutter:
         """The cutter; ``file`` is relative to ``folder``.

@@ -127,7 +127,7 @@ class ChecksTable(Table):
 
     cutter_strength: bool = Field(True, strict=True, description="stress of the cutter against its strength")
     flute_length: bool = Field(True, strict=True, description="no shank in material above the flutes")
-    chip_space: bool = Field(True, strict=True, description="room for chips, where gullet_mm2 is stated")
+    chip_space: bool = Field(True, strict=True, description="chip space, if gullet_mm2 is stated")
     chip_range: bool = Field(True, strict=True, description="chip thickness within the range of the coefficients")
     spindle: bool = Field(True, strict=True, description="torque and power of the machine's spindle")
     rigid_model: bool = Field(True, strict=True, description="deflection against feed per tooth and radial depth")

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.report.shape import thinned
 from chipload.report.view import Colouring, ViewPath
 from chipload.result import COLUMNS, LimitCheck
+from chipload.result.thinning import thinned
 from chipload.simulation.removal_mesh import RemovalMesh
 
 Floats = NDArray[np.float64]

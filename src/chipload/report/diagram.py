@@ -21,7 +21,7 @@ from chipload.engagement.chips.diagram import diagram
 from chipload.engagement.chips.move import Move
 from chipload.engagement.chips.ring import Origin, Ring
 from chipload.errors import InputError
-from chipload.report.figures import FONT, GRID, INK, STOCK
+from chipload.result.style import FONT, GRID, INK, STOCK
 
 Floats = NDArray[np.float64]
 

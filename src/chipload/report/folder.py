@@ -94,7 +94,7 @@ def write_finished(result: Result, presentation: Presentation, out: str | Path, 
     try:
         return write_result(result, presentation, out, progress)
     except InputError as err:
-        raise OutputError(f"{err}; the same command goes on") from None
+        raise OutputError(f"{err}; the same command continues") from None
 
 
 def write_result(result: Result, presentation: Presentation, out: str | Path, progress: Progress = silent) -> Path:

@@ -1,8 +1,7 @@
-"""Drawn contours as triangles, and long columns as the few points that show all their extremes."""
+"""Drawn contours as triangles, and the pieces that a path is drawn in."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -19,26 +18,6 @@ Ints = NDArray[np.int64]
 CHORD_MM = 0.005
 #: rows farther apart than this many usual steps are not joined by a line
 JUMP = 8.0
-
-
-def thinned(values: Floats, most: int) -> Ints:
-    """(m,) rows of a column to draw: at most about ``most``, each bucket's least and greatest, first and last kept.
-
-    Rows that are not a number separate pieces and are kept.
-
-    >>> thinned(np.array([0.0, 1.0, 9.0, 1.0, 0.0, -5.0, 0.0, 2.0]), 4).tolist()
-    [0, 2, 5, 7]
-    """
-    n = len(values)
-    if n <= most:
-        return np.arange(n)
-    buckets = max(1, most // 2)
-    edges = np.linspace(0, n, buckets + 1).astype(np.int64)
-    low, high = np.where(np.isnan(values), np.inf, values), np.where(np.isnan(values), -np.inf, values)
-    keep = [np.array([0, n - 1]), np.flatnonzero(np.isnan(values))]
-    for a, b in itertools.pairwise(edges.tolist()):
-        keep.append(np.array([a + low[a:b].argmin(), a + high[a:b].argmax()]))
-    return np.unique(np.concatenate(keep))
 
 
 def pieces(history: Mapping[str, NDArray[Any]]) -> Ints:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.report.bodies import Body
-from chipload.report.figures import SCALE
+from chipload.result.style import SCALE
 from chipload.simulation.removal_mesh import RemovalMesh
 
 Floats = NDArray[np.float64]

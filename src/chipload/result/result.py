@@ -5,23 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, InputError
-from chipload.lazy import require_extra
 from chipload.result.columns import COLUMNS
-from chipload.result.limits import LimitCheck
+from chipload.result.display import result_html
+from chipload.result.limits import Columns, LimitCheck
+from chipload.result.tabular import pandas_of, xarray_of
 from chipload.result.track import Track
 from chipload.result.verdict import Verdict
 
 if TYPE_CHECKING:
     import pandas
+    import plotly.graph_objects as go
+    import xarray
 
 Floats = NDArray[np.float64]
+#: most columns that are plotted where none is named
+MOST_ROWS = 5
 
 
 @dataclass(frozen=True)
@@ -156,13 +160,29 @@ class Result:
         return f"{self.verdict.value.capitalize()}: {found[0]}{more}."
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the message and a table of the limits."""
-        rows = "".join(
-            f"<tr><td>{escape(track.name)}</td><td>{escape(check.text)}</td><td>{check.state.value}</td></tr>"
-            for track in self.in_use
-            for check in track.limits
-        )
-        return f"<p><b>{escape(self.message)}</b></p><table>{rows}</table>"
+        """What a notebook shows: the message, and tables of limits, tracks and findings."""
+        return result_html(self)
+
+    def plot(self, *columns: str, track: str = "", x: Literal["t_s", "s_mm"] = "t_s") -> go.Figure:
+        """Columns of a track one below the other, with their limits, against time or path.
+
+        Parameters
+        ----------
+        columns : names; none: those that the limits of the track bound, then force, torque and power; at most five
+        track : name; none: the first in use
+        x : time or path
+
+        Raises
+        ------
+        InputError
+            There is no track or column of that name, or the track has no history.
+        """
+        from chipload.result.plot import USUAL, columns_figure
+
+        chosen, history = self._chosen(track), self._history(track)
+        bound = [check.column.name for check in chosen.limits]
+        names = columns or tuple(dict.fromkeys(c for c in (*bound, *USUAL) if c in history))[:MOST_ROWS]
+        return columns_figure(history, {check.name: check.limit for check in chosen.limits}, names, x)
 
     def to_pandas(self, track: str = "") -> pandas.DataFrame:
         """The history of a track as a table of pandas; no name: the first in use. Needs ``chipload[notebook]``.
@@ -170,16 +190,19 @@ class Result:
         Raises
         ------
         InputError
-            There is no track of that name, or pandas is not installed.
+            There is no track of that name, it has no history, or pandas is not installed.
         """
-        require_extra("notebook")
-        import pandas
+        return pandas_of(self._history(track))
 
-        names = [one.name for one in self.tracks]
-        if not names or (track and track not in names):
-            raise InputError(f"track {track!r}: is not in the result: it has {', '.join(names) or 'none'}")
-        columns = self.track(track or names[0]).columns
-        return pandas.DataFrame({name: np.array(values) for name, values in columns.items()})
+    def to_xarray(self, track: str = "") -> xarray.Dataset:
+        """The history of a track as a dataset of xarray, with units; no name: the first in use.
+
+        Raises
+        ------
+        InputError
+            There is no track of that name, it has no history, or xarray is not installed (``chipload[notebook]``).
+        """
+        return xarray_of(self._history(track))
 
     def track(self, name: str) -> Track:
         """The track of a name.
@@ -190,6 +213,22 @@ class Result:
             There is none.
         """
         return {track.name: track for track in self.tracks}[name]
+
+    def _chosen(self, name: str) -> Track:
+        names = [one.name for one in self.tracks]
+        if not names or (name and name not in names):
+            raise InputError(f"track {name!r}: is not in the result: it has {', '.join(names) or 'none'}")
+        return self.track(name or names[0])
+
+    def _history(self, name: str) -> Columns:
+        chosen = self._chosen(name)
+        columns = chosen.columns
+        if not columns:
+            with_history = [one.name for one in self.tracks if any(True for _ in one.blocks())]
+            raise InputError(
+                f"track {chosen.name!r}: has no history: these have one: {', '.join(with_history) or 'none'}"
+            )
+        return columns
 
 
 def _located(finding: Finding) -> str:

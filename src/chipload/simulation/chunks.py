@@ -142,7 +142,7 @@ def remove_in_chunks(
             setting = replace(setting, moves=None)
         elif setting.moves is not None:
             setting.moves.skip(program, resolution.step_mm, sums.steps)
-        unfinished.notice(f"goes on after step {sums.steps} of {count}, kept in {unfinished.folder}")
+        unfinished.notice(f"continues after step {sums.steps} of {count}, kept in {unfinished.folder}")
     try:
         sums, columns = _removed(program, stock, sums, setting, unfinished, count, times, keeps, progress)
     except HandOver as found:

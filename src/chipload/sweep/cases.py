@@ -1,4 +1,4 @@
-"""The cases of a sweep: combinations of values of a job's keys, each with samples of the material."""
+"""The cases of a sweep: combinations of values of a job's keys, each with samples of material and modes."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Samples:
-    """Samples of the force coefficients within what is known of them.
+    """Samples of the force coefficients, and of the modes, within what is known of them.
 
     Parameters
     ----------
@@ -66,10 +66,19 @@ class Samples:
         if self.seed < 0:
             raise InputError(f"--seed = {self.seed}: must be at least 0")
 
-    def of(self, material: Material) -> list[Material]:
+    def points(self, dimensions: int) -> NDArray[np.float64]:
+        """(count, dimensions) points of a scrambled Sobol sequence in the unit cube."""
+        sobol = qmc.Sobol(dimensions, rng=np.random.default_rng(self.seed))
+        return np.asarray(sobol.random(1 << (self.count - 1).bit_length())[: self.count])
+
+    def of(self, material: Material, normal: NDArray[np.float64] | None = None) -> list[Material]:
         """Materials whose coefficients are samples of the normal distribution that ``material`` states.
 
-        Tangential coefficients stay in the range that is believed. Points: a scrambled Sobol sequence.
+        Tangential coefficients stay in the range that is believed.
+
+        Parameters
+        ----------
+        normal : (count, 6) standard normal numbers; None: of :meth:`points`
 
         Raises
         ------
@@ -79,8 +88,9 @@ class Samples:
         if not self.count:
             return []
         factor = _root(material.variances)
-        points = qmc.Sobol(6, rng=np.random.default_rng(self.seed)).random(1 << (self.count - 1).bit_length())
-        drawn = norm.ppf(np.clip(points[: self.count], 1e-9, 1.0 - 1e-9)) @ factor.T + np.array(material.coefficients)
+        if normal is None:
+            normal = norm.ppf(np.clip(self.points(6), 1e-9, 1.0 - 1e-9))
+        drawn = normal @ factor.T + np.array(material.coefficients)
         drawn[:, 0], drawn[:, 3] = np.clip(drawn[:, 0], 10.0, 2e4), np.clip(drawn[:, 3], 0.0, 1e3)
         names = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")
         return [

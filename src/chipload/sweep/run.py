@@ -10,21 +10,20 @@ from typing import Any
 
 from scipy.stats import binomtest
 
-from chipload.cutting.material import Material, material_named, material_text, read_material
 from chipload.errors import InputError
-from chipload.files import hash_of, is_file, read_regular, write_whole
-from chipload.jobs import load_job
+from chipload.files import hash_of, is_file, read_regular
 from chipload.progress import Progress, silent
 from chipload.result import Verdict
 from chipload.sweep.case_run import REFUSED, Record, case_key, case_record, kept_record
 from chipload.sweep.cases import Case, Samples, cases_of
+from chipload.sweep.sampled import sample_files
 from chipload.sweep.workers import completed
 from chipload.tables import LARGEST_FILE, parsed
 
 #: share of the samples in which a combination must hold
 CONFIDENCE = 0.95
-#: folder of the cases and of the sampled materials in the folder of a sweep
-CASES, MATERIALS = "cases", "materials"
+#: folder of the cases in the folder of a sweep
+CASES = "cases"
 #: a longer text is no name of a file
 LONGEST_NAME = 1000
 
@@ -141,7 +140,7 @@ def run_sweep(
     job : the job file
     over : texts ``key.path=a,b,c``, see :func:`chipload.sweep.cases_of`
     out : folder of the sweep: ``cases/`` has a record, a summary and a history for each case
-    samples : of the material, for each combination
+    samples : of material and modes, for each combination
     workers : processes
     dask : address of a Dask scheduler whose workers see the same files; then ``workers`` has no meaning
     confidence : share of the samples in which a combination must hold
@@ -164,7 +163,7 @@ def run_sweep(
     job, out, samples = Path(job).absolute(), Path(out).absolute(), samples or Samples()
     text = read_regular(job, str(job), LARGEST_FILE, "not a job")
     cases = cases_of(over, samples.count)
-    materials = _materials(job, cases, samples, out / MATERIALS)
+    files = sample_files(job, cases, samples, out)
     (out / CASES).mkdir(parents=True, exist_ok=True)
     inputs = _inputs(
         job.parent, [parsed(job.name, text), *(value.strip("\"'") for c in cases for _, value in c.values)]
@@ -172,10 +171,10 @@ def run_sweep(
     records: dict[int, Record] = {}
     tasks, waiting = [], []
     for k, case in enumerate(cases):
-        chosen = materials[case.combination][case.sample - 1] if case.sample else ""
-        overrides = (*case.overrides, *((f'material.file="{chosen}"',) if chosen else ()))
+        chosen = files[case.combination][case.sample - 1] if case.sample else None
+        overrides = (*case.overrides, *(chosen.overrides if chosen else ()))
         folder = out / CASES / case.name
-        hashed = inputs | ({"sample": hash_of(chosen)} if chosen else {})
+        hashed = inputs | (dict(chosen.hashes) if chosen else {})
         key = case_key(text, hashed, (*case.overrides, str(case.sample)))
         if (kept := kept_record(folder, key)) is not None:
             records[k] = kept
@@ -198,32 +197,3 @@ def _inputs(folder: Path, raw: Any) -> dict[str, str]:
     if not isinstance(raw, str) or len(raw) > LONGEST_NAME or not is_file(folder / raw):
         return {}
     return {raw: hash_of(folder / raw)}
-
-
-def _materials(job: Path, cases: Sequence[Case], samples: Samples, folder: Path) -> dict[int, list[Path]]:
-    """Files with the samples of the material of each combination; equal materials share their files."""
-    if not samples.count:
-        return {}
-    out: dict[int, list[Path]] = {}
-    written: dict[str, list[Path]] = {}
-    for case in cases:
-        if case.combination in out:
-            continue
-        loaded = load_job(job, case.overrides)
-        source = getattr(loaded.job, "material", None)
-        if source is None:
-            raise InputError(f"--samples: a {loaded.capability.name} job without a material has nothing to sample")
-        material = _material(source)
-        text = material_text(material)
-        if text not in written:
-            own = folder / f"{len(written) + 1:03d}"
-            own.mkdir(parents=True, exist_ok=True)
-            written[text] = [own / f"sample-{k:06d}.toml" for k in range(1, samples.count + 1)]
-            for file, sample in zip(written[text], samples.of(material), strict=True):
-                write_whole(file, material_text(sample).encode())
-        out[case.combination] = written[text]
-    return out
-
-
-def _material(source: str | Path) -> Material:
-    return read_material(source) if isinstance(source, Path) else material_named(source)

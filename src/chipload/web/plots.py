@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.report.figures import FONT, GRID, INK, LIMIT
-from chipload.report.shape import thinned
+from chipload.result.style import FONT, GRID, INK, LIMIT
+from chipload.result.thinning import thinned
 from chipload.web.checks import Bound, bound_of, label_and_unit
 from chipload.web.result import PageResult, PageTrack, TextColumn
 

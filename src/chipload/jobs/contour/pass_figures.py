@@ -19,7 +19,9 @@ from chipload.jobs.contour.outcome import Operation
 from chipload.jobs.contour.result import limits_of
 from chipload.machine.machine import Machine
 from chipload.planning.result import StrategyResult
-from chipload.report.figures import (
+from chipload.report.shape import CHORD_MM, pieces
+from chipload.result import COLUMNS, LimitCheck, Verdict
+from chipload.result.style import (
     FONT,
     GRID,
     INK,
@@ -31,8 +33,7 @@ from chipload.report.figures import (
     STOCK,
     WALL,
 )
-from chipload.report.shape import CHORD_MM, pieces, thinned
-from chipload.result import COLUMNS, LimitCheck, Verdict
+from chipload.result.thinning import thinned
 
 Floats = NDArray[np.float64]
 

@@ -77,9 +77,7 @@ class OperationTable(Table):
     link_feed_mm_min: Positive | None = Field(
         None, le=1e5, description="feed of links through cleared space; none: the machine's greatest feed"
     )
-    link_lift_mm: NotNegative | None = Field(
-        None, description="how far links stay off the floor, where they are long enough; none: 0.1"
-    )
+    link_lift_mm: NotNegative | None = Field(None, description="clearance of long links above the floor; none: 0.1")
     engagement_deg: Literal["limit"] | Engagement | None = Field(
         None,
         description="engagement that a pocket keeps, instead of radial_depth_mm; limit: the greatest within all limits",
@@ -91,7 +89,9 @@ class OperationTable(Table):
         None, description="pre-drilled holes to enter by, as deep as the pocket: x, y, diameter of each"
     )
     rest_of: int | None = Field(
-        None, ge=0, description="number of an earlier pocket operation, from 0: only what its larger cutter left is cut"
+        None,
+        ge=0,
+        description="number of an earlier pocket operation, from 0: rest machining of what its larger cutter left",
     )
 
 

@@ -15,11 +15,11 @@ from chipload.jobs.feeds.result import result_of
 from chipload.jobs.simulation.figures import program_presentation
 from chipload.jobs.simulation.outcome import SimulationResult
 from chipload.jobs.simulation.result import changed_name
-from chipload.report.figures import FONT, GRID, LIMIT, LINE_POINTS
 from chipload.report.presentation import Presentation
-from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table
 from chipload.result import COLUMNS, LimitCheck
+from chipload.result.style import FONT, GRID, LIMIT, LINE_POINTS
+from chipload.result.thinning import thinned
 
 #: colours of the program as it was, and with its new feeds
 BEFORE, AFTER = "#c9821a", "#3457a6"

@@ -18,7 +18,7 @@ class FeedsTable(Table):
         None, description="least feed per tooth of a line that cuts, so that it does not rub"
     )
     air_mm_min: Positive | None = Field(
-        None, le=1e6, description="feed of a line that touches nothing, if it is slower; none: it keeps its own"
+        None, le=1e6, description="feed of a line without a cut, if it is slower; none: unchanged"
     )
     change_least_percent: NotNegative = Field(
         5.0, lt=100.0, description="a feed that could rise by less than this stays that of the line before"

@@ -17,10 +17,10 @@ from chipload.cutting.material import material_text
 from chipload.jobs.fit.job import CHANNELS
 from chipload.jobs.fit.outcome import FitResult
 from chipload.jobs.fit.result import MATERIAL, UNITS
-from chipload.report.figures import FONT, GRID, INK, LIMIT
 from chipload.report.presentation import Content, Presentation
 from chipload.report.scene import TOOL
 from chipload.report.sheet import definitions, figure, table
+from chipload.result.style import FONT, GRID, INK, LIMIT
 from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]

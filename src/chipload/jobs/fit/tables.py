@@ -73,7 +73,7 @@ class FitJobTable(Table):
     name: Text = Field(description="of the material that is made")
     source: Text = Field(description="where the measurements come from")
     workpiece: str = Field("", description="what was cut")
-    conditions: str = Field("", description="how it was cut, as dry or flood")
+    conditions: str = Field("", description="cutting conditions, e.g. dry or flood")
     method: Literal["average", "instantaneous"] = Field(description="from mean forces, or from whole turns")
     band_hz: Positive | None = Field(None, description="harmonics up to here count; instantaneous needs it")
     runout: Literal["seek", "given"] = Field("seek", description="fitted too, or that of the cutter")

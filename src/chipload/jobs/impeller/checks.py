@@ -15,8 +15,8 @@ from chipload.jobs.impeller.roughing_check import rough_sections
 from chipload.jobs.impeller.surface_figures import styled
 from chipload.planning.impeller.surfaces import BODIES
 from chipload.program.program import RAPID
-from chipload.report.figures import FONT, GRID, LIMIT
 from chipload.report.sheet import figure, table
+from chipload.result.style import FONT, GRID, LIMIT
 
 #: rows of one program that the view in space shows at most
 ROWS = 20_000

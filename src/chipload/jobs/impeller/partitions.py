@@ -12,8 +12,8 @@ from chipload.jobs.impeller.outcome import PICKED, ImpellerResult, Searched
 from chipload.jobs.impeller.surface_figures import styled
 from chipload.planning.impeller.compare import Partition
 from chipload.planning.impeller.patch import Patch
-from chipload.report.figures import FONT, GRID
 from chipload.report.sheet import figure, table
+from chipload.result.style import FONT, GRID
 
 Ints = NDArray[np.int64]
 

@@ -16,7 +16,7 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.jobs.impeller.mesh import grid_faces, surface_mesh
 from chipload.jobs.impeller.outcome import Searched
 from chipload.planning.impeller.closed_form import axis_at
-from chipload.report.figures import FONT, GRID, INK, LIMIT, SCALE
+from chipload.result.style import FONT, GRID, INK, LIMIT, SCALE
 
 Floats = NDArray[np.float64]
 

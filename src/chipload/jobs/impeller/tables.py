@@ -42,12 +42,12 @@ class SectionsTable(Table):
     splitter: tuple[Text, ...] = Field((), description="likewise; none: there are no splitters")
     hub: Text
     shroud: Text
-    unit: Unit = Field(description="of the files, which do not say it")
+    unit: Unit = Field(description="unit of the files, which do not state it")
     columns: Literal["X R*THETA R", "X R THETA_DEG", "X Y Z"] | None = Field(
         None, description="of files that do not name them"
     )
     flow_along_x: bool = Field(description="true: the flow comes along +X of the files, and the part is turned over")
-    hub_ahead_mm: NotNegative = Field(description="how far the hub goes on ahead of the leading edge")
+    hub_ahead_mm: NotNegative = Field(description="length of the hub ahead of the leading edge")
 
 
 class StepTable(Table):
@@ -58,7 +58,7 @@ class StepTable(Table):
 
     file: Text = Field(description="`chipload check FILE` lists its faces")
     flow: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = Field(
-        description="which way along the axis of rotation the flow comes in; the axis goes through the origin"
+        description="direction of the incoming flow along the axis of rotation, which contains the origin"
     )
     plus: SideFaces = Field(description="side that faces a growing angle about the axis, seen against the flow")
     minus: SideFaces = Field(description="side that faces a falling angle, of the same blade or of another")
@@ -67,8 +67,8 @@ class StepTable(Table):
     hub: tuple[FaceName, ...] | Text = Field(description="faces of revolution, or a file of points as of sections")
     shroud: tuple[FaceName, ...] | Text = Field(description="likewise; the tip of one blade is faces of it")
     unit: Unit | None = Field(None, description="of hub and shroud where they are files of points")
-    fit_mm: Positive = Field(0.001, le=0.1, description="how far a patch may leave its face where it is fitted")
-    hub_ahead_mm: NotNegative = Field(description="how far the hub goes on ahead of the leading edge")
+    fit_mm: Positive = Field(0.001, le=0.1, description="greatest deviation of a fitted patch from its face")
+    hub_ahead_mm: NotNegative = Field(description="length of the hub ahead of the leading edge")
 
 
 class ImpellerTable(Table):
@@ -97,7 +97,7 @@ class SurfaceTable(Table):
     side: Literal["plus", "minus", "floor", "plus fillet", "minus fillet"] = Field(
         description="plus faces a growing angle; floor: the hub beyond it; fillet: between the side and the hub"
     )
-    along: Span = Field(description="from where to where along the surface, 0 to 1")
+    along: Span = Field(description="range along the surface, 0 to 1")
     up: Span = Field(description="from where to where up from the hub, across on a floor, 0 to 1")
     points: tuple[Count, Count] = Field(description="contact points along and up")
 
@@ -112,8 +112,8 @@ class PickedTable(Table):
 class PathsTable(Table):
     """Finishing programs of the patches in the least time, checked by simulation."""
 
-    check_mm: Positive = Field(description="most distance of check points of the paths")
-    chord_mm: Positive = Field(le=1.0, description="how far the tip may leave its path between two rows")
+    check_mm: Positive = Field(description="greatest distance of check points of the paths")
+    chord_mm: Positive = Field(le=1.0, description="greatest deviation of the tip between two rows")
     overrun_mm: NotNegative = Field(1.0, description="of lines beyond the ends of their patch, where they can")
     lift_mm: Positive = Field(description="off the surface at the ends of a line")
     lead_mm: Positive | None = Field(
@@ -141,12 +141,12 @@ class RoughTable(Table):
     step_mm: Positive = Field(description="greatest distance of rows")
     blades_mm: NotNegative = Field(description="allowance on blades and splitters")
     hub_mm: NotNegative = Field(description="allowance on the hub")
-    over_mm: NotNegative = Field(description="how far the blank stands over the shroud")
+    over_mm: NotNegative = Field(description="height of the blank over the shroud")
     feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's tip")
     speed_rpm: Positive = Field(le=1e6, description="spindle speed")
-    check_mm: Positive = Field(description="most distance of check points")
+    check_mm: Positive = Field(description="greatest distance of check points")
     coarser: Annotated[Number, Field(ge=1.0, le=100.0)] = Field(
-        10.0, description="how many times paths.chord_mm the tip may leave its path"
+        10.0, description="factor on paths.chord_mm for roughing"
     )
     grid_mm: Positive = Field(description="distance of the lines by which the blank is simulated")
     touch_mm3: NotNegative = Field(description="what a rapid, or parts above the cutting part, may take in one row")
@@ -156,8 +156,8 @@ class ImpellerOperationTable(Table):
     """The search for the largest cutters of all surfaces."""
 
     kind: Literal["impeller"]
-    check_mm: Positive = Field(description="most distance of check points")
-    near_mm: Positive = Field(description="nearer on the own surface its curvature stands for check points")
+    check_mm: Positive = Field(description="greatest distance of check points")
+    near_mm: Positive = Field(description="within this distance the curvature of the surface replaces check points")
     tolerance_mm: Positive = Field(
         0.05, le=1.0, description="how deep a wall may lie in a cutter between check points where it is certified"
     )
@@ -167,7 +167,9 @@ class ImpellerOperationTable(Table):
     scallop_mm: Positive = Field(le=5.0, description="greatest height between two passes")
     feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's tip")
     speed_rpm: Positive = Field(le=1e6, description="spindle speed")
-    most_cutters: Annotated[Count, Field(le=6)] = Field(description="different cutters at most; fewer are compared")
+    most_cutters: Annotated[Count, Field(le=6)] = Field(
+        description="greatest number of different cutters; fewer are compared too"
+    )
     cutter_change_s: NotNegative = Field(description="time of a cutter change")
     table_change_s: NotNegative = Field(description="time of setting the index table to another angle")
     paths: PathsTable | None = Field(None, description="none: the search and the patches alone, no programs")

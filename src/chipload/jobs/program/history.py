@@ -5,26 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
 from chipload.jobs.program.result import result_of
 from chipload.jobs.simulation.outcome import ProgramResult
-from chipload.lazy import require_extra
 from chipload.result import Result, Verdict
+from chipload.result.display import message_html, table_html
+from chipload.result.tabular import pandas_of, xarray_of
 from chipload.stock.layers import LayeredStock
 
 if TYPE_CHECKING:
     import pandas
     import plotly.graph_objects as go
-
-#: colours of the verdicts
-COLOURS = {Verdict.HOLDS: "#0b6b4f", Verdict.UNPROVEN: "#8a6100", Verdict.EXCEEDS: "#b3261e"}
+    import xarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,17 +97,18 @@ class History:
         InputError
             A column is not known.
         """
-        from chipload.report.columns import USUAL, columns_figure
+        from chipload.result.plot import USUAL, columns_figure
 
         limits = {check.name: check.limit for check in self.result.limits}
         return columns_figure(self.columns, limits, columns or USUAL, x)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The columns as a table of pandas, which is to be installed: ``pip install chipload[notebook]``."""
-        require_extra("notebook")
-        import pandas
+        """The columns as a table of pandas. Needs ``chipload[notebook]``."""
+        return pandas_of(self.columns)
 
-        return pandas.DataFrame({name: np.array(values) for name, values in self.columns.items()})
+    def to_xarray(self) -> xarray.Dataset:
+        """The columns as a dataset of xarray, with units. Needs ``chipload[notebook]``."""
+        return xarray_of(self.columns)
 
     def save(self, out: str | Path) -> Path:
         """Write the folder that ``chipload run`` writes: report, summary, history, scene, stock."""
@@ -121,15 +119,8 @@ class History:
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
-        rows = "".join(
-            f"<tr><td>{escape(name)}</td><td style='text-align:right'>{escape(value)}</td></tr>"
-            for name, value in _rows(self.numbers)
-        )
-        colour = COLOURS[self.verdict]
-        return (
-            f"<div style='border-left:5px solid {colour};padding:4px 12px;color:{colour}'>{escape(self.message)}</div>"
-            f"<table>{rows}</table>"
-        )
+        numbers = table_html(("program", self.program.name), _rows(self.numbers))
+        return message_html(self.verdict, self.message) + numbers
 
 
 def _rows(numbers: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -37,7 +37,7 @@ class ProcessDampingTable(Table):
 
 
 class DynamicsTable(Table):
-    """How cutter and workpiece vibrate: with it every step has a stability margin."""
+    """Modes of vibration of cutter and workpiece: with them every step has a stability margin."""
 
     file: Text | None = Field(None, description="modes as [[mode]], as chipload tap writes them")
     mode: tuple[ModeTable, ...] = Field((), description="modes in the job")

@@ -25,13 +25,13 @@ from chipload.program.apt.writer import write_apt
 from chipload.program.motions import spans
 from chipload.program.program import DWELL, RAPID, Program
 from chipload.report.diagram import diagram_figure
-from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, SPACE_POINTS, STOCK
 from chipload.report.presentation import Blank, Content, Presentation
 from chipload.report.scene import FIXTURE
-from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table
 from chipload.result import Result, Verdict
 from chipload.result.motions import chords_of
+from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS, SPACE_POINTS, STOCK
+from chipload.result.thinning import thinned
 from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]

@@ -16,10 +16,10 @@ from chipload.jobs.simulation.stability import (
     stability_numbers,
 )
 from chipload.jobs.simulation.stability_watch import engaged_edge
-from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, STOCK
-from chipload.report.shape import thinned
 from chipload.report.sheet import figure, table
 from chipload.result.limits import Columns
+from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS, STOCK
+from chipload.result.thinning import thinned
 from chipload.stability.chart import StabilityChart, stability_chart
 from chipload.stability.cuts import joined
 from chipload.stability.margin import MOST_MARGIN

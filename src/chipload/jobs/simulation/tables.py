@@ -31,11 +31,9 @@ class ProgramTable(Table):
     dialect: Literal["linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"] | None = None
     tools: Text | None = Field(None, description="LinuxCNC tool table")
     feed_mm_min: Positive | None = Field(None, le=1e5, description="feed of cuts before the program states one")
-    tolerance_mm: Positive = Field(
-        0.001, le=1.0, description="how far the tip may leave its path where a move is cut up"
-    )
+    tolerance_mm: Positive = Field(0.001, le=1.0, description="greatest deviation of the tip where a move is divided")
     parameters: dict[str, Number] = Field(
-        default_factory=dict, description='values that the controller holds, as "#100" = 2.5, "#<depth>", R10 or Q10'
+        default_factory=dict, description='variables of the controller, e.g. "#100" = 2.5, "#<depth>", R10 or Q10'
     )
     work_offsets: dict[str, tuple[Number, ...]] = Field(
         default_factory=dict,
@@ -53,8 +51,8 @@ class SolidTable(Table):
     low_mm: Point | None = Field(None, description="lower corner of a block")
     high_mm: Point | None = Field(None, description="upper corner of a block")
     file: Text | None = Field(None, description=".stl, .step or an earlier result's .npz")
-    units: Unit | None = Field(None, description="unit of an STL file, which does not say it")
-    chord_mm: Positive = Field(0.01, le=1.0, description="how far facets may leave a model's faces")
+    units: Unit | None = Field(None, description="unit of an STL file, which does not state it")
+    chord_mm: Positive = Field(0.01, le=1.0, description="greatest deviation of facets from a model's faces")
     layer_mm: Positive | None = Field(
         None,
         description="thickness of the layers; none: from depths of cut and the smallest cutter, at most 400 layers; an "
@@ -63,12 +61,12 @@ class SolidTable(Table):
 
 
 class TargetTable(Table):
-    """The part that the program should leave: what is cut into it is a gouge, what stands over it is excess."""
+    """The part that the program should leave: material missing from it is a gouge, material left on it is excess."""
 
     file: Text = Field(description=".stl or .step, closed")
-    units: Unit | None = Field(None, description="unit of an STL file, which does not say it")
-    chord_mm: Positive = Field(0.01, le=1.0, description="how far facets may leave a model's faces")
-    spacing_mm: Positive = Field(description="longest side of the triangles whose corners are checked")
+    units: Unit | None = Field(None, description="unit of an STL file, which does not state it")
+    chord_mm: Positive = Field(0.01, le=1.0, description="greatest deviation of facets from a model's faces")
+    spacing_mm: Positive = Field(description="longest side of the triangles whose corners are compared")
     excess_range_mm: Positive = Field(1.0, description="material over the part is measured up to this")
 
 
@@ -76,9 +74,9 @@ class FixtureTable(Table):
     """What no part of a tool may touch."""
 
     file: Text = Field(description=".stl or .step, closed")
-    units: Unit | None = Field(None, description="unit of an STL file, which does not say it")
-    chord_mm: Positive = Field(0.1, le=1.0, description="how far facets may leave a model's faces")
-    spacing_mm: Positive = Field(description="longest side of the triangles whose corners are checked")
+    units: Unit | None = Field(None, description="unit of an STL file, which does not state it")
+    chord_mm: Positive = Field(0.1, le=1.0, description="greatest deviation of facets from a model's faces")
+    spacing_mm: Positive = Field(description="longest side of the triangles whose corners are compared")
 
 
 class SimulateTable(Table):
@@ -102,11 +100,14 @@ class SimulateTable(Table):
         None, description="length of a slice of the flank; none: half the radius, a tenth where the axis leans"
     )
     stock_points_mm: Positive | None = Field(
-        None, description="pitch of the points of the stock that shank and holder are held against; none: they are not"
+        None, description="pitch of the points of the stock for the clearance of shank and holder; none: not checked"
     )
     speeds: SpeedsTable | None = Field(None, description="new spindle speeds; needs [dynamics]; none: they stay")
     confidence: Number = Field(
-        0.5, ge=0.5, lt=1.0, description="one-sided confidence at which limits of loads are held; 0.5: their mean"
+        0.5,
+        ge=0.5,
+        lt=1.0,
+        description="one-sided confidence of the loads that limits are compared with; 0.5: their mean",
     )
 
 
@@ -117,9 +118,11 @@ class ProgramLimitsTable(Limits):
     torque_nm: Positive | None = None
     power_w: Positive | None = None
     chip_max_mm: Positive | None = None
-    deflection_um: Positive | None = Field(None, description="how far tool and work part, see [stiffness]")
+    deflection_um: Positive | None = Field(None, description="displacement between tool and workpiece, see [stiffness]")
     deflection_workpiece_um: Positive | None = Field(None, description="deflection of the [workpiece]")
-    form_error_um: Positive | None = Field(None, description="what giving way leaves on, or takes from, the [part]")
+    form_error_um: Positive | None = Field(
+        None, description="material left on, or removed from, the [part] by deflection"
+    )
     gouge_mm: Positive | None = Field(None, description="deepest cut into the [part]")
     excess_mm: Positive | None = Field(None, description="most material over the [part] where the tool came near it")
     stability_margin: Positive | None = Field(
@@ -128,7 +131,7 @@ class ProgramLimitsTable(Limits):
     stable_probability: Positive | None = Field(
         None, lt=1.0, description="least probability of stability; needs spreads in [dynamics]"
     )
-    sle_um: Positive | None = Field(None, description="what forced vibration leaves on, or takes from, a wall")
+    sle_um: Positive | None = Field(None, description="material left on, or removed from, a wall by forced vibration")
 
 
 #: limits that feeds can hold
@@ -145,8 +148,8 @@ Stiff = Annotated[float, BeforeValidator(_stiff), Field(gt=0.0)]
 
 
 class StiffnessTable(Table):
-    """Stiffness of holder, spindle and work; inf: rigid. What is not stated counts as rigid and leaves deflections
-    unproven.
+    """Stiffness of holder, spindle and workpiece; inf: rigid. A value that is not stated counts as rigid, and
+    deflections are then unproven.
     """
 
     holder_gpa: Stiff | None = Field(None, description="Young's modulus of the holders, solid parts of holder_mm")
@@ -167,14 +170,16 @@ class ClampTable(Table):
     high_mm: Point | None = Field(None, description="upper corner of a box")
     point_mm: Point | None = Field(None, description="middle of an upright cylinder")
     diameter_mm: Positive | None = Field(None, description="of the cylinder; it is as high as that")
-    directions: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = Field("xyz", description="directions that are held")
+    directions: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = Field(
+        "xyz", description="directions in which it clamps"
+    )
     stiffness_n_um: Positive | None = Field(
-        None, description="of the whole clamp in each direction, as of soft jaws or vacuum; none: it does not give way"
+        None, description="of the whole clamp in each direction, e.g. soft jaws or vacuum; none: rigid"
     )
 
 
 class WorkpieceTable(Table):
-    """What the stock is made of and how it is clamped: it gives way in the state in which each step finds it."""
+    """Elastic properties of the stock and its clamps: the deflection is that of the state of removal of each step."""
 
     modulus_gpa: Positive = Field(le=1000.0, description="Young's modulus")
     poisson: NotNegative = Field(lt=0.5, description="Poisson's ratio")
@@ -183,15 +188,17 @@ class WorkpieceTable(Table):
         None, ge=500.0, le=25000.0, description="with it the workpiece has natural frequencies, in each state"
     )
     damping_ratio: Positive | None = Field(
-        None, lt=0.5, description="of its modes in the clamps; [dynamics] needs it: without it stability is unproven"
+        None, lt=0.5, description="of its modes in the clamps; needed by [dynamics]: without it stability is unproven"
     )
     yield_mpa: Positive | None = Field(
         None, ge=10.0, le=5000.0, description="stress up to which it springs back; with it that is a limit"
     )
     modes: Count = Field(4, le=20, description="lowest modes that are followed through the removal")
-    order: Literal[2, 3] = Field(2, description="of the modes of a cell; 3 costs more and is closer in corners")
+    order: Literal[2, 3] = Field(
+        2, description="order of the modes of a cell; 3 takes longer and is more exact in corners"
+    )
     cell_mm: Positive | None = Field(None, description="side of the cells; none: by the thinnest wall that is left")
-    states: Count = Field(16, le=200, description="states of removal that are solved at most")
+    states: Count = Field(16, le=200, description="greatest number of states of removal that are solved")
     state_change_percent: Positive = Field(
         5.0,
         le=100.0,

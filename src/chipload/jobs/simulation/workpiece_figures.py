@@ -7,8 +7,8 @@ import plotly.graph_objects as go
 
 from chipload.jobs.simulation.bent_workpiece import BentWorkpiece
 from chipload.jobs.simulation.outcome import SimulationResult
-from chipload.report.figures import FONT, GRID, LIMIT, SCALE
 from chipload.report.sheet import figure, table
+from chipload.result.style import FONT, GRID, LIMIT, SCALE
 from chipload.structure.cells.followed import FollowedModes
 
 #: the greatest displacement is drawn as this share of the part's diagonal

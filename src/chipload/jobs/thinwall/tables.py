@@ -85,7 +85,7 @@ class WallTable(Table):
     stagger_root_deg: Number | None = None
     stagger_tip_deg: Number | None = None
     files: tuple[Text, ...] | None = Field(None, description="sections from the clamp to the free edge")
-    unit: Unit | None = Field(None, description="of the files, which do not say it")
+    unit: Unit | None = Field(None, description="unit of the files, which do not state it")
     columns: Text | None = Field(None, description="of files that do not name them, as X Y Z")
     span: tuple[NotNegative, NotNegative] | None = Field(None, description="part of the span that is the wall")
     file: Text | None = Field(None, description="STEP file; `chipload check FILE` lists its faces")
@@ -95,12 +95,12 @@ class WallTable(Table):
         None, description="what is clamped: a face beside the front, or a point of that edge"
     )
     fit_mm: Positive | None = Field(
-        None, le=0.1, description="how far a patch may leave its face where it is fitted; none: 0.001"
+        None, le=0.1, description="greatest deviation of a fitted patch from its face; none: 0.001"
     )
 
 
 class WorkpieceTable(Table):
-    """What the wall is made of."""
+    """Material of the wall."""
 
     name: Text
     modulus_gpa: Gigapascal = Field(description="Young's modulus")
@@ -122,22 +122,24 @@ class WallOperationTable(Table):
     kind: Literal["thinwall"]
     cutter: Count = Field(description="number of a [[cutter]]")
     milling: Literal["down", "up"]
-    feed_mm_min: Positive = Field(le=1e5, description="of the middle of the cutter's corner")
+    feed_mm_min: Positive = Field(le=1e5, description="feed of the centre of the cutter's corner radius")
     speed_rpm: Positive = Field(le=1e6)
     lean_deg: Positive = Field(lt=89.0, description="of the axis from the surface's normal towards the free edge")
     lead_deg: Number = Field(description="of the axis forward along the feed")
     step_over_mm: Positive | None = Field(None, description="from row to row; or scallop_um")
-    scallop_um: Positive | None = Field(None, description="height of what rows leave between them; or step_over_mm")
+    scallop_um: Positive | None = Field(None, description="scallop height between rows; or step_over_mm")
     depth_min_mm: Positive
     depth_max_mm: Positive
-    slope: Positive = Field(le=1.0, description="greatest change of depth over a way along the surface")
+    slope: Positive = Field(le=1.0, description="greatest change of depth per length along the surface")
     reserve: NotNegative = Field(
         lt=1.0, description="share by which the planner keeps below the threshold for what its force model leaves out"
     )
     clearance_mm: Positive = Field(description="from the surface between two pieces of the path")
     step_mm: Positive = Field(le=10.0, description="from contact point to contact point, a step of the simulation")
-    chord_mm: Positive = Field(0.005, le=0.1, description="how far rows may leave the surface between contact points")
-    least_error: bool = Field(False, description="also plan the least form error in the time of the constant depth")
+    chord_mm: Positive = Field(
+        0.005, le=0.1, description="greatest deviation of rows from the surface between contact points"
+    )
+    least_error: bool = Field(False, description="also plan the least form error within the time of the constant depth")
     compensate_um: Positive | None = Field(
         None, le=200.0, description="also move the last passes against their form error, by at most this"
     )

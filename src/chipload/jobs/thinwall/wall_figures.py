@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from chipload.jobs.thinwall.outcome import ThinWallResult, Variant
-from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, SCALE, SPACE_POINTS
-from chipload.report.shape import thinned
+from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS, SCALE, SPACE_POINTS
+from chipload.result.thinning import thinned
 
 Floats = NDArray[np.float64]
 

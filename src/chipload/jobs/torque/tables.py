@@ -17,14 +17,14 @@ Angle = Annotated[Number, Field(ge=-360.0, le=720.0)]
 
 
 class ShellProgramTable(Table):
-    """A program that exists and goes round the wall."""
+    """An existing program around the wall."""
 
     file: Text
     dialect: Literal["linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"] | None = None
     feed_mm_min: Positive | None = Field(None, le=1e5, description="feed of cuts before the program states one")
-    tolerance_mm: Positive = Field(0.001, le=1.0, description="how far the tip may leave its path where a move is cut")
+    tolerance_mm: Positive = Field(0.001, le=1.0, description="greatest deviation of the tip where a move is divided")
     parameters: dict[str, Number] = Field(
-        default_factory=dict, description='values that the controller holds, as "#100" = 2.5, "#<depth>", R10 or Q10'
+        default_factory=dict, description='variables of the controller, e.g. "#100" = 2.5, "#<depth>", R10 or Q10'
     )
     work_offsets: dict[str, tuple[Number, ...]] = Field(
         default_factory=dict,
@@ -40,11 +40,11 @@ class RoundTable(Table):
     milling: Literal["down", "up"]
     top_mm: Number = Field(description="height of the tip where the helix begins")
     bottom_mm: Number = Field(description="height of the tip in the last round")
-    pitch_mm: Positive = Field(description="how far the helix falls in a round")
+    pitch_mm: Positive = Field(description="lead of the helix")
     feed_mm_min: Positive = Field(le=1e5, description="feed of the tip")
     speed_rpm: Positive = Field(le=1e6, description="spindle speed")
     clearance_mm: Positive = Field(description="height of rapids above the top of the wall")
-    lead_mm: Positive = Field(description="length of the straight way to the wall and away from it")
+    lead_mm: Positive = Field(description="length of the straight lead-in and lead-out")
 
 
 class BossTable(Table):
@@ -52,7 +52,7 @@ class BossTable(Table):
 
     from_deg: Angle
     to_deg: Angle = Field(description="above from_deg, counter-clockwise from +X")
-    radial_mm: Positive = Field(description="so much more than stock_mm")
+    radial_mm: Positive = Field(description="radial stock in excess of stock_mm")
 
 
 class ShellTable(Table):
@@ -70,7 +70,9 @@ class ShellTable(Table):
     poisson: Number = Field(ge=0.0, lt=0.5, description="Poisson's ratio")
     strength_mpa: Number = Field(ge=1.0, le=5000.0, description="stress that the wall must not exceed: its yield")
     stock_mm: Positive = Field(description="radial stock outside the finished wall")
-    wall_tolerance_mm: NotNegative = Field(description="the wall may be thinner by so much; the limit is made for that")
+    wall_tolerance_mm: NotNegative = Field(
+        description="amount by which the wall may be thinner; the limit accounts for it"
+    )
     boss: tuple[BossTable, ...] = Field((), max_length=20)
 
 
@@ -79,9 +81,9 @@ class SurpriseTable(Table):
 
     kind: Literal["thicker-side", "hard-spot", "worn-cutter", "thinner-wall"]
     share: Number = Field(gt=0.0, le=3.0, description="0.3: 30 % more (of a thinner wall: less)")
-    at_deg: Angle | None = Field(None, description="where round the wall, counter-clockwise from +X")
+    at_deg: Angle | None = Field(None, description="angle around the wall, counter-clockwise from +X")
     width_mm: Positive | None = Field(None, description="of a hard spot, round the wall")
-    ramp_mm: Positive | None = Field(None, description="over so much path a hard spot comes and goes")
+    ramp_mm: Positive | None = Field(None, description="length of path over which a hard spot begins and ends")
     edge_share: NotNegative | None = Field(
         None, le=9.0, description="of a worn cutter: the edge's part grows by so much"
     )
@@ -90,7 +92,7 @@ class SurpriseTable(Table):
 class OverrideTable(Table):
     """The rules of the controller; what it holds comes from the limit."""
 
-    hold: Share = Field(description="share of the limit of torque that is held")
+    hold: Share = Field(description="set point, as a share of the limit of torque")
     overload_nm: Positive
     torque_most_nm: Positive
     light_nm: Positive
@@ -107,17 +109,15 @@ class OverrideTable(Table):
     gain_down_per_s: Positive = 6.0
     error_span: Positive = 1.0
     change_span: Positive = 0.5
-    pi_gain: NotNegative | None = Field(None, description="of the PI controller; else by its tuning rule")
-    pi_rate_per_s: NotNegative | None = Field(None, description="of the PI controller; else by its tuning rule")
+    pi_gain: NotNegative | None = Field(None, description="of the PI controller; none: by its tuning rule")
+    pi_rate_per_s: NotNegative | None = Field(None, description="of the PI controller; none: by its tuning rule")
     overload_steps: Count = 3
     stuck_steps: Count = 10
     air_steps: Count = 3
     settle_steps: Count = 5
-    low_share: NotNegative = Field(
-        0.5, le=1.0, description="a reading below that share of the prediction is not believed"
-    )
-    low_steps: Count = Field(50, description="so many of them in a cut stop the machine")
-    off_path_steps: Count = Field(10, description="so many steps under load off the path stop the machine")
+    low_share: NotNegative = Field(0.5, le=1.0, description="a reading below this share of the prediction is rejected")
+    low_steps: Count = Field(50, description="number of such readings in a cut that stops the machine")
+    off_path_steps: Count = Field(10, description="number of steps under load off the path that stops the machine")
     gap_s: Positive = Field(0.5, le=10.0, description="a longer time between steps counts as a start")
 
 
@@ -142,7 +142,7 @@ class SpindleTable(Table):
     currents are torques, power over speed [N m].
     """
 
-    file: Text | None = Field(None, description="what `chipload spindle` wrote; a key that is stated here counts more")
+    file: Text | None = Field(None, description="file of `chipload spindle`; keys that are stated here override it")
     inertia_kg_m2: Positive | None = Field(None, description="of the rotor")
     torque_constant_nm_a: Positive | None = Field(None, description="torque for an ampere")
     torque_constant_error_share: NotNegative | None = Field(
@@ -179,7 +179,7 @@ class LoopTable(Table):
 class TorqueControlTable(Table):
     """The wall, and the controller that holds the torque on it."""
 
-    file: Text | None = Field(None, description="sets and rules (TOML); else the standard ones")
+    file: Text | None = Field(None, description="sets and rules (TOML); none: the standard ones")
     shell: ShellTable
     override: OverrideTable
 

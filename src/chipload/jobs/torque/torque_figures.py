@@ -11,8 +11,8 @@ from plotly.subplots import make_subplots
 
 from chipload.control.fuzzy import FuzzyTable, surface
 from chipload.jobs.torque.outcome import HELD, ControllerCase, TorqueResult
-from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS, SCALE, STOCK
-from chipload.report.shape import thinned
+from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS, SCALE, STOCK
+from chipload.result.thinning import thinned
 from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]

@@ -45,7 +45,7 @@ class RoughingSettings:
     motion : what the rows are milled with
     spacing : of the check points [mm]
     around : bodies beyond the channel's two on either side that are checked
-    over : how far the blank stands over the shroud [mm]; beside the channel it is uncut, and nothing may touch it there
+    over : height of the blank over the shroud [mm]; beside the channel it is uncut, and nothing may touch it there
     """
 
     depth: float
@@ -93,7 +93,7 @@ def roughing(
     Parameters
     ----------
     index : 0 blade, 1 splitter
-    ahead : how far the hub goes on ahead of the leading edge [mm]
+    ahead : length of the hub ahead of the leading edge [mm]
     before : rows that are milled already, at another table angle: where they come as near as a row here is to its
         neighbour, there is no row
     """

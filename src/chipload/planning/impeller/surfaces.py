@@ -31,7 +31,7 @@ class ContactSampling:
     ----------
     along, up : from where to where along and up the surface, 0..1
     points : how many contact points along and up
-    spacing : most distance of check points along their surfaces [mm]
+    spacing : greatest distance of check points along their surfaces [mm]
     near : as :class:`Scene` [mm]
     around : as :meth:`Impeller.scene`
     ahead : how far the hub goes on ahead of the blade's leading edge [mm]

@@ -1,4 +1,4 @@
-"""Any columns of a simulated program, one below the other, against time or path."""
+"""Any columns of a history, one below the other, against time or path."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from chipload.errors import InputError
-from chipload.report.figures import FONT, GRID, INK, LIMIT, LINE_POINTS
-from chipload.report.shape import thinned
-from chipload.result import COLUMNS, column_of
+from chipload.result.columns import COLUMNS, column_of
+from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS
+from chipload.result.thinning import thinned
 from chipload.tables import nearest
 
 #: the columns that are drawn where none is named
@@ -36,16 +36,17 @@ def columns_figure(
 
     Parameters
     ----------
-    columns : (n,) each, those of a history
+    columns : (n,) each, those of a history; ``t_s`` or ``s_mm`` must be there
     limits : by name
 
     Raises
     ------
     InputError
-        A column is not known or holds no numbers.
+        A column is not known or holds no numbers, or the history has no such x.
     """
-    if x not in AGAINST:
-        raise InputError(f"plot: x = {x!r}: must be one of {', '.join(AGAINST)}")
+    against = [name for name in AGAINST if name in columns]
+    if x not in against:
+        raise InputError(f"plot: x = {x!r}: must be one of {', '.join(against) or 'none: the history has no time'}")
     drawable = sorted(k for k, v in columns.items() if v.dtype.kind in "fiub")
     for name in names:
         if name not in drawable:
@@ -54,12 +55,13 @@ def columns_figure(
         raise InputError("plot: no column is named: name at least one, as force_n")
     bound = {column_of(k).name: v for k, v in limits.items() if not k.startswith("spindle")}
     across = np.asarray(columns[x])
+    lines = np.asarray(columns.get("line", np.zeros(len(across), dtype=np.int64)))
     out = make_subplots(rows=len(names), cols=1, shared_xaxes=True, vertical_spacing=0.24 / (2 + 2 * len(names)))
     for row, name in enumerate(names, start=1):
         y = np.asarray(columns[name], dtype=np.float64)
         keep = thinned(y, LINE_POINTS)
-        says = f"{name}: %{{y:.4g}}, line %{{customdata}}<extra></extra>"
-        given = {"x": across[keep], "y": y[keep], "customdata": columns["line"][keep], "hovertemplate": says}
+        text = f"{name}: %{{y:.4g}}, line %{{customdata}}<extra></extra>"
+        given = {"x": across[keep], "y": y[keep], "customdata": lines[keep], "hovertemplate": text}
         out.add_trace(go.Scatter(**given, mode="lines", name=name, line={"color": INK, "width": 1.3}), row=row, col=1)
         if name in bound:
             for end in (bound[name], *((-bound[name],) if name in SIGNED else ())):
@@ -67,11 +69,12 @@ def columns_figure(
             size = np.abs(y[keep]) if name in SIGNED else y[keep]
             over = keep[size < bound[name] if COLUMNS[name].least else size > bound[name]]
             if len(over):
-                given = {"x": across[over], "y": y[over], "customdata": columns["line"][over], "hovertemplate": says}
+                given = {"x": across[over], "y": y[over], "customdata": lines[over], "hovertemplate": text}
                 mark = {"color": LIMIT, "size": 5}
                 out.add_trace(go.Scatter(**given, mode="markers", name=f"{name} exceeds", marker=mark), row=row, col=1)
-        top = max(float(y.max(initial=0.0)), bound.get(name, 0.0))
-        low = min(float(y.min(initial=0.0)), -bound.get(name, 0.0) if name in SIGNED else 0.0)
+        known = y[np.isfinite(y)]
+        top = max(float(known.max(initial=0.0)), bound.get(name, 0.0))
+        low = min(float(known.min(initial=0.0)), -bound.get(name, 0.0) if name in SIGNED else 0.0)
         room = 0.06 * (top - low) or 1.0
         out.update_yaxes(title_text=name, range=[low - room, top + room], row=row, col=1)
     out.update_xaxes(gridcolor=GRID, zeroline=False)

@@ -1,0 +1,116 @@
+"""Samples of modes: their distribution, the files that hold them, and that the cases are run with them."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chipload.jobs.simulation.dynamics import read_modes
+from chipload.jobs.simulation.dynamics_tables import DynamicsTable, ModeTable
+from scipy.stats import norm
+
+from chipload.cutting.material import material_named, material_text
+from chipload.errors import InputError
+from chipload.sweep.cases import Samples
+from chipload.sweep.run import run_sweep
+from chipload.sweep.sampled import modes_texts
+
+TABLE = DynamicsTable(frequency_percent=2.0, damping_percent=10.0, stiffness_percent=5.0)
+MODES = [
+    ModeTable(tool=3, frequency_hz=812.0, damping_ratio=0.021, stiffness_n_um=6.9, direction="x"),
+    ModeTable(of="workpiece", frequency_hz=1450.0, damping_ratio=0.01, mass_kg=0.3, direction=(0.6, 0.8)),
+]
+SLOT = "G21 G90 G94\nT1 M6\nS3000 M3\nG0 X-8 Y5 Z5\nG1 Z-2 F300\nX8\nG0 Z5\nM2\n"
+JOB = """[program]
+file = "slot.ngc"
+[machine]
+name = "vmc"
+[stock]
+low_mm = [0.0, 0.0, -6.0]
+high_mm = [20.0, 10.0, 0.0]
+[material]
+file = "known.toml"
+[[cutter]]
+number = 1
+diameter_mm = 6.0
+flutes = 2
+helix_deg = 30.0
+flute_length_mm = 18.0
+overhang_mm = 25.0
+modulus_gpa = 580.0
+[dynamics]
+frequency_percent = 0.0
+damping_percent = 0.0
+stiffness_percent = 20.0
+[[dynamics.mode]]
+frequency_hz = 900.0
+damping_ratio = 0.03
+stiffness_n_um = 1.5
+direction = "y"
+[[operation]]
+kind = "simulate"
+step_mm = 2.0
+[limits]
+stability_margin = 0.5
+"""
+
+
+def drawn(count: int) -> np.ndarray:
+    """(count, 2, 3) frequency [Hz], damping ratio and stiffness [N/um] of the modes, as files state them."""
+    normal = norm.ppf(Samples(count).points(6))
+    out = []
+    for text in modes_texts(MODES, TABLE, normal):
+        first, second = tomllib.loads(text)["mode"]
+        weight = 1e-6 * second["mass_kg"] * (math.tau * second["frequency_hz"]) ** 2
+        out.append(
+            [[first["frequency_hz"], first["damping_ratio"], first["stiffness_n_um"]],
+             [second["frequency_hz"], second["damping_ratio"], weight]]
+        )  # fmt: skip
+    return np.array(out)
+
+
+def test_samples_of_modes_have_the_stated_deviations():
+    found = drawn(512)
+    stiffness = 1e-6 * 0.3 * (math.tau * 1450.0) ** 2
+    stated = np.array([[812.0, 0.021, 6.9], [1450.0, 0.01, stiffness]])
+    np.testing.assert_allclose(found.mean(axis=0), stated, rtol=0.005)
+    np.testing.assert_allclose(found.std(axis=0) / stated, [[0.02, 0.1, 0.05]] * 2, rtol=0.05)
+    assert np.abs(np.corrcoef(found.reshape(512, 6).T) - np.eye(6)).max() < 0.1
+
+
+def test_the_files_are_files_of_modes(tmp_path):
+    (text,) = modes_texts(MODES, TABLE, np.zeros((1, 6)))
+    (tmp_path / "modes.toml").write_text(text)
+    assert list(read_modes(tmp_path / "modes.toml")) == MODES
+
+
+@pytest.fixture
+def job(tmp_path) -> Path:
+    (tmp_path / "slot.ngc").write_text(SLOT)
+    known = replace(material_named("al7075-t6"), spread=1e-6)
+    (tmp_path / "known.toml").write_text(material_text(known))
+    (tmp_path / "job.toml").write_text(JOB)
+    return tmp_path / "job.toml"
+
+
+def test_cases_run_with_their_modes(job, tmp_path):
+    """The margin is the stiffness times a constant where frequency, damping and coefficients are the same."""
+    out = tmp_path / "out"
+    done = run_sweep(job, ["limits.force_n=9000"], out, samples=Samples(3))
+    margin = np.array([record["limits"]["stability_margin"]["worst"] for record in done.records])
+    assert ((margin > 0.0) & (margin < 3.0)).all()
+    modes = [tomllib.loads(f.read_text())["mode"][0] for f in sorted((out / "modes" / "001").iterdir())]
+    assert {(m["frequency_hz"], m["damping_ratio"]) for m in modes} == {(900.0, 0.03)}
+    share = margin / [m["stiffness_n_um"] for m in modes]
+    assert np.ptp(margin) > 0.02 * margin.mean()
+    np.testing.assert_allclose(share, share[0], rtol=2e-3)
+
+
+def test_a_limit_of_the_probability_is_refused(job, tmp_path):
+    job.write_text(JOB + "stable_probability = 0.9\n")
+    with pytest.raises(InputError, match=r"state limits\.stability_margin in place of limits\.stable_probability"):
+        run_sweep(job, [], tmp_path / "out", samples=Samples(2))
