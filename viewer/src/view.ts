@@ -118,11 +118,16 @@ export class View {
     this.colouring = c;
     this.path.colour(doc, c, this.header);
     this.path.clip(this.plane ? [this.plane] : []);
-    this.overlay.legend(this.header, c);
+    this.legend();
     this.shades = doc && c?.frames
       ? coloured(doc.f4(c.frames), c.frames_above ? doc.u1(c.frames_above) : null, c, this.header) : null;
     this.stock?.shade(this.draped ? this.shades : null);
     this.dirty = true;
+  }
+
+  private legend(): void {
+    const maps = this.solids.filter((s) => !this.hidden.has(s.body.name)).map((s) => s.body.legend);
+    this.overlay.legend(this.header, this.colouring, maps.filter((m) => m !== undefined));
   }
 
   /** Show the values of the column on what was cut there. */
@@ -303,6 +308,7 @@ export class View {
     if (this.stock) this.stock.group.visible = seen("stock");
     this.path.group.visible = seen("path");
     this.marks.visible = seen("marks");
+    this.legend();
     this.stand(this.place, this.row);
     this.dirty = true;
   }

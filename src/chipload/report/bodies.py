@@ -5,7 +5,10 @@ moves its surface is stated; none is left out.
 from __future__ import annotations
 
 import io
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -20,6 +23,8 @@ TRIANGLES, HALVINGS = 400_000, 12
 OWN = ("path", "rapids", "cutter")
 #: kinds of bodies by how their names begin
 KINDS = ("stock", "part", "fixture", "wall")
+#: a colour in a legend, and characters of its texts at most
+COLOUR, LONGEST = re.compile("#[0-9a-f]{6}"), 80
 PLAIN = (168, 176, 186, 255)
 
 
@@ -34,6 +39,7 @@ class Body:
     vertices, faces : (v, 3) [mm], (f, 3)
     colours : (4,) sRGB of all, or (v, 4)
     triangles : that the scene has of it
+    legend : what the colours mean (:func:`chipload.report.scene.legend`); None: nothing
     moved_mm : how far drawing it with fewer triangles moves its vertices at most
     """
 
@@ -44,6 +50,7 @@ class Body:
     colours: NDArray[np.uint8]
     triangles: int
     moved_mm: float = 0.0
+    legend: Mapping[str, Any] | None = None
 
     @property
     def low(self) -> Floats:
@@ -125,7 +132,21 @@ def _body(name: str, mesh: trimesh.Trimesh, most: int) -> Body:
         vertices, faces, painted, moved = fewer_triangles(vertices, faces, painted, most)
     plain = _plain(name)
     kind = next((k for k in KINDS if plain.startswith(k)), "body")
-    return Body(name, kind, vertices, faces, painted, triangles, moved)
+    return Body(name, kind, vertices, faces, painted, triangles, moved, _legend(mesh.metadata))
+
+
+def _legend(metadata: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The legend of a mesh, where the file has a sound one."""
+    found: Any = metadata.get("legend")
+    try:
+        title = str(found["title"])[:LONGEST]
+        stops = [[float(v), str(c)] for v, c in found["stops"]]
+        words = [[str(w)[:LONGEST], str(c)] for w, c in found["words"]]
+    except (TypeError, KeyError, ValueError):
+        return None
+    colours = [str(c) for _, c in (*stops, *words)]
+    sound = np.isfinite([float(v) for v, _ in stops]).all() and all(map(COLOUR.fullmatch, colours))
+    return {"title": title, "stops": stops, "words": words} if sound else None
 
 
 def _plain(name: str) -> str:

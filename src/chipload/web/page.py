@@ -157,7 +157,11 @@ class Page:
         """Where a run is."""
         with ui.element("div").classes("cl-run").mark("run") as self.bar:
             self.bar_text = ui.label("").classes("cl-run-text").props("role=status").mark("run-text")
-            self.bar_line = ui.linear_progress(0.0, show_value=False, size="8px").classes("cl-run-line")
+            self.bar_line = (
+                ui.linear_progress(0.0, show_value=False, size="8px")
+                .classes("cl-run-line")
+                .props('aria-label="progress of the run"')
+            )
             self.bar_stop = ui.button("Stop", on_click=self.runs.stop).props("outline dense no-caps color=red")
             self.bar_stop.mark("stop")
             self.bar_close = ui.button(icon="close", on_click=lambda: self.bar.set_visibility(False)).props(

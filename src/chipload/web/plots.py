@@ -22,6 +22,12 @@ Floats = NDArray[np.float64]
 POINTS = 4000
 COLOURS = ("#3457a6", "#0b7a75", "#c9821a", "#8a4fa3")
 CURSOR = "#b3261e"
+#: columns that are drawn with another one, in its axis: what is allowed, planned and measured of it, with its dash
+BESIDE = {
+    "torque_nm": (("torque_allowable_nm", "#b3261e", "dash"), ("torque_planned_nm", "#6b7683", "dot")),
+    "torque_measured_nm": (("torque_allowable_nm", "#b3261e", "dash"), ("torque_planned_nm", "#6b7683", "dot")),
+    "force_normal_n": (("force_allowable_n", "#b3261e", "dash"), ("force_normal_planned_n", "#6b7683", "dot")),
+}
 #: a limit farther above the values than this is named but would flatten them if it were drawn
 FAR = 1.8
 
@@ -62,7 +68,17 @@ def plots(
         axis = "" if k == 0 else str(k + 1)
         top = 1.0 - k * (height + gap)
         beside = [(side, xs, _numbers(side, column)) for side, xs in others]
-        finite = np.concatenate([v[np.isfinite(v)] for v in (y, *(v for _, _, v in beside if v is not None))])
+        drawn = [y, *(v for _, _, v in beside if v is not None)]
+        for name, paint, dash in BESIDE.get(column, ()):
+            own = result.column(track, name) if name in result.columns else None
+            if own is None or isinstance(own, TextColumn) or not np.isfinite(own).any():
+                continue
+            # an allowable value far above would flatten what it is compared with
+            if float(np.nanmin(own)) <= FAR * float(np.nanmax(np.nan_to_num(y))):
+                drawn.append(np.minimum(own, FAR * float(np.nanmax(np.nan_to_num(y)))))
+            some = drawn_rows(own)
+            data.append(_line(name, x[some], own[some], axis, paint, f"%{{y:.5g}} {unit} {name}", dash))
+        finite = np.concatenate([v[np.isfinite(v)] for v in drawn])
         low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
         limit = bound.limit if bound is not None else math.inf
         near = limit <= FAR * high
@@ -89,14 +105,8 @@ def plots(
         for side, xs, v in beside:
             if v is not None:
                 some = drawn_rows(v)
-                data.append(
-                    {
-                        "type": "scatter", "mode": "lines", "name": f"{column}: {side.title}", "x": xs[some],
-                        "y": v[some], "xaxis": "x", "yaxis": f"y{axis}", "connectgaps": False, "showlegend": False,
-                        "line": {"color": side.colour, "width": 1.3},
-                        "hovertemplate": f"%{{y:.5g}} {unit} {escape(side.title)}<extra></extra>",
-                    }
-                )  # fmt: skip
+                said = f"%{{y:.5g}} {unit} {escape(side.title)}"
+                data.append(_line(f"{column}: {side.title}", xs[some], v[some], axis, side.colour, said))
         notes.append(
             {
                 "text": annotation(result, track, column, row, bound, sides, against), "x": 0.004, "y": top,
@@ -137,6 +147,15 @@ def plots(
     }
     config = {"displaylogo": False, "displayModeBar": False, "doubleClick": "reset"}
     return {"data": data, "layout": layout, "config": config}
+
+
+def _line(name: str, x: Floats, y: Floats, axis: str, colour: str, said: str, dash: str = "solid") -> dict[str, Any]:
+    """One line of the figure; ``axis`` is the ending of its y axis."""
+    return {
+        "type": "scatter", "mode": "lines", "name": name, "x": x, "y": y, "xaxis": "x", "yaxis": f"y{axis}",
+        "connectgaps": False, "showlegend": False, "line": {"color": colour, "width": 1.3, "dash": dash},
+        "hovertemplate": f"{said}<extra></extra>",
+    }  # fmt: skip
 
 
 def abscissa(track: PageTrack, against: str) -> Floats:
