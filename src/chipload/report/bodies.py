@@ -140,13 +140,15 @@ def _legend(metadata: Mapping[str, Any]) -> dict[str, Any] | None:
     found: Any = metadata.get("legend")
     try:
         title = str(found["title"])[:LONGEST]
-        stops = [[float(v), str(c)] for v, c in found["stops"]]
-        words = [[str(w)[:LONGEST], str(c)] for w, c in found["words"]]
+        values, texts = [float(v) for v, _ in found["stops"]], [str(w)[:LONGEST] for w, _ in found["words"]]
+        colours = [str(c) for _, c in (*found["stops"], *found["words"])]
     except (TypeError, KeyError, ValueError):
         return None
-    colours = [str(c) for _, c in (*stops, *words)]
-    sound = np.isfinite([float(v) for v, _ in stops]).all() and all(map(COLOUR.fullmatch, colours))
-    return {"title": title, "stops": stops, "words": words} if sound else None
+    if not (np.isfinite(values).all() and all(map(COLOUR.fullmatch, colours))):
+        return None
+    stops = [list(pair) for pair in zip(values, colours, strict=False)]
+    words = [list(pair) for pair in zip(texts, colours[len(values) :], strict=True)]
+    return {"title": title, "stops": stops, "words": words}
 
 
 def _plain(name: str) -> str:

@@ -48,7 +48,7 @@ class ScenePanel:
         with ui.element("div").classes("cl-panel cl-space").props('role=region aria-label="3D view"') as self.frame:
             self.stage = ui.element("div").classes("cl-stage")
             self.stage.on("viewrow", self._moved, js_handler="(e) => emit(e.detail)")
-            self.second = ui.element("div").classes("cl-stage cl-second")
+            self.second = ui.element("div").classes("cl-second")
             self.second.on("viewrow", self._moved_beside, js_handler="(e) => emit(e.detail)")
             self.second.set_visibility(False)
             self.titles = [ui.label("").classes(f"cl-over cl-side cl-side-{k}") for k in range(2)]
