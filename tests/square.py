@@ -11,6 +11,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding, Severity
 from chipload.report.presentation import Blank
 from chipload.report.removal import removal_bytes, removal_meshes
+from chipload.report.scene import legend
 from chipload.result import LimitCheck, Provenance, Result, Track, TrackKind, Verdict, in_memory
 from chipload.result.history import write_history
 from chipload.result.summary import summary_bytes
@@ -104,6 +105,10 @@ def make_result(folder: Path, job: str = "square", program: bytes = PROGRAM.enco
         box = trimesh.creation.box(extents=(60.0, 60.0, 10.0))
         box.apply_translation((20.0, 20.0, -7.0))
         box.visual.face_colors = (168, 122, 58, 255)
+        box.metadata["legend"] = legend(
+            "gouge and excess [mm]", [(-0.2, (178, 24, 43)), (0.0, (236, 236, 232)), (0.2, (33, 102, 172))],
+            [("not looked for", (250, 246, 225))],
+        )  # fmt: skip
         made = trimesh.Scene()
         made.add_geometry(box, node_name="stock", geom_name="stock")
         (folder / "scene.glb").write_bytes(made.export(file_type="glb", extension_webp=False))

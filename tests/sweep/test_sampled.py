@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chipload.jobs.simulation.dynamics import read_modes
-from chipload.jobs.simulation.dynamics_tables import DynamicsTable, ModeTable
 from scipy.stats import norm
 
 from chipload.cutting.material import material_named, material_text
 from chipload.errors import InputError
+from chipload.jobs.simulation.dynamics import read_modes
+from chipload.jobs.simulation.dynamics_tables import DynamicsTable, ModeTable
 from chipload.sweep.cases import Samples
 from chipload.sweep.run import run_sweep
 from chipload.sweep.sampled import modes_texts

@@ -55,8 +55,15 @@ def test_space_plays_whatever_was_clicked_before(cut) -> None:
     cut.wait_for_function(f"{VIEW}.row == 0")
     cut.keyboard.press("Space")
     cut.wait_for_function(f"{VIEW}.row > 3")
+    assert cut.evaluate(f"{VIEW}.playing") is True
+    assert cut.locator("button[aria-label='pause (Space)']").count() == 1
     cut.keyboard.press("Space")
     cut.wait_for_function(f"!{VIEW}.playing")
+    here = cut.evaluate(f"{VIEW}.row")
+    assert here > 3
+    cut.wait_for_timeout(400)
+    assert cut.evaluate(f"{VIEW}.row") == here
+    assert cut.locator("button[aria-label='play (Space)']").count() == 1
 
 
 def test_axe_finds_nothing_serious(cut) -> None:

@@ -176,6 +176,20 @@ def test_the_scene_is_not_blank_and_a_column_changes_its_colours(square, pixels)
         page.locator(".cl-layers").get_by_text(name).click()
 
 
+def test_a_painted_body_has_its_legend_while_it_is_shown(square) -> None:
+    page = square
+    assert page.locator(".cv-title").all_inner_texts()[-1] == "gouge and excess [mm]"
+    assert page.inner_text(".cv-map-ends").split() == ["-0.2", "0", "0.2"]
+    assert page.evaluate("getComputedStyle(document.querySelector('.cv-map')).backgroundImage").startswith(
+        "linear-gradient(to right, rgb(178, 24, 43) 0%, rgb(236, 236, 232) 50%, rgb(33, 102, 172) 100%)"
+    )
+    assert "not looked for" in page.inner_text(".cv-bar")
+    page.locator(".cl-layers").get_by_text("stock").click()
+    page.wait_for_selector(".cv-map", state="detached")
+    page.locator(".cl-layers").get_by_text("stock").click()
+    page.wait_for_selector(".cv-map")
+
+
 def test_plots_show_the_columns_that_are_chosen(square) -> None:
     page = square
     traces = "document.querySelector('.cl-figure').data.map(d => [d.name, Math.max(...d.y), d.x[d.x.length - 1]])"

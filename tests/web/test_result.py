@@ -10,14 +10,17 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import trimesh
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding, InputError
 from chipload.jobs.contour.figures import presentation_of
 from chipload.jobs.contour.result import result_of
 from chipload.program.apt.reader import read_apt
+from chipload.report.bodies import scene_bodies
 from chipload.report.colouring import POINTS, WORDS, drawn_rows
 from chipload.report.folder import write_result
+from chipload.report.scene import legend
 from chipload.report.view import parts_of
 from chipload.result import Track, TrackKind, Verdict, in_memory
 from chipload.web import plots, scene
@@ -70,6 +73,40 @@ def test_a_path_keeps_its_places_and_its_red(root: Path) -> None:
     assert "does not change with the slider" in shown.notice
     words = scene.colouring(r, r.tracks[0], "pass", None)
     assert words.words == (("square", WORDS[0]),)
+
+
+def test_the_legend_of_a_painted_body_is_that_of_the_scene_or_none() -> None:
+    box = trimesh.creation.box()
+    box.visual.face_colors = (168, 122, 58, 255)
+    good = legend("gouge [mm]", [(0.0, (255, 255, 255)), (0.5, (178, 24, 43))], [("not known", (250, 246, 225))])
+    assert good["stops"] == [[0.0, "#ffffff"], [0.5, "#b2182b"]]
+    for metadata, expected in (
+        (good, good),
+        ({**good, "stops": [[0.0, "url(http://evil.example)"]]}, None),
+        ({**good, "stops": [["x", "#ffffff"]]}, None),
+        ({**good, "stops": [[1e999, "#ffffff"]]}, None),
+        ({"title": "x"}, None),
+        ("text", None),
+    ):
+        box.metadata["legend"] = metadata
+        glb = trimesh.Scene({"part": box}).export(file_type="glb", extension_webp=False)
+        (body,) = scene_bodies(glb)
+        assert body.legend == expected
+
+
+def test_what_is_allowed_and_planned_is_drawn_with_the_torque(tmp_path: Path) -> None:
+    one = square_result()
+    allowed, planned = np.full(ROWS, 8.0), np.linspace(4.0, 5.0, ROWS)
+    columns = {**one.tracks[0].columns, "torque_allowable_nm": allowed, "torque_planned_nm": planned}
+    write_by_hand(replace(one, tracks=(replace(one.tracks[0], blocks=in_memory(columns)),)), tmp_path / "t")
+    r = open_result(tmp_path, "t")
+    track = r.tracks[0]
+    figure = plots.plots(r, track, plots.bounds_of(r, track, ["torque_nm"]), "time", 0)
+    drawn = {d["name"]: d for d in figure["data"]}
+    assert drawn["torque_allowable_nm"]["y"].tolist() == [8.0] * len(drawn["torque_allowable_nm"]["y"])
+    assert drawn["torque_planned_nm"]["y"].tolist() == pytest.approx(planned)
+    assert drawn["torque_nm"]["y"].max() == 9.0
+    assert {d["yaxis"] for d in drawn.values()} == {"y"}
 
 
 def test_a_cutter_is_its_profile() -> None:

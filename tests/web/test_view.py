@@ -5,7 +5,7 @@ import base64
 import numpy as np
 import pytest
 
-from square import ROWS, VOLUMES, T
+from square import ROWS, VOLUMES, T, X, Y
 
 VIEW = "chiploadViewer.of(document.querySelector('.cl-stage').id)"
 
@@ -31,6 +31,14 @@ def state(page):
 
 def settle(page, row):
     page.wait_for_function(f"r => {VIEW}.state().row == r", arg=row)
+
+
+def settle_panels(page, row):
+    """The panels stand at the row of the view when it stops: they are told some ten times a second."""
+    page.wait_for_function(
+        "r => Math.abs(Number(document.querySelector('.cl-where').textContent.match(/step (\\d+)/)[1]) - 1 - r) <= 5",
+        arg=row,
+    )
 
 
 def red(picture):
@@ -97,8 +105,16 @@ def test_playing_moves_by_itself_and_the_panels_follow(cut) -> None:
     page.keyboard.press("Space")
     page.wait_for_function(f"{VIEW}.state().row > 20")
     page.wait_for_function("Number(document.querySelector('.cl-where').textContent.match(/step (\\d+)/)[1]) > 15")
+    before = {"row": page.evaluate(f"{VIEW}.row"), "frames": page.evaluate(f"{VIEW}.frames")}
+    page.wait_for_function(f"r => {VIEW}.row > r", arg=before["row"])
+    # it is drawn again for what it shows, and line and cutter are those of the row
+    assert page.evaluate(f"{VIEW}.frames") > before["frames"]
     page.keyboard.press("Space")
     page.wait_for_function(f"!{VIEW}.playing")
+    row = state(page)["row"]
+    assert row > 20
+    settle_panels(page, row)
+    assert state(page)["tip"] == pytest.approx([X[row], Y[row], -2.0], abs=0.81)
     page.keyboard.press("Home")
     settle(page, 0)
 

@@ -4,6 +4,8 @@ export interface Buffer { at: number; n: number; t: "f4" | "u4" | "u2" | "u1" }
 export type Rgb = [number, number, number];
 export type Triple = [number, number, number];
 
+/** What the colours of a painted body mean: values with their colours, rising, and colours of what is no value. */
+export interface MapLegend { title: string; stops: [number, string][]; words: [string, string][] }
 export interface Body {
   name: string;
   kind: string;
@@ -11,6 +13,7 @@ export interface Body {
   index: Buffer;
   colour?: Rgb;
   colours?: Buffer;
+  legend?: MapLegend;
 }
 export interface Removal { low: Triple; high: Triple; corners: Buffer; seen: Buffer; rows: Buffer }
 export interface Path {

@@ -1,6 +1,6 @@
 /** What is laid over the 3D view as HTML: the scale of the colours, a scale bar, values under the pointer, messages. */
 
-import { Colouring, Header } from "./document";
+import { Colouring, Header, MapLegend } from "./document";
 
 const STYLE = `
 .cv { position: relative; width: 100%; height: 100%; overflow: hidden; touch-action: none;
@@ -12,7 +12,7 @@ const STYLE = `
 .cv-title { font-weight: 600; }
 .cv-ramp { height: 10px; border-radius: 2px; margin: 4px 0 1px; position: relative; }
 .cv-ramp i { position: absolute; top: -3px; bottom: -3px; width: 0; border-left: 2.5px solid #c81e1e; }
-.cv-ends { display: flex; justify-content: space-between; font-variant-numeric: tabular-nums; }
+.cv-ends, .cv-map-ends { display: flex; justify-content: space-between; font-variant-numeric: tabular-nums; }
 .cv-red { color: #b01818; font-weight: 600; }
 .cv-dot { display: inline-block; width: 10px; height: 10px; border-radius: 5px; margin-right: 6px; }
 .cv-scale { right: 104px; bottom: 8px; padding: 2px 6px; text-align: center; font-size: 11px; }
@@ -55,26 +55,51 @@ export class Overlay {
     host.append(this.root);
   }
 
-  /** The scale of the colours, with the limit marked on it. */
-  legend(header: Header, c: Colouring | null): void {
+  /** The scale of the path with the limit marked on it, and those of painted bodies. */
+  legend(header: Header, c: Colouring | null, maps: MapLegend[]): void {
     this.bar.replaceChildren();
-    this.bar.style.display = c ? "" : "none";
-    if (!c) return;
-    const add = (cls: string, text = "") => {
-      const e = document.createElement("div");
-      e.className = cls;
-      e.textContent = text;
-      this.bar.append(e);
-      return e;
-    };
+    this.bar.style.display = c || maps.length ? "" : "none";
+    if (c) this.column(header, c);
+    for (const m of maps) this.map(m);
+  }
+
+  private add(cls: string, text = ""): HTMLElement {
+    const e = document.createElement("div");
+    e.className = cls;
+    e.textContent = text;
+    this.bar.append(e);
+    return e;
+  }
+
+  private word(word: string, colour: string): void {
+    const row = this.add(""), dot = document.createElement("span");
+    dot.className = "cv-dot";
+    dot.style.background = colour;
+    row.append(dot, word);
+  }
+
+  /** What the colours of a body mean. */
+  private map(m: MapLegend): void {
+    this.add("cv-title", m.title);
+    const n = m.stops.length, low = m.stops[0]?.[0] ?? 0, span = (m.stops[n - 1]?.[0] ?? 1) - low || 1;
+    if (n > 1) {
+      const ramp = this.add("cv-ramp cv-map");
+      ramp.style.background = `linear-gradient(to right, ${m.stops.map(([v, x]) => `${x} ${100 * (v - low) / span}%`).join(", ")})`;
+      const ends = this.add("cv-map-ends");
+      for (const [v] of n === 3 ? m.stops : [m.stops[0], m.stops[n - 1]]) {
+        const e = document.createElement("span");
+        e.textContent = number(v);
+        ends.append(e);
+      }
+    }
+    for (const [word, colour] of m.words) this.word(word, colour);
+  }
+
+  private column(header: Header, c: Colouring): void {
+    const add = (cls: string, text = "") => this.add(cls, text);
     add("cv-title", c.unit ? `${c.label} [${c.unit}]` : c.label);
     if (c.words.length) {
-      for (const [word, colour] of c.words.slice(0, 12)) {
-        const row = add("", ""), dot = document.createElement("span");
-        dot.className = "cv-dot";
-        dot.style.background = colour;
-        row.append(dot, word);
-      }
+      for (const [word, colour] of c.words.slice(0, 12)) this.word(word, colour);
       return;
     }
     const ramp = add("cv-ramp");

@@ -6,6 +6,7 @@ import { HIT, Solid, Tool } from "./bodies";
 import { SIZE, ViewCube } from "./cube";
 import { Colouring, Document, Header, Mark, Rgb, fetched } from "./document";
 import { Overlay, number } from "./overlay";
+import { Abscissa, Pair, between } from "./pair";
 import { ToolPath, coloured } from "./path";
 import { Stock } from "./stock";
 
@@ -45,7 +46,7 @@ export class View {
   private told = 0;
   private before = 0;
   private recorder: MediaRecorder | null = null;
-  private peers: View[] = [];
+  private pair: Pair<View> | null = null;
 
   constructor(readonly host: HTMLElement) {
     this.overlay = new Overlay(host);
@@ -117,11 +118,16 @@ export class View {
     this.colouring = c;
     this.path.colour(doc, c, this.header);
     this.path.clip(this.plane ? [this.plane] : []);
-    this.overlay.legend(this.header, c);
+    this.legend();
     this.shades = doc && c?.frames
       ? coloured(doc.f4(c.frames), c.frames_above ? doc.u1(c.frames_above) : null, c, this.header) : null;
     this.stock?.shade(this.draped ? this.shades : null);
     this.dirty = true;
+  }
+
+  private legend(): void {
+    const maps = this.solids.filter((s) => !this.hidden.has(s.body.name)).map((s) => s.body.legend);
+    this.overlay.legend(this.header, this.colouring, maps.filter((m) => m !== undefined));
   }
 
   /** Show the values of the column on what was cut there. */
@@ -138,7 +144,7 @@ export class View {
   }
 
   /** Stand where time (or path) has a value. */
-  abscissa(value: number, against: "time" | "path" = "time"): void {
+  abscissa(value: number, against: Abscissa = "time"): void {
     if (!this.header) return;
     this.stand(this.path.at(against === "time" ? this.path.t : this.path.s, value));
   }
@@ -240,8 +246,22 @@ export class View {
     return true;
   }
 
-  /** Follow another view's camera, and it this one's. */
-  link(other: View): void { this.peers.push(other); other.peers.push(this); this.follow(); }
+  /** Lead another view: `here` and `there` are rising lengths of path [mm] that belong together, or times alike. */
+  lead(other: View, against: Abscissa, here: number[], there: number[]): void {
+    this.alone();
+    this.pair = { other, against, here, there };
+    other.pair = { other: this, against, here: [], there: [] };
+    this.follow();
+    if (this.path) this.stand(this.place, this.row);
+  }
+
+  get paired(): boolean { return this.pair !== null; }
+
+  /** No longer move with another view. */
+  alone(): void {
+    if (this.pair) this.pair.other.pair = null;
+    this.pair = null;
+  }
 
   /** What is drawn, for tests: triangles of all bodies, volume of the stock, place of the tool. */
   state(): Record<string, unknown> {
@@ -288,6 +308,7 @@ export class View {
     if (this.stock) this.stock.group.visible = seen("stock");
     this.path.group.visible = seen("path");
     this.marks.visible = seen("marks");
+    this.legend();
     this.stand(this.place, this.row);
     this.dirty = true;
   }
@@ -305,6 +326,16 @@ export class View {
     }
     this.stock?.at(now);
     this.dirty = true;
+    this.leadOn();
+  }
+
+  /** Put the view that this one leads where it belongs. */
+  private leadOn(): void {
+    const p = this.pair;
+    if (!p || !p.here.length || !p.other.path) return;
+    const column = p.against === "time" ? this.path.t : this.path.s, k = Math.floor(this.place);
+    const next = Math.min(k + 1, column.length - 1), value = column[k] + (this.place - k) * (column[next] - column[k]);
+    p.other.abscissa(between(p.here, p.there, value), p.against);
   }
 
   private touch(mark: Mark | null): void {
@@ -331,12 +362,14 @@ export class View {
   private tell(name: string, detail: unknown): void { this.host.dispatchEvent(new CustomEvent(name, { detail })); }
 
   private follow(): void {
-    for (const p of this.peers) {
-      p.camera.position.copy(this.camera.position);
-      p.controls.target.copy(this.controls.target);
-      p.camera.lookAt(p.controls.target);
-      p.dirty = true;
-    }
+    const p = this.pair?.other;
+    if (!p) return;
+    p.camera.position.copy(this.camera.position);
+    p.camera.near = this.camera.near;
+    p.camera.far = this.camera.far;
+    p.controls.target.copy(this.controls.target);
+    p.camera.lookAt(p.controls.target);
+    p.dirty = true;
   }
 
   private draw(): void {
@@ -433,6 +466,13 @@ export function of(id: string): View {
 
 /** Show the document of an address in an element. */
 export async function open(id: string, url: string, keep = false): Promise<void> { of(id).load(await fetched(url), keep); }
+
+/** Show the document of an address beside a view that leads it. */
+export async function beside(id: string, url: string, leader: string, against: Abscissa, here: number[], there: number[]): Promise<void> {
+  const view = of(id);
+  view.load(await fetched(url), view.paired);
+  of(leader).lead(view, against, here, there);
+}
 
 /** Colour the path of a view by the document of an address. */
 export async function paint(id: string, url: string): Promise<void> {

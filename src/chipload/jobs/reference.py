@@ -121,10 +121,10 @@ def reference() -> str:
         many = "tuple" in str(root.model_fields[capability.key].annotation)
         out.append(f"Such a job has a table `{f'[[{capability.key}]]' if many else f'[{capability.key}]'}`.")
         out.append(_summary(root) + "\n")
-        if any(_table_in(field.annotation) is None for field in root.model_fields.values()):
+        if any(table_in(field.annotation) is None for field in root.model_fields.values()):
             out += ["\n### Keys before the first table\n", *_rows(root, "", tables=False)]
         for name, field in root.model_fields.items():
-            table = _table_in(field.annotation)
+            table = table_in(field.annotation)
             if table is None:
                 continue
             many = "tuple" in str(field.annotation)
@@ -151,7 +151,7 @@ def _rows(table: type[BaseModel], name: str, prefix: str = "", tables: bool = Tr
         yield "| key | value | required | example | meaning |"
         yield "|---|---|---|---|---|"
     for key, field in table.model_fields.items():
-        inner = _table_in(field.annotation)
+        inner = table_in(field.annotation)
         if inner is not None:
             if tables:
                 yield from _rows(inner, key, f"{prefix}{key}.")
@@ -159,7 +159,7 @@ def _rows(table: type[BaseModel], name: str, prefix: str = "", tables: bool = Tr
         needed = field.is_required() or (table is CutterTable and key in NEEDED)
         need = "required" if needed else "name or file" if issubclass(table, SourceTable) else _default(field)
         meaning = _meaning(table, key, field).replace("|", "/")
-        yield f"| `{prefix}{key}` | {_value(field)} | {need} | `{_example(name, key, field)}` | {meaning} |"
+        yield f"| `{prefix}{key}` | {value_words(field)} | {need} | `{_example(name, key, field)}` | {meaning} |"
 
 
 def _meaning(table: type[BaseModel], key: str, field: FieldInfo) -> str:
@@ -199,7 +199,8 @@ def _default(field: FieldInfo) -> str:
     return "optional" if value is None or value in ((), {}) else f"default {value}"
 
 
-def _value(field: FieldInfo) -> str:
+def value_words(field: FieldInfo) -> str:
+    """What a key takes, in words: its type and its range."""
     bounds: list[str] = []
     words = _text_of(field.annotation, bounds)
     bounds += _limits(field.metadata)
@@ -237,7 +238,8 @@ def _text_of(annotation: Any, bounds: list[str]) -> str:
     return getattr(annotation, "__name__", str(annotation))
 
 
-def _table_in(annotation: Any) -> type[BaseModel] | None:
+def table_in(annotation: Any) -> type[BaseModel] | None:
+    """The table that a key holds, itself or in a list; None: it holds a value."""
     if isinstance(annotation, type) and not isinstance(annotation, types.GenericAlias):
         return annotation if issubclass(annotation, BaseModel) else None
-    return next((t for t in map(_table_in, typing.get_args(annotation)) if t is not None), None)
+    return next((t for t in map(table_in, typing.get_args(annotation)) if t is not None), None)

@@ -5,7 +5,10 @@ moves its surface is stated; none is left out.
 from __future__ import annotations
 
 import io
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -20,6 +23,8 @@ TRIANGLES, HALVINGS = 400_000, 12
 OWN = ("path", "rapids", "cutter")
 #: kinds of bodies by how their names begin
 KINDS = ("stock", "part", "fixture", "wall")
+#: a colour in a legend, and characters of its texts at most
+COLOUR, LONGEST = re.compile("#[0-9a-f]{6}"), 80
 PLAIN = (168, 176, 186, 255)
 
 
@@ -34,6 +39,7 @@ class Body:
     vertices, faces : (v, 3) [mm], (f, 3)
     colours : (4,) sRGB of all, or (v, 4)
     triangles : that the scene has of it
+    legend : what the colours mean (:func:`chipload.report.scene.legend`); None: nothing
     moved_mm : how far drawing it with fewer triangles moves its vertices at most
     """
 
@@ -44,6 +50,7 @@ class Body:
     colours: NDArray[np.uint8]
     triangles: int
     moved_mm: float = 0.0
+    legend: Mapping[str, Any] | None = None
 
     @property
     def low(self) -> Floats:
@@ -125,7 +132,23 @@ def _body(name: str, mesh: trimesh.Trimesh, most: int) -> Body:
         vertices, faces, painted, moved = fewer_triangles(vertices, faces, painted, most)
     plain = _plain(name)
     kind = next((k for k in KINDS if plain.startswith(k)), "body")
-    return Body(name, kind, vertices, faces, painted, triangles, moved)
+    return Body(name, kind, vertices, faces, painted, triangles, moved, _legend(mesh.metadata))
+
+
+def _legend(metadata: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The legend of a mesh, where the file has a sound one."""
+    found: Any = metadata.get("legend")
+    try:
+        title = str(found["title"])[:LONGEST]
+        values, texts = [float(v) for v, _ in found["stops"]], [str(w)[:LONGEST] for w, _ in found["words"]]
+        colours = [str(c) for _, c in (*found["stops"], *found["words"])]
+    except (TypeError, KeyError, ValueError):
+        return None
+    if not (np.isfinite(values).all() and all(map(COLOUR.fullmatch, colours))):
+        return None
+    stops = [list(pair) for pair in zip(values, colours, strict=False)]
+    words = [list(pair) for pair in zip(texts, colours[len(values) :], strict=True)]
+    return {"title": title, "stops": stops, "words": words}
 
 
 def _plain(name: str) -> str:

@@ -217,6 +217,7 @@ def _body(body: Body, out: Buffers) -> dict[str, Any]:
             if body.colours.ndim == 1
             else {"colours": out.put(body.colours[:, :3], "u1")}
         ),
+        **({} if body.legend is None else {"legend": body.legend}),
     }
 
 

@@ -111,6 +111,7 @@ _ROWS = (
     ("torque_nm", "N m", "torque", "greatest torque on the cutter over a revolution"),
     ("torque_mean_nm", "N m", "mean torque", "mean torque over a revolution, which the spindle has to give"),
     ("torque_measured_nm", "N m", "measured torque", "torque as the controller measures it"),
+    ("torque_planned_nm", "N m", "planned torque", "mean torque that the plan expects at the programmed feed"),
     ("torque_allowable_nm", "N m", "allowable torque", "torque that the workpiece allows at the place"),
     ("torque_over_percent", "%", "torque over allowable", "torque above the allowable torque, in percent of it"),
     ("power_w", "W", "power", "mean power over a revolution"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from html import escape
 from importlib import resources
 from pathlib import PurePosixPath
@@ -15,8 +16,18 @@ from chipload.errors import InputError, OutputError
 from chipload.report.folder import check_target
 from chipload.result import Verdict
 from chipload.web.asset_cache import AssetCache
-from chipload.web.folder_access import ENTRIES, FolderEntry, OpenedFolder, is_job, list_folder, resolve_name
+from chipload.web.comparison import MOST
+from chipload.web.folder_access import (
+    ENTRIES,
+    FolderEntry,
+    OpenedFolder,
+    is_job,
+    is_result,
+    list_folder,
+    resolve_name,
+)
 from chipload.web.panels import RELEASE
+from chipload.web.panels.job_form import JobForm
 from chipload.web.result import PageResult, open_result
 from chipload.web.result_view import VERDICTS, ResultView
 from chipload.web.runs import Run
@@ -64,6 +75,7 @@ class Page:
             self.home = ui.element("div").classes("cl-home")
             with ui.element("div").classes("cl-view") as self.stage:
                 self.view = ResultView(assets)
+        self.view.moved_on = self._moved_on
         self.opening, self.list = self._dialog("Open")
         self.running, self.ask = self._dialog("Run")
         self._help()
@@ -107,6 +119,7 @@ class Page:
             self.report.props(f'href="/report?name={quote(name)}"')
             ui.navigate.history.replace(f"/?show={quote(name)}")
             await self.view.open(result)
+            await self._offer(name, result)
         except InputError as err:
             ui.notify(str(err), type="negative")
             if self.result is None:
@@ -125,6 +138,12 @@ class Page:
             ).classes("cl-tracks").mark("track")  # fmt: skip
             self.tracks.on("popup-hide", js_handler=RELEASE)
             self.tracks.set_visibility(False)
+            self.others = ui.select({}, multiple=True, on_change=self._compared).props(
+                f'dense options-dense outlined hide-bottom-space max-values={MOST - 1} aria-label="compare with"'
+                ' display-value="compare with \u2026"'
+            ).classes("cl-tracks").mark("compare")  # fmt: skip
+            self.others.on("popup-hide", js_handler=RELEASE)
+            self.others.set_visibility(False)
             self.busy = ui.spinner(size="sm")
             self.busy.set_visibility(False)
             ui.element("div").classes("cl-gap")
@@ -138,7 +157,11 @@ class Page:
         """Where a run is."""
         with ui.element("div").classes("cl-run").mark("run") as self.bar:
             self.bar_text = ui.label("").classes("cl-run-text").props("role=status").mark("run-text")
-            self.bar_line = ui.linear_progress(0.0, show_value=False, size="8px").classes("cl-run-line")
+            self.bar_line = (
+                ui.linear_progress(0.0, show_value=False, size="8px")
+                .classes("cl-run-line")
+                .props('aria-label="progress of the run"')
+            )
             self.bar_stop = ui.button("Stop", on_click=self.runs.stop).props("outline dense no-caps color=red")
             self.bar_stop.mark("stop")
             self.bar_close = ui.button(icon="close", on_click=lambda: self.bar.set_visibility(False)).props(
@@ -183,13 +206,17 @@ class Page:
         self.name.set_text(str(self.opened.root.name))
         self.report.set_visibility(False)
         self.tracks.set_visibility(False)
+        self.others.set_visibility(False)
         with self.home, ui.element("div").classes("cl-card"):
             if job is not None:
                 ui.label(self._called(job)).classes("cl-dialog-title")
                 with ui.element("div").classes("cl-entry"):
                     _button("Run", lambda: self._ask(job), "play_arrow").mark(f"run-{job}")
                     ui.label("plans, proves and writes a result; it can be stopped").classes("cl-note")
-                ui.html(self._text(job), sanitize=True).classes("cl-scroll cl-code cl-job")
+                with ui.element("div").classes("cl-job-two"):
+                    with ui.element("div").classes("cl-scroll cl-job"):
+                        JobForm(resolve_name(self.opened.root, job), lambda values: self._ask(job, values))
+                    ui.html(self._text(job), sanitize=True).classes("cl-scroll cl-code cl-job").props("tabindex=0")
             ui.label("Results and jobs in this folder").classes("cl-dialog-title")
             self._listed(found, all_seen)
 
@@ -223,24 +250,29 @@ class Page:
         return "".join(f'<div class="cl-line"><i>{k}</i>{escape(t) or " "}</div>' for k, t in enumerate(lines, 1))
 
     # -- running ------------------------------------------------------------------------------------------------
-    def _ask(self, job: str) -> None:
-        """Where the result goes."""
+    def _ask(self, job: str, overrides: Sequence[str] = ()) -> None:
+        """Where the result goes; one with changed values goes beside the last one and is compared with it."""
         self.opening.close()
         stem, folder = PurePosixPath(job).stem, PurePosixPath(job).parent
-        out = (folder / ("result" if stem == "job" else f"result-{stem}")).as_posix()
+        last = (folder / ("result" if stem == "job" else f"result-{stem}")).as_posix()
+        known = is_result(self.opened.root / last)
+        out = f"{last}-changed" if overrides else last
         self.ask.clear()
         with self.ask:
             ui.label(f"{self._called(job)}: its result goes into this folder of the opened one:").classes("cl-note")
             where = ui.input(value=out).props("dense outlined").classes("cl-out").mark("out")
+            for text in overrides:
+                ui.label(text).classes("cl-note cl-changed")
             message = ui.label("").classes("cl-no")
+            beside = last if overrides and known else None
             with ui.element("div").classes("cl-entry"):
-                _button("Run", lambda: self._run(job, str(where.value), message), "play_arrow").props(
-                    "unelevated color=primary"
-                ).props(remove="flat").mark("start")
+                _button(
+                    "Run", lambda: self._run(job, str(where.value), message, overrides, beside), "play_arrow"
+                ).props("unelevated color=primary").props(remove="flat").mark("start")
                 _button("Cancel", self.running.close)
         self.running.open()
 
-    def _run(self, job: str, out: str, message: Any) -> None:
+    def _run(self, job: str, out: str, message: Any, overrides: Sequence[str], beside: str | None) -> None:
         """Start a run, unless one runs or its folder cannot be written."""
         root = self.opened.root
         try:
@@ -255,7 +287,7 @@ class Page:
             message.set_text(str(err).replace(f"--out {root}/", ""))
             return
         self.running.close()
-        self.runs.now = now = Run(job, target.relative_to(root).as_posix())
+        self.runs.now = now = Run(job, target.relative_to(root).as_posix(), overrides, beside)
         self.seen, self.own = None, now
         self.bar.set_visibility(True)
         background_tasks.create(now.work(path, target))
@@ -281,12 +313,49 @@ class Page:
             self.seen = now
             if now.state == "done" and now is self.own:
                 await self.show(now.out)
+                if now.beside is not None and now.beside != now.out:
+                    self.others.set_value([f"result {now.beside}"])
                 self.bar.set_visibility(False)
 
     # -- keys ---------------------------------------------------------------------------------------------------
     async def _tracked(self) -> None:
         if self.result is not None and isinstance(self.tracks.value, int):
             await self.view.follow(self.tracks.value)
+            if self.others.value:
+                self.others.set_value([])
+
+    def _moved_on(self, number: int) -> None:
+        """The panels show another track by themselves."""
+        self.tracks.set_value(number)
+
+    async def _offer(self, name: str, result: PageResult) -> None:
+        """What the result can be compared with: its other tracks, and the other results of the folder."""
+        found, _ = await asyncio.to_thread(list_folder, self.opened.root)
+        options = {f"track {k}": t.title for k, t in enumerate(result.tracks)}
+        options |= {f"result {f.name}": self._called(f.name) for f in found if f.kind == "result" and f.name != name}
+        self.others.set_options(options, value=[])
+        self.others.set_visibility(len(options) > 1)
+
+    async def _compared(self) -> None:
+        result, chosen = self.result, [str(v) for v in self.others.value or []]
+        if result is None:
+            return
+        others = []
+        for value in chosen:
+            kind, _, rest = value.partition(" ")
+            try:
+                if kind == "track":
+                    track = result.tracks[int(rest)]
+                    if track is not self.view.track:
+                        others.append((result, track, track.title))
+                else:
+                    other = await asyncio.to_thread(open_result, self.opened.root, rest)
+                    others.append((other, other.tracks[0], f"{self._called(rest)}: {other.tracks[0].own.name}"))
+            except InputError as err:
+                ui.notify(str(err), type="negative")
+        self.others.props["display-value"] = "; ".join(title for *_, title in others) or "compare with \u2026"
+        self.others.update()
+        await self.view.compare(others)
 
     async def _key(self, event: Any) -> None:
         if not event.action.keydown or event.modifiers.ctrl or event.modifiers.meta or event.modifiers.alt:

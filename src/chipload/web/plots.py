@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from chipload.result.style import FONT, GRID, INK, LIMIT
 from chipload.result.thinning import thinned
 from chipload.web.checks import Bound, bound_of, label_and_unit
+from chipload.web.comparison import Side, along, row_beside
 from chipload.web.result import PageResult, PageTrack, TextColumn
 
 Floats = NDArray[np.float64]
@@ -21,6 +22,12 @@ Floats = NDArray[np.float64]
 POINTS = 4000
 COLOURS = ("#3457a6", "#0b7a75", "#c9821a", "#8a4fa3")
 CURSOR = "#b3261e"
+#: columns that are drawn with another one, in its axis: what is allowed, planned and measured of it, with its dash
+BESIDE = {
+    "torque_nm": (("torque_allowable_nm", "#b3261e", "dash"), ("torque_planned_nm", "#6b7683", "dot")),
+    "torque_measured_nm": (("torque_allowable_nm", "#b3261e", "dash"), ("torque_planned_nm", "#6b7683", "dot")),
+    "force_normal_n": (("force_allowable_n", "#b3261e", "dash"), ("force_normal_planned_n", "#6b7683", "dot")),
+}
 #: a limit farther above the values than this is named but would flatten them if it were drawn
 FAR = 1.8
 
@@ -31,10 +38,19 @@ def bounds_of(result: PageResult, track: PageTrack, columns: Sequence[str]) -> d
 
 
 def plots(
-    result: PageResult, track: PageTrack, bounds: Mapping[str, Bound | None], against: str, row: int
+    result: PageResult,
+    track: PageTrack,
+    bounds: Mapping[str, Bound | None],
+    against: str,
+    row: int,
+    sides: Sequence[Side] = (),
 ) -> dict[str, Any]:
-    """The figure (plotly, plain values) of columns and their limits with the cursor at a row."""
+    """The figure (plotly, plain values) of columns and their limits with the cursor at a row.
+
+    ``sides``: the track itself and those that it is compared with, each drawn in its colour along the first.
+    """
     x = abscissa(track, against)
+    others = [(side, along(sides[0], side, against)) for side in sides[1:]]
     at = float(x[row])
     data: list[dict[str, Any]] = []
     axes: dict[str, Any] = {}
@@ -48,10 +64,21 @@ def plots(
         y = values.codes.astype(np.float64) if isinstance(values, TextColumn) else values
         rows = drawn_rows(y)
         unit = escape(label_and_unit(column)[1])
-        colour = COLOURS[k % len(COLOURS)]
+        colour = sides[0].colour if sides else COLOURS[k % len(COLOURS)]
         axis = "" if k == 0 else str(k + 1)
         top = 1.0 - k * (height + gap)
-        finite = y[np.isfinite(y)]
+        beside = [(side, xs, _numbers(side, column)) for side, xs in others]
+        drawn = [y, *(v for _, _, v in beside if v is not None)]
+        for name, paint, dash in BESIDE.get(column, ()):
+            own = result.column(track, name) if name in result.columns else None
+            if own is None or isinstance(own, TextColumn) or not np.isfinite(own).any():
+                continue
+            # an allowable value far above would flatten what it is compared with
+            if float(np.nanmin(own)) <= FAR * float(np.nanmax(np.nan_to_num(y))):
+                drawn.append(np.minimum(own, FAR * float(np.nanmax(np.nan_to_num(y)))))
+            some = drawn_rows(own)
+            data.append(_line(name, x[some], own[some], axis, paint, f"%{{y:.5g}} {unit} {name}", dash))
+        finite = np.concatenate([v[np.isfinite(v)] for v in drawn])
         low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
         limit = bound.limit if bound is not None else math.inf
         near = limit <= FAR * high
@@ -75,9 +102,14 @@ def plots(
                 "hovertemplate": f"%{{y:.5g}} {unit}<extra></extra>",
             }
         )  # fmt: skip
+        for side, xs, v in beside:
+            if v is not None:
+                some = drawn_rows(v)
+                said = f"%{{y:.5g}} {unit} {escape(side.title)}"
+                data.append(_line(f"{column}: {side.title}", xs[some], v[some], axis, side.colour, said))
         notes.append(
             {
-                "text": annotation(result, track, column, row, bound), "x": 0.004, "y": top,
+                "text": annotation(result, track, column, row, bound, sides, against), "x": 0.004, "y": top,
                 "xref": "paper", "yref": "paper", "xanchor": "left", "yanchor": "top", "showarrow": False,
                 "font": {"size": 11, "color": colour},
                 "bgcolor": "rgba(255,255,255,0.85)", "borderpad": 1,
@@ -105,16 +137,25 @@ def plots(
             "position": 0.0,
             "gridcolor": GRID,
             "zeroline": False,
-            "range": [float(x[0]), float(x[-1])] if x[-1] > x[0] else [float(x[0]) - 1.0, float(x[0]) + 1.0],
+            "range": _range([x, *(xs for _, xs in others)]),
             "tickfont": {"size": 10, "color": "#5f6b7a"},
         },
         "shapes": shapes,
         "annotations": notes,
-        "uirevision": f"{result.name}/{track.title}/{against}",
+        "uirevision": f"{result.name}/{track.title}/{against}/{'/'.join(side.title for side in sides)}",
         **axes,
     }
     config = {"displaylogo": False, "displayModeBar": False, "doubleClick": "reset"}
     return {"data": data, "layout": layout, "config": config}
+
+
+def _line(name: str, x: Floats, y: Floats, axis: str, colour: str, said: str, dash: str = "solid") -> dict[str, Any]:
+    """One line of the figure; ``axis`` is the ending of its y axis."""
+    return {
+        "type": "scatter", "mode": "lines", "name": name, "x": x, "y": y, "xaxis": "x", "yaxis": f"y{axis}",
+        "connectgaps": False, "showlegend": False, "line": {"color": colour, "width": 1.3, "dash": dash},
+        "hovertemplate": f"{said}<extra></extra>",
+    }  # fmt: skip
 
 
 def abscissa(track: PageTrack, against: str) -> Floats:
@@ -122,16 +163,46 @@ def abscissa(track: PageTrack, against: str) -> Floats:
     return track.t if against == "time" else track.s
 
 
-def annotation(result: PageResult, track: PageTrack, column: str, row: int, bound: Bound | None) -> str:
-    """Name of a column, its value at a row, and its limit."""
+def annotation(
+    result: PageResult,
+    track: PageTrack,
+    column: str,
+    row: int,
+    bound: Bound | None,
+    sides: Sequence[Side] = (),
+    against: str = "time",
+) -> str:
+    """Name of a column, its value at a row, those of the other sides there, and its limit."""
     word, unit = label_and_unit(column)
-    values = result.column(track, column)
-    code = int(values.codes[row]) if isinstance(values, TextColumn) else -1
-    value = f"{values[row]:.5g}" if not isinstance(values, TextColumn) else values.words[code] if code >= 0 else ""
     limit = ""
     if bound is not None:
         limit = f'  <span style="color:{LIMIT}">limit {bound.limit:g}</span>'
-    return f"{escape(word)} <b>{escape(value)}</b> {escape(unit)}{limit}"
+    values = [f"<b>{escape(_value(result, track, column, row))}</b>"]
+    for side in sides[1:]:
+        there = _value(side.result, side.track, column, row_beside(sides[0], side, against, row))
+        values.append(f'<span style="color:{side.colour}"><b>{escape(there)}</b></span>')
+    return f"{escape(word)} {' / '.join(values)} {escape(unit)}{limit}"
+
+
+def _value(result: PageResult, track: PageTrack, column: str, row: int) -> str:
+    """What a column holds at a row, as text; a dash: the result has no such column."""
+    if column not in result.columns:
+        return "-"
+    values = result.column(track, column)
+    if not isinstance(values, TextColumn):
+        return f"{values[row]:.5g}"
+    return values.words[int(values.codes[row])] if values.codes[row] >= 0 else ""
+
+
+def _numbers(side: Side, column: str) -> Floats | None:
+    """(n,) numbers of a column of a side; None: it has none."""
+    values = side.result.column(side.track, column) if column in side.result.columns else None
+    return None if values is None or isinstance(values, TextColumn) else values
+
+
+def _range(x: Sequence[Floats]) -> list[float]:
+    low, high = min(float(v[0]) for v in x), max(float(v[-1]) for v in x)
+    return [low, high] if high > low else [low - 1.0, low + 1.0]
 
 
 def cursor(at: float) -> dict[str, Any]:

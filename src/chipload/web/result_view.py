@@ -6,7 +6,7 @@ The row is the one thing that moves: slider, plots, lines, table and keys set it
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,13 +14,17 @@ from nicegui import ui
 
 from chipload.result import Verdict
 from chipload.web.asset_cache import AssetCache
+from chipload.web.comparison import COLOURS, MOST, Side
 from chipload.web.panels import RELEASE
+from chipload.web.panels.comparison import ComparisonPanel
 from chipload.web.panels.limits import LimitPanel
+from chipload.web.panels.loads import LinePanel, ToolPanel, sequence
 from chipload.web.panels.plots import PlotPanel, nearest
 from chipload.web.panels.scene import ScenePanel
 from chipload.web.panels.source import SourcePanel
 from chipload.web.plots import abscissa
 from chipload.web.result import PageResult, PageTrack
+from chipload.web.scene import bodies
 
 #: seconds that a whole track takes where no speed is chosen
 WHOLE = 30.0
@@ -29,6 +33,8 @@ SPEEDS = {0: "30 s", 1: "\u00d71", 10: "\u00d710", 100: "\u00d7100"}
 VERDICTS = {Verdict.HOLDS: "ok", Verdict.UNPROVEN: "may", Verdict.EXCEEDS: "no"}
 #: steps of the slider
 STEPS = 4000
+#: tables beside the 3D view
+TABLES = {"limits": "limits", "tools": "tools", "lines": "lines", "compare": "compare"}
 
 
 class ResultView:
@@ -40,6 +46,9 @@ class ResultView:
         self.row = 0
         self.playing = False
         self.turn = asyncio.Lock()
+        self.sides: tuple[Side, ...] = ()
+        #: told when another program of the sequence is shown
+        self.moved_on: Callable[[int], None] = lambda _: None
         with ui.element("div").classes("cl-verdict") as self.verdict:
             self.word = ui.label("").classes("cl-word").mark("verdict")
             self.message = ui.label("").classes("cl-message").props("role=status")
@@ -50,7 +59,15 @@ class ResultView:
                 self.scene = ScenePanel(assets, self._viewed)
                 self.plots = PlotPanel(self.pick, self._turned)
             with ui.element("div").classes("cl-right"):
-                self.limits = LimitPanel(self.find)
+                with ui.element("div").classes("cl-panel cl-tables"):
+                    self.table = ui.toggle(TABLES, value="limits", on_change=self._tabled).props(
+                        "dense no-caps size=sm unelevated toggle-color=blue-grey-7"
+                    ).classes("cl-tabs").mark("tables")  # fmt: skip
+                    self.limits = LimitPanel(self.find)
+                    self.tools = ToolPanel(self._found)
+                    self.lines = LinePanel(self._found)
+                    self.compared = ComparisonPanel()
+                self._tabled()
                 self.source = SourcePanel(self.pick)
         with ui.element("div").classes("cl-foot"):
             self._button("first_page", "to the beginning (Home)", lambda: self.go(0))
@@ -87,9 +104,36 @@ class ResultView:
             if self.result is None or not 0 <= k < len(self.result.tracks) or self.track is self.result.tracks[k]:
                 return
             self.pause()
+            await self._alone()
             self.track = self.result.tracks[k]
             await self.scene.follow(self.result, self.track)
             await self._tracked(self.result, self.track)
+
+    async def compare(self, others: Sequence[tuple[PageResult, PageTrack, str]]) -> None:
+        """Show other tracks beside and over the own one; empty: it alone."""
+        async with self.turn:
+            if self.result is None or self.track is None:
+                return
+            self.pause()
+            if not others:
+                await self._alone()
+                return
+            every = [(self.result, self.track, self.track.title), *others][:MOST]
+            self.sides = tuple(Side(*side, COLOURS[k]) for k, side in enumerate(every))
+            self.plots.compare(self.sides)
+            found = await asyncio.to_thread(bodies, self.sides[1].result)
+            await self.scene.compare(self.sides, found)
+            self.table.set_value("compare")
+            self.compared.show(self.sides, self.plots.against.value)
+            self.go(self.row)
+
+    async def _alone(self) -> None:
+        """Compare no longer."""
+        if self.sides:
+            self.sides = ()
+            self.plots.compare(())
+            self.compared.show((), self.plots.against.value)
+            await self.scene.compare((), None)
 
     def first(self) -> None:
         """Stand at the worst that was found, or at the beginning."""
@@ -153,6 +197,7 @@ class ResultView:
     # -- parts --------------------------------------------------------------------------------------------------
     async def _open(self, result: PageResult) -> None:
         self.pause()
+        await self._alone()
         track = result.tracks[0]
         self.result, self.track = result, track
         verdict, message = result.result.verdict, result.result.message
@@ -167,11 +212,13 @@ class ResultView:
 
     async def _tracked(self, result: PageResult, track: PageTrack) -> None:
         self.limits.open(result, track)
+        self.tools.open(result, track)
         marks = self.scene.marks
         self.row = marks[0].row if marks else 0
         self.plots.open(result, track, self.row)
         self._turned()
         await self.source.open(result, track)
+        self.lines.open(result, track, self.source.text)
         self.first()
 
     def _turned(self) -> None:
@@ -180,10 +227,44 @@ class ResultView:
             return
         x = abscissa(self.track, self.plots.against.value)
         self.scene.against(self.plots.against.value)
+        if self.sides:
+            self.compared.show(self.sides, self.plots.against.value)
         low, high = float(x[0]), float(x[-1]) if x[-1] > x[0] else float(x[0]) + 1.0
         self.slider.props.update({"min": low, "max": high, "step": (high - low) / STEPS})
         self.slider.update()
         self.slider.set_value(float(x[self.row]) if self.row < len(x) else low)
+
+    def _tabled(self) -> None:
+        """Show the table that is chosen."""
+        chosen = self.table.value
+        self.limits.box.set_visibility(chosen == "limits")
+        self.tools.html.set_visibility(chosen == "tools")
+        self.lines.box.set_visibility(chosen == "lines")
+        self.compared.html.set_visibility(chosen == "compare")
+        if self.track is not None and chosen == "tools":
+            self.tools.at(self.row)
+
+    async def _found(self, number: int, row: int) -> None:
+        """A table asks for a row, of another track where it names one."""
+        if self.result is None or self.track is None:
+            return
+        if 0 <= number < len(self.result.tracks) and self.result.tracks[number] is not self.track:
+            await self.follow(number)
+            self.moved_on(number)
+        self.find(row)
+
+    async def _next(self) -> None:
+        """Play the program that is run after this one, where there is one."""
+        if self.result is None or self.track is None or self.sides:
+            return
+        order = sequence(self.result, self.track)
+        place = order.index(self.track) + 1
+        if place < len(order):
+            number = self.result.tracks.index(order[place])
+            await self.follow(number)
+            self.moved_on(number)
+            self.go(0)
+            self.toggle()
 
     def _slid(self, event: Any) -> None:
         if self.track is None or not isinstance(event.args, (int, float)):
@@ -192,7 +273,7 @@ class ResultView:
         self.row = nearest(abscissa(self.track, self.plots.against.value), float(event.args))
         self._shown(self.track)
 
-    def _viewed(self, row: int, playing: bool) -> None:
+    async def _viewed(self, row: int, playing: bool) -> None:
         """The 3D view stands at a row: it plays, or its path was clicked."""
         if self.track is None:
             return
@@ -206,11 +287,14 @@ class ResultView:
         self._shown(self.track)
         if not playing:
             self.pause()
+            await self._next()
 
     def _shown(self, track: PageTrack) -> None:
         k = self.row
         self.plots.at(k)
         self.source.at(k)
+        if self.table.value == "tools":
+            self.tools.at(k)
         x, y, z = track.place[k].tolist()
         clock = f"{track.t[k]:.3f} of {track.t[-1]:.5g} s \u00b7 "
         line = f" \u00b7 line {int(self.source.text.of_row[k])}" if self.source.text is not None else ""

@@ -13,6 +13,7 @@ import json
 import os
 import signal
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -25,10 +26,17 @@ State = Literal["running", "stopping", "done", "stopped", "failed"]
 
 
 class Run:
-    """One run: its ``state``, the share ``done``, ``what`` it does; at its end its ``code`` and its ``message``."""
+    """One run: its ``state``, the share ``done``, ``what`` it does; at its end its ``code`` and its ``message``.
 
-    def __init__(self, job: str, out: str) -> None:
-        self.job, self.out = job, out
+    Parameters
+    ----------
+    job, out : names in the opened folder
+    overrides : values in the place of those of the job, as `--set` takes them
+    beside : name of the result that it is compared with; None: none
+    """
+
+    def __init__(self, job: str, out: str, overrides: Sequence[str] = (), beside: str | None = None) -> None:
+        self.job, self.out, self.overrides, self.beside = job, out, tuple(overrides), beside
         self.state: State = "running"
         self.done, self.what = 0.0, "starting"
         self.code: int | None = None
@@ -42,7 +50,7 @@ class Run:
 
     async def work(self, job: Path, out: Path) -> None:
         """Start the process and follow it to its end."""
-        words = [sys.executable, "-m", "chipload.web.worker", str(job), str(out)]
+        words = [sys.executable, "-m", "chipload.web.worker", str(job), str(out), *self.overrides]
         pipe = asyncio.subprocess.PIPE
         try:
             process = await asyncio.create_subprocess_exec(

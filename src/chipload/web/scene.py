@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,8 +66,17 @@ def view_path(track: PageTrack) -> ViewPath:
     return ViewPath(track.place, track.axis, track.t, track.s, np.maximum(tool, 0), track.line, track.apart)
 
 
-def page_scene(result: PageResult, track: PageTrack, found: tuple[tuple[Body, ...], str], column: str) -> PageScene:
-    """What the 3D view of a track shows, coloured by a column; ``found``: its bodies and what is to be said of them."""
+def page_scene(
+    result: PageResult,
+    track: PageTrack,
+    found: tuple[tuple[Body, ...], str],
+    column: str,
+    span: tuple[float, float] | None = None,
+) -> PageScene:
+    """What the 3D view of a track shows, coloured by a column.
+
+    ``found``: its bodies and what is to be said of them; ``span``: ends of the scale, None: the column's own.
+    """
     solids, notice = found
     removal = stock_of(result, track)
     if removal is not None:
@@ -85,16 +94,24 @@ def page_scene(result: PageResult, track: PageTrack, found: tuple[tuple[Body, ..
 
     marks = marks_of(result.result, track.own, row, track.place)
     scene = ViewScene(
-        result.result.title, solids, removal, view_path(track), parts, marks, colouring(result, track, column, removal)
-    )
+        result.result.title, solids, removal, view_path(track), parts, marks,
+        colouring(result, track, column, removal, span),
+    )  # fmt: skip
     names = tuple(b.name for b in solids) + (("stock",) if removal is not None else ())
     return PageScene(scene_document(scene), names, removal, marks, " ".join([notice, unknown]).strip())
 
 
-def colouring(result: PageResult, track: PageTrack, column: str, removal: RemovalMesh | None) -> Colouring:
-    """The colours of a column of a track."""
+def colouring(
+    result: PageResult,
+    track: PageTrack,
+    column: str,
+    removal: RemovalMesh | None,
+    span: tuple[float, float] | None = None,
+) -> Colouring:
+    """The colours of a column of a track; ``span``: ends of their scale, None: the column's own."""
     values: NDArray[np.float64] | TextColumn = result.column(track, column)
     path = view_path(track)
     if isinstance(values, TextColumn):
         return colouring_of_words(column, values.codes, values.words, path)
-    return colouring_of(column, values, path, lowest_limit(track.own.limits, column), removal)
+    made = colouring_of(column, values, path, lowest_limit(track.own.limits, column), removal)
+    return made if span is None else replace(made, low=span[0], high=span[1])

@@ -1,4 +1,7 @@
-"""Run one job for the page: `python -m chipload.web.worker JOB OUT`; :mod:`chipload.web.runs` says what it writes."""
+"""Run one job for the page: `python -m chipload.web.worker JOB OUT [KEY=VALUE]...`.
+
+:mod:`chipload.web.runs` states what it writes.
+"""
 
 from __future__ import annotations
 
@@ -19,8 +22,8 @@ BREATH = 0.1
 ASKED = threading.Event()
 
 
-def work(job: str, out: str) -> dict[str, Any]:
-    """Run the job and write its result; the exit code that `chipload run` has, and what it says."""
+def work(job: str, out: str, *overrides: str) -> dict[str, Any]:
+    """Run the job, with overrides, and write its result; the exit code that `chipload run` has, and what it says."""
     safe = 0
     try:
         from chipload.jobs import load_job, resume_note, run_job
@@ -29,7 +32,7 @@ def work(job: str, out: str) -> dict[str, Any]:
 
         tell = Teller()
         tell(0.0, "reading")
-        read = load_job(job)
+        read = load_job(job, overrides)
         tell(0.0, resume_note(read) or "reading")
         check_target(out)
         with Checkpoint(checkpoint_folder(out)) as kept:
@@ -98,4 +101,4 @@ def _watch() -> None:
 if __name__ == "__main__":
     signal.signal(signal.SIGTERM, _stop)
     threading.Thread(target=_watch, daemon=True).start()
-    _write(work(*sys.argv[1:3]))
+    _write(work(*sys.argv[1:]))

@@ -15,7 +15,7 @@ from chipload.jobs.impeller.mesh import OFF, body_meshes, surface_mesh
 from chipload.jobs.impeller.outcome import ImpellerResult, Searched
 from chipload.jobs.impeller.partitions import patch_grid, shade_of
 from chipload.planning.impeller.compare import Partition
-from chipload.report.scene import engagement_colours
+from chipload.report.scene import engagement_colours, engagement_legend
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -33,7 +33,9 @@ def scene_bytes(milled: ImpellerResult) -> bytes:
         points, faces = surface_mesh(op)
         colours = engagement_colours(op.answer.diameter, most)
         colours[op.answer.cutter < 0] = MISSED
-        _add(scene, f"{k}-largest", points, faces, colours)
+        says = engagement_legend("largest cutter diameter [mm]", most)
+        says["words"] = [["no cutter reaches it", "#b3261e"]] if (op.answer.cutter < 0).any() else []
+        _add(scene, f"{k}-largest", points, faces, colours, says)
         if milled.used is not None:
             _add(
                 scene, f"{k}-patches", points + OFF * op.surface.scene.normal, faces, _patches(milled, milled.used, op)
@@ -58,9 +60,13 @@ def _patches(milled: ImpellerResult, way: Partition, op: Searched) -> NDArray[np
     return out
 
 
-def _add(scene: Any, name: str, points: Floats, faces: Ints, colours: NDArray[np.uint8]) -> None:
+def _add(
+    scene: Any, name: str, points: Floats, faces: Ints, colours: NDArray[np.uint8], says: dict[str, Any] | None = None
+) -> None:
     both = np.concatenate([faces, faces[:, ::-1]])
     mesh = trimesh.Trimesh(points, both, vertex_colors=colours, process=False)
+    if says is not None:
+        mesh.metadata["legend"] = says
     scene.add_geometry(mesh, node_name=name, geom_name=name)
 
 

@@ -16,6 +16,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from chipload.jobs.simulation import part_numbers
+from chipload.report.scene import legend
 from chipload.report.sheet import table
 from chipload.simulation.surface import Collision, Difference
 
@@ -47,6 +48,11 @@ def coloured_mesh(left: Difference, span: float) -> trimesh.Trimesh:
     """The part for a scene."""
     mesh = trimesh.Trimesh(left.points, left.faces, process=False)
     mesh.visual.vertex_colors = colours(left, span)
+    mesh.metadata["legend"] = legend(
+        "gouge (below 0) and excess [mm]",
+        [(-span, GOUGE), (0.0, DONE), (span, EXCESS)],
+        [("more than was looked for", UNKNOWN)],
+    )
     return mesh
 
 

@@ -24,7 +24,8 @@ class LimitPanel:
 
     def __init__(self, pick: Callable[[int], None]) -> None:
         self.pick = pick
-        with ui.element("div").classes("cl-panel cl-tables").props('role=region aria-label="limits and findings"'):
+        self.box = ui.element("div").classes("cl-table-box").props('role=region aria-label="limits and findings"')
+        with self.box:
             self.html = (
                 ui.html("", sanitize=True)
                 .classes("cl-scroll")

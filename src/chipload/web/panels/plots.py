@@ -9,6 +9,7 @@ import numpy as np
 from nicegui import ui
 
 from chipload.web.checks import Bound, label_and_unit
+from chipload.web.comparison import Side
 from chipload.web.panels import RELEASE
 from chipload.web.plots import abscissa, annotation, bounds_of, plots
 from chipload.web.result import PageResult, PageTrack, TextColumn
@@ -29,6 +30,7 @@ class PlotPanel:
         self.track: PageTrack | None = None
         self.row, self.drawn = 0, -1
         self.bounds: dict[str, Bound | None] = {}
+        self.sides: tuple[Side, ...] = ()
         with ui.element("div").classes("cl-panel cl-plots").props('role=region aria-label="plots"'):
             with ui.element("div").classes("cl-head"):
                 self.columns = ui.select({}, multiple=True, on_change=self._changed).props(
@@ -41,9 +43,15 @@ class PlotPanel:
             self.figure = ui.plotly({"data": [], "layout": {}, "config": {}}).classes("cl-figure")
             self.figure.on("plotly_click", self._clicked, js_handler=CLICK)
 
+    def compare(self, sides: tuple[Side, ...]) -> None:
+        """Draw other tracks over the own one, the first of ``sides``; empty: it alone."""
+        self.sides = sides
+        self._draw()
+
     def open(self, result: PageResult, track: PageTrack, row: int = 0) -> None:
         """Show a track, the cursor at a row."""
         same = self.result is result
+        self.sides = ()
         self.result, self.track, self.row = result, track, row
         if not same:
             options = {c: _called(c) for c in result.columns}
@@ -61,7 +69,9 @@ class PlotPanel:
         x = float(abscissa(self.track, self.against.value)[row])
         change: dict[str, Any] = {"shapes[0].x0": x, "shapes[0].x1": x}
         for k, (column, bound) in enumerate(self.bounds.items()):
-            change[f"annotations[{k}].text"] = annotation(self.result, self.track, column, row, bound)
+            change[f"annotations[{k}].text"] = annotation(
+                self.result, self.track, column, row, bound, self.sides, self.against.value
+            )
         self.figure.run_plot_method("relayout", change)
 
     def _chosen(self) -> list[str]:
@@ -70,7 +80,7 @@ class PlotPanel:
     def _draw(self) -> None:
         if self.result is not None and self.track is not None:
             self.bounds = bounds_of(self.result, self.track, self._chosen())
-            figure = plots(self.result, self.track, self.bounds, self.against.value, self.row)
+            figure = plots(self.result, self.track, self.bounds, self.against.value, self.row, self.sides)
             self.figure.update_figure(figure)
             self.drawn = self.row
 

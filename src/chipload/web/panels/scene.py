@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import html
 import json
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import Any
 
@@ -19,6 +19,7 @@ from chipload.report.colouring import FIRST, POINTS
 from chipload.report.view import ViewMark, colouring_document
 from chipload.web.asset_cache import AssetCache
 from chipload.web.checks import label_and_unit
+from chipload.web.comparison import Side, common_span, knots, row_beside
 from chipload.web.panels import RELEASE
 from chipload.web.result import PageResult, PageTrack
 from chipload.web.scene import PageScene, bodies, colouring, page_scene, view_path
@@ -34,18 +35,25 @@ SECTIONS = {"": "no section", "x": "section X", "y": "section Y", "z": "section 
 class ScenePanel:
     """The 3D view of a result."""
 
-    def __init__(self, assets: AssetCache, picked: Callable[[int, bool], None]) -> None:
+    def __init__(self, assets: AssetCache, picked: Callable[[int, bool], Awaitable[None]]) -> None:
         self.assets, self.picked = assets, picked
         self.result: PageResult | None = None
         self.track: PageTrack | None = None
         self.scene: PageScene | None = None
+        self.beside: PageScene | None = None
         self.found: Any = ((), "")
         self.seen: dict[str, bool] = {}
+        self.sides: tuple[Side, ...] = ()
+        self.counted = "time"
         with ui.element("div").classes("cl-panel cl-space").props('role=region aria-label="3D view"') as self.frame:
             self.stage = ui.element("div").classes("cl-stage")
             self.stage.on("viewrow", self._moved, js_handler="(e) => emit(e.detail)")
+            self.second = ui.element("div").classes("cl-second")
+            self.second.on("viewrow", self._moved_beside, js_handler="(e) => emit(e.detail)")
+            self.second.set_visibility(False)
+            self.titles = [ui.label("").classes(f"cl-over cl-side cl-side-{k}") for k in range(2)]
             with ui.element("div").classes("cl-over cl-over-left"):
-                self.column = ui.select({}, label="path coloured by", on_change=self._recoloured).props(
+                self.column = ui.select({}, label="path coloured by", on_change=lambda: self._recoloured()).props(
                     "dense options-dense outlined hide-bottom-space"
                 ).classes("cl-colour").mark("colour")  # fmt: skip
                 self.column.on("popup-hide", js_handler=RELEASE)
@@ -89,7 +97,45 @@ class ScenePanel:
 
     def against(self, what: str) -> None:
         """What the slider counts: time or path."""
+        self.counted = what
         self.stage.props(f"data-against={what}")
+        if self.sides:
+            here, there = (json.dumps(v.tolist()) for v in knots(self.sides[0], self.sides[1], what))
+            second = f"chiploadViewer.of('c{self.second.id}')"
+            self._first(f"lead({second}, '{what}', {here}, {there})")
+
+    async def compare(self, sides: tuple[Side, ...], found: Any) -> None:
+        """Show the first two sides beside each other; empty: the own track alone. ``found``: bodies of the second."""
+        self.sides, self.beside = sides, None
+        self.frame.classes(**{"add" if sides else "remove": "cl-two"})
+        self.second.set_visibility(bool(sides))
+        for k, title in enumerate(self.titles):
+            title.set_text(sides[k].title if sides else "")
+            title.style(f"color: {sides[k].colour if sides else 'inherit'}")
+        if sides:
+            await self._open_beside(found)
+        else:
+            self._first("alone()")
+        if sides is self.sides:
+            await self._recoloured(1)
+
+    async def _open_beside(self, found: Any) -> None:
+        """The second view, led by the first."""
+        sides, column = self.sides, str(self.column.value)
+        other = sides[1]
+        shown = column if column in other.result.columns else other.result.columns[0]
+        scene = await asyncio.to_thread(
+            page_scene, other.result, other.track, found, shown, common_span(sides[:2], column)
+        )
+        if sides is not self.sides:
+            return
+        self.beside = scene
+        here, there = (json.dumps(v.tolist()) for v in knots(sides[0], other, self.counted))
+        url, second = self.assets.put(scene.document), f"c{self.second.id}"
+        ui.run_javascript(
+            f"chiploadViewer.beside('{second}', '{url}', '{self.view_id}', '{self.counted}', {here}, {there})"
+            ".then(() => {" + "".join(self._layer(name, on) for name, on in self.seen.items()) + "})"
+        )
 
     async def open(self, result: PageResult, track: PageTrack) -> None:
         """Show a result from its beginning."""
@@ -103,6 +149,8 @@ class ScenePanel:
 
     async def follow(self, result: PageResult, track: PageTrack, *, keep: bool = True) -> None:
         """Show another track of the same result."""
+        if self.sides:
+            await self.compare((), None)
         self.track = track
         scene = await asyncio.to_thread(page_scene, result, track, self.found, str(self.column.value))
         if track is not self.track:
@@ -121,41 +169,63 @@ class ScenePanel:
     def at(self, row: int) -> None:
         """Stand at a row."""
         if self.track is not None:
-            self._call(f"go({int(row)})")
+            self._first(f"go({int(row)})")
 
     def show(self, mark: int) -> None:
         """Show what touches at a mark."""
-        self._call(f"show({int(mark)})")
+        self._first(f"show({int(mark)})")
 
     def play(self, rate: float) -> None:
         """Play, in seconds of the machine in a second; 0 stops."""
-        self._call(f"play({rate!r})")
+        self._first(f"play({rate!r})")
 
     def view_from(self, name: str) -> None:
         """Look from a side, at everything."""
-        self._call(f"look({json.dumps(name)})")
+        self._first(f"look({json.dumps(name)})")
 
     # -- parts --------------------------------------------------------------------------------------------------
-    def _call(self, what: str) -> None:
+    def _first(self, what: str) -> None:
+        """Call the own view; a view beside it follows."""
         if self.track is not None:
             ui.run_javascript(f"window.chiploadViewer && chiploadViewer.of('{self.view_id}').{what}")
 
-    def _moved(self, event: Any) -> None:
+    def _call(self, what: str) -> None:
+        """Call every view that is shown."""
+        self._first(what)
+        if self.sides:
+            ui.run_javascript(f"window.chiploadViewer && chiploadViewer.of('c{self.second.id}').{what}")
+
+    async def _moved_beside(self, event: Any) -> None:
+        """The path of the second view was clicked: to the row of the own track that belongs there."""
+        detail = event.args
+        if self.sides and isinstance(detail, dict) and isinstance(detail.get("row"), int):
+            row = min(max(detail["row"], 0), len(self.sides[1].track) - 1)
+            await self.picked(row_beside(self.sides[1], self.sides[0], self.counted, row), False)
+
+    async def _moved(self, event: Any) -> None:
         detail = event.args
         if isinstance(detail, dict) and isinstance(detail.get("row"), int):
-            self.picked(detail["row"], bool(detail.get("playing")))
+            await self.picked(detail["row"], bool(detail.get("playing")))
 
-    async def _recoloured(self) -> None:
+    async def _recoloured(self, views: int = 2) -> None:
+        """Colour the path by the column that is chosen, in the first views."""
         result, track, column, scene = self.result, self.track, self.column.value, self.scene
         if result is None or track is None or scene is None or not isinstance(column, str):
             return
 
-        def document() -> bytes:
-            return colouring_document(colouring(result, track, column, scene.removal), view_path(track))
+        shown = [(self.view_id, Side(result, track, "", ""), scene)]
+        if self.sides and self.beside is not None and column in self.sides[1].result.columns:
+            shown.append((f"c{self.second.id}", self.sides[1], self.beside))
+        span = common_span([side for _, side, _ in shown], column) if len(shown) > 1 else None
 
-        data = await asyncio.to_thread(document)
-        if (track, column) == (self.track, self.column.value):
-            ui.run_javascript(f"chiploadViewer.paint('{self.view_id}', '{self.assets.put(data)}')")
+        def document(side: Side, own: PageScene) -> bytes:
+            made = colouring(side.result, side.track, column, own.removal, span)
+            return colouring_document(made, view_path(side.track))
+
+        for view, side, own in shown[:views]:
+            data = await asyncio.to_thread(document, side, own)
+            if (track, column) == (self.track, self.column.value):
+                ui.run_javascript(f"chiploadViewer.paint('{view}', '{self.assets.put(data)}')")
 
     def _boxes(self, scene: PageScene) -> None:
         """A box for each thing that can be hidden."""
@@ -179,9 +249,11 @@ class ScenePanel:
             ui.run_javascript(self._layer(name, wanted))
 
     def _layer(self, name: str, on: bool) -> str:
-        view, value = f"chiploadViewer.of('{self.view_id}')", json.dumps(on)
-        special = {GLASS: "glass", DRAPE: "drape"}.get(name)
-        return f"{view}.{special}({value});" if special else f"{view}.layer({json.dumps(name)}, {value});"
+        """JavaScript that shows or hides a thing in every view."""
+        value, special = json.dumps(on), {GLASS: "glass", DRAPE: "drape"}.get(name)
+        what = f"{special}({value})" if special else f"layer({json.dumps(name)}, {value})"
+        views = [self.view_id, *([f"c{self.second.id}"] if self.sides else [])]
+        return "".join(f"chiploadViewer.of('{view}').{what};" for view in views)
 
     def _section(self) -> None:
         axis, share = str(self.axis.value or ""), float(self.share.value or 0.0)
