@@ -135,8 +135,8 @@ def reference() -> str:
 
 def _variant(capability: Capability, plain: Capability) -> Iterator[str]:
     """A kind of job that has the tables of another one, and one in its operation."""
-    own = _table_in(capability.root.model_fields["operation"].annotation)
-    inner = None if own is None else _table_in(own.model_fields[capability.inner].annotation)
+    own = table_in(capability.root.model_fields["operation"].annotation)
+    inner = None if own is None else table_in(own.model_fields[capability.inner].annotation)
     yield f"Such a job has the tables of jobs with `[{plain.key}]`, and a table `[operation.{capability.inner}]`."
     yield _summary(capability.root) + "\n"
     if inner is not None:
