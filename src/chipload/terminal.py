@@ -90,6 +90,27 @@ def show(text: str) -> None:
         raise cannot_write("stdout", err) from None
 
 
+def write_bytes(data: bytes) -> None:
+    """A file on stdout, byte by byte.
+
+    Raises
+    ------
+    OutputError
+        Stdout takes no more, as on a full disk.
+    BrokenPipeError
+        Its reader has gone.
+    """
+    try:
+        sys.stdout.flush()
+        sys.stdout.buffer.write(data)
+        sys.stdout.buffer.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as err:
+        _let_go_of_output()
+        raise cannot_write("stdout", err) from None
+
+
 def plain(text: str) -> str:
     r"""The text with each control character, and each that turns the direction of writing, as its code.
 

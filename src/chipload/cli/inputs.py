@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,8 +35,8 @@ def setup_of(parameters: Sequence[str], work_offsets: Sequence[str]) -> Setup:
     return Setup({name: values[0] for name, values in given.items()}, dict(pairs("work-offset", work_offsets)))
 
 
-def machine_of(name: str | None) -> Machine:
-    """A shipped machine by name, or a file: TOML of ours or LinuxCNC's .ini."""
+def machine_of(name: str | None, tell: Callable[[str], None] = show) -> Machine:
+    """A shipped machine by name, or a file: TOML of ours or LinuxCNC's .ini, whose findings are told."""
     from chipload.machine.ini import read_ini
     from chipload.machine.machine import machine_named, machine_names, read_machine
 
@@ -45,7 +45,7 @@ def machine_of(name: str | None) -> Machine:
     if name.lower().endswith(".ini"):
         machine, findings = read_ini(Path(name))
         for f in findings:
-            show(f"{name}: {f}")
+            tell(f"{name}: {f}")
         return machine
     return read_machine(name) if name.lower().endswith(".toml") else machine_named(name)
 

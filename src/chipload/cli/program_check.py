@@ -10,12 +10,24 @@ from chipload.errors import InputError, Severity
 from chipload.terminal import EXCEEDED, bar, show
 
 if TYPE_CHECKING:
+    from chipload.program.read import ProgramReading
     from chipload.program.setup import Setup
 
 #: [mm] where none is stated
 TOLERANCE_MM = 0.001
 #: machines that a program is read for where none is stated: the first that has its axes
 GENERIC = ("vmc", "xyzbc-trunnion", "xyzac-trunnion", "xyzbc-head-table")
+
+
+def finding_lines(reading: ProgramReading) -> list[str]:
+    """What was found in a program, a line each: first what leaves it unproven, then by line of the program."""
+    gaps = [f for f in reading.findings if f.severity >= Severity.UNPROVEN]
+    broken = set(map(id, reading.violations))
+    rest = sorted((*(f for f in reading.findings if f not in gaps), *reading.violations), key=lambda f: f.line)
+    return [
+        *(f"{f} [unproven]" for f in gaps),
+        *(f"{f}{' [does not hold]' if id(f) in broken else ''}" for f in rest),
+    ]
 
 
 def check_program(
@@ -48,12 +60,9 @@ def check_program(
         raise refused[0]  # that of the simplest machine
     if machine is None:
         show(f"no machine is stated: read for {on.name}; state yours with --machine, as its limits and times differ")
-    broken = set(map(id, reading.violations))
+    for line in finding_lines(reading):
+        show(line)
     gaps = [f for f in reading.findings if f.severity >= Severity.UNPROVEN]
-    for f in gaps:
-        show(f"{f} [unproven]")
-    for f in sorted((*(f for f in reading.findings if f not in gaps), *reading.violations), key=lambda f: f.line):
-        show(f"{f}{' [does not hold]' if id(f) in broken else ''}")
     low, high = reading.program.p_work.min(axis=0), reading.program.p_work.max(axis=0)
     box = ", ".join(f"{x} {a:g} to {b:g}" for x, a, b in zip("XYZ", low, high, strict=True))
     _, seconds = line_times(reading, on)

@@ -28,7 +28,8 @@ from chipload.units import MM_PER, rad_s_from_rpm
 
 _RAD_PER = {"deg": math.pi / 180.0, "degree": math.pi / 180.0, "rad": 1.0, "radian": 1.0, "grad": math.pi / 200.0}
 _RAD_PER |= {"gon": math.pi / 200.0}
-_MM_PER = {"mm": 1.0, "metric": 1.0, "in": 25.4, "inch": 25.4, "imperial": 25.4, "cm": MM_PER["cm"]}
+#: [mm] of each unit of length of a configuration
+UNITS_MM = {"mm": 1.0, "metric": 1.0, "in": 25.4, "inch": 25.4, "imperial": 25.4, "cm": MM_PER["cm"]}
 _OWN: dict[str, Vector] = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 _OWN |= {turn: _OWN[way] for turn, way in zip("ABCUVW", "XYZXYZ", strict=True)}
 
@@ -74,7 +75,7 @@ def read_ini(path: str | Path) -> tuple[Machine, tuple[Finding, ...]]:
 
 
 def _machine(ini: Ini, findings: list[Finding], path: Path) -> Machine:
-    mm = _unit(ini, "LINEAR_UNITS", _MM_PER)
+    mm = _unit(ini, "LINEAR_UNITS", UNITS_MM)
     words = (ini.value("KINS", "KINEMATICS") or "").split()
     if not words:
         raise InputError(f"{ini.label}: [KINS] KINEMATICS is missing: must be given")
