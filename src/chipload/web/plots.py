@@ -122,8 +122,21 @@ def plots(
                     "line": {"color": LIMIT, "width": 1, "dash": "dash"},
                 }
             )  # fmt: skip
-    title = {"time": "time [s]", "path": "path [mm]"}[against]
     layout = {
+        **_layout(against, _range([x, *(xs for _, xs in others)])),
+        "shapes": shapes,
+        "annotations": notes,
+        "uirevision": f"{result.name}/{track.title}/{against}/{'/'.join(side.title for side in sides)}",
+        **axes,
+    }
+    config = {"displaylogo": False, "displayModeBar": False, "doubleClick": "reset"}
+    return {"data": data, "layout": layout, "config": config}
+
+
+def _layout(against: str, span: list[float]) -> dict[str, Any]:
+    """What all plots share: fonts, margins and the axis of time or path, which shows ``span``."""
+    title = {"time": "time [s]", "path": "path [mm]"}[against]
+    return {
         "font": {**FONT, "size": 11, "color": INK},
         "margin": {"l": 52, "r": 10, "t": 4, "b": 32},
         "paper_bgcolor": "white",
@@ -137,16 +150,10 @@ def plots(
             "position": 0.0,
             "gridcolor": GRID,
             "zeroline": False,
-            "range": _range([x, *(xs for _, xs in others)]),
+            "range": span,
             "tickfont": {"size": 10, "color": "#5f6b7a"},
         },
-        "shapes": shapes,
-        "annotations": notes,
-        "uirevision": f"{result.name}/{track.title}/{against}/{'/'.join(side.title for side in sides)}",
-        **axes,
     }
-    config = {"displaylogo": False, "displayModeBar": False, "doubleClick": "reset"}
-    return {"data": data, "layout": layout, "config": config}
 
 
 def _line(name: str, x: Floats, y: Floats, axis: str, colour: str, said: str, dash: str = "solid") -> dict[str, Any]:
