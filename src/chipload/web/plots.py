@@ -30,6 +30,14 @@ BESIDE = {
 }
 #: a limit farther above the values than this is named but would flatten them if it were drawn
 FAR = 1.8
+#: an axis of values
+VALUES: dict[str, Any] = {
+    "gridcolor": GRID,
+    "zerolinecolor": "#c9ced6",
+    "nticks": 4,
+    "tickfont": {"size": 10, "color": "#5f6b7a"},
+    "automargin": False,
+}
 
 
 def bounds_of(result: PageResult, track: PageTrack, columns: Sequence[str]) -> dict[str, Bound | None]:
@@ -87,11 +95,7 @@ def plots(
         axes[f"yaxis{axis}"] = {
             "domain": [max(top - height, 0.0), top],
             "range": [min(low, 0.0) - 0.04 * span, reach + 0.26 * span],
-            "gridcolor": GRID,
-            "zerolinecolor": "#c9ced6",
-            "nticks": 4,
-            "tickfont": {"size": 10, "color": "#5f6b7a"},
-            "automargin": False,
+            **VALUES,
             **(_words(values) if isinstance(values, TextColumn) else {}),
         }
         data.append(
