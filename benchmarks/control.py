@@ -2,10 +2,14 @@
 
     python benchmarks/control.py [steps]
     python benchmarks/control.py robustness [example]
+    python benchmarks/control.py depths cone 1 1.5 2
 
 The second prints the table of robustness of docs/design/control.md: an example (tube) whose spindle, cut and loop
 differ from what the controller believes; the greatest constant feed and the derated schedule stay as they
 were found for the example itself.
+
+The third gives the constant feed the depth of cut as well: a job that makes its program ([round]), with other pitches
+of its helix, within the same limits.
 
 The fuzzy forms alone, the whole step with its rules, and the closed loop on a path of 280 mm with steps of depth, with
 a control period of 10 ms, 1 ms of simulation and the model's look-ahead; each three times, the best counts.
@@ -29,9 +33,10 @@ from chipload.control.spindle_model import Spindle, SpindleDeviation
 from chipload.control.wall import Loads
 from chipload.jobs import load_job
 from chipload.jobs.torque.allowable import allowable
-from chipload.jobs.torque.controllers import compared, controller_of, player
-from chipload.jobs.torque.outcome import MODEL, PLAIN
+from chipload.jobs.torque.controllers import compared, controller_of, player, shortest
+from chipload.jobs.torque.outcome import HELD, MODEL, PLAIN
 from chipload.jobs.torque.run import opened
+from chipload.jobs.torque.spindle import deviation_of
 
 LIMIT = 2000.0
 RULES = Override(
@@ -123,7 +128,36 @@ def robustness(name: str) -> None:
         print(f"| {text} | {' | '.join(cells)} | {runs[-1].outcome.time_over:.2f} |")
 
 
+def depths(name: str, pitches: list[float]) -> None:
+    """Times of the constant feed, the derated schedule and the fuzzy controller with the model, for other pitches."""
+    found = load_job(Path(chipload.examples.__file__).parent / name / "job.toml").job
+    print("| pitch mm | limit N m | constant: time s | error um | model: time s | fuzzy with the model: time s "
+          "| torque | ideal s |\n|---|---|---|---|---|---|---|---|", flush=True)  # fmt: skip
+    for pitch in pitches:
+        made = found.table.round.model_copy(update={"pitch_mm": pitch})
+        job = replace(found, table=found.table.model_copy(update={"round": made}))
+        machine, material, table, program, spindle = opened(job)
+        a = allowable(job, program, material, machine)
+        if a.torque <= 0.0:
+            print(f"| {pitch:g} | no torque is allowable | | | | | | |", flush=True)
+            continue
+        ask = job.table.loop
+        rules = replace(controller_of(job, a.torque), quantum=ask.override_step)
+        acceleration = ask.acceleration_mm_s2 or min(machine.acceleration[:2])
+        period = 1e-3 * ask.period_ms
+        loop = Loop(acceleration, period, 1e-3 * ask.latency_ms, min(1e-3, period), seed=ask.seed)
+        runs = compared(a.path, rules, player(a.path, table, spindle, deviation_of(job), loop, a.torque, a.walls),
+                        a.torque)  # fmt: skip
+        plain, model, held = (runs[x] for x in (PLAIN, MODEL, HELD))
+        print(f"| {pitch:g} | {1e-3 * a.torque:.3f} | {plain.outcome.time:.1f} | {1e3 * plain.error.max():.1f} | "
+              f"{model.outcome.time:.1f} | {held.outcome.time:.1f} | {held.outcome.load_max / a.torque:.2f} | "
+              f"{shortest(a.path, rules, a.torque, acceleration):.1f} |", flush=True)  # fmt: skip
+
+
 def main() -> None:
+    if sys.argv[1:2] == ["depths"]:
+        depths(sys.argv[2], [float(x) for x in sys.argv[3:]])
+        return
     if sys.argv[1:2] == ["robustness"]:
         robustness(sys.argv[2] if len(sys.argv) > 2 else "tube")
         return

@@ -48,7 +48,7 @@ class Power:
 
 
 @dataclass(frozen=True)
-class Section:
+class LoadSection:
     """What a tool cuts between two rapids.
 
     Parameters
@@ -77,7 +77,7 @@ class Section:
     rated: float | None
 
 
-def sections_of(result: Result, spindle: Path | None = None) -> tuple[Section, ...]:
+def sections_of(result: Result, spindle: Path | None = None) -> tuple[LoadSection, ...]:
     """The sections of the tracks in use; ``spindle``: what `chipload spindle --power` wrote.
 
     Raises
@@ -91,7 +91,7 @@ def sections_of(result: Result, spindle: Path | None = None) -> tuple[Section, .
     return out if spindle is None else tuple(replace(s, motor=_motor(s, spindle)) for s in out)
 
 
-def load_csv(sections: Sequence[Section]) -> bytes:
+def load_csv(sections: Sequence[LoadSection]) -> bytes:
     """A row a section, units in the names; a cell is empty where nothing is known."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -113,7 +113,7 @@ def load_csv(sections: Sequence[Section]) -> bytes:
     return text.getvalue().encode("utf-8")
 
 
-def afc_table(sections: Sequence[Section]) -> bytes:
+def afc_table(sections: Sequence[LoadSection]) -> bytes:
     """The columns of Heidenhain's tool table that AFC takes its reference from, a row a tool, in percent.
 
     Raises
@@ -128,7 +128,7 @@ def afc_table(sections: Sequence[Section]) -> bytes:
     return "\n".join(["BEGIN AFC-LOAD.TAB MM", *rows, "[END]"]).encode("ascii") + b"\n"
 
 
-def _percent(tool: int, own: Sequence[Section]) -> tuple[float, float]:
+def _percent(tool: int, own: Sequence[LoadSection]) -> tuple[float, float]:
     """Load of a tool and what is added to it until wear is reported [% of the rated power], rounded up."""
     at = f"load monitor heidenhain: tool {tool}"
     load = high = 0.0
@@ -149,7 +149,7 @@ def _percent(tool: int, own: Sequence[Section]) -> tuple[float, float]:
     return up, max(0.1, math.ceil(10.0 * (high - up) - 1e-9) / 10.0)
 
 
-def _sections(track: Track) -> Iterator[Section]:
+def _sections(track: Track) -> Iterator[LoadSection]:
     blocks = [block for block in track.blocks() if all(name in block for name in NEEDED)]
     if not blocks:
         return
@@ -170,7 +170,7 @@ def _sections(track: Track) -> Iterator[Section]:
         first, last, top = int(rows[cuts[0]]), int(rows[cuts[-1]]), int(rows[np.argmax(power)])
         before = np.concatenate([[0.0], c["t_s"][:-1]])
         spent = (c["t_s"] - before)[rows[cuts]]
-        yield Section(
+        yield LoadSection(
             track.name, number, int(c["tool"][top]),
             (int(c["line"][rows[cuts]].min()), int(c["line"][rows[cuts]].max())),
             (float(before[first]), float(c["t_s"][last])),
@@ -190,7 +190,7 @@ def _cutting(power: Floats, deviation: Floats | None, error: float) -> Power:
     return Power(most, low, float((power * (1.0 + error) + 2.0 * deviation).max()))
 
 
-def _motor(section: Section, file: Path) -> Power:
+def _motor(section: LoadSection, file: Path) -> Power:
     """The motor's power for that at the cutter; efficiency and idle power may differ by what the file states."""
     found = read_spindle(file, section.speed)
     if found.source != "power":
