@@ -22,7 +22,7 @@ from chipload.cutting.material import Material
 from chipload.cutting.strength import allowed_stress, cutter_stress
 from chipload.errors import InputError
 from chipload.files import read_regular
-from chipload.jobs.checks import DefaultChecks, load_error, upper_loads
+from chipload.jobs.checks import DefaultChecks, load_error, peak_excess, upper_loads
 from chipload.jobs.program.outcome import FeedResult
 from chipload.jobs.program.tables import FeedsTable
 from chipload.machine.feed import row_time_limited
@@ -80,9 +80,14 @@ class Asked:
         return (*self.limits, *(() if "cutter_strength" in self.checks.off else (STRESS,)))
 
     def error(self, limit: str) -> float:
-        """Relative error of the column that a limit bounds; 0 where it is not finite: then nothing has this load."""
-        error = load_error(self.errors, column_of(limit).name)
-        return error if math.isfinite(error) else 0.0
+        """Relative error of the column that a limit bounds, measured peaks above predicted ones included.
+
+        An error that is not finite counts as 0: then nothing has this load.
+        """
+        column = column_of(limit).name
+        error = load_error(self.errors, column)
+        peaks = peak_excess(self.checks.material, column)
+        return (1.0 + (error if math.isfinite(error) else 0.0)) * (1.0 + peaks) - 1.0
 
 
 def changeable(path: Path, machine: Machine, dialect: str | None) -> tuple[str, str]:
