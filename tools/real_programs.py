@@ -1,22 +1,30 @@
 """Run real files of other people and write their verdicts and times into docs/real_programs.md.
 
-    CHIPLOAD_DATA=... python tools/real_programs.py [NAME ...] [--limit-s 900]
+    CHIPLOAD_DATA=... python tools/real_programs.py [NAME ...] [--limit-s 900] [--again] [--kept DIR]
 
-``chipload simulate`` runs each file of :data:`FILES` in a process of its own: what a file does not state is guessed, so
-that a verdict is never better than unproven. A file that takes longer than the limit, or that is refused, is recorded
-as such. Rows of files that were not run this time stay as they are. Times are processor times.
+``chipload init`` drafts a job of each file of :data:`FILES`; ``chipload check`` estimates its run; ``chipload run
+--accept`` runs it, the shortest first, in a process of its own. What a file does not state is guessed, and the guesses
+are accepted. A file that takes longer than the limit, or that is refused, is recorded as such; a simulation that was
+stopped goes on from its checkpoint the next time. Files that have a verdict on the page are not run again unless
+``--again`` asks for it. Times are processor times of a file, all its parts together.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import re
 import resource
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
+#: where jobs, checkpoints and processor times are kept between two calls
+KEPT = Path(__file__).parents[1] / ".real"
+#: [s] of a unit of an estimate
+UNITS_S = {"s": 1.0, "min": 60.0, "h": 3600.0}
 PAGE = Path(__file__).parents[1] / "docs" / "real_programs.md"
 #: files below CHIPLOAD_DATA, and what they are
 FILES = {
@@ -44,10 +52,12 @@ FILES = {
 NOT_RUN, TOO_LONG, REFUSED = "not run", "longer than {:g} s", "refused"
 HEAD = """# Real programs, run whole
 
-Files of other people, each run from its beginning to its end by `chipload simulate FILE`. What a file does not state
-(cutter, stock, machine) is guessed, so that no verdict is better than `unproven`, and a gouge or a rapid through stock
-may be that of a guessed stock. `make real` runs all of them and writes this page; times are processor times of one run,
-the compiling of kernels included where a run was the first. A row with *{not_run}* waits for the next `make real`.
+Files of other people, each drafted by `chipload init FILE DIR` and run from its beginning to its end by
+`chipload run DIR/job.toml --accept`. What a file does not state (cutter, stock, machine) is guessed and accepted, so
+that a verdict rests on guesses: a gouge or a rapid through stock may be that of a guessed stock. `make real` runs all
+files that have no verdict yet, the shortest first by the estimate of `chipload check`, and writes this page; a file
+that was stopped goes on where it was. Times are processor times, the compiling of kernels included where a run was the
+first. A row with *{not_run}* waits for the next `make real`.
 
 | file | kind | verdict | first reason | time [s] |
 |---|---|---|---|---:|
@@ -65,18 +75,49 @@ def row(name: str, kind: str, verdict: str, reason: str, seconds: float | None) 
     return f"| `{name}` | {kind} | {verdict} | {reason.replace('|', '/')[:160]} | {time} |"
 
 
-def run(file: Path, limit_s: float) -> tuple[str, str, float]:
-    """Verdict, first reason and processor time [s] of a file."""
+def timed(words: list[str], limit_s: float | None = None) -> tuple[int | None, str, str, float]:
+    """Exit code (None: stopped at the limit), the two texts and the processor time [s] of a command."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    try:
-        done = subprocess.run(
-            [sys.executable, "-m", "chipload", "simulate", str(file)], capture_output=True, text=True, timeout=limit_s
-        )
-        verdict, reason = read(done.returncode, done.stdout, done.stderr)
-    except subprocess.TimeoutExpired:
-        verdict, reason = TOO_LONG.format(limit_s), ""
+    line = [sys.executable, "-m", "chipload", *words]
+    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            out, err = process.communicate(timeout=limit_s)
+            code: int | None = process.returncode
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGTERM)  # keeps its checkpoint
+            out, err = process.communicate()
+            code = None
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return verdict, reason, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return code, out, err, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def drafted(file: Path, folder: Path) -> tuple[float, str]:
+    """Draft the job of a file, unless it is there; the longest that its run may take [s], and why there is no job."""
+    job = folder / "job" / "job.toml"
+    if not job.is_file():
+        code, _, err, _ = timed(["init", str(file), str(job.parent)])
+        if code:
+            return 0.0, read(code, "", err)[1]
+    return estimated(timed(["check", str(job)])[1]), ""
+
+
+def estimated(out: str) -> float:
+    """The longest time [s] of the estimate of ``chipload check``; without one it is a plan, which comes last."""
+    found = re.search(r"^estimate: .* to ([0-9.]+) (s|min|h)\b", out, re.MULTILINE)
+    return float(found[1]) * UNITS_S[found[2]] if found else math.inf
+
+
+def run(folder: Path, limit_s: float) -> tuple[str, str, float]:
+    """Verdict, first reason and processor time [s] of the job in a folder, that of earlier calls included."""
+    spent = folder / "seconds.txt"
+    earlier = float(spent.read_text()) if spent.is_file() else 0.0
+    code, out, err, seconds = timed(
+        ["run", str(folder / "job" / "job.toml"), "--accept", "--out", str(folder / "result")], limit_s
+    )
+    spent.write_text(f"{earlier + seconds:.1f}")
+    if code is None:
+        return TOO_LONG.format(limit_s), err.strip().splitlines()[-1][:160] if err.strip() else "", earlier + seconds
+    return *read(code, out, err), earlier + seconds
 
 
 def read(code: int, out: str, err: str) -> tuple[str, str]:
@@ -93,19 +134,44 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="parts of the names of the files; none: all")
     parser.add_argument("--limit-s", type=float, default=900.0, help="by the clock, for each file")
+    parser.add_argument("--again", action="store_true", help="run files that have a verdict too")
+    parser.add_argument("--kept", type=Path, default=KEPT, help="folder for jobs and checkpoints")
     chosen = parser.parse_args(arguments)
     data = os.environ.get("CHIPLOAD_DATA")
     if not data:
         sys.exit("CHIPLOAD_DATA is not set: state the folder of the real files")
-    for name, kind in FILES.items():
+    page = rows_of(PAGE.read_text(encoding="utf-8")) if PAGE.exists() else {}
+    waiting: list[tuple[float, str]] = []
+    for name in FILES:
         if chosen.names and not any(part in name for part in chosen.names):
+            continue
+        if finished(page.get(name, "")) and not chosen.again:
             continue
         if not (Path(data) / name).exists():
             print(f"{name}: is not in {data}")
             continue
-        found = row(name, kind, *run(Path(data) / name, chosen.limit_s))
+        most, why = drafted(Path(data) / name, folder_of(chosen.kept, name))
+        if why:
+            write({name: row(name, FILES[name], REFUSED, why, None)})
+            continue
+        waiting.append((most, name))
+    for most, name in sorted(waiting):
+        print(f"{name}: at most {most:.0f} s by the estimate" if math.isfinite(most) else f"{name}: a plan", flush=True)
+    for _, name in sorted(waiting):
+        found = row(name, FILES[name], *run(folder_of(chosen.kept, name), chosen.limit_s))
         print(found, flush=True)
         write({name: found})
+
+
+def folder_of(kept: Path, name: str) -> Path:
+    """The folder of a file."""
+    return kept / re.sub(r"[^A-Za-z0-9]+", "-", name)
+
+
+def finished(text: str) -> bool:
+    """Whether a row of the page has a verdict."""
+    cells = [cell.strip() for cell in text.split("|")]
+    return len(cells) > 3 and cells[3] in ("holds", "unproven", "exceeds")
 
 
 def write(new: dict[str, str]) -> None:

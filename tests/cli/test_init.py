@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import tomllib
 import zipfile
@@ -261,6 +262,39 @@ def test_a_freecad_job(tmp_path: Path) -> None:
     ]  # fmt: skip
     lines, _ = check_job(load_job(tmp_path / "job" / "job.toml"))
     assert any(line.startswith("estimate: ") for line in lines)
+
+
+def test_a_freecad_job_by_name_and_where_its_lines_come_from(program: Path, tmp_path: Path) -> None:
+    document(tmp_path / "part.FCStd")
+    code, _, said = call("init", tmp_path / "part.FCStd", tmp_path / "job", "--job", "Other")
+    assert (code, said) == (2, "chipload: part.FCStd: no CAM job Other: has Job\n")
+    code, _, said = call("init", program, tmp_path / "job", "--job", "Job")
+    assert (code, said) == (2, "chipload: --job Job: is for a FreeCAD document: leave it out for slot.nc\n")
+    assert call("init", tmp_path / "part.FCStd", tmp_path / "job", "--job", "Job")[0] == 0
+    lines = (tmp_path / "job" / "program.ngc").read_text().splitlines()
+    with zipfile.ZipFile(tmp_path / "part.FCStd") as archive:
+        path = archive.read("Profile.nc").decode().splitlines()
+    with (tmp_path / "job" / "program_lines.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["command"]) for row in rows] == list(range(len(path)))
+    assert {row["operation"] for row in rows} == {"Profile"}
+    for row, own in zip(rows, path, strict=True):
+        written = lines[int(row["line"]) - 1]
+        words = [w for w in own.split() if not w.startswith(("F", "("))]
+        assert own.startswith("(") or written.split()[: len(words)] == words
+
+
+def test_a_draft_is_looked_at(program: Path, tmp_path: Path) -> None:
+    """The same verdict and the same worst values as of the file itself; a machine is stated in the job."""
+    assert call("init", program, tmp_path / "job")[0] == 0
+    job = tmp_path / "job" / "job.toml"
+    code, said, _ = call("simulate", program, "--set", "operation.0.step_mm=20")
+    again, same, _ = call("simulate", job, "--set", "operation.0.step_mm=20")
+    worst = [[line for line in text.splitlines() if line.startswith("worst values")] for text in (said, same)]
+    assert (again, worst[1]) == (code, worst[0])
+    assert same.splitlines()[-1] == "unproven: a first look"
+    code, _, said = call("simulate", job, "--machine", "vmc")
+    assert (code, said) == (2, "chipload: --machine: job.toml is a job: state it there, or by --set\n")
 
 
 def test_damaged_documents_are_refused(tmp_path: Path) -> None:

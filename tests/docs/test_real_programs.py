@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import pytest
+
+from chipload.simulation.estimate import estimate
 
 ROOT = Path(__file__).parents[2]
 
@@ -47,3 +50,54 @@ def test_the_page_names_every_file_once(tool):
     page = (ROOT / "docs" / "real_programs.md").read_text(encoding="utf-8")
     assert list(tool.rows_of(page)) == list(tool.FILES)
     assert re.search(r"^real: ", (ROOT / "Makefile").read_text(), re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("out", "seconds"),
+    [
+        ("job.toml: read\nestimate: 5671 steps, 358 MB of memory, 13 to 100 s\n8 guesses", 100.0),
+        ("estimate: 200000 steps, 610 MB of memory, 5 to 57 min; a first answer: run --coarse", 3420.0),
+        ("operation 0: pocket, cutter 1 of 12 mm, 1600 mm2", math.inf),
+    ],
+)
+def test_an_estimate_is_read(tool, out, seconds):
+    assert tool.estimated(out) == seconds
+
+
+def test_the_estimate_of_the_product_is_read(tool):
+    for steps in (100, 200_000, 20_000_000):
+        assert math.isfinite(tool.estimated(estimate(steps, steps // 2)))
+
+
+def test_the_shortest_is_run_first_and_a_verdict_is_kept(tool, tmp_path, monkeypatch):
+    """Files with a verdict are left out; what was stopped at the limit goes on, and its times add up."""
+    monkeypatch.setattr(tool, "PAGE", tmp_path / "page.md")
+    monkeypatch.setenv("CHIPLOAD_DATA", str(tmp_path))
+    names = list(tool.FILES)[:3]
+    for name in names:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    tool.write({names[0]: tool.row(names[0], "k", "exceeds", "x", 5.0)})
+    ran, codes = [], [None, 3, 3]
+
+    def timed(words, limit_s=None):
+        if words[0] == "check":
+            minutes = 1 if "text" in words[1] else 2
+            return 0, f"estimate: 1 steps, 1 MB of memory, 1 to {minutes} min", "", 0.0
+        if words[0] == "run":
+            ran.append(Path(words[1]).parents[1].name)
+            return codes.pop(0), "Exceeds: y\n", "chipload: stopped: 7 steps are kept\n", 10.0
+        return 0, "", "", 0.0
+
+    monkeypatch.setattr(tool, "timed", timed)
+    kept = ["--kept", str(tmp_path / "kept")]
+    for name in names:
+        tool.folder_of(tmp_path / "kept", name).mkdir(parents=True)
+    tool.main([*names[1:], *kept])
+    assert ran == [tool.folder_of(tmp_path, name).name for name in (names[2], names[1])]
+    rows = tool.rows_of(tool.PAGE.read_text())
+    assert "longer than 900 s" in rows[names[2]]
+    assert rows[names[0]].endswith("| exceeds | x | 5 |")
+    tool.main([*names, *kept])
+    assert len(ran) == 3
+    assert tool.rows_of(tool.PAGE.read_text())[names[2]].endswith("| exceeds | y | 20 |")

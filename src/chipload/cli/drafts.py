@@ -18,6 +18,7 @@ File = Annotated[
         metavar="FILE", help="NC text, CL data, CAMotics project, DXF, STEP, FreeCAD document, or sections of a blade"
     ),
 ]
+Looked = Annotated[Path, typer.Argument(metavar="FILE", help="as of init, or the job.toml that init wrote")]
 
 
 MachineOf = Annotated[
@@ -34,6 +35,9 @@ def init(
     ] = None,
     for_machine: MachineOf = None,
     tools: Tools = None,
+    job: Annotated[
+        str | None, typer.Option("--job", metavar="NAME", help="CAM job of a FreeCAD document; else the first")
+    ] = None,
     material: Annotated[bool, typer.Option("--material", help="write a template of a material into DIR")] = False,
     machine: Annotated[bool, typer.Option("--machine", help="write a template of a machine into DIR")] = False,
     catalogue: Annotated[bool, typer.Option("--catalogue", help="write a template of a catalogue into DIR")] = False,
@@ -62,14 +66,14 @@ def init(
 
         if (folder / "job.toml").exists():
             raise InputError(f"{folder / 'job.toml'}: is there already and is not overwritten: name another folder")
-        draft = draft_of(file, folder, machine=for_machine, tools=tools)
-        job = write_draft(draft, folder)
+        draft = draft_of(file, folder, machine=for_machine, tools=tools, job=job)
+        written = write_draft(draft, folder)
         show(draft.title)
         for note in draft.notes:
             show(f"found: {note}")
         for guess in draft.guesses:
             show(f"guess: {guess}")
-        show(f"written: {job}: {len(draft.guesses)} guesses to confirm; then chipload run {job} --out result")
+        show(f"written: {written}: {len(draft.guesses)} guesses to confirm; then chipload run {written} --out result")
         return 0
 
     guarded(work, debug)
@@ -92,7 +96,7 @@ def _templates(kinds: list[str], folder: Path) -> int:
 
 @app.command()
 def simulate(
-    file: File,
+    file: Looked,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="the result folder; default: only the verdict is shown")
     ] = None,
@@ -114,11 +118,18 @@ def simulate(
 
         if out is not None:
             check_target(out)
+        written = file.suffix.lower() == ".toml"
+        for option, value in (("machine", machine), ("tools", tools)):
+            if written and value is not None:
+                raise InputError(f"--{option}: {file.name} is a job: state it there, or by --set")
         with TemporaryDirectory(prefix="chipload-") as above:
-            folder = Path(above) / (file.stem or "draft")
-            draft = draft_of(file, folder, machine=machine, tools=tools)
-            loaded = load_job(write_draft(draft, folder), sets or ())
-            show(draft.title)
+            job = file
+            if not written:
+                folder = Path(above) / (file.stem or "draft")
+                draft = draft_of(file, folder, machine=machine, tools=tools)
+                job = write_draft(draft, folder)
+                show(draft.title)
+            loaded = load_job(job, sets or ())
             for guess in loaded.guesses:
                 show(f"guess: {guess.rpartition(' (line')[0]}")
             with bar() as progress:
@@ -126,7 +137,8 @@ def simulate(
                 target = write_finished(done.result, done.presentation, out) if out is not None else None
         show(done.result.message)
         show_limits(done.result)
-        show(f"{done.result.verdict.value}: a first look; chipload init {file} DIR writes the job")
+        more = "" if written else f"; chipload init {file} DIR writes the job"
+        show(f"{done.result.verdict.value}: a first look{more}")
         if target is not None:
             show(f"report: {target / 'report.html'}")
         return done.result.verdict.exit_code

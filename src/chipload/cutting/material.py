@@ -36,7 +36,7 @@ _DIRECTIONS = ("krc_mpa", "kac_mpa", "kre_n_mm", "kae_n_mm")
 _TEXTS = ("name", "source", "conditions", "workpiece", "cutter")
 _EXPONENTS = ("exponent_t", "exponent_r", "exponent_a")
 _RANGES = {"chip": ("chip_min_mm", "chip_max_mm"), "speed": ("speed_min_m_min", "speed_max_m_min")}
-_KEYS = (*_TEXTS, *_NUMBERS, *_EXPONENTS, *_RANGES["chip"], *_RANGES["speed"], "spread", "covariance")
+_KEYS = (*_TEXTS, *_NUMBERS, *_EXPONENTS, *_RANGES["chip"], *_RANGES["speed"], "spread", "covariance", "peak_excess")
 
 #: the six coefficients in their order, as the rows and columns of their covariance
 Covariance = tuple[tuple[float, float, float, float, float, float], ...]
@@ -60,6 +60,8 @@ class Material:
     exponents : (m_t, m_r, m_a) of the size effect, from 0 to below 1; 0: none, the linear law
     cutter : what they were measured with: form, diameter, teeth, helix, rake, substrate
     speed : (lowest, highest) cutting speed they hold for [mm/s]; None: the source does not say
+    peak_excess : how far above what these coefficients predict the peaks of a force were measured, relative, in runs
+        that were not fitted; 0: not measured, or not above
     tangential : only the tangential force is known; the other coefficients are 0 and mean nothing: torque and power can
         be proved, directions and sizes of forces, deflections and stability cannot
     covariance : (6, 6), of (Ktc, Krc, Kac, Kte, Kre, Kae) in products of MPa and N/mm, from a fit; instead of
@@ -88,6 +90,7 @@ class Material:
     speed: tuple[float, float] | None = None
     covariance: Covariance | None = None
     tangential: bool = False
+    peak_excess: float = 0.0
 
     def __post_init__(self) -> None:
         for key, (name, low, high) in _NUMBERS.items():
@@ -116,6 +119,8 @@ class Material:
                 f"material.speed_max_m_min = {high:g}: must be above speed_min_m_min = {low:g}, which must be at "
                 "least 0"
             )
+        if not 0.0 <= self.peak_excess <= 10.0:
+            raise InputError(f"material.peak_excess = {self.peak_excess:g}: must be from 0 to 10 (0.4 is 40 %)")
         if self.covariance is not None:
             self._check_covariance()
         if self.tangential and any((self.Krc, self.Kac, self.Kre, self.Kae)):
@@ -209,6 +214,7 @@ def _from_table(label: str, table: dict[str, Any]) -> Material:
             raise InputError(f"{label}: {key} = {table[key]!r}: must be a text")
     numbers: dict[str, Any] = {n: _number(label, key, table.get(key, 0.0)) for key, (n, _, _) in _NUMBERS.items()}
     numbers["tangential"] = tangential
+    numbers["peak_excess"] = _number(label, "peak_excess", table.get("peak_excess", 0.0))
     ranges: dict[str, Any] = {name: _range(label, table, *keys) for name, keys in _RANGES.items()}
     if (speed := ranges["speed"]) is not None:
         ranges["speed"] = (mm_s_from_mm_min(1000.0 * speed[0]), mm_s_from_mm_min(1000.0 * speed[1]))
@@ -228,7 +234,8 @@ def read_material(path: str | Path) -> Material:
     Keys: ``name``, ``ktc_mpa``, ``krc_mpa``, ``kac_mpa``, ``kte_n_mm``, ``kre_n_mm``, ``kae_n_mm`` (N per mm of
     depth), ``source``; without all four radial and axial ones only the tangential force is known; optional
     ``workpiece``, ``conditions``, ``cutter``, ``chip_min_mm`` with ``chip_max_mm``, ``speed_min_m_min`` with
-    ``speed_max_m_min``, ``exponent_t``, ``exponent_r``, ``exponent_a``, and ``spread`` or ``covariance`` (6 rows of 6).
+    ``speed_max_m_min``, ``exponent_t``, ``exponent_r``, ``exponent_a``, ``spread`` or ``covariance`` (6 rows of 6), and
+    ``peak_excess``.
 
     Raises
     ------
@@ -249,6 +256,8 @@ def material_text(material: Material) -> str:
     for name, limits in (("chip", material.chip), ("speed", speed)):
         if limits is not None:
             values |= dict(zip(_RANGES[name], limits, strict=True))
+    if material.peak_excess:
+        values["peak_excess"] = material.peak_excess
     if material.spread is not None:
         values["spread"] = material.spread
     if material.covariance is not None:

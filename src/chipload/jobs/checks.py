@@ -36,6 +36,8 @@ LOADS = ("force_n", "force_xy_n", "force_normal_n", "torque_mean_nm")
 DIRECTED = (
     "force_n", "deflection_um", "deflection_workpiece_um", "form_error_um", "cutter_stress_mpa", "deflection_share",
 )  # fmt: skip
+#: columns that follow the greatest force of a turn, not its mean
+PEAKS = (*DIRECTED, "force_xy_n", "torque_nm")
 #: columns that have the error of the force where they have none of their own
 WITH_FORCE = ("cutter_stress_mpa", "deflection_workpiece_um")
 
@@ -212,7 +214,7 @@ def default_limits(
         loaded = load >= LOADED * load.max(initial=0.0)
         check = check_limit("deflection_share", 1.0, columns, track=track, rows=loaded, reason=direction)
         out.append(_rigid(check))
-    return tuple(out)
+    return tuple(with_peaks(check, checks.material) for check in out)
 
 
 def _rigid(check: LimitCheck) -> LimitCheck:
@@ -248,6 +250,28 @@ def load_error(errors: Mapping[str, float], column: str) -> float:
     (0.02, 0.0)
     """
     return errors.get(column, errors.get("force_n", 0.0) if column in WITH_FORCE else 0.0)
+
+
+def peak_excess(material: Material, column: str) -> float:
+    """How far a column may be above its value because measured peaks were above predicted ones, relative.
+
+    >>> from chipload.cutting.material import Material
+    >>> own = Material("own", 800.0, 200.0, 50.0, 20.0, 20.0, 2.0, source="made up", peak_excess=0.4)
+    >>> peak_excess(own, "force_n"), peak_excess(own, "torque_mean_nm")
+    (0.4, 0.0)
+    """
+    return material.peak_excess if column in PEAKS else 0.0
+
+
+def with_peaks(check: LimitCheck, material: Material) -> LimitCheck:
+    """A check of a peak that holds by prediction alone is unproven where measured peaks were that far above."""
+    excess = peak_excess(material, check.column.name)
+    if check.state is not Verdict.HOLDS or check.worst is None or excess == 0.0:
+        return check
+    if abs(check.worst) * (1.0 + check.resolution_error) * (1.0 + excess) <= check.limit:
+        return check
+    reason = f"measured peaks of {material.name} were up to {100.0 * excess:.3g} % above predicted ones"
+    return replace(check, state=Verdict.UNPROVEN, reason=reason)
 
 
 def upper_loads(columns: Columns, sigma: float) -> Columns:

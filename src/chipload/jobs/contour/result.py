@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, Severity
-from chipload.jobs.checks import chip_findings, default_limits, unchecked_checks
+from chipload.jobs.checks import chip_findings, default_limits, unchecked_checks, with_peaks
 from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
 from chipload.machine.machine import Machine
 from chipload.planning.result import Event, StrategyResult
@@ -74,6 +74,8 @@ def limits_of(machine: Machine, op: Operation, strategy: StrategyResult, track: 
         check_limit(name, limit, columns, track=track, rows=strategy.wall_rows if name in ON_WALL else None)
         for name, limit in op.limits.items()
     )
+    if op.checks is not None:
+        stated = tuple(with_peaks(check, op.checks.material) for check in stated)
     own = () if op.checks is None else default_limits(op.checks, machine, columns, track, {})
     step = np.cumsum(_takes_time(columns)) - 1
     return tuple(c if c.row is None else replace(c, row=int(step[c.row])) for c in (*stated, *own))

@@ -6,9 +6,12 @@ Differs from FreeCAD's own posts: lengths are mm, feeds mm/s in the document; he
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+
+import numpy as np
 
 from chipload.errors import InputError
 from chipload.geometry.brep import step_of_brep
@@ -20,6 +23,10 @@ from chipload.jobs.drafts.drawing import draft_model
 from chipload.jobs.drafts.program import Known, draft_program
 
 _FEED = re.compile(r"\bF\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)")
+#: [mm] how far a triangle may leave a surface of the stock
+CHORD_MM = 0.01
+#: file beside the program: of which command of which operation each line is
+ORIGINS = "program_lines.csv"
 #: keys of a tool bit and of the ``[[cutter]]``
 _BIT = (
     ("Diameter", "diameter_mm"),
@@ -28,16 +35,24 @@ _BIT = (
 )
 
 
-def draft_freecad(file: Path, folder: Path, machine: str | None = None) -> Draft:
+def draft_freecad(file: Path, folder: Path, machine: str | None = None, job: str | None = None) -> Draft:
     """The draft of a job for a FreeCAD document.
+
+    Parameters
+    ----------
+    job : name or label of the CAM job in the document; None: the first one
 
     Raises
     ------
     InputError
-        The document cannot be read, or holds neither a CAM job with paths nor a shape.
+        The document cannot be read, holds neither a CAM job with paths nor a shape, or no CAM job of that name.
     """
     document = read_document(file)
     jobs = [o for o in document.objects.values() if "Stock" in o.properties and "Operations" in o.properties]
+    if job is not None:
+        known, jobs = jobs, [o for o in jobs if job in (o.name, o.label)]
+        if not jobs:
+            raise InputError(f"{file.name}: no CAM job {job}: has {', '.join(o.label for o in known) or 'none'}")
     if jobs:
         return _of_job(file, folder, document, jobs[0], machine)
     return _of_part(file, folder, document, machine)
@@ -46,6 +61,7 @@ def draft_freecad(file: Path, folder: Path, machine: str | None = None) -> Draft
 def _of_job(file: Path, folder: Path, document: Document, job: DocumentObject, machine: str | None) -> Draft:
     controllers: dict[str, DocumentObject] = {}
     lines = ["(written from the operations of a FreeCAD document: mm, mm/min)", "G21 G90 G94 G17 G54"]
+    origins: list[tuple[int, str, int]] = []
     now = ""
     for operation in _operations(document, job):
         controller = _controller(document, operation)
@@ -63,7 +79,9 @@ def _of_job(file: Path, folder: Path, document: Document, job: DocumentObject, m
             lines += [f"T{number} M6 ({_plain(controller.label)})", f"G43 H{number}"]
             if speed > 0.0:
                 lines.append(f"S{speed:g} {turn}")
-        lines += [f"({_plain(operation.label)})", *commands]
+        lines.append(f"({_plain(operation.label)})")
+        origins += [(len(lines) + k + 1, operation.name, k) for k in range(len(commands))]
+        lines += commands
     if not controllers:
         raise InputError(
             f"{file.name}: job {job.label}: no operation has a path: recompute the job in FreeCAD and save"
@@ -74,7 +92,9 @@ def _of_job(file: Path, folder: Path, document: Document, job: DocumentObject, m
     }  # fmt: skip
     known = Known(cutters, _stock(document, job, file.name), machine, text=text, origin=file.name)
     draft = draft_program(folder / "program.ngc", folder, known)
-    return Draft(draft.title, draft.tables, draft.notes, {"program.ngc": text.encode("ascii", "replace")})
+    rows = ["line,operation,command", *(f"{line},{name},{number}" for line, name, number in origins)]
+    files = {"program.ngc": text.encode("ascii", "replace"), ORIGINS: ("\n".join(rows) + "\n").encode("utf-8")}
+    return Draft(draft.title, draft.tables, draft.notes, files)
 
 
 def _operations(document: Document, job: DocumentObject) -> list[DocumentObject]:
@@ -97,7 +117,7 @@ def _controller(document: Document, operation: DocumentObject) -> DocumentObject
 
 
 def _commands(document: Document, operation: DocumentObject) -> list[str]:
-    """The lines of an operation's path, feeds in mm/min."""
+    """A line for each command of an operation's path, feeds in mm/min."""
     path = operation.properties.get("Path")
     raw = path if isinstance(path, list) else []
     if isinstance(path, str) and path in document.parts:
@@ -162,11 +182,20 @@ def _stock(document: Document, job: DocumentObject, name: str) -> tuple[Box, str
         with TemporaryDirectory(prefix="chipload-") as folder:
             step = Path(folder) / "stock.step"
             step.write_bytes(step_of_brep(data, f"{name}: stock"))
-            corners = read_mesh(step, unit=None, key="stock").bounds
+            mesh = read_mesh(step, unit=None, key="stock", chord_mm=CHORD_MM)
     except InputError:
         return None
-    low, high = ((float(p[0]), float(p[1]), float(p[2])) for p in corners)
-    return (low, high), f"{where}, the box of its shape"
+    # a stock that is no box has more room in its box than material: a guess
+    box = abs(float(mesh.volume) / float(np.prod(np.ptp(mesh.bounds, axis=0))) - 1.0) < 1e-6
+    return (
+        _corner(mesh.bounds[0]),
+        _corner(mesh.bounds[1]),
+    ), where if box else f"the box around the {where}, which is no box"
+
+
+def _corner(values: Iterable[float]) -> tuple[float, float, float]:
+    x, y, z = (round(float(value), 6) for value in values)
+    return x, y, z
 
 
 def _of_part(file: Path, folder: Path, document: Document, machine: str | None) -> Draft:

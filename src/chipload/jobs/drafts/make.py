@@ -9,7 +9,9 @@ from chipload.files import is_file
 from chipload.jobs.drafts.draft import Draft
 
 
-def draft_of(file: Path, folder: Path, *, machine: str | None = None, tools: Path | None = None) -> Draft:
+def draft_of(
+    file: Path, folder: Path, *, machine: str | None = None, tools: Path | None = None, job: str | None = None
+) -> Draft:
     """The draft of a job for a file.
 
     Parameters
@@ -18,6 +20,7 @@ def draft_of(file: Path, folder: Path, *, machine: str | None = None, tools: Pat
     folder : of the job, to which file names are relative
     machine : a shipped name or a file (TOML); None: guessed
     tools : a LinuxCNC tool table of a program
+    job : a CAM job of a FreeCAD document, by name or label; None: the first
 
     Raises
     ------
@@ -27,6 +30,8 @@ def draft_of(file: Path, folder: Path, *, machine: str | None = None, tools: Pat
     if not is_file(file):
         raise InputError(f"{file}: no such file: name a program, a drawing, a model or sections of a blade")
     ending = file.suffix.lower()
+    if job is not None and ending != ".fcstd":
+        raise InputError(f"--job {job}: is for a FreeCAD document: leave it out for {file.name}")
     if ending == ".camotics":
         from chipload.jobs.drafts.projects import draft_camotics
 
@@ -34,7 +39,7 @@ def draft_of(file: Path, folder: Path, *, machine: str | None = None, tools: Pat
     if ending == ".fcstd":
         from chipload.jobs.drafts.freecad import draft_freecad
 
-        return draft_freecad(file, folder, machine)
+        return draft_freecad(file, folder, machine, job)
     if ending in (".dxf", ".step", ".stp"):
         from chipload.jobs.drafts.drawing import draft_drawing, draft_model
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.cutting.strength import allowed_stress, cutter_stress
-from chipload.jobs.checks import DefaultChecks, load_error, upper_loads
+from chipload.jobs.checks import DefaultChecks, load_error, peak_excess, upper_loads
 from chipload.jobs.feeds.outcome import FeedResult
 from chipload.jobs.feeds.tables import FeedsTable
 from chipload.jobs.feeds.verify import require_same, rubbing_lines, speeds_of, tooth_feeds
@@ -75,9 +75,14 @@ class FeedRequest:
         return (*self.limits, *(() if "cutter_strength" in self.checks.off else (STRESS,)))
 
     def error(self, limit: str) -> float:
-        """Relative error of the column that a limit bounds; 0 where it is not finite: then nothing has this load."""
-        error = load_error(self.errors, column_of(limit).name)
-        return error if math.isfinite(error) else 0.0
+        """Relative error of the column that a limit bounds, measured peaks above predicted ones included.
+
+        An error that is not finite counts as 0: then nothing has this load.
+        """
+        column = column_of(limit).name
+        error = load_error(self.errors, column)
+        peaks = peak_excess(self.checks.material, column)
+        return (1.0 + (error if math.isfinite(error) else 0.0)) * (1.0 + peaks) - 1.0
 
 
 def watching(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,10 @@ from chipload.result import Provenance
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 Floats = NDArray[np.float64]
+#: share of the measured peaks that the band of a material covers
+COVERED = 0.9
+#: of the force in the plane: a peak that is predicted below this is not compared
+SMALL = 0.1
 
 
 def read_cuts(job: FitJob) -> tuple[tuple[MeasuredCut, ...], tuple[Finding, ...]]:
@@ -81,7 +86,7 @@ def run(job: FitJob, progress: Progress = silent) -> FitResult:
         )  # fmt: skip
     progress(0.7, "predict")
     comparisons = tuple(_compared(fit, cut, use) for cut, use in zip(cuts, uses, strict=True))
-    material, why = _material(job, fit)
+    material, why = _material(job, fit, comparisons)
     notes = tuple(Finding("fit-note", 0, text) for text in fit.notes)
     if not fit.search.converged:
         text = "the search for runout and phase did not end: widen the windows"
@@ -134,7 +139,27 @@ def _percent(said: Floats, seen: Floats) -> Floats:
     return np.asarray((said - seen) / size * 100.0)
 
 
-def _material(job: FitJob, fit: Fit) -> tuple[Material | None, tuple[Finding, ...]]:
+def peak_excess(comparisons: Sequence[Comparison]) -> float | None:
+    """How far measured peaks are above predicted ones in runs that were not fitted, relative; None: there is no run.
+
+    Of each run and each direction (feed, across, axis, and the greatest force in the plane) the larger peak of each
+    turn over the predicted one: :data:`COVERED` of the turns are below, and the worst of these counts, to 4 digits. A
+    direction whose prediction is below :data:`SMALL` of the force in the plane is left out.
+    """
+    worst: list[float] = []
+    for one in comparisons:
+        said = one.predicted
+        predicted = np.append(np.maximum(np.abs(said.high), np.abs(said.low)), said.resultant)
+        turns = one.turns
+        seen = np.column_stack([np.maximum(np.abs(turns.high), np.abs(turns.low)), turns.plane])
+        measured = np.append(one.cut.measured, one.cut.measured[:2].all())
+        counts = measured & np.isfinite(predicted) & (predicted > SMALL * said.resultant)
+        if one.use == "predict" and counts.any():
+            worst.append(float((np.quantile(seen[:, counts], COVERED, axis=0) / predicted[counts]).max() - 1.0))
+    return float(f"{max(0.0, *worst):.4g}") if worst else None
+
+
+def _material(job: FitJob, fit: Fit, comparisons: Sequence[Comparison]) -> tuple[Material | None, tuple[Finding, ...]]:
     """The material, or why there is none."""
     table = job.table
     values = fit.coefficients.values.copy()
@@ -159,11 +184,18 @@ def _material(job: FitJob, fit: Fit) -> tuple[Material | None, tuple[Finding, ..
     else:
         text = "how sure the coefficients are is not written: the covariance of all six is not known"
         found = (Finding("fit-covariance", 0, text),)
+    excess = peak_excess(comparisons)
+    if excess is None:
+        text = 'no run was kept back (use = "predict"): how far peaks are above the prediction is not known'
+        found = (*found, Finding("fit-peaks", 0, text))
+    else:
+        text = f"90 % of the peaks measured in runs that were not fitted are at most {100.0 * excess:.3g} % above"
+        found = (*found, Finding("fit-peaks", 0, f"{text} the prediction: limits on peaks are held with that"))
     try:
         made = Material(
             name=table.name, source=f"{source}; {table.method} fit", workpiece=table.workpiece, cutter=said,
             conditions="; ".join(x for x in (table.conditions, cuts) if x), chip=(0.0, float(f"{chip:.6g}")),
-            covariance=covariance, **numbers,
+            covariance=covariance, peak_excess=excess or 0.0, **numbers,
         )  # fmt: skip
     except InputError as err:
         return None, (_lost(f"no material is written: {err}"),)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chipload.jobs.checks import DIRECTED, default_limits, load_error, upper_loads
+from chipload.jobs.checks import DIRECTED, default_limits, load_error, upper_loads, with_peaks
 from chipload.jobs.simulation.outcome import SimulationResult
 from chipload.jobs.simulation.stability import STABILITY_LIMITS, StabilityResult, stability_limits
 from chipload.machine.machine import Machine
@@ -88,7 +88,8 @@ def _stated(simulation: SimulationResult, columns: Columns, track: str, name: st
     if name == "form_error_um" and "form_points" in columns and not np.asarray(columns["form_points"]).any():
         reason = "no point of the part is finished"
     error = load_error(simulation.errors, column_of(name).name)
-    return check_limit(name, limit, columns, track=track, error=error, reason=reason)
+    check = check_limit(name, limit, columns, track=track, error=error, reason=reason)
+    return with_peaks(check, simulation.checks.material)
 
 
 def _difference(simulation: SimulationResult, columns: Columns, track: str, name: str, limit: float) -> LimitCheck:

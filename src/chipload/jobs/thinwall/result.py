@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, Severity
-from chipload.jobs.checks import chip_findings, default_limits, unchecked_checks
+from chipload.jobs.checks import chip_findings, default_limits, unchecked_checks, with_peaks
 from chipload.jobs.thinwall.outcome import OVER, USED, Finish, ThinWallResult, Variant, helps
 from chipload.report.programs import ENDINGS, program_name
 from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict, check_limit, in_memory, state_of
@@ -59,9 +59,10 @@ def limits_of(walled: ThinWallResult, one: Variant) -> tuple[LimitCheck, ...]:
     c, out = one.columns, []
     for name, limit in walled.limits.items():
         if name == "form_error_um":
-            out.append(_form_error(one, limit))
+            out.append(with_peaks(_form_error(one, limit), walled.checks.material))
         else:
-            out.append(check_limit(name, limit, c, track=one.name, error=mesh_error_of(walled, name, c)))
+            check = check_limit(name, limit, c, track=one.name, error=mesh_error_of(walled, name, c))
+            out.append(with_peaks(check, walled.checks.material))
     over, cuts = "force_over_allowable", c["force_normal_n"] > 0.0
     out.append(check_limit(over, 1.0 + OVER, c, track=one.name, rows=cuts, error=mesh_error_of(walled, over, c)))
     strength = float(walled.settings["yield_mpa"])

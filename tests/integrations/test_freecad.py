@@ -1,0 +1,114 @@
+"""The add-on of FreeCAD in `freecadcmd`: a job of FreeCAD's own CAM is checked, shown, and gets other feeds."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from chipload.machine.machine import machine_named
+from chipload.program.program import DWELL, RAPID, Program
+from chipload.program.read import read_program
+
+ADDON = Path(__file__).parents[2] / "integrations" / "freecad"
+FREECAD = shutil.which("freecadcmd") or shutil.which("FreeCADCmd")
+#: [mm] of one level of the outline: the sides, quarter circles of 3 mm at the corners
+LEVEL = 2 * (40 + 30) + 2 * math.pi * 3
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    if FREECAD is None:
+        pytest.skip("no freecadcmd: the add-on is not run in FreeCAD")
+    pytest.importorskip("OCP", reason="no CAD kernel: the stock of a FreeCAD document is not read")
+    out = tmp_path_factory.mktemp("freecad")
+    command = f"{shlex.quote(sys.executable)} -m chipload"
+    own = os.environ | {"ADDON": str(ADDON), "FOLDER": str(out), "CHIPLOAD": command, "HOME": str(out)}
+    script = Path(__file__).with_name("freecad_job.py")
+    subprocess.run([FREECAD, str(script)], env=own, stdin=subprocess.DEVNULL, capture_output=True, check=False)
+    fault = out / "fault.txt"
+    assert not fault.exists(), fault.read_text()
+    return out
+
+
+@pytest.fixture(scope="module")
+def found(folder: Path) -> dict[str, object]:
+    return json.loads((folder / "out.json").read_text())
+
+
+def test_what_the_document_states_is_no_guess(folder: Path, found: dict[str, object]) -> None:
+    """Stock (1 mm around the part), diameter and cutting edge are the document's; the tool has no flutes in it."""
+    assert (found["jobs"], found["settings"]) == (["Job"], [])
+    keys = sorted(line.split()[1] for line in found["guesses"])
+    assert keys == ["cutter.0.flutes", "cutter.0.helix_deg", "cutter.0.overhang_mm", "machine.name", "material.name"]
+    text = (folder / "part-chipload" / "job.toml").read_text()
+    assert "low_mm = [-1.0, -1.0, -1.0]" in text
+    assert "high_mm = [41.0, 31.0, 11.0]" in text
+
+
+def test_the_program_is_that_of_freecads_own_post(folder: Path) -> None:
+    """Motion by motion: the same end, the same feed; FreeCAD rounds to 0.001 mm."""
+    machine = machine_named("vmc")
+    ours, theirs = (
+        read_program(path, machine, dialect="linuxcnc", feed=10.0).program
+        for path in (folder / "part-chipload" / "program.ngc", folder / "posted.ngc")
+    )
+    ends, feeds = zip(*(_cuts(program) for program in (ours, theirs)), strict=True)
+    assert np.abs(ends[0] - ends[1]).max() < 1.1e-3
+    assert np.abs(feeds[0] - feeds[1]).max() < 1.1e-3
+
+
+def _cuts(program: Program) -> tuple[np.ndarray, np.ndarray]:
+    """Ends [mm] and feeds [mm/s] of the motions with a feed that move; a post may leave out the others."""
+    length = np.r_[0.0, np.linalg.norm(np.diff(program.p_work, axis=0), axis=1)]
+    cuts = (program.motion != RAPID) & (program.motion != DWELL) & (length > 1e-9)
+    return program.p_work[cuts], program.feed[cuts]
+
+
+def test_the_verdict_and_its_findings_are_in_the_document(found: dict[str, object]) -> None:
+    """With every guess stated the rigid model is the only thing in doubt; its place stands on the path."""
+    assert found["verdict"] == "unproven"
+    kinds = [kind for kind, _ in found["shown"]]
+    assert kinds.count("App::FeaturePython") == 1
+    assert kinds.count("App::Annotation") >= 1
+    labels = [label for kind, label in found["shown"] if kind == "Part::Feature"]
+    edges = [[float(label.split()[1]), float(label.split()[3])] for label in labels]
+    assert 1 <= len(edges) <= 5
+    assert edges[-1][1] == pytest.approx(found["force"], rel=1e-3)
+    # two levels, the plunges between 14 and -1 mm, and nothing that is a rapid
+    assert found["length"] == pytest.approx(2 * LEVEL + 15.0, rel=0.01)
+
+
+def test_feeds_are_written_back(found: dict[str, object]) -> None:
+    """The force stays below 300 N at twice the feed, the greatest that is asked for: each feed is doubled."""
+    assert found["exceeding"].startswith("the feeds are not written: with them the program exceeds a limit")
+    assert found["kept"]
+    before, after = ([f or 0.0 for f in found[key]] for key in ("before", "after"))
+    assert found["changed"] == np.count_nonzero(before) > 10
+    assert after == pytest.approx([2.0 * f for f in before], rel=1e-5)
+    assert found["better"] == "unproven"
+
+
+def test_what_cannot_be_done_is_refused(found: dict[str, object]) -> None:
+    assert found["outdated"] == "operation Profile: has changed since it was checked: check the job again"
+    assert "'machine.name': must be a key, = and a value" in found["not_a_setting"]
+    assert found["no_program"].startswith("/nowhere/chipload: cannot be started")
+
+
+def test_the_package_names_what_is_there() -> None:
+    """What FreeCAD's add-on manager reads, and the class that InitGui.py registers."""
+    space = "{https://wiki.freecad.org/Package_Metadata}"
+    root = ElementTree.parse(ADDON / "package.xml").getroot()
+    bench = root.find(f"{space}content/{space}workbench")
+    assert bench.findtext(f"{space}classname") == "ChiploadWorkbench"
+    assert "class ChiploadWorkbench" in (ADDON / "InitGui.py").read_text()
+    assert (ADDON / bench.findtext(f"{space}subdirectory") / "Init.py").is_file()
