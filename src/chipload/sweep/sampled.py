@@ -87,7 +87,7 @@ def _files(
     normal = norm.ppf(np.clip(samples.points(COEFFICIENTS + OF_MODE * len(modes)), 1e-9, 1.0 - 1e-9))
     drawn = samples.of(material, normal[:, :COEFFICIENTS])
     materials = _written(out / MATERIALS, [material_text(one) for one in drawn], written)
-    if not modes:
+    if table is None or not modes:
         return [SampleFiles(file, None) for file in materials]
     files = _written(out / MODES, modes_texts(modes, table, normal[:, COEFFICIENTS:]), written)
     return [SampleFiles(*pair) for pair in zip(materials, files, strict=True)]
