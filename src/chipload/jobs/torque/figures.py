@@ -14,9 +14,8 @@ from chipload.jobs.torque import torque_figures as drawn
 from chipload.jobs.torque.files import HAL, PATH, program_files
 from chipload.jobs.torque.numbers import operation_numbers
 from chipload.jobs.torque.outcome import HELD, ControllerCase, SpindleEstimate, TorqueResult
-from chipload.jobs.torque.result import track_name
 from chipload.jobs.torque.scene import scene_bytes
-from chipload.report.presentation import Blank, Presentation
+from chipload.report.presentation import Presentation
 from chipload.report.sheet import figure, items, table
 
 SETS = ("NB", "NM", "NS", "Z", "PS", "PM", "PB")
@@ -24,20 +23,7 @@ SETS = ("NB", "NM", "NS", "Z", "PS", "PM", "PB")
 
 def presentation_of(outcome: TorqueResult) -> Presentation:
     """The presentation of a torque-controlled program."""
-    return Presentation(
-        partial(_sections, outcome),
-        partial(scene_bytes, outcome),
-        partial(program_files, outcome),
-        partial(_blanks, outcome),
-    )
-
-
-def _blanks(outcome: TorqueResult) -> dict[str, Blank]:
-    """The stock as it really is, the same for every controller of the loop that the verdict stands on."""
-    if not outcome.control.cases:
-        return {}
-    mesh, case = outcome.wall.blank.mesh(), outcome.control.cases[-1]
-    return {track_name(case, name): Blank(mesh, outcome.job.cutters) for name in case.runs}
+    return Presentation(partial(_sections, outcome), partial(scene_bytes, outcome), partial(program_files, outcome))
 
 
 def _sections(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:

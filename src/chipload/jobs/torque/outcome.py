@@ -22,7 +22,6 @@ from chipload.control.override import Override
 from chipload.control.plant import Loop
 from chipload.control.spindle_model import Spindle, SpindleDeviation
 from chipload.control.wall import PathLimit
-from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding
 from chipload.jobs.checks import DefaultChecks
 from chipload.jobs.tables import ChecksTable
@@ -155,7 +154,6 @@ class TorqueInputs:
     unchecked : names of those that are not stated
     settings : the keys of the job but cutters and surprises
     surprises : a text each
-    cutters : by tool number
     checks, check_table : what is checked beside the stated limits, and its table
     """
 
@@ -167,7 +165,6 @@ class TorqueInputs:
     unchecked: tuple[str, ...]
     settings: Mapping[str, Any]
     surprises: tuple[str, ...]
-    cutters: Mapping[int, Cutter]
     checks: DefaultChecks
     check_table: ChecksTable
     provenance: Provenance
@@ -186,7 +183,7 @@ class ShellWall:
     oval : harmonics under a force at ``oval_s`` [mm] along the wall, its free end
     solid : second opinion
     surface : least and greatest distance of what is left from the finished surface [mm]; None: no whole layer was cut
-    blank, stock : as it is before the program, and after it
+    stock : as it is after the program
     """
 
     shell: Shell
@@ -198,7 +195,6 @@ class ShellWall:
     oval_s: float
     solid: SolidComparison
     surface: tuple[float, float] | None
-    blank: LayeredStock
     stock: LayeredStock
 
 

@@ -108,9 +108,6 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
             oval_s=a.thin.shell.length,
             solid=_second_opinion(a.thin, a.width, a.planned),
             surface=surface_off(a.real.stock, place.outer, low, high),
-            blank=shell_stock(
-                job, program, off_centre(job.shell.stock_mm, job.table.surprise), thinner_share(job.table.surprise)
-            ),
             stock=a.real.stock,
         ),
         allowable=AllowableTorque(
@@ -153,7 +150,6 @@ def _inputs(job: TorqueJob, program: Program, machine: Machine, material: Materi
         unchecked=ask.unstated,
         settings=job.table.model_dump(exclude_none=True, exclude={"cutter", "surprise"}),
         surprises=tuple(_text_of(x.model_dump(exclude_none=True)) for x in job.table.surprise),
-        cutters=dict(job.cutters),
         checks=default_checks(job.table.checks, job.cutters, material, 0.5),
         check_table=job.table.checks,
         provenance=_provenance(job, machine, material),
