@@ -27,6 +27,8 @@ CORE = (
     "test_words.py",
 )  # fmt: skip
 CHROMIUM = Path("/usr/bin/chromium")
+#: run by freecadcmd, not by Python
+collect_ignore = ["integrations/freecad_job.py"]
 EXAMPLES = Path(__file__).parents[1] / "src" / "chipload" / "examples"
 WALL = Contour.from_bulges([[0, 28], [0, 8], [8, 0], [28, 0]], [0, math.tan(math.pi / 8), 0, 0])
 CENTRES = Contour.from_bulges([[5, 28], [5, 8], [8, 5], [28, 5]], [0, math.tan(math.pi / 8), 0, 0])

@@ -168,7 +168,7 @@ def test_a_wrong_engagement_is_placed():
     assert "engagement differs by 0.02" in v.reasons[0]
 
 
-def test_a_row_beside_the_path_fails():
+def test_a_row_compared_the_path_fails():
     rows = finish_rows()
     rows["y_mm"] = rows["y_mm"].copy()
     rows["y_mm"][10] += 1e-3
