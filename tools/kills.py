@@ -17,15 +17,38 @@ import signal
 import sys
 import tempfile
 import time
+import traceback
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
 from fuzz_jobs import small_jobs
 
+from chipload.examples import copy_example
+
 HOW = (signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGHUP)
 #: codes of a run that ended with a result
 DONE = (0, 3)
+#: jobs of examples, made small
+EXAMPLES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "thin wall": (
+        "plate",
+        (
+            "wall.length_mm=8.0", "wall.height_mm=9.0", "wall.thickness_mm=1.7", "wall.foot_mm=4.0",
+            "wall.allowance_mm=[0.2, 0.2]", "wall.elements=[4, 5]", "operation.0.scallop_um=40.0",
+            "operation.0.depth_max_mm=0.2", "operation.0.step_mm=3.0", "operation.0.least_error=false",
+            "operation.0.corner_slices=60", "operation.0.reserve=0.1",
+        ),
+    ),
+    "torque": ("tube", ("simulation.step_mm=2.0", "simulation.layer_mm=2.0")),
+    "impeller": (
+        "impeller",
+        (
+            *(f"surface.{k}.points=[6, 4]" for k in range(3)), "operation.0.check_mm=5",
+            "operation.0.most_cutters=1", "surface.2.up=[0.05, 0.75]",
+        ),
+    ),
+}  # fmt: skip
 
 
 def jobs(place: Path) -> dict[str, list[str]]:
@@ -40,6 +63,13 @@ def jobs(place: Path) -> dict[str, list[str]]:
         text = (folder / "job.toml").read_text().replace(*finer)
         (folder / "job.toml").write_text(text)
         out[name] = ["run", str(folder / "job.toml"), "--keep-s", "0", "--out"]
+    for name, (example, sets) in EXAMPLES.items():
+        job = copy_example(example, place / name) / "job.toml"
+        text = job.read_text()
+        job.write_text(text[: text.index("[operation.rough]")] if name == "impeller" else text)
+        out[name] = ["run", str(job), *(word for s in sets for word in ("--set", s)), "--keep-s", "0", "--out"]
+    over = ("--over", "cutter.0.diameter_mm=8,10", "--over", "operation.0.feed_mm_min=600,900")
+    out["sweep"] = ["sweep", str(place / "contour" / "job.toml"), *over, "--out"]
     return out
 
 
@@ -65,6 +95,8 @@ class Run:
                 main_of_chipload()
             except SystemExit as err:
                 code = err.code if isinstance(err.code, int) else 1
+            except BaseException:
+                traceback.print_exc()
             finally:
                 sys.stderr.flush()
                 os._exit(code)
@@ -134,35 +166,35 @@ def main() -> int:
     ask.add_argument("--only", nargs="*", help="jobs by name")
     given = ask.parse_args()
     rng = np.random.default_rng(given.seed)
-    for part in ("contour", "program", "fit"):
+    for part in ("contour", "program", "fit", "thinwall", "torque", "impeller"):
         for module in ("run", "result", "figures"):
             importlib.import_module(f"chipload.jobs.{part}.{module}")
+    importlib.import_module("chipload.sweep.run")
     importlib.import_module("chipload.report.folder")
     importlib.import_module("chipload.cli")
     total = Counter[str]()
     with tempfile.TemporaryDirectory(prefix="kills-") as folder:
         place = Path(folder)
         commands = {n: w for n, w in jobs(place).items() if not given.only or n in given.only}
-        whole = {}
-        for name, words in commands.items():
-            begin = time.monotonic()
-            code, said, _ = Run([*words, str(place / name / "whole")], place / "messages").ended()
-            if code not in DONE:
-                raise SystemExit(f"{name}: {said}")
-            whole[name] = (time.monotonic() - begin, contents(place / name / "whole"))
         print("| job | cases | SIGKILL | SIGTERM | SIGHUP | went on | other bytes | left | faults |", flush=True)
         print("|---|---:|---:|---:|---:|---:|---:|---:|---:|", flush=True)
         share = -(-given.kills // len(commands))
         for name, words in commands.items():
+            begin, undisturbed = time.monotonic(), place / name / "whole"
+            undisturbed.parent.mkdir(exist_ok=True)
+            code, said, _ = Run([*words, str(undisturbed)], place / "messages").ended()
+            if code not in DONE:
+                raise SystemExit(f"{name}: {said}")
+            whole = (time.monotonic() - begin, contents(undisturbed))
             found = Counter[str]()
             for k in range(share):
                 own = place / name / f"case-{k}"
                 own.mkdir()
-                found += case(words, own, *whole[name], rng)
+                found += case(words, own, *whole, rng)
                 shutil.rmtree(own)
             own = place / name / "two"
             own.mkdir()
-            found += two_at_once(words, own, whole[name][1])
+            found += two_at_once(words, own, whole[1])
             cells = ("cases", "SIGKILL", "SIGTERM", "SIGHUP", "went on", "other bytes", "left", "faults")
             print(f"| {name} | {' | '.join(str(found[c]) for c in cells)} |", flush=True)
             total += found

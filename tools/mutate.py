@@ -95,9 +95,13 @@ TESTS = (
     "tests/stock",
     "tests/machine/test_feed.py",
     "tests/laws/test_shell_loads.py",
+    "tests/laws/test_force_laws.py",
+    "tests/laws/test_chip_laws.py",
 )
-#: longest test that takes part, and tests of a mutant together [s]
-LONGEST_S, TOGETHER_S = 10.0, 15.0
+#: those collected for compiled kernels, which run as Python
+KERNEL_TESTS = ("tests/structure", "tests/cutting", "tests/engagement", "tests/stability", "tests/control")
+#: longest test that takes part, the same of compiled kernels, and tests of a mutant together [s]
+LONGEST_S, LONGEST_KERNEL_S, TOGETHER_S = 10.0, 4.0, 15.0
 
 #: (file, the line as changed, stripped): why no test can notice it
 EQUIVALENT: dict[tuple[str, str], str] = {
@@ -115,6 +119,19 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "dt = np.where(moving, 2.0 * step / np.where(moving, total, 1.1), 0.0)",
     ): "the number stands where nothing is taken",
     ("structure/shell.py", "stiffness[held, held] = 1.1"): "what is held has no load",
+    (
+        "structure/removal.py",
+        'progress(min(1.0, (at + 64) * len(new)), "columns of the compliance")',
+    ): "how far it is, not what comes out",
+    ("control/spindle.py", "jacobian[0, 0] = +(constant**2) / scale_t"): "only its square is used",
+    (
+        "planning/thinwall/plane_stock.py",
+        "half = np.arccos(np.where(some, -c / np.where(some, size, 1.1), 0.0))",
+    ): "the number stands where nothing is taken",
+    (
+        "planning/thinwall/depth.py",
+        "b[u] = np.where(last[u] == +1, 0.5 * b[u], b[u])",
+    ): "how fast the bracket shuts, not where",
     (
         "stock/planar.py",
         "reach = h / math.sqrt(0.5) + 0.5 * radius * piece",
@@ -255,10 +272,14 @@ def work(mutants: list[Mutant], kept: Path, compiled: bool, tell: Callable[[Muta
             alive = collected.survives(module, m.applied(source), m.line, tests, limit)
             tell(m, Answer("survived" if alive else "killed", len(tests)))
 
-    words = [*TESTS, *(SOURCE + f for f in files)]
+    words = [*(TESTS if compiled else KERNEL_TESTS), *(SOURCE + f for f in files)]
     for file in files:
         importlib.import_module("chipload." + file.removesuffix(".py").replace("/", "."))
-    collect(words, kept / "scratch", Collected(ROOT / SOURCE, [*FILES, *KERNELS], LONGEST_S, every))
+    collect(
+        words,
+        kept / "scratch",
+        Collected(ROOT / SOURCE, [*FILES, *KERNELS], LONGEST_S if compiled else LONGEST_KERNEL_S, every),
+    )
 
 
 def _in_a_copy(m: Mutant, tests: list[str], kept: Path, compiled: bool, tell: Callable[[Mutant, Answer], None]) -> None:

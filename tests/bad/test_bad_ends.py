@@ -14,6 +14,7 @@ import pytest
 import shapely
 from typer.testing import CliRunner
 
+from chipload import cli
 from chipload.cli import app
 from chipload.errors import InputError, OutputError
 from chipload.examples import copy_example
@@ -190,10 +191,35 @@ def test_input_that_is_refused_before_the_work_begins_leaves_what_was_kept(tmp_p
     assert (tmp_path / "u" / LAST).exists()
 
 
-def test_a_full_disk_ends_with_its_own_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The report cannot be written: what was simulated is kept; with free space the same command continues."""
-    copy_example("chips", tmp_path / "job")
-    words = ["run", str(tmp_path / "job" / "job.toml"), "--out", str(tmp_path / "out"), "--keep-s", "0"]
+#: a small job of a capability that goes on where it was stopped, and of one that begins again
+SMALL = {
+    "chips": ("operation.0.step_mm=4",),
+    "contour": ('operation.0.strategies=["plain"]', 'operation.0.use="plain"', "operation.0.step_mm=0.5"),
+}
+
+
+@pytest.fixture(params=sorted(SMALL))
+def small(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[list[str], Path, bool]:
+    """The command of a small job, its result folder, and whether a stopped run goes on."""
+    name, out = request.param, tmp_path / "results" / "out"
+    job = copy_example(name, tmp_path / "job") / "job.toml"
+    sets = [word for text in SMALL[name] for word in ("--set", text)]
+    return ["run", str(job), "--out", str(out), "--keep-s", "0", *sets], out, name == "chips"
+
+
+def ended_well(words: list[str], out: Path) -> str:
+    """What the command says that ends with a result and leaves nothing beside it."""
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code in (0, 3), done.output
+    assert [p.name for p in out.parent.iterdir()] == ["out"]
+    return done.output
+
+
+def test_a_full_disk_ends_with_its_own_code(
+    small: tuple[list[str], Path, bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The report cannot be written: what was simulated is kept, and with space the same command continues to its end."""
+    words, out, goes_on = small
 
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
@@ -203,12 +229,69 @@ def test_a_full_disk_ends_with_its_own_code(tmp_path: Path, monkeypatch: pytest.
         ended = CliRunner().invoke(app, words)
     assert ended.exit_code == 4, ended.output
     assert "cannot be written: No space left on device: free space; the same command continues" in ended.output
-    assert not (tmp_path / "out").exists()
-    assert (tmp_path / "out.unfinished" / LAST).exists()
-    again = CliRunner().invoke(app, words)
-    assert again.exit_code in (0, 3), again.output
-    assert "continues after step" in again.output
-    assert not (tmp_path / "out.unfinished").exists()
+    assert not out.exists()
+    assert (out.with_name("out.unfinished") / LAST).exists() == goes_on
+    assert ("continues after step" in ended_well(words, out)) == goes_on
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_a_signal_while_the_result_is_written_leaves_no_half_of_it(
+    small: tuple[list[str], Path, bool], name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words, out, goes_on = small
+    number = getattr(signal, name)
+    monkeypatch.setattr(folder, "_write", lambda *_: os.kill(os.getpid(), number))
+    before = signal.signal(number, cli._stop)
+    try:
+        ended = CliRunner().invoke(app, words)
+    finally:
+        signal.signal(number, before)
+    assert ended.exit_code == 130, ended.output
+    left = [p.name for p in out.parent.iterdir()] if out.parent.exists() else []
+    assert left == (["out.unfinished"] if goes_on else [])
+    monkeypatch.undo()
+    assert ("continues after step" in ended_well(words, out)) == goes_on
+
+
+def test_a_second_run_into_the_same_folder(
+    small: tuple[list[str], Path, bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While the first writes its result, the same command: refused where work is kept, else each result is whole."""
+    words, out, goes_on = small
+    ended_well(words, out)
+    alone = {p.name: p.read_bytes() for p in out.iterdir()}
+    write, codes = folder._write, list[int]()
+
+    def second(*given: object) -> None:
+        monkeypatch.setattr(folder, "_write", write)
+        codes.append(CliRunner().invoke(app, words).exit_code)
+        write(*given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(folder, "_write", second)
+    ended_well(words, out)
+    assert codes == [2] if goes_on else codes[0] in (0, 3)
+    assert {p.name: p.read_bytes() for p in out.iterdir()} == alone
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_a_signal_outside_of_the_command_is_no_fault(when: str) -> None:
+    """Before the command is read and after it has ended: 130 as at any other moment, without a traceback."""
+    code = (
+        "import os, signal, sys\n"
+        "import chipload.cli as cli\n"
+        "app = cli.app\n"
+        "def stopped():\n"
+        f"    if {when == 'after'}:\n"
+        "        try:\n"
+        "            app(['--version'])\n"
+        "        except SystemExit:\n"
+        "            pass\n"
+        "    os.kill(os.getpid(), signal.SIGTERM)\n"
+        "cli.app = stopped\n"
+        "cli.main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=False)
+    assert (done.returncode, done.stderr) == (130, "")
 
 
 def test_a_file_that_is_written_whole_says_why_it_cannot(tmp_path: Path) -> None:

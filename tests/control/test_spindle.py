@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.signal import lfilter, lsim
+from scipy.stats import sem, t
 
-from chipload.control.spindle import _light, estimate, first_order, identify, idle_map
+from chipload.control.spindle import Run, _light, estimate, first_order, identify, identify_runs, idle_map
 from chipload.errors import InputError
 
 KT, INERTIA, IDLE, LAG = 300.0, 50.0, (2.0, 0.004), 0.05
@@ -120,6 +121,26 @@ def test_air_alone():
     spindle = idle_map(speed, 2.0 + 0.004 * speed + rng.normal(0, 0.5, 500), 1.0, 0.0, idle_terms=2)
     np.testing.assert_allclose(spindle.idle, IDLE, atol=3.0 * 0.5 / np.sqrt(500))
     assert spindle.light == pytest.approx(1.0, rel=0.1)
+    assert spindle.speeds == (speed.min(), speed.max())
+
+
+def test_the_interval_of_an_idle_current_is_that_of_a_mean():
+    """One speed: the current is a mean, its interval that of Student's t."""
+    current = np.random.default_rng(3).normal(2.0, 0.5, 40)
+    found = idle_map(np.full(40, 300.0), current, 1.0, 0.0)
+    low, high = t.interval(0.95, 39, loc=current.mean(), scale=sem(current))
+    assert found.idle[0] == pytest.approx(current.mean())
+    assert found.half_width[2] == pytest.approx(0.5 * (high - low))
+    assert found.level == 0.95
+
+
+def test_with_a_torque_constant_that_is_known_the_rest_is_found():
+    """Of a current without noise and lag: idle current and inertia as they were made."""
+    speed, torque, current = currents(np.random.default_rng(0), spread=0.0, lag=0.0)
+    found = identify_runs([Run(TIME, speed, current, torque)], 0.0, torque_constant=KT)
+    assert found.torque_constant == KT
+    np.testing.assert_allclose(found.idle, IDLE, rtol=0.02)
+    assert found.inertia == pytest.approx(INERTIA, rel=0.05)
 
 
 def test_refused():

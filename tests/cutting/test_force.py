@@ -269,3 +269,11 @@ def test_refused(change, message):
     with pytest.raises(InputError) as err:
         forces_along(**{**args, **change})
     assert str(err.value) == message
+
+
+def test_the_greatest_torque_of_a_straight_tooth_by_hand():
+    """Ktc a h R = 1000 x 2 x 0.1 x 5 N mm, where the chip of a slot is thickest."""
+    plain = Material("plain", 1000.0, 0.0, 0.0, 0.0, 0.0, 0.0, source="made up for this test")
+    mill = Cutter(10.0, 2, 0.0, 20.0, 30.0, 6e5)
+    found = forces_along([0.0], [math.pi], 0.1, [[1.0, 0.0]], mill, plain, 2.0, spindle_speed=100.0)
+    assert found["torque_nm"] == pytest.approx([1.0], rel=1e-3)

@@ -9,7 +9,7 @@ import pytest
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_over_turn
-from chipload.cutting.material import Material, beyond, material_named, material_names, read_material
+from chipload.cutting.material import Material, beyond, material_named, material_names, material_text, read_material
 from chipload.engagement.tooth_engagement import engagement_of_arcs
 from chipload.errors import InputError
 
@@ -182,3 +182,15 @@ def test_refused(tmp_path, line, message):
     with pytest.raises(InputError) as err:
         read_material(path)
     assert str(err.value) == f"material {path}: {message}"
+
+
+def test_a_material_that_is_written_is_read_as_it_was(tmp_path):
+    """With the ranges of chips and speeds that its coefficients hold in."""
+    text = (
+        GOOD + "chip_min_mm = 0.02\nchip_max_mm = 0.3\nspeed_min_m_min = 60.0\nspeed_max_m_min = 240.0\nspread = 0.2\n"
+    )
+    (tmp_path / "a.toml").write_text(text)
+    first = read_material(tmp_path / "a.toml")
+    assert first.speed == pytest.approx((1000.0, 4000.0))
+    (tmp_path / "b.toml").write_text(material_text(first))
+    assert read_material(tmp_path / "b.toml") == first

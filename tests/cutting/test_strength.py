@@ -62,6 +62,16 @@ def test_steel_by_von_mises_and_a_notch() -> None:
     )
 
 
+@pytest.mark.parametrize("material", [SOFT, replace(SOFT, exponents=(0.2, 0.2, 0.2))])
+@pytest.mark.parametrize("mill", [MILL, replace(HELIX, modulus=2.1e5)])
+def test_a_notch_multiplies_the_stress(material: Material, mill: Cutter) -> None:
+    """With and without a size effect, carbide and steel: the stress of the smooth cutter times the factor."""
+    notched = replace(mill, strength=ToolStrength(concentration=1.7))
+    smooth = replace(mill, strength=ToolStrength(concentration=1.0))
+    expected = 1.7 * cutter_stress(slot(smooth), smooth, material)
+    assert cutter_stress(slot(notched), notched, material) == pytest.approx(expected, rel=1e-12)
+
+
 def test_loads_of_a_helix_are_those_of_its_slices() -> None:
     """A sum over 4000 thin pieces of the edge of each tooth, forces as the edge's definition has them."""
     bites, z = slot(HELIX, 0.08, 6.0), np.array([4.0, 18.0, 40.0])

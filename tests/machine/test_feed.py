@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chipload.errors import InputError
-from chipload.machine.feed import corner_speed, curvature_speed, limited_speed, move_time
+from chipload.machine.feed import corner_speed, curvature_speed, limited_speed, move_time, row_time_limited
+from chipload.machine.machine import machine_named
 
 
 def brute(s, wanted, a, v0, v1):
@@ -121,3 +122,14 @@ def test_refused(call, message):
     with pytest.raises(InputError) as err:
         limited_speed(*call)
     assert str(err.value) == message
+
+
+def test_the_slowest_axis_or_the_time_that_is_asked():
+    """A at 30 deg/s: 45, 15 and 0 degrees in 1.5, 0.5 and 0 s; asked for are 1, 2 and 3 s."""
+    axes = np.zeros((4, 9))
+    axes[1:, 3] = np.radians([45.0, 60.0, 60.0])
+    machine = machine_named("xyzac-trunnion")
+    assert row_time_limited(machine, axes, [1.0, 2.0, 3.0]) == pytest.approx([1.5, 2.0, 3.0])
+    for wrong in ([1.0] * 5, [1.0, -1.0, 1.0], [1.0, math.nan, 1.0]):
+        with pytest.raises(InputError, match=r"row_time_limited: time \(\d,\): must be one number or \(n - 1,\), >= 0"):
+            row_time_limited(machine, axes, wrong)

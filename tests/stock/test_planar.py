@@ -109,6 +109,8 @@ def test_engagement_of_a_slot_and_of_a_step_over():
     for s in (0.2, 1.0, 3.0, 5.5):
         got = stock.engagement((0.0, -s), (1.0, 0.0))
         assert got == pytest.approx(math.acos(1.0 - s / R), abs=1e-3)  # the rim is smaller than the cut by TOUCH
+    # along the path that has cut, nothing is left
+    assert stock.engagement((0.0, 0.0), (1.0, 0.0)) == 0.0
 
 
 def test_order_does_not_matter():
@@ -129,3 +131,25 @@ def test_order_does_not_matter():
 def test_nothing_to_cut_is_refused(box, radius):
     with pytest.raises(InputError):
         PlanarStock(box, radius)
+
+
+@pytest.mark.parametrize("radius", [0.4, 3.0, 12.0])
+def test_memory_is_reserved_for_every_cell_that_a_capsule_touches(radius):
+    """Random segments: what one takes is at most what was reserved for it, and the stock has room for it."""
+    rng = np.random.default_rng(4)
+    stock = PlanarStock((0.0, 0.0, 40.0, 30.0), radius)
+    for _ in range(60):
+        before, capsules = stock.used, stock.capsules
+        stock.remove([rng.uniform([0.0, 0.0] * 2, [40.0, 30.0] * 2)])
+        assert stock.used - before <= (2 * (stock.capsules - capsules) + 2) * int(stock.grid[7])
+        assert stock.used <= len(stock.link)
+        assert stock.capsules <= len(stock.axis)
+
+
+@pytest.mark.parametrize("radius", [0.4, 3.0, 12.0])
+def test_half_a_radius_lies_around_the_stock(radius):
+    """The cells reach half a radius beyond every side, so that a cutter beside the stock is seen."""
+    x, y, h, nx, ny, *_ = PlanarStock((1.0, 2.0, 41.0, 32.0), radius).grid
+    assert (x, y) == pytest.approx((1.0 - 0.5 * radius, 2.0 - 0.5 * radius))
+    assert 41.0 + 0.5 * radius <= x + nx * h < 41.0 + 0.5 * radius + h
+    assert 32.0 + 0.5 * radius <= y + ny * h < 32.0 + 0.5 * radius + h

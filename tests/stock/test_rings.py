@@ -68,3 +68,29 @@ def test_distance_from_the_surface():
 def test_no_ring():
     with pytest.raises(InputError, match="must have a width all round"):
         ring_stock(BOUNDS, flat(20.0), flat(20.5), (0.6, 0.0))
+
+
+def test_a_boss_beyond_half_a_turn():
+    """From 200 to 250 deg: a sector of 50 deg, on that side alone."""
+    stock = ring_stock(BOUNDS, flat(20.0), flat(21.5), bosses=[Boss(math.radians(200.0), math.radians(250.0), 1.2)])
+    for degrees in (202.0, 225.0, 248.0):
+        assert thickness(stock, 1, degrees) == pytest.approx(2.7, abs=1e-3)
+    assert thickness(stock, 1, 45.0) == pytest.approx(1.5, abs=1e-3)
+
+
+def test_a_boss_all_round_is_a_thicker_ring():
+    stock = ring_stock(BOUNDS, flat(20.0), flat(21.5), bosses=[Boss(0.0, math.tau, 1.0)])
+    assert stock.area(0) == pytest.approx(math.pi * (22.5**2 - 20.0**2), rel=1e-4)
+
+
+def test_distance_from_the_surface_in_one_layer():
+    """The lowest layer alone, then the highest: a layer counts where both of its bounds are within the heights."""
+    stock = ring_stock(BOUNDS, flat(18.0), cone(21.0, 0.5))
+    for low, middle in ((-4.0, -3.5), (-1.0, -0.5)):
+        found = surface_off(stock, flat(20.0), low, low + 1.0)
+        assert found == pytest.approx((1.0 - 0.5 * middle, 1.0 - 0.5 * middle), abs=2e-3)
+
+
+def test_the_narrowest_ring_is_named():
+    with pytest.raises(InputError, match=r"at z = -0\.5 mm a ring from 20\.8 to 20\.5 mm"):
+        ring_stock(BOUNDS, cone(20.9, -0.2), flat(20.5))

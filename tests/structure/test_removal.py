@@ -66,6 +66,16 @@ def test_thinned_and_gone(x):
     np.testing.assert_allclose(compliance(state, full), exact, rtol=0.0, atol=1e-9 * abs(exact).max())
 
 
+def test_cut_beside_the_clamp():
+    """Elements that the clamp holds, thinned and gone: to 1e-9 of a new solution."""
+    solid = wall()
+    state = start(solid, limit=10**6)
+    places, n = seen(solid)
+    normal = watch(state, places, n)
+    state = cut(cut(state, row(solid.grid, 0, 1, slice(2))), row(solid.grid, 0, 1, slice(2, 5)), (0.0, 0.4))
+    np.testing.assert_allclose(compliance(state, normal), solved(factorise(state.solid), places, n), rtol=1e-9)
+
+
 @pytest.mark.parametrize(("make", "limit"), [(wall, 350), (blade, 250)])
 def test_any_order_of_cuts(make, limit):
     """Random thinning, many times: each state to 1e-9; the rank alone says when it is factored again."""

@@ -53,6 +53,17 @@ def test_what_is_left_out(tube):
     assert np.all(normal(few, s) < 0.99 * best)
 
 
+def test_what_more_terms_add_is_what_is_left_out_less():
+    """From 24 to 48 terms, all else alike, by the difference of their remainders: s (L - s) (1 / 24^2 - 1 / 48^2) over
+    8 pi D, D = 70000 / (12 (1 - 0.33^2)) N mm."""
+    s = np.array([20.0, 30.0, 40.0])
+    low, high = (ritz(TUBE, harmonics=200, terms=n) for n in (24, 48))
+    stiffness = 70e3 / (12.0 * (1.0 - 0.33**2))
+    expected = s * (60.0 - s) * (24.0**-2 - 48.0**-2) / (8.0 * math.pi * stiffness)
+    np.testing.assert_allclose(left_out(low, s) - left_out(high, s), expected, rtol=1e-9)
+    np.testing.assert_allclose(normal(high, s) - normal(low, s), 1e3 * expected, rtol=0.1)
+
+
 @pytest.mark.parametrize(("angle_deg", "um_n"), [(10.0, 3.14), (-10.0, 0.849)])
 def test_cones(angle_deg, um_n):
     assert normal(ritz(replace(TUBE, cone_angle=math.radians(angle_deg))), 60.0) == pytest.approx(um_n, rel=0.004)
@@ -182,6 +193,8 @@ def test_outside_the_wall_is_refused(tube):
     with pytest.raises(InputError) as err:
         compliance(tube, 58.0, length=5.0)
     assert str(err.value) == "shell: s = 58 mm with a patch of 5 mm: must lie on the wall, from 0 to 60"
+    with pytest.raises(InputError, match="s = 1 mm with a patch of 5 mm: must lie on the wall"):
+        compliance(tube, 1.0, length=5.0)
     with pytest.raises(InputError, match="not in balance"):
         ritz(replace(TUBE, ends="free"))
 

@@ -93,6 +93,15 @@ def test_measured_tip():
             np.testing.assert_allclose(C, true, rtol=1e-3)
 
 
+def test_a_spring_of_rotation_at_a_distance_is_a_joint():
+    """A rigid lever of length L on a spring c: displacement L^2 c, rotation c, both L c: just passive, for every L."""
+    for length in np.linspace(1.0, 97.0, 60):
+        c = 1e-8
+        joint = Joint(length**2 * c, c, length * c)
+        chain = (Bar(50.0, 0.0, joint),)
+        assert chain_compliance(chain, 0.0, 0.0) > 0.0
+
+
 def test_refused():
     for call, message in (
         (lambda: springs(0.0), "joint.translation = 0: a stiffness must be above 0; inf for a rigid one"),

@@ -14,6 +14,7 @@ from typing import NoReturn
 # each of these modules adds its commands to the application
 from chipload.cli import drafts, jobs, mtconnect, program_filter, programs, results, shipped, sweep, tap, torque  # noqa: F401
 from chipload.cli.app import app
+from chipload.terminal import STOPPED
 
 __all__ = ["app", "main"]
 
@@ -27,12 +28,16 @@ app.registered_commands.sort(key=lambda c: ORDER.index(c.name or getattr(c.callb
 
 def main() -> NoReturn:
     """Entry of the command ``chipload``."""
-    for name in ("SIGTERM", "SIGHUP"):
-        # under nohup a terminal that closes is ignored
-        number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, _stop)
-    app()
+    try:
+        for name in ("SIGTERM", "SIGHUP"):
+            # under nohup a terminal that closes is ignored
+            number = getattr(signal, name, None)
+            if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, _stop)
+        app()
+    except KeyboardInterrupt:
+        # before the command began or after it ended
+        sys.exit(STOPPED)
     sys.exit(0)
 
 
