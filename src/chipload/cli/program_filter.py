@@ -52,6 +52,7 @@ def filter_program(
             open_ = "; `--allow-unproven` in the ini loads it" if worst is Severity.UNPROVEN else ""
             _tell(f"{file.name} is not loaded: {_WHY[worst]}{open_}")
             return EXCEEDED
+        _progress(1.0, "checked")
         write_bytes(data)
         return 0
 
