@@ -218,7 +218,7 @@ def ended_well(words: list[str], out: Path) -> str:
 def test_a_full_disk_ends_with_its_own_code(
     small: tuple[list[str], Path, bool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The report cannot be written: what was simulated is kept, and with space the same command continues to its end."""
+    """The report cannot be written: what was simulated is kept; with free space the same command continues."""
     words, out, goes_on = small
 
     def full(*_: object) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chipload.web.comparison import COLOURS, KeyNumber, Side, along, common_span, key_numbers, knots, row_compared
+from chipload.web.comparison import COLOURS, KeyNumber, Side, along, common_span, key_numbers, knots, matching_row
 from chipload.web.loads import line_loads, tool_uses
 from chipload.web.panels.comparison import comparison_table
 from chipload.web.result import open_result
@@ -42,10 +42,10 @@ def test_key_numbers_and_their_differences(sides) -> None:
 def test_rows_belong_together_by_time_or_by_path(sides) -> None:
     a, b = sides
     # row 99 of the first: 10 s and 80 mm; the second is at half its way then, or at the same place after 20 s
-    assert row_compared(a, b, "path", 99) == 99
-    assert row_compared(a, b, "time", 99) == 49
-    assert row_compared(b, a, "time", 49) == 99
-    assert row_compared(b, a, "time", ROWS - 1) == ROWS - 1
+    assert matching_row(a, b, "path", 99) == 99
+    assert matching_row(a, b, "time", 99) == 49
+    assert matching_row(b, a, "time", 49) == 99
+    assert matching_row(b, a, "time", ROWS - 1) == ROWS - 1
     assert along(a, b, "path") == pytest.approx(a.track.s)
     assert along(a, b, "time") == pytest.approx(2.0 * a.track.t)
     here, there = knots(a, b, "path")
@@ -66,7 +66,7 @@ def test_passes_of_one_name_begin_together(outcome, tmp_path: Path) -> None:
     here, _ = knots(a, b, "path")
     # a semi-finish pass and a finish pass of 900 rows each
     assert here.tolist() == pytest.approx([0.0, a.track.s[899], a.track.s[-1]])
-    assert row_compared(a, b, "path", 899) == 899
+    assert matching_row(a, b, "path", 899) == 899
 
 
 def test_tools_and_lines_by_load(tmp_path: Path) -> None:

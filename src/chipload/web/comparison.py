@@ -91,7 +91,7 @@ def knots(a: Side, b: Side, against: str) -> tuple[Floats, Floats]:
     return here, there
 
 
-def row_compared(a: Side, b: Side, against: str, row: int) -> int:
+def matching_row(a: Side, b: Side, against: str, row: int) -> int:
     """Row of ``b`` that belongs to a row of ``a``."""
     here, there = knots(a, b, against)
     own, other = (a.track.t, b.track.t) if against == "time" else (a.track.s, b.track.s)

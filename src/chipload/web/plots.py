@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from chipload.result.style import FONT, GRID, INK, LIMIT
 from chipload.result.thinning import thinned
 from chipload.web.checks import Bound, bound_of, label_and_unit
-from chipload.web.comparison import Side, along, row_compared
+from chipload.web.comparison import Side, along, matching_row
 from chipload.web.result import PageResult, PageTrack, TextColumn
 
 Floats = NDArray[np.float64]
@@ -190,7 +190,7 @@ def annotation(
         limit = f'  <span style="color:{LIMIT}">limit {bound.limit:g}</span>'
     values = [f"<b>{escape(_value(result, track, column, row))}</b>"]
     for side in sides[1:]:
-        there = _value(side.result, side.track, column, row_compared(sides[0], side, against, row))
+        there = _value(side.result, side.track, column, matching_row(sides[0], side, against, row))
         values.append(f'<span style="color:{side.colour}"><b>{escape(there)}</b></span>')
     return f"{escape(word)} {' / '.join(values)} {escape(unit)}{limit}"
 

@@ -107,7 +107,7 @@ def _columns(outcome: TorqueResult, run: ControllerRun) -> Columns:
         "override_state": np.array([STATUS[k] for k in o.status], dtype=object),
         "torque_nm": 1e-3 * o.torque,
         "torque_measured_nm": 1e-3 * o.measured,
-        "torque_planned_nm": np.interp(o.s, path.model.s[1:], outcome.allowable.steps["torque_planned_nm"]),
+        "torque_planned_nm": 1e-3 * np.interp(o.s, path.model.s, path.model.torque(1.0)),
         "torque_allowable_nm": 1e-3 * outcome.allowable.torque * relief,
         "torque_over_percent": over,
         "form_error_um": 1e3 * run.error,

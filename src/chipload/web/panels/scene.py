@@ -19,7 +19,7 @@ from chipload.report.colouring import FIRST, POINTS
 from chipload.report.view import ViewMark, colouring_document
 from chipload.web.asset_cache import AssetCache
 from chipload.web.checks import label_and_unit
-from chipload.web.comparison import Side, common_span, knots, row_compared
+from chipload.web.comparison import Side, common_span, knots, matching_row
 from chipload.web.panels import RELEASE
 from chipload.web.result import PageResult, PageTrack
 from chipload.web.scene import PageScene, bodies, colouring, page_scene, view_path
@@ -49,7 +49,7 @@ class ScenePanel:
             self.stage = ui.element("div").classes("cl-stage")
             self.stage.on("viewrow", self._moved, js_handler="(e) => emit(e.detail)")
             self.second = ui.element("div").classes("cl-second")
-            self.second.on("viewrow", self._moved_compared, js_handler="(e) => emit(e.detail)")
+            self.second.on("viewrow", self._moved_second, js_handler="(e) => emit(e.detail)")
             self.second.set_visibility(False)
             self.titles = [ui.label("").classes(f"cl-over cl-side cl-side-{k}") for k in range(2)]
             with ui.element("div").classes("cl-over cl-over-left"):
@@ -113,13 +113,13 @@ class ScenePanel:
             title.set_text(sides[k].title if sides else "")
             title.style(f"color: {sides[k].colour if sides else 'inherit'}")
         if sides:
-            await self._open_compared(found)
+            await self._open_second(found)
         else:
             self._first("alone()")
         if sides is self.sides:
             await self._recoloured(1)
 
-    async def _open_compared(self, found: Any) -> None:
+    async def _open_second(self, found: Any) -> None:
         """The second view, led by the first."""
         sides, column = self.sides, str(self.column.value)
         other = sides[1]
@@ -195,12 +195,12 @@ class ScenePanel:
         if self.sides:
             ui.run_javascript(f"window.chiploadViewer && chiploadViewer.of('c{self.second.id}').{what}")
 
-    async def _moved_compared(self, event: Any) -> None:
+    async def _moved_second(self, event: Any) -> None:
         """The path of the second view was clicked: to the row of the own track that belongs there."""
         detail = event.args
         if self.sides and isinstance(detail, dict) and isinstance(detail.get("row"), int):
             row = min(max(detail["row"], 0), len(self.sides[1].track) - 1)
-            await self.picked(row_compared(self.sides[1], self.sides[0], self.counted, row), False)
+            await self.picked(matching_row(self.sides[1], self.sides[0], self.counted, row), False)
 
     async def _moved(self, event: Any) -> None:
         detail = event.args
