@@ -161,7 +161,9 @@ def test_the_timeline_and_the_lines_lead_to_their_place(compared) -> None:
     page.wait_for_function("Math.abs(parseFloat(document.querySelector('.cl-time-now').style.left) - 60.5) < 0.01")
     page.locator(".cl-tabs").get_by_text("lines").click()
     rows = page.locator(".cl-lines-box tbody tr")
-    assert [t.split()[0] for t in rows.all_inner_texts()] == ["9", "8", "10", "7"]
+    rows.first.wait_for(state="visible")
+    lines = page.locator(".cl-lines-box tbody tr td:first-child").all_inner_texts()
+    assert lines == ["9", "8", "10", "7"]
     rows.nth(2).click()
     page.wait_for_function(f"{VIEW}.row == 150")
 
