@@ -81,6 +81,21 @@ def test_one_state_everywhere(example, name):
     assert summary["message"].lower().startswith(state)
 
 
+#: examples whose tracks were simulated in a stock
+SIMULATED = ("chips", "feeds", "chatter", "bracket", "part", "tube", "cone", "plate", "blade")
+
+
+@every
+def test_the_work_of_a_simulated_track_is_that_of_what_it_removes(example, name):
+    """Work without edge terms over the specific energy of the volume lost, less 1: by moves exact, else by layers."""
+    summary = example(name).summary
+    for track in summary.tracks:
+        if name in SIMULATED and track.in_use:
+            assert track.energy_balance
+        assert all(abs(value) < 0.03 for value in track.energy_balance.values())
+        assert name in SIMULATED or not track.energy_balance
+
+
 @every
 def test_the_page_opens_the_result_with_the_same_state(example, name):
     done = example(name)

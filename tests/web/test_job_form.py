@@ -45,6 +45,9 @@ def test_fields_state_unit_range_and_choices() -> None:
     assert fields["cutter.0.modulus_gpa"].unit == "GPa"
     assert (fields["limits.power_w"].value, fields["limits.power_w"].unit) == (None, "W")
     assert fields["checks.rigid_model"].kind == "switch"
+    assert not any(path.startswith("operation.0.feeds") for path in fields)
+    feeds = {f.path: f.value for f in job_fields(EXAMPLES / "feeds" / "job.toml")}
+    assert feeds["operation.0.feeds.slowest_percent"] == 20.0
     contour = {f.path: f for f in job_fields(EXAMPLES / "contour" / "job.toml")}
     assert set(contour["operation.0.milling"].choices) == {"down", "up"}
 

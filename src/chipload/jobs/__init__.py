@@ -130,7 +130,7 @@ def load_job(path: str | Path, overrides: Sequence[str] = ()) -> LoadedJob:
     path = Path(path).absolute()
     data = read_regular(path, str(path), LARGEST_FILE, "not a job")
     raw = parsed(path.name, data)
-    return _loaded(_capability_of(raw, overrides), path, raw, overrides, data)
+    return _loaded(capability_of(raw, overrides), path, raw, overrides, data)
 
 
 def job_of(
@@ -150,12 +150,12 @@ def job_of(
         As :func:`load_job`.
     """
     raw = plain(values)
-    own = next((c for c in CAPABILITIES if c.name == capability), None) or _capability_of(raw, overrides)
+    own = next((c for c in CAPABILITIES if c.name == capability), None) or capability_of(raw, overrides)
     data = json.dumps(raw, sort_keys=True).encode()
     return _loaded(own, Path(folder).absolute() / own.name, raw, overrides, data)
 
 
-def _capability_of(raw: Mapping[str, Any], overrides: Sequence[str]) -> Capability:
+def capability_of(raw: Mapping[str, Any], overrides: Sequence[str] = ()) -> Capability:
     """The first capability whose tables a job has, in its file or by its overrides."""
     inner = {key for _, entry in entries_of(raw, "operation") for key in entry}
     for text in overrides:

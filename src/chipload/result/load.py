@@ -108,6 +108,7 @@ def _track(folder: Path, model: TrackModel, first: int) -> Track:
         programs=model.programs,
         operation=model.operation,
         parameters=model.parameters,
+        energy_balance=model.energy_balance,
         blocks=partial(_blocks, folder / HISTORY, first, model.rows),
     )
 

@@ -68,6 +68,10 @@ class TrackModel(_Model):
     parameters: dict[str, float | str]
     programs: tuple[str, ...] = Field(description="files in the result folder")
     rows: int = Field(description="rows in history.parquet")
+    energy_balance: dict[int, float] = Field(
+        default_factory=dict,
+        description="work over the specific energy of the volume removed, less 1, by tool; empty: not simulated",
+    )
     limits: tuple[LimitModel, ...]
     findings: tuple[FindingModel, ...]
 
@@ -211,6 +215,7 @@ def _track(track: Track, rows: int) -> TrackModel:
         parameters=dict(track.parameters),
         programs=track.programs,
         rows=rows,
+        energy_balance={int(tool): float(value) for tool, value in track.energy_balance.items()},
         limits=tuple(map(_limit, track.limits)),
         findings=tuple(map(_finding, track.findings)),
     )

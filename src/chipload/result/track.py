@@ -48,6 +48,7 @@ class Track:
     programs : names of its program files
     operation : number of its operation
     parameters : what sets it apart beside its name, as ``{"latency_s": 0.1}``
+    energy_balance : work over the specific energy of the volume removed, less 1, by tool number; empty: not simulated
     blocks : its history, a row a step of the program
     """
 
@@ -60,6 +61,7 @@ class Track:
     programs: tuple[str, ...] = ()
     operation: int = 0
     parameters: Mapping[str, float | str] = field(default_factory=dict)
+    energy_balance: Mapping[int, float] = field(default_factory=dict)
     blocks: Blocks = field(default=lambda: iter(()))
 
     def __post_init__(self) -> None:

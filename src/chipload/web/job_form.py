@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 from chipload.errors import InputError
 from chipload.files import read_regular
-from chipload.jobs import CAPABILITIES, load_job
+from chipload.jobs import capability_of, load_job
 from chipload.jobs.reference import table_in, value_words
 from chipload.result.columns import unit_of
 from chipload.tables import parsed
@@ -69,7 +69,7 @@ def job_fields(path: Path) -> list[FormField]:
         The file cannot be read.
     """
     raw = parsed(path.name, read_regular(path, path.name, LARGEST))
-    capability = next((c for c in CAPABILITIES if c.key in raw), CAPABILITIES[-1])
+    capability = capability_of(raw)
     schema = capability.root.model_json_schema()
     return list(_fields(raw, schema, schema.get("$defs", {}), capability.root, ""))
 

@@ -52,4 +52,7 @@ def _track(program: ProgramResult) -> Track:
         return Track(PROGRAM, TrackKind.PROGRAM, True, time_s, (), findings, (APT,), blocks=blocks)
     limits = program_limits(simulation, simulation.removal.columns, PROGRAM)
     found = (*misplaced(simulation, limits), *findings_of(program, simulation))
-    return Track(PROGRAM, TrackKind.PROGRAM, True, time_s, limits, found, (APT,), blocks=lambda: step_rows(simulation))
+    return Track(
+        PROGRAM, TrackKind.PROGRAM, True, time_s, limits, found, (APT,),
+        energy_balance=simulation.removal.energy_balance, blocks=lambda: step_rows(simulation),
+    )  # fmt: skip

@@ -74,12 +74,13 @@ def changed_tracks(
     after = Track(
         OPTIMISED, TrackKind.PROGRAM, True, float(program.seconds.sum()),
         program_limits(simulation, simulation.removal.columns, OPTIMISED), (*findings_of(program, simulation), *found),
-        (name, APT), blocks=blocks or (lambda: step_rows(simulation)),
+        (name, APT), energy_balance=simulation.removal.energy_balance,
+        blocks=blocks or (lambda: step_rows(simulation)),
     )  # fmt: skip
     limits = program_limits(simulation, changed.before.columns, ORIGINAL, stability)
     before = Track(
         ORIGINAL, TrackKind.PROGRAM, False, changed.seconds_before, as_posted(limits, *not_compared),
-        blocks=lambda: step_rows(simulation, changed.before),
+        energy_balance=changed.before.energy_balance, blocks=lambda: step_rows(simulation, changed.before),
     )  # fmt: skip
     return (after, before)
 

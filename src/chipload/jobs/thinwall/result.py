@@ -131,6 +131,7 @@ def _track(walled: ThinWallResult, one: Variant) -> Track:
         limits=limits_of(walled, one),
         findings=findings_of(walled, one),
         programs=(f"{stem}.{ENDINGS[walled.planning.machine.dialect]}", f"{stem}.apt"),
+        energy_balance=energy_balance(one.columns, ENGAGED),
         blocks=in_memory({name: values for name, values in columns.items() if name not in DROPPED}),
     )
 

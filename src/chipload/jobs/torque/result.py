@@ -79,6 +79,7 @@ def _track(outcome: TorqueResult, case: ControllerCase, name: str) -> Track:
         findings=(*_run_findings(case, run), *chip_findings(outcome.job.checks, columns)),
         programs=(f"0-override.{ENDINGS[outcome.job.machine.dialect]}",) if used else (),
         parameters={"latency_s": case.loop.latency, "override_step": case.quantum},
+        energy_balance=outcome.energy_balance["real"],
         blocks=in_memory(columns),
     )
 
