@@ -14,7 +14,7 @@ from web_served import Served
 #: of many tracks the page shows these
 MOST = 4
 SHOWN = "name => document.querySelector('.cl-tracks .q-field__native')?.innerText.startsWith(name)"
-CELLS = "[...document.querySelectorAll('.cl-limits tbody tr')].map(r => [...r.cells].map(c => c.textContent.trim()))"
+CELLS = "[...document.querySelectorAll('.cl-checks tbody tr')].map(r => [...r.cells].map(c => c.textContent.trim()))"
 
 
 @pytest.fixture(scope="module")

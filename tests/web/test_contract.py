@@ -186,7 +186,7 @@ def test_the_page_lists_the_limits_and_the_time_of_each_track(opened, page_of, n
             assert shown.startswith(track["name"])
             assert shown.endswith(", in use") == track["in_use"]
         cells = page.evaluate(
-            "[...document.querySelectorAll('.cl-limits tbody tr')].map(r => [...r.cells].map(c => c.textContent))"
+            "[...document.querySelectorAll('.cl-checks tbody tr')].map(r => [...r.cells].map(c => c.textContent))"
         )
         wanted = [
             (checks[c["name"]].label, number(c["worst"]), f"{c['limit']:g} {c['unit']}".strip(), c["state"])
@@ -194,7 +194,7 @@ def test_the_page_lists_the_limits_and_the_time_of_each_track(opened, page_of, n
         ]
         assert sorted((c[0], c[1], c[2].strip(), c[4]) for c in cells) == sorted(wanted)
         # what exceeds comes first and is marked
-        for text, cell in zip(page.locator(".cl-limits .cl-no").all_inner_texts(), cells, strict=False):
+        for text, cell in zip(page.locator(".cl-checks .cl-no").all_inner_texts(), cells, strict=False):
             assert text == cell[4] == "exceeds"
         found = page.locator(".cl-found .cl-grave").all_inner_texts()
         for finding in track["findings"]:
@@ -205,10 +205,10 @@ def test_the_page_lists_the_limits_and_the_time_of_each_track(opened, page_of, n
 def test_the_failing_variant_shows_its_failure(opened, page_of) -> None:
     page = page_of("variants")
     assert page.inner_text(".cl-word") == "holds"
-    assert page.locator(".cl-limits .cl-no").count() == 0
+    assert page.locator(".cl-checks .cl-no").count() == 0
     page.keyboard.press("t")
-    page.locator(".cl-limits .cl-no").get_by_text("exceeds").wait_for()
-    assert page.locator(".cl-limits tbody tr").all_inner_texts()[0].split()[:3] == ["force", "900", "800"]
+    page.locator(".cl-checks .cl-no").get_by_text("exceeds").wait_for()
+    assert page.locator(".cl-checks tbody tr").all_inner_texts()[0].split()[:3] == ["force", "900", "800"]
     page.locator(".cl-found .cl-grave").get_by_text("line 8: the path leaves the workpiece").wait_for()
     page.locator(".cl-found").get_by_text("constant is not in use").wait_for()
 

@@ -55,12 +55,12 @@ def test_what_the_folder_holds_is_listed_and_opened(window) -> None:
 
 def test_limits_and_findings_lead_to_their_place(square) -> None:
     page = square
-    rows = [re.split(r"\s{1,}", t) for t in page.locator(".cl-limits tbody tr").all_inner_texts()]
+    rows = [re.split(r"\s{1,}", t) for t in page.locator(".cl-checks tbody tr").all_inner_texts()]
     assert rows[0][:4] == ["force", "900", "800", "N"]
     assert rows[0][4] == "exceeds"
     assert rows[1][:5] == ["torque", "9", "12", "N", "m"]
     assert rows[1][5] == "holds"
-    page.click(".cl-limits tbody tr >> nth=0")
+    page.click(".cl-checks tbody tr >> nth=0")
     stands_at(page, int(FORCE.argmax()))
     page.locator(".cl-found").get_by_text("line 8: a rapid goes through material").click()
     stands_at(page, int(np.flatnonzero(LINE == 8)[0]))

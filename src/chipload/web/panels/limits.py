@@ -67,7 +67,7 @@ def limit_table(track: PageTrack) -> str:
     head = (
         "<tr><th>limit</th><th class=n>worst</th><th class=n>limit</th><th>share</th><th>state</th><th>where</th></tr>"
     )
-    return f'<table class="cl-limits"><thead>{head}</thead><tbody>{"".join(out)}</tbody></table>'
+    return f'<table class="cl-limits cl-checks"><thead>{head}</thead><tbody>{"".join(out)}</tbody></table>'
 
 
 def finding_list(rows: list[PageFinding]) -> str:
