@@ -245,6 +245,22 @@ def test_a_limit_is_used_up(tmp_path: Path) -> None:
     assert read.outcome.simulated.removal.columns["force_n"].max() <= room
 
 
+def test_the_table_of_feeds_alone_tells_the_kind_of_job(tmp_path: Path) -> None:
+    """In the file or by ``--set``; the keys of both kinds are else the same."""
+    plain = JOB[: JOB.index("[operation.feeds]")] + "[limits]\nforce_n = 620.0\n"
+    (tmp_path / "job.toml").write_text(plain)
+    assert load_job(tmp_path / "job.toml").capability.name == "program"
+    asked = ["operation.0.feeds.slowest_percent=50", "operation.0.feeds.fastest_percent=200"]
+    assert load_job(tmp_path / "job.toml", asked).capability.name == "feeds"
+    (tmp_path / "job.toml").write_text(JOB + "force_n = 620.0\n")
+    assert load_job(tmp_path / "job.toml", ["operation.0.step_mm=3"]).capability.name == "feeds"
+    with pytest.raises(InputError, match="ask for speeds first, then for feeds of the new program"):
+        load_job(tmp_path / "job.toml", ["operation.0.speeds.least_rpm=5000"])
+    (tmp_path / "job.toml").write_text(plain.replace("force_n = 620.0", ""))
+    with pytest.raises(InputError, match="no limit of a load is stated"):
+        load_job(tmp_path / "job.toml", asked)
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

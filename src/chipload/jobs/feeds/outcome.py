@@ -32,12 +32,7 @@ class FeedResult(ChangedText):
 
 @dataclass(frozen=True, eq=False)
 class FeedsProgram(ProgramResult):
-    """A program with new feeds, simulated; see :class:`ProgramResult`.
-
-    Parameters
-    ----------
-    feeds : how it came to them
-    """
+    """A program with new feeds, simulated; ``feeds`` says how it came to them."""
 
     simulated: SimulationResult = field(kw_only=True)
     feeds: FeedResult = field(kw_only=True)

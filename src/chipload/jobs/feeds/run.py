@@ -11,18 +11,10 @@ from chipload.jobs.checks import CHECK_COLUMNS, default_checks, with_checks
 from chipload.jobs.feeds.allowed import FeedRequest, watching, with_new_feeds
 from chipload.jobs.feeds.job import FeedsJob
 from chipload.jobs.feeds.outcome import FeedResult, FeedsProgram
+from chipload.jobs.simulation import run as simulation
 from chipload.jobs.simulation.limits import spindle_limits
 from chipload.jobs.simulation.preparation import material_of, resolution_of, timed
 from chipload.jobs.simulation.program_text import read_as
-from chipload.jobs.simulation.run import (
-    check_lines,
-    compliance_of_workpiece,
-    machine_of,
-    program_of,
-    read_for,
-    simulated,
-    text_to_change,
-)
 from chipload.jobs.simulation.stiffness import deflecting, stiffness_of, watched, with_columns
 from chipload.jobs.simulation.tables import LOADS
 from chipload.jobs.simulation.workpiece import stock_body
@@ -54,36 +46,40 @@ def run(job: FeedsJob, progress: Progress = silent, checkpoint: Checkpoint | Non
         A file cannot be read, the controller would refuse the program, its feeds cannot be changed in the text, or the
         stock and the cutters cannot be used.
     """
-    machine, share = machine_of(job), 0.1
-    reading = read_for(job, machine, part_of(progress, 0.0, share))
+    machine, share = simulation.machine_of(job), 0.1
+    reading = simulation.read_for(job, machine, part_of(progress, 0.0, share))
     stock, material = stock_body(job, reading.program), material_of(job)
-    text, dialect = text_to_change(job, reading, stock, machine, material, "feeds")
-    compliance = compliance_of_workpiece(job, reading, stock, machine, material, part_of(progress, share, 0.55))
+    own = simulation.text_to_change(job, reading, stock, machine, material, "feeds")
+    compliance = simulation.compliance_of_workpiece(
+        job, reading, stock, machine, material, part_of(progress, share, 0.55)
+    )
     share = 0.55 if compliance is not None else share
     begin = 0.5 * (1.0 + share)
     feeds, reading = _new_feeds(
-        job, text, dialect, reading, stock, material, machine, compliance, part_of(progress, share, begin)
+        job, own, reading, stock, material, machine, compliance, part_of(progress, share, begin)
     )
     stock = stock_body(job, reading.program)
     last = part_of(progress, begin, 1.0)
-    done = program_of(
-        job, machine, reading, simulated(job, reading, stock, machine, material, checkpoint, compliance, last)
+    done = simulation.program_of(
+        job,
+        machine,
+        reading,
+        simulation.simulated(job, reading, stock, machine, material, checkpoint, compliance, last),
     )
     return FeedsProgram(**vars(done), feeds=feeds)
 
 
 def check(job: FeedsJob) -> tuple[list[str], bool]:
     """What the files of a job hold, and what its simulations need; nothing is cut, errors are those of :func:`run`."""
-    machine = machine_of(job)
-    reading = read_for(job, machine)
-    text_to_change(job, reading, stock_body(job, reading.program), machine, material_of(job), "feeds")
-    return check_lines(job, program_of(job, machine, reading), 2)
+    machine = simulation.machine_of(job)
+    reading = simulation.read_for(job, machine)
+    simulation.text_to_change(job, reading, stock_body(job, reading.program), machine, material_of(job), "feeds")
+    return simulation.check_lines(job, simulation.program_of(job, machine, reading), 2)
 
 
 def _new_feeds(
     job: FeedsJob,
-    text: str,
-    dialect: str,
+    own: tuple[str, str],
     reading: ProgramReading,
     stock: LayeredStock,
     material: Material,
@@ -91,7 +87,9 @@ def _new_feeds(
     compliance: WorkpieceCompliance | None,
     progress: Progress,
 ) -> tuple[FeedResult, ProgramReading]:
-    """The text with new feeds, from what the program cuts of a stock, which changes; and what it does then."""
+    """The text with new feeds, from what the program cuts of a stock, which changes; and what it does then. ``own``:
+    the text as it is, and its dialect.
+    """
     op, seconds = job.operation, float(line_times(reading, machine)[1].sum())
     fine = resolution_of(job, reading.program)
     turning = np.unique(reading.program.spindle[reading.program.motion != RAPID])
@@ -123,6 +121,6 @@ def _new_feeds(
         engine=op.engine, progress=part_of(progress, 0.5, 1.0),
     )  # fmt: skip
     return with_new_feeds(
-        text, dialect, reading, steps, before, allowed.columns, asked, job.cutters, machine,
-        lambda new: read_for(job, machine, text=read_as(new)), seconds,
+        *own, reading, steps, before, allowed.columns, asked, job.cutters, machine,
+        lambda new: simulation.read_for(job, machine, text=read_as(new)), seconds,
     )  # fmt: skip
