@@ -26,7 +26,10 @@ This page is made from `src/chipload/result/columns.py` by `make reference`.
 
 def schema_text() -> str:
     """The JSON Schema of summary.json."""
-    schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **Summary.model_json_schema()}
+    schema = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **Summary.model_json_schema(mode="serialization"),
+    }
     schema["title"] = f"summary.json of chipload, schema version {SCHEMA_VERSION}"
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 

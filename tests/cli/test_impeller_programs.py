@@ -71,7 +71,7 @@ def test_exit_code_and_first_lines_say_whether_it_is_verified(result):
 def test_every_way_is_written_checked_and_timed(result):
     *_, out, summary = result
     (op,) = summary["operations"]
-    ways = {way["name"]: way for way in op["partitions"]}
+    ways = {way["name"]: way for way in op["ways"]}
     assert set(ways) == {"hand-picked", "1 cutter"}
     tracks = {track["name"]: track for track in summary["tracks"]}
     for name, way in ways.items():

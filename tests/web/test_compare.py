@@ -1,5 +1,6 @@
 """Tracks and results against one another: numbers by formula, and what the page shows of them."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -124,6 +125,7 @@ def compared(browser, served, folder):
     page.wait_for_function(f"{SECOND}.header && {SECOND}.paired")
     yield page
     page.close()
+    shutil.rmtree(folder / "variants")
     assert wrong == []
 
 

@@ -103,4 +103,5 @@ def test_a_changed_value_is_run_and_compared_with_the_last_result(browser, serve
     # the last result is the hand-made one, whose force is 900 N
     assert float(force[2]) == 900.0
     page.close()
+    shutil.rmtree(work)
     assert wrong == []

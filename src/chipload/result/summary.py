@@ -22,9 +22,11 @@ Place = tuple[float, float, float]
 
 
 class _Model(BaseModel):
-    """A part of summary.json: no other keys, no number that is not finite."""
+    """A part of summary.json: no other keys, no number that is not finite; what is written has every key."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, json_schema_serialization_defaults_required=True
+    )
 
 
 class LimitModel(_Model):

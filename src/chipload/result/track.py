@@ -48,8 +48,8 @@ class Track:
     programs : names of its program files
     operation : number of its operation
     parameters : what sets it apart beside its name, as ``{"latency_s": 0.1}``
-    energy_balance : work over the specific energy of the volume removed, less 1, by tool number; empty: not simulated
     blocks : its history, a row a step of the program
+    energy_balance : work over the specific energy of the volume removed, less 1, by tool number; empty: not simulated
     """
 
     name: str
@@ -61,8 +61,8 @@ class Track:
     programs: tuple[str, ...] = ()
     operation: int = 0
     parameters: Mapping[str, float | str] = field(default_factory=dict)
-    energy_balance: Mapping[int, float] = field(default_factory=dict)
     blocks: Blocks = field(default=lambda: iter(()))
+    energy_balance: Mapping[int, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse a time that is no number."""
