@@ -308,6 +308,18 @@ def test_the_thickest_chip_of_a_ramp_is_not_that_of_its_greatest_force(tmp_path:
     assert 0.024 < after["chip_max_mm"].max() <= 0.026
 
 
+def test_the_chip_of_another_instant_grows_no_more_than_the_feed(tmp_path: Path) -> None:
+    """The instant of the greatest force is not that of the thickest chip, and runout adds to each what the feed does
+    not change: a line that may go 3.7 times as fast keeps the limit (found by random ways).
+    """
+    ways = "F500\nG1 X-0.00 Y-19.20 Z-3.39 F1972\nG1 X0.00 Y-10.00 Z-0.14 F1737\nG1 X0.05 Y-13.92 Z-0.00\nG0 Z9\nM2\n"
+    job = JOB.replace("helix_deg = 0.0\n", "helix_deg = 30.0\nrunout_mm = 0.01\nrunout_deg = 20.0\n")
+    read = done(tmp_path, HEAD + "G0 X-9 Y0\nG0 Z-2\n" + ways, "chip_max_mm = 0.178\n", job=job)
+    after = read.outcome.simulated.removal.columns
+    own = after["line"] == 9
+    assert 0.12 < after["chip_max_mm"][own].max() <= 0.178
+
+
 @settings(max_examples=6, deadline=None, phases=[Phase.generate])
 @given(st.data())
 def test_what_is_said_to_hold_holds(tmp_path_factory, data) -> None:

@@ -43,6 +43,8 @@ Ints = NDArray[np.int64]
 FASTEST, MACHINE, AIR, LIMITED = 0, 1, 2, 3
 #: the limit, and the column, of the stress of a cutter
 STRESS = "cutter_stress_mpa"
+#: the thickest chip of a step
+CHIP = "chip_max_mm"
 #: columns of the removal in which a watch says what each step allows
 _FACTOR, _BY = "feed_factor", "feed_by"
 
@@ -96,7 +98,8 @@ def watching(
     """A watch that says of each step that cuts the greatest factor within the limits and what holds it.
 
     ``before`` are the columns at the programmed feeds. A watch gets the instant of a step with the greatest force;
-    where another has a thicker chip or more torque its loads are raised to that, in the same ratio at any feed.
+    where another has more torque its loads are raised to that, in the same ratio at any feed. A thicker chip of another
+    grows with the feed at most in proportion: what runout adds to a chip does not depend on the feed.
     """
     least, most, by = _bounds(steps, asked.table, cutters, machine)
 
@@ -108,6 +111,7 @@ def watching(
             for name, x in there.items()
             if name in before
         }
+        chip = np.where(beyond.get(CHIP, 1.0) > 1.0, before[CHIP][cuts.step], 0.0) if CHIP in before else 0.0
 
         def ratios(factor: Floats) -> Floats:
             moved = at_feeds(cuts, factor)
@@ -120,7 +124,9 @@ def watching(
             limits = {**asked.limits, STRESS: allowed_stress(moved.cutter)}
             return np.array(
                 [
-                    upper[column] * beyond.get(column, 1.0) * (1.0 + asked.error(name)) / limits[name]
+                    np.maximum(upper[column] * beyond.get(column, 1.0), factor * chip if column == CHIP else 0.0)
+                    * (1.0 + asked.error(name))
+                    / limits[name]
                     for name in asked.held
                     for column in (column_of(name).name,)
                 ]
