@@ -34,8 +34,8 @@ FIGURES: dict[str, tuple[tuple[str, int, int], ...]] = {
     "plate": (("depth", 940, 520),),
     "blade": (("space", 940, 560),),
 }
-#: the picture of the page, and the example that it shows
-PAGE, SHOWN = "page", "bracket"
+#: pictures of the page: the example that each shows, and the track that it is compared with; none: none
+PAGES = {"page": ("bracket", ""), "page_compare": ("feeds", "original")}
 #: moves figures into a sheet of their own, above the page
 SHEET = """(wanted) => {
     const sheet = document.createElement('div');
@@ -75,8 +75,8 @@ def photograph(page: Page, report: Path, name: str) -> None:
     page.locator("#sheet").screenshot(path=out)
 
 
-def photograph_page(chromium: Browser, folder: Path) -> None:
-    """Write docs/page.png: the page of a result."""
+def photograph_page(chromium: Browser, folder: Path, name: str) -> None:
+    """Write docs/NAME.png: the page of a result, by itself or beside another track along the path."""
     words = [sys.executable, "-m", "chipload", "view", str(folder), "--no-open"]
     server = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
     try:
@@ -87,8 +87,19 @@ def photograph_page(chromium: Browser, folder: Path) -> None:
         page.goto(f"{address}&show=result")
         page.wait_for_selector(".cv-ramp")
         page.wait_for_selector(".cl-now")
+        other = PAGES[name][1]
+        if other:
+            page.wait_for_timeout(4000)  # the list opens once the results of the folder are in it
+            page.get_by_role("combobox", name="compare with").click()
+            page.get_by_role("option", name=other).click()
+            page.keyboard.press("Escape")
+            page.wait_for_selector(".cl-compared", state="visible")
+            page.locator(".cl-plots").get_by_text("path", exact=True).last.click()
+            page.wait_for_timeout(2000)
+            # the slider of the steps, near its end
+            page.mouse.click(750, 701)
         page.wait_for_timeout(4000)
-        page.screenshot(path=DOCS / f"{PAGE}.png")
+        page.screenshot(path=DOCS / f"{name}.png")
         page.close()
     finally:
         server.send_signal(signal.SIGINT)
@@ -98,11 +109,11 @@ def photograph_page(chromium: Browser, folder: Path) -> None:
 def main() -> int:
     """Run the examples and make their pictures."""
     parser = argparse.ArgumentParser(description="Make the pictures of the documentation anew.")
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join((PAGE, *FIGURES))}")
-    names = parser.parse_args().names or [PAGE, *FIGURES]
-    unknown = set(names) - {PAGE, *FIGURES}
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join((*PAGES, *FIGURES))}")
+    names = parser.parse_args().names or [*PAGES, *FIGURES]
+    unknown = set(names) - {*PAGES, *FIGURES}
     if unknown:
-        parser.error(f"{', '.join(sorted(unknown))}: must be of {', '.join((PAGE, *FIGURES))}")
+        parser.error(f"{', '.join(sorted(unknown))}: must be of {', '.join((*PAGES, *FIGURES))}")
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         chromium = playwright.chromium.launch(
             executable_path=CHROMIUM,
@@ -110,13 +121,15 @@ def main() -> int:
         )
         page = chromium.new_page(viewport={"width": 860, "height": 1266})
         for name in names:
-            job = copy_example(SHOWN if name == PAGE else name, Path(folder) / name)
+            job = copy_example(
+                PAGES[name][0] if name in PAGES else name, Path(folder) / name / PAGES.get(name, (name, ""))[0]
+            )
             words = [sys.executable, "-m", "chipload", "run", str(job / "job.toml"), "--out", str(job / "result")]
             code = subprocess.run(words, check=False).returncode
             if code not in (0, 3):
                 return code
-            if name == PAGE:
-                photograph_page(chromium, job)
+            if name in PAGES:
+                photograph_page(chromium, job, name)
             else:
                 photograph(page, job / "result" / "report.html", name)
             print(f"docs/{name}.png", flush=True)
