@@ -33,7 +33,7 @@ from chipload.errors import Finding, InputError
 from chipload.program.motions import lengths
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
-from chipload.simulation.accuracy import energy_balance, layers_again, moves_again, resolution_error
+from chipload.simulation.accuracy import COMPARED, energy_balance, layers_again, moves_again, resolution_error
 from chipload.simulation.loads import (
     LOADS,
     Cuts,
@@ -189,18 +189,29 @@ def with_accuracy(removal: Removal, program: Program, before: LayeredStock | Non
     """A removal with its energy balance and resolution error; ``before`` the stock before it, None: as it is."""
     if before is None:
         return removal
+    return replace(
+        removal,
+        energy_balance=energy_balance(removal.columns, setting.material.Ktc),
+        resolution_error=resolution_error_of(program, before, removal.columns, setting),
+    )
+
+
+def resolution_error_of(
+    program: Program,
+    before: LayeredStock,
+    columns: Columns,
+    setting: RunSettings,
+    names: Sequence[str] = COMPARED,
+) -> dict[str, float]:
+    """Relative error of the worst value of some columns of a removal (:mod:`chipload.simulation.accuracy`)."""
     blocks = StepBlocks(program, setting.resolution.step_mm, setting.resolution.tolerance)
     if setting.moves is None:
         again = layers_again(
             before, setting, lambda steps, stock, to: remove_block(steps, stock, RunningSums(0.0), to)[1]
         )
     else:
-        again = moves_again(setting, setting.moves, removal.columns)
-    return replace(
-        removal,
-        energy_balance=energy_balance(removal.columns, setting.material.Ktc),
-        resolution_error=resolution_error(blocks, before, removal.columns, setting, again),
-    )
+        again = moves_again(setting, setting.moves, columns)
+    return resolution_error(blocks, before, columns, setting, again, names)
 
 
 def setting_of(

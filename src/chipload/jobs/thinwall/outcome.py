@@ -143,6 +143,7 @@ class Variant:
     finish : a finished side each
     shape : the simulated stock beside the finished wall
     stress : greatest equivalent stress at the clamp [MPa] under the simulated forces
+    load_error : relative error of the greatest load by column, of layers and steps; inf: not known
     shift : greatest way [mm] by which the last passes were moved against the form error
     """
 
@@ -156,6 +157,7 @@ class Variant:
     finish: tuple[Finish, ...]
     shape: Shape
     stress: float
+    load_error: Mapping[str, float]
     shift: float = 0.0
 
     @property
@@ -164,6 +166,13 @@ class Variant:
         ratio = self.columns["force_over_allowable"]
         bad = np.flatnonzero(ratio > 1.0 + OVER)
         return np.asarray(bad[np.argsort(-ratio[bad], kind="stable")])
+
+    def over_with_error(self, modelled: bool) -> float:
+        """Greatest F_n over F_th with the error of the loads and, where F_th is modelled, that of the mesh."""
+        c = self.columns
+        unsure = c["compliance_error"] if modelled else 0.0
+        most = float((c["force_over_allowable"] * (1.0 + unsure)).max(initial=0.0))
+        return most * (1.0 + self.load_error["force_normal_n"])
 
     @property
     def deflection(self) -> float:

@@ -17,6 +17,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from chipload.jobs.checks import check_columns
 from chipload.jobs.thinwall.inputs import WallInputs
+from chipload.jobs.thinwall.load_error import SimulatedPass, load_error
 from chipload.jobs.thinwall.mesh_error import error_at
 from chipload.jobs.thinwall.outcome import Finish, Shape
 from chipload.jobs.thinwall.places import Places, between
@@ -62,6 +63,7 @@ class Proof:
     thresholds : (n, m) [N] a pass, at the places of its side
     finish, shape : of the finished wall
     stress : greatest equivalent stress at the clamp [MPa]
+    load_error : relative error of the loads by column, of layers and steps
     """
 
     columns: Mapping[str, NDArray[Any]]
@@ -69,6 +71,7 @@ class Proof:
     finish: tuple[Finish, ...]
     shape: Shape
     stress: float
+    load_error: Mapping[str, float]
 
 
 def wall_stock(inputs: WallInputs) -> LayeredStock:
@@ -107,12 +110,14 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
     law = inputs.depths.even_law if plan.name in EVEN else inputs.depths.law
     left = [np.full(places.shape, inputs.body.allowance[s]) for s in inputs.body.side_numbers]
     parts: list[dict[str, NDArray[Any]]] = []
+    simulated: list[SimulatedPass] = []
     thresholds: list[Floats] = []
     finish: dict[int, Finish] = {}
     time = way = stress = 0.0
     last = {p.side: k for k, p in enumerate(plan.passes)}
     ends = np.cumsum([len(leg.program) for leg in legs])
     for k, (p, leg, own) in enumerate(zip(plan.passes, legs, np.split(times, ends[:-1]), strict=True)):
+        before = stock.copied()
         removal = remove(
             leg.program,
             stock,
@@ -124,6 +129,7 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
             times=own,
             progress=lambda part, what, k=k: progress((k + part) / len(legs), f"pass {k + 1} of {len(legs)}"),  # type: ignore[misc]
         )
+        simulated.append(SimulatedPass(leg.program, before, removal.columns))
         left[p.side] = p.low
         number = inputs.body.side_numbers[p.side]
         C = places.compliance(left, p.side)
@@ -143,7 +149,8 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
         if k == last[p.side]:
             finish[number] = _finish(inputs, removal, number, C, error, bars)
     whole = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-    return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(inputs, stock, legs), stress)
+    unsure = load_error(simulated, cutter, inputs.cut.material, fine)
+    return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(inputs, stock, legs), stress, unsure)
 
 
 def _stress(inputs: WallInputs, left: Sequence[Floats], number: int, columns: Mapping[str, NDArray[Any]]) -> float:

@@ -284,21 +284,20 @@ def _variable(tried: _Tried, corrections: tuple[Floats, ...]) -> Variant:
         if best is not None and not raised and _seconds(places, planned) > FASTER * best.seconds:
             break
         one = tried.prove(planned, 0.4)
-        # with the error of the mesh, as the limit is checked
-        unsure = one.columns["compliance_error"] if modelled else 0.0
-        over = float((one.columns["force_over_allowable"] * (1.0 + unsure)).max())
+        # with the errors that the limit is checked with
+        over = one.over_with_error(modelled)
         good = not len(one.over) and over <= (1.0 if modelled else 1.0 + OVER)
         if good and (best is None or one.seconds < best.seconds):
             best, tried.planned["variable"], tried.corrections = one, planned, corrections
         elif not good:
             least = [min([*least, (over, one)], key=lambda pair: pair[0])]
-        used = best is not None and (not modelled or best.deflection >= USED_SHARE * held)
+        used = best is not None and (not modelled or best.over_with_error(modelled) >= USED_SHARE)
         if best is not None and turn >= ROUNDS - 1 and (used or turn >= RAISES):
             break
         measured = _measured(places, one, inputs.depths.law, corrections)
         if not good:
             measured = tuple(np.maximum(c, m) for c, m in zip(corrections, measured, strict=True))
-            share *= HOLD / over if turn >= ROUNDS - 1 else 1.0
+            share *= HOLD / over if turn >= ROUNDS - 1 and math.isfinite(over) else 1.0
         # what is left of the limit is used
         raised = good and not used
         share *= FULL / over if raised else 1.0
@@ -382,6 +381,7 @@ def _variant(places: Places, planned: Planned, program: Program, run: _OnMachine
         proof.finish,
         proof.shape,
         proof.stress,
+        proof.load_error,
     )
 
 
