@@ -39,10 +39,10 @@ SMALL = (
     "operation.0.scallop_um=40.0",
     "operation.0.depth_max_mm=0.2",
     "operation.0.step_mm=3.0",
-    "operation.0.layer_mm=0.5",
+    "operation.0.layer_mm=0.25",
     "operation.0.corner_slices=60",
     "operation.0.reserve=0.1",
-    "limits.deflection_workpiece_um=48.0",
+    "limits.deflection_workpiece_um=38.0",
 )
 
 
@@ -111,7 +111,7 @@ def test_variable_is_held_to_the_limit(finished, done, operation):
 def test_less_error_in_the_time_of_the_constant_depth(done):
     least, constant = done.variants["least_error"], done.variants["constant"]
     assert least.seconds <= constant.seconds * 1.001
-    assert least.deflection <= constant.deflection * 1.03
+    assert least.over_with_error(modelled=True) <= 1.0
     assert least.error_rms <= constant.error_rms * (1.0 + 1e-9)
 
 
@@ -209,7 +209,7 @@ def test_a_limit_within_the_error_is_unproven(done, name):
 
 def test_the_error_of_the_loads_covers_a_finer_simulation(finished, done, tmp_path):
     """The same plan in layers of a fifth and steps of a half: its greatest loads are within the stated error."""
-    sets = (*SMALL, "operation.0.layer_mm=0.1", "operation.0.step_mm=1.5", "operation.0.corner_slices=120")
+    sets = (*SMALL, "operation.0.layer_mm=0.05", "operation.0.step_mm=1.5", "operation.0.corner_slices=120")
     inputs = read_wall(load_job(copy_example("plate", tmp_path / "plate") / "job.toml", sets).job)
     tried = Tried(places_of(inputs), lambda part, what: None)
     fine, coarse = tried.prove(unlimited_plan(tried.places), 0.5), done.variants["unconstrained"]
@@ -224,7 +224,7 @@ def test_the_error_of_the_loads_covers_a_finer_simulation(finished, done, tmp_pa
 def test_what_exceeds_is_listed_and_fails(finished, done, operation):
     free = done.variants["unconstrained"]
     share = free.deflection / (done.limits["deflection_workpiece_um"] / 1000.0)
-    assert bool(failures_of(done, free)) == (share > 1.0)
+    assert bool(failures_of(done, free)) == (free.over_with_error(modelled=True) > 1.0)
     listed = operation["variants"]["unconstrained"]["over_threshold"]
     assert listed == int((free.columns["force_over_allowable"] > 1.01).sum())
     variable = finished.result.tracks[0]

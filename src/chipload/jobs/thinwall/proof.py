@@ -7,8 +7,9 @@ logarithm, see :mod:`chipload.jobs.thinwall.places`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -63,7 +64,7 @@ class Proof:
     thresholds : (n, m) [N] a pass, at the places of its side
     finish, shape : of the finished wall
     stress : greatest equivalent stress at the clamp [MPa]
-    load_error : relative error of the loads by column, of layers and steps
+    find_load_error : gives the relative error of the loads by column, of layers and steps
     """
 
     columns: Mapping[str, NDArray[Any]]
@@ -71,7 +72,7 @@ class Proof:
     finish: tuple[Finish, ...]
     shape: Shape
     stress: float
-    load_error: Mapping[str, float]
+    find_load_error: Callable[[], Mapping[str, float]]
 
 
 def wall_stock(inputs: WallInputs) -> LayeredStock:
@@ -149,8 +150,8 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
         if k == last[p.side]:
             finish[number] = _finish(inputs, removal, number, C, error, bars)
     whole = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-    unsure = load_error(simulated, cutter, inputs.cut.material, fine)
-    return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(inputs, stock, legs), stress, unsure)
+    find = partial(load_error, simulated, cutter, inputs.cut.material, fine)
+    return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(inputs, stock, legs), stress, find)
 
 
 def _stress(inputs: WallInputs, left: Sequence[Floats], number: int, columns: Mapping[str, NDArray[Any]]) -> float:
