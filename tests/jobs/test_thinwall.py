@@ -223,7 +223,6 @@ def test_the_error_of_the_loads_covers_a_finer_simulation(finished, done, tmp_pa
 
 def test_what_exceeds_is_listed_and_fails(finished, done, operation):
     free = done.variants["unconstrained"]
-    share = free.deflection / (done.limits["deflection_workpiece_um"] / 1000.0)
     assert bool(failures_of(done, free)) == (free.over_with_error(modelled=True) > 1.0)
     listed = operation["variants"]["unconstrained"]["over_threshold"]
     assert listed == int((free.columns["force_over_allowable"] > 1.01).sum())
