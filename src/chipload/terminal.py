@@ -71,6 +71,18 @@ def write_line(text: str) -> None:
         typer.echo(f"chipload: {plain(' '.join(text.split()))}", err=True)
 
 
+@contextmanager
+def _stdout_refused() -> Iterator[None]:
+    """Turn a full disk behind stdout into an OutputError; a reader that has gone stays a BrokenPipeError."""
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as err:
+        _let_go_of_output()
+        raise cannot_write("stdout", err) from None
+
+
 def show(text: str) -> None:
     """A line on stdout, without what would command the terminal.
 
@@ -81,13 +93,8 @@ def show(text: str) -> None:
     BrokenPipeError
         Its reader has gone.
     """
-    try:
+    with _stdout_refused():
         typer.echo(plain(text))
-    except BrokenPipeError:
-        raise
-    except OSError as err:
-        _let_go_of_output()
-        raise cannot_write("stdout", err) from None
 
 
 def write_bytes(data: bytes) -> None:
@@ -100,15 +107,10 @@ def write_bytes(data: bytes) -> None:
     BrokenPipeError
         Its reader has gone.
     """
-    try:
+    with _stdout_refused():
         sys.stdout.flush()
         sys.stdout.buffer.write(data)
         sys.stdout.buffer.flush()
-    except BrokenPipeError:
-        raise
-    except OSError as err:
-        _let_go_of_output()
-        raise cannot_write("stdout", err) from None
 
 
 def plain(text: str) -> str:
