@@ -92,7 +92,7 @@ def test_all_stock_is_taken_and_nothing_else(done):
         assert one.shape.gouge <= 0.001
         assert one.shape.nearest >= -0.001
         assert all(f.made.all() for f in one.finish)
-        assert not (one.columns["rapid"] & (one.columns["chip_pieces"] > 0)).any()
+        assert not (one.columns["rapid"] & (one.columns["chip_areas"] > 0)).any()
 
 
 def test_variable_is_held_to_the_limit(finished, done, operation):

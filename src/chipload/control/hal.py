@@ -6,7 +6,7 @@ The torque is estimated from the spindle's current and speed: those of pins, or 
 follow the machine's real place and velocity; or it is that of a pin. The
 pin `beat` changes with every step; HAL watches it and takes the feed away from a controller that does not beat
 (examples/tube/linuxcnc). The time is that of the machine's pins, so a step that comes late is a long step, and one
-longer than `gap_s` is a start: spindle and controller begin anew.
+longer than `timeout_s` is a start: spindle and controller begin anew.
 
 The torque of the model is predicted in every case, with feed-forward or without, and readings are held against it. A
 controller that has stopped goes on sending 0, and beats, until it is asked to end: its end is the reason of the stop.
@@ -237,7 +237,7 @@ def control(
             row = row if model[0][row] <= s else 0
             actual = seen.velocity / float(np.interp(s, path.model.s, path.model.feed))
             true, believed = (_load(p, s, actual if on else 0.0) for p in (path.truth, path.model))
-            seconds = cut.follow(seen, true, believed, float(noise[len(rows) % len(noise)]), config.gap_s)
+            seconds = cut.follow(seen, true, believed, float(noise[len(rows) % len(noise)]), config.timeout_s)
             torque, speed = cut.torque(seen), cut.speed(seen)
             trusted = job.source == "pin" or abs(speed / job.spindle.speed - 1.0) <= SPEED_SHARE
             most_allowed = None

@@ -101,7 +101,7 @@ def with_checks(
 
     def columns(cuts: Cuts) -> dict[str, Floats]:
         found = dict(bends(cuts))
-        found["cutter_stress_mpa"] = cutter_stress(cuts.bites, cuts.cutter, material)
+        found["cutter_stress_mpa"] = cutter_stress(cuts.engagement, cuts.cutter, material)
         found["deflection_share"] = deflection_share(
             cuts.plain, found["deflection_um"], table.deflection_of_feed, table.deflection_of_depth
         )
@@ -127,7 +127,7 @@ def check_columns(
     room = any(c.cutter.gullet is not None for c in cuts)
     out = {name: np.zeros(len(deflection_um)) for name in (*CHECK_COLUMNS, *(["flute_fill"] if room else []))}
     for c in cuts:
-        out["cutter_stress_mpa"][c.step] = cutter_stress(c.bites, c.cutter, material)
+        out["cutter_stress_mpa"][c.step] = cutter_stress(c.engagement, c.cutter, material)
         out["deflection_share"][c.step] = deflection_share(
             c.plain, deflection_um[c.step], table.deflection_of_feed, table.deflection_of_depth
         )

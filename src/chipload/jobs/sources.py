@@ -92,6 +92,13 @@ def cutters(entries: Sequence[CutterTable], folder: Path) -> dict[int, Cutter]:
     return out
 
 
+def unknown_cutter(key: str, number: int, known: Mapping[int, Cutter]) -> Iterator[str]:
+    """What is wrong with the number of a cutter: that none has it; nothing where no cutter could be read."""
+    if known and number not in known:
+        numbers = ", ".join(str(n) for n in sorted(known))
+        yield f"{key} = {number}: no [[cutter]] has this number: state one of {numbers}"
+
+
 def cutter_errors(raw: Mapping[str, Any], folder: Path) -> list[str]:
     """What is wrong with those cutters of a file whose values are right one by one."""
     entries = raw.get("cutter")

@@ -255,7 +255,7 @@ def _missed(columns: Columns) -> list[int]:
     """Steps that lose most of what their middle does not engage, as where a mill meets a wall at the end of a step."""
     volume = np.where(np.asarray(columns["rapid"]), 0.0, np.asarray(columns["chip_volume_mm3"]))
     more = volume - np.asarray(columns["engaged_volume_mm3"])
-    more = np.where((more > UNLIKE * volume) & (np.asarray(columns["chip_pieces"]) > 0), more, 0.0)
+    more = np.where((more > UNLIKE * volume) & (np.asarray(columns["chip_areas"]) > 0), more, 0.0)
     order = np.argsort(-more, kind="stable")[:MISSED]
     return [int(k) for k in order if more[k] > 0.0]
 
@@ -270,7 +270,7 @@ def _films(columns: Columns) -> float:
     """Share of the volume that was lost, not by rapids, in steps without loads."""
     volume = np.where(columns["rapid"], 0.0, columns["chip_volume_mm3"])
     whole = float(np.abs(volume).sum())
-    return float(np.abs(volume[np.asarray(columns["chip_pieces"]) == 0]).sum()) / whole if whole > 0.0 else 0.0
+    return float(np.abs(volume[np.asarray(columns["chip_areas"]) == 0]).sum()) / whole if whole > 0.0 else 0.0
 
 
 def _windows(blocks: Iterable[Steps], asked: list[int], setting: RunSettings) -> list[Window]:
@@ -324,7 +324,7 @@ def moves_again(setting: RunSettings, run: MoveRun, columns: Columns) -> Again:
         for some in window.earlier:
             stock.skip(some.p0, some.p1, some.tool)
         stock.more = stock.more if more is None else more
-        finer = replace(run, stock=stock, corner_pieces=MORE * run.corner_pieces, flank_mm=flank)
+        finer = replace(run, stock=stock, corner_slices=MORE * run.corner_slices, flank_mm=flank)
         found = moved(own, finer, 0, setting.cutters, setting.material, rotation)
         worst = {name: float(found.loads[:, LOADS.index(name)].max()) for name in COMPARABLE}
         return worst, float(found.removed[:, 0].sum())
@@ -354,18 +354,18 @@ def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, re
         heights.append(z)
     stock.refine_at(heights, 0.25 * LOWEST * cutter.diameter)
     fine = setting.resolution
-    pieces = max(2 * fine.corner_pieces, FINE)
+    pieces = max(2 * fine.corner_slices, FINE)
     fine = replace(
         fine,
         rotation=0.5 * fine.rotation,
-        corner_pieces=pieces,
+        corner_slices=pieces,
         flank_mm=0.5 * fine.flank_mm,
-        bottom_pieces=2 * fine.bottom_pieces,
+        bottom_slices=2 * fine.bottom_slices,
     )
     profile = slices(
         cutter,
-        bottom_pieces=fine.bottom_pieces,
-        corner_pieces=fine.corner_pieces,
+        bottom_slices=fine.bottom_slices,
+        corner_slices=fine.corner_slices,
         flank_mm=fine.flank_mm,
         grading=max(fine.grading, 2.0) if window.upright else fine.grading,
     )

@@ -46,7 +46,7 @@ from chipload.simulation.loads import (
     over_turn,
 )
 from chipload.simulation.moves import Engine, HandOver, MoveRun, moved, run_by_moves, with_contact
-from chipload.simulation.removal import ChipPieces, Columns, Removal, Resolution, RunningSums, RunSettings, Watch
+from chipload.simulation.removal import ChipAreas, Columns, Removal, Resolution, RunningSums, RunSettings, Watch
 from chipload.simulation.shank import axial_overrun
 from chipload.simulation.steps import BLOCK, ROWS, StepBlocks, Steps, steps_in_blocks
 from chipload.simulation.swept_area import TOGETHER, Interpolation, swept_ahead
@@ -106,7 +106,7 @@ def remove(
         With the columns ``line``, ``tool``, ``label``, ``rapid``, ``s_mm``, ``t_s``, ``duration_s`` (on the
     machine), ``seconds`` (at the commanded feed, which chips and loads go by), ``x_mm``, ``y_mm``, ``z_mm``,
     ``axis_x..z``, ``feed_mm_min``, ``axial_overrun_mm`` (height of the shank that stands in material above the flutes
-    when the step ends), ``chip_volume_mm3``, ``chip_pieces`` (most on one layer),
+    when the step ends), ``chip_volume_mm3``, ``chip_areas`` (most on one layer),
     ``chip_layers`` (layers that lost something; where all of it is films, narrower than a few tolerances, there are no
     pieces and no loads), ``chip_max_mm`` (thickest),
     ``force_{x,y,z}_{mean,max,min}_n`` over the revolution, ``force_n`` (greatest size), ``torque_mean_nm``,
@@ -170,7 +170,7 @@ def with_engine(
     fine = setting.resolution
     try:
         run = run_by_moves(
-            program, stock, setting.cutters, fine.step_mm, fine.tolerance, fine.corner_pieces, fine.flank_mm
+            program, stock, setting.cutters, fine.step_mm, fine.tolerance, fine.corner_slices, fine.flank_mm
         )
     except HandOver as found:
         return by_layers(engine, setting, found)
@@ -231,8 +231,8 @@ def profile_of(cutter: Cutter, resolution: Resolution) -> Slices:
     """The slices of a cutter at a resolution."""
     return slices(
         cutter,
-        bottom_pieces=resolution.bottom_pieces,
-        corner_pieces=resolution.corner_pieces,
+        bottom_slices=resolution.bottom_slices,
+        corner_slices=resolution.corner_slices,
         flank_mm=resolution.flank_mm,
         grading=resolution.grading,
     )
@@ -329,7 +329,7 @@ def _after(
     removed: Floats,
     columns: Columns,
     basis: Floats,
-    piece: ChipPieces | None,
+    piece: ChipAreas | None,
 ) -> RunningSums:
     """The sums after some steps."""
     cuts = (removed[:, 0] > 0.0) & ~steps.rapid
@@ -378,7 +378,7 @@ def stacked(blocks: Sequence[Columns]) -> dict[str, NDArray[Any]]:
 
 def _removed(
     steps: Steps, stock: LayeredStock, sums: RunningSums, setting: RunSettings
-) -> tuple[Floats, list[StepEngagement], ChipPieces | None]:
+) -> tuple[Floats, list[StepEngagement], ChipAreas | None]:
     """(n, 4) volume, pieces and layers of each chip, contact of the shank; what the teeth cut; the chip of most pieces
     so far.
     """
@@ -388,7 +388,7 @@ def _removed(
     cutting: list[tuple[int, Move, Section]] = []
     waiting: list[Future[list[StepEngagement]]] = []
 
-    def bites(those: list[tuple[int, Move, Section]]) -> list[StepEngagement]:
+    def engaged(those: list[tuple[int, Move, Section]]) -> list[StepEngagement]:
         tools = [int(steps.tool[k]) for k, _, _ in those]
         return [
             engagement_of_step(steps, k, move, setting.cutters[n], setting.profiles[n], there, tolerance)
@@ -412,7 +412,7 @@ def _removed(
                     rank = _rank(whole)
                     near = polygons(stock.section(i).union(MultiPolygon(pieces)).intersection(box(*low, *high)))
                     cutter, z = setting.cutters[int(steps.tool[k])], float(stock.heights[i])
-                    best = ChipPieces(sums.steps + k, swept.move, cutter, z, MultiPolygon(near), tuple(whole))
+                    best = ChipAreas(sums.steps + k, swept.move, cutter, z, MultiPolygon(near), tuple(whole))
             if removed[k, 1] > 0.0:
                 cutter = setting.cutters[int(steps.tool[k])]
                 removed[k, 3] = axial_overrun(stock, cutter, steps.p1[k], steps.a1[k], FILM * tolerance)
@@ -420,9 +420,9 @@ def _removed(
             if removed[k, 1] > 0.0 and not steps.rapid[k]:
                 cutting.append((k, swept.move, there))
             if len(cutting) == TOGETHER:
-                waiting.append(beside.submit(bites, cutting))
+                waiting.append(beside.submit(engaged, cutting))
                 cutting = []
-        waiting.append(beside.submit(bites, cutting))
+        waiting.append(beside.submit(engaged, cutting))
         return removed, [bite for several in waiting for bite in several.result()], best
 
 
@@ -465,7 +465,7 @@ def _columns(steps: Steps, removed: Floats, loads: Floats, sums: RunningSums) ->
         **{f"axis_{x}": steps.a1[:, i] for i, x in enumerate("xyz")},
         "feed_mm_min": feed,
         "chip_volume_mm3": removed[:, 0],
-        "chip_pieces": removed[:, 1].astype(np.int64),
+        "chip_areas": removed[:, 1].astype(np.int64),
         "chip_layers": removed[:, 2].astype(np.int64),
         "axial_overrun_mm": removed[:, 3],
         **{name: loads[:, i] for i, name in enumerate(LOADS)},

@@ -42,7 +42,7 @@ class Difference:
     distance : (p,) float [mm]; inf: more than was looked for
     step : (p,) int, nearest step; -1: none
     deepest : (n,) float [mm] of each step; inf: far from the part
-    look : [mm]
+    search_range : [mm]
     over : (p,) bool, whether the stock stood over the point before: elsewhere nothing can be left
     """
 
@@ -51,7 +51,7 @@ class Difference:
     distance: Floats
     step: Ints
     deepest: Floats
-    look: float
+    search_range: float
     over: NDArray[np.bool_]
 
 
@@ -103,7 +103,7 @@ def difference(
     part: trimesh.Trimesh,
     in_stock: Callable[[Floats], NDArray[np.bool_]],
     spacing: float,
-    look: float,
+    search_range: float,
     tolerance: float,
     progress: Callable[[int], None] = lambda done: None,
 ) -> Difference:
@@ -113,18 +113,18 @@ def difference(
     ----------
     steps : all, or block after block
     in_stock : which points (p, 3) lay in the stock before the program
-    spacing, look, tolerance : [mm], of the points; how far material is looked for; of the path
+    spacing, search_range, tolerance : [mm], of the points; how far material is looked for; of the path
     progress : is told how many steps are done
     """
     points, faces = fine(part, spacing, "part")
     normals = np.asarray(trimesh.Trimesh(points, faces, process=False).vertex_normals)
     over = in_stock(points + OVER * tolerance * normals)
-    near = LeastDistance({n: cutting_part(c) for n, c in cutters.items()}, points, look, tolerance)
+    near = LeastDistance({n: cutting_part(c) for n, c in cutters.items()}, points, search_range, tolerance)
     deepest = [np.empty(0)]
     for block in blocks_of(steps):
         progress(near.done)
         deepest.append(near.take(block))
-    return Difference(points, faces, near.distance, near.step, np.concatenate(deepest), look, over)
+    return Difference(points, faces, near.distance, near.step, np.concatenate(deepest), search_range, over)
 
 
 def collisions(

@@ -80,7 +80,7 @@ class Page:
         self.running, self.ask = self._dialog("Run")
         self._help()
         ui.keyboard(on_key=self._key, ignore=["input", "textarea"])
-        ui.timer(LOOK, self._look)
+        ui.timer(LOOK, self._poll)
         self.stage.set_visibility(False)
 
     async def begin(self, name: str | None) -> None:
@@ -292,7 +292,7 @@ class Page:
         self.bar.set_visibility(True)
         background_tasks.create(now.work(path, target))
 
-    async def _look(self) -> None:
+    async def _poll(self) -> None:
         now = self.runs.now
         if now is None or self.seen is now:
             return

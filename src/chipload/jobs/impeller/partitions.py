@@ -78,7 +78,7 @@ def _compared(milled: ImpellerResult) -> str:
             [
                 name, cutters, f"{100.0 * way.share:.4g}", f"{d.path:.0f}", less[0],
                 f"{d.total / 60.0:.1f}", less[1], f"{d.cutter_changes} + {d.table_changes}", f"{d.bound / 60.0:.1f}",
-                f"{100.0 * d.gap:.1f}",
+                f"{100.0 * d.above_bound:.1f}",
             ]
         )  # fmt: skip
     head = ["way", "cutters [mm]", "reached [%]", "path [mm]", "[%]", "time [min]", "[%]", "changes of cutter + table"]

@@ -106,7 +106,7 @@ def resolution_of(job: ProgramJob, program: Program) -> Resolution:
     if (np.asarray(program.axis)[:, 2] > 1.0 - 1e-12).all():
         return Resolution(op.step_mm, op.tolerance_mm, CORNER, flank, grading=GRADING)
     flank = op.flank_mm or LEANING_FLANK * smallest
-    return Resolution(op.step_mm, op.tolerance_mm, 2 * CORNER, flank, bottom_pieces=LEANING_BOTTOM)
+    return Resolution(op.step_mm, op.tolerance_mm, 2 * CORNER, flank, bottom_slices=LEANING_BOTTOM)
 
 
 def timed(reading: ProgramReading, job: ProgramJob, machine: Machine) -> tuple[Program, NDArray[np.float64]]:

@@ -141,13 +141,13 @@ class WallInputs:
         p = self._surface(side, u, v).points
         along = np.linalg.norm(np.diff(p, axis=0), axis=2).sum(axis=0).max()
         up = np.linalg.norm(np.diff(p, axis=1), axis=2).sum(axis=1).max()
-        n = max(math.ceil(along / self.job.operation.step_mm), self._pieces(side), 2) + 1
+        n = max(math.ceil(along / self.job.operation.step_mm), self._chords(side), 2) + 1
         m = math.ceil(up / abs(self.cut.step_over)) + 1
         u, v = np.linspace(0.0, 1.0, n), np.linspace(self.body.foot, 1.0, m)
         return FineSide(self._surface(side, u, v), u, v)
 
-    def _pieces(self, side: int) -> int:
-        """Straight pieces along a row that stay within the chord's tolerance: the sag of one falls as its square."""
+    def _chords(self, side: int) -> int:
+        """Straight chords along a row that stay within the chord's tolerance: the sag of one falls as its square."""
         u, v = np.meshgrid(np.linspace(0.0, 1.0, 65), np.linspace(self.body.foot, 1.0, 17), indexing="ij")
         p = self.body.shape.sides(u, v)[side]
         a, b = p[:-1], p[1:]

@@ -31,7 +31,7 @@ from chipload.simulation.chips import remove
 from chipload.simulation.contact_points import touched
 from chipload.simulation.deflection import form_error, step_deflections
 from chipload.simulation.removal import Removal, Resolution
-from chipload.simulation.section_deviation import beside, nearest
+from chipload.simulation.section_deviation import nearest, section_deviation
 from chipload.stock.layers import LayeredStock
 from chipload.structure.places import normals_of, on_cut, on_side, weights
 from chipload.structure.solid import displacement, factorise
@@ -260,7 +260,7 @@ def _finish(
         number,
         points,
         found.error.reshape(shape),
-        found.gap.reshape(shape),
+        found.rigid.reshape(shape),
         found.made.reshape(shape),
         unsure.reshape(shape),
         parameters,
@@ -277,6 +277,6 @@ def _shape(inputs: WallInputs, stock: LayeredStock, legs: Sequence[PassProgram])
     )
     cloud = np.concatenate([p.reshape(-1, 3) for p in inputs.body.shape.sides(u, v)])
     gap = nearest(Program.join([leg.program for leg in legs]), inputs.cut.cutter, cloud)
-    found = beside(stock, inputs.finished_mesh(), inputs.foot_height + inputs.cut.cutter.corner_radius)
+    found = section_deviation(stock, inputs.finished_mesh(), inputs.foot_height + inputs.cut.cutter.corner_radius)
     at = found.at if found.gouge > -gap.distance else gap.at
     return Shape(found.gouge, found.left, at, found.points, gap.distance)

@@ -122,7 +122,7 @@ def findings_of(walled: ThinWallResult, one: Variant) -> tuple[Finding, ...]:
     if missed:
         text = f"{missed} points of the finished surface are not reached by any step"
         out.append(Finding("thinwall-not-finished", 0, text, Severity.EXCEEDS))
-    rapids = int((one.columns["rapid"] & (one.columns["chip_pieces"] > 0)).sum())
+    rapids = int((one.columns["rapid"] & (one.columns["chip_areas"] > 0)).sum())
     if rapids:
         out.append(Finding("rapid-cuts", 0, f"{rapids} rapids go through material", Severity.EXCEEDS))
     return (*out, *chip_findings(walled.checks, one.columns))

@@ -11,7 +11,7 @@ from typing import Any
 from chipload.control.spindle_file import IDENTIFIED
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
-from chipload.jobs.sources import entries_of, sources_and_cutters
+from chipload.jobs.sources import entries_of, sources_and_cutters, unknown_cutter
 from chipload.jobs.torque.tables import RoundTable, ShellTable, SurpriseTable, TorqueJobTable
 
 ONE_PROGRAM = "state a [program] with a file, or a [round] that is made"
@@ -122,8 +122,7 @@ def _wrong_shell(table: TorqueJobTable) -> Iterator[str]:
 
 def _wrong_round(table: TorqueJobTable, ask: RoundTable, tools: Mapping[int, Cutter]) -> Iterator[str]:
     if ask.cutter not in tools:
-        known = ", ".join(str(n) for n in sorted(tools))
-        yield f"round.cutter = {ask.cutter}: no [[cutter]] has this number: state one of {known}"
+        yield from unknown_cutter("round.cutter", ask.cutter, tools)
         return
     if not ask.bottom_mm < ask.top_mm:
         yield f"round.bottom_mm = {ask.bottom_mm:g}: must be below top_mm = {ask.top_mm:g}"

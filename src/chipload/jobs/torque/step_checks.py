@@ -71,9 +71,9 @@ def step_checks(real: Cut, loads: Loads, material: Material, most: float) -> Ste
     for cuts in real.removal.cuts:
         row = cuts.step - first
         for k, factor in enumerate((LEAST, most)):
-            stress[row, k] = cutter_stress(at_feeds(cuts, np.full(len(cuts), factor)).bites, cuts.cutter, material)
+            stress[row, k] = cutter_stress(at_feeds(cuts, np.full(len(cuts), factor)).engagement, cuts.cutter, material)
         chip[row] = cuts.plain.chip_max()
-        runout[row] = cuts.bites.chip_max() - chip[row]
+        runout[row] = cuts.engagement.chip_max() - chip[row]
         feed[row], depth[row] = tooth_feed(cuts.plain), radial_depth(cuts.plain)
         if fill is not None and cuts.cutter.gullet is not None:
             fill[row] = flute_fill(cuts)

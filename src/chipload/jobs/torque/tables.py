@@ -118,7 +118,7 @@ class OverrideTable(Table):
     low_share: NotNegative = Field(0.5, le=1.0, description="a reading below this share of the prediction is rejected")
     low_steps: Count = Field(50, description="number of such readings in a cut that stops the machine")
     off_path_steps: Count = Field(10, description="number of steps under load off the path that stops the machine")
-    gap_s: Positive = Field(0.5, le=10.0, description="a longer time between steps counts as a start")
+    timeout_s: Positive = Field(0.5, le=10.0, description="a longer time between steps counts as a start")
 
 
 class SpindleDeviationTable(Table):

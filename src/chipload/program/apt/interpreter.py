@@ -110,7 +110,9 @@ class AptInterpreter:
                 "changes the coordinates or the order in a way that is not read: write plain GOTO instead"
             )
         elif LEFT_OUT.fullmatch(word.partition(",")[0]):
-            track.gap("apt-left-out", record.line, f"{record}: moves the tool in a way that is not read: left out")
+            track.leave_out(
+                "apt-left-out", record.line, f"{record}: moves the tool in a way that is not read: left out"
+            )
         elif word == "CUTCOM" and record.args != ("OFF",):
             track.note_once("apt-cutcom", record.line, f"{record}: points are taken as of the tool's own tip")
         elif UNUSED.fullmatch(word):
@@ -123,7 +125,7 @@ class AptInterpreter:
         if self._circle is not None:
             self.track.note("apt-circle", self._circle.record.line, "CIRCLE without a GOTO after it is left out")
         if not self.ended:
-            self.track.gap("apt-end", 0, "the text does not end with FINI: it may have been cut off")
+            self.track.leave_out("apt-end", 0, "the text does not end with FINI: it may have been cut off")
         return self.track.program()
 
     # ------------------------------------------------------------------------------------------------ motions
@@ -131,7 +133,9 @@ class AptInterpreter:
     def _goto(self, record: AptRecord) -> None:
         p, b = self._point(record)
         if self._unread is not None:
-            self.track.gap("apt-cycle", record.line, f"{self._unread} is not read: its hole at {record} is left out")
+            self.track.leave_out(
+                "apt-cycle", record.line, f"{self._unread} is not read: its hole at {record} is left out"
+            )
         elif self._drilling and self._cycle is not None:
             self._hole(self._cycle, p, b, record)
         elif self._circle is not None:
@@ -198,7 +202,9 @@ class AptInterpreter:
             self.track.note("apt-circle", self._circle.record.line, "CIRCLE without a GOTO after it is left out")
         circle = read_circle(record)
         if isinstance(circle, str):
-            self.track.gap("apt-circle", record.line, f"{record}: {circle}: a straight line leads to the next point")
+            self.track.leave_out(
+                "apt-circle", record.line, f"{record}: {circle}: a straight line leads to the next point"
+            )
             self._circle = None
             return
         if circle.unread:
@@ -213,13 +219,13 @@ class AptInterpreter:
         at, direction, b = self._programmed, self._direction, self.track.axis
         self._direction = None
         if at is None or direction is None or self._drilling or self._circle is not None:
-            self.track.gap("apt-left-out", record.line, f"{record}: needs a point and INDIRV before it: left out")
+            self.track.leave_out("apt-left-out", record.line, f"{record}: needs a point and INDIRV before it: left out")
             return
         R, t, _ = self._frame()
         start = _tuple((R.T @ at + t) / self.mm)
         found = read_tlon(record, start, direction)
         if isinstance(found, str):
-            self.track.gap("apt-left-out", record.line, f"{record}: {found}: left out")
+            self.track.leave_out("apt-left-out", record.line, f"{record}: {found}: left out")
             return
         circle, end = found
         p = _tuple(R @ (np.multiply(end, self.mm) - t))
@@ -229,7 +235,7 @@ class AptInterpreter:
     def _origin(self, record: AptRecord) -> None:
         if any(record.numbers()[:3]):
             text = f"{record}: is not read: points are taken as they stand"
-            self.track.gap("apt-origin", record.line, text)
+            self.track.leave_out("apt-origin", record.line, text)
         else:
             self.track.note("apt-unused", record.line, str(record))
 
@@ -252,7 +258,7 @@ class AptInterpreter:
                 text = (
                     f"{circle.record}: the GOTO after it gives a sweep of {math.degrees(sweep):.4g} deg, which is cut"
                 )
-                self.track.gap("apt-arc", circle.record.line, text)
+                self.track.leave_out("apt-arc", circle.record.line, text)
 
     # ------------------------------------------------------------------------------------------------ holes
 
@@ -271,7 +277,9 @@ class AptInterpreter:
                 return
             self._cycle, self._drilling = found[0], True
             if found[1]:
-                self.track.gap("apt-cycle", record.line, f"{record}: {', '.join(found[1])} is not read in a cycle")
+                self.track.leave_out(
+                    "apt-cycle", record.line, f"{record}: {', '.join(found[1])} is not read in a cycle"
+                )
 
     def _hole(self, cycle: Cycle, p: Point, b: Point, record: AptRecord) -> None:
         """A hole at p against the axis b."""

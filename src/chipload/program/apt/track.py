@@ -66,7 +66,7 @@ class AptRows:
             self._left += 1
             self._left_severity = max(self._left_severity, severity)
 
-    def gap(self, code: str, line: int, text: str) -> None:
+    def leave_out(self, code: str, line: int, text: str) -> None:
         """A finding on something that is left out, so that the result is unproven."""
         self.note(code, line, text, Severity.UNPROVEN)
 
