@@ -171,4 +171,4 @@ def _bent(simulation: SimulationResult) -> tuple[SurfaceMap, ...]:
     if bent is None:
         return ()
     um = 1e3 * np.linalg.norm(bent.moved, axis=1)
-    return (SurfaceMap("workpiece", "deflection_workpiece_um", bent.points, um, bent.faces),)
+    return (SurfaceMap("workpiece", "deflection_workpiece_um", bent.points, um, bent.faces, displacement=bent.moved),)
