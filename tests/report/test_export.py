@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 from chipload.cli import app
 from chipload.errors import InputError
-from chipload.report.pdf import Line, one_page
+from chipload.report.pdf import SheetLine, one_page
 from chipload.report.removal import read_removal
 from chipload.report.setup_sheet import setup_pdf
 from chipload.report.vtk import faces_file, polyline
@@ -197,7 +197,7 @@ def test_a_long_sheet_is_one_page_and_says_what_it_leaves_out(result: Path) -> N
     lines = read_pdf(setup_pdf(replace(whole, unchecked=many)))
     assert "188 more in report.html" in " ".join(part for *_, part in lines)
     assert min(y for _, y, *_ in lines) > 30.0
-    assert one_page("", [Line("word " * 20_000)]) is None
+    assert one_page("", [SheetLine("word " * 20_000)]) is None
     note = setup_pdf(replace(whole, note="so " * 20_000))
     assert "HOLDS" in " ".join(part for *_, part in read_pdf(note))
 

@@ -25,7 +25,7 @@ _BOLD = 1.12
 
 
 @dataclass(frozen=True)
-class Line:
+class SheetLine:
     """A line of text from the left margin: a heading if ``bold``; ``size`` in sizes of the page's letters."""
 
     text: str
@@ -34,14 +34,14 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Rows:
+class SheetTable:
     """A table: the first row is its head; ``shares`` of the page's width, one a column."""
 
     rows: tuple[tuple[str, ...], ...]
     shares: tuple[float, ...]
 
 
-Block = Line | Rows
+Block = SheetLine | SheetTable
 
 
 def text_width(text: str, size: float, bold: bool = False) -> float:
@@ -98,7 +98,7 @@ def _drawn(blocks: Sequence[Block], size: float) -> tuple[list[bytes], float]:
     """The operators of a page, and the height of its last line [pt]."""
     out, y, whole = list[bytes](), HEIGHT - MARGIN, WIDTH - 2.0 * MARGIN
     for block in blocks:
-        if isinstance(block, Line):
+        if isinstance(block, SheetLine):
             letters = size * block.size
             y -= 0.6 * letters if block.bold else 0.0
             for line in wrapped(block.text, whole, letters, block.bold):

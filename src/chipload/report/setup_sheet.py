@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
+from chipload.errors import InputError
 from chipload.report.page import BANNERS, limits_table
-from chipload.report.pdf import Block, Line, Rows, one_page
+from chipload.report.pdf import Block, SheetLine, SheetTable, one_page
 from chipload.report.sheet import definitions, heading, items, style, table
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict
 
@@ -59,14 +60,14 @@ def setup_sheet(result: Result) -> bytes:
 
 def setup_pdf(result: Result) -> bytes:
     """The sheet as one A4 page of PDF; of long lists it holds the first entries and states how many more there are."""
-    for limits, room in ((LIMITS, ROOM), *((n, n) for n in FEWER)):
-        page = one_page(f"{result.title}: setup", _blocks(result, limits, room))
+    title = f"{result.title[:200]}: setup"
+    pages = [_blocks(result, limits, room) for limits, room in ((LIMITS, ROOM), *((n, n) for n in FEWER))]
+    pages.append([SheetLine(result.verdict.value.upper(), True, 1.8), SheetLine(result.message[:2000])])
+    for blocks in pages:
+        page = one_page(title, blocks)
         if page is not None:
             return page
-    head = [Line(result.verdict.value.upper(), True, 1.8), Line(result.message[:2000])]
-    page = one_page(f"{result.title[:200]}: setup", head)
-    assert page is not None  # 2000 letters are half a page
-    return page
+    raise InputError("setup.pdf: the verdict does not fit on one page: export setup.html (--sheet)")
 
 
 def _blocks(result: Result, limits: int, room: int) -> list[Block]:
@@ -79,27 +80,30 @@ def _blocks(result: Result, limits: int, room: int) -> list[Block]:
     order = list(Verdict)
     checks = sorted(((t, c) for t in tracks for c in t.limits), key=lambda one: -order.index(one[1].state))
     head = ("limit", "state", "limit value", "worst", "line", "reason")
-    listed = Rows((head, *(_limit(t, c, len(tracks) > 1) for t, c in checks[:limits])), (26, 10, 11, 11, 7, 35))
+    listed = SheetTable((head, *(_limit(t, c, len(tracks) > 1) for t, c in checks[:limits])), (26, 10, 11, 11, 7, 35))
     out: list[Block] = [
-        Line(f"chipload: {result.title}", size=1.1),
-        Line(f"{result.verdict.value.upper()}", True, 1.8),
-        Line(result.message),
-        Line(f"Machine: {result.provenance.machine}"),
-        Line(f"Materials: {', '.join(result.provenance.materials) or 'none'}"),
-        Line("Programs", True, 1.2),
-        Rows((("program", "files", "time [min]", "verdict"), *programs), (30, 40, 15, 15)),
+        SheetLine(f"chipload: {result.title}", size=1.1),
+        SheetLine(f"{result.verdict.value.upper()}", True, 1.8),
+        SheetLine(result.message),
+        SheetLine(f"Machine: {result.provenance.machine}"),
+        SheetLine(f"Materials: {', '.join(result.provenance.materials) or 'none'}"),
+        SheetLine("Programs", True, 1.2),
+        SheetTable((("program", "files", "time [min]", "verdict"), *programs), (30, 40, 15, 15)),
     ]
-    out += [Line(f"Tools {numbers}; motions [mm]: {box}") for numbers, box in _travel(result)[:room]]
-    out += [Line("Limits", True, 1.2), listed if checks else Line("No limit was checked.")]
+    out += [SheetLine(f"Tools {numbers}; motions [mm]: {box}") for numbers, box in _travel(result)[:room]]
+    out += [SheetLine("Limits", True, 1.2), listed if checks else SheetLine("No limit was checked.")]
     if len(checks) > limits:
-        out.append(Line(f"{len(checks) - limits} more limits in report.html; none of them is in a worse state."))
+        out.append(SheetLine(f"{len(checks) - limits} more limits in report.html; none of them is in a worse state."))
     for title, texts in (
         ("Guesses, to be checked at the machine", _guesses(result)),
         ("Not checked", result.unchecked),
     ):
         if texts:
-            out += [Line(title, True, 1.2), *(Line(f"- {text}") for text in _short(texts, room))]
-    out += [Line("Inputs", True, 1.2), *(Line(f"{k}: {v}") for k, v in list(result.provenance.inputs.items())[:room])]
+            out += [SheetLine(title, True, 1.2), *(SheetLine(f"- {text}") for text in _short(texts, room))]
+    out += [
+        SheetLine("Inputs", True, 1.2),
+        *(SheetLine(f"{k}: {v}") for k, v in list(result.provenance.inputs.items())[:room]),
+    ]
     return out
 
 
