@@ -90,7 +90,15 @@ def test_value_is_refused():
         ("[" * 100000, "not a FreeCAD tool bit: must be JSON"),
         ("[1]", "not a FreeCAD tool bit: must have shape and parameter"),
         ({"shape": "endmill.fcstd", "parameter": 3}, "not a FreeCAD tool bit: must have shape and parameter"),
-        ({"shape": "drill.fcstd", "parameter": {}}, "shape drill: must be one of endmill, ballend, torus, bullnose"),
+        (
+            {"shape": "probe.fcstd", "parameter": {}},
+            "shape probe: must be one of endmill, ballend, torus, bullnose, drill, vbit, reamer, tap, threadmill, "
+            "dovetail, slittingsaw",
+        ),
+        (
+            {"shape": "drill.fcstd", "parameter": {"Diameter": "3 mm"}},
+            "shape drill: TipAngle: must be given and above 0",
+        ),
         (
             {"shape": "torus.fcstd", "parameter": {"Diameter": "6 mm"}},
             "shape torus without TorusRadius, CornerRadius or FlatRadius: give one",

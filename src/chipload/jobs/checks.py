@@ -139,7 +139,7 @@ def check_columns(
 def unchecked_checks(checks: DefaultChecks) -> tuple[str, ...]:
     """Checks that are switched off, and cutters whose chip space is not stated."""
     out = [f"check {name}: switched off by the job" for name in checks.off]
-    roomless = [n for n, c in sorted(checks.cutters.items()) if c.gullet is None]
+    roomless = [n for n, c in sorted(checks.cutters.items()) if c.gullet is None and not c.body]
     if roomless:
         out.append(f"chip space of tools {', '.join(map(str, roomless))}: gullet_mm2 is not stated")
     return tuple(out)

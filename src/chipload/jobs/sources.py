@@ -58,6 +58,11 @@ def sources_and_cutters(
         sources = sources_of(table, folder, *keys)
     with errors.collect():
         tools = cutters(table.cutter, folder)
+    errors.texts += [
+        f"cutter {n}: body_mm: for a program that is simulated: leave it out, and state its numbers"
+        for n, cutter in tools.items()
+        if cutter.body
+    ]
     return sources, tools
 
 

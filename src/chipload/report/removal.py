@@ -41,7 +41,7 @@ def removal_meshes(result: Result, blanks: Mapping[str, Blank]) -> dict[int, Rem
         path = tool_path(result.tracks[k], blank)
         if path is not None:
             with contextlib.suppress(InputError):
-                out[k] = removal_mesh(blank.mesh, path, blank.cutters)
+                out[k] = removal_mesh(blank.mesh, path, {n: c for n, c in blank.cutters.items() if not c.body})
     return out
 
 

@@ -168,7 +168,11 @@ def with_engine(
     if engine == "layers":
         return setting, None
     fine = setting.resolution
+    bodies = np.isin(program.tool, [n for n, c in setting.cutters.items() if c.body])
     try:
+        if bodies.any():
+            k = int(np.argmax(bodies))
+            raise HandOver(int(program.line[k]), f"tool {int(program.tool[k])} is a body without chips")
         run = run_by_moves(
             program, stock, setting.cutters, fine.step_mm, fine.tolerance, fine.corner_slices, fine.flank_mm
         )

@@ -177,23 +177,33 @@ def in_stock(
     steps : all, or block after block; gone through twice
     points : (p, 3) float [mm] of a grid in the stock
     progress : is told how many steps are done
+
+    A tool that is a body without chips takes the points away at a feed, and runs into them in rapids.
     """
-    cut = LeastDistance({n: cutting_part(c) for n, c in cutters.items()}, points, tolerance, tolerance)
-    hit = LeastDistance({n: above_cutting(c) for n, c in cutters.items()}, points, tolerance, tolerance)
+    parts, bodies = {n: cutting_part(c) for n, c in cutters.items()}, [n for n, c in cutters.items() if c.body]
+    cut = LeastDistance(parts, points, tolerance, tolerance)
+    hits = {ABOVE: LeastDistance({n: above_cutting(c) for n, c in cutters.items()}, points, tolerance, tolerance)}
+    if bodies:
+        hits["cutting part in a rapid"] = LeastDistance(parts, points, tolerance, tolerance)
     for block in blocks_of(steps):
         progress(cut.done)
-        cut.take(block)
-        hit.take(block)
-    bad = (hit.first < cut.first) & (hit.first != NEVER)
-    at, depth = hit.first[bad], hit.distance[bad]
-    best: dict[int, Collision] = {}
-    done = 0
-    for block in blocks_of(steps) if len(at) else ():
-        deepest, own = np.full(len(block), np.inf), (at >= done) & (at < done + len(block))
-        np.minimum.at(deepest, at[own] - done, depth[own])
-        _by_line(block, done, ABOVE, "stock", deepest, tolerance, best)
-        done += len(block)
-    return tuple(best.values())
+        rapid = block.rapid & np.isin(block.tool, bodies)
+        cut.take(block, ~rapid)
+        for what, hit in hits.items():
+            hit.take(block, None if what == ABOVE else rapid)
+    out: list[Collision] = []
+    for what, hit in hits.items():
+        bad = (hit.first < cut.first) & (hit.first != NEVER)
+        at, depth = hit.first[bad], hit.distance[bad]
+        best: dict[int, Collision] = {}
+        done = 0
+        for block in blocks_of(steps) if len(at) else ():
+            deepest, own = np.full(len(block), np.inf), (at >= done) & (at < done + len(block))
+            np.minimum.at(deepest, at[own] - done, depth[own])
+            _by_line(block, done, what, "stock", deepest, tolerance, best)
+            done += len(block)
+        out += best.values()
+    return tuple(out)
 
 
 def _by_line(
