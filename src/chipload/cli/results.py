@@ -59,7 +59,7 @@ def export(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="a new or empty folder for the files")],
     csv: Annotated[bool, typer.Option("--csv", help="history.csv: a row for each step, units in the names")] = False,
     vtk: Annotated[bool, typer.Option("--vtk", help="paths .vtp; chips, maps, stock .vtu; stock .stl")] = False,
-    sheet: Annotated[bool, typer.Option("--sheet", help="setup.pdf and setup.html: one page to print")] = False,
+    sheet: Annotated[bool, typer.Option("--sheet", help="setup.html; with chipload[export] setup.pdf")] = False,
     load_monitor: Annotated[
         str | None,
         typer.Option(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable, Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any
 
@@ -39,7 +40,8 @@ def export_result(
 
     ``csv``: history.csv, a row a step, units in the names of the columns. ``vtk``: the path of each track with all its
     numbers (.vtp), its undeformed chips (.vtu), surface maps with displacements by finite elements (.vtu), the stock
-    that is left (.vtu and .stl). ``sheet``: setup.pdf and setup.html, one page.
+    that is left (.vtu and .stl). ``sheet``: setup.html, one page, and as
+    setup.pdf where ``chipload[export]`` is installed.
     ``monitor``: reference loads for a load monitor, ``csv`` or ``heidenhain``; ``spindle``: the file that tells the
     motor's power.
 
@@ -61,7 +63,9 @@ def export_result(
     if "vtk" in kinds:
         files |= _vtk(result, folder)
     if "sheet" in kinds:
-        files |= {"setup.pdf": lambda: setup_pdf(result), "setup.html": lambda: setup_sheet(result)}
+        files["setup.html"] = lambda: setup_sheet(result)
+        if find_spec("fpdf") is not None:
+            files["setup.pdf"] = lambda: setup_pdf(result)
     if monitor is not None:
         files |= _load_monitor(result, monitor, spindle)
     elif spindle is not None:
