@@ -40,7 +40,12 @@ def clamp_errors(table: SimulationJobTable) -> Iterator[str]:
         for k, mode in enumerate(table.dynamics.mode):
             if mode.of == "workpiece":
                 yield f"dynamics.mode.{k}: of the workpiece: leave it out: workpiece.density_kg_m3 gives its modes"
-    for k, clamp in enumerate(table.workpiece.clamp):
+    yield from wrong_clamps(table.workpiece)
+
+
+def wrong_clamps(table: WorkpieceTable) -> Iterator[str]:
+    """Clamps that state no place, or more than one."""
+    for k, clamp in enumerate(table.clamp):
         key = f"workpiece.clamp.{k}"
         box = (clamp.low_mm is not None, clamp.high_mm is not None)
         point = (clamp.point_mm is not None, clamp.diameter_mm is not None)

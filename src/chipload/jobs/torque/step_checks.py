@@ -18,7 +18,7 @@ from chipload.cutting.material import Material
 from chipload.cutting.strength import cutter_stress
 from chipload.engagement.extent import radial_depth, tooth_feed
 from chipload.jobs.tables import ChecksTable
-from chipload.jobs.torque.cut import Cut
+from chipload.jobs.torque.cut import CutSteps
 from chipload.simulation.chip_space import flute_fill
 from chipload.simulation.loads import at_feeds
 
@@ -54,7 +54,7 @@ class StepChecks:
     overrun: Floats
 
 
-def step_checks(real: Cut, loads: Loads, material: Material, most: float) -> StepChecks:
+def step_checks(real: CutSteps, loads: Loads, material: Material, most: float) -> StepChecks:
     """Steps as they really are.
 
     Parameters
