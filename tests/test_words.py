@@ -115,13 +115,6 @@ def test_no_exception_is_left_over():
     assert STANDARD.keys() <= private()
 
 
-#: class names that two files define; the list only becomes shorter
-SHARED = {
-    "Blank", "Body", "Flow", "Measured", "Region", "Remainder", "Run", "Samples", "Source", "State", "Statement",
-    "ToolPath", "WorkpieceTable", "_Job", "_Model", "_Row",
-}  # fmt: skip
-
-
 def test_a_class_name_stands_for_one_class():
     classes = Counter(name.rsplit(":", 1)[1] for name in names_of_source() if name.startswith("class "))
-    assert {name for name, count in classes.items() if count > 1} == SHARED
+    assert {name for name, count in classes.items() if count > 1} == set()

@@ -65,7 +65,7 @@ def test_every_tool_table_is_read():
         numbers = [int(n) for n in re.findall(r"^T(\d+)", path.read_text(errors="replace"), re.M)]
         for n in set(numbers):
             if numbers.count(n) > 1:
-                with pytest.raises(InputError, match=f"tool {n} stands twice"):
+                with pytest.raises(InputError, match=f"tool {n} appears twice"):
                     read_tool_table(path, n, "mm")
             else:
                 assert read_tool_table(path, n, "mm")["number"] == n

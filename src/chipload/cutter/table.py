@@ -99,7 +99,7 @@ class CutterTable(BaseModel):
             # nothing cuts with it: teeth and modulus have no effect
             sizes = {"diameter_mm": 2.0 * max(r for r, _ in body), "flute_length_mm": body[-1][1]}
             values = {"flutes": 1, "helix_deg": 0.0, "modulus_gpa": 210.0, **sizes, **values}
-        where = f": {self.file} does not say it" if self.file else ""
+        where = f": {self.file} does not state it" if self.file else ""
         missing = [
             f"cutter.{key} is missing{where}: must be given, a cutter is never guessed"
             for key in NEEDED
@@ -158,11 +158,11 @@ class CutterTable(BaseModel):
         if kind in (".json", ".tools"):
             return self._checked(read_fusion_tool(path, self.tool))
         if self.tool is None:
-            raise InputError(f"cutter.tool is missing: {self.file} holds many: say which")
+            raise InputError(f"cutter.tool is missing: {self.file} holds several tools: state which")
         if kind == ".camotics":
             return read_camotics_tool(path, self.tool)
         if self.file_unit is None:
-            raise InputError(f"cutter.file_unit is missing: {self.file} does not say its unit: give mm or inch")
+            raise InputError(f"cutter.file_unit is missing: {self.file} does not state its unit: give mm or inch")
         return dict(read_tool_table(path, self.tool, self.file_unit))
 
     @staticmethod

@@ -161,7 +161,7 @@ def chip_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...
     if thick[k] > chip[1] * (1.0 + 1e-9):
         text = (
             f"chips are up to {thick[k]:.4g} mm thick: the coefficients of {material.name} hold up to {chip[1]:g} mm, "
-            "the loads beyond it are not known"
+            "the loads beyond that are not known"
         )
         out.append(_at_step("chip-beyond-coefficients", columns, k, text))
     thin = np.flatnonzero((thick > 0.0) & (thick < chip[0] * (1.0 - 1e-9)))
@@ -222,7 +222,7 @@ def _rigid(check: LimitCheck) -> LimitCheck:
     if check.state is not Verdict.EXCEEDS:
         return check
     return replace(
-        check, state=Verdict.UNPROVEN, reason="the deflection changes the chip: the rigid model does not hold"
+        check, state=Verdict.UNPROVEN, reason="the deflection changes the chip: the rigid model is not valid"
     )
 
 

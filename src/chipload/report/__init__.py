@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from chipload.lazy import attach
 
 if TYPE_CHECKING:
-    from chipload.report.bodies import Body, scene_bodies
+    from chipload.report.bodies import SceneBody, scene_bodies
     from chipload.report.export import export_result
     from chipload.report.folder import check_target, write_finished, write_result
     from chipload.report.presentation import Blank, Presentation
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Blank",
-    "Body",
     "Colouring",
     "Presentation",
+    "SceneBody",
     "ViewMark",
     "ViewPath",
     "ViewScene",
@@ -37,7 +37,7 @@ __all__ = [
 __getattr__, __dir__ = attach(
     __name__,
     {
-        "bodies": "Body scene_bodies",
+        "bodies": "SceneBody scene_bodies",
         "export": "export_result",
         "folder": "check_target write_finished write_result",
         "presentation": "Blank Presentation",

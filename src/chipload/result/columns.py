@@ -178,7 +178,7 @@ def _by_name(columns: Iterable[Column]) -> Mapping[str, Column]:
     table: dict[str, Column] = {}
     for column in columns:
         if column.name in table:
-            raise ValueError(f"column {column.name}: stands twice in the table of columns")
+            raise ValueError(f"column {column.name}: appears twice in the table of columns")
         if column.unit != unit_of(column.name):
             raise ValueError(f"column {column.name}: unit {column.unit!r} is not that of its name")
         table[column.name] = column

@@ -39,7 +39,7 @@ class Difference:
     Parameters
     ----------
     points : (p, 3) float [mm]; faces : (f, 3) int, triangles of them
-    distance : (p,) float [mm]; inf: more than was looked for
+    distance : (p,) float [mm]; inf: beyond the search range
     step : (p,) int, nearest step; -1: none
     deepest : (n,) float [mm] of each step; inf: far from the part
     search_range : [mm]
@@ -79,7 +79,8 @@ def require_points(mesh: trimesh.Trimesh, spacing: float, name: str) -> None:
     guess = float(np.asarray(mesh.area)) / (0.25 * spacing * spacing) + len(sides)
     if guess > MOST_POINTS:
         raise InputError(
-            f"{name}: spacing_mm = {spacing:g}: gives about {guess:.0g} points, more than {MOST_POINTS}: state more"
+            f"{name}: spacing_mm = {spacing:g}: gives about {guess:.0g} points, more than {MOST_POINTS}: state "
+            "a larger spacing"
         )
 
 

@@ -263,7 +263,8 @@ class LayeredStock:
         count = float(self.thickness[split.start : split.stop].sum()) / layer_mm
         if count > LAYER_LIMIT:
             raise InputError(
-                f"stock.layer_mm = {layer_mm:g}: {count:.4g} layers: must be at most {LAYER_LIMIT}: state thicker ones"
+                f"stock.layer_mm = {layer_mm:g}: {count:.4g} layers: must be at most {LAYER_LIMIT}: state "
+                "thicker layers"
             )
         for i in split:
             parts = math.ceil(self.thickness[i] / layer_mm * (1.0 - 1e-12))

@@ -88,7 +88,7 @@ class Shell:
         if self.thickness > narrow:
             raise InputError(
                 f"shell.thickness = {self.thickness:g} mm: must be at most the least radius {narrow:g}; "
-                "a thin shell is meant (below a tenth of it)"
+                "this is for thin shells (below a tenth of it)"
             )
 
     def radius_at(self, s: ArrayLike) -> Floats:

@@ -51,7 +51,7 @@ def coloured_mesh(left: Difference, span: float) -> trimesh.Trimesh:
     mesh.metadata["legend"] = legend(
         "gouge (below 0) and excess [mm]",
         [(-span, GOUGE), (0.0, DONE), (span, EXCESS)],
-        [("more than was looked for", UNKNOWN)],
+        [("beyond the search range", UNKNOWN)],
     )
     return mesh
 
@@ -79,12 +79,12 @@ def section(
             f"{100.0 * what['part_reached_share']:.3g} % lie within {left.search_range:g} mm of the tool path; over "
             "the others there is more.</p>",
             '<p class="note">On the part in the view above, red is cut too deep, blue stands over the part, in full '
-            f"colour by {span:.3g} mm; pale: more than was looked for.</p>",
+            f"colour by {span:.3g} mm; pale: beyond the search range.</p>",
         ]
     if compared_with:
         body += [
             "<h2>Collisions</h2>",
-            f"<p>Shank and holder were held against {escape(', '.join(compared_with))}: "
+            f"<p>Shank and holder were compared with {escape(', '.join(compared_with))}: "
             f"{len(collisions) or 'no'} line{'s' if len(collisions) != 1 else ''} with a collision.</p>",
         ]
     if collisions:

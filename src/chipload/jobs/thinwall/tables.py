@@ -99,7 +99,7 @@ class WallTable(Table):
     )
 
 
-class WorkpieceTable(Table):
+class WallWorkpieceTable(Table):
     """Material of the wall."""
 
     name: Text
@@ -160,7 +160,7 @@ class ThinWallJobTable(Table):
     """The whole file of a job that cuts a thin wall."""
 
     wall: WallTable
-    workpiece: WorkpieceTable
+    workpiece: WallWorkpieceTable
     machine: SourceTable
     material: SourceTable
     threshold: ThresholdTable | None = None

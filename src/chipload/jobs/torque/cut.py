@@ -33,7 +33,7 @@ from chipload.stock.layers import LayeredStock
 from chipload.stock.rings import Boss, ring_stock
 from chipload.stock.tile_grid import LAYER_LIMIT
 from chipload.structure.beam import compliance
-from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
+from chipload.units import mm_s_from_mm_min, rad_s_from_rpm, rpm_from_rad_s
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -150,7 +150,7 @@ def program_of(job: TorqueJob, machine: Machine, progress: Progress = silent) ->
             progress=progress,
         )  # fmt: skip
         if reading.violations:
-            raise InputError(f"{job.program_file.name}: does not hold: {reading.violations[0]}")
+            raise InputError(f"{job.program_file.name}: exceeds a limit of the machine: {reading.violations[0]}")
         gaps = [f for f in reading.findings if f.severity >= Severity.UNPROVEN]
         if gaps:
             raise InputError(f"{job.program_file.name}: {gaps[0]}: what is not read cannot be controlled")
@@ -163,8 +163,8 @@ def program_of(job: TorqueJob, machine: Machine, progress: Progress = silent) ->
     speeds = np.unique(program.spindle[cuts])
     if len(speeds) != 1 or speeds[0] == 0.0:
         raise InputError(
-            f"program: spindle speeds {', '.join(f'{x:g}' for x in speeds)} rad/s: must be one, not 0: the spindle is "
-            "told from its torque at one speed"
+            f"program: spindle speeds {', '.join(f'{rpm_from_rad_s(x):g}' for x in speeds)} rpm: must be one speed, "
+            "not 0: the torque is estimated at one speed"
         )
     return program
 
@@ -227,7 +227,7 @@ def shell_stock(
     if (high - low) / fine > LAYER_LIMIT:
         raise InputError(
             f"simulation.layer_mm = {fine:g}: {(high - low) / fine:.4g} layers: must be at most {LAYER_LIMIT}: state "
-            "thicker ones"
+            "thicker layers"
         )
     bounds = [np.linspace(lowest, high, max(1, math.ceil((high - lowest) / fine - 1e-9)) + 1)]
     if lowest > low:
@@ -260,7 +260,7 @@ def require_linear(material: Material) -> None:
     if any(material.exponents):
         raise InputError(
             f"material {material.name}: has a size effect: must have none here: the torque is split into a part of the "
-            "edge and one that goes with the feed"
+            "edge and a part proportional to the feed"
         )
     if material.Ktc <= LITTLE_MPA:
         raise InputError(f"material.ktc_mpa = {material.Ktc:g}: must be above {LITTLE_MPA:g}")

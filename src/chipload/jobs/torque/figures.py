@@ -220,7 +220,7 @@ def _estimate(e: SpindleEstimate, outcome: TorqueResult, figures: dict[str, go.F
         ["bandwidth of both [Hz]", f"{e.bandwidth:.3g}"],
         ["resolution: noise, quantisation, idle map [N m]", f"{1e-3 * e.resolution:.3g}"],
         ["share by which the torque constant may be wrong [%]", f"{100.0 * e.constant_error:.3g}"],
-        ["holds for torques from, to [N m]", f"{1e-3 * e.range[0]:.3g}, {1e-3 * e.range[1]:.3g}"],
+        ["valid for torques from, to [N m]", f"{1e-3 * e.range[0]:.3g}, {1e-3 * e.range[1]:.3g}"],
         [f"tooth passing frequency {e.aliased[0]:.4g} Hz, as the readings show it [Hz]", f"{e.aliased[1]:.3g}"],
         ["lighter than this is not trusted: nothing is sped up on it [N m]", f"{1e-3 * e.light:.3g}"],
         ["share of the time in cut that is lighter [%]", f"{100.0 * e.light_share:.3g}"],

@@ -155,8 +155,8 @@ def _wrong_shell(table: TorqueJobTable, shell: ShellTable) -> Iterator[str]:
     least = min(shell.mean_radius_mm, shell.mean_radius_mm + shell.length_mm * math.sin(f))
     if shell.wall_mm > 0.2 * least:
         yield (
-            f"{at}.wall_mm = {shell.wall_mm:g}: must be at most a fifth of the least radius {least:g}: a thin wall "
-            "is meant"
+            f"{at}.wall_mm = {shell.wall_mm:g}: must be at most a fifth of the least radius {least:g}: this job is "
+            "for thin walls"
         )
     if shell.wall_tolerance_mm >= 0.5 * shell.wall_mm:
         yield (

@@ -42,7 +42,7 @@ class ShellProgramTable(Table):
         default_factory=dict,
         description="origins of work offsets in the machine, X Y Z A B C U V W in mm and degrees, as G55 = [80, 0, 0]",
     )
-    tool_comments: bool = Field(True, description="hold the diameters in the program's comments against the cutters")
+    tool_comments: bool = Field(True, description="compare the diameters in the program's comments with the cutters")
 
 
 class RoundTable(Table):

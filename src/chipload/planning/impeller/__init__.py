@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from chipload.planning.impeller.answer import Answer, Unreachable, largest_cutters
     from chipload.planning.impeller.assignment import Changes
     from chipload.planning.impeller.compare import CutterChoice, Partition, cutter_choices
-    from chipload.planning.impeller.costs import ChannelSide, Costs, Measured, Terms
+    from chipload.planning.impeller.costs import ChannelSide, Costs, MeasuredCost, Terms
     from chipload.planning.impeller.covering.covering import Covering
     from chipload.planning.impeller.fillets import with_fillets
     from chipload.planning.impeller.impeller import Impeller
@@ -41,7 +41,7 @@ __all__ = [
     "IndexTable",
     "LineMotion",
     "Link",
-    "Measured",
+    "MeasuredCost",
     "Milling",
     "Partition",
     "Patch",
@@ -65,7 +65,7 @@ __getattr__, __dir__ = attach(
         "answer": "Answer Unreachable largest_cutters",
         "assignment": "Changes",
         "compare": "CutterChoice Partition cutter_choices",
-        "costs": "ChannelSide Costs Measured Terms",
+        "costs": "ChannelSide Costs MeasuredCost Terms",
         "covering.covering": "Covering",
         "fillets": "with_fillets",
         "impeller": "Impeller",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from chipload.lazy import attach
 
 if TYPE_CHECKING:
-    from chipload.planning.thinwall.blank import Blank, FinishSurface
+    from chipload.planning.thinwall.blank import FinishSurface, WallBlank
     from chipload.planning.thinwall.depth import DepthRange, largest_depths
     from chipload.planning.thinwall.experiments import Proposal, propose_cuts
     from chipload.planning.thinwall.force_table import ForceTable, law_on_stock
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from chipload.planning.thinwall.variants import PlannedVariant
 
 __all__ = [
-    "Blank",
     "CutterPose",
     "DepthRange",
     "Experiments",
@@ -34,6 +33,7 @@ __all__ = [
     "PlannedVariant",
     "Proposal",
     "Threshold",
+    "WallBlank",
     "calibrated",
     "largest_depths",
     "law_on_stock",
@@ -47,7 +47,7 @@ __all__ = [
 __getattr__, __dir__ = attach(
     __name__,
     {
-        "blank": "Blank FinishSurface",
+        "blank": "WallBlank FinishSurface",
         "depth": "DepthRange largest_depths",
         "experiments": "Proposal propose_cuts",
         "force_table": "ForceTable law_on_stock",

@@ -59,7 +59,7 @@ class FinishSurface:
 
 
 @dataclass(frozen=True, eq=False)
-class Blank:
+class WallBlank:
     """A wall and its stock.
 
     Parameters

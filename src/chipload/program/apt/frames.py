@@ -97,7 +97,7 @@ class Coordinates:
             return ""
         if self.points_in == "csys":
             return "CSYS: points are brought from its coordinates into the work frame"
-        return "CSYS: points stand as they are, given in the work frame"
+        return "CSYS: points are in the work frame and stay unchanged"
 
     @cached_property
     def _plain(self) -> bool:

@@ -234,7 +234,7 @@ class AptInterpreter:
 
     def _origin(self, record: AptRecord) -> None:
         if any(record.numbers()[:3]):
-            text = f"{record}: is not read: points are taken as they stand"
+            text = f"{record}: is not read: points are taken unchanged"
             self.track.leave_out("apt-origin", record.line, text)
         else:
             self.track.note("apt-unused", record.line, str(record))
@@ -289,7 +289,7 @@ class AptInterpreter:
         at, up = np.array(p), np.array(b)
         stated, turning = track.stated, track.spindle
         if cycle.kind == "TAP" and turning == 0.0:
-            raise record.error("a tap and the spindle stands: SPINDL must come before it")
+            raise record.error("a tap with the spindle at rest: SPINDL must come before it")
         if track.at is not None:
             height = float(np.subtract(track.at, at) @ up)
             if height < cycle.rtrcto - 1e-9 and track.axis == b:
@@ -318,7 +318,7 @@ class AptInterpreter:
         if value < 0.0 or (len(record.args) > 1 and not turns):
             raise record.error("must be a time in s, at least 0, or a number of turns and REV")
         if turns and self.track.spindle == 0.0:
-            raise record.error("turns of the spindle, which stands: SPINDL must come before it")
+            raise record.error("turns of the spindle, which is at rest: SPINDL must come before it")
         self.track.dwell(value * math.tau / abs(self.track.spindle) if turns else value, record.line)
 
     # ------------------------------------------------------------------------------------------------ what holds

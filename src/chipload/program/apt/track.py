@@ -126,7 +126,9 @@ class AptRows:
             value, counts = self.stated[0], self.stated[1]
             if counts == TURN:
                 if self.spindle == 0.0:
-                    raise InputError(f"line {line}: a feed per turn and the spindle stands: SPINDL must come before it")
+                    raise InputError(
+                        f"line {line}: a feed per turn with the spindle at rest: SPINDL must come before it"
+                    )
                 value *= abs(self.spindle) / math.tau
             else:
                 value = mm_s_from_mm_min(value)

@@ -155,7 +155,7 @@ class Fanuc(Dialect):
             raise NotReadError("G5: splines")
         for code in idle:
             if code in (51, 50, 80, 81):
-                c.once("nc-ignored", f"{shown(code)}: look-ahead and smoothing do not concern the path")
+                c.once("nc-ignored", f"{shown(code)}: look-ahead and smoothing do not change the path")
             g.remove(code)
         if idle:
             for letter in "pqr" if not any(x in CYCLES or x in (20, 30) for x in g) else "":

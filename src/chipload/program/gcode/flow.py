@@ -393,7 +393,7 @@ class Flow:
         rest = word.rest
         while rest:
             if not rest.startswith("["):
-                raise InputError(f"{rest[:12]!r}: arguments of a call stand in [ ]")
+                raise InputError(f"{rest[:12]!r}: arguments of a call must be in [ ]")
             value, rest = self._bracket(rest, word)
             arguments.append(value)
         if len(arguments) > LOCAL:

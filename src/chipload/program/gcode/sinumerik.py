@@ -230,7 +230,7 @@ def _letter(block: Block, c: Controller, letter: str, value: float, values: list
 
 def _put(block: Block, letter: str, value: float) -> None:
     if letter in block.words:
-        raise InputError(f"{letter.upper()}: stands twice in one block")
+        raise InputError(f"{letter.upper()}: appears twice in one block")
     block.words[letter] = value
 
 

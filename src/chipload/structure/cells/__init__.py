@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from chipload.structure.cells.clamp import Clamp, clamp_stiffness
     from chipload.structure.cells.followed import FollowedModes, ModesOfStates
     from chipload.structure.cells.grid import CellGrid, grid_over
-    from chipload.structure.cells.moments import Region
+    from chipload.structure.cells.moments import StockRegion
     from chipload.structure.cells.nearest import StockSections
-    from chipload.structure.cells.states import State, StepCompliances, StepLines, step_compliances
+    from chipload.structure.cells.states import RemovalState, StepCompliances, StepLines, step_compliances
     from chipload.structure.cells.stress import greatest_stress
     from chipload.structure.cells.workpiece import CellWorkpiece, Elastic, cell_workpiece
 
@@ -23,10 +23,10 @@ __all__ = [
     "Elastic",
     "FollowedModes",
     "ModesOfStates",
-    "Region",
-    "State",
+    "RemovalState",
     "StepCompliances",
     "StepLines",
+    "StockRegion",
     "StockSections",
     "cell_workpiece",
     "clamp_stiffness",
@@ -41,9 +41,9 @@ __getattr__, __dir__ = attach(
         "clamp": "Clamp clamp_stiffness",
         "followed": "FollowedModes ModesOfStates",
         "grid": "CellGrid grid_over",
-        "moments": "Region",
+        "moments": "StockRegion",
         "nearest": "StockSections",
-        "states": "State StepCompliances StepLines step_compliances",
+        "states": "RemovalState StepCompliances StepLines step_compliances",
         "stress": "greatest_stress",
         "workpiece": "CellWorkpiece Elastic cell_workpiece",
     },

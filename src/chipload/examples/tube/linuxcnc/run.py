@@ -187,7 +187,7 @@ def play(args: argparse.Namespace) -> dict[str, object]:
     (out / "hal.toml").write_text(text)
     job = load_hal(out / "hal.toml")
     if hal_in_use():
-        raise Failed("HAL: a controller runs on this machine already, and there is room for one: end it first")
+        raise Failed("HAL: a controller runs on this machine already, and only one can: end it first")
     killed = None
     with LinuxCNC(result / PROGRAM, lost, seconds) as cnc:
         command = [sys.executable, "-c", "from chipload.cli import main; main()", "hal", str(out / "hal.toml")]
