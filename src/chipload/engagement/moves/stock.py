@@ -33,6 +33,8 @@ Ints = NDArray[np.int64]
 
 #: side of a cell over the smallest cutter radius, and most cells
 CELL, CELLS = 0.1, 4_000_000
+#: least side of a cell over that
+THIN = 0.1
 #: a step is looked at once every so many cutter radii, at its middle at least
 INSTANT = 0.25
 #: instants of a step that is looked at once and does not cut as the one before it, and of one that enters or leaves;
@@ -171,7 +173,8 @@ class MoveStock:
         side = max(CELL * float(self.cutters[:, 8].min()), math.sqrt(size[0] * size[1] / CELLS))
         count = np.maximum(np.ceil(size[:2] / side - 1e-9), 1.0)
         self.shape = count.astype(np.int64)
-        self.grid = np.array([*self.low[:2], *(size[:2] / count)])
+        # of a stock that is thinner than a cell the one cell reaches beyond it: what cutters cover is counted in cells
+        self.grid = np.array([*self.low[:2], *np.maximum(size[:2] / count, THIN * side)])
         cells = int(self.shape.prod())
         self.level = np.empty((cells, 3))
         self.level[:] = (self.high[2], self.high[2], self.low[2])
