@@ -158,7 +158,7 @@ def frozen():
     ],
 )
 def test_pins_that_fail(change, reason):
-    """A current that stays, no current, no speed, an unconnected pin, a current far above the cut: the machine stops, and says why."""
+    """A current that stays or is missing, no speed, an unconnected pin, far too much: the machine stops, says why."""
     found, _ = go(change=change, gone_after=1500)
     assert found.ended == reason
     assert found.column("override")[-1] == 0.0

@@ -343,7 +343,7 @@ def step_points(removal: Removal, program: Program) -> Floats:
     Raises
     ------
     InputError
-        The tip stands.
+        The tip stands still.
     """
     c, own = removal.columns, fed_rows(removal)
     ends = np.column_stack([c[f"{x}_mm"] for x in "xyz"])
@@ -352,7 +352,7 @@ def step_points(removal: Removal, program: Program) -> Floats:
     length = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if (length == 0.0).any():
         line = int(c["line"][own][int(np.argmin(length))])
-        raise InputError(f"line {line}: the tip stands: must move along the path")
+        raise InputError(f"line {line}: the tip stands still: it must move along the path")
     return points
 
 
