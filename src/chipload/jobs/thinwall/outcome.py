@@ -40,6 +40,8 @@ class PassMap:
     u, v : (n,), (m,) their parameters
     depth : (n, m) float [mm]
     threshold : (n, m) float [N], limit over compliance, or calibrated
+    stable : (n, m) float [mm], depth that chatter allows; None: it is not calculated
+    speed : of the spindle [rad/s]; None: that of the operation
     """
 
     side: int
@@ -48,6 +50,8 @@ class PassMap:
     v: Floats
     depth: Floats
     threshold: Floats
+    stable: Floats | None = None
+    speed: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
