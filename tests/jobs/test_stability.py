@@ -417,4 +417,54 @@ def test_teeth_that_are_not_evenly_spaced_have_a_margin_of_their_own(tmp_path):
     assert found["margin_min"] != pytest.approx(library_margin(9000, 1.5), rel=0.05)
     assert found["windows"]
     check = check_of(one, "sle_um")
-    assert (check.state, check.reason) == (Verdict.UNPROVEN, "the teeth of tool 1 are not evenly spaced")
+    assert (check.state, check.reason) == (Verdict.UNPROVEN, "the teeth of tool 1 are not alike")
+
+
+#: two passes along x, the second after a retract: 3 mm deep at half the diameter, then 0.4 of the depth in a full slot
+TWO = (
+    "G21 G90 G94 G17\nT1 M6\nS8000 M3\nG0 X-8 Y20 Z5\nG0 Z-3\nG1 X48 F1200 (side)\nG0 Z5 (up)\nG0 X-8 Y-3\nG0 Z-0.9\n"
+    "G1 X48 (slot)\nG1 Z2\nG0 Z5\nM2\n"
+)
+
+
+def test_speeds_by_zone_change_between_two_passes_and_are_simulated_again(tmp_path):
+    """Where no speed is quiet for both passes the second has an S word of its own in the line that leaves the first."""
+    modes = MODES + MODES.replace("650.0", "450.0").replace("720.0", "480.0")
+    found = {}
+    for by in ("tool", "zone"):
+        (tmp_path / by).mkdir()
+        speeds = f'[operation.speeds]\nby = "{by}"\nleast_rpm = 6000.0\nmost_rpm = 14000.0'
+        found[by] = done(tmp_path / by, text=TWO, modes=modes, limits="stability_margin = 2.0", speeds=speeds)
+    one, two = (found[by].result.operations[0]["speeds"] for by in ("tool", "zone"))
+    assert len(one["tools"]) == 1
+    first, second = two["tools"]
+    assert (first["first_line"], first["last_line"], second["first_line"], second["last_line"]) == (6, 6, 10, 10)
+    new = found["zone"].outcome.speeds.text
+    words = [(w.line, w.rpm) for w in speed_words(new)]
+    assert words == [(3, first["rpm"]), (7, second["rpm"])]
+    strip = re.compile(r" ?[SF][\d.]+")
+    assert strip.sub("", new) == strip.sub("", TWO)
+    # both are simulated from fresh stock: each pass has what was expected, and one of them more than at one speed
+    least = {
+        by: [
+            columns["stability_margin"][(columns["line"] == line) & (columns["chip_pieces"] > 0)].min()
+            for line in (6, 10)
+        ]
+        for by in found
+        for columns in [found[by].result.in_use[0].columns]
+    }
+    assert least["zone"] == pytest.approx([first["margin_expected"], second["margin_expected"]], rel=0.02)
+    gain = np.array(least["zone"]) / least["tool"]
+    assert gain.min() > 0.97
+    assert gain.max() > 1.1
+    columns = found["zone"].result.in_use[0].columns
+    for zone in (first, second):
+        steps = (columns["line"] == zone["first_line"]) & (columns["torque_mean_nm"] > 0.0)
+        speed = columns["power_w"][steps] / columns["torque_mean_nm"][steps] / OMEGA
+        assert speed == pytest.approx(np.full(steps.sum(), zone["rpm"]))
+    assert "lines 10 to 10" in found["zone"].result.note
+
+
+def test_an_s_word_that_holds_in_two_zones_is_named() -> None:
+    with pytest.raises(InputError, match="line 2: has an S word: change it"):
+        with_speeds("G0 X1\nS500 M3", {}, {}, {2: 600.0})

@@ -255,3 +255,71 @@ def with_loss_of_contact(periods, steps, teeth, st, ex, depth, feed, kt, kr, w, 
 
 #: engaged arcs of down milling: a slot, half, a twentieth of the diameter
 SLOT, HALF, THIN = down(1.0), down(0.5), down(0.05)
+
+
+@njit(cache=True)
+def in_time_by_teeth(turns, steps, radii, st, ex, lag, sine, cosine, length, feed, kt, kr, ka, w, z, U, rpm):
+    """Growth per revolution of a free motion in three directions, by discs of the edge and teeth with runout.
+
+    A disc has the outward normal sine u - cosine A, lags behind the tip and cuts from ``st`` to ``ex``. At each step
+    and tooth the surface below is that of the tooth that left least: the nominal chip of m feeds and radii decides
+    which, the motion of both how it changes.
+    """
+    N, M, K = len(radii), len(w), len(sine)
+    dt = 60.0 / (rpm * N) / steps
+    ring = N * steps
+    past = np.zeros((3, ring))
+    q = np.ones(M) * 1e-3
+    v = w * 1e-3
+    size = np.zeros(turns)
+    scale = 0.0
+    r = np.zeros(3)
+    f = np.zeros(3)
+    for p in range(turns):
+        for i in range(ring):
+            for a in range(3):
+                r[a] = (U[a] * q).sum()
+            f[:] = 0.0
+            for j in range(N):
+                for k in range(K):
+                    phi = (((i + 0.5) / steps - j) * TAU / N - lag[k] - st[k]) % TAU + st[k]
+                    if phi >= ex[k]:
+                        continue
+                    s = math.sin(phi)
+                    c = math.cos(phi)
+                    least = 1e300
+                    m = 0
+                    for before in range(1, N + 1):
+                        h = sine[k] * (before * feed * s + radii[j] - radii[(j - before) % N])
+                        if h < least:
+                            least = h
+                            m = before
+                    if least <= 0.0:
+                        continue
+                    at = (i - m * steps) % ring
+                    u = s * (r[0] - past[0, at]) + c * (r[1] - past[1, at])
+                    chip = sine[k] * u - cosine[k] * (r[2] - past[2, at])
+                    across = kr * sine[k] + ka * cosine[k]
+                    f[0] -= length[k] * chip * (kt * c + across * s)
+                    f[1] -= length[k] * chip * (across * c - kt * s)
+                    f[2] += length[k] * chip * (kr * cosine[k] - ka * sine[k])
+            past[:, i] = r
+            for k in range(M):
+                g = (U[:, k] * f).sum() / w[k] ** 2
+                wd = w[k] * math.sqrt(1 - z[k] ** 2)
+                e = math.exp(-z[k] * w[k] * dt)
+                c = math.cos(wd * dt)
+                s = math.sin(wd * dt)
+                a = q[k] - g
+                q[k] = g + e * (a * (c + z[k] * w[k] / wd * s) + v[k] * s / wd)
+                v[k] = e * (v[k] * (c - z[k] * w[k] / wd * s) - a * w[k] ** 2 / wd * s)
+        energy = (q**2 * w**2 + v**2).sum()
+        size[p] = 0.5 * math.log(energy) + scale
+        shrink = 1.0 / math.sqrt(energy)
+        scale -= math.log(shrink)
+        q *= shrink
+        v *= shrink
+        past *= shrink
+    half = turns // 2
+    t = np.arange(turns - half) - 0.5 * (turns - half - 1)
+    return (t * size[half:]).sum() / (t * t).sum()

@@ -172,7 +172,7 @@ def with_runout(bites: ToothEngagement, cutter: Cutter) -> ToothEngagement:
     """
     if cutter.teeth_alike:
         return bites
-    radii, turns = tooth_radii(cutter), _turns(cutter)
+    radii, turns = tooth_radii(cutter), turns_before(cutter)
     sine = bites.slices[bites.slice, 3]
     sizes = np.zeros(len(bites.rows), dtype=np.int64)
     none = np.empty((0, 7))
@@ -190,7 +190,7 @@ def with_runout(bites: ToothEngagement, cutter: Cutter) -> ToothEngagement:
     return ToothEngagement(start, rows, tooth, own, slices, bites.frame)
 
 
-def _turns(cutter: Cutter) -> Floats:
+def turns_before(cutter: Cutter) -> Floats:
     """(N, N) float: of tooth j and m = 1 .. N, the angle of the m pitches before it over 2 pi / N."""
     N = cutter.flutes
     pitch = np.array(cutter.pitch) * N / math.tau if cutter.pitch else np.ones(N)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from chipload.stability.process_damping import ProcessDamping
     from chipload.stability.speeds import QuietSpeeds, SpeedWindow, quiet_speeds
     from chipload.stability.surface_error import location_error
+    from chipload.stability.zones import SpeedZone, speed_zones
 
 __all__ = [
     "CutGroups",
@@ -25,6 +26,7 @@ __all__ = [
     "ProcessDamping",
     "QuietSpeeds",
     "SpeedWindow",
+    "SpeedZone",
     "StabilityChart",
     "StabilityMargins",
     "critical_depth",
@@ -33,6 +35,7 @@ __all__ = [
     "largest_multipliers",
     "location_error",
     "quiet_speeds",
+    "speed_zones",
     "stability_chart",
     "stability_margins",
     "stable_probability",
@@ -51,5 +54,6 @@ __getattr__, __dir__ = attach(
         "probability": "ModeSpread stable_probability variance_shares",
         "process_damping": "ProcessDamping",
         "speeds": "QuietSpeeds SpeedWindow quiet_speeds",
+        "zones": "SpeedZone speed_zones",
     },
 )

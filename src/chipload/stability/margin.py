@@ -8,6 +8,7 @@ At the margin the vector of mu says which mode chatters, its angle at which freq
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -19,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipload.errors import InputError
 from chipload.stability import _kernels
 from chipload.stability.cuts import DynamicCuts
-from chipload.stability.variable_pitch import revolution_multipliers
+from chipload.stability.delays import several_multipliers
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +34,7 @@ FINER = (15.0, 25.0)
 SPARE, STILL = 24, 1e-4
 #: the same where values are printed
 SPARE_EXACT, STILL_EXACT = 60, 1e-10
-#: how far the margin of teeth that are not evenly spaced is closed in
+#: how far the margin of several delays or three directions is closed in
 CLOSED = 2e-3
 #: cuts that one thread takes at once, and most threads
 CHUNK, MOST_THREADS = 32, 8
@@ -69,7 +70,7 @@ def largest_multipliers(
     still: float = STILL_EXACT,
 ) -> NDArray[np.complex128]:
     """Multiplier of greatest modulus of each cut, of a pair the one above the real axis, (n,) complex; of a tooth
-    period, or of a revolution where teeth are not evenly spaced.
+    period, or of a revolution where teeth are not alike.
 
     Parameters
     ----------
@@ -85,8 +86,8 @@ def largest_multipliers(
     """
     factor = np.array(np.broadcast_to(np.asarray(gain, dtype=np.float64), (len(cuts),)))
     dimension = 2 * len(cuts.damping) + SPARE_EXACT if most is None else most
-    if cuts.pitches:
-        found = revolution_multipliers(cuts, factor, per_wave, dimension, still, shared)
+    if cuts.several:
+        found = several_multipliers(cuts, factor, per_wave, dimension, still, shared)
         return np.asarray(found[:, 0] * np.exp(1j * found[:, 1]))
     out = np.zeros((len(cuts), 3))
     pitch = np.full(len(cuts), cuts.pitch)
@@ -113,8 +114,8 @@ def stability_margins(cuts: DynamicCuts) -> StabilityMargins:
     InputError
         An eigenvalue was not found in the finest cells either.
     """
-    if cuts.pitches:
-        return _revolution_margins(cuts)
+    if cuts.several:
+        return _several_margins(cuts)
     out = np.full((len(cuts), 5), -1.0)
     for per_wave in (PER_WAVE, *FINER):
         lost = np.flatnonzero(~(out[:, 0] >= 0.0))
@@ -126,14 +127,14 @@ def stability_margins(cuts: DynamicCuts) -> StabilityMargins:
     return StabilityMargins(out[:, 0], out[:, 1], out[:, 2].astype(np.int64), out[:, 3])
 
 
-def _revolution_margins(cuts: DynamicCuts) -> StabilityMargins:
-    """Of teeth that are not evenly spaced: all cuts together from gain to gain, then by bisection and regula falsi."""
-    n, teeth = len(cuts), len(cuts.pitches)
+def _several_margins(cuts: DynamicCuts) -> StabilityMargins:
+    """Of several delays or three directions: all cuts together from gain to gain, then bisection and regula falsi."""
+    n, teeth = len(cuts), round(math.tau / cuts.pitch) if cuts.uneven else 1
     most = 2 * len(cuts.damping) + SPARE
     last = np.zeros((n, 4))
 
     def growth(which: NDArray[np.int64], gain: Floats) -> Floats:
-        last[which] = revolution_multipliers(cuts.chosen(which), gain, PER_WAVE, most, STILL, shared)
+        last[which] = several_multipliers(cuts.chosen(which), gain, PER_WAVE, most, STILL, shared)
         return np.asarray(np.log(np.maximum(last[which, 0], _kernels.TINY)) / teeth)
 
     every = np.arange(n)

@@ -1,11 +1,11 @@
 """Modes of cutter and workpiece at the cut.
 
 Notation: f natural frequency [Hz], w = 2 pi f, z damping ratio, k modal stiffness [N/mm], m = k / w^2 modal mass [t];
-a unit direction in the machine's x and y; U = direction / sqrt(m), so that r = U q with q'' + 2 z w q' + w^2 q = U^T F
-for the displacement r of the cutter from the work under the force F on the cutter. A mode of the workpiece enters in
-the same way: cutter and work part by the sum of both.
+a unit direction in the machine's x and y, or x, y and z; U = direction / sqrt(m), so that r = U q with
+q'' + 2 z w q' + w^2 q = U^T F for the displacement r of the cutter from the work under the force F on the cutter. A
+mode of the workpiece enters in the same way: cutter and work part by the sum of both.
 
-The axial motion is taken as rigid.
+With directions in x and y alone the axial motion is taken as rigid.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Modes:
     frequency : (M,) float [Hz]
     damping : (M,) float, damping ratio
     stiffness : (M,) float [N/mm], modal stiffness at the tip
-    direction : (M, 2) float, in x and y of the machine; made unit vectors
+    direction : (M, 2) float, in x and y of the machine, or (M, 3) in x, y and z; made unit vectors
 
     Raises
     ------
@@ -64,9 +64,11 @@ class Modes:
             value.setflags(write=False)
             object.__setattr__(self, name, value)
         direction = np.array(self.direction, dtype=np.float64)
-        if direction.shape != (len(self), 2):
-            raise InputError(f"modes.direction of shape {direction.shape}: must be ({len(self)}, 2)")
-        size = np.hypot(direction[:, 0], direction[:, 1])
+        if direction.shape not in ((len(self), 2), (len(self), 3)):
+            raise InputError(
+                f"modes.direction of shape {direction.shape}: must be ({len(self)}, 2) or ({len(self)}, 3)"
+            )
+        size = np.linalg.norm(direction, axis=1)
         if not (np.isfinite(size) & (size > 0.0)).all():
             raise InputError("modes.direction: must be finite and not 0")
         direction /= size[:, None]
@@ -86,13 +88,28 @@ class Modes:
         """(M,) modal masses [t]."""
         return np.asarray(self.stiffness / self.omega**2)
 
-    def in_frames(self, T: ArrayLike, n: ArrayLike) -> Floats:
-        """U (c, 2, M) of cuts whose T and n are given as (c, 2) in x and y of the machine [1/sqrt(t)]."""
-        axes = np.stack([np.asarray(T, dtype=np.float64), np.asarray(n, dtype=np.float64)], axis=1)
-        return np.ascontiguousarray(np.einsum("caj,kj->cak", axes, self.direction) / np.sqrt(self.mass))
+    @property
+    def axial(self) -> bool:
+        """Whether a mode moves along z."""
+        return self.direction.shape[1] == 3 and bool(self.direction[:, 2].any())
+
+    def in_frames(self, T: ArrayLike, n: ArrayLike, A: ArrayLike | None = None, *, directions: int = 2) -> Floats:
+        """U (c, 2, M) of cuts whose T and n are given as (c, 2) or (c, 3) in axes of the machine [1/sqrt(t)].
+
+        Parameters
+        ----------
+        A : (c, 3), axis of the cutter; None: z
+        directions : 3: U (c, 3, M), along T, n and A
+        """
+        each = [np.asarray(x, dtype=np.float64) for x in (T, n)]
+        if directions == 3:
+            each.append(np.tile([0.0, 0.0, 1.0], (len(each[0]), 1)) if A is None else np.asarray(A, dtype=np.float64))
+        each = [np.pad(x, ((0, 0), (0, 3 - x.shape[1]))) for x in each]
+        own = np.pad(self.direction, ((0, 0), (0, 3 - self.direction.shape[1])))
+        return np.ascontiguousarray(np.einsum("caj,kj->cak", np.stack(each, axis=1), own) / np.sqrt(self.mass))
 
     def receptance(self, omega: ArrayLike) -> NDArray[np.complex128]:
-        """(.., 2, 2) displacement in x and y per force at angular frequencies [rad/s], [mm/N]."""
+        """(.., 2, 2), or (.., 3, 3) with z, displacement per force at angular frequencies [rad/s], [mm/N]."""
         w = np.asarray(omega, dtype=np.float64)[..., None]
         share = 1.0 / (self.omega**2 - w**2 + 2j * self.damping * self.omega * w)
         shape = self.direction.T / np.sqrt(self.mass)

@@ -66,6 +66,6 @@ class ProcessDamping:
         per_edge = np.divide(
             0.5 * self.indentation * self.wear_land**2 * sine, radius, out=np.zeros(len(own)), where=radius > 0.0
         )
-        out = rows.copy()
+        out = rows[:, :11].copy()
         out[:, 5], out[:, 6], out[:, 7] = self.friction * per_edge, per_edge * sine, 0.0
         return out

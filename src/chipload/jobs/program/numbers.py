@@ -20,7 +20,14 @@ def speed_numbers(
         "time_before_s": speeds.seconds_before,
         "time_after_s": time_s,
         "tools": [
-            {"tool": t.tool, "before_rpm": list(t.before), "rpm": t.rpm, "margin_expected": t.margin}
+            {
+                "tool": t.tool,
+                "first_line": t.lines[0],
+                "last_line": t.lines[1],
+                "before_rpm": list(t.before),
+                "rpm": t.rpm,
+                "margin_expected": t.margin,
+            }
             for t in speeds.tools
         ],
         "before": {key: before[key] for key in keys},

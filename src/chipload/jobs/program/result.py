@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 from chipload.errors import Finding, Severity
@@ -36,7 +37,11 @@ def result_of(program: ProgramResult) -> Result:
         tracks: tuple[Track, ...] = changed_tracks(
             program, simulation, own, name, "gouge_mm", "excess_mm", "form_error_um", stability=own.stability
         )
-        tools = "; ".join(f"tool {t.tool} {t.rpm:g} rpm" for t in own.tools)
+        count = Counter(t.tool for t in own.tools)
+        tools = "; ".join(
+            f"tool {t.tool} {f'in lines {t.lines[0]} to {t.lines[1]} ' if count[t.tool] > 1 else ''}{t.rpm:g} rpm"
+            for t in own.tools
+        )
         note = f"The program takes {time_s:.4g} s, before {own.seconds_before:.4g} s; {tools}."
         return program_result("program", program, tracks, numbers, note)
     return program_result("program", program, (_track(program),), numbers)

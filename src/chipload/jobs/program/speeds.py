@@ -1,8 +1,9 @@
 """New spindle speeds for a program that exists: from the margins of its steps to its own text with other S words.
 
 One speed a tool, the one with the greatest least margin of those cuts of the tool that are nearest to chatter or
-longest in cut. The feed per tooth stays. The new text is read again, and motion by motion it must be the old program at
-the wanted speeds and feeds; what then holds is said by simulating it from fresh stock, which is done by the caller.
+longest in cut; or one a zone, see :mod:`chipload.jobs.program.zones`. The feed per tooth stays. The new text is read
+again, and motion by motion it must be the old program at the wanted speeds and feeds; what then holds is said by
+simulating it from fresh stock, which is done by the caller.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from chipload.cutting.material import Material
 from chipload.errors import InputError
 from chipload.jobs.checks import CHECK_COLUMNS, with_checks
+from chipload.jobs.program.zones import row_speeds, zone_speeds
 from chipload.jobs.simulation.job import ProgramJob
 from chipload.jobs.simulation.outcome import SpeedResult, ToolSpeed
 from chipload.jobs.simulation.preparation import resolution_of, timed
@@ -89,11 +91,18 @@ def new_speeds(
     )  # fmt: skip
     before = with_columns(before, (*watched(gives), *CHECK_COLUMNS, *stability.columns))
     found = stability_of(job, stability, machine)
-    tools = _advised(found, reading.program)
-    new = _new_text(text, reading.program, {t.tool: t.rpm for t in tools})
+    table = stated(op.speeds, "operation.0.speeds")
+    tools: list[tuple[ToolSpeed, int]] = []
+    for one in _advised(found, reading.program):
+        zones = zone_speeds(found, reading.program, before.columns, one.tool) if table.by == "zone" else ()
+        tools += zones if len(zones) > 1 else [(one, one.lines[0])]
+    tools.sort(key=lambda zone: zone[0].lines)
+    words = np.array([w.line for w in speed_words(text)], dtype=np.int64)
+    wanted, added = row_speeds(reading.program, tools, words)
+    new = _new_text(text, reading.program, wanted, added)
     after = read(read_as(new))
-    _same(reading.program, after.program, {t.tool: t.rpm for t in tools})
-    return SpeedResult(new, dialect, before, seconds, tools, found), after
+    _same(reading.program, after.program, wanted)
+    return SpeedResult(new, dialect, before, seconds, tuple(t for t, _ in tools), found), after
 
 
 def _advised(stability: StabilityResult, program: Program) -> tuple[ToolSpeed, ...]:
@@ -112,52 +121,60 @@ def _advised(stability: StabilityResult, program: Program) -> tuple[ToolSpeed, .
         if len(own) == 1 and present >= stability.wanted and margin <= present + GAIN:
             rpm, margin = rpm_from_rad_s(float(own[0])), present
         before = tuple(round(rpm_from_rad_s(float(x)), 6) for x in own)
-        out.append(ToolSpeed(tool, before, rpm, margin))
+        line = program.line[moving]
+        out.append(ToolSpeed(tool, before, rpm, margin, (int(line.min()), int(line.max()))))
     return tuple(out)
 
 
-def _new_text(text: str, program: Program, wanted: Mapping[int, float]) -> str:
-    """The text with the wanted speeds [1/min] of tools."""
-    words = speed_words(text)
-    starts = np.array([w.line for w in words], dtype=np.int64)
+def _new_text(text: str, program: Program, wanted: Floats, added: Mapping[int, float]) -> str:
+    """The text with the wanted speeds of its rows (n,) [rad/s], NaN where they stay, and ``added`` S words by line."""
+    old = speed_words(text)
+    starts = np.array(sorted({w.line for w in old} | set(added)), dtype=np.int64)
     cuts = (program.motion != RAPID) & (program.motion != DWELL) & (program.spindle != 0.0)
     under = np.searchsorted(starts, program.line, side="right") - 1
+    changed = cuts & ~np.isnan(wanted)
     speeds: dict[int, float] = {}
-    for k, word in enumerate(words):
-        tools = set(program.tool[cuts & (under == k)].tolist())
-        if not tools & set(wanted):
+    for word in old:
+        own = cuts & (under == int(np.searchsorted(starts, word.line)))
+        if not (own & changed).any():
             continue
+        new = np.unique(np.where(np.isnan(wanted[own]), np.abs(program.spindle[own]), wanted[own]))
+        tools = np.unique(program.tool[own])
         if len(tools) > 1:
-            named = ", ".join(map(str, sorted(tools)))
+            named = ", ".join(map(str, tools.tolist()))
             raise InputError(
                 f"line {word.line}: S{word.rpm:g} holds for tools {named}: write an S word behind each tool change"
             )
-        speeds[word.line] = wanted[tools.pop()]
-    lost = cuts & (under < 0) & np.isin(program.tool, list(wanted))
-    if lost.any():
-        raise InputError(f"line {program.line[lost][0]}: cuts at a speed that no S word above it states")
+        if len(new) > 1:
+            raise InputError(
+                f"line {word.line}: S{word.rpm:g} holds in two zones of tool {tools[0]}: write an S word between them"
+            )
+        speeds[word.line] = round(rpm_from_rad_s(float(new[0])), 6)
+    if (changed & (under < 0)).any():
+        raise InputError(
+            f"line {program.line[changed & (under < 0)][0]}: cuts at a speed that no S word above it states"
+        )
     feeds: dict[int, float] = {}
     for row in np.flatnonzero((program.motion != RAPID) & (program.motion != DWELL)).tolist():
-        line, tool = int(program.line[row]), int(program.tool[row])
-        old = abs(rpm_from_rad_s(float(program.spindle[row])))
-        factor = wanted[tool] / old if tool in wanted and old > 0.0 else 1.0
+        line, speed = int(program.line[row]), abs(float(program.spindle[row]))
+        factor = float(wanted[row]) / speed if not np.isnan(wanted[row]) and speed > 0.0 else 1.0
         if feeds.setdefault(line, factor) != factor:
             raise InputError(f"line {line}: moves at two speeds: write them on lines of their own")
-    return with_speeds(text, speeds, {line: 1.0 if abs(f - 1.0) < 1e-9 else f for line, f in feeds.items()})
+    scaled = {line: 1.0 if abs(f - 1.0) < 1e-9 else f for line, f in feeds.items()}
+    return with_speeds(text, speeds, scaled, added)
 
 
-def _same(old: Program, new: Program, wanted: Mapping[int, float]) -> None:
+def _same(old: Program, new: Program, wanted: Floats) -> None:
     """Refuse a new text that is not the old program at the wanted speeds and with its feed per tooth."""
     wrong, at = len(old) != len(new), 0
     if not wrong:
         off = differing(old, new, "motion", "p_work", "axis", "centre", "normal", "turns", "tool", "line")
         moves = (old.motion != RAPID) & (old.motion != DWELL)
+        own = moves & (old.spindle != 0.0) & ~np.isnan(wanted)
         factor = np.ones(len(old))
-        for tool, rpm in wanted.items():
-            own = moves & (old.tool == tool) & (old.spindle != 0.0)
-            speed = np.sign(old.spindle[own]) * rpm / rpm_from_rad_s(1.0)
-            off[own] |= np.abs(new.spindle[own] - speed) > 1e-9 * np.abs(speed)
-            factor[own] = np.abs(speed / old.spindle[own])
+        speed = np.sign(old.spindle[own]) * wanted[own]
+        off[own] |= np.abs(new.spindle[own] - speed) > 1e-9 * np.abs(speed)
+        factor[own] = np.abs(speed / old.spindle[own])
         rounded = 1.01 * 10.0 ** (1 - DIGITS)
         feed = old.feed * factor
         off |= moves & ((new.feed > feed * (1.0 + 1e-9)) | (new.feed < feed * (1.0 - rounded)))

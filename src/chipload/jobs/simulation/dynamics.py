@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from pydantic import ValidationError
 
 from chipload.cutter.cutter import Cutter
@@ -27,7 +28,7 @@ from chipload.stability.process_damping import ProcessDamping
 PER_UM, PER_KG = 1000.0, 1e-3
 #: largest file of modes [bytes]
 LARGEST_FILE = 1_000_000
-DIRECTIONS = {"x": (1.0, 0.0), "y": (0.0, 1.0)}
+DIRECTIONS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,10 +151,13 @@ def read_modes(path: Path) -> tuple[ModeTable, ...]:
 
 
 def _modes(some: Iterable[tuple[int, ModeTable, float]]) -> Modes:
+    """Modes with directions in x, y and z where one moves along z, else in x and y."""
     rows = list(some)
+    stated = [DIRECTIONS[m.direction] if isinstance(m.direction, str) else m.direction for _, m, _ in rows]
+    direction = np.array([(*d, 0.0)[:3] for d in stated])
     return Modes(
         frequency=[m.frequency_hz for _, m, _ in rows],  # type: ignore[arg-type]
         damping=[m.damping_ratio for _, m, _ in rows],  # type: ignore[arg-type]
         stiffness=[k for _, _, k in rows],  # type: ignore[arg-type]
-        direction=[DIRECTIONS[m.direction] if isinstance(m.direction, str) else m.direction for _, m, _ in rows],  # type: ignore[arg-type]
+        direction=direction if direction[:, 2].any() else direction[:, :2],
     )

@@ -13,7 +13,9 @@ def _direction(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
-Direction = Annotated[Literal["x", "y"] | tuple[Number, Number], BeforeValidator(_direction)]
+Direction = Annotated[
+    Literal["x", "y", "z"] | tuple[Number, Number] | tuple[Number, Number, Number], BeforeValidator(_direction)
+]
 
 
 class ModeTable(Table):
@@ -25,7 +27,7 @@ class ModeTable(Table):
     damping_ratio: Positive | None = Field(None, lt=1.0, description="not stated: stability is unproven")
     stiffness_n_um: Positive | None = Field(None, description="modal stiffness")
     mass_kg: Positive | None = Field(None, description="modal mass, in place of stiffness_n_um")
-    direction: Direction = Field(description="x, y or [x, y] of the machine")
+    direction: Direction = Field(description="x, y, z, [x, y] or [x, y, z] of the machine")
 
 
 class ProcessDampingTable(Table):
@@ -58,7 +60,11 @@ class ModesFileTable(Table):
 
 
 class SpeedsTable(Table):
-    """New spindle speeds, one a tool, with the greatest stability margin; the feed per tooth stays."""
+    """New spindle speeds with the greatest stability margin, one a tool or one a zone; the feed per tooth stays."""
 
+    by: Literal["tool", "zone"] = Field(
+        "tool", description="zone: where one speed is not quiet for all passes of a tool, it changes between passes, "
+        "out of the material",
+    )  # fmt: skip
     least_rpm: Positive | None = Field(None, description="none: that of the machine")
     most_rpm: Positive | None = Field(None, description="none: that of the machine")

@@ -107,12 +107,16 @@ class ChangedText:
 
 @dataclass(frozen=True)
 class ToolSpeed:
-    """A new spindle speed of a tool [1/min], and the least margin that its steps are expected to have with it."""
+    """A new spindle speed of a tool [1/min], and the least margin that its steps are expected to have with it.
+
+    ``lines`` are the first and the last line that cut at it.
+    """
 
     tool: int
     before: tuple[float, ...]
     rpm: float
     margin: float
+    lines: tuple[int, int]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,8 @@
 """Stability of a simulated program: the margin of every step, its limit, quiet speeds, numbers.
 
-Steps that cut alike are asked once, see :mod:`chipload.stability.grouping`. Runout is left out; thrust is rigid; modes
-have directions in the machine, so that a cutter that leans is not known. The margin has the error of the map and that
-of the force by the resolution of the simulation.
+Steps that cut alike are asked once, see :mod:`chipload.stability.grouping`. Thrust is rigid unless a mode moves along
+z; modes have directions in the machine, so that a cutter that leans is not known. The margin has the error of the map
+and that of the force by the resolution of the simulation.
 """
 
 from __future__ import annotations
@@ -198,7 +198,12 @@ def stability_limits(
             why = f"material {stability.watch.material.name} has a size effect"
         uneven = [t for t in np.unique(np.asarray(columns["tool"])[cutting]).tolist() if stability.watch.uneven(int(t))]
         if name == "sle_um" and uneven:
-            why = f"the teeth of tool {int(uneven[0])} are not evenly spaced"
+            why = f"the teeth of tool {int(uneven[0])} are not alike"
+        spatial = [
+            t for t in np.unique(np.asarray(columns["tool"])[cutting]).tolist() if stability.watch.spatial(int(t))
+        ]
+        if name == "sle_um" and spatial and not uneven:
+            why = f"tool {int(spatial[0])} and workpiece move along the axis"
         rows = cutting if name == "sle_um" else margin > 0.0
         known = 0.0 if name == PROBABILITY else error
         out.append(check_limit(name, limit, columns, track=track, rows=rows, error=known, reason=why))

@@ -57,17 +57,24 @@ def stability_sections(
     if process is not None:
         land = f"wear land {process.wear_land:g} mm, {process.indentation:g} N/mm3, friction {process.friction:g}"
         rows.append(["process damping is counted", land])
+    axial = "The axial direction is rigid"
+    if stability.watch.spatial(int(what["tool"])):
+        axial = "Cutter and workpiece move along the axis as well"
     body += [
         '<p class="note">The margin is the factor on the cutting force at which a step begins to chatter; below 1 it '
-        f"chatters. Runout is left out, the axial direction is rigid{left_out}.</p>",
+        f"chatters. {axial}{left_out}.</p>",
         table(["", ""], rows),
     ]
     if speeds is not None:
         told = [
-            [str(t.tool), ", ".join(f"{x:.6g}" for x in t.before), f"{t.rpm:.6g}", f"{t.margin:.3g}"]
+            [
+                str(t.tool), f"{t.lines[0]} to {t.lines[1]}", ", ".join(f"{x:.6g}" for x in t.before), f"{t.rpm:.6g}",
+                f"{t.margin:.3g}",
+            ]
             for t in speeds.tools
-        ]
-        body += ["<h3>New speeds</h3>", table(["tool", "before [rpm]", "new [rpm]", "margin expected"], told)]
+        ]  # fmt: skip
+        head = ["tool", "lines", "before [rpm]", "new [rpm]", "margin expected"]
+        body += ["<h3>New speeds</h3>", table(head, told)]
     if what["windows"]:
         cells = [[f"{w['low_rpm']:.5g}", f"{w['high_rpm']:.5g}", f"{w['margin']:.3g}"] for w in what["windows"]]
         head = ["from [rpm]", "to [rpm]", "greatest margin"]

@@ -10,21 +10,29 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
 from chipload.stability.cuts import DynamicCuts, joined
 from chipload.stock.shapes import read_shapes, shape_bytes
 
-KIND = "chipload different cuts of a simulation 2"
+KIND = "chipload different cuts of a simulation 3"
 #: arrays of the file with their numbers of dimensions
 ARRAYS = {
     "tools": 1, "counts": 1, "pitch": 1, "leaning": 1, "keys": 1, "key_ends": 1, "values": 2, "sizes": 1, "rows": 2,
     "damped": 2, "period": 1, "damping": 1, "modes": 1, "omega": 1, "U": 1, "first_steps": 1, "first_margins": 1,
-    "teeth": 1, "pitches": 1,
+    "teeth": 1, "pitches": 1, "directions": 1, "delay": 1,
 }  # fmt: skip
 
+#: columns of rows with three directions, the most
+WIDTH = 13
+
 Known = dict[int, dict[bytes, tuple[float, ...]]]
+
+
+def _wide(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rows (b, :data:`WIDTH`), with columns of 0 where they have less."""
+    return np.pad(rows, ((0, 0), (0, WIDTH - rows.shape[1])))
 
 
 def asked_bytes(
@@ -57,7 +65,11 @@ def asked_bytes(
         "key_ends": np.cumsum([len(key) for key in keys], dtype=np.int64),
         "values": np.array(values).reshape(len(keys), columns),
         "sizes": np.concatenate([np.diff(c.start) for c in whole.values()]) if whole else none.astype(np.int64),
-        "rows": np.concatenate([c.rows for c in whole.values()]) if whole else none.reshape(0, 11),
+        "rows": np.concatenate([_wide(c.rows) for c in whole.values()]) if whole else none.reshape(0, WIDTH),
+        "directions": np.array([c.U.shape[1] for c in whole.values()], dtype=np.int64),
+        "delay": np.concatenate([c.delay if len(c.delay) else np.zeros(len(c.rows)) for c in whole.values()])
+        if whole
+        else none,
         "damped": np.concatenate([c.damped for c in whole.values()]) if whole else none.reshape(0, 11),
         "period": np.concatenate([c.period for c in whole.values()]) if whole else none,
         "damping": np.concatenate([c.damping for c in whole.values()]) if whole else none,
@@ -96,7 +108,12 @@ def read_asked(
         and len(a["damped"]) in (0, len(a["rows"]))
         and ends[-1] == len(keys)
         and numbers.sum() == len(a["damping"])
-        and 2 * len(a["omega"]) == len(a["U"]) == 2 * int((a["counts"] * numbers).sum())
+        and len(a["directions"]) == len(tools)
+        and np.isin(a["directions"], (2, 3)).all()
+        and len(a["omega"]) == int((a["counts"] * numbers).sum())
+        and len(a["U"]) == int((a["counts"] * numbers * a["directions"]).sum())
+        and a["rows"].shape[1] == WIDTH
+        and len(a["delay"]) == len(a["rows"])
         and len(a["first_steps"]) == len(a["first_margins"])
         and len(a["teeth"]) == len(tools)
         and a["teeth"].sum() == len(a["pitches"])
@@ -105,20 +122,22 @@ def read_asked(
         raise InputError(f"{path}: damaged: remove its folder")
     known: Known = {}
     cuts: dict[int, list[DynamicCuts]] = {}
-    first, row, at, mode, tooth = 0, 0, 0, 0, 0
-    each = zip(tools, a["counts"].tolist(), numbers.tolist(), a["pitch"].tolist(), a["teeth"].tolist(), strict=True)
-    for tool, n, m, pitch, teeth in each:
+    first, row, at, mode, tooth, shape = 0, 0, 0, 0, 0, 0
+    each = zip(*(a[x].tolist() for x in ("tools", "counts", "modes", "pitch", "teeth", "directions")), strict=True)
+    for tool, n, m, pitch, teeth, d in each:
         own = slice(first, first + n)
         start = np.concatenate([[0], np.cumsum(sizes[own])])
-        omega, U = a["omega"][at : at + n * m].reshape(n, m), a["U"][2 * at : 2 * (at + n * m)].reshape(n, 2, m)
+        omega, U = a["omega"][at : at + n * m].reshape(n, m), a["U"][shape : shape + n * d * m].reshape(n, d, m)
+        stop = row + int(start[-1])
+        delay, rows = a["delay"][row:stop], np.ascontiguousarray(a["rows"][row:stop, : WIDTH if d == 3 else WIDTH - 2])
         some = DynamicCuts(
-            start, a["rows"][row : row + int(start[-1])], np.asarray(exponents, dtype=np.float64), a["period"][own],
-            pitch, a["damping"][mode : mode + m], omega, U, a["damped"][row : row + int(start[-1])],
-            tuple(a["pitches"][tooth : tooth + teeth].tolist()),
+            start, rows, np.asarray(exponents, dtype=np.float64), a["period"][own],
+            pitch, a["damping"][mode : mode + m], omega, U, a["damped"][row:stop],
+            tuple(a["pitches"][tooth : tooth + teeth].tolist()), delay if delay.any() else np.zeros(0),
         )  # fmt: skip
         values = [tuple(v) for v in a["values"][own].tolist()]
         known[tool] = dict(zip([keys[ends[k] : ends[k + 1]] for k in range(first, first + n)], values, strict=True))
         cuts[tool] = [some]
-        first, row, at, mode, tooth = first + n, row + int(start[-1]), at + n * m, mode + m, tooth + teeth
+        first, row, at, mode, tooth, shape = first + n, stop, at + n * m, mode + m, tooth + teeth, shape + n * d * m
     margins = dict(zip(a["first_steps"].tolist(), a["first_margins"].tolist(), strict=True))
     return known, cuts, {int(tool) for tool in a["leaning"].tolist()}, margins

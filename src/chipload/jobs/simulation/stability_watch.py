@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.jobs.simulation.dynamics import Dynamics
 from chipload.jobs.simulation.stability_state import asked_bytes, read_asked
@@ -22,6 +23,7 @@ from chipload.simulation.loads import Cuts
 from chipload.stability.cuts import DynamicCuts, dynamic_cuts, joined
 from chipload.stability.grouping import grouped
 from chipload.stability.margin import stability_margins
+from chipload.stability.modes import Modes
 from chipload.stability.probability import stable_probability
 from chipload.stability.surface_error import force_rows, wall_errors
 from chipload.structure.cells.followed import FollowedModes
@@ -36,7 +38,7 @@ PROBABILITY = "stable_probability"
 UPRIGHT = 1.0 - 1e-9
 #: cuts of a tool that speeds are looked for with: those nearest to chatter, and those with most edge in cut
 NEAREST, LARGEST = 12, 12
-#: the same of a cutter whose teeth are not evenly spaced, of which each takes some times as long
+#: the same of a cutter whose teeth are not alike, of which each takes some times as long
 UNEVEN = (4, 2)
 
 
@@ -50,6 +52,8 @@ class StabilityWatch:
     material : whose coefficients count
     workpiece : modes of the workpiece in the state of each step; None: none are known
     first_margin : of the steps so far, their margin with the modes that the workpiece has before its first cut
+    known : columns of the different cuts of each tool by what they cut, in the order of ``cuts``
+    cut_of, numbers_of : by tool, steps and the numbers of their cuts; and these numbers by what is cut
     """
 
     dynamics: Dynamics
@@ -59,6 +63,8 @@ class StabilityWatch:
     known: dict[int, dict[bytes, tuple[float, ...]]] = field(default_factory=dict)
     cuts: dict[int, list[DynamicCuts]] = field(default_factory=dict)
     leaning: set[int] = field(default_factory=set)
+    cut_of: dict[int, list[tuple[NDArray[np.int64], NDArray[np.int64]]]] = field(default_factory=dict)
+    numbers_of: dict[int, dict[bytes, int]] = field(default_factory=dict)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -73,7 +79,7 @@ class StabilityWatch:
         if not upright:
             self.leaning.add(cuts.tool)
         if (modes is not None or self.follows) and upright and len(cuts):
-            groups = grouped(cuts.plain, cuts.spindle, any(self.material.exponents))
+            groups = grouped(cuts.plain, cuts.spindle, any(self.material.exponents) or runs_out(cuts.cutter))
             key = groups.key
             if self.follows:  # each step has modes of its own
                 key = tuple(own + step.tobytes() for own, step in zip(key, np.asarray(cuts.step), strict=True))
@@ -83,7 +89,7 @@ class StabilityWatch:
                 at = np.array(sorted(new.values()))
                 whole = dynamic_cuts(
                     groups.engagement, cuts.cutter, self.material, modes, cuts.spindle, groups.T, groups.n,
-                    self.dynamics.process,
+                    self.dynamics.process, directions=self._directions(cuts.cutter, modes),
                 )  # fmt: skip
                 some, steps = whole.chosen(at), np.asarray(cuts.step)[at]
                 if self.follows and self.workpiece is not None:
@@ -93,14 +99,27 @@ class StabilityWatch:
                 self.cuts.setdefault(cuts.tool, []).append(some)
                 for k, values in zip(at.tolist(), self._values(some, whole, at, groups.engagement), strict=True):
                     table[key[k]] = values
+            numbers = self.numbers_of.setdefault(cuts.tool, {})
+            for own in list(table)[len(numbers) :] if len(numbers) < len(table) else ():
+                numbers[own] = len(numbers)
+            self.cut_of.setdefault(cuts.tool, []).append((np.array(cuts.step), np.array([numbers[x] for x in key])))
             out = np.array([table[own] for own in key])
             number = np.array([0, *self.numbers(cuts.tool)])
             out[:, 2] = number[out[:, 2].astype(np.int64) + 1]
         return dict(zip(self.columns, out.T.copy(), strict=True))
 
     def uneven(self, tool: int) -> bool:
-        """Whether the teeth of a tool are not evenly spaced."""
-        return any(c.pitches for c in self.cuts.get(tool, []))
+        """Whether the teeth of a tool are not alike."""
+        return any(c.uneven for c in self.cuts.get(tool, []))
+
+    def spatial(self, tool: int) -> bool:
+        """Whether cutter and workpiece move along the axis as well."""
+        return any(c.U.shape[1] == 3 for c in self.cuts.get(tool, []))
+
+    def _directions(self, cutter: Cutter, modes: Modes | None) -> int:
+        """3 where a mode moves along the axis and the chip changes by it, or the cutter answers it; else 2."""
+        axial = modes is not None and modes.axial
+        return 3 if axial or (self.follows and cutter.corner_radius > 0.0) else 2
 
     @property
     def follows(self) -> bool:
@@ -120,7 +139,7 @@ class StabilityWatch:
 
     def _with_modes(self, some: DynamicCuts, hertz: Floats, shapes: Floats, frame: Floats) -> DynamicCuts:
         """Cuts with the modes of the workpiece, of each step."""
-        U = np.einsum("cai,cik->cak", frame[:, :2], shapes)
+        U = np.einsum("cai,cik->cak", frame[:, : some.U.shape[1]], shapes)
         damping = np.full(hertz.shape[1], self.dynamics.workpiece_damping)
         return some.with_modes(damping, math.tau * hertz, U)
 
@@ -130,7 +149,7 @@ class StabilityWatch:
         """The columns of new cuts."""
         found = stability_margins(some)
         error = np.zeros(len(some))
-        if not any(self.material.exponents) and not some.pitches:
+        if not any(self.material.exponents) and not some.several:
             size = np.diff(whole.start)[at]
             row = np.concatenate([np.arange(whole.start[k], whole.start[k] + n) for k, n in zip(at, size, strict=True)])
             rows = np.ascontiguousarray(force_rows(engagement, self.material)[row])
@@ -151,6 +170,14 @@ class StabilityWatch:
     def clear(self) -> None:
         """Keep nothing."""
         self.known, self.cuts, self.leaning, self.first_margin = {}, {}, set(), {}
+        self.cut_of, self.numbers_of = {}, {}
+
+    def cuts_of(self, tool: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Steps of a tool that cut, rising, and the number of what each cuts."""
+        some = self.cut_of.get(tool, [])
+        steps, numbers = (np.concatenate([x[k] for x in some] or [np.zeros(0, dtype=np.int64)]) for k in range(2))
+        order = np.argsort(steps, kind="stable")
+        return steps[order], numbers[order]
 
     def parts(self, tool: int) -> DynamicCuts | None:
         """Cuts of a tool that speeds are looked for with; None: it has none."""
@@ -159,10 +186,15 @@ class StabilityWatch:
             return None
         whole = joined(some)
         margin = np.array([x[0] for x in self.known[tool].values()])
-        near, large = (NEAREST, LARGEST) if not whole.pitches else UNEVEN
+        near, large = (NEAREST, LARGEST) if not whole.uneven else UNEVEN
         first = np.argsort(margin, kind="stable")[:near]
         most = np.argsort(-engaged_edge(whole), kind="stable")[:large]
         return whole.chosen(np.unique(np.concatenate([first, most])))
+
+
+def runs_out(cutter: Cutter) -> bool:
+    """Whether teeth differ by runout."""
+    return cutter.flutes > 1 and cutter.runout[0] != 0.0
 
 
 def engaged_edge(cuts: DynamicCuts) -> Floats:

@@ -41,6 +41,8 @@ class PassMap:
     u, v : (n,), (m,) their parameters
     depth : (n, m) float [mm]
     threshold : (n, m) float [N], limit over compliance, or calibrated
+    stable : (n, m) float [mm], depth that chatter allows; None: it is not calculated
+    speed : of the spindle [rad/s]; None: that of the operation
     """
 
     side: int
@@ -49,6 +51,8 @@ class PassMap:
     v: Floats
     depth: Floats
     threshold: Floats
+    stable: Floats | None = None
+    speed: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
+from chipload.jobs.thinwall.chatter import WallChatter, chatter_of
 from chipload.jobs.thinwall.inputs import WallInputs
 from chipload.jobs.thinwall.mesh_error import error_at, mesh_error
 from chipload.planning.thinwall.blank import SIDES, FinishSurface
@@ -32,12 +33,14 @@ class Places:
     ----------
     u, v : (n,), (m,) float
     surfaces : finish surface of each side at them
+    chatter : of the wall and the cutter; None: it is not calculated
     """
 
     inputs: WallInputs
     u: Floats
     v: Floats
     surfaces: tuple[FinishSurface, ...]
+    chatter: WallChatter | None = None
     _solved: dict[tuple[bytes, int], Floats] = field(default_factory=dict)
     _errors: dict[int, Floats] = field(default_factory=dict)
 
@@ -79,7 +82,7 @@ class Places:
 
         Parameters
         ----------
-        spare : the compliance is taken with the error of its mesh, so that what is planned holds with it
+        spare : what is planned holds: the compliance is taken with the error of its mesh, depths within chatter
         """
         u, v = (x.ravel() for x in np.meshgrid(self.u, self.v, indexing="ij"))
 
@@ -94,7 +97,8 @@ class Places:
             known = inputs.threshold(deflection)(left, side)
             return replace(known, force=factor * known.force, factor=factor * known.factor)
 
-        return limited if self.inputs.depths.experiments is None else measured
+        found = limited if self.inputs.depths.experiments is None else measured
+        return found if self.chatter is None or not spare else self.chatter.limited(self, found)
 
 
 def places_of(inputs: WallInputs) -> Places:
@@ -106,7 +110,7 @@ def places_of(inputs: WallInputs) -> Places:
         FinishSurface(inputs.body.shape.sides(a, b)[s], inputs.body.shape.normals(a, b)[s], inputs.body.allowance[s])
         for s in inputs.body.side_numbers
     )
-    return Places(inputs, u, v, surfaces)
+    return Places(inputs, u, v, surfaces, chatter_of(inputs))
 
 
 def between(places: tuple[Floats, Floats], values: Floats, u: Floats, v: Floats) -> Floats:

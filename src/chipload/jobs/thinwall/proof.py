@@ -144,6 +144,8 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
         columns["t_s"] = columns["t_s"] + time
         columns["s_mm"] = columns["s_mm"] + way
         time, way = float(columns["t_s"][-1]), float(columns["s_mm"][-1])
+        if places.chatter is not None:
+            columns |= places.chatter.columns(places, removal, p, left, columns)
         columns["pass"] = np.full(len(columns["t_s"]), leg.program.labels[0], dtype=object)
         parts.append(columns)
         stress = max(stress, _stress(inputs, places.coarse(left), number, columns))

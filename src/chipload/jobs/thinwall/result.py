@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from chipload.errors import Finding, Severity
 from chipload.jobs.checks import chip_findings, default_limits, unchecked_checks, with_peaks
+from chipload.jobs.thinwall.chatter import FIRST_STATE, chatter_limits, chatter_numbers
 from chipload.jobs.thinwall.outcome import OVER, USED, Finish, ThinWallResult, Variant, helps
 from chipload.report.programs import ENDINGS, program_name
 from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict, check_limit, in_memory, state_of
@@ -21,7 +22,7 @@ Place = tuple[float, float, float] | None
 #: contact points over their allowable force that are listed, the worst first
 LISTED = 100
 #: columns of the plan that the history does not keep
-DROPPED = ("u", "v", "side", "label", "compliance_error")
+DROPPED = ("u", "v", "side", "label", "compliance_error", FIRST_STATE)
 #: in place of a specific energy [MPa]: some step of a wall always has engaged edge
 ENGAGED = 1.0
 #: limits that are proportional to the compliance of the wall
@@ -52,7 +53,7 @@ def result_of(walled: ThinWallResult) -> Result:
             *unchecked_checks(walled.checks),
             *(f"limit {name}: not stated" for name in walled.unchecked),
             "holder, clamp and machine: no collision check",
-            "chatter: not calculated",
+            *(() if "dynamics" in walled.settings else ("chatter: not calculated",)),
             "tangential forces do not bend the wall; a bent wall is not cut less deep",
         ),
         provenance=walled.provenance,
@@ -82,6 +83,7 @@ def limits_of(walled: ThinWallResult, one: Variant) -> tuple[LimitCheck, ...]:
     if one.shift > 0.0 and state is Verdict.HOLDS:
         state, why = Verdict.UNPROVEN, "the path is moved: it is compared within its greatest shift only"
     out.append(LimitCheck("gouge_mm", tolerance + one.shift, gouge, state, one.name, place=place, reason=why))
+    out += chatter_limits(walled.settings.get("dynamics"), c, one.name)
     return (*out, *default_limits(walled.checks, walled.planning.machine, c, one.name, one.load_error))
 
 
@@ -187,7 +189,7 @@ def _operation(walled: ThinWallResult, v: Variant) -> dict[str, Any]:
         "step_over_mm": walled.planning.step_over,
         "feed_per_tooth_mm": walled.planning.feed_per_tooth,
         "time_constant_over_variable": c.seconds / v.seconds,
-        "variants": {name: _variant(one) for name, one in walled.variants.items()},
+        "variants": {name: _variant(one, walled.settings.get("dynamics")) for name, one in walled.variants.items()},
         "infeasible": [
             {
                 "side": h.side,
@@ -204,7 +206,7 @@ def _operation(walled: ThinWallResult, v: Variant) -> dict[str, Any]:
     }
 
 
-def _variant(one: Variant) -> dict[str, Any]:
+def _variant(one: Variant, dynamics: Mapping[str, Any] | None) -> dict[str, Any]:
     c = one.columns
     cuts = c["force_normal_n"] > 0.0
     known = cuts & (c["force_normal_planned_n"] > 0.0)
@@ -254,6 +256,7 @@ def _variant(one: Variant) -> dict[str, Any]:
         "steps": len(c["line"]),
         "program": program_name(0, one.name),
         "moved_um_max": 1000.0 * one.shift,
+        **chatter_numbers(one, dynamics),
     }
 
 
@@ -269,6 +272,9 @@ def _maps(walled: ThinWallResult) -> list[SurfaceMap]:
             name = f"{column}, pass {k + 1}, side {m.side + 1}"
             points = np.asarray(m.points).reshape(-1, 3)
             out.append(SurfaceMap(name, column, points, np.asarray(values).ravel(), _faces(m.depth.shape), USED))
+        if m.stable is not None:
+            name, points = f"stable depth, pass {k + 1}, side {m.side + 1}", np.asarray(m.points).reshape(-1, 3)
+            out.append(SurfaceMap(name, "depth_mm", points, m.stable.ravel(), _faces(m.depth.shape), USED))
     return out
 
 

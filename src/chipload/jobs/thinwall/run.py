@@ -104,6 +104,8 @@ def run(job: ThinWallJob, progress: Progress = silent) -> ThinWallResult:
         "yield_mpa": job.table.workpiece.yield_mpa,
         "simulated_tries": tried.variable,
     }
+    if job.table.dynamics is not None:
+        settings["dynamics"] = job.table.dynamics.model_dump()
     cut = inputs.cut
     return ThinWallResult(
         title=title_of(job.path),
@@ -387,7 +389,15 @@ def _linked(inputs: WallInputs, plan: Plan, places: tuple[Floats, Floats] | None
 def _variant(places: Places, planned: Planned, program: Program, run: _OnMachine, proof: Proof) -> Variant:
     plan = planned.plan
     maps = tuple(
-        PassMap(p.side, places.surfaces[p.side].points, *places.grid, p.depth, threshold)
+        PassMap(
+            p.side,
+            places.surfaces[p.side].points,
+            *places.grid,
+            p.depth,
+            threshold,
+            None if p.threshold.depth is None else p.threshold.depth.reshape(p.depth.shape),
+            p.threshold.speed,
+        )
         for p, threshold in zip(plan.passes, proof.thresholds, strict=True)
     )
     return Variant(

@@ -21,6 +21,7 @@ from chipload.jobs.tables import (
     Text,
     Unit,
 )
+from chipload.jobs.thinwall.chatter_tables import WallDynamicsTable
 
 
 def _range(low: float, high: float, unit: str, hint: tuple[str, str]) -> BeforeValidator:
@@ -165,6 +166,7 @@ class ThinWallJobTable(Table):
     material: SourceTable
     threshold: ThresholdTable | None = None
     cutter: tuple[CutterTable, ...] = Field(min_length=1)
+    dynamics: WallDynamicsTable | None = Field(None, description="vibration; none: chatter is not calculated")
     operation: tuple[WallOperationTable, ...] = Field(min_length=1, max_length=1)
     limits: ThinWallLimitsTable
     checks: ChecksTable = Field(default_factory=ChecksTable.model_construct)

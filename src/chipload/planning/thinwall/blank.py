@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 
 from chipload.errors import InputError
 from chipload.planning.thinwall.threshold import Threshold, modelled
-from chipload.structure.places import MeshPlaces, normals_of, on_cut, on_side, points_of
+from chipload.structure.modes import modes
+from chipload.structure.places import MeshPlaces, normals_of, on_cut, on_side, points_of, weights
 from chipload.structure.solid import SolidWorkpiece, compliance, factorise
 
 Floats = NDArray[np.float64]
@@ -176,6 +177,16 @@ class WallBlank:
         )
         C[clamped] = C[~clamped].min()
         return C
+
+    def modes(self, left: Sequence[Floats], side: Side, count: int) -> tuple[Floats, Floats]:
+        """Lowest modes while stock ``left`` is on both sides: frequencies (count,) [Hz] and their shapes at the places
+        of a side, (p, 3, count) [1/sqrt(t)].
+        """
+        solid = self.state(left)
+        places = on_cut(self._places(side), solid.kept, side)
+        frequency, shapes = modes(factorise(solid), count)
+        at = weights(solid.grid, places)
+        return frequency, np.stack([at @ shape for shape in shapes], axis=2)
 
     def _clamped(self, places: MeshPlaces) -> NDArray[np.bool_]:
         """Places on the clamp itself: they do not give way; the stiffest place stands for them."""

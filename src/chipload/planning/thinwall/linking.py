@@ -150,6 +150,9 @@ def _pass_program(
     rows = beyond_edges(bare, margins.beyond)
     place = np.concatenate([place[:, :1], place, place[:, -1:]], axis=1)
     depth = np.pad(depth, ((0, 0), (1, 1)))
+    if p.threshold.speed is not None:  # the feed per tooth stays
+        own = p.threshold.speed
+        pass_motion = replace(pass_motion, spindle=own, feed=pass_motion.feed * own / pass_motion.spindle)
     tip, axis, centre = placed(rows, pass_motion.posture)
     low_axis = float(axis[..., 2].min())
     if min(low_axis, float((axis + ASIDE * rows.normal)[..., 2].min())) < 0.02:

@@ -57,7 +57,7 @@ class WallPass:
     low, high : (n, m) float [mm], stock after and before it
     threshold : what the places bear in the state after it
     force : (n, m) float [N], c F_n of its depth; 0 where nothing is cut
-    exceeds : (n, m) bool, where that is above the threshold
+    exceeds : (n, m) bool, where that is above the threshold, or the pass is deeper than chatter allows
     """
 
     side: int
@@ -128,7 +128,8 @@ def planned_pass(side: int, low: Floats, high: Floats, threshold: Threshold, law
     """A pass from the stock before it to that after it, with the force that is planned there."""
     depth = high - low
     force = np.where(depth > NOTHING, c * law.force(np.maximum(depth, NOTHING)), 0.0)
-    return WallPass(side, low, high, threshold, force, force > threshold.force.reshape(low.shape) * (1.0 + 1e-9))
+    exceeds = force > threshold.force.reshape(low.shape) * (1.0 + 1e-9)
+    return WallPass(side, low, high, threshold, force, exceeds | (depth > threshold.within(depth) + NOTHING))
 
 
 def _no_sliver(low: Floats, high: Floats, allowance: float, smallest: float) -> Floats:
@@ -178,7 +179,7 @@ def variable(
             threshold = threshold_of(D, side)
             F = threshold.force.reshape(D[side].shape)
             open_ = D[side] < a - NOTHING
-            depth = law.depth(F / c[side])
+            depth = threshold.within(law.depth(F / c[side]))
             weak = (depth == 0.0) & open_
             infeasible |= {(side, int(i), int(j)) for i, j in np.argwhere(weak)}
             depth = lower_envelope(surfaces[side].points, np.maximum(depth, law.limits.smallest), slope)
@@ -204,7 +205,8 @@ def least_first_depth(
     """Least depth [mm] that all places of all sides bear in the last passes; 0: one bears none."""
     D = [np.zeros(s.points.shape[:2]) for s in surfaces]
     c = _ones(surfaces, corrections)
-    return min(float(law.depth(threshold_of(D, side).force / c[side].ravel()).min()) for side in range(len(surfaces)))
+    found = [threshold_of(D, side) for side in range(len(surfaces))]
+    return min(float(t.within(law.depth(t.force / c[k].ravel())).min()) for k, t in enumerate(found))
 
 
 def constant(

@@ -49,6 +49,8 @@ class Threshold:
     outside : (p,) bool, beyond the experiments; False where modelled
     compliance : (p,) float [mm/N], C_nn; None: calibrated
     text : a sentence that says where the force is known from
+    depth : (p,) float [mm], greatest depth that chatter allows, 0: none; None: not asked
+    speed : of the spindle [rad/s] that this holds for; None: that of the operation
     """
 
     force: Floats
@@ -57,6 +59,12 @@ class Threshold:
     outside: Bools
     compliance: Floats | None
     text: str
+    depth: Floats | None = None
+    speed: float | None = None
+
+    def within(self, depth: Floats) -> Floats:
+        """Depths [mm] of the places, no deeper than chatter allows."""
+        return depth if self.depth is None else np.minimum(depth, self.depth.reshape(depth.shape))
 
 
 def modelled(C_nn: ArrayLike, deflection: float, factor: float = 1.0) -> Threshold:

@@ -46,13 +46,16 @@ def speed_words(text: str) -> tuple[SpeedWord, ...]:
     return tuple(SpeedWord(line, float(found[1])) for line, found in _found(text))
 
 
-def with_speeds(text: str, speeds: Mapping[int, float], feeds: Mapping[int, float]) -> str:
+def with_speeds(
+    text: str, speeds: Mapping[int, float], feeds: Mapping[int, float], added: Mapping[int, float] | None = None
+) -> str:
     r"""The text with other speeds; O(length).
 
     Parameters
     ----------
     speeds : new number [1/min] of the S word of a line
     feeds : factor on the speed by line, of every line that moves at a feed
+    added : number [1/min] of a new S word behind the last word of a line that has none
 
     Returns
     -------
@@ -61,25 +64,39 @@ def with_speeds(text: str, speeds: Mapping[int, float], feeds: Mapping[int, floa
     Raises
     ------
     InputError
-        As :func:`speed_words` and :func:`chipload.program.gcode.feed_words.with_feeds`, or a line has no S word.
+        As :func:`speed_words` and :func:`chipload.program.gcode.feed_words.with_feeds`, or a line has no S word, or has
+        one where one is to be added.
 
     >>> with_speeds("S6000 M3\nG1 X10 F600\nG95 G1 X20 F0.1", {1: 9000.0}, {2: 1.5, 3: 1.5})
     'S9000 M3\nG1 X10 F900\nG95 G1 X20 F0.1'
+    >>> with_speeds("S6000 M3\nG0 Z5 (up)\nG1 X20 F600", {}, {3: 1.5}, {2: 9000.0})
+    'S6000 M3\nG0 Z5 S9000 (up)\nG1 X20 F900'
     """
     lines = text.split("\n")
-    left = dict(speeds)
+    left, more, address = dict(speeds), dict(added or {}), "S"
     for line, found in _found(text):
+        address = found[0][: found.start(1) - found.start()]
+        if line in more:
+            raise InputError(f"line {line}: has an S word: change it")
         if line in left:
-            new = left.pop(line)
-            if not 0.0 < new < math.inf:
-                raise InputError(f"line {line}: a speed of {new:g}: must be above 0")
+            new = _possible(line, left.pop(line))
             raw = lines[line - 1]
             lines[line - 1] = f"{raw[: found.start(1)]}{new:.10g}{raw[found.end(1) :]}"
     if left:
         raise InputError(f"line {min(left)}: has no S word")
+    for line, new in more.items():
+        end = len(COMMENTS.sub(lambda found: " " * len(found[0]), lines[line - 1]).rstrip())
+        lines[line - 1] = f"{lines[line - 1][:end]} {address}{_possible(line, new):.10g}{lines[line - 1][end:]}"
     per_turn = _per_turn(text)
     factors = {line: 1.0 if line in per_turn else factor for line, factor in feeds.items()}
     return with_feeds("\n".join(lines), factors)
+
+
+def _possible(line: int, speed: float) -> float:
+    """A new speed of a line, which must be above 0."""
+    if not 0.0 < speed < math.inf:
+        raise InputError(f"line {line}: a speed of {speed:g}: must be above 0")
+    return speed
 
 
 def _found(text: str) -> list[tuple[int, re.Match[str]]]:

@@ -1,0 +1,50 @@
+"""The command that hears chatter in a stream of samples and answers with commands for the spindle override."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from chipload.cli.app import Debug, app
+from chipload.terminal import guarded
+
+
+@app.command()
+def chatter(
+    summary: Annotated[Path, typer.Argument(metavar="SUMMARY", help="summary.json of the simulated program")],
+    rate_hz: Annotated[float, typer.Option("--rate-hz", help="samples in a second")],
+    floor: Annotated[float, typer.Option("--floor", help="least chatter, in units of the signal; measure it in air")],
+    rpm: Annotated[
+        float | None, typer.Option("--rpm", help="programmed speed; none: that of the step nearest to chatter")
+    ] = None,
+    share: Annotated[float, typer.Option("--share", help="least share of the alternating power")] = 0.2,
+    window_s: Annotated[float, typer.Option("--window-s", help="length of a window")] = 0.25,
+    least: Annotated[float, typer.Option("--least-override", help="of the programmed speed")] = 0.5,
+    most: Annotated[float, typer.Option("--most-override", help="of the programmed speed")] = 1.2,
+    halui: Annotated[bool, typer.Option("--halui", help="write commands for halcmd, not sentences")] = False,
+    debug: Debug = False,
+) -> None:
+    """Hear chatter in samples of torque and speed, and choose a quiet speed of the simulation instead.
+
+    Each line of the input holds a sample of the torque or the current, and the speed in revolutions per second, as
+    halsampler writes them. With --halui the output is for halcmd:
+    halsampler | chipload chatter ... --halui | halcmd -kf
+    """
+
+    def work() -> int:
+        from chipload.control.chatter import ListeningRules
+        from chipload.control.chatter_stream import answers, quiet_speeds_of
+
+        rules = ListeningRules(rate_hz, floor, share, window_s, least=least, most=most)
+        programmed, windows = quiet_speeds_of(summary, rpm)
+        stopped = False
+        for text in answers(sys.stdin, rules, programmed, windows, halui):
+            typer.echo(text)
+            sys.stdout.flush()
+            stopped = stopped or "program.pause" in text or "stopped" in text
+        return 3 if stopped else 0
+
+    guarded(work, debug)
