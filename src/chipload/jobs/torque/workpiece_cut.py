@@ -42,7 +42,7 @@ from chipload.jobs.torque.cut import (
     LITTLE_MPA,
     CutSteps,
     edge_material,
-    fed_rows,
+    feed_rows,
     require_linear,
     step_feeds,
     step_points,
@@ -182,7 +182,7 @@ def workpiece_cut(
         )
         for body, metal, share in ((stock.copied(), edge_material(material), 0.5), (stock, material, 0.75))
     )  # fmt: skip
-    little, rows = LITTLE_MPA / material.Ktc, fed_rows(removal)
+    little, rows = LITTLE_MPA / material.Ktc, feed_rows(removal)
     c, light = removal.columns, less.columns
     bars = {number: tool_bars(cutter) for number, cutter in job.cutters.items()}
     whole = deflections(removal, material, known, bars)
