@@ -117,7 +117,7 @@ def test_a_stop_outlives_its_controller(tmp_path, result):
 
 @pytest.mark.parametrize(("fault", "reason"), [("lost", "no-reading"), ("nan", "no-reading"), ("stuck", "no-reading")])
 def test_a_sensor_that_fails_stops_it(tmp_path, result, fault, reason):
-    """Current and speed on pins of a simulated spindle; its sensor fails in the cut: it stops, and nothing is exceeded."""
+    """Current and speed on pins of a simulated spindle; it fails in the cut: the machine stops, nothing is exceeded."""
     found = played(tmp_path, result, "--fault", fault, "--seconds", "30")["fault"]
     assert found["status_after"] == reason
     assert found["stopped_after_s"] < 4.0

@@ -177,7 +177,7 @@ def workpiece_cut(
         raise InputError("stock: the program cuts nothing from the workpiece: check its corners and the work offset")
     less, removal = (
         remove(
-            program, body, job.cutters, metal, fine, keep=True, accuracy=False,
+            program, body, job.cutters, metal, fine, keep=True, accuracy=metal is material,
             progress=part_of(progress, share, share + 0.25),
         )
         for body, metal, share in ((stock.copied(), edge_material(material), 0.5), (stock, material, 0.75))
