@@ -196,6 +196,8 @@ def test_what_is_compared_with(result, what):
     e = what["estimate"]
     assert e["range_nm"] == [pytest.approx(0.03), pytest.approx(0.15 * (40.0 - 2.0 - 0.004 * 628.3), rel=1e-3)]
     assert math.prod(1.0 + (math.tau * e["bandwidth_hz"] * x) ** 2 for x in (0.01, 0.02)) == pytest.approx(2.0)
+    # 30 mA at 0.15 N m/A, behind a filter that takes half of each reading
+    assert e["noise_nm"] == pytest.approx(0.15 * 0.03 * math.sqrt(0.5 / 1.5))
     # 3 flutes at 6000 rpm, read every 10 ms
     assert (e["tooth_passing_hz"], e["tooth_passing_seen_hz"]) == (pytest.approx(300.0), pytest.approx(0.0, abs=1e-6))
     assert what["spindle_deviation"]["torque_constant_percent"] == 0.5

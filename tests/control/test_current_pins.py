@@ -195,10 +195,14 @@ def test_the_command(tmp_path, monkeypatch):
 
     monkeypatch.setattr(hal_client, "HalPins", Pins)
     words = ["hal", str(tmp_path / "hal.toml"), "--out", str(tmp_path / "log.csv"), "--current-pin", "vfd.current"]
-    done = CliRunner().invoke(app, [*words, "--speed-pin", "spindle.0.speed-in"])
+    named = ["--speed-pin", "spindle.0.speed-in", "--spindle-override-pin", "halui.spindle.0.override.value"]
+    done = CliRunner().invoke(app, [*words, *named])
     assert done.exit_code == 3
     assert "ended: gone" in done.stdout
-    assert asked == {"current-in": "vfd.current", "speed-in": "spindle.0.speed-in"}
+    assert asked == {
+        "current-in": "vfd.current", "speed-in": "spindle.0.speed-in",
+        "spindle-override-in": "halui.spindle.0.override.value",
+    }  # fmt: skip
     head = (tmp_path / "log.csv").read_text().splitlines()[0].split(",")
     assert {"t_s", "current_a", "speed_rad_s"} <= set(head)
     done = CliRunner().invoke(app, words)

@@ -56,12 +56,15 @@ def test_what_the_pins_are_told(monkeypatch):
     """The load is the torque over the limit, and of the lamps exactly that of the status is on."""
     lines = []
     pins = HalPins.__new__(HalPins)
-    monkeypatch.setattr(HalPins, "_line", lambda self, text: lines.append(text) or "1 2 3 4 5 6 7 8 9")
+    pins._follows_override, pins._spindle_override = True, 1.0
+    monkeypatch.setattr(HalPins, "_line", lambda self, text: lines.append(text) or "1 2 3 4 5 6 7 8 9 0.9")
     pins.exchange(0.5, True, 0.15, STATUS.index("overload"), 3.0, 0.2)
     pins.exchange(0.5, True, 0.15, 0, 3.0, 0.0)
     names = [name for name, _, way in PINS if way == "out"]
     first, second = (dict(zip(names, map(float, line.split()), strict=True)) for line in lines)
     assert first["load"] == pytest.approx(75.0)
+    # 1 until the pin of the spindle override has been read
+    assert (first["spindle-override"], second["spindle-override"]) == (1.0, 0.9)
     assert (first["torque"], first["limit"], first["feed"]) == (0.15, 0.2, 0.5)
     assert [name for name in names if name.startswith("why-") and first[name]] == ["why-overload"]
     assert second["load"] == 0.0

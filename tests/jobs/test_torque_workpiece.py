@@ -163,7 +163,8 @@ def test_a_workpiece_from_the_command_line(folder, tmp_path):
     assert what["ideal_time_s"] > 0.0
     assert {"noise_nm", "bandwidth_hz", "range_nm"} <= set(what["estimate"])
     (worst,) = (c for c in summary["tracks"][0]["limits"] if c["name"] == "form_error_um")
-    assert worst["resolution_error"] == pytest.approx(error)
+    # that of the compliance, and beside it that of the force by layers and steps
+    assert error + 0.01 <= worst["resolution_error"] < error + 0.05
     held = what["with_latency"]["controllers"]["fuzzy_feedforward"]
     assert worst["worst"] == pytest.approx(held["form_error_um_max"])
     # wear makes torque and deflection greater alike: the truth allows as much, without the margin for the error

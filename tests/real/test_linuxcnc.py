@@ -115,12 +115,29 @@ def test_a_stop_outlives_its_controller(tmp_path, result):
     assert killed["moved_after_mm"] == 0.0
 
 
+@pytest.mark.parametrize(("fault", "reason"), [("lost", "no-reading"), ("nan", "no-reading"), ("stuck", "no-reading")])
+def test_a_sensor_that_fails_stops_it(tmp_path, result, fault, reason):
+    """Current and speed on pins of a simulated spindle; it fails in the cut: the machine stops, nothing is exceeded."""
+    found = played(tmp_path, result, "--fault", fault, "--seconds", "30")["fault"]
+    assert found["status_after"] == reason
+    assert found["stopped_after_s"] < 4.0
+    assert found["torque_over_limit_max_after"] < 1.05
+
+
+@pytest.mark.parametrize(("fault", "most"), [("drift-up", 1.0), ("drift-down", 1.25)])
+def test_a_sensor_that_drifts_is_not_seen(tmp_path, result, fault, most):
+    """0.1 A are 16 % of the limit: upwards it is slower, downwards the torque is as much too great."""
+    found = played(tmp_path, result, "--fault", fault, "--seconds", "60")["fault"]
+    assert found["stopped_after_s"] is None
+    assert found["torque_over_limit_max_after"] < most
+
+
 def test_numbers_through_the_pins():
     """What is sent is on the pins and signals, what is on the signals comes back; a value that is none is refused."""
     with HalPins("probe") as pins:
         for name, value in (("x", 1.5), ("y", -2.25), ("z", 1e-9), ("velocity", 24.0), ("torque-in", 0.7)):
             subprocess.run(["halcmd", "sets", f"probe-{name}", repr(value)], check=True, capture_output=True)
-        seen = pins.exchange(0.625, True, 0.5, 3, 12.5)
+        seen = pins.exchange(0.625, True, 0.5, 3, 12.5, 1.0)
         assert seen is not None
         assert seen[1:6] == (1.5, -2.25, 1e-9, 24.0, 0.7)
 
@@ -132,7 +149,7 @@ def test_numbers_through_the_pins():
         assert said("gets", "probe-beat") == "TRUE"
         assert said("getp", "probe.status") == "3"
         assert said("getp", "probe.s") == "12.5"
-        assert pins.exchange(math.nan, False, 0.5, 3, 12.5) is None
+        assert pins.exchange(math.nan, False, 0.5, 3, 12.5, 1.0) is None
         # the beat that came with it has not arrived
         assert said("gets", "probe-beat") == "TRUE"
         assert said("gets", "probe-feed") == "0.625"

@@ -138,9 +138,15 @@ def test_the_command(tmp_path: Path, file: Path) -> None:
     free = 0.5 * SLOW + 0.001 * SLOW**2
     assert low < most < high
     assert 0.8 * (most - free) == pytest.approx(float(row["cutting_power_max_w"]), rel=1e-4)
-    code, said = call("export", tmp_path / "result", "--out", tmp_path / "no", "--load-monitor", "fanuc")
+    code, said = call("export", tmp_path / "result", "--out", tmp_path / "no", "--load-monitor", "other")
     assert code == 2
     assert "must be one of csv, heidenhain" in said
+    for name, why in (("siemens", "machine's maker designs"), ("Fanuc", "machine's maker"), (".AFC.DEP", "itself")):
+        code, said = call("export", tmp_path / "result", "--out", tmp_path / "no", "--load-monitor", name)
+        assert code == 2
+        assert f"--load-monitor {name}: the format of its file is not published" in said
+        assert why in said
+        assert "state csv" in said
     code, said = call("export", tmp_path / "result", "--out", tmp_path / "no", "--spindle", file)
     assert code == 2
     assert "belongs to --load-monitor" in said

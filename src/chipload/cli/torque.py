@@ -46,6 +46,14 @@ def hal(
             "--speed-pin", metavar="PIN", help="pin or signal with the spindle's speed [rev/s], e.g. spindle.0.speed-in"
         ),
     ] = None,
+    spindle_override_pin: Annotated[
+        str | None,
+        typer.Option(
+            "--spindle-override-pin",
+            metavar="PIN",
+            help="pin or signal with the spindle override in force, e.g. halui.spindle.0.override.value, for the panel",
+        ),
+    ] = None,
     python: Annotated[
         str, typer.Option("--python", help="the Python interpreter that has LinuxCNC's modules")
     ] = "/usr/bin/python3",
@@ -82,6 +90,8 @@ def hal(
         if measured is not None and speed_pin is not None:
             job = replace(job, source="current" if power_pin is None else "power")
             sources = {"current-in": measured, "speed-in": speed_pin}
+        if spindle_override_pin is not None:
+            sources["spindle-override-in"] = spindle_override_pin
         asked: list[int] = []
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda n, _: asked.append(n))

@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 from chipload.errors import InputError
 from chipload.files import cannot_write, fresh_folder
 from chipload.report.chip_bodies import chip_bodies
-from chipload.report.load_monitor import MONITORS, afc_table, load_csv, sections_of
+from chipload.report.load_monitor import MONITORS, UNPUBLISHED, afc_table, load_csv, sections_of
 from chipload.report.presentation import Content
 from chipload.report.removal import REMOVAL, read_removal
 from chipload.report.setup_sheet import setup_pdf, setup_sheet
@@ -77,6 +77,12 @@ def export_result(
 
 
 def _load_monitor(result: Result, monitor: str, spindle: Path | None) -> dict[str, Callable[[], Content]]:
+    why = UNPUBLISHED.get(monitor.lower().lstrip("."))
+    if why is not None:
+        raise InputError(
+            f"--load-monitor {monitor}: the format of its file is not published: {why}: state csv, whose numbers are "
+            "to be entered"
+        )
     if monitor not in MONITORS:
         raise InputError(f"--load-monitor {monitor}: must be one of {', '.join(MONITORS)}")
     sections = sections_of(result, spindle)

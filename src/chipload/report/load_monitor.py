@@ -32,6 +32,13 @@ Floats = NDArray[np.float64]
 
 #: formats that can be asked for, and the files that they give
 MONITORS = {"csv": "load.csv", "heidenhain": "afc-load.tab"}
+#: formats that are not published: what there is instead
+UNPUBLISHED = {
+    "siemens": "the limits of its monitors are entered on pages that the machine's maker designs",
+    "sinumerik": "the limits of its monitors are entered on pages that the machine's maker designs",
+    "fanuc": "the limits of its monitors are entered on pages that the machine's maker designs",
+    "afc.dep": "the control makes this file itself, from the table that heidenhain writes",
+}
 #: limit that knows the rated power of the spindle
 POWER_LIMIT = "spindle_power_w"
 #: columns that are needed

@@ -19,8 +19,8 @@ from chipload.control.override import STATUS
 from chipload.errors import InputError
 
 #: name, type, direction of the pins; lengths in machine units, which must be mm, torque in N m, velocity in mm/s;
-#: `load` is the torque in percent of the limit that is held, one pin `why-...` is on; each has a signal
-#: `<component>-<pin>`
+#: `load` is the torque in percent of the limit that is held, one pin `why-...` is on; `spindle-override` is 1, or that
+#: of the pin that `spindle-override-in` is read from; each has a signal `<component>-<pin>`
 PINS: tuple[tuple[str, str, str], ...] = (
     ("feed", "float", "out"),
     ("beat", "bit", "out"),
@@ -29,6 +29,7 @@ PINS: tuple[tuple[str, str, str], ...] = (
     ("s", "float", "out"),
     ("limit", "float", "out"),
     ("load", "float", "out"),
+    ("spindle-override", "float", "out"),
     *((f"why-{status}", "bit", "out") for status in STATUS),
     ("x", "float", "in"),
     ("y", "float", "in"),
@@ -38,12 +39,13 @@ PINS: tuple[tuple[str, str, str], ...] = (
     ("feed-in", "float", "in"),
     ("current-in", "float", "in"),
     ("speed-in", "float", "in"),
+    ("spindle-override-in", "float", "in"),
 )
 
 
 class PinValues(NamedTuple):
     """What the in pins read: time [s], position [mm], velocity on the path [mm/s], torque [N m], override in force,
-    current of the spindle [A] and its speed [rev/s], as LinuxCNC's `spindle.0.speed-in`.
+    current of the spindle [A] and its speed [rev/s], as LinuxCNC's `spindle.0.speed-in`, spindle override in force.
     """
 
     time: float
@@ -55,6 +57,7 @@ class PinValues(NamedTuple):
     feed: float
     current: float = math.nan
     speed: float = math.nan
+    spindle_override: float = 1.0
 
 
 class ControlledMachine(Protocol):
@@ -92,6 +95,8 @@ class HalPins:
     ) -> None:
         script = resources.files("chipload.control.linuxcnc") / "pins.py"
         self._answer_s = answer_s
+        self._follows_override = "spindle-override-in" in (sources or {})
+        self._spindle_override = 1.0
         try:
             self._process = subprocess.Popen(
                 [python, "-I", str(script)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
@@ -112,9 +117,15 @@ class HalPins:
         """Set the out pins, read the in pins; None: the component is gone."""
         load = 100.0 * torque / limit if limit > 0.0 else 0.0
         why = " ".join(str(int(k == status)) for k in range(len(STATUS)))
-        answer = self._line(f"{feed!r} {int(beat)} {torque!r} {status} {s!r} {limit!r} {load!r} {why}")
+        spindle = self._spindle_override
+        answer = self._line(f"{feed!r} {int(beat)} {torque!r} {status} {s!r} {limit!r} {load!r} {spindle!r} {why}")
         words = answer.split() if answer is not None else []
-        return PinValues(*map(float, words)) if len(words) == len(PinValues._fields) else None
+        if len(words) != len(PinValues._fields):
+            return None
+        seen = PinValues(*map(float, words))
+        if self._follows_override and math.isfinite(seen.spindle_override):
+            self._spindle_override = seen.spindle_override
+        return seen
 
     def _line(self, text: str) -> str | None:
         stdin, stdout = self._process.stdin, self._process.stdout

@@ -1,7 +1,8 @@
 """A panel of the controller for LinuxCNC: the XML that PyVCP draws, and the lines of HAL that connect it.
 
 It shows the torque, in N m and in percent of the limit that is held at the place, the feed override that is sent and
-the one in force, and why: a lamp beside each status of the controller, in words. The panel reads pins only.
+the one in force, the spindle override that an answer to chatter has set (1: none), and why: a lamp beside each status
+of the controller, in words. The panel reads pins only.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ SHOWN: tuple[tuple[str, str], ...] = (
     ("load", "load"),
     ("sent", "feed"),
     ("in-force", "feed-in"),
+    ("spindle-override", "spindle-override"),
     *((f"why-{status}", f"why-{status}") for status in STATUS),
 )
 #: greatest load of the bar [%], at least
@@ -62,6 +64,9 @@ def panel_xml(job: HalJob) -> str:
         "</labelframe>",
         '<labelframe text="Feed override">',
         *_numbers(override),
+        "</labelframe>",
+        '<labelframe text="Spindle override">',
+        *_numbers((("against chatter", "spindle-override", "5.3f"),)),
         "</labelframe>",
         '<labelframe text="Why">',
         "<table>",

@@ -306,7 +306,7 @@ def cut(
         accuracy=False,
         progress=lambda x, what: progress(0.5 + 0.5 * x, what),
     )
-    c, own, little = removal.columns, fed_rows(removal), LITTLE_MPA / material.Ktc
+    c, own, little = removal.columns, feed_rows(removal), LITTLE_MPA / material.Ktc
     points = step_points(removal, program)
     loads = two_parts(
         1e3 * c["torque_mean_nm"][own], c["force_normal_n"][own],
@@ -331,7 +331,7 @@ def edge_material(material: Material) -> Material:
     )
 
 
-def fed_rows(removal: Removal) -> slice:
+def feed_rows(removal: Removal) -> slice:
     """Rows of a removal from its first feed to its last."""
     feeds = np.flatnonzero(~removal.columns["rapid"])
     return slice(int(feeds[0]), int(feeds[-1]) + 1)
@@ -345,7 +345,7 @@ def step_points(removal: Removal, program: Program) -> Floats:
     InputError
         The tip stands still.
     """
-    c, own = removal.columns, fed_rows(removal)
+    c, own = removal.columns, feed_rows(removal)
     ends = np.column_stack([c[f"{x}_mm"] for x in "xyz"])
     start = ends[own.start - 1] if own.start > 0 else np.asarray(program.p_work[0])
     points = np.vstack([start, ends[own]])
@@ -358,7 +358,7 @@ def step_points(removal: Removal, program: Program) -> Floats:
 
 def step_feeds(removal: Removal, rapids: float) -> Floats:
     """(n,) programmed feeds of the same steps [mm/s]; ``rapids`` that of the rapids between two cuts."""
-    c, own = removal.columns, fed_rows(removal)
+    c, own = removal.columns, feed_rows(removal)
     return np.where(c["rapid"][own], rapids, mm_s_from_mm_min(1.0) * c["feed_mm_min"][own])
 
 

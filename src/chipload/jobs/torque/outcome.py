@@ -211,6 +211,7 @@ class ClampedWorkpiece:
     strained : greatest stress per force, as planned and real [MPa/N]
     strength : yield stress [MPa]
     stock : as it is after the program
+    load_error : relative error of loads by layers and steps, by column
     """
 
     planned: WorkpieceCompliance
@@ -218,6 +219,7 @@ class ClampedWorkpiece:
     strained: tuple[float, float]
     strength: float
     stock: LayeredStock
+    load_error: Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)

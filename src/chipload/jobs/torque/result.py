@@ -52,9 +52,16 @@ def result_of(outcome: TorqueResult) -> Result:
             *(
                 ("the wall has one thickness, that at the end of the cut",)
                 if isinstance(outcome.wall, ShellWall)
-                else ("holder and spindle: count as rigid",)
+                else (
+                    "holder and spindle: count as rigid",
+                    "error of the torque over the allowable one by layers and steps: not estimated",
+                )
             ),
-            "error of the loads by layers and steps: not estimated",
+            *(
+                ("error of the loads by layers and steps: not estimated",)
+                if isinstance(outcome.wall, ShellWall)
+                else ()
+            ),
         ),
         provenance=outcome.job.provenance,
         note=_note(outcome),
@@ -74,14 +81,19 @@ def limits_of(outcome: TorqueResult, columns: Columns, track: str) -> tuple[Limi
         check_limit(name, limit, columns, track=track, error=errors.get(name, 0.0))
         for name, limit in outcome.job.limits.items()
     )
-    return (*stated, *default_limits(outcome.job.checks, outcome.job.machine, columns, track, {}))
+    return (*stated, *default_limits(outcome.job.checks, outcome.job.machine, columns, track, errors))
 
 
 def workpiece_errors(outcome: TorqueResult) -> dict[str, float]:
-    """Relative errors of columns by the compliance of a workpiece, by their name; none of a shell."""
+    """Relative errors of columns on a workpiece, by their name: of the loads by layers and steps, and of the compliance
+    beside that; none of a shell.
+    """
     if isinstance(outcome.wall, ShellWall):
         return {}
-    return dict.fromkeys(("form_error_um", "strength_share", "deflection_workpiece_um"), outcome.wall.real.error)
+    loads = dict(outcome.wall.load_error)
+    both = loads.get("force_n", 0.0) + outcome.wall.real.error
+    loads["torque_nm"] = loads.get("torque_mean_nm", 0.0)
+    return loads | dict.fromkeys(("form_error_um", "strength_share", "deflection_workpiece_um", "deflection_um"), both)
 
 
 def _real(case: ControllerCase) -> bool:

@@ -42,7 +42,7 @@ from chipload.jobs.torque.cut import (
     LITTLE_MPA,
     CutSteps,
     edge_material,
-    fed_rows,
+    feed_rows,
     require_linear,
     step_feeds,
     step_points,
@@ -177,12 +177,12 @@ def workpiece_cut(
         raise InputError("stock: the program cuts nothing from the workpiece: check its corners and the work offset")
     less, removal = (
         remove(
-            program, body, job.cutters, metal, fine, keep=True, accuracy=False,
+            program, body, job.cutters, metal, fine, keep=True, accuracy=metal is material,
             progress=part_of(progress, share, share + 0.25),
         )
         for body, metal, share in ((stock.copied(), edge_material(material), 0.5), (stock, material, 0.75))
     )  # fmt: skip
-    little, rows = LITTLE_MPA / material.Ktc, fed_rows(removal)
+    little, rows = LITTLE_MPA / material.Ktc, feed_rows(removal)
     c, light = removal.columns, less.columns
     bars = {number: tool_bars(cutter) for number, cutter in job.cutters.items()}
     whole = deflections(removal, material, known, bars)
