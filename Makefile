@@ -59,7 +59,7 @@ demo: $(VENV)/.run
 	echo "the page: $(BIN)/chipload view result"; \
 	exit $$((planned + simulated))
 
-# docs/summary.schema.json, docs/columns.md and docs/jobs.md, from the source
+# docs/summary.schema.json, columns.md, jobs.md and materials.md, from the source
 reference: setup
 	$(BIN)/python tools/docs_reference.py
 

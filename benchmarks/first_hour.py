@@ -2,7 +2,7 @@
 
     CHIPLOAD_DATA=... python benchmarks/first_hour.py [NAME ...] [--write]
 
-`--write` writes docs/first_hour.md. An edit is one changed line of job.toml. Times are processor times.
+`--write` renews the rows of docs/first_hour.md. An edit is one changed line of job.toml. Times are processor times.
 """
 
 from __future__ import annotations
@@ -111,69 +111,17 @@ def run(case: Case, folder: Path) -> dict[str, object]:
     }
 
 
-HEAD = """# The first hour
-
-What a user has becomes a job by `chipload init FILE DIR`, and a verdict by `chipload run DIR/job.toml --out result`.
-`init` writes what the file states and marks each guess; `run` refuses until each table with a guess is confirmed
-(delete `confirm = true`), or takes all guesses by `--accept`. `chipload simulate FILE` does both for a first look; its
-verdict is never better than unproven.
-
-| FILE | what init takes from it | kind of job |
-|---|---|---|
-| NC text (`.ngc`, `.nc`, `.h` ...) | tools and stock of comments, BLK FORM, WORKPIECE; axes, dialect | simulation |
-| APT CL data | CUTTER, tool lengths, stock size | simulation |
-| CAMotics project | tools, workpiece, the program that it names | simulation |
-| FreeCAD document | a CAM job: operations as a program, tool bits, stock; else the part | simulation; pocket or wall |
-| DXF | closed contours, else open ones; layers, unit | pocket; contour |
-| STEP | horizontal faces, else two curved faces | pocket; thin wall |
-| sections of a blade | shape, numbered files beside it | thin wall |
-
-## Tools, templates, export
-
-A `[[cutter]]` names a tool of a library: `file = "library.json"`, `tool = 3`. What the file states need not be written;
-what the job states stands above the file.
-
-| file | made by | states |
-|---|---|---|
-| `.json`, `.tools` | Fusion 360, HSMWorks | sizes, corner, flutes, length, holder, material |
-| `.p21` | tool makers, ISO 13399 | values with their symbol: DC, RE, APMX or LCF, DMM or DCONMS, FHA, ZEFF or NOF |
-| `.fctb` | FreeCAD 0.20 and 1.x | diameter, flutes, edge height, shank, corner, stick-out |
-| `.camotics` | CAMotics | shape, diameter, length |
-| `.tbl` | LinuxCNC | diameter; `file_unit` is needed |
-
-Drills and chamfer mills are read as cutters with a point or a taper. Thread mills, taps, T-slot and barrel cutters are
-refused. `chipload init --material DIR` writes a commented template of a material file; likewise `--machine`,
-`--catalogue` and `--fixture` (a block as STL).
-
-`chipload export RESULT --out DIR` writes `history.csv` (a row a step, units in the names), the path of each track
-with all its numbers for ParaView (`.vtp`), surface maps and the stock that is left (`.vtu`, `.stl`), and `setup.html`,
-one page that a browser prints: verdict, program, tools, travel, limits, guesses. `--csv`, `--vtk` and `--sheet` choose.
-
-`chipload run --coarse` takes steps eight times as long, layers four times as thick and wider tolerances. Its result is
-never better than unproven and lists the keys that it changed.
-
-## Twelve files of others
-
-Made by `python benchmarks/first_hour.py --write`, processor time of `init` and `run` together. An edit is one changed
-line of job.toml. A verdict rests on the guesses that were accepted; it shows that the way from the file to the result
-is whole, not that these programs are right for a real workpiece.
-
-| file | kind | guesses | edits | verdict | time [s] |
-|---|---|---:|---|---|---:|
-"""
-
-
-TAIL = """
-The first row holds the time in which kernels are compiled, once a computer. The pockets exceed limits of the check of
-the plan: a gouge of 1.4 to 1.7 um against 1 um at the wall, or the engagement at single rows. Programs exceed by what
-was guessed: the travel of a machine that no file names, a block whose zero or top no file states.
-"""
+def written(page: str, rows: dict[str, str]) -> str:
+    """The page with new rows, by name of the file, in the places of those with the same name."""
+    for name, row in rows.items():
+        page = re.sub(rf"^\| {re.escape(name)} \|.*$", lambda _, row=row: row, page, count=1, flags=re.MULTILINE)
+    return page
 
 
 def main() -> None:
     """Run the cases that are named, or all."""
     names = [a for a in sys.argv[1:] if not a.startswith("--")]
-    rows = []
+    rows = {}
     for case in CASES:
         if names and not any(n in case.file for n in names):
             continue
@@ -183,12 +131,11 @@ def main() -> None:
         told = str(out["verdict"]) + (f": {out['message']}" if "message" in out else "")
         told = told.replace("|", "/")
         seconds = f"{out['seconds']:.0f}" if "seconds" in out else ""
-        rows.append(
-            f"| {Path(case.file).name} | {case.kind} | {out.get('guesses', '')} | {edits} | {told} | {seconds} |"
-        )
-        print(rows[-1], flush=True)
+        name = Path(case.file).name
+        rows[name] = f"| {name} | {case.kind} | {out.get('guesses', '')} | {edits} | {told} | {seconds} |"
+        print(rows[name], flush=True)
     if "--write" in sys.argv:
-        PAGE.write_text(HEAD + "\n".join(rows) + "\n" + TAIL)
+        PAGE.write_text(written(PAGE.read_text(encoding="utf-8"), rows), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Write the pages of docs/ that are made from the source: summary.schema.json, columns.md and jobs.md.
+"""Write the pages of docs/ that are made from the source: summary.schema.json, columns.md, jobs.md and materials.md.
 
 Run it after a change of the schema, of the table of columns or of the tables of a job: ``make reference``. With
 ``--check`` nothing is written; the exit code is 1 if a page is not current.
@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 from chipload.jobs.reference import reference
+from chipload.jobs.shipped import materials
 from chipload.result import COLUMNS, SCHEMA_VERSION, Summary
 from chipload.result.columns import BOUNDED
 
@@ -21,6 +22,20 @@ Every quantity of a result has one name, with the unit in it. A limit in `[limit
 that it bounds. The fields of `history.parquet` carry unit, label and meaning as metadata.
 
 This page is made from `src/chipload/result/columns.py` by `make reference`.
+"""
+
+MATERIALS = """# Shipped materials
+
+`[material] name` names one of these. Each holds in the range of chip thickness that is shown: in steps with thicker or
+thinner chips its loads are unproven. The spread is the relative standard deviation of the coefficients; `confidence`
+compares limits with loads at its upper band ([how](how-to/confidence.md)). A group of VDI 3323 has the tangential force
+alone: it proves torque and power; force direction, deflection and stability are unproven. Which group an alloy belongs
+to is stated where its source states it; a group never has the name of an alloy.
+
+Titanium is not among them: for group 37, two editions of the same catalogue state 2110 and 1245 MPa. Measure your own
+by `chipload fit` ([how](how-to/material.md)).
+
+This page is made from `src/chipload/data/materials` by `make reference`; `chipload materials` prints it.
 """
 
 
@@ -45,7 +60,20 @@ def columns_text() -> str:
     return "\n".join([HEAD, *rows, "", "## Limits that bound a column of another name", "", *others, ""])
 
 
-PAGES = {"summary.schema.json": schema_text, "columns.md": columns_text, "jobs.md": reference}
+def materials_text() -> str:
+    """The table of the shipped materials."""
+    listing = materials()
+    lines = ["| " + " | ".join(listing.head) + " |", "|" + "---|" * len(listing.head)]
+    lines += ["| " + " | ".join((f"`{name}`", *rest)) + " |" for name, *rest in listing.rows]
+    return "\n".join([MATERIALS, *lines, ""])
+
+
+PAGES = {
+    "summary.schema.json": schema_text,
+    "columns.md": columns_text,
+    "jobs.md": reference,
+    "materials.md": materials_text,
+}
 
 
 def main(check: bool) -> int:

@@ -136,3 +136,28 @@ def test_a_simulation_is_estimated(tmp_path: Path) -> None:
     lines, _ = check_job(job)
     steps = len(run_job(job).outcome.simulated.removal.columns["line"])
     assert lines[-1].startswith(f"estimate: {steps} steps, ")
+
+
+def test_a_limit_of_the_engagement_that_the_wall_alone_exceeds(tmp_path: Path) -> None:
+    """5 mm radius, 0.1 mm deep: cos = 0.98, 11.48 deg; 11 deg needs at most 5 (1 - cos 11 deg) = 0.0919 mm."""
+    folder = examples.copy_example("contour", tmp_path / "contour")
+    whole = CliRunner().invoke(app, ["check", str(folder / "job.toml")])
+    assert whole.exit_code == 0
+    assert "cannot be held" not in whole.output
+    done = CliRunner().invoke(app, ["check", str(folder / "job.toml"), "--set", "limits.engagement_deg=11"])
+    assert done.exit_code == 3
+    wanted = "limits.engagement_deg = 11 cannot be held: operation 0 asks for 11.48 deg along a straight wall"
+    assert wanted in done.output
+    assert "state a radial depth of at most 0.09186 mm" in done.output
+
+
+def test_a_wall_that_does_not_carry_the_smallest_depth(tmp_path: Path) -> None:
+    """The threshold is the limit over the compliance: a thousandth of the limit, a thousandth of the force."""
+    folder = examples.copy_example("plate", tmp_path / "plate")
+    whole = CliRunner().invoke(app, ["check", str(folder / "job.toml")])
+    assert whole.exit_code == 0
+    assert "cannot be held" not in whole.output
+    tight = ["--set", "limits.deflection_workpiece_um=0.05"]
+    done = CliRunner().invoke(app, ["check", str(folder / "job.toml"), *tight])
+    assert done.exit_code == 3
+    assert "the limit cannot be held at" in done.output

@@ -155,6 +155,29 @@ def test_confirm_must_be_true_or_false() -> None:
     )
 
 
+def test_a_program_that_never_starts_the_spindle(program: Path, tmp_path: Path) -> None:
+    """150 m/min with 8 mm is 5968 rpm, in two digits 6000; the loads are those of the same text with S6000 M3."""
+    silent = FUSION.replace("S4000 M3\n", "")
+    program.write_text(silent)
+    code, said, _ = call("init", program, tmp_path / "job")
+    assert code == 0
+    assert "program.speed_rpm = 6000.0: the text cuts before it starts the spindle" in said
+    assert "machine-spindle-off" not in said
+    job = (tmp_path / "job" / "job.toml").read_text()
+    assert tomllib.loads(job)["program"]["speed_rpm"] == 6000.0
+    worst = []
+    for name, text, keys in (("guessed", silent, job), ("stated", FUSION.replace("S4000", "S6000"), "")):
+        program.write_text(text)
+        (tmp_path / "job" / "job.toml").write_text(keys or job.replace("speed_rpm = 6000.0", "# "))
+        code, _, said = call("run", tmp_path / "job" / "job.toml", "--accept", "--out", tmp_path / name)
+        assert code == 3, said
+        summary = json.loads((tmp_path / name / "summary.json").read_text())
+        worst.append({c["name"]: c["worst"] for c in summary["limits"]})
+        assert not [f for t in summary["tracks"] for f in t["findings"] if f["code"] == "machine-spindle-off"]
+    assert worst[0] == worst[1]
+    assert worst[0]["spindle_power_w"] > 0.0
+
+
 def test_comments_of_other_posts() -> None:
     """FeatureCAM's APT, Heidenhain and Sinumerik: numbers as they stand in the texts."""
     apt = "UNITS/MM\nINSERT/[HOLDER=C40] 14MM CRB 2FL 32 LOC\nCUTTER/14.,0,7.,0,0,0,84.\nLOAD/TOOL,17\n"

@@ -212,6 +212,16 @@ class Cutter:
         return 0.5 * self.diameter
 
     @property
+    def resolved_diameter(self) -> float:
+        """Diameter by which lengths of a simulation go [mm]: d, of a pointed cutter a tenth of its widest.
+
+        >>> engraver = Cutter(0.01, 1, 0.0, 3.0, 30.0, 6e5, taper=math.radians(45.0))
+        >>> round(engraver.resolved_diameter, 9)  # 6.01 mm wide at its top
+        0.601
+        """
+        return max(self.diameter, 0.2 * float(self.radius_at([self.flute_length])[0]))
+
+    @property
     def _largest_corner(self) -> float:
         """Corner radius at which e = 0 [mm]."""
         ta, tb = math.tan(self.bottom), math.tan(self.taper)

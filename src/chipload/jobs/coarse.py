@@ -104,7 +104,7 @@ def _of_program(loaded: LoadedJob) -> list[str]:
     stock = job.table.stock
     saved = stock is not None and stock.file is not None and stock.file.lower().endswith(".npz")
     if stock is not None and stock.layer_mm is None and not saved and job.cutters:
-        smallest = min(cutter.diameter for cutter in job.cutters.values())
+        smallest = min(cutter.resolved_diameter for cutter in job.cutters.values())
         out.append(f"stock.layer_mm={format_value(LAYER * smallest)}")
     for k, op in enumerate(job.table.operation):
         if op.corner_slices is None:

@@ -82,6 +82,7 @@ def read_program(
     dialect: str | None = None,
     tools: ToolTable | None = None,
     feed: float | None = None,
+    speed: float | None = None,
     tolerance: float = TOLERANCE_MM,
     text: str | None = None,
     setup: Setup | None = None,
@@ -100,6 +101,7 @@ def read_program(
     dialect : None: by the ending of the file, for NC texts that of the machine
     tools : diameters and lengths; without it they count as 0
     feed : [mm/s] of cuts before the text states a feed
+    speed : [rad/s] of the spindle, clockwise, before the text starts it, or in all of a text that never does
     setup : what the controller knows before the program, and the cutters of the job
     comments : the comments of NC text are held against the cutters of the job
     strict : NC text that LinuxCNC would refuse is refused
@@ -149,7 +151,16 @@ def read_program(
         program, more = to_work(commands, machine, tolerance=tolerance, placed=placed)
         if machine.chain.rotary:
             findings = tuple(replace(f, severity=Severity.UNPROVEN) if f.code in OF_LENGTHS else f for f in findings)
+    if speed is not None:
+        commands = replace(commands, spindle=_turning(commands.spindle, speed))
+        program = replace(program, spindle=_turning(program.spindle, speed))
     return _checked(commands, program, machine, (*agreed, *findings), more, placed)
+
+
+def _turning(spindle: Floats, speed: float) -> Floats:
+    """Speeds of the spindle [rad/s], with one for the rows before it first turns."""
+    first = int(np.argmax(spindle != 0.0)) if spindle.any() else len(spindle)
+    return np.concatenate([np.full(first, speed), spindle[first:]])
 
 
 def reading_of(

@@ -413,8 +413,12 @@ def _kept(removal: Removal) -> tuple[Cuts, ...]:
     if not removal.cuts:
         if not removal.columns["chip_volume_mm3"].any():
             raise InputError("deflection: the program cuts nothing")
-        if removal.columns["chip_pieces"].any():  # else only films are lost, in which no edge is engaged
-            raise InputError("deflection: the removal did not keep what the teeth cut: remove(..., keep=True)")
+        if not removal.columns["chip_pieces"].any():
+            raise InputError(
+                "deflection: all chips are films, narrower than a few tolerances: state a smaller layer_mm or "
+                "tolerance_mm"
+            )
+        raise InputError("deflection: the removal did not keep what the teeth cut: remove(..., keep=True)")
     return removal.cuts
 
 

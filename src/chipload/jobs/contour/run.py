@@ -142,6 +142,7 @@ def check(job: ContourJob) -> tuple[list[str], bool]:
         f"{job.path.name}: right: {closed} closed and {len(inputs.contours) - closed} open contours, "
         f"machine {inputs.machine.name}, material {inputs.material.name}"
     ]
+    beyond = list[str]()
     for k, op in enumerate(job.operations):
         op, _ = _resolved(job, inputs, op)
         cutter, setting = job.cutters[op.cutter], _setting(job, inputs, op)
@@ -151,10 +152,27 @@ def check(job: ContourJob) -> tuple[list[str], bool]:
             count = check_contour(inputs.contours, setting, cutter, inputs.material, inputs.machine)
             what = f"{count} pass{'es' if count > 1 else ''}"
         lines.append(f"operation {k}: {op.kind}, cutter {op.cutter} of {cutter.diameter:g} mm, {what}")
+        beyond += _above_limit(job, k, op, cutter)
+    lines += beyond
     lines += [f"finding: {text}" for text in (*job.findings, *inputs.findings)]
     if job.unchecked:
         lines.append(f"not checked, no limit stated: {', '.join(job.unchecked)}")
-    return lines, True
+    return lines, not beyond
+
+
+def _above_limit(job: ContourJob, k: int, op: OperationTable, cutter: Cutter) -> list[str]:
+    """That the engagement along a straight wall is above its limit: in an inside corner it is greater still."""
+    limit, depth = job.limits.get("engagement_deg"), op.radial_depth_mm
+    if limit is None or depth is None or not 0.0 < depth < cutter.diameter:
+        return []
+    asked = math.degrees(math.acos(1.0 - depth / cutter.radius))
+    if asked <= limit * (1.0 + 1e-9):
+        return []
+    most = cutter.radius * (1.0 - math.cos(math.radians(limit)))
+    return [
+        f"limits.engagement_deg = {limit:g} cannot be held: operation {k} asks for {asked:.4g} deg along a straight "
+        f"wall: state a radial depth of at most {most:.4g} mm, or a greater limit"
+    ]
 
 
 def _operation(job: ContourJob, inputs: Inputs, op: OperationTable, progress: Progress) -> Operation:

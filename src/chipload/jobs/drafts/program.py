@@ -22,7 +22,7 @@ from chipload.program.program import DWELL, RAPID, Program
 from chipload.program.read import ENDINGS, ProgramReading, read_program, read_tools
 from chipload.program.reconcile import unit_mm
 from chipload.program.setup import Setup
-from chipload.units import mm_s_from_mm_min
+from chipload.units import mm_s_from_mm_min, rpm_from_rad_s
 
 #: machines that a program is read for where none is stated: the first that has its axes
 MACHINES = ("vmc", "xyzbc-trunnion", "xyzac-trunnion", "xyzbc-head-table")
@@ -30,6 +30,8 @@ MACHINES = ("vmc", "xyzbc-trunnion", "xyzac-trunnion", "xyzbc-head-table")
 LONG = 3_000_000
 #: feed of cuts that the draft takes where the text states none [mm/min]
 FEED_MM_MIN = 300.0
+#: cutting speed that the draft takes where the text never starts the spindle [m/min]
+SPEED_M_MIN = 150.0
 #: material over and around the motions in a guessed block [mm]
 ALLOWANCE_MM = 1.0
 #: steps that a guessed step length aims at
@@ -101,7 +103,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     }
     sizes = [_size(known.cutters.get(n) or header.cutters.get(n) or _of_table(known.tools, n)) for n in numbers]
     tables = [
-        _program_table(path, folder, chosen, known),
+        _program_table(path, folder, chosen, known, min(sizes)),
         _machine_table(chosen, known),
         DraftTable(
             "stock", (*stock_entries, _layer(deepest, sizes)), note="the block that the program starts from [mm]"
@@ -118,7 +120,9 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     ]
     found = [f for f in chosen.reading.findings if f.severity >= Severity.UNPROVEN]
     rest = [f for f in chosen.reading.findings if f not in found and not f.code.endswith(PLAIN)]
-    notes = [str(f) for f in (*found, *chosen.reading.violations, *rest)][:LISTED]
+    # a speed is guessed where the spindle rests
+    asked = [f for f in chosen.reading.violations if f.code != "machine-spindle-off"]
+    notes = [str(f) for f in (*found, *asked, *rest)][:LISTED]
     origin = known.origin or path.name
     return Draft(
         f"Simulate {origin}: chips, forces, torque and collisions of the program in its stock.",
@@ -243,7 +247,7 @@ def _of_table(tools: Path | None, number: int) -> Stated:
     return own
 
 
-def _program_table(path: Path, folder: Path, chosen: _Chosen, known: Known) -> DraftTable:
+def _program_table(path: Path, folder: Path, chosen: _Chosen, known: Known, smallest: float) -> DraftTable:
     entries = [Entry("file", path.name if known.text is not None else relative(path, folder))]
     if chosen.dialect is not None:
         entries.append(Entry("dialect", chosen.dialect, "the one that leaves the fewest words unread", True))
@@ -255,8 +259,22 @@ def _program_table(path: Path, folder: Path, chosen: _Chosen, known: Known) -> D
         entries.append(Entry("tools", note="LinuxCNC tool table: lengths, diameters", example='"shop.tbl"'))
     if chosen.feed is not None:
         entries.append(Entry("feed_mm_min", chosen.feed, "the text cuts before it states a feed", True))
+    speed = _speed(chosen, smallest)
+    if speed is not None:
+        entries.append(Entry("speed_rpm", speed, "the text cuts before it starts the spindle; 150 m/min", True))
     offsets = Entry("work_offsets", note="origins in the machine", example="{ G54 = [0.0, 0.0, 0.0] }")
     return DraftTable("program", (*entries, offsets), note="the program; lengths here are in mm, whatever unit it has")
+
+
+def _speed(chosen: _Chosen, smallest: float) -> float | None:
+    """Spindle speed [rpm] for a program that cuts before it states one; None: it states one."""
+    program = chosen.reading.program
+    first = int(np.argmax(program.spindle != 0.0)) if program.spindle.any() else len(program)
+    if not _cutting(program)[:first].any():
+        return None
+    wanted = 1000.0 * SPEED_M_MIN / (math.pi * smallest)
+    low, high = rpm_from_rad_s(chosen.machine.spindle_min), rpm_from_rad_s(chosen.machine.spindle_max)
+    return round(min(max(float(f"{wanted:.2g}"), low), high), 3)
 
 
 def _machine_table(chosen: _Chosen, known: Known) -> DraftTable:

@@ -101,7 +101,7 @@ def resolution_of(job: ProgramJob, program: Program) -> Resolution:
     the bottom; those of a leaning one do not and are more, of equal angle, for it may cut with any of them.
     """
     op: SimulateTable = job.table.operation[0]
-    smallest = min(c.radius for c in job.cutters.values())
+    smallest = 0.5 * min(c.resolved_diameter for c in job.cutters.values())
     flank = op.flank_mm or 0.5 * smallest
     if op.corner_slices is not None:
         return Resolution(op.step_mm, op.tolerance_mm, op.corner_slices, flank)

@@ -39,7 +39,7 @@ from chipload.simulation.loads import Cuts
 from chipload.simulation.steps import StepBlocks
 from chipload.simulation.surface import collisions, difference, in_stock
 from chipload.stock.layers import LayeredStock
-from chipload.units import mm_s_from_mm_min
+from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 #: of a simulation, what one pass over its steps beside the removal takes
 SHARE = 0.2 / 3.0
@@ -59,6 +59,7 @@ def read_for(job: ProgramJob, machine: Machine, progress: Progress = silent, tex
         dialect=table.dialect,
         tools=read_tools(job.tools_file) if job.tools_file is not None else None,
         feed=mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None,
+        speed=rad_s_from_rpm(table.speed_rpm) if table.speed_rpm is not None else None,
         tolerance=table.tolerance_mm,
         text=text,
         setup=Setup(table.parameters, table.work_offsets, job.cutters, table.placed_in),

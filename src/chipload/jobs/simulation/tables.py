@@ -31,6 +31,9 @@ class ProgramTable(Table):
     dialect: Literal["linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"] | None = None
     tools: Text | None = Field(None, description="LinuxCNC tool table")
     feed_mm_min: Positive | None = Field(None, le=1e5, description="feed of cuts before the program states one")
+    speed_rpm: Positive | None = Field(
+        None, le=1e6, description="speed of the spindle, clockwise, before the program starts it, or if it never does"
+    )
     tolerance_mm: Positive = Field(0.001, le=1.0, description="greatest deviation of the tip where a move is divided")
     parameters: dict[str, Number] = Field(
         default_factory=dict, description='variables of the controller, e.g. "#100" = 2.5, "#<depth>", R10 or Q10'

@@ -120,7 +120,7 @@ def layer_thickness(program: Program, cutters: Mapping[int, Cutter], top: float)
     thick that there are at most :data:`MOST` layers from the lowest point of the program to the top: the cost of
     a step goes with the layers that the cutter meets.
     """
-    smallest = min(c.diameter for c in cutters.values())
+    smallest = min(c.resolved_diameter for c in cutters.values())
     deep = top - min(_lowest(program, cutters), top)
     p, way = np.asarray(program.p_work), lengths(program)
     cuts = (program.motion != RAPID) & (p[:, 2] < top)

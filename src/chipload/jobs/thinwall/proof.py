@@ -211,7 +211,10 @@ def _columns(
     unsure = np.stack([error_at(inputs.body.places, error, u, v) for u, v in uv]).max(axis=0)
     place, values = spots[MIDDLE]
     u, v = uv[MIDDLE]
-    found = step_deflections(removal, inputs.cut.material, place, work=gives.max(axis=0), bars=bars)
+    if removal.cuts:
+        found = step_deflections(removal, inputs.cut.material, place, work=gives.max(axis=0), bars=bars)
+    else:  # a pass that takes only films: its loads are not known, as its load_error says
+        found = dict.fromkeys(("work_mm", "cutter_mm", "deflection_mm", "force_normal_n"), np.zeros(n))
     weakest, each = allowable.argmin(axis=0), np.arange(len(u))
     threshold = allowable[weakest, each]
     judged = np.stack([spot.point for spot, _ in spots])[weakest, each]
@@ -247,6 +250,10 @@ def _finish(
     parameters = np.linspace(0.02, 0.98, POINTS[0]), np.linspace(inputs.body.foot, 1.0, POINTS[1] + 1)[1:]
     u, v = np.meshgrid(*parameters, indexing="ij")
     points, normals = inputs.body.shape.sides(u, v)[number], inputs.body.shape.normals(u, v)[number]
+    unsure = error_at(inputs.body.places, error, u.ravel(), v.ravel()).reshape(u.shape)
+    if not removal.cuts:
+        none = np.zeros(u.shape)
+        return Finish(number, points, none, none, none > 0.0, unsure, parameters)
     found = form_error(
         removal,
         inputs.cut.material,
@@ -256,7 +263,6 @@ def _finish(
         bars=bars,
         near=0.5 * inputs.body.allowance[number],
     )
-    unsure = error_at(inputs.body.places, error, u.ravel(), v.ravel())
     shape = u.shape
     return Finish(
         number,
@@ -264,7 +270,7 @@ def _finish(
         found.error.reshape(shape),
         found.rigid.reshape(shape),
         found.made.reshape(shape),
-        unsure.reshape(shape),
+        unsure,
         parameters,
     )
 

@@ -173,7 +173,13 @@ def check(job: ThinWallJob) -> tuple[list[str], bool]:
         f"{law.depths[0]:g} mm, {law.forces[-1]:.4g} N at {law.depths[-1]:g} mm",
         f"{VARIANTS} variants or more; the unconstrained one: {estimate(count, 0)}",
     ]
-    return lines, True
+    weak = bearing.force < law.forces[0]
+    if weak.any():
+        lines.append(
+            f"the limit cannot be held at {int(weak.sum())} of {weak.size} places of the finished side: the normal "
+            f"force at the smallest depth, {law.forces[0]:.4g} N at {law.depths[0]:g} mm, is above their threshold"
+        )
+    return lines, not weak.any()
 
 
 def propose(
