@@ -129,7 +129,7 @@ def test_tool_bit_lacks_a_key(tmp_path):
     with pytest.raises(InputError) as err:
         cutter_from_table({"number": 1, "file": "bit.fctb"}, tmp_path)
     lacks = ("flutes", "helix_deg", "flute_length_mm", "overhang_mm", "modulus_gpa")
-    assert str(err.value).splitlines() == [f"cutter.{k} is missing: bit.fctb does not say it: {NEVER}" for k in lacks]
+    assert str(err.value).splitlines() == [f"cutter.{k} is missing: bit.fctb does not state it: {NEVER}" for k in lacks]
 
 
 @pytest.mark.parametrize(

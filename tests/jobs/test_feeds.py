@@ -265,7 +265,10 @@ def test_the_table_of_feeds_alone_tells_the_kind_of_job(tmp_path: Path) -> None:
     ("text", "said"),
     [
         ("#1 = 600\n" + SLOT.replace("F600", "F#1"), "line 7: F#1: a feed that is calculated cannot be changed"),
-        (HEAD + "o1 repeat [2]\nG1 X3 F60\no1 endrepeat\nM2\n", "line 4: o1 repeat: feeds are changed only in a text"),
+        (
+            HEAD + "o1 repeat [2]\nG1 X3 F60\no1 endrepeat\nM2\n",
+            "line 4: o1 repeat: feeds are changed only in a program",
+        ),
         (SLOT.replace("\n", "\r"), "a.ngc: a line ends with CR alone"),
     ],
 )

@@ -12,8 +12,8 @@ import pytest
 
 from chipload.errors import InputError
 from chipload.machine.machine import machine_named
-from chipload.program.read import read_program
-from chipload.report.page import WHOLE
+from chipload.program.read import line_times, read_program, read_tools
+from chipload.report.page import HEADINGS, WHOLE
 from chipload.result import COLUMNS, Verdict
 from chipload.result.columns import unit_of
 from chipload.web.result import open_result
@@ -171,8 +171,60 @@ def test_each_track_has_a_time_that_rises(example, name):
         assert (np.diff(t[max(still - 1, 0) :]) >= 0.0).all(), (
             f"{track.name}: {np.flatnonzero(np.diff(t) < 0.0)[:9] + 1}"
         )
-        assert t[-1] == pytest.approx(track.time_s, rel=1e-3)
+        places = np.column_stack([columns[f"{x}_mm"] for x in "xyz"])
+        moves = np.linalg.norm(np.diff(places, axis=0), axis=1) > 1e-6
+        assert (np.diff(t)[max(still - 1, 0) :] > 0.0)[moves[max(still - 1, 0) :]].all(), (
+            f"{track.name}: no time to move"
+        )
+        assert t[-1] == pytest.approx(track.time_s, rel=CLOSE)
         assert np.allclose(np.cumsum(columns["duration_s"]), t, rtol=1e-9, atol=1e-9)
+
+
+#: of times of one program in several places
+CLOSE = 1e-3
+
+
+@every
+def test_one_clock(example, name):
+    """Times of result, history, report and page, and of the programs as ``chipload check`` reads them."""
+    done = example(name)
+    report = (done.folder / "report.html").read_text()
+    heading = f"<h2>{HEADINGS[done.result.tracks[0].kind]}</h2>"
+    shown = {cell for row in cells(report, heading) for cell in row} if heading in report else None
+    page = {}
+    if any(track.rows for track in done.summary.tracks):
+        page = {track.own.name: track.t for track in open_result(done.folder.parent, name).tracks}
+    machine = machine_named(done.loaded.job.machine)
+    for track, model in zip(done.result.tracks, done.summary.tracks, strict=True):
+        assert track.time_s == model.time_s
+        if track.time_s is None:
+            continue
+        if shown is None:
+            minutes = float(re.search(r" ([0-9.e+-]+) min; ", report)[1])
+            assert 60.0 * minutes == pytest.approx(track.time_s, rel=CLOSE)
+        else:
+            assert f"{track.time_s:.5g}" in shown
+        if model.rows:
+            assert page[track.name][-1] == pytest.approx(track.time_s, rel=CLOSE)
+        if track.programs and done.result.capability not in OVERRIDDEN:
+            tools = tool_lengths(done) if name in WITH_LENGTHS else None
+            read = read_program(done.folder / track.programs[0], machine, tools=tools)
+            assert line_times(read, machine)[1].sum() == pytest.approx(track.time_s, rel=CLOSE), track.name
+
+
+#: the override changes the time of these programs while they run
+OVERRIDDEN = {"torque"}
+#: examples whose programs are written for tables of tool lengths
+WITH_LENGTHS = {"plate", "blade"}
+
+
+def tool_lengths(done):
+    """The cutters of a job as a tool table of LinuxCNC: the length is the overhang."""
+    cutters = done.loaded.job.cutters.items()
+    text = "".join(f"T{n} P{n} D{2.0 * c.radius:g} Z{c.overhang:g}\n" for n, c in cutters)
+    file = done.folder.parent / f"{done.name}.tbl"
+    file.write_text(text)
+    return read_tools(file)
 
 
 @every

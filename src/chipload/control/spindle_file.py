@@ -145,7 +145,7 @@ def _pair(label: str, table: Any, name: str) -> tuple[float, float]:
     if len(numbers) != 2 or not 0.0 <= numbers[0] <= numbers[1]:
         raise InputError(
             f"{label}: range.{name} = {value!r}: must be two numbers, least and greatest; without a torque constant a "
-            "file is none for a job: log cuts of known torque, or state --torque-constant-nm-a"
+            "job cannot use the file: log cuts of known torque, or state --torque-constant-nm-a"
         )
     return numbers[0], numbers[1]
 

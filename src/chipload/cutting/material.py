@@ -154,8 +154,8 @@ class Material:
             return np.array(self.covariance)
         if self.spread is None:
             raise InputError(
-                f"material {self.name}: neither spread nor covariance is known, so how sure its coefficients are "
-                "cannot be said: give spread, or fit them"
+                f"material {self.name}: neither spread nor covariance is known, so the uncertainty of its "
+                "coefficients is unknown: give spread, or fit them"
             )
         return np.diag((self.spread * np.array(self.coefficients)) ** 2)
 

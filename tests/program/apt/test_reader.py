@@ -245,7 +245,7 @@ def test_tap_turns_back():
 @pytest.mark.parametrize(
     ("body", "message"),
     [
-        ("CYCLE/DRILL,FEDTO,5\nGOTO/0,0,0", "line 6: CYCLE/DRILL,FEDTO,5: must say how deep"),
+        ("CYCLE/DRILL,FEDTO,5\nGOTO/0,0,0", "line 6: CYCLE/DRILL,FEDTO,5: must state the depth"),
         ("CYCLE/DEEP,FEDTO,5,RAPTO,1,STEP,0", "pecks must be above 0"),
         ("CYCLE/DEEP,FEDTO,5,RAPTO,1,STEP,1E-6", "makes more than 10000 pecks"),
         ("GOTO/1,2", "line 6: GOTO/1,2: has 2 numbers: must have 3 or 6"),
@@ -258,7 +258,7 @@ def test_tap_turns_back():
         ("UNITS/FEET", "must be MM, CM or INCHES"),
         ("CSYS/1,0,0,0,0,2,0,0,0,0,1,0", "unit vectors at right angles"),
         ("FEDRAT/0\nGOTO/1,1,1", "line 7: a cutting motion at feed 0"),
-        ("SPINDL/OFF\nFEDRAT/.1,MMPR\nGOTO/1,1,1", "line 8: a feed per turn and the spindle stands"),
+        ("SPINDL/OFF\nFEDRAT/.1,MMPR\nGOTO/1,1,1", "line 8: a feed per turn with the spindle at rest"),
     ],
 )
 def test_refused(body, message):

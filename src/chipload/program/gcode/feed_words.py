@@ -83,8 +83,8 @@ def _straight(raw: str, open_text: str, number: int) -> None:
     found = _O_WORD.match(raw) or _JUMP.search(open_text)
     if found is not None:
         raise InputError(
-            f"line {number}: {found[0].strip()}: feeds are changed only in a text that runs straight through: convert "
-            "it first (chipload convert)"
+            f"line {number}: {found[0].strip()}: feeds are changed only in a program without jumps: convert it "
+            "first (chipload convert)"
         )
 
 
