@@ -77,8 +77,8 @@ def check_light(spindle: Spindle, period: float, light: float) -> None:
     found = torque_resolution(spindle, period)
     if light < found.total:
         raise InputError(
-            f"override.light = {1e-3 * light:g} N m: below the resolution of the spindle, {found}: air cannot be told "
-            f"from a cut: {_remedy(found)}, or light at least {1e-3 * found.total:.3g} N m"
+            f"override.light = {1e-3 * light:g} N m: below the resolution of the spindle, {found}: air cannot be "
+            f"distinguished from a cut: {_remedy(found)}, or light at least {1e-3 * found.total:.3g} N m"
         )
 
 
