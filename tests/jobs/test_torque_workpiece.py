@@ -84,7 +84,7 @@ G0 Y-30
 G0 Z5
 M2
 """
-HELICAL = ("--set", "cutter.0.helix_deg=30", "--set", "limits.form_error_um=400")
+HELICAL = ("--set", "cutter.0.helix_deg=30", "--set", "limits.form_error_um=140")
 MATERIAL = material_named("al6082-t6")
 
 
@@ -167,10 +167,11 @@ def test_a_workpiece_from_the_command_line(folder, tmp_path):
     assert error + 0.01 <= worst["resolution_error"] < error + 0.05
     held = what["with_latency"]["controllers"]["fuzzy_feedforward"]
     assert worst["worst"] == pytest.approx(held["form_error_um_max"])
-    # wear makes torque and deflection greater alike: the truth allows as much, without the margin for the error
-    assert 1.0 < what["torque_limit"]["true_wall_nm"] / what["torque_limit_nm"] < 1.0 + error
+    # wear makes torque and deflection greater alike: the truth allows nearly as much torque, without the margin
+    assert what["torque_limit"]["true_wall_nm"] / what["torque_limit_nm"] == pytest.approx(1.0, abs=error + 0.01)
     assert held["ended"] == "path"
-    assert what["ideal_time_s"] < held["time_s"] < what["with_latency"]["controllers"]["constant"]["time_s"]
+    assert what["ideal_time_s"] < held["time_s"]
+    assert held["form_error_um_max"] < 140.0
     rows = pq.read_table(tmp_path / "r" / "history.parquet").to_pydict()
     own = np.array(rows["track"]) == summary["tracks"][0]["name"]
     work, both = (np.array(rows[x])[own] for x in ("deflection_workpiece_um", "deflection_um"))

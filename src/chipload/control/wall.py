@@ -198,7 +198,8 @@ def limit_by_responses(loads: Loads, responses: Sequence[LimitedResponse]) -> Pa
 
     >>> one = np.array([1.0])
     >>> loads = Loads(100.0 * one, 400.0 * one, 50.0 * one, 50.0 * one)
-    >>> limit_by_responses(loads, [LimitedResponse("deflection", 5e-3 * one, 5e-3 * one, 15e-3)]).torque
+    >>> bends = LimitedResponse("deflection", 5e-3 * one, 5e-3 * one, 15e-3)
+    >>> round(limit_by_responses(loads, [bends]).torque, 6)
     900.0
     """
     each = np.full(len(loads.torque_cut), np.inf)

@@ -125,12 +125,12 @@ def _vtk(result: Result, folder: Path) -> dict[str, Callable[[], Content]]:
         files[f"map-{k}-{_safe(one.name)}.vtu"] = lambda one=one: _map(one)  # type: ignore[misc]
     stock = folder / "stock.npz"
     if stock.is_file():
-        mesh: list[Any] = []
+        bodies: list[Any] = []
 
         def left() -> Any:
-            if not mesh:
-                mesh.append(LayeredStock.load(stock).mesh())
-            return mesh[0]
+            if not bodies:
+                bodies.append(LayeredStock.load(stock).mesh())
+            return bodies[0]
 
         files["stock.vtu"] = lambda: faces_file(left().vertices, left().faces)
         files["stock.stl"] = lambda: _stl(left())
