@@ -60,7 +60,10 @@ CASES = (
     Case("machines_tools/better_tool_library/Shape/slittingsaw.fcstd", "FreeCAD document"),
     Case(
         "blades/turbogrid_rotor37/profile.curve", "sections of a blade",
-        (("operation.0.scallop_um", "400.0", "rows far apart, for a first look"),),
+        (
+            ("operation.0.scallop_um", "150.0", "rows far apart, for a first look"),
+            ("wall.span", "[0.8, 1.0]", "the upper fifth, for a first look"),
+        ),
     ),
 )  # fmt: skip
 

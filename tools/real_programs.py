@@ -57,9 +57,9 @@ Files of other people, each drafted by `chipload init FILE DIR` and run from its
 that a verdict rests on guesses: a gouge or a rapid through stock may be that of a guessed stock. `make real` runs all
 files that have no verdict yet, the shortest first by the estimate of `chipload check`, and writes this page; a file
 that was stopped goes on where it was. Times are processor times, the compiling of kernels included where a run was the
-first. A row with *{not_run}* waits for the next `make real`.
-Rows of `top.ngc`, `Guincho_LLbar.apt` and `octagon.dxf` are still those of `chipload simulate`, whose guesses leave a
-result unproven; `--again` of the tool renews them.
+first. A row with *{not_run}* waits for the next `make real`; the longest that its run may take by the estimate stands
+beside it. The row of `octagon.dxf` is still that of `chipload simulate`, whose guesses leave a result unproven; `--again`
+of the tool renews it.
 
 | file | kind | verdict | first reason | time [s] |
 |---|---|---|---|---:|
@@ -158,7 +158,12 @@ def main(arguments: list[str] | None = None) -> None:
             continue
         waiting.append((most, name))
     for most, name in sorted(waiting):
-        print(f"{name}: at most {most:.0f} s by the estimate" if math.isfinite(most) else f"{name}: a plan", flush=True)
+        length = (
+            f"at most {most:.0f} s by the estimate" if math.isfinite(most) else "a plan, whose time is not estimated"
+        )
+        print(f"{name}: {length}", flush=True)
+        if not finished(page.get(name, "")):
+            write({name: row(name, FILES[name], NOT_RUN, length, None)})
     for _, name in sorted(waiting):
         found = row(name, FILES[name], *run(folder_of(chosen.kept, name), chosen.limit_s))
         print(found, flush=True)

@@ -217,8 +217,7 @@ def test_what_is_wrong_is_said() -> None:
     with pytest.raises(InputError, match=r"did not keep what the teeth cut: remove\(..., keep=True\)"):
         contacts(forgot)
     films = replace(forgot, columns={**forgot.columns, "chip_pieces": np.zeros_like(forgot.columns["chip_pieces"])})
-    with pytest.raises(InputError, match="films, narrower than a few tolerances: state a smaller layer_mm"):
-        contacts(films)
+    assert len(contacts(films).step) == 0  # films have no loads
 
 
 @pytest.mark.parametrize("turn", [400.0, -400.0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any
@@ -116,11 +117,9 @@ def _vtk(result: Result, folder: Path) -> dict[str, Callable[[], Content]]:
         blocks = list(track.blocks())
         if blocks and all(key in blocks[0] for key in ("x_mm", "y_mm", "z_mm")):
             files[f"path-{_safe(track.name)}.vtp"] = lambda blocks=blocks: _path(blocks)  # type: ignore[misc]
-        mesh = read_removal(removal, k) if blocks and removal.is_file() else None
-        if mesh is not None and len(mesh.rows):
-            files[f"chips-{_safe(track.name)}.vtu"] = lambda mesh=mesh, blocks=blocks: _chips(  # type: ignore[misc]
-                mesh, blocks
-            )
+        removed = read_removal(removal, k) if blocks and removal.is_file() else None
+        if removed is not None and len(removed.rows):
+            files[f"chips-{_safe(track.name)}.vtu"] = partial(_chips, removed, blocks)
     for k, one in enumerate(result.maps):
         files[f"map-{k}-{_safe(one.name)}.vtu"] = lambda one=one: _map(one)  # type: ignore[misc]
     stock = folder / "stock.npz"

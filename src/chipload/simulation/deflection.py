@@ -138,7 +138,7 @@ def contacts(removal: Removal) -> Contacts:
     InputError
         The removal was made without ``keep``.
     """
-    parts = []
+    parts = [(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 3)))]
     for cuts in _kept(removal):
         bites = cuts.engagement
         owner = np.repeat(np.arange(len(bites)), np.diff(bites.start))
@@ -414,10 +414,7 @@ def _kept(removal: Removal) -> tuple[Cuts, ...]:
         if not removal.columns["chip_volume_mm3"].any():
             raise InputError("deflection: the program cuts nothing")
         if not removal.columns["chip_pieces"].any():
-            raise InputError(
-                "deflection: all chips are films, narrower than a few tolerances: state a smaller layer_mm or "
-                "tolerance_mm"
-            )
+            return ()  # films, narrower than a few tolerances, have no loads
         raise InputError("deflection: the removal did not keep what the teeth cut: remove(..., keep=True)")
     return removal.cuts
 

@@ -154,11 +154,11 @@ def _cutter(document: Document, controller: DocumentObject, name: str) -> Stated
     corner = next((v for k in ("TorusRadius", "CornerRadius") if (v := bit.number(k)) is not None), None)
     special = shape.removesuffix(".fcstd").rsplit("/", 1)[-1]
     if special in SPECIAL:
-        found = {key: (value, where) for key, value in special_shape(special, bit.number, where).items()}
-        if "body_mm" in found:
+        shaped = {key: (value, where) for key, value in special_shape(special, bit.number, where).items()}
+        if "body_mm" in shaped:
             out = {k: v for k, v in out.items() if k in ("name", "shank_diameter_mm")}
-            found = {"body_mm": found["body_mm"]}
-        out |= found
+            shaped = {"body_mm": shaped["body_mm"]}
+        out |= shaped
     elif "ball" in shape and diameter:
         out["corner_radius_mm"] = (0.5 * diameter, where)
     elif corner is not None and 0.0 < corner <= 0.5 * diameter:
