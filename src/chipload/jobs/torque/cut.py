@@ -264,7 +264,7 @@ def cut(
     Parameters
     ----------
     rapids : feed of the rapids between two cuts [mm/s]
-    keep : the removal keeps what the teeth cut
+    keep : the removal keeps what the teeth cut, and finds the error of its loads
 
     Raises
     ------
@@ -288,7 +288,7 @@ def cut(
         material,
         fine,
         keep=keep,
-        accuracy=False,
+        accuracy=keep,
         progress=lambda x, what: progress(0.5 + 0.5 * x, what),
     )
     c = removal.columns

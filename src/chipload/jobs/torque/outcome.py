@@ -254,6 +254,7 @@ class TorqueResult:
     ----------
     step_checks : the steps for the checks beside the stated limits
     findings : of the simulations of the plan and of the truth
+    resolution_error : relative error of loads by layers and steps, by column of the simulation of the truth
     energy_balance : work over the specific energy of the volume removed, less 1, by tool number: as planned, and real
     """
 
@@ -263,6 +264,7 @@ class TorqueResult:
     control: ControlComparison
     step_checks: StepChecks
     findings: tuple[Finding, ...]
+    resolution_error: Mapping[str, float]
     energy_balance: Mapping[str, Mapping[int, float]]
 
     @property

@@ -5,6 +5,8 @@ The verdict stands on the fuzzy controller with the model of the cut and the lat
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -16,9 +18,18 @@ from chipload.jobs.torque.numbers import operation_numbers
 from chipload.jobs.torque.outcome import HELD, PLAIN, ControllerCase, ControllerRun, TorqueResult
 from chipload.jobs.torque.step_checks import check_columns
 from chipload.report.programs import ENDINGS
-from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, check_limit, in_memory
+from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, check_limit, column_of, in_memory, state_of
 from chipload.result.limits import Columns
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
+
+#: the limit on the excess of the torque over what is allowable
+OVER = "torque_over_percent"
+#: columns whose error is that of the force, and that of the mean torque
+WITH_FORCE = (
+    "force_n", "form_error_um", "stress_mpa", "strength_share", "deflection_um", "deflection_share",
+    "cutter_stress_mpa",
+)  # fmt: skip
+WITH_TORQUE = ("torque_nm", "torque_mean_nm", "power_w")
 
 
 def result_of(outcome: TorqueResult) -> Result:
@@ -42,7 +53,6 @@ def result_of(outcome: TorqueResult) -> Result:
             *(() if outcome.control.cases else ("cutter strength, chips and spindle: no controller was run",)),
             "chatter and runout beyond that of the cutter: not calculated",
             "the wall has one thickness, that at the end of the cut",
-            "error of the loads by layers and steps: not estimated",
         ),
         provenance=outcome.job.provenance,
         note=_note(outcome),
@@ -56,9 +66,35 @@ def track_name(case: ControllerCase, controller: str) -> str:
 
 
 def limits_of(outcome: TorqueResult, columns: Columns, track: str) -> tuple[LimitCheck, ...]:
-    """Every limit of the job against a controller, then those that are checked by default."""
-    stated = (check_limit(name, limit, columns, track=track) for name, limit in outcome.job.limits.items())
-    return (*stated, *default_limits(outcome.job.checks, outcome.job.machine, columns, track, {}))
+    """Every limit of the job against a controller, then those that are checked by default.
+
+    Their ``resolution_error`` is that of the simulation of the truth: of the mean torque for torques and powers, of the
+    force for what the wall and the cutter do.
+    """
+    errors = errors_of(outcome.resolution_error)
+    stated = (
+        check_limit(name, limit, columns, track=track, error=errors.get(column_of(name).name, 0.0))
+        for name, limit in outcome.job.limits.items()
+    )
+    found = (*stated, *default_limits(outcome.job.checks, outcome.job.machine, columns, track, errors))
+    return tuple(over_allowable(x, columns, errors["torque_nm"]) if x.name == OVER else x for x in found)
+
+
+def errors_of(simulated: Mapping[str, float]) -> dict[str, float]:
+    """Relative errors of the columns of a controller, from those of the columns of the simulation.
+
+    >>> errors_of({"force_n": 0.02, "torque_mean_nm": 0.03})["stress_mpa"]
+    0.02
+    """
+    force, torque = simulated["force_n"], simulated["torque_mean_nm"]
+    return dict.fromkeys(WITH_FORCE, force) | dict.fromkeys(WITH_TORQUE, torque)
+
+
+def over_allowable(check: LimitCheck, columns: Columns, error: float) -> LimitCheck:
+    """The excess over the allowable torque: its error is that of the torque, also where there is no excess."""
+    share = float(np.max(columns["torque_nm"] / columns["torque_allowable_nm"], initial=0.0))
+    state, why = state_of(share, 1.0 + 1e-2 * check.limit, error)
+    return replace(check, state=state, reason=why, resolution_error=error if math.isfinite(error) else 0.0)
 
 
 def _real(case: ControllerCase) -> bool:

@@ -131,6 +131,7 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
         ),
         step_checks=step_checks(a.real, a.loads, material, _fastest(cases)),
         findings=(*a.planned.removal.findings, *a.real.removal.findings),
+        resolution_error=a.real.removal.resolution_error,
         energy_balance={
             name: energy_balance(cut.removal.columns, material.Ktc)
             for name, cut in (("planned", a.planned), ("real", a.real))
