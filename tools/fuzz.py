@@ -7,8 +7,12 @@ are not finite, or the death of the process), **hang** (over 20 s of the process
 (over 4 GiB). Faults, hangs and memory must be 0, and the exit code is 1 where they are not.
 
 `--jobs` sets every numeric value of the job of every example to 0, -1, 1e-9, 1e9, nan, inf and a text, loads the job
-and checks it as `chipload check` does; `--jobs --run` does the same to small jobs and runs them too (``fuzz_jobs``). A
-run that goes on as it should for some seconds of the processor ends as **long**.
+and checks it as `chipload check` does; `--jobs --run` does the same to every example made small, and to some small
+jobs more, and runs them (``fuzz_jobs``), each case in a child that is forked from one process (``fuzz_fork``). A run
+that goes on as it should for some seconds of the processor ends as **long**, a result that cannot be true as
+**nonsense**. With `--record FILE` a campaign that was stopped goes on:
+
+    python tools/fuzz.py --jobs --run --cases 10000 --budget 3600 --record runs.jsonl
 """
 
 from __future__ import annotations
@@ -30,6 +34,7 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
+from fuzz_fork import campaign as job_campaign
 from fuzz_jobs import carry_out, case
 from fuzz_readers import READERS, Nonsense
 
@@ -145,18 +150,14 @@ def serve(reader: str) -> None:
     from chipload.errors import InputError
 
     place = Path(tempfile.mkdtemp(prefix="fuzz-"))
-    jobs = reader in ("jobs", "runs")
-    seeds = [] if jobs else READERS[reader].seeds()
+    seeds = READERS[reader].seeds()
     try:
         for line in sys.stdin:
             number, said = int(line), ""
             try:
-                if jobs:
-                    end = carry_out(number, reader == "runs", place)
-                else:
-                    path = place / f"case{READERS[reader].suffix}"
-                    path.write_bytes(case_of(reader, number, seeds))
-                    end = "findings" if READERS[reader].read(path) else "read"
+                path = place / f"case{READERS[reader].suffix}"
+                path.write_bytes(case_of(reader, number, seeds))
+                end = "findings" if READERS[reader].read(path) else "read"
             except InputError as err:
                 end, said = "refused", str(err)
                 if not said or "Traceback" in said:
@@ -274,9 +275,10 @@ def main() -> int:
     )
     ask.add_argument("--cases", type=int, default=1_000_000, help="most cases of a reader")
     ask.add_argument("--first", type=int, default=0, metavar="K", help="number of the first case")
-    ask.add_argument("--reader", action="append", choices=[*READERS, "jobs", "runs"], help="only this one; repeatable")
+    ask.add_argument("--reader", action="append", choices=[*READERS], help="only this one; repeatable")
     ask.add_argument("--jobs", action="store_true", help="extreme jobs instead of damaged files")
     ask.add_argument("--run", action="store_true", help="with --jobs: small jobs, which are run too")
+    ask.add_argument("--record", type=Path, metavar="FILE", help="with --jobs: keep each case there and go on")
     ask.add_argument("--case", type=int, help="only this case, in this process, with its traceback")
     ask.add_argument("--keep", type=Path, metavar="FILE", help="with --case: write the damaged file there")
     ask.add_argument("--serve", help=argparse.SUPPRESS)
@@ -284,7 +286,13 @@ def main() -> int:
     if given.serve:
         serve(given.serve)
         return 0
-    names = given.reader or (["runs" if given.run else "jobs"] if given.jobs else list(READERS))
+    if given.jobs:
+        if given.case is not None:
+            return _one_job(given.case, given.run)
+        _, bad = job_campaign(given.run, given.first, given.cases, given.budget, given.record)
+        print("\n".join(bad))
+        return 1 if bad else 0
+    names = given.reader or list(READERS)
     if given.case is not None:
         return _one(names[0], given.case, given.keep)
     print(f"| reader | {' | '.join(KINDS)} |\n|---|{'---:|' * len(KINDS)}", flush=True)
@@ -302,12 +310,14 @@ def main() -> int:
     return 1 if bad else 0
 
 
+def _one_job(number: int, run: bool) -> int:
+    print(case(number, run))
+    with tempfile.TemporaryDirectory() as place:
+        print(carry_out(number, run, Path(place)))
+    return 0
+
+
 def _one(reader: str, number: int, keep: Path | None) -> int:
-    if reader in ("jobs", "runs"):
-        print(case(number, reader == "runs"))
-        with tempfile.TemporaryDirectory() as place:
-            print(carry_out(number, reader == "runs", Path(place)))
-        return 0
     seeds = READERS[reader].seeds()
     with tempfile.TemporaryDirectory() as place:
         path = keep or Path(place) / f"case{READERS[reader].suffix}"

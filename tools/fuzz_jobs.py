@@ -1,9 +1,10 @@
 """Extreme jobs of tools/fuzz.py: every number of a job set to what nobody means, loaded, checked and run.
 
-`jobs` are those of the examples, loaded and checked as `chipload check` does. `runs` are small jobs of the capabilities
-that end within a moment, which are also run: what is accepted runs to its end, or for :data:`RUN_S` seconds of the
-processor while it tells its progress. The first cases change one number each, all further ones two to three, by their
-number.
+`jobs` are those of the examples, loaded and checked as `chipload check` does. `runs` are small jobs that end within a
+moment, those of every example made small (``fuzz_small``) and some of capabilities that no example has, which are run
+too: what is accepted runs to its end, or for :data:`RUN_S` seconds of the processor while it tells its progress; what
+is refused only when it is run, though `chipload check` finds nothing, is counted as nonsense. The first cases change
+one number each, all further ones two to three, by their number.
 """
 
 from __future__ import annotations
@@ -17,15 +18,21 @@ import tomllib
 from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from fuzz_readers import Nonsense
+from fuzz_small import SMALL
+
+if TYPE_CHECKING:
+    from chipload.result import Result
 
 #: seconds of the processor after which a run that goes on as it should is stopped
-RUN_S = 8.0
+RUN_S = 2.0
 #: what every number is set to
 VALUES = ["0", "-1", "1e-9", "1e9", "nan", "inf", '"text"']
+#: columns that are never below 0
+SIZES = ("force_n", "torque_nm", "torque_mean_nm", "power_w", "chip_max_mm", "deflection_um", "t_s", "duration_s")
 #: and what two to three are set to together
 MORE = [*VALUES, "-1e9", "1e-3", "1e3", "1e300", "0.5", "7", "-0.5", "90", "[]", "true"]
 
@@ -79,9 +86,6 @@ NC = "G21 G90 G17\nT1 M6\nS6000 M3\nG0 X-6 Y5 Z5\nZ-2\nG1 X20 F900\nG3 X22 Y7 J2
 SLOT = "G21 G90 G17\nT1 M6\nS6000 M3\nG0 X10 Y5 Z5\nG1 Z-2 F900\nX16\nG0 Z5\nM2\n"
 DYNAMICS = """
 [dynamics]
-frequency_percent = 2.0
-damping_percent = 20.0
-stiffness_percent = 10.0
 [[dynamics.mode]]
 frequency_hz = 900.0
 damping_ratio = 0.03
@@ -98,7 +102,7 @@ CLAMPS = """
 modulus_gpa = 71.7
 poisson = 0.33
 states = 2
-cell_mm = 4.0
+cell_mm = 2.5
 [[workpiece.clamp]]
 face = "z-"
 [[workpiece.clamp]]
@@ -207,7 +211,10 @@ def places(run: bool) -> tuple[tuple[str, str], ...]:
     out = []
     if run:
         for name, files in small_jobs().items():
-            out += [(name, at) for at in leaves(tomllib.loads(files["job.toml"].decode()))]
+            out += [(f"small {name}", at) for at in leaves(tomllib.loads(files["job.toml"].decode()))]
+        for name, small in SMALL.items():
+            text = _example(name)
+            out += [(name, at) for at in leaves(tomllib.loads(text[: text.index(small.cut)] if small.cut else text))]
     else:
         for folder in sorted(resources.files("chipload.examples").iterdir(), key=str):
             if folder.joinpath("job.toml").is_file():
@@ -231,8 +238,26 @@ def case(number: int, run: bool) -> tuple[str, tuple[str, ...]]:
     return name, tuple(f"{own[k]}={MORE[int(rng.integers(len(MORE)))]}" for k in chosen)
 
 
+def folder_of(name: str, run: bool, place: Path) -> tuple[Path, tuple[str, ...]]:
+    """The folder of a job, which is written where it is not there yet, and the overrides that make it small."""
+    from chipload.examples import copy_example
+
+    folder, own = place / name.replace(" ", "-"), name.removeprefix("small ")
+    sets = SMALL[name].sets if run and name in SMALL else ()
+    if not folder.exists():
+        if not run:
+            copy_example(name, folder)
+        elif name in SMALL:
+            SMALL[name].write(folder)
+        else:
+            folder.mkdir()
+            for file, data in small_jobs()[own].items():
+                (folder / file).write_bytes(data)
+    return folder, sets
+
+
 def carry_out(number: int, run: bool, place: Path) -> str:
-    """Load and check the job of a case, and run it where that is asked; how it ends.
+    """Load and check the job of a case, or run it where that is asked; how it ends.
 
     Returns
     -------
@@ -240,25 +265,17 @@ def carry_out(number: int, run: bool, place: Path) -> str:
         ``read``: every limit holds, ``findings``: one does not, ``long``: it was stopped on its way.
     """
     from chipload.errors import Cancelled
-    from chipload.examples import copy_example
     from chipload.jobs import check_job, load_job, run_job
     from chipload.result.summary import summary_bytes
 
     name, overrides = case(number, run)
-    folder = place / name
-    if not folder.exists():
-        if run:
-            folder.mkdir()
-            for file, data in small_jobs()[name].items():
-                (folder / file).write_bytes(data)
-        else:
-            copy_example(name, folder)
-    loaded = load_job(folder / "job.toml", overrides)
-    lines, holds = check_job(loaded)
-    for line in lines:
-        if any(word in f" {line} " for word in (" nan ", " inf ")):
-            raise Nonsense(line)
+    folder, sets = folder_of(name, run, place)
+    loaded = load_job(folder / "job.toml", (*sets, *overrides))
     if not run:
+        lines, holds = check_job(loaded)
+        for line in lines:
+            if any(word in f" {line} " for word in (" nan ", " inf ")):
+                raise Nonsense(line)
         return "read" if holds else "findings"
     until = time.process_time() + RUN_S
 
@@ -272,12 +289,36 @@ def carry_out(number: int, run: bool, place: Path) -> str:
         return "long"
     text = summary_bytes(done.result, {})
     json.loads(text, parse_constant=_not_finite)
-    for track in done.result.tracks:
+    judge(done.result)
+    return "read" if done.result.verdict.exit_code == 0 else "findings"
+
+
+def judge(result: Result) -> None:
+    """Refuse what no result may say.
+
+    Raises
+    ------
+    Nonsense
+        A number that is not finite, a time or a load below 0, a limit that holds and is exceeded, or a track whose
+        limits hold though its work is not that of its volume.
+    """
+    for track in result.tracks:
+        if track.time_s is not None and not 0.0 <= track.time_s < math.inf:
+            raise Nonsense(f"{track.name} takes {track.time_s} s")
         for column, values in track.columns.items():
             held = np.asarray(values)
             if held.dtype.kind == "f" and not np.isfinite(held).all():
                 raise Nonsense(f"column {column} of {track.name} is not finite")
-    return "read" if done.result.verdict.exit_code == 0 else "findings"
+            if column in SIZES and len(held) and float(held.min()) < -1e-9 * float(np.abs(held).max()):
+                raise Nonsense(f"column {column} of {track.name} is {held.min():g}")
+        for check in track.limits:
+            beyond = check.worst is not None and (check.worst - check.limit) * (-1.0 if check.column.least else 1.0)
+            if check.state.value == "holds" and beyond > 1e-9 * abs(check.limit):
+                raise Nonsense(f"{track.name}: {check.name} {check.worst} of {check.limit} holds")
+        error = max((check.resolution_error for check in track.limits), default=0.0)
+        for tool, balance in track.energy_balance.items():
+            if track.in_use and result.verdict.exit_code == 0 and abs(balance) > 0.1 + error:
+                raise Nonsense(f"{track.name}: energy balance {balance:.3g} of tool {tool}, and every limit holds")
 
 
 def _not_finite(text: str) -> float:

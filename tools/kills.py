@@ -22,54 +22,31 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
-from fuzz_jobs import small_jobs
-
-from chipload.examples import copy_example
+from fuzz_jobs import folder_of
 
 HOW = (signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGHUP)
 #: codes of a run that ended with a result
 DONE = (0, 3)
-#: jobs of examples, made small
-EXAMPLES: dict[str, tuple[str, tuple[str, ...]]] = {
-    "thin wall": (
-        "plate",
-        (
-            "wall.length_mm=8.0", "wall.height_mm=9.0", "wall.thickness_mm=1.7", "wall.foot_mm=4.0",
-            "wall.allowance_mm=[0.2, 0.2]", "wall.elements=[4, 5]", "operation.0.scallop_um=40.0",
-            "operation.0.depth_max_mm=0.2", "operation.0.step_mm=3.0", "operation.0.least_error=false",
-            "operation.0.corner_slices=60", "operation.0.reserve=0.1",
-        ),
-    ),
-    "torque": ("tube", ("simulation.step_mm=2.0", "simulation.layer_mm=2.0")),
-    "impeller": (
-        "impeller",
-        (
-            *(f"surface.{k}.points=[6, 4]" for k in range(3)), "operation.0.check_mm=5",
-            "operation.0.most_cutters=1", "surface.2.up=[0.05, 0.75]",
-        ),
-    ),
-}  # fmt: skip
+#: small jobs of fuzz_jobs, and the examples made small that are of other capabilities
+JOBS = (
+    "small program", "small moves", "small feeds", "small dynamics", "small workpiece", "small contour",
+    "small pocket", "small average", "small instantaneous", "plate", "tube", "impeller",
+)  # fmt: skip
+#: of these the steps are made short, so that a run is ended between two checkpoints
+SHORT_STEPS = ("small program", "small moves")
 
 
 def jobs(place: Path) -> dict[str, list[str]]:
     """The command of each job without its result folder."""
     out = {}
-    for name, files in small_jobs().items():
-        folder = place / name
-        folder.mkdir()
-        for file, data in files.items():
-            (folder / file).write_bytes(data)
-        finer = ("step_mm = 2.0", "step_mm = 0.25") if name in ("program", "moves", "dynamics") else ("", "")
-        text = (folder / "job.toml").read_text().replace(*finer)
-        (folder / "job.toml").write_text(text)
-        out[name] = ["run", str(folder / "job.toml"), "--keep-s", "0", "--out"]
-    for name, (example, sets) in EXAMPLES.items():
-        job = copy_example(example, place / name) / "job.toml"
-        text = job.read_text()
-        job.write_text(text[: text.index("[operation.rough]")] if name == "impeller" else text)
-        out[name] = ["run", str(job), *(word for s in sets for word in ("--set", s)), "--keep-s", "0", "--out"]
+    for name in JOBS:
+        folder, sets = folder_of(name, True, place)
+        if name in SHORT_STEPS:
+            sets = (*sets, "operation.0.step_mm=0.25")
+        words = [word for text in sets for word in ("--set", text)]
+        out[name] = ["run", str(folder / "job.toml"), *words, "--keep-s", "0", "--out"]
     over = ("--over", "cutter.0.diameter_mm=8,10", "--over", "operation.0.feed_mm_min=600,900")
-    out["sweep"] = ["sweep", str(place / "contour" / "job.toml"), *over, "--out"]
+    out["sweep"] = ["sweep", str(place / "small-contour" / "job.toml"), *over, "--out"]
     return out
 
 
@@ -180,19 +157,22 @@ def main() -> int:
         print("|---|---:|---:|---:|---:|---:|---:|---:|---:|", flush=True)
         share = -(-given.kills // len(commands))
         for name, words in commands.items():
-            begin, undisturbed = time.monotonic(), place / name / "whole"
-            undisturbed.parent.mkdir(exist_ok=True)
-            code, said, _ = Run([*words, str(undisturbed)], place / "messages").ended()
-            if code not in DONE:
-                raise SystemExit(f"{name}: {said}")
+            undisturbed = place / f"{name} of kills" / "whole"
+            undisturbed.parent.mkdir()
+            for _ in range(2):
+                # the first one compiles what is not there yet
+                begin = time.monotonic()
+                code, said, _ = Run([*words, str(undisturbed)], place / "messages").ended()
+                if code not in DONE:
+                    raise SystemExit(f"{name}: {said}")
             whole = (time.monotonic() - begin, contents(undisturbed))
             found = Counter[str]()
             for k in range(share):
-                own = place / name / f"case-{k}"
+                own = undisturbed.parent / f"case-{k}"
                 own.mkdir()
                 found += case(words, own, *whole, rng)
                 shutil.rmtree(own)
-            own = place / name / "two"
+            own = undisturbed.parent / "two"
             own.mkdir()
             found += two_at_once(words, own, whole[1])
             cells = ("cases", "SIGKILL", "SIGTERM", "SIGHUP", "went on", "other bytes", "left", "faults")

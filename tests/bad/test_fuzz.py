@@ -1,15 +1,27 @@
-"""A small budget of tools/fuzz.py: no damaged input of any reader ends in a fault, a hang or 4 GiB."""
+"""A small budget of tools/fuzz.py: no damaged input ends in a fault, a hang or 4 GiB, and how cases are told apart."""
 
 from __future__ import annotations
 
+import json
+import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, in_memory
+from chipload.result.result import Provenance
+
 TOOL = Path(__file__).parents[2] / "tools" / "fuzz.py"
+sys.path.insert(0, str(TOOL.parent))
+
+import fuzz_fork  # noqa: E402
+import fuzz_jobs  # noqa: E402
 
 
 def ran(*words: str) -> subprocess.CompletedProcess[str]:
@@ -37,7 +49,7 @@ def test_a_case_is_the_same_each_time(tmp_path: Path) -> None:
 ])  # fmt: skip
 def test_each_end_is_told_from_the_others(tmp_path: Path, body: str, end: str) -> None:
     """The tool itself, with a reader that ends in a known way."""
-    for name in ("fuzz.py", "fuzz_jobs.py", "plate.step"):
+    for name in ("fuzz.py", "fuzz_fork.py", "fuzz_jobs.py", "fuzz_small.py", "plate.step"):
         (tmp_path / name).write_bytes(TOOL.with_name(name).read_bytes())
     text = TOOL.with_name("fuzz_readers.py").read_text("utf-8")
     text = text.replace("def _meridian(path: Path) -> int:\n", f"def _meridian(path: Path) -> int:\n    {body}\n")
@@ -47,3 +59,55 @@ def test_each_end_is_told_from_the_others(tmp_path: Path, body: str, end: str) -
     head, row = (re.findall(r"[^|\s]+", line) for line in done.stdout.splitlines()[0:3:2])
     assert dict(zip(head, row, strict=True))[end] == "1"
     assert done.returncode == (0 if end == "refused" else 1)
+
+
+def _dies() -> tuple[str, str]:
+    os._exit(3)
+
+
+def _takes_much() -> tuple[str, str]:
+    return fuzz_fork.said_of_work(lambda: str(np.ones(1 << 30).sum()))
+
+
+def _is_wrong() -> tuple[str, str]:
+    return fuzz_fork.said_of_work(lambda: str(1 // 0))
+
+
+@pytest.mark.parametrize(("work", "end", "said"), [
+    (lambda: ("read", ""), "read", ""), (_dies, "fault", "the process ended with 3"), (_takes_much, "memory", ""),
+    (_is_wrong, "fault", "ZeroDivisionError"),
+])  # fmt: skip
+def test_each_end_of_a_forked_case(work: Callable[[], tuple[str, str]], end: str, said: str) -> None:
+    found, words, spent = fuzz_fork.forked(work)
+    assert (found, words[: len(said)]) == (end, said)
+    assert spent >= 0.0
+
+
+def test_a_campaign_goes_on_after_its_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    record = tmp_path / "runs.jsonl"
+    record.write_text('[0, "refused", "known", 0.1]\n[1, "fa', "utf-8")
+    monkeypatch.setattr(fuzz_fork, "imported", lambda: None)
+    monkeypatch.setattr(fuzz_fork, "carry_out", lambda number, run, place: "read")
+    total, bad = fuzz_fork.campaign(False, 0, 3, 60.0, record)
+    assert (total["cases"], total["refused"], total["read"], bad) == (3, 1, 2, [])
+    lines = record.read_text("utf-8").splitlines()
+    assert [json.loads(line)[0] for line in lines if line.endswith("]")] == [0, 1, 2]
+
+
+def result_with(**track: object) -> Result:
+    """A result of one limit that holds."""
+    force = LimitCheck("force_n", 500.0, 480.0, Verdict.HOLDS, "program")
+    one = Track("program", TrackKind.PROGRAM, True, 3.0, (force,), blocks=in_memory({"force_n": np.array([480.0])}))
+    return Result("program", "x", (replace(one, **track),), (), (), (), Provenance({}, (), "", {}, {}))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("track", "said"), [
+    ({"blocks": in_memory({"force_n": np.array([np.nan])})}, "not finite"),
+    ({"blocks": in_memory({"force_n": np.array([-3.0, 480.0])})}, "is -3"),
+    ({"limits": (LimitCheck("force_n", 400.0, 480.0, Verdict.HOLDS, "program"),)}, "of 400.0 holds"),
+    ({"energy_balance": {1: 0.3}}, "energy balance 0.3"),
+])  # fmt: skip
+def test_nonsense_is_seen(track: dict[str, object], said: str) -> None:
+    fuzz_jobs.judge(result_with())
+    with pytest.raises(fuzz_jobs.Nonsense, match=said):
+        fuzz_jobs.judge(result_with(**track))

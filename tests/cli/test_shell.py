@@ -17,10 +17,16 @@ from chipload.control.hal_file import load_hal
 from chipload.control.plant import Loop
 from chipload.control.plant import run as play
 from chipload.cutter.cutter import Cutter
+from chipload.jobs import load_job
+from chipload.jobs.torque.cut import cut, off_centre, shell_stock
+from chipload.jobs.torque.result import over_allowable
+from chipload.jobs.torque.run import opened
 from chipload.machine.machine import machine_named
 from chipload.program.motions import lengths
 from chipload.program.program import RAPID
 from chipload.program.read import read_program
+from chipload.progress import silent
+from chipload.result import LimitCheck, Verdict
 from chipload.structure import beam
 from chipload.structure.shell import Shell, compliance, ritz
 from torque_job import OVERRIDE_AND_LOOP, SPINDLE
@@ -137,6 +143,52 @@ def test_every_controller_twice(what):
 def test_work_is_that_of_the_volume(what):
     assert set(what["energy_balance"]) == {"planned", "real"}
     assert all(abs(each["1"]) < 0.05 for each in what["energy_balance"].values())
+
+
+def test_each_limit_of_a_load_has_its_error_and_is_unproven_inside_it(result):
+    """5 % of excess are allowed, and the torque over what is allowed has the error of the torque."""
+    tracks = json.loads((result / "summary.json").read_text())["tracks"]
+    loads = ("form_error_um", "strength_share", "spindle_power_w", "cutter_stress_mpa", "deflection_share")
+    for track in tracks:
+        checks = {check["name"]: check for check in track["limits"]}
+        for name in loads:
+            check = checks[name]
+            assert 0.01 <= check["resolution_error"] < 1.0, (track["name"], name)
+            inside = check["worst"] * (1.0 + check["resolution_error"]) > check["limit"]
+            assert (check["state"] == "holds") == (not inside), (track["name"], name)
+        over = checks["torque_over_percent"]
+        assert over["resolution_error"] == checks["spindle_torque_nm"]["resolution_error"] > 0.01
+        if over["worst"] > 0.0 and (1.0 + over["worst"] / 100.0) * (1.0 + over["resolution_error"]) > 1.05:
+            assert over["state"] != "holds", track["name"]
+        assert checks["axial_overrun_mm"]["resolution_error"] == 0.0
+
+
+@pytest.mark.parametrize(("share", "state"), [(0.9, "holds"), (0.97, "unproven"), (1.02, "unproven"), (1.2, "exceeds")])
+def test_an_excess_over_the_allowable_torque_has_the_error_of_the_torque(share, state):
+    """No excess is allowed, and the torque is known to 5 %: 0.97 of what is allowed may be 1.02 of it."""
+    columns = {"torque_nm": np.array([0.1, share]), "torque_allowable_nm": np.ones(2)}
+    excess = 100.0 * max(share - 1.0, 0.0)
+    plain = LimitCheck("torque_over_percent", 0.0, excess, Verdict.EXCEEDS if excess > 0.0 else Verdict.HOLDS)
+    found = over_allowable(plain, columns, 0.05)
+    assert (found.state.value, found.resolution_error, found.worst) == (state, 0.05, excess)
+    assert bool(found.reason) == (state == "unproven")
+    assert over_allowable(plain, columns, math.inf).state is Verdict.UNPROVEN
+
+
+def test_the_errors_cover_layers_and_steps_of_a_quarter(job):
+    """The greatest loads of the truth, simulated with layers and steps a quarter as thick and long."""
+    found = []
+    for share in (1.0, 0.25):
+        sets = (f"simulation.step_mm={2.0 * share}", f"simulation.layer_mm={0.5 * share}")
+        real = load_job(job, sets).job
+        machine, material, _, program, _ = opened(real)
+        stock = shell_stock(real, program, off_centre(real.shell.stock_mm, real.table.surprise))
+        found.append(cut(real, program, stock, material, machine.rapid, silent, keep=True))
+    coarse, fine = ([each.loads.torque_edge + each.loads.torque_cut, each.loads.force_edge + each.loads.force_cut]
+                    for each in found)  # fmt: skip
+    errors = found[0].removal.resolution_error
+    for name, a, b in zip(("torque_mean_nm", "force_n"), coarse, fine, strict=True):
+        assert 0.0 < abs(b.max() - a.max()) <= errors[name] * a.max(), name
 
 
 def test_the_verdict_is_what_was_measured(result, what):

@@ -68,6 +68,19 @@ def test_a_thin_cutter_breaks_and_the_report_says_where() -> None:
     assert "rigid model" in strong.message
 
 
+def test_the_range_of_the_rigid_model_has_the_error_of_the_deflection() -> None:
+    """The deflection goes with the force; a share that may be above 1 by this error is unproven."""
+    done = slot()
+    share, force = held(done, "deflection_share"), held(done, "force_n")
+    assert share.resolution_error == force.resolution_error > 0.0
+    # a range so small that the share is within its error below 1
+    room = share.worst * (1.0 + 0.5 * share.resolution_error)
+    below = slot(checks={"deflection_of_feed": 2.0 * room, "deflection_of_depth": 0.25 * room})
+    close = held(below, "deflection_share")
+    assert close.worst < 1.0 < close.worst * (1.0 + close.resolution_error)
+    assert (close.state, below.verdict) == (Verdict.UNPROVEN, "unproven")
+
+
 def test_what_is_switched_off_is_listed() -> None:
     thin = replace(MILL, diameter=4.0)
     done = slot(thin, 3.0, checks={"cutter_strength": False, "rigid_model": False})

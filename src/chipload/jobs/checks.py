@@ -39,7 +39,7 @@ DIRECTED = (
 #: columns that follow the greatest force of a turn, not its mean
 PEAKS = (*DIRECTED, "force_xy_n", "torque_nm")
 #: columns that have the error of the force where they have none of their own
-WITH_FORCE = ("cutter_stress_mpa", "deflection_workpiece_um")
+WITH_FORCE = ("cutter_stress_mpa", "deflection_um", "deflection_workpiece_um")
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +212,8 @@ def default_limits(
     if "rigid_model" not in checks.off and "deflection_share" in columns:
         load = np.asarray(columns[next(c for c in LOADS if c in columns)])
         loaded = load >= LOADED * load.max(initial=0.0)
-        check = check_limit("deflection_share", 1.0, columns, track=track, rows=loaded, reason=direction)
+        error = load_error(errors, "deflection_share")
+        check = check_limit("deflection_share", 1.0, columns, track=track, rows=loaded, error=error, reason=direction)
         out.append(_rigid(check))
     return tuple(with_peaks(check, checks.material) for check in out)
 
@@ -244,11 +245,16 @@ def _spindle(machine: Machine, columns: Columns, track: str, errors: Mapping[str
 
 
 def load_error(errors: Mapping[str, float], column: str) -> float:
-    """Relative error of a column by the resolution; stress and deflection have that of the force.
+    """Relative error of a column by the resolution; stress and deflection have that of the force, and the share of the
+    range of the rigid model that of the deflection.
 
     >>> load_error({"force_n": 0.02}, "cutter_stress_mpa"), load_error({"force_n": 0.02}, "power_w")
     (0.02, 0.0)
+    >>> load_error({"force_n": 0.02, "deflection_um": 0.03}, "deflection_share")
+    0.03
     """
+    if column == "deflection_share" and column not in errors:
+        column = "deflection_um"
     return errors.get(column, errors.get("force_n", 0.0) if column in WITH_FORCE else 0.0)
 
 

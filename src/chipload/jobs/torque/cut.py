@@ -281,7 +281,7 @@ def cut(
     Parameters
     ----------
     rapids : feed of the rapids between two cuts [mm/s]
-    keep : the removal keeps what the teeth cut
+    keep : the removal keeps what the teeth cut, and finds the error of its loads
 
     Raises
     ------
@@ -303,7 +303,7 @@ def cut(
         material,
         fine,
         keep=keep,
-        accuracy=False,
+        accuracy=keep,
         progress=lambda x, what: progress(0.5 + 0.5 * x, what),
     )
     c, own, little = removal.columns, feed_rows(removal), LITTLE_MPA / material.Ktc

@@ -211,7 +211,6 @@ class ClampedWorkpiece:
     strained : greatest stress per force, as planned and real [MPa/N]
     strength : yield stress [MPa]
     stock : as it is after the program
-    load_error : relative error of loads by layers and steps, by column
     """
 
     planned: WorkpieceCompliance
@@ -219,7 +218,6 @@ class ClampedWorkpiece:
     strained: tuple[float, float]
     strength: float
     stock: LayeredStock
-    load_error: Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,6 +275,7 @@ class TorqueResult:
     wall : the thin wall, or the workpiece, that limits the torque
     step_checks : the steps for the checks beside the stated limits
     findings : of the simulations of the plan and of the truth
+    resolution_error : relative error of loads by layers and steps, by column of the simulation of the truth
     energy_balance : work over the specific energy of the volume removed, less 1, by tool number: as planned, and real
     """
 
@@ -286,6 +285,7 @@ class TorqueResult:
     control: ControlComparison
     step_checks: StepChecks
     findings: tuple[Finding, ...]
+    resolution_error: Mapping[str, float]
     energy_balance: Mapping[str, Mapping[int, float]]
 
     @property

@@ -5,6 +5,8 @@ The verdict stands on the fuzzy controller with the model of the cut and the lat
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -24,9 +26,16 @@ from chipload.jobs.torque.outcome import (
 )
 from chipload.jobs.torque.step_checks import check_columns
 from chipload.report.programs import ENDINGS
-from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, check_limit, in_memory
+from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, check_limit, column_of, in_memory, state_of
 from chipload.result.limits import Columns
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
+
+#: the limit on the excess of the torque over what is allowable
+OVER = "torque_over_percent"
+#: columns whose error is that of the force, of the force and the compliance of the workpiece, of the mean torque
+WITH_FORCE = ("force_n", "deflection_share", "cutter_stress_mpa")
+WITH_PART = ("form_error_um", "stress_mpa", "strength_share", "deflection_um", "deflection_workpiece_um")
+WITH_TORQUE = ("torque_nm", "torque_mean_nm", "power_w")
 
 
 def result_of(outcome: TorqueResult) -> Result:
@@ -49,19 +58,9 @@ def result_of(outcome: TorqueResult) -> Result:
             *(f"limit {name}: not stated" for name in outcome.job.unchecked),
             *(() if outcome.control.cases else ("cutter strength, chips and spindle: no controller was run",)),
             "chatter and runout beyond that of the cutter: not calculated",
-            *(
-                ("the wall has one thickness, that at the end of the cut",)
-                if isinstance(outcome.wall, ShellWall)
-                else (
-                    "holder and spindle: count as rigid",
-                    "error of the torque over the allowable one by layers and steps: not estimated",
-                )
-            ),
-            *(
-                ("error of the loads by layers and steps: not estimated",)
-                if isinstance(outcome.wall, ShellWall)
-                else ()
-            ),
+            "the wall has one thickness, that at the end of the cut"
+            if isinstance(outcome.wall, ShellWall)
+            else "holder and spindle: count as rigid",
         ),
         provenance=outcome.job.provenance,
         note=_note(outcome),
@@ -75,25 +74,38 @@ def track_name(case: ControllerCase, controller: str) -> str:
 
 
 def limits_of(outcome: TorqueResult, columns: Columns, track: str) -> tuple[LimitCheck, ...]:
-    """Every limit of the job against a controller, then those that are checked by default."""
-    errors = workpiece_errors(outcome)
+    """Every limit of the job against a controller, then those that are checked by default.
+
+    Their ``resolution_error`` is that of the simulation of the truth: of the mean torque for torques and powers, of the
+    force for what the part and the cutter do, there with that of the compliance of a clamped workpiece.
+    """
+    compliance = outcome.wall.real.error if isinstance(outcome.wall, ClampedWorkpiece) else 0.0
+    errors = errors_of(outcome.resolution_error, compliance)
     stated = (
-        check_limit(name, limit, columns, track=track, error=errors.get(name, 0.0))
+        check_limit(name, limit, columns, track=track, error=errors.get(column_of(name).name, 0.0))
         for name, limit in outcome.job.limits.items()
     )
-    return (*stated, *default_limits(outcome.job.checks, outcome.job.machine, columns, track, errors))
+    found = (*stated, *default_limits(outcome.job.checks, outcome.job.machine, columns, track, errors))
+    return tuple(over_allowable(x, columns, errors["torque_nm"]) if x.name == OVER else x for x in found)
 
 
-def workpiece_errors(outcome: TorqueResult) -> dict[str, float]:
-    """Relative errors of columns on a workpiece, by their name: of the loads by layers and steps, and of the compliance
-    beside that; none of a shell.
+def errors_of(simulated: Mapping[str, float], compliance: float = 0.0) -> dict[str, float]:
+    """Relative errors of the columns of a controller, from those of the columns of the simulation and that of the
+    compliance of the workpiece.
+
+    >>> errors_of({"force_n": 0.02, "torque_mean_nm": 0.03})["stress_mpa"]
+    0.02
     """
-    if isinstance(outcome.wall, ShellWall):
-        return {}
-    loads = dict(outcome.wall.load_error)
-    both = loads.get("force_n", 0.0) + outcome.wall.real.error
-    loads["torque_nm"] = loads.get("torque_mean_nm", 0.0)
-    return loads | dict.fromkeys(("form_error_um", "strength_share", "deflection_workpiece_um", "deflection_um"), both)
+    force, torque = simulated["force_n"], simulated["torque_mean_nm"]
+    both = (1.0 + force) * (1.0 + compliance) - 1.0 if compliance else force
+    return dict.fromkeys(WITH_FORCE, force) | dict.fromkeys(WITH_PART, both) | dict.fromkeys(WITH_TORQUE, torque)
+
+
+def over_allowable(check: LimitCheck, columns: Columns, error: float) -> LimitCheck:
+    """The excess over the allowable torque: its error is that of the torque, also where there is no excess."""
+    share = float(np.max(columns["torque_nm"] / columns["torque_allowable_nm"], initial=0.0))
+    state, why = state_of(share, 1.0 + 1e-2 * check.limit, error)
+    return replace(check, state=state, reason=why, resolution_error=error if math.isfinite(error) else 0.0)
 
 
 def _real(case: ControllerCase) -> bool:

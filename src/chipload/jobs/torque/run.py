@@ -95,6 +95,7 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
         ),
         step_checks=step_checks(own.real, own.loads, material, _fastest(cases)),
         findings=(*own.planned.removal.findings, *(own.real.removal.findings if own.real is not own.planned else ())),
+        resolution_error=own.real.removal.resolution_error,
         energy_balance={name: energy_balance(cut.removal.columns, material.Ktc) for name, cut in both},
     )
 

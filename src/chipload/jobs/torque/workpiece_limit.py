@@ -40,9 +40,7 @@ def clamped_workpiece(job: TorqueJob, a: AllowableWorkpiece) -> ClampedWorkpiece
     """The workpiece in the result."""
     strength = stated(stated(job.workpiece, "workpiece").yield_mpa, "workpiece.yield_mpa")
     planned, real = a.planned.compliance, a.real.compliance
-    return ClampedWorkpiece(
-        planned, real, (a.planned.strained, a.real.strained), strength, a.real.stock, a.real.removal.resolution_error
-    )
+    return ClampedWorkpiece(planned, real, (a.planned.strained, a.real.strained), strength, a.real.stock)
 
 
 def allowable_torque(job: TorqueJob, a: AllowableWorkpiece) -> AllowableTorque:
