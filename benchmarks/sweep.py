@@ -2,9 +2,10 @@
 
     python benchmarks/sweep.py [--jobs 200] [--write]
 
-The job is a slot of 36 mm; step and limit vary. ``--write`` puts the table into docs/sweep.md. Times are by the clock,
-since the work is in other processes, all in one run, with the start of the processes. A case holds what chipload was
-when it ran: do not edit the source meanwhile.
+The job is a slot of 36 mm; step and limit vary. ``--write`` puts the table into docs/sweep.md. Times are by the clock
+and in processor time of all processes with their start, all in one run. On two cores that have nothing else to do two
+processes take half of their processor time by the clock. A case holds what chipload was when it ran: do not edit the
+source meanwhile.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import multiprocessing
 import os
 import re
 import signal
+import sys
 import tempfile
 import threading
 import time
@@ -62,14 +64,14 @@ def tree(folder: Path) -> str:
 
 
 @contextmanager
-def one_killed(cases: Path) -> Iterator[None]:
-    """Kill one worker with SIGKILL as soon as two cases are done."""
+def one_killed(cases: Path, after: int) -> Iterator[None]:
+    """Kill one worker with SIGKILL as soon as ``after`` cases are done."""
     done = threading.Event()
 
     def watch() -> None:
         while not done.wait(0.05):
             workers = multiprocessing.active_children()
-            if workers and len(list(cases.glob("*.json"))) >= 2:
+            if workers and len(list(cases.glob("*.json"))) >= after:
                 os.kill(workers[0].pid or 0, signal.SIGKILL)
                 return
 
@@ -89,11 +91,19 @@ def measured(run: Callable[[], object], out: Path) -> tuple[float, str]:
     return time.perf_counter() - begin, tree(out)
 
 
+def processor_time() -> float:
+    """Processor time [s] of this process and of all that it started and that have ended."""
+    for child in multiprocessing.active_children():
+        child.join(10.0)
+    return sum(os.times()[:4])
+
+
 def table(jobs: int) -> list[str]:
-    """The rows: where it ran, time, share of the first, whether the bytes are those of the first."""
+    """The rows: where it ran, both times, whether the bytes are those of the first."""
     from distributed import LocalCluster
 
     rows: list[tuple[str, float, str]] = []
+    spent = [processor_time()]
     with tempfile.TemporaryDirectory(prefix="chipload-sweep-") as above:
         folder = Path(above)
         (folder / "slot.ngc").write_text(PROGRAM)
@@ -106,17 +116,23 @@ def table(jobs: int) -> list[str]:
         def of(name: str, **where: object) -> None:
             out = folder / name
             rows.append((name, *measured(lambda: run_sweep(job, over, out, **where), out)))
+            print(f"{name}: {rows[-1][1]:.1f} s, load {os.getloadavg()[0]:.0f}", file=sys.stderr)
 
         of("one process")
+        spent.append(processor_time())
         of("two processes", workers=2)
-        with one_killed(folder / "two, one killed" / "cases"):
+        spent.append(processor_time())
+        with one_killed(folder / "two, one killed" / "cases", jobs // 2):
             of("two, one killed", workers=2)
+        spent.append(processor_time())
         with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
             of("Dask, two workers", dask=cluster.scheduler_address)
+        spent.append(processor_time())
     first = rows[0]
     return [
-        f"| {name} | {seconds:.1f} | {seconds / first[1]:.2f} | {'the same' if found == first[2] else 'DIFFERENT'} |"
-        for name, seconds, found in rows
+        f"| {name} | {seconds:.1f} | {spent[k + 1] - spent[k]:.1f} | "
+        f"{'the same' if found == first[2] else 'DIFFERENT'} |"
+        for k, (name, seconds, found) in enumerate(rows)
     ]
 
 
@@ -126,7 +142,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=200, help="a multiple of 10")
     parser.add_argument("--write", action="store_true", help="into docs/sweep.md")
     chosen = parser.parse_args()
-    head = f"| {chosen.jobs // 10 * 10} jobs on | time [s] | of one process | bytes of all cases |"
+    head = f"| {chosen.jobs // 10 * 10} jobs on | time [s] | processor time [s] | bytes of all cases |"
     lines = [head, "|---|---:|---:|---|", *table(chosen.jobs)]
     load = f"Load of the computer while it ran: {os.getloadavg()[1]:.0f}, on {os.cpu_count()} cores."
     text = "\n".join([*lines, "", load])

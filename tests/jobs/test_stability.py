@@ -447,7 +447,7 @@ def test_speeds_by_zone_change_between_two_passes_and_are_simulated_again(tmp_pa
     # both are simulated from fresh stock: each pass has what was expected, and one of them more than at one speed
     least = {
         by: [
-            columns["stability_margin"][(columns["line"] == line) & (columns["chip_pieces"] > 0)].min()
+            columns["stability_margin"][(columns["line"] == line) & (columns["chip_areas"] > 0)].min()
             for line in (6, 10)
         ]
         for by in found

@@ -216,7 +216,7 @@ def test_what_is_wrong_is_said() -> None:
     forgot, _ = ball_rows(keep=False)
     with pytest.raises(InputError, match=r"did not keep what the teeth cut: remove\(..., keep=True\)"):
         contacts(forgot)
-    films = replace(forgot, columns={**forgot.columns, "chip_pieces": np.zeros_like(forgot.columns["chip_pieces"])})
+    films = replace(forgot, columns={**forgot.columns, "chip_areas": np.zeros_like(forgot.columns["chip_areas"])})
     assert len(contacts(films).step) == 0  # films have no loads
 
 

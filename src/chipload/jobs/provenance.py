@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import platform
 from collections.abc import Mapping, Sequence
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -32,8 +33,9 @@ def versions() -> dict[str, str]:
     return found | {"python": platform.python_version()}
 
 
+@cache
 def sources() -> str:
-    """Hash of the sources of chipload: what was begun with others is not gone on with."""
+    """Hash of the sources of chipload: what was begun with others is not gone on with. Read once in a process."""
     out = hashlib.sha256()
     folder = Path(__file__).parents[1]
     for file in sorted(folder.rglob("*.py")):

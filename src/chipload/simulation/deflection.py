@@ -413,7 +413,7 @@ def _kept(removal: Removal) -> tuple[Cuts, ...]:
     if not removal.cuts:
         if not removal.columns["chip_volume_mm3"].any():
             raise InputError("deflection: the program cuts nothing")
-        if not removal.columns["chip_pieces"].any():
+        if not removal.columns["chip_areas"].any():
             return ()  # films, narrower than a few tolerances, have no loads
         raise InputError("deflection: the removal did not keep what the teeth cut: remove(..., keep=True)")
     return removal.cuts

@@ -201,7 +201,7 @@ def chatter_limits(
     if dynamics is None:
         return ()
     limit, reason = float(dynamics["margin"]), "" if dynamics["mode"] else "modes of the cutter are not stated"
-    cuts = np.asarray(columns["chip_pieces"]) > 0
+    cuts = np.asarray(columns["chip_areas"]) > 0
     return (check_limit("stability_margin", limit, columns, track=track, rows=cuts, error=MARGIN_ERROR, reason=reason),)
 
 
@@ -212,7 +212,7 @@ def chatter_numbers(one: Variant, dynamics: Mapping[str, Any] | None) -> dict[st
         return {}
     first = one.columns[FIRST_STATE]
     differs = (margin < dynamics["margin"]) != (first < dynamics["margin"])
-    cuts = np.flatnonzero(np.asarray(one.columns["chip_pieces"]) > 0)
+    cuts = np.flatnonzero(np.asarray(one.columns["chip_areas"]) > 0)
     k = int(cuts[np.argmin(margin[cuts])])
     passes = [
         {

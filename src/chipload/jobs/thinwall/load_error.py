@@ -50,7 +50,7 @@ def load_error(
     mapping of column to at least 0; inf where it is not known, as where a pass takes only films, for which no loads are
     computed
     """
-    if any(p.columns["chip_volume_mm3"].any() and not p.columns["chip_pieces"].any() for p in passes):
+    if any(p.columns["chip_volume_mm3"].any() and not p.columns["chip_areas"].any() for p in passes):
         return dict.fromkeys(COMPARABLE, math.inf)
     setting = setting_of({cutter.number: cutter}, material, resolution, "slerp", None, 1)
     worst = {name: np.array([float(p.columns[name].max(initial=0.0)) for p in passes]) for name in COMPARABLE}
