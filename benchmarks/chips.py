@@ -221,7 +221,7 @@ def costs(at: list[tuple[float, float]], steps: int) -> dict[str, tuple[np.ndarr
     out["layers (areas of 20 moves)"] = counts, np.array(spent)
     pieces = np.array([16, 32, 64, 128, 256, 512])
     out["slices of the cutter (400 points, with forces)"] = (
-        np.array([len(slices(BALL, corner_pieces=int(k), flank_mm=2.0)) for k in pieces]),
+        np.array([len(slices(BALL, corner_slices=int(k), flank_mm=2.0)) for k in pieces]),
         np.array([min(finishing(400, 0.3, int(k))[1] for _ in range(2)) for k in pieces]),
     )
     thick = np.array([1.2, 0.6, 0.3, 0.15, 0.075])

@@ -3,13 +3,14 @@
     python benchmarks/control.py [steps]
     python benchmarks/control.py robustness [example]
     python benchmarks/control.py depths cone 1 1.5 2
+    python benchmarks/control.py depths tube 1 1.5 2 3
 
 The second prints the table of robustness of docs/design/control.md: an example (tube) whose spindle, cut and loop
 differ from what the controller believes; the greatest constant feed and the derated schedule stay as they
 were found for the example itself.
 
-The third gives the constant feed the depth of cut as well: a job that makes its program ([round]), with other pitches
-of its helix, within the same limits.
+The third and fourth give the constant feed the depth of cut as well: other pitches of the helix, within the same
+limits.
 
 The fuzzy forms alone, the whole step with its rules, and the closed loop on a path of 280 mm with steps of depth, with
 a control period of 10 ms, 1 ms of simulation and the model's look-ahead; each three times, the best counts.
@@ -37,12 +38,16 @@ from chipload.jobs.torque.controllers import compared, controller_of, player, sh
 from chipload.jobs.torque.outcome import HELD, MODEL, PLAIN
 from chipload.jobs.torque.run import opened
 from chipload.jobs.torque.spindle import deviation_of
+from chipload.jobs.torque.tables import RoundTable
 
 LIMIT = 2000.0
 RULES = Override(
     kind="mamdani", torque_ref=0.93 * LIMIT, overload=2.0 * LIMIT, torque_most=18e3, light=80.0, floor=0.05, cap=1.0,
     start=0.3, air_override=0.4, lost_override=0.2, lost_s=1.0,
 )  # fmt: skip
+#: the program of the example `tube` as keys of a [round]
+TUBE = RoundTable(cutter=1, milling="down", top_mm=0.0, bottom_mm=-6.0, pitch_mm=3.0, feed_mm_min=2400.0,
+                  speed_rpm=6000.0, clearance_mm=10.0, lead_mm=12.0)  # fmt: skip
 SPINDLE = Spindle(628.0, 5.0, 300.0, (2.0, 0.004), 0.5, 5.0, 60.0, 0.01, 0.02, 0.05)
 
 
@@ -131,6 +136,8 @@ def robustness(name: str) -> None:
 def depths(name: str, pitches: list[float]) -> None:
     """Times of the constant feed, the derated schedule and the fuzzy controller with the model, for other pitches."""
     found = load_job(Path(chipload.examples.__file__).parent / name / "job.toml").job
+    if found.table.round is None:
+        found = replace(found, program_file=None, table=found.table.model_copy(update={"program": None, "round": TUBE}))
     print("| pitch mm | limit N m | constant: time s | error um | model: time s | fuzzy with the model: time s "
           "| torque | ideal s |\n|---|---|---|---|---|---|---|---|", flush=True)  # fmt: skip
     for pitch in pitches:

@@ -63,7 +63,7 @@ def simulated(
     """Processor seconds and columns."""
     case = made(name, moves)
     stock = LayeredStock.block(case.low, case.high, 2.0, 32.0)
-    fine = Resolution(step_mm=3.0, tolerance=1e-3, corner_pieces=pieces, flank_mm=flank)
+    fine = Resolution(step_mm=3.0, tolerance=1e-3, corner_slices=pieces, flank_mm=flank)
     begun = time.process_time()
     removal = remove(case.program, stock, case.cutters, ALLOY, fine, engine="moves", accuracy=accuracy)
     return time.process_time() - begun, dict(removal.columns)
@@ -77,7 +77,7 @@ def geometry(name: str, moves: int) -> float:
     begun = time.process_time()
     for at in range(0, moves, 512):
         a, b = p[at : min(at + 512, moves)], p[at + 1 : min(at + 512, moves) + 1]
-        stock.take(a, b, np.ones(len(a), dtype=np.int64), corner_pieces=SLICES // 2, flank_mm={1: 0.5 * cutter.radius})
+        stock.take(a, b, np.ones(len(a), dtype=np.int64), corner_slices=SLICES // 2, flank_mm={1: 0.5 * cutter.radius})
     return time.process_time() - begun
 
 

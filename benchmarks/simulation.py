@@ -36,7 +36,7 @@ from chipload.stock.layers import LayeredStock
 BALL = Cutter(8.0, 2, math.radians(30.0), 20.0, 35.0, 6e5, corner_radius=4.0)
 #: moves of a row, from point to point and from row to row [mm]
 ROW, ALONG, ACROSS = 250, 0.4, 0.4
-RESOLUTION = Resolution(step_mm=1.0, tolerance=5e-3, corner_pieces=12, flank_mm=2.0, rotation=math.radians(3.0))
+RESOLUTION = Resolution(step_mm=1.0, tolerance=5e-3, corner_slices=12, flank_mm=2.0, rotation=math.radians(3.0))
 
 
 def finishing(moves: int) -> Program:

@@ -26,7 +26,7 @@ from scipy.sparse import csc_array
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.clamp import Clamp
 from chipload.structure.cells.grid import grid_over
-from chipload.structure.cells.moments import Region, stock_moments
+from chipload.structure.cells.moments import StockRegion, stock_moments
 from chipload.structure.cells.vibration import vibration_modes
 from chipload.structure.cells.workpiece import Elastic, cell_workpiece, displacements, line_compliances
 from chipload.structure.factors import factor
@@ -84,7 +84,7 @@ def main() -> None:
     """Print a row for each quantity."""
     cell, order = (float(sys.argv[1]), int(sys.argv[2])) if len(sys.argv) > 2 else (2.5, 2)
     stock, grid = pocketed(), grid_over((0, 0, 0), (100, 60, 30), cell, order)
-    clamp = Clamp("clamp", Region(shapely.box(-1, -1, 101, 61), 0.0, 0.001), np.ones(3, dtype=np.bool_))
+    clamp = Clamp("clamp", StockRegion(shapely.box(-1, -1, 101, 61), 0.0, 0.001), np.ones(3, dtype=np.bool_))
     elastic = Elastic(70e3, 0.33, 2.7e-9)
     stock_moments(stock, grid)  # compiles
     rows: list[tuple[str, float, str]] = []

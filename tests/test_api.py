@@ -144,7 +144,7 @@ def test_a_job_of_values_is_checked(folder):
         ({"machine": 3}, r"machine: int: give a name, a file"),
         ({"machine": "vmx"}, r"machine vmx: not known: the nearest is"),
         ({"part": "corner.pdf"}, r"must end in .dxf, .step or .stp"),
-        ({"stock": {"top_mm": object()}}, r"object: is no value of a job"),
+        ({"stock": {"top_mm": object()}}, r"object: is not a value that a job can hold"),
     ],
 )
 def test_refused(folder, change, says):

@@ -1,7 +1,7 @@
 """Names of files, classes, fields, functions, job keys and columns use the words of docs/glossary.md.
 
-A name is split into its words (``StepBite`` and ``step_bite`` into step and bite). Names that still hold a forbidden
-word are listed in :data:`PRIVATE`; the list only becomes shorter.
+A name is split into its words (``StepBite`` and ``step_bite`` into step and bite). Terms of a standard that hold a
+forbidden word are listed with their reason in :data:`STANDARD`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from collections import Counter
 from pathlib import Path
 from typing import get_args
 
-import pytest
 from pydantic import BaseModel
 
 import chipload
@@ -88,67 +87,13 @@ def private() -> set[str]:
     return {name for name in names if bad(re.split(r"[:.]", name)[-1])}
 
 
-#: names that still hold a forbidden word: geometry (inside, gap, pieces), a turning tool's front angle, and what is
-#: renamed together with its package
-PRIVATE = {
-    "class geometry/offset:_Pieces",
-    "class geometry/step_faces:Inside",
-    "class machine/linearise:Pieces",
-    "class simulation/removal:ChipPieces",
-    "column result:chip_pieces",
-    "field control/_override:Rules.gap_s",
-    "field control/override:Override.gap_s",
-    "field jobs/thinwall/tables:WallTable.front",
-    "field jobs/torque/tables:OverrideTable.gap_s",
-    "field machine/trajectory:TrajectoryPlanner.gap_cycles",
-    "field planning/impeller/lines:Line.pieces",
-    "field program/apt/frames:Coordinates.given",
-    "field program/gcode/tools:Tool.front",
-    "field simulation/removal:Resolution.bottom_pieces",
-    "field simulation/removal:Resolution.corner_pieces",
-    "field simulation/deflection:FormError.gap",
-    "field simulation/loads:Cuts.bites",
-    "field simulation/loads:Cuts.way",
-    "field engagement/moves/stock:Engaged.pieces",
-    "field simulation/moves:MoveRun.corner_pieces",
-    "field simulation/surface:Difference.look",
-    "field structure/removal:StructureRemoval.inside",
-    "field structure/solid:SolidWorkpiece.held",
-    "function cutting/fit:said",
-    "function engagement/_kernels:front_part",
-    "function engagement/chips/covered:_pieces",
-    "function engagement/chips/faces/_kernels:pieces",
-    "function engagement/immersion/_kernels:inside",
-    "function files:_held",
-    "function geometry/fillet:gap",
-    "function geometry/step_faces:inside",
-    "function jobs/feeds/allowed:held",
-    "function jobs/simulation/workpiece:inside",
-    "function jobs/thinwall/inputs:_pieces",
-    "function planning/contour/offsets:_open_inside",
-    "function planning/impeller/patches:gap",
-    "function planning/impeller/paths:_crest",
-    "function planning/impeller/ranges/_kernels:inside",
-    "function planning/impeller/ranges/_kernels:widest_gap",
-    "function program/apt/track:gap",
-    "function program/gcode/controller:gap",
-    "function program/gcode/modal:axes_given",
-    "function program/read:_held",
-    "function report/diagram:_pieces",
-    "function report/shape:pieces",
-    "function simulation/checkpoint:pieces",
-    "function simulation/chips:bites",
-    "function simulation/section_deviation:beside",
-    "function stock/tile_grid:_pieces",
-    "function structure/shell:_held",
-    "function structure/shell:_inside",
-    "function terminal:say",
-    "function web/page:_look",
-    "key thinwall:front",
-    "key torque:gap_s",
+#: standard terms that hold a forbidden word, and whose they are; the list only becomes shorter
+STANDARD = {
+    "field machine/trajectory:TrajectoryPlanner.gap_cycles": "ARC_BLEND_GAP_CYCLES of LinuxCNC's configuration",
+    "field program/gcode/tools:Tool.front": "front angle of a turning tool in LinuxCNC's tool table",
+    "field jobs/thinwall/tables:WallTable.front": "front and back face of a wall; the word stood for a pocket's path",
+    "key thinwall:front": "the same, as a key of the job file",
 }
-#: how many there are; the number only falls
-MOST = 55
 
 
 def test_the_list_of_forbidden_words_is_read():
@@ -162,26 +107,14 @@ def test_the_list_of_forbidden_words_is_read():
 
 
 def test_no_new_name_holds_a_forbidden_word():
-    new = private() - PRIVATE
+    new = private() - STANDARD.keys()
     assert not new, {name: [FORBIDDEN[w] for w in words(name) if w in FORBIDDEN] for name in new}
 
 
-def test_the_number_of_private_names_does_not_grow(capsys: pytest.CaptureFixture[str]):
-    left = private()
-    by_word = Counter(w for name in left for w in words(name.rsplit(":", 1)[-1].rsplit(".", 1)[-1]) if w in FORBIDDEN)
-    with capsys.disabled():
-        print(f"\n{len(left)} names with private words: {', '.join(f'{w} {n}' for w, n in by_word.most_common())}")
-    assert len(PRIVATE) <= MOST
-    assert len(left) <= MOST
-
-
-#: class names that two files define; the list only becomes shorter
-SHARED = {
-    "Blank", "Body", "Flow", "Measured", "Region", "Remainder", "Run", "Samples", "Source", "State", "Statement",
-    "ToolPath", "WorkpieceTable", "_Job", "_Model", "_Row",
-}  # fmt: skip
+def test_no_exception_is_left_over():
+    assert STANDARD.keys() <= private()
 
 
 def test_a_class_name_stands_for_one_class():
     classes = Counter(name.rsplit(":", 1)[1] for name in names_of_source() if name.startswith("class "))
-    assert {name for name, count in classes.items() if count > 1} == SHARED
+    assert {name for name, count in classes.items() if count > 1} == set()

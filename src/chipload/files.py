@@ -166,7 +166,7 @@ def fresh_folder(above: Path) -> Iterator[Path]:
     """
     while True:
         folder = Path(tempfile.mkdtemp(prefix=FRESH, dir=above))
-        handle = _held(folder)
+        handle = _lock_of(folder)
         if handle != _GONE:
             break
     try:
@@ -209,7 +209,7 @@ def exchanged(a: Path, b: Path) -> bool:
 _GONE = -1
 
 
-def _held(folder: Path) -> int | None:
+def _lock_of(folder: Path) -> int | None:
     """A handle that locks the folder; None: this file system has no locks; ``_GONE``: a sweep came first."""
     if sys.platform == "win32":
         return None

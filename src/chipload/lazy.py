@@ -16,6 +16,7 @@ EXTRAS: Mapping[str, tuple[str, str]] = {
     "web": ("nicegui", "the page in the browser"),
     "notebook": ("pandas", "a table of pandas or a dataset of xarray"),
     "cluster": ("distributed", "a sweep on a Dask cluster"),
+    "export": ("fpdf", "setup.pdf"),
 }
 
 

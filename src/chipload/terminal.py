@@ -27,26 +27,26 @@ def guarded(work: Callable[[], int], debug: bool) -> NoReturn:
         raise typer.Exit(work())
     except InputErrors as err:
         for text in err.args:
-            say(str(text))
+            write_line(str(text))
         code = WRONG
     except InputError as err:
-        say(str(err))
+        write_line(str(err))
         code = WRONG
     except OutputError as err:
-        say(str(err))
+        write_line(str(err))
         code = UNWRITTEN
     except BrokenPipeError:
         _let_go_of_output()
         code = UNWRITTEN
     except OSError as err:
         if is_full(err):
-            say(str(cannot_write(err.filename or "the disk", err)))
+            write_line(str(cannot_write(err.filename or "the disk", err)))
             code = UNWRITTEN
         else:
             _fault(err, debug)
             code = FAULT
     except (KeyboardInterrupt, Cancelled) as err:
-        say(f"stopped: {str(err) or 'nothing was written'}")
+        write_line(f"stopped: {str(err) or 'nothing was written'}")
         code = STOPPED
     except typer.Exit as end:
         code = end.exit_code if _flushed() else UNWRITTEN
@@ -59,16 +59,28 @@ def guarded(work: Callable[[], int], debug: bool) -> NoReturn:
 def _fault(err: Exception, debug: bool) -> None:
     if debug:
         traceback.print_exc()
-    say(
+    write_line(
         f"a fault of chipload: {type(err).__name__}: {err}. Please report it with the job file and the output of "
         "the same command with --debug"
     )
 
 
-def say(text: str) -> None:
+def write_line(text: str) -> None:
     """One line on stderr; a reader of it that has gone is not waited for."""
     with contextlib.suppress(OSError, ValueError):
         typer.echo(f"chipload: {plain(' '.join(text.split()))}", err=True)
+
+
+@contextmanager
+def _stdout_refused() -> Iterator[None]:
+    """Turn a full disk behind stdout into an OutputError; a reader that has gone stays a BrokenPipeError."""
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as err:
+        _let_go_of_output()
+        raise cannot_write("stdout", err) from None
 
 
 def show(text: str) -> None:
@@ -81,13 +93,8 @@ def show(text: str) -> None:
     BrokenPipeError
         Its reader has gone.
     """
-    try:
+    with _stdout_refused():
         typer.echo(plain(text))
-    except BrokenPipeError:
-        raise
-    except OSError as err:
-        _let_go_of_output()
-        raise cannot_write("stdout", err) from None
 
 
 def write_bytes(data: bytes) -> None:
@@ -100,15 +107,10 @@ def write_bytes(data: bytes) -> None:
     BrokenPipeError
         Its reader has gone.
     """
-    try:
+    with _stdout_refused():
         sys.stdout.flush()
         sys.stdout.buffer.write(data)
         sys.stdout.buffer.flush()
-    except BrokenPipeError:
-        raise
-    except OSError as err:
-        _let_go_of_output()
-        raise cannot_write("stdout", err) from None
 
 
 def plain(text: str) -> str:
@@ -166,7 +168,7 @@ def log_lines(clock: Callable[[], float], every_s: float = LOG_S) -> Callable[[f
         last = now
         left = (now - begun) * (1.0 - done) / done
         shown = f"{left / 60.0:.0f} min" if left >= 90.0 else f"{left:.0f} s"
-        say(f"{100.0 * done:.0f} %, about {shown} left: {what}")
+        write_line(f"{100.0 * done:.0f} %, about {shown} left: {what}")
 
     return report
 

@@ -63,8 +63,8 @@ NEVER = "must be given, a cutter is never guessed"
         ({"tool": 1}, "cutter.tool is given without cutter.file: give the tool table or leave it out"),
         ({"file_unit": "cm"}, "cutter.file_unit = 'cm': must be mm or inch"),
         ({"file": "a.xml"}, "cutter.file = a.xml: must end in .fctb, .json, .tools, .p21, .camotics, .tbl"),
-        ({"file": "a.tbl"}, "cutter.tool is missing: a.tbl holds many: say which"),
-        ({"file": "a.tbl", "tool": 1}, "cutter.file_unit is missing: a.tbl does not say its unit: give mm or inch"),
+        ({"file": "a.tbl"}, "cutter.tool is missing: a.tbl holds several tools: state which"),
+        ({"file": "a.tbl", "tool": 1}, "cutter.file_unit is missing: a.tbl does not state its unit: give mm or inch"),
         ({"file": "a.fctb", "tool": 1}, "cutter.tool is for a file of several tools: leave it out with a.fctb"),
     ],
 )
@@ -90,7 +90,15 @@ def test_value_is_refused():
         ("[" * 100000, "not a FreeCAD tool bit: must be JSON"),
         ("[1]", "not a FreeCAD tool bit: must have shape and parameter"),
         ({"shape": "endmill.fcstd", "parameter": 3}, "not a FreeCAD tool bit: must have shape and parameter"),
-        ({"shape": "drill.fcstd", "parameter": {}}, "shape drill: must be one of endmill, ballend, torus, bullnose"),
+        (
+            {"shape": "probe.fcstd", "parameter": {}},
+            "shape probe: must be one of endmill, ballend, torus, bullnose, drill, vbit, reamer, tap, threadmill, "
+            "dovetail, slittingsaw",
+        ),
+        (
+            {"shape": "drill.fcstd", "parameter": {"Diameter": "3 mm"}},
+            "shape drill: TipAngle: must be given and above 0",
+        ),
         (
             {"shape": "torus.fcstd", "parameter": {"Diameter": "6 mm"}},
             "shape torus without TorusRadius, CornerRadius or FlatRadius: give one",
@@ -127,7 +135,7 @@ def test_tool_bit_lacks_a_key(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("T1 P1 D10\nT1 P2 D8\n", ": tool 1 stands twice, in lines 1 and 2: keep one"),
+        ("T1 P1 D10\nT1 P2 D8\n", ": tool 1 appears twice, in lines 1 and 2: keep one"),
         ("T2 P1 D10\nT7 D3", ": tool 1 is not there: must be one of 2, 7"),
         ("", ": tool 1 is not there: must be one of none"),
         ("T2 P1 D10\nhello", " line 2: not a tool: must be words as T1 P1 D10"),

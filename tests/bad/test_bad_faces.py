@@ -108,7 +108,7 @@ ON_PLUS = ", ".join(f"{x:.9f}" for x in IMPELLER.blade.plus.at(0.05, 0.0)[0])
         ("hub = [3]", "hub = [1]",
          "impeller.step.hub: face 1 is not of revolution about the axis: round it radius or height change by 39.35 mm: "
          "check flow, and that the axis goes through the origin"),
-        ("hub = [3]", "hub = [3, 3]", "impeller.step.hub: face 3 stands twice: name each face once"),
+        ("hub = [3]", "hub = [3, 3]", "impeller.step.hub: face 3 appears twice: name each face once"),
         ("hub = [3]", "hub = [3, 4]",
          "impeller.step.hub: face 4 begins 24 mm from the end of face 3: state those between"),
         ("hub = [3]", "hub = []",
@@ -184,7 +184,9 @@ def test_a_part_of_a_side(job):
 
 
 def test_a_face_of_a_side_twice(job):
-    assert refused(job, "plus = 1", "plus = [1, 1]") == ("impeller.step.plus: face 1 stands twice: name each face once")
+    assert refused(job, "plus = 1", "plus = [1, 1]") == (
+        "impeller.step.plus: face 1 appears twice: name each face once"
+    )
 
 
 def test_a_hub_with_a_corner(job):
@@ -258,7 +260,7 @@ def slot():
     [
         (None, 1, 9, 5, "",
          "wall.back = 9: no such face: must be from 1 to 6: chipload check wall.step lists the faces"),
-        (None, 1, 1, 5, "", "wall.back: is face 1 as wall.front: state the face opposite"),
+        (None, 1, 1, 5, "", "wall.back: face 1 is wall.front too: state the opposite face"),
         (None, FRONT, [20.0, 1.0, 30.0], [20.0, 3.0, 0.0], "",
          "wall between faces 4 and 6 of wall.step: not opposite each other: lines across lean by 84.3 deg from the "
          "normals: must be at most 45 deg, and apart: state the two sides of one wall, or a greater edge_share"),
@@ -275,7 +277,8 @@ def slot():
          "wall.clamp = [0, 3, 0]: lies at a corner of face 4: take a point within the edge"),
         (bore, FRONT, BACK, 5, "", "wall.front: face 4 has a hole: must be one piece without any"),
         (slot, [7.0, 1.0, 20.0], [7.0, 2.0, 20.0], [20.0, 1.0, 10.0], "",
-         "wall between faces 3 and 5 of wall.step: between them is no metal: state the sides of a wall, not of a slot"),
+         "wall between faces 3 and 5 of wall.step: no material between them: state the two sides of a wall, not of a "
+         "slot"),
         (None, FRONT, BACK, [20.0, 3.0, 0.0], "length_mm = 5.0\n",
          "job.toml: wall.length_mm: not used by shape = step: leave it out"),
         (None, FRONT, BACK, [20.0, 3.0, 0.0], "edge_share = 0.6\n",

@@ -82,7 +82,7 @@ def test_another_outer_diameter(hecc):
 def test_columns_that_no_line_names(hecc):
     changed(hecc, 'columns = "X R*THETA R"\n', "")
     assert refused(hecc) == (
-        "impeller.sections.blade: main_07.txt: no line names the columns: say which they are, as X R*THETA R"
+        "impeller.sections.blade: main_07.txt: no line names the columns: state them, as X R*THETA R"
     )
 
 
@@ -106,7 +106,7 @@ def test_a_file_that_is_missing(hecc):
         ('body = "blade"\nside = "minus"', 'body = "splitter"\nside = "minus"',
          "job.toml: surface.1.body = 'splitter': the impeller has no splitter: leave it out"),
         ('body = "blade"\nside = "minus"', 'body = "blade"\nside = "plus"',
-         "job.toml: surface.1: blade plus stands twice: list each surface once"),
+         "job.toml: surface.1: blade plus appears twice: list each surface once"),
         ("[impeller.shape]\n", "[impeller.shap]\n", "job.toml: impeller.shap: unknown key; did you mean shape?"),
         ("channel_mm = 24.185", "channel_mm = 30.0",
          "shape: must be hub_radius + blade_height < outer_radius, outlet_height < height, blades thick"),

@@ -52,7 +52,7 @@ WRONG_SET = {
     "cuter.0.diameter_mm=12": "cuter: unknown key; did you mean cutter?",
     "cutter.1.diameter_mm=12": "cutter.1: cutter has 1 entry: count from 0 to 0",
     "cutter.first.diameter_mm=12": "cutter.first: cutter has 1 entry: count from 0 to 0",
-    "part.file.name=a": "part.file is a value, it holds no key name",
+    "part.file.name=a": "part.file is a value, not a table: it has no key name",
     "nothing": "must be key.path=value, as cutter.0.diameter_mm=12",
     ".a=1": "must be key.path=value, as cutter.0.diameter_mm=12",
 }

@@ -13,7 +13,7 @@ BAD = [
     ("G1 X1", 1, "G1: the feed is 0 or was never set: give F"),
     ("G0 X1.5.6", 1, "number 1.5....: has two decimal points"),
     ("G0 X", 1, "the block ends where a value is expected: complete it"),
-    ("G0 X1 Y1 X2", 1, "X: stands twice in one block"),
+    ("G0 X1 Y1 X2", 1, "X: appears twice in one block"),
     ("G0 G1 X1 F1", 1, "G0 and G1: exclude each other in one block"),
     ("G90 G91", 1, "G90 and G91: exclude each other in one block"),
     ("M3 M4 S5", 1, "M3 and M4: exclude each other in one block"),
@@ -63,7 +63,7 @@ BAD = [
     ("F10\nG81 X1 Z2 R1", 2, "R1: lies below the bottom of the hole, 2: raise R"),
     ("F10\nG83 X1 Z-2 R1", 2, "G83: Q is missing: the depth of a peck"),
     ("F10\nG84 X1 Z-2 R1", 2, "G84: the spindle does not turn: start it by M3"),
-    ("F10\nG81 X1 Z-2 R1 A5", 2, "A: stands in no canned cycle"),
+    ("F10\nG81 X1 Z-2 R1 A5", 2, "A: is not allowed in a canned cycle"),
     ("G93 G1 X1 F10\nY1", 2, "G1: each feed by inverse time (G93) needs its own F"),
     ("G95 G1 X1 F0.1", 1, "G1: feed per revolution (G95) and no spindle speed: give S"),
     ("G91 G53 G0 X1", 1, "G53: goes with G90 only"),
@@ -133,12 +133,12 @@ def test_bad_options(options, message):
     ("text", "message"),
     [
         ("T1 P1 X", "table: line 1: 'X': a letter with its number is expected"),
-        ("T1 T2", "table: line 1: T stands twice"),
+        ("T1 T2", "table: line 1: T appears twice"),
         ("P1", "table: line 1: T is missing: the number of the tool"),
-        ("T1\nT1", "table: line 2: tool 1 stands twice"),
+        ("T1\nT1", "table: line 2: tool 1 appears twice"),
         ("T1 Q12", "table: line 1: Q12: must be from 0 to 9"),
         ("T1.5", "table: line 1: T1.5: must be a whole number"),
-        ("T1 S2", "table: line 1: word S: is none of T P D I J Q X Y Z A B C U V W"),
+        ("T1 S2", "table: line 1: word S: must be one of T P D I J Q X Y Z A B C U V W"),
     ],
 )
 def test_bad_tool_table(text, message):

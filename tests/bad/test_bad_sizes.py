@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from chipload.cutter.cutter import Cutter
+from chipload.engagement.moves.stock import MoveStock, work_room
 from chipload.errors import InputError
 from chipload.examples import copy_example
 from chipload.jobs import check_job, load_job
@@ -82,11 +83,11 @@ def straight(length: float) -> Program:
 
 
 def test_steps_of_a_simulation() -> None:
-    tip = Resolution(step_mm=1e-7, tolerance=0.01, corner_pieces=4, flank_mm=2.0, rotation=math.radians(10.0))
+    tip = Resolution(step_mm=1e-7, tolerance=0.01, corner_slices=4, flank_mm=2.0, rotation=math.radians(10.0))
     refused(
         lambda: counted(straight(100.0), {1: cutter()}, tip), r"step_mm = 1e-07: 1e\+09 steps: must be at most 5000"
     )
-    coarse = Resolution(step_mm=0.5, tolerance=0.01, corner_pieces=4, flank_mm=2.0, rotation=math.radians(10.0))
+    coarse = Resolution(step_mm=0.5, tolerance=0.01, corner_slices=4, flank_mm=2.0, rotation=math.radians(10.0))
     assert counted(straight(100.0), {1: cutter()}, coarse) == 200
     assert np.isfinite(coarse.step_mm)
 
@@ -103,3 +104,17 @@ def test_a_helix_and_its_layers(tmp_path: Path, change: str, message: str) -> No
     copy_example("cone", tmp_path / "c")
     with pytest.raises(InputError, match=message):
         check_job(load_job(tmp_path / "c" / "job.toml", [change]))
+
+
+@pytest.mark.parametrize("side", range(3))
+def test_a_stock_without_thickness(side: int) -> None:
+    """1e-9 mm wide: the cells that the cutter covers would take 8 TiB."""
+    high = np.where(np.arange(3) == side, 1e-9, HIGH)
+    refused(lambda: LayeredStock.block(LOW, high, 1.0, 40.0), r"stock: 1e-09 mm from .*: each side must be at least 0")
+    thin = np.where(np.arange(3) == side, 1e-3, HIGH)
+    assert LayeredStock.block(LOW, thin, 1.0, 40.0).volume() > 0.0
+
+
+def test_room_for_a_stock_thinner_than_a_cell_of_its_index() -> None:
+    index = MoveStock(np.zeros(3), np.array([1e-3, 1e-3, 9.0]), {1: cutter()})
+    assert len(work_room(index.grid, index.cutters, 4, np.array([2.0]))[0]) < 1_000_000

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from chipload.cli import app
 from chipload.errors import InputError
 from chipload.examples import copy_example
-from chipload.planning.thinwall.blank import Blank
+from chipload.planning.thinwall.blank import WallBlank
 from chipload.planning.thinwall.table import read_cuts
 from chipload.planning.thinwall.threshold import Experiments, calibrated, modelled
 from chipload.structure.grid import Grid, from_points, plate
@@ -103,7 +103,7 @@ def test_a_modulus_in_another_unit(modulus: float, hint: str) -> None:
 
 
 def test_a_wall_thinner_than_what_is_cut_off_it() -> None:
-    assert said(lambda: Blank(clamped(), (1.0, 1.5))) == (
+    assert said(lambda: WallBlank(clamped(), (1.0, 1.5))) == (
         "wall: allowance_mm 1 and 1.5 leave no wall: it is 2 mm thick with its stock"
     )
 
@@ -124,7 +124,7 @@ def test_a_table_of_experiments_with_one_place(tmp_path: Path) -> None:
 def test_experiments_on_a_line() -> None:
     line = Experiments(np.array([[0.0, 1.0], [0.5, 1.0], [1.0, 1.0]]), np.array([20.0, 30.0, 20.0]))
     assert said(lambda: calibrated(line, [[0.5, 0.5]], 1.0)) == (
-        "experiments: all places lie on a line: add one beside it"
+        "experiments: all places lie on a line: add one off it"
     )
 
 

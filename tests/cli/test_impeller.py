@@ -194,7 +194,7 @@ def test_patches_cover_what_is_reached_and_are_clear(summary, proof):
         changes = way["cutter_changes"] + 5 * way["table_changes"]
         assert way["time_min"] == pytest.approx(11 * path / 100.0 + changes)
         assert way["least_time_any_shape_min"] <= way["least_time_min"] + 1e-9 <= way["time_min"] + 2e-9
-        assert way["gap"] == pytest.approx(way["time_min"] / way["least_time_min"] - 1.0)
+        assert way["above_bound"] == pytest.approx(way["time_min"] / way["least_time_min"] - 1.0)
     times = [w["time_min"] for w in op["ways"][1:]]
     assert times == sorted(times, reverse=True)
     assert (op["time_min"], op["name"]) == (min(times), op["ways"][1 + times.index(min(times))]["name"])

@@ -119,7 +119,7 @@ def test_a_job_is_not_overwritten(program: Path, tmp_path: Path) -> None:
     before = (tmp_path / "job" / "job.toml").read_bytes()
     code, _, said = call("init", program, tmp_path / "job")
     assert code == 2
-    assert said.startswith(f"chipload: {tmp_path / 'job' / 'job.toml'}: is there already and is not overwritten")
+    assert said.startswith(f"chipload: {tmp_path / 'job' / 'job.toml'}: already exists and is not overwritten")
     assert (tmp_path / "job" / "job.toml").read_bytes() == before
 
 
@@ -269,7 +269,7 @@ def test_a_freecad_job_by_name_and_where_its_lines_come_from(program: Path, tmp_
     code, _, said = call("init", tmp_path / "part.FCStd", tmp_path / "job", "--job", "Other")
     assert (code, said) == (2, "chipload: part.FCStd: no CAM job Other: has Job\n")
     code, _, said = call("init", program, tmp_path / "job", "--job", "Job")
-    assert (code, said) == (2, "chipload: --job Job: is for a FreeCAD document: leave it out for slot.nc\n")
+    assert (code, said) == (2, "chipload: --job Job: applies to a FreeCAD document only: leave it out for slot.nc\n")
     assert call("init", tmp_path / "part.FCStd", tmp_path / "job", "--job", "Job")[0] == 0
     lines = (tmp_path / "job" / "program.ngc").read_text().splitlines()
     with zipfile.ZipFile(tmp_path / "part.FCStd") as archive:
@@ -292,7 +292,7 @@ def test_a_draft_is_looked_at(program: Path, tmp_path: Path) -> None:
     again, same, _ = call("simulate", job, "--set", "operation.0.step_mm=20")
     worst = [[line for line in text.splitlines() if line.startswith("worst values")] for text in (said, same)]
     assert (again, worst[1]) == (code, worst[0])
-    assert same.splitlines()[-1] == "unproven: a first look"
+    assert same.splitlines()[-1] == "unproven: a first result"
     code, _, said = call("simulate", job, "--machine", "vmc")
     assert (code, said) == (2, "chipload: --machine: job.toml is a job: state it there, or by --set\n")
 

@@ -58,7 +58,7 @@ def test_a_good_program_passes_byte_by_byte(folder: Path) -> None:
     assert (code, out) == (0, GOOD)
     assert err.splitlines()[-1] == "FILTER_PROGRESS=100"
     # X -10 is outside the travel only with the work offset at zero, which the screen knows better: told, not held
-    assert "X = -10 mm: machine mill goes from 0 to 400 mm" in err
+    assert "X = -10 mm: machine mill travels from 0 to 400 mm" in err
 
 
 def test_a_limit_of_the_machine_holds_it_back(folder: Path) -> None:

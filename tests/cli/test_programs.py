@@ -73,7 +73,7 @@ def test_a_program_beyond_the_machine(files: Path):
     )
     code, out, _ = call("check", files / "b.ngc", "--machine", "vmc")
     assert code == 3
-    assert "line 8: row 2: X = 900 mm: machine vmc goes from -400 to 400 mm" in out
+    assert "line 8: row 2: X = 900 mm: machine vmc travels from -400 to 400 mm" in out
     assert "feeds with the spindle at rest" in out
     assert out.count("[does not hold]") == 2
 
@@ -160,7 +160,7 @@ def test_a_job_with_a_program(files: Path):
     job.write_text('[program]\nfile = "a.ngc"\ntools = "t.tbl"\n[machine]\nname = "vmc"\n')
     code, out, err = call("run", job, "--out", files / "result")
     assert (code, err) == (3, "")
-    assert out.startswith("Unproven: what the cutter meets was not simulated")
+    assert out.startswith("Unproven: the program was not simulated in its stock")
     summary = json.loads((files / "result" / "summary.json").read_text())
     (operation,), (track,) = summary["operations"], summary["tracks"]
     assert summary["verdict"] == track["verdict"] == "unproven"

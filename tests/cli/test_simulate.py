@@ -58,7 +58,7 @@ def test_the_example_cuts_two_pieces_and_as_much_as_the_stock_loses(tmp_path: Pa
     summary = json.loads((tmp_path / "r" / "summary.json").read_text())
     op = summary["operations"][0]
     assert op["kind"] == "simulate"
-    assert op["chip_pieces_max"] == 2
+    assert op["chip_areas_max"] == 2
     assert op["chip_volume_mm3"] == pytest.approx(op["removed_mm3"], rel=1e-6)
     assert op["chip_volume_mm3"] > 100.0
     for x in "xyz":
@@ -120,7 +120,7 @@ def test_what_is_left_is_the_stock_of_the_next_job(job: Path, tmp_path: Path) ->
     assert summary["limits"][0]["reason"] == "force is too small to be known"
     assert op["stock_before_mm3"] == pytest.approx(left.volume(), rel=1e-12)
     # the slot is cut already, but for films where its edges were made simpler
-    assert op["chip_pieces_max"] == 0
+    assert op["chip_areas_max"] == 0
     assert op["chip_volume_mm3"] == pytest.approx(op["films_mm3"])
     assert op["films_mm3"] == pytest.approx(0.0, abs=1e-2)
     assert op["force_n"]["max"] == 0.0

@@ -60,7 +60,7 @@ def test_more_than_was_identified_is_refused(job):
     """A limit above the cuts of the logs, another speed, a key that is nowhere, a file that is none."""
     code, _, err = call("check", job, "--set", "limits.torque_nm=0.7", "--set", "torque_control.override.overload_nm=2")
     assert code == 2
-    assert "spindle: the estimate holds up to 0.5 N m, the torque that is held is 0.651 N m: log heavier cuts" in err
+    assert "spindle: the estimate is valid up to 0.5 N m, the torque that is held is 0.651 N m: log heavier cuts" in err
     text = (job.parent / "spindle.toml").read_text()
     for old, new, wanted in (
         (r"^speed_rpm = .*$", "speed_rpm = [1000, 3000]", "the program turns at 6000: log an air run at that speed"),

@@ -135,9 +135,22 @@ def test_a_drift_of_the_idle_current():
     assert 60.0 * slope == pytest.approx(0.1 * 4.512 * SPINDLE.torque_constant, rel=0.05)
 
 
+def frozen():
+    """The current of 2 s from then on."""
+    kept = []
+
+    def change(current, speed, t):
+        if t > 2.0 and not kept:
+            kept.append(current)
+        return (kept[0] if kept else current), speed
+
+    return change
+
+
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
+        (frozen(), "no-reading"),
         (lambda i, w, t: (math.nan, w) if t > 2.0 else (i, w), "no-reading"),
         (lambda i, w, t: (i, math.nan) if t > 2.0 else (i, w), "no-reading"),
         (lambda i, w, t: (0.0, w) if t > 2.0 else (i, w), "no-reading"),
@@ -145,7 +158,7 @@ def test_a_drift_of_the_idle_current():
     ],
 )
 def test_pins_that_fail(change, reason):
-    """No current, no speed, an unconnected pin, a current far above the cut: the machine stops, and says why."""
+    """A current that stays or is missing, no speed, an unconnected pin, far too much: the machine stops, says why."""
     found, _ = go(change=change, gone_after=1500)
     assert found.ended == reason
     assert found.column("override")[-1] == 0.0

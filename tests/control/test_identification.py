@@ -54,7 +54,7 @@ def test_where_it_holds(identified):
     w = math.tau * found["range"]["bandwidth_hz"]
     lags = found["sensor_lag_s"], found["smoothing_s"]
     assert math.prod(1.0 + (w * x) ** 2 for x in lags) == pytest.approx(2.0, rel=1e-2)
-    assert "holds for torques from" in out
+    assert "valid for torques from" in out
     assert "tooth passing frequency" in out
 
 

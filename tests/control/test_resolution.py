@@ -56,8 +56,8 @@ def test_a_spindle_that_cannot_tell_a_cut_from_air():
         check_light(large, PERIOD, 50.0)
     assert str(refused.value) == (
         "override.light = 0.05 N m: below the resolution of the spindle, 1.42 N m (noise 0.35, quantisation 0.0037, "
-        "idle map 1.1): air cannot be told from a cut: state a spindle with a smaller idle_error_share (an air run "
-        "before each job) or a smaller spindle, or light at least 1.42 N m"
+        "idle map 1.1): air cannot be distinguished from a cut: state a spindle with a smaller idle_error_share (an "
+        "air run before each job) or a smaller spindle, or light at least 1.42 N m"
     )
     check_light(SPINDLE, PERIOD, 61.2)
 

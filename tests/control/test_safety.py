@@ -188,7 +188,7 @@ def test_a_jump_in_time_is_a_start(monkeypatch):
     monkeypatch.setattr(hal, "advance", lambda *x: summed.append(x[4]) or real(*x))
     record, _, _ = go(change=lambda pins, k: pins._replace(time=pins.time + 1e6 * (k >= 200)))
     assert record.ended == "path"
-    assert max(summed) <= RULES.gap_s
+    assert max(summed) <= RULES.timeout_s
     jumped = record.rows[199]
     assert STATUS[int(jumped[7])] == "settling"
     assert jumped[3] <= RULES.start
@@ -283,7 +283,7 @@ def test_a_stop_is_final():
         ("low_share", 0.7, "override.low_share = 0.7: must be at least 0 and at most 0.666667"),
         ("low_steps", 10, "override.low_steps = 10: must be above 10"),
         ("off_path_steps", 0, "override.off_path_steps = 0: must be at least 1"),
-        ("gap_s", 60.0, "override.gap_s = 60: must be above 0 and at most 10"),
+        ("timeout_s", 60.0, "override.timeout_s = 60: must be above 0 and at most 10"),
     ],
 )
 def test_rules_out_of_range(name, value, message):

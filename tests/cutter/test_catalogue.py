@@ -55,7 +55,7 @@ def test_refused(tmp_path, row, text):
 def test_refused_catalogues():
     with pytest.raises(InputError, match="no cutter"):
         Catalogue("none", ())
-    with pytest.raises(InputError, match="D 10 r 1 stands twice"):
+    with pytest.raises(InputError, match="D 10 r 1 appears twice"):
         Catalogue("twice", (CatalogueCutter(10.0, 1.0), CatalogueCutter(10.0, 1.0)))
     with pytest.raises(InputError, match="catalogue other: not known: the nearest is wu2019"):
         catalogue_named("other")

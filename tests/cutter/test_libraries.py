@@ -36,7 +36,7 @@ def library(tmp_path: Path) -> Path:
         tool(5, "bull nose end mill", RE=1.5),
         tool(6, "drill", SIG=118),
         tool(7, "chamfer mill", TA=45, **{"tip-diameter": 0.2}),
-        tool(8, "thread mill"),
+        tool(8, "probe shaft"),
         {"type": "holder", "unit": "millimeters"},
     ]
     path.write_text(json.dumps({"data": tools, "version": 2}))
@@ -65,7 +65,7 @@ def test_shapes_and_units(library: Path) -> None:
 
 
 def test_what_a_fusion_library_is_refused_for(library: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="type thread mill: must be one of flat end mill"):
+    with pytest.raises(InputError, match="type probe shaft: must be one of flat end mill"):
         read_fusion_tool(library, 8)
     with pytest.raises(InputError, match="tool 9 is not there: must be one of 3, 4, 5, 6, 7, 8"):
         read_fusion_tool(library, 9)

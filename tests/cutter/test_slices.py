@@ -27,7 +27,7 @@ def mill(**form):
 
 def test_of_a_flat_mill_by_hand():
     """Bottom from -5 to 0 without lag, flank from 0 to 20 on which s is z."""
-    edge = slices(mill(), bottom_pieces=1)
+    edge = slices(mill(), bottom_slices=1)
     np.testing.assert_array_equal(edge.s_from, [-5.0, 0.0])
     np.testing.assert_array_equal(edge.s_to, [0.0, 20.0])
     lead = math.tan(math.radians(35.0)) / 5.0
@@ -40,7 +40,7 @@ def test_of_a_flat_mill_by_hand():
 def test_the_middles_lie_on_the_envelope(form):
     """The middle of a slice, reached along its tangent, lies on the profile; its normal is square to the profile."""
     cutter = mill(**form)
-    edge = slices(cutter, corner_pieces=200, flank_mm=0.5)
+    edge = slices(cutter, corner_slices=200, flank_mm=0.5)
     half = 0.5 * (edge.s_to - edge.s_from)
     np.testing.assert_allclose(np.hypot(edge.sin_kappa, edge.cos_kappa), 1.0, rtol=1e-15)
     z = edge.z + half * edge.sin_kappa
@@ -55,7 +55,7 @@ def test_the_middles_lie_on_the_envelope(form):
 @pytest.mark.parametrize("form", FORMS)
 def test_they_follow_one_another_from_the_axis_to_the_flute_end(form):
     cutter = mill(**form)
-    edge = slices(cutter, bottom_pieces=3, corner_pieces=64, flank_mm=1.7)
+    edge = slices(cutter, bottom_slices=3, corner_slices=64, flank_mm=1.7)
     np.testing.assert_allclose(edge.s_from[1:], edge.s_to[:-1], atol=1e-12)
     length = edge.s_to - edge.s_from
     assert (length > 0.0).all()
@@ -74,7 +74,7 @@ def test_they_follow_one_another_from_the_axis_to_the_flute_end(form):
 def test_constant_lead(form):
     """The lag at the lower end of every slice is that of its height, and goes on to that of the next."""
     cutter = mill(**form)
-    edge = slices(cutter, corner_pieces=400)
+    edge = slices(cutter, corner_slices=400)
     lead = math.tan(cutter.helix) / 5.0
     np.testing.assert_allclose(edge.lag, lead * edge.z, rtol=1e-13)
     np.testing.assert_allclose((edge.lag + edge.rate * (edge.s_to - edge.s_from))[:-1], edge.lag[1:], atol=1e-5)
@@ -83,8 +83,8 @@ def test_constant_lead(form):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"bottom_pieces": 0}, "slices: bottom_pieces = 0: must be at least 1"),
-        ({"corner_pieces": 0}, "slices: corner_pieces = 0: must be at least 1"),
+        ({"bottom_slices": 0}, "slices: bottom_slices = 0: must be at least 1"),
+        ({"corner_slices": 0}, "slices: corner_slices = 0: must be at least 1"),
         ({"grading": 0.5}, "slices: grading = 0.5: must be from 1 (evenly) to 3"),
         ({"flank_mm": 0.0}, "slices: flank_mm = 0: must be above 0, or None for one slice"),
     ],

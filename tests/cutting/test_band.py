@@ -79,8 +79,8 @@ def test_refuses_a_material_that_does_not_say():
     with pytest.raises(InputError) as err:
         mean_band(BITES, MILL, replace(material_named("al7075-t6"), spread=None))
     assert str(err.value) == (
-        "material al7075-t6: neither spread nor covariance is known, so how sure its coefficients are cannot be said: "
-        "give spread, or fit them"
+        "material al7075-t6: neither spread nor covariance is known, so the uncertainty of its coefficients is "
+        "unknown: give spread, or fit them"
     )
 
 

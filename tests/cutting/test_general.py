@@ -29,9 +29,9 @@ FORMS = {
 }
 
 
-def feed_bites(cutter, feed, low, high, top, corner_pieces=16, flank_mm=None):
+def feed_bites(cutter, feed, low, high, top, corner_slices=16, flank_mm=None):
     """Every slice up to s = top moves by ``feed`` (T, n, A) a tooth and is engaged from low to high, where h > 0."""
-    edge = slices(cutter, corner_pieces=corner_pieces, flank_mm=flank_mm)
+    edge = slices(cutter, corner_slices=corner_slices, flank_mm=flank_mm)
     rows, own = [], []
     for k in range(len(edge)):
         ends = edge.s_from[k], min(edge.s_to[k], top)
@@ -100,7 +100,7 @@ def test_every_form_against_vectors_of_elements(form, feed, low, high):
     top = 7.0
     theta = np.random.default_rng(3).uniform(0.0, math.tau, 4)
     expected = np.array([brute(cutter, PLAIN, feed, low, high, top, t, 4000) for t in theta])
-    bites = feed_bites(cutter, feed, low, high, top, corner_pieces=400, flank_mm=0.5)
+    bites = feed_bites(cutter, feed, low, high, top, corner_slices=400, flank_mm=0.5)
     force, torque = forces_over_turn(bites, cutter, PLAIN, theta)
     assert np.abs(expected).max() > 50.0
     ours = np.column_stack([force[0], torque[0]])
@@ -219,7 +219,7 @@ def test_where_immersion_is_counted_from_does_not_matter():
 
 
 def test_greatest_of_many_rows_by_samples_is_that_by_breaks():
-    bites = feed_bites(BALL, (0.05, 0.01, -0.02), 0.2, 2.4, 8.0, corner_pieces=40, flank_mm=1.0)
+    bites = feed_bites(BALL, (0.05, 0.01, -0.02), 0.2, 2.4, 8.0, corner_slices=40, flank_mm=1.0)
     assert len(bites.rows) > 40
     by_breaks = greatest_forces(bites, BALL, AL, exact_rows=None)
     by_samples = greatest_forces(bites, BALL, AL)

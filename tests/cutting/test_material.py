@@ -172,7 +172,7 @@ def test_a_spread_is_a_diagonal_covariance():
         ),
         (
             f"spread = 0.1\ncovariance = {np.eye(6).tolist()}",
-            "material.spread and material.covariance: give one of them, they say the same thing",
+            "material.spread and material.covariance: give one of them: both state the same",
         ),
     ],
 )

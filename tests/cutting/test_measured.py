@@ -76,7 +76,7 @@ def test_clipped_and_drifting(tmp_path):
         (HEAD + "0,1,2,3\n0.001,1,x,3\n", "line 8: '0.001,1,x,3': must be numbers"),
         (HEAD + "0,1,2,3\n0.001,1,2\n", "line 8: 3 values: must be 4"),
         (HEAD + "0,1,2,3\n0.001,1,nan,3\n", "line 8: a value is not finite"),
-        (HEAD.replace("1000", "5000") + "0,1,2,3\n0.001,1,2,3\n0.002,1,2,3\n", "the header says 5000 Hz"),
+        (HEAD.replace("1000", "5000") + "0,1,2,3\n0.001,1,2,3\n0.002,1,2,3\n", "the header states 5000 Hz"),
         ("Fx,Fy\n1,2\n2,3\n3,4\n", "line 1: Fx: has no unit: name it fx_n"),
         ("fx_n,fy_n\n1,2\n2,3\n3,4\n", "line 1: no time column and no sampling rate"),
         ("1,2\n2,3\n", "line 1: numbers without names"),

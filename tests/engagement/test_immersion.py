@@ -85,7 +85,7 @@ def test_a_full_slot_removes_the_area_of_the_profile_times_the_feed(cutter: Cutt
     """Oracle: half the profile, integrated by radius_at, times two, times the feed of a revolution."""
     depth, layers = 4.0, 400
     section = section_of([shapely.box(-50.0, -50.0, 50.0, 50.0)] * layers, np.linspace(0.0, depth, layers + 1).tolist())
-    fine = slices(cutter, corner_pieces=200, flank_mm=0.05)
+    fine = slices(cutter, corner_slices=200, flank_mm=0.05)
     frame = tool_frame(UP, (0.0, 1.0, 0.0))
     rows, owner = immersed((3.0, 2.0, 0.0), frame, (0.0, 0.03, 0.0), (0.0, 0.0, 0.0), fine, section)
     z = (np.arange(20000) + 0.5) * depth / 20000
@@ -113,7 +113,7 @@ def test_random_poses_agree_with_sampled_membership_in_the_solid_itself(seed: in
     axis /= np.linalg.norm(axis)
     feed, turn = rng.normal(size=3) * (0.1, 0.1, 0.03), rng.normal(size=3) * 0.003
     turn = turn - (turn @ axis) * axis
-    fine = slices(cutter, corner_pieces=60, flank_mm=0.1, bottom_pieces=60)
+    fine = slices(cutter, corner_slices=60, flank_mm=0.1, bottom_slices=60)
     frame = tool_frame(axis, feed, clockwise=bool(seed % 2))
     rows, owner = immersed((0.0, 0.0, 0.0), frame, feed, turn, fine, section_of(shapes, bounds.tolist()))
     phi = (np.arange(2000) + 0.5) * math.tau / 2000
@@ -130,7 +130,7 @@ def test_random_poses_agree_with_sampled_membership_in_the_solid_itself(seed: in
 
 def test_points_of_the_edge_lie_on_the_cutter() -> None:
     """With 12 slices the mean height of an arc's ends is up to 13 um inside a ball of 6 mm: short steps find air."""
-    ball = slices(Cutter(12.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=6.0), corner_pieces=12)
+    ball = slices(Cutter(12.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=6.0), corner_slices=12)
     arc = ball.radius > 0.0
     assert np.hypot(ball.rho[arc], 6.0 - ball.z_middle[arc]) == pytest.approx(6.0, abs=1e-12)
     tops = np.append(ball.z[1:][arc[:-1]], 6.0)[: arc.sum()]

@@ -148,7 +148,7 @@ def test_a_random_body_is_cut_as_brute_force_says():
             "a.stl",
             bytes(80) + struct.pack("<I", 9) + bytes(60),
             {"unit": "mm"},
-            "its head says 9 triangles, which are 534 bytes, and it has 144",
+            "its header states 9 triangles, which are 534 bytes, and it has 144",
         ),
         ("a.step", b"hello", {"chord_mm": 0.1}, "a.step: not a STEP file"),
         ("a.step", b"hello", {}, "state how far a triangle may leave a surface"),

@@ -39,7 +39,7 @@ def test_nearest():
 def test_refused():
     with pytest.raises(InputError, match="meridian: radius -1 mm: must be at least 0"):
         Revolved(np.array([[-1.0, 0.0], [2.0, 3.0]]), 1)
-    with pytest.raises(InputError, match="meridian: point 2 stands twice"):
+    with pytest.raises(InputError, match="meridian: point 2 appears twice"):
         Revolved(np.array([[1.0, 0.0], [2.0, 3.0], [2.0, 3.0]]), 1)
     with pytest.raises(InputError, match="on the axis"):
         Revolved(np.array([[0.0, 0.0], [5.0, 0.0]]), 1).curvature([0.0], [0.0])

@@ -142,7 +142,7 @@ def test_a_program_beyond_the_machine_fails(history) -> None:
     far = Program.join([slot(), rapid([1000.0, 0.0, 5.0], SPEED, 1, "away")])
     found = simulated(program=far)
     assert found.verdict == "exceeds"
-    assert "X = 1000 mm: machine vmc goes from -400 to 400 mm" in found.message
+    assert "X = 1000 mm: machine vmc travels from -400 to 400 mm" in found.message
 
 
 def test_a_program_of_five_axes_is_read_for_its_machine(tmp_path: Path) -> None:
@@ -212,7 +212,7 @@ def test_the_result_folder_is_that_of_a_run(history, tmp_path: Path) -> None:
         ({"limits": {"force": 3.0}}, "limits.force: unknown key; did you mean force_n"),
         ({"limits": {"gouge_mm": 3.0}}, "limits.gouge_mm: needs the part that should come out: give part or leave it"),
         ({"step_mm": -1.0}, "operation.0.step_mm = -1: must be above 0"),
-        ({"cutter": {}}, "cutter: none is given"),
+        ({"cutter": {}}, "cutter: missing: give at least one"),
         ({"cutter": {3: MILL}}, "tool 1: no [[cutter]] has this number: state one beside 3"),
         ({"cutter": {"diameter_mm": 10.0}}, "cutter.flutes is missing"),
         ({"cutter": 10.0}, "cutter 1: float: give a chipload.Cutter or the keys of a [[cutter]]"),

@@ -62,7 +62,7 @@ def test_a_thin_cutter_breaks_and_the_report_says_where() -> None:
     assert found.worst == pytest.approx(cutter_stress(bites, thin, AL)[0], rel=1e-3)
     allowed = done.numbers["cutter_stress_mpa"]["allowed"]["1"]
     assert (allowed["mpa"], allowed["tool_material"], allowed["safety_factor"]) == (1500.0, "carbide", 2.0)
-    # a stronger grade carries it; then the rigid model does not hold
+    # a stronger grade carries it; then the rigid model is not valid
     strong = slot(replace(thin, strength=ToolStrength(mpa=4000.0, safety_factor=1.5)), 3.0)
     assert strong.verdict == "unproven"
     assert "rigid model" in strong.message

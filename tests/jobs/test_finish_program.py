@@ -138,7 +138,7 @@ def test_the_finish_pass_of_the_text_keeps_the_engagement(outcome, tmp_path):
     ("changes", "text"),
     [
         ({"side": "right"}, "operation.side = 'right': the path of finish.ngc with milling = 'down' is on the left of"),
-        ({"lines": (1, 6)}, "nothing cuts level below the stock's top in lines 1 to 6"),
+        ({"lines": (1, 6)}, "no horizontal cut below the stock's top in lines 1 to 6"),
         ({"text": PROGRAM.replace("G1 Y28.", "G0 Z3.\nG0 Z-5.\nG1 Y28."), "lines": (14, 18)}, "the cut is interrupted"),
         ({"text": PROGRAM.replace("T1 M6", "T3 M6")}, "line 14 is cut by tool 3, the operation has cutter = 1"),
     ],

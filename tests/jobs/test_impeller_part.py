@@ -205,7 +205,7 @@ def test_fillets_are_said_and_what_is_not_milled(tmp_path):
     assert holds
     assert lines[1].startswith("blade plus fillet: 3 mm, up to 3.634 mm of the side are under it, within ")
     assert lines[3] == "floor: at least 18.67 mm wide between two fillets, round the axis"
-    assert lines[4] == "not milled, for no [[surface]] names it: blade plus fillet"
+    assert lines[4] == "not milled: no [[surface]] names it: blade plus fillet"
     assert lines[7].startswith("surface 1: blade minus fillet: 200 contact points, ")
     found = read_part(load_job(path).job).impeller
     # both ways: a side begins where its fillet ends

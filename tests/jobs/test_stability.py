@@ -90,7 +90,7 @@ def test_the_margin_of_a_side_cut_is_that_of_the_library(tmp_path: Path, rpm: in
     assert cuts.sum() > 5
     exact = library_margin(rpm, depth)
     assert np.allclose(columns["stability_margin"][cuts], exact, rtol=0.01)
-    assert (columns["stability_margin"][~cuts & (columns["chip_pieces"] == 0)] == 3.0).all()
+    assert (columns["stability_margin"][~cuts & (columns["chip_areas"] == 0)] == 3.0).all()
     check = check_of(read)
     assert (check.limit, check.column.least) == (1.0, True)
     assert check.state is (Verdict.EXCEEDS if exact < 0.98 else Verdict.HOLDS)
@@ -344,7 +344,7 @@ def test_spreads_of_the_modes_give_a_probability(tmp_path: Path) -> None:
     # the material states no spread: only the modes are unsure
     assert 0.9 < check.worst <= 1.0
     assert check.state is Verdict.HOLDS
-    assert (columns["stable_probability"][columns["chip_pieces"] == 0] == 1.0).all()
+    assert (columns["stable_probability"][columns["chip_areas"] == 0] == 1.0).all()
     chatters = done(tmp_path, text=text.replace("Z-2", "Z-5"), modes=spreads + MODES, limits="stable_probability = 0.9")
     assert check_of(chatters, "stable_probability").state is Verdict.EXCEEDS
 
@@ -447,7 +447,7 @@ def test_speeds_by_zone_change_between_two_passes_and_are_simulated_again(tmp_pa
     # both are simulated from fresh stock: each pass has what was expected, and one of them more than at one speed
     least = {
         by: [
-            columns["stability_margin"][(columns["line"] == line) & (columns["chip_pieces"] > 0)].min()
+            columns["stability_margin"][(columns["line"] == line) & (columns["chip_areas"] > 0)].min()
             for line in (6, 10)
         ]
         for by in found

@@ -74,9 +74,11 @@ def test_largest_that_fits_and_none_that_does(impeller):
     (plan, *_) = plans(impeller, cutters, None, tables=(40.0, 55.0))
     assert plan.cutter.diameter == 14.0
     assert plan.table in TABLE.angle
-    with pytest.raises(InputError, match=r"operation.0.rough.share = 0.9: no cutter of catalogue own goes at so many"):
+    with pytest.raises(
+        InputError, match=r"operation.0.rough.share = 0.9: no cutter of catalogue own fits at that share"
+    ):
         plans(impeller, (CatalogueCutter(60.0, 2.0),), None)
-    with pytest.raises(InputError, match=r"operation.0.rough: D 60 r 2 mm goes nowhere in the channel"):
+    with pytest.raises(InputError, match=r"operation.0.rough: D 60 r 2 mm fits nowhere in the channel"):
         plans(impeller, cutters, cutters[2])
 
 

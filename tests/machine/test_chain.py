@@ -43,7 +43,7 @@ def test_every_shipped_machine_says_where_its_numbers_come_from(name):
     ("text", "old", "new", "message"),
     [
         (HEAD, 'chain = "CXYZB"', 'chain = "CXYB"', "unknown key axis.z: the nearest known one is axis.y"),
-        (HEAD, 'chain = "CXYZB"', 'chain = "CXYZBB"', "machine.chain = CXYZBB: B stands twice: must stand once"),
+        (HEAD, 'chain = "CXYZB"', 'chain = "CXYZBB"', "machine.chain = CXYZBB: B appears twice: must appear once"),
         (
             HEAD,
             '"CXYZB"',
@@ -147,6 +147,6 @@ def test_limits_name_the_worst_row():
         (
             "machine-limit",
             9,
-            "row 2: X = 450 mm: machine horizontal-b goes from -400 mm to 400 mm (2 rows, the first is 1)",
+            "row 2: X = 450 mm: machine horizontal-b travels from -400 mm to 400 mm (2 rows, the first is 1)",
         ),
     ]

@@ -114,13 +114,13 @@ def test_a_rewind_is_reported_wide():
 def test_where_no_turn_is_within_the_limits_the_least_is_broken():
     axes, findings = follow(limited(C=(-30, 30), A=(0, 50)), np.zeros((3, 3)), tilted([0.0, 20.0, 40.0]))
     np.testing.assert_allclose(np.degrees(axes[:, 5]), [0, 20, 40], atol=1e-9)
-    assert [f.text for f in findings] == ["row 2: C = 40 deg: machine xyzac-trunnion goes from -30 deg to 30 deg"]
+    assert [f.text for f in findings] == ["row 2: C = 40 deg: machine xyzac-trunnion travels from -30 deg to 30 deg"]
 
 
 def test_linear_limits_are_found():
     _, findings = follow(TRUNNION, [[0.0, 0.0, 0.0], [250.0, 0.0, 0.0]], [[0.0, 0.0, 1.0]] * 2)
     assert [f.code for f in findings] == ["machine-singular", "machine-limit"]
-    assert findings[1].text == "row 1: X = 250 mm: machine xyzac-trunnion goes from -200 mm to 200 mm"
+    assert findings[1].text == "row 1: X = 250 mm: machine xyzac-trunnion travels from -200 mm to 200 mm"
 
 
 def test_through_the_pole():

@@ -133,7 +133,7 @@ def test_trivial_kinematics_say_what_is_not_said(tmp_path):
         "ini-spindle",
         "ini-velocity",
     ]
-    assert findings[0].text == "A: trivkins do not say where it stands: taken as a table about X through the origin"
+    assert findings[0].text == "A: trivkins do not state its position: taken as a table about X through the origin"
     axes = np.zeros((1, 9))
     axes[0, 3] = math.pi / 2
     np.testing.assert_allclose(forward(machine, axes)[1], [[0.0, -1.0, 0.0]], atol=1e-15)  # right-handed about +X

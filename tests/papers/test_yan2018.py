@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
-from chipload.planning.thinwall.blank import SIDES, Blank
+from chipload.planning.thinwall.blank import SIDES, WallBlank
 from chipload.planning.thinwall.depth import DepthRange, normal_force
 from chipload.planning.thinwall.force_table import law_of
 from chipload.planning.thinwall.passes import constant, least_first_depth, variable
@@ -32,7 +32,7 @@ DEFLECTION = 0.1
 def plans():
     """Wall of 100 x 60 x 3 mm with 1 mm of stock on both sides."""
     grid = plate(100.0, 60.0, 5.0, (20, 12, 1))
-    wall = Blank(SolidWorkpiece(grid, 114000.0, 0.34, 4.43e-9, grid.side("j-"), rule=8), (1.0, 1.0))
+    wall = WallBlank(SolidWorkpiece(grid, 114000.0, 0.34, 4.43e-9, grid.side("j-"), rule=8), (1.0, 1.0))
     surfaces = [wall.surface(s) for s in wall.sides()]
     law = law_of(POSTURE, TITANIUM, DepthRange(0.01, 1.0), measure="greatest")
 

@@ -90,7 +90,7 @@ def done(tmp_path_factory):
 
 def test_every_line_that_cuts_has_a_deflection(done):
     c = done.simulated.removal.columns
-    cuts = (c["chip_pieces"] > 0) & ~c["rapid"]
+    cuts = (c["chip_areas"] > 0) & ~c["rapid"]
     assert (c["deflection_workpiece_um"][cuts] > 0.0).all()
     numbers = result_of(done).operations[0]
     assert numbers["form_error_um"]["points"] > 100

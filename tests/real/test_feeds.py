@@ -97,7 +97,7 @@ def test_a_real_program_keeps_its_limit_and_its_path(name: str, tmp_path: Path) 
     (tmp_path / "job.toml").write_text(JOB.format(file=source.name, **values))
     done = CliRunner().invoke(app, ["run", str(tmp_path / "job.toml"), "--out", str(tmp_path / "r")])
     summary = json.loads((tmp_path / "r" / "summary.json").read_text())
-    # these long cutters bend by more than their chips, where the rigid model does not hold, and that is stated
+    # these long cutters bend by more than their chips, where the rigid model is not valid, and that is stated
     assert (done.exit_code, summary["verdict"]) == (3, "unproven"), done.stderr
     unproven = [c["name"] for t in summary["tracks"] for c in t["limits"] if t["in_use"] and c["state"] == "unproven"]
     assert "deflection_share" in unproven

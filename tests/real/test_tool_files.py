@@ -33,7 +33,11 @@ def test_every_tool_bit_is_read_or_refused():
             with pytest.raises(InputError, match=f"shape {shape}: must be one of endmill, ballend, torus, bullnose"):
                 read_fctb(path)
     assert len(BITS) == 16
-    assert len(read) == 8
+    assert len(read) == 14  # all but a probe and a chamfer mill; six of them since points, V-bits and bodies are read
+    assert sorted(name for name, own in read.items() if "body_mm" in own) == [
+        "2a2863e0", "4515b6a2", "861cf098", "ecf494c4"
+    ]  # fmt: skip
+    assert read["b4643d72"]["bottom_deg"] == 30.5  # 119 deg
     assert read["4f1877a0"] == {
         "name": "New Torus",
         "diameter_mm": 5.0,
@@ -61,7 +65,7 @@ def test_every_tool_table_is_read():
         numbers = [int(n) for n in re.findall(r"^T(\d+)", path.read_text(errors="replace"), re.M)]
         for n in set(numbers):
             if numbers.count(n) > 1:
-                with pytest.raises(InputError, match=f"tool {n} stands twice"):
+                with pytest.raises(InputError, match=f"tool {n} appears twice"):
                     read_tool_table(path, n, "mm")
             else:
                 assert read_tool_table(path, n, "mm")["number"] == n

@@ -4,19 +4,28 @@ from __future__ import annotations
 
 import base64
 import csv
+import io
+import re
 import struct
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pyarrow.parquet as pq
+import pypdf
 import pytest
 import trimesh
 from typer.testing import CliRunner
 
 from chipload.cli import app
 from chipload.errors import InputError
-from chipload.report.vtk import polyline, triangles
+from chipload.report.pdf import SheetLine, one_page
+from chipload.report.removal import read_removal
+from chipload.report.setup_sheet import setup_pdf
+from chipload.report.vtk import faces_file, polyline
+from chipload.result import Result, SurfaceMap
+from chipload.result.load import load_result
 from chipload.stock.layers import LayeredStock
 from mill import SLOT_JOB
 
@@ -112,6 +121,72 @@ def test_the_sheet_shows_verdict_program_and_limits(exported: Path) -> None:
         assert part in text
 
 
+def test_chips_are_bodies_with_the_volume_of_the_slot(result: Path, exported: Path) -> None:
+    """Of each closed chip by the divergence theorem; dexels of 6 / 32 mm keep the 240 mm3 to 2 %."""
+    found = read_vtk(exported / "chips-program.vtu")
+    assert set(found["types"].tolist()) == {9}
+    a, b, c, d = (found["points"][found["connectivity"].reshape(-1, 4)[:, k]] for k in range(4))
+    each = (np.einsum("ij,ij->i", a, np.cross(b, c)) + np.einsum("ij,ij->i", a, np.cross(c, d))) / 6.0
+    volumes = np.bincount(found["chip"], each)[1:]
+    mesh = read_removal(result / "removal.npz", 0)
+    assert mesh is not None
+    kept = [mesh.volume(k) for k in range(len(mesh.rows) + 1)]
+    np.testing.assert_allclose(volumes, -np.diff(kept)[: len(volumes)], atol=1e-3)
+    assert volumes.min() > -1e-3
+    assert volumes.sum() == pytest.approx(240.0, rel=0.02)
+    history = pq.read_table(result / "history.parquet")
+    rows = found["row"]
+    assert history["line"].to_numpy()[rows].tolist() == found["line"].tolist()
+    chip, first = np.unique(found["chip"], return_index=True)
+    whole = history["chip_volume_mm3"].to_numpy().sum()
+    assert found["chip_volume_mm3"][first].sum() == pytest.approx(whole, rel=1e-12)
+    force = history["force_n"].to_numpy()
+    bounds = np.concatenate([[0], mesh.rows + 1])
+    expected = [force[bounds[k - 1] : bounds[k]].max() for k in chip]
+    np.testing.assert_array_equal(found["force_n"][first], expected)
+
+
+def test_a_field_of_finite_elements_keeps_its_vectors(result: Path, tmp_path: Path) -> None:
+    """The cells of a displaced surface map come back from maps.npz and from the file of VTK as they stood."""
+    from chipload.report.export import _map
+    from chipload.result.history import maps_bytes
+
+    moved = np.array([[0.0, 0.0, 0.0], [0.001, 0.0, 0.0], [0.0, -0.002, 0.003]])
+    um = 1000.0 * np.linalg.norm(moved, axis=1)
+    one = SurfaceMap("bent", "deflection_workpiece_um", np.eye(3), um, np.array([[0, 1, 2]]), displacement=moved)
+    (tmp_path / "map.vtu").write_bytes(_map(one))
+    found = read_vtk(tmp_path / "map.vtu")
+    np.testing.assert_array_equal(found["displacement_mm"], moved)
+    np.testing.assert_array_equal(found["deflection_workpiece_um"], um)
+    (tmp_path / "maps.npz").write_bytes(maps_bytes(replace(load_result(result), maps=(one,))))
+    np.testing.assert_array_equal(np.load(tmp_path / "maps.npz")["0-displacement"], moved)
+    with pytest.raises(ValueError, match=r"displacement of shape \(2, 3\)"):
+        replace(one, displacement=moved[:2])
+
+
+def read_pdf(data: bytes) -> str:
+    """The text of the only page, which is A4."""
+    (page,) = pypdf.PdfReader(io.BytesIO(data)).pages
+    assert (float(page.mediabox.width), float(page.mediabox.height)) == pytest.approx((595.28, 841.89))
+    return re.sub(r"\s+", " ", page.extract_text())
+
+
+def test_the_sheet_in_pdf(exported: Path) -> None:
+    data = (exported / "setup.pdf").read_bytes()
+    for part in ("HOLDS", "Holds: ", "torque [N m]", "0-program.apt", "vmc", "X -8 to 28"):
+        assert part in read_pdf(data)
+
+
+def test_a_long_sheet_is_one_page_and_says_what_it_leaves_out(result: Path) -> None:
+    whole: Result = load_result(result)
+    many = tuple(f"limit number {k} (\u00b5m, \u221e): not stated, because nobody said so" for k in range(200))
+    text = read_pdf(setup_pdf(replace(whole, unchecked=many)))
+    assert "188 more in report.html" in text
+    assert "(\u00b5m, ?)" in text
+    assert one_page("", [SheetLine("word " * 20_000)]) is None
+    assert "HOLDS" in read_pdf(setup_pdf(replace(whole, note="so " * 20_000)))
+
+
 def test_what_is_refused(result: Path, exported: Path, tmp_path: Path) -> None:
     assert call("export", result, "--out", exported)[0] == 2
     code, _, said = call("export", tmp_path, "--out", tmp_path / "out")
@@ -122,7 +197,7 @@ def test_what_is_refused(result: Path, exported: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="force_n: 1 values: must be 2"):
         polyline([[0, 0, 0], [1, 0, 0]], {"force_n": np.zeros(1)})
     with pytest.raises(InputError, match="a face names a point outside 0 to 2"):
-        triangles(np.eye(3), [[0, 1, 3]])
+        faces_file(np.eye(3), [[0, 1, 3]])
 
 
 def test_one_kind_alone(result: Path, tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ from chipload.jobs.contour.scene import scene_bytes
 from chipload.planning.result import Event, StrategyResult
 from chipload.report.folder import write_result
 from chipload.report.page import limits_table, page_bytes
-from chipload.report.shape import pieces, slab
+from chipload.report.shape import slab, stretches
 from chipload.result import Verdict
 from chipload.result.history import write_history
 from chipload.result.load import load_result
@@ -321,7 +321,7 @@ def test_a_prism_of_a_region_with_an_island_has_its_volume() -> None:
 def test_pieces_begin_where_the_rows_jump() -> None:
     x = np.array([0.0, 1.0, 2.0, 50.0, 51.0, 52.0])
     history = {"x_mm": x, "y_mm": 0 * x, "z_mm": 0 * x, "pass": np.array(["finish"] * 5 + ["lead"], dtype=object)}
-    assert pieces(history).tolist() == [0, 0, 0, 1, 1, 2]
+    assert stretches(history).tolist() == [0, 0, 0, 1, 1, 2]
 
 
 def test_the_scene_holds_wall_stock_cutter_and_paths_in_colour(outcome: Maker) -> None:

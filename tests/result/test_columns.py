@@ -37,7 +37,7 @@ def test_no_two_columns_have_one_label_and_unit():
 
 
 def test_a_name_that_stands_twice_is_refused():
-    with pytest.raises(ValueError, match="column a_mm: stands twice"):
+    with pytest.raises(ValueError, match="column a_mm: appears twice"):
         _by_name([Column("a_mm", "mm", "a", "a"), Column("a_mm", "mm", "b", "b")])
 
 

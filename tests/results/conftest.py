@@ -45,7 +45,7 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
     "tube": (),
     "cone": (),
     "plate": ("operation.0.least_error=false",),
-    "blade": ("operation.0.least_error=false",),
+    "blade": ("operation.0.least_error=false", "operation.0.layer_mm=0.5", "operation.0.step_mm=2.7"),
     "impeller": (
         "operation.0.most_cutters=1",
         *(f"surface.{k}.{key}" for k in range(3) for key in ("along=[0.42, 0.58]", "points=[6, 5]")),

@@ -22,7 +22,7 @@ from simulation.test_steps import five_axis
 MILL = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
 BALL = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=5.0)
 BULL = Cutter(12.0, 3, 0.4, 20.0, 30.0, 6e5, corner_radius=2.0)
-FINE = Resolution(step_mm=1.0, tolerance=1e-4, corner_pieces=60, flank_mm=0.25)
+FINE = Resolution(step_mm=1.0, tolerance=1e-4, corner_slices=60, flank_mm=0.25)
 #: cutting without edge forces, and along the tooth's motion alone: its work is Ktc times the volume
 ENERGY = Material("plain", 1000.0, 0.0, 0.0, 0.0, 0.0, 0.0, source="made up for this test")
 
@@ -100,7 +100,7 @@ def test_a_wall_costs_what_the_exact_arcs_say(spindle: str) -> None:
 def test_the_torque_does_the_work_that_the_volume_asks_for(cutter: Cutter, path: list[list[list[float]]]) -> None:
     """Oracle: with Ktc alone, torque times angle is Ktc times the volume removed, whatever the engagement."""
     stock = block(0.2, 60.0)
-    fine = Resolution(step_mm=0.5, tolerance=5e-4, corner_pieces=40, flank_mm=0.5)
+    fine = Resolution(step_mm=0.5, tolerance=5e-4, corner_slices=40, flank_mm=0.5)
     # a small feed: the thickness is of first order in the feed per tooth, and so is what a step takes
     c = remove(five_axis(*path, feed=5.0), stock, {1: cutter}, ENERGY, fine).columns
     work = 1000.0 * (c["torque_mean_nm"] * 100.0 * c["seconds"]).sum()
@@ -121,10 +121,10 @@ def test_a_rapid_through_material_is_found_and_costs_no_force() -> None:
 def test_what_is_watched_becomes_columns_of_the_steps_that_cut() -> None:
     removal = remove(
         straight([-10, 0, -3], [30, 0, -3]), block(), {1: MILL}, ENERGY, FINE,
-        watch=lambda cuts: {"thickest_mm": cuts.bites.chip_max(), "step": cuts.step.astype(np.float64)},
+        watch=lambda cuts: {"thickest_mm": cuts.engagement.chip_max(), "step": cuts.step.astype(np.float64)},
     )  # fmt: skip
     c = removal.columns
-    cut = c["chip_pieces"] > 0
+    cut = c["chip_areas"] > 0
     assert not c["thickest_mm"][~cut].any()
     assert c["thickest_mm"][c["x_mm"] > 6.5] == pytest.approx(math.tau * 20.0 / (4 * 300.0), rel=1e-9)
     assert c["step"][cut].tolist() == np.flatnonzero(cut).tolist()

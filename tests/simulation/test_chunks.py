@@ -28,7 +28,7 @@ from simulation.test_steps import five_axis
 MILL = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
 BALL = Cutter(8.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=4.0)
 CUTTERS = {1: MILL, 2: BALL}
-ROUGH = Resolution(step_mm=1.0, tolerance=0.01, corner_pieces=4, flank_mm=2.0, rotation=math.radians(10.0))
+ROUGH = Resolution(step_mm=1.0, tolerance=0.01, corner_slices=4, flank_mm=2.0, rotation=math.radians(10.0))
 MATERIAL = replace(material_named("al7075-t6"), spread=0.05)
 
 

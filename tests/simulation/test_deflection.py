@@ -29,7 +29,7 @@ from simulation.test_steps import five_axis
 AL = material_named("al7075-t6")
 MILL = Cutter(10.0, 4, 0.0, 20.0, 30.0, 6e5)
 BALL = Cutter(8.0, 2, math.radians(30.0), 20.0, 40.0, 6e5, corner_radius=4.0)
-FINE = Resolution(step_mm=1.0, tolerance=1e-4, corner_pieces=60, flank_mm=0.5)
+FINE = Resolution(step_mm=1.0, tolerance=1e-4, corner_slices=60, flank_mm=0.5)
 #: where h = 0 the edge alone pushes along the normal: a known force, whatever is cut
 EDGE = Material("edge", 1000.0, 0.0, 0.0, 0.0, 20.0, 0.0, source="made up for this test")
 
@@ -67,7 +67,7 @@ def test_without_helix_a_bar_bends_under_the_force_of_its_edge() -> None:
     assert (found.cutter > 0.0).all()
     assert found.force == pytest.approx(20.0 * depth, rel=1e-9)
     assert found.at_edge.all()
-    assert abs(found.gap).max() < 1e-9
+    assert abs(found.rigid).max() < 1e-9
 
 
 @pytest.mark.parametrize("milling", ["down", "up"])
@@ -110,7 +110,7 @@ def ball_rows(material: Material = AL, cutter: Cutter = BALL, x: float = 0.0, ke
     return remove(Program.join(parts), stock, {1: cutter}, material, FINE_BALL, keep=keep), n
 
 
-FINE_BALL = Resolution(step_mm=0.5, tolerance=5e-4, corner_pieces=40, flank_mm=1.0)
+FINE_BALL = Resolution(step_mm=0.5, tolerance=5e-4, corner_slices=40, flank_mm=1.0)
 
 
 def leaning_points():
@@ -123,7 +123,7 @@ def test_cusps_of_a_ball_are_the_gap_and_each_point_belongs_to_the_nearer_row() 
     found = form_error(removal, AL, leaning_points(), np.tile(n, (6, 1)), work=None, bars=None, near=0.2)
     slope = math.hypot(1.0, 0.2)
     away = slope * np.array([0.2, 0.0, 0.2, 0.2, 0.0, 0.2])
-    assert found.gap == pytest.approx(np.hypot(4.0, away) - 4.0, abs=1e-6)
+    assert found.rigid == pytest.approx(np.hypot(4.0, away) - 4.0, abs=1e-6)
     assert not found.error.any()
     y = removal.columns["y_mm"][found.step]
     assert (np.sign(y - y.mean()) == [-1, -1, -1, 1, 1, 1]).all()
@@ -186,7 +186,7 @@ def test_with_runout_the_longer_tooth_makes_the_wall_and_takes_more() -> None:
     removal = remove(Program.join(path), stock, {1: mill}, EDGE, FINE, keep=True)
     p, n = wall_points(np.array([-1.0]), x=10.2)
     found = form_error(removal, EDGE, p, n, work=[1e-4], bars=None, near=0.1)
-    assert found.gap == pytest.approx([-0.005], abs=1e-6)
+    assert found.rigid == pytest.approx([-0.005], abs=1e-6)
     assert found.work == pytest.approx([1e-4 * 20.0 * 2.0], rel=1e-9)
     assert found.left == pytest.approx([-0.001], abs=1e-6)
 
@@ -233,14 +233,14 @@ def test_the_moment_of_a_leaning_ball_is_that_when_its_edge_is_nearest(turn: flo
     ball = centre + np.array([0.7, 0.0, 0.0])
     points = ball + 4.0 * down
     found = form_error(removal, AL, points, -down, work=None, bars=None, near=0.1)
-    assert abs(found.gap).max() < 1e-6
+    assert abs(found.rigid).max() < 1e-6
     assert found.at_edge.all()
     (cuts,) = removal.cuts
     kappa, theta = np.linspace(0.01, 0.75, 371), np.linspace(0.0, math.pi, 1201)
     z = 4.0 - 4.0 * np.cos(kappa)
     for i in range(4):
         k = int(np.flatnonzero(cuts.step == found.step[i])[0])
-        T, n, A = cuts.bites.frame[k]
+        T, n, A = cuts.engagement.frame[k]
         tip = ball - 4.0 * axis
         best = (math.inf, 0.0)
         for j in range(2):
@@ -250,7 +250,7 @@ def test_the_moment_of_a_leaning_ball_is_that_when_its_edge_is_nearest(turn: flo
             d = np.linalg.norm(edge - points[i], axis=2)
             best = min(best, (float(d.min()), float(theta[np.unravel_index(d.argmin(), d.shape)[0]])))
         assert best[0] < 0.02
-        force = in_work(forces_over_turn(cuts.bites, BALL, AL, [best[1]])[0], cuts.bites.frame)[k, 0]
+        force = in_work(forces_over_turn(cuts.engagement, BALL, AL, [best[1]])[0], cuts.engagement.frame)[k, 0]
         assert found.force[i] == pytest.approx(float(force @ -down[i]), rel=0.02, abs=0.3)
     assert np.ptp(found.force) > 2.0
 
@@ -284,8 +284,8 @@ def test_steps_kept_in_blocks_are_the_same_steps(monkeypatch: pytest.MonkeyPatch
     assert len(a) > 14
     assert a.step.tolist() == b.step.tolist()
     for name in ("start", "rows", "tooth", "frame"):
-        assert np.array_equal(getattr(a.bites, name), getattr(b.bites, name)), name
+        assert np.array_equal(getattr(a.engagement, name), getattr(b.engagement, name)), name
     # each block numbers its own slices
-    assert np.array_equal(a.bites.slices[a.bites.slice], b.bites.slices[b.bites.slice])
-    assert np.array_equal(a.way, b.way)
-    assert (np.linalg.norm(a.way[:, 3:6] - a.way[:, :3], axis=1) <= 0.5 + 1e-9).all()
+    assert np.array_equal(a.engagement.slices[a.engagement.slice], b.engagement.slices[b.engagement.slice])
+    assert np.array_equal(a.ends, b.ends)
+    assert (np.linalg.norm(a.ends[:, 3:6] - a.ends[:, :3], axis=1) <= 0.5 + 1e-9).all()

@@ -17,7 +17,7 @@ from chipload.simulation.loads import Cuts, at_feeds, greatest_loads, joined
 from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
 
-FINE = Resolution(step_mm=2.0, tolerance=1e-3, corner_pieces=12, flank_mm=1.0)
+FINE = Resolution(step_mm=2.0, tolerance=1e-3, corner_slices=12, flank_mm=1.0)
 STEEL = Material(
     "made up", 1800.0, 700.0, 250.0, 20.0, 30.0, 5.0, source="made up for this test", exponents=(0.2, 0.3, 0.1)
 )
@@ -73,10 +73,10 @@ def test_each_step_has_its_own_factor_and_cuts_join() -> None:
         some = slice(start[k], start[k + 1])
         np.testing.assert_allclose(mixed.plain.rows[some, 4:], factor[k] * old[some, 4:], rtol=1e-15)
     # runout does not grow with the feed: chips of the long tooth are thicker by no more than twice its radius
-    thick, true = mixed.bites.chip_max(), mixed.plain.chip_max()
+    thick, true = mixed.engagement.chip_max(), mixed.plain.chip_max()
     assert (thick - true <= 0.008 + 1e-9).all()
     assert (thick[true > 1e-3] > true[true > 1e-3]).all()
     again = joined([whole, whole])
     np.testing.assert_array_equal(again.spindle, np.full(2 * len(whole), 300.0))
     assert len(again.plain.rows) == 2 * len(old)
-    assert math.isclose(removal.columns["chip_max_mm"].max(), whole.bites.chip_max().max())
+    assert math.isclose(removal.columns["chip_max_mm"].max(), whole.engagement.chip_max().max())

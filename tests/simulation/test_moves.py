@@ -38,7 +38,7 @@ from chipload.stock.layers import LayeredStock
 Floats = NDArray[np.float64]
 MILL = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
 BALL = Cutter(8.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=4.0, runout=(0.01, 0.3))
-FINE = Resolution(step_mm=1.0, tolerance=0.001, corner_pieces=24, flank_mm=2.5)
+FINE = Resolution(step_mm=1.0, tolerance=0.001, corner_slices=24, flank_mm=2.5)
 ALLOY = replace(material_named("al7075-t6"), spread=0.05)
 LOW, HIGH = (0.0, 0.0, -8.0), (40.0, 30.0, 0.0)
 
@@ -201,7 +201,7 @@ def test_workers_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def watch(cuts: Cuts) -> dict[str, Floats]:
-    return {"own": cuts.plain.chip_max() + cuts.way[:, 0]}
+    return {"own": cuts.plain.chip_max() + cuts.ends[:, 0]}
 
 
 @pytest.mark.parametrize("engine", ["moves", "auto"])
@@ -261,7 +261,7 @@ def test_every_load_is_that_of_the_layered_engine_for_the_same_engagement(tool: 
     """
     removal = run(zigzag(), keep=True)
     cuts = removal.cuts[tool]
-    bites, seconds = cuts.bites, removal.columns["seconds"][cuts.step]
+    bites, seconds = cuts.engagement, removal.columns["seconds"][cuts.step]
     parts = [
         StepEngagement(k, bites.frame[k], bites.rows[a:b], bites.slice[a:b])  # type: ignore[index]
         for k, (a, b) in enumerate(itertools.pairwise(bites.start.tolist()))

@@ -16,7 +16,7 @@ from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
 
 MILL = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
-FINE = Resolution(step_mm=2.0, tolerance=1e-3, corner_pieces=8, flank_mm=2.0)
+FINE = Resolution(step_mm=2.0, tolerance=1e-3, corner_slices=8, flank_mm=2.0)
 
 
 def simulated(low, high):

@@ -7,20 +7,20 @@ import pytest
 import trimesh
 
 from chipload.cutter.cutter import Cutter
-from chipload.simulation.removal_mesh import ToolPath, merged_quads, removal_mesh
+from chipload.simulation.removal_mesh import ToolPoses, merged_quads, removal_mesh
 
 FLAT = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5)
 BALL = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=5.0)
 BOX = trimesh.creation.box(bounds=[[0, 0, 0], [60, 40, 20]])
 
 
-def path(tips, tool=1, axis=(0.0, 0.0, 1.0), apart=()) -> ToolPath:
+def path(tips, tool=1, axis=(0.0, 0.0, 1.0), apart=()) -> ToolPoses:
     """A path through tips with one axis."""
     p = np.array(tips, dtype=float)
     gaps = np.zeros(len(p), dtype=bool)
     gaps[list(apart)] = True
     a = np.array(axis) / np.linalg.norm(axis)
-    return ToolPath(p, np.tile(a, (len(p), 1)), np.full(len(p), tool), gaps)
+    return ToolPoses(p, np.tile(a, (len(p), 1)), np.full(len(p), tool), gaps)
 
 
 def slot(z: float, n: int = 141) -> list[tuple[float, float, float]]:

@@ -9,7 +9,7 @@ from shapely import box
 
 from chipload.cutter.cutter import Cutter
 from chipload.program.program import LINE, RAPID, Program
-from chipload.simulation.section_deviation import beside, nearest
+from chipload.simulation.section_deviation import nearest, section_deviation
 from chipload.stock.layers import LayeredStock
 
 BALL = Cutter(8.0, 2, 0.5, 10.0, 30.0, 6e5, corner_radius=4.0)
@@ -68,10 +68,10 @@ def test_stock_beside_a_block():
     """A block of 10 mm in a stock of 12: 1 mm left at the sides; a slot 0.25 mm into it is a gouge of 0.25."""
     stock = LayeredStock.block((-6.0, -6.0, 0.0), (6.0, 6.0, 4.0), 1.0, 20.0)
     body = trimesh.creation.box(bounds=[[-5.0, -5.0, 0.0], [5.0, 5.0, 4.0]]).subdivide().subdivide()
-    found = beside(stock, body, 0.0)
+    found = section_deviation(stock, body, 0.0)
     assert found.gouge == 0.0
     assert found.left == pytest.approx(1.0)
     stock.remove(2, box(-1.0, 4.75, 1.0, 7.0))
-    cut = beside(stock, body, 3.0)
+    cut = section_deviation(stock, body, 3.0)
     assert cut.gouge == pytest.approx(0.25)
     assert cut.at[2] == pytest.approx(2.5)

@@ -19,7 +19,7 @@ from chipload.stock.layers import LayeredStock
 from simulation.test_steps import five_axis
 
 CUTTERS = {1: Cutter(10.0, 4, 0.5, 30.0, 60.0, 6e5)}
-ROUGH = Resolution(step_mm=2.0, tolerance=0.01, corner_pieces=4, flank_mm=2.0, rotation=math.radians(10.0))
+ROUGH = Resolution(step_mm=2.0, tolerance=0.01, corner_slices=4, flank_mm=2.0, rotation=math.radians(10.0))
 
 
 def leaning(turn: float) -> Program:

@@ -11,6 +11,7 @@ from chipload.web.loads import line_loads, tool_uses
 from chipload.web.panels.comparison import comparison_table
 from chipload.web.result import open_result
 from square import FORCE, LINE, ROWS, make_result, two_variants, write_by_hand
+from web_lists import choose
 
 VIEW = "chiploadViewer.of(document.querySelector('.cl-stage').id)"
 SECOND = "chiploadViewer.of(document.querySelector('.cl-second').id)"
@@ -107,19 +108,6 @@ def test_a_tool_that_leaves_the_material_has_two_bars(tmp_path: Path) -> None:
     assert (second.tool, second.cut_s, second.worst["force_n"][1]) == (7, pytest.approx(5.0), 150)
 
 
-def open_list(page, name: str) -> None:
-    """Open the list of what can be compared: once the results of the folder are in it, it stays open."""
-    for _ in range(20):
-        page.get_by_role("combobox", name="compare with").click()
-        try:
-            page.get_by_role("option", name=name).first.wait_for(timeout=3000)
-        except Exception:
-            page.keyboard.press("Escape")
-        else:
-            return
-    raise AssertionError(f"the list does not open: {name}")
-
-
 @pytest.fixture(scope="module")
 def compared(browser, served, folder):
     """The page of two variants, compared."""
@@ -131,9 +119,7 @@ def compared(browser, served, folder):
     page.goto(served.address("?show=variants"))
     page.wait_for_selector(".cl-limits", state="visible")
     page.wait_for_selector(".cv-ramp")
-    open_list(page, "constant")
-    page.get_by_role("option", name="constant").click()
-    page.keyboard.press("Escape")
+    choose(page, "compare with", "constant")
     page.wait_for_selector(".cl-compared", state="visible")
     page.wait_for_function(f"{SECOND}.header && {SECOND}.paired")
     yield page
@@ -185,15 +171,11 @@ def test_the_timeline_and_the_lines_lead_to_their_place(compared) -> None:
 
 def test_another_result_is_compared_and_left_again(compared) -> None:
     page = compared
-    open_list(page, "constant")
-    page.get_by_role("option", name="constant").click()
-    page.get_by_role("option", name="square", exact=True).click()
-    page.keyboard.press("Escape")
+    choose(page, "compare with", "constant", chosen=False)
+    choose(page, "compare with", "square")
     page.wait_for_function("document.querySelector('.cl-compared')?.innerText.includes('square: program')")
     page.wait_for_function(f"{SECOND}.state().bodies.length == 1")
-    open_list(page, "square")
-    page.get_by_role("option", name="square", exact=True).click()
-    page.keyboard.press("Escape")
+    choose(page, "compare with", "square", chosen=False)
     page.wait_for_function("!document.querySelector('.cl-compared')")
     assert not page.locator(".cl-second").is_visible()
     assert page.evaluate(f"{VIEW}.paired") is False

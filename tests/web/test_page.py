@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from square import FEED, FORCE, LINE, ROWS, T, X, Y
+from web_lists import choose
 
 BACKGROUND = (238, 241, 245)
 
@@ -157,8 +158,7 @@ def test_the_scene_is_not_blank_and_a_column_changes_its_colours(square, pixels)
     red = ((before[..., 0] > 170) & (before[..., 1] < 60) & (before[..., 2] < 60)).sum()
     assert red > 20
     assert page.inner_text(".cv-ends").split() == [f"{FORCE.min():.4g}", f"{FORCE.max():.4g}"]
-    page.click(".cl-colour")
-    page.get_by_role("option", name="feed [mm/min]").click()
+    choose(page, "path coloured by", "feed [mm/min]")
     page.wait_for_function("document.querySelector('.cv-title').textContent.includes('feed')")
     # the keys are the page's again after a list was open
     page.keyboard.press("ArrowRight")
@@ -194,11 +194,9 @@ def test_plots_show_the_columns_that_are_chosen(square) -> None:
     page = square
     traces = "document.querySelector('.cl-figure').data.map(d => [d.name, Math.max(...d.y), d.x[d.x.length - 1]])"
     assert page.evaluate(traces) == [["force_n", 900.0, T[-1]], ["torque_nm", 9.0, T[-1]]]
-    page.click(".cl-columns")
-    page.get_by_role("option", name="feed [mm/min]").click()
+    choose(page, "columns", "feed [mm/min]")
     page.wait_for_function("document.querySelector('.cl-figure').data.length == 3")
     assert page.evaluate(traces)[2] == ["feed_mm_min", 480.0, T[-1]]
-    page.keyboard.press("Escape")
     page.get_by_text("path", exact=True).last.click()
     page.wait_for_function("document.querySelector('.cl-figure').layout.xaxis.title.text.includes('path')")
     assert page.evaluate(traces)[0][2] == pytest.approx(160.0)

@@ -26,12 +26,15 @@ def hold_torque(
     limits: Values,
     program: Source | None = None,
     round: Values | None = None,
+    stock: Values | None = None,
+    real_stock: Values | None = None,
+    workpiece: Values | None = None,
     surprise: Tables = (),
     checks: Values | None = None,
     folder: str | Path = ".",
     progress: Progress = silent,
 ) -> FinishedJob:
-    """Simulate the control of the cutting torque on a thin tube or cone.
+    """Simulate the control of the cutting torque on a thin tube, a cone or a clamped workpiece.
 
     Result, errors and parameters that are not named here are those of :func:`plan_contour`.
 
@@ -39,12 +42,13 @@ def hold_torque(
     ----------
     torque_control, spindle, loop, simulation : keys of the table of this name
     program, round : a program that exists (its file or keys), or keys of ``[round]`` by which one is made
+    stock, real_stock, workpiece : keys of the table of this name, in place of the shell of ``torque_control``
     surprise : keys of a ``[[surprise]]``, or several
     """
     return run_tables(
-        "torque", folder, progress, torque_control=torque_control, program=program, round=round, machine=machine,
-        material=material, cutter=cutters_of(cutter), surprise=surprise, spindle=spindle, loop=loop,
-        simulation=simulation, limits=limits, checks=checks,
+        "torque", folder, progress, torque_control=torque_control, program=program, round=round, stock=stock,
+        real_stock=real_stock, workpiece=workpiece, machine=machine, material=material, cutter=cutters_of(cutter),
+        surprise=surprise, spindle=spindle, loop=loop, simulation=simulation, limits=limits, checks=checks,
     )  # fmt: skip
 
 

@@ -65,7 +65,7 @@ def init(
         from chipload.jobs.drafts.make import draft_of
 
         if (folder / "job.toml").exists():
-            raise InputError(f"{folder / 'job.toml'}: is there already and is not overwritten: name another folder")
+            raise InputError(f"{folder / 'job.toml'}: already exists and is not overwritten: name another folder")
         draft = draft_of(file, folder, machine=for_machine, tools=tools, job=job)
         written = write_draft(draft, folder)
         show(draft.title)
@@ -138,7 +138,7 @@ def simulate(
         show(done.result.message)
         show_limits(done.result)
         more = "" if written else f"; chipload init {file} DIR writes the job"
-        show(f"{done.result.verdict.value}: a first look{more}")
+        show(f"{done.result.verdict.value}: a first result{more}")
         if target is not None:
             show(f"report: {target / 'report.html'}")
         return done.result.verdict.exit_code

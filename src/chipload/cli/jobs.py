@@ -11,7 +11,7 @@ import typer
 from chipload.cli.app import Accept, Debug, JobFile, Sets, app
 from chipload.cli.inputs import show_limits
 from chipload.errors import Cancelled, InputError, Severity
-from chipload.terminal import bar, guarded, say, show
+from chipload.terminal import bar, guarded, show, write_line
 
 #: [s] between two states of a simulation
 KEEP_S = 10.0
@@ -63,8 +63,8 @@ def run(
         if not 0.0 <= keep_s < math.inf:
             raise InputError(f"--keep-s = {keep_s:g}: must be at least 0 s")
         if note := resume_note(loaded):
-            say(note)
-        with Checkpoint(checkpoint_folder(out), keep_s, fresh=fresh, notice=say) as kept:
+            write_line(note)
+        with Checkpoint(checkpoint_folder(out), keep_s, fresh=fresh, notice=write_line) as kept:
             try:
                 with bar() as progress:
                     done = run_job(

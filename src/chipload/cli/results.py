@@ -58,8 +58,8 @@ def export(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="a result folder of chipload run")],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="a new or empty folder for the files")],
     csv: Annotated[bool, typer.Option("--csv", help="history.csv: a row for each step, units in the names")] = False,
-    vtk: Annotated[bool, typer.Option("--vtk", help="paths .vtp, maps .vtu, stock .vtu and .stl: ParaView")] = False,
-    sheet: Annotated[bool, typer.Option("--sheet", help="setup.html: one page to print")] = False,
+    vtk: Annotated[bool, typer.Option("--vtk", help="paths .vtp; chips, maps, stock .vtu; stock .stl")] = False,
+    sheet: Annotated[bool, typer.Option("--sheet", help="setup.html; with chipload[export] setup.pdf")] = False,
     load_monitor: Annotated[
         str | None,
         typer.Option(

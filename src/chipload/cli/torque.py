@@ -73,7 +73,9 @@ def hal(
         measured = current_pin if power_pin is None else power_pin
         if (measured is None) != (speed_pin is None):
             missing, there = ("--speed-pin", name_of) if speed_pin is None else (name_of, "--speed-pin")
-            raise InputError(f"{missing}: missing: with {there} state both: the torque is told from current and speed")
+            raise InputError(
+                f"{missing}: missing: with {there} state both: the torque is estimated from current and speed"
+            )
         job, sources = load_hal(file), {}
         if panel is not None:
             return _write_panel(job, panel, name, out)
@@ -223,10 +225,10 @@ def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
     if found.constant_known is not None:
         least, most = (1e-3 * x for x in found.torque)
         out.append(
-            f"holds for torques from {least:.3g} to {most:.4g} N m, {low:.5g} to {high:.5g} rpm, below "
+            f"valid for torques from {least:.3g} to {most:.4g} N m, {low:.5g} to {high:.5g} rpm, below "
             f"{sensor.bandwidth:.3g} Hz"
             if most < math.inf
-            else f"holds for torques above {least:.3g} N m, below {sensor.bandwidth:.3g} Hz; no cut above that is "
+            else f"valid for torques above {least:.3g} N m, below {sensor.bandwidth:.3g} Hz; no cut above that is "
             "logged"
         )
     torque = "N m" if found.constant_known is not None else unit
@@ -246,6 +248,6 @@ def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
         inside = seen < sensor.bandwidth
         out.append(
             f"tooth passing frequency {passing:.4g} Hz: readings at {1.0 / sensor.period:.4g} Hz show it at "
-            f"{seen:.3g} Hz, " + ("inside the bandwidth: it looks like a torque" if inside else "above the bandwidth")
+            f"{seen:.3g} Hz, " + ("inside the bandwidth: it is read as a torque" if inside else "above the bandwidth")
         )
     return out

@@ -51,7 +51,7 @@ class Rules(NamedTuple):
     low_share: float
     low_steps: float
     off_path_steps: float
-    gap_s: float
+    timeout_s: float
     quantum: float
     trim_least: float
     trim_most: float
@@ -129,7 +129,7 @@ def step(rules, sets, state, seen):
     if state[FINAL] > 0.0:
         return 0.0, int(state[FINAL])
     dt = seen.dt
-    if dt > rules.gap_s:
+    if dt > rules.timeout_s:
         state[OVERRIDE] = min(state[OVERRIDE], rules.start)
         state[GOOD_COUNT] = 0.0
         dt = 0.0

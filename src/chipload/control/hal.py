@@ -6,7 +6,7 @@ The torque is estimated from the spindle's current and speed: those of pins, or 
 follow the machine's real place and velocity; or it is that of a pin. The
 pin `beat` changes with every step; HAL watches it and takes the feed away from a controller that does not beat
 (examples/tube/linuxcnc). The time is that of the machine's pins, so a step that comes late is a long step, and one
-longer than `gap_s` is a start: spindle and controller begin anew.
+longer than `timeout_s` is a start: spindle and controller begin anew.
 
 The torque of the model is predicted in every case, with feed-forward or without, and readings are held against it. A
 controller that has stopped goes on sending 0, and beats, until it is asked to end: its end is the reason of the stop.
@@ -142,6 +142,17 @@ class _Cut:
     started: float | None = None
     current: float = math.nan
     last: tuple[float, Load, Load] | None = None
+    #: the last reading and the time since when it has been the same [s]
+    repeated: tuple[float, float] = (math.nan, 0.0)
+
+    def stuck(self, seen: PinValues, light: float, lost_s: float) -> bool:
+        """Whether a current or power with noise has been the same for half of ``lost_s`` where a cut is expected."""
+        if self.source not in MEASURED:
+            return False
+        if seen.current != self.repeated[0]:
+            self.repeated = (seen.current, seen.time)
+        noisy = self.believed.noise > 0.5 * self.believed.current_step
+        return noisy and self.state.expected >= light and seen.time - self.repeated[1] >= 0.5 * lost_s
 
     def follow(self, seen: PinValues, true: Load, model: Load, noise: float, gap: float) -> float:
         """Go on to the time of the pins with the loads there; returns the time since the last step, 0 for the first."""
@@ -237,8 +248,10 @@ def control(
             row = row if model[0][row] <= s else 0
             actual = seen.velocity / float(np.interp(s, path.model.s, path.model.feed))
             true, believed = (_load(p, s, actual if on else 0.0) for p in (path.truth, path.model))
-            seconds = cut.follow(seen, true, believed, float(noise[len(rows) % len(noise)]), config.gap_s)
+            seconds = cut.follow(seen, true, believed, float(noise[len(rows) % len(noise)]), config.timeout_s)
             torque, speed = cut.torque(seen), cut.speed(seen)
+            if cut.stuck(seen, config.light, config.lost_s):
+                torque = math.nan
             trusted = job.source == "pin" or abs(speed / job.spindle.speed - 1.0) <= SPEED_SHARE
             most_allowed = None
             if job.modelled:

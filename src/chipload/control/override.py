@@ -46,8 +46,8 @@ from chipload.errors import InputError
 Floats = NDArray[np.float64]
 
 KINDS = ("fixed", "pi", "mamdani", "product-sum")
-#: longest gap_s: after it the simulated spindle begins anew [s]
-LONGEST_GAP_S = 10.0
+#: longest timeout_s: after it the simulated spindle begins anew [s]
+LONGEST_TIMEOUT_S = 10.0
 #: falling is at least so many times faster than rising
 FALL_OVER_RISE = 3.0
 
@@ -96,7 +96,7 @@ class Override:
     overload_steps, stuck_steps, air_steps, settle_steps : in steps
     low_share, low_steps : a reading below this share of the prediction is rejected, and so many of them stop
     off_path_steps : a load off the path stops after so many
-    gap_s : a longer time between steps counts as a start [s], at most 10
+    timeout_s : a longer time between steps counts as a start [s], at most 10
     quantum : step of the override that the controller takes; 0: any value
     trim_least, trim_most : of q with a model
 
@@ -133,7 +133,7 @@ class Override:
     low_share: float = 0.5
     low_steps: int = 50
     off_path_steps: int = 10
-    gap_s: float = 0.5
+    timeout_s: float = 0.5
     quantum: float = 0.01
     trim_least: float = 0.2
     trim_most: float = 1.5
@@ -172,7 +172,7 @@ class Override:
             ("low_share", 0.0, 1.0 / self.trim_most, True),
             ("low_steps", self.stuck_steps, math.inf, False),
             ("off_path_steps", 1, math.inf, True),
-            ("gap_s", 0.0, LONGEST_GAP_S, False),
+            ("timeout_s", 0.0, LONGEST_TIMEOUT_S, False),
             ("quantum", 0.0, self.floor, True),
             ("trim_least", 0.0, 1.0, False),
             ("trim_most", 1.0, math.inf, True),

@@ -246,8 +246,8 @@ def _regression(design: Floats, target: Floats, free: list[int]) -> _Regression:
     found, _, rank, _ = np.linalg.lstsq(design[:, free], target, rcond=1e-10)
     if rank < len(free):
         raise InputError(
-            "spindle: torque, acceleration and idle current cannot be told apart: cuts at two speeds and two torques "
-            "are needed, or fewer idle_terms"
+            "spindle: torque, acceleration and idle current cannot be distinguished: cuts at two speeds and two "
+            "torques are needed, or fewer idle_terms"
         )
     left = target - design[:, free] @ found
     freedom = len(left) - len(free)

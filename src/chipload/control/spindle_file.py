@@ -73,7 +73,7 @@ def write_spindle(found: IdentifiedSpindle, logs: dict[str, str]) -> str:
         f"{'power_step_w' if power else 'current_step_a'} = {step * (found.cut_speed if power else 1.0):.4g}",
         f"idle_error_share = {found.idle.error:.3g}",
         "",
-        "[range]                     # where the estimate holds",
+        "[range]                     # where the estimate is valid",
         *([f"torque_nm = [{', '.join(f'{1e-3 * x:.4g}' for x in found.torque if x < math.inf)}]"] if known else []),
         f"speed_rpm = [{f.speeds[0] * rpm_from_rad_s(1.0):.5g}, {f.speeds[1] * rpm_from_rad_s(1.0):.5g}]",
         f"bandwidth_hz = {found.sensor.bandwidth:.4g}",

@@ -18,6 +18,7 @@ limited.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,10 +70,14 @@ def two_parts(torque: Floats, force: Floats, little_torque: Floats, little_force
     """
     if not 0.0 < little < 1.0:
         raise InputError(f"two_parts: little = {little:g}: must be above 0 and below 1")
-    torque_cut, force_cut = (
-        np.clip((a - b) / (1.0 - little), 0.0, a) for a, b in ((torque, little_torque), (force, little_force))
-    )
-    return Loads(torque - torque_cut, torque_cut, force - force_cut, force_cut)
+    torque_edge, torque_cut = edge_and_cut(torque, little_torque, little)
+    return Loads(torque_edge, torque_cut, *edge_and_cut(force, little_force, little))
+
+
+def edge_and_cut(whole: Floats, less: Floats, little: float) -> tuple[Floats, Floats]:
+    """The part of the edge and the part that goes with the feed of something that is linear in both, see two_parts."""
+    cut = np.clip((whole - less) / (1.0 - little), 0.0, whole)
+    return whole - cut, cut
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,16 +121,33 @@ def unit_response(modes: Ritz, near: Floats, far: Floats, width: float, tool: Fl
 
 
 @dataclass(frozen=True, eq=False)
+class LimitedResponse:
+    """Something that a workpiece must not exceed in n steps, by the edge and by what goes with the feed.
+
+    Parameters
+    ----------
+    by : its name: ``deflection`` or ``strength``
+    edge, cut : (n,) float, at the programmed feed
+    most : its limit, in the same unit
+    """
+
+    by: str
+    edge: Floats
+    cut: Floats
+    most: float
+
+
+@dataclass(frozen=True, eq=False)
 class PathLimit:
     """The allowable torque along a path.
 
     Parameters
     ----------
     torque : [N mm]; 0: not attainable, the edge alone is too much somewhere
-    by : ``deflection`` or ``strength``
+    by : ``deflection`` or ``strength``, the name of a response
     step : where it is reached
     force : F_lim there [N]
-    each : (n,) float [N mm], T(o_lim) of every step; inf beside the wall
+    each : (n,) float [N mm], T(o_lim) of every step; inf where no response limits
     """
 
     torque: float
@@ -148,23 +170,55 @@ def path_limit(loads: Loads, wall: UnitResponse, deflection: float, stress: floa
     InputError
         Nothing is cut on the wall.
     """
-    on = (wall.compliance > 0.0) & (loads.force_cut > 0.0)
-    if not on.any():
+    responses = (
+        LimitedResponse(
+            "deflection", wall.compliance * loads.force_edge, wall.compliance * loads.force_cut, deflection
+        ),
+        LimitedResponse("strength", wall.stress * loads.force_edge, wall.stress * loads.force_cut, stress),
+    )
+    found = limit_by_responses(loads, responses)
+    if found is None:
         raise InputError(
             "torque_control.shell: the program cuts nothing from the wall: check its clamp_z_mm, radius and stock"
         )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        bend = np.where(on, deflection / wall.compliance, np.inf)
-        force = np.where(on, np.minimum(bend, stress / wall.stress), np.inf)
-        override = np.where(on, (force - loads.force_edge) / loads.force_cut, np.inf)
-    each = np.where(on, loads.torque_edge + loads.torque_cut * np.where(on, override, 0.0), np.inf)
+    return found
+
+
+def limit_by_responses(loads: Loads, responses: Sequence[LimitedResponse]) -> PathLimit | None:
+    """The limit of torque at which the first of some responses reaches its own; None: none of them ever rises.
+
+    Parameters
+    ----------
+    loads : of the steps; the force is only told of
+    responses : of the same steps
+
+    Examples
+    --------
+    A block of 0.1 um/N under an edge force of 50 N that may give way by 15 um: 150 N, so twice the 50 N of the feed.
+
+    >>> one = np.array([1.0])
+    >>> loads = Loads(100.0 * one, 400.0 * one, 50.0 * one, 50.0 * one)
+    >>> limit_by_responses(loads, [LimitedResponse("deflection", 5e-3 * one, 5e-3 * one, 15e-3)]).torque
+    900.0
+    """
+    each = np.full(len(loads.torque_cut), np.inf)
+    override, first = each.copy(), np.zeros(len(each), dtype=np.int64)
+    for k, response in enumerate(responses):
+        rises = response.cut > 0.0
+        own = np.divide(response.most - response.edge, response.cut, out=np.full(len(each), np.inf), where=rises)
+        first[own < override] = k
+        override = np.minimum(override, own)
+    on = np.isfinite(override)
+    if not on.any():
+        return None
+    each[on] = loads.torque_edge[on] + loads.torque_cut[on] * override[on]
     asked = override <= max(1.0, float(override.min()))
     k = int(np.argmin(np.where(asked, each, np.inf)))
     unattainable = float(override.min()) <= 0.0
     if unattainable:
         k = int(np.argmin(override))
-    by = "deflection" if bend[k] <= stress / wall.stress[k] else "strength"
-    return PathLimit(0.0 if unattainable else float(each[k]), by, k, float(force[k]), each)
+    force = float(loads.force_edge[k] + loads.force_cut[k] * override[k])
+    return PathLimit(0.0 if unattainable else float(each[k]), responses[first[k]].by, k, force, each)
 
 
 def row_means(steps: Floats) -> Floats:
@@ -180,8 +234,9 @@ class WallPath:
     Parameters
     ----------
     s : (n + 1,) float [mm], ends of the steps along the path
-    edge, cut : (n + 1,) float [N], the two parts of F there
-    compliance : (n,) float [mm/N], C_w + C_t of the steps that make the finished surface, 0 of others
+    edge, cut : (n + 1,) float [N], the two parts of F there; or of a response that is known itself
+    compliance : (n,) float [mm/N], C_w + C_t of the steps that make the finished surface, 0 of others; of a response
+        that is known itself, 1 and 0
     """
 
     s: Floats

@@ -2,7 +2,7 @@
 
 Notation: from the tip upwards the cutting part (diameter, corner radius, cutting length), a neck up to the neck length,
 the shank up to where the cutter leaves the holder (reach), the holder above. A part that is left out is not there: with
-no cutting length the cutting part goes on without end, with no reach there is no holder.
+no cutting length the cutting part is extended without end, with no reach there is no holder.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class Catalogue:
     Raises
     ------
     InputError
-        It is empty, or a size stands twice.
+        It is empty, or a size appears twice.
     """
 
     name: str
@@ -128,7 +128,7 @@ class Catalogue:
         for a, b in pairwise(ordered):
             if a == b:
                 raise InputError(
-                    f"catalogue {self.name}: D {a.diameter:g} r {a.corner_radius:g} stands twice: keep one"
+                    f"catalogue {self.name}: D {a.diameter:g} r {a.corner_radius:g} appears twice: keep one"
                 )
         object.__setattr__(self, "cutters", ordered)
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chipload.cutter.bodies import Profile, check_body
 from chipload.cutter.strength import ToolStrength, check_material
 from chipload.errors import InputError
 
@@ -56,6 +57,8 @@ class Cutter:
     chip_ratio : volume of loose chips over the volume cut, >= 1; with ``gullet`` or not at all
     fluted_factor : equivalent diameter of the fluted part over the diameter, in bending and torsion, (0, 1]
     strength : what its material carries
+    body : (rho, z) [mm] of the profile from the tip to ``flute_length``, of a tool of another shape: it is held against
+        part, stock and fixtures, its chips are not simulated; empty: the seven numbers are its shape
     number : tool number, >= 0; 0: what is in the spindle where a program names no tool
     name : as the shop calls it
 
@@ -85,6 +88,7 @@ class Cutter:
     chip_ratio: float | None = None
     fluted_factor: float = FLUTED_FACTOR
     strength: ToolStrength = ORDINARY
+    body: Profile = ()
     number: int = 1
     name: str = ""
 
@@ -148,6 +152,10 @@ class Cutter:
             )
         need(self.runout[0] >= 0.0, "runout_mm", self.runout[0], "must be at least 0")
         self._check_pitch()
+        if self.body:
+            wide = check_body(self.body, self.flute_length)
+            limit = f"must be {2.0 * wide:g}, as of body_mm; leave it out"
+            need(abs(wide - self.radius) <= 1e-6, "diameter_mm", self.diameter, limit)
         shank = self.shank_diameter
         need(shank is None or shank > 0.0, "shank_diameter_mm", shank or 0.0, "must be above 0")
         for k, part in enumerate(self.holder):
@@ -251,6 +259,9 @@ class Cutter:
         z = np.asarray(z, dtype=np.float64)
         if not (z >= 0.0).all():
             raise InputError("cutter: radius_at: a height is below the tip: must be at least 0 mm")
+        if self.body:
+            radii, heights = np.array(self.body).T
+            return np.asarray(np.interp(z, heights, radii))
         _, r, e, f, alpha, beta, _ = self.apt
         low, high = f - r * math.cos(alpha), f - r * math.sin(beta)
         bottom = np.where(z < low, z, 0.0) / math.tan(alpha) if alpha > 0.0 else e
@@ -264,6 +275,8 @@ class Cutter:
         >>> Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5).profile(0.01).tolist()
         [[0.0, 0.0], [5.0, 0.0], [5.0, 20.0]]
         """
+        if self.body:
+            return np.array([(0.0, 0.0), *self.body] if self.body[0][0] > 0.0 else self.body)
         _, r, e, f, alpha, beta, h = self.apt
         points = [(0.0, 0.0)]
         if r > 0.0:

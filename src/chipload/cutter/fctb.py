@@ -1,6 +1,7 @@
 """FreeCAD tool bits (`.fctb`) of 0.20 and 1.x: JSON with lengths as texts such as `6,0 mm`, `1/4 in` or `0.25 "`.
 
-Read are end mills, ball ends and bull noses (torus); a shape that does not mill with its flank is refused.
+Read are end mills, ball ends, bull noses (torus), drills and V-bits; taps, reamers, thread mills, dovetail mills and
+slitting saws as bodies. Another shape is refused.
 """
 
 from __future__ import annotations
@@ -10,14 +11,16 @@ import re
 from pathlib import Path
 from typing import Any
 
+from chipload.cutter.tool_bits import SPECIAL, special_shape
 from chipload.errors import InputError
 from chipload.files import read_regular
 
 #: shape file -> what it is
-SHAPES = {"endmill": "flat", "ballend": "ball", "torus": "bull", "bullnose": "bull"}
+SHAPES = {"endmill": "flat", "ballend": "ball", "torus": "bull", "bullnose": "bull", **{s: s for s in SPECIAL}}
 _MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3, "in": 25.4, "inch": 25.4, '"': 25.4}
 _LENGTH = re.compile(r"^([0-9]+(?:[.,][0-9]+)?)(?:\s*/\s*([0-9]+))?\s*([^\s0-9]+)$")
 _MIXED = re.compile(r"^([0-9]+)[\s+-]+([0-9]+)\s*/\s*([0-9]+)\s*([^\s0-9]+)$")
+_ANGLE = re.compile(r"^([0-9]+(?:[.,][0-9]+)?)\s*(?:°|deg)$")
 _LARGEST_FILE = 1_000_000
 _LONGEST = 60
 
@@ -25,8 +28,8 @@ _LONGEST = 60
 def read_fctb(path: str | Path) -> dict[str, Any]:
     """What the file says, under the keys of a job's ``[[cutter]]``; what it does not say is not there.
 
-    Diameter, flutes, cutting edge height, shank diameter, corner radius by shape, the add-on's stick-out as overhang,
-    the name. Not in such a file: number, helix, modulus.
+    Diameter, flutes, cutting edge height, shank diameter, the add-on's stick-out as overhang, the name; by shape corner
+    radius, point, taper or body. Not in such a file: number, helix, modulus.
 
     Raises
     ------
@@ -51,6 +54,8 @@ def read_fctb(path: str | Path) -> dict[str, Any]:
     more = data.get("attribute")
     attribute: dict[str, Any] = more if isinstance(more, dict) else {}
     out: dict[str, Any] = {}
+    if kind in SPECIAL and str(parameter.get("Flutes")) == "0":
+        parameter = {k: v for k, v in parameter.items() if k != "Flutes"}
     if isinstance(data.get("name"), str):
         out["name"] = data["name"]
     for source, name, key in (
@@ -77,7 +82,19 @@ def read_fctb(path: str | Path) -> dict[str, Any]:
                 raise InputError(f"{label}: FlatRadius without Diameter: give it")
             length = 0.5 * out["diameter_mm"] - length
         out["corner_radius_mm"] = length
+    if kind in SPECIAL:
+        out |= special_shape(kind, lambda name: _size(label, parameter, name), label)
+        if out.get("body_mm"):
+            out.pop("flutes", None)
     return out
+
+
+def _size(label: str, parameter: dict[str, Any], name: str) -> float | None:
+    """A length [mm] or an angle [deg] of a tool bit."""
+    if name not in parameter:
+        return None
+    angle = _ANGLE.match(str(parameter[name]).strip()[:_LONGEST])
+    return float(angle[1].replace(",", ".")) if angle else _length(f"{label}: {name}", parameter[name])
 
 
 def _length(label: str, text: object) -> float:

@@ -1,8 +1,10 @@
 """Tool libraries of Fusion 360 and HSMWorks: JSON (`.json`), or a ZIP that holds it (`.tools`).
 
 A tool's ``geometry`` has the symbols of ISO 13399 in the tool's own unit: DC diameter, RE corner radius, LCF flute
-length, LB length below the holder, SFDM shank, NOF flutes, SIG point, TA taper, HA helix angle [deg]. Read are
-end mills (flat, ball, bull nose), face mills, chamfer mills and drills; other shapes are refused.
+length, LB length below the holder, SFDM shank, NOF flutes, SIG point, TA taper, HA helix angle [deg], TP pitch.
+Read are end mills (flat, ball, bull nose, tapered), face mills, slot mills (T-slot), chamfer mills and drills. Taps,
+thread mills, reamers, dovetail, lollipop and circle segment (barrel, lens) mills are bodies, whose chips are not
+simulated. Other shapes are refused.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
+from chipload.cutter.bodies import cylinder, tap_core
 from chipload.errors import InputError
 from chipload.files import read_regular
 from chipload.units import MM_PER
@@ -21,7 +24,11 @@ from chipload.units import MM_PER
 #: type of a tool -> what it is
 SHAPES = {
     "flat end mill": "flat", "ball end mill": "ball", "bull nose end mill": "bull", "face mill": "bull",
-    "chamfer mill": "cone", "spot drill": "point", "drill": "point", "center drill": "point",
+    "chamfer mill": "cone", "spot drill": "point", "drill": "point", "center drill": "point", "counter sink": "point",
+    "tapered mill": "taper", "slot mill": "slot", "tap right hand": "tap", "tap left hand": "tap",
+    "thread mill": "body", "reamer": "body", "dovetail mill": "body", "lollipop mill": "body",
+    "circle segment barrel": "body", "circle segment lens": "body", "circle segment oval": "body",
+    "circle segment taper": "body",
 }  # fmt: skip
 #: Young's modulus [GPa] by the material of the body
 MODULUS = {"carbide": 580.0, "hss": 210.0}
@@ -122,7 +129,7 @@ def _cutter(tool: dict[str, Any], number: int | None, label: str) -> dict[str, A
 
 
 def _tip(shape: str, geometry: dict[str, Any], out: dict[str, Any], mm: float, label: str) -> dict[str, Any]:
-    """Corner, taper and point."""
+    """Corner, taper, point, neck or body; a body whose profile is not stated is the cylinder around it."""
     d = out.get("diameter_mm")
     if shape == "ball" and d is not None:
         return {"corner_radius_mm": 0.5 * d}
@@ -134,6 +141,19 @@ def _tip(shape: str, geometry: dict[str, Any], out: dict[str, Any], mm: float, l
         if angle is None or not 0.0 < angle <= 180.0:
             raise InputError(f"{label}: SIG, the point angle: must be above 0 and at most 180 deg")
         return {"bottom_deg": 90.0 - 0.5 * angle}
+    if shape == "slot":
+        neck = _number(geometry, "shoulder-diameter", label)
+        return {"shank_diameter_mm": neck * mm} if neck is not None and neck > 0.0 else {}
+    if shape == "taper":
+        angle, corner = _number(geometry, "TA", label), _number(geometry, "RE", label) or 0.0
+        return {"taper_deg": angle or 0.0} | ({"corner_radius_mm": corner * mm} if corner else {})
+    if shape in ("tap", "body") and d is not None:
+        high = out.get("flute_length_mm", out.get("overhang_mm"))
+        if high is None:
+            raise InputError(f"{label}: LCF, the flute length: must be given and above 0")
+        pitch = (_number(geometry, "TP", label) or 0.0) * mm if shape == "tap" else 0.0
+        body = tap_core(d, pitch, high) if 0.0 < pitch < 0.5 * d else cylinder(d, high)
+        return {"body_mm": body, "diameter_mm": 2.0 * body[0][0], "flute_length_mm": high}
     if shape == "cone" and d is not None:
         angle, tip = _number(geometry, "TA", label), _number(geometry, "tip-diameter", label) or 0.0
         if angle is None or not 0.0 < angle < 90.0:

@@ -73,7 +73,7 @@ class Slices:
         """(k,) float [mm], height at the middle of the profile's piece, where ``rho`` is taken: the point (rho, z) lies
         on the profile; the mean of the ends of an arc would lie inside it, by r cos(kappa) (1 - cos(half its angle)).
 
-        >>> ball = slices(Cutter(12.0, 2, 0.0, 20.0, 30.0, 6e5, corner_radius=6.0), corner_pieces=3)
+        >>> ball = slices(Cutter(12.0, 2, 0.0, 20.0, 30.0, 6e5, corner_radius=6.0), corner_slices=3)
         >>> (np.hypot(ball.rho, 6.0 - ball.z_middle)[:3]).round(12).tolist()
         [6.0, 6.0, 6.0]
         """
@@ -99,8 +99,8 @@ def edge_lag(cutter: Cutter) -> float:
 def slices(
     cutter: Cutter,
     *,
-    bottom_pieces: int = 4,
-    corner_pieces: int = 16,
+    bottom_slices: int = 4,
+    corner_slices: int = 16,
     flank_mm: float | None = None,
     grading: float = 1.0,
 ) -> Slices:
@@ -109,8 +109,8 @@ def slices(
     Parameters
     ----------
     cutter : any
-    bottom_pieces : slices of the bottom line, where there is one; one at least
-    corner_pieces : slices of the corner, where there is one; one at least
+    bottom_slices : slices of the bottom line, where there is one; one at least
+    corner_slices : slices of the corner, where there is one; one at least
     grading : the bounds of those in kappa are spaced as (j / n)^grading, from 1 (evenly) to 3; above 1 they are narrow
         near the bottom, where shallow cuts lie
     flank_mm : greatest length of a slice of the flank [mm], above 0; None: the flank is one slice (with a taper its rho
@@ -123,13 +123,13 @@ def slices(
 
     Examples
     --------
-    >>> bull = slices(Cutter(10.0, 4, 0.0, 20.0, 30.0, 6e5, corner_radius=1.0), bottom_pieces=1, corner_pieces=1)
+    >>> bull = slices(Cutter(10.0, 4, 0.0, 20.0, 30.0, 6e5, corner_radius=1.0), bottom_slices=1, corner_slices=1)
     >>> bull.s_from.round(3).tolist(), bull.s_to.round(3).tolist(), bull.rho.round(3).tolist()
     ([-4.0, 0.0, 1.571], [0.0, 1.571, 20.571], [2.0, 4.707, 5.0])
     >>> bull.sin_kappa.round(3).tolist(), bull.z.round(3).tolist()
     ([0.0, 0.707, 1.0], [0.0, 0.0, 1.0])
     """
-    for name, number in (("bottom_pieces", bottom_pieces), ("corner_pieces", corner_pieces)):
+    for name, number in (("bottom_slices", bottom_slices), ("corner_slices", corner_slices)):
         if number < 1:
             raise InputError(f"slices: {name} = {number}: must be at least 1")
     if not 1.0 <= grading <= 3.0:
@@ -142,12 +142,12 @@ def slices(
     end = e + r * math.sin(alpha)
     parts: list[Part] = []
     if end > tiny:
-        rho = np.linspace(0.0, end, bottom_pieces + 1)
+        rho = np.linspace(0.0, end, bottom_slices + 1)
         s = (rho - end) / math.cos(alpha)
         parts.append(_line(s, rho, rho * math.tan(alpha), alpha))
     reach = 0.0
     if r > tiny:
-        share = np.linspace(0.0, 1.0, corner_pieces + 1)
+        share = np.linspace(0.0, 1.0, corner_slices + 1)
         kappa = alpha + (0.5 * math.pi - beta - alpha) * (share if grading == 1.0 else share**grading)
         mid = 0.5 * (kappa[:-1] + kappa[1:])
         s = r * (kappa - alpha)

@@ -66,6 +66,9 @@ class CutterTable(BaseModel):
     holder_mm: Annotated[tuple[tuple[float, float], ...] | None, BeforeValidator(_rows)] = Field(
         None, description="length and diameter of the holder's parts, upwards from the overhang"
     )
+    body_mm: Annotated[tuple[tuple[float, float], ...] | None, BeforeValidator(_rows)] = Field(
+        None, description="radius and height over the tip of a tool of another shape: a body, its chips not simulated"
+    )
     tip_n_um: float | None = Field(
         None, description="measured stiffness of the tip across the axis; in place of grip, holder and spindle"
     )
@@ -92,7 +95,11 @@ class CutterTable(BaseModel):
         """
         given = self.model_dump(exclude_none=True)
         values = {**self._from_file(Path(folder)), **given}
-        where = f": {self.file} does not say it" if self.file else ""
+        if body := values.get("body_mm"):
+            # nothing cuts with it: teeth and modulus have no effect
+            sizes = {"diameter_mm": 2.0 * max(r for r, _ in body), "flute_length_mm": body[-1][1]}
+            values = {"flutes": 1, "helix_deg": 0.0, "modulus_gpa": 210.0, **sizes, **values}
+        where = f": {self.file} does not state it" if self.file else ""
         missing = [
             f"cutter.{key} is missing{where}: must be given, a cutter is never guessed"
             for key in NEEDED
@@ -124,6 +131,7 @@ class CutterTable(BaseModel):
             chip_ratio=values.get("chip_ratio"),
             fluted_factor=values.get("fluted_factor", FLUTED_FACTOR),
             strength=_strength(values),
+            body=values.get("body_mm", ()),
             number=values["number"],
             name=values.get("name", ""),
         )
@@ -144,17 +152,17 @@ class CutterTable(BaseModel):
         if self.file_unit is not None and kind != ".tbl":
             raise InputError(f"cutter.file_unit is for a tool table (.tbl): leave it out with {self.file}")
         if kind == ".fctb":
-            return dict(read_fctb(path))
+            return self._checked(read_fctb(path))
         if kind == ".p21":
             return read_iso13399(path)
         if kind in (".json", ".tools"):
             return self._checked(read_fusion_tool(path, self.tool))
         if self.tool is None:
-            raise InputError(f"cutter.tool is missing: {self.file} holds many: say which")
+            raise InputError(f"cutter.tool is missing: {self.file} holds several tools: state which")
         if kind == ".camotics":
             return read_camotics_tool(path, self.tool)
         if self.file_unit is None:
-            raise InputError(f"cutter.file_unit is missing: {self.file} does not say its unit: give mm or inch")
+            raise InputError(f"cutter.file_unit is missing: {self.file} does not state its unit: give mm or inch")
         return dict(read_tool_table(path, self.tool, self.file_unit))
 
     @staticmethod

@@ -47,7 +47,7 @@ def read_tool_table(path: str | Path, tool: int, unit: str) -> dict[str, Any]:
             raise InputError(f"{label} line {k}: a number is too large: must be below {_LARGEST_NUMBER:g}")
         number = int(words["T"])
         if number == tool and tool in found:
-            raise InputError(f"{label}: tool {tool} stands twice, in lines {found[tool][0]} and {k}: keep one")
+            raise InputError(f"{label}: tool {tool} appears twice, in lines {found[tool][0]} and {k}: keep one")
         found[number] = (k, words, comment.strip())
         known.append(number)
     if tool not in found:

@@ -351,15 +351,15 @@ def _mean(fit: Fit, cut: MeasuredCut, p: Floats) -> Floats:
     return np.asarray(np.where(fit.known, unit_means(cut, cutter) @ p[2:], np.nan))
 
 
-def _banded(fit: Fit, said: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
-    """What is said at the fitted parameters, and the half width of its 95 % band, by differences."""
+def _banded(fit: Fit, numbers: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
+    """What ``numbers`` gives at the fitted parameters, and the half width of its 95 % band, by differences."""
     p = fit.search.parameters
-    values = said(p)
+    values = numbers(p)
     slopes = np.zeros((*values.shape, len(p)))
     for j, sd in enumerate(np.sqrt(np.diagonal(fit.search.spread))):
         if sd > 0.0:
             d = np.where(np.arange(len(p)) == j, 0.1 * sd, 0.0)
-            slopes[..., j] = (said(p + d) - said(p - d)) / (0.2 * sd)
+            slopes[..., j] = (numbers(p + d) - numbers(p - d)) / (0.2 * sd)
     return values, _student(fit.search.freedom) * np.sqrt(
         np.einsum("...j,jk,...k->...", slopes, fit.search.spread, slopes)
     )
@@ -369,12 +369,12 @@ def predict(fit: Fit, cut: MeasuredCut) -> Prediction:
     """Mean and extremes of a cut that was not fitted, with their bands from the covariance of runout and x."""
     theta = np.linspace(0.0, math.tau, TURN, endpoint=False)
 
-    def said(p: Floats) -> Floats:
+    def numbers(p: Floats) -> Floats:
         whole = _turned(fit, cut, p, theta, None, fit.channels.resonance)
         band = _turned(fit, cut, p, theta, max(fit.search.harmonics, 1), fit.channels.resonance)
         return np.stack([_mean(fit, cut, p), whole.max(axis=0), whole.min(axis=0), band.max(axis=0), band.min(axis=0)])
 
-    values, half = _banded(fit, said)
+    values, half = _banded(fit, numbers)
     whole = predicted(fit, cut, theta)
     return Prediction(
         values[0], values[1], values[2], values[3], values[4], half, float(np.hypot(whole[:, 0], whole[:, 1]).max())

@@ -129,7 +129,7 @@ class Material:
     def _check_covariance(self) -> None:
         """Refuse what is no covariance; keep it as a tuple of rows."""
         if self.spread is not None:
-            raise InputError("material.spread and material.covariance: give one of them, they say the same thing")
+            raise InputError("material.spread and material.covariance: give one of them: both state the same")
         c = np.asarray(self.covariance, dtype=np.float64)
         if c.shape != (6, 6) or not np.isfinite(c).all():
             raise InputError(f"material.covariance of shape {c.shape}: must be 6 rows of 6 finite numbers")

@@ -277,7 +277,7 @@ def _spacing(t: Floats, stated: float | None, label: str) -> float:
         )
     rate = (len(t) - 1) / float(t[-1] - t[0])
     if stated is not None and abs(rate - stated) > 0.01 * stated:
-        raise InputError(f"{label}: time stamps are {rate:.6g} Hz apart, the header says {stated:g} Hz: correct one")
+        raise InputError(f"{label}: time stamps are {rate:.6g} Hz apart, the header states {stated:g} Hz: correct one")
     # time stamps are rounded, a stated rate is not
     return stated if stated is not None else rate
 

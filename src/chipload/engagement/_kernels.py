@@ -128,7 +128,7 @@ def rim_arcs(ox, oy, r, seg, candidates, n, enter, leave):
 
 
 @njit(cache=True, nogil=True)
-def front_part(tx, ty, enter, leave, n, phi_in, phi_out):
+def leading_arcs(tx, ty, enter, leave, n, phi_in, phi_out):
     """The rim arcs in material, cut to the front half, as immersion angles.
 
     Immersion phi is counted from the left normal n = Rot(+90 deg) T clockwise (the sense of a spindle that turns
@@ -257,7 +257,7 @@ def engage(centres, headings, r, seg, box, first, last, angle, count, phi):
             count[q] = -1
             angle[q] = 0.0
             continue
-        m = front_part(headings[q, 0], headings[q, 1], enter, leave, arcs, phi_in, phi_out)
+        m = leading_arcs(headings[q, 0], headings[q, 1], enter, leave, arcs, phi_in, phi_out)
         count[q] = m
         total = 0.0
         for k in range(m):

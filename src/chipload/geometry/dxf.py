@@ -54,7 +54,7 @@ def read_dxf(
     Parameters
     ----------
     path : the file, text or binary DXF
-    units : unit of the numbers (``mm``, ``inch`` ...), whatever the header says; a disagreement is a finding
+    units : unit of the numbers (``mm``, ``inch`` ...), whatever the header states; a disagreement is a finding
     units_if_unstated : unit where the header names none
     layers : names of the layers to read, case ignored; all by default
     join_mm : widest gap [mm] that is closed
@@ -197,7 +197,7 @@ def _unit(doc: Any, file: Path, units: str | None, if_unsaid: str | None, findin
     said = INSUNITS.get(code)
     if units is not None:
         if said is not None and said != units:
-            findings.append(Finding("dxf-units", 0, f"the header says {said}; read as {units}, as part.units says"))
+            findings.append(Finding("dxf-units", 0, f"the header states {said}; read as {units}, as part.units says"))
         return units
     if said is not None:
         return said

@@ -131,18 +131,18 @@ def _touched(side: BSplinePatch, hub: Revolved, radius: float, u: Floats | list[
     """v* (n,): the lowest place of a side at which the ball touches the hub too."""
     at = np.asarray(u, dtype=np.float64)
 
-    def gap(v: Floats) -> Floats:
+    def clearance(v: Floats) -> Floats:
         return from_hub(hub, _centre(side, radius, at, v))[0] - radius
 
     low, high = np.zeros(len(at)), np.full(len(at), np.nan)
-    below, above = gap(low), np.full(len(at), np.nan)
+    below, above = clearance(low), np.full(len(at), np.nan)
     if (below >= 0.0).any():
         raise InputError(
             f"no ball of {radius:g} mm lies in the corner of side and hub at u = {at[below.argmax()]:.3g}: they must "
             "meet in a corner"
         )
     for v in _SCAN[1:]:
-        now, found = gap(np.full(len(at), v)), np.isfinite(high)
+        now, found = clearance(np.full(len(at), v)), np.isfinite(high)
         met = ~found & (now >= 0.0)
         high, above = np.where(met, v, high), np.where(met, now, above)
         low, below = np.where(found | met, low, v), np.where(found | met, below, now)
@@ -155,7 +155,7 @@ def _touched(side: BSplinePatch, hub: Revolved, radius: float, u: Floats | list[
     out: Floats = high
     for _ in range(_STEPS):
         out = low - below * (high - low) / (above - below)
-        now = gap(out)
+        now = clearance(out)
         if np.abs(now).max() < _MET:
             break
         up = now >= 0.0

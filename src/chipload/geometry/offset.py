@@ -262,7 +262,7 @@ def swept(seg: Floats, p: Floats, q: Floats, near: Floats) -> Floats:
 
 # -- trimming -----------------------------------------------------------------------------------------------------
 @dataclass(frozen=True, eq=False)
-class _Pieces:
+class _SplitSegments:
     """Pieces of raw segments: raw segment (m,), parameters (m, 2) in 0..1, nodes (m, 2); places of the nodes (k, 2)."""
 
     raw: Ints
@@ -270,8 +270,8 @@ class _Pieces:
     node: Ints
     place: Floats
 
-    def __getitem__(self, pick: NDArray[np.bool_] | Ints) -> _Pieces:
-        return _Pieces(self.raw[pick], self.span[pick], self.node[pick], self.place)
+    def __getitem__(self, pick: NDArray[np.bool_] | Ints) -> _SplitSegments:
+        return _SplitSegments(self.raw[pick], self.span[pick], self.node[pick], self.place)
 
 
 def _trimmed(raw: _Raw, given: Floats, d: float, tol: float, snap: float) -> tuple[tuple[Contour, ...], Floats | None]:
@@ -280,7 +280,7 @@ def _trimmed(raw: _Raw, given: Floats, d: float, tol: float, snap: float) -> tup
     pieces = pieces[~raw.knife[pieces.raw]]
     fixed = boxes(given)
 
-    def too_near(some: _Pieces, limit: float) -> NDArray[np.bool_]:
+    def too_near(some: _SplitSegments, limit: float) -> NDArray[np.bool_]:
         out = np.empty(len(some.raw), dtype=np.bool_)
         _kernels.nearer(given, fixed, _samples(raw, some), limit, out)
         return out
@@ -299,7 +299,7 @@ def _trimmed(raw: _Raw, given: Floats, d: float, tol: float, snap: float) -> tup
     return _chained(raw, pieces, d, tol), None
 
 
-def _split(raw: _Raw, tol: float, snap: float) -> tuple[_Pieces, NDArray[np.bool_]]:
+def _split(raw: _Raw, tol: float, snap: float) -> tuple[_SplitSegments, NDArray[np.bool_]]:
     """All pieces between crossings, and which nodes (k,) may end an open chain."""
     seg = raw.segments
     n = len(seg)
@@ -335,7 +335,7 @@ def _split(raw: _Raw, tol: float, snap: float) -> tuple[_Pieces, NDArray[np.bool
     a, b = a[real], b[real]
     # what fell out between two pieces was a point: the next begins where the one before it ended
     span = np.column_stack([t[a], t[b]])
-    return _Pieces(owner[a], span, np.column_stack([label[a], label[b]]), place), loose
+    return _SplitSegments(owner[a], span, np.column_stack([label[a], label[b]]), place), loose
 
 
 def _parameter(seg: Floats, p: Floats) -> Floats:
@@ -368,13 +368,13 @@ def _lengths(seg: Floats) -> Floats:
     return np.where(seg[:, 6] == 0.0, np.hypot(*(seg[:, 2:4] - seg[:, 0:2]).T), r * np.abs(seg[:, 6]))
 
 
-def _samples(raw: _Raw, pieces: _Pieces) -> Floats:
+def _samples(raw: _Raw, pieces: _SplitSegments) -> Floats:
     """(m, 3, 2) middle and quarter points of the pieces."""
     seg, (t0, t1) = raw.segments[pieces.raw], pieces.span.T
     return np.stack([_on(seg, t0 + w * (t1 - t0)) for w in (0.5, 0.25, 0.75)], axis=1)
 
 
-def _single(raw: _Raw, pieces: _Pieces, same: float) -> NDArray[np.bool_]:
+def _single(raw: _Raw, pieces: _SplitSegments, same: float) -> NDArray[np.bool_]:
     """(m,) which pieces stay where some coincide: of those that run one way the first, of opposite ones none."""
     middle = _samples(raw, pieces)[:, 0]
     groups: dict[tuple[int, int], list[int]] = defaultdict(list)
@@ -398,7 +398,7 @@ def _single(raw: _Raw, pieces: _Pieces, same: float) -> NDArray[np.bool_]:
     return keep
 
 
-def _rooted(pieces: _Pieces, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _rooted(pieces: _SplitSegments, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(m,) pieces that are left when dead ends have been taken away, one after another."""
     alive = np.ones(len(pieces.raw), dtype=np.bool_)
     if not len(alive):
@@ -417,7 +417,7 @@ def _rooted(pieces: _Pieces, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 # -- chaining -----------------------------------------------------------------------------------------------------
-def _chained(raw: _Raw, pieces: _Pieces, d: float, tol: float) -> tuple[Contour, ...]:
+def _chained(raw: _Raw, pieces: _SplitSegments, d: float, tol: float) -> tuple[Contour, ...]:
     """Contours from pieces; at a node of many the sharpest turn to the offset side is taken."""
     seg = raw.segments[pieces.raw]
     heading, bend = [], []
@@ -467,7 +467,7 @@ def _chained(raw: _Raw, pieces: _Pieces, d: float, tol: float) -> tuple[Contour,
     return tuple(c for _, c in sorted(out, key=lambda item: item[0]))
 
 
-def _contour(raw: _Raw, pieces: _Pieces, chain: list[int]) -> Contour:
+def _contour(raw: _Raw, pieces: _SplitSegments, chain: list[int]) -> Contour:
     """One contour; pieces of a raw segment that follow one another become one segment again."""
     runs: list[list[int]] = []
     for k in chain:

@@ -44,7 +44,7 @@ class Revolved:
             raise InputError(f"meridian: radius {m[:, 0].min():g} mm: must be at least 0")
         chord = np.linalg.norm(np.diff(m, axis=0), axis=1)
         if (chord == 0.0).any():
-            raise InputError(f"meridian: point {int((chord == 0.0).argmax()) + 1} stands twice: keep one")
+            raise InputError(f"meridian: point {int((chord == 0.0).argmax()) + 1} appears twice: keep one")
         if self.side not in (1, -1):
             raise InputError(f"meridian.side = {self.side}: must be 1 or -1")
         s = np.concatenate([[0.0], np.cumsum(chord)])

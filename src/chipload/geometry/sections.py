@@ -184,7 +184,7 @@ def _halves(p: Floats) -> tuple[_Half, _Half]:
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
     if not (np.diff(s) > 0.0).all():
         row = int((np.diff(s) <= 0.0).argmax()) + 1
-        raise InputError(f"sections: point {row} of a section comes twice, one after the other: leave one out")
+        raise InputError(f"sections: point {row} of a section is repeated: leave one out")
     curve = make_interp_spline(s, ring, k=3)
     last = len(s) - 2
     found = minimize_scalar(
@@ -237,7 +237,7 @@ def _sections_of(path: Path, scale: float, columns: str | None) -> list[Floats]:
             raise InputError(f"{path}: {p.shape[1]} columns: must be 3")
         found = " ".join(names) or stated
         if found is None:
-            raise InputError(f"{path}: no line names the columns: say which they are, as X R*THETA R")
+            raise InputError(f"{path}: no line names the columns: state them, as X R*THETA R")
         if columns is not None and found != columns:
             raise InputError(f"{path}: columns {found}: must be {columns} as stated")
         if found == "X Y Z":

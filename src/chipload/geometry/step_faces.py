@@ -142,8 +142,8 @@ def read_faces(path: str | Path, key: str = "part.file") -> Model:
 
 # -- in the process of the CAD kernel ---------------------------------------------------------------------------
 @dataclass(frozen=True, eq=False)
-class Inside:
-    """A face as the kernel has it: its number, the kind of its surface, how many holes, the shape."""
+class KernelFace:
+    """A face in the CAD kernel: its number, the kind of its surface, how many holes, the shape."""
 
     number: int
     kind: str
@@ -151,14 +151,14 @@ class Inside:
     shape: Any
 
 
-def inside(part: Part, number: int) -> Inside:
+def kernel_face(part: Part, number: int) -> KernelFace:
     """A face by its number."""
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.TopAbs import TopAbs_WIRE
 
     shape = part.faces[number - 1]
     kind = _KINDS.get(BRepAdaptor_Surface(shape).GetType().name, "other surface")
-    return Inside(number, kind, len(_all(shape, TopAbs_WIRE)) - 1, shape)
+    return KernelFace(number, kind, len(_all(shape, TopAbs_WIRE)) - 1, shape)
 
 
 def listed(part: Part) -> tuple[list[list[Any]], bool]:
@@ -175,7 +175,7 @@ def listed(part: Part) -> tuple[list[list[Any]], bool]:
         BRepGProp.SurfaceProperties_s(face, properties)
         BRepBndLib.AddOptimal_s(face, box, False, False)
         low, high = (np.array([p.X(), p.Y(), p.Z()]) for p in (box.CornerMin(), box.CornerMax()))
-        has = inside(part, k)
+        has = kernel_face(part, k)
         out.append([k, has.kind, float(properties.Mass()), low, high, has.holes, len(_all(face, TopAbs_EDGE))])
     bounding = sum(len(_all(body, TopAbs_FACE)) for body in _all(part.shape, TopAbs_SOLID))
     return out, bounding == len(out)

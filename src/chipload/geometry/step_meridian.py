@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from chipload.errors import InputError
 from chipload.geometry.step import Part
-from chipload.geometry.step_faces import Face, Inside, inside
+from chipload.geometry.step_faces import Face, KernelFace, kernel_face
 
 Floats = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ def meridian_of(faces: Sequence[Face], R: Floats, key: str, tips: bool = False) 
 # -- in the process of the CAD kernel ---------------------------------------------------------------------------
 def joined(part: Part, numbers: Sequence[int], R: Floats, key: str, tips: bool) -> Floats:
     """What :func:`meridian_of` gives of the faces of these numbers."""
-    rest = [inside(part, number) for number in numbers]
+    rest = [kernel_face(part, number) for number in numbers]
     left = [meridian_in(f, R, key, tips) for f in rest]
     # begin with the piece that has the first of all ends
     ends = [max(_first(p[0]), _first(p[-1])) for p in left]
@@ -90,7 +90,7 @@ def _first(p: Floats) -> float:
     return float(p[1] - p[0])
 
 
-def meridian_in(face: Inside, R: Floats, key: str, tips: bool) -> Floats:
+def meridian_in(face: KernelFace, R: Floats, key: str, tips: bool) -> Floats:
     """(n, 2) r and z of one face, in either sense."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepTools import BRepTools
@@ -123,7 +123,7 @@ def meridian_in(face: Inside, R: Floats, key: str, tips: bool) -> Floats:
     return rz(u, np.full(COUNT, v[0]))
 
 
-def _tip(face: Inside, R: Floats, key: str) -> Floats:
+def _tip(face: KernelFace, R: Floats, key: str) -> Floats:
     """Half-way between the two longest edges of the tip of a blade, by shares of their length."""
     rows = sorted(_edges(face, R), key=lambda e: -float(np.linalg.norm(np.diff(e, axis=0), axis=1).sum()))[:2]
     curves = []
@@ -148,14 +148,14 @@ def _tip(face: Inside, R: Floats, key: str) -> Floats:
     return np.asarray(0.5 * (a + b), dtype=np.float64)
 
 
-def _across(face: Inside, R: Floats) -> Floats:
+def _across(face: KernelFace, R: Floats) -> Floats:
     """Of a plane across the axis: from its least to its greatest radius along its edges."""
     p = np.concatenate(_edges(face, R))
     r = np.hypot(p[:, 0], p[:, 1])
     return np.stack([np.linspace(r.min(), r.max(), COUNT), np.full(COUNT, p[:, 2].mean())], axis=-1)
 
 
-def _edges(face: Inside, R: Floats) -> list[Floats]:
+def _edges(face: KernelFace, R: Floats) -> list[Floats]:
     """Points (n, 3) of each edge of a face."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve
     from OCP.TopAbs import TopAbs_EDGE

@@ -25,7 +25,7 @@ from scipy.interpolate import CubicSpline, make_interp_spline
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch, basis, through
 from chipload.geometry.step import Part
-from chipload.geometry.step_faces import Face, Inside, inside
+from chipload.geometry.step_faces import Face, KernelFace, kernel_face
 
 Floats = NDArray[np.float64]
 
@@ -89,18 +89,18 @@ def has_four(part: Part, number: int) -> bool:
     """As :func:`four_sided`, of the face of that number."""
     from OCP.BRep import BRep_Tool
 
-    face = inside(part, number)
+    face = kernel_face(part, number)
     loop = loop_of(face, BRep_Tool.Surface_s(face.shape))
     return face.holes == 0 and (len(loop) == 4 or len(_corners(loop)) == 4)
 
 
 def taken(part: Part, number: int, key: str, fit: float) -> tuple[Floats, Floats, Floats, int, bool, float]:
     """Knots, poles and side of the patch of a face, whether they are those of the file, and how far it leaves it."""
-    made = _taken(inside(part, number), key, fit)
+    made = _taken(kernel_face(part, number), key, fit)
     return made.patch.knots_u, made.patch.knots_v, made.patch.control, made.patch.side, made.kept, made.off
 
 
-def _taken(face: Inside, key: str, fit: float) -> ReadFace:
+def _taken(face: KernelFace, key: str, fit: float) -> ReadFace:
     from OCP.BRep import BRep_Tool
     from OCP.TopAbs import TopAbs_REVERSED
 
@@ -137,7 +137,7 @@ def points_of(surface: Any, uv: Floats) -> Floats:
     return np.array([(p.X(), p.Y(), p.Z()) for p in out]).reshape(*uv.shape[:-1], 3)
 
 
-def loop_of(face: Inside, surface: Any) -> list[_Piece]:
+def loop_of(face: KernelFace, surface: Any) -> list[_Piece]:
     """The edges round the face, those without length left out."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Curve2d
@@ -223,7 +223,7 @@ def off_of(patch: BSplinePatch, uv_of: Callable[[Floats, Floats], Floats], surfa
     return float(np.linalg.norm(patch.at(s.ravel(), t.ravel()).reshape(points.shape) - points, axis=2).max())
 
 
-def _fitted(face: Inside, surface: Any, loop: list[_Piece], side: int, key: str, fit: float) -> ReadFace:
+def _fitted(face: KernelFace, surface: Any, loop: list[_Piece], side: int, key: str, fit: float) -> ReadFace:
     sides = [_side(pieces) for pieces in _four(face, loop, key)]
     corners = np.array([s(np.zeros(1))[0] for s in sides])
 
@@ -261,14 +261,14 @@ def _fitted(face: Inside, surface: Any, loop: list[_Piece], side: int, key: str,
     raise _left(face, key, best, fit)
 
 
-def _left(face: Inside, key: str, best: float, fit: float) -> InputError:
+def _left(face: KernelFace, key: str, best: float, fit: float) -> InputError:
     return InputError(
         f"{key}: face {face.number} is left by its fit by {best:.4g} mm: must be at most fit_mm = {fit:g}: state more, "
         "or have the face written in smooth parts"
     )
 
 
-def _even(taken: ReadFace, face: Inside, key: str, fit: float) -> ReadFace:
+def _even(taken: ReadFace, face: KernelFace, key: str, fit: float) -> ReadFace:
     """The same surface over shares of length, if its own parameters are uneven."""
     out = taken
     for _ in range(2):
@@ -277,7 +277,7 @@ def _even(taken: ReadFace, face: Inside, key: str, fit: float) -> ReadFace:
     return out
 
 
-def _even_u(taken: ReadFace, face: Inside, key: str, fit: float) -> ReadFace:
+def _even_u(taken: ReadFace, face: KernelFace, key: str, fit: float) -> ReadFace:
     """The curves that go with the basis functions of v, each over shares of length instead of u."""
     patch, x, few = taken.patch, np.linspace(0.0, 1.0, 2 * _SAMPLES), np.linspace(0.0, 1.0, 9)
     grid = patch.at(*_mesh(x, few)).reshape(len(x), len(few), 3)
@@ -313,7 +313,7 @@ def _at_shares(side: Callable[[Floats], Floats], shares: Floats) -> Floats:
     return side(x)[back]
 
 
-def _four(face: Inside, loop: list[_Piece], key: str) -> list[list[_Piece]]:
+def _four(face: KernelFace, loop: list[_Piece], key: str) -> list[list[_Piece]]:
     """The loop as four sides."""
     if len(loop) == 4:
         return [[p] for p in loop]

@@ -13,7 +13,7 @@ import numpy as np
 
 from chipload.errors import InputError
 from chipload.geometry.step import Part
-from chipload.geometry.step_faces import Face, Model, inside
+from chipload.geometry.step_faces import Face, Model, kernel_face
 from chipload.geometry.step_meridian import meridian_in
 
 #: areas of like faces differ by less than this share
@@ -62,7 +62,7 @@ def _like(faces: Sequence[Face]) -> list[list[Face]]:
 def round_about(part: Part, number: int, R: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> list[float]:
     """Least and greatest radius [mm] of a face that is of revolution about z after a rotation; else nothing."""
     try:
-        curve = meridian_in(inside(part, number), R, "", tips=False)
+        curve = meridian_in(kernel_face(part, number), R, "", tips=False)
     except InputError:
         return []
     return [float(curve[:, 0].min()), float(curve[:, 0].max())]

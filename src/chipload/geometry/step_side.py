@@ -25,7 +25,7 @@ from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch, through
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.step import Part
-from chipload.geometry.step_faces import Face, inside
+from chipload.geometry.step_faces import Face, kernel_face
 
 Floats = NDArray[np.float64]
 
@@ -289,7 +289,7 @@ def trimmed(part: Part, number: int, key: str) -> tuple[Floats, Floats, Floats, 
 
     from chipload.geometry.step_patch import POLYNOMIAL, box_of, kept_of, loop_of, off_of, points_of
 
-    face = inside(part, number)
+    face = kernel_face(part, number)
     if face.holes:
         raise InputError(f"{key}: face {number} has a hole: must be one piece without any")
     surface = BRep_Tool.Surface_s(face.shape)

@@ -49,7 +49,7 @@ def read_stl(path: Path, key: str) -> Floats:
         raise InputError(f"{label}: {len(data)} bytes: not an STL file: export it again")
     else:
         raise InputError(
-            f"{label}: not an STL file, or damaged: its head says {count} triangles, which are "
+            f"{label}: not an STL file, or damaged: its header states {count} triangles, which are "
             f"{_HEAD + _EACH * count} bytes, and it has {len(data)}: export it again"
         )
     if len(corners) == 0:

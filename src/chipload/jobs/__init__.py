@@ -179,7 +179,9 @@ def plain(value: Any) -> Any:
         return str(value)
     if isinstance(value, (str, bool, int, float)):
         return value
-    raise InputError(f"{type(value).__name__}: is no value of a job: give numbers, texts, lists and tables")
+    raise InputError(
+        f"{type(value).__name__}: is not a value that a job can hold: give numbers, texts, lists and tables"
+    )
 
 
 def _loaded(

@@ -101,7 +101,7 @@ def with_checks(
 
     def columns(cuts: Cuts) -> dict[str, Floats]:
         found = dict(bends(cuts))
-        found["cutter_stress_mpa"] = cutter_stress(cuts.bites, cuts.cutter, material)
+        found["cutter_stress_mpa"] = cutter_stress(cuts.engagement, cuts.cutter, material)
         found["deflection_share"] = deflection_share(
             cuts.plain, found["deflection_um"], table.deflection_of_feed, table.deflection_of_depth
         )
@@ -127,7 +127,7 @@ def check_columns(
     room = any(c.cutter.gullet is not None for c in cuts)
     out = {name: np.zeros(len(deflection_um)) for name in (*CHECK_COLUMNS, *(["flute_fill"] if room else []))}
     for c in cuts:
-        out["cutter_stress_mpa"][c.step] = cutter_stress(c.bites, c.cutter, material)
+        out["cutter_stress_mpa"][c.step] = cutter_stress(c.engagement, c.cutter, material)
         out["deflection_share"][c.step] = deflection_share(
             c.plain, deflection_um[c.step], table.deflection_of_feed, table.deflection_of_depth
         )
@@ -139,7 +139,7 @@ def check_columns(
 def unchecked_checks(checks: DefaultChecks) -> tuple[str, ...]:
     """Checks that are switched off, and cutters whose chip space is not stated."""
     out = [f"check {name}: switched off by the job" for name in checks.off]
-    roomless = [n for n, c in sorted(checks.cutters.items()) if c.gullet is None]
+    roomless = [n for n, c in sorted(checks.cutters.items()) if c.gullet is None and not c.body]
     if roomless:
         out.append(f"chip space of tools {', '.join(map(str, roomless))}: gullet_mm2 is not stated")
     return tuple(out)
@@ -161,7 +161,7 @@ def chip_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...
     if thick[k] > chip[1] * (1.0 + 1e-9):
         text = (
             f"chips are up to {thick[k]:.4g} mm thick: the coefficients of {material.name} hold up to {chip[1]:g} mm, "
-            "the loads beyond it are not known"
+            "the loads beyond that are not known"
         )
         out.append(_at_step("chip-beyond-coefficients", columns, k, text))
     thin = np.flatnonzero((thick > 0.0) & (thick < chip[0] * (1.0 - 1e-9)))
@@ -222,7 +222,7 @@ def _rigid(check: LimitCheck) -> LimitCheck:
     if check.state is not Verdict.EXCEEDS:
         return check
     return replace(
-        check, state=Verdict.UNPROVEN, reason="the deflection changes the chip: the rigid model does not hold"
+        check, state=Verdict.UNPROVEN, reason="the deflection changes the chip: the rigid model is not valid"
     )
 
 

@@ -43,7 +43,7 @@ def override(raw: dict[str, Any], text: str, root: type[Table]) -> None:
             else:
                 holder, slot = here, key
         else:
-            raise InputError(f"--set {text}: {'.'.join(keys[:depth])} is a value, it holds no key {key}")
+            raise InputError(f"--set {text}: {'.'.join(keys[:depth])} is a value, not a table: it has no key {key}")
         if last:
             holder[slot] = _value(value)
             # a source is one or the other: stating the one takes the place of the other

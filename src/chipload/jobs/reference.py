@@ -66,7 +66,7 @@ KINDS = {
     "contour": "Jobs that plan contours and pockets",
     "thinwall": "Jobs that cut a thin wall",
     "impeller": "Jobs that mill an impeller",
-    "torque": "Jobs that hold the torque on a thin tube or cone",
+    "torque": "Jobs that hold the torque on a thin tube, a cone or a workpiece",
     "fit": "Jobs that fit force coefficients to measured forces",
 }
 #: how a value is written, by the key or by the table and the key

@@ -58,6 +58,11 @@ def sources_and_cutters(
         sources = sources_of(table, folder, *keys)
     with errors.collect():
         tools = cutters(table.cutter, folder)
+    errors.texts += [
+        f"cutter {n}: body_mm: for a program that is simulated: leave it out, and state its numbers"
+        for n, cutter in tools.items()
+        if cutter.body
+    ]
     return sources, tools
 
 
@@ -90,6 +95,13 @@ def cutters(entries: Sequence[CutterTable], folder: Path) -> dict[int, Cutter]:
         out[cutter.number] = cutter
     errors.refuse()
     return out
+
+
+def unknown_cutter(key: str, number: int, known: Mapping[int, Cutter]) -> Iterator[str]:
+    """What is wrong with the number of a cutter: that none has it; nothing where no cutter could be read."""
+    if known and number not in known:
+        numbers = ", ".join(str(n) for n in sorted(known))
+        yield f"{key} = {number}: no [[cutter]] has this number: state one of {numbers}"
 
 
 def cutter_errors(raw: Mapping[str, Any], folder: Path) -> list[str]:

@@ -44,7 +44,7 @@ class Chain:
     Raises
     ------
     InputError
-        An axis is missing, stands twice or in the wrong place, a direction depends on others.
+        An axis is missing, appears twice or in the wrong place, a direction depends on others.
     """
 
     axes: tuple[Axis, ...]
@@ -58,7 +58,7 @@ class Chain:
         letters = "".join(axis.letter for axis in self.axes)
         for letter in letters:
             if letters.count(letter) > 1:
-                raise InputError(f"machine.chain = {letters}: {letter} stands twice: must stand once")
+                raise InputError(f"machine.chain = {letters}: {letter} appears twice: must appear once")
         for letter in "XYZ":
             if letter not in letters:
                 raise InputError(f"machine.chain = {letters}: {letter} is missing: must have X, Y and Z")

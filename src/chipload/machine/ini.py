@@ -167,7 +167,7 @@ def _geometry(
         for letter in order:
             if letter in "ABC":
                 way = "XYZ"["ABC".index(letter)]
-                text = f"{letter}: trivkins do not say where it stands: taken as a table about {way} through the origin"
+                text = f"{letter}: trivkins do not state its position: taken as a table about {way} through the origin"
                 findings.append(Finding("ini-kinematics", 0, text))
         return {}, {}, origin
     pins = hal_pins(ini, findings)

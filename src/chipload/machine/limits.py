@@ -58,7 +58,7 @@ def limit_findings(
     >>> axes = np.zeros((2, 9))
     >>> axes[1, 3] = np.radians(60.0)
     >>> limit_findings(machine_named("xyzac-trunnion"), axes)[0].text
-    'row 1: A = 60 deg: machine xyzac-trunnion goes from -100 deg to 50 deg'
+    'row 1: A = 60 deg: machine xyzac-trunnion travels from -100 deg to 50 deg'
     """
     q = np.asarray(axes, dtype=np.float64)
     lines = np.zeros(len(q), dtype=np.int64) if line is None else np.asarray(line)
@@ -70,7 +70,7 @@ def limit_findings(
             (
                 "machine-offset" if fits else "machine-limit",
                 beyond(axis, values),
-                f"goes from {written(axis, axis.low)} to {written(axis, axis.high)}",
+                f"travels from {written(axis, axis.low)} to {written(axis, axis.high)}",
             )
         ]
         if axis.step is not None:

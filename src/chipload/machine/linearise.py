@@ -41,7 +41,7 @@ _ROTARY = [LETTERS.index(letter) for letter in "ABC"]
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class AxisSegments:
     """Moves cut into pieces.
 
     Parameters
@@ -74,8 +74,8 @@ def linearise(
     free: str | None = None,
     pole_tolerance: float = 1e-9,
     max_rows: int = 1_000_000,
-) -> tuple[Pieces, tuple[Finding, ...]]:
-    """Pieces between which the axes may go straight: the tip on its line, the tool's axis on its great circle.
+) -> tuple[AxisSegments, tuple[Finding, ...]]:
+    """Segments between which the axes may go straight: the tip on its line, the tool's axis on its great circle.
 
     Between the rows given the tip goes straight and the axis along the great circle. O(m) for m pieces, times the
     rounds, of which two or three are enough at h^2.
@@ -93,8 +93,8 @@ def linearise(
 
     Returns
     -------
-    Pieces, and the findings of ``follow`` on their rows, besides ``machine-linear``: a move on which the rotary axes
-    jump, so that no cutting helps.
+    The segments, and the findings of ``follow`` on their rows, besides ``machine-linear``: a move on which the rotary
+    axes jump, so that no cutting helps.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def linearise(
     jumps = sorted(set(row[1:][e > 1.0].tolist()))
     text = "row {}: the rotary axes jump: no piece is short enough for the tolerance: retract before it"
     found = tuple(Finding("machine-linear", 0, text.format(k)) for k in jumps)
-    return Pieces(x, d, axes, row, part), (*findings, *found)
+    return AxisSegments(x, d, axes, row, part), (*findings, *found)
 
 
 def traced(
@@ -151,7 +151,7 @@ def traced(
     tool_length: float = 0.0,
     work_zero: ArrayLike | None = None,
     max_rows: int = 1_000_000,
-) -> Pieces:
+) -> AxisSegments:
     """The path in the work frame when every axis goes in straight proportion from row to row.
 
     The straight lines between the tips of the pieces leave the path by at most ``tolerance`` (each place against the
@@ -198,7 +198,7 @@ def traced(
             e[k : k + _CHUNK] = _MARGIN * np.linalg.norm(tips - chord, axis=2).max(axis=1) / tolerance
         parts = np.where(e > 1.0, np.minimum(np.ceil(np.sqrt(e) * _MORE), _PARTS), 1.0).astype(np.int64)
         if (parts == 1).all():
-            return Pieces(x, d, at, row, part)
+            return AxisSegments(x, d, at, row, part)
 
 
 def _share(values: Floats, row: Ints, part: Floats) -> Floats:

@@ -31,7 +31,7 @@ def check_program(program: Program, machine: Machine) -> tuple[Finding, ...]:
     >>> from chipload.machine.machine import machine_named
     >>> from chipload.program.build import rapid
     >>> check_program(rapid([[0, 0, 5], [401, 0, 5]], 0.0, 1, "link"), machine_named("vmc"))[0].text
-    'row 1: X = 401 mm: machine vmc goes from -400 to 400 mm'
+    'row 1: X = 401 mm: machine vmc travels from -400 to 400 mm'
     """
     found: list[Finding] = []
 
@@ -50,7 +50,7 @@ def check_program(program: Program, machine: Machine) -> tuple[Finding, ...]:
         least, most = machine.limits[i]
         over = np.maximum(least - low[:, i], high[:, i] - most)
         value = np.where(least - low[:, i] > high[:, i] - most, low[:, i], high[:, i])
-        text = f"{axis.upper()} = {{:g}} mm: machine {machine.name} goes from {least:g} to {most:g} mm"
+        text = f"{axis.upper()} = {{:g}} mm: machine {machine.name} travels from {least:g} to {most:g} mm"
         report("machine-limit", over > slack, over, text, value)
     cuts = (program.motion == LINE) | is_arc(program)
     feed = np.where(cuts, program.feed, 0.0)

@@ -149,7 +149,7 @@ def read_program(
         program, more = to_work(commands, machine, tolerance=tolerance, placed=placed)
         if machine.chain.rotary:
             findings = tuple(replace(f, severity=Severity.UNPROVEN) if f.code in OF_LENGTHS else f for f in findings)
-    return _held(commands, program, machine, (*agreed, *findings), more, placed)
+    return _checked(commands, program, machine, (*agreed, *findings), more, placed)
 
 
 def reading_of(
@@ -174,10 +174,10 @@ def reading_of(
     if len(program) == 0:
         raise InputError("program: no motion: nothing to check")
     commands, found = to_axes(program, machine, tool_lengths=tool_lengths, tolerance=tolerance)
-    return _held(commands, program, machine, (), tuple(f for f in found if f.code not in LIMITS))
+    return _checked(commands, program, machine, (), tuple(f for f in found if f.code not in LIMITS))
 
 
-def _held(
+def _checked(
     commands: Commands,
     program: Program,
     machine: Machine,

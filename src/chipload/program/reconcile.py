@@ -38,7 +38,7 @@ _STATED = (
 _UNITS = re.compile(r"\bG\s*(20|21|70|71)\b(?!\.)")
 
 
-class Statement(NamedTuple):
+class StatedDiameter(NamedTuple):
     """A diameter [mm] of a tool, and where it stands."""
 
     diameter: float
@@ -46,7 +46,7 @@ class Statement(NamedTuple):
     line: int
 
 
-def tool_comments(text: str) -> dict[int, Statement]:
+def tool_comments(text: str) -> dict[int, StatedDiameter]:
     r"""What the comments of an NC text state about the diameter of each tool, the first of each tool.
 
     >>> tool_comments("(T1 D=10. CR=0. - ZMIN=-5. - flat end mill)")[1].diameter
@@ -54,7 +54,7 @@ def tool_comments(text: str) -> dict[int, Statement]:
     >>> tool_comments("G20\n(TOOL: T2 = 0.5 dia. ENDMILL)")[2].diameter
     12.7
     """
-    out: dict[int, Statement] = {}
+    out: dict[int, StatedDiameter] = {}
     for tool, statement in _comments(text, unit_mm(text)):
         out.setdefault(tool, statement)
     return out
@@ -70,7 +70,7 @@ def unit_mm(text: str) -> float:
     return MM_PER["inch"] if found is not None and found[1] in ("20", "70") else 1.0
 
 
-def _comments(text: str, own: float) -> Iterator[tuple[int, Statement]]:
+def _comments(text: str, own: float) -> Iterator[tuple[int, StatedDiameter]]:
     for number, line in enumerate(text.split("\n"), start=1):
         if "(" not in line and ";" not in line:
             continue
@@ -80,7 +80,7 @@ def _comments(text: str, own: float) -> Iterator[tuple[int, Statement]]:
             if hit is not None and float(hit["value"]) > 0.0:
                 mm = own if hit["unit"] is None else MM_PER["mm" if hit["unit"] == "MM" else "inch"]
                 shown = " ".join(said.split())[:60]
-                yield int(hit["tool"]), Statement(float(hit["value"]) * mm, f"the comment ({shown})", number)
+                yield int(hit["tool"]), StatedDiameter(float(hit["value"]) * mm, f"the comment ({shown})", number)
 
 
 def agree(
@@ -88,7 +88,7 @@ def agree(
     cutters: Mapping[int, Cutter],
     *,
     tools: ToolTable | None = None,
-    comments: Mapping[int, Statement] | None = None,
+    comments: Mapping[int, StatedDiameter] | None = None,
     shapes: Mapping[int, Shape] | None = None,
 ) -> tuple[Finding, ...]:
     """Hold what is stated about each cutter against the cutter that is simulated; differences by wear are findings.
@@ -110,7 +110,7 @@ def agree(
     for number, cutter in sorted(cutters.items()):
         table = tools.tools.get(number) if tools is not None else None
         if table is not None and table.diameter != 0.0:
-            stated = Statement(abs(table.diameter), "the tool table", 0)
+            stated = StatedDiameter(abs(table.diameter), "the tool table", 0)
             found += _same(name, number, cutter, stated, f"correct D of T{number} in the tool table or")
         if comments and number in comments:
             remedy = "correct whichever is wrong, or set program.tool_comments = false:"
@@ -120,7 +120,7 @@ def agree(
     return tuple(found)
 
 
-def _same(name: str, number: int, cutter: Cutter, stated: Statement, remedy: str) -> list[Finding]:
+def _same(name: str, number: int, cutter: Cutter, stated: StatedDiameter, remedy: str) -> list[Finding]:
     """A finding where a diameter differs a little."""
     apart = abs(stated.diameter - cutter.diameter)
     if apart <= SAME_MM:

@@ -29,7 +29,7 @@ PLAIN = (168, 176, 186, 255)
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class SceneBody:
     """A body of a scene.
 
     Parameters
@@ -63,7 +63,7 @@ class Body:
         return np.asarray(self.vertices.max(axis=0))
 
 
-def scene_bodies(glb: bytes, most: int = TRIANGLES) -> tuple[Body, ...]:
+def scene_bodies(glb: bytes, most: int = TRIANGLES) -> tuple[SceneBody, ...]:
     """The bodies of a scene.glb beside path and cutter, none with more than ``most`` triangles.
 
     Raises
@@ -81,7 +81,7 @@ def scene_bodies(glb: bytes, most: int = TRIANGLES) -> tuple[Body, ...]:
     return tuple(out)
 
 
-def bodies_note(bodies: tuple[Body, ...]) -> str:
+def bodies_note(bodies: tuple[SceneBody, ...]) -> str:
     """A sentence for each body that is drawn with fewer triangles; empty: none is."""
     return " ".join(
         f"{b.name} has {b.triangles} triangles: drawn with {len(b.faces)}, within {b.moved_mm:.2g} mm."
@@ -120,7 +120,7 @@ def fewer_triangles(
     return mean, index, colours if colours.ndim == 1 else colours[first], moved
 
 
-def _body(name: str, mesh: trimesh.Trimesh, most: int) -> Body:
+def _body(name: str, mesh: trimesh.Trimesh, most: int) -> SceneBody:
     visual = mesh.visual
     colours = np.asarray(visual.to_color().vertex_colors if visual.kind == "texture" else visual.vertex_colors)
     each = colours.reshape(-1, 4).astype(np.uint8)
@@ -132,7 +132,7 @@ def _body(name: str, mesh: trimesh.Trimesh, most: int) -> Body:
         vertices, faces, painted, moved = fewer_triangles(vertices, faces, painted, most)
     plain = _plain(name)
     kind = next((k for k in KINDS if plain.startswith(k)), "body")
-    return Body(name, kind, vertices, faces, painted, triangles, moved, _legend(mesh.metadata))
+    return SceneBody(name, kind, vertices, faces, painted, triangles, moved, _legend(mesh.metadata))
 
 
 def _legend(metadata: Mapping[str, Any]) -> dict[str, Any] | None:

@@ -107,12 +107,12 @@ def diagram_figure(
     else:
         _outline(figure, _closed(made.covered.rings), "covered", {"width": 0, "color": CHIP}, CHIP)
         shown = rings
-    _pieces(figure, rings, 1)
-    _pieces(figure, shown, 2)
+    _edges(figure, rings, 1)
+    _edges(figure, shown, 2)
     return _styled(figure, title)
 
 
-def _pieces(figure: go.Figure, rings: list[Ring], col: int) -> None:
+def _edges(figure: go.Figure, rings: list[Ring], col: int) -> None:
     """Edges of rings in the colours of their origins: in the diagram (col 1) or on the layer (col 2)."""
     for origin, (name, colour) in PIECES.items():
         xs, ys = [], []

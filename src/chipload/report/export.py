@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable, Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any
 
@@ -15,12 +16,15 @@ import pyarrow.parquet as pq
 
 from chipload.errors import InputError
 from chipload.files import cannot_write, fresh_folder
+from chipload.report.chip_bodies import chip_bodies
 from chipload.report.load_monitor import MONITORS, afc_table, load_csv, sections_of
 from chipload.report.presentation import Content
-from chipload.report.setup_sheet import setup_sheet
-from chipload.report.vtk import polyline, triangles
-from chipload.result import Result
+from chipload.report.removal import REMOVAL, read_removal
+from chipload.report.setup_sheet import setup_pdf, setup_sheet
+from chipload.report.vtk import faces_file, polyline
+from chipload.result import Result, SurfaceMap
 from chipload.result.load import HISTORY, load_result
+from chipload.simulation.removal_mesh import RemovalMesh
 from chipload.stock.layers import LayeredStock
 
 #: what can be asked for
@@ -35,7 +39,9 @@ def export_result(
     """Write a result folder as other files into a new or empty folder; whole or not at all.
 
     ``csv``: history.csv, a row a step, units in the names of the columns. ``vtk``: the path of each track with all its
-    numbers (.vtp), surface maps (.vtu), the stock that is left (.vtu and .stl). ``sheet``: setup.html, one page.
+    numbers (.vtp), its undeformed chips (.vtu), surface maps with displacements by finite elements (.vtu), the stock
+    that is left (.vtu and .stl). ``sheet``: setup.html, one page, and as
+    setup.pdf where ``chipload[export]`` is installed.
     ``monitor``: reference loads for a load monitor, ``csv`` or ``heidenhain``; ``spindle``: the file that tells the
     motor's power.
 
@@ -58,6 +64,8 @@ def export_result(
         files |= _vtk(result, folder)
     if "sheet" in kinds:
         files["setup.html"] = lambda: setup_sheet(result)
+        if find_spec("fpdf") is not None:
+            files["setup.pdf"] = lambda: setup_pdf(result)
     if monitor is not None:
         files |= _load_monitor(result, monitor, spindle)
     elif spindle is not None:
@@ -97,16 +105,18 @@ def _csv(history: Path, file: IO[bytes]) -> None:
 
 def _vtk(result: Result, folder: Path) -> dict[str, Callable[[], Content]]:
     files: dict[str, Callable[[], Content]] = {}
-    for track in result.tracks:
-        name = f"path-{_safe(track.name)}.vtp"
+    removal = folder / REMOVAL
+    for k, track in enumerate(result.tracks):
         blocks = list(track.blocks())
         if blocks and all(key in blocks[0] for key in ("x_mm", "y_mm", "z_mm")):
-            files[name] = lambda blocks=blocks: _path(blocks)  # type: ignore[misc]
+            files[f"path-{_safe(track.name)}.vtp"] = lambda blocks=blocks: _path(blocks)  # type: ignore[misc]
+        mesh = read_removal(removal, k) if blocks and removal.is_file() else None
+        if mesh is not None and len(mesh.rows):
+            files[f"chips-{_safe(track.name)}.vtu"] = lambda mesh=mesh, blocks=blocks: _chips(  # type: ignore[misc]
+                mesh, blocks
+            )
     for k, one in enumerate(result.maps):
-        values = {one.column: np.asarray(one.values, dtype=np.float64).ravel()}
-        files[f"map-{k}-{_safe(one.name)}.vtu"] = lambda one=one, values=values: triangles(  # type: ignore[misc]
-            one.points, one.faces, values
-        )
+        files[f"map-{k}-{_safe(one.name)}.vtu"] = lambda one=one: _map(one)  # type: ignore[misc]
     stock = folder / "stock.npz"
     if stock.is_file():
         mesh: list[Any] = []
@@ -116,14 +126,31 @@ def _vtk(result: Result, folder: Path) -> dict[str, Callable[[], Content]]:
                 mesh.append(LayeredStock.load(stock).mesh())
             return mesh[0]
 
-        files["stock.vtu"] = lambda: triangles(left().vertices, left().faces)
+        files["stock.vtu"] = lambda: faces_file(left().vertices, left().faces)
         files["stock.stl"] = lambda: _stl(left())
     return files
 
 
-def _path(blocks: Sequence[Mapping[str, Any]]) -> bytes:
+def _columns(blocks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """All numbers of a history."""
     names = [n for n, v in blocks[0].items() if np.asarray(v).dtype.kind in "fiub"]
-    columns = {n: np.concatenate([np.asarray(b[n]) for b in blocks]) for n in names}
+    return {n: np.concatenate([np.asarray(b[n]) for b in blocks]) for n in names}
+
+
+def _chips(mesh: RemovalMesh, blocks: Sequence[Mapping[str, Any]]) -> bytes:
+    chips = chip_bodies(mesh, _columns(blocks))
+    return faces_file(chips.points, chips.faces, of_faces={"chip": chips.chip, **chips.values})
+
+
+def _map(one: SurfaceMap) -> bytes:
+    values = {one.column: np.asarray(one.values, dtype=np.float64).ravel()}
+    if one.displacement is not None:
+        values["displacement_mm"] = one.displacement
+    return faces_file(one.points, one.faces, values)
+
+
+def _path(blocks: Sequence[Mapping[str, Any]]) -> bytes:
+    columns = _columns(blocks)
     points = np.column_stack([columns[key] for key in ("x_mm", "y_mm", "z_mm")])
     return polyline(points, columns)
 

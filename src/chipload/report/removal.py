@@ -15,7 +15,7 @@ from chipload.errors import InputError
 from chipload.report.presentation import Blank
 from chipload.report.view import parts_of
 from chipload.result import Result, Track
-from chipload.simulation.removal_mesh import RemovalMesh, ToolPath, removal_mesh
+from chipload.simulation.removal_mesh import RemovalMesh, ToolPoses, removal_mesh
 
 Floats = NDArray[np.float64]
 
@@ -41,11 +41,11 @@ def removal_meshes(result: Result, blanks: Mapping[str, Blank]) -> dict[int, Rem
         path = tool_path(result.tracks[k], blank)
         if path is not None:
             with contextlib.suppress(InputError):
-                out[k] = removal_mesh(blank.mesh, path, blank.cutters)
+                out[k] = removal_mesh(blank.mesh, path, {n: c for n, c in blank.cutters.items() if not c.body})
     return out
 
 
-def tool_path(track: Track, blank: Blank) -> ToolPath | None:
+def tool_path(track: Track, blank: Blank) -> ToolPoses | None:
     """Where the tool of a track stands at each row; None: it has no history, or no place."""
     parts: dict[str, list[NDArray[Any]]] = {}
     for block in track.blocks():
@@ -62,7 +62,7 @@ def tool_path(track: Track, blank: Blank) -> ToolPath | None:
         axis = np.tile([0.0, 0.0, 1.0], (n, 1))
     only = next(iter(blank.cutters)) if len(blank.cutters) == 1 else 0
     tool = columns["tool"].astype(np.int64) if "tool" in columns else np.full(n, only, dtype=np.int64)
-    return ToolPath(tip, axis, tool, breaks(tip, columns.get("s_mm")))
+    return ToolPoses(tip, axis, tool, breaks(tip, columns.get("s_mm")))
 
 
 def breaks(place: Floats, s: NDArray[Any] | None) -> NDArray[np.bool_]:

@@ -20,7 +20,7 @@ CHORD_MM = 0.005
 JUMP = 8.0
 
 
-def pieces(history: Mapping[str, NDArray[Any]]) -> Ints:
+def stretches(history: Mapping[str, NDArray[Any]]) -> Ints:
     """(n,) number of the piece of path that each row belongs to: a new one where the rows jump or the pass changes."""
     p = np.column_stack([np.asarray(history[c], dtype=np.float64) for c in ("x_mm", "y_mm", "z_mm")])
     step = np.linalg.norm(np.diff(p, axis=0), axis=1)

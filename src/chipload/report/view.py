@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.report.bodies import Body
+from chipload.report.bodies import SceneBody
 from chipload.result.style import SCALE
 from chipload.simulation.removal_mesh import RemovalMesh
 
@@ -99,7 +99,7 @@ class ViewScene:
     """
 
     title: str
-    bodies: Sequence[Body]
+    bodies: Sequence[SceneBody]
     removal: RemovalMesh | None
     path: ViewPath
     cutters: Mapping[int, Sequence[tuple[str, Floats]]]
@@ -206,7 +206,7 @@ def _box(scene: ViewScene) -> tuple[Floats, Floats]:
     return np.minimum(low, np.maximum(first, low - room)), np.maximum(high, np.minimum(last, high + room))
 
 
-def _body(body: Body, out: Buffers) -> dict[str, Any]:
+def _body(body: SceneBody, out: Buffers) -> dict[str, Any]:
     return {
         "name": body.name,
         "kind": body.kind,

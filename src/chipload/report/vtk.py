@@ -1,4 +1,4 @@
-"""Files of VTK (XML, binary inline): lines and triangles with values at their points, for ParaView and others.
+"""Files of VTK (XML, binary inline): lines, triangles and quads with values, for ParaView and others.
 
 Reference: VTK file formats, https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html: an array is base64 of
 its length in bytes (UInt64) and its little-endian values.
@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
 
-#: cell type of a triangle
-_TRIANGLE = 5
+#: cell type by the number of corners
+_CELLS = {3: 5, 4: 9}
 _TYPES = {"f8": "Float64", "i8": "Int64", "u1": "UInt8"}
 
 
@@ -47,27 +47,41 @@ def polyline(points: ArrayLike, values: Mapping[str, NDArray[Any]]) -> bytes:
     return _file("PolyData", body)
 
 
-def triangles(points: ArrayLike, faces: ArrayLike, values: Mapping[str, NDArray[Any]] | None = None) -> bytes:
-    """A `.vtu` file of triangles: points (n, 3) [mm], faces (m, 3) of their numbers, values (n,) by name.
+def faces_file(
+    points: ArrayLike,
+    faces: ArrayLike,
+    values: Mapping[str, NDArray[Any]] | None = None,
+    of_faces: Mapping[str, NDArray[Any]] | None = None,
+) -> bytes:
+    """A `.vtu` file of triangles or quads.
+
+    Parameters
+    ----------
+    points : (n, 3) [mm]
+    faces : (m, 3) or (m, 4) numbers of points
+    values : (n,) or (n, 3) by name, of the points
+    of_faces : (m,) by name
 
     Raises
     ------
     InputError
         As :func:`polyline`, or a face names a point that is not there.
     """
-    p, f = _points(points), np.asarray(faces, dtype=np.int64).reshape(-1, 3)
+    p, f = _points(points), np.asarray(faces, dtype=np.int64)
     if len(f) and not (int(f.min()) >= 0 and int(f.max()) < len(p)):
-        raise InputError(f"triangles: a face names a point outside 0 to {len(p) - 1}")
+        raise InputError(f"export: a face names a point outside 0 to {len(p) - 1}")
+    corners = f.shape[1]
     body = [
         f'<Piece NumberOfPoints="{len(p)}" NumberOfCells="{len(f)}">',
         *_values(values or {}, len(p)),
+        *_values(of_faces or {}, len(f), "CellData"),
         "<Points>",
         _array("points", p),
         "</Points>",
         "<Cells>",
         _array("connectivity", f.ravel()),
-        _array("offsets", 3 * np.arange(1, len(f) + 1, dtype=np.int64)),
-        _array("types", np.full(len(f), _TRIANGLE, dtype=np.uint8)),
+        _array("offsets", corners * np.arange(1, len(f) + 1, dtype=np.int64)),
+        _array("types", np.full(len(f), _CELLS[corners], dtype=np.uint8)),
         "</Cells>",
         "</Piece>",
     ]
@@ -81,14 +95,14 @@ def _points(points: ArrayLike) -> NDArray[np.float64]:
     return p
 
 
-def _values(values: Mapping[str, NDArray[Any]], count: int) -> list[str]:
-    out = ["<PointData>"]
+def _values(values: Mapping[str, NDArray[Any]], count: int, of: str = "PointData") -> list[str]:
+    out = [f"<{of}>"]
     for name, column in values.items():
         if len(column) != count:
-            raise InputError(f"export: {name}: {len(column)} values: must be {count}, one a point")
+            raise InputError(f"export: {name}: {len(column)} values: must be {count}, one a point or face")
         kind = np.int64 if column.dtype.kind in "iub" else np.float64
         out.append(_array(name, np.asarray(column, dtype=kind)))
-    return [*out, "</PointData>"]
+    return [*out, f"</{of}>"]
 
 
 def _array(name: str, values: NDArray[Any]) -> str:

@@ -82,7 +82,7 @@ _ROWS = (
     ("chip_volume_mm3", "mm\u00b3", "chip volume", "volume that the step removes"),
     ("engaged_volume_mm3", "mm\u00b3", "engaged volume", "volume that the engaged edge sweeps in the step"),
     ("cutting_work_j", "J", "cutting work", "work of the torque without the edge coefficients"),
-    ("chip_pieces", "", "chip pieces", "greatest number of separate pieces of the chip on one layer"),
+    ("chip_areas", "", "chip areas", "greatest number of separate areas of the chip on one layer"),
     ("chip_layers", "", "chip layers", "layers of the stock that lose material"),
     ("flute_fill", "", "chip space", "loose chip volume of a tooth over the volume of its flute"),
     # loads
@@ -178,7 +178,7 @@ def _by_name(columns: Iterable[Column]) -> Mapping[str, Column]:
     table: dict[str, Column] = {}
     for column in columns:
         if column.name in table:
-            raise ValueError(f"column {column.name}: stands twice in the table of columns")
+            raise ValueError(f"column {column.name}: appears twice in the table of columns")
         if column.unit != unit_of(column.name):
             raise ValueError(f"column {column.name}: unit {column.unit!r} is not that of its name")
         table[column.name] = column

@@ -48,10 +48,14 @@ def write_history(result: Result, file: IO[bytes]) -> dict[str, int]:
 
 
 def maps_bytes(result: Result) -> bytes:
-    """maps.npz: ``points``, ``values`` and ``faces`` of each map by its number."""
+    """maps.npz: ``points``, ``values``, ``faces`` and ``displacement``, if any, of each map by its number."""
     sink = io.BytesIO()
+    names = ("points", "values", "faces", "displacement")
     arrays = {
-        f"{k}-{name}": getattr(one, name) for k, one in enumerate(result.maps) for name in ("points", "values", "faces")
+        f"{k}-{name}": values
+        for k, one in enumerate(result.maps)
+        for name in names
+        if (values := getattr(one, name)) is not None
     }
     np.savez_compressed(sink, **arrays)
     return sink.getvalue()

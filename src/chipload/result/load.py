@@ -143,7 +143,15 @@ def _maps(folder: Path, summary: Summary) -> tuple[SurfaceMap, ...]:
     try:
         with np.load(folder / MAPS, allow_pickle=False) as held:
             return tuple(
-                SurfaceMap(m.name, m.column, held[f"{k}-points"], held[f"{k}-values"], held[f"{k}-faces"], m.track)
+                SurfaceMap(
+                    m.name,
+                    m.column,
+                    held[f"{k}-points"],
+                    held[f"{k}-values"],
+                    held[f"{k}-faces"],
+                    m.track,
+                    held.get(f"{k}-displacement"),
+                )
                 for k, m in enumerate(summary.maps)
             )
     except (OSError, KeyError, ValueError) as err:

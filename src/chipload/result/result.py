@@ -60,6 +60,7 @@ class SurfaceMap:
     values : (n,) float, in the unit of the column; NaN where the quantity is not known
     faces : (m, 3) int, triangles of the points; (0, 3): points only
     track : name of the track that it belongs to; empty: the whole result
+    displacement : (n, 3) float [mm] of the points by finite elements; None: the map has none
     """
 
     name: str
@@ -68,12 +69,15 @@ class SurfaceMap:
     values: Floats
     faces: NDArray[np.int64]
     track: str = ""
+    displacement: Floats | None = None
 
     def __post_init__(self) -> None:
         """Refuse arrays that do not belong together."""
         n = len(self.points)
         if self.points.shape != (n, 3) or self.values.shape != (n,) or self.faces.shape[1:] != (3,):
             raise ValueError(f"map {self.name}: shapes {self.points.shape}, {self.values.shape}, {self.faces.shape}")
+        if self.displacement is not None and self.displacement.shape != (n, 3):
+            raise ValueError(f"map {self.name}: displacement of shape {self.displacement.shape}, not {(n, 3)}")
         if self.column not in COLUMNS:
             raise ValueError(f"map {self.name}: column {self.column} is not known")
 

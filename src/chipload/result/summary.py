@@ -21,7 +21,7 @@ SCHEMA_VERSION: Literal[1] = 1
 Place = tuple[float, float, float]
 
 
-class _Model(BaseModel):
+class _SummaryPart(BaseModel):
     """A part of summary.json: no other keys, no number that is not finite; what is written has every key."""
 
     model_config = ConfigDict(
@@ -29,7 +29,7 @@ class _Model(BaseModel):
     )
 
 
-class LimitModel(_Model):
+class LimitModel(_SummaryPart):
     """A limit against the worst value that was found."""
 
     name: str = Field(description="name of the limit, as in [limits] of the job")
@@ -47,7 +47,7 @@ class LimitModel(_Model):
     reason: str = Field(description="why the limit is unproven")
 
 
-class FindingModel(_Model):
+class FindingModel(_SummaryPart):
     """What was noticed."""
 
     code: str
@@ -58,7 +58,7 @@ class FindingModel(_Model):
     row: int | None
 
 
-class TrackModel(_Model):
+class TrackModel(_SummaryPart):
     """One program along its path."""
 
     name: str
@@ -78,7 +78,7 @@ class TrackModel(_Model):
     findings: tuple[FindingModel, ...]
 
 
-class MapModel(_Model):
+class MapModel(_SummaryPart):
     """A quantity over a surface; its arrays are in maps.npz."""
 
     name: str
@@ -90,7 +90,7 @@ class MapModel(_Model):
     greatest_place: Place | None
 
 
-class ProvenanceModel(_Model):
+class ProvenanceModel(_SummaryPart):
     """Where the numbers come from."""
 
     inputs: dict[str, str]
@@ -100,7 +100,7 @@ class ProvenanceModel(_Model):
     versions: dict[str, str]
 
 
-class Summary(_Model):
+class Summary(_SummaryPart):
     """The content of summary.json."""
 
     schema_version: Literal[1]

@@ -42,7 +42,7 @@ Deflection and form error go with the force: they have its error.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
@@ -73,6 +73,8 @@ Again = Callable[["Window"], tuple[Mapping[str, float], Mapping[str, float]]]
 #: columns that are compared; the others that a limit may hold go with the force
 COMPARED = ("force_n", "torque_nm", "torque_mean_nm", "power_w", "chip_max_mm")
 WITH_FORCE = ("deflection_um", "form_error_um")
+#: those that can be compared
+COMPARABLE = (*COMPARED, "force_normal_n")
 #: earlier steps that are removed again: at most this share of the run's, and this number in a short run
 SHARE, LEAST = 0.05, 60
 #: likewise, for steps that lose more than their middle engages
@@ -84,7 +86,10 @@ FACTOR, LEANING = 2.0, 3.0
 #: error that both resolutions share, likewise
 FLOOR, LEANING_FLOOR = 0.01, 0.02
 #: by moves: error of a column that is not found from a few steps, and slices of the finer run over those of the run
-MOVES_FLOOR = {"force_n": 0.03, "torque_nm": 0.03, "torque_mean_nm": 0.01, "power_w": 0.01, "chip_max_mm": 0.03}
+MOVES_FLOOR = {
+    "force_n": 0.03, "torque_nm": 0.03, "torque_mean_nm": 0.01, "power_w": 0.01, "chip_max_mm": 0.03,
+    "force_normal_n": 0.03,
+}  # fmt: skip
 MORE = 4
 #: layers of the finer stock: the lowest in diameters, each so many times as thick as the one below it
 LOWEST, GROWTH = 5e-4, 1.3
@@ -160,7 +165,12 @@ class Window:
 
 
 def resolution_error(
-    blocks: Iterable[Steps], before: LayeredStock, columns: Columns, setting: RunSettings, again: Again
+    blocks: Iterable[Steps],
+    before: LayeredStock,
+    columns: Columns,
+    setting: RunSettings,
+    again: Again,
+    names: Sequence[str] = COMPARED,
 ) -> dict[str, float]:
     """Relative error of the worst value of each column of loads: see the module.
 
@@ -171,18 +181,19 @@ def resolution_error(
     columns : of the removal
     setting : of the run
     again : :func:`layers_again` or :func:`moves_again`
+    names : columns that are compared, of :data:`COMPARABLE`; the force among them
 
     Returns
     -------
-    mapping of :data:`COMPARED` and :data:`WITH_FORCE` to at least 0; inf where the run has a load of 0 and the finer
+    mapping of ``names`` and :data:`WITH_FORCE` to at least 0; inf where the run has a load of 0 and the finer
     one has not
     """
-    asked, count = _asked(columns, before)
+    asked, count = _asked(columns, before, names)
     missed = _missed(columns) if setting.moves is None else []
     asked = list(dict.fromkeys([*asked[:1], *missed, *asked[1:]]))
-    found = dict.fromkeys((*COMPARED, *WITH_FORCE), 0.0)
-    lost = dict.fromkeys(COMPARED, 0.0)
-    worst = {name: float(np.max(columns[name], initial=0.0)) for name in COMPARED}
+    found = dict.fromkeys((*names, *WITH_FORCE), 0.0)
+    lost = dict.fromkeys(names, 0.0)
+    worst = {name: float(np.max(columns[name], initial=0.0)) for name in names}
     budget, spent = max(int(SHARE * count), LEAST), 0
     left = max(int(MISSED_SHARE * count), MISSED_LEAST)
     windows = {w.step: replace(w, parts=PARTS if w.step in missed else 2) for w in _windows(blocks, asked, setting)}
@@ -195,7 +206,7 @@ def resolution_error(
         else:
             continue
         alike, halves = again(window)
-        for name in COMPARED:
+        for name in names:
             c, w = float(columns[name][step]), worst[name]
             same = alike.get(name, c)
             off = max(halves[name] - w, abs(same - c) if c >= 0.5 * w else same - w)
@@ -203,7 +214,7 @@ def resolution_error(
     # the flank of a flat mill is cut into slices where its contact changes: exact
     straight = all(c.corner_radius == 0.0 and c.taper == 0.0 and c.bottom == 0.0 for c in _used(windows, setting))
     films, least = _films(columns), FLOOR if all(w.upright for w in windows.values()) else LEANING_FLOOR
-    for name in COMPARED:
+    for name in names:
         if worst[name] > 0.0 and films < 1.0:
             floor = least if setting.moves is None or straight else MOVES_FLOOR[name]
             found[name] = lost[name] / worst[name] + floor + films / (1.0 - films)
@@ -220,11 +231,11 @@ def _used(windows: Mapping[int, Window], setting: RunSettings) -> list[Cutter]:
     return [setting.cutters[n] for n in sorted(some)]
 
 
-def _asked(columns: Columns, before: LayeredStock) -> tuple[list[int], int]:
+def _asked(columns: Columns, before: LayeredStock, names: Sequence[str]) -> tuple[list[int], int]:
     """Steps to compute once more, the most telling first, and how many the run has."""
     rapid, volume = np.asarray(columns["rapid"]), np.asarray(columns["chip_volume_mm3"])
     force = np.asarray(columns["force_n"])
-    worst = [_among_worst(np.asarray(columns[name])) for name in COMPARED if len(force)]
+    worst = [_among_worst(np.asarray(columns[name])) for name in names if len(force)]
     cut = np.flatnonzero(force > 0.0)
     out = [k for k in worst if force[k] > 0.0]
     if len(cut):
@@ -244,7 +255,7 @@ def _missed(columns: Columns) -> list[int]:
     """Steps that lose most of what their middle does not engage, as where a mill meets a wall at the end of a step."""
     volume = np.where(np.asarray(columns["rapid"]), 0.0, np.asarray(columns["chip_volume_mm3"]))
     more = volume - np.asarray(columns["engaged_volume_mm3"])
-    more = np.where((more > UNLIKE * volume) & (np.asarray(columns["chip_pieces"]) > 0), more, 0.0)
+    more = np.where((more > UNLIKE * volume) & (np.asarray(columns["chip_areas"]) > 0), more, 0.0)
     order = np.argsort(-more, kind="stable")[:MISSED]
     return [int(k) for k in order if more[k] > 0.0]
 
@@ -259,7 +270,7 @@ def _films(columns: Columns) -> float:
     """Share of the volume that was lost, not by rapids, in steps without loads."""
     volume = np.where(columns["rapid"], 0.0, columns["chip_volume_mm3"])
     whole = float(np.abs(volume).sum())
-    return float(np.abs(volume[np.asarray(columns["chip_pieces"]) == 0]).sum()) / whole if whole > 0.0 else 0.0
+    return float(np.abs(volume[np.asarray(columns["chip_areas"]) == 0]).sum()) / whole if whole > 0.0 else 0.0
 
 
 def _windows(blocks: Iterable[Steps], asked: list[int], setting: RunSettings) -> list[Window]:
@@ -309,13 +320,13 @@ def moves_again(setting: RunSettings, run: MoveRun, columns: Columns) -> Again:
     def loads_of(window: Window, own: Steps, more: tuple[int, int] | None) -> tuple[Mapping[str, float], float]:
         stock = run.stock.cropped(window.low, window.high)
         if stock is None:
-            return dict.fromkeys(COMPARED, 0.0), 0.0
+            return dict.fromkeys(COMPARABLE, 0.0), 0.0
         for some in window.earlier:
             stock.skip(some.p0, some.p1, some.tool)
         stock.more = stock.more if more is None else more
-        finer = replace(run, stock=stock, corner_pieces=MORE * run.corner_pieces, flank_mm=flank)
+        finer = replace(run, stock=stock, corner_slices=MORE * run.corner_slices, flank_mm=flank)
         found = moved(own, finer, 0, setting.cutters, setting.material, rotation)
-        worst = {name: float(found.loads[:, LOADS.index(name)].max()) for name in COMPARED}
+        worst = {name: float(found.loads[:, LOADS.index(name)].max()) for name in COMPARABLE}
         return worst, float(found.removed[:, 0].sum())
 
     def again(window: Window) -> tuple[Mapping[str, float], Mapping[str, float]]:
@@ -333,7 +344,7 @@ def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, re
     cutter = setting.cutters[tool]
     stock = before.cropped(window.low[:2], window.high[:2])
     if stock is None:
-        return dict.fromkeys(COMPARED, 0.0)
+        return dict.fromkeys(COMPARABLE, 0.0)
     low, high = float(window.low[2]), float(window.high[2])
     thickest = 0.5 * float(np.median(before.thickness[slice(*_span(before, low, high))]))
     heights, z, thin = [low], low, LOWEST * cutter.diameter
@@ -343,18 +354,18 @@ def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, re
         heights.append(z)
     stock.refine_at(heights, 0.25 * LOWEST * cutter.diameter)
     fine = setting.resolution
-    pieces = max(2 * fine.corner_pieces, FINE)
+    pieces = max(2 * fine.corner_slices, FINE)
     fine = replace(
         fine,
         rotation=0.5 * fine.rotation,
-        corner_pieces=pieces,
+        corner_slices=pieces,
         flank_mm=0.5 * fine.flank_mm,
-        bottom_pieces=2 * fine.bottom_pieces,
+        bottom_slices=2 * fine.bottom_slices,
     )
     profile = slices(
         cutter,
-        bottom_pieces=fine.bottom_pieces,
-        corner_pieces=fine.corner_pieces,
+        bottom_slices=fine.bottom_slices,
+        corner_slices=fine.corner_slices,
         flank_mm=fine.flank_mm,
         grading=max(fine.grading, 2.0) if window.upright else fine.grading,
     )
@@ -364,7 +375,7 @@ def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, re
         for _, swept in swept_ahead(some, stock, setting.cutters, setting.interpolation, tolerance, setting.workers):
             stock.remove_many([i for i, _ in swept.met], [shape for _, shape in swept.met], 0.5 * tolerance)
     columns = remove(_parts(window.own, window.parts), stock, again)
-    return {name: float(columns[name].max()) for name in COMPARED}
+    return {name: float(columns[name].max()) for name in COMPARABLE}
 
 
 def _span(stock: LayeredStock, low: float, high: float) -> tuple[int, int]:

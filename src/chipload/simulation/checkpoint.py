@@ -93,8 +93,8 @@ class Stored(Mapping[str, NDArray[Any]]):
     def __len__(self) -> int:
         return len(self.names)
 
-    def pieces(self) -> Iterator[dict[str, NDArray[Any]]]:
-        """All columns, piece after piece."""
+    def chunks(self) -> Iterator[dict[str, NDArray[Any]]]:
+        """All columns, chunk after chunk."""
         for (file, count), held in zip(self.files, self.held, strict=True):
             yield _read(file, self.names, count, held)
 
@@ -106,7 +106,7 @@ def in_rows(columns: Arrays, size: int) -> Iterator[dict[str, NDArray[Any]]]:
     [[0, 1], [2, 3], [4]]
     """
     held: dict[str, NDArray[Any]] = {}
-    for piece in columns.pieces() if isinstance(columns, Stored) else (columns,):
+    for piece in columns.chunks() if isinstance(columns, Stored) else (columns,):
         held = {k: np.concatenate([held[k], v]) if held else v for k, v in piece.items()}
         count = len(next(iter(held.values())))
         for at in range(0, count - size + 1, size):

@@ -30,7 +30,7 @@ def flute_fill(cuts: Cuts) -> Floats:
     InputError
         They are not stated.
     """
-    cutter, bites = cuts.cutter, cuts.bites
+    cutter, bites = cuts.cutter, cuts.engagement
     if cutter.gullet is None or cutter.chip_ratio is None:
         raise InputError(f"flute_fill: gullet_mm2 and chip_ratio of cutter {cuts.tool}: missing: state both")
     p, q, a, b, along, offset, across = bites.rows.T

@@ -33,7 +33,7 @@ from chipload.errors import Finding, InputError
 from chipload.program.motions import lengths
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
-from chipload.simulation.accuracy import energy_balance, layers_again, moves_again, resolution_error
+from chipload.simulation.accuracy import COMPARED, energy_balance, layers_again, moves_again, resolution_error
 from chipload.simulation.loads import (
     LOADS,
     Cuts,
@@ -46,7 +46,7 @@ from chipload.simulation.loads import (
     over_turn,
 )
 from chipload.simulation.moves import Engine, HandOver, MoveRun, moved, run_by_moves, with_contact
-from chipload.simulation.removal import ChipPieces, Columns, Removal, Resolution, RunningSums, RunSettings, Watch
+from chipload.simulation.removal import ChipAreas, Columns, Removal, Resolution, RunningSums, RunSettings, Watch
 from chipload.simulation.shank import axial_overrun
 from chipload.simulation.steps import BLOCK, ROWS, StepBlocks, Steps, steps_in_blocks
 from chipload.simulation.swept_area import TOGETHER, Interpolation, swept_ahead
@@ -106,7 +106,7 @@ def remove(
         With the columns ``line``, ``tool``, ``label``, ``rapid``, ``s_mm``, ``t_s``, ``duration_s`` (on the
     machine), ``seconds`` (at the commanded feed, which chips and loads go by), ``x_mm``, ``y_mm``, ``z_mm``,
     ``axis_x..z``, ``feed_mm_min``, ``axial_overrun_mm`` (height of the shank that stands in material above the flutes
-    when the step ends), ``chip_volume_mm3``, ``chip_pieces`` (most on one layer),
+    when the step ends), ``chip_volume_mm3``, ``chip_areas`` (most on one layer),
     ``chip_layers`` (layers that lost something; where all of it is films, narrower than a few tolerances, there are no
     pieces and no loads), ``chip_max_mm`` (thickest),
     ``force_{x,y,z}_{mean,max,min}_n`` over the revolution, ``force_n`` (greatest size), ``torque_mean_nm``,
@@ -168,9 +168,13 @@ def with_engine(
     if engine == "layers":
         return setting, None
     fine = setting.resolution
+    bodies = np.isin(program.tool, [n for n, c in setting.cutters.items() if c.body])
     try:
+        if bodies.any():
+            k = int(np.argmax(bodies))
+            raise HandOver(int(program.line[k]), f"tool {int(program.tool[k])} is a body without chips")
         run = run_by_moves(
-            program, stock, setting.cutters, fine.step_mm, fine.tolerance, fine.corner_pieces, fine.flank_mm
+            program, stock, setting.cutters, fine.step_mm, fine.tolerance, fine.corner_slices, fine.flank_mm
         )
     except HandOver as found:
         return by_layers(engine, setting, found)
@@ -189,18 +193,29 @@ def with_accuracy(removal: Removal, program: Program, before: LayeredStock | Non
     """A removal with its energy balance and resolution error; ``before`` the stock before it, None: as it is."""
     if before is None:
         return removal
+    return replace(
+        removal,
+        energy_balance=energy_balance(removal.columns, setting.material.Ktc),
+        resolution_error=resolution_error_of(program, before, removal.columns, setting),
+    )
+
+
+def resolution_error_of(
+    program: Program,
+    before: LayeredStock,
+    columns: Columns,
+    setting: RunSettings,
+    names: Sequence[str] = COMPARED,
+) -> dict[str, float]:
+    """Relative error of the worst value of some columns of a removal (:mod:`chipload.simulation.accuracy`)."""
     blocks = StepBlocks(program, setting.resolution.step_mm, setting.resolution.tolerance)
     if setting.moves is None:
         again = layers_again(
             before, setting, lambda steps, stock, to: remove_block(steps, stock, RunningSums(0.0), to)[1]
         )
     else:
-        again = moves_again(setting, setting.moves, removal.columns)
-    return replace(
-        removal,
-        energy_balance=energy_balance(removal.columns, setting.material.Ktc),
-        resolution_error=resolution_error(blocks, before, removal.columns, setting, again),
-    )
+        again = moves_again(setting, setting.moves, columns)
+    return resolution_error(blocks, before, columns, setting, again, names)
 
 
 def setting_of(
@@ -220,8 +235,8 @@ def profile_of(cutter: Cutter, resolution: Resolution) -> Slices:
     """The slices of a cutter at a resolution."""
     return slices(
         cutter,
-        bottom_pieces=resolution.bottom_pieces,
-        corner_pieces=resolution.corner_pieces,
+        bottom_slices=resolution.bottom_slices,
+        corner_slices=resolution.corner_slices,
         flank_mm=resolution.flank_mm,
         grading=resolution.grading,
     )
@@ -318,7 +333,7 @@ def _after(
     removed: Floats,
     columns: Columns,
     basis: Floats,
-    piece: ChipPieces | None,
+    piece: ChipAreas | None,
 ) -> RunningSums:
     """The sums after some steps."""
     cuts = (removed[:, 0] > 0.0) & ~steps.rapid
@@ -367,7 +382,7 @@ def stacked(blocks: Sequence[Columns]) -> dict[str, NDArray[Any]]:
 
 def _removed(
     steps: Steps, stock: LayeredStock, sums: RunningSums, setting: RunSettings
-) -> tuple[Floats, list[StepEngagement], ChipPieces | None]:
+) -> tuple[Floats, list[StepEngagement], ChipAreas | None]:
     """(n, 4) volume, pieces and layers of each chip, contact of the shank; what the teeth cut; the chip of most pieces
     so far.
     """
@@ -377,7 +392,7 @@ def _removed(
     cutting: list[tuple[int, Move, Section]] = []
     waiting: list[Future[list[StepEngagement]]] = []
 
-    def bites(those: list[tuple[int, Move, Section]]) -> list[StepEngagement]:
+    def engaged(those: list[tuple[int, Move, Section]]) -> list[StepEngagement]:
         tools = [int(steps.tool[k]) for k, _, _ in those]
         return [
             engagement_of_step(steps, k, move, setting.cutters[n], setting.profiles[n], there, tolerance)
@@ -401,7 +416,7 @@ def _removed(
                     rank = _rank(whole)
                     near = polygons(stock.section(i).union(MultiPolygon(pieces)).intersection(box(*low, *high)))
                     cutter, z = setting.cutters[int(steps.tool[k])], float(stock.heights[i])
-                    best = ChipPieces(sums.steps + k, swept.move, cutter, z, MultiPolygon(near), tuple(whole))
+                    best = ChipAreas(sums.steps + k, swept.move, cutter, z, MultiPolygon(near), tuple(whole))
             if removed[k, 1] > 0.0:
                 cutter = setting.cutters[int(steps.tool[k])]
                 removed[k, 3] = axial_overrun(stock, cutter, steps.p1[k], steps.a1[k], FILM * tolerance)
@@ -409,9 +424,9 @@ def _removed(
             if removed[k, 1] > 0.0 and not steps.rapid[k]:
                 cutting.append((k, swept.move, there))
             if len(cutting) == TOGETHER:
-                waiting.append(beside.submit(bites, cutting))
+                waiting.append(beside.submit(engaged, cutting))
                 cutting = []
-        waiting.append(beside.submit(bites, cutting))
+        waiting.append(beside.submit(engaged, cutting))
         return removed, [bite for several in waiting for bite in several.result()], best
 
 
@@ -454,7 +469,7 @@ def _columns(steps: Steps, removed: Floats, loads: Floats, sums: RunningSums) ->
         **{f"axis_{x}": steps.a1[:, i] for i, x in enumerate("xyz")},
         "feed_mm_min": feed,
         "chip_volume_mm3": removed[:, 0],
-        "chip_pieces": removed[:, 1].astype(np.int64),
+        "chip_areas": removed[:, 1].astype(np.int64),
         "chip_layers": removed[:, 2].astype(np.int64),
         "axial_overrun_mm": removed[:, 3],
         **{name: loads[:, i] for i, name in enumerate(LOADS)},

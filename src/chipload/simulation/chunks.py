@@ -37,7 +37,7 @@ from chipload.simulation.chips import (
     with_engine,
 )
 from chipload.simulation.moves import Engine, HandOver, with_contact
-from chipload.simulation.removal import ChipPieces, Columns, Removal, Resolution, RunningSums, RunSettings, Watch
+from chipload.simulation.removal import ChipAreas, Columns, Removal, Resolution, RunningSums, RunSettings, Watch
 from chipload.simulation.steps import BLOCK, steps_in_blocks
 from chipload.simulation.swept_area import Interpolation
 from chipload.stock.layers import LayeredStock
@@ -236,7 +236,7 @@ def _read_sums(path: Path, cutters: Mapping[int, Cutter]) -> RunningSums:
         step, tool = a["of"].tolist()
         chips = tuple(p for p in shapes[1:] if isinstance(p, Polygon))
         assert isinstance(shapes[0], MultiPolygon)
-        piece = ChipPieces(step, Move(a["tip"], a["axis"]), cutters[tool], float(a["height"][0]), shapes[0], chips)
+        piece = ChipAreas(step, Move(a["tip"], a["axis"]), cutters[tool], float(a["height"][0]), shapes[0], chips)
     line, _, why = bytes(a["handed"].astype(np.uint8)).decode().partition(" ")
     handed = (int(line), why) if line else None
     return RunningSums(before, int(steps), s_mm, t_s, cut_s, a["basis"], tuple(a["rapids"].tolist()), piece, handed)

@@ -89,7 +89,7 @@ class FormError:
     Attributes
     ----------
     step : (p,) int, the step that makes each point; -1: none comes near, the other columns are then 0
-    gap : (p,) float [mm], what the rigid cutter leaves there; below 0: it gouges
+    rigid : (p,) float [mm], what the rigid cutter leaves there; below 0: it gouges
     cutter, work : (p,) float [mm], by how much each gives way along n at that moment
     force : (p,) float [N], F . n at that moment: it pushes work and cutter apart where above 0
     at_edge : (p,) bool, whether q lies at the end of a bite, as it should; False: it is touched again by a cutter that
@@ -97,7 +97,7 @@ class FormError:
     """
 
     step: Ints
-    gap: Floats
+    rigid: Floats
     cutter: Floats
     work: Floats
     force: Floats
@@ -116,7 +116,7 @@ class FormError:
     @property
     def left(self) -> Floats:
         """Material left over the wanted surface [mm], cusps and all."""
-        return self.gap + self.error
+        return self.rigid + self.error
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +140,7 @@ def contacts(removal: Removal) -> Contacts:
     """
     parts = []
     for cuts in _kept(removal):
-        bites = cuts.bites
+        bites = cuts.engagement
         owner = np.repeat(np.arange(len(bites)), np.diff(bites.start))
         p, q, a, b, along, offset, across = bites.rows.T
         s0, rho, z0, sk, ck = bites.slices[bites.slice, :5].T
@@ -148,7 +148,7 @@ def contacts(removal: Removal) -> Contacts:
         height, radius = z0 + sk * half, rho
         total, place, weight = np.zeros((len(bites), 3)), np.zeros((len(bites), 3)), np.zeros(len(bites))
         frame = bites.frames[owner]
-        tip = 0.5 * (cuts.way[owner, :3] + cuts.way[owner, 3:6])
+        tip = 0.5 * (cuts.ends[owner, :3] + cuts.ends[owner, 3:6])
         for phi in (p, q):
             h = along * np.sin(phi) + across * np.cos(phi) + offset
             made = np.where(np.abs(h) <= GRAZES * (np.hypot(along, across) + np.abs(offset)), b - a, 0.0)
@@ -161,7 +161,7 @@ def contacts(removal: Removal) -> Contacts:
             np.add.at(weight, owner, made)
         size = np.linalg.norm(total, axis=1)
         one = size > ONE_SIDE * weight
-        point = 0.5 * (cuts.way[:, :3] + cuts.way[:, 3:6])
+        point = 0.5 * (cuts.ends[:, :3] + cuts.ends[:, 3:6])
         point[weight > 0.0] = place[weight > 0.0] / weight[weight > 0.0, None]
         normal = np.zeros((len(cuts), 3))
         normal[one] = -total[one] / size[one, None]
@@ -207,17 +207,17 @@ def step_deflections(
         pitch = math.tau / cuts.cutter.flutes if cuts.cutter.teeth_alike else math.tau
         count = max(math.ceil(pitch / rotation), 8)
         theta = np.arange(count) * (pitch / count)
-        force = in_work(forces_over_turn(cuts.bites, cuts.cutter, material, theta)[0], cuts.bites.frames)
+        force = in_work(forces_over_turn(cuts.engagement, cuts.cutter, material, theta)[0], cuts.engagement.frames)
         n = place.normal[at]
         away = np.einsum("cmi,ci->cm", force, n)
         bent = np.einsum("cij,cmj,ci->cm", stiff[at], force, n)
-        middle = 0.5 * (cuts.way[:, :3] + cuts.way[:, 3:6])
-        z = np.einsum("ci,ci->c", place.point[at] - middle, cuts.bites.frames[:, 2])
+        middle = 0.5 * (cuts.ends[:, :3] + cuts.ends[:, 3:6])
+        z = np.einsum("ci,ci->c", place.point[at] - middle, cuts.engagement.frames[:, 2])
         m = len(theta)
         moments = _bent(
             cuts, np.repeat(np.arange(len(cuts)), m), np.tile(theta, len(cuts)), np.repeat(z, m), material, bars
         )
-        swing = np.einsum("cmi,cij->cmj", moments[:, 3:].reshape(-1, m, 2), cuts.bites.frames[:, :2])
+        swing = np.einsum("cmi,cij->cmj", moments[:, 3:].reshape(-1, m, 2), cuts.engagement.frames[:, :2])
         pushed = np.einsum("cmi,ci->cm", swing, n)
         for name, values in zip(names, (bent, pushed, bent + pushed, away), strict=True):
             out[name][cuts.step] = values.max(axis=1).clip(0.0)
@@ -256,10 +256,10 @@ def tip_deflections(
     pitch = math.tau / cuts.cutter.flutes if cuts.cutter.teeth_alike else math.tau
     m = max(math.ceil(pitch / rotation), 8)
     n = len(cuts)
-    if has_lever_loads(cuts.bites, cuts.cutter, material) and greatest_height(cuts.bites) <= bars[0].length:
+    if has_lever_loads(cuts.engagement, cuts.cutter, material) and greatest_height(cuts.engagement) <= bars[0].length:
         # the teeth are all on the first bar
         levers = np.vstack([np.eye(4)[0], tip_compliance(bars)])
-        loads = lever_loads(cuts.bites, cuts.cutter, material, m, levers)
+        loads = lever_loads(cuts.engagement, cuts.cutter, material, m, levers)
         if work is None:
             most = 1e3 * np.hypot(loads[:, 6], loads[:, 7]).max(axis=1)
             return {"deflection_cutter_um": most, "deflection_um": most}
@@ -278,7 +278,7 @@ def tip_deflections(
         apart = (work * force)[:, :, None]
     else:
         # in the frame of the cutter, as the force is
-        frame = cuts.bites.frames
+        frame = cuts.engagement.frames
         own = np.einsum("nia,nsab,njb->nsij", frame, work, frame)
         apart = np.einsum("nsij,nmj->nmsi", own, force)
     out["deflection_workpiece_um"] = 1e3 * np.linalg.norm(apart, axis=3).max(axis=(1, 2))
@@ -333,9 +333,9 @@ def form_error(
     all_cuts = _kept(removal) if isinstance(removal, Removal) else removal
     least = np.full(len(q), np.inf)
     for cuts in all_cuts:
-        _kernels.least_gaps(q, n, cuts.way, _shape(cuts.cutter), near, facing, least)
-    gap, cutter, yielded, force = (np.zeros(len(q)) for _ in range(4))
-    out = FormError(np.full(len(q), -1), gap, cutter, yielded, force, np.zeros(len(q), dtype=np.bool_))
+        _kernels.least_gaps(q, n, cuts.ends, _shape(cuts.cutter), near, facing, least)
+    rigid, cutter, yielded, force = (np.zeros(len(q)) for _ in range(4))
+    out = FormError(np.full(len(q), -1), rigid, cutter, yielded, force, np.zeros(len(q), dtype=np.bool_))
     best = np.full(len(q), np.inf)
     todo = np.flatnonzero(np.isfinite(least))
     for at in range(0, len(todo), CHUNK):
@@ -364,7 +364,7 @@ def _made_by(
     room = 16 * len(q) + 64
     while True:
         owner, moment = np.empty((room, 2), dtype=np.int64), np.empty((room, 14))
-        count = _kernels.contacts(q, n, cuts.way, shape, most, model.facing, owner, moment)
+        count = _kernels.contacts(q, n, cuts.ends, shape, most, model.facing, owner, moment)
         if count <= room:
             break
         room = count
@@ -373,7 +373,7 @@ def _made_by(
         return 0.0
     point, k = owner.T
     d, s, z, sine = moment[:, :4].T
-    frame = cuts.bites.frames[k]
+    frame = cuts.engagement.frames[k]
     along, left = (np.einsum("mi,mi->m", moment[:, 11:], frame[:, i]) for i in (0, 1))
     phi = np.arctan2(along, left) % math.tau
     lag = math.tan(cuts.cutter.helix) / cuts.cutter.radius
@@ -381,7 +381,7 @@ def _made_by(
     widest = 0.0
     for j in range(1 if cuts.cutter.teeth_alike else cuts.cutter.flutes):
         there, made = np.empty(count), np.empty(count, dtype=np.bool_)
-        b = cuts.bites
+        b = cuts.engagement
         _kernels.points_in_engagement(
             k, s, phi, b.start, b.rows, b.tooth, b.slice, b.slices, j, model.reach, there, made
         )
@@ -394,9 +394,9 @@ def _made_by(
         away = np.einsum("mi,mi->m", force, n[point])
         work = np.einsum("mi,mij,mj->m", n[point], stiff[point], force)
         cutter = np.einsum("mi,mi->m", bent, n[point])
-        gap = d - radii[j] * sine
+        rigid = d - radii[j] * sine
         widest = max(widest, float(np.abs(cutter + work - radii[j] * sine).max()))
-        total = gap + cutter + work
+        total = rigid + cutter + work
         order = np.lexsort((total, ~made, point))
         first = order[np.r_[True, point[order][1:] != point[order][:-1]]]
         at = number[point[first]]
@@ -404,7 +404,7 @@ def _made_by(
         first, at = first[better], at[better]
         best[at] = total[first]
         out.step[at] = cuts.step[k[first]]
-        out.gap[at], out.cutter[at], out.work[at] = gap[first], cutter[first], work[first]
+        out.rigid[at], out.cutter[at], out.work[at] = rigid[first], cutter[first], work[first]
         out.force[at], out.at_edge[at] = away[first], made[first]
     return widest
 
@@ -413,7 +413,8 @@ def _kept(removal: Removal) -> tuple[Cuts, ...]:
     if not removal.cuts:
         if not removal.columns["chip_volume_mm3"].any():
             raise InputError("deflection: the program cuts nothing")
-        raise InputError("deflection: the removal did not keep what the teeth cut: remove(..., keep=True)")
+        if removal.columns["chip_areas"].any():  # else only films are lost, in which no edge is engaged
+            raise InputError("deflection: the removal did not keep what the teeth cut: remove(..., keep=True)")
     return removal.cuts
 
 
@@ -456,7 +457,7 @@ def _bent(
                 f"flute_length_mm = {cuts.cutter.flute_length:g}"
             )
     out = np.empty((len(k), 5))
-    b = cuts.bites
+    b = cuts.engagement
     law = np.array(material.law)
     _kernels.bent_many(k, theta, z, b.start, b.rows, b.tooth, b.slice, b.slices, cuts.cutter.flutes, law, chain, out)
     return out

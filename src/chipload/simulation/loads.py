@@ -73,8 +73,8 @@ class Cuts:
     tool : its number in the program
     cutter : its numbers
     step : (c,) int, the steps that cut, rows of ``Removal.columns``
-    way : (c, 12) float, tip at the start and the end [mm], axis at the start and the end
-    bites : of those steps, in the middle of each, with frames
+    ends : (c, 12) float, tip at the start and the end [mm], axis at the start and the end
+    engagement : of those steps, in the middle of each, with frames
     plain : the same without runout
     spindle : (c,) float [rad/s], signed
     """
@@ -82,8 +82,8 @@ class Cuts:
     tool: int
     cutter: Cutter
     step: NDArray[np.int64]
-    way: Floats
-    bites: ToothEngagement
+    ends: Floats
+    engagement: ToothEngagement
     plain: ToothEngagement
     spindle: Floats
 
@@ -93,23 +93,23 @@ class Cuts:
 
 def joined(cuts: list[Cuts]) -> Cuts:
     """Cuts of one cutter that follow one another as one."""
-    columns = (np.concatenate([getattr(c, name) for c in cuts]) for name in ("step", "way", "spindle"))
-    step, way, spindle = columns
-    bites = _joined([c.bites for c in cuts])
-    plain = bites if all(c.plain is c.bites for c in cuts) else _joined([c.plain for c in cuts])
-    return Cuts(cuts[0].tool, cuts[0].cutter, step, way, bites, plain, spindle)
+    columns = (np.concatenate([getattr(c, name) for c in cuts]) for name in ("step", "ends", "spindle"))
+    step, ends, spindle = columns
+    engagement = _joined([c.engagement for c in cuts])
+    plain = engagement if all(c.plain is c.engagement for c in cuts) else _joined([c.plain for c in cuts])
+    return Cuts(cuts[0].tool, cuts[0].cutter, step, ends, engagement, plain, spindle)
 
 
-def _joined(bites: list[ToothEngagement]) -> ToothEngagement:
-    start = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(b.start) for b in bites]))])
-    rows, tooth = (np.concatenate([getattr(b, name) for b in bites]) for name in ("rows", "tooth"))
-    frame = np.concatenate([b.frames for b in bites])
-    if all(b.slices is bites[0].slices or np.array_equal(b.slices, bites[0].slices) for b in bites):
-        return ToothEngagement(start, rows, tooth, np.concatenate([b.slice for b in bites]), bites[0].slices, frame)
+def _joined(parts: list[ToothEngagement]) -> ToothEngagement:
+    start = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(b.start) for b in parts]))])
+    rows, tooth = (np.concatenate([getattr(b, name) for b in parts]) for name in ("rows", "tooth"))
+    frame = np.concatenate([b.frames for b in parts])
+    if all(b.slices is parts[0].slices or np.array_equal(b.slices, parts[0].slices) for b in parts):
+        return ToothEngagement(start, rows, tooth, np.concatenate([b.slice for b in parts]), parts[0].slices, frame)
     # each has slices of its own
-    before = np.cumsum([0, *(len(b.slices) for b in bites)])
-    piece = np.concatenate([b.slice + n for b, n in zip(bites, before, strict=False)])
-    return ToothEngagement(start, rows, tooth, piece, np.concatenate([b.slices for b in bites]), frame)
+    before = np.cumsum([0, *(len(b.slices) for b in parts)])
+    piece = np.concatenate([b.slice + n for b, n in zip(parts, before, strict=False)])
+    return ToothEngagement(start, rows, tooth, piece, np.concatenate([b.slices for b in parts]), frame)
 
 
 def at_feeds(cuts: Cuts, factor: Floats) -> Cuts:
@@ -124,7 +124,7 @@ def at_feeds(cuts: Cuts, factor: Floats) -> Cuts:
     rows = old.rows.copy()
     rows[:, 4:] *= np.repeat(factor, np.diff(old.start))[:, None]
     plain = ToothEngagement(old.start, rows, old.tooth, old.slice, old.slices, old.frame)
-    return replace(cuts, bites=with_runout(plain, cuts.cutter), plain=plain)
+    return replace(cuts, engagement=with_runout(plain, cuts.cutter), plain=plain)
 
 
 def engagement_of_step(
@@ -153,7 +153,7 @@ def engagement_of_step(
 
 
 def engagement_of_steps(cuts: list[StepEngagement], profile: Slices) -> ToothEngagement:
-    """The bites of some steps of one cutter, without its runout."""
+    """The engagement of some steps of one cutter, without its runout."""
     start = np.cumsum([0, *(len(c.rows) for c in cuts)])
     rows, owner = np.concatenate([c.rows for c in cuts]), np.concatenate([c.owner for c in cuts])
     frame = np.array([c.frame for c in cuts])
@@ -162,7 +162,7 @@ def engagement_of_steps(cuts: list[StepEngagement], profile: Slices) -> ToothEng
 
 
 def _with_parts(rows: Floats, owner: Ints, profile: Slices) -> tuple[Ints, Floats]:
-    """Slices of bites, and the columns of the profile followed by those of parts of its arcs.
+    """Slices of the engaged edge, and the columns of the profile followed by those of parts of its arcs.
 
     A bite that ends within a slice of an arc has the radius and the normal of its own middle, not of the slice's: in a
     shallow cut by a ball nose the uppermost slice holds much of the torque.
@@ -190,22 +190,22 @@ def greatest_loads(cuts: Cuts, material: Material, rotation: float, bands: bool 
     """Columns (c,) of :data:`LOADS` that limits hold: greatest force [N], greatest and mean torque [N m], mean power
     [W], thickest chip [mm]; with ``bands`` those of :data:`BANDS` too.
     """
-    turn = over_turn(cuts.bites, cuts.cutter, material, rotation)
+    turn = over_turn(cuts.engagement, cuts.cutter, material, rotation)
     force, torque, _ = turn
-    sure = bands_of_steps(cuts.bites, cuts.cutter, material, turn, cuts.spindle) if bands else {}
-    _, mean = mean_forces(cuts.bites, cuts.cutter, material)
+    sure = bands_of_steps(cuts.engagement, cuts.cutter, material, turn, cuts.spindle) if bands else {}
+    _, mean = mean_forces(cuts.engagement, cuts.cutter, material)
     return {
         "force_n": np.linalg.norm(force, axis=2).max(axis=1),
         "torque_nm": torque.max(axis=1) / 1000.0,
         "torque_mean_nm": mean / 1000.0,
         "power_w": mean * np.abs(cuts.spindle) / 1000.0,
-        "chip_max_mm": cuts.bites.chip_max(),
+        "chip_max_mm": cuts.engagement.chip_max(),
         **sure,
     }
 
 
 def bands_of_steps(
-    bites: ToothEngagement, cutter: Cutter, material: Material, turn: OverTurn, spindle: Floats
+    engagement: ToothEngagement, cutter: Cutter, material: Material, turn: OverTurn, spindle: Floats
 ) -> dict[str, Floats]:
     """Columns (c,) of :data:`BANDS` from :func:`over_turn` of the steps: standard deviation of greatest force [N],
     greatest and mean torque [N m] and power [W] by that of the coefficients; none where the material does not say it.
@@ -214,22 +214,22 @@ def bands_of_steps(
         return {}
     force, torque, theta = turn
     at_force = theta[np.linalg.norm(force, axis=2).argmax(axis=1)]
-    force_sd, torque_sd = peak_band(bites, cutter, material, at_force, theta[torque.argmax(axis=1)])
-    mean_sd = mean_band(bites, cutter, material)[1]
+    force_sd, torque_sd = peak_band(engagement, cutter, material, at_force, theta[torque.argmax(axis=1)])
+    mean_sd = mean_band(engagement, cutter, material)[1]
     values = (force_sd, torque_sd / 1000.0, mean_sd / 1000.0, mean_sd * np.abs(spindle) / 1000.0)
     return dict(zip(BANDS, values, strict=True))
 
 
-def over_turn(bites: ToothEngagement, cutter: Cutter, material: Material, rotation: float) -> OverTurn:
+def over_turn(engagement: ToothEngagement, cutter: Cutter, material: Material, rotation: float) -> OverTurn:
     """Force and torque at rotations at most ``rotation`` apart, and these rotations [rad]."""
     pitch = math.tau / cutter.flutes if cutter.teeth_alike else math.tau
     count = max(math.ceil(pitch / rotation), 8)
     theta = np.asarray(np.arange(count) * (pitch / count), dtype=np.float64)
-    return *forces_over_turn(bites, cutter, material, theta), theta
+    return *forces_over_turn(engagement, cutter, material, theta), theta
 
 
 def loads_of_steps(
-    bites: ToothEngagement,
+    engagement: ToothEngagement,
     cuts: list[StepEngagement],
     cutter: Cutter,
     material: Material,
@@ -239,20 +239,20 @@ def loads_of_steps(
 ) -> Floats:
     """(c, len(LOADS)) loads of steps that take ``seconds`` (c,), from :func:`over_turn` of them."""
     force, torque, _ = turn
-    mean, torque_mean = mean_forces(bites, cutter, material)
-    turned = in_work(force, bites.frames)
-    left = _left(bites, cuts)
-    volume, work = engaged_work(bites, cutter, material, np.abs(spindle) * seconds)
+    mean, torque_mean = mean_forces(engagement, cutter, material)
+    turned = in_work(force, engagement.frames)
+    left = _left(engagement, cuts)
+    volume, work = engaged_work(engagement, cutter, material, np.abs(spindle) * seconds)
     return np.column_stack(
         [
-            in_work(mean, bites.frames),
+            in_work(mean, engagement.frames),
             turned.max(axis=1),
             turned.min(axis=1),
             np.linalg.norm(force, axis=2).max(axis=1),
             torque_mean / 1000.0,
             torque.max(axis=1) / 1000.0,
             torque_mean * np.abs(spindle) / 1000.0,
-            bites.chip_max(),
+            engagement.chip_max(),
             -np.einsum("nmi,ni->nm", turned, left).min(axis=1).clip(None, 0.0),
             volume,
             work / 1000.0,
@@ -260,7 +260,9 @@ def loads_of_steps(
     )
 
 
-def engaged_work(bites: ToothEngagement, cutter: Cutter, material: Material, turned: Floats) -> tuple[Floats, Floats]:
+def engaged_work(
+    engagement: ToothEngagement, cutter: Cutter, material: Material, turned: Floats
+) -> tuple[Floats, Floats]:
     """(c,) volume [mm^3] that the engaged edge sweeps while the spindle turns by ``turned`` (c,) [rad], and (c,) work
     [N mm] of the torque without the edge coefficients.
 
@@ -269,21 +271,21 @@ def engaged_work(bites: ToothEngagement, cutter: Cutter, material: Material, tur
     the material has a size effect the quotient is the mean of Ktc h^(-m) over the volume.
     """
     plain = replace(material, Kte=0.0, Kre=0.0, Kae=0.0, covariance=None)
-    work = mean_forces(bites, cutter, plain)[1] * turned
+    work = mean_forces(engagement, cutter, plain)[1] * turned
     if material.exponents[0] == 0.0:
         return work / material.Ktc, work
-    return mean_forces(bites, cutter, replace(plain, exponents=(0.0, 0.0, 0.0)))[1] * turned / material.Ktc, work
+    return mean_forces(engagement, cutter, replace(plain, exponents=(0.0, 0.0, 0.0)))[1] * turned / material.Ktc, work
 
 
-def _left(bites: ToothEngagement, cuts: list[StepEngagement]) -> Floats:
+def _left(engagement: ToothEngagement, cuts: list[StepEngagement]) -> Floats:
     """(c, 3) outward normal of the cutter, in the work frame, where it leaves a surface behind: nu averaged over the
-    ends of bites at which h = 0, by their length along the profile; 0 where no surface or two that face each other are
-    left.
+    ends of engagement at which h = 0, by their length along the profile; 0 where no surface or two that face each
+    other are left.
     """
     rows, owner = np.concatenate([c.rows for c in cuts]), np.concatenate([c.owner for c in cuts])
     of = np.repeat(np.arange(len(cuts)), [len(c.rows) for c in cuts])
     p, q, a, b, along, offset, across = rows.T
-    sk, ck = bites.slices[owner, 3], bites.slices[owner, 4]
+    sk, ck = engagement.slices[owner, 3], engagement.slices[owner, 4]
     total, whole = np.zeros((len(cuts), 3)), np.zeros(len(cuts))
     for phi in (p, q):
         h = along * np.sin(phi) + across * np.cos(phi) + offset

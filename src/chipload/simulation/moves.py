@@ -89,13 +89,13 @@ class MoveRun:
     ----------
     stock : the moves so far
     layers : heights of the layers of the stock [mm], ascending bounds
-    corner_pieces, flank_mm : slices of an engaged corner, longest slice of the flank by tool number
+    corner_slices, flank_mm : slices of an engaged corner, longest slice of the flank by tool number
     tolerance : of outlines [mm]
     """
 
     stock: MoveStock
     layers: Floats
-    corner_pieces: int
+    corner_slices: int
     flank_mm: Mapping[int, float]
     tolerance: float
 
@@ -109,7 +109,7 @@ class MoveRun:
 
     def contact(self, steps: Steps) -> Engaged:
         """Make some steps: what they engage."""
-        return self.stock.take(steps.p0, steps.p1, steps.tool, corner_pieces=self.corner_pieces, flank_mm=self.flank_mm)
+        return self.stock.take(steps.p0, steps.p1, steps.tool, corner_slices=self.corner_slices, flank_mm=self.flank_mm)
 
     def finish(self, stock: LayeredStock, workers: int) -> None:
         """Take from the layers what the moves swept of their sections; found in so many threads."""
@@ -126,7 +126,7 @@ def run_by_moves(
     cutters: Mapping[int, Cutter],
     step_mm: float,
     tolerance: float,
-    corner_pieces: int,
+    corner_slices: int,
     flank_mm: float,
 ) -> MoveRun:
     """The run of a program by moves.
@@ -148,7 +148,7 @@ def run_by_moves(
         raise HandOver(0, "the stock is neither a block nor a mesh")
     moves = MoveStock(low, high, used, stock.part)
     return MoveRun(
-        moves, np.asarray(stock.bounds), math.ceil(ENGAGED * corner_pieces), dict.fromkeys(used, flank_mm), tolerance
+        moves, np.asarray(stock.bounds), math.ceil(ENGAGED * corner_slices), dict.fromkeys(used, flank_mm), tolerance
     )
 
 
@@ -209,7 +209,7 @@ def moved(
     removed, loads, basis, cuts = np.zeros((n, 4)), np.zeros((n, len(LOADS))), np.zeros((4, 6)), list[Cuts]()
     bands = {name: np.zeros(n) for name in BANDS} if material.has_band else {}
     removed[:, 0] = np.bincount(found.step, found.volume / found.instants, n)
-    np.maximum.at(removed[:, 1], found.step, found.pieces)
+    np.maximum.at(removed[:, 1], found.step, found.areas)
     removed[:, 2] = _layers(found, run.layers, n)
     rapid = steps.rapid[found.step]
     length = np.linalg.norm(steps.p1 - steps.p0, axis=1)[found.step]

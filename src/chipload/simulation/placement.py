@@ -92,7 +92,7 @@ def placement_of(
     """
     fed = ~np.asarray(columns["rapid"], dtype=np.bool_)
     if not fed.any():
-        raise InputError("program: no motion at a feed: there is no placement to look at")
+        raise InputError("program: no motion at a feed: there is no placement to compare")
     stock_low, stock_high = (np.asarray(corner, dtype=np.float64) for corner in bounds)
     seconds, chips = np.asarray(columns["seconds"]), np.asarray(columns["chip_volume_mm3"])
     tip = np.column_stack([columns[f"{x}_mm"] for x in "xyz"])

@@ -47,24 +47,24 @@ class Resolution:
     ----------
     step_mm : longest step of the tip [mm]
     tolerance : how far chords leave the edges of chips [mm]
-    corner_pieces : slices of a corner radius
+    corner_slices : slices of a corner radius
     flank_mm : length of a slice along the flank [mm]
     rotation : between two rotations at which the force is looked at [rad]
     grading : of the slices of a corner, see :func:`chipload.cutter.slices.slices`
-    bottom_pieces : slices of the bottom line
+    bottom_slices : slices of the bottom line
     """
 
     step_mm: float
     tolerance: float
-    corner_pieces: int
+    corner_slices: int
     flank_mm: float
     rotation: float = math.radians(1.0)
     grading: float = 1.0
-    bottom_pieces: int = 4
+    bottom_slices: int = 4
 
 
 @dataclass(frozen=True, eq=False)
-class ChipPieces:
+class ChipAreas:
     """The chip of one step on one layer: the one with most pieces, of those the one whose pieces are most alike.
 
     Parameters
@@ -108,7 +108,7 @@ class Removal:
     volume_before: float
     volume_after: float
     mean_band: tuple[float, ...] | None
-    piece: ChipPieces | None
+    piece: ChipAreas | None
     findings: tuple[Finding, ...]
     labels: tuple[str, ...]
     cuts: tuple[Cuts, ...] = ()
@@ -170,5 +170,5 @@ class RunningSums:
     cut_s: float = 0.0
     basis: Floats = field(default_factory=lambda: np.zeros((4, 6)))
     rapids: tuple[int, ...] = ()
-    piece: ChipPieces | None = None
+    piece: ChipAreas | None = None
     handed: tuple[int, str] | None = None

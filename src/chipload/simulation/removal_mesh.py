@@ -66,7 +66,7 @@ class RemovalMesh:
 
 
 @dataclass(frozen=True, eq=False)
-class ToolPath:
+class ToolPoses:
     """Where the tool stands at each row.
 
     Parameters
@@ -83,7 +83,7 @@ class ToolPath:
     apart: NDArray[np.bool_]
 
 
-def removal_mesh(blank: trimesh.Trimesh, path: ToolPath, cutters: Mapping[int, Cutter]) -> RemovalMesh:
+def removal_mesh(blank: trimesh.Trimesh, path: ToolPoses, cutters: Mapping[int, Cutter]) -> RemovalMesh:
     """Run the tool along the rows through the blank.
 
     Parameters
@@ -137,7 +137,7 @@ def _pitch(size: Floats, radius: float, poses: int) -> float:
     return float(max(fine, 2.0 * radius * math.sqrt(3.0 * max(poses, 1) / WORK)))
 
 
-def _instants(path: ToolPath, cutters: Mapping[int, Cutter], known: NDArray[np.bool_]) -> list[Ints]:
+def _instants(path: ToolPoses, cutters: Mapping[int, Cutter], known: NDArray[np.bool_]) -> list[Ints]:
     """Rows that stand for runs of rows that go on from one another with one tool: the first and last of each run, and
     those between at which the path has turned or gone some share of the radius.
     """
@@ -165,7 +165,7 @@ def _instants(path: ToolPath, cutters: Mapping[int, Cutter], known: NDArray[np.b
     return out
 
 
-def _frames(instants: list[Ints], path: ToolPath) -> Ints:
+def _frames(instants: list[Ints], path: ToolPoses) -> Ints:
     """(m,) rows at which frames end: after equal lengths of path."""
     if not instants:
         return np.zeros(0, dtype=np.int64)
@@ -189,7 +189,7 @@ def _runs(instants: list[Ints], ends: Ints) -> list[list[Ints]]:
     return out
 
 
-def _between(path: ToolPath, places: Ints, far: float) -> tuple[Floats, Floats]:
+def _between(path: ToolPoses, places: Ints, far: float) -> tuple[Floats, Floats]:
     """Tips and axes at some rows, and between rows that are farther apart than ``far`` [mm]; at least two."""
     if len(places) == 1:
         places = np.repeat(places, 2)

@@ -101,7 +101,7 @@ def nearest(program: Program, cutter: Cutter, points: ArrayLike) -> WallClearanc
     return best
 
 
-def beside(stock: LayeredStock, body: trimesh.Trimesh, low: float) -> SectionDeviation:
+def section_deviation(stock: LayeredStock, body: trimesh.Trimesh, low: float) -> SectionDeviation:
     """What is left of a stock beside the finished body.
 
     Parameters

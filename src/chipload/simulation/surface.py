@@ -39,10 +39,10 @@ class Difference:
     Parameters
     ----------
     points : (p, 3) float [mm]; faces : (f, 3) int, triangles of them
-    distance : (p,) float [mm]; inf: more than was looked for
+    distance : (p,) float [mm]; inf: beyond the search range
     step : (p,) int, nearest step; -1: none
     deepest : (n,) float [mm] of each step; inf: far from the part
-    look : [mm]
+    search_range : [mm]
     over : (p,) bool, whether the stock stood over the point before: elsewhere nothing can be left
     """
 
@@ -51,7 +51,7 @@ class Difference:
     distance: Floats
     step: Ints
     deepest: Floats
-    look: float
+    search_range: float
     over: NDArray[np.bool_]
 
 
@@ -79,7 +79,8 @@ def require_points(mesh: trimesh.Trimesh, spacing: float, name: str) -> None:
     guess = float(np.asarray(mesh.area)) / (0.25 * spacing * spacing) + len(sides)
     if guess > MOST_POINTS:
         raise InputError(
-            f"{name}: spacing_mm = {spacing:g}: gives about {guess:.0g} points, more than {MOST_POINTS}: state more"
+            f"{name}: spacing_mm = {spacing:g}: gives about {guess:.0g} points, more than {MOST_POINTS}: state "
+            "a larger spacing"
         )
 
 
@@ -103,7 +104,7 @@ def difference(
     part: trimesh.Trimesh,
     in_stock: Callable[[Floats], NDArray[np.bool_]],
     spacing: float,
-    look: float,
+    search_range: float,
     tolerance: float,
     progress: Callable[[int], None] = lambda done: None,
 ) -> Difference:
@@ -113,18 +114,18 @@ def difference(
     ----------
     steps : all, or block after block
     in_stock : which points (p, 3) lay in the stock before the program
-    spacing, look, tolerance : [mm], of the points; how far material is looked for; of the path
+    spacing, search_range, tolerance : [mm], of the points; how far material is looked for; of the path
     progress : is told how many steps are done
     """
     points, faces = fine(part, spacing, "part")
     normals = np.asarray(trimesh.Trimesh(points, faces, process=False).vertex_normals)
     over = in_stock(points + OVER * tolerance * normals)
-    near = LeastDistance({n: cutting_part(c) for n, c in cutters.items()}, points, look, tolerance)
+    near = LeastDistance({n: cutting_part(c) for n, c in cutters.items()}, points, search_range, tolerance)
     deepest = [np.empty(0)]
     for block in blocks_of(steps):
         progress(near.done)
         deepest.append(near.take(block))
-    return Difference(points, faces, near.distance, near.step, np.concatenate(deepest), look, over)
+    return Difference(points, faces, near.distance, near.step, np.concatenate(deepest), search_range, over)
 
 
 def collisions(
@@ -177,23 +178,33 @@ def in_stock(
     steps : all, or block after block; gone through twice
     points : (p, 3) float [mm] of a grid in the stock
     progress : is told how many steps are done
+
+    A tool that is a body without chips takes the points away at a feed, and runs into them in rapids.
     """
-    cut = LeastDistance({n: cutting_part(c) for n, c in cutters.items()}, points, tolerance, tolerance)
-    hit = LeastDistance({n: above_cutting(c) for n, c in cutters.items()}, points, tolerance, tolerance)
+    parts, bodies = {n: cutting_part(c) for n, c in cutters.items()}, [n for n, c in cutters.items() if c.body]
+    cut = LeastDistance(parts, points, tolerance, tolerance)
+    hits = {ABOVE: LeastDistance({n: above_cutting(c) for n, c in cutters.items()}, points, tolerance, tolerance)}
+    if bodies:
+        hits["cutting part in a rapid"] = LeastDistance(parts, points, tolerance, tolerance)
     for block in blocks_of(steps):
         progress(cut.done)
-        cut.take(block)
-        hit.take(block)
-    bad = (hit.first < cut.first) & (hit.first != NEVER)
-    at, depth = hit.first[bad], hit.distance[bad]
-    best: dict[int, Collision] = {}
-    done = 0
-    for block in blocks_of(steps) if len(at) else ():
-        deepest, own = np.full(len(block), np.inf), (at >= done) & (at < done + len(block))
-        np.minimum.at(deepest, at[own] - done, depth[own])
-        _by_line(block, done, ABOVE, "stock", deepest, tolerance, best)
-        done += len(block)
-    return tuple(best.values())
+        rapid = block.rapid & np.isin(block.tool, bodies)
+        cut.take(block, ~rapid)
+        for what, hit in hits.items():
+            hit.take(block, None if what == ABOVE else rapid)
+    out: list[Collision] = []
+    for what, hit in hits.items():
+        bad = (hit.first < cut.first) & (hit.first != NEVER)
+        at, depth = hit.first[bad], hit.distance[bad]
+        best: dict[int, Collision] = {}
+        done = 0
+        for block in blocks_of(steps) if len(at) else ():
+            deepest, own = np.full(len(block), np.inf), (at >= done) & (at < done + len(block))
+            np.minimum.at(deepest, at[own] - done, depth[own])
+            _by_line(block, done, what, "stock", deepest, tolerance, best)
+            done += len(block)
+        out += best.values()
+    return tuple(out)
 
 
 def _by_line(

@@ -113,6 +113,7 @@ def _near_stock(
     low, high = boxes(steps, cutters)
     near = (high[:, 0] >= stock.xs[0]) & (low[:, 0] <= stock.xs[-1])
     near &= (high[:, 1] >= stock.ys[0]) & (low[:, 1] <= stock.ys[-1])
+    near &= ~np.isin(steps.tool, [n for n, c in cutters.items() if c.body])
     return low, high, near
 
 

@@ -104,7 +104,7 @@ def quiet_speeds(parts: Sequence[DynamicCuts], speed: ArrayLike, wanted: float) 
     """
     speeds = np.asarray(speed, dtype=np.float64)
     if not sum(map(len, parts)):
-        raise InputError("quiet speeds: no cut: nothing to look at")
+        raise InputError("quiet speeds: no cut: no speed to choose")
     if speeds.ndim != 1 or not len(speeds) or not (speeds[0] > 0.0 and (np.diff(speeds) > 0.0).all()):
         raise InputError("quiet speeds: speeds must rise from above 0 rad/s")
     least, own, before = np.full(len(speeds), np.inf), np.zeros(len(speeds), dtype=np.int64), 0

@@ -49,6 +49,8 @@ Shapes = NDArray[np.object_]
 KIND = "chipload layered stock 1"
 #: arrays of a saved stock and their numbers of dimensions
 SAVED = {"bounds": 1, "xs": 1, "ys": 1, "cut": 1, "room": 1, "tidied": 1, "vertices": 2, "faces": 2}
+#: shortest side of a block [mm]
+LEAST_MM = 1e-3
 #: a tile with fewer points than this is not tidied
 ROOM = 128
 
@@ -103,11 +105,16 @@ class LayeredStock:
         Raises
         ------
         InputError
-            A side is not above 0, or bounds do not ascend from the bottom to the top.
+            A side is shorter than :data:`LEAST_MM`, or bounds do not ascend from the bottom to the top.
         """
         a, b = (np.asarray(corner, dtype=np.float64) for corner in (low, high))
         if a.shape != (3,) or b.shape != (3,) or not np.isfinite([a, b]).all() or not (b > a).all():
             raise InputError(f"stock: from {a.tolist()} to {b.tolist()} mm: each side must be above 0 and finite")
+        if float((b - a).min()) < LEAST_MM:
+            raise InputError(
+                f"stock: {float((b - a).min()):g} mm from {a.tolist()} to {b.tolist()}: each side must be at least "
+                f"{LEAST_MM:g} mm"
+            )
         bounds = bounds_of(bounds_or_layer_mm, float(a[2]), float(b[2]))
         if bounds[0] != a[2] or bounds[-1] != b[2]:
             raise InputError(
@@ -263,7 +270,8 @@ class LayeredStock:
         count = float(self.thickness[split.start : split.stop].sum()) / layer_mm
         if count > LAYER_LIMIT:
             raise InputError(
-                f"stock.layer_mm = {layer_mm:g}: {count:.4g} layers: must be at most {LAYER_LIMIT}: state thicker ones"
+                f"stock.layer_mm = {layer_mm:g}: {count:.4g} layers: must be at most {LAYER_LIMIT}: state "
+                "thicker layers"
             )
         for i in split:
             parts = math.ceil(self.thickness[i] / layer_mm * (1.0 - 1e-12))

@@ -83,7 +83,7 @@ def bounds_of(bounds_or_layer_mm: ArrayLike, low: float, high: float) -> Floats:
         thickest = float(given)
         if not 0.0 < thickest < math.inf:
             raise InputError(f"stock.layer_mm = {thickest:g}: must be above 0")
-        given = np.linspace(low, high, _pieces(low, high, thickest, "stock.layer_mm", LAYER_LIMIT) + 1)
+        given = np.linspace(low, high, _parts(low, high, thickest, "stock.layer_mm", LAYER_LIMIT) + 1)
     if given.ndim != 1 or len(given) < 2 or not np.isfinite(given).all() or not (np.diff(given) > 0.0).all():
         raise InputError("stock.bounds: must be two or more ascending heights [mm]")
     return given
@@ -93,15 +93,15 @@ def borders_of(low: float, high: float, tile_mm: float) -> Floats:
     """Borders [mm] of equal tiles no longer than ``tile_mm``."""
     if not 0.0 < tile_mm < math.inf:
         raise InputError(f"stock.tile_mm = {tile_mm:g}: must be above 0; two to four cutter diameters")
-    return np.linspace(low, high, _pieces(low, high, tile_mm, "stock.tile_mm", TILE_LIMIT) + 1)
+    return np.linspace(low, high, _parts(low, high, tile_mm, "stock.tile_mm", TILE_LIMIT) + 1)
 
 
-def _pieces(low: float, high: float, longest: float, key: str, most: int) -> int:
+def _parts(low: float, high: float, longest: float, key: str, most: int) -> int:
     """Number of equal pieces no longer than ``longest``."""
     count = (high - low) / longest * (1.0 - 1e-12)
     if not count <= most:
         raise InputError(
-            f"{key} = {longest:g}: {high - low:g} mm in {count:.4g} pieces: must be at most {most}: state more"
+            f"{key} = {longest:g}: {high - low:g} mm in {count:.4g} parts: must be at most {most}: state a larger value"
         )
     return max(1, math.ceil(count))
 

@@ -104,7 +104,7 @@ class StructureRemoval:
     B : (b,) int, rows of ``columns``
     D : (b, b) float [N/mm]
     lu : factors of I + D G, as :func:`scipy.linalg.lu_factor` gives them
-    inside : the cut elements
+    interior : the cut elements
     limit : greatest rank before the workpiece is factored again
     factorisations : how many there were
     """
@@ -116,7 +116,7 @@ class StructureRemoval:
     B: Indices
     D: Array
     lu: tuple[Array, NDArray[np.int32]]
-    inside: CutElements
+    interior: CutElements
     limit: int
     factorisations: int = 1
 
@@ -160,7 +160,7 @@ def _fresh(base: Factored, region: Indices, limit: int, factorisations: int) -> 
     rows = _rows(base, region)
     columns = SolvedColumns(rows, np.zeros(0, np.int64), np.full(len(rows), -1), np.zeros((0, len(rows))))
     none = np.zeros(0, dtype=np.int64)
-    inside = CutElements(none, none, none, csc_array((0, 0)), None)
+    interior = CutElements(none, none, none, csc_array((0, 0)), None)
     return StructureRemoval(
         base.solid,
         base,
@@ -169,7 +169,7 @@ def _fresh(base: Factored, region: Indices, limit: int, factorisations: int) -> 
         none,
         np.zeros((0, 0)),
         (np.zeros((0, 0)), np.zeros(0, np.int32)),
-        inside,
+        interior,
         limit,
         factorisations,
     )
@@ -253,7 +253,7 @@ def cut(
     if len(A):
         D += before[B][:, A] @ factor(before[A][:, A].tocsc()).solve(before[A][:, B].toarray())
     K_BA = after[B][:, live].tocsc()
-    inside = CutElements(
+    interior = CutElements(
         touched[live],
         touched[A[gone]],
         np.flatnonzero((now != state.base.solid.kept).any(axis=1)),
@@ -261,7 +261,7 @@ def cut(
         factor(after[live][:, live].tocsc()) if len(live) else None,
     )
     if len(live):
-        D -= K_BA @ inside.solve(K_BA.T.toarray())
+        D -= K_BA @ interior.solve(K_BA.T.toarray())
     at = np.searchsorted(state.columns.rows, touched[B])
     columns = _with_columns(state.columns, state.base, at, progress)
     G = columns.W[np.ix_(columns.place[at], at)]
@@ -275,7 +275,7 @@ def cut(
             f"cut: smallest pivot {pivot:.1e}, must be above {SMALLEST_PIVOT:.1e}: a piece of the workpiece would hang "
             "on a hinge of nodes or hardly at all"
         )
-    return replace(state, solid=solid, columns=columns, B=at, D=D, lu=lu, inside=inside)
+    return replace(state, solid=solid, columns=columns, B=at, D=D, lu=lu, interior=interior)
 
 
 def _cut_elements(base: Factored, solid: SolidWorkpiece) -> tuple[Indices, NDArray[np.bool_], csc_array, csc_array]:

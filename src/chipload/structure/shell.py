@@ -88,7 +88,7 @@ class Shell:
         if self.thickness > narrow:
             raise InputError(
                 f"shell.thickness = {self.thickness:g} mm: must be at most the least radius {narrow:g}; "
-                "a thin shell is meant (below a tenth of it)"
+                "this is for thin shells (below a tenth of it)"
             )
 
     def radius_at(self, s: ArrayLike) -> Floats:
@@ -151,7 +151,7 @@ def ritz(shell: Shell, harmonics: int = 80, terms: int = 40, repeat: int = 1) ->
         weight = (math.tau if n == 0 else math.pi) * area
         flat = (len(s) * 6, 3 * terms)
         stiffness = b.reshape(flat).T @ (law @ b * weight[:, None, None]).reshape(flat)
-        held = _held(shell, terms, int(n))
+        held = _rigid_motions(shell, terms, int(n))
         stiffness[held, :] = stiffness[:, held] = 0.0
         stiffness[held, held] = 1.0
         scale = 1.0 / np.sqrt(np.diag(stiffness))
@@ -267,7 +267,7 @@ def stress(
     """
     point, angle = np.broadcast_arrays(np.asarray(s_point, dtype=np.float64), np.asarray(theta, dtype=np.float64))
     shape, at, angle = point.shape, point.ravel(), angle.ravel()
-    _inside(modes.shell, at, 0.0)
+    _require_on_wall(modes.shell, at, 0.0)
     if (length == 0.0 or width == 0.0) and (np.hypot(at - s_force, modes.shell.radius_at(at) * angle) == 0.0).any():
         raise InputError(
             f"shell.stress: s = {s_force:g} mm: under a point force the stress has no limit; give the length and the "
@@ -427,7 +427,7 @@ def _strains(shell: Shell, basis: tuple[Floats, ...], s: Floats, n: int) -> Floa
     return b.reshape(len(s), 6, -1)
 
 
-def _held(shell: Shell, terms: int, n: int) -> NDArray[np.int64]:
+def _rigid_motions(shell: Shell, terms: int, n: int) -> NDArray[np.int64]:
     """Coefficients that are 0: the rigid motions that nothing holds and no load moves."""
     if n > 0 or shell.ends == "clamped":
         return np.empty(0, dtype=np.int64)
@@ -439,7 +439,7 @@ def _held(shell: Shell, terms: int, n: int) -> NDArray[np.int64]:
 def _loads(modes: Ritz, s: Floats, length: float) -> Floats:
     """(k, 3 terms, 3) work of unit forces along u, v, w at s, spread over ``length``, on each function."""
     shell, terms = modes.shell, modes.terms
-    _inside(shell, s, length)
+    _require_on_wall(shell, s, length)
     nodes, weights = legendre.leggauss(terms + 2) if length > 0.0 else (np.zeros(1), np.full(1, 2.0))
     out = np.zeros((len(s), 3, terms, 3))
     places = (s[:, None] + 0.5 * length * nodes).ravel()
@@ -449,7 +449,7 @@ def _loads(modes: Ritz, s: Floats, length: float) -> Floats:
     return out.reshape(len(s), 3 * terms, 3)
 
 
-def _inside(shell: Shell, s: Floats, length: float) -> None:
+def _require_on_wall(shell: Shell, s: Floats, length: float) -> None:
     """Refuse places that are not on the wall."""
     slack = 1e-9 * shell.length
     bad = ~((s - 0.5 * length >= -slack) & (s + 0.5 * length <= shell.length + slack))

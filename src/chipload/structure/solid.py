@@ -61,7 +61,7 @@ class SolidWorkpiece:
     fixed: NDArray[np.bool_] | Indices
     kept: Array = field(default_factory=lambda: np.array([0.0, 1.0]))
     rule: int = 27
-    held: NDArray[np.bool_] = field(init=False)
+    constrained: NDArray[np.bool_] = field(init=False)
 
     def __post_init__(self) -> None:
         lo, hi = MODULUS_RANGE
@@ -102,7 +102,7 @@ class SolidWorkpiece:
         kept.setflags(write=False)
         held.setflags(write=False)
         object.__setattr__(self, "kept", kept)
-        object.__setattr__(self, "held", held)
+        object.__setattr__(self, "constrained", held)
 
     @property
     def there(self) -> Indices:
@@ -146,7 +146,7 @@ def free_dofs(solid: SolidWorkpiece) -> Indices:
     """Degrees of freedom that are neither held nor of a node without an element."""
     used = np.zeros(len(solid.grid.nodes), dtype=np.bool_)
     used[solid.grid.elements[solid.there]] = True
-    return np.flatnonzero((used[:, None] & ~solid.held).ravel())
+    return np.flatnonzero((used[:, None] & ~solid.constrained).ravel())
 
 
 def check_clamped(solid: SolidWorkpiece) -> None:
@@ -175,7 +175,7 @@ def check_clamped(solid: SolidWorkpiece) -> None:
             motion[:, c, c] = 1.0
             a, b = (c + 1) % 3, (c + 2) % 3
             motion[:, b, 3 + c], motion[:, a, 3 + c] = x[:, a] / size, -x[:, b] / size
-        stopped = motion[solid.held[mine]]
+        stopped = motion[solid.constrained[mine]]
         if len(stopped):
             values, vectors = np.linalg.eigh(stopped.T @ stopped)
         else:

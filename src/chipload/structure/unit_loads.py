@@ -79,7 +79,7 @@ def alive(state: StructureRemoval, watched: UnitLoads) -> NDArray[np.bool_]:
 
 
 def _alive(state: StructureRemoval, F: csc_array, d: int) -> NDArray[np.bool_]:
-    weight = np.asarray(abs(F.tocsr()[state.inside.gone]).sum(axis=0))
+    weight = np.asarray(abs(F.tocsr()[state.interior.gone]).sum(axis=0))
     return np.asarray(weight.reshape(-1, d).max(axis=1) <= 1e-12)
 
 
@@ -103,7 +103,7 @@ def compliance(state: StructureRemoval, watched: UnitLoads) -> Array:
     V = state.correction(U)
     b, p = len(U), len(watched.own)
     out = watched.own - np.einsum("bpi,bpj->pij", U.reshape(b, p, d), V.reshape(b, p, d))
-    weight = np.asarray(abs(watched.F.tocsr()[state.inside.A]).sum(axis=0))
+    weight = np.asarray(abs(watched.F.tocsr()[state.interior.A]).sum(axis=0))
     on_cut = weight.reshape(-1, d).max(axis=1) > 0.0
     if on_cut.any():
         out[on_cut] = _on_cut(state, watched.F[:, np.repeat(on_cut, d)], d)
@@ -120,7 +120,7 @@ def cut_compliance(state: StructureRemoval, places: MeshPlaces, normals: ArrayLi
     InputError
         An element was not cut, or a place is on material that is gone.
     """
-    stray = places.element[~np.isin(places.element, state.inside.elements)]
+    stray = places.element[~np.isin(places.element, state.interior.elements)]
     if len(stray):
         raise InputError(
             f"cut_compliance: element {stray[0]} was not cut since the last factorisation: watch the place instead"
@@ -139,9 +139,9 @@ def _refuse_dead(living: NDArray[np.bool_]) -> None:
 def _on_cut(state: StructureRemoval, F: csc_array, d: int) -> Array:
     """Forces on the cut elements, by way of B; (p, d, d)."""
     rows = F.tocsr()
-    f_A = rows[state.inside.A].toarray()
-    u_A = state.inside.solve(f_A)
-    g = rows[state.columns.rows[state.B]].toarray() - state.inside.K_BA @ u_A
+    f_A = rows[state.interior.A].toarray()
+    u_A = state.interior.solve(f_A)
+    g = rows[state.columns.rows[state.B]].toarray() - state.interior.K_BA @ u_A
     G = state.columns.W[np.ix_(state.columns.place[state.B], state.B)]
     u_B = G @ g
     shape = (-1, F.shape[1] // d, d)

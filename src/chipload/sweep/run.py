@@ -118,7 +118,7 @@ class SweepResult:
         head = f"{len(self.cases)} cases, {len(all_of_them)} combinations, {refused} refused"
         if best is None:
             return f"{head}; none holds" + (f" in {self.confidence:.0%} of its samples" if self._sampled else "")
-        values = ", ".join(f"{key}={value}" for key, value in best.values) or "the job as it stands"
+        values = ", ".join(f"{key}={value}" for key, value in best.values) or "the job as stated"
         time = "" if best.time_s is None else f" in {best.time_s:.4g} s"
         low, high = best.interval
         chance = f" with a probability of {best.probability:.3g} ({low:.3g} to {high:.3g})" if self._sampled else ""

@@ -60,7 +60,7 @@ def open_path(path: str | Path) -> OpenedFolder:
     if real.is_dir():
         return OpenedFolder(real, "." if is_result(real) else None)
     if not is_job(real):
-        raise InputError(f"{path}: is no job: name a job file (TOML), a result folder or a folder that holds them")
+        raise InputError(f"{path}: is not a job: name a job file (TOML), a result folder or a folder that holds them")
     return OpenedFolder(real.parent, real.name)
 
 

@@ -30,7 +30,7 @@ from chipload.web.panels import RELEASE
 from chipload.web.panels.job_form import JobForm
 from chipload.web.result import PageResult, open_result
 from chipload.web.result_view import VERDICTS, ResultView
-from chipload.web.runs import Run
+from chipload.web.runs import JobRun
 
 KEYS = (
     ("\u2190 \u2192", "one step back or on; with Shift twenty"),
@@ -50,7 +50,7 @@ class Runs:
     """The runs of this page: one at a time, seen in every window."""
 
     def __init__(self) -> None:
-        self.now: Run | None = None
+        self.now: JobRun | None = None
 
     async def stop(self) -> None:
         """Stop what runs."""
@@ -64,8 +64,8 @@ class Page:
     def __init__(self, opened: OpenedFolder, runs: Runs, assets: AssetCache) -> None:
         self.opened, self.runs, self.assets = opened, runs, assets
         self.result: PageResult | None = None
-        self.own: Run | None = None
-        self.seen: Run | None = runs.now if runs.now is not None and runs.now.over else None
+        self.own: JobRun | None = None
+        self.seen: JobRun | None = runs.now if runs.now is not None and runs.now.over else None
         ui.add_css(resources.files(__package__).joinpath("page.css").read_text("utf-8"))
         ui.add_head_html('<script>document.documentElement.lang = "en"</script><script src="/viewer.js"></script>')
         ui.colors(primary="#2f5d8a")
@@ -80,7 +80,7 @@ class Page:
         self.running, self.ask = self._dialog("Run")
         self._help()
         ui.keyboard(on_key=self._key, ignore=["input", "textarea"])
-        ui.timer(LOOK, self._look)
+        ui.timer(LOOK, self._poll)
         self.stage.set_visibility(False)
 
     async def begin(self, name: str | None) -> None:
@@ -280,19 +280,19 @@ class Page:
                 raise InputError("a job runs already: stop it first")
             path = resolve_name(root, job)
             if not is_job(path):
-                raise InputError(f"{job}: is no job any more")
+                raise InputError(f"{job}: is no longer a job")
             target = target_in(root, out)
             check_target(target)
         except (InputError, OutputError) as err:
             message.set_text(str(err).replace(f"--out {root}/", ""))
             return
         self.running.close()
-        self.runs.now = now = Run(job, target.relative_to(root).as_posix(), overrides, beside)
+        self.runs.now = now = JobRun(job, target.relative_to(root).as_posix(), overrides, beside)
         self.seen, self.own = None, now
         self.bar.set_visibility(True)
         background_tasks.create(now.work(path, target))
 
-    async def _look(self) -> None:
+    async def _poll(self) -> None:
         now = self.runs.now
         if now is None or self.seen is now:
             return

@@ -25,7 +25,7 @@ KEPT = 2000
 State = Literal["running", "stopping", "done", "stopped", "failed"]
 
 
-class Run:
+class JobRun:
     """One run: its ``state``, the share ``done``, ``what`` it does; at its end its ``code`` and its ``message``.
 
     Parameters

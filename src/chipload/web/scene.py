@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, InputError
-from chipload.report.bodies import Body, bodies_note, scene_bodies
+from chipload.report.bodies import SceneBody, bodies_note, scene_bodies
 from chipload.report.colouring import colouring_of, colouring_of_words, lowest_limit
 from chipload.report.marks import marks_of
 from chipload.report.removal import REMOVAL, read_removal
@@ -34,7 +34,7 @@ class PageScene:
     notice: str
 
 
-def bodies(result: PageResult) -> tuple[tuple[Body, ...], str]:
+def bodies(result: PageResult) -> tuple[tuple[SceneBody, ...], str]:
     """The bodies of scene.glb beside path and cutter, and a sentence where there are none or they are simplified."""
     try:
         path = result.file(SCENE)
@@ -69,7 +69,7 @@ def view_path(track: PageTrack) -> ViewPath:
 def page_scene(
     result: PageResult,
     track: PageTrack,
-    found: tuple[tuple[Body, ...], str],
+    found: tuple[tuple[SceneBody, ...], str],
     column: str,
     span: tuple[float, float] | None = None,
 ) -> PageScene:

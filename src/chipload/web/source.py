@@ -36,7 +36,7 @@ LOST = 200
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
+class TrackText:
     """A text beside a track.
 
     Parameters
@@ -59,16 +59,16 @@ class Source:
         return k if len(later) and later[k] < np.iinfo(np.int64).max else None
 
 
-def source_of(result: PageResult, track: PageTrack) -> Source | None:
+def source_of(result: PageResult, track: PageTrack) -> TrackText | None:
     """The text of a track; None where the result holds none that can be read."""
     wanted, note = result.result.provenance.inputs.get("program"), ""
     if track.line is not None and track.line.any() and wanted is not None:
         own = _with_new_feeds(result, track)
         if own is not None:
-            return Source(own.name, _lines(own), track.line, "with its new feeds")
+            return TrackText(own.name, _lines(own), track.line, "with its new feeds")
         original = find_by_hash(result.root, wanted)
         if original is not None and original.stat().st_size <= LARGEST:
-            return Source(original.name, _lines(original), track.line, "")
+            return TrackText(original.name, _lines(original), track.line, "")
         note = f"CL data of {wanted.rsplit(' sha256 ', 1)[0]}, whose own text is not in the opened folder"
     for name in track.own.programs:
         try:
@@ -79,7 +79,7 @@ def source_of(result: PageResult, track: PageTrack) -> Source | None:
         except (ChiploadError, OSError):
             continue
         if program is not None:
-            return Source(path.name, _lines(path), followed(track.place, program), note)
+            return TrackText(path.name, _lines(path), followed(track.place, program), note)
     return None
 
 

@@ -20,7 +20,7 @@ LOW, HIGH = np.array([0.0, 0.0, -12.0]), np.array([30.0, 24.0, 0.0])
 
 def take(stock: MoveStock, points: Floats, corner: int = 12, flank: float = 1.0) -> Engaged:
     tool = np.full(len(points) - 1, 1)
-    return stock.take(points[:-1], points[1:], tool, corner_pieces=corner, flank_mm={1: flank})
+    return stock.take(points[:-1], points[1:], tool, corner_slices=corner, flank_mm={1: flank})
 
 
 def volumes(stock: MoveStock, points: Floats, **more: float) -> Floats:
@@ -163,7 +163,7 @@ def test_several_cutters_leave_one_stock() -> None:
     points = line((-6.0, 12.0, -2.0), (36.0, 12.0, -2.0), 0.5)
     n = len(points) - 1
     for number in (1, 2):
-        found = stock.take(points[:-1], points[1:], np.full(n, number), corner_pieces=48, flank_mm={1: 1.0, 2: 1.0})
+        found = stock.take(points[:-1], points[1:], np.full(n, number), corner_slices=48, flank_mm={1: 1.0, 2: 1.0})
         each = np.bincount(found.step, found.volume / found.instants, n)[40:60]
         z = np.linspace(0.0, 2.0, 100001)
         rho = BALL.radius_at(z)

@@ -11,7 +11,7 @@ from chipload.errors import InputError
 from chipload.planning.impeller.answer import largest_cutters, one_cutter
 from chipload.planning.impeller.closed_form import axis_at
 from chipload.planning.impeller.compare import clear_somewhere, cutter_choices, gouges
-from chipload.planning.impeller.costs import STEP, ChannelSide, Costs, Measured, Terms
+from chipload.planning.impeller.costs import STEP, ChannelSide, Costs, MeasuredCost, Terms
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.patches import costs_of, divided
 from chipload.planning.impeller.scene import Scene
@@ -227,7 +227,9 @@ def test_what_programs_take_leads_the_next_division():
     costs.factor = np.ones((2, 3, 2))
     costs.measured([])
     assert (costs.factor == 1.0).all()
-    costs.measured([Measured(0, 1, 0, 10.0, 30.0), Measured(0, 1, 0, 30.0, 30.0), Measured(0, 2, 1, 10.0, 50.0)])
+    costs.measured(
+        [MeasuredCost(0, 1, 0, 10.0, 30.0), MeasuredCost(0, 1, 0, 30.0, 30.0), MeasuredCost(0, 2, 1, 10.0, 50.0)]
+    )
     # two patches of one cutter at one angle together; what has no program yet as the mean of its order, or of all
     assert costs.factor[0, 1, 0] == 1.5
     assert costs.factor[0, 2, 1] == 5.0

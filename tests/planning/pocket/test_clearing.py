@@ -10,7 +10,7 @@ import shapely
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.planning.pocket.clearing import CUT, ENTRY, LIFT, LINK, clear_region, polyline
-from chipload.planning.pocket.leftover import Remainder, leftover, swept
+from chipload.planning.pocket.leftover import PocketRemainder, leftover, swept
 from chipload.planning.pocket.reach import centre_region, reach_of, shortest_order, widest_places
 from chipload.stock.planar import PlanarStock
 
@@ -70,7 +70,7 @@ def test_leftover_of_one_straight_cut():
     area, contours, places = leftover(reachable, points, breaks, 3.0)
     assert area == pytest.approx(reachable.area - 84.0 - 9.0 * math.pi, rel=1e-4)
     assert len(contours) == len(places) == 2
-    rest = Remainder(reachable, 3.0)
+    rest = PocketRemainder(reachable, 3.0)
     rest.take(points[:1], breaks[:1])  # part after part as at once
     rest.take(points, breaks)
     assert rest.parts()[0] == pytest.approx(area, abs=1e-9)

@@ -89,7 +89,7 @@ def test_mean_against_layers(cutter, lead, step):
             edges += [(*ring[i], *ring[i + 1]) for i in range(4)]
     start = 8 * np.arange(len(bounds))
     tip = posture.centre - cutter.apt[3] * posture.axis
-    profile = slices(cutter, corner_pieces=600, bottom_pieces=60)
+    profile = slices(cutter, corner_slices=600, bottom_slices=60)
     rows, owner = immersed(
         tip, posture.frame, [0.05, 0.0, 0.0], [0.0, 0.0, 0.0], profile, Section(bounds, start, np.array(edges))
     )

@@ -213,7 +213,7 @@ def test_what_can_not_be_proposed_is_refused() -> None:
     xyz, F = np.zeros((20, 3)), np.full(20, 30.0)
     for message, change in (
         ("experiments.count = 2: must be from 3 to 20", {"count": 2}),
-        ("all candidates lie on a line: allow one beside it", {"candidates": [0, 1, 2, 3]}),
+        ("all candidates lie on a line: allow one off it", {"candidates": [0, 1, 2, 3]}),
         ("bracket = 1, steps = 2: must be above 1", {"bracket": 1.0}),
         ("experiments.repeats = 9: must be from 0 to count = 4", {"repeats": 9}),
         ("experiments.scatter = -1: must be at least 0", {"scatter": -1.0}),

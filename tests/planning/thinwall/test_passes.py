@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chipload.errors import InputError
-from chipload.planning.thinwall.blank import SIDES, Blank, FinishSurface
+from chipload.planning.thinwall.blank import SIDES, FinishSurface, WallBlank
 from chipload.planning.thinwall.depth import DepthRange
 from chipload.planning.thinwall.force_table import ForceTable
 from chipload.planning.thinwall.passes import constant, least_first_depth, variable
@@ -26,7 +26,7 @@ def made(thickness: float) -> SolidWorkpiece:
 
 
 def test_state_is_the_thinner_plate():
-    wall = Blank(made(5.0), (1.0, 1.5), 2)
+    wall = WallBlank(made(5.0), (1.0, 1.5), 2)
     left = (np.full(wall.shape, 0.3), np.full(wall.shape, 0.8))
     thin = made(2.5 + 0.3 + 0.8)
     places = on_side(thin.grid, "k+", [0.5, 1.0, 0.25], [1.0, 1.0, 0.5])
@@ -36,7 +36,7 @@ def test_state_is_the_thinner_plate():
 
 
 def test_surfaces():
-    wall = Blank(made(5.0), (1.0, 1.5))
+    wall = WallBlank(made(5.0), (1.0, 1.5))
     low, high = (wall.surface(s) for s in SIDES)
     assert_allclose(low.points[..., 2], 1.0, atol=1e-12)
     assert_allclose(high.points[..., 2], 3.5, atol=1e-12)
@@ -46,7 +46,7 @@ def test_surfaces():
 
 def test_softest_place_of_an_element():
     """One place without stock makes the elements around it thin, no others."""
-    wall = Blank(made(5.0), (1.0, 1.0), 2)
+    wall = WallBlank(made(5.0), (1.0, 1.0), 2)
     D = np.full(wall.shape, 1.0)
     D[4, 3] = 0.0
     kept = wall.state((np.ones(wall.shape), D)).kept.reshape(6, 5, 2)
@@ -139,7 +139,7 @@ def test_places_that_bear_nothing_are_listed():
 
 def test_refused():
     with pytest.raises(InputError, match="leave no wall"):
-        Blank(made(2.0), (1.0, 1.0))
+        WallBlank(made(2.0), (1.0, 1.0))
     with pytest.raises(InputError, match="constant depth_mm = 0: must be above 0"):
         constant([line(1.0)], lambda left, side: modelled([1.0], 0.05), STRAIGHT, 0.0)
     assert math.isclose(float(STRAIGHT.depth(50.0)), 0.5)

@@ -59,7 +59,7 @@ def test_a_tlon_on_a_turned_table_and_in_inches():
         ("INDIRV/0,1,0\nTLON,GOFWD/(CIRCLE/0,0,5,9),ON,(LINE/0,0,5,0,1,5)", "must be on its circle of radius 9"),
         ("TLLFT,GOLFT/C1", "moves the tool in a way that is not read: left out"),
         ("GOHOME", "moves the tool in a way that is not read: left out"),
-        ("ORIGIN/10,0,0", "points are taken as they stand"),
+        ("ORIGIN/10,0,0", "points are taken unchanged"),
         ("CIRCLE/0,0,10", "no centre and axis of six numbers: a straight line leads to the next point"),
         ("MOVARC/0,0,5,0,0,1,10,ANGLE", "ANGLE without a number of degrees"),
         ("MOVARC/0,0,5,0,0,1,10,ANGLE,45\nGOTO/0,10,5", "the GOTO after it gives a sweep of 90 deg, which is cut"),

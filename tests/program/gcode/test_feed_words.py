@@ -48,7 +48,7 @@ def test_by_hand(text, lines, said):
         ("F1\nG1 X1", {2: 0.0}, "line 2: a feed 0 times the old one: must be above 0"),
         ("F100\nG20 G1 X1", {2: 0.5}, "line 2: moves at a feed that was stated in another unit: state it again here"),
         ("G20 G1 X1 F100\nX2", {1: 1.0, 2: 0.5}, "line 2: moves at a feed that was stated in another unit"),
-        ("o100 while [#1 LT 3]", {}, "line 1: o100 while: feeds are changed only in a text that runs straight through"),
+        ("o100 while [#1 LT 3]", {}, "line 1: o100 while: feeds are changed only in a program without jumps"),
         ("G0 X1\nN5 M98 P7", {}, "line 2: M98: feeds are changed only"),
         ("GOTOF END", {}, "line 1: GOTOF: feeds are changed only"),
     ],

@@ -16,7 +16,7 @@ import shapely
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.clamp import Clamp
 from chipload.structure.cells.grid import grid_over
-from chipload.structure.cells.moments import Region
+from chipload.structure.cells.moments import StockRegion
 from chipload.structure.cells.workpiece import Elastic, cell_workpiece, displacements
 
 pytestmark = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
@@ -87,7 +87,7 @@ def theirs(state, lines, folder):
 def test_a_rib_on_a_floor_gives_way_as_in_calculix(tmp_path, state):
     lines = [(x, z) for x, z in LINES if state < 2 or z + 4.0 <= 16.0 or not 12.0 <= x <= 20.0]
     stock = stock_of(state)
-    clamp = Clamp("clamp", Region(shapely.box(-1, -1, 33, 21), 0.0, 0.001), np.ones(3, dtype=np.bool_))
+    clamp = Clamp("clamp", StockRegion(shapely.box(-1, -1, 33, 21), 0.0, 0.001), np.ones(3, dtype=np.bool_))
     work = cell_workpiece(stock, grid_over((0, 0, 0), (32, 20, 22), (4.0, 2.6, 2.6)[state], 3), Elastic(E, NU), [clamp])
     ours = [
         displacements(work, [(x, 8.0, z), (x, 8.0, z + 4.0)], [(x, BACK[state], z + 2.0)])[0, 1, 1] for x, z in lines

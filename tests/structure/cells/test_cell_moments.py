@@ -13,7 +13,7 @@ from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.assembly import mass, modes_of, shares, stiffness
 from chipload.structure.cells.clamp import rigid_motions
 from chipload.structure.cells.grid import grid_over, mode_values, product_tensors
-from chipload.structure.cells.moments import Region, section_moments, stock_moments
+from chipload.structure.cells.moments import StockRegion, section_moments, stock_moments
 
 
 def ring(count, radius, middle, phase=0.1):
@@ -93,7 +93,7 @@ def test_volume_and_mass_are_those_of_the_stock():
 def test_a_region_takes_a_part_of_the_stock():
     stock = LayeredStock.block((0, 0, 0), (10, 10, 4), 0.5, 5.0)
     grid = grid_over((0, 0, 0), (10, 10, 4), 3.0)
-    found = shares(stock_moments(stock, grid, Region(shapely.box(-1, 2, 4, 20), 1.25, 9.0)))
+    found = shares(stock_moments(stock, grid, StockRegion(shapely.box(-1, 2, 4, 20), 1.25, 9.0)))
     assert found.sum() * np.prod(grid.size) == pytest.approx(4.0 * 8.0 * 2.75, rel=1e-12)
 
 

@@ -9,7 +9,7 @@ import shapely
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.clamp import Clamp
 from chipload.structure.cells.grid import grid_over
-from chipload.structure.cells.moments import Region
+from chipload.structure.cells.moments import StockRegion
 from chipload.structure.cells.stress import greatest_stress
 from chipload.structure.cells.workpiece import Elastic, cell_workpiece
 
@@ -24,7 +24,7 @@ def test_an_upright_beam_bends_with_six_f_l_over_b_h_squared(shift):
     keep = shapely.box(2 + shift, 2 + shift, 8 + shift, 6 + shift)
     for k in range(stock.layers):
         stock.remove(k, shapely.box(-1, -1, 11, 9).difference(keep))
-    clamp = Clamp("clamp", Region(shapely.box(-1, -1, 11, 9), 0.0, 0.001), np.ones(3, dtype=np.bool_))
+    clamp = Clamp("clamp", StockRegion(shapely.box(-1, -1, 11, 9), 0.0, 0.001), np.ones(3, dtype=np.bool_))
     work = cell_workpiece(stock, grid_over((0, 0, 0), (10, 8, 40), 2.0), PLAIN, [clamp])
     x, y = 5.0 + shift, 2.0 + shift
     found = greatest_stress(
@@ -41,7 +41,7 @@ def test_an_upright_beam_bends_with_six_f_l_over_b_h_squared(shift):
 
 def test_what_is_near_the_contact_does_not_count():
     stock = LayeredStock.block((0, 0, 0), (20, 20, 10), 10.0, 100.0)
-    clamp = Clamp("clamp", Region(shapely.box(-1, -1, 21, 21), 0.0, 0.001), np.ones(3, dtype=np.bool_))
+    clamp = Clamp("clamp", StockRegion(shapely.box(-1, -1, 21, 21), 0.0, 0.001), np.ones(3, dtype=np.bool_))
     work = cell_workpiece(stock, grid_over((0, 0, 0), (20, 20, 10), 2.5), PLAIN, [clamp])
     line, force = np.array([(10.0, 10.0, 10.0)] * 2), np.array([0.0, 0.0, -100.0])
     near, far = (greatest_stress(work, PLAIN, line, force, away) for away in (0.0, 5.0))

@@ -14,7 +14,7 @@ from chipload.errors import InputError
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.clamp import Clamp
 from chipload.structure.cells.grid import grid_over
-from chipload.structure.cells.moments import Region
+from chipload.structure.cells.moments import StockRegion
 from chipload.structure.cells.support import supported
 from chipload.structure.cells.workpiece import Elastic, cell_workpiece, displacements, line_compliances, mode_weights
 from chipload.structure.factors import Factors
@@ -23,7 +23,7 @@ from chipload.structure.factors import Factors
 @pytest.fixture(scope="module")
 def wall():
     stock = LayeredStock.block((0, 0, 0), (40, 2.5, 25), 25.0, 50.0)
-    clamp = Clamp("clamp", Region(shapely.box(-1, -1, 41, 4), 0.0, 0.001), np.ones(3, dtype=np.bool_))
+    clamp = Clamp("clamp", StockRegion(shapely.box(-1, -1, 41, 4), 0.0, 0.001), np.ones(3, dtype=np.bool_))
     return cell_workpiece(stock, grid_over((0, 0, 0), (40, 2.5, 25), 5.0), Elastic(7e4, 0.33), [clamp])
 
 

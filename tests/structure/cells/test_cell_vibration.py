@@ -14,8 +14,8 @@ from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.clamp import Clamp
 from chipload.structure.cells.followed import ModesOfStates
 from chipload.structure.cells.grid import grid_over
-from chipload.structure.cells.moments import Region
-from chipload.structure.cells.states import State, StepLines
+from chipload.structure.cells.moments import StockRegion
+from chipload.structure.cells.states import RemovalState, StepLines
 from chipload.structure.cells.vibration import overlap, shapes_along, vibration_modes
 from chipload.structure.cells.workpiece import Elastic, cell_workpiece
 from chipload.structure.grid import plate
@@ -30,7 +30,7 @@ THINNED = {0.0: 1733.0, 1.25: 1894.0, 2.5: 2026.0, 3.75: 2089.0, 5.0: 2019.0, 8.
 
 
 def below(x, y):
-    return Clamp("clamp", Region(shapely.box(-1, -1, x + 1, y + 1), 0.0, 0.001), np.ones(3, dtype=np.bool_))
+    return Clamp("clamp", StockRegion(shapely.box(-1, -1, x + 1, y + 1), 0.0, 0.001), np.ones(3, dtype=np.bool_))
 
 
 def thinned(rows, layer=1.25):
@@ -100,7 +100,7 @@ def test_modes_are_followed_through_the_removal():
             stocks.append(stock.copied())
             step += 1
     removed = 400.0 * np.arange(17)
-    states = [State(k, removed[k], lambda k=k: built(stocks[k], 10.0)) for k in range(17)]
+    states = [RemovalState(k, removed[k], lambda k=k: built(stocks[k], 10.0)) for k in range(17)]
     steps = StepLines(np.arange(16), np.array(lines), np.ones(16), removed[:16])
     watch = ModesOfStates(steps, 3, 1.0)
     found = watch.followed(states, tolerance=0.06, most=9, error=0.0)

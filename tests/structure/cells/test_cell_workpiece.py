@@ -13,9 +13,9 @@ from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.assembly import modes_of
 from chipload.structure.cells.clamp import Clamp
 from chipload.structure.cells.grid import CellGrid, grid_over
-from chipload.structure.cells.moments import Region
+from chipload.structure.cells.moments import StockRegion
 from chipload.structure.cells.nearest import StockSections
-from chipload.structure.cells.states import State, StepLines, size_of, step_compliances
+from chipload.structure.cells.states import RemovalState, StepLines, size_of, step_compliances
 from chipload.structure.cells.thickness import cells_over, thinnest
 from chipload.structure.cells.workpiece import Elastic, cell_workpiece, line_compliances
 
@@ -26,7 +26,7 @@ ALL = np.ones(3, dtype=np.bool_)
 def below(stock, slab=0.001, directions=ALL, stiffness=np.inf):
     """A clamp on the lower face."""
     z, box = float(stock.bounds[0]), (stock.xs[0] - 1, stock.ys[0] - 1, stock.xs[-1] + 1, stock.ys[-1] + 1)
-    return Clamp("clamp", Region(shapely.box(*box), z, z + slab), directions, stiffness)
+    return Clamp("clamp", StockRegion(shapely.box(*box), z, z + slab), directions, stiffness)
 
 
 def shaped(outline, low, high, layer=1.0):
@@ -97,7 +97,7 @@ def test_a_beam_bends_as_the_closed_form_says():
     # 100 x 8 x 8 in cells of its own size; a force spread over the height of its free end
     length, side = 100.0, 8.0
     stock = LayeredStock.block((0, 0, 0), (length, side, side), 8.0, 200.0)
-    held = Clamp("clamp", Region(shapely.box(-1, -1, 0.001, 9), -1.0, 9.0), ALL)
+    held = Clamp("clamp", StockRegion(shapely.box(-1, -1, 0.001, 9), -1.0, 9.0), ALL)
     work = cell_workpiece(stock, grid_over((0, 0, 0), (length, side, side), 8.0), Elastic(7e4, 0.0), [held])
     found = line_compliances(work, [[(length, 4.0, 0.0), (length, 4.0, side)]])[0, 1, 1, 1]
     area, inertia = side * side, side**4 / 12.0
@@ -148,7 +148,7 @@ def test_what_is_not_held_is_refused(clamps, message):
     made = [
         Clamp(
             "workpiece.clamp.0",
-            Region(shapely.box(0, 0, 20, 20), min(top, 0.0) - 1.0, top),
+            StockRegion(shapely.box(0, 0, 20, 20), min(top, 0.0) - 1.0, top),
             np.isin(list("xyz"), list(d)),
         )
         for d, top in clamps
@@ -160,7 +160,7 @@ def test_what_is_not_held_is_refused(clamps, message):
 def test_material_that_hangs_on_nothing_is_left_out():
     stock = LayeredStock.block((0, 0, 0), (60, 10, 10), 10.0, 100.0)
     stock.remove(0, shapely.box(20, -1, 45, 11))
-    held = Clamp("clamp", Region(shapely.box(-1, -1, 0.5, 11), -1.0, 11.0), ALL)
+    held = Clamp("clamp", StockRegion(shapely.box(-1, -1, 0.5, 11), -1.0, 11.0), ALL)
     work = cell_workpiece(stock, grid_over((0, 0, 0), (60, 10, 10), 5.0), ALUMINIUM, [held])
     assert work.loose == pytest.approx(1500.0)
     assert work.volume == pytest.approx(2000.0)
@@ -215,7 +215,7 @@ def test_compliance_follows_the_removal():
     def build(s):
         return lambda: cell_workpiece(s, grid, ALUMINIUM, [below(s)])
 
-    states = [State(k, v, build(s)) for k, v, s in stocks]
+    states = [RemovalState(k, v, build(s)) for k, v, s in stocks]
     steps = StepLines(np.arange(12), np.array(lines), np.full(12, 100.0), 450.0 * np.arange(12))
     rough = step_compliances(steps, states, tolerance=0.02, most=5, spacing=1.0)
     exact = step_compliances(steps, states, tolerance=0.0, most=13, spacing=1.0)

@@ -22,7 +22,7 @@ REASONS: Mapping[Status, str] = {
     Status.OVERLOAD: "STOPPED: overload",
     Status.NO_READING: "STOPPED: no reading of the torque",
     Status.LOW_READING: "STOPPED: torque too low for this cut",
-    Status.OFF_PATH: "STOPPED: torque beside the path",
+    Status.OFF_PATH: "STOPPED: torque off the path",
     Status.MACHINE_DATA: "STOPPED: no place or time",
 }
 #: name that PyVCP's component has under AXIS

@@ -1,1 +1,23 @@
 """Undeformed chips on layers: what a cutter covers during a move, and what of it is new."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from chipload.lazy import attach
+
+if TYPE_CHECKING:
+    from chipload.engagement.chips.covered import CoveredArea, covered_polygons
+    from chipload.engagement.chips.move import Move
+    from chipload.engagement.chips.ring import Origin, Ring
+
+__all__ = ["CoveredArea", "Move", "Origin", "Ring", "covered_polygons"]
+
+__getattr__, __dir__ = attach(
+    __name__,
+    {
+        "covered": "CoveredArea covered_polygons",
+        "move": "Move",
+        "ring": "Origin Ring",
+    },
+)

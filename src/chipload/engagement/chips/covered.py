@@ -269,10 +269,10 @@ def _larger(buffer: Floats) -> Floats:
 
 def candidates(move: Move, cutter: Cutter, height: float, tolerance: float) -> Floats:
     """All pieces of the diagram that may bound the covered area, as edges (n, 12) of :mod:`chips.ring`."""
-    return _pieces(move, cutter_numbers(cutter), float(height), tolerance, _KNOTS)
+    return _candidates(move, cutter_numbers(cutter), float(height), tolerance, _KNOTS)
 
 
-def _pieces(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> Floats:
+def _candidates(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> Floats:
     cp, ca, vmin = move.tip, move.axis, STILL * tolerance
     span, ends = np.empty((_SPANS, 2)), np.empty((knots + 1, 2))
     trace.levels(cp, ca, K, ends)
@@ -282,10 +282,10 @@ def _pieces(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> Fl
     for ta, tb in span[:m]:
         if tb - ta <= _TOUCH:
             continue
-        n, jumped = faces.pieces(cp, ca, K, h, tolerance, vmin, ta, tb, knots, buffer, 0, jumps)
+        n, jumped = faces.candidates(cp, ca, K, h, tolerance, vmin, ta, tb, knots, buffer, 0, jumps)
         while n == trace.FULL:
             buffer = _larger(buffer)
-            n, jumped = faces.pieces(cp, ca, K, h, tolerance, vmin, ta, tb, knots, buffer, 0, jumps)
+            n, jumped = faces.candidates(cp, ca, K, h, tolerance, vmin, ta, tb, knots, buffer, 0, jumps)
         found.append(buffer[:n].copy())
         for t in jumps[:jumped]:
             found += [
@@ -311,7 +311,7 @@ def whole_section(move: Move, K: Floats, h: float, t: float, tolerance: float) -
 
 def _noded(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> CoveredArea | None:
     """The general case: faces between all pieces, those kept that some section covers."""
-    edges = _pieces(move, K, h, tolerance, knots)
+    edges = _candidates(move, K, h, tolerance, knots)
     if len(edges) == 0:
         return None
     lines = shapely.line_merge(shapely.multilinestrings(edges[:, :4].reshape(-1, 2, 2)))

@@ -1,1 +1,19 @@
 """Which part of each slice of a cutter is in the layered workpiece, and how thick it cuts there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from chipload.lazy import attach
+
+if TYPE_CHECKING:
+    from chipload.engagement.immersion.immersion import Section, immersed, tool_frame
+
+__all__ = ["Section", "immersed", "tool_frame"]
+
+__getattr__, __dir__ = attach(
+    __name__,
+    {
+        "immersion": "Section immersed tool_frame",
+    },
+)

@@ -73,7 +73,7 @@ def crossings(mid, flat, radius, edges, first, last, out, count):
 
 
 @njit(cache=True, nogil=True)
-def inside(x, y, edges, first, last):
+def covers(x, y, edges, first, last):
     """Whether (x, y) is in the polygons whose edges are given: a ray along +x."""
     odd = False
     for e in range(first, last):
@@ -242,7 +242,7 @@ def band(
             l = layer if onto else under
             x = mid[0] + wide * (co * flat[0, 0] + si * flat[1, 0])
             y = mid[1] + wide * (co * flat[0, 1] + si * flat[1, 1])
-            kept = inside(x, y, edges, start[l], start[l + 1])
+            kept = covers(x, y, edges, start[l], start[l + 1])
         if not kept:
             opened = -1
             continue
@@ -336,9 +336,9 @@ def meets(phi, tip, frame, speed, turn, slice_, bounds, start, edges):
         if found:
             x += shift * nu[0] / flat
             y += shift * nu[1] / flat
-            return inside(x, y, edges, start[l], start[l + 1])
+            return covers(x, y, edges, start[l], start[l + 1])
     l = below(height, bounds)
-    return inside(x, y, edges, start[l], start[l + 1])
+    return covers(x, y, edges, start[l], start[l + 1])
 
 
 @njit(cache=True, nogil=True)

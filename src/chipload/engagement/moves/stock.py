@@ -33,6 +33,8 @@ Ints = NDArray[np.int64]
 
 #: side of a cell over the smallest cutter radius, and most cells
 CELL, CELLS = 0.1, 4_000_000
+#: least side of a cell over that
+THIN = 0.1
 #: a step is looked at once every so many cutter radii, at its middle at least
 INSTANT = 0.25
 #: instants of a step that is looked at once and does not cut as the one before it, and of one that enters or leaves;
@@ -113,7 +115,7 @@ class Engaged:
     slice : (b,) int, row of ``slices``
     slices : (k, 6) float: s from, s to, rho, z from, sin(kappa), cos(kappa)
     volume : (m,) float [mm^3], of the step if it cut all over as at the instant
-    pieces : (m,) int, of the engaged surface
+    areas : (m,) int, of the engaged surface
     z : (m, 2) float [mm], least and greatest height of what is engaged
     left : (m, 3) sum of the outward normals where the front leaves a surface, times their length along the edge [mm]
     left_mm : (m,) float, that length
@@ -129,7 +131,7 @@ class Engaged:
     slice: Ints
     slices: Floats
     volume: Floats
-    pieces: Ints
+    areas: Ints
     z: Floats
     left: Floats
     left_mm: Floats
@@ -155,7 +157,7 @@ class MoveStock:
     >>> mill = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5)
     >>> stock = MoveStock(np.array([0.0, -20.0, -9.0]), np.array([40.0, 20.0, 0.0]), {1: mill})
     >>> p = np.array([[-6.0, 0.0, -2.0], [10.0, 0.0, -2.0], [11.0, 0.0, -2.0]])
-    >>> found = stock.take(p[:-1], p[1:], np.array([1, 1]), corner_pieces=12, flank_mm={1: 9.0})
+    >>> found = stock.take(p[:-1], p[1:], np.array([1, 1]), corner_slices=12, flank_mm={1: 9.0})
     >>> float(found.volume[found.step == 1].round(6)[0])
     20.0
     """
@@ -171,7 +173,8 @@ class MoveStock:
         side = max(CELL * float(self.cutters[:, 8].min()), math.sqrt(size[0] * size[1] / CELLS))
         count = np.maximum(np.ceil(size[:2] / side - 1e-9), 1.0)
         self.shape = count.astype(np.int64)
-        self.grid = np.array([*self.low[:2], *(size[:2] / count)])
+        # of a stock that is thinner than a cell the one cell reaches beyond it: what cutters cover is counted in cells
+        self.grid = np.array([*self.low[:2], *np.maximum(size[:2] / count, THIN * side)])
         cells = int(self.shape.prod())
         self.level = np.empty((cells, 3))
         self.level[:] = (self.high[2], self.high[2], self.low[2])
@@ -243,17 +246,17 @@ class MoveStock:
         """Make steps without looking at what they cut."""
         self._run(p0, p1, tool, np.zeros(len(p0), dtype=np.int64), 1, dict.fromkeys(self.tools, 1.0))
 
-    def take(self, p0: Floats, p1: Floats, tool: Ints, *, corner_pieces: int, flank_mm: Mapping[int, float]) -> Engaged:
+    def take(self, p0: Floats, p1: Floats, tool: Ints, *, corner_slices: int, flank_mm: Mapping[int, float]) -> Engaged:
         """Make steps, one after the other, and find what each engages.
 
         Parameters
         ----------
         p0, p1 : (n, 3) float [mm], tip at the start and the end of each
         tool : (n,) int
-        corner_pieces : slices of the engaged part of a corner
+        corner_slices : slices of the engaged part of a corner
         flank_mm : longest slice of the flank by tool number [mm]
         """
-        return self._run(p0, p1, tool, self.instants(p0, p1, tool), corner_pieces, flank_mm)
+        return self._run(p0, p1, tool, self.instants(p0, p1, tool), corner_slices, flank_mm)
 
     def _run(
         self, p0: Floats, p1: Floats, tool: Ints, instants: Ints, pieces: int, flank_mm: Mapping[int, float]

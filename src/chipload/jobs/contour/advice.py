@@ -80,7 +80,7 @@ def greatest_engagement(
     else:
         why = "" if by is None else f": {_told(by)}"
         raise InputError(
-            f"operation.engagement_deg = 'limit': no engagement from {LEAST_DEG:g} deg holds the limits{why}: lower "
+            f"operation.engagement_deg = 'limit': no engagement from {LEAST_DEG:g} deg keeps the limits{why}: lower "
             "feed_mm_min or axial_depth_mm"
         )
     if by is None:

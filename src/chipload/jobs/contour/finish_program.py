@@ -87,7 +87,7 @@ def read_finish(path: Path, machine: Machine, lines: Sequence[int] | None, top: 
     rows = np.flatnonzero(cuts)
     asked = "" if lines is None else f" in lines {lines[0]} to {lines[1]}"
     if not len(rows):
-        raise InputError(f"part.file = {path.name}: nothing cuts level below the stock's top{asked}: state part.lines")
+        raise InputError(f"part.file = {path.name}: no horizontal cut below the stock's top{asked}: state part.lines")
     heights = np.unique(z[rows].round(6))
     if len(heights) > 1:
         raise InputError(
@@ -104,7 +104,8 @@ def read_finish(path: Path, machine: Machine, lines: Sequence[int] | None, top: 
     high = np.flatnonzero(z[: rows[0]] >= top - LEVEL_MM)
     if not len(high):
         raise InputError(
-            f"part.file = {path.name}: never at the height of the stock's top before the cut: stock.top_mm?"
+            f"part.file = {path.name}: the tool is never at the height of the stock's top before the cut: "
+            "check stock.top_mm"
         )
     text = "" if dialect_of(path, machine) in ("apt", "heidenhain") else gcode_text(path)
     return FinishProgram(path, text, p, int(rows[0]), int(rows[-1]), int(high[-1]))

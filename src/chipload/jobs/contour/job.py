@@ -10,7 +10,7 @@ from typing import Any
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.contour.tables import ALWAYS, MAY, NEEDS, ContourJobTable, ContourLimitsTable, OperationTable
 from chipload.jobs.messages import Errors
-from chipload.jobs.sources import Limited, entries_of, sources_and_cutters
+from chipload.jobs.sources import Limited, entries_of, sources_and_cutters, unknown_cutter
 
 
 @dataclass(frozen=True)
@@ -78,9 +78,7 @@ def _contradictions(table: ContourJobTable, cutters: Mapping[int, Cutter]) -> It
         at = f"operation.{k}"
         if op.kind == "contour" and op.strategies is not None:
             yield from _wrong_strategies(at, op)
-        if cutters and op.cutter not in cutters:
-            known = ", ".join(str(n) for n in sorted(cutters))
-            yield f"{at}.cutter = {op.cutter}: no [[cutter]] has this number: state one of {known}"
+        yield from unknown_cutter(f"{at}.cutter", op.cutter, cutters)
         cutter = cutters.get(op.cutter)
         if op.kind == "pocket":
             yield from _wrong_pocket(at, k, table, cutters)

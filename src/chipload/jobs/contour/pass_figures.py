@@ -19,7 +19,7 @@ from chipload.jobs.contour.outcome import Operation
 from chipload.jobs.contour.result import limits_of
 from chipload.machine.machine import Machine
 from chipload.planning.result import StrategyResult
-from chipload.report.shape import CHORD_MM, pieces
+from chipload.report.shape import CHORD_MM, stretches
 from chipload.result import COLUMNS, LimitCheck, Verdict
 from chipload.result.style import (
     FONT,
@@ -164,7 +164,7 @@ def _gapped(x: Floats, y: Floats, apart: NDArray[np.int64]) -> tuple[Floats, Flo
 
 def _lifted(history: Mapping[str, NDArray[Any]], rows: NDArray[np.int64]) -> tuple[Floats, Floats]:
     """Places of rows, x and y, with a gap where rows between them belong to something else."""
-    piece = pieces(history)[rows]
+    piece = stretches(history)[rows]
     apart = np.flatnonzero(piece[1:] != piece[:-1]) + 1
     x, y = (np.asarray(history[c], dtype=np.float64)[rows] for c in ("x_mm", "y_mm"))
     return np.insert(x, apart, np.nan).astype(np.float32), np.insert(y, apart, np.nan).astype(np.float32)
@@ -204,7 +204,7 @@ def _shaded_lines(
     engagement = np.asarray(h["engagement_deg"], dtype=np.float64)
     even = rows[:: max(1, len(rows) // PLAN_POINTS)]
     keep = np.union1d(even, rows[thinned(engagement[rows], PLAN_POINTS // 2)])
-    piece = pieces(h)[keep]
+    piece = stretches(h)[keep]
     joined = np.flatnonzero(piece[1:] == piece[:-1])
     a = engagement[keep[joined + 1]]
     share = np.clip((a - scale[0]) / (scale[1] - scale[0]), 0.0, 1.0) if scale[1] > scale[0] else np.zeros(len(a))

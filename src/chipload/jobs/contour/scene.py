@@ -13,7 +13,7 @@ from chipload.jobs.contour.outcome import ContourResult, Operation
 from chipload.jobs.contour.result import track_name
 from chipload.report.presentation import Blank
 from chipload.report.scene import ROWS, STOCK, TOOL, WALL, engagement_colours
-from chipload.report.shape import merged, pieces, ribbon, slab
+from chipload.report.shape import merged, ribbon, slab, stretches
 
 Floats = NDArray[np.float64]
 
@@ -78,7 +78,7 @@ def _path(history: Mapping[str, NDArray[Any]], highest: float) -> Any:
     rows = np.arange(0, n, -(-n // ROWS))
     points = np.column_stack([history[k][rows] for k in ("x_mm", "y_mm", "z_mm")])
     colours = engagement_colours(history["engagement_deg"][rows], highest)
-    piece = pieces(history)[rows]
+    piece = stretches(history)[rows]
     broken = np.flatnonzero(piece[1:] != piece[:-1]) + 1
     shade = np.flatnonzero((colours[1:] != colours[:-1]).any(axis=1)) + 1
     cuts = np.unique(np.concatenate([[0], broken, shade, [len(rows) - 1]]))

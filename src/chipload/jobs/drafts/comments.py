@@ -12,8 +12,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from chipload.cutter.bodies import Profile, apt_body
+from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
-from chipload.program.apt.cutters import read_cutters
+from chipload.program.apt.cutters import Shape, read_cutters
 from chipload.program.reconcile import tool_comments
 from chipload.units import MM_PER
 
@@ -132,7 +134,11 @@ def _apt_cutters(text: str) -> dict[int, Stated]:
     except InputError:
         return {}
     out: dict[int, Stated] = {}
-    for number, (d, r, _, _, alpha, beta, _) in shapes.items():
+    for number, shape in shapes.items():
+        d, r, e, f, alpha, beta, _ = shape
+        if (body := _apt_body(shape)) is not None:
+            out[number] = {"body_mm": ([[round(x, 6) for x in p] for p in body], f"CUTTER, r {r:g}, e {e:g}, f {f:g}")}
+            continue
         own: Stated = {"diameter_mm": (d, "CUTTER")}
         if r > 0.0:
             own["corner_radius_mm"] = (r, "CUTTER")
@@ -159,6 +165,16 @@ def _apt_cutters(text: str) -> dict[int, Stated]:
         elif tool is not None and value and word == "CSI_SET_EXTENSION_LENGTH":
             tool.setdefault("overhang_mm", (float(value[1]) * mm, word))
     return out
+
+
+def _apt_body(shape: Shape) -> Profile | None:
+    """The body of seven numbers that are no cutter of this program: a barrel, a lens; None: they are one."""
+    d, r, e, f, alpha, beta, h = shape
+    try:
+        Cutter(d, 1, 0.0, h or d, h or d, 2.1e5, r, e if r > 0.0 else None, f if r > 0.0 else None, alpha, beta)
+    except InputError:
+        return apt_body(shape)
+    return None
 
 
 def _stock(text: str, mm: float) -> tuple[Box, str] | None:

@@ -11,7 +11,7 @@ from chipload.jobs.drafts.draft import DraftTable, Entry
 #: keys that a cutter has, in the order of the file
 KEYS = (
     "diameter_mm", "corner_radius_mm", "bottom_deg", "taper_deg", "flutes", "helix_deg", "flute_length_mm",
-    "overhang_mm", "shank_diameter_mm", "modulus_gpa",
+    "overhang_mm", "shank_diameter_mm", "modulus_gpa", "body_mm",
 )  # fmt: skip
 
 
@@ -46,6 +46,12 @@ def cutter_table(number: int, sources: Iterable[Stated], deepest: float = 0.0) -
 def _guesses(stated: Mapping[str, tuple[Any, str]], deepest: float) -> dict[str, tuple[Any, str]]:
     """Values for the keys that a cutter cannot be without."""
     out: dict[str, tuple[Any, str]] = {}
+    if "body_mm" in stated:
+        body = stated["body_mm"][0]
+        if "overhang_mm" not in stated:
+            length = round(body[-1][1] + max(2.0 * max(r for r, _ in body), 5.0), 3)
+            out["overhang_mm"] = (length, "no file states it; the body and one diameter")
+        return out
     if "diameter_mm" not in stated:
         out["diameter_mm"] = (10.0, "no file states it")
     d = float(stated.get("shank_diameter_mm", stated.get("diameter_mm", (10.0, "")))[0])

@@ -149,7 +149,7 @@ def toml(value: Any) -> str:
         return "{ " + ", ".join(f"{_key(k)} = {toml(v)}" for k, v in value.items()) + " }"
     if isinstance(value, Sequence):
         return f"[{', '.join(toml(v) for v in value)}]"
-    raise InputError(f"{type(value).__name__}: is no value of a job")
+    raise InputError(f"{type(value).__name__}: is not a value that a job can hold")
 
 
 def _key(key: str) -> str:
@@ -174,12 +174,12 @@ def write_draft(draft: Draft, folder: Path) -> Path:
     job = folder / "job.toml"
     for name in ("job.toml", *draft.files):
         if (folder / name).exists():
-            raise InputError(f"{folder / name}: is there already and is not overwritten: name another folder")
+            raise InputError(f"{folder / name}: already exists and is not overwritten: name another folder")
     contents = {**draft.files, "job.toml": draft.text().encode()}
     try:
         if folder.exists():
             if not folder.is_dir():
-                raise InputError(f"{folder}: is no folder: name another one")
+                raise InputError(f"{folder}: is not a folder: name another one")
             done: list[Path] = []
             try:
                 for name, data in contents.items():

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from chipload.cutter.tool_bits import SPECIAL, special_shape
 from chipload.errors import InputError
 from chipload.geometry.brep import step_of_brep
 from chipload.geometry.mesh import read_mesh
@@ -151,7 +152,13 @@ def _cutter(document: Document, controller: DocumentObject, name: str) -> Stated
     shape = (bit.text("ShapeName") or bit.text("ShapeID") or bit.text("ShapeType") or bit.text("BitShape")).lower()
     diameter = out.get("diameter_mm", (0.0, ""))[0]
     corner = next((v for k in ("TorusRadius", "CornerRadius") if (v := bit.number(k)) is not None), None)
-    if "ball" in shape and diameter:
+    special = shape.removesuffix(".fcstd").rsplit("/", 1)[-1]
+    if special in SPECIAL:
+        own = {key: (value, where) for key, value in special_shape(special, bit.number, where).items()}
+        if "body_mm" in own:
+            out, own = {k: v for k, v in out.items() if k in ("name", "shank_diameter_mm")}, {"body_mm": own["body_mm"]}
+        out |= own
+    elif "ball" in shape and diameter:
         out["corner_radius_mm"] = (0.5 * diameter, where)
     elif corner is not None and 0.0 < corner <= 0.5 * diameter:
         out["corner_radius_mm"] = (corner, where)

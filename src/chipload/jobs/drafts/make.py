@@ -31,7 +31,7 @@ def draft_of(
         raise InputError(f"{file}: no such file: name a program, a drawing, a model or sections of a blade")
     ending = file.suffix.lower()
     if job is not None and ending != ".fcstd":
-        raise InputError(f"--job {job}: is for a FreeCAD document: leave it out for {file.name}")
+        raise InputError(f"--job {job}: applies to a FreeCAD document only: leave it out for {file.name}")
     if ending == ".camotics":
         from chipload.jobs.drafts.projects import draft_camotics
 

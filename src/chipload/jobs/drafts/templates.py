@@ -29,7 +29,7 @@ def write_template(kind: str, folder: Path) -> Path:
     """
     path = folder / TEMPLATES[kind]
     if path.exists():
-        raise InputError(f"{path}: is there already and is not overwritten: name another folder")
+        raise InputError(f"{path}: already exists and is not overwritten: name another folder")
     if kind == "fixture":
         data = block_stl(*JAW).encode()
     else:

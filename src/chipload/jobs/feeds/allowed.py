@@ -72,7 +72,7 @@ class FeedRequest:
     more: Watch | None = None
 
     @property
-    def held(self) -> tuple[str, ...]:
+    def feed_limits(self) -> tuple[str, ...]:
         """Names of the limits that hold the feed: ``limits``, then the stress of the cutter."""
         return (*self.limits, *(() if "cutter_strength" in self.checks.off else (STRESS,)))
 
@@ -118,8 +118,8 @@ def watching(
             loads: dict[str, Floats] = greatest_loads(moved, material, asked.rotation, asked.checks.sigma > 0.0)
             if asked.more is not None:
                 loads |= asked.more(moved)
-            if STRESS in asked.held and STRESS not in loads:
-                loads[STRESS] = cutter_stress(moved.bites, moved.cutter, material)
+            if STRESS in asked.feed_limits and STRESS not in loads:
+                loads[STRESS] = cutter_stress(moved.engagement, moved.cutter, material)
             upper = upper_loads(loads, asked.checks.sigma)
             limits = {**asked.limits, STRESS: allowed_stress(moved.cutter)}
             return np.array(
@@ -127,7 +127,7 @@ def watching(
                     np.maximum(upper[column] * beyond.get(column, 1.0), factor * chip if column == CHIP else 0.0)
                     * (1.0 + asked.error(name))
                     / limits[name]
-                    for name in asked.held
+                    for name in asked.feed_limits
                     for column in (column_of(name).name,)
                 ]
             )
@@ -170,7 +170,7 @@ def with_new_feeds(
     """
     c = before.columns
     feeds, touch = ~steps.rapid, np.where(c["chip_layers"] > 0, StepContact.FILM, StepContact.AIR)
-    touch[c["chip_pieces"] > 0] = StepContact.CUT
+    touch[c["chip_areas"] > 0] = StepContact.CUT
     least, most, by = _bounds(steps, asked.table, cutters, machine)
     cuts = feeds & (touch == StepContact.CUT)
     if cuts.any():
@@ -182,7 +182,7 @@ def with_new_feeds(
     after = read(new)
     require_same(reading.program, after.program, lines.line, factor)
     names = {FASTEST: "fastest", MACHINE: "machine", AIR: "air", SLOWEST: "slowest", KEPT: "programmed"}
-    names |= {LIMITED + k: name for k, name in enumerate(asked.held)}
+    names |= {LIMITED + k: name for k, name in enumerate(asked.feed_limits)}
     held = np.where((useful < lines.allowed) & (lines.by != SLOWEST), MACHINE, lines.by)
     fed = FeedResult(
         text=new,

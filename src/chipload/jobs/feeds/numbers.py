@@ -67,7 +67,7 @@ def feed_numbers(
     program : its file
     """
     c, listed = simulation.removal.columns, exceeding(feeds, simulation, checks)
-    cuts = (c["chip_pieces"] > 0) & ~c["rapid"]
+    cuts = (c["chip_areas"] > 0) & ~c["rapid"]
 
     def loads(columns: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
         some = columns["feed_mm_min"][cuts]

@@ -89,7 +89,7 @@ def run(job: FitJob, progress: Progress = silent) -> FitResult:
     material, why = _material(job, fit, comparisons)
     notes = tuple(Finding("fit-note", 0, text) for text in fit.notes)
     if not fit.search.converged:
-        text = "the search for runout and phase did not end: widen the windows"
+        text = "the search for runout and phase did not converge: widen the windows"
         notes = (Finding("fit-not-converged", 0, text, Severity.UNPROVEN), *notes)
     progress(1.0, "fitted")
     return FitResult(job, title_of(job.path), fit, comparisons, material, (*why, *findings, *notes), _provenance(job))
@@ -190,7 +190,7 @@ def _material(job: FitJob, fit: Fit, comparisons: Sequence[Comparison]) -> tuple
         found = (*found, Finding("fit-peaks", 0, text))
     else:
         text = f"90 % of the peaks measured in runs that were not fitted are at most {100.0 * excess:.3g} % above"
-        found = (*found, Finding("fit-peaks", 0, f"{text} the prediction: limits on peaks are held with that"))
+        found = (*found, Finding("fit-peaks", 0, f"{text} the prediction: limits on peaks allow for that"))
     try:
         made = Material(
             name=table.name, source=f"{source}; {table.method} fit", workpiece=table.workpiece, cutter=said,

@@ -80,7 +80,7 @@ def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
         f'<p class="note">One for each cutter at each table angle, for one channel; the pallet turns by {turn:.6g} deg '
         "to the next. The check takes every part of the tool, holder too, through every row along rays on the true "
         "surfaces and uses nothing of the planner. "
-        + ("" if milled.roughs is not None else "They finish: roughing is not asked for.")
+        + ("" if milled.roughs is not None else "They finish only: the job states no roughing.")
         + "</p>",
         table(head, rows, numbers=(2, 3, 4, 5, 6, 7, 8)),
         table(scallop, patches, numbers=(0, 2, 3, 4, 5, 6, 7, 8)),

@@ -162,7 +162,7 @@ def _open(op: Searched) -> list[str]:
     ]
     if any(c.cutting_length is None for c in op.answer.catalogue.cutters):
         out.append(
-            "Neck, shank and holder of catalogue cutters that state none: their cutting part goes on without end."
+            "Neck, shank and holder of catalogue cutters that state none: their cutting part is extended without end."
         )
     return out
 

@@ -61,7 +61,7 @@ def load(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) -> Impel
     for k, surface in enumerate(table.surface):
         errors.texts += _wrong_surface(f"surface.{k}", surface, part)
         if any((s.body, s.side) == (surface.body, surface.side) for s in table.surface[:k]):
-            errors.add(f"surface.{k}: {surface.body} {surface.side} stands twice: list each surface once")
+            errors.add(f"surface.{k}: {surface.body} {surface.side} appears twice: list each surface once")
     errors.texts += _wrong_paths(table.operation[0])
     if part.sections is not None:
         errors.texts += _wrong_sections(part.sections)

@@ -58,7 +58,7 @@ def partition_of(milled: ImpellerResult, way: Partition) -> dict[str, Any]:
         "table_changes": d.table_changes,
         "least_time_min": d.bound / 60.0,
         "least_time_any_shape_min": d.bound_any_shape / 60.0,
-        "gap": d.gap,
+        "above_bound": d.above_bound,
         "patches": [_patch(milled, way, p) for p in d.patches],
     }
 

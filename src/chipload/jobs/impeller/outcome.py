@@ -422,10 +422,12 @@ def unreached_text(op: Searched, missed: Unreachable) -> str:
 def unmilled(milled: ImpellerResult) -> tuple[str, ...]:
     """What the patches leave open."""
     if milled.used is None:
-        return (f"not {milled.partitions[-1].name} of the catalogue mill all that can be reached",)
+        return (f"{milled.partitions[-1].name} of the catalogue do not mill all that can be reached",)
     divided = milled.used.divided
     untold = divided.untold if divided else 0
-    return (f"{untold} ranges of pallet angles had too many arcs to tell: they count as closed",) if untold else ()
+    return (
+        (f"{untold} ranges of pallet angles had too many arcs to be decided: they count as closed",) if untold else ()
+    )
 
 
 def uncertified_text(op: Searched) -> str:
@@ -436,7 +438,7 @@ def uncertified_text(op: Searched) -> str:
         return ""
     text = f"{op.surface.name}: the largest cutter of {count} contact points is not certified"
     if not answer.bounded.all():
-        return f"{text}: there are too many arcs of pallet angle to tell"
+        return f"{text}: too many arcs of pallet angle to decide"
     if covering is None or any(answer.catalogue.cutters[k].corner_radius == 0.0 for k in np.unique(answer.cutter)):
         return f"{text} between check points: a sharp corner may meet a wall there: take cutters with a corner radius"
     return f"{text} between check points: the rim of a shank or holder may meet a wall there: state more clearance_mm"
@@ -453,8 +455,8 @@ def for_all(milled: ImpellerResult) -> str:
     """`one cutter for all: D 16 r 2 mm at 40 deg`."""
     if milled.one is not None:
         c, alpha = milled.one[0], np.degrees(milled.surfaces[0].table.angle[milled.one[1]])
-        return f"the largest one cutter for all: D {c.diameter:g} r {c.corner_radius:g} mm at {alpha:.6g} deg"
-    return "no one cutter mills all of it at one table angle"
+        return f"the largest single cutter for all: D {c.diameter:g} r {c.corner_radius:g} mm at {alpha:.6g} deg"
+    return "no single cutter mills all of it at one table angle"
 
 
 def largest(op: Searched) -> str:
@@ -463,4 +465,4 @@ def largest(op: Searched) -> str:
         c, alpha = op.one.cutter, np.degrees(op.table.angle[op.one.table])
         return f"D {c.diameter:g} r {c.corner_radius:g} mm at {alpha:.6g} deg for all of it"
     d = op.answer.diameter[op.answer.cutter >= 0]
-    return f"no cutter mills all of it at one table angle, D {d.min():g} to {d.max():g} mm point by point"
+    return f"no single cutter mills all of it at one table angle, D {d.min():g} to {d.max():g} mm point by point"

@@ -64,7 +64,7 @@ def read_part(job: ImpellerJob) -> ImpellerPart:
     milled = {(s.body, s.side) for s in job.table.surface}
     names = [(b, f"{k} fillet") for b in BODIES[: len(made.bodies)] for k in ("plus", "minus")]
     left = [" ".join(name) for name in names if name not in milled]
-    not_milled = (f"not milled, for no [[surface]] names it: {', '.join(left)}",) if left else ()
+    not_milled = (f"not milled: no [[surface]] names it: {', '.join(left)}",) if left else ()
     return ImpellerPart(made, (*plain.faces, *said, *not_milled))
 
 
@@ -118,7 +118,7 @@ def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diamet
         numbers = [f.number for f in faces]
         for k, number in enumerate(numbers):
             if number in numbers[:k]:
-                raise InputError(f"{at}: face {number} stands twice: name each face once")
+                raise InputError(f"{at}: face {number} appears twice: name each face once")
         found = meridian_of(faces, R, at, tips=key == "shroud")
         (r0, z0), (r1, z1) = found[0], found[-1]
         said.append(f"{key}: {'; '.join(map(str, faces))}: r {r0:.6g}, z {z0:.6g} to r {r1:.6g}, z {z1:.6g} mm")
@@ -165,5 +165,5 @@ def _faces(model: Model, names: Names, key: str) -> list[Face]:
     faces = [model.face(name, key) for name in names]  # type: ignore[arg-type]
     for k, one in enumerate(faces):
         if any(one.number == other.number for other in faces[:k]):
-            raise InputError(f"{key}: face {one.number} stands twice: name each face once")
+            raise InputError(f"{key}: face {one.number} appears twice: name each face once")
     return faces

@@ -20,7 +20,7 @@ from chipload.jobs.impeller.tables import PathsTable
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.assignment import Changes
 from chipload.planning.impeller.compare import CutterChoice, Partition
-from chipload.planning.impeller.costs import Costs, Measured
+from chipload.planning.impeller.costs import Costs, MeasuredCost
 from chipload.planning.impeller.patch import Patch
 from chipload.planning.impeller.settings import (
     CutterSetting,
@@ -74,7 +74,7 @@ def checked_partitions(
     """
     memory = _Memory()
     best: dict[str, _Planned] = {}
-    rows: dict[int, list[tuple[int, Measured]]] = {}
+    rows: dict[int, list[tuple[int, MeasuredCost]]] = {}
     partitions: Sequence[Partition] = first
     for turn in range(_ROUNDS):
         moved = False
@@ -163,7 +163,7 @@ def _same(a: Partition, b: Partition) -> bool:
     return [key(p) for p in a.divided.patches] == [key(p) for p in b.divided.patches]
 
 
-def _measured(costs: Sequence[Costs], done: _Planned, machine: Machine) -> list[tuple[int, Measured]]:
+def _measured(costs: Sequence[Costs], done: _Planned, machine: Machine) -> list[tuple[int, MeasuredCost]]:
     """For each patch the number of its side, and what its program takes; rest passes count to the patch they mend."""
     taken: dict[int, float] = {}
     millings = [m for s in done.plan.settings for m in s.millings]
@@ -179,7 +179,7 @@ def _measured(costs: Sequence[Costs], done: _Planned, machine: Machine) -> list[
     for m in millings:
         own, order, table, bare = _place(costs, m.patch)
         number = next(k for k, c in enumerate(costs) if c is own)
-        row = Measured(order, m.patch.cutter, table, bare, taken.get(id(m.patch), 0.0))
+        row = MeasuredCost(order, m.patch.cutter, table, bare, taken.get(id(m.patch), 0.0))
         out.append((number, row))
     return out
 

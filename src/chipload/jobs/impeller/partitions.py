@@ -36,9 +36,9 @@ def divided_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
     ]
     if milled.checked:
         out += [
-            "<h3>Ways by their programs</h3>",
-            '<p class="note">Every way is written, checked and timed. All channels, without roughing: cut, leads and '
-            "links, changes of cutter and table.</p>",
+            "<h3>Partitions by their programs</h3>",
+            '<p class="note">Every partition is written, checked and timed. All channels, without roughing: cut, leads '
+            "and links, changes of cutter and table.</p>",
             _programmed(milled),
         ]
     used = milled.used
@@ -67,7 +67,7 @@ def _compared(milled: ImpellerResult) -> str:
         name = escape(way.name)
         used.append(way is milled.used)
         if d is None:
-            rows.append([name, '<span class="no">no so many mill all</span>', *[""] * 8])
+            rows.append([name, '<span class="no">these cutters do not reach all points</span>', *[""] * 8])
             continue
         cutters = ", ".join(f"D {way.catalogue.cutters[k].diameter:g} r {way.catalogue.cutters[k].corner_radius:g}"
                             for k in d.cutters)  # fmt: skip
@@ -78,11 +78,20 @@ def _compared(milled: ImpellerResult) -> str:
             [
                 name, cutters, f"{100.0 * way.share:.4g}", f"{d.path:.0f}", less[0],
                 f"{d.total / 60.0:.1f}", less[1], f"{d.cutter_changes} + {d.table_changes}", f"{d.bound / 60.0:.1f}",
-                f"{100.0 * d.gap:.1f}",
+                f"{100.0 * d.above_bound:.1f}",
             ]
         )  # fmt: skip
-    head = ["way", "cutters [mm]", "reached [%]", "path [mm]", "[%]", "time [min]", "[%]", "changes of cutter + table"]
-    head += ["least time [min]", "gap [%]"]
+    head = [
+        "partition",
+        "cutters [mm]",
+        "reached [%]",
+        "path [mm]",
+        "[%]",
+        "time [min]",
+        "[%]",
+        "changes of cutter + table",
+    ]
+    head += ["least time [min]", "above least [%]"]
     return table(head, rows, numbers=(2, 3, 4, 5, 6, 7, 8, 9), used=used)
 
 
@@ -97,8 +106,8 @@ def _programmed(milled: ImpellerResult) -> str:
         ]
         for w in milled.checked or ()
     ]  # fmt: skip
-    head = ["way", "cutters [mm]", "path [mm]", "cut [min]", "links [min]", "changes [min]", "time [min]"]
-    head += ["predicted [min]", "mean scallop of asked [%]", "check"]
+    head = ["partition", "cutters [mm]", "path [mm]", "cut [min]", "links [min]", "changes [min]", "time [min]"]
+    head += ["predicted [min]", "mean scallop of limit [%]", "check"]
     used = [w is milled.used_checked for w in milled.checked or ()]
     return table(head, rows, numbers=(2, 3, 4, 5, 6, 7, 8), used=used)
 

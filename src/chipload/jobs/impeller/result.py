@@ -190,5 +190,5 @@ def _unchecked(milled: ImpellerResult) -> tuple[str, ...]:
         "fixtures, pallet and linear axes: no collision check",
     ]
     if milled.programs is None:
-        out.append("programs: none is asked for")
+        out.append("programs: the job states no [operation.paths]")
     return tuple(out)

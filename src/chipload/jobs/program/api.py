@@ -240,7 +240,7 @@ def _cutters(given: Cutters, program: Program) -> dict[int, Cutter]:
     """By tool number; one cutter alone is the only tool that the program has."""
     if isinstance(given, Mapping) and all(isinstance(k, int) for k in given):
         if not given:
-            raise InputError("cutter: none is given")
+            raise InputError("cutter: missing: give at least one")
         several = {int(k): _cutter(v, int(k)) for k, v in given.items()}
         return {k: replace(c, number=k) for k, c in several.items()}
     used = sorted(set(np.asarray(program.tool).tolist()))

@@ -61,7 +61,7 @@ class History:
     def stock(self) -> LayeredStock:
         """The stock that is left."""
         if self.program.simulated is None:
-            raise InputError(f"{self.program.name}: was read, not simulated: there is no stock")
+            raise InputError(f"{self.program.name}: was only read, not simulated: it has no stock")
         return self.program.simulated.stock
 
     @property

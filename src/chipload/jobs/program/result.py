@@ -51,7 +51,7 @@ def _track(program: ProgramResult) -> Track:
     """The program as it is."""
     time_s, simulation = float(program.seconds.sum()), program.simulated
     if simulation is None:
-        unproven = Finding("not-simulated", 0, "what the cutter meets was not simulated", Severity.UNPROVEN)
+        unproven = Finding("not-simulated", 0, "the program was not simulated in its stock", Severity.UNPROVEN)
         findings = (*(exceeding(f) for f in program.reading.violations), unproven)
         blocks = in_memory(motion_rows(program))
         return Track(PROGRAM, TrackKind.PROGRAM, True, time_s, (), findings, (APT,), blocks=blocks)

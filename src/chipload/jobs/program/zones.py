@@ -62,7 +62,7 @@ def passes_of(stability: StabilityResult, program: Program, columns: Columns, to
     if not len(steps):
         return ()
     line = np.asarray(columns["line"], dtype=np.int64)
-    cutting = np.unique(line[np.asarray(columns["chip_pieces"]) > 0])
+    cutting = np.unique(line[np.asarray(columns["chip_areas"]) > 0])
     own, at = line[steps], program.line.astype(np.int64)
     moves, first_at = np.unique(at, return_index=True)
     tools, cuts_here = program.tool[first_at], np.isin(moves, cutting)

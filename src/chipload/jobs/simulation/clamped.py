@@ -13,7 +13,7 @@ from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.assembly import modes_of, shares
 from chipload.structure.cells.clamp import Clamp, clamp_stiffness
 from chipload.structure.cells.grid import CellGrid, grid_over
-from chipload.structure.cells.moments import Region, stock_moments
+from chipload.structure.cells.moments import StockRegion, stock_moments
 from chipload.structure.cells.workpiece import Elastic
 
 #: thickness of the slab that stands for a face [mm], and N/mm in 1 N/um, MPa in 1 GPa
@@ -40,7 +40,12 @@ def clamp_errors(table: SimulationJobTable) -> Iterator[str]:
         for k, mode in enumerate(table.dynamics.mode):
             if mode.of == "workpiece":
                 yield f"dynamics.mode.{k}: of the workpiece: leave it out: workpiece.density_kg_m3 gives its modes"
-    for k, clamp in enumerate(table.workpiece.clamp):
+    yield from wrong_clamps(table.workpiece)
+
+
+def wrong_clamps(table: WorkpieceTable) -> Iterator[str]:
+    """Clamps that state no place, or more than one."""
+    for k, clamp in enumerate(table.clamp):
         key = f"workpiece.clamp.{k}"
         box = (clamp.low_mm is not None, clamp.high_mm is not None)
         point = (clamp.point_mm is not None, clamp.diameter_mm is not None)
@@ -88,7 +93,7 @@ def _clamp(table: ClampTable, name: str, stock: LayeredStock) -> Clamp:
         low[2], high[2] = z - 0.5 * table.diameter_mm, z + 0.5 * table.diameter_mm
     held = np.array([axis in table.directions for axis in "xyz"])
     stiffness = np.inf if table.stiffness_n_um is None else PER * table.stiffness_n_um
-    return Clamp(name, Region(outline, float(low[2]), float(high[2])), held, stiffness)
+    return Clamp(name, StockRegion(outline, float(low[2]), float(high[2])), held, stiffness)
 
 
 def clamped_volumes(table: WorkpieceTable, stock: LayeredStock) -> NDArray[np.float64]:

@@ -90,7 +90,7 @@ def contact_lines(cuts: Cuts) -> Floats:
     It runs along the axis through the mean of the ends of the engagement at which the chip has no thickness, from the
     lowest to the highest of them; where a step leaves no surface, through the middle of its engagement.
     """
-    bites = cuts.bites
+    bites = cuts.engagement
     owner = np.repeat(np.arange(len(bites)), np.diff(bites.start))
     p, q, a, b, along, offset, across = bites.rows.T
     s0, rho, z0, sk = bites.slices[bites.slice, :4].T
@@ -119,5 +119,5 @@ def contact_lines(cuts: Cuts) -> Floats:
     mean = total / np.where(known, weight, 1.0)[:, None]
     ends = np.repeat(mean[:, None], 2, axis=1)
     ends[known, 0, 2], ends[known, 1, 2] = low[known], high[known]
-    tip = 0.5 * (cuts.way[:, :3] + cuts.way[:, 3:6])
+    tip = 0.5 * (cuts.ends[:, :3] + cuts.ends[:, 3:6])
     return np.asarray(tip[:, None] + np.einsum("nei,nij->nej", ends, bites.frames))

@@ -138,7 +138,7 @@ def read_modes(path: Path) -> tuple[ModeTable, ...]:
     try:
         raw = tomllib.loads(read_regular(path, path.name, LARGEST_FILE).decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as err:
-        raise InputError(f"{path.name}: no TOML: {err}") from None
+        raise InputError(f"{path.name}: not a TOML file: {err}") from None
     for mode in raw.get("mode", ()) if isinstance(raw.get("mode"), list) else ():
         if isinstance(mode, dict):
             for key in ("residual_percent", "coherence"):

@@ -78,6 +78,12 @@ def program_job(
         errors.texts += [*_contradictions(table), *wrong]
         with errors.collect():
             tools = cutters(table.cutter, folder)
+        changed = [key for key in ("feeds", "speeds") if getattr(table.operation[0], key, None) is not None]
+        errors.texts += [
+            f"operation.0.{changed[0]}: cutter {n} is a body (body_mm) whose load is not known: leave {changed[0]} out"
+            for n, cutter in tools.items()
+            if cutter.body and changed
+        ]
         with errors.collect():
             if table.dynamics is not None and tools:
                 dynamics_of(table.dynamics, folder, tools, table.workpiece)

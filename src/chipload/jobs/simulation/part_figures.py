@@ -51,7 +51,7 @@ def coloured_mesh(left: Difference, span: float) -> trimesh.Trimesh:
     mesh.metadata["legend"] = legend(
         "gouge (below 0) and excess [mm]",
         [(-span, GOUGE), (0.0, DONE), (span, EXCESS)],
-        [("more than was looked for", UNKNOWN)],
+        [("beyond the search range", UNKNOWN)],
     )
     return mesh
 
@@ -76,15 +76,15 @@ def section(
             "<h2>What is left on the part</h2>",
             table(["", "mm", "line", "at x, y, z [mm]"], rows, numbers=(1, 2)),
             f"<p>Of {what['part_under_stock']} points of the part that had stock over them "
-            f"{100.0 * what['part_reached_share']:.3g} % lie within {left.look:g} mm of the tool's way; over the "
-            "others there is more.</p>",
+            f"{100.0 * what['part_reached_share']:.3g} % lie within {left.search_range:g} mm of the tool path; over "
+            "the others there is more.</p>",
             '<p class="note">On the part in the view above, red is cut too deep, blue stands over the part, in full '
-            f"colour by {span:.3g} mm; pale: more than was looked for.</p>",
+            f"colour by {span:.3g} mm; pale: beyond the search range.</p>",
         ]
     if compared_with:
         body += [
             "<h2>Collisions</h2>",
-            f"<p>Shank and holder were held against {escape(', '.join(compared_with))}: "
+            f"<p>Shank and holder were compared with {escape(', '.join(compared_with))}: "
             f"{len(collisions) or 'no'} line{'s' if len(collisions) != 1 else ''} with a collision.</p>",
         ]
     if collisions:

@@ -32,7 +32,7 @@ def numbers(left: Difference | None, columns: Mapping[str, NDArray[Any]]) -> dic
         "part_points": len(left.points),
         "part_under_stock": len(known),
         "part_reached_share": float(known.mean()) if len(known) else 1.0,
-        "excess_range_mm": left.look,
+        "excess_range_mm": left.search_range,
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named, read_material
 from chipload.jobs.checks import DefaultChecks, default_checks
 from chipload.jobs.simulation.clamped import require_clamped
@@ -106,21 +108,21 @@ def resolution_of(job: ProgramJob, program: Program) -> Resolution:
     if (np.asarray(program.axis)[:, 2] > 1.0 - 1e-12).all():
         return Resolution(op.step_mm, op.tolerance_mm, CORNER, flank, grading=GRADING)
     flank = op.flank_mm or LEANING_FLANK * smallest
-    return Resolution(op.step_mm, op.tolerance_mm, 2 * CORNER, flank, bottom_pieces=LEANING_BOTTOM)
+    return Resolution(op.step_mm, op.tolerance_mm, 2 * CORNER, flank, bottom_slices=LEANING_BOTTOM)
 
 
 def timed(reading: ProgramReading, job: ProgramJob, machine: Machine) -> tuple[Program, NDArray[np.float64]]:
     """The program from its first tool on, and the time of each row; what is left out counts with the first row."""
-    program, times = _with_tool(reading.program, job), times_of(reading, machine)
+    program, times = with_tool(reading.program, job.cutters), times_of(reading, machine)
     first = len(times) - len(program)
     return program, np.concatenate([[times[: first + 1].sum()], times[first + 1 :]])
 
 
-def _with_tool(program: Program, job: ProgramJob) -> Program:
+def with_tool(program: Program, cutters: Mapping[int, Cutter]) -> Program:
     """The program without the rapids at its beginning that are made before a tool is in the spindle (T0), unless the
     job says what is in it.
     """
-    if 0 in job.cutters:
+    if 0 in cutters:
         return program
     idle = (program.tool == 0) & (program.motion == RAPID)
     first = len(program) if idle.all() else int(np.argmin(idle))

@@ -64,8 +64,8 @@ def straight(program: Program, words: str) -> None:
     if len(back):
         line = int(program.line[program.line > 0][back[0]])
         raise InputError(
-            f"line {line}: the program goes back behind it: {words} are changed only in a text that runs straight "
-            "through: convert it first (chipload convert)"
+            f"line {line}: the program jumps back past it: {words} are changed only in a program without jumps: "
+            "convert it first (chipload convert)"
         )
 
 

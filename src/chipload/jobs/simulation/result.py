@@ -126,7 +126,23 @@ def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:
         out.append(Finding("collision", c.line, text, Severity.EXCEEDS, place, int(c.step)))
     if simulation.workpiece is not None:
         out += simulation.workpiece.findings
+    out += _bodies(simulation)
     return (*out, *chip_findings(simulation.checks, simulation.removal.columns))
+
+
+def _bodies(simulation: SimulationResult) -> list[Finding]:
+    """Tools that are bodies without chips, each where it first moves at a feed."""
+    columns, out = simulation.removal.columns, []
+    for number, cutter in sorted(simulation.checks.cutters.items()):
+        rows = np.flatnonzero((columns["tool"] == number) & ~columns["rapid"]) if cutter.body else np.zeros(0)
+        if len(rows):
+            row = int(rows[0])
+            text = (
+                f"tool {number}{f' ({cutter.name})' if cutter.name else ''} is a body: it is held against part, stock "
+                "and fixtures; its chips, forces and torque, and what it removes, are not simulated"
+            )
+            out.append(Finding("tool-body", int(columns["line"][row]), text, Severity.UNPROVEN, None, row))
+    return out
 
 
 def misplaced(simulation: SimulationResult, limits: tuple[LimitCheck, ...]) -> tuple[Finding, ...]:
@@ -171,4 +187,4 @@ def _bent(simulation: SimulationResult) -> tuple[SurfaceMap, ...]:
     if bent is None:
         return ()
     um = 1e3 * np.linalg.norm(bent.moved, axis=1)
-    return (SurfaceMap("workpiece", "deflection_workpiece_um", bent.points, um, bent.faces),)
+    return (SurfaceMap("workpiece", "deflection_workpiece_um", bent.points, um, bent.faces, displacement=bent.moved),)

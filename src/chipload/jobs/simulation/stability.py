@@ -212,7 +212,7 @@ def stability_limits(
 
 def cutting_rows(columns: Columns) -> NDArray[np.bool_]:
     """(n,) steps that cut at a feed."""
-    return np.asarray((np.asarray(columns["chip_pieces"]) > 0) & ~np.asarray(columns["rapid"]))
+    return np.asarray((np.asarray(columns["chip_areas"]) > 0) & ~np.asarray(columns["rapid"]))
 
 
 def filled_margins(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.float64]:

@@ -42,7 +42,7 @@ class ProgramTable(Table):
     placed_in: Text | None = Field(
         None, description="work offset in whose coordinates stock and part are; none: the first of the program"
     )
-    tool_comments: bool = Field(True, description="hold the diameters in the program's comments against the cutters")
+    tool_comments: bool = Field(True, description="compare the diameters in the program's comments with the cutters")
 
 
 class SolidTable(Table):

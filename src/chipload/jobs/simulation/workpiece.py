@@ -74,7 +74,7 @@ def insides(stock: LayeredStock) -> Callable[[NDArray[np.float64]], NDArray[np.b
     """Which points [mm] lie in the stock as it is now."""
     bounds, sections = np.asarray(stock.bounds), [stock.section(i) for i in range(stock.layers)]
 
-    def inside(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def contains(points: NDArray[np.float64]) -> NDArray[np.bool_]:
         layer = np.searchsorted(bounds, points[:, 2], side="right") - 1
         out = np.zeros(len(points), dtype=np.bool_)
         for i in np.unique(layer[(layer >= 0) & (layer < len(sections))]).tolist():
@@ -82,7 +82,7 @@ def insides(stock: LayeredStock) -> Callable[[NDArray[np.float64]], NDArray[np.b
             out[own] = shapely.contains_xy(sections[i], points[own, 0], points[own, 1])
         return out
 
-    return inside
+    return contains
 
 
 def stock_body(job: ProgramJob, program: Program) -> LayeredStock:

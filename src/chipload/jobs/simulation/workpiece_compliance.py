@@ -27,7 +27,7 @@ from chipload.simulation.removal import Columns, Resolution
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.followed import FollowedModes, ModesOfStates
 from chipload.structure.cells.grid import CellGrid, grid_over
-from chipload.structure.cells.states import State, StepCompliances, size_of, step_compliances
+from chipload.structure.cells.states import RemovalState, StepCompliances, size_of, step_compliances
 from chipload.structure.cells.stress import greatest_stress
 from chipload.structure.cells.thickness import cells_over
 from chipload.structure.cells.workpiece import CellWorkpiece, Elastic, cell_workpiece, line_compliances
@@ -169,7 +169,7 @@ def workpiece_compliance(
         most[0] = max(most[0], 3 * len(made.modes))
         return made
 
-    states = [State(k, v, lambda then=then: build(then, grid)) for k, v, then in ahead.stocks]  # type: ignore[misc]
+    states = [RemovalState(k, v, lambda then=then: build(then, grid)) for k, v, then in ahead.stocks]  # type: ignore[misc]
     share = table.state_change_percent / 100.0
     spacing = SPACING * float(grid.size.max())
     watch = None if table.density_kg_m3 is None else ModesOfStates(ahead.lines, table.modes, spacing)
@@ -194,7 +194,7 @@ def workpiece_compliance(
         strained = _strained(found, ahead, grid, build, elastic, table.yield_mpa)
     findings: tuple[Finding, ...] = ()
     if found.loose > 1e-6 * stock.volume():
-        text = f"{found.loose:.3g} mm3 of the workpiece hang on nothing: they hold no force"
+        text = f"{found.loose:.3g} mm3 of the workpiece are connected to nothing and carry no force"
         findings = (Finding("loose-material", 0, text, Severity.UNPROVEN),)
     return WorkpieceCompliance(
         found,

@@ -38,17 +38,21 @@ def workpiece_section(simulation: SimulationResult, figures: dict[str, go.Figure
         body += _frequencies(own.modes, figures)
     bent = own.bent
     if bent is not None:
-        x, y, z = bent.place
-        line = int(c["line"][bent.step])
-        body += [
-            "<h3>Bent at its worst</h3>",
-            f'<p class="note">In line {line}, under {np.linalg.norm(bent.force):.4g} N; displacement drawn '
-            f"{_scale(bent):.3g} times.</p>",
-            figure("bent", bent_figure(bent), figures),
-            f"<p>A support of 10 N/\u00b5m at ({x:.4g}, {y:.4g}, {z:.4g}) lowers the deflection there from "
-            f"{1e3 * bent.before:.3g} to {1e3 * bent.after:.3g} \u00b5m.</p>",
-        ]
+        body += bent_section(bent, f"In line {int(c['line'][bent.step])}", figures)
     return body
+
+
+def bent_section(bent: BentWorkpiece, where: str, figures: dict[str, go.Figure]) -> list[str]:
+    """The part of the report on how the workpiece bends at its worst; ``where`` begins a sentence."""
+    x, y, z = bent.place
+    return [
+        "<h3>Bent at its worst</h3>",
+        f'<p class="note">{where}, under {np.linalg.norm(bent.force):.4g} N; displacement drawn '
+        f"{_scale(bent):.3g} times.</p>",
+        figure("bent", bent_figure(bent), figures),
+        f"<p>A support of 10 N/\u00b5m at ({x:.4g}, {y:.4g}, {z:.4g}) lowers the deflection there from "
+        f"{1e3 * bent.before:.3g} to {1e3 * bent.after:.3g} \u00b5m.</p>",
+    ]
 
 
 def _frequencies(modes: FollowedModes, figures: dict[str, go.Figure]) -> list[str]:

@@ -1,1 +1,23 @@
-"""The result of cutting a thin wall: three variants, simulated."""
+"""Jobs that plan the depth of cut of a thin wall, and simulate and compare its variants."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from chipload.lazy import attach
+
+if TYPE_CHECKING:
+    from chipload.jobs.thinwall.job import ThinWallJob
+    from chipload.jobs.thinwall.outcome import ThinWallResult, Variant
+    from chipload.jobs.thinwall.run import propose
+
+__all__ = ["ThinWallJob", "ThinWallResult", "Variant", "propose"]
+
+__getattr__, __dir__ = attach(
+    __name__,
+    {
+        "job": "ThinWallJob",
+        "outcome": "ThinWallResult Variant",
+        "run": "propose",
+    },
+)

@@ -21,7 +21,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from chipload.jobs.thinwall.outcome import Finish, Variant
 from chipload.jobs.thinwall.places import Places
-from chipload.planning.thinwall.passes import NOTHING, planned_pass
+from chipload.planning.thinwall.passes import NOTHING, ThresholdOf, planned_pass
 from chipload.planning.thinwall.threshold import Threshold
 from chipload.planning.thinwall.variants import PlannedVariant, limited_to
 
@@ -35,6 +35,7 @@ MOVES = 2
 
 def least_error(
     places: Places,
+    limited: ThresholdOf,
     corrections: tuple[Floats, ...],
     seconds: float,
     time_of: Callable[[PlannedVariant], float],
@@ -44,13 +45,13 @@ def least_error(
 
     Parameters
     ----------
+    limited : thresholds of the other passes
     corrections : of the law's forces
     seconds : that it may take
     time_of : time of a plan [s]
     prove : writes and simulates one
     """
     inputs = places.inputs
-    limited = places.threshold(inputs.depths.deflection, inputs.depths.factor)
 
     def planned(share: float) -> PlannedVariant:
         def threshold_of(left: Sequence[Floats], side: int) -> Threshold:

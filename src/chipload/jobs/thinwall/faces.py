@@ -38,7 +38,7 @@ def wall_of_faces(job: ThinWallJob) -> ThinWall:
     named: dict[str, FaceName] = {key: stated(getattr(w, key), f"wall.{key}") for key in ("front", "back", "clamp")}
     front, back = (model.face(named[key], f"wall.{key}") for key in ("front", "back"))
     if front.number == back.number:
-        raise InputError(f"wall.back: is face {back.number} as wall.front: state the face opposite")
+        raise InputError(f"wall.back: face {back.number} is wall.front too: state the opposite face")
     taken = [patch_of(f, f"wall.{key}", fit) for f, key in ((front, "front"), (back, "back"))]
     made = wall_of(taken[0].patch, taken[1].patch, _clamp(model, named["clamp"], front, taken[0].patch))
     name = f"wall between faces {front.number} and {back.number} of {model.file.name}"
@@ -46,7 +46,7 @@ def wall_of_faces(job: ThinWallJob) -> ThinWall:
     if model.solid:
         middle = made.plus.at(0.5, 0.5)[0] - made.minus.at(0.5, 0.5)[0]
         if made.plus.normal(0.5, 0.5)[0] @ middle < 0.0:
-            raise InputError(f"{name}: between them is no metal: state the sides of a wall, not of a slot")
+            raise InputError(f"{name}: no material between them: state the two sides of a wall, not of a slot")
     return ThinWall(f"{name} (front {taken[0]}; back {taken[1]})", wall.at)
 
 

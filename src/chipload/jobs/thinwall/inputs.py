@@ -25,7 +25,7 @@ from chipload.jobs.thinwall.faces import wall_of_faces
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.tables import SHAPES
 from chipload.machine.machine import Machine, machine_named, read_machine
-from chipload.planning.thinwall.blank import SIDES, Blank, FinishSurface
+from chipload.planning.thinwall.blank import SIDES, FinishSurface, WallBlank
 from chipload.planning.thinwall.depth import DepthRange, Measure
 from chipload.planning.thinwall.force_table import ForceTable, law_on_stock
 from chipload.planning.thinwall.linking import FineSide
@@ -64,7 +64,7 @@ class WallBody:
     allowance: tuple[float, float]
     side_numbers: tuple[int, ...]
     foot: float
-    wall: Blank
+    wall: WallBlank
     places: tuple[Floats, Floats]
 
 
@@ -141,13 +141,13 @@ class WallInputs:
         p = self._surface(side, u, v).points
         along = np.linalg.norm(np.diff(p, axis=0), axis=2).sum(axis=0).max()
         up = np.linalg.norm(np.diff(p, axis=1), axis=2).sum(axis=1).max()
-        n = max(math.ceil(along / self.job.operation.step_mm), self._pieces(side), 2) + 1
+        n = max(math.ceil(along / self.job.operation.step_mm), self._chords(side), 2) + 1
         m = math.ceil(up / abs(self.cut.step_over)) + 1
         u, v = np.linspace(0.0, 1.0, n), np.linspace(self.body.foot, 1.0, m)
         return FineSide(self._surface(side, u, v), u, v)
 
-    def _pieces(self, side: int) -> int:
-        """Straight pieces along a row that stay within the chord's tolerance: the sag of one falls as its square."""
+    def _chords(self, side: int) -> int:
+        """Straight chords along a row that stay within the chord's tolerance: the sag of one falls as its square."""
         u, v = np.meshgrid(np.linspace(0.0, 1.0, 65), np.linspace(self.body.foot, 1.0, 17), indexing="ij")
         p = self.body.shape.sides(u, v)[side]
         a, b = p[:-1], p[1:]
@@ -289,7 +289,7 @@ def _shape(job: ThinWallJob) -> ThinWall:
     return through_sections(made, edge_share, w.span or (0.0, 1.0))
 
 
-def _wall(job: ThinWallJob, shape: ThinWall) -> tuple[Blank, float]:
+def _wall(job: ThinWallJob, shape: ThinWall) -> tuple[WallBlank, float]:
     """The wall in finite elements with all of its stock, and the share of v that is its foot."""
     w, made = job.table.wall, job.table.workpiece
     _, height, _ = shape.size()
@@ -301,7 +301,9 @@ def _wall(job: ThinWallJob, shape: ThinWall) -> tuple[Blank, float]:
     i, j = w.elements
     rows = max(1, round(foot * j))
     if rows >= j:
-        raise InputError(f"wall.elements = {list(w.elements)}: {j} up the wall: the foot takes {rows}: state more")
+        raise InputError(
+            f"wall.elements = {list(w.elements)}: {j} up the wall: must be above {rows}, those of the foot: state more"
+        )
     v = np.concatenate([np.linspace(0.0, foot, rows + 1)[:-1], np.linspace(foot, 1.0, j - rows + 1)])
 
     def place(p: Floats) -> Floats:
@@ -311,7 +313,7 @@ def _wall(job: ThinWallJob, shape: ThinWall) -> tuple[Blank, float]:
 
     grid = from_map(np.linspace(0.0, 1.0, i + 1).tolist(), v.tolist(), [0.0, 1.0], place)
     solid = SolidWorkpiece(grid, 1000.0 * made.modulus_gpa, made.poisson, 1e-12 * made.density_kg_m3, grid.side("j-"))
-    return Blank(solid, w.allowance_mm, 1, rows), foot
+    return WallBlank(solid, w.allowance_mm, 1, rows), foot
 
 
 def _step_over(job: ThinWallJob, cutter: Cutter) -> float:
@@ -322,7 +324,7 @@ def _step_over(job: ThinWallJob, cutter: Cutter) -> float:
     r, h = cutter.corner_radius, stated(op.scallop_um, "operation.0.scallop_um") / 1000.0
     if not math.isclose(2.0 * r, cutter.diameter):
         raise InputError(
-            "operation.0.scallop_um: is known for a ball only: state step_over_mm for cutter "
+            "operation.0.scallop_um: applies to ball-nose cutters only: state step_over_mm for cutter "
             f"{cutter.number} with corner_radius_mm = {r:g}"
         )
     if not h < 0.5 * r:

@@ -9,7 +9,7 @@ from typing import Any
 
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
-from chipload.jobs.sources import Limited, sources_and_cutters
+from chipload.jobs.sources import Limited, sources_and_cutters, unknown_cutter
 from chipload.jobs.thinwall.tables import (
     EVERY,
     SHAPES,
@@ -91,9 +91,7 @@ def _contradictions(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Ite
     for key in type(wall).model_fields:
         if getattr(wall, key) is not None and key not in (*EVERY, *needs, *may):
             yield f"wall.{key}: not used by shape = {wall.shape}: leave it out"
-    if tools and op.cutter not in tools:
-        known = ", ".join(str(n) for n in sorted(tools))
-        yield f"operation.0.cutter = {op.cutter}: no [[cutter]] has this number: state one of {known}"
+    yield from unknown_cutter("operation.0.cutter", op.cutter, tools)
     if (op.step_over_mm is None) == (op.scallop_um is None):
         said = "none is" if op.step_over_mm is None else "both are"
         yield f"operation.0: {said} stated: state either step_over_mm or scallop_um"

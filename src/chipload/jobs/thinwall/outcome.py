@@ -6,8 +6,9 @@ the place bears, limit over normal compliance in the state of that pass; u, v pa
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -147,6 +148,7 @@ class Variant:
     finish : a finished side each
     shape : the simulated stock beside the finished wall
     stress : greatest equivalent stress at the clamp [MPa] under the simulated forces
+    find_load_error : gives ``load_error``, when that is first asked for: it takes longer than the simulation
     shift : greatest way [mm] by which the last passes were moved against the form error
     """
 
@@ -160,7 +162,13 @@ class Variant:
     finish: tuple[Finish, ...]
     shape: Shape
     stress: float
+    find_load_error: Callable[[], Mapping[str, float]]
     shift: float = 0.0
+
+    @cached_property
+    def load_error(self) -> Mapping[str, float]:
+        """Relative error of the greatest load by column, of layers and steps; inf: not known."""
+        return self.find_load_error()
 
     @property
     def over(self) -> NDArray[np.int64]:
@@ -168,6 +176,19 @@ class Variant:
         ratio = self.columns["force_over_allowable"]
         bad = np.flatnonzero(ratio > 1.0 + OVER)
         return np.asarray(bad[np.argsort(-ratio[bad], kind="stable")])
+
+    def over_with_error(self, modelled: bool, assumed: float | None = None) -> float:
+        """Greatest F_n over F_th with the error of the loads and, where F_th is modelled, that of the mesh.
+
+        Parameters
+        ----------
+        modelled : whether F_th is
+        assumed : error of F_n, where its own is not asked for
+        """
+        c = self.columns
+        unsure = c["compliance_error"] if modelled else 0.0
+        most = float((c["force_over_allowable"] * (1.0 + unsure)).max(initial=0.0))
+        return most * (1.0 + (self.load_error["force_normal_n"] if assumed is None else assumed))
 
     @property
     def deflection(self) -> float:

@@ -7,8 +7,9 @@ logarithm, see :mod:`chipload.jobs.thinwall.places`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from chipload.jobs.checks import check_columns
 from chipload.jobs.thinwall.inputs import WallInputs
+from chipload.jobs.thinwall.load_error import SimulatedPass, load_error
 from chipload.jobs.thinwall.mesh_error import error_at
 from chipload.jobs.thinwall.outcome import Finish, Shape
 from chipload.jobs.thinwall.places import Places, between
@@ -29,7 +31,7 @@ from chipload.simulation.chips import remove
 from chipload.simulation.contact_points import touched
 from chipload.simulation.deflection import form_error, step_deflections
 from chipload.simulation.removal import Removal, Resolution
-from chipload.simulation.section_deviation import beside, nearest
+from chipload.simulation.section_deviation import nearest, section_deviation
 from chipload.stock.layers import LayeredStock
 from chipload.structure.places import normals_of, on_cut, on_side, weights
 from chipload.structure.solid import displacement, factorise
@@ -62,6 +64,7 @@ class Proof:
     thresholds : (n, m) [N] a pass, at the places of its side
     finish, shape : of the finished wall
     stress : greatest equivalent stress at the clamp [MPa]
+    find_load_error : gives the relative error of the loads by column, of layers and steps
     """
 
     columns: Mapping[str, NDArray[Any]]
@@ -69,6 +72,7 @@ class Proof:
     finish: tuple[Finish, ...]
     shape: Shape
     stress: float
+    find_load_error: Callable[[], Mapping[str, float]]
 
 
 def wall_stock(inputs: WallInputs) -> LayeredStock:
@@ -107,12 +111,14 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
     law = inputs.depths.even_law if plan.name in EVEN else inputs.depths.law
     left = [np.full(places.shape, inputs.body.allowance[s]) for s in inputs.body.side_numbers]
     parts: list[dict[str, NDArray[Any]]] = []
+    simulated: list[SimulatedPass] = []
     thresholds: list[Floats] = []
     finish: dict[int, Finish] = {}
     time = way = stress = 0.0
     last = {p.side: k for k, p in enumerate(plan.passes)}
     ends = np.cumsum([len(leg.program) for leg in legs])
     for k, (p, leg, own) in enumerate(zip(plan.passes, legs, np.split(times, ends[:-1]), strict=True)):
+        before = stock.copied()
         removal = remove(
             leg.program,
             stock,
@@ -124,6 +130,7 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
             times=own,
             progress=lambda part, what, k=k: progress((k + part) / len(legs), f"pass {k + 1} of {len(legs)}"),  # type: ignore[misc]
         )
+        simulated.append(SimulatedPass(leg.program, before, removal.columns))
         left[p.side] = p.low
         number = inputs.body.side_numbers[p.side]
         C = places.compliance(left, p.side)
@@ -145,7 +152,8 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
         if k == last[p.side]:
             finish[number] = _finish(inputs, removal, number, C, error, bars)
     whole = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-    return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(inputs, stock, legs), stress)
+    find = partial(load_error, simulated, cutter, inputs.cut.material, fine)
+    return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(inputs, stock, legs), stress, find)
 
 
 def _stress(inputs: WallInputs, left: Sequence[Floats], number: int, columns: Mapping[str, NDArray[Any]]) -> float:
@@ -254,7 +262,7 @@ def _finish(
         number,
         points,
         found.error.reshape(shape),
-        found.gap.reshape(shape),
+        found.rigid.reshape(shape),
         found.made.reshape(shape),
         unsure.reshape(shape),
         parameters,
@@ -271,6 +279,6 @@ def _shape(inputs: WallInputs, stock: LayeredStock, legs: Sequence[PassProgram])
     )
     cloud = np.concatenate([p.reshape(-1, 3) for p in inputs.body.shape.sides(u, v)])
     gap = nearest(Program.join([leg.program for leg in legs]), inputs.cut.cutter, cloud)
-    found = beside(stock, inputs.finished_mesh(), inputs.foot_height + inputs.cut.cutter.corner_radius)
+    found = section_deviation(stock, inputs.finished_mesh(), inputs.foot_height + inputs.cut.cutter.corner_radius)
     at = found.at if found.gouge > -gap.distance else gap.at
     return Shape(found.gouge, found.left, at, found.points, gap.distance)

@@ -17,6 +17,7 @@ from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Ve
 from chipload.simulation.accuracy import energy_balance
 
 Floats = NDArray[np.float64]
+Place = tuple[float, float, float] | None
 
 #: contact points over their allowable force that are listed, the worst first
 LISTED = 100
@@ -26,6 +27,15 @@ DROPPED = ("u", "v", "side", "label", "compliance_error", FIRST_STATE)
 ENGAGED = 1.0
 #: limits that are proportional to the compliance of the wall
 OF_COMPLIANCE = ("deflection_workpiece_um", "deflection_um", "force_over_allowable")
+#: loads that a limit goes with, where it is none itself
+GOES_WITH = {
+    "deflection_workpiece_um": ("force_normal_n",),
+    "force_over_allowable": ("force_normal_n",),
+    "form_error_um": ("force_normal_n",),
+    "stress_mpa": ("force_normal_n",),
+    "deflection_um": ("force_normal_n", "force_n"),
+    "deflection_cutter_um": ("force_n",),
+}
 
 
 def result_of(walled: ThinWallResult) -> Result:
@@ -44,7 +54,6 @@ def result_of(walled: ThinWallResult) -> Result:
             *(f"limit {name}: not stated" for name in walled.unchecked),
             "holder, clamp and machine: no collision check",
             *(() if "dynamics" in walled.settings else ("chatter: not calculated",)),
-            "error of the loads by layers and steps: not estimated",
             "tangential forces do not bend the wall; a bent wall is not cut less deep",
         ),
         provenance=walled.provenance,
@@ -60,22 +69,28 @@ def limits_of(walled: ThinWallResult, one: Variant) -> tuple[LimitCheck, ...]:
     c, out = one.columns, []
     for name, limit in walled.limits.items():
         if name == "form_error_um":
-            out.append(with_peaks(_form_error(one, limit), walled.checks.material))
+            out.append(with_peaks(_form_error(walled, one, limit), walled.checks.material))
         else:
-            check = check_limit(name, limit, c, track=one.name, error=mesh_error_of(walled, name, c))
+            check = check_limit(name, limit, c, track=one.name, error=error_of(walled, one, name))
             out.append(with_peaks(check, walled.checks.material))
     over, cuts = "force_over_allowable", c["force_normal_n"] > 0.0
-    out.append(check_limit(over, 1.0 + OVER, c, track=one.name, rows=cuts, error=mesh_error_of(walled, over, c)))
+    out.append(check_limit(over, 1.0 + OVER, c, track=one.name, rows=cuts, error=error_of(walled, one, over)))
     strength = float(walled.settings["yield_mpa"])
-    out.append(LimitCheck("stress_mpa", strength, one.stress, state_of(one.stress, strength)[0], one.name))
+    out.append(_known("stress_mpa", strength, one.stress, one, error_of(walled, one, "stress_mpa")))
     gouge, tolerance = max(one.shape.gouge, -one.shape.nearest, 0.0), float(walled.settings["gouge_tolerance_mm"])
     place = (float(one.shape.at[0]), float(one.shape.at[1]), float(one.shape.at[2]))
     state, why = state_of(gouge, tolerance + one.shift)[0], ""
     if one.shift > 0.0 and state is Verdict.HOLDS:
         state, why = Verdict.UNPROVEN, "the path is moved: it is compared within its greatest shift only"
     out.append(LimitCheck("gouge_mm", tolerance + one.shift, gouge, state, one.name, place=place, reason=why))
-    out += chatter_limits(walled.settings.get("dynamics"), c, one.name)
-    return (*out, *default_limits(walled.checks, walled.planning.machine, c, one.name, {}))
+    out += chatter_limits(walled.settings.get("dynamics"), c, one.name, error_of(walled, one, "force_n"))
+    return (*out, *default_limits(walled.checks, walled.planning.machine, c, one.name, one.load_error))
+
+
+def error_of(walled: ThinWallResult, one: Variant, name: str) -> float:
+    """Relative error of the value that a limit bounds: of the loads by layers and steps, and of the mesh."""
+    loads = max(one.load_error.get(load, 0.0) for load in GOES_WITH.get(name, (name,)))
+    return (1.0 + loads) * (1.0 + mesh_error_of(walled, name, one.columns)) - 1.0
 
 
 def mesh_error_of(walled: ThinWallResult, name: str, columns: Mapping[str, NDArray[Any]]) -> float:
@@ -109,7 +124,7 @@ def findings_of(walled: ThinWallResult, one: Variant) -> tuple[Finding, ...]:
     if missed:
         text = f"{missed} points of the finished surface are not reached by any step"
         out.append(Finding("thinwall-not-finished", 0, text, Severity.EXCEEDS))
-    rapids = int((one.columns["rapid"] & (one.columns["chip_pieces"] > 0)).sum())
+    rapids = int((one.columns["rapid"] & (one.columns["chip_areas"] > 0)).sum())
     if rapids:
         out.append(Finding("rapid-cuts", 0, f"{rapids} rapids go through material", Severity.EXCEEDS))
     return (*out, *chip_findings(walled.checks, one.columns))
@@ -138,7 +153,14 @@ def _track(walled: ThinWallResult, one: Variant) -> Track:
     )
 
 
-def _form_error(one: Variant, limit: float) -> LimitCheck:
+def _known(name: str, limit: float, worst: float, one: Variant, error: float, place: Place = None) -> LimitCheck:
+    """The check of one value of a variant with its relative error; inf: it is not known."""
+    state, why = state_of(worst, limit, error)
+    known = error if np.isfinite(error) else 1.0
+    return LimitCheck(name, limit, worst, state, one.name, place=place, resolution_error=known, reason=why)
+
+
+def _form_error(walled: ThinWallResult, one: Variant, limit: float) -> LimitCheck:
     """The form error of the finished sides, where it is greatest."""
     worst, place = 0.0, None
     for f in one.finish:
@@ -150,9 +172,9 @@ def _form_error(one: Variant, limit: float) -> LimitCheck:
     if not one.finish:
         return LimitCheck("form_error_um", limit, None, Verdict.UNPROVEN, one.name, reason="no side is finished")
     sizes = [(np.where(f.made, np.abs(f.error), 0.0).ravel(), f.unsure.ravel()) for f in one.finish]
-    error = _growth(*(np.concatenate(x) for x in zip(*sizes, strict=True)))
-    state, why = state_of(worst, limit, error)
-    return LimitCheck("form_error_um", limit, worst, state, one.name, place=place, resolution_error=error, reason=why)
+    mesh = _growth(*(np.concatenate(x) for x in zip(*sizes, strict=True)))
+    error = (1.0 + error_of(walled, one, "form_error_um")) * (1.0 + mesh) - 1.0
+    return _known("form_error_um", limit, worst, one, error, place)
 
 
 def _operation(walled: ThinWallResult, v: Variant) -> dict[str, Any]:

@@ -37,7 +37,7 @@ from chipload.planning.thinwall.depth import largest_depths, normal_force
 from chipload.planning.thinwall.experiments import Proposal, propose_cuts
 from chipload.planning.thinwall.force_table import ForceTable
 from chipload.planning.thinwall.linking import Margins, PassProgram, link_passes
-from chipload.planning.thinwall.passes import Plan
+from chipload.planning.thinwall.passes import Plan, ThresholdOf
 from chipload.planning.thinwall.variants import PlannedVariant as Planned
 from chipload.planning.thinwall.variants import even, limited_to, unlimited
 from chipload.program.check import check_program
@@ -93,7 +93,7 @@ def run(job: ThinWallJob, progress: Progress = silent) -> ThinWallResult:
     tried = _Tried(places_of(inputs), progress)
     free = tried.prove(_unlimited(tried.places), 0.25)
     constant, corrections = _constant(tried, free)
-    variable = _variable(tried, corrections)
+    variable = _variable(tried, corrections, constant)
     made = {"variable": variable, "constant": constant, "unconstrained": free, **_compared(tried, variable, constant)}
     progress(1.0, "proved")
     body, finished = inputs.stock_mesh(), inputs.finished_mesh()
@@ -211,6 +211,7 @@ class _Tried:
         self.variable = 0
         self.planned: dict[str, Planned] = {}
         self.corrections: tuple[Floats, ...] = ()
+        self.share = 1.0
 
     def prove(self, planned: Planned, share: float) -> Variant:
         """Write and simulate a plan, which takes this share of what is left to do."""
@@ -234,19 +235,50 @@ def _unlimited(places: Places) -> Planned:
     )
 
 
+def _thresholds(places: Places, share: float) -> ThresholdOf:
+    """Thresholds that allow a share of the deflection limit, or of measured forces."""
+    depths = places.inputs.depths
+    if depths.experiments is None:
+        return places.threshold(share * depths.deflection, depths.factor)
+    return places.threshold(depths.deflection, share * depths.factor)
+
+
+def _room(one: Variant) -> tuple[float, float]:
+    """Error of the normal force of a variant, and the share of the limit that leaves room for it; no room is left for
+    an error that is not known.
+    """
+    error = one.load_error["force_normal_n"]
+    error = error if math.isfinite(error) else 0.0
+    return error, 1.0 / (1.0 + error)
+
+
+def _over(one: Variant, modelled: bool, assumed: float) -> tuple[float, bool]:
+    """Greatest F_n over F_th with the errors that the limit is checked with, and whether the limit holds; the error of
+    the loads is ``assumed`` where the limit does not hold with that.
+    """
+    most = 1.0 if modelled else 1.0 + OVER
+    over = one.over_with_error(modelled, assumed)
+    if over > most or len(one.over):
+        return over, False
+    over = one.over_with_error(modelled)
+    return over, over <= most
+
+
 def _constant(tried: _Tried, free: Variant) -> tuple[Variant, tuple[Floats, ...]]:
     """The constant depth that the simulation of the greatest one lets expect, corrected until it holds; and the
     corrections of the force in even stock that the greatest one gave.
     """
     places = tried.places
     inputs, law = places.inputs, places.inputs.depths.even_law
-    threshold_of = places.threshold(inputs.depths.deflection, inputs.depths.factor)
+    modelled = inputs.depths.experiments is None
+    assumed, share = _room(free)
     at_most = _measured(places, free, law, tuple(np.ones(places.shape) for _ in places.surfaces))
     corrections = at_most
     for turn in range(CONSTANTS):
-        planned = even(places.surfaces, threshold_of, law, inputs.depths.deflection, corrections)
+        held = share * inputs.depths.deflection if modelled else inputs.depths.deflection
+        planned = even(places.surfaces, _thresholds(places, share), law, held, corrections)
         constant = tried.prove(planned, 0.4)
-        if not len(constant.over) or turn == CONSTANTS - 1 or _smallest(places, planned):
+        if turn == CONSTANTS - 1 or _smallest(places, planned) or _over(constant, modelled, assumed)[1]:
             break
         measured = _measured(places, constant, law, corrections)
         corrections = tuple(np.maximum(c, m) for c, m in zip(corrections, measured, strict=True))
@@ -260,54 +292,49 @@ def _smallest(places: Places, planned: Planned) -> bool:
     )
 
 
-def _variable(tried: _Tried, corrections: tuple[Floats, ...]) -> Variant:
+def _variable(tried: _Tried, corrections: tuple[Floats, ...], like: Variant) -> Variant:
     """Variable depths within the limit: planned, simulated, corrected by what was found. Of the plans that hold the
     fastest one; where none does, the one that exceeds least.
 
     Parameters
     ----------
     corrections : of the law's forces, to begin with
+    like : whose error of the loads is expected
     """
     places = tried.places
     inputs = places.inputs
     modelled, held = inputs.depths.experiments is None, inputs.depths.deflection
     best: Variant | None = None
     least: list[tuple[float, Variant]] = []  # of those that exceed, the one that exceeds least
-    share, raised = 1.0, False
+    assumed, share = _room(like)
+    raised = False
     for turn in range(TRIES):
-        threshold_of = (
-            places.threshold(share * held, inputs.depths.factor)
-            if modelled
-            else places.threshold(held, share * inputs.depths.factor)
-        )
         planned = limited_to(
-            places.surfaces, threshold_of, inputs.depths.law, inputs.depths.slope, share * held, corrections
-        )
+            places.surfaces, _thresholds(places, share), inputs.depths.law, inputs.depths.slope, share * held,
+            corrections,
+        )  # fmt: skip
         if best is not None and not raised and _seconds(places, planned) > FASTER * best.seconds:
             break
         one = tried.prove(planned, 0.4)
-        # with the error of the mesh, as the limit is checked
-        unsure = one.columns["compliance_error"] if modelled else 0.0
-        over = float((one.columns["force_over_allowable"] * (1.0 + unsure)).max())
-        good = not len(one.over) and over <= (1.0 if modelled else 1.0 + OVER)
+        over, good = _over(one, modelled, assumed)
         if good and (best is None or one.seconds < best.seconds):
-            best, tried.planned["variable"], tried.corrections = one, planned, corrections
+            best, tried.planned["variable"], tried.corrections, tried.share = one, planned, corrections, share
         elif not good:
             least = [min([*least, (over, one)], key=lambda pair: pair[0])]
-        used = best is not None and (not modelled or best.deflection >= USED_SHARE * held)
+        used = best is not None and (not modelled or best.over_with_error(modelled) >= USED_SHARE)
         if best is not None and turn >= ROUNDS - 1 and (used or turn >= RAISES):
             break
         measured = _measured(places, one, inputs.depths.law, corrections)
         if not good:
             measured = tuple(np.maximum(c, m) for c, m in zip(corrections, measured, strict=True))
-            share *= HOLD / over if turn >= ROUNDS - 1 else 1.0
+            share *= HOLD / over if turn >= ROUNDS - 1 and math.isfinite(over) else 1.0
         # what is left of the limit is used
         raised = good and not used
         share *= FULL / over if raised else 1.0
         corrections = measured
     if best is not None:
         return best
-    tried.planned["variable"], tried.corrections = planned, corrections
+    tried.planned["variable"], tried.corrections, tried.share = planned, corrections, share
     return least[0][1]
 
 
@@ -316,8 +343,8 @@ def _compared(tried: _Tried, variable: Variant, constant: Variant) -> dict[str, 
     places, op, out = tried.places, tried.places.inputs.job.operation, {}
     if op.least_error:
         out["least_error"] = least_error(
-            places, tried.corrections, constant.seconds, lambda planned: _seconds(places, planned),
-            lambda planned: tried.prove(planned, 0.4),
+            places, _thresholds(places, tried.share), tried.corrections, constant.seconds,
+            lambda planned: _seconds(places, planned), lambda planned: tried.prove(planned, 0.4),
         )  # fmt: skip
     if op.compensate_um is not None:
         out["compensated"] = compensated(
@@ -392,6 +419,7 @@ def _variant(places: Places, planned: Planned, program: Program, run: _OnMachine
         proof.finish,
         proof.shape,
         proof.stress,
+        proof.find_load_error,
     )
 
 

@@ -100,7 +100,7 @@ class WallTable(Table):
     )
 
 
-class WorkpieceTable(Table):
+class WallWorkpieceTable(Table):
     """Material of the wall."""
 
     name: Text
@@ -161,7 +161,7 @@ class ThinWallJobTable(Table):
     """The whole file of a job that cuts a thin wall."""
 
     wall: WallTable
-    workpiece: WorkpieceTable
+    workpiece: WallWorkpieceTable
     machine: SourceTable
     material: SourceTable
     threshold: ThresholdTable | None = None

@@ -14,6 +14,7 @@ from chipload.control.wall import Loads, PathLimit, UnitResponse, WallPath, path
 from chipload.cutting.material import Material
 from chipload.jobs.torque.cut import (
     Cut,
+    CutSteps,
     Place,
     contact_width,
     cut,
@@ -25,12 +26,14 @@ from chipload.jobs.torque.cut import (
 from chipload.jobs.torque.job import TorqueJob
 from chipload.machine.machine import Machine
 from chipload.program.program import Program
-from chipload.progress import Progress, silent
+from chipload.progress import Progress, part_of, silent
 from chipload.structure.shell import Ritz, Shell, ritz
 from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
 
+#: a check simulates the plan with steps and layers so many times as long
+COARSER, COARSER_LAYERS = 4.0, 2.0
 #: the torque that is allowed anywhere is at most so many times the limit
 RELIEF_MOST = 3.0
 #: the allowable torque is the least of so many steps on both sides
@@ -85,10 +88,10 @@ def allowable(
     """
     surprises, place = job.table.surprise, Place(job.shell)
     thinner = thinner_share(surprises)
-    planned = cut(job, program, shell_stock(job, program), material, machine.rapid, _part(progress, 0.0, 0.5))
+    planned = cut(job, program, shell_stock(job, program), material, machine.rapid, part_of(progress, 0.0, 0.5))
     real = cut(
         job, program, shell_stock(job, program, off_centre(job.shell.stock_mm, surprises), thinner), material,
-        machine.rapid, _part(progress, 0.5, 1.0), keep=True,
+        machine.rapid, part_of(progress, 0.5, 1.0), keep=True,
     )  # fmt: skip
     loads = true_loads(real.loads, real.points, place, surprises)
     shell = wall_of(job)
@@ -101,7 +104,7 @@ def allowable(
     return Allowable(
         planned, real, loads, thin, true, width, limit, torque,
         unit_response(true, real.near, real.far, width, real.tool),
-        _path(planned, loads, _relief(limit, torque)),
+        path_of(planned, loads, relief_of(limit, torque)),
     )  # fmt: skip
 
 
@@ -131,14 +134,14 @@ def allowed(job: TorqueJob) -> tuple[float, float]:
     return 1e-3 * ask.form_error_um, ask.strength_share * job.shell.strength_mpa
 
 
-def feed_at(planned: Cut, limit: PathLimit, k: int) -> float:
+def feed_at(planned: CutSteps, limit: PathLimit, k: int) -> float:
     """Feed at which a step reaches its allowable force [mm/min]."""
     loads = planned.loads
     override = (limit.each[k] - loads.torque_edge[k]) / loads.torque_cut[k]
     return float(mm_min_from_mm_s(float(planned.feed[k])) * override)
 
 
-def _relief(limit: PathLimit, torque: float) -> Floats:
+def relief_of(limit: PathLimit, torque: float) -> Floats:
     """(n + 1,) allowable torque at the ends of the steps over the limit, the least of the steps near."""
     if torque <= 0.0:
         return np.ones(len(limit.each) + 1)
@@ -148,11 +151,30 @@ def _relief(limit: PathLimit, torque: float) -> Floats:
     return np.asarray(sliding_window_view(padded, 2 * NEAR + 2).min(axis=1)[: len(each) + 1])
 
 
-def _path(planned: Cut, true: Loads, relief: Floats) -> ToolPath:
+def path_of(planned: CutSteps, true: Loads, relief: Floats) -> ToolPath:
+    """The path of the controllers, with what is planned and what is true."""
     believed = np.column_stack([row_means(planned.loads.torque_edge), row_means(planned.loads.torque_cut)])
     real = np.column_stack([row_means(true.torque_edge), row_means(true.torque_cut)])
     return tool_path(planned.points, np.append(planned.feed, planned.feed[-1]), believed, real, relief)
 
 
-def _part(progress: Progress, low: float, high: float) -> Progress:
-    return lambda done, what: progress(low + (high - low) * done, what)
+def coarser(job: TorqueJob) -> TorqueJob:
+    """The same job with longer steps and thicker layers."""
+    fine = job.table.simulation
+    coarse = fine.model_copy(
+        update={
+            "step_mm": min(COARSER * fine.step_mm, 10.0),
+            "layer_mm": min(COARSER_LAYERS * fine.layer_mm, 10.0),
+            "tolerance_mm": max(fine.tolerance_mm, 0.02),
+        }
+    )
+    return replace(job, table=job.table.model_copy(update={"simulation": coarse}))
+
+
+def limit_text(planned: CutSteps, limit: PathLimit, where: str) -> str:
+    """The limit of a coarse simulation, in a sentence."""
+    feed = feed_at(planned, limit, limit.step)
+    return (
+        f"by a coarse simulation the limit of torque is about {1e-3 * limit.torque:.2g} N m, {where}; the feed must be "
+        f"at most {feed:.3g} mm/min there, {mm_min_from_mm_s(float(planned.feed[limit.step])):.4g} are programmed"
+    )

@@ -62,7 +62,7 @@ def tuned(job: TorqueJob, config: Override, path: ToolPath, spindle: Spindle, lo
 
 def cases_of(
     job: TorqueJob, path: ToolPath, controller: Override, table: FuzzyTable, spindle: Spindle, torque: float,
-    walls: tuple[WallPath, WallPath, WallPath], acceleration: float, progress: Progress,
+    walls: tuple[WallPath, ...], acceleration: float, progress: Progress,
 ) -> tuple[ControllerCase, ...]:  # fmt: skip
     """Every controller without latency, and with what the job states."""
     ask = job.table.loop
@@ -79,7 +79,7 @@ def cases_of(
 
 def player(
     path: ToolPath, table: FuzzyTable, spindle: Spindle, deviation: SpindleDeviation, loop: Loop, torque: float,
-    walls: tuple[WallPath, WallPath, WallPath],
+    walls: tuple[WallPath, ...],
 ) -> Play:  # fmt: skip
     """What runs one controller, with or without the model, against the truth."""
 
@@ -89,9 +89,9 @@ def player(
             path.truth, model, override, table, spindle, loop, torque, relief=path.relief, monitor=path.model,
             deviation=deviation,
         )  # fmt: skip
-        error, stress, bent = (wall_error(w, path.model, found, spindle.speed) for w in walls)
+        error, stress, bent, *workpiece = (wall_error(w, path.model, found, spindle.speed) for w in walls)
         return ControllerRun(
-            override, modelled, found, error, stress, bent, feed_ratio(path.model, found, spindle.speed)
+            override, modelled, found, error, stress, bent, feed_ratio(path.model, found, spindle.speed), *workpiece
         )
 
     return play

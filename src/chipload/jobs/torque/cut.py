@@ -7,7 +7,7 @@ radius of the middle surface; the wall t / cos f wide across Z, its outer edge t
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from chipload.control.wall import Loads, two_parts
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.errors import InputError, Severity
+from chipload.jobs.simulation.preparation import with_tool
 from chipload.jobs.tables import stated
 from chipload.jobs.torque.job import TorqueJob
 from chipload.jobs.torque.tables import RoundTable, ShellTable, SurpriseTable
@@ -32,7 +33,7 @@ from chipload.stock.layers import LayeredStock
 from chipload.stock.rings import Boss, ring_stock
 from chipload.stock.tile_grid import LAYER_LIMIT
 from chipload.structure.beam import compliance
-from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
+from chipload.units import mm_s_from_mm_min, rad_s_from_rpm, rpm_from_rad_s
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -87,7 +88,7 @@ class Place:
 
 
 @dataclass(frozen=True, eq=False)
-class Cut:
+class CutSteps:
     """What the steps of a program cut; steps from the first feed to the last.
 
     Parameters
@@ -97,9 +98,6 @@ class Cut:
     points : (n + 1, 3) float [mm], ends of the steps
     feed : (n,) float [mm/s]
     loads : in two parts
-    near, far : (n,) float [mm], s of the ends of the depth of cut, nearer to the clamp and to the free end
-    makes : (n,) bool, the step makes the finished surface
-    tool : (n,) float [mm/N], compliance of the cutter in the middle of the depth of cut
     """
 
     removal: Removal
@@ -107,6 +105,25 @@ class Cut:
     points: Floats
     feed: Floats
     loads: Loads
+
+    @property
+    def rows(self) -> slice:
+        """Rows of the removal that the steps are."""
+        first = int(np.flatnonzero(~self.removal.columns["rapid"])[0])
+        return slice(first, first + len(self.feed))
+
+
+@dataclass(frozen=True, eq=False)
+class Cut(CutSteps):
+    """What the steps of a program cut from the stock of a thin wall.
+
+    Parameters
+    ----------
+    near, far : (n,) float [mm], s of the ends of the depth of cut, nearer to the clamp and to the free end
+    makes : (n,) bool, the step makes the finished surface
+    tool : (n,) float [mm/N], compliance of the cutter in the middle of the depth of cut
+    """
+
     near: Floats
     far: Floats
     makes: Bools
@@ -133,11 +150,11 @@ def program_of(job: TorqueJob, machine: Machine, progress: Progress = silent) ->
             progress=progress,
         )  # fmt: skip
         if reading.violations:
-            raise InputError(f"{job.program_file.name}: does not hold: {reading.violations[0]}")
+            raise InputError(f"{job.program_file.name}: exceeds a limit of the machine: {reading.violations[0]}")
         gaps = [f for f in reading.findings if f.severity >= Severity.UNPROVEN]
         if gaps:
             raise InputError(f"{job.program_file.name}: {gaps[0]}: what is not read cannot be controlled")
-        program = reading.program
+        program = with_tool(reading.program, job.cutters)
     if np.abs(program.axis - (0.0, 0.0, 1.0)).max() > 1e-9:
         raise InputError("program: the cutter's axis leans: must be +Z all along; use a cutter with the wall's taper")
     cuts = program.motion != RAPID
@@ -146,8 +163,8 @@ def program_of(job: TorqueJob, machine: Machine, progress: Progress = silent) ->
     speeds = np.unique(program.spindle[cuts])
     if len(speeds) != 1 or speeds[0] == 0.0:
         raise InputError(
-            f"program: spindle speeds {', '.join(f'{x:g}' for x in speeds)} rad/s: must be one, not 0: the spindle is "
-            "told from its torque at one speed"
+            f"program: spindle speeds {', '.join(f'{rpm_from_rad_s(x):g}' for x in speeds)} rpm: must be one speed, "
+            "not 0: the torque is estimated at one speed"
         )
     return program
 
@@ -210,7 +227,7 @@ def shell_stock(
     if (high - low) / fine > LAYER_LIMIT:
         raise InputError(
             f"simulation.layer_mm = {fine:g}: {(high - low) / fine:.4g} layers: must be at most {LAYER_LIMIT}: state "
-            "thicker ones"
+            "thicker layers"
         )
     bounds = [np.linspace(lowest, high, max(1, math.ceil((high - lowest) / fine - 1e-9)) + 1)]
     if lowest > low:
@@ -243,7 +260,7 @@ def require_linear(material: Material) -> None:
     if any(material.exponents):
         raise InputError(
             f"material {material.name}: has a size effect: must have none here: the torque is split into a part of the "
-            "edge and one that goes with the feed"
+            "edge and a part proportional to the feed"
         )
     if material.Ktc <= LITTLE_MPA:
         raise InputError(f"material.ktc_mpa = {material.Ktc:g}: must be above {LITTLE_MPA:g}")
@@ -272,14 +289,12 @@ def cut(
         As :func:`chipload.simulation.chips.remove`; the material has a size effect, the tip stands while it cuts.
     """
     require_linear(material)
-    fine, little = resolution_of(job), LITTLE_MPA / material.Ktc
-    light = replace(
-        material, Ktc=LITTLE_MPA, Krc=little * material.Krc, Kac=little * material.Kac, spread=None, covariance=None
-    )
+    fine = resolution_of(job)
     before = stock.state()
     less = remove(
-        program, stock, job.cutters, light, fine, accuracy=False, progress=lambda x, what: progress(0.5 * x, what)
-    ).columns
+        program, stock, job.cutters, edge_material(material), fine, accuracy=False,
+        progress=lambda x, what: progress(0.5 * x, what),
+    ).columns  # fmt: skip
     stock.restore(before)
     removal = remove(
         program,
@@ -291,21 +306,13 @@ def cut(
         accuracy=False,
         progress=lambda x, what: progress(0.5 + 0.5 * x, what),
     )
-    c = removal.columns
-    feeds = np.flatnonzero(~c["rapid"])
-    own = slice(int(feeds[0]), int(feeds[-1]) + 1)
-    ends = np.column_stack([c[f"{x}_mm"] for x in "xyz"])
-    start = ends[own.start - 1] if own.start > 0 else np.asarray(program.p_work[0])
-    points = np.vstack([start, ends[own]])
-    length = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    if (length == 0.0).any():
-        line = int(c["line"][own][int(np.argmin(length))])
-        raise InputError(f"line {line}: the tip stands: must move along the path")
+    c, own, little = removal.columns, fed_rows(removal), LITTLE_MPA / material.Ktc
+    points = step_points(removal, program)
     loads = two_parts(
         1e3 * c["torque_mean_nm"][own], c["force_normal_n"][own],
         1e3 * less["torque_mean_nm"][own], less["force_normal_n"][own], little,
     )  # fmt: skip
-    feed = np.where(c["rapid"][own], rapids, mm_s_from_mm_min(1.0) * c["feed_mm_min"][own])
+    feed = step_feeds(removal, rapids)
     near, far, height = _depths(Place(job.shell), stock.bounds, points, c["chip_layers"][own])
     tools = c["tool"][own]
     makes, soft = np.zeros(len(feed), dtype=np.bool_), np.zeros(len(feed))
@@ -314,6 +321,45 @@ def cut(
         m, t = _on_the_wall(Place(job.shell), job.cutters[number], points, rows, height)
         makes[rows], soft[rows] = m, t
     return Cut(removal, stock, points, feed, loads, near, far, makes, soft)
+
+
+def edge_material(material: Material) -> Material:
+    """The same with little more than its edge coefficients."""
+    little = LITTLE_MPA / material.Ktc
+    return replace(
+        material, Ktc=LITTLE_MPA, Krc=little * material.Krc, Kac=little * material.Kac, spread=None, covariance=None
+    )
+
+
+def fed_rows(removal: Removal) -> slice:
+    """Rows of a removal from its first feed to its last."""
+    feeds = np.flatnonzero(~removal.columns["rapid"])
+    return slice(int(feeds[0]), int(feeds[-1]) + 1)
+
+
+def step_points(removal: Removal, program: Program) -> Floats:
+    """(n + 1, 3) ends of the steps from the first feed to the last [mm].
+
+    Raises
+    ------
+    InputError
+        The tip stands still.
+    """
+    c, own = removal.columns, fed_rows(removal)
+    ends = np.column_stack([c[f"{x}_mm"] for x in "xyz"])
+    start = ends[own.start - 1] if own.start > 0 else np.asarray(program.p_work[0])
+    points = np.vstack([start, ends[own]])
+    length = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if (length == 0.0).any():
+        line = int(c["line"][own][int(np.argmin(length))])
+        raise InputError(f"line {line}: the tip stands still: it must move along the path")
+    return points
+
+
+def step_feeds(removal: Removal, rapids: float) -> Floats:
+    """(n,) programmed feeds of the same steps [mm/s]; ``rapids`` that of the rapids between two cuts."""
+    c, own = removal.columns, fed_rows(removal)
+    return np.where(c["rapid"][own], rapids, mm_s_from_mm_min(1.0) * c["feed_mm_min"][own])
 
 
 def _depths(place: Place, bounds: Floats, points: Floats, layers: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
@@ -341,21 +387,36 @@ def _on_the_wall(
 
 def true_loads(loads: Loads, points: Floats, place: Place, surprises: tuple[SurpriseTable, ...]) -> Loads:
     """The loads with a worn cutter and hard spots; thicker sides and thinner walls are in what was cut."""
-    cut, edge = np.ones(len(loads.torque_cut)), np.ones(len(loads.torque_cut))
     middle = 0.5 * (points[1:] + points[:-1])
     around = place.outer(middle[:, 2])
+
+    def away(x: SurpriseTable) -> Floats:
+        """Distance from a hard spot, round the wall."""
+        turn = np.arctan2(middle[:, 1], middle[:, 0]) - math.radians(stated(x.at_deg, "surprise.at_deg"))
+        return np.asarray(around * np.abs(np.angle(np.exp(1j * turn))))
+
+    edge, cut = surprise_factors(len(middle), away, surprises)
+    return Loads(loads.torque_edge * edge, loads.torque_cut * cut, loads.force_edge * edge, loads.force_cut * cut)
+
+
+def surprise_factors(
+    steps: int, away: Callable[[SurpriseTable], Floats], surprises: tuple[SurpriseTable, ...]
+) -> tuple[Floats, Floats]:
+    """(n,) factors of the parts of the edge and of the feed.
+
+    ``away`` gives the (n,) distance [mm] of the steps from a hard spot.
+    """
+    cut, edge = np.ones(steps), np.ones(steps)
     for x in surprises:
         if x.kind == "worn-cutter":
             cut *= 1.0 + x.share
             edge *= 1.0 + stated(x.edge_share, "surprise.edge_share")
         elif x.kind == "hard-spot":
             width, ramp = stated(x.width_mm, "surprise.width_mm"), stated(x.ramp_mm, "surprise.ramp_mm")
-            turn = np.arctan2(middle[:, 1], middle[:, 0]) - math.radians(stated(x.at_deg, "surprise.at_deg"))
-            away = around * np.abs(np.angle(np.exp(1j * turn)))
-            there = np.clip((0.5 * width - away) / ramp + 1.0, 0.0, 1.0)
+            there = np.clip((0.5 * width - away(x)) / ramp + 1.0, 0.0, 1.0)
             cut *= 1.0 + x.share * there
             edge *= 1.0 + x.share * there
-    return Loads(loads.torque_edge * edge, loads.torque_cut * cut, loads.force_edge * edge, loads.force_cut * cut)
+    return edge, cut
 
 
 def off_centre(stock_mm: float, surprises: tuple[SurpriseTable, ...]) -> tuple[float, float]:

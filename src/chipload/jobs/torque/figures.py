@@ -10,10 +10,18 @@ import numpy as np
 import plotly.graph_objects as go
 
 from chipload.control.fuzzy import FuzzyTable
+from chipload.jobs.simulation.workpiece_figures import bent_section
 from chipload.jobs.torque import torque_figures as drawn
 from chipload.jobs.torque.files import HAL, PATH, program_files
 from chipload.jobs.torque.numbers import operation_numbers
-from chipload.jobs.torque.outcome import HELD, ControllerCase, SpindleEstimate, TorqueResult
+from chipload.jobs.torque.outcome import (
+    HELD,
+    ClampedWorkpiece,
+    ControllerCase,
+    ShellWall,
+    SpindleEstimate,
+    TorqueResult,
+)
 from chipload.jobs.torque.scene import scene_bytes
 from chipload.report.presentation import Presentation
 from chipload.report.sheet import figure, items, table
@@ -30,7 +38,11 @@ def _sections(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]
     body = _limit(outcome, figures)
     if outcome.control.cases:
         body += _controllers(outcome, figures)
-    body += _wall(outcome, figures)
+    body += (
+        _wall(outcome.wall, outcome, figures)
+        if isinstance(outcome.wall, ShellWall)
+        else _workpiece(outcome.wall, figures)
+    )
     if outcome.control.estimate is not None:
         body += _estimate(outcome.control.estimate, outcome, figures)
     body += _rules(outcome.control.table, figures)
@@ -52,11 +64,23 @@ def _limit(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
     why = {
         "deflection": f"its deflection of {outcome.job.limits['form_error_um']:g} µm",
         "strength": f"{outcome.job.limits['strength_share']:g} of its strength of {outcome.wall.strength:g} MPa",
+        "workpiece deflection": f"its own deflection of {outcome.job.limits.get('deflection_workpiece_um', 0.0):g} µm",
         "stated": "the limit that the job states",
     }[outcome.source]
     place = ", ".join(f"{round(x, 3) + 0.0:g}" for x in where["place"])
     body = ["<h2>Allowable torque</h2>"]
-    if outcome.attainable:
+    if outcome.attainable and isinstance(outcome.wall, ClampedWorkpiece):
+        line = (
+            f"<p>The limit is <b>{what['torque_limit_nm']:.4g} N m</b>, mean over a revolution. It comes from {why}, "
+            f"at ({place}) mm, where the workpiece allows a force of {where['force_n']:.4g} N. Its compliance there is "
+            f"known to {100.0 * outcome.wall.planned.error:.2g} %: the limit is made for one that is greater by as "
+            f"much. Elsewhere the workpiece allows more, up to {where['relief_max']:.3g} times as much torque; the "
+            "controller holds the same share of what is allowable everywhere, "
+            f"{where['held_nm']:.4g} N m here. The workpiece as it really is would allow "
+            f"{where['true_wall_nm']:.4g} N m.</p>"
+        )
+        body.append(line)
+    if outcome.attainable and isinstance(outcome.wall, ShellWall):
         body.append(
             f"<p>The limit is <b>{what['torque_limit_nm']:.4g} N m</b>, mean over a revolution. It comes from {why}, "
             f"at ({place}) mm: the wall of {outcome.wall.thinnest:.4g} mm (as thin as the tolerance lets it be) and "
@@ -66,7 +90,7 @@ def _limit(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
             f"allow {where['true_wall_nm']:.4g} N m. The closed formula of one tooth, which knows no engagement, says "
             f"{where['one_tooth_formula_nm']:.3g} N m.</p>"
         )
-    said = what["surface_off_um"]
+    said = what.get("surface_off_um")
     if said is not None:
         body.append(
             f"<p>What the program leaves lies {said['min']:.3g} to {said['max']:.3g} µm from the finished surface of "
@@ -151,25 +175,35 @@ def _table(outcome: TorqueResult, case: ControllerCase) -> str:
     return table(head, rows, numbers=(1, 2, 3, 4, 5, 6), used=used) + units
 
 
-def _wall(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
-    solid, whole = outcome.wall.solid, float(outcome.wall.oval.share.sum())
+def _workpiece(wall: ClampedWorkpiece, figures: dict[str, go.Figure]) -> list[str]:
+    own = wall.real
+    body = [
+        "<h2>Deflection of the workpiece</h2>",
+        f"<p>{len(own.steps.states)} states of removal in cells of {own.cell:.3g} mm, {own.unknowns} unknowns; the "
+        f"thinnest wall left is {own.wall:.3g} mm. The deflection is known to {100.0 * own.error:.2g} %. The greatest "
+        f"stress is {wall.strained[1]:.3g} MPa per newton; its yield stress {wall.strength:g} MPa.</p>",
+    ]
+    return body if own.bent is None else [*body, *bent_section(own.bent, "In the worst step", figures)]
+
+
+def _wall(wall: ShellWall, outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
+    solid, whole = wall.solid, float(wall.oval.share.sum())
     rows = [
         [f"{p.s:.4g}", f"{1e3 * p.shell:.4g}", f"{1e3 * p.solid:.4g}", f"{100.0 * (p.solid / p.shell - 1.0):+.2f}"]
         for p in solid.places
     ]
     a, b, c = solid.counts
-    share = 100.0 * float(outcome.wall.oval.share[1]) / whole
+    share = 100.0 * float(wall.oval.share[1]) / whole
     beam = (
-        f"A beam with shear gives {1e3 * outcome.wall.oval.beam:.3g} µm: it is wrong by "
-        f"{whole / outcome.wall.oval.beam:.3g} times."
-        if outcome.wall.oval.beam is not None
+        f"A beam with shear gives {1e3 * wall.oval.beam:.3g} µm: it is wrong by {whole / wall.oval.beam:.3g} times."
+        if wall.oval.beam is not None
         else f"There is no beam for a cone; its first harmonic, which a beam would have, is {share:.3g} % of it."
     )
     return [
         "<h2>Compliance of the wall</h2>",
-        f"<p>Under 1 N at the free end the wall of {outcome.wall.thinnest:.4g} mm is deflected by "
+        f"<p>Under 1 N at the free end the wall of {wall.thinnest:.4g} mm is deflected by "
         f"{1e3 * whole:.4g} µm, nearly all of it by becoming oval. {beam}</p>",
-        figure("oval", drawn.ovalised(outcome), figures),
+        figure("oval", drawn.ovalised(wall), figures),
         "<h3>Second opinion: the same wall by finite elements</h3>",
         f'<p class="note">Half of the wall by {a} x {b} x {c} hexahedra of 20 nodes (half round, along, through), '
         f"{solid.nodes} nodes; the same force on the same area, displacement of the end of the depth of cut.</p>",
@@ -186,7 +220,7 @@ def _estimate(e: SpindleEstimate, outcome: TorqueResult, figures: dict[str, go.F
         ["bandwidth of both [Hz]", f"{e.bandwidth:.3g}"],
         ["resolution: noise, quantisation, idle map [N m]", f"{1e-3 * e.resolution:.3g}"],
         ["share by which the torque constant may be wrong [%]", f"{100.0 * e.constant_error:.3g}"],
-        ["holds for torques from, to [N m]", f"{1e-3 * e.range[0]:.3g}, {1e-3 * e.range[1]:.3g}"],
+        ["valid for torques from, to [N m]", f"{1e-3 * e.range[0]:.3g}, {1e-3 * e.range[1]:.3g}"],
         [f"tooth passing frequency {e.aliased[0]:.4g} Hz, as the readings show it [Hz]", f"{e.aliased[1]:.3g}"],
         ["lighter than this is not trusted: nothing is sped up on it [N m]", f"{1e-3 * e.light:.3g}"],
         ["share of the time in cut that is lighter [%]", f"{100.0 * e.light_share:.3g}"],

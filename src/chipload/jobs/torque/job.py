@@ -1,4 +1,4 @@
-"""A job that holds the torque on a thin tube or cone."""
+"""A job that holds the torque on a thin tube, a cone or a clamped workpiece."""
 
 from __future__ import annotations
 
@@ -11,10 +11,16 @@ from typing import Any
 from chipload.control.spindle_file import IDENTIFIED
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
-from chipload.jobs.sources import entries_of, sources_and_cutters
+from chipload.jobs.simulation.clamped import wrong_clamps
+from chipload.jobs.simulation.tables import WorkpieceTable
+from chipload.jobs.sources import entries_of, sources_and_cutters, unknown_cutter
+from chipload.jobs.tables import stated
 from chipload.jobs.torque.tables import RoundTable, ShellTable, SurpriseTable, TorqueJobTable
 
 ONE_PROGRAM = "state a [program] with a file, or a [round] that is made"
+ONE_WALL = "state the wall by [torque_control.shell], or [stock] and [workpiece] of any part"
+#: tables that go with a workpiece and not with a shell
+OF_WORKPIECE = ("stock", "real_stock", "workpiece")
 #: keys that each kind of surprise needs beside `share`
 SURPRISES: Mapping[str, tuple[str, ...]] = {
     "thicker-side": ("at_deg",),
@@ -22,11 +28,16 @@ SURPRISES: Mapping[str, tuple[str, ...]] = {
     "worn-cutter": ("edge_share",),
     "thinner-wall": (),
 }
+#: the same on a workpiece; what the stock really is stands in [real_stock]
+WORKPIECE_SURPRISES: Mapping[str, tuple[str, ...]] = {
+    "hard-spot": ("at_mm", "width_mm", "ramp_mm"),
+    "worn-cutter": ("edge_share",),
+}
 
 
 @dataclass(frozen=True)
 class TorqueJob:
-    """A job on a thin tube or cone; paths are absolute.
+    """A job on a thin tube, a cone or a workpiece; paths are absolute.
 
     Parameters
     ----------
@@ -52,8 +63,13 @@ class TorqueJob:
 
     @property
     def shell(self) -> ShellTable:
-        """The finished wall."""
-        return self.table.torque_control.shell
+        """The finished wall of a thin tube or cone."""
+        return stated(self.table.torque_control.shell, "torque_control.shell")
+
+    @property
+    def workpiece(self) -> WorkpieceTable | None:
+        """What limits the torque; None: the shell does."""
+        return self.table.workpiece
 
 
 def load(path: Path, table: TorqueJobTable, overrides: Sequence[str]) -> TorqueJob:
@@ -69,11 +85,12 @@ def load(path: Path, table: TorqueJobTable, overrides: Sequence[str]) -> TorqueJ
     if table.program is not None and table.round is not None:
         errors.add(f"program, round: both are stated: {ONE_PROGRAM}")
     sources, tools = sources_and_cutters(table, folder, errors, "machine", "material")
-    errors.texts += _wrong_shell(table)
-    if table.round is not None and tools:
-        errors.texts += _wrong_round(table, table.round, tools)
+    shell = table.torque_control.shell
+    errors.texts += _wrong_workpiece(table) if shell is None else _wrong_shell(table, shell)
+    if table.round is not None and tools and shell is not None:
+        errors.texts += _wrong_round(shell, table.round, tools)
     for k, surprise in enumerate(table.surprise):
-        errors.texts += _wrong_surprise(f"surprise.{k}", surprise, table.torque_control.shell.wall_mm)
+        errors.texts += _wrong_surprise(f"surprise.{k}", surprise, shell)
     errors.refuse()
     control, spindle = table.torque_control.file, table.spindle.file
     return TorqueJob(
@@ -86,6 +103,12 @@ def load(path: Path, table: TorqueJobTable, overrides: Sequence[str]) -> TorqueJ
 def missing(values: Mapping[str, Any]) -> list[str]:
     """What a job lacks that one of its tables alone cannot see; ``values`` are those of the file."""
     found = [f"program, round: neither is stated: {ONE_PROGRAM}"] if not {"program", "round"} & set(values) else []
+    control = values.get("torque_control")
+    on_shell = isinstance(control, dict) and "shell" in control
+    if not on_shell and "workpiece" not in values:
+        found.append(f"torque_control.shell, workpiece: neither is stated: {ONE_WALL}")
+    elif not on_shell and "stock" not in values:
+        found.append("stock: missing: state it ([workpiece] needs it)")
     spindle = values.get("spindle")
     if isinstance(spindle, dict) and "file" not in spindle:
         found += [
@@ -94,19 +117,46 @@ def missing(values: Mapping[str, Any]) -> list[str]:
             if key not in spindle
         ]
     for k, surprise in entries_of(values, "surprise"):
-        needs = SURPRISES.get(str(surprise.get("kind")), ())
+        needs = (SURPRISES if on_shell else WORKPIECE_SURPRISES).get(str(surprise.get("kind")), ())
         found += [f"surprise.{k}.{key}: missing: state it" for key in needs if key not in surprise]
     return found
 
 
-def _wrong_shell(table: TorqueJobTable) -> Iterator[str]:
-    shell, at = table.torque_control.shell, "torque_control.shell"
+def _wrong_workpiece(table: TorqueJobTable) -> Iterator[str]:
+    """What keys of a job on a workpiece contradict."""
+    if table.round is not None:
+        yield "round: goes round a [torque_control.shell]: state a [program] with a file for a workpiece"
+    for key in ("stock", "real_stock"):
+        solid = getattr(table, key)
+        if solid is None:
+            continue
+        block = (solid.low_mm is not None, solid.high_mm is not None)
+        if any(block) == (solid.file is not None) or any(block) != all(block):
+            yield f"{key}: state either low_mm and high_mm of a block, or a file"
+        if solid.layer_mm is not None:
+            yield f"{key}.layer_mm: leave it out: simulation.layer_mm states it"
+    if table.workpiece is not None:
+        yield from wrong_clamps(table.workpiece)
+        if table.workpiece.yield_mpa is None:
+            yield "workpiece.yield_mpa: missing: state it (limits.strength_share needs it)"
+        for key in ("density_kg_m3", "damping_ratio"):
+            if getattr(table.workpiece, key) is not None:
+                yield f"workpiece.{key}: not used by a torque job: leave it out"
+
+
+def _wrong_shell(table: TorqueJobTable, shell: ShellTable) -> Iterator[str]:
+    at = "torque_control.shell"
+    for key in OF_WORKPIECE:
+        if getattr(table, key) is not None:
+            yield f"{key}: goes without [torque_control.shell]: {ONE_WALL}"
+    if table.limits.deflection_workpiece_um is not None:
+        yield "limits.deflection_workpiece_um: needs [workpiece]: state form_error_um, or [workpiece] for the shell"
     f = math.radians(shell.angle_deg)
     least = min(shell.mean_radius_mm, shell.mean_radius_mm + shell.length_mm * math.sin(f))
     if shell.wall_mm > 0.2 * least:
         yield (
-            f"{at}.wall_mm = {shell.wall_mm:g}: must be at most a fifth of the least radius {least:g}: a thin wall "
-            "is meant"
+            f"{at}.wall_mm = {shell.wall_mm:g}: must be at most a fifth of the least radius {least:g}: this job is "
+            "for thin walls"
         )
     if shell.wall_tolerance_mm >= 0.5 * shell.wall_mm:
         yield (
@@ -120,16 +170,15 @@ def _wrong_shell(table: TorqueJobTable) -> Iterator[str]:
             )
 
 
-def _wrong_round(table: TorqueJobTable, ask: RoundTable, tools: Mapping[int, Cutter]) -> Iterator[str]:
+def _wrong_round(shell: ShellTable, ask: RoundTable, tools: Mapping[int, Cutter]) -> Iterator[str]:
     if ask.cutter not in tools:
-        known = ", ".join(str(n) for n in sorted(tools))
-        yield f"round.cutter = {ask.cutter}: no [[cutter]] has this number: state one of {known}"
+        yield from unknown_cutter("round.cutter", ask.cutter, tools)
         return
     if not ask.bottom_mm < ask.top_mm:
         yield f"round.bottom_mm = {ask.bottom_mm:g}: must be below top_mm = {ask.top_mm:g}"
     taper = math.degrees(tools[ask.cutter].taper)
     # a flank that is wider upwards leaves a wall that is narrower upwards
-    upwards = table.torque_control.shell.angle_deg * (1.0 if table.torque_control.shell.clamped == "low" else -1.0)
+    upwards = shell.angle_deg * (1.0 if shell.clamped == "low" else -1.0)
     if abs(upwards + taper) > 1e-6:
         yield (
             f"round.cutter = {ask.cutter}: taper_deg = {taper:g}: must be {max(-upwards, 0.0):g}, that of the wall: "
@@ -138,10 +187,15 @@ def _wrong_round(table: TorqueJobTable, ask: RoundTable, tools: Mapping[int, Cut
         )
 
 
-def _wrong_surprise(at: str, surprise: SurpriseTable, wall: float) -> Iterator[str]:
-    needs = SURPRISES[surprise.kind]
-    for key in ("at_deg", "width_mm", "ramp_mm", "edge_share"):
+def _wrong_surprise(at: str, surprise: SurpriseTable, shell: ShellTable | None) -> Iterator[str]:
+    """What keys of a surprise contradict; ``shell`` None: on a workpiece."""
+    if shell is None and surprise.kind not in WORKPIECE_SURPRISES:
+        yield f"{at}.kind = {surprise.kind}: is of a [torque_control.shell]: state [real_stock] of a workpiece"
+        return
+    needs = (WORKPIECE_SURPRISES if shell is None else SURPRISES)[surprise.kind]
+    for key in ("at_deg", "at_mm", "width_mm", "ramp_mm", "edge_share"):
         if getattr(surprise, key) is not None and key not in needs:
-            yield f"{at}.{key}: not used by kind = {surprise.kind}: leave it out"
-    if surprise.kind == "thinner-wall" and surprise.share >= 0.5:
-        yield f"{at}.share = {surprise.share:g}: must be below 0.5 of the wall of {wall:g} mm"
+            where = " of a workpiece" if shell is None else ""
+            yield f"{at}.{key}: not used by kind = {surprise.kind}{where}: leave it out"
+    if shell is not None and surprise.kind == "thinner-wall" and surprise.share >= 0.5:
+        yield f"{at}.share = {surprise.share:g}: must be below 0.5 of the wall of {shell.wall_mm:g} mm"

@@ -6,12 +6,11 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-from chipload.jobs.torque.outcome import ControllerCase, TorqueResult
+from chipload.jobs.torque.outcome import ClampedWorkpiece, ControllerCase, ShellWall, TorqueResult
 
 
 def operation_numbers(outcome: TorqueResult) -> dict[str, Any]:
     """The operation in summary.json."""
-    low, high = outcome.wall.surface or (None, None)
     answer: dict[str, Any] = {
         "kind": "torque",
         "program": {"file": outcome.job.program_name, "motions": len(outcome.job.program)},
@@ -23,18 +22,13 @@ def operation_numbers(outcome: TorqueResult) -> dict[str, Any]:
             "place": outcome.allowable.path.points[outcome.allowable.limit.step + 1].tolist(),
             "held_nm": 0.0 if outcome.control.controller is None else 1e-3 * outcome.control.controller.torque_ref,
             "true_wall_nm": 1e-3 * outcome.allowable.true_torque,
-            "one_tooth_formula_nm": 1e-3 * outcome.allowable.one_tooth,
+            "one_tooth_formula_nm": None if outcome.allowable.one_tooth is None else 1e-3 * outcome.allowable.one_tooth,
             "relief_max": float(outcome.allowable.path.relief.max()),
         },
         "torque_planned_nm_max": 1e-3 * float(outcome.allowable.path.model.torque(1.0).max()),
         "torque_true_nm_max": 1e-3 * float(outcome.allowable.path.truth.torque(1.0).max()),
         "path_mm": float(outcome.allowable.path.model.s[-1]),
-        "surface_off_um": None if low is None or high is None else {"min": 1e3 * low, "max": 1e3 * high},
-        "wall": {
-            "planned_mm": outcome.wall.shell.thickness,
-            "limit_made_for_mm": outcome.wall.thinnest,
-            "real_mm": outcome.wall.real,
-        },
+        **(_shell(outcome.wall) if isinstance(outcome.wall, ShellWall) else {"workpiece": _workpiece(outcome.wall)}),
         "surprises": list(outcome.job.surprises),
     }
     if outcome.control.cases:
@@ -75,29 +69,54 @@ def operation_numbers(outcome: TorqueResult) -> dict[str, Any]:
             "tooth_passing_seen_hz": e.aliased[1],
         }
     answer["spindle_deviation"] = asdict(outcome.control.deviation)
-    answer["second_opinion"] = {
-        "elements": {"half_round": outcome.wall.solid.counts[0], "along": outcome.wall.solid.counts[1],
-                     "through": outcome.wall.solid.counts[2], "nodes_each": 20},
-        "nodes": outcome.wall.solid.nodes,
-        "places": [
-            {"s_mm": p.s, "shell_um_n": 1e3 * p.shell, "hexahedra_um_n": 1e3 * p.solid}
-            for p in outcome.wall.solid.places
-        ],
-        "apart_percent_max": 100.0 * outcome.wall.solid.apart,
-    }  # fmt: skip
-    whole = float(outcome.wall.oval.share.sum())
-    answer["ovalisation"] = {
-        "s_mm": outcome.wall.oval_s,
-        "whole_um_n": 1e3 * whole,
-        "beam_um_n": None if outcome.wall.oval.beam is None else 1e3 * outcome.wall.oval.beam,
-        "shell_over_beam": None if outcome.wall.oval.beam is None else whole / outcome.wall.oval.beam,
-        "first_harmonic_share": float(outcome.wall.oval.share[1] / whole),
-    }
+    if isinstance(outcome.wall, ShellWall):
+        answer |= _opinions(outcome.wall)
     answer["energy_balance"] = {
         name: {str(tool): value for tool, value in each.items()} for name, each in outcome.energy_balance.items()
     }
     answer["settings"] = dict(outcome.job.settings)
     return answer
+
+
+def _shell(wall: ShellWall) -> dict[str, Any]:
+    """The thickness of a thin wall, and what the program leaves on it."""
+    low, high = wall.surface or (None, None)
+    return {
+        "surface_off_um": None if low is None or high is None else {"min": 1e3 * low, "max": 1e3 * high},
+        "wall": {"planned_mm": wall.shell.thickness, "limit_made_for_mm": wall.thinnest, "real_mm": wall.real},
+    }
+
+
+def _workpiece(wall: ClampedWorkpiece) -> dict[str, Any]:
+    """The compliance of a workpiece, its error for which the limit makes allowance, and its stress per force."""
+    return {
+        **wall.planned.numbers,
+        "compliance_error_percent": 100.0 * wall.planned.error,
+        "stress_mpa_n": wall.strained[0],
+    }
+
+
+def _opinions(wall: ShellWall) -> dict[str, Any]:
+    """The same wall by hexahedra, and against a beam."""
+    whole = float(wall.oval.share.sum())
+    return {
+        "second_opinion": {
+            "elements": {"half_round": wall.solid.counts[0], "along": wall.solid.counts[1],
+                         "through": wall.solid.counts[2], "nodes_each": 20},
+            "nodes": wall.solid.nodes,
+            "places": [
+                {"s_mm": p.s, "shell_um_n": 1e3 * p.shell, "hexahedra_um_n": 1e3 * p.solid} for p in wall.solid.places
+            ],
+            "apart_percent_max": 100.0 * wall.solid.apart,
+        },
+        "ovalisation": {
+            "s_mm": wall.oval_s,
+            "whole_um_n": 1e3 * whole,
+            "beam_um_n": None if wall.oval.beam is None else 1e3 * wall.oval.beam,
+            "shell_over_beam": None if wall.oval.beam is None else whole / wall.oval.beam,
+            "first_harmonic_share": float(wall.oval.share[1] / whole),
+        },
+    }  # fmt: skip
 
 
 def _controllers(case: ControllerCase) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What holding the torque on a thin wall gave: the limit, each controller with and without latency, and what holds.
+"""What holding the torque gave: the limit of wall or workpiece, each controller with and without latency, what holds.
 
 Torques are held against what the wall bears at their place: `torque_nm_max` is the torque over its relief, so that it
 compares with the one limit, that of the place where the wall bears least; `torque_raw_nm_max` is the torque itself.
@@ -24,6 +24,7 @@ from chipload.control.spindle_model import Spindle, SpindleDeviation
 from chipload.control.wall import PathLimit
 from chipload.errors import Finding
 from chipload.jobs.checks import DefaultChecks
+from chipload.jobs.simulation.workpiece_compliance import WorkpieceCompliance
 from chipload.jobs.tables import ChecksTable
 from chipload.jobs.torque.step_checks import StepChecks
 from chipload.machine.machine import Machine
@@ -54,6 +55,7 @@ class ControllerRun:
     stress : (k,) float [MPa], greatest equivalent one of the wall
     deflection : (k,) float [mm], of wall and cutter anywhere
     ratio : (k,) float, feed per tooth over the programmed one
+    workpiece : (k,) float [mm], deflection of the workpiece alone; None: the wall is a shell
     """
 
     config: Override
@@ -63,6 +65,7 @@ class ControllerRun:
     stress: Floats
     deflection: Floats
     ratio: Floats
+    workpiece: Floats | None = None
 
     def numbers(self) -> dict[str, Any]:
         """In summary.json."""
@@ -199,6 +202,25 @@ class ShellWall:
 
 
 @dataclass(frozen=True, eq=False)
+class ClampedWorkpiece:
+    """The workpiece that limits the torque.
+
+    Parameters
+    ----------
+    planned, real : its compliance through the removal of the stock as planned, and as it really is
+    strained : greatest stress per force, as planned and real [MPa/N]
+    strength : yield stress [MPa]
+    stock : as it is after the program
+    """
+
+    planned: WorkpieceCompliance
+    real: WorkpieceCompliance
+    strained: tuple[float, float]
+    strength: float
+    stock: LayeredStock
+
+
+@dataclass(frozen=True, eq=False)
 class AllowableTorque:
     """The limit of torque along the path.
 
@@ -207,19 +229,17 @@ class AllowableTorque:
     limit : of torque, from the wall alone
     torque : the limit that is kept [N mm], the least of that and the stated one; 0: not attainable
     true_torque : what the wall as it really is would bear [N mm]
-    one_tooth : the limit by the closed formula of one tooth [N mm], to compare
+    one_tooth : the limit by the closed formula of one tooth [N mm], to compare; None: of a workpiece there is none
     remedy : what would make a torque allowable, where none is
     path : with what is planned and what is true
-    steps : (n,) columns of the planned path by name
     """
 
     limit: PathLimit
     torque: float
     true_torque: float
-    one_tooth: float
+    one_tooth: float | None
     remedy: str
     path: ToolPath
-    steps: Mapping[str, NDArray[Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,13 +272,14 @@ class TorqueResult:
 
     Parameters
     ----------
+    wall : the thin wall, or the workpiece, that limits the torque
     step_checks : the steps for the checks beside the stated limits
     findings : of the simulations of the plan and of the truth
     energy_balance : work over the specific energy of the volume removed, less 1, by tool number: as planned, and real
     """
 
     job: TorqueInputs
-    wall: ShellWall
+    wall: ShellWall | ClampedWorkpiece
     allowable: AllowableTorque
     control: ControlComparison
     step_checks: StepChecks
@@ -272,7 +293,7 @@ class TorqueResult:
 
     @property
     def source(self) -> str:
-        """Where the limit of torque comes from: `deflection`, `strength` or `stated`."""
+        """Where the limit comes from: `deflection`, `strength`, `workpiece deflection` or `stated`."""
         return "stated" if self.allowable.torque < self.allowable.limit.torque else self.allowable.limit.by
 
     def compared(self, case: ControllerCase) -> dict[str, float]:

@@ -13,7 +13,15 @@ from chipload.control.override import STATUS
 from chipload.errors import Finding, Severity
 from chipload.jobs.checks import chip_findings, default_limits, unchecked_checks
 from chipload.jobs.torque.numbers import operation_numbers
-from chipload.jobs.torque.outcome import HELD, PLAIN, ControllerCase, ControllerRun, TorqueResult
+from chipload.jobs.torque.outcome import (
+    HELD,
+    PLAIN,
+    ClampedWorkpiece,
+    ControllerCase,
+    ControllerRun,
+    ShellWall,
+    TorqueResult,
+)
 from chipload.jobs.torque.step_checks import check_columns
 from chipload.report.programs import ENDINGS
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, check_limit, in_memory
@@ -41,7 +49,11 @@ def result_of(outcome: TorqueResult) -> Result:
             *(f"limit {name}: not stated" for name in outcome.job.unchecked),
             *(() if outcome.control.cases else ("cutter strength, chips and spindle: no controller was run",)),
             "chatter and runout beyond that of the cutter: not calculated",
-            "the wall has one thickness, that at the end of the cut",
+            *(
+                ("the wall has one thickness, that at the end of the cut",)
+                if isinstance(outcome.wall, ShellWall)
+                else ("holder and spindle: count as rigid",)
+            ),
             "error of the loads by layers and steps: not estimated",
         ),
         provenance=outcome.job.provenance,
@@ -57,8 +69,19 @@ def track_name(case: ControllerCase, controller: str) -> str:
 
 def limits_of(outcome: TorqueResult, columns: Columns, track: str) -> tuple[LimitCheck, ...]:
     """Every limit of the job against a controller, then those that are checked by default."""
-    stated = (check_limit(name, limit, columns, track=track) for name, limit in outcome.job.limits.items())
+    errors = workpiece_errors(outcome)
+    stated = (
+        check_limit(name, limit, columns, track=track, error=errors.get(name, 0.0))
+        for name, limit in outcome.job.limits.items()
+    )
     return (*stated, *default_limits(outcome.job.checks, outcome.job.machine, columns, track, {}))
+
+
+def workpiece_errors(outcome: TorqueResult) -> dict[str, float]:
+    """Relative errors of columns by the compliance of a workpiece, by their name; none of a shell."""
+    if isinstance(outcome.wall, ShellWall):
+        return {}
+    return dict.fromkeys(("form_error_um", "strength_share", "deflection_workpiece_um"), outcome.wall.real.error)
 
 
 def _real(case: ControllerCase) -> bool:
@@ -115,6 +138,7 @@ def _columns(outcome: TorqueResult, run: ControllerRun) -> Columns:
         "stress_mpa": run.stress,
         "strength_share": run.stress / outcome.wall.strength,
         "spindle_rpm": rpm_from_rad_s(1.0) * o.speed,
+        **({} if run.workpiece is None else {"deflection_workpiece_um": 1e3 * run.workpiece}),
         **check_columns(outcome.step_checks, path.model.s, o, run.ratio, 1e3 * run.deflection, outcome.job.check_table),
     }
 
@@ -141,12 +165,14 @@ def _findings(outcome: TorqueResult) -> tuple[Finding, ...]:
     """What was found in the whole result."""
     out = [Finding(f.code, f.line, f.text, Severity.EXCEEDS, f.place, f.row) for f in outcome.findings]
     if not outcome.attainable:
-        limit = outcome.allowable.limit
+        limit, what = outcome.allowable.limit, "wall" if isinstance(outcome.wall, ShellWall) else "workpiece"
         text = (
             f"no torque is allowable: at step {limit.step} the edge force alone exceeds the "
-            f"{limit.force:.4g} N that the wall allows by its {limit.by}: {outcome.allowable.remedy}"
+            f"{limit.force:.4g} N that the {what} allows by its {limit.by}: {outcome.allowable.remedy}"
         )
         out.append(Finding("no-allowable-torque", 0, text, Severity.EXCEEDS))
+    elif isinstance(outcome.wall, ClampedWorkpiece):
+        out += outcome.wall.real.findings
     elif outcome.wall.surface is None:
         out.append(Finding("wall-not-finished", 0, "the program finishes no part of the wall", Severity.EXCEEDS))
     elif outcome.wall.surface[0] < -outcome.wall.tolerance:

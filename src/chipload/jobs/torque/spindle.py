@@ -80,7 +80,7 @@ def require_resolved(job: TorqueJob, spindle: Spindle, torque: float) -> None:
         raise wrong_side("light_nm", light, override.hold * torque)
     if override.hold * torque > most:
         raise InputError(
-            f"spindle: the estimate holds up to {1e-3 * most:.4g} N m, the torque that is held is "
+            f"spindle: the estimate is valid up to {1e-3 * most:.4g} N m, the torque that is held is "
             f"{1e-3 * override.hold * torque:.4g} N m: "
             + (
                 "log heavier cuts of known torque"

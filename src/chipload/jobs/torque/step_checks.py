@@ -18,7 +18,7 @@ from chipload.cutting.material import Material
 from chipload.cutting.strength import cutter_stress
 from chipload.engagement.extent import radial_depth, tooth_feed
 from chipload.jobs.tables import ChecksTable
-from chipload.jobs.torque.cut import Cut
+from chipload.jobs.torque.cut import CutSteps
 from chipload.simulation.chip_space import flute_fill
 from chipload.simulation.loads import at_feeds
 
@@ -54,7 +54,7 @@ class StepChecks:
     overrun: Floats
 
 
-def step_checks(real: Cut, loads: Loads, material: Material, most: float) -> StepChecks:
+def step_checks(real: CutSteps, loads: Loads, material: Material, most: float) -> StepChecks:
     """Steps as they really are.
 
     Parameters
@@ -71,9 +71,9 @@ def step_checks(real: Cut, loads: Loads, material: Material, most: float) -> Ste
     for cuts in real.removal.cuts:
         row = cuts.step - first
         for k, factor in enumerate((LEAST, most)):
-            stress[row, k] = cutter_stress(at_feeds(cuts, np.full(len(cuts), factor)).bites, cuts.cutter, material)
+            stress[row, k] = cutter_stress(at_feeds(cuts, np.full(len(cuts), factor)).engagement, cuts.cutter, material)
         chip[row] = cuts.plain.chip_max()
-        runout[row] = cuts.bites.chip_max() - chip[row]
+        runout[row] = cuts.engagement.chip_max() - chip[row]
         feed[row], depth[row] = tooth_feed(cuts.plain), radial_depth(cuts.plain)
         if fill is not None and cuts.cutter.gullet is not None:
             fill[row] = flute_fill(cuts)

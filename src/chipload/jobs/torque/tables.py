@@ -1,4 +1,4 @@
-"""The tables of a job that holds the torque on a thin tube or cone: which keys there are, their units and ranges.
+"""The tables of a job that holds the torque on a thin tube, a cone or a clamped workpiece: keys, units and ranges.
 
 The keys of ``[torque_control]`` `override` and ``[spindle]`` are those of the file of ``chipload hal``.
 """
@@ -10,14 +10,26 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from chipload.cutter.table import CutterTable
-from chipload.jobs.tables import ChecksTable, Count, Limits, NotNegative, Number, Positive, SourceTable, Table, Text
+from chipload.jobs.simulation.tables import SolidTable, WorkpieceTable
+from chipload.jobs.tables import (
+    ChecksTable,
+    Count,
+    Limits,
+    NotNegative,
+    Number,
+    Point,
+    Positive,
+    SourceTable,
+    Table,
+    Text,
+)
 
 Share = Annotated[Number, Field(gt=0.0, le=1.0)]
 Angle = Annotated[Number, Field(ge=-360.0, le=720.0)]
 
 
 class ShellProgramTable(Table):
-    """An existing program around the wall."""
+    """An existing program: around the wall, or of any CAM on a [workpiece]."""
 
     file: Text
     dialect: Literal["linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"] | None = None
@@ -30,7 +42,7 @@ class ShellProgramTable(Table):
         default_factory=dict,
         description="origins of work offsets in the machine, X Y Z A B C U V W in mm and degrees, as G55 = [80, 0, 0]",
     )
-    tool_comments: bool = Field(True, description="hold the diameters in the program's comments against the cutters")
+    tool_comments: bool = Field(True, description="compare the diameters in the program's comments with the cutters")
 
 
 class RoundTable(Table):
@@ -82,7 +94,8 @@ class SurpriseTable(Table):
     kind: Literal["thicker-side", "hard-spot", "worn-cutter", "thinner-wall"]
     share: Number = Field(gt=0.0, le=3.0, description="0.3: 30 % more (of a thinner wall: less)")
     at_deg: Angle | None = Field(None, description="angle around the wall, counter-clockwise from +X")
-    width_mm: Positive | None = Field(None, description="of a hard spot, round the wall")
+    at_mm: Point | None = Field(None, description="middle of a hard spot of a [workpiece]")
+    width_mm: Positive | None = Field(None, description="of a hard spot, round the wall; in a [workpiece] its diameter")
     ramp_mm: Positive | None = Field(None, description="length of path over which a hard spot begins and ends")
     edge_share: NotNegative | None = Field(
         None, le=9.0, description="of a worn cutter: the edge's part grows by so much"
@@ -118,7 +131,7 @@ class OverrideTable(Table):
     low_share: NotNegative = Field(0.5, le=1.0, description="a reading below this share of the prediction is rejected")
     low_steps: Count = Field(50, description="number of such readings in a cut that stops the machine")
     off_path_steps: Count = Field(10, description="number of steps under load off the path that stops the machine")
-    gap_s: Positive = Field(0.5, le=10.0, description="a longer time between steps counts as a start")
+    timeout_s: Positive = Field(0.5, le=10.0, description="a longer time between steps counts as a start")
 
 
 class SpindleDeviationTable(Table):
@@ -180,7 +193,7 @@ class TorqueControlTable(Table):
     """The wall, and the controller that holds the torque on it."""
 
     file: Text | None = Field(None, description="sets and rules (TOML); none: the standard ones")
-    shell: ShellTable
+    shell: ShellTable | None = Field(None, description="the wall; none: state [stock] and [workpiece]")
     override: OverrideTable
 
 
@@ -188,15 +201,22 @@ class SimulationTable(Table):
     """How fine the chips are looked at."""
 
     step_mm: Positive = Field(le=10.0, description="longest step of the tip")
-    layer_mm: Positive = Field(le=10.0, description="thickness of the layers of the stock")
+    layer_mm: Positive = Field(le=10.0, description="thickness of the layers of the stock where the cutter comes")
     tolerance_mm: Positive = Field(0.005, le=0.1, description="how far chords may leave the edges of chips")
 
 
 class TorqueLimitsTable(Limits):
-    """The limits of the wall."""
+    """The limits of the wall or the workpiece."""
 
-    form_error_um: Positive = Field(le=5000.0, description="by the deflection of wall and cutter along the normal")
-    strength_share: Share = Field(description="share of the strength that the wall may be strained to")
+    form_error_um: Positive = Field(
+        le=5000.0, description="by the deflection of wall, or workpiece, and cutter along the normal"
+    )
+    strength_share: Share = Field(
+        description="share of its strength (strength_mpa, yield_mpa) that the wall or workpiece may be strained to"
+    )
+    deflection_workpiece_um: Positive | None = Field(
+        None, le=5000.0, description="deflection of the [workpiece] itself, in any direction"
+    )
     torque_nm: Positive | None = Field(None, description="of the cutter or the spindle, if less")
     torque_over_percent: NotNegative = Field(le=50.0, description="the torque may exceed its limit by so much")
 
@@ -206,6 +226,9 @@ class TorqueJobTable(Table):
 
     program: ShellProgramTable | None = None
     round: RoundTable | None = None
+    stock: SolidTable | None = Field(None, description="what the program is planned for; goes with [workpiece]")
+    real_stock: SolidTable | None = Field(None, description="the stock as it really is; none: as planned")
+    workpiece: WorkpieceTable | None = Field(None, description="whose deflection and strength limit the torque")
     machine: SourceTable
     material: SourceTable
     cutter: tuple[CutterTable, ...] = Field(min_length=1)

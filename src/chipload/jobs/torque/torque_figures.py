@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from chipload.control.fuzzy import FuzzyTable, surface
-from chipload.jobs.torque.outcome import HELD, ControllerCase, TorqueResult
+from chipload.jobs.torque.outcome import HELD, ControllerCase, ShellWall, TorqueResult
 from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS, SCALE, STOCK
 from chipload.result.thinning import thinned
 from chipload.units import mm_min_from_mm_s
@@ -84,7 +84,8 @@ def allowable(outcome: TorqueResult) -> go.Figure:
         ("of the edge alone, planned", path.model.edge, "#8a8f98", "dot"),
     ]
     if outcome.attainable:
-        lines.append(("allowable for the wall", outcome.allowable.torque * path.relief, LIMIT, "dash"))
+        what = "wall" if isinstance(outcome.wall, ShellWall) else "workpiece"
+        lines.append((f"allowable for the {what}", outcome.allowable.torque * path.relief, LIMIT, "dash"))
     figure = go.Figure()
     for name, y, colour, dash in lines:
         keep = thinned(y, LINE_POINTS)
@@ -96,22 +97,22 @@ def allowable(outcome: TorqueResult) -> go.Figure:
     return _styled(figure, 380)
 
 
-def ovalised(outcome: TorqueResult) -> go.Figure:
+def ovalised(wall: ShellWall) -> go.Figure:
     """The rim under the cutter's force, and what each harmonic adds, against a beam."""
-    oval, shell = outcome.wall.oval, outcome.wall.shell
+    oval, shell = wall.oval, wall.shell
     figure = make_subplots(
         rows=1, cols=2, specs=[[{"type": "polar"}, {"type": "xy"}]], column_widths=[0.45, 0.55],
         subplot_titles=("rim, pushed inwards at 0 deg", "normal deflection under 1 N, by harmonic [µm]"),
     )  # fmt: skip
-    radius = float(shell.radius_at(outcome.wall.oval_s))
+    radius = float(shell.radius_at(wall.oval_s))
     scale = EXAGGERATED * radius / float(np.abs(oval.rim).max())
     degrees = np.degrees(oval.theta)
     shapes = [
         ("round", np.full(len(degrees), radius), "#8a8f98", "dot"),
         ("shell", radius - scale * oval.rim, "#0b7a75", "solid"),
     ]
-    if outcome.wall.oval.beam is not None:
-        shapes.append(("beam", radius - scale * outcome.wall.oval.beam * np.cos(oval.theta), LIMIT, "dash"))
+    if wall.oval.beam is not None:
+        shapes.append(("beam", radius - scale * wall.oval.beam * np.cos(oval.theta), LIMIT, "dash"))
     for name, r, colour, dash in shapes:
         style = {"color": colour, "width": 2.0, "dash": dash}
         figure.add_trace(go.Scatterpolar(r=r, theta=degrees, mode="lines", name=name, line=style), row=1, col=1)
@@ -119,12 +120,12 @@ def ovalised(outcome: TorqueResult) -> go.Figure:
     figure.add_trace(
         go.Bar(x=n, y=1e3 * oval.share[:16], name="of the shell", marker={"color": "#0b7a75"}), row=1, col=2
     )
-    if outcome.wall.oval.beam is not None:
+    if wall.oval.beam is not None:
         style = {"color": LIMIT, "width": 1.4, "dash": "dash"}
-        whole = f"a beam with shear, in all {1e3 * outcome.wall.oval.beam:.3g} µm"
+        whole = f"a beam with shear, in all {1e3 * wall.oval.beam:.3g} µm"
         ends = [-0.5, float(n[-1]) + 0.5]
         figure.add_trace(
-            go.Scatter(x=ends, y=[1e3 * outcome.wall.oval.beam] * 2, mode="lines", line=style, name=whole), row=1, col=2
+            go.Scatter(x=ends, y=[1e3 * wall.oval.beam] * 2, mode="lines", line=style, name=whole), row=1, col=2
         )
     figure.update_xaxes(title_text="harmonic round the wall (1: as a beam, 2: oval)", dtick=1, row=1, col=2)
     figure.update_polars(radialaxis={"visible": False})

@@ -68,7 +68,7 @@ def walls_of(contours: Sequence[Contour], side: str, milling: str, length: float
             raise InputError(f"operation.side = {side}: the contour is closed: choose inside or outside")
         turned = [c if side == "left" else c.reversed() for c in chains]
     else:
-        turned = [_open_inside(c) for c in chains] + list(Region.of(closed).contours)
+        turned = [_turned_to_area(c) for c in chains] + list(Region.of(closed).contours)
         if side == "outside":
             turned = [c.reversed() for c in turned]
     if milling == "up":
@@ -76,7 +76,7 @@ def walls_of(contours: Sequence[Contour], side: str, milling: str, length: float
     return Walls(tuple(turned), tuple(run_on(c, length) for c in turned), length)
 
 
-def _open_inside(chain: Contour) -> Contour:
+def _turned_to_area(chain: Contour) -> Contour:
     """An open chain turned so that the area to its closing chord lies on its left."""
     chord = np.concatenate([chain.end, chain.start, np.zeros(3)])
     area = Contour(np.vstack([chain.segments, chord])).area

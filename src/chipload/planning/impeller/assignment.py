@@ -136,7 +136,7 @@ class _Leaf(NamedTuple):
     cost: Floats
 
 
-class _Row(NamedTuple):
+class _AssignmentRow(NamedTuple):
     parts: tuple[_Node, ...]
 
 
@@ -144,12 +144,12 @@ class _Either(NamedTuple):
     parts: tuple[_Node, ...]
 
 
-_Node = _Leaf | _Row | _Either
+_Node = _Leaf | _AssignmentRow | _Either
 
 
 def _solved(sides: Sequence[tuple[Floats, Floats]], chosen: NDArray[np.int64], changes: Changes) -> Assignment | None:
     """The least time with the chosen cutters alone."""
-    tree = _Row(tuple(_side(k, [cost[:, :, chosen] for cost in side]) for k, side in enumerate(sides)))
+    tree = _AssignmentRow(tuple(_side(k, [cost[:, :, chosen] for cost in side]) for k, side in enumerate(sides)))
     start = np.zeros((len(chosen), sides[0][0].shape[3]))
     after, record = _forward(tree, start, changes)
     total = float(after.min())
@@ -172,8 +172,8 @@ def _side(number: int, orders: list[Floats]) -> _Node:
                 strips.append(_Leaf((number, order, k, -1), whole))
             else:
                 row = tuple(_Leaf((number, order, k, j), cell) for j, cell in enumerate(cells))
-                strips.append(_Either((_Row(row), _Row(row[::-1]))))
-        ways += [_Row(tuple(strips)), _Row(tuple(strips[::-1]))]
+                strips.append(_Either((_AssignmentRow(row), _AssignmentRow(row[::-1]))))
+        ways += [_AssignmentRow(tuple(strips)), _AssignmentRow(tuple(strips[::-1]))]
     return _Either(tuple(ways))
 
 
@@ -182,7 +182,7 @@ def _forward(node: _Node, before: Floats, changes: Changes) -> tuple[Floats, obj
     if isinstance(node, _Leaf):
         return _entered(before, changes) + node.cost, before
     records = []
-    if isinstance(node, _Row):
+    if isinstance(node, _AssignmentRow):
         for part in node.parts:
             before, record = _forward(part, before, changes)
             records.append(record)
@@ -208,7 +208,7 @@ def _backward(
         ]
         return min(ways, key=lambda way: float(way[0]))[1]
     assert isinstance(record, list)
-    if isinstance(node, _Row):
+    if isinstance(node, _AssignmentRow):
         for part, one in zip(reversed(node.parts), reversed(record), strict=True):
             state = _backward(part, one, state, changes, steps)
         return state

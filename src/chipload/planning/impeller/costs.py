@@ -121,7 +121,7 @@ class ChannelSide:
         return np.array(np.gradient(grid, (self.u, self.v)[1 - order], axis=1 - order)).reshape(-1, 3)
 
 
-class Measured(NamedTuple):
+class MeasuredCost(NamedTuple):
     """What a patch takes in a program [s] beside what its contact points predict; order, cutter, table of its side."""
 
     order: int
@@ -178,12 +178,12 @@ class Costs:
         out: Floats = self.time[order][self.side.points(order)] * self.factor[order]
         return out
 
-    def measured(self, rows: Sequence[Measured]) -> None:
+    def measured(self, rows: Sequence[MeasuredCost]) -> None:
         """Takes the factors from programs; what no program has yet is taken for the mean of its order, or of all."""
         if not rows:
             return
 
-        def ratio(some: Sequence[Measured]) -> float:
+        def ratio(some: Sequence[MeasuredCost]) -> float:
             return math.fsum(r.programmed for r in some) / math.fsum(r.predicted for r in some)
 
         whole = ratio(rows)

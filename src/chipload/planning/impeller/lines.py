@@ -107,7 +107,7 @@ class Tracks:
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A line at the stations: (u, v), S, N, K, its direction, the pieces with B, B at every station (nan: none)."""
+    """A line at the stations: (u, v), S, N, K, its direction, the sections with B, B at every station (nan: none)."""
 
     q: Floats
     at: Floats
@@ -115,7 +115,7 @@ class Line:
     N: Floats
     K: Floats
     d: Floats
-    pieces: tuple[Turned, ...]
+    sections: tuple[Turned, ...]
     pallet: Floats
 
 
@@ -251,10 +251,10 @@ class Lines:
         covered = np.zeros(len(use), dtype=np.bool_)
         ways = self.mender
         owner = np.full(len(use), -1)
-        for k, piece in enumerate(line.pieces):
+        for k, piece in enumerate(line.sections):
             owner[piece.first : piece.last] = k
         gone: dict[tuple[int, int], float] = {}  # (first station, towards the next 1 or back -1): how far [share]
-        for mine, piece in enumerate(line.pieces):
+        for mine, piece in enumerate(line.sections):
             for a, b in runs(use[piece.first : piece.last]):
                 i, j = piece.first + a, piece.first + b
                 covered[i:j] = True

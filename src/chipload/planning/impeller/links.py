@@ -167,7 +167,7 @@ def linked(
     T = axis_at(table, 0.0)
     points = scene.check if outline is None else np.vstack([scene.check, outline])
     top = safe_height(points, table) + how.above
-    job = _Job(scene, cutter, table, how, clear_of, top)
+    job = _LinkJob(scene, cutter, table, how, clear_of, top)
     passes, stayed = [single(k, t, label) for k, t in enumerate(tracks)], 0
     if joint is not None and not one_way:
         # a lifted link: both leads, both lifts, up and down again
@@ -221,7 +221,7 @@ def linked(
     return Linked(_within_rate(Moves.join(parts), rate), tuple(refused), direct, retracts, np.array(of), stayed)
 
 
-def _in_order(job: _Job, passes: Sequence[Pass], stages: Sequence[int]) -> list[Pass]:
+def _in_order(job: _LinkJob, passes: Sequence[Pass], stages: Sequence[int]) -> list[Pass]:
     """The passes in the order of a tour, stage after stage."""
     edges = [0, *stages, math.inf]
     out: list[Pass] = []
@@ -251,7 +251,7 @@ class _Pose(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class _Job:
+class _LinkJob:
     scene: Scene
     cutter: CatalogueCutter
     table: float

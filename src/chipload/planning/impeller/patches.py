@@ -57,7 +57,7 @@ class PatchDivision:
     untold: int
 
     @property
-    def gap(self) -> float:
+    def above_bound(self) -> float:
         """By what share the time is above the bound."""
         return self.total / self.bound - 1.0 if self.bound > 0.0 else 0.0
 

@@ -3,7 +3,7 @@
 Notation: a line runs along one parameter p of the surface at q(p) of the other; d its direction, N normal, e = N x d;
 h height of the scallop. The next line lies at the step w across e, q + w / (S_q.e) with the derivative half-way; w is
 how far the pass reaches below h on this side and how far the next one does on its own (``cusp.py``), then refined until
-the crest between the poses of both (``crest.py``) is as high as aimed. The next line's pallet angles are not known
+the scallop between the poses of both (``scallop.py``) is as high as aimed. The next line's pallet angles are not known
 before it lies: they are first taken for those of this line.
 
 The pallet angles of a line come from the exact ranges at its points (``pallet.py``). Points without a range are left
@@ -33,12 +33,12 @@ from chipload.planning.impeller.track import ToolTrack, posed
 from chipload.progress import Progress, silent
 
 _MENDS, _ROUNDS = 4, 12
-#: distance of the places at which a crest is looked for [mm], and while a step is sought
+#: distance of the places at which a scallop is looked for [mm], and while a step is sought
 _FINE, _COARSE = 0.5, 1.5
 _LINES = 5000
 #: of how far a pass stays below the scallop, how far from the border the outermost lines lie
 _INSIDE = 0.9
-_USED = 0.9  # of what is aimed at, the mean crest that is enough
+_USED = 0.9  # of what is aimed at, the mean scallop that is enough
 _STILL = 5e-3  # share by which a step may still change
 
 
@@ -142,7 +142,7 @@ class _Stepper:
             _, behind = self._reach(line)
             w = np.minimum(w, self._even(_INSIDE * behind))
             inside = self.lines.line(q + self._dq(line, w), line.pallet)
-            if len(inside.pieces) > len(line.pieces):
+            if len(inside.sections) > len(line.sections):
                 break
             _, behind = self._reach(inside)
             known = np.isfinite(behind)
@@ -169,15 +169,15 @@ class _Stepper:
         for _ in range(_MENDS):
             w = self._step(line, w, B)
             out = self.lines.line(self._moved(line, w, end), B)
-            crest = self._crest(line, out.q, out.pallet)
+            scallop = self._scallop(line, out.q, out.pallet)
             if not np.isfinite(out.pallet).any():
                 break
             B = out.pallet
-            if (crest > self.scallop * (0.5 + 0.5 * self.aim)).any():
+            if (scallop > self.scallop * (0.5 + 0.5 * self.aim)).any():
                 continue
             # what is used of the scallop where the line is not at the border
-            inner = np.isfinite(crest) & (out.q < end)
-            share = float(crest[inner].mean() / self.scallop) if inner.any() else 1.0
+            inner = np.isfinite(scallop) & (out.q < end)
+            share = float(scallop[inner].mean() / self.scallop) if inner.any() else 1.0
             if best is None or share > best[0]:
                 best = share, out
             if share > _USED * self.aim:
@@ -189,11 +189,11 @@ class _Stepper:
         return out
 
     def _step(self, line: Line, w: Floats, pallet: Floats) -> Floats:
-        """The step at which the crest is as high as aimed, if the next line is milled at these pallet angles."""
+        """The step at which the scallop is as high as aimed, if the next line is milled at these pallet angles."""
         aim = self.aim * self.scallop
         for _ in range(_ROUNDS):
-            crest = self._crest(line, self._moved(line, w, 1.0), pallet, _COARSE)
-            ratio = np.clip(np.sqrt(aim / np.clip(crest, 0.1 * aim, None)), 0.6, 1.3)
+            scallop = self._scallop(line, self._moved(line, w, 1.0), pallet, _COARSE)
+            ratio = np.clip(np.sqrt(aim / np.clip(scallop, 0.1 * aim, None)), 0.6, 1.3)
             if not np.isfinite(ratio).any() or (np.nanmin(ratio) > 0.99 and np.nanmax(ratio) < 1.03):
                 break
             new = np.minimum(
@@ -206,8 +206,8 @@ class _Stepper:
                 break
         return w
 
-    def _crest(self, line: Line, q: Floats, pallet: Floats, fine: float = _FINE) -> Floats:
-        """(n,) crest between a line and one at q, the highest near each station; nan: one of them is not milled.
+    def _scallop(self, line: Line, q: Floats, pallet: Floats, fine: float = _FINE) -> Floats:
+        """(n,) scallop between a line and one at q, the highest near each station; nan: one of them is not milled.
 
         ``fine`` : distance of the places along the line at which it is looked for [mm]
         """

@@ -114,7 +114,7 @@ def roughed(
         goes = np.array([_goes(scene, cutter, float(alpha), how, table, workers) for alpha in table.angle])
         if not goes.any():
             raise InputError(
-                f"operation.0.rough: D {cutter.diameter:g} r {cutter.corner_radius:g} mm goes nowhere in the channel "
+                f"operation.0.rough: D {cutter.diameter:g} r {cutter.corner_radius:g} mm fits nowhere in the channel "
                 f"on the plus side of the {'splitter' if index else 'blade'}: state a smaller one"
             )
         done = np.zeros(goes.shape[1], dtype=np.bool_)
@@ -192,8 +192,9 @@ def _largest(
     most = float(np.sort(found)[::-1][max(int(np.ceil(share * len(found))) - 1, 0)])
     if most <= 0.0:
         raise InputError(
-            f"operation.0.rough.share = {share:g}: no cutter of catalogue {catalogue.name} goes at so many points of "
-            f"the channels, at {float((found > 0.0).mean()):.3g} of them one does: lower it, or state a cutter"
+            f"operation.0.rough.share = {share:g}: no cutter of catalogue {catalogue.name} fits at that share of "
+            f"the points of the channels, at most at {float((found > 0.0).mean()):.3g} of them: lower it, or "
+            "state a cutter"
         )
     able = [c for c in catalogue.cutters if c.diameter <= most]
     return max(able, key=lambda c: (c.diameter, c.corner_radius))

@@ -25,7 +25,7 @@ from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.planning.pocket import _kernels, _pass
 from chipload.planning.pocket.free_space import edge_places, take_free
-from chipload.planning.pocket.leftover import Remainder
+from chipload.planning.pocket.leftover import PocketRemainder
 from chipload.planning.pocket.reach import CHORD, Reach, centre_region, reach_of, widest_places
 from chipload.planning.pocket.starts import Starts
 from chipload.planning.result import Event
@@ -208,7 +208,7 @@ class _Run:
         take_free(self.stock, free, radius)
         self.reachable = centre_region(centres, -radius)
         self.rows: list[Floats] = []
-        self.remainder, self.taken = Remainder(self.reachable, radius, free), 0
+        self.remainder, self.taken = PocketRemainder(self.reachable, radius, free), 0
         self.whole = self.remainder.rest.area
         self.events: list[Event] = []
         self.starts = Starts(radius, step)
@@ -370,7 +370,7 @@ class _Run:
                 self.progress(min(0.99, self.area / self.whole), f"front, pass {self.passes + 1}")
         return np.vstack(segments), np.vstack(places), took, int(reason), state[0:2]
 
-    def _left(self) -> Remainder:
+    def _left(self) -> PocketRemainder:
         """What the path so far has left."""
         new = self.rows[max(0, self.taken - 1) :]
         if self.taken < len(self.rows):

@@ -41,7 +41,7 @@ def swept(points: Floats, breaks: NDArray[np.bool_], radius: float) -> shapely.G
     return shapely.union_all(out)
 
 
-class Remainder:
+class PocketRemainder:
     """What is left of a region, less and less of it as a path goes on; each part of the path is taken away once."""
 
     def __init__(self, reachable: Region, radius: float, free: Sequence[Region] = ()) -> None:
@@ -87,6 +87,6 @@ def leftover(
     reachable: Region, points: Floats, breaks: NDArray[np.bool_], radius: float
 ) -> tuple[float, tuple[Contour, ...], list[tuple[float, tuple[float, float]]]]:
     """:meth:`Remainder.parts` of a whole path at once."""
-    rest = Remainder(reachable, radius)
+    rest = PocketRemainder(reachable, radius)
     rest.take(points, breaks)
     return rest.parts()

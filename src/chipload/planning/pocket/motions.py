@@ -104,7 +104,7 @@ def motions_of(path: ClearingPath, heights: Heights, feed: float, link_feed: flo
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class MotionSamples:
     """The rows of a history along motions, a sample at the end of each piece.
 
     Parameters
@@ -124,7 +124,7 @@ class Samples:
     length: Floats
 
 
-def samples_of(motions: Motions, step: float) -> Samples:
+def samples_of(motions: Motions, step: float) -> MotionSamples:
     """Motions that cut in samples of at most ``step`` [mm], others whole."""
     seg, kind = motions.segments, motions.kind
     parts = np.ones(len(kind), dtype=np.int64)
@@ -136,7 +136,7 @@ def samples_of(motions: Motions, step: float) -> Samples:
     _, begins = places(seg[k], share - 1.0 / parts[k])
     still = motions.lengths[k] == 0.0
     heading[still] = begins[still] = (1.0, 0.0)
-    return Samples(k, share, centre, heading, begins, motions.lengths[k] / parts[k])
+    return MotionSamples(k, share, centre, heading, begins, motions.lengths[k] / parts[k])
 
 
 def places(seg: Floats, share: Floats) -> tuple[Floats, Floats]:
@@ -155,7 +155,7 @@ def places(seg: Floats, share: Floats) -> tuple[Floats, Floats]:
 
 
 def replayed(
-    motions: Motions, samples: Samples, radius: float, free: Sequence[Region] = ()
+    motions: Motions, samples: MotionSamples, radius: float, free: Sequence[Region] = ()
 ) -> tuple[Engagement, Floats]:
     """The engaged arcs at the end of every piece, from the stock as the motions before it left it, and the greatest
     engagement (m,) [rad] along it; ``free`` regions hold no material. O(m).
@@ -179,7 +179,7 @@ def replayed(
     return Engagement(angle, count, np.clip(phi, 0.0, math.pi)), most
 
 
-def speeds(motions: Motions, samples: Samples, machine: Machine) -> tuple[Floats, Floats, Floats]:
+def speeds(motions: Motions, samples: MotionSamples, machine: Machine) -> tuple[Floats, Floats, Floats]:
     """Length [mm] along the path, speed [mm/s] and time within the run [s] at the end of every piece."""
     acceleration = machine.acceleration_xy
     t, u = samples.heading[:-1], samples.begins[1:]
@@ -200,13 +200,13 @@ def speeds(motions: Motions, samples: Samples, machine: Machine) -> tuple[Floats
     return length, speed, time
 
 
-def runs_of(motions: Motions, samples: Samples) -> list[tuple[int, int]]:
+def runs_of(motions: Motions, samples: MotionSamples) -> list[tuple[int, int]]:
     """First and last piece of each run."""
     first = np.searchsorted(samples.motion, [a for a, _ in motions.runs])
     return list(zip(first.tolist(), [*(first[1:] - 1).tolist(), len(samples.motion) - 1], strict=True))
 
 
-def clock(motions: Motions, samples: Samples, time: Floats, programs: list[Program], ends: Floats) -> Floats:
+def clock(motions: Motions, samples: MotionSamples, time: Floats, programs: list[Program], ends: Floats) -> Floats:
     """(m,) time at the end of every piece [s] from that at the ends of the program's rows; of a LIFT when the cutter is
     down again.
 

@@ -60,7 +60,7 @@ class FinishSurface:
 
 
 @dataclass(frozen=True, eq=False)
-class Blank:
+class WallBlank:
     """A wall and its stock.
 
     Parameters
@@ -191,6 +191,6 @@ class Blank:
     def _clamped(self, places: MeshPlaces) -> NDArray[np.bool_]:
         """Places on the clamp itself: they do not give way; the stiffest place stands for them."""
         held = np.zeros(len(self.solid.grid.nodes), dtype=np.bool_)
-        held[self.solid.grid.side("j-")] = self.solid.held[self.solid.grid.side("j-")].all(axis=1)
+        held[self.solid.grid.side("j-")] = self.solid.constrained[self.solid.grid.side("j-")].all(axis=1)
         foot = places.local[:, 1] <= -1.0 + 1e-12
         return np.asarray(foot & held[self.solid.grid.elements[places.element]].any(axis=1))

@@ -200,7 +200,7 @@ def _outermost(x: Floats, allowed: Ints, count: int) -> tuple[list[int], int]:
     try:
         hull = np.sort(allowed[ConvexHull(x[allowed]).vertices])
     except QhullError as error:
-        raise InputError("experiments: all candidates lie on a line: allow one beside it") from error
+        raise InputError("experiments: all candidates lie on a line: allow one off it") from error
     if len(hull) <= count:
         return [int(i) for i in hull], len(hull)
     hull = hull[:: max(1, len(hull) // 40)]

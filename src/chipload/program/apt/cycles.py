@@ -108,7 +108,7 @@ def read_cycle(record: AptRecord, mm: float) -> tuple[Cycle, tuple[str, ...]] | 
     Raises
     ------
     InputError
-        A number is missing or out of range, a word stands twice.
+        A number is missing or out of range, a word appears twice.
     """
     words = [word for arg in record.args for word in arg.split(" ") if word]
     kind = words[0] if words else ""
@@ -201,7 +201,7 @@ def _feed(word: str, value: float, mm: float) -> tuple[float, str]:
 
 def _checked(record: AptRecord, kind: str, values: dict[str, float], feed: tuple[float, str] | None) -> Cycle:
     if "depth" not in values or "rapto" not in values:
-        raise record.error("must say how deep, by FEDTO or DEPTH, and from where, by RAPTO or CLEAR")
+        raise record.error("must state the depth, by FEDTO or DEPTH, and the start, by RAPTO or CLEAR")
     values["depth"] = abs(values["depth"])
     values.setdefault("rtrcto", values["rapto"])
     values["rtrcto"] = max(values["rtrcto"], values["rapto"])

@@ -51,7 +51,7 @@ class Coordinates:
     Parameters
     ----------
     A : (3, 3) float, t : (3,) float [mm], of CSYS
-    given : ``work`` or ``csys``, what points under a CSYS are in; None: not said
+    points_in : ``work`` or ``csys``, what points under a CSYS are in; None: not said
     turned : angles as ROTABL gives them, about X, Y, Z
     tlaxis : of TLAXIS, a unit vector; None: not said
     line : of the CSYS
@@ -59,7 +59,7 @@ class Coordinates:
 
     A: Floats = field(default_factory=_one)
     t: Floats = field(default_factory=_nought)
-    given: str | None = None
+    points_in: str | None = None
     turned: tuple[float, float, float] = (0.0, 0.0, 0.0)
     tlaxis: tuple[float, float, float] | None = None
     line: int = 0
@@ -75,18 +75,18 @@ class Coordinates:
         if any(self.turned):
             R = self._turned()
             return R, np.zeros(3), R @ _Z
-        if not self._plain and self.given is None:
+        if not self._plain and self.points_in is None:
             raise InputError(
                 f"line {self.line}: CSYS without TRNTYP does not say what points are given in: say whether it is the "
                 "work frame or the coordinates of CSYS"
             )
-        R, t = (self.A, self.t) if self.given == "csys" else (np.eye(3), np.zeros(3))
+        R, t = (self.A, self.t) if self.points_in == "csys" else (np.eye(3), np.zeros(3))
         return R, t, self.A @ _Z if self.tlaxis is None else R @ self.tlaxis
 
     @property
     def in_work(self) -> bool:
         """Whether points are in the work frame as they stand."""
-        return not any(self.turned) and (self._plain or self.given == "work")
+        return not any(self.turned) and (self._plain or self.points_in == "work")
 
     @property
     def note(self) -> str:
@@ -95,9 +95,9 @@ class Coordinates:
             return "ROTABL: points are turned back with the table into the work frame"
         if self._plain:
             return ""
-        if self.given == "csys":
+        if self.points_in == "csys":
             return "CSYS: points are brought from its coordinates into the work frame"
-        return "CSYS: points stand as they are, given in the work frame"
+        return "CSYS: points are in the work frame and stay unchanged"
 
     @cached_property
     def _plain(self) -> bool:
@@ -135,10 +135,10 @@ class Coordinates:
 
     def trntyp(self, record: AptRecord) -> Coordinates:
         """After a TRNTYP record."""
-        given = {"WORLD": "work", "LOCAL": "csys"}.get(record.args[0] if record.args else "")
-        if given is None or any(record.number(k) for k in range(1, len(record.args))):
+        points_in = {"WORLD": "work", "LOCAL": "csys"}.get(record.args[0] if record.args else "")
+        if points_in is None or any(record.number(k) for k in range(1, len(record.args))):
             raise record.error("must be TRNTYP/WORLD or TRNTYP/LOCAL, its numbers 0")
-        return replace(self, given=given)
+        return replace(self, points_in=points_in)
 
     def rotabl(self, record: AptRecord) -> Coordinates:
         """After a ROTABL record; angles are those that the table has then, not added up."""

@@ -110,7 +110,9 @@ class AptInterpreter:
                 "changes the coordinates or the order in a way that is not read: write plain GOTO instead"
             )
         elif LEFT_OUT.fullmatch(word.partition(",")[0]):
-            track.gap("apt-left-out", record.line, f"{record}: moves the tool in a way that is not read: left out")
+            track.leave_out(
+                "apt-left-out", record.line, f"{record}: moves the tool in a way that is not read: left out"
+            )
         elif word == "CUTCOM" and record.args != ("OFF",):
             track.note_once("apt-cutcom", record.line, f"{record}: points are taken as of the tool's own tip")
         elif UNUSED.fullmatch(word):
@@ -123,7 +125,7 @@ class AptInterpreter:
         if self._circle is not None:
             self.track.note("apt-circle", self._circle.record.line, "CIRCLE without a GOTO after it is left out")
         if not self.ended:
-            self.track.gap("apt-end", 0, "the text does not end with FINI: it may have been cut off")
+            self.track.leave_out("apt-end", 0, "the text does not end with FINI: it may have been cut off")
         return self.track.program()
 
     # ------------------------------------------------------------------------------------------------ motions
@@ -131,7 +133,9 @@ class AptInterpreter:
     def _goto(self, record: AptRecord) -> None:
         p, b = self._point(record)
         if self._unread is not None:
-            self.track.gap("apt-cycle", record.line, f"{self._unread} is not read: its hole at {record} is left out")
+            self.track.leave_out(
+                "apt-cycle", record.line, f"{self._unread} is not read: its hole at {record} is left out"
+            )
         elif self._drilling and self._cycle is not None:
             self._hole(self._cycle, p, b, record)
         elif self._circle is not None:
@@ -198,7 +202,9 @@ class AptInterpreter:
             self.track.note("apt-circle", self._circle.record.line, "CIRCLE without a GOTO after it is left out")
         circle = read_circle(record)
         if isinstance(circle, str):
-            self.track.gap("apt-circle", record.line, f"{record}: {circle}: a straight line leads to the next point")
+            self.track.leave_out(
+                "apt-circle", record.line, f"{record}: {circle}: a straight line leads to the next point"
+            )
             self._circle = None
             return
         if circle.unread:
@@ -213,13 +219,13 @@ class AptInterpreter:
         at, direction, b = self._programmed, self._direction, self.track.axis
         self._direction = None
         if at is None or direction is None or self._drilling or self._circle is not None:
-            self.track.gap("apt-left-out", record.line, f"{record}: needs a point and INDIRV before it: left out")
+            self.track.leave_out("apt-left-out", record.line, f"{record}: needs a point and INDIRV before it: left out")
             return
         R, t, _ = self._frame()
         start = _tuple((R.T @ at + t) / self.mm)
         found = read_tlon(record, start, direction)
         if isinstance(found, str):
-            self.track.gap("apt-left-out", record.line, f"{record}: {found}: left out")
+            self.track.leave_out("apt-left-out", record.line, f"{record}: {found}: left out")
             return
         circle, end = found
         p = _tuple(R @ (np.multiply(end, self.mm) - t))
@@ -228,8 +234,8 @@ class AptInterpreter:
 
     def _origin(self, record: AptRecord) -> None:
         if any(record.numbers()[:3]):
-            text = f"{record}: is not read: points are taken as they stand"
-            self.track.gap("apt-origin", record.line, text)
+            text = f"{record}: is not read: points are taken unchanged"
+            self.track.leave_out("apt-origin", record.line, text)
         else:
             self.track.note("apt-unused", record.line, str(record))
 
@@ -252,7 +258,7 @@ class AptInterpreter:
                 text = (
                     f"{circle.record}: the GOTO after it gives a sweep of {math.degrees(sweep):.4g} deg, which is cut"
                 )
-                self.track.gap("apt-arc", circle.record.line, text)
+                self.track.leave_out("apt-arc", circle.record.line, text)
 
     # ------------------------------------------------------------------------------------------------ holes
 
@@ -271,7 +277,9 @@ class AptInterpreter:
                 return
             self._cycle, self._drilling = found[0], True
             if found[1]:
-                self.track.gap("apt-cycle", record.line, f"{record}: {', '.join(found[1])} is not read in a cycle")
+                self.track.leave_out(
+                    "apt-cycle", record.line, f"{record}: {', '.join(found[1])} is not read in a cycle"
+                )
 
     def _hole(self, cycle: Cycle, p: Point, b: Point, record: AptRecord) -> None:
         """A hole at p against the axis b."""
@@ -281,7 +289,7 @@ class AptInterpreter:
         at, up = np.array(p), np.array(b)
         stated, turning = track.stated, track.spindle
         if cycle.kind == "TAP" and turning == 0.0:
-            raise record.error("a tap and the spindle stands: SPINDL must come before it")
+            raise record.error("a tap with the spindle at rest: SPINDL must come before it")
         if track.at is not None:
             height = float(np.subtract(track.at, at) @ up)
             if height < cycle.rtrcto - 1e-9 and track.axis == b:
@@ -310,7 +318,7 @@ class AptInterpreter:
         if value < 0.0 or (len(record.args) > 1 and not turns):
             raise record.error("must be a time in s, at least 0, or a number of turns and REV")
         if turns and self.track.spindle == 0.0:
-            raise record.error("turns of the spindle, which stands: SPINDL must come before it")
+            raise record.error("turns of the spindle, which is at rest: SPINDL must come before it")
         self.track.dwell(value * math.tau / abs(self.track.spindle) if turns else value, record.line)
 
     # ------------------------------------------------------------------------------------------------ what holds

@@ -68,7 +68,7 @@ def read_apt(
         raise InputError(f"csys = {csys!r}: must be work or csys")
     if feed is not None and not 0.0 < feed < math.inf:
         raise InputError(f"feed = {feed:g} mm/s: must be above 0")
-    reader = AptInterpreter(AptRows(name, feed, spindle, tool, name), MM_PER[units], Coordinates(given=csys))
+    reader = AptInterpreter(AptRows(name, feed, spindle, tool, name), MM_PER[units], Coordinates(points_in=csys))
     for record in records(text):
         if reader.ended:
             reader.track.note(

@@ -66,7 +66,7 @@ class AptRows:
             self._left += 1
             self._left_severity = max(self._left_severity, severity)
 
-    def gap(self, code: str, line: int, text: str) -> None:
+    def leave_out(self, code: str, line: int, text: str) -> None:
         """A finding on something that is left out, so that the result is unproven."""
         self.note(code, line, text, Severity.UNPROVEN)
 
@@ -126,7 +126,9 @@ class AptRows:
             value, counts = self.stated[0], self.stated[1]
             if counts == TURN:
                 if self.spindle == 0.0:
-                    raise InputError(f"line {line}: a feed per turn and the spindle stands: SPINDL must come before it")
+                    raise InputError(
+                        f"line {line}: a feed per turn with the spindle at rest: SPINDL must come before it"
+                    )
                 value *= abs(self.spindle) / math.tau
             else:
                 value = mm_s_from_mm_min(value)

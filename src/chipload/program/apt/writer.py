@@ -78,7 +78,7 @@ def write_apt(
             tool = tools[k]
             if cutters is not None and tool not in cutters and tool != 0:
                 raise InputError(f"program row {k}: tool {tool} has no cutter: give its [[cutter]]")
-            if cutters is not None and tool in cutters:
+            if cutters is not None and tool in cutters and not cutters[tool].body:
                 out.append(cutter_statement(cutters[tool]))
             out.append(f"LOADTL/{tool}")
         if speeds[k] != spindle:

@@ -125,7 +125,7 @@ class Controller:
         """A finding that is made a single time."""
         self.findings.once(code, self.line, text, severity)
 
-    def gap(self, code: str, text: str) -> None:
+    def leave_out(self, code: str, text: str) -> None:
         """A finding on something that is left out or assumed, so that the result is unproven."""
         self.findings.add(code, self.line, text, Severity.UNPROVEN)
 
@@ -205,7 +205,7 @@ class Controller:
             return stated
         known = number if number in self.diameters else self.state.tool
         if known not in self.diameters:
-            self.gap(
+            self.leave_out(
                 "nc-diameter-unknown",
                 f"{name} D{number}: no diameter is known, the path is compensated by 0: state D of tool {number} in a "
                 f"tool table (program.tools), or a [[cutter]] with number = {number}",
@@ -214,13 +214,13 @@ class Controller:
         diameter = self.diameters[known]
         taken = f"the {diameter:g} mm of cutter {known} are taken"
         if number in (self.tools or {}):
-            self.gap(
+            self.leave_out(
                 "nc-diameter-missing",
                 f"{name} D{number}: the tool table states no D for tool {number}, with it the controller compensates "
                 f"by 0: {taken}: write D{diameter:g} in the table",
             )
         elif known != number and self.dialect == "linuxcnc":
-            self.gap("nc-diameter-unknown", f"{name} D{number}: no diameter of tool {number} is known: {taken}")
+            self.leave_out("nc-diameter-unknown", f"{name} D{number}: no diameter of tool {number} is known: {taken}")
         else:
             self.once("nc-diameter-of-cutter", f"{name} D{number}: {taken}")
         return diameter

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from chipload.errors import InputError
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.expression import integer_of
-from chipload.program.gcode.modal import COVET, GROUP_OF, M_GROUP_OF, USER_M, axes_given, shown
+from chipload.program.gcode.modal import COVET, GROUP_OF, M_GROUP_OF, USER_M, has_axes, shown
 from chipload.program.gcode.words import Block, bare, read_block
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ class Dialect:
 def _other_controllers(block: Block, c: Controller) -> None:
     """Words of Mach3, GRBL and their posts that LinuxCNC refuses: G70 and G71 as units, K0 of an arc in XY."""
     units = {700: 200, 710: 210}
-    if not axes_given(block):
+    if not has_axes(block):
         for code in [code for code in block.g if code in units]:
             c.once("nc-units", f"{shown(code)}: taken as {shown(units[code])}")
             block.g[block.g.index(code)] = units[code]
@@ -96,7 +96,7 @@ def _other_controllers(block: Block, c: Controller) -> None:
 def leave_out(c: Controller, reason: str) -> None:
     """Leave motions out from here on, until :func:`go_on`."""
     c.left_out = reason
-    c.gap("nc-left-out", f"{reason}: motions are left out until it ends")
+    c.leave_out("nc-left-out", f"{reason}: motions are left out until it ends")
 
 
 def go_on(c: Controller) -> None:
@@ -109,7 +109,7 @@ def _without_motion(block: Block, c: Controller) -> None:
     lasting = [code for code in block.g if code in LASTING]
     if lasting:
         c.state.motion = lasting[-1]
-    if lasting or axes_given(block):
+    if lasting or has_axes(block):
         block.g = [code for code in block.g if GROUP_OF[code] not in ("motion", "once")]
         block.words = {x: value for x, value in block.words.items() if x in KEPT_WORDS}
 
@@ -127,14 +127,14 @@ def lenient(block: Block, c: Controller, unread: frozenset[int] = UNREAD) -> Blo
     if bad:
         names = ", ".join(shown(code) for code in bad if code != NOTED) or "a motion"
         if bad != [NOTED]:
-            c.gap("nc-unknown-word", f"{names}: is not read: its block does not move")
-        c.unread = names if axes_given(block) else c.unread
+            c.leave_out("nc-unknown-word", f"{names}: is not read: its block does not move")
+        c.unread = names if has_axes(block) else c.unread
         block.g = [code for code in block.g if code not in bad and GROUP_OF[code] not in ("motion", "once")]
         block.words = {x: value for x, value in block.words.items() if x in KEPT_WORDS}
     elif any(GROUP_OF[code] in ("motion", "none") for code in block.g):
         c.unread = ""
-    elif c.unread and axes_given(block) and COVET.isdisjoint(block.g):
-        c.gap("nc-unknown-word", f"{c.unread}, which is not read, goes on here: the block does not move")
+    elif c.unread and has_axes(block) and COVET.isdisjoint(block.g):
+        c.leave_out("nc-unknown-word", f"{c.unread}, which is not read, goes on here: the block does not move")
         block.words = {x: value for x, value in block.words.items() if x in KEPT_WORDS}
     if c.left_out:
         _without_motion(block, c)

@@ -53,7 +53,7 @@ class Drilling:
         c.not_compensated(shown(code))
         for axis in "abcuvw":
             if axis in words:
-                raise InputError(f"{axis.upper()}: stands in no canned cycle")
+                raise InputError(f"{axis.upper()}: is not allowed in a canned cycle")
         if state.plane % 10:
             raise InputError(f"{shown(code)}: cycles lie in the planes of G17, G18 and G19")
         if state.feed_mode == 930:

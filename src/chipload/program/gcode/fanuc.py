@@ -104,7 +104,7 @@ class Fanuc(Dialect):
             if code in NOT_READ:
                 raise NotReadError(f"{shown(code)}: {NOT_READ[code]}")
         if any(key == ALARM for key, _ in block.sets):
-            c.gap("nc-alarm", f"#{ALARM}: an alarm ends the program here")
+            c.leave_out("nc-alarm", f"#{ALARM}: an alarm ends the program here")
             block.sets, block.m = [], [30]
         self._coordinates(block, c)
         if MACRO in block.g:
@@ -155,7 +155,7 @@ class Fanuc(Dialect):
             raise NotReadError("G5: splines")
         for code in idle:
             if code in (51, 50, 80, 81):
-                c.once("nc-ignored", f"{shown(code)}: look-ahead and smoothing do not concern the path")
+                c.once("nc-ignored", f"{shown(code)}: look-ahead and smoothing do not change the path")
             g.remove(code)
         if idle:
             for letter in "pqr" if not any(x in CYCLES or x in (20, 30) for x in g) else "":
@@ -203,7 +203,7 @@ class Fanuc(Dialect):
         if 870 in g:
             g[g.index(870)] = FANUC_BACK_BORING
             words["i"], words["j"] = -abs(words.pop("q", 0.0)), 0.0
-            c.gap(
+            c.leave_out(
                 "nc-back-boring",
                 "G87: the shift by Q is taken against X, where the machine has a setting, and the cutter as round",
             )

@@ -146,7 +146,7 @@ class Flow:
             said = f"{len(raw)} characters: a line has at most {LONGEST_LINE}"
             if self.dialect.strict:
                 raise InputError(said)
-            self.c.gap("nc-long-line", said)
+            self.c.leave_out("nc-long-line", said)
 
     def _block(self, raw: str) -> bool:
         if self.dialect.jump(self, raw):
@@ -164,7 +164,7 @@ class Flow:
         except NotReadError as error:
             if self.dialect.strict:
                 raise
-            self.c.gap("nc-not-read", f"{error}: the block is left out")
+            self.c.leave_out("nc-not-read", f"{error}: the block is left out")
             self.line += 1
             return True
         self.line += 1
@@ -174,7 +174,7 @@ class Flow:
             try:
                 call_macro(self, block.macro)
             except NotReadError as error:
-                self.c.gap("nc-not-read", f"{error}: the block is left out")
+                self.c.leave_out("nc-not-read", f"{error}: the block is left out")
         elif block.block_call:
             self._call_block(block.block_call)
         elif 98 in block.m:
@@ -190,7 +190,7 @@ class Flow:
             raise InputError(f"the text ends within o{self._calls[-1].label}: endsub or M99 is missing")
         if self.dialect.strict:
             raise InputError("the text ends without M2, M30 or %: write M2 as its last block")
-        self.c.gap("nc-no-end", "the text ends without M2 or M30: it may have been cut off")
+        self.c.leave_out("nc-no-end", "the text ends without M2 or M30: it may have been cut off")
         self.i.finish()
         return False
 
@@ -393,7 +393,7 @@ class Flow:
         rest = word.rest
         while rest:
             if not rest.startswith("["):
-                raise InputError(f"{rest[:12]!r}: arguments of a call stand in [ ]")
+                raise InputError(f"{rest[:12]!r}: arguments of a call must be in [ ]")
             value, rest = self._bracket(rest, word)
             arguments.append(value)
         if len(arguments) > LOCAL:
@@ -434,7 +434,7 @@ class Flow:
             said = f"M98 P{label}: there is no block O{label} in this text"
             if self.dialect.strict:
                 raise InputError(said)
-            self.c.gap("nc-call", f"{said}: the call is left out")
+            self.c.leave_out("nc-call", f"{said}: the call is left out")
             self.line += 1
             return
         self.line += 1

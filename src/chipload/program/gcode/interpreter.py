@@ -217,7 +217,7 @@ class BlockInterpreter:
                 raise InputError("M66: P and E: one input at a time")
             if "e" in words and words.get("l", 0.0) != 0.0:
                 raise InputError("M66: an analogue input is read at once: L must be 0")
-            self.c.gap("nc-input", "M66: an input of the machine is not known here: #5399 counts as 0")
+            self.c.leave_out("nc-input", "M66: an input of the machine is not known here: #5399 counts as 0")
             self.c.parameters.numbered[5399] = 0.0
 
     def _machine(self, block: Block) -> None:

@@ -82,7 +82,7 @@ def shown(code: int) -> str:
     return f"G{code // 10}.{code % 10}" if code % 10 else f"G{code // 10}"
 
 
-def axes_given(block: Block) -> bool:
+def has_axes(block: Block) -> bool:
     """Whether a word of an axis, or of a pole, stands in the block."""
     words = block.words
     return not _AXES.isdisjoint(words) or "@" in words or "^" in words
@@ -119,7 +119,7 @@ def motion_of(block: Block, codes: dict[str, int], lasting: int) -> int:
     InputError
         Axes are given and nothing uses them, or two codes do.
     """
-    own, once, axes = codes.get("motion", codes.get("none", -1)), codes.get("once", -1), axes_given(block)
+    own, once, axes = codes.get("motion", codes.get("none", -1)), codes.get("once", -1), has_axes(block)
     covets = once in COVET
     if own == NO_MOTION:
         if axes and not covets:

@@ -230,7 +230,7 @@ def _letter(block: Block, c: Controller, letter: str, value: float, values: list
 
 def _put(block: Block, letter: str, value: float) -> None:
     if letter in block.words:
-        raise InputError(f"{letter.upper()}: stands twice in one block")
+        raise InputError(f"{letter.upper()}: appears twice in one block")
     block.words[letter] = value
 
 
@@ -298,7 +298,7 @@ def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple
 
 def _left_out(block: Block, c: Controller, word: str) -> None:
     """A word whose motion is not read: its block does not move."""
-    c.gap("nc-unknown-word", f"{word}: is not read: its block does not move")
+    c.leave_out("nc-unknown-word", f"{word}: is not read: its block does not move")
     if NOTED not in block.g:
         block.g.append(NOTED)
 
@@ -319,7 +319,7 @@ def _called(block: Block, c: Controller, name: str, arguments: str) -> None:
     elif name in IDLE:
         c.once("nc-ignored", f"{name}: does not concern the path and is left out")
     else:
-        c.gap("nc-call", f"{name}({arguments.strip()[:60]}): cycles and calls are not read: left out")
+        c.leave_out("nc-call", f"{name}({arguments.strip()[:60]}): cycles and calls are not read: left out")
 
 
 def _swivel(c: Controller, arguments: str) -> None:
@@ -386,6 +386,6 @@ def _keyword(block: Block, c: Controller, word: str, body: str = "") -> None:
     elif word in IDLE:
         c.once("nc-ignored", f"{word}: does not concern the path and is left out")
     elif re.fullmatch(rf"(?:N[0-9]+\s*)?{re.escape(word)}\s*", body):
-        c.gap("nc-call", f"{word[:40]}: calls a program that is not here: left out")
+        c.leave_out("nc-call", f"{word[:40]}: calls a program that is not here: left out")
     else:
         c.note("nc-unknown-word", f"{word[:40]}: is not known")

@@ -157,7 +157,7 @@ def flow_step(flow: Flow, raw: str, value: Value) -> bool:
     try:
         flow.line = _next(flow, some, one, value)
     except NotReadError as error:
-        flow.c.gap("nc-jump", f"{error}: {one.word} {one.rest[:40]}: taken as no jump")
+        flow.c.leave_out("nc-jump", f"{error}: {one.word} {one.rest[:40]}: taken as no jump")
         flow.line = _without(flow.line, some, one)
     return True
 
@@ -292,7 +292,7 @@ def condition(text: str, c: Controller, value: Value) -> bool:
     parts = _split(text, _SIGNS)
     if len(parts) > 1:
         if len(parts) != 3 or any(len(_split(side, _JOINS)) > 1 for side in parts[::2]):
-            raise NotReadError(f"{text[:40]!r}: comparisons beside one another need brackets")
+            raise NotReadError(f"{text[:40]!r}: several comparisons need brackets")
         return _TESTS[parts[1]](_side(parts[0], c, value), _side(parts[2], c, value))
     for join in ("OR", "XOR", "AND"):
         parts = _split(text, re.compile(_JOINS.pattern.replace("AND|OR|XOR", join)))

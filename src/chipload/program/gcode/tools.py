@@ -70,7 +70,7 @@ def read_tool_table(text: str, *, name: str = "tool table", units: str = "mm") -
     Raises
     ------
     InputError
-        A word cannot be read, stands twice or is out of its range, or a number stands twice.
+        A word cannot be read, appears twice or is out of its range, or a number appears twice.
 
     >>> table, _ = read_tool_table("T3 P1 D6.0 Z50.5 ; end mill")
     >>> table.tools[3].offset[2], table.tools[3].comment
@@ -89,7 +89,7 @@ def read_tool_table(text: str, *, name: str = "tool table", units: str = "mm") -
         except InputError as error:
             raise InputError(f"{name}: line {line}: {error}") from None
         if tool.number in tools:
-            raise InputError(f"{name}: line {line}: tool {tool.number} stands twice")
+            raise InputError(f"{name}: line {line}: tool {tool.number} appears twice")
         if len(tools) >= MOST_TOOLS:
             raise InputError(f"{name}: line {line}: more than {MOST_TOOLS} tools")
         if tool.diameter < 0.0:
@@ -107,12 +107,12 @@ def _entry(body: str, comment: str, scale: float) -> Tool:
         if found is None:
             raise InputError(f"{body[at : at + 12]!r}: a letter with its number is expected")
         if found[1] in words:
-            raise InputError(f"{found[1]} stands twice")
+            raise InputError(f"{found[1]} appears twice")
         words[found[1]] = float(found[2])
         at = found.end()
     for letter, value in words.items():
         if letter not in "TPDIJQ" + LETTERS:
-            raise InputError(f"word {letter}: is none of T P D I J Q X Y Z A B C U V W")
+            raise InputError(f"word {letter}: must be one of T P D I J Q X Y Z A B C U V W")
         if not abs(value) <= 1e9:
             raise InputError(f"{letter}{value:g}: must be within 1e9")
         if letter in "TPQ" and value != int(value):

@@ -88,7 +88,7 @@ def bare(line: str) -> tuple[str, list[str]]:
     text = "".join(line.split())
     if not text.isascii():
         odd = next(c for c in text if not c.isascii())
-        raise InputError(f"character {odd!r}: only ASCII may stand outside comments")
+        raise InputError(f"character {odd!r}: only ASCII is allowed outside comments")
     if len(text) > LONGEST:
         raise InputError(f"{len(text)} characters: a block has at most {LONGEST}")
     return text.lower(), comments
@@ -111,7 +111,7 @@ def read_block(text: str, comments: list[str], parameters: Parameters) -> Block:
     Raises
     ------
     InputError
-        A character means nothing, a value is missing or has no value, a letter stands twice.
+        A character means nothing, a value is missing or has no value, a letter appears twice.
     """
     number, at = strip_number(text)
     block = Block(number=number, comments=comments)
@@ -142,7 +142,7 @@ def read_block(text: str, comments: list[str], parameters: Parameters) -> Block:
             block.sets.append((key, value))
         elif letter in LETTERS:
             if letter in words:
-                raise InputError(f"{letter.upper()}: stands twice in one block")
+                raise InputError(f"{letter.upper()}: appears twice in one block")
             words[letter], at = read_value(text, at, parameters)
         else:
             raise InputError(f"character {letter!r}: begins no word")

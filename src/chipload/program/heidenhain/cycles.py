@@ -129,7 +129,7 @@ class Cycles:
         if s.left_out:
             return
         if s.unknown:
-            raise NotKnownError("a cycle is called where the tool stands, which is not known: move there first")
+            raise NotKnownError("a cycle is called at a position that is not known: move there first")
         s.end_contour()
         if number is None:
             raise InputError("a cycle is called and none is defined: give CYCL DEF 1")

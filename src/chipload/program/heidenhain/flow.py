@@ -48,7 +48,7 @@ def text_of(raw: str) -> Text:
     return Text(blocks, places)
 
 
-class Flow:
+class HeidenhainFlow:
     """Where a program is in its texts.
 
     Parameters
@@ -109,7 +109,7 @@ class Flow:
         name = block[8:].strip().strip('"').split("\\")[-1].split("/")[-1]
         text = self._file(name)
         if text is None:
-            self.s.unproven("heidenhain-call", f"{block[:60]}: is not beside this program: it is left out")
+            self.s.unproven("heidenhain-call", f"{block[:60]}: is not in the folder of this program: it is left out")
             return at + 1
         self._enter(self.text, at)
         self.text = text

@@ -42,7 +42,7 @@ def polar_line(s: ConversationalState, text: str) -> None:
     x, y = _centre(s)
     radius, angle = cmath.polar(complex(s.at[0] - x, s.at[1] - y))
     if {0, 1} & s.unknown and len(words.POLAR.findall(text)) < 2:
-        raise NotKnownError("LP: where the tool stands is not known: give PR and PA")
+        raise NotKnownError("LP: the position of the tool is not known: give PR and PA")
     for step, letter, sign, value in words.POLAR.findall(text):
         amount = s.signed(sign, value)
         if letter == "R":
@@ -92,7 +92,7 @@ def pole(s: ConversationalState, text: str) -> None:
     """CC: the pole; without coordinates it is where the tool stands."""
     end, named = s.ends(text)
     if not named and {0, 1} & s.unknown:
-        raise NotKnownError("CC: where the tool stands is not known: give X and Y")
+        raise NotKnownError("CC: the position of the tool is not known: give X and Y")
     for k in (0, 1):
         if k in named or not named:
             s.pole[k] = end[k]
@@ -233,7 +233,7 @@ def _centre(s: ConversationalState) -> tuple[float, float]:
 
 def _placed(s: ConversationalState) -> None:
     if {0, 1} & s.unknown:
-        raise NotKnownError("an arc begins where the tool stands, which is not known: move there first")
+        raise NotKnownError("an arc begins at a position that is not known: move there first")
 
 
 def _arc(

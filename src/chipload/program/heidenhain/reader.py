@@ -24,11 +24,11 @@ from chipload.files import read_regular
 from chipload.program.commands import Commands, commands_from_rows
 from chipload.program.heidenhain import motions, switches, words
 from chipload.program.heidenhain.cycles import Cycles, call_positions
-from chipload.program.heidenhain.flow import Flow, text_of
+from chipload.program.heidenhain.flow import HeidenhainFlow, text_of
 from chipload.program.heidenhain.formula import NotKnownError, q_number
 from chipload.program.heidenhain.q_cycles import MAX
 from chipload.program.heidenhain.state import KEPT, ConversationalState
-from chipload.program.reconcile import Statement
+from chipload.program.reconcile import StatedDiameter
 from chipload.units import MM_PER
 
 __all__ = ["KEPT", "read_heidenhain", "read_heidenhain_file", "tool_definitions"]
@@ -84,7 +84,7 @@ def read_heidenhain(
     if len(text) > LONGEST_TEXT:
         raise InputError(f"{name}: {len(text)} characters: must be at most {LONGEST_TEXT}")
     state = ConversationalState(name, parameters or {}, radii or {}, feed)
-    run = _Blocks(state, Flow(state, text_of(text), folder))
+    run = _Blocks(state, HeidenhainFlow(state, text_of(text), folder))
     try:
         run.go()
         state.end_contour()
@@ -105,26 +105,26 @@ def heidenhain_text(path: Path) -> str:
     return read_regular(path, path.name, LONGEST_TEXT).decode("utf-8", "replace")
 
 
-def tool_definitions(text: str) -> dict[int, Statement]:
+def tool_definitions(text: str) -> dict[int, StatedDiameter]:
     r"""What TOOL DEF states about the diameter of each tool; a radius of 0 states none.
 
     >>> tool_definitions("BEGIN PGM A MM\nTOOL DEF 5 L+30 R+2")[5].diameter
     4.0
     """
     inch = re.search(r"BEGIN PGM[^\n]*\bINCH\b", text[:1000].upper()) is not None
-    out: dict[int, Statement] = {}
+    out: dict[int, StatedDiameter] = {}
     for line, raw in enumerate(text.splitlines(), start=1):
         found = _DEFINED.match(raw.upper())
         if found is not None and float(found[2]) > 0.0:
             diameter = 2.0 * float(found[2]) * MM_PER["inch" if inch else "mm"]
-            out.setdefault(int(found[1]), Statement(diameter, "TOOL DEF", line))
+            out.setdefault(int(found[1]), StatedDiameter(diameter, "TOOL DEF", line))
     return out
 
 
 class _Blocks:
     """Carries blocks out, one after another."""
 
-    def __init__(self, state: ConversationalState, flow: Flow) -> None:
+    def __init__(self, state: ConversationalState, flow: HeidenhainFlow) -> None:
         self.s, self.flow = state, flow
         self.cycles, self.tools = Cycles(state), switches.Tools()
 

@@ -105,7 +105,7 @@ class ConversationalState:
             if not abs(amount) <= FARTHEST:
                 raise InputError(f"{letter} = {amount:g}: must be at most {FARTHEST:g}")
             if step and k in self.unknown:
-                raise NotKnownError(f"I{letter}: where the axis stands is not known: give {letter} first")
+                raise NotKnownError(f"I{letter}: the position of the axis is not known: give {letter} first")
             end[k] = end[k] + amount if step else amount
             named.add(k)
         return end, named

@@ -51,6 +51,9 @@ def cutting_part(cutter: Cutter) -> Body:
     >>> [abs(ball.distance(*p)) for p in ((0.0, -1.0), (3.0, 1.0), (4.0, 10.0), (7.0, 10.0))]
     [1.0, 0.0, 1.0, 2.0]
     """
+    if cutter.body:
+        p = cutter.profile(0.0)
+        return Body(np.hstack([p[:-1], p[1:]]), np.zeros(5), cutter.flute_length)
     _, r, e, f, alpha, beta, h = cutter.apt
     foot = (e + r * math.sin(alpha), f - r * math.cos(alpha))
     flank = (e + r * math.cos(beta), f - r * math.sin(beta))

@@ -23,7 +23,7 @@ from chipload.errors import InputError
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.assembly import CellModes, springs
 from chipload.structure.cells.grid import Array, CellGrid
-from chipload.structure.cells.moments import Region, stock_moments
+from chipload.structure.cells.moments import StockRegion, stock_moments
 
 #: k_v h d / E of a stiff clamp
 STIFF = 1e4
@@ -46,7 +46,7 @@ class Clamp:
     """
 
     name: str
-    region: Region
+    region: StockRegion
     directions: NDArray[np.bool_]
     stiffness: float = np.inf
 

@@ -18,7 +18,7 @@ from scipy.optimize import linear_sum_assignment
 
 from chipload.progress import Progress, silent
 from chipload.structure.cells.grid import Array, Indices
-from chipload.structure.cells.states import State, StepLines, between_rows, spaced_rows
+from chipload.structure.cells.states import RemovalState, StepLines, between_rows, spaced_rows
 from chipload.structure.cells.vibration import VibrationModes, overlap, shapes_along, vibration_modes
 from chipload.structure.cells.workpiece import CellWorkpiece
 
@@ -91,7 +91,13 @@ class ModesOfStates:
             self.known[state] = found, shapes_along(work, found, self.steps.lines[self.rows])
 
     def followed(
-        self, states: Sequence[State], *, tolerance: float, most: int, error: float = 0.0, progress: Progress = silent
+        self,
+        states: Sequence[RemovalState],
+        *,
+        tolerance: float,
+        most: int,
+        error: float = 0.0,
+        progress: Progress = silent,
     ) -> FollowedModes:
         """Modes in the state of every step.
 
@@ -128,7 +134,7 @@ class ModesOfStates:
         _, column = linear_sum_assignment(-np.abs(overlap(first, last)))
         return float(np.abs(np.log(last.frequency[column] / first.frequency)).max())
 
-    def _joined(self, states: Sequence[State], error: float) -> FollowedModes:
+    def _joined(self, states: Sequence[RemovalState], error: float) -> FollowedModes:
         """Modes of all states with the same column for the same mode, and between them."""
         order, steps = sorted(self.known), self.steps
         frequency, shapes = [self.known[order[0]][0].frequency], [self.known[order[0]][1]]

@@ -26,7 +26,7 @@ from chipload.structure.cells.grid import Array, CellGrid
 
 
 @dataclass(frozen=True, eq=False)
-class Region:
+class StockRegion:
     """A prism upright in the work frame, to which a stock can be limited.
 
     Parameters
@@ -92,7 +92,7 @@ def height_moments(grid: CellGrid, low: float, high: float) -> tuple[range, Arra
     return cells, out
 
 
-def stock_moments(stock: LayeredStock, grid: CellGrid, region: Region | None = None) -> Array:
+def stock_moments(stock: LayeredStock, grid: CellGrid, region: StockRegion | None = None) -> Array:
     """(nx, ny, nz, n, n, n) float moments M_klm of a stock in cells that hold it.
 
     Parameters

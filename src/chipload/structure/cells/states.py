@@ -50,7 +50,7 @@ class StepLines:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class RemovalState:
     """A state of removal that can be built.
 
     Parameters
@@ -117,7 +117,7 @@ def size_of(compliance: Array) -> Array:
 
 def step_compliances(
     steps: StepLines,
-    states: Sequence[State],
+    states: Sequence[RemovalState],
     *,
     tolerance: float,
     most: int,
@@ -182,7 +182,7 @@ class _Solver:
     def __init__(
         self,
         steps: StepLines,
-        states: Sequence[State],
+        states: Sequence[RemovalState],
         samples: Indices,
         built: Callable[[int, CellWorkpiece], None] | None = None,
     ) -> None:
@@ -256,7 +256,7 @@ def _chosen(
     return chosen, sorted(spans)
 
 
-def _first_states(states: Sequence[State]) -> list[int]:
+def _first_states(states: Sequence[RemovalState]) -> list[int]:
     """The first, the last, and two between at thirds of the volume."""
     whole = states[-1].removed
     removed = np.array([state.removed for state in states])

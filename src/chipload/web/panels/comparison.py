@@ -57,6 +57,6 @@ def comparison_table(sides: Sequence[Side], against: str) -> str:
 
 def _note(sides: Sequence[Side], against: str) -> str:
     if against == "time":
-        return "All stand at the same time. Plots against path put them at the same place of the path."
+        return "All are at the same time. Plots against path put them at the same place of the path."
     passes = len(knots(sides[0], sides[1], against)[0]) > 2
-    return f"All stand at the same share of {'each pass' if passes else 'their path'}."
+    return f"All are at the same share of {'each pass' if passes else 'their path'}."

@@ -12,7 +12,7 @@ from chipload.web.checks import label_and_unit
 from chipload.web.loads import Ints, LineLoad, ToolUse, line_loads, shown_loads, tool_uses
 from chipload.web.panels import RELEASE
 from chipload.web.result import PageResult, PageTrack
-from chipload.web.source import Source
+from chipload.web.source import TrackText
 
 #: a click gives the number of the track and the row of its history
 CLICK = (
@@ -77,7 +77,7 @@ class LinePanel:
             self.by.on("popup-hide", js_handler=RELEASE)
             self.html = _table_box(self._clicked).mark("lines")
 
-    def open(self, result: PageResult, track: PageTrack, source: Source | None) -> None:
+    def open(self, result: PageResult, track: PageTrack, source: TrackText | None) -> None:
         """Show the lines of a track, as its text counts them."""
         self.result, self.track = result, track
         self.line = source.of_row if source is not None else track.line

@@ -10,7 +10,7 @@ from typing import Any
 from nicegui import ui
 
 from chipload.web.result import PageResult, PageTrack
-from chipload.web.source import Source, source_of
+from chipload.web.source import TrackText, source_of
 
 #: lines that are in the page at a time, and how near to their end a new part is brought
 WINDOW, MARGIN = 600, 60
@@ -24,7 +24,7 @@ class SourcePanel:
 
     def __init__(self, pick: Callable[[int], None]) -> None:
         self.pick = pick
-        self.text: Source | None = None
+        self.text: TrackText | None = None
         self.first, self.line = 0, 0
         with ui.element("div").classes("cl-panel cl-source").props('role=region aria-label="program"'):
             self.name = ui.label("").classes("cl-head cl-file")
@@ -75,7 +75,7 @@ class SourcePanel:
         before = lines[(lines < here) & (lines > 0)]
         return self.text.row_of(int(before.max())) if len(before) else None
 
-    def _window(self, text: Source, line: int) -> None:
+    def _window(self, text: TrackText, line: int) -> None:
         count = len(text.lines)
         self.first = max(0, min(line - WINDOW // 2, count - WINDOW))
         last = min(self.first + WINDOW, count)

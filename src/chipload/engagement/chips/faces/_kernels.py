@@ -19,7 +19,7 @@ LEAST = 1e-12  # [t] nearer than this two instants are one
 
 
 @njit(cache=True, nogil=True)
-def pieces(cp, ca, K, h, tol, vmin, ta, tb, knots, buf, n, jumps):
+def candidates(cp, ca, K, h, tol, vmin, ta, tb, knots, buf, n, jumps):
     """Edges of all candidate pieces of one span of time: new count, FULL; and how many ``jumps`` (t) of the section."""
     width = tb - ta
     if ta > 0.0:

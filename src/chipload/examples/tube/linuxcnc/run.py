@@ -1,7 +1,7 @@
 """Start all of it: LinuxCNC without a screen, the cut beside it, the controller; then say whether they agree.
 
     python run.py OUT [--result DIR] [--lost stop|programmed] [--kill-at MM | --kill-stopped] [--hang]
-                      [--overload-nm T] [--seconds S]
+                      [--overload-nm T] [--seconds S] [--fault KIND --fault-at MM]
 
 The program, its path and the controller are those of the job beside this folder: `DIR` is what `chipload run` made of
 it; without it the job is run first, into `OUT/job`.
@@ -11,6 +11,9 @@ OUT gets `machine.csv` (what the machine did), `control.csv` (what the controlle
 closely the feed follows the override. With `--kill-at` the controller is killed when the machine has come so far, with
 `--kill-stopped` when it has stopped the machine (SIGKILL: it cannot say goodbye; with `--hang` SIGSTOP: it is there and
 does nothing). The machine then has two seconds more, and the summary says what it did with them.
+
+With `--fault` the torque is told from pins of current and speed, those of a simulated spindle beside LinuxCNC, whose
+sensor fails at that place: it reads 0 (`lost`), no number (`nan`), its last value (`stuck`), or 0.1 A more or less.
 
 LinuxCNC refuses to run as root; where this is root, it runs as nobody. It ends in every case: `drive.py` is told to,
 then HAL is unloaded, then what is left of our own processes (they bear our mark in their environment) is killed.
@@ -31,15 +34,17 @@ import tempfile
 import time
 import uuid
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from sensor_fault import FAULTS, PINS, SensorWithFault  # type: ignore[import-not-found]  # beside this file
 
 from chipload.control.hal import COLUMNS, HalJob
 from chipload.control.hal_file import load_hal
 from chipload.control.linuxcnc.path import locate
+from chipload.control.override import STATUS
 from chipload.control.plant import Loop, run
 
 HERE = Path(__file__).parent
@@ -182,26 +187,29 @@ def play(args: argparse.Namespace) -> dict[str, object]:
     (out / "hal.toml").write_text(text)
     job = load_hal(out / "hal.toml")
     if hal_in_use():
-        raise Failed("HAL: a controller runs on this machine already, and there is room for one: end it first")
+        raise Failed("HAL: a controller runs on this machine already, and only one can: end it first")
     killed = None
     with LinuxCNC(result / PROGRAM, lost, seconds) as cnc:
         command = [sys.executable, "-c", "from chipload.cli import main; main()", "hal", str(out / "hal.toml")]
-        controller = subprocess.Popen([*command, "--out", str(out / "control.csv")], env=os.environ.copy())
+        sensor = None if args.fault is None else SensorWithFault(job, args.fault, args.fault_at)
+        pins = () if sensor is None else PINS
+        controller = subprocess.Popen([*command, *pins, "--out", str(out / "control.csv")], env=os.environ.copy())
         machine = cnc.folder / "machine.csv"
         try:
-            wait("the program starts", lambda: len(rows_of(machine)) > 0 or controller.poll() is not None, 60.0)
-            end = time.monotonic() + seconds + 10.0
-            while not cnc.ended() and time.monotonic() < end:
-                rows = rows_of(machine)
-                if killed is None and (args.kill_at is not None or args.kill_stopped):
-                    s = along(job, rows)
-                    stopped = args.kill_stopped and s[-1] > 20.0 and (rows[-5:, 4] == 0.0).all()
-                    if stopped or (args.kill_at is not None and s[-1] >= args.kill_at):
-                        controller.send_signal(signal.SIGSTOP if args.hang else signal.SIGKILL)
-                        killed = time.monotonic()
-                if killed is not None and time.monotonic() > killed + AFTER_S:
-                    (cnc.folder / "end").touch()
-                time.sleep(0.05)
+            with sensor or nullcontext():
+                wait("the program starts", lambda: len(rows_of(machine)) > 0 or controller.poll() is not None, 60.0)
+                end = time.monotonic() + seconds + 10.0
+                while not cnc.ended() and time.monotonic() < end:
+                    rows = rows_of(machine)
+                    if killed is None and (args.kill_at is not None or args.kill_stopped):
+                        s = along(job, rows)
+                        stopped = args.kill_stopped and s[-1] > 20.0 and (rows[-5:, 4] == 0.0).all()
+                        if stopped or (args.kill_at is not None and s[-1] >= args.kill_at):
+                            controller.send_signal(signal.SIGSTOP if args.hang else signal.SIGKILL)
+                            killed = time.monotonic()
+                    if killed is not None and time.monotonic() > killed + AFTER_S:
+                        (cnc.folder / "end").touch()
+                    time.sleep(0.05)
         finally:
             if killed is not None:
                 controller.kill()
@@ -218,7 +226,11 @@ def play(args: argparse.Namespace) -> dict[str, object]:
             left = cnc.left()
             shutil.rmtree(cnc.folder)
     rows = rows_of(out / "machine.csv")
-    summary = summed(job, rows, rows_of(out / "control.csv"), killed, limit)
+    control = rows_of(out / "control.csv")
+    if sensor is not None:
+        summary = common(job, rows) | {"fault": after_fault(job, rows, control, sensor.at, limit)}
+    else:
+        summary = summed(job, rows, control, killed, limit)
     summary |= {"lost": lost, "processes_left": len(left), "hal_left": hal_in_use()}
     (out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
     return summary
@@ -233,17 +245,48 @@ def made(out: Path) -> Path:
     return out / "job"
 
 
+def common(job: HalJob, rows: np.ndarray) -> dict[str, object]:
+    """What every run says: the programmed feed, and the greatest feed over it and override on the path."""
+    s, programmed = along(job, rows), float(job.path.model.feed[0])
+    # rapids go at the machine's own speed
+    on = (s > 0.0) & (s < job.path.model.s[-1])
+    return {
+        "programmed_mm_s": programmed,
+        "feed_over_programmed_max": float(rows[on, 4].max() / programmed),
+        "override_max": float(rows[:, 5].max()),
+    }
+
+
+def after_fault(
+    job: HalJob, rows: np.ndarray, control: np.ndarray, at: float | None, limit: float
+) -> dict[str, object]:
+    """What the controller and the machine did from the fault of the sensor on."""
+    if at is None:
+        raise Failed("the sensor: its fault was not reached")
+    c = dict(zip(COLUMNS, control.T, strict=True))
+    s, last = along(job, rows), float(job.path.model.s[-1])
+    later = (c["t_s"] >= at) & (c["s_mm"] < last - 1e-3)
+    stands = (rows[:, 0] > at) & (rows[:, 4] == 0.0) & (s < last - 1e-3)
+    load = c["torque_nmm"] / c["relief"] / limit
+    return {
+        "at_mm": float(np.interp(at, rows[:, 0], s)),
+        "override_before": float(np.interp(at, rows[:, 0], rows[:, 5])),
+        "status_after": STATUS[int(c["status"][-1])].value,
+        "stopped_after_s": float(rows[stands, 0][0] - at) if stands.any() else None,
+        "moved_after_mm": float(s[-1] - np.interp(at, rows[:, 0], s)),
+        "override_max_after": float(rows[rows[:, 0] >= at, 5].max()),
+        "torque_over_limit_max_after": float(np.nanmax(load[later])),
+        "torque_over_limit_max_before": float(np.nanmax(load[c["t_s"] < at])),
+    }
+
+
 def summed(job: HalJob, rows: np.ndarray, control: np.ndarray, killed: float | None, limit: float) -> dict[str, object]:
     """What the run says; ``limit`` of torque [N mm] at the place where the wall bears least."""
     s, programmed = along(job, rows), float(job.path.model.feed[0])
     # rapids go at the machine's own speed
     on = (s > 0.0) & (s < job.path.model.s[-1])
     t, velocity, override = rows[:, 0], rows[:, 4], rows[:, 5]
-    answer: dict[str, object] = {
-        "programmed_mm_s": programmed,
-        "feed_over_programmed_max": float(velocity[on].max() / programmed),
-        "override_max": float(override.max()),
-    }
+    answer = common(job, rows)
     if killed is not None:
         # the one-shot runs out, then the axes take their time
         late = on & (t > killed + 1.0)
@@ -321,6 +364,8 @@ def main() -> int:
     kill.add_argument("--kill-at", type=float, metavar="MM", help="kill the controller there along the path")
     kill.add_argument("--kill-stopped", action="store_true", help="kill it when it has stopped the machine")
     parser.add_argument("--hang", action="store_true", help="do not kill it, let it hang")
+    parser.add_argument("--fault", choices=FAULTS, help="how the sensor of the spindle fails")
+    parser.add_argument("--fault-at", type=float, default=260.0, metavar="MM", help="where, along the path")
     parser.add_argument("--overload-nm", type=float, help="torque that stops")
     parser.add_argument("--seconds", type=float, default=40.0, help="longest run of the program")
     args = parser.parse_args()

@@ -1,1 +1,19 @@
-"""How far a whole cutter stands from the check points."""
+"""Clearance of a whole cutter from the check points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from chipload.lazy import attach
+
+if TYPE_CHECKING:
+    from chipload.planning.impeller.clearance.clearance import between, moves_clear, nearest
+
+__all__ = ["between", "moves_clear", "nearest"]
+
+__getattr__, __dir__ = attach(
+    __name__,
+    {
+        "clearance": "between moves_clear nearest",
+    },
+)

@@ -90,7 +90,7 @@ def collect(
 
 
 @njit(cache=True, nogil=True)
-def inside(
+def deepest(
     points: Any, own: Any, nodes: Any, spans: Any, leaves: int, cc: Any, cone: Any, r: float, near2: float, rho: float,
     stages: Any, B: float,
 ) -> int:  # fmt: skip
@@ -169,7 +169,7 @@ def merged(cover: Any, number: int, arcs: Any, first: int, last: int) -> int:
 
 
 @njit(cache=True, nogil=True)
-def widest_gap(cover: Any, number: int, lo: float, hi: float, least: float) -> tuple[float, float]:
+def widest_uncovered(cover: Any, number: int, lo: float, hi: float, least: float) -> tuple[float, float]:
     """The widest part of lo..hi that is not covered, (lo, lo): none is wider than ``least``."""
     a, b, reached = lo, lo, lo
     for k in range(number + 1):
@@ -212,11 +212,11 @@ def valid(
     while waiting > 0:
         waiting -= 1
         lo, hi = todo[waiting, 0], todo[waiting, 1]
-        a, b = widest_gap(cover, covered, lo, hi, least)
+        a, b = widest_uncovered(cover, covered, lo, hi, least)
         if b <= a:
             continue
         # one point that forbids the middle of the widest gap may spare all others
-        who = inside(points, own, nodes, spans, leaves, cc, cone, r, near2, rho, stages, 0.5 * (a + b))
+        who = deepest(points, own, nodes, spans, leaves, cc, cone, r, near2, rho, stages, 0.5 * (a + b))
         if who >= 0 and seen[who] != stamp:
             seen[who] = stamp
             before = filled

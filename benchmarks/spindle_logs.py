@@ -1,0 +1,116 @@
+"""Current and power of measured spindles in runs that were not used to learn them, and material told from air.
+
+    CHIPLOAD_DATA=... python benchmarks/spindle_logs.py
+
+Prints the table of docs/design/control.md. First a mill in wax: for each condition (feed, wear of the tool) the mean
+current and power in the cut of one run predict those of another run; the error of a mean over a second; and the share
+of pairs of a second in the cut and one in the air of which the first is estimated greater, by the idle map of the air
+of the run that was learned from (50 %: not told apart). Then an industrial spindle, whose idle current is that of the
+air before its first passes.
+"""
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from chipload.control.logs import read_log
+from chipload.control.spindle import estimate, idle_map
+
+DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2] / "shared" / "data")) / "measured"
+MILL, TRACE = DATA / "umich_smart_cnc", DATA / "nasa_uc_milling" / "tool54_example.csv"
+COLUMNS = {
+    "sample_s": 0.1,
+    "speed": {"column": "S1_ActualVelocity", "unit": "rev/s"},
+    "feed": {"column": "M1_CURRENT_FEEDRATE", "unit": "mm/s"},
+    "label": {"column": "Machining_Process"},
+}
+#: column, unit and name of what is predicted
+SOURCES = (
+    ("current", {"current": {"column": "S1_CurrentFeedback", "unit": "A"}}),
+    ("power", {"current": {"column": "S1_OutputPower", "unit": "A"}}),
+)
+#: feed mm/s, tool, run that is learned from, run that is held out
+CONDITIONS = (
+    ("3", "unworn", "11", "12"), ("3", "worn", "13", "14"), ("6", "unworn", "01", "03"), ("6", "worn", "01", "06"),
+    ("20", "unworn", "02", "05"), ("20", "worn", "07", "16"),
+)  # fmt: skip
+#: feed of rapid moves in these logs [mm/s], samples of a second, samples of a revolution of the other spindle
+RAPID, SECOND, TURN = 50.0, 10, 25
+
+
+def rows_of(number, source):
+    """The log of a run, its rows at speed, and those of them that cut."""
+    log, _ = read_log(MILL / f"experiment_{number}.csv", COLUMNS | source)
+    on = log.speed > 0.97 * np.quantile(log.speed, 0.99)
+    on &= np.convolve(on, np.ones(11), "same") > 10.5
+    return log, on, on & np.char.startswith(log.label, "Layer") & (log.feed < RAPID)
+
+
+def means(values, count):
+    """Means over ``count`` samples, those that are whole."""
+    whole = len(values) // count * count
+    return values[:whole].reshape(-1, count).mean(axis=1)
+
+
+def apart(air, cut):
+    """Share of pairs in which the second is greater."""
+    return float((cut[:, None] > air).mean() + 0.5 * (cut[:, None] == air).mean())
+
+
+def predicted(source, learned, held_out):
+    """Error of the mean in the cut and rms error over a second, both of the mean, and pairs in order."""
+    log, on, cutting = rows_of(learned, source)
+    other, there, cuts = rows_of(held_out, source)
+    guess, seen = float(log.current[cutting].mean()), other.current[cuts]
+    seconds = means(seen, SECOND)
+    rms = float(np.sqrt(np.mean((seconds - guess) ** 2))) if len(seconds) else np.nan
+    error = guess / seen.mean() - 1.0, rms / abs(seen.mean())
+    air, free = on & ~cutting, there & ~cuts
+    if min(air.sum(), free.sum(), cuts.sum()) < 10 * SECOND:
+        return *error, np.nan
+    spindle = idle_map(log.speed[air], log.current[air], 1.0, 0.0)
+    found = [
+        estimate(spindle, other.time[rows], other.speed[rows], other.current[rows], average=SECOND + 1).torque[::SECOND]
+        for rows in (free, cuts)
+    ]
+    return *error, apart(*found)
+
+
+def industrial():
+    """Pairs in order over five revolutions, and shares of cut and air that are trusted."""
+    log, _ = read_log(TRACE, {"sample_s": 1.0, "current": {"column": "current_sub", "unit": "count"},
+                              "label": {"column": "cut_signal"}})  # fmt: skip
+    speed, learned = np.full(len(log.time), 1.0), np.zeros(len(log.time), dtype=bool)
+    learned[3650:3850] = learned[5900:6050] = True
+    spindle = idle_map(speed[learned], log.current[learned], 1.0, 0.0)
+    rest = slice(6100, 19_504)
+    found = estimate(spindle, log.time[rest], speed[rest], log.current[rest], average=5 * TURN)
+    cut = log.label[rest] == "1"
+    return apart(found.torque[~cut][::TURN], found.torque[cut][::TURN]), found.trusted[cut], found.trusted[~cut]
+
+
+def main():
+    names = [name for name, _ in SOURCES]
+    head = [f"{x}: mean % | over a second rms % | material from air, pairs %" for x in names]
+    print(f"| feed mm/s | tool | learned from, held out | {' | '.join(head)} |")
+    print("|---" * (3 + 3 * len(names)) + "|")
+    for feed, tool, learned, held_out in CONDITIONS:
+        cells = []
+        for _, source in SOURCES:
+            mean, rms, told = predicted(source, learned, held_out)
+            cells += [
+                f"{100 * mean:+.1f}",
+                "" if np.isnan(rms) else f"{100 * rms:.1f}",
+                "" if np.isnan(told) else f"{100 * told:.0f}",
+            ]
+        print(f"| {feed} | {tool} | {learned}, {held_out} | {' | '.join(cells)} |")
+    told, cut, air = industrial()
+    print(
+        f"\nindustrial spindle: {100 * told:.0f} % of pairs in order; trusted {100 * cut.mean():.0f} % of the rows in "
+        f"the cut, {100 * air.mean():.1f} % of those in the air"
+    )
+
+
+if __name__ == "__main__":
+    main()

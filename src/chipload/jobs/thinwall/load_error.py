@@ -1,0 +1,65 @@
+"""How far the loads on a thin wall may be from those of a finer simulation: layers, slices, steps and rotations.
+
+Every pass that holds the greatest load of some column is looked at as :mod:`chipload.simulation.accuracy` says: a few
+of its steps are computed once more in a finer stock. With e_p the error of a pass relative to its own worst value w_p,
+and w the worst of all passes, the error of the whole is the greatest e_p w_p / w.
+
+What bends the wall goes with the force along its normal, what bends the cutter with the whole force.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material
+from chipload.program.program import Program
+from chipload.simulation.accuracy import COMPARABLE
+from chipload.simulation.chips import resolution_error_of, setting_of
+from chipload.simulation.removal import Resolution
+from chipload.stock.layers import LayeredStock
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedPass:
+    """A pass: its path, the stock before it, and the columns of its removal."""
+
+    program: Program
+    before: LayeredStock
+    columns: Mapping[str, NDArray[Any]]
+
+
+def load_error(
+    passes: Sequence[SimulatedPass], cutter: Cutter, material: Material, resolution: Resolution
+) -> dict[str, float]:
+    """Relative error of the worst value of each column of loads over all passes.
+
+    Parameters
+    ----------
+    passes : in the order of cutting
+    resolution : that they were simulated with
+
+    Returns
+    -------
+    mapping of column to at least 0; inf where it is not known, as where a pass takes only films, for which no loads are
+    computed
+    """
+    if any(p.columns["chip_volume_mm3"].any() and not p.columns["chip_areas"].any() for p in passes):
+        return dict.fromkeys(COMPARABLE, math.inf)
+    setting = setting_of({cutter.number: cutter}, material, resolution, "slerp", None, 1)
+    worst = {name: np.array([float(p.columns[name].max(initial=0.0)) for p in passes]) for name in COMPARABLE}
+    out = dict.fromkeys(COMPARABLE, 0.0)
+    for k in sorted({int(values.argmax()) for values in worst.values()}):
+        p = passes[k]
+        found = resolution_error_of(p.program, p.before, p.columns, setting, COMPARABLE)
+        for name in COMPARABLE:
+            whole = float(worst[name].max())
+            share = float(worst[name][k]) / whole if whole > 0.0 else 1.0
+            out[name] = max(out[name], found[name] * share)
+    return out

@@ -1,0 +1,299 @@
+"""What a program cuts from a clamped workpiece, and the torque that the workpiece allows along it.
+
+Notation: o the override; D(o) = D_e + D_c o greatest distance over a revolution by which workpiece and cutter part
+along the normal of the surface that a step leaves, anywhere on its contact line (their whole deflection where it leaves
+two surfaces that face each other), W(o) deflection of the workpiece in any direction, F(o) greatest force, g greatest
+stress of the workpiece per force. All are convex in o, so between 0 and 1 the straight line lies above them.
+
+Compliance is that of the state of removal of each step, which no feed changes. It is known to a share e: the limit is
+made for compliance and stress (1 + e) times as great. The stress is looked at in the steps that bend the workpiece most
+and in those with most force; the greatest g among them counts everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.control.linuxcnc.path import ToolPath
+from chipload.control.wall import (
+    LimitedResponse,
+    Loads,
+    PathLimit,
+    WallPath,
+    edge_and_cut,
+    limit_by_responses,
+    row_means,
+    two_parts,
+)
+from chipload.cutting.material import Material
+from chipload.errors import InputError
+from chipload.jobs.simulation.job import ProgramJob
+from chipload.jobs.simulation.preparation import resolution_of
+from chipload.jobs.simulation.tables import ProgramLimitsTable, SimulateTable, SimulationJobTable, SolidTable
+from chipload.jobs.simulation.workpiece import stock_body
+from chipload.jobs.simulation.workpiece_compliance import WorkpieceCompliance, workpiece_compliance
+from chipload.jobs.tables import stated
+from chipload.jobs.torque.allowable import path_of, relief_of
+from chipload.jobs.torque.cut import (
+    LITTLE_MPA,
+    CutSteps,
+    edge_material,
+    fed_rows,
+    require_linear,
+    step_feeds,
+    step_points,
+    surprise_factors,
+)
+from chipload.jobs.torque.job import TorqueJob
+from chipload.jobs.torque.tables import SurpriseTable
+from chipload.machine.machine import Machine
+from chipload.program.program import Program
+from chipload.progress import Progress, part_of, silent
+from chipload.simulation.chips import remove
+from chipload.simulation.deflection import contacts, step_deflections, tip_deflections
+from chipload.simulation.removal import Removal
+from chipload.stock.layers import LayeredStock
+from chipload.structure.spindle import Bar, tool_bars
+
+Floats = NDArray[np.float64]
+
+#: between two rotations that are looked at [rad]
+ROTATION = math.radians(1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class TwoParts:
+    """Something of n steps by the edge and by what goes with the feed: (n,) float each."""
+
+    edge: Floats
+    cut: Floats
+
+    def times(self, edge: Floats, cut: Floats) -> TwoParts:
+        """With other factors of both, (n,) each."""
+        return TwoParts(self.edge * edge, self.cut * cut)
+
+
+@dataclass(frozen=True, eq=False)
+class WorkpieceCut(CutSteps):
+    """What the steps of a program cut from a workpiece; the force of its loads is the greatest of each step.
+
+    Parameters
+    ----------
+    error : D of each step [mm]
+    whole : deflection of workpiece and cutter in any direction [mm]
+    work : W, that of the workpiece alone [mm]
+    compliance : of the workpiece through the removal
+    strained : g [MPa/N]
+    """
+
+    error: TwoParts
+    whole: TwoParts
+    work: TwoParts
+    compliance: WorkpieceCompliance
+    strained: float
+
+
+@dataclass(frozen=True, eq=False)
+class AllowableWorkpiece:
+    """What is planned, what is true, and which torque the workpiece allows.
+
+    Parameters
+    ----------
+    planned, real : what is cut; the same where no [real_stock] is stated
+    loads : of the real cut, with a worn cutter and hard spots
+    factors : (n,) of the parts of the edge and of the feed, by these
+    limit : of torque, from the workpiece alone
+    torque : the limit that is kept [N mm], the least of that and the stated one; 0: not attainable
+    true_limit : what the workpiece would allow as it really is
+    path : with what is planned and what is true
+    """
+
+    planned: WorkpieceCut
+    real: WorkpieceCut
+    loads: Loads
+    factors: tuple[Floats, Floats]
+    limit: PathLimit
+    torque: float
+    true_limit: PathLimit
+    path: ToolPath
+
+    @property
+    def walls(self) -> tuple[WallPath, ...]:
+        """For the form error, the stress, the whole deflection, and that of the workpiece alone."""
+        s, one, real = self.path.model.s, np.ones(len(self.real.feed)), self.real
+        known = [x.times(*self.factors) for x in (real.error, real.whole, real.work)]
+        error, whole, work = (WallPath(s, row_means(x.edge), row_means(x.cut), one) for x in known)
+        force = (row_means(self.loads.force_edge), row_means(self.loads.force_cut))
+        return error, WallPath(s, *force, np.full(len(one), real.strained)), whole, work
+
+
+def simulation_of(job: TorqueJob, solid: SolidTable) -> ProgramJob:
+    """The job of a simulation of the same program, through a stock of it."""
+    t = job.table
+    fine = SimulateTable.model_validate(
+        {"kind": "simulate", "step_mm": t.simulation.step_mm, "tolerance_mm": t.simulation.tolerance_mm}
+    )
+    saved = solid.file is not None and solid.file.lower().endswith(".npz")
+    stock = solid if saved else solid.model_copy(update={"layer_mm": t.simulation.layer_mm})
+    table = SimulationJobTable.model_construct(
+        program=t.program, machine=t.machine, stock=stock, part=None, fixture=(), material=t.material, cutter=t.cutter,
+        stiffness=None, dynamics=None, workpiece=t.workpiece, checks=t.checks, operation=(fine,),
+        limits=ProgramLimitsTable.model_construct(),
+    )  # fmt: skip
+    return ProgramJob(
+        job.path, table, job.path.parent / stated(t.program, "program").file, None, job.machine, job.overrides,
+        job.cutters, job.material,
+    )  # fmt: skip
+
+
+def workpiece_cut(
+    job: TorqueJob,
+    solid: SolidTable,
+    program: Program,
+    material: Material,
+    rapids: float,
+    progress: Progress = silent,
+) -> WorkpieceCut:
+    """Run the program through a stock of the workpiece, with the material and with its edge alone.
+
+    Parameters
+    ----------
+    rapids : feed of the rapids between two cuts [mm/s]
+
+    Raises
+    ------
+    InputError
+        The program cuts nothing, the tip stands, the material has a size effect, or the clamps leave a rigid motion.
+    """
+    require_linear(material)
+    own = simulation_of(job, solid)
+    stock, fine = stock_body(own, program), resolution_of(own, program)
+    known = workpiece_compliance(own, program, stock, material, fine, part_of(progress, 0.0, 0.5))
+    if known is None or known.strained is None:
+        raise InputError("stock: the program cuts nothing from the workpiece: check its corners and the work offset")
+    less, removal = (
+        remove(
+            program, body, job.cutters, metal, fine, keep=True, accuracy=False,
+            progress=part_of(progress, share, share + 0.25),
+        )
+        for body, metal, share in ((stock.copied(), edge_material(material), 0.5), (stock, material, 0.75))
+    )  # fmt: skip
+    little, rows = LITTLE_MPA / material.Ktc, fed_rows(removal)
+    c, light = removal.columns, less.columns
+    bars = {number: tool_bars(cutter) for number, cutter in job.cutters.items()}
+    whole = deflections(removal, material, known, bars)
+    edge = deflections(less, edge_material(material), known, bars)
+    error, all_of_it, work = (
+        TwoParts(*edge_and_cut(a[rows], b[rows], little)) for a, b in zip(whole, edge, strict=True)
+    )
+    loads = two_parts(
+        1e3 * c["torque_mean_nm"][rows], c["force_n"][rows],
+        1e3 * light["torque_mean_nm"][rows], light["force_n"][rows], little,
+    )  # fmt: skip
+    return WorkpieceCut(
+        removal, stock, step_points(removal, program), step_feeds(removal, rapids), loads, error, all_of_it, work,
+        known, float(known.strained.per_force.max()),
+    )  # fmt: skip
+
+
+def deflections(
+    removal: Removal, material: Material, known: WorkpieceCompliance, bars: dict[int, tuple[Bar, ...]]
+) -> tuple[Floats, Floats, Floats]:
+    """(n,) D, the whole deflection, and W of each row of a removal [mm]; 0 where nothing is cut."""
+    n = len(removal.columns["line"])
+    whole, work = np.zeros(n), np.zeros(n)
+    for cuts in removal.cuts:
+        found = tip_deflections(cuts, material, bars=bars[cuts.tool], work=known.steps.at(cuts.step), rotation=ROTATION)
+        whole[cuts.step] = 1e-3 * found["deflection_um"]
+        work[cuts.step] = 1e-3 * found["deflection_workpiece_um"]
+    place = contacts(removal)
+    soft, error = known.steps.at(place.step), np.zeros(n)
+    for station in np.moveaxis(soft, 1, 0):
+        found = step_deflections(removal, material, place, work=station, bars=bars, rotation=ROTATION)
+        np.maximum(error, found["deflection_mm"], out=error)
+    facing = place.step[~place.normal.any(axis=1)]
+    error[facing] = whole[facing]
+    return error, whole, work
+
+
+def responses_of(
+    job: TorqueJob, cut: WorkpieceCut, factors: tuple[Floats, Floats] | None = None, margin: float = 0.0
+) -> list[LimitedResponse]:
+    """What the limits of the job say of a cut.
+
+    Parameters
+    ----------
+    factors : (n,) of the parts of the edge and of the feed
+    margin : share by which compliance and stress count as greater
+    """
+    ask, ones = job.table.limits, np.ones(len(cut.feed))
+    e, c = factors or (ones, ones)
+    e, c = (1.0 + margin) * e, (1.0 + margin) * c
+    most = 1e-3 * ask.form_error_um
+    strength = ask.strength_share * stated(stated(job.workpiece, "workpiece").yield_mpa, "workpiece.yield_mpa")
+    force = TwoParts(cut.loads.force_edge, cut.loads.force_cut)
+    out = [
+        ("deflection", cut.error, most),
+        ("strength", force.times(cut.strained * ones, cut.strained * ones), strength),
+    ]
+    if ask.deflection_workpiece_um is not None:
+        out.append(("workpiece deflection", cut.work, 1e-3 * ask.deflection_workpiece_um))
+    return [LimitedResponse(name, x.edge * e, x.cut * c, most) for name, x, most in out]
+
+
+def limit_on_workpiece(loads: Loads, responses: list[LimitedResponse]) -> PathLimit:
+    """The torque that a workpiece allows along a program.
+
+    Raises
+    ------
+    InputError
+        No feed changes anything.
+    """
+    found = limit_by_responses(loads, responses)
+    if found is None:
+        raise InputError("stock: the program cuts nothing from the workpiece that a feed would change: check the stock")
+    return found
+
+
+def allowable_on_workpiece(
+    job: TorqueJob, program: Program, material: Material, machine: Machine, progress: Progress = silent
+) -> AllowableWorkpiece:
+    """Cut the stock as planned and as it is, and find the limit.
+
+    Raises
+    ------
+    InputError
+        As :func:`workpiece_cut`; the real stock is not cut by the same steps.
+    """
+    ask, half = job.table, part_of(progress, 0.0, 0.5)
+    planned = workpiece_cut(job, stated(ask.stock, "stock"), program, material, machine.rapid, half)
+    real = planned
+    if ask.real_stock is not None:
+        real = workpiece_cut(job, ask.real_stock, program, material, machine.rapid, part_of(progress, 0.5, 1.0))
+    factors = surprise_factors(len(real.feed), lambda x: _away(real, x), ask.surprise)
+    e, c = factors
+    loads = Loads(
+        real.loads.torque_edge * e, real.loads.torque_cut * c, real.loads.force_edge * e, real.loads.force_cut * c
+    )
+    limit = limit_on_workpiece(planned.loads, responses_of(job, planned, margin=planned.compliance.error))
+    most = ask.limits.torque_nm
+    torque = limit.torque if most is None else min(limit.torque, 1e3 * most)
+    return AllowableWorkpiece(
+        planned, real, loads, factors, limit, torque, limit_on_workpiece(loads, responses_of(job, real, factors)),
+        path_of(planned, loads, relief_of(limit, torque)),
+    )  # fmt: skip
+
+
+def real_stock_body(job: TorqueJob, program: Program) -> LayeredStock:
+    """The stock as it really is, before the program."""
+    return stock_body(simulation_of(job, job.table.real_stock or stated(job.table.stock, "stock")), program)
+
+
+def _away(cut: WorkpieceCut, x: SurpriseTable) -> Floats:
+    """(n,) distance of the steps from the middle of a hard spot [mm]."""
+    middle = 0.5 * (cut.points[1:] + cut.points[:-1])
+    return np.asarray(np.linalg.norm(middle - np.array(stated(x.at_mm, "surprise.at_mm")), axis=1))

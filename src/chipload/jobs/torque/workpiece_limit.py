@@ -1,0 +1,120 @@
+"""A clamped workpiece and the torque that it allows: for the result, and coarsely for a check; what would help.
+
+Notation as in :mod:`chipload.jobs.torque.workpiece_cut`. Where D_e or W_e alone reaches its limit d no feed would do.
+Each change by itself would where the response of the edge is then at most d / :data:`MARGIN`: a depth of cut in
+proportion, an overhang by its cube, a support by what it takes off at the step that bends the workpiece most, clamps or
+walls by their stiffness.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from chipload.control.wall import PathLimit
+from chipload.cutting.material import Material
+from chipload.jobs.simulation.preparation import resolution_of
+from chipload.jobs.tables import stated
+from chipload.jobs.torque.allowable import coarser, limit_text
+from chipload.jobs.torque.job import TorqueJob
+from chipload.jobs.torque.outcome import AllowableTorque, ClampedWorkpiece
+from chipload.jobs.torque.remedies import MARGIN
+from chipload.jobs.torque.workpiece_cut import (
+    AllowableWorkpiece,
+    WorkpieceCut,
+    limit_on_workpiece,
+    responses_of,
+    simulation_of,
+    workpiece_cut,
+)
+from chipload.machine.machine import Machine
+from chipload.program.program import Program
+from chipload.simulation.chips import counted
+
+#: a check simulates the plan if that takes at most so many coarse steps, in so many states of removal
+MOST_PREVIEWED, STATES = 1500, 2
+
+
+def clamped_workpiece(job: TorqueJob, a: AllowableWorkpiece) -> ClampedWorkpiece:
+    """The workpiece in the result."""
+    strength = stated(stated(job.workpiece, "workpiece").yield_mpa, "workpiece.yield_mpa")
+    planned, real = a.planned.compliance, a.real.compliance
+    return ClampedWorkpiece(planned, real, (a.planned.strained, a.real.strained), strength, a.real.stock)
+
+
+def allowable_torque(job: TorqueJob, a: AllowableWorkpiece) -> AllowableTorque:
+    """The torque that the workpiece allows, in the result."""
+    return AllowableTorque(
+        limit=a.limit,
+        torque=a.torque,
+        true_torque=a.true_limit.torque,
+        one_tooth=None,
+        remedy="" if a.torque > 0.0 else remedy_on_workpiece(job, a.planned, a.limit),
+        path=a.path,
+    )
+
+
+def preview_on_workpiece(job: TorqueJob, program: Program, material: Material, machine: Machine) -> tuple[str, bool]:
+    """The limit of torque by a coarse simulation of the plan, in a sentence, and whether there is one."""
+    rough = coarser(job)
+    few = stated(rough.workpiece, "workpiece").model_copy(update={"states": STATES})
+    rough = replace(rough, table=rough.table.model_copy(update={"workpiece": few}))
+    stock = stated(rough.table.stock, "stock")
+    if counted(program, job.cutters, resolution_of(simulation_of(rough, stock), program)) > MOST_PREVIEWED:
+        return "the limit of torque is found when the job is run", True
+    planned = workpiece_cut(rough, stock, program, material, machine.rapid)
+    margin = planned.compliance.error
+    limit = limit_on_workpiece(planned.loads, responses_of(rough, planned, margin=margin))
+    line = int(planned.removal.columns["line"][planned.rows][limit.step])
+    where = f"by the {limit.by.removeprefix('workpiece ')} of the workpiece in line {line}"
+    if limit.torque <= 0.0:
+        return f"no torque is allowable, {where}: {remedy_on_workpiece(rough, planned, limit)}", False
+    return limit_text(planned, limit, where), True
+
+
+def remedy_on_workpiece(job: TorqueJob, planned: WorkpieceCut, limit: PathLimit) -> str:
+    """What would do where no torque is allowable, in a sentence."""
+    found = remedies_on_workpiece(job, planned, limit)
+    if not found:
+        return (
+            "no feed would do, and no depth of cut, clamp, wall or overhang alone: state a sharper cutter or wider "
+            "limits"
+        )
+    return f"no feed would do; one of these would: {'; '.join(found)}; or a sharper cutter"
+
+
+def remedies_on_workpiece(job: TorqueJob, planned: WorkpieceCut, limit: PathLimit) -> list[str]:
+    """Changes of which each by itself would do."""
+    k, margin = limit.step, planned.compliance.error
+    response = next(r for r in responses_of(job, planned, margin=margin) if r.by == limit.by)
+    edge, allowed = float(response.edge[k]), response.most / MARGIN
+    out = [_depth_text(planned, k, allowed / edge)]
+    if limit.by == "strength":
+        return out
+    work = min((1.0 + margin) * float(planned.work.edge[k]), edge)
+    tool = edge - work
+    if tool < allowed:
+        stiffer = work / (allowed - tool)
+        bent = planned.compliance.bent
+        if bent is not None and bent.before > 0.0 and work * bent.after / bent.before <= allowed - tool:
+            x, y, z = bent.place
+            out.append(f"a support near ({x:.3g}, {y:.3g}, {z:.3g}) mm")
+        out.append(
+            f"clamps or walls with which the workpiece is {stiffer:.2g} times as stiff there (a wall "
+            f"{stiffer ** (1.0 / 3.0):.2g} times as thick)"
+        )
+    if work < allowed:
+        cutter = job.cutters[int(planned.removal.columns["tool"][planned.rows][k])]
+        length = cutter.overhang * ((allowed - work) / tool) ** (1.0 / 3.0)
+        out.append(f"an overhang of the cutter of at most {length:.3g} mm (now {cutter.overhang:.3g})")
+    return out
+
+
+def _depth_text(planned: WorkpieceCut, k: int, share: float) -> str:
+    """A depth of cut that is less by a share, at a step."""
+    steps = planned.compliance.steps
+    row = int(np.searchsorted(steps.step, planned.rows.start + k))
+    low, high = steps.lines[min(row, len(steps.step) - 1), :, 2]
+    depth = abs(float(high - low))
+    return f"a depth of cut of at most {share * depth:.2g} mm (now {depth:.3g})"

@@ -1,0 +1,88 @@
+"""A tool that is a body: held against part, stock and fixtures, its chips not simulated, the verdict never holds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import trimesh
+from typer.testing import CliRunner
+
+from chipload.cli import app
+from mill import SLOT_JOB
+
+#: tool 1 mills a slot 2 mm deep at Y5, tool 2 comes down in it: X10 at a feed, then X4 in a rapid
+PROGRAM = (
+    "G21 G90 G94\nT1 M6\nS3000 M3\nG0 X-8 Y5 Z5\nG1 Z-2 F300\nX28\nG0 Z5\n"
+    "T2 M6\nS500 M3\nG0 X10 Y5 Z5\nG1 Z-4 F100\nG1 Z5\nG0 X4\nG0 Z-4\nG0 Z5\nM5\nM2\n"
+)
+TAP = '[[cutter]]\nnumber = 2\nname = "M6 tap"\nbody_mm = [[2.5, 0.0], [2.5, 15.0]]\noverhang_mm = 30.0\n'
+JOB = SLOT_JOB.replace("STEP", "3.0").replace("[[operation]]", TAP + "[[operation]]")
+
+
+def call(*words: object) -> tuple[int, str, str]:
+    done = CliRunner().invoke(app, [str(w) for w in words])
+    return done.exit_code, done.stdout, done.stderr
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    above = tmp_path_factory.mktemp("tap")
+    (above / "slot.ngc").write_text(PROGRAM)
+    post = trimesh.creation.box(bounds=[[9.0, 4.0, -6.0], [11.0, 6.0, -3.0]])
+    post.export(above / "post.stl")
+    more = '[[fixture]]\nfile = "post.stl"\nunits = "mm"\nspacing_mm = 0.5\n'
+    text = JOB.replace('kind = "simulate"', 'kind = "simulate"\nstock_points_mm = 0.5')
+    (above / "job.toml").write_text(text + more)
+    code, _, said = call("run", above / "job.toml", "--out", above / "result")
+    assert code == 3, said
+    return above
+
+
+def test_the_verdict_and_the_findings(folder: Path) -> None:
+    summary = json.loads((folder / "result" / "summary.json").read_text())
+    (track,) = summary["tracks"]
+    found = {f["code"]: f for f in track["findings"]}
+    assert found["tool-body"]["severity"] == "unproven"
+    assert found["tool-body"]["line"] == 11
+    assert "tool 2 (M6 tap) is a body" in found["tool-body"]["text"]
+    assert found["handed-over"]["line"] == 10
+    texts = [f["text"] for f in track["findings"] if f["code"] == "collision"]
+    # at X10 it goes 1 mm into the post, whose top is at -3; at X4 in a rapid 2 mm into the floor of the slot
+    assert any("cutting part goes 1 mm into fixture 0" in t for t in texts)
+    (rapid,) = [t for t in texts if "cutting part in a rapid goes" in t]
+    assert 1.0 < float(rapid.split("goes ")[1].split()[0]) <= 2.0
+
+
+def test_it_removes_nothing_and_loads_nothing(folder: Path) -> None:
+    history = pq.read_table(folder / "result" / "history.parquet")
+    own = history["tool"].to_numpy() == 2
+    assert own.any()
+    for name in ("chip_volume_mm3", "force_n", "torque_nm"):
+        assert not np.asarray(history[name])[own].any()
+    # the slot of tool 1, as without tool 2: 6 by 2 by 20 mm
+    assert np.asarray(history["chip_volume_mm3"]).sum() == pytest.approx(240.0, rel=1e-3)
+
+
+def test_without_what_it_hits_the_verdict_is_unproven(folder: Path) -> None:
+    plain = PROGRAM.replace("G0 X4\nG0 Z-4\n", "G0 X4\n")
+    (folder / "plain.ngc").write_text(plain)
+    (folder / "plain.toml").write_text(JOB.replace("slot.ngc", "plain.ngc"))
+    code, out, _ = call("run", folder / "plain.toml", "--out", folder / "plain")
+    assert (code, out.splitlines()[0].split(":")[0]) == (3, "Unproven")
+    assert "tool 2 (M6 tap) is a body" in out
+
+
+def test_what_is_refused(folder: Path) -> None:
+    feeds = "[operation.feeds]\nslowest_percent = 50.0\nfastest_percent = 150.0\n"
+    (folder / "feeds.toml").write_text(JOB.replace("[limits]", f"{feeds}[limits]"))
+    code, _, said = call("check", folder / "feeds.toml")
+    assert code == 2
+    assert "operation.0.feeds: cutter 2 is a body (body_mm) whose load is not known: leave feeds out" in said
+    (folder / "moves.toml").write_text(JOB.replace('kind = "simulate"', 'kind = "simulate"\nengine = "moves"'))
+    code, _, said = call("run", folder / "moves.toml", "--out", folder / "moves")
+    assert code == 2
+    assert "tool 2 is a body without chips" in said

@@ -1,0 +1,45 @@
+"""Lists of the page, chosen from as a person does who looks whether it worked, on however busy a computer."""
+
+import re
+import time
+
+#: seconds that one look takes, and after which a choice that did not arrive is an error
+LOOK, PATIENCE = 3.0, 90.0
+
+
+def choose(page, name: str, option: str, chosen: bool = True) -> None:
+    """Choose an option of the list ``name``, or with ``chosen=False`` take it back, and close the list.
+
+    ``option`` is its name, which values in brackets may follow.
+
+    A choice counts once the list shows it, which it does when the server has answered. A list that closed before,
+    because its options were renewed or a click came while it moved, is opened again.
+    """
+    field = page.get_by_role("combobox", name=name)
+    words = re.escape(option).replace("/", "\\/")
+    listed = page.get_by_role("option", name=re.compile(rf"^{words}( \(|, |$)"))
+    state, missed = str(chosen).lower(), ""
+    until = time.monotonic() + PATIENCE
+    while time.monotonic() < until:
+        try:
+            if field.get_attribute("aria-expanded", timeout=1000 * LOOK) != "true":
+                field.click(timeout=1000 * LOOK)
+            listed.wait_for(timeout=1000 * LOOK)
+            if listed.get_attribute("aria-selected", timeout=1000 * LOOK) == state:
+                page.keyboard.press("Escape")
+                listed.wait_for(state="hidden", timeout=1000 * LOOK)
+                return
+            listed.click(timeout=1000 * LOOK)
+            _answered(page, listed, field, state)
+        except Exception as err:  # what is not there within a look is looked for again
+            missed = str(err)
+    raise AssertionError(f"{name}: {option} is not {'chosen' if chosen else 'left'}: {missed}")
+
+
+def _answered(page, listed, field, state: str) -> None:
+    """Wait for the answer to a click on an option: it has the state, or the list has closed."""
+    until = time.monotonic() + LOOK
+    while time.monotonic() < until and field.get_attribute("aria-expanded") == "true":
+        if listed.get_attribute("aria-selected", timeout=1000 * LOOK) == state:
+            return
+        page.wait_for_timeout(50)
