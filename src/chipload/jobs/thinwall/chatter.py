@@ -195,14 +195,21 @@ def chatter_of(inputs: WallInputs) -> WallChatter | None:
 
 
 def chatter_limits(
-    dynamics: Mapping[str, Any] | None, columns: Mapping[str, NDArray[Any]], track: str
+    dynamics: Mapping[str, Any] | None, columns: Mapping[str, NDArray[Any]], track: str, force_error: float = 0.0
 ) -> tuple[LimitCheck, ...]:
-    """The check of the margin by the values of ``[dynamics]``; none where it is not stated."""
+    """The check of the margin by the values of ``[dynamics]``; none where it is not stated.
+
+    ``force_error`` is the relative error of the force by layers and steps.
+    """
     if dynamics is None:
         return ()
     limit, reason = float(dynamics["margin"]), "" if dynamics["mode"] else "modes of the cutter are not stated"
     cuts = np.asarray(columns["chip_areas"]) > 0
-    return (check_limit("stability_margin", limit, columns, track=track, rows=cuts, error=MARGIN_ERROR, reason=reason),)
+    return (
+        check_limit(
+            "stability_margin", limit, columns, track=track, rows=cuts, error=MARGIN_ERROR + force_error, reason=reason
+        ),
+    )
 
 
 def chatter_numbers(one: Variant, dynamics: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -83,7 +83,7 @@ def limits_of(walled: ThinWallResult, one: Variant) -> tuple[LimitCheck, ...]:
     if one.shift > 0.0 and state is Verdict.HOLDS:
         state, why = Verdict.UNPROVEN, "the path is moved: it is compared within its greatest shift only"
     out.append(LimitCheck("gouge_mm", tolerance + one.shift, gouge, state, one.name, place=place, reason=why))
-    out += chatter_limits(walled.settings.get("dynamics"), c, one.name)
+    out += chatter_limits(walled.settings.get("dynamics"), c, one.name, error_of(walled, one, "force_n"))
     return (*out, *default_limits(walled.checks, walled.planning.machine, c, one.name, one.load_error))
 
 
