@@ -160,7 +160,7 @@ def _eliminated(
     """The part with one row more, condensed on the next plane."""
     grid = solid.grid
     there = row[solid.kept[row, 1] > solid.kept[row, 0]]
-    free = ~solid.held.ravel()
+    free = ~solid.constrained.ravel()
     mine = element_dofs(grid.elements[there])
     touched = np.unique(mine[free[mine]])
     far = np.isin(touched // 3, plane)

@@ -10,7 +10,7 @@ import pytest
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.errors import InputError
-from chipload.planning.thinwall.blank import Blank
+from chipload.planning.thinwall.blank import WallBlank
 from chipload.planning.thinwall.chatter import WallCutting, WallMotion, quietest_speed, stable_depths
 from chipload.planning.thinwall.depth import DepthRange
 from chipload.planning.thinwall.plane_stock import CutterPose, engagement_of_depths
@@ -77,7 +77,7 @@ def test_the_depth_on_a_strip_is_that_of_its_closed_form_mode():
     length, width, thick, E, rho = 40.0, 6.0, 2.0, 70e3, 2.7e-9
     grid = plate(width, length, thick, (2, 8, 1))
     solid = SolidWorkpiece(grid, E, 0.0, rho, grid.side("j-"))
-    blank = Blank(solid, (0.0, 0.2))
+    blank = WallBlank(solid, (0.0, 0.2))
     none = np.zeros(blank.shape)
     hertz, shapes = blank.modes((none, none), "k+", 1)
     t = thick - 0.2
