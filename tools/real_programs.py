@@ -58,8 +58,8 @@ that a verdict rests on guesses: a gouge or a rapid through stock may be that of
 files that have no verdict yet, the shortest first by the estimate of `chipload check`, and writes this page; a file
 that was stopped goes on where it was. Times are processor times, the compiling of kernels included where a run was the
 first. A row with *{not_run}* waits for the next `make real`; the longest that its run may take by the estimate stands
-beside it. The row of `octagon.dxf` is still that of `chipload simulate`, whose guesses leave a result unproven; `--again`
-of the tool renews it.
+beside it. The row of `octagon.dxf` is still that of `chipload simulate`, whose guesses leave a result unproven;
+`--again` of the tool renews it.
 
 | file | kind | verdict | first reason | time [s] |
 |---|---|---|---|---:|

@@ -101,7 +101,8 @@ def _parts(low: float, high: float, longest: float, key: str, most: int) -> int:
     count = (high - low) / longest * (1.0 - 1e-12)
     if not count <= most:
         raise InputError(
-            f"{key} = {longest:g}: {high - low:g} mm in {count:.4g} pieces: must be at most {most}: state a larger value"
+            f"{key} = {longest:g}: {high - low:g} mm in {count:.4g} pieces: must be at most {most}: "
+            "state a larger value"
         )
     return max(1, math.ceil(count))
 
