@@ -16,10 +16,8 @@ from chipload.jobs.thinwall.figures import program_files
 from chipload.jobs.thinwall.inputs import read_wall
 from chipload.jobs.thinwall.places import places_of
 from chipload.jobs.thinwall.result import failures_of, result_of
-from chipload.jobs.thinwall.run import TRIES
-from chipload.jobs.thinwall.run import _Tried as Tried
-from chipload.jobs.thinwall.run import _unlimited as unlimited_plan
 from chipload.jobs.thinwall.scene import scene_bytes
+from chipload.jobs.thinwall.tries import TRIES, Tried, unlimited_plan
 from chipload.program.gcode.writer import NOT_VERIFIED, VERIFIED
 from chipload.program.read import read_program, read_tools, times_of
 from chipload.report.folder import write_result

@@ -19,7 +19,7 @@ import math
 import numpy as np
 from numba import njit
 
-from chipload.stability._kernels import HERMITE, first_vector, next_vector, settled
+from chipload.stability._kernels import HERMITE
 from chipload.stability.directional._kernels import (
     AT_END,
     FROM_MOMENTS,
@@ -32,6 +32,7 @@ from chipload.stability.directional._kernels import (
     W12,
     matrices,
 )
+from chipload.stability.spectrum._kernels import first_vector, next_vector, settled
 
 TAU = 2.0 * math.pi
 #: fewest cells between two teeth

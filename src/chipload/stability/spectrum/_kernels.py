@@ -1,4 +1,4 @@
-"""Greatest eigenvalue of a real upper Hessenberg matrix; arrays and scalars only.
+"""Greatest eigenvalue of a real upper Hessenberg matrix, and the steps of Arnoldi that make it; arrays only.
 
 Reference: [Martin1970], shifted QR of a real Hessenberg matrix (EISPACK hqr); LAPACK's call with vectors takes longer
 than the map itself. Oracle: numpy.linalg.eigvals.
@@ -151,3 +151,53 @@ def greatest(matrix, n, a):
             tries += 1
             _sweep(a, low, last, x, y, w)
     return best, angle
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def first_vector(v):
+    """A unit vector that is always the same."""
+    seed = 12345.0
+    norm = 0.0
+    for i in range(len(v)):
+        seed = (seed * 16807.0) % 2147483647.0
+        v[i] = seed / 2147483647.0 - 0.5
+        norm += v[i] ** 2
+    norm = math.sqrt(norm)
+    for i in range(len(v)):
+        v[i] /= norm
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def next_vector(V, H, j, y):
+    """Make y orthogonal to the rows 0 .. j of V, twice; what is taken goes into H, the norm of the rest is returned."""
+    n = V.shape[1]
+    for _ in range(2):
+        for row in range(j + 1):
+            dot = 0.0
+            for i in range(n):
+                dot += V[row, i] * y[i]
+            H[row, j] += dot
+            for i in range(n):
+                y[i] -= dot * V[row, i]
+    norm = 0.0
+    for i in range(n):
+        norm += y[i] * y[i]
+    norm = math.sqrt(norm)
+    H[j + 1, j] = norm
+    return norm
+
+
+@njit(cache=True, nogil=True)
+def settled(H, j, norm, most, tol, room, state):
+    """Whether the greatest multiplier after j + 1 dimensions is the one that is kept. ``state``: modulus and angle, and
+    the modulus one and two dimensions before.
+    """
+    last = j == most - 1 or norm < 1e-12
+    if last or j >= 3:
+        state[0], state[1] = greatest(H, j + 1, room)
+        moved = abs(state[0] - state[2]) + abs(state[2] - state[3])
+        if last or (j >= 5 and moved < tol * max(state[0], 0.1)):
+            return True
+        state[3] = state[2]
+        state[2] = state[0]
+    return False

@@ -1,0 +1,62 @@
+"""The passes of a plan as a program on the machine: linked, with the time of each row."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import Finding, Severity
+from chipload.jobs.thinwall.inputs import WallInputs
+from chipload.machine.limits import limit_findings
+from chipload.machine.machine import Machine
+from chipload.planning.thinwall.linking import Margins, PassProgram, link_passes
+from chipload.planning.thinwall.passes import Plan
+from chipload.program.check import check_program
+from chipload.program.commands import Commands
+from chipload.program.program import Program
+from chipload.program.read import times_on
+from chipload.program.to_axes import to_axes
+from chipload.program.to_work import axes_of
+
+Floats = NDArray[np.float64]
+
+#: safe height of the tip over the wall, in radii of the cutter
+SAFE = 1.5
+#: links sag by this share of their distance to the stock
+SAG = 0.3
+#: rows run on beyond the edges of the wall by so many [mm], over the reach of the corner in its stock
+BEYOND = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class OnMachine:
+    """A program on the machine: the axes, the time of each row of the tip [s], what the machine does not give."""
+
+    commands: Commands
+    times: Floats
+    exceeding: tuple[Finding, ...]
+
+
+def on_machine(inputs: WallInputs, program: Program) -> OnMachine:
+    """What the axes do for a program."""
+    machine: Machine = inputs.cut.machine
+    lengths = {inputs.cut.cutter.number: inputs.cut.cutter.overhang}
+    commands, _ = to_axes(program, machine, tool_lengths=lengths)
+    axes = axes_of(commands, machine)
+    broken = [*check_program(program, machine), *limit_findings(machine, axes, commands.line, placed=False)]
+    exceeding = tuple(replace(f, severity=Severity.EXCEEDS) for f in broken if f.code != "machine-offset")
+    return OnMachine(commands, times_on(program, machine, lengths), exceeding)
+
+
+def linked(inputs: WallInputs, plan: Plan, places: tuple[Floats, Floats] | None = None) -> tuple[PassProgram, ...]:
+    """The way of a plan at these places, u and v; None: those of the elements."""
+    sides = [inputs.fine(s) for s in inputs.body.side_numbers]
+    cutter = inputs.cut.cutter
+    allowance = max(inputs.body.allowance)
+    reach = math.sqrt(2.0 * cutter.corner_radius * allowance)
+    sag = SAG * (inputs.cut.pass_motion.clearance - allowance)
+    margins = Margins(BEYOND + reach, inputs.top + SAFE * cutter.radius, sag)
+    return link_passes(plan.passes, sides, places or inputs.body.places, inputs.cut.pass_motion, margins)
