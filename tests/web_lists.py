@@ -1,4 +1,4 @@
-"""Lists of the page, chosen from as a person does who looks whether it worked, on however busy a computer."""
+"""Lists and keys of the page, used as a person does who looks whether it worked, on however busy a computer."""
 
 import re
 import time
@@ -34,6 +34,21 @@ def choose(page, name: str, option: str, chosen: bool = True) -> None:
         except Exception as err:  # what is not there within a look is looked for again
             missed = str(err)
     raise AssertionError(f"{name}: {option} is not {'chosen' if chosen else 'left'}: {missed}")
+
+
+def press_until(page, key: str, holds: str, arg: object) -> None:
+    """Press a key, again every few seconds, until a function of JavaScript holds for ``arg``: a key that comes while
+    the page turns to another track goes to the old one.
+    """
+    until = time.monotonic() + PATIENCE
+    while time.monotonic() < until:
+        page.keyboard.press(key)
+        try:
+            page.wait_for_function(holds, arg=arg, timeout=1000 * LOOK)
+        except Exception:
+            continue
+        return
+    raise AssertionError(f"{key}: {holds} does not hold for {arg}")
 
 
 def _answered(page, listed, field, state: str) -> None:

@@ -16,6 +16,7 @@ import pytest
 
 from chipload.result import Verdict, load_result
 from square import two_variants, write_by_hand
+from web_lists import press_until
 from web_served import Served
 
 EXAMPLES = Path(__file__).parents[2] / "src" / "chipload" / "examples"
@@ -59,6 +60,10 @@ def run(name: str, folder: Path) -> int:
     words = ["run", str(job), "--out", str(folder / "result")]
     line = [sys.executable, "-c", "from chipload.cli import main; main()", *words]
     return subprocess.run(line, capture_output=True, text=True, timeout=900, check=False).returncode
+
+
+#: whether a track is the one that is shown
+SHOWN = "name => document.querySelector('.cl-tracks .q-field__native')?.innerText.startsWith(name)"
 
 
 @pytest.fixture(scope="module")
@@ -178,20 +183,24 @@ def test_the_page_lists_the_limits_and_the_time_of_each_track(opened, page_of, n
         assert len(t) == track["rows"]
         assert (np.diff(t) >= 0.0).all()
         assert t[-1] == pytest.approx(track["time_s"], rel=1e-3)
-        page.keyboard.press("Home")
         ends = f" of {t[-1]:.5g} s \u00b7 step 1 of {len(t)}"
-        page.wait_for_function("e => document.querySelector('.cl-where').textContent.includes(e)", arg=ends)
+        press_until(page, "Home", "e => document.querySelector('.cl-where').textContent.includes(e)", ends)
         if len(tracks) > 1:
+            page.wait_for_function(SHOWN, arg=track["name"])
             shown = page.locator(".cl-tracks input, .cl-tracks .q-field__native").first.inner_text()
             assert shown.startswith(track["name"])
             assert shown.endswith(", in use") == track["in_use"]
-        cells = page.evaluate(
-            "[...document.querySelectorAll('.cl-checks tbody tr')].map(r => [...r.cells].map(c => c.textContent))"
-        )
         wanted = [
             (checks[c["name"]].label, number(c["worst"]), f"{c['limit']:g} {c['unit']}".strip(), c["state"])
             for c in track["limits"]
         ]
+        for _ in range(600):  # the table follows the name of the track
+            cells = page.evaluate(
+                "[...document.querySelectorAll('.cl-checks tbody tr')].map(r => [...r.cells].map(c => c.textContent))"
+            )
+            if sorted((c[0], c[1], c[2].strip(), c[4]) for c in cells) == sorted(wanted):
+                break
+            page.wait_for_timeout(100)
         assert sorted((c[0], c[1], c[2].strip(), c[4]) for c in cells) == sorted(wanted)
         # what exceeds comes first and is marked
         for text, cell in zip(page.locator(".cl-checks .cl-no").all_inner_texts(), cells, strict=False):

@@ -134,6 +134,7 @@ def plan_thin_wall(
     operation: Tables,
     limits: Values,
     threshold: Source | None = None,
+    dynamics: Values | None = None,
     checks: Values | None = None,
     folder: str | Path = ".",
     progress: Progress = silent,
@@ -147,8 +148,10 @@ def plan_thin_wall(
     wall, workpiece : keys of ``[wall]`` and ``[workpiece]``
     operation : keys of the ``[[operation]]``
     threshold : measured calibration cuts: a file, or keys of ``[threshold]``; None: the threshold is calculated
+    dynamics : keys of ``[dynamics]``; None: chatter is not calculated
     """
     return run_tables(
         "thinwall", folder, progress, wall=wall, workpiece=workpiece, machine=machine, material=material,
-        threshold=threshold, cutter=cutters_of(cutter), operation=operation, limits=limits, checks=checks,
+        threshold=threshold, cutter=cutters_of(cutter), dynamics=dynamics, operation=operation, limits=limits,
+        checks=checks,
     )  # fmt: skip
