@@ -94,7 +94,7 @@ def removal_mesh(blank: trimesh.Trimesh, path: ToolPoses, cutters: Mapping[int, 
     Examples
     --------
     >>> line = np.column_stack([np.linspace(-6.0, 26.0, 33), np.full(33, 10.0), np.full(33, 6.0)])
-    >>> path = ToolPath(line, np.tile([0.0, 0.0, 1.0], (33, 1)), np.ones(33, int), np.zeros(33, bool))
+    >>> path = ToolPoses(line, np.tile([0.0, 0.0, 1.0], (33, 1)), np.ones(33, int), np.zeros(33, bool))
     >>> box = trimesh.creation.box(bounds=[[0, 0, 0], [20, 20, 10]])
     >>> mesh = removal_mesh(box, path, {1: Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5)})
     >>> [round(float(v), -2) for v in mesh.volumes[[0, -1]]]  # a slot 10 wide and 4 deep

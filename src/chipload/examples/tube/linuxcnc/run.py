@@ -39,7 +39,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from sensor_fault import FAULTS, PINS, SensorWithFault  # type: ignore[import-not-found]  # beside this file
 
 from chipload.control.hal import COLUMNS, HalJob
 from chipload.control.hal_file import load_hal
@@ -191,6 +190,8 @@ def play(args: argparse.Namespace) -> dict[str, object]:
     killed = None
     with LinuxCNC(result / PROGRAM, lost, seconds) as cnc:
         command = [sys.executable, "-c", "from chipload.cli import main; main()", "hal", str(out / "hal.toml")]
+        from sensor_fault import PINS, SensorWithFault  # type: ignore[import-not-found]
+
         sensor = None if args.fault is None else SensorWithFault(job, args.fault, args.fault_at)
         pins = () if sensor is None else PINS
         controller = subprocess.Popen([*command, *pins, "--out", str(out / "control.csv")], env=os.environ.copy())
@@ -354,6 +355,9 @@ def summed(job: HalJob, rows: np.ndarray, control: np.ndarray, killed: float | N
 
 def main() -> int:
     """Parse, run, show."""
+    # a script has the folder that it stands in on its path
+    from sensor_fault import FAULTS  # type: ignore[import-not-found]
+
     parser = argparse.ArgumentParser(description="A round pass on a tube under LinuxCNC, torque held.")
     parser.add_argument("out", type=Path, help="folder for the results")
     parser.add_argument("--result", type=Path, metavar="DIR", help="result of the job; none: it is run first")
