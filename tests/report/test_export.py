@@ -183,8 +183,8 @@ def test_a_long_sheet_is_one_page_and_says_what_it_leaves_out(result: Path) -> N
     text = read_pdf(setup_pdf(replace(whole, unchecked=many)))
     assert "188 more in report.html" in text
     assert "(\u00b5m, ?)" in text
-    assert one_page("", [SheetLine("word " * 20_000)]) is None
-    assert "HOLDS" in read_pdf(setup_pdf(replace(whole, note="so " * 20_000)))
+    assert one_page("", [SheetLine("word " * 4_000)]) is None
+    assert "HOLDS" in read_pdf(setup_pdf(replace(whole, note="so " * 4_000)))
 
 
 def test_what_is_refused(result: Path, exported: Path, tmp_path: Path) -> None:

@@ -79,7 +79,7 @@ EXAMPLES = {
     "material.name": '"al7075-t6"', "catalogue.name": '"wu2019"', "cutter.name": '"end mill 10"',
     "workpiece.name": '"Ti-6Al-4V"', "tools": '"shop.tbl"', "parameters": '{ "#100" = 2.5 }',
     "work_offsets": "{ G55 = [80.0, 0.0, 0.0] }", "placed_in": '"G54"', "low_mm": "[0.0, 0.0, -20.0]",
-    "body_mm": "[[0.0, 0.0], [8.0, 6.0], [8.0, 20.0]]",
+    "body_mm": "[[0.0, 0.0], [8.0, 6.0], [8.0, 20.0]]", "at_mm": "[40.0, 0.0, 8.0]",
     "high_mm": "[60.0, 40.0, 0.0]", "holder_mm": "[[20.0, 25.0], [30.0, 40.0]]",
     "pitch_deg": "[88.0, 92.0, 88.0, 92.0]", "layers": '["WALL"]',
     "strategies": '["plain", "backward"]', "allowance_mm": "0.2", "wall.allowance_mm": "[0.3, 0.3]",
