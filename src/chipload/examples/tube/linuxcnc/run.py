@@ -356,7 +356,7 @@ def summed(job: HalJob, rows: np.ndarray, control: np.ndarray, killed: float | N
 def main() -> int:
     """Parse, run, show."""
     # a script has the folder that it stands in on its path
-    from sensor_fault import FAULTS  # type: ignore[import-not-found]
+    from sensor_fault import FAULTS
 
     parser = argparse.ArgumentParser(description="A round pass on a tube under LinuxCNC, torque held.")
     parser.add_argument("out", type=Path, help="folder for the results")
