@@ -1,4 +1,4 @@
-# make demo | test | quick | docs | real | package | reference | lock
+# make demo | test | quick | coverage | docs | real | package | reference | lock
 SHELL := /bin/bash
 PYTHON ?= $(shell /usr/bin/python3 -c 'import sys; print("/usr/bin/python3" if sys.version_info >= (3, 11) else "python3")' 2>/dev/null || echo python3)
 VENV := .venv
@@ -7,7 +7,7 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 export NO_MKDOCS_2_WARNING := 1
 export NUMBA_CACHE_DIR := $(CURDIR)/$(VENV)/numba
 
-.PHONY: setup test quick docs real package demo reference lock
+.PHONY: setup test quick coverage docs real package demo reference lock
 .DELETE_ON_ERROR:
 
 # what runs jobs and shows the page
@@ -36,6 +36,12 @@ test: setup
 # the tests marked core, within 3 minutes on two cores
 quick: setup
 	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal -q -m core tests
+
+# which share of each package the tests run; about twice the time of the tests
+coverage: setup
+	rm -f .coverage .coverage.*
+	OPENBLAS_NUM_THREADS=1 $(BIN)/coverage run -m pytest -n 2 --dist worksteal -q
+	$(BIN)/python tools/coverage_by_package.py
 
 docs: setup
 	$(BIN)/mkdocs build --strict --site-dir site

@@ -12,14 +12,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from chipload.cutter.cutter import Cutter
 from chipload.engagement.chips.covered import covered_polygons
 from chipload.engagement.chips.move import LEAST_AXIS_Z, Move
+from chipload.engagement.chips.section import cutter_numbers
 from chipload.errors import InputError
+from chipload.simulation.flute_end import Tiles, in_air, met
 from chipload.simulation.reach import reached
 from chipload.simulation.steps import Steps
 from chipload.stock.layers import LayeredStock
@@ -61,22 +62,23 @@ def swept_ahead(
         Beside or in the stock the axis lies, or looks down.
     """
     low, high, near = _near_stock(steps, stock, cutters)
+    before = stock.tiles.copy()
 
     def swept(part: range) -> list[tuple[int, Swept]]:
         found: dict[int, Met] = {}
         ranges = {k: stock.layers_between(low[k, 2], high[k, 2]) for k in part if near[k]}
         ranges = {k: layers for k, layers in ranges.items() if layers}
+        profiles = list(_profiles(steps, ranges, cutters, stock, before, tolerance))
         for k, left in _left(steps, ranges, low, high, cutters, stock).items():
             # an axis that lies is refused in air too
             if left.any() or min(steps.a0[k, 2], steps.a1[k, 2]) < 2.0 * LEAST_AXIS_Z:
                 found[k] = _move(steps, k, interpolation), ranges[k], left
         out: dict[int, Swept] = {}
-        for tool in sorted({int(steps.tool[k]) for k in found}):
-            own = {k: both for k, both in found.items() if steps.tool[k] == tool}
-            for (k, (move, layers, _)), met in zip(
-                own.items(), _covered(steps, own, cutters[tool], stock, tolerance), strict=True
-            ):
-                out[k] = Swept(move, low[k], high[k], layers, met)
+        for tool, K, those in profiles:
+            own = {k: both for k, both in found.items() if k in those}
+            areas = _covered(steps, own, cutters[tool], K, stock, tolerance) if own else []
+            for (k, (move, layers, _)), covered in zip(own.items(), areas, strict=True):
+                out[k] = Swept(move, low[k], high[k], layers, covered)
         return sorted(out.items())
 
     parts = [range(i, min(i + TOGETHER, len(steps))) for i in range(0, len(steps), TOGETHER)]
@@ -135,28 +137,41 @@ def _left(
     of = list(ranges)
     counts = [len(layers) for layers in ranges.values()]
     step, layer = np.repeat(of, counts), np.concatenate([np.array(r) for r in ranges.values()])
-    a, b = low[step, :2], high[step, :2]
-    boxes = shapely.box(a[:, 0], a[:, 1], b[:, 0], b[:, 1])
-    i0, j0 = np.searchsorted(stock.xs, a[:, 0], "right"), np.searchsorted(stock.ys, a[:, 1], "right")
-    i1, j1 = np.searchsorted(stock.xs, b[:, 0], "left"), np.searchsorted(stock.ys, b[:, 1], "left")
-    i0, j0 = np.maximum(i0 - 1, 0), np.maximum(j0 - 1, 0)
-    i1, j1 = np.minimum(i1, len(stock.xs) - 1), np.minimum(j1, len(stock.ys) - 1)
-    left = np.zeros(len(step), dtype=np.bool_)
-    for dj in range(int((j1 - j0).max(initial=0))):
-        for di in range(int((i1 - i0).max(initial=0))):
-            ask = np.flatnonzero(~left & (j0 + dj < j1) & (i0 + di < i1))
-            left[ask] = shapely.intersects(boxes[ask], stock.tiles[layer[ask], j0[ask] + dj, i0[ask] + di])
+    left = met(stock.tiles, stock, layer, low[step, :2], high[step, :2])
     out = dict(zip(of, np.split(left, np.cumsum(counts)[:-1]), strict=True))
     for tool in np.unique(steps.tool[of]).tolist():
         lean = [k for k in of if steps.tool[k] == tool and out[k].any() and min(steps.a0[k, 2], steps.a1[k, 2]) < 1.0]
         asked = [np.array(ranges[k])[out[k]] for k in lean]
-        for k, met in zip(lean, reached(steps, lean, asked, cutters[tool], stock), strict=True):
-            out[k] = np.isin(ranges[k], met)
+        for k, near in zip(lean, reached(steps, lean, asked, cutters[tool], stock), strict=True):
+            out[k] = np.isin(ranges[k], near)
     return out
 
 
+def _profiles(
+    steps: Steps,
+    ranges: Mapping[int, range],
+    cutters: Mapping[int, Cutter],
+    stock: LayeredStock,
+    before: Tiles,
+    tolerance: float,
+) -> Iterator[tuple[int, Floats, set[int]]]:
+    """Each tool with the numbers of its cutter, or of a longer one (:mod:`chipload.simulation.flute_end`), and the
+    steps that these stand for.
+
+    Parameters
+    ----------
+    before : tiles of the stock before all steps of the block
+    """
+    for tool in sorted({int(steps.tool[k]) for k in ranges}):
+        own = {k: layers for k, layers in ranges.items() if steps.tool[k] == tool}
+        K = cutter_numbers(cutters[tool])
+        longer, those = in_air(steps, own, K, stock, before, tolerance)
+        yield tool, K, own.keys() - those
+        yield tool, longer, those
+
+
 def _covered(
-    steps: Steps, own: Mapping[int, Met], cutter: Cutter, stock: LayeredStock, tolerance: float
+    steps: Steps, own: Mapping[int, Met], cutter: Cutter, K: Floats, stock: LayeredStock, tolerance: float
 ) -> list[list[tuple[int, Polygon | MultiPolygon]]]:
     """What steps cover of each layer that they meet; layers that an upright flank crosses share one polygon."""
     heights = stock.heights
@@ -173,7 +188,7 @@ def _covered(
             asked[-1] = np.append(asked[-1], z[flank][0])
             rows[flank] = len(asked[-1]) - 1
         of.append(np.where(left, rows, -1))
-    shapes = covered_polygons([move for move, _, _ in own.values()], cutter, asked, tolerance)
+    shapes = covered_polygons([move for move, _, _ in own.values()], K, asked, tolerance)
     return [
         [(i, shape) for i, n in zip(layers, rows.tolist(), strict=True) if n >= 0 and (shape := found[n]) is not None]
         for (_, layers, _), rows, found in zip(own.values(), of, shapes, strict=True)

@@ -11,6 +11,7 @@ import shapely
 from chipload.cutter.cutter import Cutter
 from chipload.engagement.chips.covered import covered, covered_polygons
 from chipload.engagement.chips.move import LEAST_AXIS_Z, Move
+from chipload.engagement.chips.section import cutter_numbers
 from chipload.errors import InputError
 from chipload.machine.machine import machine_named
 from engagement.chips.brute import CUTTERS, sections
@@ -160,7 +161,7 @@ def test_along_its_own_leaning_axis(cutter, way, height):
     dense = shapely.unary_union(met)
     assert dense.difference(c.polygon.buffer(2e-3)).area < 1e-9
     assert c.area == pytest.approx(dense.area, rel=3e-3)
-    (many,) = covered_polygons([move], CUTTERS[cutter], [np.array([height])], 1e-3)
+    (many,) = covered_polygons([move], cutter_numbers(CUTTERS[cutter]), [np.array([height])], 1e-3)
     assert many[0].equals(c.polygon)
 
 

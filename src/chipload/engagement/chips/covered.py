@@ -143,14 +143,17 @@ def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], toleranc
 
 
 def covered_polygons(
-    moves: Sequence[Move], cutter: Cutter, heights: Sequence[Floats], tolerance: float
+    moves: Sequence[Move], K: Floats, heights: Sequence[Floats], tolerance: float
 ) -> list[list[Shape | None]]:
     """``CoveredArea.polygon`` of many layers of many moves: ``heights[m]`` of move m; None where it is never in the
     layer.
 
     One loop over all of them without the interpreter: in threads it costs no more than the areas do.
+
+    Parameters
+    ----------
+    K : of :func:`chipload.engagement.chips.section.cutter_numbers`
     """
-    K = cutter_numbers(cutter)
     along = [_along(move, K, tolerance) for move in moves]
     if not any(along):
         return _polygons(moves, K, heights, tolerance)
@@ -211,8 +214,14 @@ def _polygons(
         shapes[i] = _thick(_untangled(shapes[i]), tolerance)
     for i in np.flatnonzero(count == GENERAL).tolist():
         move = moves[int(np.searchsorted(first, i, "right")) - 1]
-        area = _noded(move, K, float(levels[i]), tolerance, max(_KNOTS, 4 * int(knots[i])))
-        shapes[i] = None if area is None else area.polygon
+        found = _noded_shape(
+            _candidates(move, K, float(levels[i]), tolerance, max(_KNOTS, 4 * int(knots[i]))),
+            move,
+            K,
+            float(levels[i]),
+            tolerance,
+        )
+        shapes[i] = None if found is None else _thick(found, tolerance)
     return [list(shapes[a:b]) for a, b in itertools.pairwise(first.tolist())]
 
 
@@ -310,8 +319,16 @@ def whole_section(move: Move, K: Floats, h: float, t: float, tolerance: float) -
 
 
 def _noded(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> CoveredArea | None:
-    """The general case: faces between all pieces, those kept that some section covers."""
+    """The general case, with the origin of each edge."""
     edges = _candidates(move, K, h, tolerance, knots)
+    whole = _noded_shape(edges, move, K, h, tolerance)
+    if whole is None:
+        return None
+    return CoveredArea(_without_slivers(rings_of_polygons(whole, edges), tolerance), h, tolerance, False)
+
+
+def _noded_shape(edges: Floats, move: Move, K: Floats, h: float, tolerance: float) -> Shape | None:
+    """Faces between all pieces of the diagram, those kept that some section covers."""
     if len(edges) == 0:
         return None
     lines = shapely.line_merge(shapely.multilinestrings(edges[:, :4].reshape(-1, 2, 2)))
@@ -326,9 +343,7 @@ def _noded(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> Cov
     faces.covered_points(move.tip, move.axis, K, h, points, over, 0.01 * tolerance, inside)
     if not inside.any():
         return None
-    whole = shapely.unary_union(found[inside])
-    rings = rings_of_polygons(whole, edges)
-    return CoveredArea(_without_slivers(rings, tolerance), h, tolerance, False)
+    return cast(Shape, shapely.unary_union(found[inside]))
 
 
 def _without_slivers(rings: tuple[Ring, ...], tolerance: float) -> tuple[Ring, ...]:

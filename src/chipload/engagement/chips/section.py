@@ -38,6 +38,14 @@ def cutter_numbers(cutter: Cutter) -> Floats:
     return out
 
 
+def lengthened(K: Floats, length: float) -> Floats:
+    """The numbers of a cutter whose flutes go on to another length [mm] along its flank."""
+    out = K.copy()
+    out[10], out[11] = length, K[9] + length * K[8]
+    out.setflags(write=False)
+    return out
+
+
 @dataclass(frozen=True, eq=False)
 class SectionEdge:
     """Points of the edge of a section.
