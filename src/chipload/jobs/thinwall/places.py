@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +22,29 @@ from chipload.jobs.thinwall.mesh_error import error_at, mesh_error
 from chipload.planning.thinwall.blank import SIDES, FinishSurface
 from chipload.planning.thinwall.passes import ThresholdOf
 from chipload.planning.thinwall.threshold import Threshold, modelled
+from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]
+
+#: side of a tile of the stock, in diameters of the cutter
+TILE = 1.0
+#: layers below the reach of the cutter are so many times as thick
+COARSE = 8.0
+
+
+def wall_stock(inputs: WallInputs) -> LayeredStock:
+    """The workpiece before it is cut, in layers that are thin where the cutter comes.
+
+    Raises
+    ------
+    InputError
+        There are too many layers.
+    """
+    op, cutter = inputs.job.operation, inputs.cut.cutter
+    stock = LayeredStock.of_mesh(inputs.stock_mesh(), COARSE * op.layer_mm, TILE * cutter.diameter)
+    low = inputs.foot_height - cutter.corner_radius
+    stock.refine(max(low, float(stock.bounds[0])), float(stock.bounds[-1]), op.layer_mm)
+    return stock
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +65,11 @@ class Places:
     chatter: WallChatter | None = None
     _solved: dict[tuple[bytes, int], Floats] = field(default_factory=dict)
     _errors: dict[int, Floats] = field(default_factory=dict)
+
+    @cached_property
+    def uncut(self) -> LayeredStock:
+        """The stock before it is cut: copied by what cuts it."""
+        return wall_stock(self.inputs)
 
     @property
     def grid(self) -> tuple[Floats, Floats]:

@@ -40,10 +40,6 @@ from chipload.structure.stress import greatest
 
 Floats = NDArray[np.float64]
 
-#: side of a tile of the stock, in diameters of the cutter
-TILE = 1.0
-#: layers below the reach of the cutter are so many times as thick
-COARSE = 8.0
 #: places of a step at which the wall is judged: its beginning, middle and end
 JUDGED, MIDDLE = (0.0, 0.5, 1.0), 1
 #: variants whose stock is even
@@ -75,21 +71,6 @@ class Proof:
     find_load_error: Callable[[], Mapping[str, float]]
 
 
-def wall_stock(inputs: WallInputs) -> LayeredStock:
-    """The workpiece before it is cut, in layers that are thin where the cutter comes.
-
-    Raises
-    ------
-    InputError
-        There are too many layers.
-    """
-    op, cutter = inputs.job.operation, inputs.cut.cutter
-    stock = LayeredStock.of_mesh(inputs.stock_mesh(), COARSE * op.layer_mm, TILE * cutter.diameter)
-    low = inputs.foot_height - cutter.corner_radius
-    stock.refine(max(low, float(stock.bounds[0])), float(stock.bounds[-1]), op.layer_mm)
-    return stock
-
-
 def resolution_of(inputs: WallInputs, legs: Sequence[PassProgram]) -> Resolution:
     """How fine the simulation looks: a row of the passes is a step."""
     op = inputs.job.operation
@@ -106,7 +87,7 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
     """
     inputs = places.inputs
     cutter = inputs.cut.cutter
-    stock, fine = wall_stock(inputs), resolution_of(inputs, legs)
+    stock, fine = places.uncut.copied(), resolution_of(inputs, legs)
     bars = {cutter.number: tool_bars(cutter)}
     law = inputs.depths.even_law if plan.name in EVEN else inputs.depths.law
     left = [np.full(places.shape, inputs.body.allowance[s]) for s in inputs.body.side_numbers]

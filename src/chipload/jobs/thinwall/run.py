@@ -21,8 +21,8 @@ from chipload.jobs.thinwall.outcome import (
     WallGeometry,
     WallPlanning,
 )
-from chipload.jobs.thinwall.places import places_of
-from chipload.jobs.thinwall.proof import resolution_of, wall_stock
+from chipload.jobs.thinwall.places import places_of, wall_stock
+from chipload.jobs.thinwall.proof import resolution_of
 from chipload.jobs.thinwall.tries import Tried, compared_variants, constant_within, unlimited_plan, variable_within
 from chipload.jobs.thinwall.wall_program import linked, on_machine
 from chipload.planning.thinwall.blank import SIDES
