@@ -49,16 +49,26 @@ def groups_of(tips: Any, axes: Any, size: int, out: Any) -> None:
 
 
 @njit(cache=True, nogil=True)
-def out_of_reach(group: Any, middle: Any, half: float, widest: float, lowest_start: float) -> bool:
+def apart(h: float, d: float, start: float, shape: Any) -> float:
+    """How far a point at the height h above the tip, d from the axis, is at least from a part; below 0 inside."""
+    x, r, e = h - start - shape[2], shape[0], shape[1]
+    if x <= 0.0:
+        return float(math.sqrt((d - e) * (d - e) + x * x) - r if d > e else -x - r)
+    return float(max(d - e - r, h - start - shape[8]))
+
+
+@njit(cache=True, nogil=True)
+def out_of_reach(group: Any, middle: Any, half: float, starts: Any, shapes: Any) -> bool:
     """Whether no move of a group can meet the ray of half the length ``half`` round its ``middle``."""
     x, y, z = middle[0] - group[0], middle[1] - group[1], middle[2] - group[2]
     far = math.sqrt(x * x + y * y + z * z)
     h = x * group[4] + y * group[5] + z * group[6]
     slack = group[3] + far * group[7] + half
-    if h < lowest_start - slack:
-        return True
-    away = math.sqrt(max(far * far - h * h, 0.0))
-    return bool(away > widest + slack)
+    d = math.sqrt(max(far * far - h * h, 0.0))
+    nearest = math.inf
+    for part in range(len(shapes)):
+        nearest = min(nearest, apart(h, d, starts[part], shapes[part]))
+    return bool(nearest > slack)
 
 
 @njit(cache=True, nogil=True)
@@ -145,6 +155,24 @@ def least_near(
 
 
 @njit(cache=True, nogil=True)
+def along(S: Any, frame: Any, depth: float, top: float, middle: Any) -> float:
+    """Half the length of the ray from -depth to ``top``; its ``middle``."""
+    for j in range(3):
+        middle[j] = S[j] + 0.5 * (top - depth) * frame[2, j]
+    return 0.5 * (top + depth)
+
+
+@njit(cache=True, nogil=True)
+def highest(low: Any, met: Any) -> float:
+    """The highest of the least s of the kinds of parts that there are."""
+    top = -math.inf
+    for kind in range(len(low)):
+        if met[kind]:
+            top = max(top, low[kind])
+    return top
+
+
+@njit(cache=True, nogil=True)
 def left(
     points: Any, frames: Any, tips: Any, axes: Any, groups: Any, size: int, starts: Any, shapes: Any, cutting: Any,
     depth: float,
@@ -154,29 +182,24 @@ def left(
     """For the points ``first``..``last``: ``rest`` [mm] above the surface that no cutting move takes, ``gouge`` [mm]
     the deepest below it that any part comes, the rows that do, the part. ``cutting`` (n,) whether a row feeds.
     """
-    tip, axis = np.empty(3), np.empty(3)
+    tip, axis, middle = np.empty(3), np.empty(3), np.empty(3)
     n, parts = len(tips), len(shapes)
-    half = 0.5 * (height + depth)
-    widest, least = 0.0, height
-    for part in range(parts):
-        widest, least = max(widest, shapes[part, 9]), min(least, starts[part])
     for i in range(first, last):
         S, frame = points[i], frames[i]
-        middle = S + 0.5 * (height - depth) * frame[2]
+        # of the ray counts what is below the least that is known
+        top = max(rest[i], 0.0)
+        half = along(S, frame, depth, top, middle)
         k = 0
         while k + 1 < n:
             k += 1
             # the moves of a group are left out together
-            if (k - 1) % size == 0 and out_of_reach(groups[(k - 1) // size], middle, half, widest, least):
+            if (k - 1) % size == 0 and out_of_reach(groups[(k - 1) // size], middle, half, starts, shapes):
                 k += size - 1
                 continue
             sweep, h, d2 = seen_from(middle, tips, axes, k, half)
-            slack = sweep + half
-            if h < -slack:
-                continue
+            slack, d = sweep + half, math.sqrt(max(d2, 0.0))
             for part in range(parts):
-                big = shapes[part, 9] + slack
-                if d2 > big * big or h < starts[part] - slack or h > starts[part] + shapes[part, 8] + slack:
+                if apart(h, d, starts[part], shapes[part]) > slack:
                     continue
                 count = max(1, math.ceil(sweep / step))
                 best, at = least_of(
@@ -192,6 +215,9 @@ def left(
                     )  # fmt: skip
                 if part == 0 and cutting[k] and best < rest[i]:
                     rest[i], rest_row[i] = best, k
+                    if top > 0.0:
+                        top = max(best, 0.0)
+                        half = along(S, frame, depth, top, middle)
                 if -best > gouge[i]:
                     gouge[i], gouge_row[i], gouge_part[i] = -best, k, part
 
@@ -205,27 +231,27 @@ def lowest(
     """The least s of the ray of each point in the parts of each of the ``kinds`` 0..2, into ``low`` (n, 3), which holds
     ``height``; the row and the part where it is met into ``rows``, ``part_of`` (n, 3).
     """
-    tip, axis = np.empty(3), np.empty(3)
+    tip, axis, middle = np.empty(3), np.empty(3), np.empty(3)
     n, parts = len(tips), len(shapes)
-    half = 0.5 * (height + depth)
-    widest, least = 0.0, height
+    met = np.zeros(3, dtype=np.bool_)
     for part in range(parts):
-        widest, least = max(widest, shapes[part, 9]), min(least, starts[part])
+        met[kinds[part]] = True
     for i in range(len(points)):
         S, frame = points[i], frames[i]
-        middle = S + 0.5 * (height - depth) * frame[2]
+        # of the ray counts what is below the least that is known of each kind
+        top = highest(low[i], met)
+        half = along(S, frame, depth, top, middle)
         k = 0
         while k + 1 < n:
             k += 1
             # the moves of a group are left out together
-            if (k - 1) % size == 0 and out_of_reach(groups[(k - 1) // size], middle, half, widest, least):
+            if (k - 1) % size == 0 and out_of_reach(groups[(k - 1) // size], middle, half, starts, shapes):
                 k += size - 1
                 continue
             sweep, h, d2 = seen_from(middle, tips, axes, k, half)
-            slack = sweep + half
+            slack, d = sweep + half, math.sqrt(max(d2, 0.0))
             for part in range(parts):
-                big = shapes[part, 9] + slack
-                if d2 > big * big or h < starts[part] - slack or h > starts[part] + shapes[part, 8] + slack:
+                if apart(h, d, starts[part], shapes[part]) > slack:
                     continue
                 kind = kinds[part]
                 count = max(1, math.ceil(sweep / step))
@@ -240,3 +266,5 @@ def lowest(
                 )
                 if best < low[i, kind]:
                     low[i, kind], rows[i, kind], part_of[i, kind] = best, k, part
+                    top = highest(low[i], met)
+                    half = along(S, frame, depth, top, middle)
