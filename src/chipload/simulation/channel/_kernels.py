@@ -18,6 +18,10 @@ from chipload.stock.dexels._kernels import pierce
 
 _GOLDEN = 0.6180339887498949
 _STEPS = 14
+#: of the sweep of a move, how far its poses are from the one half-way, turns included
+_HALF = 0.55
+#: between two instants a part comes lower than at both by less than this [mm]: for what is left, for gouges
+_LEFT, _DIP = 0.1, 0.05
 
 
 @njit(cache=True, nogil=True)
@@ -102,27 +106,51 @@ def lower(
 
 @njit(cache=True, nogil=True)
 def seen_from(middle: Any, tips: Any, axes: Any, k: int, half: float) -> tuple[float, float, float]:
-    """How far the tool sweeps past the ray of half length ``half`` about ``middle`` in move k; from its end the height
-    of ``middle`` along the axis, and the square of its distance from the axis.
+    """How far the tool sweeps past the ray of half length ``half`` about ``middle`` in move k; half-way through it the
+    height of ``middle`` along the axis, and its distance from the axis.
     """
-    ax, ay, az = axes[k, 0], axes[k, 1], axes[k, 2]
-    x, y, z = middle[0] - tips[k, 0], middle[1] - tips[k, 1], middle[2] - tips[k, 2]
-    dx, dy, dz = tips[k, 0] - tips[k - 1, 0], tips[k, 1] - tips[k - 1, 1], tips[k, 2] - tips[k - 1, 2]
-    bx, by, bz = ax - axes[k - 1, 0], ay - axes[k - 1, 1], az - axes[k - 1, 2]
-    long = math.sqrt(dx * dx + dy * dy + dz * dz)
-    far = math.sqrt(x * x + y * y + z * z)
-    h = x * ax + y * ay + z * az
-    return long + math.sqrt(bx * bx + by * by + bz * bz) * (far + long + half), h, far * far - h * h
+    norm = h = far2 = long2 = turn2 = 0.0
+    for j in range(3):
+        a = axes[k, j] + axes[k - 1, j]
+        x = middle[j] - 0.5 * (tips[k, j] + tips[k - 1, j])
+        norm += a * a
+        h += a * x
+        far2 += x * x
+        long2 += (tips[k, j] - tips[k - 1, j]) ** 2
+        turn2 += (axes[k, j] - axes[k - 1, j]) ** 2
+    h /= math.sqrt(norm)
+    long = math.sqrt(long2)
+    sweep = long + math.sqrt(turn2) * (math.sqrt(far2) + long + half)
+    return sweep, h, math.sqrt(max(far2 - h * h, 0.0))
+
+
+@njit(cache=True, nogil=True)
+def away_at(t: float, tips: Any, axes: Any, k: int, start: float, shape: Any, middle: Any) -> float:
+    """How far the point ``middle`` is at least from the part at the share ``t`` of move k."""
+    norm = h = far = 0.0
+    for j in range(3):
+        a = axes[k - 1, j] * (1.0 - t) + axes[k, j] * t
+        x = middle[j] - tips[k - 1, j] * (1.0 - t) - tips[k, j] * t
+        norm += a * a
+        h += a * x
+        far += x * x
+    h /= math.sqrt(norm)
+    return float(apart(h, math.sqrt(max(far - h * h, 0.0)), start, shape))
 
 
 @njit(cache=True, nogil=True)
 def least_of(
     count: int, tips: Any, axes: Any, k: int, start: float, shape: Any, S: Any, frame: Any, depth: float,
-    height: float, tip: Any, axis: Any,
+    height: float, tip: Any, axis: Any, middle: Any, near: float,
 ) -> tuple[float, int]:  # fmt: skip
-    """The least ``lower`` of the instants 0 .. count of move k, and which it is."""
+    """The least ``lower`` of the instants 0 .. count of move k, and which it is.
+
+    Left out are instants at which the part is farther than ``near`` from ``middle``.
+    """
     best, at = height, 0
     for m in range(count + 1):
+        if away_at(m / count, tips, axes, k, start, shape, middle) > near:
+            continue
         s = lower(m / count, tips, axes, k, start, shape, S, frame, depth, height, tip, axis)
         if s < best:
             best, at = s, m
@@ -196,19 +224,20 @@ def left(
             if (k - 1) % size == 0 and out_of_reach(groups[(k - 1) // size], middle, half, starts, shapes):
                 k += size - 1
                 continue
-            sweep, h, d2 = seen_from(middle, tips, axes, k, half)
-            slack, d = sweep + half, math.sqrt(max(d2, 0.0))
+            sweep, h, d = seen_from(middle, tips, axes, k, half)
+            slack = _HALF * sweep + half
             for part in range(parts):
                 if apart(h, d, starts[part], shapes[part]) > slack:
                     continue
                 count = max(1, math.ceil(sweep / step))
                 best, at = least_of(
-                    count, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis
-                )
+                    count, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis,
+                    middle, half + _LEFT,
+                )  # fmt: skip
                 if best >= height:
                     continue
                 known = rest[i] if part == 0 and cutting[k] else height
-                if best - 0.1 < known or best < 0.1:
+                if best - _LEFT < known or best < _LEFT:
                     best = least_near(
                         best, at, count, tol, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip,
                         axis,
@@ -248,18 +277,19 @@ def lowest(
             if (k - 1) % size == 0 and out_of_reach(groups[(k - 1) // size], middle, half, starts, shapes):
                 k += size - 1
                 continue
-            sweep, h, d2 = seen_from(middle, tips, axes, k, half)
-            slack, d = sweep + half, math.sqrt(max(d2, 0.0))
+            sweep, h, d = seen_from(middle, tips, axes, k, half)
+            slack = _HALF * sweep + half
             for part in range(parts):
                 if apart(h, d, starts[part], shapes[part]) > slack:
                     continue
                 kind = kinds[part]
                 count = max(1, math.ceil(sweep / step))
                 best, at = least_of(
-                    count, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis
-                )
+                    count, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis,
+                    middle, half + _DIP,
+                )  # fmt: skip
                 # between two instants a part comes lower by less than this
-                if best >= height or best - 0.05 >= low[i, kind]:
+                if best >= height or best - _DIP >= low[i, kind]:
                     continue
                 best = least_near(
                     best, at, count, tol, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis
