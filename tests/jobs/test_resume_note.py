@@ -22,7 +22,7 @@ from chipload.jobs import load_job, resume_note
         ("pocket", "a contour job does not resume: "),
         ("tube", "a torque job does not resume: "),
         ("plate", "a thinwall job does not resume: "),
-        ("impeller", "an impeller job does not resume: "),
+        ("impeller", ""),
     ],
 )
 def test_what_begins_again_is_said(tmp_path: Path, name: str, note: str) -> None:

@@ -11,7 +11,7 @@ from chipload.planning.impeller.lines import LineMotion
 from chipload.planning.impeller.links import Link, linked
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.programs import program_of
-from chipload.planning.impeller.roughing import RoughingSettings, guarded, layers, roughing
+from chipload.planning.impeller.roughing import RoughingSettings, guarded, layers, roughing, thickened
 from chipload.simulation.channel.channel import left_on, wall
 
 CUTTER = CatalogueCutter(12.0, 2.0, cutting_length=45.0, reach=60.0, holder_diameter=30.0)
@@ -26,7 +26,7 @@ def impeller():
 
 @pytest.fixture(scope="module")
 def rough(impeller):
-    tracks, scene = roughing(impeller, 0, CUTTER, TABLE, HOW, workers=2)
+    tracks, scene = roughing(impeller, 0, CUTTER, TABLE, HOW, workers=2), thickened(impeller, 0, HOW)
     way = linked(
         tracks.tracks, scene, CUTTER, TABLE, 2.0, Link(1.0, 0.3, 0.1, 0.0, 20.0, 5.0), 0.5, "rough", 2.0, one_way=True
     )

@@ -50,7 +50,7 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
         "operation.0.most_cutters=1",
         *(f"surface.{k}.{key}" for k in range(3) for key in ("along=[0.42, 0.58]", "points=[6, 5]")),
     ),
-    "hecc": ("operation.0.tolerance_mm=0.5",),
+    "hecc": ("operation.0.tolerance_mm=0.5", *(f"surface.{k}.points=[8, 4]" for k in range(6))),
 }
 
 

@@ -45,7 +45,7 @@ def run(
 ) -> None:
     """Run a job: plan or read its programs, simulate and check them; write the result folder.
 
-    The same command continues a simulation that was stopped.
+    The same command continues a simulation or an impeller job that was stopped.
     """
 
     def work() -> int:

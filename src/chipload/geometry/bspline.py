@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import make_interp_spline
 
 from chipload.errors import InputError
+from chipload.geometry import _bspline
 
 Floats = NDArray[np.float64]
 
@@ -66,10 +67,11 @@ class BSplinePatch:
         """
         a, b = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(v, dtype=np.float64))
         p, q = self.degrees
-        i, N = basis(self.knots_u, p, a.ravel(), du)
-        j, M = basis(self.knots_v, q, b.ravel(), dv)
-        rows = self.control[i[:, None, None] + np.arange(p + 1)[:, None], j[:, None, None] + np.arange(q + 1)]
-        out: Floats = np.einsum("ki,kj,kijd->kd", N, M, rows)
+        x, y = a.ravel(), b.ravel()
+        _within(self.knots_u, p, x)
+        _within(self.knots_v, q, y)
+        out = np.empty((len(x), 3))
+        _bspline.points_of(self.knots_u, self.knots_v, self.control, p, q, x, y, du, dv, out)
         return out
 
     def normal(self, u: ArrayLike, v: ArrayLike) -> Floats:
@@ -137,6 +139,12 @@ class BSplinePatch:
         )
 
 
+def _within(knots: Floats, degree: int, x: Floats) -> None:
+    """Refuse parameters that are not on the surface."""
+    if (x < knots[degree]).any() or (x > knots[-degree - 1]).any():
+        raise InputError(f"patch: parameter out of {knots[degree]:g}..{knots[-degree - 1]:g}")
+
+
 def basis(knots: Floats, degree: int, x: Floats, derivative: int = 0) -> tuple[NDArray[np.int64], Floats]:
     """First index (k,) of the basis functions that are not 0 at x (k,); their values or derivatives (k, degree + 1).
 
@@ -144,8 +152,7 @@ def basis(knots: Floats, degree: int, x: Floats, derivative: int = 0) -> tuple[N
     >>> N.tolist()
     [[0.75, 0.25]]
     """
-    if (x < knots[degree]).any() or (x > knots[-degree - 1]).any():
-        raise InputError(f"patch: parameter out of {knots[degree]:g}..{knots[-degree - 1]:g}")
+    _within(knots, degree, x)
     count = len(knots) - degree - 1
     span = np.clip(np.searchsorted(knots, x, side="right") - 1, degree, count - 1)
     values = np.ones((len(x), 1))

@@ -68,7 +68,7 @@ CAPABILITIES = (
     Capability("torque", "torque_control", "TorqueJobTable"),
     Capability("feeds", "program", "FeedsJobTable", resumes=True, inner="feeds"),
     Capability("program", "program", "ProgramJobTable", resumes=True),
-    Capability("impeller", "impeller", "ImpellerJobTable"),
+    Capability("impeller", "impeller", "ImpellerJobTable", resumes=True),
     Capability("thinwall", "wall", "ThinWallJobTable"),
     Capability("fit", "measurement", "FitJobTable"),
     Capability("contour", "part", "ContourJobTable"),

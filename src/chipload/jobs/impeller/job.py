@@ -73,6 +73,11 @@ def load(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) -> Impel
     )  # fmt: skip
 
 
+def resume_note(job: ImpellerJob) -> str:
+    """What is not kept while the job runs: nothing that takes long."""
+    return ""
+
+
 def missing(values: Mapping[str, Any]) -> list[str]:
     """What a part lacks or has twice; ``values`` are those of the file."""
     part = values.get("impeller")

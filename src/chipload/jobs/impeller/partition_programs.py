@@ -21,6 +21,7 @@ from chipload.machine.machine import Machine
 from chipload.planning.impeller.assignment import Changes
 from chipload.planning.impeller.compare import CutterChoice, Partition
 from chipload.planning.impeller.costs import Costs, MeasuredCost
+from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.patch import Patch
 from chipload.planning.impeller.settings import (
     CutterSetting,
@@ -37,6 +38,9 @@ from chipload.progress import Progress
 
 #: how often ways are divided at most
 _ROUNDS = 2
+#: shares of the scallop above which rest passes take what is left, where the check finds more than asked; it is planned
+#: again where that is at most this share of what is asked
+_LOWER, _NEARLY = (0.85, 0.75), 1.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +68,7 @@ def checked_partitions(
     machine: Machine,
     paths: PathsTable,
     progress: Progress,
+    keep: Keep = anew,
 ) -> tuple[CheckedPartition, ...]:
     """Each way that mills all, with the programs of its best round.
 
@@ -83,7 +88,7 @@ def checked_partitions(
                 continue
             moved = True
             done = (turn + k / len(ways)) / _ROUNDS
-            plan = _planned(way, partition, job, machine, memory, _from(progress, 0.8 * done))
+            plan = _planned(way, partition, job, machine, memory, _from(progress, 0.8 * done), keep)
             for number, row in _measured(way.costs, plan, machine):
                 rows.setdefault(id(way.costs), []).append((number, row))
             if way.name not in best or plan.seconds < best[way.name].seconds:
@@ -99,11 +104,11 @@ def checked_partitions(
                 kept = best[way.name]
                 best[way.name] = replace(kept, predicted=_predicted(way, kept.partition))
         if turn + 1 < _ROUNDS:
-            partitions = [way.partition(job.workers) for way in ways]
+            partitions = [way.partition(job.workers, keep=keep) for way in ways]
     out = []
     for k, way in enumerate(ways):
         if way.name in best:
-            out.append(_checked(way, best[way.name], job, machine, paths, memory))
+            out.append(_checked(way, best[way.name], job, machine, paths, memory, keep))
         progress(0.8 + 0.2 * (k + 1) / len(ways), f"check of the programs of {way.name}")
     return tuple(out)
 
@@ -138,10 +143,11 @@ def _place(costs: Sequence[Costs], p: Patch) -> tuple[Costs, int, int, float]:
 
 
 def _planned(
-    way: CutterChoice, partition: Partition, job: FinishSettings, machine: Machine, memory: _Memory, progress: Progress
-) -> _Planned:
+    way: CutterChoice, partition: Partition, job: FinishSettings, machine: Machine, memory: _Memory,
+    progress: Progress, keep: Keep,
+) -> _Planned:  # fmt: skip
     own = job.with_catalogue(partition.catalogue)
-    plan = planned(own, partition.division.patches, _changes(way), progress=progress, known=memory.millings)
+    plan = planned(own, partition.division.patches, _changes(way), progress=progress, known=memory.millings, keep=keep)
     each = [float(times_on(s.program, machine).sum()) for s in plan.settings]
     seconds = way.costs[0].terms.repeats * sum(each) + _change_time(plan.settings, way)
     return _Planned(partition, _predicted(way, partition), plan, seconds)
@@ -198,18 +204,41 @@ def _patch_of_rest(
 
 
 def _checked(
-    way: CutterChoice, done: _Planned, job: FinishSettings, machine: Machine, paths: PathsTable, memory: _Memory
-) -> CheckedPartition:
+    way: CutterChoice, done: _Planned, job: FinishSettings, machine: Machine, paths: PathsTable, memory: _Memory,
+    keep: Keep,
+) -> CheckedPartition:  # fmt: skip
     own = job.with_catalogue(done.partition.catalogue)
+    programs, covered = _looked_at(own, done.plan, machine, paths, memory, keep)
+    for aim in _LOWER:
+        if not 1.0 < _most_left(programs, covered) <= _NEARLY:
+            break
+        plan = planned(
+            own, done.partition.division.patches, _changes(way), known=memory.millings, keep=keep, aim=aim
+        )  # fmt: skip
+        again = _looked_at(own, plan, machine, paths, memory, keep)
+        if _most_left(*again) < _most_left(programs, covered):
+            programs, covered = again
+    repeats = way.costs[0].terms.repeats
+    changes = _change_time([p.setting for p in programs], way)
+    return CheckedPartition(done.partition, programs, covered, repeats, done.predicted, changes)
+
+
+def _most_left(programs: Sequence[Checked], covered: Sequence[Covered]) -> float:
+    """The most that is left, as a share of what is asked."""
+    scallops = [x.greatest / x.asked for p in programs for x in p.scallops]
+    return max([*scallops, *(c.greatest[0] / c.asked for c in covered)], default=0.0)
+
+
+def _looked_at(
+    own: FinishSettings, plan: PlannedSettings, machine: Machine, paths: PathsTable, memory: _Memory, keep: Keep
+) -> tuple[tuple[Checked, ...], tuple[Covered, ...]]:
+    """The programs of a plan with what the check finds; of like programs once."""
     text = hashlib.sha256()
-    for s in done.plan.settings:
+    for s in plan.settings:
         for column in (s.program.motion, s.program.p_work, s.program.axis, s.program.feed):
             text.update(np.ascontiguousarray(column).tobytes())
         text.update(repr(s.cutter).encode())
     key = text.hexdigest()
     if key not in memory.checks:
-        memory.checks[key] = checked_programs(own, machine, done.plan, paths, lambda _done, _what: None)
-    programs, covered = memory.checks[key]
-    repeats = way.costs[0].terms.repeats
-    changes = _change_time([p.setting for p in programs], way)
-    return CheckedPartition(done.partition, programs, covered, repeats, done.predicted, changes)
+        memory.checks[key] = checked_programs(own, machine, plan, paths, keep)
+    return memory.checks[key]

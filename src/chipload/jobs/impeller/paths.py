@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,20 +19,20 @@ from chipload.planning.impeller.coverage import between_lines
 from chipload.planning.impeller.covering.covering import Covering
 from chipload.planning.impeller.floor import patch_of
 from chipload.planning.impeller.impeller import Impeller
+from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.lines import LineMotion
 from chipload.planning.impeller.links import Link
 from chipload.planning.impeller.paths import PatchFinish
 from chipload.planning.impeller.programs import pallet_rate, too_fast
-from chipload.planning.impeller.settings import FinishSettings, Milling, PlannedSettings, channel_scene
+from chipload.planning.impeller.settings import CutterSetting, FinishSettings, Milling, PlannedSettings, channel_scene
 from chipload.planning.impeller.surfaces import BODIES, ContactSampling
 from chipload.planning.impeller.tables import IndexTable
 from chipload.program.check import check_program
 from chipload.program.program import Program
 from chipload.program.read import times_on
 from chipload.program.to_axes import to_axes
-from chipload.progress import Progress
 from chipload.simulation.channel.channel import Remainder, SurfacePoints, left_on, scallop_numbers, wall
-from chipload.simulation.channel.gouges import deepest_gouge
+from chipload.simulation.channel.gouges import Gouge, deepest_gouge
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 #: of a lift at the feed of the cut where the job does not state it [mm]
@@ -77,7 +78,7 @@ def finish_settings(
 
 
 def checked_programs(
-    job: FinishSettings, machine: Machine, plan: PlannedSettings, paths: PathsTable, progress: Progress
+    job: FinishSettings, machine: Machine, plan: PlannedSettings, paths: PathsTable, keep: Keep = anew
 ) -> tuple[tuple[Checked, ...], tuple[Covered, ...]]:
     """A program for each setting with what the check finds; what all of them leave on each surface."""
     impeller, asked, settings = job.impeller, job.how.scallop, plan.settings
@@ -87,10 +88,7 @@ def checked_programs(
     whole = [_whole(job, body, side, millings) for body, side in faces]
     coarse = walls_of(impeller, job.ahead)
     walls = [*dense, *whole]
-    found = []
-    for k, setting in enumerate(settings, 1):
-        found.append(left_on(walls, setting.program, setting.cutter, _HEIGHT, _DEPTH, workers=job.workers))
-        progress(k / len(settings), f"check of {k} programs")
+    found = [_left(job, walls, setting, keep) for setting in settings]
     # what is left is what no program takes
     rest = [replace(same[0], rest=np.min([x.rest for x in same], axis=0)) for same in zip(*found, strict=True)]
     crests = iter(rest)
@@ -100,9 +98,7 @@ def checked_programs(
         scallops = tuple(_scallop(m, next(crests), asked) for m in setting.millings)
         _, findings = to_axes(program, machine)
         said = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
-        gouge = deepest_gouge(
-            coarse, program, setting.cutter, _DEPTH, _RESOLUTION * paths.gouge_mm, paths.gouge_mm, workers=job.workers
-        )
+        gouge = _gouge(job, coarse, setting, paths, keep)
         rows = times_on(program, machine)
         seconds, cutting = float(rows.sum()), float(rows[in_cut(program)].sum())
         between = between_channels(program, machine, impeller.blades)
@@ -113,6 +109,41 @@ def checked_programs(
         for face, left in zip(faces, rest[len(dense) :], strict=True)
     )
     return tuple(out), covered
+
+
+def _moves_key(setting: CutterSetting) -> tuple[object, ...]:
+    """What the checks of a program depend on beside the walls."""
+    program = setting.program
+    return (setting.cutter, program.motion, program.p_work, program.axis)
+
+
+def _left(
+    job: FinishSettings, walls: Sequence[SurfacePoints], setting: CutterSetting, keep: Keep
+) -> tuple[Remainder, ...]:
+    """What a program leaves on each wall."""
+
+    def columns() -> list[list[NDArray[Any]]]:
+        found = left_on(walls, setting.program, setting.cutter, _HEIGHT, _DEPTH, workers=job.workers)
+        return [[x.rest, x.gouge, x.row, x.part] for x in found]
+
+    got = keep(("left", *_moves_key(setting), [w.points for w in walls]), columns)
+    return tuple(
+        Remainder(w, rest, gouge, row, part, _HEIGHT, _DEPTH)
+        for w, (rest, gouge, row, part) in zip(walls, got, strict=True)
+    )
+
+
+def _gouge(
+    job: FinishSettings, walls: Sequence[SurfacePoints], setting: CutterSetting, paths: PathsTable, keep: Keep
+) -> Gouge:
+    """The deepest gouge of a program."""
+    allowed = paths.gouge_mm
+    return keep(
+        ("gouge", *_moves_key(setting)),
+        lambda: deepest_gouge(
+            walls, setting.program, setting.cutter, _DEPTH, _RESOLUTION * allowed, allowed, workers=job.workers
+        ),
+    )
 
 
 def in_cut(program: Program) -> NDArray[np.bool_]:

@@ -18,6 +18,7 @@ from chipload.jobs.impeller.tables import ImpellerOperationTable, PathsTable, Ro
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.floor import meridian
 from chipload.planning.impeller.impeller import Impeller
+from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.lines import LineMotion
 from chipload.planning.impeller.links import Link
 from chipload.planning.impeller.programs import pallet_rate, too_fast
@@ -30,7 +31,7 @@ from chipload.program.read import times_on
 from chipload.program.to_axes import to_axes
 from chipload.progress import Progress
 from chipload.simulation.channel.channel import SurfacePoints, left_on
-from chipload.simulation.channel.gouges import deepest_gouge
+from chipload.simulation.channel.gouges import Gouge, deepest_gouge
 from chipload.simulation.channel.stock import ChannelRemoval, sector, taken_from
 from chipload.stock.dexel import TriDexel
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
@@ -50,9 +51,7 @@ _LEAST = 1e-3
 def checked_roughing(
     impeller: Impeller, machine: Machine, table: IndexTable, catalogue: Catalogue, stated: CatalogueCutter | None,
     op: ImpellerOperationTable, paths: PathsTable, rough: RoughTable, walls: Sequence[SurfacePoints],
-    ahead: float, workers:
-    int,
-    progress: Progress,
+    ahead: float, workers: int, progress: Progress, keep: Keep = anew,
 ) -> tuple[CheckedRough, ...]:  # fmt: skip
     """A roughing program for each channel and table angle, each with what the checks find.
 
@@ -73,7 +72,7 @@ def checked_roughing(
     )  # fmt: skip
     plans = roughed(
         impeller, catalogue, stated, how, link, rad_s_from_rpm(rough.speed_rpm), table, rough.share, ahead, workers,
-        lambda done, what: progress(0.6 * done, what),
+        lambda done, what: progress(0.6 * done, what), keep,
     )  # fmt: skip
     out: list[CheckedRough] = []
     stock: dict[int, TriDexel] = {}
@@ -88,7 +87,7 @@ def checked_roughing(
             numbered = safe.numbered(len(out) + 1)
             out.append(
                 _checked(
-                    machine, numbered, taken, rough.touch_mm3, paths, walls, workers, table, impeller.blades
+                    machine, numbered, taken, rough.touch_mm3, paths, walls, workers, table, impeller.blades, keep
                 )
             )  # fmt: skip
         progress(0.6 + 0.4 * (k + 1) / len(plans), f"check of {k + 1} roughing programs")
@@ -115,22 +114,28 @@ def without_touch(
 def _checked(
     machine: Machine, plan: RoughingSetting, taken: ChannelRemoval, touch: float, paths: PathsTable, walls:
     Sequence[SurfacePoints],
-    workers: int, table: IndexTable, blades: int,
+    workers: int, table: IndexTable, blades: int, keep: Keep,
 ) -> CheckedRough:  # fmt: skip
     program = plan.program
-    found = left_on(walls, program, plan.cutter, _HEIGHT, _DEPTH, step=_STEP, workers=workers)
-    gouge = deepest_gouge(
-        walls, program, plan.cutter, _DEPTH, _RESOLUTION * paths.gouge_mm, paths.gouge_mm, step=_STEP, workers=workers
-    )
+    allowed = paths.gouge_mm
+
+    def looked() -> tuple[Gouge, list[float]]:
+        found = left_on(walls, program, plan.cutter, _HEIGHT, _DEPTH, step=_STEP, workers=workers)
+        deep = deepest_gouge(
+            walls, program, plan.cutter, _DEPTH, _RESOLUTION * allowed, allowed, step=_STEP, workers=workers
+        )
+        return deep, [float(x.rest.min()) for x in found]
+
+    gouge, rest = keep(("rough check", plan.cutter, program.motion, program.p_work, program.axis), looked)
     stands: list[float | None] = []
     for hub in (False, True):
-        least = min(float(x.rest.min()) for x in found if x.wall.name.startswith("floor") == hub)
+        least = min(r for w, r in zip(walls, rest, strict=True) if w.name.startswith("floor") == hub)
         stands.append(least if least < _HEIGHT else None)
     _, findings = to_axes(program, machine)
     said = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
     seconds = float(times_on(program, machine).sum())
     return CheckedRough(
-        plan, gouge, paths.gouge_mm, (stands[0], stands[1]), taken, touch,
+        plan, gouge, allowed, (stands[0], stands[1]), taken, touch,
         tuple(said), seconds, between_channels(program, machine, blades),
         channel_repeat(program, machine, table, blades),
     )  # fmt: skip

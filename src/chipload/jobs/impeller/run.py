@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import time
 from collections.abc import Sequence
@@ -9,9 +10,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named, read_catalogue
 from chipload.errors import InputError
+from chipload.jobs.impeller.checkpoint import KeptParts
 from chipload.jobs.impeller.job import ImpellerJob
 from chipload.jobs.impeller.outcome import ImpellerResult, OneCutter, Searched, unreached_text
 from chipload.jobs.impeller.part import ImpellerPart, read_part
@@ -19,7 +22,7 @@ from chipload.jobs.impeller.partition_programs import checked_partitions
 from chipload.jobs.impeller.paths import finish_settings, walls_of
 from chipload.jobs.impeller.roughing import checked_roughing
 from chipload.jobs.impeller.tables import ImpellerOperationTable
-from chipload.jobs.provenance import provenance_of, title_of
+from chipload.jobs.provenance import provenance_of, sources, title_of, versions
 from chipload.jobs.tables import Table
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.impeller.answer import Answer, largest_cutters, one_cutter, one_cutter_of
@@ -27,18 +30,23 @@ from chipload.planning.impeller.compare import CutterChoice, cutter_choices
 from chipload.planning.impeller.costs import ChannelSide, Terms
 from chipload.planning.impeller.covering.covering import Covering, covering_of, first_edge
 from chipload.planning.impeller.impeller import Impeller
+from chipload.planning.impeller.kept import Keep
 from chipload.planning.impeller.surfaces import BODIES, ContactSampling, ContactSurface, hub_range, surface_of
 from chipload.planning.impeller.tables import IndexTable, index_table
 from chipload.planning.impeller.unreached import with_fits
 from chipload.progress import Progress, silent
+from chipload.progress import part_of as within
 from chipload.result import Provenance
+from chipload.simulation.checkpoint import Checkpoint, digest
 from chipload.units import mm_s_from_mm_min
 
+#: of the time of a run what search, division, roughing and finishing take, with paths and without
+_WITH_PATHS, _SEARCH_ALONE = (5.0, 10.0, 10.0, 75.0), (50.0, 50.0, 0.0, 0.0)
 #: threads of the search; its answer does not depend on them
 WORKERS = len(os.sched_getaffinity(0))
 
 
-def run(job: ImpellerJob, progress: Progress = silent) -> ImpellerResult:
+def run(job: ImpellerJob, progress: Progress = silent, checkpoint: Checkpoint | None = None) -> ImpellerResult:
     """The largest cutters of every surface that the job names.
 
     Raises
@@ -53,24 +61,26 @@ def run(job: ImpellerJob, progress: Progress = silent) -> ImpellerResult:
     _picked(job, catalogue)
     _rougher(job, catalogue)
     op = job.operation
+    provenance = _provenance(job, machine, catalogue, part)
+    keep = KeptParts(checkpoint, digest(job.table.model_dump_json(), provenance.inputs, versions(), sources()))
     table, begin = _tables(machine, op), time.perf_counter()
     covering = _covering(job, impeller, catalogue)
     took = time.perf_counter() - begin
     surfaces = _surfaces(job, impeller, covering)
+    first, second, third, last = _stages(op, progress)
     done = []
     for k, surface in enumerate(surfaces):
-        found = _searched(job, k, surface, table, catalogue, part_of(part_of(progress, 0, 2), k, len(surfaces)))
+        found = _searched(job, k, surface, table, catalogue, part_of(first, k, len(surfaces)), keep)
         done.append(replace(found, search_s=found.search_s + took / len(surfaces)))
         _reached(k, done[-1])
     pairs = [(found.surface.scene, found.answer) for found in done]
-    whole = one_cutter_of(pairs, op.clearance_mm, table.spans, WORKERS)
+    whole = keep(("one cutter",), lambda: one_cutter_of(pairs, op.clearance_mm, table.spans, WORKERS))
     one = None if whole is None else (catalogue.cutters[whole[0]], whole[1])
-    half = part_of(progress, 1, 2)
-    ways = _choices(job, done, catalogue, impeller, part_of(half, 0, 4))
-    partitions = tuple(way.partition(WORKERS, part_of(half, 1, 4)) for way in ways)
+    ways = _choices(job, done, catalogue, impeller, part_of(second, 0, 2), keep)
+    partitions = tuple(way.partition(WORKERS, part_of(second, 1, 2), keep) for way in ways)
     milled = ImpellerResult(
         title_of(job.path), impeller, catalogue, machine, tuple(done), one, partitions, None, None, _settings(op),
-        job.table.impeller.outer_diameter_mm, _provenance(job, machine, catalogue, part),
+        job.table.impeller.outer_diameter_mm, provenance,
     )  # fmt: skip
     if op.paths is None or milled.used is None:
         return milled
@@ -78,12 +88,13 @@ def run(job: ImpellerJob, progress: Progress = silent) -> ImpellerResult:
     if op.rough is not None:
         roughs = checked_roughing(
             impeller, machine, table, catalogue, _rougher(job, catalogue), op, op.paths, op.rough,
-            walls_of(impeller, _ahead(job)), _ahead(job), WORKERS, part_of(half, 2, 4),
+            walls_of(impeller, _ahead(job)), _ahead(job), WORKERS, third, keep,
         )  # fmt: skip
     how = finish_settings(
         impeller, machine, table, catalogue, op, op.paths, _ahead(job), len(roughs or ()), WORKERS, covering
     )
-    checked = checked_partitions(ways, partitions, how, machine, op.paths, part_of(half, 3, 4))
+    checked = checked_partitions(ways, partitions, how, machine, op.paths, last, keep)
+    keep.write(at_once=True)
     chosen = {one.name: one.partition for one in checked}
     return replace(milled, checked=checked, roughs=roughs, partitions=tuple(chosen.get(p.name, p) for p in partitions))
 
@@ -121,23 +132,35 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
     return lines, True
 
 
+def _stages(op: ImpellerOperationTable, progress: Progress) -> list[Progress]:
+    """Progress of the search, the division, roughing and finishing, by the share of the time that each takes."""
+    shares = _WITH_PATHS if op.paths is not None else _SEARCH_ALONE
+    edges = np.concatenate([[0.0], np.cumsum(shares)]) / sum(shares)
+    return [within(progress, float(a), float(b)) for a, b in itertools.pairwise(edges)]
+
+
 def part_of(progress: Progress, k: int, n: int) -> Progress:
     """Progress of the k-th of n like parts."""
     return lambda done, what: progress((k + done) / n, what)
 
 
 def _searched(
-    job: ImpellerJob, k: int, surface: ContactSurface, table: IndexTable, catalogue: Catalogue, progress: Progress
-) -> Searched:
+    job: ImpellerJob, k: int, surface: ContactSurface, table: IndexTable, catalogue: Catalogue, progress: Progress,
+    keep: Keep,
+) -> Searched:  # fmt: skip
     """The largest cutters of a surface."""
-    op = job.operation
-    begin = time.perf_counter()
-    answer = largest_cutters(
-        surface.scene, catalogue, table.angle, op.clearance_mm, pallets=table.spans, workers=WORKERS, progress=progress
-    )
-    answer = replace(answer, unreachable=with_fits(surface.scene, answer, table.spans, WORKERS))
-    one = one_cutter(surface.scene, answer, op.clearance_mm, table.spans, WORKERS)
-    took = time.perf_counter() - begin
+    op, scene = job.operation, surface.scene
+
+    def found() -> tuple[Answer, tuple[int, int, tuple[NDArray[np.float64], ...]] | None, float]:
+        begin = time.perf_counter()
+        answer = largest_cutters(
+            scene, catalogue, table.angle, op.clearance_mm, pallets=table.spans, workers=WORKERS, progress=progress
+        )
+        answer = replace(answer, unreachable=with_fits(scene, answer, table.spans, WORKERS))
+        one = one_cutter(scene, answer, op.clearance_mm, table.spans, WORKERS)
+        return answer, one, time.perf_counter() - begin
+
+    answer, one, took = keep(("search", k), found)
     best = None
     if one is not None:
         reached = np.flatnonzero(answer.cutter >= 0)
@@ -147,7 +170,7 @@ def _searched(
 
 
 def _choices(
-    job: ImpellerJob, done: Sequence[Searched], catalogue: Catalogue, impeller: Impeller, progress: Progress
+    job: ImpellerJob, done: Sequence[Searched], catalogue: Catalogue, impeller: Impeller, progress: Progress, keep: Keep
 ) -> tuple[CutterChoice, ...]:
     """The cutter picked by hand where one is stated, then one cutter, two, ..."""
     op = job.operation
@@ -157,7 +180,7 @@ def _choices(
     picked = _picked(job, catalogue)
     index = None if picked is None else catalogue.cutters.index(picked)
     sides = [_side(x, x.answer) for x in done]
-    return cutter_choices(sides, terms, index, range(1, op.most_cutters + 1), WORKERS, progress)
+    return cutter_choices(sides, terms, index, range(1, op.most_cutters + 1), WORKERS, progress, keep)
 
 
 def _side(op: Searched, answer: Answer) -> ChannelSide:

@@ -19,6 +19,11 @@ def in_blocks(block: Callable[[int], None], total: int, workers: int, progress: 
     Cancelled
         By ``progress``; blocks that have not begun are dropped.
     """
+    if workers == 1 or total <= BLOCK:
+        for first in range(0, total, BLOCK):
+            block(first)
+            progress(min(first + BLOCK, total) / total, what)
+        return
     with ThreadPoolExecutor(workers) as pool:
         waiting = [pool.submit(block, first) for first in range(0, total, BLOCK)]
         try:

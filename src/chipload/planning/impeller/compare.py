@@ -18,9 +18,10 @@ from numpy.typing import ArrayLike
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.errors import InputError
-from chipload.planning.impeller.answer import largest_cutters
+from chipload.planning.impeller.answer import Answer, largest_cutters
 from chipload.planning.impeller.closed_form import axis_at, contact_limit
 from chipload.planning.impeller.costs import ChannelSide, Costs, Terms
+from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.patches import PatchDivision, costs_of, divided
 from chipload.planning.impeller.scene import Scene
 from chipload.progress import Progress, silent
@@ -80,10 +81,10 @@ class CutterChoice:
     most: int | None
     took: float = 0.0
 
-    def partition(self, workers: int = 1, progress: Progress = silent) -> Partition:
+    def partition(self, workers: int = 1, progress: Progress = silent, keep: Keep = anew) -> Partition:
         """The way in the least time by its costs as they stand."""
         sides = [c.side for c in self.costs]
-        found = divided(self.costs, self.most, workers, progress)
+        found = divided(self.costs, self.most, workers, progress, keep)
         return Partition(self.name, found, sides[0].answer.catalogue, _share(sides), *_proved(sides), self.took)
 
 
@@ -94,6 +95,7 @@ def cutter_choices(
     numbers: Sequence[int | None] = (1, 2, 3),
     workers: int = 1,
     progress: Progress = silent,
+    keep: Keep = anew,
 ) -> tuple[CutterChoice, ...]:
     """The hand-picked cutter (an index in the catalogue) at any table angle, then so many cutters, which share costs.
 
@@ -110,17 +112,19 @@ def cutter_choices(
             raise InputError(f"hand_picked = {hand_picked}: must be an index of the {len(catalogue.cutters)} cutters")
         picked = Catalogue("hand-picked", (catalogue.cutters[hand_picked],))
         feed = terms.feed[hand_picked] if isinstance(terms.feed, tuple) else terms.feed
-        begin = time.perf_counter()
-        own = [
-            replace(
-                s,
-                answer=largest_cutters(
+
+        def searched() -> tuple[tuple[Answer, ...], float]:
+            begin = time.perf_counter()
+            answers = tuple(
+                largest_cutters(
                     s.scene, picked, s.answer.tables, s.clearance, pallets=s.pallets, workers=workers, progress=progress
-                ),
+                )
+                for s in sides
             )
-            for s in sides
-        ]
-        took = time.perf_counter() - begin
+            return answers, time.perf_counter() - begin
+
+        answers, took = keep(("hand-picked",), searched)
+        own = [replace(s, answer=answer) for s, answer in zip(sides, answers, strict=True)]
         out.append(CutterChoice("hand-picked", costs_of(own, replace(terms, feed=feed), workers), 1, took))
     for m in numbers:
         name = "any cutters" if m is None else f"{m} cutter{'s' if m > 1 else ''}"

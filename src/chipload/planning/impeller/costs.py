@@ -24,7 +24,8 @@ from chipload.cutter.catalogue import Catalogue
 from chipload.errors import InputError
 from chipload.planning.impeller.answer import Answer, left_open, shortest
 from chipload.planning.impeller.grid.grid import admitted
-from chipload.planning.impeller.ranges.ranges import FULL, valid_ranges
+from chipload.planning.impeller.kept import Keep, anew
+from chipload.planning.impeller.ranges.ranges import FULL, Ranges, valid_ranges
 from chipload.planning.impeller.scene import Floats, Scene
 from chipload.planning.impeller.step_over import Contact, contact_of, width
 
@@ -193,7 +194,7 @@ class Costs:
             for key in {(r.cutter, r.table) for r in own}:
                 self.factor[order, key[0], key[1]] = ratio([r for r in own if (r.cutter, r.table) == key])
 
-    def prove(self, asked: Sequence[tuple[int, int, int]], workers: int = 1) -> None:
+    def prove(self, asked: Sequence[tuple[int, int, int]], workers: int = 1, keep: Keep = anew) -> None:
         """Make (c, k, t) known."""
         groups: dict[int, list[tuple[int, int]]] = {}
         for point, cutter, table in sorted(set(asked)):
@@ -202,10 +203,7 @@ class Costs:
         for k, members in groups.items():
             which = np.array(members)
             c, t = which[:, 0], which[:, 1]
-            side = self.side
-            got = valid_ranges(
-                side.scene, self.catalogue.cutters[k], self.tables[t], side.clearance, side.pallets, c, workers=workers
-            )
+            got = self._proved(c, k, t, workers, keep)
             self.asked += len(c)
             self.untold += int((~got.complete).sum())
             self.known[c, k, t] = True
@@ -225,6 +223,14 @@ class Costs:
                 # a step-over of nothing: the cutter does not fit there, whatever its ranges
                 paid = np.where(w > 0.0, self._paid(w[:, None], c, k)[:, 0], np.inf)
                 self.time[order, c, k, t] = np.maximum(self.time[order, c, k, t], paid)
+
+    def _proved(self, c: NDArray[np.int64], k: int, t: NDArray[np.int64], workers: int, keep: Keep) -> Ranges:
+        """Ranges of a cutter at contact points and table angles."""
+        side, cutter = self.side, self.catalogue.cutters[k]
+        return keep(
+            ("ranges", side.body, side.side, cutter, self.tables[t], c),
+            lambda: valid_ranges(side.scene, cutter, self.tables[t], side.clearance, side.pallets, c, workers=workers),
+        )
 
     def _paid(self, w: Floats, points: NDArray[np.int64], k: int) -> Floats:
         """Time [s] (c, n) of contact points at step-overs (c, n)."""

@@ -23,6 +23,7 @@ from chipload.errors import InputError
 from chipload.planning.impeller.answer import Unreachable
 from chipload.planning.impeller.assignment import Changes, Step, assigned, bound_of_cells, bound_of_strips
 from chipload.planning.impeller.costs import ChannelSide, Costs, Terms
+from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.patch import Patch
 from chipload.progress import Progress, silent
 
@@ -74,7 +75,11 @@ def costs_of(sides: Sequence[ChannelSide], terms: Terms, workers: int = 1) -> tu
 
 
 def divided(
-    costs: Sequence[Costs], most: int | None = None, workers: int = 1, progress: Progress = silent
+    costs: Sequence[Costs],
+    most: int | None = None,
+    workers: int = 1,
+    progress: Progress = silent,
+    keep: Keep = anew,
 ) -> PatchDivision | None:
     """The patches of sides milled one after the other with at most so many different cutters.
 
@@ -108,7 +113,7 @@ def divided(
         if not any(open_):
             break
         for c, asked in zip(costs, open_, strict=True):
-            c.prove(asked, workers)
+            c.prove(asked, workers, keep)
     patches = _patches(costs, best.steps)
     runs = [(p.cutter, p.table) for p in patches]
     cutter_changes = sum(a[0] != b[0] for a, b in pairwise(runs))

@@ -1,11 +1,11 @@
 """What all passes together leave standing too high, and the rest passes that take it.
 
 Notation: p, q the parameters along a rest pass and across; h height of the scallop. A surface is looked at on a grid
-finer than the narrowest step of a corner; what is left at a point is its distance from the nearest poses of every
-track, along the normal by one step of the secant (``crest.py``). Points that belong together are a region. A region is
-milled with the cutter and table angle that have valid pallet angles at most of its points: one that is in use first,
-then the cutters in use at any angle, then smaller ones. What is milled is looked at again; what was tried with a cutter
-at an angle is not tried so again.
+finer than the narrowest step of a corner; what is left at a point is its distance from the poses of every track that
+touch near it, along the normal by one step of the secant (``scallop_height.py``). Points that belong together are a
+region. A region is milled with the cutter and table angle that have valid pallet angles at most of its points: one that
+is in use first, then the cutters in use at any angle, then smaller ones. What is milled is looked at again; what was
+tried with a cutter at an angle is not tried so again.
 """
 
 from __future__ import annotations
@@ -17,18 +17,20 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, gaussian_filter1d, label
-from scipy.spatial import cKDTree
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.geometry.bspline import BSplinePatch
+from chipload.planning.impeller import _scallop
+from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.lines import LineMotion, Lines, stretched
 from chipload.planning.impeller.ranges.ranges import valid_ranges
-from chipload.planning.impeller.scallop_height import distance
 from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.planning.impeller.track import ToolTrack
 
-#: poses are no farther apart than this [mm]; so many nearest ones are looked at; points of a region that are tried
-_FINE, _NEAREST, _SAMPLE = 0.5, 64, 10
+#: poses are no farther apart than this [mm]; points of a region that are tried
+_FINE, _SAMPLE = 0.5, 10
+#: width of the cells in which poses are looked for, as a share of the cutter's radius, and the least [mm]
+_CELL, _LEAST_CELL = 0.5, 2.0
 #: distance of grid points, and of rest passes, as a share of the step of a corner on a plane
 _GRID, _STEP = 0.45, 0.85
 #: stations of a rest pass are no farther apart than this [mm]
@@ -110,28 +112,24 @@ def corner_step(corner: float, scallop: float) -> float:
 
 def left_over(face: SurfaceGrid, passes: Sequence[tuple[CatalogueCutter, Sequence[ToolTrack]]]) -> Floats:
     """(a, b) float [mm] what the tracks of every cutter leave on the grid; inf where none comes near."""
-    points, normals = face.points.reshape(-1, 3), face.normals.reshape(-1, 3)
+    points = np.ascontiguousarray(face.points.reshape(-1, 3))
+    normals = np.ascontiguousarray(face.normals.reshape(-1, 3))
     out = np.full(len(points), np.inf)
     for cutter, tracks in passes:
         contact, tips, axes, of = _poses(tracks)
         if not len(contact):
             continue
-        _, near = cKDTree(contact).query(points, min(_NEAREST, len(contact)))
-        near = near.reshape(len(points), -1)
-        rho, r = cutter.rho, cutter.corner_radius
-        D = distance(points[:, None], tips[near], axes[near], rho, r)
-        best = D.argmin(axis=1)
-        rows = np.arange(len(points))
-        which, D0 = near[rows, best], D[rows, best]
-        # between three poses of a track a parabola
-        low, high = np.maximum(which - 1, 0), np.minimum(which + 1, len(of) - 1)
-        a, b = (distance(points, tips[k], axes[k], rho, r) for k in (low, high))
-        bend = a - 2.0 * D0 + b
-        inner = (low < which) & (which < high) & (of[low] == of[high]) & (bend > 0.0) & (np.minimum(a, b) >= D0)
-        gain = np.where(inner, (b - a) ** 2 / (8.0 * np.where(inner, bend, 1.0)), 0.0)
-        D1 = distance(points + D0[:, None] * normals, tips[which], axes[which], rho, r)
-        drop = np.where(0.2 * np.abs(D0) < D0 - D1, D0 / np.where(D0 == D1, 1.0, D0 - D1), 1.0)
-        out = np.minimum(out, (D0 - gain) * np.where(gain < D0, drop, 1.0))
+        # two passes lie at most a radius apart: a point between them is within half of that from one of them
+        size = max(0.5 * cutter.diameter * _CELL, _LEAST_CELL)
+        low = contact.min(axis=0)
+        at = np.floor((contact - low) / size).astype(np.int64)
+        cells = at.max(axis=0) + 1
+        number = (at[:, 0] * cells[1] + at[:, 1]) * cells[2] + at[:, 2]
+        order = np.argsort(number, kind="stable")
+        starts = np.searchsorted(number[order], np.arange(int(cells.prod()) + 1))
+        _scallop.left_of(
+            points, normals, cells, low, size, starts, order, tips, axes, of, cutter.rho, cutter.corner_radius, out
+        )
     return out.reshape(face.points.shape[:2])
 
 
@@ -162,7 +160,7 @@ class RestSettings:
 
     Parameters
     ----------
-    scene, catalogue, motion, pallets, workers : as for the patches
+    scene, catalogue, motion, pallets, workers, keep : as for the patches
     used : cutters at table angles that are in use
     tables : all table angles [rad]
     """
@@ -176,9 +174,19 @@ class RestSettings:
     tables: Floats
     pallets: tuple[tuple[float, float], ...]
     workers: int
+    keep: Keep = anew
 
     def chosen(self, face: SurfaceGrid, region: Flags) -> Pair | None:
         """The cutter and table angle for a region; None: none that was not tried reaches any of its points."""
+        tried = tuple((k, a, x & region) for (k, a), x in face.tried.items() if (x & region).any())
+        key = ("rest pair", *self._place(face, region), self.catalogue, self.used, tried)
+        return self.keep(key, lambda: self._chosen(face, region))
+
+    def _place(self, face: SurfaceGrid, region: Flags) -> tuple[object, ...]:
+        """What a region is known by."""
+        return (face.body, face.side, face.u, face.v, region)
+
+    def _chosen(self, face: SurfaceGrid, region: Flags) -> Pair | None:
         where = np.argwhere(region)
         some = where[np.unique(np.linspace(0, len(where) - 1, _SAMPLE).round().astype(int))]
         best: tuple[float, float] = (0.0, 0.0)
@@ -220,6 +228,12 @@ class RestSettings:
     def passes(self, face: SurfaceGrid, region: Flags, pair: Pair) -> RestPasses:
         """Passes over a region along its longer side."""
         cutter, alpha = self.catalogue.cutters[pair[0]], pair[1]
+        tried = face.tried.setdefault(pair, np.zeros(region.shape, dtype=np.bool_))
+        tried |= region
+        key = ("rest passes", *self._place(face, region), cutter, alpha)
+        return self.keep(key, lambda: self._passes(face, region, cutter, alpha))
+
+    def _passes(self, face: SurfaceGrid, region: Flags, cutter: CatalogueCutter, alpha: float) -> RestPasses:
         i, j = np.nonzero(region)
         cell = [float(np.linalg.norm(np.diff(face.points, axis=k), axis=2).mean()) for k in (0, 1)]
         along = "u" if np.ptp(i) * cell[0] >= np.ptp(j) * cell[1] else "v"
@@ -250,8 +264,6 @@ class RestSettings:
             new, _ = lines.tracks(one, np.ones(len(p), dtype=np.bool_), k)
             tracks += new
         box = ((float(face.u[i.min()]), float(face.u[i.max()])), (float(face.v[j.min()]), float(face.v[j.max()])))
-        tried = face.tried.setdefault(pair, np.zeros(region.shape, dtype=np.bool_))
-        tried |= region
         return RestPasses(face.body, face.side, box, tuple(tracks))
 
 

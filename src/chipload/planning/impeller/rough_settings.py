@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from chipload.errors import InputError
 from chipload.planning.impeller.answer import largest_cutters
 from chipload.planning.impeller.floor import layer_of
 from chipload.planning.impeller.impeller import Impeller
+from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.lines import Tracks
 from chipload.planning.impeller.links import Link, Linked, linked
 from chipload.planning.impeller.programs import program_of
@@ -92,6 +94,7 @@ def roughed(
     impeller: Impeller, catalogue: Catalogue, stated: CatalogueCutter | None, how: RoughingSettings, link: Link,
     spindle: float,
     table: IndexTable, share: float, ahead: float = 0.0, workers: int = 1, progress: Progress = silent,
+    keep: Keep = anew,
 ) -> tuple[RoughingSetting, ...]:  # fmt: skip
     """The roughing programs of all channels.
 
@@ -107,11 +110,13 @@ def roughed(
         No cutter goes at the share of the points.
     """
     scenes = [_looked_at(impeller, k, how, ahead) for k in range(len(impeller.bodies))]
-    cutter = stated if stated is not None else _largest(scenes, catalogue, how, table, share, workers)
+    cutter = stated
+    if cutter is None:
+        cutter = keep(("rough cutter",), lambda: _largest(scenes, catalogue, how, table, share, workers))
     spans = tuple((float(a), float(b)) for a, b in table.spans)
     plans: list[tuple[int, float]] = []
     for index, scene in enumerate(scenes):
-        goes = np.array([_goes(scene, cutter, float(alpha), how, table, workers) for alpha in table.angle])
+        goes = keep(("rough tables", index, cutter), partial(_reached_at, scene, cutter, how, table, workers))
         if not goes.any():
             raise InputError(
                 f"operation.0.rough: D {cutter.diameter:g} r {cutter.corner_radius:g} mm fits nowhere in the channel "
@@ -130,12 +135,18 @@ def roughed(
     out: list[RoughingSetting] = []
     for k, (index, alpha) in enumerate(plans):
         before = [t for r in out if r.index == index for t in r.machined]
-        tracks, walls = roughing(
-            impeller, index, cutter, alpha, how, ahead, spans, workers,
-            _part(progress, k, len(plans)), before,
+        tracks = keep(
+            ("rough rows", index, cutter, alpha, before),
+            partial(
+                roughing, impeller, index, cutter, alpha, how, ahead, spans, workers, _part(progress, k, len(plans)),
+                before,
+            ),
         )  # fmt: skip
-        top = uncut(impeller, index, how, ahead, whole=True)
-        way = _linked(tracks.tracks, walls, cutter, alpha, how, link, top)
+        walls, top = thickened(impeller, index, how, ahead), uncut(impeller, index, how, ahead, whole=True)
+        way = keep(
+            ("rough links", index, cutter, alpha, before),
+            partial(_linked, tracks.tracks, walls, cutter, alpha, how, link, top),
+        )
         count = len(layers(impeller, how.depth, how.hub, ahead))
         program, tool = program_of(way.moves, spindle, len(out) + 1), len(out) + 1
         out.append(
@@ -198,6 +209,13 @@ def _largest(
         )
     able = [c for c in catalogue.cutters if c.diameter <= most]
     return max(able, key=lambda c: (c.diameter, c.corner_radius))
+
+
+def _reached_at(
+    scene: Scene, cutter: CatalogueCutter, how: RoughingSettings, table: IndexTable, workers: int
+) -> NDArray[np.bool_]:
+    """(t, c) at which points of a channel a cutter goes at each table angle."""
+    return np.array([_goes(scene, cutter, float(alpha), how, table, workers) for alpha in table.angle])
 
 
 def _goes(

@@ -87,8 +87,8 @@ def roughing(
     workers: int = 1,
     progress: Progress = silent,
     before: Sequence[ToolTrack] = (),
-) -> tuple[Tracks, Scene]:
-    """Tracks of the channel on the plus side of a body, and the thickened walls that they keep clear of.
+) -> Tracks:
+    """Tracks of the channel on the plus side of a body, clear of its walls as :func:`thickened` gives them.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def roughing(
             missed += gone
             number += 1
             progress((k + (j + 1) / (count + 1)) / len(shares), f"layer {k + 1} of {len(shares)}")
-    return Tracks(tuple(tracks), tuple(missed), number), scene
+    return Tracks(tuple(tracks), tuple(missed), number)
 
 
 def thickened(impeller: Impeller, index: int, how: RoughingSettings, ahead: float = 0.0) -> Scene:

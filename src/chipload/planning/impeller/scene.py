@@ -25,6 +25,24 @@ _UNIT = 1e-6  # a normal may differ from a unit vector by so much
 
 
 @dataclass(frozen=True, eq=False)
+class CheckPoints:
+    """Check points in the order of their tree, to be shared by scenes: ``points`` and ``of`` are those of a scene.
+
+    Parameters
+    ----------
+    points, of : check points (m, 3) [mm] and their surfaces (m,), read-only
+    tree : over them
+    ordered, own : both in the order of the tree
+    """
+
+    points: Floats
+    of: Ints
+    tree: Tree
+    ordered: Floats
+    own: Ints
+
+
+@dataclass(frozen=True, eq=False)
 class Scene:
     """Contact points and check points of one set-up.
 
@@ -39,6 +57,7 @@ class Scene:
     near : check points of the contact's own surface nearer than this [mm] are left out: there the curvature stands for
         them. A deviation of the surface from its second order, over that distance, is not seen.
     covering : of the walls between the check points; None: ranges hold at the check points alone
+    shared : the same check points in another scene, which are not looked at again; None: they are new
 
     Raises
     ------
@@ -55,13 +74,18 @@ class Scene:
     near: float
     known: Tree | None = field(default=None, repr=False)
     covering: Covering | None = field(default=None, repr=False)
-    tree: Tree = field(init=False, repr=False)
+    shared: CheckPoints | None = field(default=None, repr=False)
     rows: Floats = field(init=False, repr=False)
-    ordered: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         c, m = len(self.contact), len(self.check)
         shapes = {"contact": (c, 3), "normal": (c, 3), "curvature": (c, 3, 3), "check": (m, 3)}
+        lengths = {"surface": c, "check_surface": m}
+        same = self.shared
+        if same is not None and same.points is self.check and same.of is self.check_surface:
+            del shapes["check"], lengths["check_surface"]
+        else:
+            same = None
         for name, shape in shapes.items():
             value = np.array(getattr(self, name), dtype=np.float64)
             if value.shape != shape:
@@ -70,7 +94,7 @@ class Scene:
                 raise InputError(f"scene.{name}: a number is not finite")
             value.flags.writeable = False
             object.__setattr__(self, name, value)
-        for name, length in (("surface", c), ("check_surface", m)):
+        for name, length in lengths.items():
             number = np.array(getattr(self, name), dtype=np.int64)
             if number.shape != (length,):
                 raise InputError(f"scene.{name}: shape {number.shape}: must be ({length},)")
@@ -83,16 +107,42 @@ class Scene:
             raise InputError(f"scene.normal of contact point {int(wrong.argmax())}: must be a unit vector")
         if not 0.0 <= self.near < np.inf:
             raise InputError(f"scene.near_mm = {self.near:g}: must be at least 0")
-        object.__setattr__(self, "tree", tree_of(self.check) if self.known is None else self.known)
+        if same is None:
+            tree = tree_of(self.check) if self.known is None else self.known
+            ordered = np.ascontiguousarray(self.check[tree.order])
+            own = self.check_surface[tree.order]
+            object.__setattr__(self, "shared", CheckPoints(self.check, self.check_surface, tree, ordered, own))
         object.__setattr__(self, "rows", self._rows())
-        object.__setattr__(self, "ordered", np.ascontiguousarray(self.check[self.tree.order]))
+
+    @property
+    def walls(self) -> CheckPoints:
+        """The check points with their tree."""
+        if self.shared is None:
+            raise InputError("scene: its check points are not known: make it anew")
+        return self.shared
+
+    @property
+    def tree(self) -> Tree:
+        """Of the check points."""
+        return self.walls.tree
+
+    @property
+    def ordered(self) -> Floats:
+        """(m, 3) check points in the order of the tree [mm]."""
+        return self.walls.ordered
+
+    @property
+    def own(self) -> Ints:
+        """(m,) surface of each check point, in the order of the tree."""
+        return self.walls.own
 
     def at_contacts(self, contact: Floats, normal: Floats, curvature: Floats, surface: int) -> Scene:
         """The same check points with other contact points, all on one surface."""
         number = np.full(len(contact), surface, dtype=np.int64)
         return Scene(
-            contact, normal, curvature, number, self.check, self.check_surface, self.near, self.tree, self.covering
-        )
+            contact, normal, curvature, number, self.check, self.check_surface, self.near, self.tree, self.covering,
+            self.shared,
+        )  # fmt: skip
 
     def _rows(self) -> Floats:
         """(c, 16): S, N, tangents E1, E2, K in them, the surface."""

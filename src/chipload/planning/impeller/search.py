@@ -140,7 +140,7 @@ def limits(
     rows = np.ascontiguousarray(scene.rows[round_enough])
     part = tuple(np.ascontiguousarray(x[round_enough]) for x in (rho, pallet, bound, proved, proof))
     tree = scene.tree
-    points, own = scene.check[tree.order], scene.check_surface[tree.order]
+    points, own = scene.ordered, scene.own
     cones = np.column_stack([np.sin(alpha), np.cos(alpha)])
     tool = np.array([corner_radius, cut, scene.near**2])
 

@@ -21,6 +21,7 @@ from chipload.geometry.bspline import BSplinePatch as Surface
 from chipload.planning.impeller.assignment import Changes
 from chipload.planning.impeller.floor import patch_of
 from chipload.planning.impeller.impeller import FILLET, Impeller
+from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.lines import Tracks
 from chipload.planning.impeller.links import Link, Linked, linked
 from chipload.planning.impeller.passes import surface_joint
@@ -48,8 +49,8 @@ from chipload.progress import Progress, silent
 NUMBERS = {(0, "plus"): 0, (1, "minus"): 1, (0, "minus"): 3, (1, "plus"): 4}
 NUMBERS |= {(body, f"{side} fillet"): FILLET + n for (body, side), n in NUMBERS.items()}
 _FLOOR = 2
-#: rest passes take what is left above this share of the scallop: the count is of points, and not exact
-_AIM = 0.95
+#: share of the scallop above which rest passes take what is left
+AIM = 0.95
 #: so many settings are brought into the best order; more of them on and on to the nearest
 _EXACT = 7
 
@@ -166,7 +167,7 @@ class FinishSettings:
         """The same with the cutters of another catalogue."""
         return replace(self, catalogue=catalogue)
 
-    def milling(self, patch: Patch) -> Milling:
+    def milling(self, patch: Patch, keep: Keep = anew) -> Milling:
         """The finishing path of a patch."""
         strips, part = (patch.low, patch.high), patch.part
         along, box = ("v", (strips, part)) if patch.order == "u" else ("u", (part, strips))
@@ -174,9 +175,12 @@ class FinishSettings:
             other = np.unique(patch.at[:, 1 if patch.order == "u" else 0])
             whole = (float(other[0]), float(other[-1]))
             box = (strips, whole) if patch.order == "u" else (whole, strips)
-        tracks = finishing(
-            self.surface(patch.body, patch.side), along, box, self.scene, _number(patch.body, patch.side),
-            self.catalogue.cutters[patch.cutter], patch.table, self.how, self.spans, self.workers,
+        tracks = keep(
+            ("milling", *_key(self.catalogue, patch)),
+            lambda: finishing(
+                self.surface(patch.body, patch.side), along, box, self.scene, _number(patch.body, patch.side),
+                self.catalogue.cutters[patch.cutter], patch.table, self.how, self.spans, self.workers,
+            ),
         )  # fmt: skip
         return Milling(patch, along, box, tracks)
 
@@ -192,7 +196,9 @@ class FinishSettings:
             motion.chord, motion.clearance,
         )  # fmt: skip
 
-    def setting(self, pair: Pair, millings: Sequence[Milling], rests: Sequence[RestPasses], tool: int) -> CutterSetting:
+    def setting(
+        self, pair: Pair, millings: Sequence[Milling], rests: Sequence[RestPasses], tool: int, keep: Keep = anew
+    ) -> CutterSetting:
         """The tracks of a cutter at a table angle, linked; ``tool`` its number."""
         cutter, alpha = self.catalogue.cutters[pair[0]], pair[1]
         tracks = (*(t for m in millings for t in m.tracks.tracks), *(t for r in rests for t in r.tracks))
@@ -200,9 +206,13 @@ class FinishSettings:
         owners = [(m.patch.body, m.patch.side, m.tracks.tracks) for m in millings]
         owners += [(r.body, r.side, r.tracks) for r in rests]
         menders = [x for body, side, rows in owners for x in [self.mender(body, side, pair)] * len(rows)]
-        moves = linked(
-            tracks, self.scene, cutter, alpha, motion.feed, self.link, motion.clearance, rate=motion.rate,
-            joint=surface_joint(menders), stages=(sum(len(m.tracks.tracks) for m in millings),) if rests else (),
+        stages = (sum(len(m.tracks.tracks) for m in millings),) if rests else ()
+        moves = keep(
+            ("links", cutter, alpha, tracks, stages),
+            lambda: linked(
+                tracks, self.scene, cutter, alpha, motion.feed, self.link, motion.clearance, rate=motion.rate,
+                joint=surface_joint(menders), stages=stages,
+            ),
         )  # fmt: skip
         program = program_of(moves.moves, self.spindle, self.tools + tool)
         return CutterSetting(cutter, alpha, tuple(millings), tuple(rests), moves, program)
@@ -219,6 +229,8 @@ def planned(
     rounds: int = 8,
     progress: Progress = silent,
     known: dict[MillingKey, Milling] | None = None,
+    keep: Keep = anew,
+    aim: float = AIM,
 ) -> PlannedSettings:
     """The settings of patches with their rest passes, in the order in which changes take least.
 
@@ -227,43 +239,46 @@ def planned(
     changes : what a change of cutter and a setting of the table take
     rounds : most times that what is left is looked at and milled with rest passes
     known : millings that are planned already; those that are planned here are added
+    keep : gives what an earlier run has finished of them
+    aim : rest passes take what is left above this share of the scallop: what is counted is points, and not exact
     """
     groups: dict[Pair, list[Milling]] = {}
     known = {} if known is None else known
     for done, patch in enumerate(patches):
         key = _key(job.catalogue, patch)
         if key not in known:
-            known[key] = job.milling(patch)
+            known[key] = job.milling(patch, keep)
         milling = replace(known[key], patch=patch)
         groups.setdefault((patch.cutter, patch.table), []).append(milling)
         progress(0.8 * (done + 1) / len(patches), f"paths of {done + 1} patches")
-    settings = {pair: job.setting(pair, rows, (), k) for k, (pair, rows) in enumerate(groups.items(), 1)}
+    settings = {pair: job.setting(pair, rows, (), k, keep) for k, (pair, rows) in enumerate(groups.items(), 1)}
     faces = _faces(job, [m for rows in groups.values() for m in rows])
     h = job.how.scallop
     hopeless = [np.zeros((len(f.u), len(f.v)), dtype=np.bool_) for f in faces]
     left: list[Floats] = []
+    memory: LeftMemory = {}
     for turn in range(rounds + 1):
-        passes = [(s.cutter, s.machined) for s in settings.values()]
-        left = [left_over(f, passes) for f in faces]
+        left = [_left(f, settings.values(), memory) for f in faces]
         plan = RestSettings(
             job.scene, job.catalogue, job.how.motion, h, job.how.overrun, tuple(settings), job.table.angle, job.spans,
-            job.workers,
+            job.workers, keep,
         )  # fmt: skip
         new: dict[Pair, list[RestPasses]] = {}
         for face, over, lost in zip(faces, left, hopeless, strict=True):
-            for region in regions(over, _AIM * h, lost) if turn < rounds else ():
+            for region in regions(over, aim * h, lost) if turn < rounds else ():
                 pair = plan.chosen(face, region)
                 if pair is None:
                     lost |= region
                 else:
                     new.setdefault(pair, []).append(plan.passes(face, region, pair))
+                progress(0.8 + 0.2 * turn / rounds, f"rest passes, {turn + 1} times")
         if not new:
             break
         for pair, rests in new.items():
             old = settings.get(pair)
             settings[pair] = job.setting(
                 pair, old.millings if old else (), (*(old.rests if old else ()), *rests),
-                [*settings].index(pair) + 1 if old else len(settings) + 1,
+                [*settings].index(pair) + 1 if old else len(settings) + 1, keep,
             )  # fmt: skip
         progress(0.8 + 0.2 * (turn + 1) / rounds, f"rest passes, {turn + 1} times")
     area, lost_area = {}, {}
@@ -274,6 +289,25 @@ def planned(
     order = setting_order(list(settings), changes)
     numbered = tuple(settings[pair].numbered(job.tools + k) for k, pair in enumerate(order, 1))
     return PlannedSettings(numbered, area, lost_area)
+
+
+#: what the tracks of a patch, or of rest passes, leave on a surface: by the surface and the tracks, which it keeps
+LeftMemory = dict[tuple[int, tuple[int, ...]], tuple[Floats, tuple[ToolTrack, ...]]]
+
+
+def _left(face: SurfaceGrid, settings: Iterable[CutterSetting], memory: LeftMemory) -> Floats:
+    """(a, b) float [mm] what all tracks that are in the moves leave on the grid of a surface."""
+    out = np.full((len(face.u), len(face.v)), np.inf)
+    for s in settings:
+        gone, first = {k for k, _ in s.linked.refused}, 0
+        for tracks in (*(m.tracks.tracks for m in s.millings), *(r.tracks for r in s.rests)):
+            milled = tuple(t for k, t in enumerate(tracks, first) if k not in gone)
+            first += len(tracks)
+            key = (id(face), tuple(id(t) for t in milled))
+            if key not in memory:
+                memory[key] = left_over(face, [(s.cutter, milled)]), milled
+            out = np.minimum(out, memory[key][0])
+    return out
 
 
 def _key(catalogue: Catalogue, patch: Patch) -> MillingKey:

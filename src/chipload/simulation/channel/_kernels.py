@@ -18,6 +18,10 @@ from chipload.stock.dexels._kernels import pierce
 
 _GOLDEN = 0.6180339887498949
 _STEPS = 14
+#: of the sweep of a move, how far its poses are from the one half-way, turns included
+_HALF = 0.55
+#: between two instants a part comes lower than at both by less than this [mm]: for what is left, for gouges
+_LEFT, _DIP = 0.1, 0.05
 
 
 @njit(cache=True, nogil=True)
@@ -49,16 +53,26 @@ def groups_of(tips: Any, axes: Any, size: int, out: Any) -> None:
 
 
 @njit(cache=True, nogil=True)
-def out_of_reach(group: Any, middle: Any, half: float, widest: float, lowest_start: float) -> bool:
+def apart(h: float, d: float, start: float, shape: Any) -> float:
+    """How far a point at the height h above the tip, d from the axis, is at least from a part; below 0 inside."""
+    x, r, e = h - start - shape[2], shape[0], shape[1]
+    if x <= 0.0:
+        return float(math.sqrt((d - e) * (d - e) + x * x) - r if d > e else -x - r)
+    return float(max(d - e - r, h - start - shape[8]))
+
+
+@njit(cache=True, nogil=True)
+def out_of_reach(group: Any, middle: Any, half: float, starts: Any, shapes: Any) -> bool:
     """Whether no move of a group can meet the ray of half the length ``half`` round its ``middle``."""
     x, y, z = middle[0] - group[0], middle[1] - group[1], middle[2] - group[2]
     far = math.sqrt(x * x + y * y + z * z)
     h = x * group[4] + y * group[5] + z * group[6]
     slack = group[3] + far * group[7] + half
-    if h < lowest_start - slack:
-        return True
-    away = math.sqrt(max(far * far - h * h, 0.0))
-    return bool(away > widest + slack)
+    d = math.sqrt(max(far * far - h * h, 0.0))
+    nearest = math.inf
+    for part in range(len(shapes)):
+        nearest = min(nearest, apart(h, d, starts[part], shapes[part]))
+    return bool(nearest > slack)
 
 
 @njit(cache=True, nogil=True)
@@ -92,27 +106,51 @@ def lower(
 
 @njit(cache=True, nogil=True)
 def seen_from(middle: Any, tips: Any, axes: Any, k: int, half: float) -> tuple[float, float, float]:
-    """How far the tool sweeps past the ray of half length ``half`` about ``middle`` in move k; from its end the height
-    of ``middle`` along the axis, and the square of its distance from the axis.
+    """How far the tool sweeps past the ray of half length ``half`` about ``middle`` in move k; half-way through it the
+    height of ``middle`` along the axis, and its distance from the axis.
     """
-    ax, ay, az = axes[k, 0], axes[k, 1], axes[k, 2]
-    x, y, z = middle[0] - tips[k, 0], middle[1] - tips[k, 1], middle[2] - tips[k, 2]
-    dx, dy, dz = tips[k, 0] - tips[k - 1, 0], tips[k, 1] - tips[k - 1, 1], tips[k, 2] - tips[k - 1, 2]
-    bx, by, bz = ax - axes[k - 1, 0], ay - axes[k - 1, 1], az - axes[k - 1, 2]
-    long = math.sqrt(dx * dx + dy * dy + dz * dz)
-    far = math.sqrt(x * x + y * y + z * z)
-    h = x * ax + y * ay + z * az
-    return long + math.sqrt(bx * bx + by * by + bz * bz) * (far + long + half), h, far * far - h * h
+    norm = h = far2 = long2 = turn2 = 0.0
+    for j in range(3):
+        a = axes[k, j] + axes[k - 1, j]
+        x = middle[j] - 0.5 * (tips[k, j] + tips[k - 1, j])
+        norm += a * a
+        h += a * x
+        far2 += x * x
+        long2 += (tips[k, j] - tips[k - 1, j]) ** 2
+        turn2 += (axes[k, j] - axes[k - 1, j]) ** 2
+    h /= math.sqrt(norm)
+    long = math.sqrt(long2)
+    sweep = long + math.sqrt(turn2) * (math.sqrt(far2) + long + half)
+    return sweep, h, math.sqrt(max(far2 - h * h, 0.0))
+
+
+@njit(cache=True, nogil=True)
+def away_at(t: float, tips: Any, axes: Any, k: int, start: float, shape: Any, middle: Any) -> float:
+    """How far the point ``middle`` is at least from the part at the share ``t`` of move k."""
+    norm = h = far = 0.0
+    for j in range(3):
+        a = axes[k - 1, j] * (1.0 - t) + axes[k, j] * t
+        x = middle[j] - tips[k - 1, j] * (1.0 - t) - tips[k, j] * t
+        norm += a * a
+        h += a * x
+        far += x * x
+    h /= math.sqrt(norm)
+    return float(apart(h, math.sqrt(max(far - h * h, 0.0)), start, shape))
 
 
 @njit(cache=True, nogil=True)
 def least_of(
     count: int, tips: Any, axes: Any, k: int, start: float, shape: Any, S: Any, frame: Any, depth: float,
-    height: float, tip: Any, axis: Any,
+    height: float, tip: Any, axis: Any, middle: Any, near: float,
 ) -> tuple[float, int]:  # fmt: skip
-    """The least ``lower`` of the instants 0 .. count of move k, and which it is."""
+    """The least ``lower`` of the instants 0 .. count of move k, and which it is.
+
+    Left out are instants at which the part is farther than ``near`` from ``middle``.
+    """
     best, at = height, 0
     for m in range(count + 1):
+        if away_at(m / count, tips, axes, k, start, shape, middle) > near:
+            continue
         s = lower(m / count, tips, axes, k, start, shape, S, frame, depth, height, tip, axis)
         if s < best:
             best, at = s, m
@@ -145,6 +183,24 @@ def least_near(
 
 
 @njit(cache=True, nogil=True)
+def along(S: Any, frame: Any, depth: float, top: float, middle: Any) -> float:
+    """Half the length of the ray from -depth to ``top``; its ``middle``."""
+    for j in range(3):
+        middle[j] = S[j] + 0.5 * (top - depth) * frame[2, j]
+    return 0.5 * (top + depth)
+
+
+@njit(cache=True, nogil=True)
+def highest(low: Any, met: Any) -> float:
+    """The highest of the least s of the kinds of parts that there are."""
+    top = -math.inf
+    for kind in range(len(low)):
+        if met[kind]:
+            top = max(top, low[kind])
+    return top
+
+
+@njit(cache=True, nogil=True)
 def left(
     points: Any, frames: Any, tips: Any, axes: Any, groups: Any, size: int, starts: Any, shapes: Any, cutting: Any,
     depth: float,
@@ -154,44 +210,43 @@ def left(
     """For the points ``first``..``last``: ``rest`` [mm] above the surface that no cutting move takes, ``gouge`` [mm]
     the deepest below it that any part comes, the rows that do, the part. ``cutting`` (n,) whether a row feeds.
     """
-    tip, axis = np.empty(3), np.empty(3)
+    tip, axis, middle = np.empty(3), np.empty(3), np.empty(3)
     n, parts = len(tips), len(shapes)
-    half = 0.5 * (height + depth)
-    widest, least = 0.0, height
-    for part in range(parts):
-        widest, least = max(widest, shapes[part, 9]), min(least, starts[part])
     for i in range(first, last):
         S, frame = points[i], frames[i]
-        middle = S + 0.5 * (height - depth) * frame[2]
+        # of the ray counts what is below the least that is known
+        top = max(rest[i], 0.0)
+        half = along(S, frame, depth, top, middle)
         k = 0
         while k + 1 < n:
             k += 1
             # the moves of a group are left out together
-            if (k - 1) % size == 0 and out_of_reach(groups[(k - 1) // size], middle, half, widest, least):
+            if (k - 1) % size == 0 and out_of_reach(groups[(k - 1) // size], middle, half, starts, shapes):
                 k += size - 1
                 continue
-            sweep, h, d2 = seen_from(middle, tips, axes, k, half)
-            slack = sweep + half
-            if h < -slack:
-                continue
+            sweep, h, d = seen_from(middle, tips, axes, k, half)
+            slack = _HALF * sweep + half
             for part in range(parts):
-                big = shapes[part, 9] + slack
-                if d2 > big * big or h < starts[part] - slack or h > starts[part] + shapes[part, 8] + slack:
+                if apart(h, d, starts[part], shapes[part]) > slack:
                     continue
                 count = max(1, math.ceil(sweep / step))
                 best, at = least_of(
-                    count, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis
-                )
+                    count, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis,
+                    middle, half + _LEFT,
+                )  # fmt: skip
                 if best >= height:
                     continue
                 known = rest[i] if part == 0 and cutting[k] else height
-                if best - 0.1 < known or best < 0.1:
+                if best - _LEFT < known or best < _LEFT:
                     best = least_near(
                         best, at, count, tol, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip,
                         axis,
                     )  # fmt: skip
                 if part == 0 and cutting[k] and best < rest[i]:
                     rest[i], rest_row[i] = best, k
+                    if top > 0.0:
+                        top = max(best, 0.0)
+                        half = along(S, frame, depth, top, middle)
                 if -best > gouge[i]:
                     gouge[i], gouge_row[i], gouge_part[i] = -best, k, part
 
@@ -205,38 +260,41 @@ def lowest(
     """The least s of the ray of each point in the parts of each of the ``kinds`` 0..2, into ``low`` (n, 3), which holds
     ``height``; the row and the part where it is met into ``rows``, ``part_of`` (n, 3).
     """
-    tip, axis = np.empty(3), np.empty(3)
+    tip, axis, middle = np.empty(3), np.empty(3), np.empty(3)
     n, parts = len(tips), len(shapes)
-    half = 0.5 * (height + depth)
-    widest, least = 0.0, height
+    met = np.zeros(3, dtype=np.bool_)
     for part in range(parts):
-        widest, least = max(widest, shapes[part, 9]), min(least, starts[part])
+        met[kinds[part]] = True
     for i in range(len(points)):
         S, frame = points[i], frames[i]
-        middle = S + 0.5 * (height - depth) * frame[2]
+        # of the ray counts what is below the least that is known of each kind
+        top = highest(low[i], met)
+        half = along(S, frame, depth, top, middle)
         k = 0
         while k + 1 < n:
             k += 1
             # the moves of a group are left out together
-            if (k - 1) % size == 0 and out_of_reach(groups[(k - 1) // size], middle, half, widest, least):
+            if (k - 1) % size == 0 and out_of_reach(groups[(k - 1) // size], middle, half, starts, shapes):
                 k += size - 1
                 continue
-            sweep, h, d2 = seen_from(middle, tips, axes, k, half)
-            slack = sweep + half
+            sweep, h, d = seen_from(middle, tips, axes, k, half)
+            slack = _HALF * sweep + half
             for part in range(parts):
-                big = shapes[part, 9] + slack
-                if d2 > big * big or h < starts[part] - slack or h > starts[part] + shapes[part, 8] + slack:
+                if apart(h, d, starts[part], shapes[part]) > slack:
                     continue
                 kind = kinds[part]
                 count = max(1, math.ceil(sweep / step))
                 best, at = least_of(
-                    count, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis
-                )
+                    count, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis,
+                    middle, half + _DIP,
+                )  # fmt: skip
                 # between two instants a part comes lower by less than this
-                if best >= height or best - 0.05 >= low[i, kind]:
+                if best >= height or best - _DIP >= low[i, kind]:
                     continue
                 best = least_near(
                     best, at, count, tol, tips, axes, k, starts[part], shapes[part], S, frame, depth, height, tip, axis
                 )
                 if best < low[i, kind]:
                     low[i, kind], rows[i, kind], part_of[i, kind] = best, k, part
+                    top = highest(low[i], met)
+                    half = along(S, frame, depth, top, middle)

@@ -55,6 +55,8 @@ _MOST = 4_000_000
 _SHARP = 0.5
 #: a bound below this share of the limit is enough
 _ENOUGH = 0.5
+#: least height above a wall that is looked at [mm]; how much lower a tool may come between two instants
+_LOW, _DIP = 0.1, 0.05
 _BLOCK = 512
 
 
@@ -147,13 +149,14 @@ def deepest_gouge(
         t, w = _reach(points[corner], normals[corner])
         grown = _GROWN * float(t.max())
         starts, shapes, kinds = _parts(cutter, grown)
-        low = np.full((len(points), 3), _height(grown))
+        tall = _height(_sag(cutter.corner_radius, t, w), grown)
+        low = np.full((len(points), 3), tall)
         row, part = np.full((len(points), 3), -1), np.zeros((len(points), 3), dtype=np.int64)
 
         def block(
             first: int, points: Floats = points, normals: Floats = normals, starts: Floats = starts,
             shapes: Floats = shapes, kinds: NDArray[np.int64] = kinds, low: Floats = low,
-            row: NDArray[np.int64] = row, part: NDArray[np.int64] = part, height: float = _height(grown),
+            row: NDArray[np.int64] = row, part: NDArray[np.int64] = part, height: float = tall,
         ) -> None:  # fmt: skip
             last = min(first + _BLOCK, len(points))
             frames = frames_of(normals[first:last])
@@ -194,9 +197,11 @@ def deepest_gouge(
     return Gouge(best.found, max(settled, best.found), best.wall, best.place, best.row, best.part)
 
 
-def _height(grown: float) -> float:
-    """How far above a wall is looked [mm]: what lies above is no matter."""
-    return max(1.0, grown)
+def _height(bend: Floats, grown: float) -> float:
+    """How far above a wall is looked [mm]: a tool that stays higher than a cell may bend (n,) does not gouge there."""
+    most = max(1.0, grown)
+    known = bend[np.isfinite(bend)]
+    return min(most, max(float(known.max()) + _DIP, _LOW)) if len(known) == len(bend) else most
 
 
 def _parts(cutter: CatalogueCutter, grown: float) -> tuple[Floats, Floats, NDArray[np.int64]]:

@@ -32,7 +32,7 @@ def admitted(
     B = np.ascontiguousarray(pallets, dtype=np.float64)
     tree, alpha, r = scene.tree, found.tables, found.corner_radius
     out = np.full((*found.rho.shape, len(B)), -np.inf)
-    points, own = scene.check[tree.order], scene.check_surface[tree.order]
+    points, own = scene.ordered, scene.own
     cones = np.column_stack([np.sin(alpha), np.cos(alpha)])
     tool = np.array([r, cut, scene.near**2])
     rows = np.ascontiguousarray(scene.rows)

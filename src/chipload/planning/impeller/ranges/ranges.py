@@ -77,7 +77,7 @@ def valid_ranges(
     proof = np.full((len(which), _MOST), -1, dtype=np.int64)
     tool = np.array([cutter.rho, cutter.corner_radius])
     stages = cutter.stages(clearance)
-    check, own = scene.check[tree.order], scene.check_surface[tree.order]
+    check, own = scene.ordered, scene.own
 
     def block(first: int) -> None:
         _kernels.fitted(
