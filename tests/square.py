@@ -8,13 +8,17 @@ import numpy as np
 import trimesh
 
 from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import Material
+from chipload.engagement.tooth_engagement import engagement_of_arcs
 from chipload.errors import Finding, Severity
+from chipload.report.engagement import engagement_bytes
 from chipload.report.presentation import Blank
 from chipload.report.removal import removal_bytes, removal_meshes
 from chipload.report.scene import legend
 from chipload.result import LimitCheck, Provenance, Result, Track, TrackKind, Verdict, in_memory
 from chipload.result.history import write_history
 from chipload.result.summary import summary_bytes
+from chipload.simulation.engagement_samples import engagement_samples
 
 ROWS = 200
 #: hand-made history: the cutter goes round a square of 40 mm, 0.1 s a step, one line of the program a side
@@ -128,6 +132,23 @@ VOLUMES = (
 )
 
 
+#: what its teeth cut: a slot, feed per tooth of 0.08 mm (0.04 on the last side), from row 10 on
+SLOT = replace(
+    engagement_of_arcs(np.zeros(ROWS - 10), np.full(ROWS - 10, np.pi), FEED[10:] / 6000.0, MILL, 2.0),
+    frame=np.array(
+        [[[x, y, 0.0], [-y, x, 0.0], [0.0, 0.0, 1.0]] for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1))], dtype=np.float64
+    )[SIDE[10:]],
+)
+METAL = Material("plain", 1000.0, 300.0, 0.0, 10.0, 5.0, 0.0, source="made up for a test")
+SAMPLES = engagement_samples(SLOT, MILL, METAL, np.arange(10, ROWS), 1)
+
+
+#: mean torque [N m], spindle speed and stability margin of its rows, and the chart of its tool
+TORQUE, RPM = np.full(ROWS, 2.0), np.where(SIDE == 3, 2400.0, 3000.0)
+MARGIN = np.where(SIDE == 1, 0.8, 2.0)
+CHART = {"tool": 1, "speed_rpm": [1000.0, 2000.0, 3000.0, 6000.0], "margin": [0.5, 1.5, 0.8, 2.5]}
+
+
 def make_cut_result(folder: Path) -> Path:
     """The square cut into a block, its stock at every row, and a clamp that the holder runs into at row 60."""
     one = square_result("cut")
@@ -135,11 +156,20 @@ def make_cut_result(folder: Path) -> Path:
     at = (float(X[60]), float(Y[60]), -2.0)
     hit = Finding("collision", 8, "shank or holder goes 1.5 mm into fixture 0", Severity.EXCEEDS, at, 60)
     listed = {"what": "shank or holder", "into": "fixture 0", "depth_mm": 1.5, "line": 8, "place": list(at), "t_s": 6.1}
+    operating = {**track.columns, "torque_mean_nm": TORQUE, "power_w": TORQUE * RPM * np.pi / 30.0}
     result = replace(
         one,
-        tracks=(replace(track, limits=track.limits[1:], findings=(hit,)),),
-        operations=({"kind": "simulate", "collisions": [{**listed, "tool": 1}]},),
-    )
+        tracks=(
+            replace(
+                track, limits=track.limits[1:], findings=(hit,),
+                blocks=in_memory({**operating, "stability_margin": MARGIN}),
+            ),
+        ),
+        operations=({
+            "kind": "simulate", "collisions": [{**listed, "tool": 1}],
+            "stability": {"margin_wanted": 1.2, "chart": [CHART]},
+        },),
+    )  # fmt: skip
     write_by_hand(result, folder)
     made = trimesh.Scene()
     for name, low, high, colour in (
@@ -152,4 +182,5 @@ def make_cut_result(folder: Path) -> Path:
     (folder / "scene.glb").write_bytes(made.export(file_type="glb", extension_webp=False))
     blanks = {"program": Blank(STOCK, {1: MILL})}
     (folder / "removal.npz").write_bytes(removal_bytes(result, removal_meshes(result, blanks), blanks))
+    (folder / "engagement.npz").write_bytes(engagement_bytes(result, {"program": SAMPLES}))
     return folder

@@ -45,6 +45,26 @@ export interface Colouring {
   frames: Buffer | null;
   frames_above: Buffer | null;
 }
+/** Steps in cut: ranges of immersion with their chip thickness, force and torque over a revolution. */
+export interface Engagement {
+  stride: number;
+  bounds: Record<string, number>;
+  rotations: number;
+  row: Buffer;
+  tool: Buffer;
+  flutes: Buffer;
+  start: Buffer;
+  frame: Buffer;
+  ranges: Buffer;
+  turn: Buffer;
+}
+/** Least stability margin of a tool over spindle speed, by tool number; speed and margin of each kept row, 0: none. */
+export interface Stability {
+  wanted: number;
+  charts: Record<string, { rpm: number[]; margin: number[] }>;
+  rpm: Buffer;
+  margin: Buffer;
+}
 export interface Header {
   title: string;
   low: Triple;
@@ -57,6 +77,8 @@ export interface Header {
   marks: Mark[];
   colouring: Colouring | null;
   columns?: Colouring[];
+  engagement?: Engagement | null;
+  stability?: Stability | null;
 }
 
 const MAGIC = 0x31564c43; // "CLV1"

@@ -24,8 +24,22 @@ const STYLE = `
 .cv-controls { display: flex; flex-wrap: wrap; gap: 4px 12px; align-items: center; padding: 4px 0; font-size: 13px; }
 .cv-controls button, .cv-controls select { font: inherit; padding: 3px 10px; }
 .cv-controls input[type=range] { flex: 1; min-width: 160px; }
+.cv-cut { font: 12px/1.35 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; color: #1f2933; }
+.cv-cut-said { padding: 4px 2px; font-variant-numeric: tabular-nums; }
+.cv-cut-body { display: grid; grid-template-columns: repeat(auto-fit, minmax(210px, 1fr)); gap: 6px; }
+.cv-chip { min-height: 200px; border: 1px solid #d9dde2; position: relative; touch-action: none; }
+.cv-chip canvas { position: absolute; inset: 0; width: 100%; height: 100%; display: block; }
+.cv-cut-plots { display: contents; }
+.cv-plot { width: 100%; max-height: 240px; background: #fff; border: 1px solid #edf0f3; }
 .cv-print { display: none; width: 100%; }
-@media print { .cv-box, .cv-controls { display: none; } .cv-print { display: block; } }
+@media print { .cv-box, .cv-controls { display: none; } .cv-cut { font: 12px/1.35 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; color: #1f2933; }
+.cv-cut-said { padding: 4px 2px; font-variant-numeric: tabular-nums; }
+.cv-cut-body { display: grid; grid-template-columns: repeat(auto-fit, minmax(210px, 1fr)); gap: 6px; }
+.cv-chip { min-height: 200px; border: 1px solid #d9dde2; position: relative; touch-action: none; }
+.cv-chip canvas { position: absolute; inset: 0; width: 100%; height: 100%; display: block; }
+.cv-cut-plots { display: contents; }
+.cv-plot { width: 100%; max-height: 240px; background: #fff; border: 1px solid #edf0f3; }
+.cv-print { display: block; } }
 @media (max-width: 600px) { .cv-bar { min-width: 120px; max-width: 46%; } .cv-scale { display: none; }
   .cv-note { top: auto; bottom: 84px; left: 4px; transform: none; max-width: 68%; } }
 `;

@@ -1,5 +1,6 @@
 /** The 3D view with its own controls, as a report holds it: no server moves it. */
 
+import { CutPanel } from "./cut";
 import { Colouring, Header, unpacked } from "./document";
 import { View } from "./view";
 
@@ -39,7 +40,8 @@ export async function panel(host: HTMLElement, text: string): Promise<View> {
     label.append(c, " ", name);
     bar.append(label);
   };
-  const names = [...header.bodies.map((b) => b.name), ...(view.stock ? ["stock"] : []), "path", "cutter"];
+  const names = [...header.bodies.map((b) => b.name), ...(view.stock ? ["stock"] : []), "path", "cutter",
+    ...(header.engagement ? ["engagement"] : [])];
   for (const name of names) check(name, true, (on) => view.layer(name, on));
   check("see through", false, (on) => view.glass(on));
   if (view.stock) check("values on stock", false, (on) => view.drape(on));
@@ -73,6 +75,12 @@ export async function panel(host: HTMLElement, text: string): Promise<View> {
   else view.go(view.path.count - 1);
   slider.value = String(t[view.path.place(view.row)]);
   said();
+  if (header.engagement) {
+    const cut = made("div");
+    cut.id = `${host.id}-cut`;
+    host.append(cut);
+    new CutPanel(cut, view);
+  }
   // what a printer gets
   const image = made("img");
   image.alt = "the 3D view";

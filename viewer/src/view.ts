@@ -4,7 +4,9 @@ import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { HIT, Solid, Tool } from "./bodies";
 import { SIZE, ViewCube } from "./cube";
-import { Colouring, Document, Header, Mark, Rgb, fetched } from "./document";
+import { Colouring, Document, Header, Mark, Rgb } from "./document";
+import { EngagedCutter } from "./engaged";
+import { Teeth } from "./engagement";
 import { Overlay, number } from "./overlay";
 import { Abscissa, Pair, between } from "./pair";
 import { ToolPath, coloured } from "./path";
@@ -32,6 +34,9 @@ export class View {
   private tools = new Map<number, Tool>();
   private readonly marks = new THREE.Group();
   private readonly measure = new THREE.Group();
+  private readonly engaged = new EngagedCutter();
+  /** told where the view stands */
+  readonly stood = new Set<() => void>();
   private colouring: Colouring | null = null;
   private picks: THREE.Vector3[] | null = null;
   private hidden = new Set<Layer>();
@@ -47,6 +52,7 @@ export class View {
   private before = 0;
   private recorder: MediaRecorder | null = null;
   private pair: Pair<View> | null = null;
+  private speeds: { rpm: Float32Array; margin: Float32Array } | null = null;
 
   constructor(readonly host: HTMLElement) {
     this.overlay = new Overlay(host);
@@ -59,7 +65,8 @@ export class View {
     canvas.tabIndex = -1;
     this.overlay.root.prepend(canvas);
     this.scene.background = new THREE.Color(BACKGROUND);
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8d99a8, 1.5), this.camera, this.marks, this.measure);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8d99a8, 1.5), this.camera, this.marks, this.measure,
+      this.engaged.group);
     const lamp = new THREE.DirectionalLight(0xffffff, 1.7);
     lamp.position.set(0.4, 0.7, 1);
     this.camera.add(lamp);
@@ -94,6 +101,8 @@ export class View {
     this.solids = h.bodies.map((b) => new Solid(doc, b));
     this.stock = h.removal ? new Stock(doc, h.removal) : null;
     this.path = new ToolPath(doc, h.path);
+    this.engaged.load(doc, h);
+    this.speeds = h.stability ? { rpm: doc.f4(h.stability.rpm), margin: doc.f4(h.stability.margin) } : null;
     this.tools = new Map(Object.entries(h.cutters).map(([n, parts]) => [Number(n), new Tool(parts)]));
     this.scene.add(...this.solids.map((s) => s.group), this.path.group, ...[...this.tools.values()].map((t) => t.group));
     if (this.stock) this.scene.add(this.stock.group);
@@ -153,6 +162,14 @@ export class View {
   play(rate: number): void {
     this.rate = rate;
     this.before = performance.now();
+  }
+
+  get teeth(): Teeth | null { return this.engaged.teeth; }
+
+  /** Tool, spindle speed and stability margin where it stands; null: the result knows no stability. */
+  operating(): { tool: number; rpm: number; margin: number } | null {
+    const k = Math.floor(this.place), s = this.speeds;
+    return s ? { tool: this.path.tool[k], rpm: s.rpm[k], margin: s.margin[k] } : null;
   }
 
   get playing(): boolean { return this.rate > 0; }
@@ -269,6 +286,7 @@ export class View {
     return {
       row: this.row, tip, bodies: this.solids.map((s) => [s.body.name, s.body.index.n / 3]), frames: this.frames,
       stock: this.stock ? { frame: this.stock.frame, ...this.stock.measured() } : null, segments: this.path.drawn.length / 3,
+      engaged: this.engaged.triangles,
     };
   }
 
@@ -325,7 +343,9 @@ export class View {
       own.group.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), this.path.axis(place, new THREE.Vector3()));
     }
     this.stock?.at(now);
+    this.engaged.stand(now, this.path.tip(place, new THREE.Vector3()), !this.hidden.has("engagement"));
     this.dirty = true;
+    for (const tell of this.stood) tell();
     this.leadOn();
   }
 
@@ -451,43 +471,5 @@ export class View {
       this.overlay.message(`${number(d.length())} mm   dX ${number(d.x)}  dY ${number(d.y)}  dZ ${number(d.z)}`);
     }
     this.dirty = true;
-  }
-}
-
-const views = new Map<string, View>();
-
-/** The view in an element, made where it is not there yet. */
-export function of(id: string): View {
-  const host = document.getElementById(id)!;
-  let view = views.get(id);
-  if (!view || !host.contains(view.host)) views.set(id, (view = new View(host)));
-  return view;
-}
-
-/** Show the document of an address in an element. */
-export async function open(id: string, url: string, keep = false): Promise<void> { of(id).load(await fetched(url), keep); }
-
-/** Show the document of an address beside a view that leads it. */
-export async function beside(id: string, url: string, leader: string, against: Abscissa, here: number[], there: number[]): Promise<void> {
-  const view = of(id);
-  view.load(await fetched(url), view.paired);
-  of(leader).lead(view, against, here, there);
-}
-
-/** Colour the path of a view by the document of an address. */
-export async function paint(id: string, url: string): Promise<void> {
-  const doc = await fetched(url), view = of(id);
-  view.colour(doc, doc.header.colouring);
-}
-
-/** Fill an element with the view of a document that is held as text, and its controls. */
-export async function report(id: string, text: string): Promise<void> {
-  const host = document.getElementById(id)!;
-  try {
-    const { panel } = await import("./panel");
-    const view = await panel(host, text);
-    views.set(id, view);
-  } catch (e) {
-    host.textContent = `The 3D view cannot be shown: ${e instanceof Error ? e.message : e}`;
   }
 }

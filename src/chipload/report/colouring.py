@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.report.view import Colouring, ViewPath
-from chipload.result import COLUMNS, LimitCheck
+from chipload.result import COLUMNS, LimitCheck, Track
 from chipload.result.thinning import thinned
 from chipload.simulation.removal_mesh import RemovalMesh
 
@@ -37,6 +37,11 @@ def beyond(values: Floats, check: LimitCheck) -> Bools:
 def lowest_limit(limits: Sequence[LimitCheck], column: str) -> LimitCheck | None:
     """The check of a column with the lowest limit."""
     return min((c for c in limits if c.column.name == column), key=lambda c: c.limit, default=None)
+
+
+def bounds_of(track: Track) -> dict[str, float]:
+    """The lowest limit of each column of a track."""
+    return {c.column.name: c.limit for c in sorted(track.limits, key=lambda c: -c.limit)}
 
 
 def drawn_rows(path: ViewPath, values: Floats, points: int = POINTS) -> Ints:

@@ -17,6 +17,7 @@ from typing import IO
 from chipload.errors import InputError, OutputError
 from chipload.files import cannot_write, exchanged, fresh_folder, read_regular, sweep
 from chipload.progress import Progress, silent
+from chipload.report.engagement import ENGAGEMENT, engagement_bytes
 from chipload.report.page import page_bytes
 from chipload.report.presentation import Content, Presentation
 from chipload.report.removal import REMOVAL, removal_bytes, removal_meshes
@@ -32,7 +33,7 @@ LARGEST_SUMMARY = 100_000_000
 #: files and who makes them
 Makers = list[tuple[str, Callable[[], Content]]]
 #: files that every result has
-NAMES = (SUMMARY, HISTORY, MAPS, REMOVAL, "scene.glb", "report.html")
+NAMES = (SUMMARY, HISTORY, MAPS, REMOVAL, ENGAGEMENT, "scene.glb", "report.html")
 #: endings of programs and of further files
 SUFFIXES = (".ngc", ".nc", ".apt", ".npz", ".parquet", ".csv", ".toml")
 
@@ -110,16 +111,22 @@ def write_result(result: Result, presentation: Presentation, out: str | Path, pr
     def history(file: IO[bytes]) -> None:
         rows.update(write_history(result, file))
 
-    scene, blanks = cache(presentation.scene), presentation.blanks()
+    scene, blanks, samples = cache(presentation.scene), presentation.blanks(), presentation.samples()
     meshes = cache(lambda: removal_meshes(result, blanks))
+
+    def view() -> list[str]:
+        return view_section(result, scene(), meshes(), blanks, samples)
+
     makers: Makers = [
         (HISTORY, lambda: history),
         (SUMMARY, lambda: summary_bytes(result, rows)),
         ("scene.glb", scene),
-        ("report.html", lambda: page_bytes(result, presentation, view_section(result, scene(), meshes(), blanks))),
+        ("report.html", lambda: page_bytes(result, presentation, view())),
     ]
     if blanks:
         makers.append((REMOVAL, lambda: removal_bytes(result, meshes(), blanks)))
+    if samples:
+        makers.append((ENGAGEMENT, lambda: engagement_bytes(result, samples)))
     if result.maps:
         makers.append((MAPS, lambda: maps_bytes(result)))
     return write_files(makers, out, presentation.files, progress=progress)

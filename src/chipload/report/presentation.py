@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 import trimesh
 
 from chipload.cutter.cutter import Cutter
+from chipload.simulation.engagement_samples import EngagementSamples
 
 #: content of a file, or what writes it bit by bit
 Content = bytes | Callable[[IO[bytes]], None]
@@ -33,9 +34,11 @@ class Presentation:
     scene : scene.glb
     files : programs and other files by name
     blanks : of tracks by their names, from which the stock is shown at every row
+    samples : tooth engagement and loads over a revolution of some steps, of tracks by their names
     """
 
     sections: Callable[[dict[str, go.Figure]], list[str]]
     scene: Callable[[], bytes]
     files: Callable[[], Mapping[str, Content]] = field(default=dict)
     blanks: Callable[[], Mapping[str, Blank]] = field(default=dict)
+    samples: Callable[[], Mapping[str, EngagementSamples]] = field(default=dict)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import resources
 from typing import Any
 
@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.report.bodies import SceneBody
+from chipload.report.operating import OperatingPoints
 from chipload.result.style import SCALE
+from chipload.simulation.engagement_samples import EngagementSamples
 from chipload.simulation.removal_mesh import RemovalMesh
 
 Floats = NDArray[np.float64]
@@ -95,7 +97,8 @@ class ViewMark:
 @dataclass(frozen=True, eq=False)
 class ViewScene:
     """All that a view shows: ``cutters`` are parts (kind, profile) by tool number, 0 for every other; ``columns`` other
-    colours to choose from.
+    colours to choose from; ``samples`` what the teeth cut at some rows, ``bounds`` limits of force [N] and torque
+    [N m] by their columns; ``operating`` speed and margin of each row.
     """
 
     title: str
@@ -106,6 +109,9 @@ class ViewScene:
     marks: Sequence[ViewMark]
     colouring: Colouring | None
     columns: Sequence[Colouring] = ()
+    samples: EngagementSamples | None = None
+    bounds: Mapping[str, float] = field(default_factory=dict)
+    operating: OperatingPoints | None = None
 
 
 class Buffers:
@@ -146,6 +152,8 @@ def scene_document(scene: ViewScene, kept: int = KEPT) -> bytes:
         ],
         "colouring": None if scene.colouring is None else _colouring(scene.colouring, path, out),
         "columns": [_colouring(c, path, out) for c in scene.columns],
+        "stability": None if scene.operating is None else _operating(scene.operating, len(path.t), kept, out),
+        "engagement": None if scene.samples is None else _engagement(scene.samples, scene.bounds, out),
     }
     return _document(header, out)
 
@@ -233,7 +241,7 @@ def _removal(removal: RemovalMesh, out: Buffers) -> dict[str, Any]:
 
 def _path(path: ViewPath, out: Buffers, kept: int) -> dict[str, Any]:
     n = len(path.t)
-    rows = np.arange(n) if n <= kept else np.unique(np.linspace(0, n - 1, kept).astype(np.int64))
+    rows = _kept_rows(n, kept)
     upright = bool((np.abs(path.axis - [0.0, 0.0, 1.0]) < 1e-9).all())
     return {
         "count": n,
@@ -264,6 +272,32 @@ def _colouring(c: Colouring, path: ViewPath, out: Buffers) -> dict[str, Any]:
         "above": out.put(c.above, "u1"),
         "frames": None if c.frames is None else out.put(c.frames, "f4"),
         "frames_above": None if c.frames_above is None else out.put(c.frames_above, "u1"),
+    }
+
+
+def _kept_rows(n: int, kept: int) -> Ints:
+    """Rows of n that are kept, even and at most so many."""
+    return np.arange(n) if n <= kept else np.unique(np.linspace(0, n - 1, kept).astype(np.int64))
+
+
+def _operating(points: OperatingPoints, n: int, kept: int, out: Buffers) -> dict[str, Any]:
+    rows = _kept_rows(n, kept)
+    charts = {str(tool): {"rpm": rpm, "margin": margin} for tool, (rpm, margin) in points.charts.items()}
+    return {
+        "wanted": points.wanted,
+        "charts": charts,
+        "rpm": out.put(points.rpm[rows], "f4"),
+        "margin": out.put(points.margin[rows], "f4"),
+    }
+
+
+def _engagement(samples: EngagementSamples, bounds: Mapping[str, float], out: Buffers) -> dict[str, Any]:
+    return {
+        "stride": samples.stride,
+        "bounds": dict(bounds),
+        "rotations": samples.turn.shape[1],
+        **{name: out.put(getattr(samples, name), "u4") for name in ("row", "tool", "flutes", "start")},
+        **{name: out.put(getattr(samples, name), "f4") for name in ("frame", "ranges", "turn")},
     }
 
 

@@ -6,6 +6,7 @@ import base64
 import zlib
 from collections.abc import Mapping
 from html import escape
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -13,16 +14,21 @@ from numpy.typing import NDArray
 
 from chipload.errors import Finding
 from chipload.report.bodies import bodies_note, scene_bodies
-from chipload.report.colouring import FIRST, colouring_of, lowest_limit
+from chipload.report.colouring import FIRST, bounds_of, colouring_of, lowest_limit
 from chipload.report.marks import marks_of
+from chipload.report.operating import COLUMNS as OPERATING
+from chipload.report.operating import operating_points
 from chipload.report.presentation import Blank
 from chipload.report.removal import AXIS, PLACE, breaks
 from chipload.report.view import Colouring, ViewPath, ViewScene, parts_of, pointer_parts, scene_document
 from chipload.result import LimitCheck, Result, Track
+from chipload.simulation.engagement_samples import EngagementSamples
 from chipload.simulation.removal_mesh import RemovalMesh
 
 #: rows of a path that are kept, points that it is drawn through, columns to choose from, triangles of a body
 KEPT, POINTS, COLUMNS_SHOWN, TRIANGLES = 12_000, 6_000, 3, 60_000
+#: steps whose tooth engagement is kept
+SAMPLES = 200
 #: how a file of glTF begins; another scene holds no body
 GLTF = b"glTF"
 #: element of the view, and of its document
@@ -30,7 +36,11 @@ VIEW, DATA = "view3d", "view3d-data"
 
 
 def view_section(
-    result: Result, scene_glb: bytes, meshes: Mapping[int, RemovalMesh], blanks: Mapping[str, Blank]
+    result: Result,
+    scene_glb: bytes,
+    meshes: Mapping[int, RemovalMesh],
+    blanks: Mapping[str, Blank],
+    samples: Mapping[str, EngagementSamples] = MappingProxyType({}),
 ) -> list[str]:
     """HTML of the view of the first track in use that has a place; empty: there is none."""
     found = _first(result)
@@ -50,10 +60,11 @@ def view_section(
     def row(item: LimitCheck | Finding) -> int | None:
         return item.row if item.row is not None and item.row < len(path.t) else None
 
-    colours = _colours(track, columns, path, removal)
+    colours, own = _colours(track, columns, path, removal), samples.get(track.name)
     scene = ViewScene(
         result.title, bodies, removal, path, parts, marks_of(result, track, row, path.place),
-        colours[0] if colours else None, colours,
+        colours[0] if colours else None, colours, None if own is None else own.at_most(SAMPLES), bounds_of(track),
+        operating_points(result, track, columns),
     )  # fmt: skip
     data = base64.b64encode(zlib.compress(scene_document(scene, KEPT), 9)).decode()
     notes = [bodies_note(bodies)]
@@ -81,7 +92,7 @@ def _first(result: Result) -> tuple[int, Track, dict[str, NDArray[Any]]] | None:
 
 def _columns(track: Track) -> dict[str, NDArray[Any]]:
     """The columns of a track that the view needs."""
-    wanted = {*PLACE, *AXIS, "t_s", "s_mm", "tool", "line", *FIRST}
+    wanted = {*PLACE, *AXIS, "t_s", "s_mm", "tool", "line", *FIRST, *OPERATING}
     parts: dict[str, list[NDArray[Any]]] = {}
     for block in track.blocks():
         for name in wanted & set(block):

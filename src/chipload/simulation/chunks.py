@@ -12,6 +12,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Protocol
 
 import numpy as np
@@ -77,7 +78,7 @@ def remove_in_chunks(
     *,
     interpolation: Interpolation = "slerp",
     watch: Watch | None = None,
-    keeps: WatchState | None = None,
+    keeps: Mapping[str, WatchState] = MappingProxyType({}),
     times: Floats | None = None,
     also: Any = (),
     workers: int = 2,
@@ -89,7 +90,7 @@ def remove_in_chunks(
     Parameters
     ----------
     unfinished : the folder of the run; it holds the columns of the result, and stays until it is discarded
-    keeps : of ``watch``, where it keeps something beside its columns
+    keeps : of ``watch``, what it keeps beside its columns, by names of files
     times, engine : as of :func:`chipload.simulation.chips.remove`
     also : values of any kind on which the result depends beside the arguments: versions, what ``watch`` uses
 
@@ -130,8 +131,8 @@ def remove_in_chunks(
             found_sums = _read_sums(kept["sums"], cutters)
             if setting.moves is None or "stock" in kept:
                 state = LayeredStock.load(kept["stock"]).state()
-            if keeps is not None:
-                keeps.restore(kept["watch"])
+            for name, state_of in keeps.items():
+                state_of.restore(kept[name])
         except (InputError, KeyError) as err:
             unfinished.set_aside(str(err))
             kept = None
@@ -149,8 +150,8 @@ def remove_in_chunks(
         setting, handed = by_layers(engine, setting, found)
         unfinished.again(f"goes on by layers from the beginning: line {found.line}: {found.why}")
         sums = RunningSums(stock.volume(), handed=handed)
-        if keeps is not None:
-            keeps.clear()
+        for state_of in keeps.values():
+            state_of.clear()
         sums, columns = _removed(program, stock, sums, setting, unfinished, count, times, keeps, progress)
     if setting.moves is not None:
         setting.moves.finish(stock, setting.workers)
@@ -167,7 +168,7 @@ def _removed(
     unfinished: Checkpoint,
     count: int,
     times: Floats | None,
-    keeps: WatchState | None,
+    keeps: Mapping[str, WatchState],
     progress: Progress,
 ) -> tuple[RunningSums, list[Columns]]:
     """The sums after all steps, and the columns that did not go into files."""
@@ -176,7 +177,7 @@ def _removed(
     def state() -> dict[str, bytes]:
         # the moves come from the program again
         layers = {} if setting.moves is not None else {"stock": stock.to_bytes()}
-        watched = {} if keeps is None else {"watch": keeps.to_bytes()}
+        watched = {name: kept.to_bytes() for name, kept in keeps.items()}
         return layers | watched | {"sums": _sums_bytes(sums, cutters)}
 
     done = sums.steps

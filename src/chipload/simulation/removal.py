@@ -16,6 +16,7 @@ from chipload.cutter.slices import Slices
 from chipload.cutting.material import Material
 from chipload.engagement.chips.move import Move
 from chipload.errors import Finding
+from chipload.simulation.engagement_samples import EngagementSamples
 from chipload.simulation.loads import Cuts
 from chipload.simulation.moves import MoveRun
 from chipload.simulation.swept_area import Interpolation
@@ -102,6 +103,7 @@ class Removal:
         was cut or it was not asked for
     resolution_error : relative error of the worst value of a column, by its name; empty unless it was asked for; both
         as :mod:`chipload.simulation.accuracy` says
+    samples : tooth engagement of some steps, to be shown; None: none was asked for, or nothing cut
     """
 
     columns: Columns
@@ -114,6 +116,7 @@ class Removal:
     cuts: tuple[Cuts, ...] = ()
     energy_balance: Mapping[int, float] = field(default_factory=dict)
     resolution_error: Mapping[str, float] = field(default_factory=dict)
+    samples: EngagementSamples | None = None
 
     @property
     def band_error(self) -> dict[str, float]:

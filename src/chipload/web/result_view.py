@@ -17,6 +17,7 @@ from chipload.web.asset_cache import AssetCache
 from chipload.web.comparison import COLOURS, MOST, Side
 from chipload.web.panels import RELEASE
 from chipload.web.panels.comparison import ComparisonPanel
+from chipload.web.panels.cut import CutPanel
 from chipload.web.panels.limits import LimitPanel
 from chipload.web.panels.loads import LinePanel, ToolPanel, sequence
 from chipload.web.panels.plots import PlotPanel, nearest
@@ -33,8 +34,8 @@ SPEEDS = {0: "30 s", 1: "\u00d71", 10: "\u00d710", 100: "\u00d7100"}
 VERDICTS = {Verdict.HOLDS: "ok", Verdict.UNPROVEN: "may", Verdict.EXCEEDS: "no"}
 #: steps of the slider
 STEPS = 4000
-#: tables beside the 3D view
-TABLES = {"limits": "limits", "tools": "tools", "lines": "lines", "compare": "compare"}
+#: tables and pictures beside the 3D view
+TABLES = {"limits": "limits", "cut": "cut", "tools": "tools", "lines": "lines", "compare": "compare"}
 
 
 class ResultView:
@@ -64,6 +65,7 @@ class ResultView:
                         "dense no-caps size=sm unelevated toggle-color=blue-grey-7"
                     ).classes("cl-tabs").mark("tables")  # fmt: skip
                     self.limits = LimitPanel(self.find)
+                    self.cut = CutPanel()
                     self.tools = ToolPanel(self._found)
                     self.lines = LinePanel(self._found)
                     self.compared = ComparisonPanel()
@@ -238,6 +240,7 @@ class ResultView:
         """Show the table that is chosen."""
         chosen = self.table.value
         self.limits.box.set_visibility(chosen == "limits")
+        self.cut.show(self.scene.view_id if chosen == "cut" else "")
         self.tools.html.set_visibility(chosen == "tools")
         self.lines.box.set_visibility(chosen == "lines")
         self.compared.html.set_visibility(chosen == "compare")

@@ -9,11 +9,15 @@ from numpy.typing import NDArray
 
 from chipload.errors import Finding, InputError
 from chipload.report.bodies import SceneBody, bodies_note, scene_bodies
-from chipload.report.colouring import colouring_of, colouring_of_words, lowest_limit
+from chipload.report.colouring import bounds_of, colouring_of, colouring_of_words, lowest_limit
+from chipload.report.engagement import ENGAGEMENT, read_engagement
 from chipload.report.marks import marks_of
+from chipload.report.operating import COLUMNS as OPERATING
+from chipload.report.operating import OperatingPoints, operating_points
 from chipload.report.removal import REMOVAL, read_removal
 from chipload.report.view import Colouring, ViewMark, ViewPath, ViewScene, scene_document
 from chipload.result import LimitCheck
+from chipload.simulation.engagement_samples import EngagementSamples
 from chipload.simulation.removal_mesh import RemovalMesh
 from chipload.web.checks import row_of
 from chipload.web.cutters import cutters_of
@@ -25,13 +29,16 @@ LARGEST = 400_000_000
 
 @dataclass(frozen=True, eq=False)
 class PageScene:
-    """What is shown of a track: the document, the names of its bodies, the stock at every row, places, a notice."""
+    """What is shown of a track: the document, the names of its bodies, the stock at every row, places, a notice,
+    whether it shows what the teeth cut.
+    """
 
     document: bytes
     bodies: tuple[str, ...]
     removal: RemovalMesh | None
     marks: tuple[ViewMark, ...]
     notice: str
+    engaged: bool = False
 
 
 def bodies(result: PageResult) -> tuple[tuple[SceneBody, ...], str]:
@@ -58,6 +65,24 @@ def stock_of(result: PageResult, track: PageTrack) -> RemovalMesh | None:
     if found is not None and len(found.rows) and int(found.rows[-1]) >= len(track):
         return None
     return found
+
+
+def samples_of(result: PageResult, track: PageTrack) -> EngagementSamples | None:
+    """Tooth engagement of some rows of a track; None: the result does not hold it."""
+    try:
+        found = read_engagement(result.file(ENGAGEMENT), result.result.tracks.index(track.own))
+    except (InputError, ValueError):
+        return None
+    return None if found is None or not len(found) or int(found.row[-1]) >= len(track) else found
+
+
+def operating_of(result: PageResult, track: PageTrack) -> OperatingPoints | None:
+    """Spindle speed and stability margin at each row; None: the result does not know them."""
+    if not set(OPERATING) <= set(result.columns):
+        return None
+    columns = {name: result.column(track, name) for name in OPERATING}
+    numbers = {name: values for name, values in columns.items() if not isinstance(values, TextColumn)}
+    return operating_points(result.result, track.own, numbers)
 
 
 def view_path(track: PageTrack) -> ViewPath:
@@ -92,13 +117,17 @@ def page_scene(
     def row(item: LimitCheck | Finding) -> int | None:
         return row_of(track, item)
 
+    samples = samples_of(result, track)
     marks = marks_of(result.result, track.own, row, track.place)
     scene = ViewScene(
         result.result.title, solids, removal, view_path(track), parts, marks,
-        colouring(result, track, column, removal, span),
+        colouring(result, track, column, removal, span), samples=samples,
+        bounds=bounds_of(track.own), operating=operating_of(result, track),
     )  # fmt: skip
     names = tuple(b.name for b in solids) + (("stock",) if removal is not None else ())
-    return PageScene(scene_document(scene), names, removal, marks, " ".join([notice, unknown]).strip())
+    return PageScene(
+        scene_document(scene), names, removal, marks, " ".join([notice, unknown]).strip(), samples is not None
+    )
 
 
 def colouring(

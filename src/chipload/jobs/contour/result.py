@@ -20,7 +20,7 @@ from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, check
 #: limits that count only where the wall is made
 ON_WALL = ("engagement_deg", "form_error_um")
 #: columns of the planner that the result does not keep
-DROPPED = ("arcs", "form_error_signed_um")
+DROPPED = ("arcs", "arc_from_rad", "arc_to_rad", "heading_x", "heading_y", "form_error_signed_um")
 SEVERITIES = {Verdict.HOLDS: Severity.NOTE, Verdict.UNPROVEN: Severity.UNPROVEN, Verdict.EXCEEDS: Severity.EXCEEDS}
 
 
@@ -77,18 +77,18 @@ def limits_of(machine: Machine, op: Operation, strategy: StrategyResult, track: 
     if op.checks is not None:
         stated = tuple(with_peaks(check, op.checks.material) for check in stated)
     own = () if op.checks is None else default_limits(op.checks, machine, columns, track, {})
-    step = np.cumsum(_takes_time(columns)) - 1
+    step = np.cumsum(takes_time(columns)) - 1
     return tuple(c if c.row is None else replace(c, row=int(step[c.row])) for c in (*stated, *own))
 
 
 def steps_of(op: Operation, strategy: StrategyResult) -> dict[str, NDArray[Any]]:
     """The history of a strategy without the samples at which a pass begins where the one before ends."""
     columns = history_of(op, strategy)
-    kept = _takes_time(columns)
+    kept = takes_time(columns)
     return {name: values[kept] for name, values in columns.items()}
 
 
-def _takes_time(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
+def takes_time(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
     """Rows that take time, and the first."""
     kept = np.asarray(columns["duration_s"]) > 0.0
     kept[:1] = True

@@ -32,6 +32,7 @@ from chipload.result import Result, Verdict
 from chipload.result.motions import chords_of
 from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS, SPACE_POINTS, STOCK
 from chipload.result.thinning import thinned
+from chipload.simulation.engagement_samples import EngagementSamples
 from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
@@ -79,6 +80,7 @@ def program_presentation(
         lambda: scene_bytes(program),
         lambda: _files(program, result, changed),
         lambda: _blanks(program, result),
+        lambda: _samples(program, result),
     )
 
 
@@ -88,6 +90,12 @@ def _blanks(program: ProgramResult, result: Result) -> dict[str, Blank]:
     if simulated is None or simulated.blank is None:
         return {}
     return {track.name: Blank(simulated.blank, program.cutters) for track in result.tracks}
+
+
+def _samples(program: ProgramResult, result: Result) -> dict[str, EngagementSamples]:
+    """Tooth engagement of the program that was simulated last: the track in use."""
+    found = None if program.simulated is None else program.simulated.removal.samples
+    return {} if found is None else {track.name: found for track in result.tracks if track.in_use}
 
 
 def _files(program: ProgramResult, result: Result, changed: Mapping[str, ChangedText]) -> dict[str, Content]:

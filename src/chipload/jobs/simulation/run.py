@@ -34,6 +34,7 @@ from chipload.progress import Progress, silent
 from chipload.simulation.checkpoint import Checkpoint
 from chipload.simulation.chips import remove
 from chipload.simulation.chunks import remove_in_chunks
+from chipload.simulation.engagement_samples import EngagementRecorder
 from chipload.simulation.estimate import estimate
 from chipload.simulation.loads import Cuts
 from chipload.simulation.steps import StepBlocks
@@ -162,6 +163,9 @@ def simulated(
     if stability_watch is not None:
         watches.append(stability_watch)
 
+    recorder = EngagementRecorder(material)
+    watches.append(recorder)
+
     def watch(cuts: Cuts) -> dict[str, NDArray[np.float64]]:
         return {name: values for each in watches for name, values in each(cuts).items()}
 
@@ -177,16 +181,16 @@ def simulated(
         formed = None if made is None else (made.points, made.faces, made.distance, made.step)
         removal = remove_in_chunks(
             program, stock, job.cutters, material, fine, checkpoint, interpolation=op.interpolation, watch=watch,
-            keeps=stability_watch, times=times, engine=op.engine, progress=removing,
+            keeps={"engagement": recorder} | ({} if stability_watch is None else {"watch": stability_watch}),
+            times=times, engine=op.engine, progress=removing,
             also=(
                 versions(), sources(), repr((stiffness, job.table.workpiece)), repr(job.table.checks), formed,
                 None if stability_watch is None else stability_watch.dynamics,
             ),
         )  # fmt: skip
     removal = with_columns(removal, (*watched(gives, formed=made is not None), *CHECK_COLUMNS))
-    removal = replace(
-        removal, resolution_error=with_compliance_error(removal.resolution_error, removal.columns, compliance)
-    )
+    errors = with_compliance_error(removal.resolution_error, removal.columns, compliance)
+    removal = replace(removal, resolution_error=errors, samples=recorder.samples())
     if stability_watch is not None:
         removal = with_columns(removal, stability_watch.columns)
     touched = collisions(

@@ -262,6 +262,15 @@ def stability_numbers(stability: StabilityResult, columns: Columns) -> dict[str,
     if stability.watch.follows and workpiece is not None:
         followed = _followed_numbers(stability.watch, columns, stability.wanted)
         out["workpiece_modes"] = {"frequency_error_percent": 100.0 * workpiece.error, **followed}
+    if stability.quiet:
+        out["chart"] = [
+            {
+                "tool": number,
+                "speed_rpm": [round(rpm_from_rad_s(v), 2) for v in own.speed.tolist()],
+                "margin": [round(m, 4) for m in own.margin.tolist()],
+            }
+            for number, own in stability.quiet.items()
+        ]
     if quiet is not None:
         best, least = quiet.advised(speed / rpm_from_rad_s(1.0))
         out |= {"speed_rpm_advised": rounded_rpm(best), "margin_advised": least}

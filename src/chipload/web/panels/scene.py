@@ -28,6 +28,8 @@ from chipload.web.scene import PageScene, bodies, colouring, page_scene, view_pa
 VIEWS = {"iso": "from a corner", "top": "from above", "front": "from the front", "side": "from the side"}
 #: boxes that are no bodies
 GLASS, DRAPE = "see through", "values on stock"
+#: the engaged sector and surface of the cutter
+ENGAGED = "engagement"
 #: planes that cut the picture away
 SECTIONS = {"": "no section", "x": "section X", "y": "section Y", "z": "section Z"}
 
@@ -230,6 +232,7 @@ class ScenePanel:
     def _boxes(self, scene: PageScene) -> None:
         """A box for each thing that can be hidden."""
         names = [*scene.bodies, "path", "cutter"]
+        names += [ENGAGED] if scene.engaged else []
         if scene.marks:
             names.append("marks")
         more = [GLASS] if scene.bodies else []

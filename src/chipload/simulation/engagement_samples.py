@@ -1,0 +1,246 @@
+"""Tooth engagement and loads over a revolution of some steps of a run, kept to be shown.
+
+Notation: frame T, n, A, immersion phi, chip thickness h = along sin(phi) + across cos(phi) + offset and angle kappa as
+in :mod:`chipload.engagement.tooth_engagement`; rho distance from the axis, z height over the tip.
+
+A run has more steps than a page can show: every step whose number is a multiple of the stride is kept, and the stride
+is doubled whenever too many are. What is kept depends on the program alone, not on where a run was stopped.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.force import forces_over_turn, in_work
+from chipload.cutting.material import Material
+from chipload.engagement.tooth_engagement import ToothEngagement
+from chipload.errors import InputError
+from chipload.simulation.loads import Cuts
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: steps that are kept at most, and ranges of immersion of all of them
+STEPS, RANGES = 400, 60_000
+#: rotations of a revolution at which force and torque are kept
+ROTATIONS = 120
+#: columns of ``ranges``
+COLUMNS = (
+    "phi_from", "phi_to", "along", "offset", "across", "rho_from", "z_from", "rho_to", "z_to", "sin_kappa",
+    "cos_kappa", "tooth",
+)  # fmt: skip
+ARRAYS = ("row", "tool", "flutes", "frame", "start", "ranges", "turn")
+
+
+@dataclass(frozen=True, eq=False)
+class EngagementSamples:
+    """Steps in cut, by rising row.
+
+    Parameters
+    ----------
+    stride : rows between neighbouring samples of one cut
+    row : (n,) int, row of the history
+    tool, flutes : (n,) int, tool number and number of teeth
+    frame : (n, 3, 3) rows T, n, A
+    start : (n + 1,) int; the ranges of sample i are the rows start[i] .. start[i + 1] - 1
+    ranges : (b, 12) :data:`COLUMNS` [rad, mm]; tooth -1: every tooth
+    turn : (n, m, 4) force on the cutter x, y, z in the workpiece frame [N] and torque [N m] at m even rotations of
+        a revolution, from 0
+    """
+
+    stride: int
+    row: Ints
+    tool: Ints
+    flutes: Ints
+    frame: Floats
+    start: Ints
+    ranges: Floats
+    turn: Floats
+
+    def __post_init__(self) -> None:
+        n = len(self.row)
+        shapes = {
+            "tool": (n,), "flutes": (n,), "frame": (n, 3, 3), "start": (n + 1,),
+            "ranges": (int(self.start[-1]) if len(self.start) else -1, len(COLUMNS)),
+            "turn": (n, self.turn.shape[1] if self.turn.ndim == 3 else -1, 4),
+        }  # fmt: skip
+        for name, shape in shapes.items():
+            value = getattr(self, name)
+            if value.shape != shape or not np.isfinite(value).all():
+                raise InputError(f"engagement samples: {name} of shape {value.shape}: need {shape} finite numbers")
+        if self.stride < 1 or (np.diff(self.row) <= 0).any() or (np.diff(self.start) < 0).any():
+            raise InputError("engagement samples: rows must rise, and the stride be at least 1")
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    def every(self, share: int) -> EngagementSamples:
+        """The samples whose row is a multiple of ``share`` strides."""
+        stride = self.stride * share
+        return self.chosen(np.flatnonzero(self.row % stride == 0), stride)
+
+    def chosen(self, k: Ints, stride: int) -> EngagementSamples:
+        """Some of the samples."""
+        ranges, start = _rows_of(self.start, k)
+        return EngagementSamples(
+            stride, self.row[k], self.tool[k], self.flutes[k], self.frame[k], start, self.ranges[ranges], self.turn[k]
+        )
+
+    def at_most(self, steps: int) -> EngagementSamples:
+        """So many samples at most."""
+        out = self
+        while len(out) > steps:
+            out = out.every(2)
+        return out
+
+    def arrays(self) -> dict[str, NDArray[np.generic]]:
+        """What a file keeps of it, in single precision."""
+        kept = {name: getattr(self, name) for name in ARRAYS}
+        single = {k: v.astype(np.float32 if v.dtype.kind == "f" else np.int32) for k, v in kept.items()}
+        return {**single, "stride": np.array(self.stride, dtype=np.int32)}
+
+
+def samples_from(arrays: Mapping[str, NDArray[np.generic]]) -> EngagementSamples:
+    """The samples of :meth:`EngagementSamples.arrays`.
+
+    Raises
+    ------
+    InputError
+        One of the arrays is missing, or they do not fit one another.
+    """
+    try:
+        values = {name: np.asarray(arrays[name]) for name in ARRAYS}
+        stride = int(np.asarray(arrays["stride"]).item())
+    except (KeyError, ValueError) as err:
+        raise InputError(f"engagement samples: {err}: is missing: run the job again") from None
+    row, tool, flutes, start = (values[name].astype(np.int64) for name in ("row", "tool", "flutes", "start"))
+    frame, ranges, turn = (values[name].astype(np.float64) for name in ("frame", "ranges", "turn"))
+    return EngagementSamples(stride, row, tool, flutes, frame, start, ranges, turn)
+
+
+def engagement_samples(
+    engagement: ToothEngagement, cutter: Cutter, material: Material, row: Ints, tool: int, stride: int = 1
+) -> EngagementSamples:
+    """The samples of all steps of an engagement, whose rows in the history are ``row`` (n,).
+
+    Examples
+    --------
+    A straight tooth cuts a slot straight ahead along x: at a quarter turn Fy = (Ktc f_z + Kte) depth = 220 N.
+
+    >>> from chipload.engagement.tooth_engagement import engagement_of_arcs
+    >>> from dataclasses import replace
+    >>> mill = Cutter(10.0, 1, 0.0, 20.0, 30.0, 6e5)
+    >>> plain = Material("plain", 1000.0, 300.0, 0.0, 10.0, 5.0, 0.0, source="made up for this example")
+    >>> slot = replace(engagement_of_arcs([0.0], [math.pi], 0.1, mill, 2.0), frame=np.eye(3)[None])
+    >>> found = engagement_samples(slot, mill, plain, np.array([7]), 1)
+    >>> found.turn[0, ROTATIONS // 4].round(6).tolist(), found.ranges[0, 5:9].tolist()
+    ([-70.0, 220.0, 0.0, 1.1], [5.0, 0.0, 5.0, 2.0])
+    """
+    theta = np.arange(ROTATIONS) * (math.tau / ROTATIONS)
+    force, torque = forces_over_turn(engagement, cutter, material, theta)
+    frame, n = engagement.frames, len(engagement)
+    turn = np.concatenate([in_work(force, frame), torque[..., None] / 1000.0], axis=2)
+    table, rows = engagement.slices[engagement.slice], engagement.rows
+    s_from, rho, z, sine, cosine = table[:, :5].T
+    half, low = 0.5 * (rows[:, 3] - rows[:, 2]), z + (rows[:, 2] - s_from) * sine
+    profile = [rho - half * cosine, low, rho + half * cosine, low + 2.0 * half * sine, sine, cosine]
+    ranges = np.column_stack([rows[:, [0, 1, 4, 5, 6]], *profile, engagement.tooth])
+    ones = np.ones(n, dtype=np.int64)
+    return EngagementSamples(
+        stride, np.asarray(row, dtype=np.int64), tool * ones, cutter.flutes * ones, np.asarray(frame),
+        np.asarray(engagement.start), ranges, turn,
+    )  # fmt: skip
+
+
+@dataclass(eq=False)
+class EngagementRecorder:
+    """A watch that adds no column and keeps samples.
+
+    Parameters
+    ----------
+    material : whose coefficients count
+    steps, ranges : that are kept at most
+    """
+
+    material: Material
+    steps: int = STEPS
+    ranges: int = RANGES
+    stride: int = 1
+    parts: list[EngagementSamples] = field(default_factory=list)
+
+    def __call__(self, cuts: Cuts) -> dict[str, Floats]:
+        """Keep some of the steps of one cutter."""
+        chosen = np.flatnonzero(np.asarray(cuts.step) % self.stride == 0)
+        if len(chosen):
+            some = _engagement_at(cuts.engagement, chosen)
+            own = np.asarray(cuts.step)[chosen]
+            self.parts.append(engagement_samples(some, cuts.cutter, self.material, own, cuts.tool, self.stride))
+        while sum(map(len, self.parts)) > self.steps or sum(len(p.ranges) for p in self.parts) > self.ranges:
+            self.stride *= 2
+            thinner = [p.every(self.stride // p.stride) for p in self.parts]
+            self.parts = [p for p in thinner if len(p)]
+        return {}
+
+    def samples(self) -> EngagementSamples | None:
+        """What was kept; None: no step cut."""
+        return _joined([p.every(self.stride // p.stride) for p in self.parts]) if self.parts else None
+
+    def to_bytes(self) -> bytes:
+        """What was kept so far, for the state of a run: to the bit."""
+        sink, own = io.BytesIO(), self.samples()
+        arrays = {} if own is None else {name: getattr(own, name) for name in ARRAYS}
+        np.savez(sink, stride=np.array(self.stride), **arrays)
+        return sink.getvalue()
+
+    def restore(self, path: Path) -> None:
+        """Keep what an earlier run kept."""
+        try:
+            with np.load(path, allow_pickle=False) as held:
+                arrays = {name: held[name] for name in held.files}
+        except (OSError, ValueError, EOFError) as err:
+            raise InputError(f"{path}: cannot be read: {err}: remove its folder") from None
+        if "stride" not in arrays:
+            raise InputError(f"{path}: damaged: remove its folder")
+        self.stride = int(arrays["stride"])
+        self.parts = [samples_from(arrays)] if "row" in arrays else []
+
+    def clear(self) -> None:
+        """Keep nothing."""
+        self.stride, self.parts = 1, []
+
+
+def _rows_of(start: Ints, k: Ints) -> tuple[Ints, Ints]:
+    """Rows of some steps, and where those of each begin among them."""
+    size = np.diff(start)[k]
+    begin = np.concatenate([[0], np.cumsum(size)])
+    return np.arange(begin[-1]) + np.repeat(start[:-1][k] - begin[:-1], size), begin
+
+
+def _engagement_at(engagement: ToothEngagement, k: Ints) -> ToothEngagement:
+    """The tooth engagement of some steps."""
+    rows, start = _rows_of(engagement.start, k)
+    return ToothEngagement(
+        start, engagement.rows[rows], engagement.tooth[rows], engagement.slice[rows], engagement.slices,
+        engagement.frames[k],
+    )  # fmt: skip
+
+
+def _joined(parts: Sequence[EngagementSamples]) -> EngagementSamples:
+    """Samples of blocks and cutters in the order of their rows."""
+    start = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(p.start) for p in parts]))])
+    row, tool, flutes = (np.concatenate([getattr(p, name) for p in parts]) for name in ("row", "tool", "flutes"))
+    frame, ranges, turn = (np.concatenate([getattr(p, name) for p in parts]) for name in ("frame", "ranges", "turn"))
+    order = np.argsort(row, kind="stable")
+    rows, start = _rows_of(start, order)
+    stride = parts[0].stride
+    return EngagementSamples(
+        stride, row[order], tool[order], flutes[order], frame[order], start, ranges[rows], turn[order]
+    )

@@ -1,0 +1,53 @@
+/** What the page and the report call: views and panels by the elements that they fill. */
+
+import { CutPanel } from "./cut";
+import { fetched } from "./document";
+import { Abscissa } from "./pair";
+import { View } from "./view";
+
+const views = new Map<string, View>(), cuts = new Map<string, CutPanel>();
+
+/** The view in an element, made where it is not there yet. */
+export function of(id: string): View {
+  const host = document.getElementById(id)!;
+  let view = views.get(id);
+  if (!view || !host.contains(view.host)) views.set(id, (view = new View(host)));
+  return view;
+}
+
+/** Show in an element what the teeth cut where a view stands. */
+export function cut(id: string, leader: string): CutPanel {
+  const host = document.getElementById(id)!;
+  let own = cuts.get(id);
+  if (!own || own.host !== host) cuts.set(id, (own = new CutPanel(host, of(leader))));
+  own.refresh(true);
+  return own;
+}
+
+/** Show the document of an address in an element. */
+export async function open(id: string, url: string, keep = false): Promise<void> { of(id).load(await fetched(url), keep); }
+
+/** Show the document of an address beside a view that leads it. */
+export async function beside(id: string, url: string, leader: string, against: Abscissa, here: number[], there: number[]): Promise<void> {
+  const view = of(id);
+  view.load(await fetched(url), view.paired);
+  of(leader).lead(view, against, here, there);
+}
+
+/** Colour the path of a view by the document of an address. */
+export async function paint(id: string, url: string): Promise<void> {
+  const doc = await fetched(url), view = of(id);
+  view.colour(doc, doc.header.colouring);
+}
+
+/** Fill an element with the view of a document that is held as text, and its controls. */
+export async function report(id: string, text: string): Promise<void> {
+  const host = document.getElementById(id)!;
+  try {
+    const { panel } = await import("./panel");
+    const view = await panel(host, text);
+    views.set(id, view);
+  } catch (e) {
+    host.textContent = `The 3D view cannot be shown: ${e instanceof Error ? e.message : e}`;
+  }
+}
