@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named, read_catalogue
 from chipload.errors import InputError
+from chipload.jobs.impeller.channel_depth import reach_line
 from chipload.jobs.impeller.checkpoint import KeptParts
 from chipload.jobs.impeller.job import ImpellerJob
 from chipload.jobs.impeller.outcome import ImpellerResult, OneCutter, Searched, unreached_text
@@ -120,7 +121,8 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
     lines.append(
         f"machine {machine.name}: {len(angles)} table angles from {angles.min():.6g} to {angles.max():.6g} deg"
     )
-    for k, surface in enumerate(_surfaces(job, impeller)):
+    surfaces = _surfaces(job, impeller)
+    for k, surface in enumerate(surfaces):
         s = surface.scene
         lines.append(f"surface {k}: {surface.name}: {len(s.contact)} contact points, {len(s.check)} check points")
     corner = _least_corner(job, impeller, catalogue)
@@ -129,7 +131,8 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
         lines.append(f"between check points: certified within {within:g} mm for corner radii from {corner:g} mm")
     corners = ", ".join(f"{r:g}" for r in catalogue.families)
     lines.append(f"catalogue {catalogue.name}: {len(catalogue.cutters)} cutters, corner radii {corners} mm")
-    return lines, True
+    line, reached = reach_line(impeller, catalogue, np.concatenate([s.scene.contact for s in surfaces]))
+    return [*lines, line], reached
 
 
 def _stages(op: ImpellerOperationTable, progress: Progress) -> list[Progress]:
