@@ -33,13 +33,13 @@ from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.geometry.dxf import read_dxf
 from chipload.machine.machine import machine_named
-from chipload.planning.pocket.clearing import (
+from chipload.planning.pocket.clearing import clear_region
+from chipload.planning.pocket.clearing_path import (
     CUT,
     ENTRY,
     LIFT,
     LINK,
     ClearingPath,
-    clear_region,
     polyline,
     segment_lengths,
 )

@@ -13,7 +13,8 @@ from chipload.geometry.contour import Region
 from chipload.geometry.dxf import read_dxf
 from chipload.machine.feed import move_time
 from chipload.machine.machine import machine_named
-from chipload.planning.pocket.clearing import CUT, clear_region
+from chipload.planning.pocket.clearing import clear_region
+from chipload.planning.pocket.clearing_path import CUT
 from chipload.planning.pocket.plan import plan_pocket
 from chipload.planning.pocket.request import Clearing
 from chipload.simulation.centre_path import CentrePath, rim_engagement

@@ -97,7 +97,7 @@ def read_program(
 
     Parameters
     ----------
-    text : an NC text that stands for that of the file; None: the file is read
+    text : that stands for that of the file; None: the file is read
     dialect : None: by the ending of the file, for NC texts that of the machine
     tools : diameters and lengths; without it they count as 0
     feed : [mm/s] of cuts before the text states a feed
@@ -118,7 +118,7 @@ def read_program(
     values, origins, placed = setup.values(kind), setup.origins(kind), setup.placed(kind)
     if kind == "apt":
         lengths = tools.lengths() if tools is not None else {}
-        text = apt_text(path)
+        text = apt_text(path) if text is None else text
         shapes = read_cutters(text)[0] if setup.cutters else {}
         agreed = agree(path.name, setup.cutters, tools=tools, shapes=shapes)
         program, findings = read_apt(text, name=path.stem, feed=feed)
@@ -126,7 +126,7 @@ def read_program(
         more = tuple(f for f in found if f.code not in LIMITS)
     else:
         if kind == "heidenhain":
-            text = heidenhain_text(path)
+            text = heidenhain_text(path) if text is None else text
             stated = tool_definitions(text) if setup.cutters and comments else {}
             agreed = agree(path.name, setup.cutters, tools=tools, comments=stated)
             known = setup.diameters()

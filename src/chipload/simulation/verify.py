@@ -87,6 +87,7 @@ def verify_contour(
     gouge_tolerance_mm: float,
     excess_tolerance_mm: float,
     passes: Sequence[str] | None = None,
+    wall_below: tuple[float, Sequence[Contour]] | None = None,
     step_mm: float = 0.05,
     workers: int = 1,
     progress: Progress = silent,
@@ -104,6 +105,7 @@ def verify_contour(
     material : the part is `left` or `right` of the wall's travel
     engagement_tolerance_deg, gouge_tolerance_mm, excess_tolerance_mm : what is still proved
     passes : values of `pass` whose engagement is compared; None: all
+    wall_below : a height [mm], and the wall of what is cut below it; None: the wall is the same at all heights
     step_mm : spacing on path and wall for gouge, excess and rapids [mm]
     workers : threads; the answer does not depend on it
     progress : called with the share done; if it raises Cancelled the verdict so far is given, `unproven` at best
@@ -144,7 +146,7 @@ def verify_contour(
         hits, samples = _rapids_through_stock(program, levels, step_mm, failed)
         progress(0.15, "rapids")
         if wall:
-            cleft, remains, asked = _wall(levels, wall, material, step_mm)
+            cleft, remains, asked = _wall(levels, wall, wall_below, material, step_mm)
             samples += asked
             if cleft.value_mm > gouge_tolerance_mm:
                 failed.append(_exceeds("gouge", cleft, "mm", gouge_tolerance_mm))
@@ -224,14 +226,19 @@ def _need_tolerances(stock: Region | None, **tolerances: float) -> None:
 
 
 def _wall(
-    levels: Sequence[_Level], wall: Sequence[Contour], material: str, step: float
+    levels: Sequence[_Level],
+    wall: Sequence[Contour],
+    wall_below: tuple[float, Sequence[Contour]] | None,
+    material: str,
+    step: float,
 ) -> tuple[GreatestDistance, GreatestDistance, int]:
     """The greatest gouge and excess of all levels, and the number of points asked."""
     cleft = remains = GreatestDistance(0.0, (0.0, 0.0), 0)
     samples = 0
     for level in levels:
-        cleft = max(cleft, gouge(level.centre_path, wall, material, step), key=lambda v: v.value_mm)
-        remains = max(remains, excess(level.centre_path, wall, step), key=lambda v: v.value_mm)
+        own = wall_below[1] if wall_below is not None and level.z < wall_below[0] - LEVEL_MM else wall
+        cleft = max(cleft, gouge(level.centre_path, own, material, step), key=lambda v: v.value_mm)
+        remains = max(remains, excess(level.centre_path, own, step), key=lambda v: v.value_mm)
         samples += cleft.samples + remains.samples
     return cleft, remains, samples
 

@@ -9,7 +9,8 @@ import shapely
 
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
-from chipload.planning.pocket.clearing import CUT, ENTRY, LIFT, LINK, clear_region, polyline
+from chipload.planning.pocket.clearing import clear_region
+from chipload.planning.pocket.clearing_path import CUT, ENTRY, LIFT, LINK, polyline
 from chipload.planning.pocket.leftover import PocketRemainder, leftover, swept
 from chipload.planning.pocket.reach import centre_region, reach_of, shortest_order, widest_places
 from chipload.stock.planar import PlanarStock

@@ -9,7 +9,7 @@ import pytest
 from chipload.errors import InputError
 from chipload.machine.machine import machine_named
 from chipload.planning.link_rows import row_ends
-from chipload.planning.pocket.clearing import CUT, LIFT, LINK, ClearingPath
+from chipload.planning.pocket.clearing_path import CUT, LIFT, LINK, ClearingPath
 from chipload.planning.pocket.motions import clock, motions_of, programs_of, samples_of, speeds
 from chipload.planning.pocket.request import Clearing
 from chipload.planning.result import StrategyResult

@@ -10,7 +10,7 @@ must be those of the plan.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,18 +22,26 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour
 from chipload.geometry.offset import offset
+from chipload.jobs.contour.semifinish_text import inserted_lines, put_in
 from chipload.machine.machine import Machine
-from chipload.program.gcode.blocks import decimal
+from chipload.program.apt.reader import apt_text
 from chipload.program.gcode.reader import gcode_text
+from chipload.program.heidenhain.reader import heidenhain_text
 from chipload.program.program import ARC_CCW, ARC_CW, LINE, RAPID, Program
-from chipload.program.read import ENDINGS, dialect_of, read_program
+from chipload.program.read import ENDINGS, Dialect, dialect_of, read_program
 from chipload.simulation.centre_path import flat_motions
-from chipload.units import mm_min_from_mm_s
 
 #: motions are level and places are the same within this [mm]
 LEVEL_MM = 1e-6
 #: modes in which the inserted lines would mean something else
 _MODES = re.compile(r"(?<![A-Za-z_])[gG]\s*0*(20|70|91|90\.1|41|42|41\.1|42\.1|51|68|16)(?![\d.])")
+#: the same in conversational text and in CL data
+MODES = {
+    "heidenhain": re.compile(r"\bR[LR]\b(?!\d)|\bINCH\b|CYCL DEF (?:7|8|10|11|19|26)\b|\bPLANE [A-Z]+|TRANS DATUM"),
+    "apt": re.compile(r"UNITS\s*/\s*IN|TRACUT|COPY/|CUTCOM\s*/\s*(?:LEFT|RIGHT)|MULTAX\s*/?\s*ON", re.IGNORECASE),
+}
+#: what reads the text of a file
+TEXTS: Mapping[str, Callable[[Path], str]] = {"apt": apt_text, "heidenhain": heidenhain_text}
 _COMMENT = re.compile(r"\([^)\n]*\)|;[^\n]*")
 
 
@@ -44,13 +52,15 @@ class FinishProgram:
     Parameters
     ----------
     file : of the program
-    text : of it; "": no G-code, nothing can be inserted
+    dialect : of its text
+    text : of it
     program : its motions
     first, last : rows of the finish path
     safe : the last row before it at or above the top of the stock
     """
 
     file: Path
+    dialect: Dialect
     text: str
     program: Program
     first: int
@@ -107,8 +117,10 @@ def read_finish(path: Path, machine: Machine, lines: Sequence[int] | None, top: 
             f"part.file = {path.name}: the tool is never at the height of the stock's top before the cut: "
             "check stock.top_mm"
         )
-    text = "" if dialect_of(path, machine) in ("apt", "heidenhain") else gcode_text(path)
-    return FinishProgram(path, text, p, int(rows[0]), int(rows[-1]), int(high[-1]))
+    dialect = dialect_of(path, machine)
+    return FinishProgram(
+        path, dialect, TEXTS.get(dialect, gcode_text)(path), p, int(rows[0]), int(rows[-1]), int(high[-1])
+    )
 
 
 def flat_lengths(p: Program) -> NDArray[Any]:
@@ -161,16 +173,15 @@ def with_semifinish(finish: FinishProgram, planned: Program, machine: Machine) -
     InputError
         The text states modes in which the inserted lines would mean something else, or it does not read back.
     """
-    found = _MODES.search(_COMMENT.sub(" ", finish.text))
+    found = MODES.get(finish.dialect, _MODES).search(_COMMENT.sub(" ", finish.text))
     if found is not None:
         raise InputError(f"{finish.file.name}: not written back: the text states {found[0]}")
     rows = _semifinish_rows(planned)
     p, k = finish.program, finish.safe
     line = int(p.line[k])
     ending = "\r\n" if "\r\n" in finish.text else "\n"
-    old = finish.text.split(ending)
-    new = _blocks(planned, rows, p, k, machine.decimals)
-    text = ending.join([*old[:line], *new, *old[line:]])
+    new = inserted_lines(finish.dialect, planned, rows, p, k, machine.decimals)
+    text = ending.join(put_in(finish.dialect, finish.text.split(ending), line, new))
     _read_back(finish, text, planned, rows, line, len(new), machine)
     return text
 
@@ -181,44 +192,6 @@ def _semifinish_rows(planned: Program) -> NDArray[Any]:
     finish = int(np.flatnonzero(labels == "finish")[0])
     begin = int(np.flatnonzero(planned.motion[:finish] == RAPID)[-1])
     return np.arange(begin)
-
-
-def _blocks(planned: Program, rows: NDArray[np.int64], p: Program, k: int, decimals: int) -> list[str]:
-    """Blocks that leave the machine where, and in the modes in which, row k of the old program left it."""
-
-    def at(letters: str, values: Sequence[float]) -> str:
-        return " ".join(f"{a}{decimal(v, decimals, point=True)}" for a, v in zip(letters, values, strict=True))
-
-    x, y, z = p.p_work[k].tolist()
-    safe = float(planned.p_work[rows, 2].max())
-    out = ["(semi-finish passes by chipload)"]
-    if safe > z:
-        out.append(f"G0 {at('Z', [safe])}")
-    place = np.array([x, y, max(safe, z)])
-    feed = 0.0
-    for row in rows.tolist():
-        to, motion = planned.p_work[row], int(planned.motion[row])
-        word = f" F{decimal(mm_min_from_mm_s(1.0) * planned.feed[row], 3, point=True)}" if motion != RAPID else ""
-        word = "" if planned.feed[row] == feed else word
-        if motion != RAPID:
-            feed = float(planned.feed[row])
-        if motion == RAPID and place[2] < safe:
-            out.append(f"G0 {at('Z', to[2:])}")
-            place = np.array([*place[:2], to[2]])
-        if motion in (ARC_CW, ARC_CCW):
-            centre = planned.centre[row, :2] - place[:2]
-            out.append(f"G{2 if motion == ARC_CW else 3} {at('XY', to[:2])} {at('IJ', centre)}{word}")
-        else:
-            out.append(f"G{0 if motion == RAPID else 1} {at('XYZ', to)}{word}")
-        place = to
-    out += [f"G0 {at('XY', [x, y])}"]
-    if z < safe:
-        out.append(f"G0 {at('Z', [z])}")
-    cut = np.flatnonzero(np.isin(p.motion[: k + 1], (LINE, ARC_CW, ARC_CCW)))
-    if len(cut):  # the modes that the next lines rely on
-        modal = f"F{decimal(mm_min_from_mm_s(1.0) * p.feed[cut[-1]], 3, point=True)}"
-        out.append(modal if p.motion[k] == RAPID else f"G1 {at('XYZ', [x, y, z])} {modal}")
-    return out
 
 
 def _read_back(
@@ -241,5 +214,12 @@ def _read_back(
 
 
 def _rows(p: Program) -> NDArray[Any]:
-    """(n, 8) motion, end [mm], centre in the plane [mm], feed [mm/s], tool."""
-    return np.column_stack([p.motion, p.p_work, p.centre[:, :2], p.feed, p.tool])
+    """(n, 8) motion, end [mm], middle of an arc in the plane [mm], feed [mm/s], tool.
+
+    The middle, for the centre of a flat arc lies so far off that rounded ends move it.
+    """
+    seg = flat_motions(p)
+    turn, (x, y) = 0.5 * seg[:, 6], (seg[:, 0:2] - seg[:, 4:6]).T
+    middle = seg[:, 4:6] + np.column_stack([np.cos(turn) * x - np.sin(turn) * y, np.sin(turn) * x + np.cos(turn) * y])
+    arc = np.isin(p.motion, (ARC_CW, ARC_CCW))[:, None]
+    return np.column_stack([p.motion, p.p_work, np.where(arc, middle, 0.0), p.feed, p.tool])

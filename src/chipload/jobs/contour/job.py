@@ -8,7 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from chipload.cutter.cutter import Cutter
-from chipload.jobs.contour.tables import ALWAYS, MAY, NEEDS, ContourJobTable, ContourLimitsTable, OperationTable
+from chipload.jobs.contour.tables import (
+    ALWAYS,
+    MAY,
+    NEEDS,
+    STRATEGIES,
+    ContourJobTable,
+    ContourLimitsTable,
+    OperationTable,
+)
 from chipload.jobs.messages import Errors
 from chipload.jobs.sources import Limited, entries_of, sources_and_cutters, unknown_cutter
 
@@ -76,7 +84,7 @@ def _contradictions(table: ContourJobTable, cutters: Mapping[int, Cutter]) -> It
     """What an operation's values and its cutter contradict, and that nothing is checked at all."""
     for k, op in enumerate(table.operation):
         at = f"operation.{k}"
-        if op.kind == "contour" and op.strategies is not None:
+        if op.kind in STRATEGIES and op.strategies is not None:
             yield from _wrong_strategies(at, op)
         yield from unknown_cutter(f"{at}.cutter", op.cutter, cutters)
         cutter = cutters.get(op.cutter)
@@ -112,10 +120,18 @@ def _wrong_pocket(at: str, k: int, table: ContourJobTable, cutters: Mapping[int,
         yield f"{at}.rest_of = {op.rest_of}: must be the number of an earlier pocket operation, from 0"
         return
     before = table.operation[op.rest_of]
+    if before.tabs is not None:
+        yield f"{at}.rest_of = {op.rest_of}: that operation leaves tabs, which are not known to this one"
+    deep, own_depth = depth_of(before), depth_of(op, finished=True)
+    if own_depth > deep + 1e-9:
+        yield (
+            f"{at}.rest_of = {op.rest_of}: that operation is {deep:g} mm deep without its floor_allowance_mm, this one "
+            f"{own_depth:g}: state a depth_mm of at most {deep:g}, or a floor_finish there"
+        )
     larger, own = cutters.get(before.cutter), cutters.get(op.cutter)
     if larger is None or own is None:
         return
-    left, leaves = before.allowance_mm or 0.0, op.allowance_mm or 0.0
+    left, leaves = left_on_walls(before), left_on_walls(op)
     if own.diameter > larger.diameter or (own.diameter == larger.diameter and leaves >= left):
         yield (
             f"{at}.rest_of = {op.rest_of}: its cutter of {larger.diameter:g} mm leaves nothing for this one of "
@@ -123,10 +139,21 @@ def _wrong_pocket(at: str, k: int, table: ContourJobTable, cutters: Mapping[int,
         )
 
 
+def left_on_walls(op: OperationTable) -> float:
+    """What a pocket leaves on its walls in the end [mm]."""
+    return (op.allowance_mm or 0.0) if op.wall_finish is None else op.wall_finish.allowance_mm
+
+
+def depth_of(op: OperationTable, finished: bool = False) -> float:
+    """Depth that a pocket is cut to [mm], or that of its ``finished`` floor."""
+    left = 0.0 if finished or op.floor_finish is not None else op.floor_allowance_mm or 0.0
+    return (op.axial_depth_mm if op.depth_mm is None else op.depth_mm) - left
+
+
 def _wrong_strategies(at: str, op: OperationTable) -> Iterator[str]:
-    listed = op.strategies or ()
-    if not listed:
-        yield f"{at}.strategies = []: must name at least one of plain, backward, feed"
+    listed, known = op.strategies or (), STRATEGIES[op.kind]
+    if not listed or not set(listed) <= set(known):
+        yield f"{at}.strategies = {list(listed)}: must name at least one of {', '.join(known)}"
         return
     if len(set(listed)) < len(listed):
         yield f"{at}.strategies = {list(listed)}: a strategy is listed twice: list each once"

@@ -43,6 +43,7 @@ COLOURS = {
     "feed": "#c9821a",
     "forward": "#3457a6",
     "pocket": "#3457a6",
+    "trochoidal": "#8a4fa0",
 }
 DASHES = {"plain": "dot", "feed": "dash"}
 #: columns along the pass; a limit of the column's name is drawn with it
@@ -55,7 +56,7 @@ def shown_rows(strategy: StrategyResult) -> NDArray[np.bool_]:
     """Rows that the figures along the pass show: the finish pass, or all cutting where there is none."""
     names = np.asarray(strategy.history["pass"]).astype(str)
     finish: NDArray[np.bool_] = np.isin(names, ["finish", "closing"])
-    cut: NDArray[np.bool_] = np.isin(names, ["pocket", "semifinish"])
+    cut: NDArray[np.bool_] = np.isin(names, ["pocket", "floor", "wall", "semifinish"])
     return next((some for some in (finish, cut) if some.any()), np.ones(len(names), dtype=np.bool_))
 
 

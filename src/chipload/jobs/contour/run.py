@@ -28,14 +28,15 @@ from chipload.jobs.contour.finish_program import (
     read_finish,
     with_semifinish,
 )
-from chipload.jobs.contour.job import ContourJob
+from chipload.jobs.contour.job import ContourJob, left_on_walls
 from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
 from chipload.jobs.contour.tables import OperationTable
 from chipload.jobs.provenance import provenance_of, title_of
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.contour.plan import Finishing, check_contour, plan_contour
 from chipload.planning.pocket.plan import check_pocket, plan_pocket
-from chipload.planning.pocket.request import LINK_LIFT_MM, Clearing, LargerCutter
+from chipload.planning.pocket.request import LINK_LIFT_MM, Clearing, FloorFinish, LargerCutter, WallFinish
+from chipload.planning.pocket.tabs import Tabs
 from chipload.planning.result import OperationResult, StrategyResult
 from chipload.program.check import check_program
 from chipload.progress import Progress, silent
@@ -88,15 +89,28 @@ def read_inputs(job: ContourJob) -> Inputs:
         contours = finish_contours(finish, job.cutters[op.cutter], op.milling, op.side)
     else:
         contours, stock, findings = _read_part(job)
-    for k, op in enumerate(job.operations):
-        speed = rad_s_from_rpm(op.speed_rpm)
+    for at, rpm in _speeds(job):
+        speed = rad_s_from_rpm(rpm)
         if not machine.spindle_min * (1.0 - 1e-9) <= speed <= machine.spindle_max * (1.0 + 1e-9):
             low, high = (x / rad_s_from_rpm(1.0) for x in (machine.spindle_min, machine.spindle_max))
             raise InputError(
-                f"{job.path.name}: operation.{k}.speed_rpm = {op.speed_rpm:g}: machine {machine.name} turns from "
+                f"{job.path.name}: {at}.speed_rpm = {rpm:g}: machine {machine.name} turns from "
                 f"{low:g} to {high:g} rpm: state a speed between them"
             )
     return Inputs(contours, stock, finish, machine, material, findings)
+
+
+def _speeds(job: ContourJob) -> list[tuple[str, float]]:
+    """Every spindle speed of a job by where it stands."""
+    out = []
+    for k, op in enumerate(job.operations):
+        out.append((f"operation.{k}", op.speed_rpm))
+        out += [
+            (f"operation.{k}.{name}", finish.speed_rpm)
+            for name, finish in (("floor_finish", op.floor_finish), ("wall_finish", op.wall_finish))
+            if finish is not None
+        ]
+    return out
 
 
 def run(job: ContourJob, progress: Progress = silent) -> ContourResult:
@@ -109,14 +123,14 @@ def run(job: ContourJob, progress: Progress = silent) -> ContourResult:
     """
     progress(0.0, "reading")
     inputs = read_inputs(job)
-    operations = []
+    operations: list[Operation] = []
     for k, op in enumerate(job.operations):
         share = 1.0 / len(job.operations)
 
         def part(done: float, what: str, start: float = k * share, share: float = share) -> None:
             progress(start + share * done, what)
 
-        operations.append(_operation(job, inputs, op, part))
+        operations.append(_operation(job, inputs, op, [done.result for done in operations], part))
     progress(1.0, "done")
     return ContourResult(
         title=title_of(job.path),
@@ -175,10 +189,12 @@ def _above_limit(job: ContourJob, k: int, op: OperationTable, cutter: Cutter) ->
     ]
 
 
-def _operation(job: ContourJob, inputs: Inputs, op: OperationTable, progress: Progress) -> Operation:
+def _operation(
+    job: ContourJob, inputs: Inputs, op: OperationTable, planned: Sequence[OperationResult], progress: Progress
+) -> Operation:
     cutter = job.cutters[op.cutter]
     op, advice = _resolved(job, inputs, op)
-    result = _plan(job, inputs, op, cutter, lambda done, what: progress(0.5 * done, what))
+    result = _plan(job, inputs, op, cutter, planned, lambda done, what: progress(0.5 * done, what))
     result = replace(result, findings=(*result.findings, *advice))
     verifications, machine_findings = {}, {}
     for k, (name, strategy) in enumerate(result.strategies.items()):
@@ -202,14 +218,21 @@ def _operation(job: ContourJob, inputs: Inputs, op: OperationTable, progress: Pr
 def _inserted(inputs: Inputs, result: OperationResult) -> tuple[str, str]:
     """Name and text of the program that the finish path came from, with the semi-finish passes; "", "": none."""
     finish = inputs.finish
-    if finish is None or not finish.text:
+    if finish is None:
         return "", ""
     return finish.file.name, with_semifinish(finish, result.strategies[result.use].program, inputs.machine)
 
 
-def _plan(job: ContourJob, inputs: Inputs, op: OperationTable, cutter: Cutter, progress: Progress) -> OperationResult:
+def _plan(
+    job: ContourJob,
+    inputs: Inputs,
+    op: OperationTable,
+    cutter: Cutter,
+    planned: Sequence[OperationResult],
+    progress: Progress,
+) -> OperationResult:
     """Call the planner of the operation's kind."""
-    setting = _setting(job, inputs, op)
+    setting = _setting(job, inputs, op, planned)
     if isinstance(setting, Clearing):
         return plan_pocket(
             inputs.contours, setting, cutter, inputs.material, inputs.machine, limits=job.limits, progress=progress
@@ -238,16 +261,35 @@ def _resolved(job: ContourJob, inputs: Inputs, op: OperationTable) -> tuple[Oper
     return op.model_copy(update={"radial_depth_mm": cutter.radius * (1.0 - math.cos(angle))}), found
 
 
-def _larger(job: ContourJob, op: OperationTable) -> LargerCutter | None:
-    """The cutter whose rest an operation cuts."""
+def _larger(job: ContourJob, op: OperationTable, planned: Sequence[OperationResult]) -> LargerCutter | None:
+    """The cutter whose rest an operation cuts, and what its path left where it is ``planned``."""
     if op.rest_of is None:
         return None
     before = job.operations[op.rest_of]
-    return LargerCutter(job.cutters[before.cutter].radius, before.allowance_mm or 0.0)
+    left = _NO_CONTOURS
+    if op.rest_of < len(planned):
+        result = planned[op.rest_of]
+        left = tuple(result.strategies[result.use].drawn["leftover"])
+    return LargerCutter(job.cutters[before.cutter].radius, left_on_walls(before), left)
 
 
-def _setting(job: ContourJob, inputs: Inputs, op: OperationTable) -> Finishing | Clearing:
-    """What an operation asks of its planner."""
+def _floor_finish(op: OperationTable) -> FloorFinish | None:
+    own = op.floor_finish
+    return None if own is None else FloorFinish(mm_s_from_mm_min(own.feed_mm_min), rad_s_from_rpm(own.speed_rpm))
+
+
+def _wall_finish(op: OperationTable) -> WallFinish | None:
+    own = op.wall_finish
+    if own is None:
+        return None
+    feed, speed = mm_s_from_mm_min(own.feed_mm_min), rad_s_from_rpm(own.speed_rpm)
+    return WallFinish(feed, speed, own.axial_depth_mm, own.allowance_mm)
+
+
+def _setting(
+    job: ContourJob, inputs: Inputs, op: OperationTable, planned: Sequence[OperationResult] = ()
+) -> Finishing | Clearing:
+    """What an operation asks of its planner, behind those that are ``planned``."""
     rigid, radial = _rigid(job), op.radial_depth_mm or 0.0
     if op.kind == "pocket":
         return Clearing(
@@ -267,7 +309,13 @@ def _setting(job: ContourJob, inputs: Inputs, op: OperationTable) -> Finishing |
             stock=inputs.stock,
             around=op.side == "outside",
             holes=op.holes_mm or (),
-            larger=_larger(job, op),
+            larger=_larger(job, op, planned),
+            floor_allowance=op.floor_allowance_mm or 0.0,
+            floor_finish=_floor_finish(op),
+            wall_finish=_wall_finish(op),
+            tabs=None if op.tabs is None else Tabs(op.tabs.at_mm, op.tabs.width_mm, op.tabs.height_mm),
+            strategies=tuple(op.strategies or ("pocket",)),
+            use=op.use or (op.strategies or ("pocket",))[0],
         )
     forward = op.kind == "forward"
     strategies: tuple[str, ...] = ("forward",) if forward else tuple(op.strategies or ())
@@ -309,6 +357,8 @@ def verify(
     gouge = leave if op.joint == "clothoid" else 0.0
     if op.kind == "pocket":
         leave, gouge = op.radial_depth_mm or 0.0, CHORDS_MM
+    below = strategy.drawn.get("wall below", ())
+    height = top - (op.depth_mm or op.axial_depth_mm) + (op.tabs.height_mm if op.tabs is not None else 0.0)
     names = np.asarray(strategy.history["pass"]).astype(str)
     left_out = int(np.isin(names, NOT_LEVEL).sum())
     told = verify_contour(
@@ -318,6 +368,7 @@ def verify(
         stock=Region(tuple(before)) if before else None,
         stock_top_mm=top,
         wall=strategy.drawn.get("wall", ()),
+        wall_below=(height, below) if below else None,
         material="right",
         engagement_tolerance_deg=ENGAGEMENT_DEG,
         gouge_tolerance_mm=max(GOUGE_MM, gouge),

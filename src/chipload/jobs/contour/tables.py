@@ -23,7 +23,12 @@ from chipload.jobs.tables import (
 
 Engagement = Annotated[float, Field(ge=2.0, le=150.0)]
 Hole = tuple[Number, Number, Positive]
-Strategy = Literal["plain", "backward", "feed"]
+Strategy = Literal["plain", "backward", "feed", "pocket", "trochoidal"]
+#: strategies by the kind of operation that compares them
+STRATEGIES: Mapping[str, tuple[str, ...]] = {
+    "contour": ("plain", "backward", "feed"),
+    "pocket": ("pocket", "trochoidal"),
+}
 
 
 class PartTable(Table):
@@ -51,6 +56,34 @@ class StockTable(Table):
     top_mm: Number = Field(description="z of the top of the stock")
 
 
+class FloorFinishTable(Table):
+    """The finish pass of the floor of a pocket, which takes floor_allowance_mm."""
+
+    feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's centre")
+    speed_rpm: Positive = Field(le=1e6, description="spindle speed")
+
+
+class WallFinishTable(Table):
+    """The finish passes of the walls of a pocket, which take allowance_mm within the same engagement."""
+
+    feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's centre")
+    speed_rpm: Positive = Field(le=1e6, description="spindle speed")
+    axial_depth_mm: Positive | None = Field(
+        None, description="greatest depth of a level; none: the whole depth of the pocket in one"
+    )
+    allowance_mm: NotNegative = Field(0.0, description="left on the walls in turn")
+
+
+class TabsTable(Table):
+    """Strips that stay over the floor of a pocket, straight across it, and hold what it cuts out."""
+
+    at_mm: tuple[tuple[Number, Number], ...] = Field(
+        min_length=1, description="x, y of each on the wall of what is held"
+    )
+    width_mm: Positive
+    height_mm: Positive = Field(description="of their tops over the floor")
+
+
 class OperationTable(Table):
     """One operation; which keys it needs depends on its kind, see :data:`NEEDS`."""
 
@@ -66,14 +99,24 @@ class OperationTable(Table):
     side: Literal["inside", "outside", "left", "right"] | None = Field(
         None, description="where the cutter runs; outside of a pocket: around the contours, within the stock"
     )
-    strategies: tuple[Strategy, ...] | None = None
+    strategies: tuple[Strategy, ...] | None = Field(
+        None, description="compared: plain, backward, feed of a contour; pocket, trochoidal of a pocket, none: pocket"
+    )
     use: Strategy | None = Field(None, description="the strategy whose program is released")
     joint: Literal["sharp", "clothoid"] | None = None
     semifinish_depth_mm: Positive | None = Field(None, description="radial depth of the first pass on a straight wall")
     passes: Count | None = Field(None, description="passes before the finish pass, or passes of forward")
     tolerance_mm: Positive | None = Field(None, le=1.0, description="how far eased joints may leave the drawing")
     lead_mm: Positive | None = Field(None, description="radius of the lead-in")
-    allowance_mm: NotNegative | None = Field(None, description="left on the wall")
+    allowance_mm: NotNegative | None = Field(None, description="left on the wall, by clearing where it is finished")
+    floor_allowance_mm: NotNegative | None = Field(None, description="left on the floor by clearing; none: 0")
+    floor_finish: FloorFinishTable | None = Field(
+        None, description="finish pass of the floor; none: it keeps floor_allowance_mm"
+    )
+    wall_finish: WallFinishTable | None = Field(
+        None, description="finish passes of the walls; none: they keep allowance_mm"
+    )
+    tabs: TabsTable | None = Field(None, description="strips that stay over the floor; none: nothing stays")
     link_feed_mm_min: Positive | None = Field(
         None, le=1e5, description="feed of links through cleared space; none: the machine's greatest feed"
     )
@@ -134,6 +177,8 @@ MAY: Mapping[str, tuple[str, ...]] = {
     "contour": ("use", "passes"),
     "forward": ("passes",),
     "pocket": (
+        "strategies",
+        "use",
         "side",
         "radial_depth_mm",
         "engagement_deg",
@@ -141,6 +186,10 @@ MAY: Mapping[str, tuple[str, ...]] = {
         "holes_mm",
         "rest_of",
         "allowance_mm",
+        "floor_allowance_mm",
+        "floor_finish",
+        "wall_finish",
+        "tabs",
         "link_feed_mm_min",
         "link_lift_mm",
     ),

@@ -13,21 +13,36 @@ whole of each step.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.geometry.contour import Contour, Region
-from chipload.planning.pocket import _kernels, _pass
-from chipload.planning.pocket.free_space import edge_places, take_free
+from chipload.geometry.contour import Region
+from chipload.planning.pocket import _kernels, _pass, trochoid
+from chipload.planning.pocket.clearing_path import (
+    CUT,
+    ENTRY,
+    LIFT,
+    LINK,
+    ClearingPath,
+    EarlierPath,
+    mirrored_earlier,
+    mirrored_path,
+    mirrored_region,
+    points_of_arcs,
+    polyline,
+    separate_polylines,
+)
+from chipload.planning.pocket.free_space import edge_places, places_along, take_free
 from chipload.planning.pocket.leftover import PocketRemainder
 from chipload.planning.pocket.reach import CHORD, Reach, centre_region, reach_of, widest_places
+from chipload.planning.pocket.skeleton import skeleton_of
 from chipload.planning.pocket.starts import Starts
+from chipload.planning.pocket.trochoid import Trochoid
 from chipload.planning.result import Event
 from chipload.progress import Progress, silent
 from chipload.stock.planar import TOUCH, PlanarStock
@@ -35,8 +50,6 @@ from chipload.stock.planar import TOUCH, PlanarStock
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: values of ``ClearingPath.kind``: into the material, cutting, through cleared space, up, across and down again
-ENTRY, CUT, LINK, LIFT = 0, 1, 2, 3
 #: step length / R where none is given
 STEP = 0.06
 #: smallest turning radius / R, towards the material
@@ -45,6 +58,8 @@ TURN_RIGHT = 0.4
 TURN_LEFT = math.radians(100.0)
 #: length / R without material that ends a pass
 IDLE = 1.5
+#: radius / R of the axis of a bore, where there is room
+BORE = 0.9
 #: entries at most besides the first of each part, and the room / R that one needs
 ENTRIES, LEAST_ROOM = 50, 0.02
 #: so many passes within 2 R that take less than this part of R^2 each are given up
@@ -64,62 +79,10 @@ BETWEEN = 4e-4
 SLACK, SLACK_UP_TO = 1e-4, 4.0
 #: area / R^2 that a pass must take for its start to be used again
 WORTH = 3e-4
+#: passes begin so far / R inside the edge of what was cut before
+INSIDE = 0.02
 #: part of the reachable area that may be left without another round
 ENOUGH = 5e-4
-
-
-@dataclass(frozen=True, eq=False)
-class ClearingPath:
-    """The way of the cutter's centre, and what it left. Row k goes along a line or an arc from row k - 1 to row k.
-
-    Parameters
-    ----------
-    x, y : (n,) float [mm]
-    centre : (n, 2) float [mm], of the arc; 0, 0 of a line
-    sweep : (n,) float [rad], counter-clockwise > 0; 0: a line
-    kind : (n,) int, ENTRY, CUT, LINK or LIFT; row 0 is a LIFT: the cutter comes from above
-    engagement_max : (n,) float [rad], greatest along the row; pi in an ENTRY, 0 in LINK and LIFT
-    pass_number : (n,) int, from 1; 0 where it belongs to none
-    events : in the order of the path
-    reachable_mm2, cleared_mm2, leftover_mm2 : areas [mm^2] of the opening of the region, and its parts
-    leftover : contours of what is left and could be reached, the greatest first
-    lengths_mm : path length by kind: `entry`, `cut`, `link`, `lift`
-    """
-
-    x: Floats
-    y: Floats
-    centre: Floats
-    sweep: Floats
-    kind: Ints
-    engagement_max: Floats
-    pass_number: Ints
-    events: tuple[Event, ...]
-    reachable_mm2: float
-    cleared_mm2: float
-    leftover_mm2: float
-    leftover: tuple[Contour, ...]
-    lengths_mm: Mapping[str, float]
-
-    @property
-    def cleared_share(self) -> float:
-        """Cleared part of what can be reached."""
-        return self.cleared_mm2 / self.reachable_mm2
-
-    @cached_property
-    def segments(self) -> Floats:
-        """(n, 7) the rows as those of a contour; row 0 has no length."""
-        p = np.column_stack([self.x, self.y])
-        return np.column_stack([np.vstack([p[:1], p[:-1]]), p, self.centre, self.sweep])
-
-    @cached_property
-    def lengths(self) -> Floats:
-        """(n,) length of each row [mm]."""
-        return segment_lengths(self.segments)
-
-    @property
-    def passes(self) -> int:
-        """Number of passes."""
-        return int(self.pass_number.max(initial=0))
 
 
 def clear_region(
@@ -131,6 +94,8 @@ def clear_region(
     step: float | None = None,
     allowance: float = 0.0,
     free: Sequence[Region] = (),
+    earlier: EarlierPath | None = None,
+    trochoidal: bool = False,
     progress: Progress = silent,
 ) -> ClearingPath:
     """Path that clears ``region`` with a cutter of ``radius`` [mm], never engaged by more than ``engagement`` [rad].
@@ -140,6 +105,8 @@ def clear_region(
     step : greatest step [mm], <= R / 4; 0.06 R where none is given
     allowance : [mm] left on every wall, >= 0
     free : regions without material; passes begin at their edges, bores come only where these do not lead
+    earlier : what the cutter has cut already; passes begin at its edge
+    trochoidal : circles along the middle lines of the region first, passes for what they leave
 
     Raises
     ------
@@ -149,19 +116,27 @@ def clear_region(
     step = STEP * radius if step is None else step
     centres = require_clearing(region, radius, engagement, milling, step, allowance)
     if milling == "up":
-        return _mirrored_path(
+        return mirrored_path(
             clear_region(
-                _mirrored(region), radius, engagement, milling="down", step=step, allowance=allowance,
-                free=[_mirrored(r) for r in free], progress=progress,
+                mirrored_region(region), radius, engagement, milling="down", step=step, allowance=allowance,
+                free=[mirrored_region(r) for r in free],
+                earlier=None if earlier is None else mirrored_earlier(earlier),
+                trochoidal=trochoidal, progress=progress,
             )
         )  # fmt: skip
     run = _Run(centres, radius, engagement, step, free, progress)
-    if free:
+    if earlier is not None:
+        run.take_earlier(earlier)
+    if free or earlier is not None:
         run.begin_at_edges(free)
+        if trochoidal:
+            run.cut_channels(region, allowance, None)
         run.clear()
     else:
         for x, y, room in widest_places(centres, CHORD * radius):
             run.enter(x, y, room)
+            if trochoidal:
+                run.cut_channels(region, allowance, (x, y, min(BORE * radius, 0.98 * room)))
             run.clear()
     run.enter_elsewhere()
     return run.result()
@@ -234,7 +209,7 @@ class _Run:
     def enter(self, x: float, y: float, room: float) -> None:
         """A helical bore at the widest place: its circle is as wide as there is room for, so that it leaves no core."""
         R = self.radius
-        rh = min(0.9 * R, 0.98 * room)
+        rh = min(BORE * R, 0.98 * room)
         n = max(12, math.ceil(2.0 * math.pi * rh / self.step))
         a = np.linspace(0.0, 2.0 * math.pi, n + 1)[1:]
         half = np.array([[x - rh, y], [x + rh, y]])
@@ -247,17 +222,31 @@ class _Run:
         )
         self.starts.add(np.column_stack([x + rh * np.cos(a), y + rh * np.sin(a)]), a + 0.5 * math.pi)
 
+    def take_earlier(self, earlier: EarlierPath) -> None:
+        """Take what was cut before out of the stock, and let passes begin along its edge."""
+        self.stock.remove_segments(earlier.segments)
+        seg = earlier.segments
+        points, breaks = separate_polylines(seg, 2.0 * CHORD * self.radius)
+        self.remainder.take(points, breaks)
+        self.whole = self.remainder.rest.area
+        for contour in centre_region(earlier.centres, INSIDE * self.radius).contours:
+            self._begin_along(*places_along(contour, self.step))
+
     def begin_at_edges(self, free: Sequence[Region]) -> None:
         """Let passes begin wherever the cutter may stand along the edge of free space."""
         for region in free:
             for points, headings in edge_places(region, self.radius, self.step):
-                inside = np.array([self.reach.holds(x, y, self.stock.grid) for x, y in points.tolist()])
-                cut = np.flatnonzero(np.diff(inside.astype(np.int64))) + 1
-                for run in np.split(np.arange(len(points)), cut):
-                    if inside[run[0]]:
-                        self.starts.add(points[run], headings[run])
+                self._begin_along(points, headings)
         if len(self.starts.p):
             self.at = self.starts.p[0].copy()
+
+    def _begin_along(self, points: Floats, headings: Floats) -> None:
+        """Starts at those of some places where the cutter may be."""
+        inside = np.array([self.reach.holds(x, y, self.stock.grid) for x, y in points.tolist()])
+        cut = np.flatnonzero(np.diff(inside.astype(np.int64))) + 1
+        for run in np.split(np.arange(len(points)), cut):
+            if inside[run[0]]:
+                self.starts.add(points[run], headings[run])
 
     def enter_elsewhere(self) -> None:
         """Bores into what no pass came to, the widest place first, as long as that clears anything."""
@@ -271,6 +260,36 @@ class _Run:
             self.clear()
             if self.area - before < 1e-3 * self.radius**2:
                 break
+
+    def cut_channels(self, region: Region, allowance: float, bore: tuple[float, float, float] | None) -> None:
+        """Trochoids along the middle lines that a bore (x, y, radius of its axis), or free space, leads to."""
+        R = self.radius
+        lines = skeleton_of(region, R + allowance + trochoid.LEAST * R, trochoid.WALLS * R)
+        if not len(lines.points):
+            return
+        if bore is None:
+            free = (k for k, p in enumerate(lines.points) if not len(self.stock.arcs(p, (1.0, 0.0), whole=True)))
+            start, rho = next(free, -1), 0.0
+        else:
+            start, rho = int(np.argmin(np.hypot(*(lines.points - bore[:2]).T))), bore[2]
+        if start < 0:
+            return
+        loops = Trochoid(self.stock, region, R, allowance, (self.limit, self.most_engaged))
+        for k, line in enumerate(lines.branches(start)):
+            way = line if k or bore is None else np.vstack([bore[:2], line])
+            begins = rho if k == 0 else min(trochoid.WIDEST * R, 0.9 * loops.room(way[0]))
+            places = []
+            for arcs, engaged in loops.circles(way, begins):
+                first = arcs[0, 0:2]
+                clear = bool(self.rows) and self._linked(first)
+                self.add(first[None, :], LINK if clear else LIFT)
+                self.passes += 1
+                self.add(arcs[:, 2:4], CUT, engaged, arcs[:, 4:7])
+                places.append(points_of_arcs(arcs, self.step))
+                self.progress(0.0, f"trochoid, circle {self.passes}")
+            if places:
+                p, headings = (np.concatenate(part) for part in zip(*places, strict=True))
+                self.starts.add(p, headings)
 
     def clear(self) -> None:
         """Passes until nothing more is found beside the path, or there are far more steps than there should be."""
@@ -413,57 +432,3 @@ class _Run:
             lengths_mm={},
         )
         return replace(path, lengths_mm={name: float(path.lengths[kind == k].sum()) for name, k in names.items()})
-
-
-def segment_lengths(segments: Floats) -> Floats:
-    """(n,) lengths [mm] of lines and arcs (n, 7); 0 is allowed."""
-    seg = segments
-    chord = np.hypot(seg[:, 2] - seg[:, 0], seg[:, 3] - seg[:, 1])
-    rho = np.hypot(seg[:, 0] - seg[:, 4], seg[:, 1] - seg[:, 5])
-    return np.asarray(np.where(seg[:, 6] == 0.0, chord, rho * np.abs(seg[:, 6])))
-
-
-def polyline(
-    points: Floats, centre: Floats, sweep: Floats, raised: NDArray[np.bool_], chord: float
-) -> tuple[Floats, NDArray[np.bool_]]:
-    """Points (m, 2) of a path whose chords leave its arcs by at most ``chord`` [mm], and ``raised`` for each."""
-    before = np.vstack([points[:1], points[:-1]])
-    v = before - centre
-    rho = np.hypot(v[:, 0], v[:, 1])
-    parts = np.ones(len(points), dtype=np.int64)
-    arc = sweep != 0.0
-    parts[arc] = np.ceil(np.abs(sweep[arc]) / (2.0 * np.arccos(1.0 - np.minimum(chord / rho[arc], 0.5))))
-    k = np.repeat(np.arange(len(points)), parts)
-    share = (np.arange(len(k)) - np.repeat(np.cumsum(parts) - parts, parts) + 1) / parts[k]
-    a = sweep[k] * share
-    out = centre[k] + np.column_stack(
-        [np.cos(a) * v[k, 0] - np.sin(a) * v[k, 1], np.sin(a) * v[k, 0] + np.cos(a) * v[k, 1]]
-    )
-    whole = share >= 1.0
-    out[whole] = points[k[whole]]
-    return out, raised[k]
-
-
-def _mirrored(region: Region) -> Region:
-    """The mirror image in the y axis, inside on the left again."""
-    flip = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
-    return Region(tuple(_image(c, flip) for c in region.contours))
-
-
-def _image(contour: Contour, flip: Floats) -> Contour:
-    seg = contour.segments * flip
-    seg[seg[:, 6] == 0.0, 4:6] = 0.0
-    return Contour(seg).reversed()
-
-
-def _mirrored_path(path: ClearingPath) -> ClearingPath:
-    """The mirror image of a path in the y axis."""
-    flip = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
-    return replace(
-        path,
-        x=-path.x,
-        centre=path.centre * (-1.0, 1.0),
-        sweep=-path.sweep,
-        events=tuple(replace(e, x=-e.x) for e in path.events),
-        leftover=tuple(_image(c, flip) for c in path.leftover),
-    )

@@ -12,6 +12,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
@@ -25,6 +26,8 @@ Floats = NDArray[np.float64]
 BAND = 4.0
 #: part of the area of a free region that a disc of radius R need not reach
 CORNERS = 1e-6
+#: how far free space keeps off what an earlier cutter left, over R; chords of its edge [mm]
+KEPT, CHORD_MM = 1e-2, 1e-4
 
 
 def parallels(region: Region, radius: float) -> list[tuple[Contour, ...]]:
@@ -48,12 +51,14 @@ def take_free(stock: PlanarStock, regions: Sequence[Region], radius: float) -> N
 
 def edge_places(region: Region, radius: float, step: float) -> list[tuple[Floats, Floats]]:
     """Points (n, 2) and headings (n,) of a cutter that goes along the boundary of a free region, a pair a contour."""
-    out = []
-    for contour in offset_region(region, radius).contours:
-        s = np.linspace(0.0, contour.length, max(8, math.ceil(contour.length / step)))
-        points, tangents, _ = contour.at(s)
-        out.append((points, np.arctan2(tangents[:, 1], tangents[:, 0])))
-    return out
+    return [places_along(contour, step) for contour in offset_region(region, radius).contours]
+
+
+def places_along(contour: Contour, step: float) -> tuple[Floats, Floats]:
+    """Points (n, 2) and headings (n,) along a contour, at most ``step`` [mm] apart."""
+    s = np.linspace(0.0, contour.length, max(8, math.ceil(contour.length / step)))
+    points, tangents, _ = contour.at(s)
+    return points, np.arctan2(tangents[:, 1], tangents[:, 0])
 
 
 def outside_of(stock: Region, radius: float) -> Region:
@@ -83,6 +88,24 @@ def hole(x: float, y: float, diameter: float, radius: float) -> Region:
 def cleared_by(region: Region, radius: float, allowance: float) -> Region:
     """What a cutter of ``radius`` can clear of a region: its opening, ``allowance`` off the walls [mm]."""
     return offset_region(offset_region(region, radius + allowance), -radius)
+
+
+def without_leftover(region: Region, left: Sequence[Contour], radius: float) -> Region:
+    """What of a free region a disc of R can be in without meeting what was ``left`` in it (closed contours).
+
+    The places of the disc's centre are a polygon, ``KEPT`` R clear of what was left; grown by R they make the region,
+    so that the disc reaches all of it.
+    """
+    if not left:
+        return region
+    centres = offset_region(region, radius).flatten(CHORD_MM)
+    around = shapely.buffer(Region.of(left).flatten(CHORD_MM), (1.0 + KEPT) * radius, quad_segs=64)
+    rest = shapely.simplify(shapely.difference(centres, around), 0.1 * CHORD_MM)
+    parts = [part for part in shapely.get_parts(rest) if part.area > (KEPT * radius) ** 2]
+    rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
+    if not rings:
+        return Region(())
+    return offset_region(Region.of([Contour.polyline(np.asarray(r.coords)[:-1], closed=True) for r in rings]), -radius)
 
 
 def _reached(region: Region, radius: float, what: str) -> Region:

@@ -20,7 +20,7 @@ from chipload.geometry.contour import Region
 from chipload.machine.feed import corner_speed, curvature_speed, limited_speed
 from chipload.machine.machine import Machine
 from chipload.planning.pocket import _replay
-from chipload.planning.pocket.clearing import CUT, ENTRY, LIFT, LINK, ClearingPath, segment_lengths
+from chipload.planning.pocket.clearing_path import CUT, ENTRY, LIFT, LINK, ClearingPath, segment_lengths
 from chipload.planning.pocket.free_space import take_free
 from chipload.program.build import helix, plunge, rapid, retract, rows
 from chipload.program.program import ARC_CCW, ARC_CW, LINE, Program
@@ -31,7 +31,7 @@ Ints = NDArray[np.int64]
 
 #: kind of a motion beside those of a path: a link rises off the floor, or comes back to it
 RAMP = 4
-#: `pass` of a motion by its kind
+#: `pass` of a motion by its kind, of one that cuts where it does not belong to a finish pass
 ZONES = {ENTRY: "entry", CUT: "pocket", LINK: "link", LIFT: "link", RAMP: "ramp"}
 #: length of a ramp over its height, and the share of a link that each of its ramps takes at most
 SLOPE, SHARE = 10.0, 0.25
@@ -155,15 +155,22 @@ def places(seg: Floats, share: Floats) -> tuple[Floats, Floats]:
 
 
 def replayed(
-    motions: Motions, samples: MotionSamples, radius: float, free: Sequence[Region] = ()
+    motions: Motions,
+    samples: MotionSamples,
+    radius: float,
+    free: Sequence[Region] = (),
+    before: Floats | None = None,
 ) -> tuple[Engagement, Floats]:
     """The engaged arcs at the end of every piece, from the stock as the motions before it left it, and the greatest
-    engagement (m,) [rad] along it; ``free`` regions hold no material. O(m).
+    engagement (m,) [rad] along it; ``free`` regions hold no material, nor does what the cutter met along the segments
+    ``before`` (n, 7). O(m).
     """
     c = samples.centre
     low, high = c.min(axis=0) - 2.0 * radius, c.max(axis=0) + 2.0 * radius
     stock = PlanarStock((low[0], low[1], high[0], high[1]), radius)
     take_free(stock, free, radius)
+    if before is not None:
+        stock.remove_segments(before)
     m = len(c)
     angle, most, count, phi = np.zeros(m), np.zeros(m), np.zeros(m, dtype=np.int64), np.zeros((m, PIECES, 2))
     cuts = (motions.kind == CUT) | (motions.kind == ENTRY)
@@ -252,11 +259,13 @@ def bore_pitch(motions: Motions, depth: float) -> float:
     return max(depth / bore_turns(r, depth) for r in radii.tolist())
 
 
-def programs_of(motions: Motions, setting_feed: float, depth: float, spindle: float, tool: int) -> list[Program]:
+def programs_of(
+    motions: Motions, setting_feed: float, depth: float, spindle: float, tool: int, zone: str = ZONES[CUT]
+) -> list[Program]:
     """A program a run: rapid above the stock, helical bore from its top or straight down where it is clear, the motions
-    at depth, up.
+    at depth, up. ``zone`` is the label of those that cut.
     """
-    h, out = motions.heights, []
+    h, out, zones = motions.heights, [], {**ZONES, CUT: zone}
     for a, b in motions.runs:
         seg = motions.segments[a + 1 : b + 1]
         at = motions.segments[a, 2:4]
@@ -271,7 +280,7 @@ def programs_of(motions: Motions, setting_feed: float, depth: float, spindle: fl
             )  # fmt: skip
         else:
             parts.append(plunge([*at, h.floor], motions.feed[a], spindle, tool, "entry"))
-        for first, last, name in _stretches([ZONES[int(k)] for k in motions.kind[a + 1 : b + 1]]):
+        for first, last, name in _stretches([zones[int(k)] for k in motions.kind[a + 1 : b + 1]]):
             part, sweep = seg[first:last], seg[first:last, 6]
             motion = np.where(sweep == 0.0, LINE, np.where(sweep > 0.0, ARC_CCW, ARC_CW))
             to = np.column_stack([part[:, 2:4], motions.height[a + 1 + first : a + 1 + last]])

@@ -7,7 +7,6 @@ Notation: R cutter radius, s radial depth, a* = arccos(1 - s/R) the engagement t
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -23,10 +22,12 @@ from chipload.geometry.offset import offset_region
 from chipload.machine.machine import Machine
 from chipload.planning.cost import CutConditions, cost
 from chipload.planning.link_rows import row_ends, with_last_link
-from chipload.planning.pocket.clearing import CUT, ENTRY, LIFT, ClearingPath, clear_region, require_clearing
+from chipload.planning.pocket.clearing import require_clearing
+from chipload.planning.pocket.clearing_path import CUT, ENTRY, LIFT
 from chipload.planning.pocket.motions import (
     ZONES,
     Motions,
+    MotionSamples,
     bore_pitch,
     clock,
     motions_of,
@@ -37,6 +38,8 @@ from chipload.planning.pocket.motions import (
 )
 from chipload.planning.pocket.reach import CHORD
 from chipload.planning.pocket.request import Asked, Clearing, laid_out, material_before
+from chipload.planning.pocket.stages import FLOOR, Stage, require_finish, sections_of, stages_of
+from chipload.planning.pocket.totals import summary_of
 from chipload.planning.result import Columns, Event, OperationResult, StrategyResult
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
@@ -67,86 +70,122 @@ def plan_pocket(
     InputError
         A contour is open, the cutter fits nowhere, s is 2 R or more.
     """
+    asked = laid_out(contours, setting, cutter.radius)
+    require_finish(setting)
+    results = {}
+    for k, name in enumerate(setting.strategies):
+
+        def part(done: float, what: str, start: int = k) -> None:
+            progress((start + done) / len(setting.strategies), what)
+
+        results[name] = _strategy(name, asked, setting, cutter, material, machine, part)
+    progress(1.0, "pocket")
+    return OperationResult("pocket", setting.use, results)
+
+
+def _strategy(
+    name: str,
+    asked: Asked,
+    setting: Clearing,
+    cutter: Cutter,
+    material: Material,
+    machine: Machine,
+    progress: Progress,
+) -> StrategyResult:
+    """One strategy with its program and what it costs."""
     radius = cutter.radius
-    asked = laid_out(contours, setting, radius)
-    wanted = asked.engagement
-    path = clear_region(
-        asked.region,
-        radius,
-        wanted,
-        milling=setting.milling,
-        step=asked.step,
-        allowance=setting.allowance,
-        free=asked.free,
-        progress=lambda done, what: progress(0.9 * done, what),
-    )
-    history, program, whole, motions = _history(path, asked, setting, cutter, material, machine)
-    on_front = np.isin(history["pass"], ["pocket"])
-    levels = len(setting.depths)
-    reach = offset_region(offset_region(asked.region, radius + setting.allowance), -radius)
-    summary = {
-        **_summary(path, history, on_front, wanted),
-        **_times(history, program, whole),
-        "levels": levels,
-        "passes": levels * path.passes,
-        "lifts": levels * int((path.kind == LIFT).sum()) - 1,
-        "lengths_mm": {name: levels * length for name, length in path.lengths_mm.items()},
-        "path_mm": levels * float(sum(v for k, v in path.lengths_mm.items() if k != "lift")),
-    }
-    result = StrategyResult(
-        "pocket",
+    sections = sections_of(asked, setting)
+    stages = stages_of(sections, setting, radius, name, lambda done, what: progress(0.9 * done, what))
+    history, program, whole, motions = _history(stages, setting, cutter, material, machine)
+    on_front = np.isin(history["pass"], [stage.name for stage in stages])
+    reaches = [_reach(section.asked, setting, radius) for section in sections]
+    return StrategyResult(
+        name,
         program,
         with_last_link(history, setting.heights.safe, whole),
-        summary,
-        (*path.events, *_failures(path, history, on_front, wanted, _in_stock(reach, setting))),
+        summary_of(stages, history, len(program), whole),
+        (
+            *(event for stage in _planned(stages) for event in stage.path.events),
+            *_failures(stages, history, on_front, [_in_stock(reach, setting) for reach in reaches]),
+        ),
         np.append(on_front, False),
         {
-            "wall": _walls(reach, setting, asked),
+            "wall": _walls(reaches[0], setting, asked),
+            "wall below": tuple(c for reach in reaches[1:] for c in _walls(reach, setting, sections[1].asked)),
             "part": asked.region.contours,
-            "leftover": path.leftover,
-            "front path": _chains(motions),
+            "leftover": stages[-1].path.leftover,
+            "front path": tuple(chain for one in motions for chain in _chains(one)),
             "stock before": material_before(asked, setting, radius),
         },
     )
-    progress(1.0, "pocket")
-    return OperationResult("pocket", "pocket", {"pocket": result})
+
+
+def _reach(asked: Asked, setting: Clearing, radius: float) -> Region:
+    """What the cutter can reach of a region, with the allowance that stays on its walls."""
+    return offset_region(offset_region(asked.region, radius + setting.left_on_walls), -radius)
+
+
+def _planned(stages: Sequence[Stage]) -> list[Stage]:
+    """The stages with a path of their own: the finish of the floor runs that of the clearing."""
+    return [stage for stage in stages if stage.name != FLOOR]
 
 
 def _history(
-    path: ClearingPath, asked: Asked, setting: Clearing, cutter: Cutter, material: Material, machine: Machine
-) -> tuple[Columns, Program, float, Motions]:
-    """Rows of all depths, the program, its time [s], and the motions of the first depth."""
-    radius, spindle = cutter.radius, setting.spindle_speed
+    stages: Sequence[Stage], setting: Clearing, cutter: Cutter, material: Material, machine: Machine
+) -> tuple[Columns, Program, float, list[Motions]]:
+    """Rows of all levels of all stages, the program, its time [s], and the motions of each path at its first level."""
     link_feed = machine.feed_max if setting.link_feed is None else setting.link_feed
-    each = [motions_of(path, heights, setting.feed, link_feed) for heights in setting.levels]
-    motions = each[0]
-    samples = samples_of(motions, asked.step)
-    met, most = replayed(motions, samples, radius, asked.free)
-    length, speed, own = speeds(motions, samples, machine)
-    programs = [programs_of(m, setting.feed, setting.depths[0], spindle, cutter.number) for m in each]
-    program = Program.join([p for level in programs for p in level])
+    each = [[motions_of(stage.path, h, stage.feed, link_feed) for h in stage.heights] for stage in stages]
+    parts = [
+        [programs_of(m, stage.feed, stage.depth, stage.spindle_speed, cutter.number, stage.name) for m in levels]
+        for stage, levels in zip(stages, each, strict=True)
+    ]
+    program = Program.join([p for levels in parts for runs in levels for p in runs])
     ends = row_ends(program, machine)
+    rows, first, travelled = [], 0, 0.0
+    for stage, levels, programs in zip(stages, each, parts, strict=True):
+        samples = samples_of(levels[0], stage.asked.step)
+        columns, own = _columns(stage, levels[0], samples, setting, cutter, material, machine)
+        for m, runs in zip(levels, programs, strict=True):
+            count = sum(len(p) for p in runs)
+            time = clock(m, samples, own, runs, ends[first : first + count])
+            z = m.height[samples.motion]
+            rows.append({**columns, "z_mm": z, "t_s": time, "s_mm": columns["s_mm"] + travelled})
+            first, travelled = first + count, travelled + float(columns["s_mm"][-1])
+    history = {name: np.concatenate([r[name] for r in rows]) for name in rows[0]}
+    return (
+        history,
+        program,
+        float(ends[-1]),
+        [m[0] for stage, m in zip(stages, each, strict=True) if stage.name != FLOOR],
+    )
+
+
+def _columns(
+    stage: Stage,
+    motions: Motions,
+    samples: MotionSamples,
+    setting: Clearing,
+    cutter: Cutter,
+    material: Material,
+    machine: Machine,
+) -> tuple[Columns, Floats]:
+    """Columns of one level of a stage, and the time within its runs [s]."""
+    radius, asked = cutter.radius, stage.asked
+    met, most = replayed(motions, samples, radius, asked.free, stage.before)
+    length, speed, own = speeds(motions, samples, machine)
     kind = motions.kind[samples.motion]
-    zone = np.array([ZONES[int(k)] for k in kind], dtype=object)
+    zone = np.array([{**ZONES, CUT: stage.name}[int(k)] for k in kind], dtype=object)
     zone[:-1][(kind[:-1] == LIFT) & (kind[1:] == ENTRY)] = "entry"
-    off = distance(asked.region.segments, samples.centre) - radius - setting.allowance
-    makes_wall = (np.abs(off) <= 2.0 * CHORD * radius) & (kind == CUT)
+    off = distance(asked.region.segments, samples.centre) - radius - stage.allowance
+    makes_wall = (np.abs(off) <= 2.0 * CHORD * radius) & (kind == CUT) & stage.makes_wall
     place = (zone, length, own, samples.centre, samples.heading, 0.0, met, speed, makes_wall)
-    cut = CutConditions(cutter, material, setting.depths[0], spindle, setting.milling, *setting.rigid)
+    cut = CutConditions(cutter, material, stage.depth, stage.spindle_speed, setting.milling, *setting.rigid)
     columns: Columns = {**cost(cut, *place), "engagement_max_deg": np.degrees(most)}
     if (kind == ENTRY).any():  # a turn of a bore is as deep as its pitch
-        thin = cost(replace(cut, axial_depth=bore_pitch(motions, setting.depths[0])), *place)
+        thin = cost(replace(cut, axial_depth=bore_pitch(motions, stage.depth)), *place)
         columns = {k: np.where(kind == ENTRY, thin.get(k, v), v) for k, v in columns.items()}
-    rows, first = [], 0
-    for level, m, parts in zip(range(len(each)), each, programs, strict=True):
-        count = sum(len(p) for p in parts)
-        time = clock(m, samples, own, parts, ends[first : first + count])
-        rows.append(
-            {**columns, "z_mm": m.height[samples.motion], "t_s": time, "s_mm": columns["s_mm"] + level * length[-1]}
-        )
-        first += count
-    history = {name: np.concatenate([r[name] for r in rows]) for name in rows[0]}
-    return history, program, float(ends[-1]), motions
+    return columns, own
 
 
 def _walls(reach: Region, setting: Clearing, asked: Asked) -> tuple[Contour, ...]:
@@ -192,7 +231,11 @@ def check_pocket(contours: Sequence[Contour], setting: Clearing, cutter: Cutter)
         As :func:`plan_pocket`.
     """
     asked = laid_out(contours, setting, cutter.radius)
-    require_clearing(asked.region, cutter.radius, asked.engagement, setting.milling, asked.step, setting.allowance)
+    require_finish(setting)
+    for section in sections_of(asked, setting):
+        require_clearing(
+            section.asked.region, cutter.radius, asked.engagement, setting.milling, asked.step, setting.allowance
+        )
     return asked.region.area
 
 
@@ -208,33 +251,23 @@ def _chains(motions: Motions) -> tuple[Contour, ...]:
     return tuple(out)
 
 
-def _times(history: Columns, program: Program, whole: float) -> dict[str, object]:
-    """Time [s] by what the cutter does, and the number of motions. What is no cut and no entry is a link."""
-    took = np.diff(history["t_s"], prepend=0.0)
-    cutting = float(took[history["pass"] == "pocket"].sum())
-    entry = float(took[history["pass"] == "entry"].sum())
-    return {
-        "time_s": whole,
-        "cutting_s": cutting,
-        "entry_s": entry,
-        "link_s": whole - cutting - entry,
-        "motions": len(program),
-    }
-
-
 def _failures(
-    path: ClearingPath, history: Columns, on_front: NDArray[np.bool_], wanted: float, within: float
+    stages: Sequence[Stage], history: Columns, on_front: NDArray[np.bool_], areas: Sequence[float]
 ) -> list[Event]:
-    """What the clearing must keep by itself: the engagement it was asked for, and the pocket cleared, in parts of the
-    area ``within`` [mm^2] that a cutter can reach, whether an earlier one did or not.
+    """What the stages must keep by themselves: the engagement that was asked for, and each section cleared, in parts of
+    its area [mm^2] that a cutter can reach, whether an earlier one did or not.
     """
     out = []
+    wanted = stages[0].asked.engagement
     most = np.where(on_front, history["engagement_max_deg"], 0.0)
     k = int(np.argmax(most))
     if most[k] > math.degrees(wanted) + ABOVE_DEG:
         text = f"engagement {most[k]:.4f} deg, wanted at most {math.degrees(wanted):.4f} deg"
         out.append(Event("pocket-engagement", float(history["x_mm"][k]), float(history["y_mm"][k]), text, failure=True))
-    if path.leftover_mm2 > (1.0 - CLEARED) * within:
+    for stage in _planned(stages):
+        path, within = stage.path, areas[stage.section]
+        if not stage.makes_wall or path.leftover_mm2 <= (1.0 - CLEARED) * within:
+            continue
         x, y = path.leftover[0].start if path.leftover else (float(path.x[-1]), float(path.y[-1]))
         text = (
             f"only {1.0 - path.leftover_mm2 / within:.2%} of what the cutter can reach is cleared, "
@@ -242,25 +275,3 @@ def _failures(
         )
         out.append(Event("pocket-uncleared", float(x), float(y), text, failure=True))
     return out
-
-
-def _summary(path: ClearingPath, history: Columns, on_front: NDArray[np.bool_], wanted: float) -> dict[str, object]:
-    a, force = history["engagement_max_deg"][on_front], history["force_xy_n"][on_front]
-    error = history["form_error_um"][on_front]
-    return {
-        "engagement_deg": {
-            "min": float(a.min()),
-            "max": float(a.max()),
-            "p95": float(np.percentile(a, 95.0)),
-            "wanted": math.degrees(wanted),
-        },
-        "force_xy_n": {"min": float(force.min()), "max": float(force.max())},
-        "torque_nm": {"min": 0.0, "max": float(history["torque_nm"].max())},
-        "form_error_um": {"max": float(error.max())},
-        "reachable_mm2": path.reachable_mm2,
-        "cleared_mm2": path.cleared_mm2,
-        "cleared_share": path.cleared_share,
-        "cleared_percent": 100.0 * path.cleared_share,
-        "leftover_mm2": path.leftover_mm2,
-        "events": dict(Counter(e.code for e in path.events)),
-    }

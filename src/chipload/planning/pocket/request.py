@@ -1,4 +1,4 @@
-"""What is asked of a pocket: depths, feeds, walls, and where there is no material before the cutter begins.
+"""What is asked of a pocket: depths, feeds, walls, finish passes, where there is no material before the cutter begins.
 
 Notation: R cutter radius, s radial depth, a* = arccos(1 - s/R) the engagement that is held.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from chipload.cutting.rigid import OF_DEPTH, OF_FEED
 from chipload.cutting.wall_error import Milling
@@ -15,8 +16,9 @@ from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.geometry.offset import offset_region
 from chipload.planning.pocket.clearing import STEP
-from chipload.planning.pocket.free_space import cleared_by, hole, outside_of
+from chipload.planning.pocket.free_space import cleared_by, hole, outside_of, without_leftover
 from chipload.planning.pocket.motions import Heights
+from chipload.planning.pocket.tabs import Tabs
 
 #: height of a link above the floor where none is stated [mm]
 LINK_LIFT_MM = 0.1
@@ -26,10 +28,37 @@ AROUND = 1.05
 
 @dataclass(frozen=True)
 class LargerCutter:
-    """A cutter that cleared the same contours before: radius and what it left on the walls [mm]."""
+    """A cutter that cleared the same contours before: radius and allowance on the walls [mm], and closed contours of
+    what else it left, as far as that is known.
+    """
 
     radius: float
     allowance: float
+    left: tuple[Contour, ...] = ()
+
+
+@dataclass(frozen=True)
+class FloorFinish:
+    """The last level of a pocket, which takes what is left on the floor: feed [mm/s], spindle speed [rad/s]."""
+
+    feed: float
+    spindle_speed: float
+
+
+@dataclass(frozen=True)
+class WallFinish:
+    """The passes that take what clearing left on the walls; mm, mm/s, rad/s.
+
+    Parameters
+    ----------
+    axial_depth : greatest depth of a level; None: the whole depth of the pocket in one
+    allowance : that they leave in turn
+    """
+
+    feed: float
+    spindle_speed: float
+    axial_depth: float | None = None
+    allowance: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -47,6 +76,11 @@ class Clearing:
     around : the contours are those of a part that stands in the stock, which is cleared around it
     holes : (x, y, diameter) of pre-drilled holes as deep as the pocket
     larger : what cleared the contours before; None: nothing did
+    floor_allowance : left on the floor by the levels that clear
+    floor_finish, wall_finish : passes that take the allowances; None: they stay
+    tabs : what stays over the floor; None: nothing
+    strategies : among `pocket` (passes alone), `trochoidal` (circles along the middle lines, then passes)
+    use : the strategy whose program is released
     """
 
     milling: Milling
@@ -66,28 +100,39 @@ class Clearing:
     around: bool = False
     holes: tuple[tuple[float, float, float], ...] = ()
     larger: LargerCutter | None = None
+    floor_allowance: float = 0.0
+    floor_finish: FloorFinish | None = None
+    wall_finish: WallFinish | None = None
+    tabs: Tabs | None = None
+    strategies: tuple[str, ...] = ("pocket",)
+    use: str = "pocket"
 
     @property
-    def depths(self) -> tuple[float, ...]:
-        """The axial depth of each level, equal ones."""
-        whole = self.axial_depth if self.depth is None else self.depth
-        count = max(1, math.ceil(whole / self.axial_depth - 1e-9))
-        return (whole / count,) * count
+    def bottom(self) -> float:
+        """Height of the finished floor."""
+        return self.top - (self.axial_depth if self.depth is None else self.depth)
 
     @property
     def levels(self) -> list[Heights]:
-        """The heights of the program at each depth, from above."""
-        out, top = [], self.top
-        for depth in self.depths:
-            floor = top - depth
-            out.append(Heights(floor, min(floor + self.link_lift, top), top, self.top + self.clearance))
-            top = floor
-        return out
+        """The heights of the program at each depth that clears, from above."""
+        return self.levels_between(self.top, self.bottom + self.floor_allowance, self.axial_depth)
 
     @property
     def heights(self) -> Heights:
         """The heights at the first depth."""
         return self.levels[0]
+
+    @property
+    def left_on_walls(self) -> float:
+        """The allowance that the last passes leave on the walls."""
+        return self.allowance if self.wall_finish is None else self.wall_finish.allowance
+
+    def levels_between(self, top: float, floor: float, axial_depth: float) -> list[Heights]:
+        """The heights of equal levels of at most ``axial_depth`` [mm], from above."""
+        count = max(1, math.ceil((top - floor) / axial_depth - 1e-9))
+        edges = [top + (floor - top) * k / count for k in range(count)] + [floor]
+        safe = self.top + self.clearance
+        return [Heights(low, min(low + self.link_lift, high), high, safe) for high, low in pairwise(edges)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +183,7 @@ def laid_out(contours: Sequence[Contour], setting: Clearing, radius: float) -> A
         before = cleared_by(drawn, setting.larger.radius, setting.larger.allowance)
         if not before.contours:
             raise InputError(f"operation.rest_of: the larger cutter, radius {setting.larger.radius:g} mm, fits nowhere")
-        free.append(before)
+        free.append(without_leftover(before, setting.larger.left, radius))
     wanted = math.acos(1.0 - setting.radial_depth / radius)
     return Asked(region, tuple(free), wanted, min(max(setting.step, STEP * radius), 0.25 * radius))
 
