@@ -19,7 +19,8 @@ from chipload.jobs.impeller.job import ImpellerJob
 from chipload.jobs.impeller.outcome import ImpellerResult, OneCutter, Searched, unreached_text
 from chipload.jobs.impeller.part import ImpellerPart, read_part
 from chipload.jobs.impeller.partition_programs import checked_partitions
-from chipload.jobs.impeller.paths import finish_settings, walls_of
+from chipload.jobs.impeller.paths import EDGE, finish_settings, walls_of
+from chipload.jobs.impeller.ray_depth import ray_depth
 from chipload.jobs.impeller.roughing import checked_roughing
 from chipload.jobs.impeller.tables import ImpellerOperationTable
 from chipload.jobs.provenance import provenance_of, sources, title_of, versions
@@ -84,6 +85,8 @@ def run(job: ImpellerJob, progress: Progress = silent, checkpoint: Checkpoint | 
     )  # fmt: skip
     if op.paths is None or milled.used is None:
         return milled
+    # blades that are too thin to be checked are refused before the programs are planned
+    ray_depth(impeller, EDGE, op.paths.gouge_mm)
     roughs = None
     if op.rough is not None:
         roughs = checked_roughing(
