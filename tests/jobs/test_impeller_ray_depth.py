@@ -27,6 +27,14 @@ def test_thickness_of_a_wedge(thin):
     assert thickness(wedge, 0, 0.2) == pytest.approx(2.0 + 0.8 * (thin - 2.0), rel=0.02)
 
 
+def test_thickness_between_the_points_that_are_tried():
+    """Two planes 0.2 mm apart, so high that points of a side are farther from each other than that."""
+    wedge = Wedge(0.2)
+    wedge.bodies = (Blade(*(through([[[x, y, z] for z in (0.0, 400.0)] for x in (0.0, 30.0)], [0, 1], [0, 1])
+                            for y in (0.1, -0.1))),)  # fmt: skip
+    assert thickness(wedge, 0, 0.013) == pytest.approx(0.2, rel=1e-6)
+
+
 def test_a_ray_ends_before_the_cutter_on_the_other_side():
     assert ray_depth(Wedge(1.5), 0.0, 0.05) == MOST
     depth = ray_depth(Wedge(0.55), 0.0, 0.1)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from chipload.errors import InputError
+from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller.impeller import Impeller
 
 Floats = NDArray[np.float64]
@@ -21,6 +22,8 @@ MOST = 0.5
 _AWAY = 1.5
 #: points of a side along and up, closer together towards its edges; those of the other side
 _POINTS, _OTHER = (121, 21), (1201, 61)
+#: steps by which the nearest place of the other side is found
+_STEPS = 6
 #: over the gouge that is allowed, the least depth that tells it
 _LEAST = 1.2
 
@@ -55,9 +58,24 @@ def thickness(impeller: Impeller, index: int, edge: float) -> float:
     for own, other in ((body.plus, body.minus), (body.minus, body.plus)):
         U, V = _grid(_OTHER, 0.0)
         u, v = _grid(_POINTS, edge)
-        away, _ = cKDTree(other.at(U, V)).query(own.at(u, v))
-        out = min(out, float(away.min()))
+        points = own.at(u, v)
+        _, k = cKDTree(other.at(U, V)).query(points)
+        out = min(out, float(_distance(other, points, U[k], V[k]).min()))
     return out
+
+
+def _distance(patch: BSplinePatch, points: Floats, u: Floats, v: Floats) -> Floats:
+    """Distance (n,) [mm] of points from a surface, from the places (u, v) on by Newton's method without curvature."""
+    out = np.linalg.norm(points - patch.at(u, v), axis=1)
+    for _ in range(_STEPS):
+        away = points - patch.at(u, v)
+        J = np.stack([patch.at(u, v, 1, 0), patch.at(u, v, 0, 1)], axis=-1)
+        A = np.swapaxes(J, 1, 2) @ J + 1e-12 * np.eye(2)
+        step = np.linalg.solve(A, np.swapaxes(J, 1, 2) @ away[..., None])[..., 0]
+        u, v = np.clip(u + step[:, 0], 0.0, 1.0), np.clip(v + step[:, 1], 0.0, 1.0)
+        out = np.minimum(out, np.linalg.norm(points - patch.at(u, v), axis=1))
+    least: Floats = out
+    return least
 
 
 def _grid(count: tuple[int, int], edge: float) -> tuple[Floats, Floats]:

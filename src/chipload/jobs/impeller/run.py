@@ -61,6 +61,7 @@ def run(job: ImpellerJob, progress: Progress = silent, checkpoint: Checkpoint | 
     impeller = part.impeller
     _picked(job, catalogue)
     _rougher(job, catalogue)
+    _checkable(job, impeller)
     op = job.operation
     provenance = _provenance(job, machine, catalogue, part)
     keep = KeptParts(checkpoint, digest(job.table.model_dump_json(), provenance.inputs, versions(), sources()))
@@ -85,8 +86,6 @@ def run(job: ImpellerJob, progress: Progress = silent, checkpoint: Checkpoint | 
     )  # fmt: skip
     if op.paths is None or milled.used is None:
         return milled
-    # blades that are too thin to be checked are refused before the programs are planned
-    ray_depth(impeller, EDGE, op.paths.gouge_mm)
     roughs = None
     if op.rough is not None:
         roughs = checked_roughing(
@@ -100,6 +99,13 @@ def run(job: ImpellerJob, progress: Progress = silent, checkpoint: Checkpoint | 
     keep.write(at_once=True)
     chosen = {one.name: one.partition for one in checked}
     return replace(milled, checked=checked, roughs=roughs, partitions=tuple(chosen.get(p.name, p) for p in partitions))
+
+
+def _checkable(job: ImpellerJob, impeller: Impeller) -> None:
+    """Refuse programs for blades that are too thin to be checked, before anything is searched."""
+    paths = job.operation.paths
+    if paths is not None:
+        ray_depth(impeller, EDGE, paths.gouge_mm)
 
 
 def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue, part: ImpellerPart) -> Provenance:
@@ -117,6 +123,7 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
     impeller = part.impeller
     _picked(job, catalogue)
     _rougher(job, catalogue)
+    _checkable(job, impeller)
     lines = [f"impeller: {impeller.blades} blades{' and as many splitters' if impeller.splitter else ''}", *part.faces]
     table = _tables(machine, job.operation)
     angles = np.degrees(table.angle)
