@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named, read_catalogue
 from chipload.errors import InputError
 from chipload.jobs.impeller.checkpoint import KeptParts
+from chipload.jobs.impeller.estimate import estimate
 from chipload.jobs.impeller.job import ImpellerJob
 from chipload.jobs.impeller.outcome import ImpellerResult, OneCutter, Searched, unreached_text
 from chipload.jobs.impeller.part import ImpellerPart, read_part
@@ -69,6 +70,8 @@ def run(job: ImpellerJob, progress: Progress = silent, checkpoint: Checkpoint | 
     covering = _covering(job, impeller, catalogue)
     took = time.perf_counter() - begin
     surfaces = _surfaces(job, impeller, covering)
+    if checkpoint is not None:
+        checkpoint.notice(_estimate(job, surfaces, catalogue))
     first, second, third, last = _stages(op, progress)
     done = []
     for k, surface in enumerate(surfaces):
@@ -130,7 +133,8 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
     lines.append(
         f"machine {machine.name}: {len(angles)} table angles from {angles.min():.6g} to {angles.max():.6g} deg"
     )
-    for k, surface in enumerate(_surfaces(job, impeller)):
+    surfaces = _surfaces(job, impeller)
+    for k, surface in enumerate(surfaces):
         s = surface.scene
         lines.append(f"surface {k}: {surface.name}: {len(s.contact)} contact points, {len(s.check)} check points")
     corner = _least_corner(job, impeller, catalogue)
@@ -139,7 +143,16 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
         lines.append(f"between check points: certified within {within:g} mm for corner radii from {corner:g} mm")
     corners = ", ".join(f"{r:g}" for r in catalogue.families)
     lines.append(f"catalogue {catalogue.name}: {len(catalogue.cutters)} cutters, corner radii {corners} mm")
+    lines.append(_estimate(job, surfaces, catalogue))
     return lines, True
+
+
+def _estimate(job: ImpellerJob, surfaces: Sequence[ContactSurface], catalogue: Catalogue) -> str:
+    """What the run will need."""
+    op = job.operation
+    areas = [float(s.area.sum()) for s in surfaces] if op.paths is not None else []
+    ways = op.most_cutters + (op.hand_picked is not None)
+    return estimate(sum(len(s.scene.contact) for s in surfaces), areas, op.scallop_mm, min(catalogue.families), ways)
 
 
 def _stages(op: ImpellerOperationTable, progress: Progress) -> list[Progress]:
