@@ -75,6 +75,47 @@ def test_its_sides_are_those_of_the_file(tmp_path):
             assert max(away) < 0.005
 
 
+PATHS = """
+[operation.paths]
+check_mm = 1.0
+chord_mm = 0.02
+overrun_mm = 0.5
+lift_mm = 1.0
+margin_mm = 0.1
+touch_mm = 0.02
+near_mm = 4.0
+above_mm = 5.0
+link_feed_mm_min = 1200.0
+gouge_mm = 0.1
+"""
+
+
+def test_it_is_planned_to_verified_programs(tmp_path):
+    """A piece of a side: points of the file's own faces, by the CAD kernel, against the poses of the programs."""
+    path = job(tmp_path)
+    text = path.read_text().replace("along = [0.1, 0.9]\nup = [0.2, 0.9]", "along = [0.4, 0.6]\nup = [0.5, 0.8]")
+    text = text.replace("most_cutters = 3", "most_cutters = 1")
+    text = text.replace("check_mm = 1.5", "check_mm = 1.5\ntolerance_mm = 0.1")
+    path.write_text(text + PATHS)
+    found = run_job(load_job(path)).outcome
+    (way,) = found.checked
+    assert way.verified, way.fails
+    R = AGAINST_Z["-y"]
+    model = read_faces(FILE)
+    sides = [model.faces[k] for k in (2, 0)]
+    for one in way.programs:
+        c, program = one.setting.cutter, one.setting.program
+        rows = np.flatnonzero(program.motion == 1)[::7]
+        for tip, axis in zip(program.p_work[rows] @ R, program.axis[rows] @ R, strict=True):
+            # the ring of the corner's centres never comes nearer to a face than the corner radius, less the gouge
+            a = np.cross(axis, [1.0, 0.0, 0.0] if abs(axis[0]) < 0.9 else [0.0, 1.0, 0.0])
+            a /= np.linalg.norm(a)
+            b = np.cross(axis, a)
+            for t in np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False):
+                p = tip + c.corner_radius * axis + c.rho * (np.cos(t) * a + np.sin(t) * b)
+                assert min(f.distance(p.tolist()) for f in sides) > c.corner_radius - 0.1
+
+
 def test_it_is_searched(tmp_path):
     found = run_job(load_job(job(tmp_path))).outcome
     assert (found.surfaces[0].answer.cutter >= 0).all()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from chipload.errors import InputError
 from chipload.examples import copy_example
 from chipload.geometry.sections import checked, loft
 from chipload.geometry.thin_wall import through_sections
@@ -107,6 +108,15 @@ def test_its_side_is_searched(job):
     assert found.one is not None
     faces = [text[:5] for key, text in found.provenance.inputs.items() if key.startswith("face ")]
     assert faces == ["hub: ", "shrou", "plus:", "minus", "blade"]
+
+
+def test_programs_for_so_thin_an_edge_are_refused(job, tmp_path):
+    """Next to its leading edge the blade is 0.06 mm thick: from there the check would see the cutter behind it."""
+    path = shutil.copytree(job.parent, tmp_path / "job") / "job.toml"
+    paths = (Path(__file__).parents[2] / "examples/impeller/job.toml").read_text()
+    path.write_text(path.read_text() + paths[paths.index("[operation.paths]") :])
+    with pytest.raises(InputError, match=r"gouge_mm = 0.05: the metal is 0.0\d+ mm thick next to an edge of a blade: "):
+        check_job(load_job(path))
 
 
 WALL = """# a blade as a wall

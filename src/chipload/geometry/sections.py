@@ -283,7 +283,8 @@ def _blocks(path: Path) -> list[tuple[list[str], list[list[float]]]]:
         if not all(map(math.isfinite, row)):
             raise InputError(f"{path} line {k}: a number is not finite: {line.strip()[:40]!r}")
         if len(row) not in (2, 3) or (blocks[-1][1] and len(row) != len(blocks[-1][1][0])):
-            raise InputError(f"{path} line {k}: {len(row)} numbers: must be as many in every line, 2 or 3")
+            remedy = "" if len(row) < 4 else ": write each section to a file of its own, a line X Y Z for each point"
+            raise InputError(f"{path} line {k}: {len(row)} numbers: must be as many in every line, 2 or 3{remedy}")
         blocks[-1][1].append(row)
     blocks = [b for b in blocks if b[1]]
     if not blocks:

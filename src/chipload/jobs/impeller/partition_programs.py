@@ -38,9 +38,9 @@ from chipload.progress import Progress
 
 #: how often ways are divided at most
 _ROUNDS = 2
-#: shares of the scallop above which rest passes take what is left, where the check finds more than asked; it is planned
-#: again where that is at most this share of what is asked
-_LOWER, _NEARLY = (0.85, 0.75), 1.25
+#: where the check finds more than asked, what is left is counted on points so many times closer together and planned
+#: again; not where it finds more than this share of what is asked: there no cutter goes
+_FINER, _NEARLY = (0.5, 0.25), 1.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,11 +209,11 @@ def _checked(
 ) -> CheckedPartition:  # fmt: skip
     own = job.with_catalogue(done.partition.catalogue)
     programs, covered = _looked_at(own, done.plan, machine, paths, memory, keep)
-    for aim in _LOWER:
+    for fine in _FINER:
         if not 1.0 < _most_left(programs, covered) <= _NEARLY:
             break
         plan = planned(
-            own, done.partition.division.patches, _changes(way), known=memory.millings, keep=keep, aim=aim
+            own, done.partition.division.patches, _changes(way), known=memory.millings, keep=keep, fine=fine
         )  # fmt: skip
         again = _looked_at(own, plan, machine, paths, memory, keep)
         if _most_left(*again) < _most_left(programs, covered):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from chipload.cutter.catalogue import Catalogue
 from chipload.jobs.impeller.channels import between_channels, channel_repeat
 from chipload.jobs.impeller.outcome import Checked, Covered, Scallop
+from chipload.jobs.impeller.ray_depth import ray_depth
 from chipload.jobs.impeller.tables import ImpellerOperationTable, PathsTable
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.coverage import between_lines
@@ -42,9 +43,9 @@ _RESOLUTION = 0.2
 #: points of the walls by which their cells are laid out, and where roughing is looked at, along and up
 _COARSE = (61, 25)
 #: not at the very edges of a blade: there a ray into the metal leaves it again
-_EDGE = 0.01
-#: how far the rays go above and below a surface [mm]
-_HEIGHT, _DEPTH = 1.0, 0.5
+EDGE = 0.01
+#: how far the rays go above a surface [mm]
+_HEIGHT = 1.0
 #: distance of points of a whole surface on which what is left is measured [mm]
 _SPACING = 0.6
 #: grid lines across the passes of a patch on which the scallop is measured, points between two passes
@@ -88,7 +89,8 @@ def checked_programs(
     whole = [_whole(job, body, side, millings) for body, side in faces]
     coarse = walls_of(impeller, job.ahead)
     walls = [*dense, *whole]
-    found = [_left(job, walls, setting, keep) for setting in settings]
+    depth = ray_depth(impeller, EDGE, paths.gouge_mm)
+    found = [_left(job, walls, setting, depth, keep) for setting in settings]
     # what is left is what no program takes
     rest = [replace(same[0], rest=np.min([x.rest for x in same], axis=0)) for same in zip(*found, strict=True)]
     crests = iter(rest)
@@ -98,7 +100,7 @@ def checked_programs(
         scallops = tuple(_scallop(m, next(crests), asked) for m in setting.millings)
         _, findings = to_axes(program, machine)
         said = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
-        gouge = _gouge(job, coarse, setting, paths, keep)
+        gouge = _gouge(job, coarse, setting, depth, paths.gouge_mm, keep)
         rows = times_on(program, machine)
         seconds, cutting = float(rows.sum()), float(rows[in_cut(program)].sum())
         between = between_channels(program, machine, impeller.blades)
@@ -118,30 +120,34 @@ def _moves_key(setting: CutterSetting) -> tuple[object, ...]:
 
 
 def _left(
-    job: FinishSettings, walls: Sequence[SurfacePoints], setting: CutterSetting, keep: Keep
+    job: FinishSettings, walls: Sequence[SurfacePoints], setting: CutterSetting, depth: float, keep: Keep
 ) -> tuple[Remainder, ...]:
     """What a program leaves on each wall."""
 
     def columns() -> list[list[NDArray[Any]]]:
-        found = left_on(walls, setting.program, setting.cutter, _HEIGHT, _DEPTH, workers=job.workers)
+        found = left_on(walls, setting.program, setting.cutter, _HEIGHT, depth, workers=job.workers)
         return [[x.rest, x.gouge, x.row, x.part] for x in found]
 
     got = keep(("left", *_moves_key(setting), [w.points for w in walls]), columns)
     return tuple(
-        Remainder(w, rest, gouge, row, part, _HEIGHT, _DEPTH)
+        Remainder(w, rest, gouge, row, part, _HEIGHT, depth)
         for w, (rest, gouge, row, part) in zip(walls, got, strict=True)
     )
 
 
 def _gouge(
-    job: FinishSettings, walls: Sequence[SurfacePoints], setting: CutterSetting, paths: PathsTable, keep: Keep
+    job: FinishSettings,
+    walls: Sequence[SurfacePoints],
+    setting: CutterSetting,
+    depth: float,
+    allowed: float,
+    keep: Keep,
 ) -> Gouge:
     """The deepest gouge of a program."""
-    allowed = paths.gouge_mm
     return keep(
         ("gouge", *_moves_key(setting)),
         lambda: deepest_gouge(
-            walls, setting.program, setting.cutter, _DEPTH, _RESOLUTION * allowed, allowed, workers=job.workers
+            walls, setting.program, setting.cutter, depth, _RESOLUTION * allowed, allowed, workers=job.workers
         ),
     )
 
@@ -187,7 +193,7 @@ def _dense(impeller: Impeller, milling: Milling, ahead: float) -> SurfacePoints:
 
 def walls_of(impeller: Impeller, ahead: float) -> list[SurfacePoints]:
     """Both sides of the bodies round the channels, and their floors."""
-    u, v = np.linspace(_EDGE, 1.0 - _EDGE, _COARSE[0]), np.linspace(0.0, 1.0 - _EDGE, _COARSE[1])
+    u, v = np.linspace(EDGE, 1.0 - EDGE, _COARSE[0]), np.linspace(0.0, 1.0 - EDGE, _COARSE[1])
     last = 1 + len(impeller.bodies)
     out = []
     for k in range(-1, last):

@@ -16,11 +16,13 @@ from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_name
 from chipload.errors import InputError
 from chipload.jobs.impeller.channel_depth import reach_line
 from chipload.jobs.impeller.checkpoint import KeptParts
+from chipload.jobs.impeller.estimate import estimate
 from chipload.jobs.impeller.job import ImpellerJob
 from chipload.jobs.impeller.outcome import ImpellerResult, OneCutter, Searched, unreached_text
 from chipload.jobs.impeller.part import ImpellerPart, read_part
 from chipload.jobs.impeller.partition_programs import checked_partitions
-from chipload.jobs.impeller.paths import finish_settings, walls_of
+from chipload.jobs.impeller.paths import EDGE, finish_settings, walls_of
+from chipload.jobs.impeller.ray_depth import ray_depth
 from chipload.jobs.impeller.roughing import checked_roughing
 from chipload.jobs.impeller.tables import ImpellerOperationTable
 from chipload.jobs.provenance import provenance_of, sources, title_of, versions
@@ -61,6 +63,7 @@ def run(job: ImpellerJob, progress: Progress = silent, checkpoint: Checkpoint | 
     impeller = part.impeller
     _picked(job, catalogue)
     _rougher(job, catalogue)
+    _checkable(job, impeller)
     op = job.operation
     provenance = _provenance(job, machine, catalogue, part)
     keep = KeptParts(checkpoint, digest(job.table.model_dump_json(), provenance.inputs, versions(), sources()))
@@ -68,6 +71,8 @@ def run(job: ImpellerJob, progress: Progress = silent, checkpoint: Checkpoint | 
     covering = _covering(job, impeller, catalogue)
     took = time.perf_counter() - begin
     surfaces = _surfaces(job, impeller, covering)
+    if checkpoint is not None:
+        checkpoint.notice(_estimate(job, surfaces, catalogue))
     first, second, third, last = _stages(op, progress)
     done = []
     for k, surface in enumerate(surfaces):
@@ -100,6 +105,13 @@ def run(job: ImpellerJob, progress: Progress = silent, checkpoint: Checkpoint | 
     return replace(milled, checked=checked, roughs=roughs, partitions=tuple(chosen.get(p.name, p) for p in partitions))
 
 
+def _checkable(job: ImpellerJob, impeller: Impeller) -> None:
+    """Refuse programs for blades that are too thin to be checked, before anything is searched."""
+    paths = job.operation.paths
+    if paths is not None:
+        ray_depth(impeller, EDGE, paths.gouge_mm)
+
+
 def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue, part: ImpellerPart) -> Provenance:
     files = dict(job.files)
     files |= {key: p for key, p in (("machine", job.machine), ("catalogue", job.catalogue)) if not isinstance(p, str)}
@@ -115,6 +127,7 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
     impeller = part.impeller
     _picked(job, catalogue)
     _rougher(job, catalogue)
+    _checkable(job, impeller)
     lines = [f"impeller: {impeller.blades} blades{' and as many splitters' if impeller.splitter else ''}", *part.faces]
     table = _tables(machine, job.operation)
     angles = np.degrees(table.angle)
@@ -132,7 +145,15 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
     corners = ", ".join(f"{r:g}" for r in catalogue.families)
     lines.append(f"catalogue {catalogue.name}: {len(catalogue.cutters)} cutters, corner radii {corners} mm")
     line, reached = reach_line(impeller, catalogue, np.concatenate([s.scene.contact for s in surfaces]))
-    return [*lines, line], reached
+    return [*lines, line, _estimate(job, surfaces, catalogue)], reached
+
+
+def _estimate(job: ImpellerJob, surfaces: Sequence[ContactSurface], catalogue: Catalogue) -> str:
+    """What the run will need."""
+    op = job.operation
+    areas = [float(s.area.sum()) for s in surfaces] if op.paths is not None else []
+    ways = op.most_cutters + (op.hand_picked is not None)
+    return estimate(sum(len(s.scene.contact) for s in surfaces), areas, op.scallop_mm, min(catalogue.families), ways)
 
 
 def _stages(op: ImpellerOperationTable, progress: Progress) -> list[Progress]:

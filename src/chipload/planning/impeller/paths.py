@@ -57,7 +57,7 @@ class PatchFinish:
     scallop: float
     motion: LineMotion
     overrun: float = 0.0
-    aim: float = 0.95
+    aim: float = 0.9
 
     def __post_init__(self) -> None:
         if not (0.0 < self.scallop < math.inf and 0.0 < self.aim <= 1.0):

@@ -49,8 +49,9 @@ from chipload.progress import Progress, silent
 NUMBERS = {(0, "plus"): 0, (1, "minus"): 1, (0, "minus"): 3, (1, "plus"): 4}
 NUMBERS |= {(body, f"{side} fillet"): FILLET + n for (body, side), n in NUMBERS.items()}
 _FLOOR = 2
-#: share of the scallop above which rest passes take what is left
-AIM = 0.95
+#: rest passes take what is left above this share of the scallop: above what is left between two lines, and below
+#: what is asked, for the count is of points
+_AIM = 0.96
 #: so many settings are brought into the best order; more of them on and on to the nearest
 _EXACT = 7
 
@@ -230,7 +231,7 @@ def planned(
     progress: Progress = silent,
     known: dict[MillingKey, Milling] | None = None,
     keep: Keep = anew,
-    aim: float = AIM,
+    fine: float = 1.0,
 ) -> PlannedSettings:
     """The settings of patches with their rest passes, in the order in which changes take least.
 
@@ -240,7 +241,7 @@ def planned(
     rounds : most times that what is left is looked at and milled with rest passes
     known : millings that are planned already; those that are planned here are added
     keep : gives what an earlier run has finished of them
-    aim : rest passes take what is left above this share of the scallop: what is counted is points, and not exact
+    fine : distance of the points at which what is left is counted, over the usual one
     """
     groups: dict[Pair, list[Milling]] = {}
     known = {} if known is None else known
@@ -252,7 +253,7 @@ def planned(
         groups.setdefault((patch.cutter, patch.table), []).append(milling)
         progress(0.8 * (done + 1) / len(patches), f"paths of {done + 1} patches")
     settings = {pair: job.setting(pair, rows, (), k, keep) for k, (pair, rows) in enumerate(groups.items(), 1)}
-    faces = _faces(job, [m for rows in groups.values() for m in rows])
+    faces = _faces(job, [m for rows in groups.values() for m in rows], fine)
     h = job.how.scallop
     hopeless = [np.zeros((len(f.u), len(f.v)), dtype=np.bool_) for f in faces]
     left: list[Floats] = []
@@ -265,7 +266,7 @@ def planned(
         )  # fmt: skip
         new: dict[Pair, list[RestPasses]] = {}
         for face, over, lost in zip(faces, left, hopeless, strict=True):
-            for region in regions(over, aim * h, lost) if turn < rounds else ():
+            for region in regions(over, _AIM * h, lost) if turn < rounds else ():
                 pair = plan.chosen(face, region)
                 if pair is None:
                     lost |= region
@@ -347,7 +348,7 @@ def _number(body: int, side: str) -> int:
     return NUMBERS.get((body, side), _FLOOR)
 
 
-def _faces(job: FinishSettings, millings: Sequence[Milling]) -> list[SurfaceGrid]:
+def _faces(job: FinishSettings, millings: Sequence[Milling], fine: float) -> list[SurfaceGrid]:
     """Every surface that is milled, as far as its patches go."""
     boxes: dict[tuple[int, str], list[tuple[tuple[float, float], tuple[float, float]]]] = {}
     for m in millings:
@@ -359,7 +360,7 @@ def _faces(job: FinishSettings, millings: Sequence[Milling]) -> list[SurfaceGrid
         low, high = grid[:, :, 0].min(axis=0), grid[:, :, 1].max(axis=0)
         box = ((float(low[0]), float(high[0])), (float(low[1]), float(high[1])))
         surface, number = job.surface(body, side), _number(body, side)
-        out.append(face_of(body, side, surface, number, box, job.how.scallop, corner))
+        out.append(face_of(body, side, surface, number, box, job.how.scallop, corner, fine))
     return out
 
 

@@ -19,6 +19,8 @@ from chipload.planning.impeller.ranges._kernels import merged
 
 #: so few nodes are told by their arcs, and in so narrow a part [rad] as many as there are
 FEW = 2
+#: with more nodes than these a part wider than the width is halved
+MANY = 256
 NARROW = 1e-4
 
 
@@ -76,9 +78,9 @@ def about(points: Any, nodes: Any, spans: Any, leaves: int, cc: Any, near2: floa
 @njit(cache=True, nogil=True)
 def collected(
     points: Any, nodes: Any, spans: Any, leaves: int, f: Any, rho: float, r: float, stages: Any, seen: Any, stamp: int,
-    stack: Any, out: Any,
+    most: int, stack: Any, out: Any,
 ) -> int:  # fmt: skip
-    """Nodes not ``seen`` that the cutter may meet in the part of B of a frame ``f``."""
+    """Nodes not ``seen`` that the cutter may meet in the part of B of a frame ``f``; -1: more than ``most``."""
     found, top = 0, 1
     stack[0] = 0
     while top > 0:
@@ -98,6 +100,8 @@ def collected(
                 continue
             away, moves = spare(points[i, 0], points[i, 1], points[i, 2], 0.0, f, rho, r, stages)
             if away <= moves:
+                if found == most:
+                    return -1
                 out[found] = i
                 found += 1
     return found
@@ -147,17 +151,19 @@ def kept_of(
         lo, hi = uncovered(cover, covered, lo, hi)
         if hi - lo <= least:
             continue
-        if first < 0 and hi - lo > width:
-            todo[waiting, 0], todo[waiting, 1] = 0.5 * (lo + hi), hi
-            todo[waiting + 1, 0], todo[waiting + 1, 1] = lo, 0.5 * (lo + hi)
-            of[waiting], of[waiting + 1] = -1, -1
-            waiting += 2
-            if waiting + 2 > len(todo):
-                return -1
-            continue
         framed(cc, cone, r, 0.5 * (lo + hi), 0.5 * (hi - lo), rho, f)
         if first < 0:
-            first, last = 0, collected(points, nodes, spans, leaves, f, rho, r, stages, seen, stamp, stack, work)
+            # a wide part that meets few nodes is looked at as a whole
+            most = MANY if hi - lo > width else len(points)
+            first, last = 0, collected(points, nodes, spans, leaves, f, rho, r, stages, seen, stamp, most, stack, work)
+            if last < 0:
+                todo[waiting, 0], todo[waiting, 1] = 0.5 * (lo + hi), hi
+                todo[waiting + 1, 0], todo[waiting + 1, 1] = lo, 0.5 * (lo + hi)
+                of[waiting], of[waiting + 1] = -1, -1
+                waiting += 2
+                if waiting + 2 > len(todo):
+                    return -1
+                continue
         deepest, who, end = 0.0, -1, last
         for j in range(first, last):
             i = work[j]
