@@ -15,8 +15,8 @@ from chipload.report.engagement import engagement_bytes
 from chipload.report.presentation import Blank
 from chipload.report.removal import removal_bytes, removal_meshes
 from chipload.report.scene import legend
-from chipload.result import LimitCheck, Provenance, Result, Track, TrackKind, Verdict, in_memory
-from chipload.result.history import write_history
+from chipload.result import LimitCheck, Provenance, Result, SurfaceMap, Track, TrackKind, Verdict, in_memory
+from chipload.result.history import maps_bytes, write_history
 from chipload.result.summary import summary_bytes
 from chipload.simulation.engagement_samples import engagement_samples
 
@@ -149,6 +149,20 @@ MARGIN = np.where(SIDE == 1, 0.8, 2.0)
 CHART = {"tool": 1, "speed_rpm": [1000.0, 2000.0, 3000.0, 6000.0], "margin": [0.5, 1.5, 0.8, 2.5]}
 
 
+def sheet() -> SurfaceMap:
+    """A surface map of 40 x 40 mm: torque of 0.4 N m for each mm along x, of which 12 are allowed; it bends upwards."""
+    x, y = (v.ravel() for v in np.meshgrid(np.linspace(0.0, 40.0, 41), np.linspace(0.0, 40.0, 41)))
+    corner = (np.arange(40)[:, None] * 41 + np.arange(40)).ravel()
+    faces = np.concatenate([np.column_stack([corner + k for k in (0, 1, 42)]),
+                            np.column_stack([corner + k for k in (0, 42, 41)])])  # fmt: skip
+    points, up = np.column_stack([x, y, 0.0 * x]), 0.01 * (x / 40.0) ** 2
+    moved = np.column_stack([0.0 * x, 0.0 * x, up])
+    return SurfaceMap("sheet", "torque_nm", points, 0.4 * x, faces, displacement=moved)
+
+
+SHEET = sheet()
+
+
 def make_cut_result(folder: Path) -> Path:
     """The square cut into a block, its stock at every row, and a clamp that the holder runs into at row 60."""
     one = square_result("cut")
@@ -169,8 +183,10 @@ def make_cut_result(folder: Path) -> Path:
             "kind": "simulate", "collisions": [{**listed, "tool": 1}],
             "stability": {"margin_wanted": 1.2, "chart": [CHART]},
         },),
+        maps=(SHEET,),
     )  # fmt: skip
     write_by_hand(result, folder)
+    (folder / "maps.npz").write_bytes(maps_bytes(result))
     made = trimesh.Scene()
     for name, low, high, colour in (
         ("stock", (-10.0, -10.0, -12.0), (50.0, 50.0, -2.0), (168, 122, 58, 255)),

@@ -19,6 +19,9 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 from chipload.examples import copy_example
 
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+from web_lists import choose
+
 DOCS = Path(__file__).parent.parent / "docs"
 CHROMIUM = "/usr/bin/chromium"
 FLAGS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox")
@@ -34,6 +37,9 @@ FIGURES: dict[str, tuple[tuple[str, int, int], ...]] = {
     "plate": (("depth", 940, 520),),
     "blade": (("space", 940, 560),),
 }
+#: the 3D view of the page, and that it and the plots are drawn
+VIEW = "chiploadViewer.of(document.querySelector('.cl-stage').id)"
+DRAWN = f"{VIEW}.frames > 0 && document.querySelectorAll('.cl-figure .trace').length > 0"
 #: pictures of the page: the example that each shows, and the track that it is compared with; none: none
 PAGES = {"page": ("bracket", ""), "page_compare": ("feeds", "original")}
 #: moves figures into a sheet of their own, above the page
@@ -89,16 +95,15 @@ def photograph_page(chromium: Browser, folder: Path, name: str) -> None:
         page.wait_for_selector(".cl-now")
         other = PAGES[name][1]
         if other:
-            page.wait_for_timeout(4000)  # the list opens once the results of the folder are in it
-            page.get_by_role("combobox", name="compare with").click()
-            page.get_by_role("option", name=other).click()
-            page.keyboard.press("Escape")
+            choose(page, "compare with", other)
             page.wait_for_selector(".cl-compared", state="visible")
             page.locator(".cl-plots").get_by_text("path", exact=True).last.click()
-            page.wait_for_timeout(2000)
-            # the slider of the steps, near its end
-            page.mouse.click(750, 701)
-        page.wait_for_timeout(4000)
+            page.wait_for_function(f"{VIEW}.paired")
+            # near the end of the path
+            page.locator(".cl-slider").click(
+                position={"x": 0.9 * page.locator(".cl-slider").bounding_box()["width"], "y": 8}
+            )
+        page.wait_for_function(DRAWN, timeout=120_000)
         page.screenshot(path=DOCS / f"{name}.png")
         page.close()
     finally:

@@ -5,6 +5,8 @@ import base64
 import numpy as np
 import pytest
 
+from web_lists import choose
+
 VIEW = "chiploadViewer.of(document.querySelector('.cl-stage').id)"
 PANEL = "chiploadViewer.cut(document.querySelector('.cl-cut').id, document.querySelector('.cl-stage').id)"
 
@@ -55,9 +57,9 @@ def test_four_plots_and_the_chip_are_drawn(cut, pixels) -> None:
     assert [e.get_attribute("aria-label") for e in cut.locator(".cv-cut-plots .cv-plot").all()] == names
     # the limit of torque, 12 N m, is far above: it would flatten the line
     assert cut.locator(".cv-cut-plots .cv-plot line[stroke='#c81e1e']").count() == 0
-    # the end of the force goes round: as many points as rotations, and the first again
+    # the end of the force goes round: as many points as rotations of two tooth periods, and the first again
     points = cut.locator(".cv-locus").get_attribute("points").split()
-    assert len(points) == 121
+    assert len(points) == 241
     assert points[0] == points[-1]
     assert len(set(points)) > 20
     data = cut.evaluate("document.querySelector('.cv-chip canvas').toDataURL('image/png')")
@@ -120,6 +122,38 @@ def test_the_operating_point_moves_in_the_chart_and_is_red_below_the_wanted_marg
     assert places[30][1] == places[180][1] < places[70][1]
     # evenly spaced in the logarithm of speed
     assert line[1][0] - line[0][0] == pytest.approx(line[3][0] - line[2][0], abs=0.2)
+
+
+def test_a_map_shows_its_limit_as_a_line_and_bends(cut, pixels) -> None:
+    """The line of 12 N m lies at x = 30; the edge at x = 40 moves by 0.01 mm, drawn as 12 % of the diagonal."""
+    choose(cut, "surface map", "sheet: torque")
+    cut.wait_for_function(f"{VIEW}.state().map == 'sheet'")
+    assert cut.evaluate(f"{VIEW}.state()")["factor"] == 0.0
+    assert cut.locator(".cv-bar").get_by_text("limit 12").count() == 1
+    others = ("cutter", "path", "fixture 0", "marks", "engagement")
+    cut.evaluate("".join(f"{VIEW}.layer({name!r}, false);" for name in others) + f"{VIEW}.look('top')")
+    data = cut.evaluate(f"{VIEW}.picture()")
+    rgb = pixels(base64.b64decode(data.split(",", 1)[1])).astype(int)
+    red = np.argwhere((rgb[..., 0] > 170) & (rgb[..., 1] < 70) & (rgb[..., 2] < 70))
+    assert len(red) > 40
+    across, width = cut.evaluate(
+        f"""() => {{ const v = {VIEW}, q = v.camera.position.clone().set(30, 20, 0).project(v.camera);
+        return [(q.x + 1) / 2, v.host.clientWidth]; }}"""
+    )
+    assert np.median(red[:, 1]) == pytest.approx(across * rgb.shape[1], abs=3.0)
+    assert width > 100
+    slider = cut.locator("[aria-label='how far the map is bent']")
+    slider.click(position={"x": slider.bounding_box()["width"] - 2.0, "y": 8.0})
+    # at most 0.12 * 40 sqrt(2) mm over 0.01 mm
+    most = 0.12 * 40.0 * np.sqrt(2.0) / 0.01
+    cut.wait_for_function(f"m => {VIEW}.state().factor > 0.9 * m", arg=most)
+    factor = cut.evaluate(f"{VIEW}.state()")["factor"]
+    assert factor <= most * (1.0 + 1e-6)
+    cut.wait_for_function("t => document.body.textContent.includes(t)", arg=f"bent {factor:.3g} times")
+    assert cut.evaluate(f"{VIEW}.map('sheet', 1)") == pytest.approx(most, rel=1e-5)
+    choose(cut, "surface map", "no map")
+    cut.wait_for_function(f"{VIEW}.state().map == ''")
+    cut.evaluate("".join(f"{VIEW}.layer({name!r}, true);" for name in others))
 
 
 def test_a_result_without_samples_says_so(browser, served) -> None:

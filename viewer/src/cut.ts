@@ -71,7 +71,7 @@ class ChipView {
       const middle = s.A.clone().multiplyScalar(0.5 * (low + high));
       this.controls.target.copy(middle);
       const away = s.T.clone().multiplyScalar(0.85).addScaledVector(s.n, 0.9).addScaledVector(s.A, 1.0).normalize();
-      this.camera.position.copy(middle).addScaledVector(away, 1.75 * size);
+      this.camera.position.copy(middle).addScaledVector(away, 2.1 * size);
       this.camera.near = 0.01 * size;
       this.camera.far = 20 * size;
       this.controls.update();

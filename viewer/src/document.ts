@@ -53,10 +53,26 @@ export interface Engagement {
   row: Buffer;
   tool: Buffer;
   flutes: Buffer;
+  periods: Buffer;
   start: Buffer;
   frame: Buffer;
   ranges: Buffer;
   turn: Buffer;
+}
+/** Values on a surface, the limit as isolines, how the surface bends. */
+export interface SurfaceMap {
+  name: string;
+  label: string;
+  unit: string;
+  low: number;
+  high: number;
+  limit: number | null;
+  positions: Buffer;
+  index: Buffer;
+  values: Buffer;
+  lines: Buffer;
+  moved: Buffer | null;
+  lines_moved: Buffer | null;
 }
 /** Least stability margin of a tool over spindle speed, by tool number; speed and margin of each kept row, 0: none. */
 export interface Stability {
@@ -79,6 +95,7 @@ export interface Header {
   columns?: Colouring[];
   engagement?: Engagement | null;
   stability?: Stability | null;
+  maps?: SurfaceMap[];
 }
 
 const MAGIC = 0x31564c43; // "CLV1"

@@ -39,6 +39,7 @@ export class Teeth {
   readonly bounds: Record<string, number>;
   private readonly tool: Uint32Array;
   private readonly flutes: Uint32Array;
+  private readonly periods: Uint32Array;
   private readonly start: Uint32Array;
   private readonly frame: Float32Array;
   private readonly ranges: Float32Array;
@@ -47,7 +48,7 @@ export class Teeth {
   constructor(doc: Document, private readonly e: Engagement) {
     this.stride = e.stride;
     this.bounds = e.bounds;
-    [this.rows, this.tool, this.flutes, this.start] = [e.row, e.tool, e.flutes, e.start].map((b) => doc.u4(b));
+    [this.rows, this.tool, this.flutes, this.periods, this.start] = [e.row, e.tool, e.flutes, e.periods, e.start].map((b) => doc.u4(b));
     [this.frame, this.ranges, this.turn] = [e.frame, e.ranges, e.turn].map((b) => doc.f4(b));
   }
 
@@ -69,10 +70,12 @@ export class Teeth {
         sine: v[9], cosine: v[10], tooth: v[11],
       });
     }
+    const period = this.turn.subarray(m * k, m * (k + 1)), turn = new Float32Array(m * this.periods[k]);
+    for (let p = 0; p < this.periods[k]; p++) turn.set(period, m * p);
     return {
       row: this.rows[k], tool: this.tool[k], flutes: this.flutes[k], ranges,
       T: new THREE.Vector3(f[g], f[g + 1], f[g + 2]), n: new THREE.Vector3(f[g + 3], f[g + 4], f[g + 5]),
-      A: new THREE.Vector3(f[g + 6], f[g + 7], f[g + 8]), turn: this.turn.subarray(m * k, m * (k + 1)),
+      A: new THREE.Vector3(f[g + 6], f[g + 7], f[g + 8]), turn,
     };
   }
 }

@@ -45,6 +45,16 @@ export async function panel(host: HTMLElement, text: string): Promise<View> {
   for (const name of names) check(name, true, (on) => view.layer(name, on));
   check("see through", false, (on) => view.glass(on));
   if (view.stock) check("values on stock", false, (on) => view.drape(on));
+  if (header.maps?.length) {
+    const maps = made("select", "", "surface map"), bent = made("input", "", "how far the map is bent");
+    maps.append(new Option("no map", ""), ...header.maps.map((m) => new Option(`map: ${m.name}, ${m.label}`, m.name)));
+    Object.assign(bent, { type: "range", min: "0", max: "1", step: "any", value: "0" });
+    bent.style.flex = "0 1 120px";
+    const show = () => { view.map(maps.value, Number(bent.value)); bent.style.display = header.maps!.find((m) => m.name === maps.value)?.moved ? "" : "none"; };
+    maps.onchange = bent.oninput = show;
+    bar.append(maps, bent);
+    show();
+  }
   const play = made("button", "play"), slider = made("input", "", "time"), where = made("span");
   slider.type = "range";
   const t = view.path.t, first = t[0] ?? 0, last = t[t.length - 1] ?? 1;

@@ -11,6 +11,7 @@ import { Overlay, number } from "./overlay";
 import { Abscissa, Pair, between } from "./pair";
 import { ToolPath, coloured } from "./path";
 import { Stock } from "./stock";
+import { MapBody } from "./surface";
 
 const BACKGROUND = 0xeef1f5, FOV = 36, NEAR = 14;
 const VIEWS: Record<string, [number, number, number]> = {
@@ -52,6 +53,8 @@ export class View {
   private before = 0;
   private recorder: MediaRecorder | null = null;
   private pair: Pair<View> | null = null;
+  private shownMap: MapBody | null = null;
+  private doc!: Document;
   private speeds: { rpm: Float32Array; margin: Float32Array } | null = null;
 
   constructor(readonly host: HTMLElement) {
@@ -94,6 +97,8 @@ export class View {
   /** Show a document; `keep` leaves the camera where it is. */
   load(doc: Document, keep = false): void {
     const h = (this.header = doc.header);
+    this.doc = doc;
+    this.map("");
     for (const s of this.solids) this.scene.remove(s.group);
     if (this.stock) this.scene.remove(this.stock.group);
     if (this.path) this.scene.remove(this.path.group);
@@ -135,8 +140,26 @@ export class View {
   }
 
   private legend(): void {
-    const maps = this.solids.filter((s) => !this.hidden.has(s.body.name)).map((s) => s.body.legend);
-    this.overlay.legend(this.header, this.colouring, maps.filter((m) => m !== undefined));
+    const maps = this.solids.filter((s) => s.group.visible).map((s) => s.body.legend);
+    this.overlay.legend(this.header, this.colouring, [...maps.filter((m) => m !== undefined), ...(this.shownMap ? [this.shownMap.legend()] : [])]);
+  }
+
+  /** Show a surface map in the place of part and stock, bent by a share of the greatest factor; "": none. The factor. */
+  map(name: string, share = 0): number {
+    const found = this.header?.maps?.find((m) => m.name === name);
+    if (this.shownMap && this.shownMap.map !== found) {
+      this.scene.remove(this.shownMap.group);
+      this.shownMap.dispose();
+      this.shownMap = null;
+    }
+    if (found && !this.shownMap) {
+      this.shownMap = new MapBody(this.doc, found, this.header);
+      this.shownMap.clip(this.plane ? [this.plane] : []);
+      this.scene.add(this.shownMap.group);
+    }
+    this.shownMap?.bend(share * this.shownMap.most);
+    this.layers();
+    return this.shownMap?.factor ?? 0;
   }
 
   /** Show the values of the column on what was cut there. */
@@ -204,6 +227,7 @@ export class View {
     }
     const planes = this.plane ? [this.plane] : [];
     for (const s of this.solids) s.clip(planes);
+    this.shownMap?.clip(planes);
     if (this.stock) (this.stock.mesh.material as THREE.Material).clippingPlanes = planes;
     this.path.clip(planes);
     this.dirty = true;
@@ -286,7 +310,7 @@ export class View {
     return {
       row: this.row, tip, bodies: this.solids.map((s) => [s.body.name, s.body.index.n / 3]), frames: this.frames,
       stock: this.stock ? { frame: this.stock.frame, ...this.stock.measured() } : null, segments: this.path.drawn.length / 3,
-      engaged: this.engaged.triangles,
+      engaged: this.engaged.triangles, map: this.shownMap?.map.name ?? "", factor: this.shownMap?.factor ?? 0,
     };
   }
 
@@ -322,8 +346,9 @@ export class View {
   private layers(): void {
     const seen = (name: Layer) => !this.hidden.has(name);
     if (!this.path) return;
-    for (const s of this.solids) s.group.visible = seen(s.body.name);
-    if (this.stock) this.stock.group.visible = seen("stock");
+    // a map stands in the place of part and stock
+    for (const s of this.solids) s.group.visible = seen(s.body.name) && (!this.shownMap || s.body.kind === "fixture");
+    if (this.stock) this.stock.group.visible = seen("stock") && !this.shownMap;
     this.path.group.visible = seen("path");
     this.marks.visible = seen("marks");
     this.legend();

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.report.bodies import SceneBody
 from chipload.report.operating import OperatingPoints
+from chipload.report.shown_maps import ShownMap
 from chipload.result.style import SCALE
 from chipload.simulation.engagement_samples import EngagementSamples
 from chipload.simulation.removal_mesh import RemovalMesh
@@ -98,7 +99,7 @@ class ViewMark:
 class ViewScene:
     """All that a view shows: ``cutters`` are parts (kind, profile) by tool number, 0 for every other; ``columns`` other
     colours to choose from; ``samples`` what the teeth cut at some rows, ``bounds`` limits of force [N] and torque
-    [N m] by their columns; ``operating`` speed and margin of each row.
+    [N m] by their columns; ``operating`` speed and margin of each row; ``maps`` to choose one from.
     """
 
     title: str
@@ -112,6 +113,7 @@ class ViewScene:
     samples: EngagementSamples | None = None
     bounds: Mapping[str, float] = field(default_factory=dict)
     operating: OperatingPoints | None = None
+    maps: Sequence[ShownMap] = ()
 
 
 class Buffers:
@@ -152,6 +154,7 @@ def scene_document(scene: ViewScene, kept: int = KEPT) -> bytes:
         ],
         "colouring": None if scene.colouring is None else _colouring(scene.colouring, path, out),
         "columns": [_colouring(c, path, out) for c in scene.columns],
+        "maps": [_map(one, out) for one in scene.maps],
         "stability": None if scene.operating is None else _operating(scene.operating, len(path.t), kept, out),
         "engagement": None if scene.samples is None else _engagement(scene.samples, scene.bounds, out),
     }
@@ -275,6 +278,23 @@ def _colouring(c: Colouring, path: ViewPath, out: Buffers) -> dict[str, Any]:
     }
 
 
+def _map(one: ShownMap, out: Buffers) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "label": one.label,
+        "unit": one.unit,
+        "low": one.low,
+        "high": one.high,
+        "limit": one.limit,
+        "positions": out.put(one.points, "f4"),
+        "index": out.put(one.faces, "u4"),
+        "values": out.put(one.values, "f4"),
+        "lines": out.put(one.lines, "f4"),
+        "moved": None if one.moved is None else out.put(one.moved, "f4"),
+        "lines_moved": None if one.lines_moved is None else out.put(one.lines_moved, "f4"),
+    }
+
+
 def _kept_rows(n: int, kept: int) -> Ints:
     """Rows of n that are kept, even and at most so many."""
     return np.arange(n) if n <= kept else np.unique(np.linspace(0, n - 1, kept).astype(np.int64))
@@ -296,7 +316,7 @@ def _engagement(samples: EngagementSamples, bounds: Mapping[str, float], out: Bu
         "stride": samples.stride,
         "bounds": dict(bounds),
         "rotations": samples.turn.shape[1],
-        **{name: out.put(getattr(samples, name), "u4") for name in ("row", "tool", "flutes", "start")},
+        **{name: out.put(getattr(samples, name), "u4") for name in ("row", "tool", "flutes", "periods", "start")},
         **{name: out.put(getattr(samples, name), "f4") for name in ("frame", "ranges", "turn")},
     }
 

@@ -20,6 +20,7 @@ from chipload.report.operating import COLUMNS as OPERATING
 from chipload.report.operating import operating_points
 from chipload.report.presentation import Blank
 from chipload.report.removal import AXIS, PLACE, breaks
+from chipload.report.shown_maps import shown_maps
 from chipload.report.view import Colouring, ViewPath, ViewScene, parts_of, pointer_parts, scene_document
 from chipload.result import LimitCheck, Result, Track
 from chipload.simulation.engagement_samples import EngagementSamples
@@ -64,7 +65,7 @@ def view_section(
     scene = ViewScene(
         result.title, bodies, removal, path, parts, marks_of(result, track, row, path.place),
         colours[0] if colours else None, colours, None if own is None else own.at_most(SAMPLES), bounds_of(track),
-        operating_points(result, track, columns),
+        operating_points(result, track, columns), shown_maps(result, track, bounds_of(track)),
     )  # fmt: skip
     data = base64.b64encode(zlib.compress(scene_document(scene, KEPT), 9)).decode()
     notes = [bodies_note(bodies)]

@@ -135,6 +135,8 @@ def remove_in_chunks(
                 state_of.restore(kept[name])
         except (InputError, KeyError) as err:
             unfinished.set_aside(str(err))
+            for state_of in keeps.values():
+                state_of.clear()
             kept = None
     if kept is not None:
         sums = found_sums

@@ -30,14 +30,14 @@ Ints = NDArray[np.int64]
 
 #: steps that are kept at most, and ranges of immersion of all of them
 STEPS, RANGES = 400, 60_000
-#: rotations of a revolution at which force and torque are kept
+#: rotations at which force and torque are kept: of a tooth period, or of a revolution where teeth differ
 ROTATIONS = 120
 #: columns of ``ranges``
 COLUMNS = (
     "phi_from", "phi_to", "along", "offset", "across", "rho_from", "z_from", "rho_to", "z_to", "sin_kappa",
     "cos_kappa", "tooth",
 )  # fmt: skip
-ARRAYS = ("row", "tool", "flutes", "frame", "start", "ranges", "turn")
+ARRAYS = ("row", "tool", "flutes", "periods", "frame", "start", "ranges", "turn")
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,17 +49,19 @@ class EngagementSamples:
     stride : rows between neighbouring samples of one cut
     row : (n,) int, row of the history
     tool, flutes : (n,) int, tool number and number of teeth
+    periods : (n,) int, how often the load repeats in a revolution: as many times as there are teeth, if they are alike
     frame : (n, 3, 3) rows T, n, A
     start : (n + 1,) int; the ranges of sample i are the rows start[i] .. start[i + 1] - 1
     ranges : (b, 12) :data:`COLUMNS` [rad, mm]; tooth -1: every tooth
     turn : (n, m, 4) force on the cutter x, y, z in the workpiece frame [N] and torque [N m] at m even rotations of
-        a revolution, from 0
+        a period, from 0
     """
 
     stride: int
     row: Ints
     tool: Ints
     flutes: Ints
+    periods: Ints
     frame: Floats
     start: Ints
     ranges: Floats
@@ -68,7 +70,7 @@ class EngagementSamples:
     def __post_init__(self) -> None:
         n = len(self.row)
         shapes = {
-            "tool": (n,), "flutes": (n,), "frame": (n, 3, 3), "start": (n + 1,),
+            "tool": (n,), "flutes": (n,), "periods": (n,), "frame": (n, 3, 3), "start": (n + 1,),
             "ranges": (int(self.start[-1]) if len(self.start) else -1, len(COLUMNS)),
             "turn": (n, self.turn.shape[1] if self.turn.ndim == 3 else -1, 4),
         }  # fmt: skip
@@ -91,8 +93,9 @@ class EngagementSamples:
         """Some of the samples."""
         ranges, start = _rows_of(self.start, k)
         return EngagementSamples(
-            stride, self.row[k], self.tool[k], self.flutes[k], self.frame[k], start, self.ranges[ranges], self.turn[k]
-        )
+            stride, self.row[k], self.tool[k], self.flutes[k], self.periods[k], self.frame[k], start,
+            self.ranges[ranges], self.turn[k],
+        )  # fmt: skip
 
     def at_most(self, steps: int) -> EngagementSamples:
         """So many samples at most."""
@@ -121,9 +124,11 @@ def samples_from(arrays: Mapping[str, NDArray[np.generic]]) -> EngagementSamples
         stride = int(np.asarray(arrays["stride"]).item())
     except (KeyError, ValueError) as err:
         raise InputError(f"engagement samples: {err}: is missing: run the job again") from None
-    row, tool, flutes, start = (values[name].astype(np.int64) for name in ("row", "tool", "flutes", "start"))
+    row, tool, flutes, periods, start = (
+        values[name].astype(np.int64) for name in ("row", "tool", "flutes", "periods", "start")
+    )
     frame, ranges, turn = (values[name].astype(np.float64) for name in ("frame", "ranges", "turn"))
-    return EngagementSamples(stride, row, tool, flutes, frame, start, ranges, turn)
+    return EngagementSamples(stride, row, tool, flutes, periods, frame, start, ranges, turn)
 
 
 def engagement_samples(
@@ -144,7 +149,8 @@ def engagement_samples(
     >>> found.turn[0, ROTATIONS // 4].round(6).tolist(), found.ranges[0, 5:9].tolist()
     ([-70.0, 220.0, 0.0, 1.1], [5.0, 0.0, 5.0, 2.0])
     """
-    theta = np.arange(ROTATIONS) * (math.tau / ROTATIONS)
+    periods = cutter.flutes if cutter.teeth_alike else 1
+    theta = np.arange(ROTATIONS) * (math.tau / (periods * ROTATIONS))
     force, torque = forces_over_turn(engagement, cutter, material, theta)
     frame, n = engagement.frames, len(engagement)
     turn = np.concatenate([in_work(force, frame), torque[..., None] / 1000.0], axis=2)
@@ -155,7 +161,7 @@ def engagement_samples(
     ranges = np.column_stack([rows[:, [0, 1, 4, 5, 6]], *profile, engagement.tooth])
     ones = np.ones(n, dtype=np.int64)
     return EngagementSamples(
-        stride, np.asarray(row, dtype=np.int64), tool * ones, cutter.flutes * ones, np.asarray(frame),
+        stride, np.asarray(row, dtype=np.int64), tool * ones, cutter.flutes * ones, periods * ones, np.asarray(frame),
         np.asarray(engagement.start), ranges, turn,
     )  # fmt: skip
 
@@ -178,7 +184,9 @@ class EngagementRecorder:
 
     def __call__(self, cuts: Cuts) -> dict[str, Floats]:
         """Keep some of the steps of one cutter."""
-        chosen = np.flatnonzero(np.asarray(cuts.step) % self.stride == 0)
+        # films that are thinner than the tolerance engage no edge
+        engaged = np.diff(cuts.engagement.start) > 0
+        chosen = np.flatnonzero((np.asarray(cuts.step) % self.stride == 0) & engaged)
         if len(chosen):
             some = _engagement_at(cuts.engagement, chosen)
             own = np.asarray(cuts.step)[chosen]
@@ -236,11 +244,11 @@ def _engagement_at(engagement: ToothEngagement, k: Ints) -> ToothEngagement:
 def _joined(parts: Sequence[EngagementSamples]) -> EngagementSamples:
     """Samples of blocks and cutters in the order of their rows."""
     start = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(p.start) for p in parts]))])
-    row, tool, flutes = (np.concatenate([getattr(p, name) for p in parts]) for name in ("row", "tool", "flutes"))
+    names = ("row", "tool", "flutes", "periods")
+    row, tool, flutes, periods = (np.concatenate([getattr(p, name) for p in parts]) for name in names)
     frame, ranges, turn = (np.concatenate([getattr(p, name) for p in parts]) for name in ("frame", "ranges", "turn"))
-    order = np.argsort(row, kind="stable")
-    rows, start = _rows_of(start, order)
-    stride = parts[0].stride
+    k = np.argsort(row, kind="stable")
+    rows, start = _rows_of(start, k)
     return EngagementSamples(
-        stride, row[order], tool[order], flutes[order], frame[order], start, ranges[rows], turn[order]
+        parts[0].stride, row[k], tool[k], flutes[k], periods[k], frame[k], start, ranges[rows], turn[k]
     )

@@ -15,6 +15,7 @@ from chipload.report.marks import marks_of
 from chipload.report.operating import COLUMNS as OPERATING
 from chipload.report.operating import OperatingPoints, operating_points
 from chipload.report.removal import REMOVAL, read_removal
+from chipload.report.shown_maps import ShownMap, shown_maps
 from chipload.report.view import Colouring, ViewMark, ViewPath, ViewScene, scene_document
 from chipload.result import LimitCheck
 from chipload.simulation.engagement_samples import EngagementSamples
@@ -30,7 +31,7 @@ LARGEST = 400_000_000
 @dataclass(frozen=True, eq=False)
 class PageScene:
     """What is shown of a track: the document, the names of its bodies, the stock at every row, places, a notice,
-    whether it shows what the teeth cut.
+    whether it shows what the teeth cut, surface maps to choose from.
     """
 
     document: bytes
@@ -39,6 +40,7 @@ class PageScene:
     marks: tuple[ViewMark, ...]
     notice: str
     engaged: bool = False
+    maps: tuple[ShownMap, ...] = ()
 
 
 def bodies(result: PageResult) -> tuple[tuple[SceneBody, ...], str]:
@@ -118,16 +120,17 @@ def page_scene(
         return row_of(track, item)
 
     samples = samples_of(result, track)
+    maps = shown_maps(result.result, track.own, bounds_of(track.own))
     marks = marks_of(result.result, track.own, row, track.place)
     scene = ViewScene(
         result.result.title, solids, removal, view_path(track), parts, marks,
         colouring(result, track, column, removal, span), samples=samples,
         bounds=bounds_of(track.own), operating=operating_of(result, track),
+        maps=maps,
     )  # fmt: skip
     names = tuple(b.name for b in solids) + (("stock",) if removal is not None else ())
-    return PageScene(
-        scene_document(scene), names, removal, marks, " ".join([notice, unknown]).strip(), samples is not None
-    )
+    notice = " ".join([notice, unknown]).strip()
+    return PageScene(scene_document(scene), names, removal, marks, notice, samples is not None, maps)
 
 
 def colouring(

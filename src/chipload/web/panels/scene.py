@@ -7,6 +7,7 @@ is played and tells the row. Here are its controls, and what it is told.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import html
 import json
 from collections.abc import Awaitable, Callable
@@ -59,6 +60,15 @@ class ScenePanel:
                     "dense options-dense outlined hide-bottom-space"
                 ).classes("cl-colour").mark("colour")  # fmt: skip
                 self.column.on("popup-hide", js_handler=RELEASE)
+                self.map = ui.select({"": "no map"}, value="", label="surface map", on_change=self._map).props(
+                    "dense options-dense outlined hide-bottom-space"
+                ).classes("cl-colour").mark("map")  # fmt: skip
+                self.map.on("popup-hide", js_handler=RELEASE)
+                self.bent = ui.slider(min=0.0, max=1.0, step=0.01, value=0.0, on_change=self._map).props(
+                    'dense aria-label="how far the map is bent"'
+                )
+                self.bent.on("change", js_handler=RELEASE)
+                self.factor = ui.label("").classes("cl-note").mark("factor")
                 self.boxes = ui.element("div").classes("cl-layers")
             with ui.element("div").classes("cl-over cl-over-right"):
                 for name, meaning in VIEWS.items():
@@ -158,6 +168,7 @@ class ScenePanel:
         if track is not self.track:
             return
         self.scene = scene
+        self._offer_maps(scene)
         few = f"The path is drawn by some {POINTS} of its {len(track)} steps." if len(track) > POINTS else ""
         self.notice.set_text(" ".join(t for t in (scene.notice, few) if t))
         url = self.assets.put(scene.document)
@@ -262,6 +273,35 @@ class ScenePanel:
         axis, share = str(self.axis.value or ""), float(self.share.value or 0.0)
         self.share.set_visibility(bool(axis))
         self._call(f"section({json.dumps(axis)}, {share!r})")
+
+    def _offer_maps(self, scene: PageScene) -> None:
+        """Surface maps to choose from; none is shown."""
+        names = {one.name: f"{one.name}: {one.label}" for one in scene.maps}
+        self.bent.set_value(0.0)
+        self.map.set_options({"": "no map", **names}, value="")
+        self.map.set_visibility(bool(names))
+        self._map_controls()
+
+    def _map_controls(self) -> None:
+        chosen = next((m for m in (self.scene.maps if self.scene else ()) if m.name == self.map.value), None)
+        bends = chosen is not None and chosen.moved is not None
+        self.bent.set_visibility(bends)
+        self.factor.set_visibility(bends)
+
+    async def _map(self) -> None:
+        """Show the map that is chosen, bent as the slider says."""
+        self._map_controls()
+        if self.track is None or self.scene is None:
+            return
+        call = (
+            f"chiploadViewer.of('{self.view_id}').map({json.dumps(self.map.value or '')}, {float(self.bent.value)!r})"
+        )
+        if not self.bent.visible:
+            ui.run_javascript(call)
+            return
+        with contextlib.suppress(TimeoutError):
+            found = await ui.run_javascript(call, timeout=30.0)
+            self.factor.set_text(f"bent {float(found or 0.0):.3g} times" if self.bent.value else "not bent")
 
     def _measure(self) -> None:
         self.measures = not self.measures

@@ -1,0 +1,84 @@
+/** A surface map: values as colours, the limit as red lines, bent by a factor. */
+
+import * as THREE from "three";
+import { Document, Header, MapLegend, SurfaceMap } from "./document";
+import { shade } from "./path";
+
+/** the greatest displacement is drawn as at most this share of the size of the surface */
+const BENT = 0.12;
+const STOPS = 5;
+
+export class MapBody {
+  readonly group = new THREE.Group();
+  readonly mesh: THREE.Mesh;
+  readonly lines: THREE.LineSegments;
+  private readonly places: [THREE.BufferAttribute, Float32Array, Float32Array | null][];
+  factor = 0;
+
+  constructor(doc: Document, readonly map: SurfaceMap, private readonly header: Header) {
+    const values = doc.f4(map.values), colours = new Float32Array(3 * values.length), c = new THREE.Color();
+    values.forEach((v, k) => {
+      const [r, g, b] = Number.isFinite(v) ? this.colour(v) : [150, 156, 165];
+      c.setRGB(r / 255, g / 255, b / 255, THREE.SRGBColorSpace).toArray(colours, 3 * k);
+    });
+    const geometry = new THREE.BufferGeometry(), line = new THREE.BufferGeometry();
+    const flat = doc.f4(map.positions), ends = doc.f4(map.lines);
+    geometry.setAttribute("position", new THREE.BufferAttribute(flat.slice(), 3));
+    geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
+    geometry.setIndex(new THREE.BufferAttribute(doc.u4(map.index), 1));
+    line.setAttribute("position", new THREE.BufferAttribute(ends.slice(), 3));
+    this.mesh = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({
+      vertexColors: true, roughness: 0.85, flatShading: true, side: THREE.DoubleSide,
+      polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1,
+    }));
+    this.lines = new THREE.LineSegments(line, new THREE.LineBasicMaterial({ color: 0xd01414 }));
+    this.mesh.frustumCulled = this.lines.frustumCulled = false;
+    this.lines.renderOrder = 3;
+    this.group.add(this.mesh, this.lines);
+    this.places = [
+      [geometry.getAttribute("position") as THREE.BufferAttribute, flat, map.moved ? doc.f4(map.moved) : null],
+      [line.getAttribute("position") as THREE.BufferAttribute, ends, map.lines_moved ? doc.f4(map.lines_moved) : null],
+    ];
+  }
+
+  /** Greatest factor of the displacement; 0: nothing bends. */
+  get most(): number {
+    const moved = this.places[0][2];
+    if (!moved) return 0;
+    let far = 0;
+    for (let k = 0; k < moved.length; k += 3) far = Math.max(far, Math.hypot(moved[k], moved[k + 1], moved[k + 2]));
+    const box = new THREE.Box3().setFromArray(this.places[0][1] as unknown as number[]);
+    return far > 0 ? BENT * box.getSize(new THREE.Vector3()).length() / far : 0;
+  }
+
+  /** Draw the displacement `factor` times as large. */
+  bend(factor: number): void {
+    this.factor = factor;
+    for (const [place, flat, moved] of this.places) {
+      if (!moved) continue;
+      const to = place.array as Float32Array;
+      for (let k = 0; k < to.length; k++) to[k] = flat[k] + factor * moved[k];
+      place.needsUpdate = true;
+    }
+  }
+
+  legend(): MapLegend {
+    const { label, unit, low, high, limit } = this.map, hex = (v: number) => "#" + this.colour(v).map((x) => x.toString(16).padStart(2, "0")).join("");
+    const stops = Array.from({ length: STOPS }, (_, k) => low + (high - low) * k / (STOPS - 1)).map((v) => [v, hex(v)] as [number, string]);
+    const words: [string, string][] = limit !== null && this.lines.geometry.getAttribute("position").count ? [[`limit ${Number(limit.toPrecision(4))}`, "#d01414"]] : [];
+    return { title: unit ? `${label} [${unit}]` : label, stops, words };
+  }
+
+  clip(planes: THREE.Plane[]): void {
+    for (const o of [this.mesh, this.lines]) (o.material as THREE.Material).clippingPlanes = planes;
+  }
+
+  dispose(): void {
+    for (const o of [this.mesh, this.lines]) { o.geometry.dispose(); (o.material as THREE.Material).dispose(); }
+  }
+
+  private colour(v: number): [number, number, number] {
+    const { low, high } = this.map;
+    return shade(this.header.scale, high > low ? (v - low) / (high - low) : 0);
+  }
+}
