@@ -112,7 +112,7 @@ def _conversational(planned: Program, rows: Ints, p: Program, k: int, decimals: 
         elif motion == LINE:
             out.append(f"L {at('XYZ', to)} {word}")
         else:
-            out.append(f"CC {at('XY', planned.centre[row, :2])}")
+            out.append(f"CC {at('XY', planned.centre[row, :2].tolist())}")
             out.append(f"C {at('XY', to[:2])} DR{'-' if motion == ARC_CW else '+'} {word}")
         low = to[2] < safe - 1e-9
     out += [f"L {at('Z', [safe])} FMAX", f"L {at('XY', [x, y])} FMAX"]

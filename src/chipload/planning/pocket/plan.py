@@ -38,7 +38,7 @@ from chipload.planning.pocket.motions import (
 )
 from chipload.planning.pocket.reach import CHORD
 from chipload.planning.pocket.request import Asked, Clearing, laid_out, material_before
-from chipload.planning.pocket.stages import FLOOR, Stage, require_finish, sections_of, stages_of
+from chipload.planning.pocket.stages import FLOOR, PocketStage, require_finish, sections_of, stages_of
 from chipload.planning.pocket.totals import summary_of
 from chipload.planning.result import Columns, Event, OperationResult, StrategyResult
 from chipload.program.program import Program
@@ -125,13 +125,13 @@ def _reach(asked: Asked, setting: Clearing, radius: float) -> Region:
     return offset_region(offset_region(asked.region, radius + setting.left_on_walls), -radius)
 
 
-def _planned(stages: Sequence[Stage]) -> list[Stage]:
+def _planned(stages: Sequence[PocketStage]) -> list[PocketStage]:
     """The stages with a path of their own: the finish of the floor runs that of the clearing."""
     return [stage for stage in stages if stage.name != FLOOR]
 
 
 def _history(
-    stages: Sequence[Stage], setting: Clearing, cutter: Cutter, material: Material, machine: Machine
+    stages: Sequence[PocketStage], setting: Clearing, cutter: Cutter, material: Material, machine: Machine
 ) -> tuple[Columns, Program, float, list[Motions]]:
     """Rows of all levels of all stages, the program, its time [s], and the motions of each path at its first level."""
     link_feed = machine.feed_max if setting.link_feed is None else setting.link_feed
@@ -162,7 +162,7 @@ def _history(
 
 
 def _columns(
-    stage: Stage,
+    stage: PocketStage,
     motions: Motions,
     samples: MotionSamples,
     setting: Clearing,
@@ -252,7 +252,7 @@ def _chains(motions: Motions) -> tuple[Contour, ...]:
 
 
 def _failures(
-    stages: Sequence[Stage], history: Columns, on_front: NDArray[np.bool_], areas: Sequence[float]
+    stages: Sequence[PocketStage], history: Columns, on_front: NDArray[np.bool_], areas: Sequence[float]
 ) -> list[Event]:
     """What the stages must keep by themselves: the engagement that was asked for, and each section cleared, in parts of
     its area [mm^2] that a cutter can reach, whether an earlier one did or not.

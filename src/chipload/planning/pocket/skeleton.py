@@ -91,7 +91,8 @@ def skeleton_of(region: Region, least: float, spacing: float) -> Skeleton:
     pairs, between = pairs[bounded], between[bounded]
     vertices = np.asarray(diagram.vertices, dtype=np.float64)
     xmin, ymin, xmax, ymax = region.bounds
-    within = (vertices >= (xmin, ymin)).all(axis=1) & (vertices <= (xmax, ymax)).all(axis=1)
+    beyond = (vertices < (xmin, ymin)) | (vertices > (xmax, ymax))
+    within: NDArray[np.bool_] = np.asarray(~beyond.any(axis=1), dtype=np.bool_)
     within[within] = region.contains(vertices[within])
     clearance = np.zeros(len(vertices))
     clearance[within] = distance(region.segments, vertices[within])

@@ -32,7 +32,7 @@ LEAST_FLOOR_MM = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
+class PocketSection:
     """Heights [mm] between which the region of a pocket is the same."""
 
     top: float
@@ -41,7 +41,7 @@ class Section:
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class PocketStage:
     """One path of the centre at one or more heights.
 
     Parameters
@@ -116,18 +116,21 @@ def require_finish(setting: Clearing) -> None:
         )
 
 
-def sections_of(asked: Asked, setting: Clearing) -> list[Section]:
+def sections_of(asked: Asked, setting: Clearing) -> list[PocketSection]:
     """The whole depth, or what lies above the tops of the tabs and what lies below."""
     if setting.tabs is None:
-        return [Section(setting.top, setting.bottom, asked)]
+        return [PocketSection(setting.top, setting.bottom, asked)]
     height = setting.bottom + setting.tabs.height
     region = without_tabs(asked.region, setting.tabs)
-    return [Section(setting.top, height, asked), Section(height, setting.bottom, replace(asked, region=region))]
+    return [
+        PocketSection(setting.top, height, asked),
+        PocketSection(height, setting.bottom, replace(asked, region=region)),
+    ]
 
 
 def stages_of(
-    sections: Sequence[Section], setting: Clearing, radius: float, strategy: str, progress: Progress
-) -> list[Stage]:
+    sections: Sequence[PocketSection], setting: Clearing, radius: float, strategy: str, progress: Progress
+) -> list[PocketStage]:
     """The stages of a pocket in their order, with their paths; ``strategy`` is that of the clearing."""
     out = []
     for k, section in enumerate(sections):
@@ -140,8 +143,8 @@ def stages_of(
 
 
 def _stages(
-    number: int, section: Section, setting: Clearing, radius: float, strategy: str, progress: Progress
-) -> list[Stage]:
+    number: int, section: PocketSection, setting: Clearing, radius: float, strategy: str, progress: Progress
+) -> list[PocketStage]:
     """The stages of one section."""
     asked = section.asked
 
@@ -162,7 +165,7 @@ def _stages(
     wall, last = setting.wall_finish, section.floor == setting.bottom
     left = setting.floor_allowance if last else 0.0
     path = path_of(setting.allowance, None, (0.0, 1.0 if wall is None else 0.7))
-    clearing = Stage(
+    clearing = PocketStage(
         CLEARING,
         number,
         asked,
@@ -185,7 +188,7 @@ def _stages(
         axial_depth = section.top - floor if wall.axial_depth is None else wall.axial_depth
         earlier = EarlierPath.of(path, centre_region(asked.region, radius + setting.allowance))
         out.append(
-            Stage(
+            PocketStage(
                 WALL,
                 number,
                 asked,

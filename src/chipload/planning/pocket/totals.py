@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.planning.pocket.clearing_path import LIFT
-from chipload.planning.pocket.stages import CLEARING, FLOOR, Stage
+from chipload.planning.pocket.stages import CLEARING, FLOOR, PocketStage
 from chipload.planning.result import Columns
 from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
 
 
-def summary_of(stages: Sequence[Stage], history: Columns, motions: int, whole: float) -> dict[str, object]:
+def summary_of(stages: Sequence[PocketStage], history: Columns, motions: int, whole: float) -> dict[str, object]:
     """JSON values of the stages; ``motions`` rows of the program, which takes ``whole`` [s].
 
     Areas are those of the first section: above the tabs, where there are any.
@@ -56,7 +56,7 @@ def summary_of(stages: Sequence[Stage], history: Columns, motions: int, whole: f
     }
 
 
-def _finish(stage: Stage, history: Columns) -> dict[str, object]:
+def _finish(stage: PocketStage, history: Columns) -> dict[str, object]:
     """The numbers of one finish: of the floor, of the walls."""
     rows = history["pass"] == stage.name
     return {
@@ -74,7 +74,7 @@ def _span(values: Floats) -> dict[str, float]:
     return {"min": float(values.min()), "max": float(values.max())}
 
 
-def _times(stages: Sequence[Stage], history: Columns, motions: int, whole: float) -> dict[str, object]:
+def _times(stages: Sequence[PocketStage], history: Columns, motions: int, whole: float) -> dict[str, object]:
     """Time [s] by what the cutter does, and the number of motions. What is no cut and no entry is a link."""
     took = np.diff(history["t_s"], prepend=0.0)
     cutting = float(took[np.isin(history["pass"], [stage.name for stage in stages])].sum())
