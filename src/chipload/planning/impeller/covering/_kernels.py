@@ -120,6 +120,17 @@ def uncovered(cover: Any, number: int, lo: float, hi: float) -> tuple[float, flo
 
 
 @njit(cache=True, nogil=True)
+def halved(todo: Any, of: Any, waiting: int, lo: float, hi: float, first: int, last: int) -> int:
+    """Puts both halves of a part with its nodes ``first``..``last`` to what is waiting; how many wait, -1: too many."""
+    middle = 0.5 * (lo + hi)
+    todo[waiting, 0], todo[waiting, 1] = middle, hi
+    todo[waiting + 1, 0], todo[waiting + 1, 1] = lo, middle
+    for k in range(waiting, waiting + 2):
+        of[k, 0], of[k, 1] = first, last
+    return waiting + 2 if waiting + 4 <= len(todo) else -1
+
+
+@njit(cache=True, nogil=True)
 def kept_of(
     points: Any, nodes: Any, spans: Any, leaves: int, cc: Any, cone: Any, rho: float, r: float, stages: Any, parts: Any,
     count: int, near2: float, width: float, least: float, seen: Any, stamp: int, work: Any, todo: Any, of: Any,
@@ -157,11 +168,8 @@ def kept_of(
             most = MANY if hi - lo > width else len(points)
             first, last = 0, collected(points, nodes, spans, leaves, f, rho, r, stages, seen, stamp, most, stack, work)
             if last < 0:
-                todo[waiting, 0], todo[waiting, 1] = 0.5 * (lo + hi), hi
-                todo[waiting + 1, 0], todo[waiting + 1, 1] = lo, 0.5 * (lo + hi)
-                of[waiting], of[waiting + 1] = -1, -1
-                waiting += 2
-                if waiting + 2 > len(todo):
+                waiting = halved(todo, of, waiting, lo, hi, -1, -1)
+                if waiting < 0:
                     return -1
                 continue
         deepest, who, end = 0.0, -1, last
@@ -202,13 +210,8 @@ def kept_of(
             of[waiting, 0], of[waiting, 1] = first, last
             waiting += 1
             continue
-        middle = 0.5 * (lo + hi)
-        todo[waiting, 0], todo[waiting, 1] = middle, hi
-        todo[waiting + 1, 0], todo[waiting + 1, 1] = lo, middle
-        of[waiting, 0], of[waiting, 1] = last, end
-        of[waiting + 1, 0], of[waiting + 1, 1] = last, end
-        waiting += 2
-        if waiting + 2 > len(todo):
+        waiting = halved(todo, of, waiting, lo, hi, last, end)
+        if waiting < 0:
             return -1
     return gaps(parts, count, cover, covered, least, out)  # type: ignore[no-any-return]
 
