@@ -58,11 +58,6 @@ def head(program: Program, rows: int, first: int = 0) -> Program:
     return Program(**some, labels=program.labels)
 
 
-def upright(program: Program) -> bool:
-    """Whether the axis stands along z."""
-    return bool(np.abs(program.axis - UP).max() <= 1e-9)
-
-
 def roughing(moves: int) -> Program:
     """Levels of 2 mm in rows there and back over a block of 120 x 60 mm."""
     rows, along = 21, 134

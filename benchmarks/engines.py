@@ -30,7 +30,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
-from engine_programs import Case, head, made, of_examples, of_others, upright
+from engine_programs import Case, head, made, of_examples, of_others
 from numpy.typing import NDArray
 from simulators import freecad
 
@@ -126,15 +126,12 @@ def command_line(moves: int) -> tuple[float, float]:
     return used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0
 
 
-def both(case: Case) -> tuple[dict[str, float], dict[str, list[float]], str]:
-    """Steps a second by engine, p50, p95, p99 [%] by which layers differ from moves in a column, and why not."""
-    rates, columns, why = dict[str, float](), dict[str, dict[str, NDArray[np.generic]]](), ""
+def both(case: Case) -> tuple[dict[str, float], dict[str, list[float]]]:
+    """Steps a second by engine, and p50, p95, p99 [%] by which layers differ from moves in a column."""
+    rates, columns = dict[str, float](), dict[str, dict[str, NDArray[np.generic]]]()
     smallest = min(c.radius for c in case.cutters.values())
     fine = Resolution(case.step_mm, 0.01, SLICES // 2, 0.5 * smallest)
     for engine in ("moves", "layers"):
-        if engine == "moves" and not upright(case.program):
-            why = "the axis is not upright"
-            continue
         stock = LayeredStock.block(case.low, case.high, case.layer_mm, 4.0 * smallest)
         remove(head(case.program, 12), stock.copied(), case.cutters, ALLOY, fine, engine=engine, accuracy=False)
         begun = time.process_time()
@@ -145,7 +142,7 @@ def both(case: Case) -> tuple[dict[str, float], dict[str, list[float]], str]:
     if len(columns) == 2:
         known, some = columns["moves"], columns["layers"]
         errors = {name: p_of(some[name], known[name]) for name in COLUMNS[:3]}
-    return rates, errors, why
+    return rates, errors
 
 
 def beside_pathsim(moves: int) -> tuple[float, float] | None:
@@ -192,15 +189,13 @@ def of_programs(cases: Iterable[Case], table: list[tuple[str, bool]]) -> tuple[l
     """Rows of the rates and of the differences between the engines; goals go to ``table``."""
     rates, errors = [], []
     for case in cases:
-        each, by_column, why = both(case)
+        each, by_column = both(case)
         for engine, rate in each.items():
             if case.name == "boat, five axes":
                 table.append(row(f"{case.name}, by {engine}", BOAT[engine], rate, "/s", True))
             elif case.name == "bear" and engine == "layers":
                 table.append(row("bear, by layers", BEAR, rate, "/s", True))
-        if case.name == "boat, five axes" and "moves" not in each:
-            table.append((f"| {case.name}, by moves | {BOAT['moves']:,.4g} /s | handed over | 0 |", True))
-        found = " | ".join(f"{each[e]:,.0f}" if e in each else why for e in ("moves", "layers"))
+        found = " | ".join(f"{each[e]:,.0f}" for e in ("moves", "layers"))
         rates.append(f"| {case.name} | {case.kind} | {len(case.program)} | {found} |")
         for column, values in by_column.items():
             errors.append(f"| {case.name} | {case.kind} | {column} | " + " | ".join(f"{v:.2f}" for v in values) + " |")

@@ -321,10 +321,10 @@ def moves_again(setting: RunSettings, run: MoveRun, columns: Columns) -> Again:
         stock = run.stock.cropped(window.low, window.high)
         if stock is None:
             return dict.fromkeys(COMPARABLE, 0.0), 0.0
-        for some in window.earlier:
-            stock.skip(some.p0, some.p1, some.tool)
         stock.more = stock.more if more is None else more
         finer = replace(run, stock=stock, corner_slices=MORE * run.corner_slices, flank_mm=flank)
+        for some in window.earlier:
+            finer.make(some, len(some))
         found = moved(own, finer, 0, setting.cutters, setting.material, rotation)
         worst = {name: float(found.loads[:, LOADS.index(name)].max()) for name in COMPARABLE}
         return worst, float(found.removed[:, 0].sum())

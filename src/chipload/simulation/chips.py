@@ -174,8 +174,9 @@ def with_engine(
             k = int(np.argmax(bodies))
             raise HandOver(int(program.line[k]), f"tool {int(program.tool[k])} is a body without chips")
         run = run_by_moves(
-            program, stock, setting.cutters, fine.step_mm, fine.tolerance, fine.corner_slices, fine.flank_mm
-        )
+            program, stock, setting.cutters, fine.step_mm, fine.tolerance, fine.corner_slices, fine.flank_mm,
+            setting.interpolation,
+        )  # fmt: skip
     except HandOver as found:
         return by_layers(engine, setting, found)
     return replace(setting, moves=run), None

@@ -1,9 +1,10 @@
-"""Steps of an upright cutter run through the stock as moves: what each removes and what that costs.
+"""Steps of a cutter run through the stock as moves: what each removes and what that costs.
 
-Notation: as in :mod:`chipload.engagement.moves`. A step is looked at at its middle, and where it is long at more
-instants, the middles of equal parts of it. Its volume and its mean loads are the means over the instants, its greatest
-loads the greatest of any; what a ``watch`` gets is the tooth engagement at the instant of the greatest force, where
-several are alike at the one nearest to the middle.
+Notation: as in :mod:`chipload.engagement.moves`, and where the axis leans or turns in
+:mod:`chipload.engagement.bricks`. A step is looked at at its middle, and where it is long at more instants, the middles
+of equal parts of it. Its volume and its mean loads are the means over the instants, its greatest loads the greatest of
+any; what a ``watch`` gets is the tooth engagement at the instant of the greatest force, where several are alike at the
+one nearest to the middle.
 
 What this engine cannot do is handed over: :class:`HandOver` names the line and the reason.
 """
@@ -24,12 +25,14 @@ from chipload.cutter.slices import edge_lag
 from chipload.cutting.band import deviations, peak_band, turned_basis
 from chipload.cutting.material import Material
 from chipload.cutting.revolution.revolution import loads_over_turn
+from chipload.engagement.bricks.stock import BrickStock
 from chipload.engagement.moves.stock import Engaged, MoveStock
 from chipload.engagement.tooth_engagement import ToothEngagement, with_runout
 from chipload.errors import InputError
 from chipload.program.program import Program
 from chipload.simulation.loads import BANDS, LOADS, ONE_SIDE, Cuts, engaged_work
 from chipload.simulation.steps import ROWS, Steps, steps_in_blocks
+from chipload.simulation.swept_area import Interpolation
 from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]
@@ -87,13 +90,13 @@ class MoveRun:
 
     Parameters
     ----------
-    stock : the moves so far
+    stock : the moves so far: of an upright axis, or of one that leans or turns
     layers : heights of the layers of the stock [mm], ascending bounds
     corner_slices, flank_mm : slices of an engaged corner, longest slice of the flank by tool number
     tolerance : of outlines [mm]
     """
 
-    stock: MoveStock
+    stock: MoveStock | BrickStock
     layers: Floats
     corner_slices: int
     flank_mm: Mapping[int, float]
@@ -104,12 +107,24 @@ class MoveRun:
         for steps in steps_in_blocks(program, step_mm, self.tolerance, size=ROWS):
             if count <= 0:
                 return
-            self.stock.skip(steps.p0[:count], steps.p1[:count], steps.tool[:count])
+            self.make(steps, min(count, len(steps)))
             count -= len(steps)
+
+    def make(self, steps: Steps, count: int) -> None:
+        """Make the first ``count`` of some steps without looking at them."""
+        p0, p1, tool = steps.p0[:count], steps.p1[:count], steps.tool[:count]
+        if isinstance(self.stock, BrickStock):
+            self.stock.skip(p0, p1, steps.a0[:count], steps.a1[:count], tool)
+        else:
+            self.stock.skip(p0, p1, tool)
 
     def contact(self, steps: Steps) -> Engaged:
         """Make some steps: what they engage."""
-        return self.stock.take(steps.p0, steps.p1, steps.tool, corner_slices=self.corner_slices, flank_mm=self.flank_mm)
+        pieces, flank = self.corner_slices, self.flank_mm
+        if isinstance(self.stock, BrickStock):
+            way = (steps.p0, steps.p1, steps.a0, steps.a1)
+            return self.stock.take(*way, steps.tool, corner_slices=pieces, flank_mm=flank)
+        return self.stock.take(steps.p0, steps.p1, steps.tool, corner_slices=pieces, flank_mm=flank)
 
     def finish(self, stock: LayeredStock, workers: int) -> None:
         """Take from the layers what the moves swept of their sections; found in so many threads."""
@@ -128,25 +143,28 @@ def run_by_moves(
     tolerance: float,
     corner_slices: int,
     flank_mm: float,
+    interpolation: Interpolation = "slerp",
 ) -> MoveRun:
-    """The run of a program by moves.
+    """The run of a program by moves: by heights over the plan where the axis stands upright all along, else by bricks.
 
     Raises
     ------
     HandOver
-        The stock was cut already, the axis turns, or tools lean.
+        The stock was cut already, or the axis turns along a straight line of its vector.
     """
     if stock.cut.any():
         raise HandOver(0, "the stock was cut before: its layers are all that is known of it")
-    lean = np.abs(np.asarray(program.axis) - (0.0, 0.0, 1.0)).max(axis=1) > UPRIGHT
-    if lean.any():
-        raise HandOver(int(program.line[int(np.argmax(lean))]), "the axis is not upright")
+    axis = np.asarray(program.axis)
+    leans = bool((np.abs(axis - (0.0, 0.0, 1.0)).max(axis=1) > UPRIGHT).any())
+    turns = np.append(False, np.abs(np.diff(axis, axis=0)).max(axis=1, initial=0.0) > UPRIGHT)
+    if interpolation != "slerp" and turns.any():
+        raise HandOver(int(program.line[int(np.argmax(turns))]), 'the axis turns with interpolation = "lerp"')
     low = np.array([stock.xs[0], stock.ys[0], stock.bounds[0]])
     high = np.array([stock.xs[-1], stock.ys[-1], stock.bounds[-1]])
     used = {n: c for n, c in cutters.items() if bool((program.tool == n).any())}
     if stock.part is None and not _is_block(stock):
         raise HandOver(0, "the stock is neither a block nor a mesh")
-    moves = MoveStock(low, high, used, stock.part)
+    moves = (BrickStock if leans else MoveStock)(low, high, used, stock.part)
     return MoveRun(
         moves, np.asarray(stock.bounds), math.ceil(ENGAGED * corner_slices), dict.fromkeys(used, flank_mm), tolerance
     )
@@ -302,34 +320,46 @@ def engagement_of(found: Engaged, entries: Ints, steps: Steps, cutter: Cutter) -
     if not spindle.all():
         line = int(steps.line[step[int(np.argmin(np.abs(spindle)))]])
         raise InputError(f"line {line}: cuts with the spindle at rest: start it (M3 S) before the cut")
-    feed = (steps.p1 - steps.p0)[step]
-    feed = feed * (math.tau / (cutter.flutes * np.abs(spindle)) / steps.seconds[step])[:, None]
-    size = np.hypot(feed[:, 0], feed[:, 1])
-    upright = size <= 1e-12 * np.abs(feed[:, 2])
-    T = np.where(upright[:, None], [[1.0, 0.0]], feed[:, :2] / np.where(upright, 1.0, size)[:, None])
     hand = np.where(spindle > 0.0, 1.0, -1.0)
-    frame = np.zeros((len(entries), 3, 3))
-    frame[:, 0, :2] = T
-    frame[:, 1, 0], frame[:, 1, 1] = -hand * T[:, 1], hand * T[:, 0]
-    frame[:, 2, 2] = 1.0
-    count = np.diff(found.start)[entries]
-    start = np.concatenate([[0], np.cumsum(count)])
-    of = np.repeat(np.arange(len(entries)), count)
-    row = np.arange(start[-1]) - start[of] + found.start[entries][of]
-    span, piece = found.span[row], found.slice[row]
+    tooth = math.tau / (cutter.flutes * np.abs(spindle)) / steps.seconds[step]
+    start, of, span, piece = _spans(found, entries)
     # psi is counted from the motion counter-clockwise, phi from n in the sense of the spindle
     turn = hand[of]
     low = 0.5 * math.pi - np.where(turn > 0.0, span[:, 1], -span[:, 0])
     wide = np.clip(span[:, 1] - span[:, 0], 0.0, math.tau)
     low = low - math.tau * np.floor(low / math.tau)
-    s0, s1, _, _, sk, ck = found.slices[piece].T
-    rows = np.column_stack([low, low + wide, s0, s1, sk * size[of], -ck * feed[of, 2], 0.0 * low])
+    slices = found.slices[piece]
+    if found.frames is not None:
+        frame = found.frames[entries] * np.stack([np.ones(len(hand)), hand, np.ones(len(hand))], axis=1)[:, :, None]
+        s0, s1, along, across, rise = slices[:, [0, 1, 6, 7, 8]].T
+        motion = np.column_stack([along, -rise, turn * across]) * tooth[of][:, None]
+    else:
+        feed = (steps.p1 - steps.p0)[step] * tooth[:, None]
+        size = np.hypot(feed[:, 0], feed[:, 1])
+        upright = size <= 1e-12 * np.abs(feed[:, 2])
+        T = np.where(upright[:, None], [[1.0, 0.0]], feed[:, :2] / np.where(upright, 1.0, size)[:, None])
+        frame = np.zeros((len(entries), 3, 3))
+        frame[:, 0, :2] = T
+        frame[:, 1, 0], frame[:, 1, 1] = -hand * T[:, 1], hand * T[:, 0]
+        frame[:, 2, 2] = 1.0
+        s0, s1, _, _, sk, ck = slices.T
+        motion = np.column_stack([sk * size[of], -ck * feed[of, 2], 0.0 * low])
+    rows = np.column_stack([low, low + wide, s0, s1, motion])
     return ToothEngagement(start, rows, np.full(len(rows), -1), piece, _slices(found.slices, cutter), frame)
+
+
+def _spans(found: Engaged, entries: Ints) -> tuple[Ints, Ints, Floats, Ints]:
+    """Of some entries: where the rows of each begin, the entry of each row, its psi from and to, its slice."""
+    count = np.diff(found.start)[entries]
+    start = np.concatenate([[0], np.cumsum(count)])
+    of = np.repeat(np.arange(len(entries)), count)
+    row = np.arange(start[-1]) - start[of] + found.start[entries][of]
+    return start, of, found.span[row], found.slice[row]
 
 
 def _slices(slices: Floats, cutter: Cutter) -> Floats:
     """(k, 7) as a bite needs them."""
-    s0, _, rho, z, sk, ck = slices.T
+    s0, _, rho, z, sk, ck = slices[:, :6].T
     lead = edge_lag(cutter)
     return np.column_stack([s0, rho, z, sk, ck, lead * z, lead * sk])
 

@@ -8,14 +8,12 @@ material there is reported.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import shapely
 import trimesh
 from numpy.typing import NDArray
 from shapely import MultiPolygon
@@ -25,8 +23,8 @@ from chipload.engagement.moves import _kernels
 from chipload.engagement.moves.edge import _kernels as edge
 from chipload.engagement.moves.front import _kernels as front
 from chipload.engagement.moves.initial import _kernels as initial
+from chipload.engagement.moves.net import area_of, nodes_of, rings
 from chipload.engagement.moves.outline import _kernels as outline
-from chipload.stock.tile_grid import polygons
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -40,8 +38,6 @@ INSTANT = 0.25
 #: instants of a step that is looked at once and does not cut as the one before it, and of one that enters or leaves;
 #: of longer steps, of each of their parts
 MORE = (3, 25)
-#: most nodes of the net of outlines
-NODES = 1_000_000
 
 
 def cutter_row(cutter: Cutter) -> Floats:
@@ -121,6 +117,8 @@ class Engaged:
     left_mm : (m,) float, that length
     edge_mm : (m,) float, length of the profile that is engaged
     above : (m,) bool, material above the flutes
+    frames : (m, 3, 3) float, rows T, N = A x T and A of an axis that leans or turns: psi is then counted from T, and
+        ``slices`` have three more columns, of the motion along T, along N and along the axis; None: the axis is z
     """
 
     step: Ints
@@ -137,6 +135,15 @@ class Engaged:
     left_mm: Floats
     edge_mm: Floats
     above: NDArray[np.bool_]
+    frames: Floats | None = None
+
+
+def faces_of(body: trimesh.Trimesh) -> Floats:
+    """(n, 12) corners and normals of the faces that a ray along z meets."""
+    corners = np.asarray(body.vertices, dtype=np.float64)[np.asarray(body.faces)]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    seen = np.abs(normal[:, 2]) > 1e-12 * np.linalg.norm(normal, axis=1)
+    return np.ascontiguousarray(np.hstack([corners[seen].reshape(-1, 9), normal[seen]]))
 
 
 class MoveStock:
@@ -204,10 +211,7 @@ class MoveStock:
 
     def _body(self, body: trimesh.Trimesh) -> None:
         """Faces over each cell, and what they leave open there."""
-        corners = np.asarray(body.vertices, dtype=np.float64)[np.asarray(body.faces)]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        seen = np.abs(normal[:, 2]) > 1e-12 * np.linalg.norm(normal, axis=1)
-        self.faces = np.ascontiguousarray(np.hstack([corners[seen].reshape(-1, 9), normal[seen]]))
+        self.faces = faces_of(body)
         initial.over(self.faces, self.grid, self.shape, self.first, self.ids)
         self.ids = np.empty(int(self.first[-1]), dtype=np.int32)
         initial.over(self.faces, self.grid, self.shape, self.first, self.ids)
@@ -322,26 +326,10 @@ class MoveStock:
         smallest cutter's circle unless the net would have more than ``NODES`` nodes. Corners are cut off by a chord.
         ``tolerance`` [mm]: by which the outline is made simpler.
         """
-        size = self.high[:2] - self.low[:2]
-        # chords of the smallest cutter's circle within the tolerance
-        pitch = min(float(self.grid[2:].min()), math.sqrt(8.0 * tolerance * float(self.cutters[:, 8].min())))
-        pitch = max(pitch, math.sqrt(size[0] * size[1] / NODES))
-        axes = []
-        for a, b in zip(self.low[:2], self.high[:2], strict=True):
-            inner = np.linspace(a, b, max(math.ceil((b - a) / pitch), 1) + 1)
-            axes.append(np.concatenate([[a - pitch], inner, [b + pitch]]))
-        xs, ys = axes
-        inside = np.empty((len(xs), len(ys)), dtype=np.bool_)
-        onward = np.empty(2 * inside.size, dtype=np.int64)
-        room = 4096
-        while True:
-            points, first = np.empty((room, 2)), np.empty(room, dtype=np.int64)
-            rings = int(outline.outlines(z, xs, ys, self._index(), self.tops, inside, onward, points, first))
-            if rings >= 0:
-                break
-            room *= 4
-        lines = [
-            np.vstack([points[a:b], points[a : a + 1]]) for a, b in itertools.pairwise(first[: rings + 1].tolist())
-        ]
-        area = shapely.build_area(shapely.GeometryCollection([shapely.LinearRing(line) for line in lines]))
-        return MultiPolygon(polygons(shapely.make_valid(shapely.simplify(area, tolerance))))
+        xs, ys = nodes_of(self.low, self.high, float(self.grid[2:].min()), float(self.cutters[:, 8].min()), tolerance)
+        inside, index = np.empty((len(xs), len(ys)), dtype=np.bool_), self._index()
+        outline.marked(z, xs, ys, index, self.tops, inside)
+        sides, first = rings(inside)
+        points = np.empty((len(sides), 2))
+        outline.placed(z, xs, ys, index, self.tops, inside, sides, points)
+        return area_of(points, first, tolerance)

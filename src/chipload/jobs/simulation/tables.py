@@ -91,7 +91,7 @@ class SimulateTable(Table):
     interpolation: Literal["slerp", "lerp"] = Field("slerp", description="how the axis turns within a step")
     engine: Literal["auto", "moves", "layers"] = Field(
         "auto",
-        description="auto: moves where they can do it, else layers; moves: exact, upright axis; layers: any axis",
+        description="auto: moves where they can do it, else layers; moves: exact; layers: polygons at heights",
     )
     corner_slices: Count | None = Field(
         None,

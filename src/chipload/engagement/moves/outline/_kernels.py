@@ -81,26 +81,27 @@ def turning(case):
 _F1, _F2, _I1 = types.float64[::1], types.float64[:, ::1], types.int64[::1]
 
 
-@njit(
-    types.int64(types.float64, _F1, _F1, INDEX, _F1, types.boolean[:, ::1], _I1, _F2, _I1),
-    cache=True,
-    nogil=True,
-)
-def outlines(z, xs, ys, index, tops, inside, onward, points, first):
-    """Rings around what was swept at a height: their points and where each begins; how many, -1 where there is no room.
+_B2 = types.boolean[:, ::1]
 
-    ``xs``, ``ys``: nodes, the outermost beside the body; ``inside`` and ``onward`` room for a mark a node and a number
-    a side.
-    """
+
+@njit(types.void(types.float64, _F1, _F1, INDEX, _F1, _B2), cache=True, nogil=True)
+def marked(z, xs, ys, index, tops, inside):
+    """Which nodes of a net were swept at a height; ``xs``, ``ys``: nodes, the outermost beside the body, not swept."""
     # the caller keeps all of them
     index = borrowed(index)
-    tops, points, first = borrowed((tops, points, first))
-    n = len(xs)
-    m = len(ys)
+    tops = borrowed(tops)
     inside[:] = False
-    for i in range(1, n - 1):
-        for j in range(1, m - 1):
+    for i in range(1, len(xs) - 1):
+        for j in range(1, len(ys) - 1):
             inside[i, j] = was_swept(xs[i], ys[j], z, index, tops)
+
+
+@njit(types.int64(_B2, _I1, _I1, _I1), cache=True, nogil=True)
+def traced(inside, onward, sides, first):
+    """Rings around the marked nodes: the sides that they cross and where each begins; how many, -1 where there is no
+    room. ``onward``: room for a number a side.
+    """
+    n, m = inside.shape
     onward[:] = -1
     for i in range(n - 1):
         for j in range(m - 1):
@@ -122,28 +123,9 @@ def outlines(z, xs, ys, index, tops, inside, onward, points, first):
         first[rings] = count
         at = begin
         while onward[at] >= 0:
-            if count == len(points):
+            if count == len(sides):
                 return -1
-            i = at // 2 // m
-            j = at // 2 % m
-            k = i + 1 - at % 2
-            l = j + at % 2
-            lx, ly, hx, hy = xs[i], ys[j], xs[k], ys[l]
-            if inside[k, l]:
-                lx, ly, hx, hy = hx, hy, lx, ly
-            # lx, ly was swept
-            border = i == 0 or j == 0 or k == n - 1 or l == m - 1
-            for _ in range(0 if border else HALVINGS):
-                x = 0.5 * (lx + hx)
-                y = 0.5 * (ly + hy)
-                if was_swept(x, y, z, index, tops):
-                    lx = x
-                    ly = y
-                else:
-                    hx = x
-                    hy = y
-            points[count, 0] = 0.5 * (lx + hx)
-            points[count, 1] = 0.5 * (ly + hy)
+            sides[count] = at
             count += 1
             to = onward[at]
             onward[at] = -1
@@ -151,3 +133,38 @@ def outlines(z, xs, ys, index, tops, inside, onward, points, first):
         rings += 1
         first[rings] = count
     return rings
+
+
+@njit(cache=True, nogil=True)
+def ends_of(side, xs, ys, inside):
+    """Ends of a side of the net, the one that was swept first, and whether it lies on the border of the net."""
+    n, m = inside.shape
+    i = side // 2 // m
+    j = side // 2 % m
+    k = i + 1 - side % 2
+    l = j + side % 2
+    border = i == 0 or j == 0 or k == n - 1 or l == m - 1
+    if inside[k, l]:
+        return xs[k], ys[l], xs[i], ys[j], border
+    return xs[i], ys[j], xs[k], ys[l], border
+
+
+@njit(types.void(types.float64, _F1, _F1, INDEX, _F1, _B2, _I1, _F2), cache=True, nogil=True)
+def placed(z, xs, ys, index, tops, inside, sides, points):
+    """Where the borders on sides of the net are: ``points`` (n, 2)."""
+    # the caller keeps all of them
+    index = borrowed(index)
+    tops = borrowed(tops)
+    for p in range(len(sides)):
+        lx, ly, hx, hy, border = ends_of(sides[p], xs, ys, inside)
+        for _ in range(0 if border else HALVINGS):
+            x = 0.5 * (lx + hx)
+            y = 0.5 * (ly + hy)
+            if was_swept(x, y, z, index, tops):
+                lx = x
+                ly = y
+            else:
+                hx = x
+                hy = y
+        points[p, 0] = 0.5 * (lx + hx)
+        points[p, 1] = 0.5 * (ly + hy)

@@ -1,0 +1,1 @@
+"""Contact on a circle of a cutter in any direction."""

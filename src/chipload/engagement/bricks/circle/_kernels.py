@@ -1,0 +1,190 @@
+"""Compiled search for the material on a circle of a cutter in any direction; arrays and scalars only.
+
+Notation: ``ring`` holds the centre of the circle and its two radii across each other [mm]; the direction psi is the
+point centre + cos(psi) first + sin(psi) second. A border is that of one move, unless what is left beside it was swept
+by another: then the search goes on from there, as in :mod:`chipload.engagement.moves.border._kernels`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from chipload.engagement.bricks._kernels import swept
+from chipload.engagement.bricks.index._kernels import what_is
+from chipload.engagement.moves._kernels import AIR, MATERIAL
+from chipload.engagement.moves.border._kernels import BESIDE, NARROW, TURNS
+
+PI = math.pi
+#: beside the end of the front, where the contact is judged [rad]
+ASIDE = 1e-4
+
+
+@njit(cache=True, nogil=True)
+def asked(ring, c, s, index, hint, wait):
+    """What is at a direction of the circle."""
+    return what_is(
+        ring[0] + c * ring[3] + s * ring[6], ring[1] + c * ring[4] + s * ring[7], ring[2] + c * ring[5] + s * ring[8],
+        index, hint, wait,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def swept_at(ring, c, s, e, index, wait):
+    """Whether the move e swept a direction of the circle."""
+    return swept(
+        index[6][e], index[8][index[7][e]], ring[0] + c * ring[3] + s * ring[6], ring[1] + c * ring[4] + s * ring[7],
+        ring[2] + c * ring[5] + s * ring[8], wait,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def crossing(ring, cu, su, cs, ss, e, index, wait):
+    """Direction at which what the move ``e`` swept begins between u, not swept by it, and s, swept, and a direction
+    just before it, not swept.
+    """
+    while True:
+        dc = cu + cs
+        ds = su + ss
+        size = 1.0 / math.sqrt(dc * dc + ds * ds)
+        dc *= size
+        ds *= size
+        if (cu - cs) ** 2 + (su - ss) ** 2 < BESIDE * BESIDE:
+            return dc, ds, cu, su
+        if swept_at(ring, dc, ds, e, index, wait):
+            cs = dc
+            ss = ds
+        else:
+            cu = dc
+            su = ds
+
+
+@njit(cache=True, nogil=True)
+def border(ring, cm, sm, ca, sa, e, index, wait):
+    """Psi between a direction m in material and one a in air where the material ends; ``e`` the move that swept the
+    latter, or AIR.
+    """
+    for _ in range(TURNS):
+        if (cm - ca) ** 2 + (sm - sa) ** 2 < NARROW:
+            break
+        if e < 0:
+            bc = cm + ca
+            bs = sm + sa
+            size = 1.0 / math.sqrt(bc * bc + bs * bs)
+            bc *= size
+            bs *= size
+            dc = bc
+            ds = bs
+        else:
+            dc, ds, bc, bs = crossing(ring, cm, sm, ca, sa, e, index, wait)
+        f = asked(ring, bc, bs, index, e, wait)
+        if f == MATERIAL:
+            if e >= 0:
+                return math.atan2(ds, dc)
+            cm = bc
+            sm = bs
+        else:
+            ca = bc
+            sa = bs
+            e = f
+    return math.atan2(sm + sa, cm + ca)
+
+
+@njit(cache=True, nogil=True)
+def ridge(ring, ca, sa, cb, sb, ea, eb, index, wait):
+    """Whether there is material between two directions in air, a swept by the move ``ea``, b by ``eb``, and a direction
+    in it: from the border of one move on to that of the next until b is reached.
+    """
+    if ea < 0:
+        ca, sa, cb, sb, ea, eb = cb, sb, ca, sa, eb, ea
+    if ea < 0 or swept_at(ring, cb, sb, ea, index, wait):
+        return False, 0.0, 0.0
+    # most moves overlap: a direction that both swept
+    for _ in range(TURNS):
+        dc = ca + cb
+        ds = sa + sb
+        size = 1.0 / math.sqrt(dc * dc + ds * ds)
+        dc *= size
+        ds *= size
+        one = swept_at(ring, dc, ds, ea, index, wait)
+        two = eb >= 0 and swept_at(ring, dc, ds, eb, index, wait)
+        if (one and two) or (ca - cb) ** 2 + (sa - sb) ** 2 < NARROW:
+            return False, 0.0, 0.0
+        if not one and not two:
+            break
+        if one:
+            ca = dc
+            sa = ds
+        else:
+            cb = dc
+            sb = ds
+    for _ in range(TURNS):
+        if (ca - cb) ** 2 + (sa - sb) ** 2 < NARROW or swept_at(ring, cb, sb, ea, index, wait):
+            return False, 0.0, 0.0
+        _, _, bc, bs = crossing(ring, cb, sb, ca, sa, ea, index, wait)
+        f = asked(ring, bc, bs, index, eb, wait)
+        if f == MATERIAL:
+            return True, bc, bs
+        if f < 0 or f in (ea, eb):
+            return False, 0.0, 0.0
+        ca = bc
+        sa = bs
+        ea = f
+    return False, 0.0, 0.0
+
+
+@njit(cache=True, nogil=True)
+def unwound(psi, near):
+    """The angle psi as the one nearest to another."""
+    return psi - 2.0 * PI * math.floor((psi - near) / (2.0 * PI) + 0.5)
+
+
+@njit(cache=True, nogil=True)
+def intervals(ring, end, apart, index, wait, out):
+    """Parts of -end .. end in material: rows (from, to) of ``out``; their number. Where the front ends, -end and end,
+    the contact is judged just beside; samples are ``apart`` [rad] at most.
+    """
+    first = min(ASIDE - end, 0.0) if end < PI else -end
+    last = max(end - ASIDE, 0.0) if end < PI else end
+    if last <= first:
+        return 0
+    n = max(math.ceil((last - first) / apart), 2)
+    d = (last - first) / n
+    c = math.cos(first)
+    s = math.sin(first)
+    cd = math.cos(d)
+    sd = math.sin(d)
+    count = 0
+    before = AIR
+    inside = False
+    c0 = c
+    s0 = s
+    for i in range(n + 1):
+        f = asked(ring, c, s, index, before, wait)
+        middle = first + (i - 0.5) * d
+        if i > 0 and f != MATERIAL and not inside and f != before:
+            found, cr, sr = ridge(ring, c0, s0, c, s, before, f, index, wait)
+            if found:
+                out[count, 0] = unwound(border(ring, cr, sr, c0, s0, before, index, wait), middle)
+                out[count, 1] = unwound(border(ring, cr, sr, c, s, f, index, wait), middle)
+                count += 1
+        if f == MATERIAL and not inside:
+            if i > 0:
+                out[count, 0] = unwound(border(ring, c, s, c0, s0, before, index, wait), middle)
+            else:
+                out[count, 0] = -end
+            inside = True
+        elif f != MATERIAL and inside:
+            out[count, 1] = unwound(border(ring, c0, s0, c, s, f, index, wait), middle)
+            count += 1
+            inside = False
+        if f != MATERIAL:
+            before = f
+        c0 = c
+        s0 = s
+        c, s = c * cd - s * sd, c * sd + s * cd
+    if inside:
+        out[count, 1] = end
+        count += 1
+    return count

@@ -1,0 +1,1 @@
+"""Outlines of what moves swept, from bricks."""

@@ -1,0 +1,64 @@
+"""Compiled outlines of what moves in bricks swept at a height; arrays and scalars only.
+
+Notation: as in :mod:`chipload.engagement.moves.outline._kernels`, whose rings these are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, types
+
+from chipload.engagement.bricks._kernels import WAIT, swept
+from chipload.engagement.bricks.index._kernels import INDEX, SWEPT, brick_of
+from chipload.engagement.moves.borrowed._kernels import borrowed
+from chipload.engagement.moves.outline._kernels import HALVINGS, ends_of
+
+_F1, _F2, _I1 = types.float64[::1], types.float64[:, ::1], types.int64[::1]
+
+
+@njit(cache=True, nogil=True)
+def was_swept(x, y, z, index, wait):
+    """Whether a move swept a point of the body's box."""
+    row = brick_of(x, y, z, index[0], index[1], index[2])
+    if row < 0:
+        return row == SWEPT
+    at = index[3][row, 0]
+    count = index[3][row, 1]
+    if count < 0:
+        return True
+    for k in range(at + count - 1, at - 1, -1):
+        e = int(index[4][k])
+        if swept(index[6][e], index[8][index[7][e]], x, y, z, wait):
+            return True
+    return False
+
+
+@njit(types.void(types.float64, _F1, _F1, INDEX, types.boolean[:, ::1]), cache=True, nogil=True)
+def marked(z, xs, ys, index, inside):
+    """Which nodes of a net were swept at a height; the outermost are not."""
+    index = borrowed(index)
+    wait = np.empty((WAIT, 6))
+    inside[:] = False
+    for i in range(1, len(xs) - 1):
+        for j in range(1, len(ys) - 1):
+            inside[i, j] = was_swept(xs[i], ys[j], z, index, wait)
+
+
+@njit(types.void(types.float64, _F1, _F1, INDEX, types.boolean[:, ::1], _I1, _F2), cache=True, nogil=True)
+def placed(z, xs, ys, index, inside, sides, points):
+    """Where the borders on sides of the net are: ``points`` (n, 2)."""
+    index = borrowed(index)
+    wait = np.empty((WAIT, 6))
+    for p in range(len(sides)):
+        lx, ly, hx, hy, border = ends_of(sides[p], xs, ys, inside)
+        for _ in range(0 if border else HALVINGS):
+            x = 0.5 * (lx + hx)
+            y = 0.5 * (ly + hy)
+            if was_swept(x, y, z, index, wait):
+                lx = x
+                ly = y
+            else:
+                hx = x
+                hy = y
+        points[p, 0] = 0.5 * (lx + hx)
+        points[p, 1] = 0.5 * (ly + hy)
