@@ -34,7 +34,7 @@ COLUMNS = {
     "control/plant.Outcome",
     "engagement/moves/stock.Engaged",
     "planning/impeller/patch.Patch",
-    "planning/pocket/clearing.ClearingPath",
+    "planning/pocket/clearing_path.ClearingPath",
     "program/apt/track.AptRows",
     "program/commands.Commands",
     "program/program.Program",

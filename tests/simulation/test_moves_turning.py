@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named
-from chipload.errors import Cancelled
+from chipload.errors import Cancelled, InputError
 from chipload.program.build import rapid, rows
 from chipload.program.program import LINE, Program
 from chipload.simulation.checkpoint import Checkpoint
@@ -140,8 +140,8 @@ def test_a_run_that_was_stopped_gives_the_same_bytes(tmp_path: Path, monkeypatch
     assert again.to_bytes() == stock.to_bytes()
 
 
-def test_material_above_the_flutes_of_a_leaning_cutter_goes_by_layers() -> None:
+def test_material_above_the_flutes_of_a_leaning_cutter_is_refused() -> None:
     short = replace(MILL, flute_length=2.0)
     program = path([[-8.0, 12.0, -3.0], [20.0, 12.0, -3.0]], [0.1, 0.0, 1.0])
-    found = remove(program, block(), {1: short}, ALLOY, FINE, engine="auto", accuracy=False)
-    assert "above the flutes of tool 1 (2 mm)" in found.findings[0].text
+    with pytest.raises(InputError, match=r"above the flutes of tool 1 \(2 mm\)"):
+        remove(program, block(), {1: short}, ALLOY, FINE, engine="moves", accuracy=False)

@@ -45,7 +45,7 @@ from chipload.simulation.loads import (
     loads_of_steps,
     over_turn,
 )
-from chipload.simulation.moves import Engine, HandOver, MoveRun, moved, run_by_moves, with_contact
+from chipload.simulation.moves import Engine, HandOver, MoveRun, leans, moved, run_by_moves, with_contact
 from chipload.simulation.removal import ChipAreas, Columns, Removal, Resolution, RunningSums, RunSettings, Watch
 from chipload.simulation.shank import axial_overrun
 from chipload.simulation.steps import BLOCK, ROWS, StepBlocks, Steps, steps_in_blocks
@@ -168,6 +168,10 @@ def with_engine(
     if engine == "layers":
         return setting, None
     fine = setting.resolution
+    leaning = leans(program)
+    if engine == "auto" and leaning.any():
+        line = int(program.line[int(np.argmax(leaning))])
+        return by_layers(engine, setting, HandOver(line, 'the axis leans; engine = "moves" simulates it by moves'))
     bodies = np.isin(program.tool, [n for n, c in setting.cutters.items() if c.body])
     try:
         if bodies.any():

@@ -155,7 +155,6 @@ def run_by_moves(
     if stock.cut.any():
         raise HandOver(0, "the stock was cut before: its layers are all that is known of it")
     axis = np.asarray(program.axis)
-    leans = bool((np.abs(axis - (0.0, 0.0, 1.0)).max(axis=1) > UPRIGHT).any())
     turns = np.append(False, np.abs(np.diff(axis, axis=0)).max(axis=1, initial=0.0) > UPRIGHT)
     if interpolation != "slerp" and turns.any():
         raise HandOver(int(program.line[int(np.argmax(turns))]), 'the axis turns with interpolation = "lerp"')
@@ -164,10 +163,15 @@ def run_by_moves(
     used = {n: c for n, c in cutters.items() if bool((program.tool == n).any())}
     if stock.part is None and not _is_block(stock):
         raise HandOver(0, "the stock is neither a block nor a mesh")
-    moves = (BrickStock if leans else MoveStock)(low, high, used, stock.part)
+    moves = (BrickStock if leans(program).any() else MoveStock)(low, high, used, stock.part)
     return MoveRun(
         moves, np.asarray(stock.bounds), math.ceil(ENGAGED * corner_slices), dict.fromkeys(used, flank_mm), tolerance
     )
+
+
+def leans(program: Program) -> NDArray[np.bool_]:
+    """Rows of a program whose axis is not upright."""
+    return np.asarray(np.abs(np.asarray(program.axis) - (0.0, 0.0, 1.0)).max(axis=1) > UPRIGHT)
 
 
 def _is_block(stock: LayeredStock) -> bool:

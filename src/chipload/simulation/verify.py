@@ -128,11 +128,9 @@ def verify_contour(
     """
     columns = _columns(history)
     _need_tolerances(
-        stock,
-        engagement_tolerance_deg=engagement_tolerance_deg,
-        gouge_tolerance_mm=gouge_tolerance_mm,
-        excess_tolerance_mm=excess_tolerance_mm,
-    )
+        stock, engagement_tolerance_deg=engagement_tolerance_deg,
+        gouge_tolerance_mm=gouge_tolerance_mm, excess_tolerance_mm=excess_tolerance_mm,
+    )  # fmt: skip
     failed: list[str] = []
     open_: list[str] = []
     difference = cleft = remains = GreatestDistance(0.0, (0.0, 0.0), 0)

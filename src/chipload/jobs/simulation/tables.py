@@ -91,7 +91,7 @@ class SimulateTable(Table):
     interpolation: Literal["slerp", "lerp"] = Field("slerp", description="how the axis turns within a step")
     engine: Literal["auto", "moves", "layers"] = Field(
         "auto",
-        description="auto: moves where they can do it, else layers; moves: exact; layers: polygons at heights",
+        description="auto: moves, or layers if the axis leans or moves cannot do it; moves: exact; layers: polygons",
     )
     corner_slices: Count | None = Field(
         None,
