@@ -108,22 +108,8 @@ def remove_in_chunks(
     setting = setting_of(cutters, material, resolution, interpolation, watch, workers)
     shape = (stock.bounds, stock.xs, stock.ys, stock.cut, stock.room, stock.tidied, stock.tiles)
     part = None if stock.part is None else (np.asarray(stock.part.vertices), np.asarray(stock.part.faces))
-    kept = unfinished.begin(
-        digest(
-            program,
-            cutters,
-            material,
-            resolution,
-            shape,
-            part,
-            interpolation,
-            watch is not None,
-            BLOCK,
-            times,
-            engine,
-            also,
-        )
-    )
+    depends = (program, cutters, material, resolution, shape, part, interpolation, watch is not None, BLOCK, times)
+    kept = unfinished.begin(digest(*depends, engine, also))
     setting, handed = with_engine(engine, setting, program, stock)
     sums, before, state = RunningSums(stock.volume(), handed=handed), stock.copied(), None
     if kept is not None:
