@@ -33,6 +33,18 @@ def test_a_track_is_as_good_as_its_worst_limit_and_finding():
     assert track("a", FORCE, findings=(Finding("x", 0, "not read", Severity.UNPROVEN),)).verdict is U
 
 
+@pytest.mark.parametrize(("balance", "error", "state"), [
+    (0.05, 0.0, H), (-0.09, 0.0, H), (0.3, 0.25, H), (0.3, 0.1, U), (-0.3, 0.1, U), (1.22, 0.45, U), (math.nan, 0.5, U),
+])  # fmt: skip
+def test_work_that_is_not_that_of_the_volume_leaves_the_track_unproven(balance, error, state):
+    limit = LimitCheck("force_n", 500.0, 200.0, H, resolution_error=error)
+    one = Track("a", TrackKind.PROGRAM, True, 9.0, (limit,), energy_balance={1: 0.0, 2: balance})
+    assert one.verdict is state
+    assert [f.code for f in one.findings] == ["energy-balance"] * (state is U)
+    again = Track("a", TrackKind.PROGRAM, True, 9.0, (limit,), one.findings, energy_balance=one.energy_balance)
+    assert again.findings == one.findings
+
+
 @pytest.mark.parametrize("time_s", [math.nan, math.inf, -1.0])
 def test_a_time_that_is_no_time_is_refused(time_s):
     with pytest.raises(ValueError, match=r"track a: time_s = .*: must be a finite number from 0"):

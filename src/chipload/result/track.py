@@ -15,10 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.errors import Finding
+from chipload.errors import Finding, Severity
 from chipload.result.limits import Columns, LimitCheck
 from chipload.result.verdict import Verdict
 
+#: work that differs from that of the volume by this share, beside the error of the limits, leaves the loads unproven
+BALANCE = 0.1
+#: of the finding that says so
+UNBALANCED = "energy-balance"
 #: yields the rows of a history, some ten thousand at a time
 Blocks = Callable[[], Iterator[Columns]]
 
@@ -49,7 +53,8 @@ class Track:
     operation : number of its operation
     parameters : what sets it apart beside its name, as ``{"latency_s": 0.1}``
     blocks : its history, a row a step of the program
-    energy_balance : work over the specific energy of the volume removed, less 1, by tool number; empty: not simulated
+    energy_balance : work over the specific energy of the volume removed, less 1, by tool number; empty: not simulated.
+        One that the error of the limits does not explain is a finding, and the track unproven at best
     """
 
     name: str
@@ -68,6 +73,19 @@ class Track:
         """Refuse a time that is no number."""
         if self.time_s is not None and not (math.isfinite(self.time_s) and self.time_s >= 0.0):
             raise ValueError(f"track {self.name}: time_s = {self.time_s}: must be a finite number from 0")
+        if all(finding.code != UNBALANCED for finding in self.findings):
+            object.__setattr__(self, "findings", (*self.findings, *self._unbalanced()))
+
+    def _unbalanced(self) -> Iterator[Finding]:
+        error = max((c.resolution_error for c in self.limits if math.isfinite(c.resolution_error)), default=0.0)
+        for tool, balance in self.energy_balance.items():
+            if not abs(balance) <= BALANCE + error:
+                side = "below" if balance < 0.0 else "above"
+                text = (
+                    f"the work of tool {tool} is {abs(balance):.0%} {side} that of the volume that it removes, and the "
+                    f"limits are known to {error:.0%}: state shorter steps or thinner layers"
+                )
+                yield Finding(UNBALANCED, 0, text, Severity.UNPROVEN)
 
     @property
     def verdict(self) -> Verdict:
