@@ -15,7 +15,11 @@ from chipload.jobs.inspection import inspect_file
 
 #: an example, what is changed in it, how both refuse it
 REFUSED = [
-    ("contour", ["operation.0.kind=pocket"], "open"),
+    (
+        "contour",
+        ["operation.0.kind=pocket", 'operation.0.strategies=["pocket"]', "operation.0.use=pocket"],
+        "open",
+    ),
     ("contour", ["cutter.0.diameter_mm=24"], "does not reach the wall"),
     ("pocket", ["cutter.0.diameter_mm=60", "operation.0.radial_depth_mm=20"], "the cutter fits nowhere"),
     ("chips", ["cutter.0.number=0"], "tool 1: no [[cutter]] has this number"),
