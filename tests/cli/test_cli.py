@@ -135,7 +135,8 @@ def test_check_reads_and_plans_nothing(job_dir: Path) -> None:
         "job.toml: right: 0 closed and 1 open contours, machine vmc, material al7075-carbide",
         "operation 0: contour, cutter 1 of 10 mm, 6 passes",
     ]
-    code, out, err = call("check", job_dir / "job.toml", "--set", "operation.0.kind=pocket")
+    pocket = ("operation.0.kind=pocket", 'operation.0.strategies=["pocket"]', "operation.0.use=pocket")
+    code, out, err = call("check", job_dir / "job.toml", *(word for text in pocket for word in ("--set", text)))
     assert (code, out) == (2, "")
     assert "a closed contour is needed" in err
     assert sorted(p.name for p in job_dir.iterdir()) == ["README.md", "corner.dxf", "job.toml"]
