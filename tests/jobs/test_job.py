@@ -69,8 +69,9 @@ def test_the_later_set_wins(job_dir: Path) -> None:
 
 
 def test_another_kind_names_the_keys_that_it_does_not_use(job_dir: Path) -> None:
-    job = loaded(job_dir / "job.toml", ["operation.0.kind=pocket"])
-    unused = ("strategies", "use", "joint", "semifinish_depth_mm", "tolerance_mm", "lead_mm")
+    named = ['operation.0.strategies=["pocket"]', "operation.0.use=pocket"]
+    job = loaded(job_dir / "job.toml", ["operation.0.kind=pocket", *named])
+    unused = ("joint", "semifinish_depth_mm", "tolerance_mm", "lead_mm")
     assert job.findings == tuple(f"operation.0.{key}: not used by kind = pocket" for key in unused)
 
 
