@@ -111,7 +111,8 @@ def check(found, sides, changes, most):
     if most is not None:
         assert len({s.cutter for s in found.steps}) <= most
     bounds = bound_of_cells(sides, changes, most), bound_of_strips(sides, changes, most), found.total + 1e-9
-    assert list(bounds) == sorted(bounds)
+    # sums of the same costs in another order differ by rounding
+    assert (np.diff(bounds) >= -1e-12 * np.abs(bounds[1:])).all()
 
 
 def test_more_cutters_are_not_slower():

@@ -94,7 +94,7 @@ class OperationTable(Table):
     axial_depth_mm: Positive = Field(description="depth of cut along the axis; of a pocket, the greatest of a level")
     feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's centre")
     speed_rpm: Positive = Field(le=1e6, description="spindle speed")
-    step_mm: Positive = Field(le=10.0, description="step of the history")
+    step_mm: Positive = Field(ge=1e-4, le=10.0, description="step of the history")
     clearance_mm: Positive = Field(description="height of rapids above the top of the stock")
     side: Literal["inside", "outside", "left", "right"] | None = Field(
         None, description="where the cutter runs; outside of a pocket: around the contours, within the stock"
@@ -104,10 +104,12 @@ class OperationTable(Table):
     )
     use: Strategy | None = Field(None, description="the strategy whose program is released")
     joint: Literal["sharp", "clothoid"] | None = None
-    semifinish_depth_mm: Positive | None = Field(None, description="radial depth of the first pass on a straight wall")
+    semifinish_depth_mm: Positive | None = Field(
+        None, le=100.0, description="radial depth of the first pass on a straight wall"
+    )
     passes: Count | None = Field(None, description="passes before the finish pass, or passes of forward")
     tolerance_mm: Positive | None = Field(None, le=1.0, description="how far eased joints may leave the drawing")
-    lead_mm: Positive | None = Field(None, description="radius of the lead-in")
+    lead_mm: Positive | None = Field(None, le=1000.0, description="radius of the lead-in")
     allowance_mm: NotNegative | None = Field(None, description="left on the wall, by clearing where it is finished")
     floor_allowance_mm: NotNegative | None = Field(None, description="left on the floor by clearing; none: 0")
     floor_finish: FloorFinishTable | None = Field(

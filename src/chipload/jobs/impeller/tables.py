@@ -112,7 +112,7 @@ class PickedTable(Table):
 class PathsTable(Table):
     """Finishing programs of the patches in the least time, checked by simulation."""
 
-    check_mm: Positive = Field(description="greatest distance of check points of the paths")
+    check_mm: Positive = Field(ge=0.01, description="greatest distance of check points of the paths")
     chord_mm: Positive = Field(le=1.0, description="greatest deviation of the tip between two rows")
     overrun_mm: NotNegative = Field(1.0, description="of lines beyond the ends of their patch, where they can")
     lift_mm: Positive = Field(description="off the surface at the ends of a line")
@@ -144,7 +144,7 @@ class RoughTable(Table):
     over_mm: NotNegative = Field(description="height of the blank over the shroud")
     feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's tip")
     speed_rpm: Positive = Field(le=1e6, description="spindle speed")
-    check_mm: Positive = Field(description="greatest distance of check points")
+    check_mm: Positive = Field(ge=0.01, description="greatest distance of check points")
     coarser: Annotated[Number, Field(ge=1.0, le=100.0)] = Field(
         10.0, description="factor on paths.chord_mm for roughing"
     )
@@ -156,7 +156,7 @@ class ImpellerOperationTable(Table):
     """The search for the largest cutters of all surfaces."""
 
     kind: Literal["impeller"]
-    check_mm: Positive = Field(description="greatest distance of check points")
+    check_mm: Positive = Field(ge=0.01, description="greatest distance of check points")
     near_mm: Positive = Field(description="within this distance the curvature of the surface replaces check points")
     tolerance_mm: Positive = Field(
         0.05, le=1.0, description="how deep a wall may lie in a cutter between check points where it is certified"

@@ -72,13 +72,13 @@ class WallTable(Table):
     foot_mm: Positive = Field(description="height above the clamp that keeps its stock")
     allowance_mm: tuple[NotNegative, NotNegative] = Field(description="stock on the side towards +y and towards -y")
     elements: tuple[Count, Count] = Field(description="finite elements along the wall and up it, the foot among them")
-    length_mm: Positive | None = None
-    height_mm: Positive | None = None
-    thickness_mm: Positive | None = None
-    chord_root_mm: Positive | None = None
-    chord_tip_mm: Positive | None = None
-    thickness_root_mm: Positive | None = None
-    thickness_tip_mm: Positive | None = None
+    length_mm: Positive | None = Field(None, le=5000.0)
+    height_mm: Positive | None = Field(None, le=5000.0)
+    thickness_mm: Positive | None = Field(None, le=5000.0)
+    chord_root_mm: Positive | None = Field(None, le=5000.0)
+    chord_tip_mm: Positive | None = Field(None, le=5000.0)
+    thickness_root_mm: Positive | None = Field(None, le=5000.0)
+    thickness_tip_mm: Positive | None = Field(None, le=5000.0)
     edge_share: NotNegative | None = Field(
         None, description="of a blade: its thickness at the edges; else the part of u left out at each edge"
     )
@@ -128,7 +128,7 @@ class WallOperationTable(Table):
     lean_deg: Positive = Field(lt=89.0, description="of the axis from the surface's normal towards the free edge")
     lead_deg: Number = Field(description="of the axis forward along the feed")
     step_over_mm: Positive | None = Field(None, description="from row to row; or scallop_um")
-    scallop_um: Positive | None = Field(None, description="scallop height between rows; or step_over_mm")
+    scallop_um: Positive | None = Field(None, ge=0.01, description="scallop height between rows; or step_over_mm")
     depth_min_mm: Positive
     depth_max_mm: Positive
     slope: Positive = Field(le=1.0, description="greatest change of depth per length along the surface")
@@ -136,7 +136,9 @@ class WallOperationTable(Table):
         lt=1.0, description="share by which the planner keeps below the threshold for what its force model leaves out"
     )
     clearance_mm: Positive = Field(description="from the surface between two pieces of the path")
-    step_mm: Positive = Field(le=10.0, description="from contact point to contact point, a step of the simulation")
+    step_mm: Positive = Field(
+        ge=1e-3, le=10.0, description="from contact point to contact point, a step of the simulation"
+    )
     chord_mm: Positive = Field(
         0.005, le=0.1, description="greatest deviation of rows from the surface between contact points"
     )

@@ -102,7 +102,15 @@ def _closed_between(a: Contour, b: Contour) -> Contour:
 
 
 def boundary(contours: Sequence[Contour]) -> StockBoundary:
-    """Stock on the right of ``contours`` as the kernel wants it, on the left."""
+    """Stock on the right of ``contours`` as the kernel wants it, on the left.
+
+    Raises
+    ------
+    InputError
+        There are none.
+    """
+    if not contours:
+        raise InputError("the stock before the first pass has no outline: state a smaller semifinish_depth_mm")
     return StockBoundary(np.vstack([c.reversed().segments for c in contours]))
 
 

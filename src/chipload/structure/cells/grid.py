@@ -30,6 +30,10 @@ Indices = NDArray[np.int64]
 ORDERS = (1, 2, 3)
 
 
+#: of a workpiece: about 1 kB each for the moments, and the factors of their equations
+MOST_CELLS = 500_000
+
+
 @dataclass(frozen=True, eq=False)
 class CellGrid:
     """Equal cells over a box.
@@ -89,6 +93,10 @@ def grid_over(low: ArrayLike, high: ArrayLike, cell_mm: float, order: int = 2) -
     if not cell_mm > 0.0:
         raise InputError(f"workpiece.cell_mm = {cell_mm:g}: must be above 0")
     x, y, z = (max(math.ceil(s / cell_mm * (1.0 - 1e-9)), 1) for s in (b - a).tolist())
+    if x * y * z > MOST_CELLS:
+        raise InputError(
+            f"workpiece.cell_mm = {cell_mm:g}: {x * y * z:.4g} cells: must be at most {MOST_CELLS}: state larger cells"
+        )
     return CellGrid(a, (b - a) / (x, y, z), (x, y, z), order)
 
 
