@@ -105,9 +105,17 @@ def result_with(**track: object) -> Result:
     ({"blocks": in_memory({"force_n": np.array([np.nan])})}, "not finite"),
     ({"blocks": in_memory({"force_n": np.array([-3.0, 480.0])})}, "is -3"),
     ({"limits": (LimitCheck("force_n", 400.0, 480.0, Verdict.HOLDS, "program"),)}, "of 400.0 holds"),
-    ({"energy_balance": {1: 0.3}}, "energy balance 0.3"),
 ])  # fmt: skip
 def test_nonsense_is_seen(track: dict[str, object], said: str) -> None:
     fuzz_jobs.judge(result_with())
     with pytest.raises(fuzz_jobs.Nonsense, match=said):
         fuzz_jobs.judge(result_with(**track))
+
+
+def test_a_work_that_is_not_that_of_the_volume_must_not_hold() -> None:
+    made = result_with(energy_balance={1: 0.3})
+    assert made.verdict is Verdict.UNPROVEN
+    fuzz_jobs.judge(made)
+    object.__setattr__(made.tracks[0], "findings", ())  # as if it were not noticed
+    with pytest.raises(fuzz_jobs.Nonsense, match=r"energy balance 0\.3"):
+        fuzz_jobs.judge(made)
