@@ -160,7 +160,7 @@ class Cutter:
         need(shank is None or shank > 0.0, "shank_diameter_mm", shank or 0.0, "must be above 0")
         for k, part in enumerate(self.holder):
             for key, size in zip(("length", "diameter"), part, strict=True):
-                need(0.0 < size < math.inf, f"holder.{k}.{key}_mm", size, "must be above 0")
+                need(0.0 < size <= 3000.0, f"holder.{k}.{key}_mm", size, "must be above 0 and at most 3000")
         tip = self.tip_stiffness
         need(tip is None or 0.0 < tip < math.inf, "tip_n_um", (tip or 0.0) / 1000.0, "must be above 0")
         if (self.gullet is None) != (self.chip_ratio is None):

@@ -168,7 +168,7 @@ def variable_within(tried: Tried, corrections: tuple[Floats, ...], like: Variant
             measured = tuple(np.maximum(c, m) for c, m in zip(corrections, measured, strict=True))
             share *= HOLD / over if turn >= ROUNDS - 1 and math.isfinite(over) else 1.0
         # what is left of the limit is used
-        raised = good and not used
+        raised = good and not used and over > 0.0
         share *= FULL / over if raised else 1.0
         corrections = measured
     if best is not None:

@@ -303,10 +303,11 @@ class TorqueResult:
         much the error differs from the constant feed's, all in percent.
         """
         held, plain, model = case.runs[HELD], case.runs[PLAIN], case.runs[MODEL]
+        least = float(plain.error.max())
         saved, possible = plain.outcome.time - held.outcome.time, plain.outcome.time - self.control.ideal_time
         return {
             "shorter_percent": 100.0 * (1.0 - held.outcome.time / plain.outcome.time),
             "shorter_than_model_percent": 100.0 * (1.0 - held.outcome.time / model.outcome.time),
             "of_possible_percent": 100.0 * saved / possible if possible > 0.0 else 0.0,
-            "form_error_change_percent": 100.0 * (float(held.error.max()) / float(plain.error.max()) - 1.0),
+            "form_error_change_percent": 100.0 * (float(held.error.max()) / least - 1.0) if least > 0.0 else 0.0,
         }
