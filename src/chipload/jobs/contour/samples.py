@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -15,8 +18,8 @@ from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 #: columns of the planner that are needed
 NEEDED = ("arcs", "arc_from_rad", "arc_to_rad", "heading_x", "heading_y", "engagement_deg", "feed_mm_min")
-#: a pass whose depth is not that of the operation
-ENTRY = "entry"
+#: passes whose depth or speed is not that of the operation: the entry, and the finish passes of a pocket
+OTHER_DEPTH = ("entry", "floor", "wall")
 
 
 def samples_of(outcome: ContourResult) -> dict[str, EngagementSamples]:
@@ -33,12 +36,13 @@ def samples_of(outcome: ContourResult) -> dict[str, EngagementSamples]:
 def _samples(op: Operation, strategy: StrategyResult) -> EngagementSamples | None:
     """The samples of a strategy; None: nothing is cut, or the planner kept no arcs."""
     rows = strategy.history
-    if op.checks is None or not set(NEEDED) <= set(rows):
+    depth = _depth(op.settings)
+    if op.checks is None or depth is None or not set(NEEDED) <= set(rows):
         return None
     t = np.asarray(rows["t_s"], dtype=np.float64)
     kept = takes_time({"duration_s": np.diff(t, prepend=0.0)})
     column = {name: np.asarray(rows[name])[kept] for name in (*NEEDED, "pass")}
-    cuts = (column["arcs"] == 1) & (column["engagement_deg"] > 0.0) & (column["pass"] != ENTRY)
+    cuts = (column["arcs"] == 1) & (column["engagement_deg"] > 0.0) & ~np.isin(column["pass"], OTHER_DEPTH)
     cuts &= column["feed_mm_min"] > 0.0
     stride = 1
     while np.count_nonzero(cuts[::stride]) > STEPS:
@@ -52,6 +56,16 @@ def _samples(op: Operation, strategy: StrategyResult) -> EngagementSamples | Non
     x, y = column["heading_x"][k], column["heading_y"][k]
     zero, one = np.zeros(len(k)), np.ones(len(k))
     frame = np.stack([np.stack(v, axis=1) for v in ((x, y, zero), (-y, x, zero), (zero, zero, one))], axis=1)
-    depth = float(op.settings["axial_depth_mm"])
     found = engagement_of_arcs(column["arc_from_rad"][k], column["arc_to_rad"][k], tooth, op.cutter, depth)
     return engagement_samples(replace(found, frame=frame), op.cutter, op.checks.material, k, op.cutter.number, stride)
+
+
+def _depth(settings: Mapping[str, Any]) -> float | None:
+    """Depth of cut of a pass, or of a level of a pocket, [mm]; None where tabs make levels of different depth."""
+    greatest = float(settings["axial_depth_mm"])
+    if settings["kind"] != "pocket":
+        return greatest
+    if settings.get("tabs") is not None:
+        return None
+    whole = float(settings.get("depth_mm", greatest)) - float(settings.get("floor_allowance_mm", 0.0))
+    return whole / max(1, math.ceil(whole / greatest - 1e-9))
