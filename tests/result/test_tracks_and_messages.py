@@ -37,11 +37,12 @@ def test_a_track_is_as_good_as_its_worst_limit_and_finding():
     (0.05, 0.0, H), (-0.09, 0.0, H), (0.3, 0.25, H), (0.3, 0.1, U), (-0.3, 0.1, U), (1.22, 0.45, U), (math.nan, 0.5, U),
 ])  # fmt: skip
 def test_work_that_is_not_that_of_the_volume_leaves_the_track_unproven(balance, error, state):
-    limit = LimitCheck("force_n", 500.0, 200.0, H, resolution_error=error)
-    one = Track("a", TrackKind.PROGRAM, True, 9.0, (limit,), energy_balance={1: 0.0, 2: balance})
+    load = LimitCheck("force_n", 500.0, 200.0, H, resolution_error=error)
+    other = LimitCheck("form_error_um", 60.0, 20.0, H, resolution_error=2.0)  # does not excuse it
+    one = Track("a", TrackKind.PROGRAM, True, 9.0, (load, other), energy_balance={1: 0.0, 2: balance})
     assert one.verdict is state
     assert [f.code for f in one.findings] == ["energy-balance"] * (state is U)
-    again = Track("a", TrackKind.PROGRAM, True, 9.0, (limit,), one.findings, energy_balance=one.energy_balance)
+    again = Track("a", TrackKind.PROGRAM, True, 9.0, (load, other), one.findings, energy_balance=one.energy_balance)
     assert again.findings == one.findings
 
 

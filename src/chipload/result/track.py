@@ -19,8 +19,10 @@ from chipload.errors import Finding, Severity
 from chipload.result.limits import Columns, LimitCheck
 from chipload.result.verdict import Verdict
 
-#: work that differs from that of the volume by this share, beside the error of the limits, leaves the loads unproven
+#: work that differs from that of the volume by this share, beside the error of the loads, leaves them unproven
 BALANCE = 0.1
+#: units of the limits whose error that is
+LOAD_UNITS = ("N", "N m", "W")
 #: of the finding that says so
 UNBALANCED = "energy-balance"
 #: yields the rows of a history, some ten thousand at a time
@@ -54,7 +56,7 @@ class Track:
     parameters : what sets it apart beside its name, as ``{"latency_s": 0.1}``
     blocks : its history, a row a step of the program
     energy_balance : work over the specific energy of the volume removed, less 1, by tool number; empty: not simulated.
-        One that the error of the limits does not explain is a finding, and the track unproven at best
+        One that the error of the loads does not explain is a finding, and the track unproven at best
     """
 
     name: str
@@ -77,13 +79,14 @@ class Track:
             object.__setattr__(self, "findings", (*self.findings, *self._unbalanced()))
 
     def _unbalanced(self) -> Iterator[Finding]:
-        error = max((c.resolution_error for c in self.limits if math.isfinite(c.resolution_error)), default=0.0)
+        loads = (c.resolution_error for c in self.limits if c.column.unit in LOAD_UNITS)
+        error = max((e for e in loads if math.isfinite(e)), default=0.0)
         for tool, balance in self.energy_balance.items():
             if not abs(balance) <= BALANCE + error:
                 side = "below" if balance < 0.0 else "above"
                 text = (
                     f"the work of tool {tool} is {abs(balance):.0%} {side} that of the volume that it removes, and the "
-                    f"limits are known to {error:.0%}: state shorter steps or thinner layers"
+                    f"loads are known to {error:.0%}: state shorter steps or thinner layers"
                 )
                 yield Finding(UNBALANCED, 0, text, Severity.UNPROVEN)
 
