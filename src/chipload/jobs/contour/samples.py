@@ -36,8 +36,10 @@ def samples_of(outcome: ContourResult) -> dict[str, EngagementSamples]:
 def _samples(op: Operation, strategy: StrategyResult) -> EngagementSamples | None:
     """The samples of a strategy; None: nothing is cut, or the planner kept no arcs."""
     rows = strategy.history
+    if op.checks is None or not set(NEEDED) <= set(rows):
+        return None
     depth = _depth(op.settings)
-    if op.checks is None or depth is None or not set(NEEDED) <= set(rows):
+    if depth is None:
         return None
     t = np.asarray(rows["t_s"], dtype=np.float64)
     kept = takes_time({"duration_s": np.diff(t, prepend=0.0)})
