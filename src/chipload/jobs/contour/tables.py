@@ -39,7 +39,7 @@ class PartTable(Table):
     units_if_unstated: Unit | None = Field(None, description="units of a drawing that names none")
     layers: tuple[Text, ...] = Field((), description="layers that are read; none: all")
     join_mm: NotNegative = Field(0.01, le=10.0, description="gaps up to this are closed and reported")
-    tolerance_mm: Positive = Field(0.001, le=1.0, description="how far arcs may leave splines and ellipses")
+    tolerance_mm: Positive = Field(0.001, ge=1e-6, le=1.0, description="how far arcs may leave splines and ellipses")
     stock_layers: tuple[Text, ...] = Field(
         (), description="layers of a drawing that hold the outline of the stock of a pocket; none: material everywhere"
     )
@@ -108,7 +108,9 @@ class OperationTable(Table):
         None, le=100.0, description="radial depth of the first pass on a straight wall"
     )
     passes: Count | None = Field(None, description="passes before the finish pass, or passes of forward")
-    tolerance_mm: Positive | None = Field(None, le=1.0, description="how far eased joints may leave the drawing")
+    tolerance_mm: Positive | None = Field(
+        None, ge=1e-6, le=1.0, description="how far eased joints may leave the drawing"
+    )
     lead_mm: Positive | None = Field(None, le=1000.0, description="radius of the lead-in")
     allowance_mm: NotNegative | None = Field(None, description="left on the wall, by clearing where it is finished")
     floor_allowance_mm: NotNegative | None = Field(None, description="left on the floor by clearing; none: 0")

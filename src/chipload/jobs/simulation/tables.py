@@ -34,7 +34,9 @@ class ProgramTable(Table):
     speed_rpm: Positive | None = Field(
         None, le=1e6, description="speed of the spindle, clockwise, before the program starts it, or if it never does"
     )
-    tolerance_mm: Positive = Field(0.001, le=1.0, description="greatest deviation of the tip where a move is divided")
+    tolerance_mm: Positive = Field(
+        0.001, ge=1e-6, le=1.0, description="greatest deviation of the tip where a move is divided"
+    )
     parameters: dict[str, Number] = Field(
         default_factory=dict, description='variables of the controller, e.g. "#100" = 2.5, "#<depth>", R10 or Q10'
     )
@@ -87,7 +89,7 @@ class SimulateTable(Table):
 
     kind: Literal["simulate"]
     step_mm: Positive = Field(le=100.0, description="longest step of the tip")
-    tolerance_mm: Positive = Field(0.001, le=0.1, description="how far chords may leave the edges of chips")
+    tolerance_mm: Positive = Field(0.001, ge=1e-6, le=0.1, description="how far chords may leave the edges of chips")
     interpolation: Literal["slerp", "lerp"] = Field("slerp", description="how the axis turns within a step")
     engine: Literal["auto", "moves", "layers"] = Field(
         "auto",

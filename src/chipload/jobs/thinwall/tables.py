@@ -147,7 +147,7 @@ class WallOperationTable(Table):
         None, le=200.0, description="also move the last passes against their form error, by at most this"
     )
     layer_mm: Positive = Field(le=1.0, description="thickness of the layers of the simulation")
-    tolerance_mm: Positive = Field(0.001, le=0.05, description="how far chords may leave the edges of chips")
+    tolerance_mm: Positive = Field(0.001, ge=1e-6, le=0.05, description="how far chords may leave the edges of chips")
     corner_slices: Count = Field(48, le=400, description="slices of the corner radius in the simulation")
 
 

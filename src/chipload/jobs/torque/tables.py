@@ -34,7 +34,9 @@ class ShellProgramTable(Table):
     file: Text
     dialect: Literal["linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"] | None = None
     feed_mm_min: Positive | None = Field(None, le=1e5, description="feed of cuts before the program states one")
-    tolerance_mm: Positive = Field(0.001, le=1.0, description="greatest deviation of the tip where a move is divided")
+    tolerance_mm: Positive = Field(
+        0.001, ge=1e-6, le=1.0, description="greatest deviation of the tip where a move is divided"
+    )
     parameters: dict[str, Number] = Field(
         default_factory=dict, description='variables of the controller, e.g. "#100" = 2.5, "#<depth>", R10 or Q10'
     )
@@ -202,7 +204,7 @@ class SimulationTable(Table):
 
     step_mm: Positive = Field(le=10.0, description="longest step of the tip")
     layer_mm: Positive = Field(le=10.0, description="thickness of the layers of the stock where the cutter comes")
-    tolerance_mm: Positive = Field(0.005, le=0.1, description="how far chords may leave the edges of chips")
+    tolerance_mm: Positive = Field(0.005, ge=1e-6, le=0.1, description="how far chords may leave the edges of chips")
 
 
 class TorqueLimitsTable(Limits):
