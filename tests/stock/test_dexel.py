@@ -303,3 +303,29 @@ def test_an_open_mesh_is_refused() -> None:
     box = trimesh.creation.box((1.0, 1.0, 1.0))
     with pytest.raises(InputError, match="not closed: 3 open edges"):
         TriDexel.of_mesh(trimesh.Trimesh(box.vertices, box.faces[1:]), 0.1)
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.03], ids=["even", "arc"])
+def test_a_path_takes_what_its_parts_take(bend):
+    """Poses in one call, and two at a time, along the surface of an earlier pass: what an even path may skip is air."""
+    rng = np.random.default_rng(5)
+    box = trimesh.creation.box(bounds=[[0, 0, 0], [20, 20, 10]])
+    for case in range(24):
+        n, radius, turn = int(rng.integers(3, 12)), rng.uniform(2.0, 6.0), 0.02 * (case % 3)
+        corner = (0.0, 0.3 * radius, radius)[case % 3]
+        apt = (2.0 * radius, corner, radius - corner, corner, 0.0, 0.0, 15.0)
+        angle = rng.uniform(0.0, math.tau) + bend * np.arange(n)
+        steps = 0.3 * radius * np.column_stack([np.cos(angle), np.sin(angle), np.full(n, rng.normal(0.0, 0.2))])
+        tips = np.array([10.0, 10.0, rng.uniform(2.0, 9.0)]) + np.cumsum(steps, axis=0) - 0.5 * steps.sum(axis=0)
+        axes = np.array([0.0, 0.0, 1.0]) + turn * rng.normal(size=3) * np.arange(n)[:, None]
+        left = []
+        for parts in ([slice(0, n)], [slice(k, k + 2) for k in range(n - 1)]):
+            stock = TriDexel.of_mesh(box, 0.8)
+            stock.remove_poses(tips + np.array([1.0, 0.5, 0.3]), axes, apt, tol=0.01)
+            for part in parts:
+                stock.remove_poses(tips[part], axes[part], apt, tol=0.001)
+            within = [np.arange(r.ends.shape[1]) < r.count[:, None] for r in stock.rays]
+            lengths = [np.diff(r.ends)[..., 0] for r in stock.rays]
+            left.append([np.where(w, s, 0.0).sum(axis=1) for w, s in zip(within, lengths, strict=True)])
+        for whole, two in zip(*left, strict=True):
+            assert np.abs(whole - two).max() < 0.02

@@ -23,6 +23,8 @@ NEWTON = 60
 #: halvings of the moment at which a ray is met, and most steps to the deepest moment
 HALVINGS, GOLDEN = 14, 40
 STEP = 1e-4
+#: part of the way by which a pose may be off the middle of its neighbours, where a path goes on evenly
+EVEN = 1e-3
 RATIO = 0.6180339887498949
 
 
@@ -267,6 +269,29 @@ def boxes(k, tips, axes, shape, out):
 
 
 @njit(cache=True, nogil=True)
+def turns(tips, axes, h):
+    """Number of poses before each (m + 1,) at which the tip or the top does not go on evenly and straight: where it
+    does at all poses of a passage, the ends of a ray in the cutter are convex over its time.
+    """
+    m = len(tips)
+    out = np.zeros(m + 1, dtype=np.int64)
+    for i in range(m):
+        even = True
+        if 0 < i < m - 1:
+            bend, way = np.zeros(2), np.zeros(2)
+            for j in range(3):
+                for n in range(2):
+                    a = tips[i - 1, j] + n * h * axes[i - 1, j]
+                    b = tips[i, j] + n * h * axes[i, j]
+                    c = tips[i + 1, j] + n * h * axes[i + 1, j]
+                    bend[n] += (a - 2.0 * b + c) ** 2
+                    way[n] += (c - a) ** 2
+            even = bend[0] <= EVEN**2 * way[0] and bend[1] <= EVEN**2 * way[1]
+        out[i + 1] = out[i] + (not even)
+    return out
+
+
+@njit(cache=True, nogil=True)
 def cut(k, grid, tol, tips, axes, shape, ends, count):
     """Take what the cutter covers on its way through the poses from the rays along axis k.
 
@@ -285,6 +310,7 @@ def cut(k, grid, tol, tips, axes, shape, ends, count):
     j1 = min(nv - 1, math.floor((box[:, 3].max() - v0) / dv))
     tip, axis = np.empty(3), np.empty(3)
     los, his = np.empty(m), np.empty(m)
+    bends = turns(tips, axes, shape[8])
     room = True
     for i in range(i0, i1 + 1):
         u = u0 + i * du
@@ -306,9 +332,8 @@ def cut(k, grid, tol, tips, axes, shape, ends, count):
                 start = n
                 while n < m and los[n] <= his[n]:
                     n += 1
-                room = (
-                    passage(k, u, v, ray, start, n, los, his, tol, tips, axes, shape, tip, axis, ends, count) and room
-                )
+                done = passage(k, u, v, ray, start, n, los, his, tol, bends, tips, axes, shape, tip, axis, ends, count)
+                room = done and room
     return room
 
 
@@ -338,7 +363,7 @@ def spare(values, a, start, stop, sign):
 
 
 @njit(cache=True, nogil=True)
-def passage(k, u, v, ray, start, stop, los, his, tol, tips, axes, shape, tip, axis, ends, count):
+def passage(k, u, v, ray, start, stop, los, his, tol, bends, tips, axes, shape, tip, axis, ends, count):
     """Take what the poses start .. stop - 1, at all of which the ray is met, and the moments about them cover."""
     n = count[ray]
     if n == 0:
@@ -354,9 +379,16 @@ def passage(k, u, v, ray, start, stop, los, his, tol, tips, axes, shape, tip, ax
         count[ray] = 0
         return True
     ta, tb = float(start), float(stop - 1)
-    if start == 0 and stop == len(tips):
-        # twice what the chords allow
+    within = start == 0 and stop == len(tips)
+    if within or (stop - start > 1 and bends[stop] == bends[start]):
+        # twice what the chords allow, also beyond the first and the last pose
         p, q = lo - 2.0 * spare(los, a, start, stop, 1.0), hi + 2.0 * spare(his, b, start, stop, -1.0)
+        if start > 0:
+            p = min(p, los[start] - 2.0 * max(0.0, los[start + 1] - los[start]))
+            q = max(q, his[start] + 2.0 * max(0.0, his[start] - his[start + 1]))
+        if stop < len(tips):
+            p = min(p, los[stop - 1] - 2.0 * max(0.0, los[stop - 2] - los[stop - 1]))
+            q = max(q, his[stop - 1] + 2.0 * max(0.0, his[stop - 1] - his[stop - 2]))
         if not solid_between(ray, p, q, ends, count):
             return True
     if start > 0:
