@@ -1,4 +1,6 @@
-"""Late imports: names of a package when they are asked for (PEP 562), and libraries that an extra installs."""
+"""Late imports: names of a package when they are asked for (PEP 562), compiled functions when the first of them is
+called, and libraries that an extra installs.
+"""
 
 from __future__ import annotations
 
@@ -64,3 +66,29 @@ def attach(package: str, places: Mapping[str, str]) -> tuple[Callable[[str], Any
         return value
 
     return find, lambda: sorted(module_of)
+
+
+class LateModule:
+    """A module of compiled functions that is imported when a name of it is first asked for.
+
+    Functions with stated types are compiled when their module is imported: on a new machine that takes seconds, which
+    a job that does not call them need not wait.
+
+    Parameters
+    ----------
+    module : its whole name
+
+    Examples
+    --------
+    >>> late = LateModule("chipload.units")
+    >>> late.rpm_from_rad_s.__module__
+    'chipload.units'
+    """
+
+    def __init__(self, module: str) -> None:
+        self._module = module
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(import_module(self._module), name)
+        setattr(self, name, value)
+        return value

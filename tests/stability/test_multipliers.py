@@ -10,10 +10,11 @@ import pytest
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
 from chipload.errors import InputError
+from chipload.stability import _kernels
 from chipload.stability.chart import critical_depth, stability_chart
 from chipload.stability.cuts import dynamic_cuts
 from chipload.stability.directional._kernels import G3, W3, matrices
-from chipload.stability.margin import largest_multipliers, stability_margins
+from chipload.stability.margin import MOST_MARGIN, largest_multipliers, stability_margins
 from chipload.stability.modes import Modes
 from chipload.stability.spectrum._kernels import greatest
 from stability.stability_oracles import (
@@ -414,3 +415,7 @@ def test_quiet_speeds_have_the_least_margin_of_all_cuts():
             quiet_speeds(cuts, bad, 1.0)
     with pytest.raises(InputError, match="no cut"):
         quiet_speeds([], [1.0, 2.0], 1.0)
+
+
+def test_the_greatest_margin_is_the_last_factor_that_is_looked_at():
+    assert _kernels.ABOVE[-1] == MOST_MARGIN

@@ -30,12 +30,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import edge_lag
-from chipload.cutting.bending import _kernels
 from chipload.cutting.force import Spindle
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs, tooth_radii
 from chipload.errors import InputError
+from chipload.lazy import LateModule
 from chipload.structure.beam import flexibilities
+
+_kernels = LateModule("chipload.cutting.bending._kernels")
 
 Floats = NDArray[np.float64]
 Milling = Literal["up", "down"]

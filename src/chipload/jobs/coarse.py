@@ -1,7 +1,8 @@
 """A first answer in a fraction of the time: a job with coarser steps, layers and tolerances.
 
 The geometry, limits and checks stay; only the resolution of the calculation changes, by overrides that the result lists
-as those of ``--set``. What such a run says is not proven: its result has an UNPROVEN finding.
+as those of ``--set``. The plan of a thin wall with the least error is left out. What such a run says is not proven: its
+result has an UNPROVEN finding.
 """
 
 from __future__ import annotations
@@ -9,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
-
-from pydantic import BaseModel
 
 from chipload.errors import Finding, InputError, Severity
 from chipload.jobs import FinishedJob, LoadedJob
@@ -63,7 +62,7 @@ def coarser(loaded: LoadedJob) -> tuple[str, ...]:
     factors = FACTORS.get(loaded.capability.name)
     if factors is None:
         raise InputError(f"--coarse: a {loaded.capability.name} job has no steps that could be coarser: leave it out")
-    table: BaseModel = loaded.job.table
+    table = loaded.job.table
     out = []
     for key, (factor, most) in factors.items():
         first, *rest = key.split(".")
@@ -78,6 +77,9 @@ def coarser(loaded: LoadedJob) -> tuple[str, ...]:
                 out.append(f"{'.'.join(path)}={format_value(int(new) if isinstance(value, int) else new)}")
     if factors is SIMULATION:
         out += _of_program(loaded)
+    for k, op in enumerate(table.operation) if loaded.capability.name == "thinwall" else ():
+        # a comparison of a dozen plans, which is not what is cut
+        out += [f"operation.{k}.least_error=false"] if op.least_error else []
     return tuple(out)
 
 

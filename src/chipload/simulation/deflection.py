@@ -48,11 +48,13 @@ from chipload.cutting.levers.levers import greatest_height, has_lever_loads, lev
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import tooth_radii
 from chipload.errors import InputError
+from chipload.lazy import LateModule
 from chipload.progress import Progress, silent
-from chipload.simulation.bending import _kernels
 from chipload.simulation.loads import GRAZES, ONE_SIDE, Cuts
 from chipload.simulation.removal import Removal
 from chipload.structure.spindle import Bar, tip_compliance
+
+_kernels = LateModule("chipload.simulation.bending._kernels")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

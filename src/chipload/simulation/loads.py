@@ -17,12 +17,14 @@ from chipload.cutter.slices import Slices
 from chipload.cutting.band import mean_band, peak_band
 from chipload.cutting.force import forces_over_turn, in_work, mean_forces
 from chipload.cutting.material import Material
-from chipload.engagement.chips._kernels import state
 from chipload.engagement.chips.move import Move
 from chipload.engagement.immersion.immersion import Section, immersed, tool_frame
 from chipload.engagement.tooth_engagement import ToothEngagement, with_runout
 from chipload.errors import InputError
+from chipload.lazy import LateModule
 from chipload.simulation.steps import Steps
+
+chips = LateModule("chipload.engagement.chips._kernels")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -139,7 +141,7 @@ def engagement_of_step(
     if steps.spindle[k] == 0.0:
         raise InputError(f"line {steps.line[k]}: cuts with the spindle at rest: start it (M3 S) before the cut")
     S = np.empty(27)
-    state(move.tip, move.axis, 0.5, S)
+    chips.state(move.tip, move.axis, 0.5, S)
     tip, axis, speed, swing = S[:3], S[3:6], S[6:9], S[9:12]
     tooth = math.tau / (cutter.flutes * abs(float(steps.spindle[k]))) / float(steps.seconds[k])
     (a, b, c), (x, y, z) = axis.tolist(), swing.tolist()

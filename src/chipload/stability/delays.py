@@ -22,7 +22,9 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.engagement.tooth_engagement import ToothEngagement, tooth_radii, turns_before, with_runout
 from chipload.errors import InputError
-from chipload.stability.several import _kernels
+from chipload.lazy import LateModule
+
+_kernels = LateModule("chipload.stability.several._kernels")
 
 if TYPE_CHECKING:
     from chipload.stability.cuts import DynamicCuts

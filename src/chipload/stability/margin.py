@@ -18,14 +18,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
-from chipload.stability import _kernels
+from chipload.lazy import LateModule
 from chipload.stability.cuts import DynamicCuts
 from chipload.stability.delays import several_multipliers
+
+_kernels = LateModule("chipload.stability._kernels")
 
 Floats = NDArray[np.float64]
 
 #: greatest margin that is told from a greater one
-MOST_MARGIN = float(_kernels.ABOVE[-1])
+MOST_MARGIN = 3.0
 #: cells of the map in a wave of the fastest mode, and where values are printed
 PER_WAVE, PER_WAVE_EXACT = 9.0, 40.0
 #: cells in a wave where the first did not do

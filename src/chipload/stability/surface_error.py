@@ -21,10 +21,12 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.errors import InputError
+from chipload.lazy import LateModule
 from chipload.stability.cuts import DynamicCuts, dynamic_cuts
-from chipload.stability.location import _kernels
 from chipload.stability.margin import shared
 from chipload.stability.modes import Modes
+
+_kernels = LateModule("chipload.stability.location._kernels")
 
 Floats = NDArray[np.float64]
 

@@ -24,7 +24,9 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from chipload.errors import InputError
 from chipload.geometry.mesh import require_closed
-from chipload.stock.dexels import _kernels
+from chipload.lazy import LateModule
+
+_kernels = LateModule("chipload.stock.dexels._kernels")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

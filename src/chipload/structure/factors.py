@@ -19,7 +19,9 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from chipload.errors import InputError
-from chipload.structure import _kernels
+from chipload.lazy import LateModule
+
+_kernels = LateModule("chipload.structure._kernels")
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting.levers import _kernels
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement
+from chipload.lazy import LateModule
+
+_kernels = LateModule("chipload.cutting.levers._kernels")
 
 Floats = NDArray[np.float64]
 

@@ -18,16 +18,18 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon
 
 from chipload.cutter.cutter import Cutter
-from chipload.engagement.bricks import _kernels
-from chipload.engagement.bricks.front import _kernels as front
-from chipload.engagement.bricks.index import _kernels as index
-from chipload.engagement.bricks.outline import _kernels as outline
-from chipload.engagement.moves._kernels import FLUTE, WIDE
-from chipload.engagement.moves.front._kernels import APART
-from chipload.engagement.moves.initial import _kernels as initial
 from chipload.engagement.moves.net import area_of, nodes_of, rings
 from chipload.engagement.moves.stock import INSTANT, Engaged, corner_parts, faces_of
 from chipload.engagement.moves.stock import cutter_row as upright_row
+from chipload.lazy import LateModule
+
+_kernels = LateModule("chipload.engagement.bricks._kernels")
+front = LateModule("chipload.engagement.bricks.front._kernels")
+index = LateModule("chipload.engagement.bricks.index._kernels")
+outline = LateModule("chipload.engagement.bricks.outline._kernels")
+moves = LateModule("chipload.engagement.moves._kernels")
+moves_front = LateModule("chipload.engagement.moves.front._kernels")
+initial = LateModule("chipload.engagement.moves.initial._kernels")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -109,7 +111,8 @@ class BrickStock:
         self.cutters = np.array([cutter_row(cutters[n]) for n in self.tools])
         size = self.high - self.low
         side = max(
-            BRICK * float(np.min(self.cutters[:, WIDE])), (float(size.prod()) / (index.MANY * BLOCKS)) ** (1.0 / 3.0)
+            BRICK * float(np.min(self.cutters[:, moves.WIDE])),
+            (float(size.prod()) / (index.MANY * BLOCKS)) ** (1.0 / 3.0),
         )
         count = np.maximum(np.ceil(size / side - 1e-9), 1.0)
         self.grid = np.array([*self.low, *(size / count)])
@@ -158,7 +161,7 @@ class BrickStock:
         self.of[self.count : end] = of
         self.count = end
         if len(rows):
-            wide, tall = self.cutters[of, WIDE], self.cutters[of, FLUTE]
+            wide, tall = self.cutters[of, moves.WIDE], self.cutters[of, moves.FLUTE]
             # the axis leans at most by what it turns more than at the start
             down = np.maximum(-rows[:, 8], 0.0) + rows[:, 12]
             tips = np.minimum(rows[:, 2], rows[:, 2] + rows[:, 5])
@@ -178,8 +181,8 @@ class BrickStock:
     def instants(self, rows: Floats, tool: Ints) -> Ints:
         """(n,) at how many times each step is looked at: an odd number, so that the middle is one of them."""
         of = np.array([self.tools[n] for n in tool.tolist()], dtype=np.int64)
-        length = rows[:, 13] + rows[:, 12] * self.cutters[of, FLUTE]
-        more = np.maximum(0.5 * (length / (INSTANT * self.cutters[of, WIDE]) - 1.0), 0.0)
+        length = rows[:, 13] + rows[:, 12] * self.cutters[of, moves.FLUTE]
+        more = np.maximum(0.5 * (length / (INSTANT * self.cutters[of, moves.WIDE]) - 1.0), 0.0)
         return np.asarray(2 * np.ceil(more - 1e-9).astype(np.int64) + 1)
 
     def skip(self, p0: Floats, p1: Floats, a0: Floats, a1: Floats, tool: Ints) -> None:
@@ -212,8 +215,8 @@ class BrickStock:
         return self._run(rows, tool, self.instants(rows, tool), corner_slices, flank_mm)
 
     def _work(self, pieces: int) -> tuple[NDArray[Any], ...]:
-        wide = float(self.cutters[:, WIDE].max())
-        apart = min(front.BRICKS * float(self.grid[3:].min()) / wide, APART)
+        wide = float(self.cutters[:, moves.WIDE].max())
+        apart = min(front.BRICKS * float(self.grid[3:].min()) / wide, moves_front.APART)
         room = int(math.tau / (apart * min(front.SLICES / pieces, 1.0))) + 8
         return (
             np.empty((room, 2)), np.empty(5), np.empty(9), np.empty(9), np.empty((3, 2)), np.empty((RANGES, 3)),

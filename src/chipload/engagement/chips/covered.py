@@ -29,15 +29,16 @@ import shapely
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.engagement.chips._kernels import instant
-from chipload.engagement.chips.faces import _kernels as faces
-from chipload.engagement.chips.loop import _kernels as loop
 from chipload.engagement.chips.move import Move
 from chipload.engagement.chips.ring import Origin, Ring, ring_of_edges, rings_of_polygons
 from chipload.engagement.chips.section import cutter_numbers
-from chipload.engagement.chips.trace import _kernels as trace
-from chipload.engagement.chips.trace._kernels import GENERAL, NOTHING
 from chipload.errors import InputError
+from chipload.lazy import LateModule
+
+_kernels = LateModule("chipload.engagement.chips._kernels")
+faces = LateModule("chipload.engagement.chips.faces._kernels")
+loop = LateModule("chipload.engagement.chips.loop._kernels")
+trace = LateModule("chipload.engagement.chips.trace._kernels")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -129,9 +130,9 @@ def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], toleranc
     start = np.cumsum([0, *count.clip(0)])
     out: list[CoveredArea | None] = []
     for i, h in enumerate(levels.tolist()):
-        if count[i] == NOTHING:
+        if count[i] == trace.NOTHING:
             out.append(None)
-        elif count[i] == GENERAL:
+        elif count[i] == trace.GENERAL:
             out.append(_noded(move, K, h, tolerance, max(_KNOTS, 4 * int(knots[i]))))
         else:
             edges = buffer[start[i] : start[i + 1]].copy()
@@ -212,7 +213,7 @@ def _polygons(
         shapes[which] = shapely.polygons(shapely.linearrings(points, indices=ring))
     for i in which[~whole[which]]:
         shapes[i] = _thick(_untangled(shapes[i]), tolerance)
-    for i in np.flatnonzero(count == GENERAL).tolist():
+    for i in np.flatnonzero(count == trace.GENERAL).tolist():
         move = moves[int(np.searchsorted(first, i, "right")) - 1]
         found = _noded_shape(
             _candidates(move, K, float(levels[i]), tolerance, max(_KNOTS, 4 * int(knots[i]))),
@@ -309,7 +310,7 @@ def _candidates(move: Move, K: Floats, h: float, tolerance: float, knots: int) -
 def whole_section(move: Move, K: Floats, h: float, t: float, tolerance: float) -> Floats:
     """Edges (n, 12) of the section at t, counter-clockwise; none where the layer isn't cut."""
     S, C, buffer = np.empty(27), np.empty((8, 5)), np.empty((2048, 12))
-    if not instant(move.tip, move.axis, K, h, t, S, C):
+    if not _kernels.instant(move.tip, move.axis, K, h, t, S, C):
         return np.empty((0, 12))
     n = trace.ring(S, K, C, tolerance, trace.FIRST, buffer, 0)
     while n < 0:

@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.engagement.chips import _kernels
 from chipload.engagement.chips.covered import CoveredArea, candidates, covered
 from chipload.engagement.chips.move import Move
 from chipload.engagement.chips.section import cutter_numbers
+from chipload.lazy import LateModule
+
+_kernels = LateModule("chipload.engagement.chips._kernels")
 
 Floats = NDArray[np.float64]
 

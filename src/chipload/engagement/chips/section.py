@@ -19,9 +19,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.engagement.chips import _kernels
 from chipload.engagement.chips.move import Move
 from chipload.errors import InputError
+from chipload.lazy import LateModule
+
+_kernels = LateModule("chipload.engagement.chips._kernels")
 
 Floats = NDArray[np.float64]
 

@@ -33,8 +33,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.slices import Slices
-from chipload.engagement.immersion import _kernels
 from chipload.errors import InputError
+from chipload.lazy import LateModule
+
+_kernels = LateModule("chipload.engagement.immersion._kernels")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -10,8 +10,10 @@ import shapely
 from numpy.typing import NDArray
 from shapely import MultiPolygon
 
-from chipload.engagement.moves.outline import _kernels
+from chipload.lazy import LateModule
 from chipload.stock.tile_grid import polygons
+
+_kernels = LateModule("chipload.engagement.moves.outline._kernels")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

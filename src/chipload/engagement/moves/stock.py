@@ -19,12 +19,14 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon
 
 from chipload.cutter.cutter import Cutter
-from chipload.engagement.moves import _kernels
-from chipload.engagement.moves.edge import _kernels as edge
-from chipload.engagement.moves.front import _kernels as front
-from chipload.engagement.moves.initial import _kernels as initial
 from chipload.engagement.moves.net import area_of, nodes_of, rings
-from chipload.engagement.moves.outline import _kernels as outline
+from chipload.lazy import LateModule
+
+_kernels = LateModule("chipload.engagement.moves._kernels")
+edge = LateModule("chipload.engagement.moves.edge._kernels")
+front = LateModule("chipload.engagement.moves.front._kernels")
+initial = LateModule("chipload.engagement.moves.initial._kernels")
+outline = LateModule("chipload.engagement.moves.outline._kernels")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from chipload.errors import InputError
 from chipload.geometry.contour import Region
-from chipload.planning.pocket import _kernels, _pass, trochoid
+from chipload.lazy import LateModule
+from chipload.planning.pocket import trochoid
 from chipload.planning.pocket.clearing_path import (
     CUT,
     ENTRY,
@@ -46,6 +47,9 @@ from chipload.planning.pocket.trochoid import Trochoid
 from chipload.planning.result import Event
 from chipload.progress import Progress, silent
 from chipload.stock.planar import TOUCH, PlanarStock
+
+_kernels = LateModule("chipload.planning.pocket._kernels")
+_pass = LateModule("chipload.planning.pocket._pass")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

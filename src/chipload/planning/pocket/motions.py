@@ -17,14 +17,16 @@ from numpy.typing import NDArray
 
 from chipload.engagement.contact import PIECES, Engagement
 from chipload.geometry.contour import Region
+from chipload.lazy import LateModule
 from chipload.machine.feed import corner_speed, curvature_speed, limited_speed
 from chipload.machine.machine import Machine
-from chipload.planning.pocket import _replay
 from chipload.planning.pocket.clearing_path import CUT, ENTRY, LIFT, LINK, ClearingPath, segment_lengths
 from chipload.planning.pocket.free_space import take_free
 from chipload.program.build import helix, plunge, rapid, retract, rows
 from chipload.program.program import ARC_CCW, ARC_CW, LINE, Program
 from chipload.stock.planar import PlanarStock
+
+_replay = LateModule("chipload.planning.pocket._replay")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

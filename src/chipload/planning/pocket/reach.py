@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from chipload.geometry.contour import Contour, Region
 from chipload.geometry.offset import offset_region
-from chipload.planning.pocket import _kernels
+from chipload.lazy import LateModule
+
+_kernels = LateModule("chipload.planning.pocket._kernels")
 
 Floats = NDArray[np.float64]
 

@@ -13,9 +13,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.planning.pocket import _kernels
+from chipload.lazy import LateModule
 from chipload.planning.pocket.reach import Reach
 from chipload.stock.planar import TOUCH, PlanarStock
+
+_kernels = LateModule("chipload.planning.pocket._kernels")
 
 Floats = NDArray[np.float64]
 

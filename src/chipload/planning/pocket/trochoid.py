@@ -17,9 +17,12 @@ from numpy.typing import NDArray
 
 from chipload.geometry.contour import Region
 from chipload.geometry.distance import distance
-from chipload.planning.pocket import _fit, _trochoid
+from chipload.lazy import LateModule
 from chipload.stock._kernels import ARCS
 from chipload.stock.planar import TOUCH, PlanarStock
+
+_fit = LateModule("chipload.planning.pocket._fit")
+_trochoid = LateModule("chipload.planning.pocket._trochoid")
 
 Floats = NDArray[np.float64]
 

@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.simulation.clearance import _kernels
+from chipload.lazy import LateModule
+
+_kernels = LateModule("chipload.simulation.clearance._kernels")
 
 Floats = NDArray[np.float64]
 

@@ -20,9 +20,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
-from chipload.simulation.clearance import _kernels
+from chipload.lazy import LateModule
 from chipload.simulation.clearance.body import Body
 from chipload.simulation.steps import Steps
+
+_kernels = LateModule("chipload.simulation.clearance._kernels")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -20,9 +20,11 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
+from chipload.lazy import LateModule
 from chipload.stock.layers import LayeredStock
-from chipload.structure.cells import _kernels
 from chipload.structure.cells.grid import Array, CellGrid
+
+_kernels = LateModule("chipload.structure.cells._kernels")
 
 
 @dataclass(frozen=True, eq=False)
