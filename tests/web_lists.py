@@ -1,8 +1,13 @@
-"""Lists and keys of the page, used as a person does who looks whether it worked, on however busy a computer."""
+"""Lists, keys and view of the page, used as a person does who looks whether it worked, on however busy a computer."""
 
+import contextlib
 import re
 import time
 
+#: the 3D view
+VIEW = "chiploadViewer.of(document.querySelector('.cl-stage').id)"
+#: seconds of the machine in a second of a slow play: the longest wait of a test does not come to the end
+SLOW = 0.1
 #: seconds that one look takes, and after which a choice that did not arrive is an error
 LOOK, PATIENCE = 3.0, 90.0
 
@@ -34,6 +39,58 @@ def choose(page, name: str, option: str, chosen: bool = True) -> None:
         except Exception as err:  # what is not there within a look is looked for again
             missed = str(err)
     raise AssertionError(f"{name}: {option} is not {'chosen' if chosen else 'left'}: {missed}")
+
+
+def settle(page, row: int) -> None:
+    """Wait until the 3D view, as drawn, and the panels stand at a row."""
+    page.wait_for_function(
+        f"r => {VIEW}.row == r && !{VIEW}.dirty && document.querySelector('.cl-where').textContent"
+        ".includes(`step ${r + 1} of`)",
+        arg=row,
+    )
+
+
+def drawn(page) -> None:
+    """Wait until the 3D view shows what it was told."""
+    page.wait_for_function(f"!{VIEW}.dirty")
+
+
+def play_slowly(page) -> None:
+    """Play by the key, then slowly, until some steps went by in the view and in the panels."""
+    page.keyboard.press("Space")
+    page.wait_for_function(f"{VIEW}.playing")
+    page.evaluate(f"{VIEW}.play({SLOW})")
+    first = page.evaluate(f"{VIEW}.row")
+    page.wait_for_function(f"r => {VIEW}.row > r + 3", arg=first)
+    page.wait_for_function(
+        "r => Number(document.querySelector('.cl-where').textContent.match(/step (\\d+)/)[1]) - 1 > r", arg=first
+    )
+
+
+def stop(page) -> int:
+    """Stop by the key; the row at which view and panels stand then."""
+    page.keyboard.press("Space")
+    page.wait_for_function(f"!{VIEW}.playing")
+    row = int(page.evaluate(f"{VIEW}.row"))
+    settle(page, row)
+    return row
+
+
+def click_until(page, x: float, y: float, holds: str) -> None:
+    """Click a plot at a place, again every few seconds, until a function of JavaScript holds: a click that comes
+    before the plot saw the pointer picks nothing.
+    """
+    until = time.monotonic() + PATIENCE
+    while time.monotonic() < until:
+        page.mouse.move(x - 3, y)
+        page.mouse.move(x, y)
+        with contextlib.suppress(Exception):
+            page.wait_for_selector(".hoverlayer .hovertext", state="attached", timeout=1000 * LOOK)
+        page.mouse.click(x, y)
+        with contextlib.suppress(Exception):
+            page.wait_for_function(holds, timeout=1000 * LOOK)
+            return
+    raise AssertionError(f"a click at {x:.0f}, {y:.0f}: {holds} does not hold")
 
 
 def press_until(page, key: str, holds: str, arg: object) -> None:

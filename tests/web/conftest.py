@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from square import PROGRAM, make_cut_result, make_result
+from web_lists import settle
 from web_served import Served
 
 EXAMPLES = Path(__file__).parents[2] / "src" / "chipload" / "examples"
@@ -103,7 +104,6 @@ def shared(browser: object, served: Served) -> Iterator[object]:
     page.wait_for_function("document.querySelectorAll('.cl-figure .trace').length > 0")
     page.wait_for_selector(".cv-ramp")
     page.wait_for_selector(".cl-now")
-    page.wait_for_timeout(500)
     yield page
     windows.close()
 
@@ -112,8 +112,7 @@ def shared(browser: object, served: Served) -> Iterator[object]:
 def square(shared: object) -> object:
     """The page of the hand-made result at its beginning."""
     shared.keyboard.press("Home")
-    shared.wait_for_function("document.querySelector('.cl-where').textContent.includes('step 1 of')")
-    shared.wait_for_timeout(200)
+    settle(shared, 0)
     return shared
 
 

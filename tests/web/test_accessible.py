@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from web_lists import VIEW, play_slowly, settle, stop
+
 #: checks accessibility in a browser; there after `npm install` in viewer/, not part of the package
 AXE = Path(__file__).parents[2] / "viewer" / "node_modules" / "axe-core" / "axe.min.js"
-VIEW = "chiploadViewer.of(document.querySelector('.cl-stage').id)"
 
 
 @pytest.fixture(scope="module")
@@ -23,8 +24,7 @@ def cut(browser, served):
 def test_nothing_lies_beside_a_narrow_window(cut) -> None:
     for width, height in ((420, 800), (1280, 720), (1920, 1080)):
         cut.set_viewport_size({"width": width, "height": height})
-        cut.wait_for_timeout(500)
-        assert cut.evaluate("document.documentElement.scrollWidth") == width
+        cut.wait_for_function("w => document.documentElement.scrollWidth == w", arg=width)
         for part in (".cl-header", ".cl-verdict", ".cl-space", ".cl-plots", ".cl-tables", ".cl-source", ".cl-foot"):
             box = cut.locator(part).bounding_box()
             assert box["x"] >= 0.0
@@ -52,23 +52,18 @@ def test_space_plays_whatever_was_clicked_before(cut) -> None:
     for text in ("marks", "values on stock", "values on stock", "marks"):
         cut.locator(".cl-layers").get_by_text(text).click()
     cut.keyboard.press("Home")
-    cut.wait_for_function(f"{VIEW}.row == 0")
-    cut.keyboard.press("Space")
-    cut.wait_for_function(f"{VIEW}.row > 3")
-    assert cut.evaluate(f"{VIEW}.playing") is True
-    assert cut.locator("button[aria-label='pause (Space)']").count() == 1
-    cut.keyboard.press("Space")
-    cut.wait_for_function(f"!{VIEW}.playing")
-    here = cut.evaluate(f"{VIEW}.row")
-    assert here > 3
-    cut.wait_for_timeout(400)
-    assert cut.evaluate(f"{VIEW}.row") == here
-    assert cut.locator("button[aria-label='play (Space)']").count() == 1
+    settle(cut, 0)
+    play_slowly(cut)
+    cut.wait_for_selector("button[aria-label='pause (Space)']")
+    assert stop(cut) > 3
+    cut.wait_for_selector("button[aria-label='play (Space)']")
 
 
 def test_axe_finds_nothing_serious(cut) -> None:
     if not AXE.exists():
         pytest.skip("no axe-core: npm install in viewer/")
+    # the teeth cut there
+    cut.evaluate(f"{VIEW}.go(30)")
     cut.evaluate(AXE.read_text())
     for tab, shown in (("limits", ".cl-checks"), ("cut", ".cv-cut-plots svg")):
         cut.locator(".cl-tabs").get_by_text(tab, exact=True).click()

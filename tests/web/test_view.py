@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from square import ROWS, VOLUMES, T, X, Y
-
-VIEW = "chiploadViewer.of(document.querySelector('.cl-stage').id)"
+from web_lists import VIEW, play_slowly, settle, stop
 
 
 @pytest.fixture(scope="module")
@@ -27,18 +26,6 @@ def cut(browser, served):
 
 def state(page):
     return page.evaluate(f"{VIEW}.state()")
-
-
-def settle(page, row):
-    page.wait_for_function(f"r => {VIEW}.state().row == r", arg=row)
-
-
-def settle_panels(page, row):
-    """The panels stand at the row of the view when it stops: they are told some ten times a second."""
-    page.wait_for_function(
-        "r => Math.abs(Number(document.querySelector('.cl-where').textContent.match(/step (\\d+)/)[1]) - 1 - r) <= 5",
-        arg=row,
-    )
 
 
 def red(picture):
@@ -102,19 +89,16 @@ def test_playing_moves_by_itself_and_the_panels_follow(cut) -> None:
     page = cut
     page.keyboard.press("Home")
     settle(page, 0)
-    page.keyboard.press("Space")
-    page.wait_for_function(f"{VIEW}.state().row > 20")
-    page.wait_for_function("Number(document.querySelector('.cl-where').textContent.match(/step (\\d+)/)[1]) > 15")
-    before = {"row": page.evaluate(f"{VIEW}.row"), "frames": page.evaluate(f"{VIEW}.frames")}
-    page.wait_for_function(f"r => {VIEW}.row > r", arg=before["row"])
-    # it is drawn again for what it shows, and line and cutter are those of the row
-    page.wait_for_function(f"n => {VIEW}.frames > n", arg=before["frames"])
-    page.keyboard.press("Space")
-    page.wait_for_function(f"!{VIEW}.playing")
-    row = state(page)["row"]
-    assert row > 20
-    settle_panels(page, row)
-    assert state(page)["tip"] == pytest.approx([X[row], Y[row], -2.0], abs=0.81)
+    frames = page.evaluate(f"{VIEW}.frames")
+    play_slowly(page)
+    row = stop(page)
+    # it was drawn again for what it showed, and place and panels are those of the row at which it stopped
+    assert page.evaluate(f"{VIEW}.frames") > frames
+    assert row > 3
+    assert state(page)["tip"] == pytest.approx([X[row], Y[row], -2.0], abs=1e-3)
+    # nothing moves it any more
+    page.wait_for_timeout(500)
+    settle(page, row)
     page.keyboard.press("Home")
     settle(page, 0)
 
@@ -151,7 +135,7 @@ def test_a_section_see_through_and_values_change_the_picture(cut, pixels) -> Non
 
 def test_a_length_is_measured_on_the_stock(cut) -> None:
     page = cut
-    page.evaluate(f"{VIEW}.look('top'); {VIEW}.layer('path', false); {VIEW}.layer('cutter', false)")
+    page.evaluate(f"{VIEW}.look('top'); {VIEW}.layer('path', false); {VIEW}.layer('cutter', false); {VIEW}.picture()")
     page.locator("button", has_text="measure").click()
     page.wait_for_function("document.querySelector('.cv-note').textContent == 'click two places'")
     # two corners of the box, by the places that the view itself projects them to
@@ -172,7 +156,7 @@ def test_a_length_is_measured_on_the_stock(cut) -> None:
 
 def test_values_under_the_pointer_and_a_saved_picture(cut) -> None:
     page = cut
-    page.evaluate(f"{VIEW}.look('top')")
+    page.evaluate(f"{VIEW}.look('top'); {VIEW}.picture()")
     x, y = page.evaluate(
         f"""() => {{ const v = {VIEW}, b = v.host.getBoundingClientRect();
         const q = v.camera.position.clone().set(24, 40, -2).project(v.camera);

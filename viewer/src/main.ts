@@ -5,6 +5,8 @@ import { fetched } from "./document";
 import { Abscissa } from "./pair";
 import { View } from "./view";
 
+export { ownKeys } from "./keys";
+
 const views = new Map<string, View>(), cuts = new Map<string, CutPanel>();
 
 /** The view in an element, made where it is not there yet. */

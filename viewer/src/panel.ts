@@ -2,7 +2,7 @@
 
 import { CutPanel } from "./cut";
 import { Colouring, Header, unpacked } from "./document";
-import { View } from "./view";
+import { View, Why } from "./view";
 
 const WHOLE = 30, SIDES = ["iso", "top", "front", "side"];
 
@@ -75,8 +75,8 @@ export async function panel(host: HTMLElement, text: string): Promise<View> {
   };
   play.onclick = toggle;
   box.addEventListener("viewrow", (e) => {
-    const { row, playing } = (e as CustomEvent<{ row: number; playing: boolean }>).detail;
-    if (!playing && !view.playing) view.go(row);
+    const { row, why } = (e as CustomEvent<{ row: number; why: Why }>).detail;
+    if (why === "clicked") { view.play(0); view.go(row); }
     slider.value = String(t[view.path.place(view.row)]);
     said();
   });

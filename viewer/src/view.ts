@@ -18,6 +18,8 @@ const VIEWS: Record<string, [number, number, number]> = {
   iso: [0.62, -1, 0.78], top: [0, -0.001, 1], front: [0, -1, 0.02], side: [1, 0, 0.02], below: [0, -0.001, -1],
 };
 type Layer = "stock" | "path" | "cutter" | "marks" | string;
+/** Why a view tells its row: it plays, it was stopped, it came to the end, its path was clicked. */
+export type Why = "playing" | "stopped" | "ended" | "clicked";
 
 export class View {
   readonly overlay: Overlay;
@@ -181,9 +183,11 @@ export class View {
     this.stand(this.path.at(against === "time" ? this.path.t : this.path.s, value));
   }
 
-  /** Play: seconds of the machine in a second; 0 stops. */
+  /** Play: seconds of the machine in a second; 0 stops, and tells the row at which it stands. */
   play(rate: number): void {
+    const stops = this.rate > 0 && rate <= 0;
     this.rate = rate;
+    if (stops) this.tellRow(this.row, "stopped");
     this.before = performance.now();
   }
 
@@ -400,11 +404,11 @@ export class View {
     if (over) this.rate = 0;
     if (over || now - this.told > 100) {
       this.told = now;
-      this.tell("viewrow", { row: this.row, playing: this.rate > 0 });
+      this.tellRow(this.row, over ? "ended" : "playing");
     }
   }
 
-  private tell(name: string, detail: unknown): void { this.host.dispatchEvent(new CustomEvent(name, { detail })); }
+  private tellRow(row: number, why: Why): void { this.host.dispatchEvent(new CustomEvent("viewrow", { detail: { row, why } })); }
 
   private follow(): void {
     const p = this.pair?.other;
@@ -471,7 +475,7 @@ export class View {
     }
     if (this.picks) { this.pick(x, y); return; }
     const k = this.hidden.has("path") ? -1 : this.near(x, y);
-    if (k >= 0) this.tell("viewrow", { row: this.path.drawnRows[k], playing: false });
+    if (k >= 0) this.tellRow(this.path.drawnRows[k], "clicked");
   }
 
   private pick(x: number, y: number): void {

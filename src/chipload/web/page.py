@@ -67,7 +67,10 @@ class Page:
         self.own: JobRun | None = None
         self.seen: JobRun | None = runs.now if runs.now is not None and runs.now.over else None
         ui.add_css(resources.files(__package__).joinpath("page.css").read_text("utf-8"))
-        ui.add_head_html('<script>document.documentElement.lang = "en"</script><script src="/viewer.js"></script>')
+        ui.add_head_html(
+            '<script>document.documentElement.lang = "en"</script><script src="/viewer.js"></script>'
+            "<script>chiploadViewer.ownKeys()</script>"
+        )
         ui.colors(primary="#2f5d8a")
         with ui.element("div").classes("cl-page"):
             self._header()

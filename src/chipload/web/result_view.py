@@ -21,7 +21,7 @@ from chipload.web.panels.cut import CutPanel
 from chipload.web.panels.limits import LimitPanel
 from chipload.web.panels.loads import LinePanel, ToolPanel, sequence
 from chipload.web.panels.plots import PlotPanel, nearest
-from chipload.web.panels.scene import ScenePanel
+from chipload.web.panels.scene import ScenePanel, Standing
 from chipload.web.panels.source import SourcePanel
 from chipload.web.plots import abscissa
 from chipload.web.result import PageResult, PageTrack
@@ -46,6 +46,8 @@ class ResultView:
         self.track: PageTrack | None = None
         self.row = 0
         self.playing = False
+        #: the view was asked to stop where it is, and has not told its row yet
+        self.stopping = False
         self.turn = asyncio.Lock()
         self.sides: tuple[Side, ...] = ()
         #: told when another program of the sequence is shown
@@ -160,6 +162,7 @@ class ResultView:
         """Stand at a row."""
         if self.track is None:
             return
+        self.stopping = False
         self.row = int(np.clip(row, 0, len(self.track) - 1))
         self.slider.set_value(float(abscissa(self.track, self.plots.against.value)[self.row]))
         self.scene.at(self.row)
@@ -181,10 +184,11 @@ class ResultView:
         """Play, or stop playing."""
         if self.playing:
             self.pause()
+            self.stopping = True
         elif self.track is not None:
             if self.row >= len(self.track) - 1:
                 self.go(0)
-            self.playing = True
+            self.playing, self.stopping = True, False
             self.play.props('icon=pause aria-label="pause (Space)"')
             t, speed = self.track.t, float(self.speed.value or 0)
             self.scene.play(speed if speed > 0.0 else max(float(t[-1] - t[0]), 1e-3) / WHOLE)
@@ -273,24 +277,27 @@ class ResultView:
         if self.track is None or not isinstance(event.args, (int, float)):
             return
         self.pause()
+        self.stopping = False
         self.row = nearest(abscissa(self.track, self.plots.against.value), float(event.args))
         self._shown(self.track)
 
-    async def _viewed(self, row: int, playing: bool) -> None:
-        """The 3D view stands at a row: it plays, or its path was clicked."""
+    async def _viewed(self, row: int, why: Standing) -> None:
+        """The 3D view stands at a row: it plays or was stopped, or its path was clicked."""
         if self.track is None:
             return
-        if not playing and not self.playing:
-            self.go(row)
-            return
-        if not self.playing:  # a message that was on its way when it was stopped
-            return
-        self.row = int(np.clip(row, 0, len(self.track) - 1))
-        self.slider.set_value(float(abscissa(self.track, self.plots.against.value)[self.row]))
-        self._shown(self.track)
-        if not playing:
+        if why is Standing.CLICKED:
             self.pause()
-            await self._next()
+            self.go(row)
+        elif why is Standing.STOPPED:
+            if self.stopping:
+                self.go(row)
+        elif self.playing:  # else a message that was on its way when it was stopped
+            self.row = int(np.clip(row, 0, len(self.track) - 1))
+            self.slider.set_value(float(abscissa(self.track, self.plots.against.value)[self.row]))
+            self._shown(self.track)
+            if why is Standing.ENDED:
+                self.pause()
+                await self._next()
 
     def _shown(self, track: PageTrack) -> None:
         k = self.row

@@ -11,6 +11,7 @@ import contextlib
 import html
 import json
 from collections.abc import Awaitable, Callable
+from enum import StrEnum
 from functools import partial
 from typing import Any
 
@@ -35,11 +36,20 @@ ENGAGED = "engagement"
 SECTIONS = {"": "no section", "x": "section X", "y": "section Y", "z": "section Z"}
 
 
+class Standing(StrEnum):
+    """Why the view tells its row."""
+
+    PLAYING = "playing"
+    STOPPED = "stopped"
+    ENDED = "ended"
+    CLICKED = "clicked"
+
+
 class ScenePanel:
     """The 3D view of a result."""
 
-    def __init__(self, assets: AssetCache, picked: Callable[[int, bool], Awaitable[None]]) -> None:
-        self.assets, self.picked = assets, picked
+    def __init__(self, assets: AssetCache, told: Callable[[int, Standing], Awaitable[None]]) -> None:
+        self.assets, self.told = assets, told
         self.result: PageResult | None = None
         self.track: PageTrack | None = None
         self.scene: PageScene | None = None
@@ -213,12 +223,13 @@ class ScenePanel:
         detail = event.args
         if self.sides and isinstance(detail, dict) and isinstance(detail.get("row"), int):
             row = min(max(detail["row"], 0), len(self.sides[1].track) - 1)
-            await self.picked(matching_row(self.sides[1], self.sides[0], self.counted, row), False)
+            if detail.get("why") == Standing.CLICKED:
+                await self.told(matching_row(self.sides[1], self.sides[0], self.counted, row), Standing.CLICKED)
 
     async def _moved(self, event: Any) -> None:
         detail = event.args
-        if isinstance(detail, dict) and isinstance(detail.get("row"), int):
-            await self.picked(detail["row"], bool(detail.get("playing")))
+        if isinstance(detail, dict) and isinstance(detail.get("row"), int) and detail.get("why") in set(Standing):
+            await self.told(detail["row"], Standing(detail["why"]))
 
     async def _recoloured(self, views: int = 2) -> None:
         """Colour the path by the column that is chosen, in the first views."""
