@@ -95,20 +95,21 @@ class Stored(Mapping[str, NDArray[Any]]):
     def __len__(self) -> int:
         return len(self.names)
 
-    def chunks(self) -> Iterator[dict[str, NDArray[Any]]]:
-        """All columns, chunk after chunk."""
+    def chunks(self, names: Sequence[str] | None = None) -> Iterator[dict[str, NDArray[Any]]]:
+        """Columns, chunk after chunk; None: all."""
         for (file, count), held in zip(self.files, self.held, strict=True):
-            yield _read(file, self.names, count, held)
+            yield _read(file, self.names if names is None else names, count, held)
 
 
-def in_rows(columns: Arrays, size: int) -> Iterator[dict[str, NDArray[Any]]]:
-    """Columns, ``size`` rows at a time and the rest.
+def in_rows(columns: Arrays, size: int, names: Sequence[str] | None = None) -> Iterator[dict[str, NDArray[Any]]]:
+    """Columns, ``size`` rows at a time and the rest; ``names``: those that are asked for, None: all.
 
     >>> [some["x"].tolist() for some in in_rows({"x": np.arange(5)}, 2)]
     [[0, 1], [2, 3], [4]]
     """
     held: dict[str, NDArray[Any]] = {}
-    for piece in columns.chunks() if isinstance(columns, Stored) else (columns,):
+    whole = {} if isinstance(columns, Stored) else {name: columns[name] for name in names or columns}
+    for piece in columns.chunks(names) if isinstance(columns, Stored) else (whole,):
         held = {k: np.concatenate([held[k], v]) if held else v for k, v in piece.items()}
         count = len(next(iter(held.values())))
         for at in range(0, count - size + 1, size):
@@ -403,5 +404,6 @@ def _hash(file: Path) -> str:
 
 def _read(file: Path, names: Sequence[str], count: int, held: frozenset[str]) -> dict[str, NDArray[Any]]:
     """Some columns of a file of ``count`` rows that holds the columns ``held``."""
-    table = pq.read_table(file, columns=[name for name in names if name in held], use_threads=False)
+    with pq.ParquetFile(file) as open_file:
+        table = open_file.read(columns=[name for name in names if name in held], use_threads=False)
     return {name: np.asarray(table.column(name).to_numpy()) if name in held else np.zeros(count) for name in names}
