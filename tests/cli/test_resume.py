@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
+import trimesh
 
 from cli.test_simulate import JOB
 
@@ -133,6 +134,29 @@ def test_a_run_with_modes_that_was_killed_goes_on_to_the_same_bytes(folder: Path
     change = ("--set", "dynamics.mode.0.stiffness_n_um=7.0")
     other = ended(start(folder, "other-modes", *change, file="modes.toml"))
     assert other.stderr == "chipload: begins again: what was kept is of another input\n"
+
+
+def test_a_run_that_was_killed_reads_what_it_had_found_of_the_part(folder: Path) -> None:
+    """The distances to the part are found before the removal: the run that goes on begins with neither."""
+    trimesh.creation.box(bounds=[[0.0, -15.0, -5.0], [50.0, 15.0, -1.5]]).export(folder / "part.stl")
+    part = '[part]\nfile = "part.stl"\nunits = "mm"\nspacing_mm = 1.0\n'
+    job = (
+        (folder / "job.toml")
+        .read_text()
+        .replace("step_mm = 0.2", "step_mm = 0.5")
+        .replace("[material]", part + "[material]")
+    )
+    (folder / "part.toml").write_text(job)
+    known = ended(start(folder, "part", file="part.toml"))
+    assert known.returncode in (0, 3), known.stderr
+    assert stop(folder, "killed-part", signal.SIGKILL, file="part.toml").returncode == -signal.SIGKILL
+    assert (folder / "killed-part.unfinished" / "pass-part.npz").exists()
+    again = ended(start(folder, "killed-part", file="part.toml"))
+    assert again.returncode == known.returncode
+    said = [text.split(", kept in ")[0] for text in again.stderr.splitlines()]
+    assert said[0].startswith("chipload: the pass 'part' continues after step ")
+    assert said[1].startswith("chipload: continues after step ")
+    same(folder, "killed-part", "part")
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGHUP])

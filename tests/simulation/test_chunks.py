@@ -253,6 +253,8 @@ def test_rows_of_uneven_pieces(tmp_path: Path) -> None:
             late = {"late": first + np.arange(count) + 0.5} if first else {}
             kept.add({"line": first + np.arange(count), "rapid": np.arange(count) == 1, **late})
         some = list(in_rows(kept.columns(), 4))
+        few = [{k: v.tolist() for k, v in part.items()} for part in in_rows(kept.columns(), 4, ("late",))]
+    assert few == [{"late": s["late"].tolist()} for s in some]
     assert [s["line"].tolist() for s in some] == [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9]]
     assert [s["late"].tolist() for s in some] == [[0.0, 0.0, 0.0, 3.5], [4.5, 5.5, 6.5, 7.5], [8.5, 9.5]]
     assert [s["rapid"].dtype for s in some] == [np.bool_] * 3

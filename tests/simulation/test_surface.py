@@ -13,6 +13,8 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
+from chipload.simulation.checkpoint import Checkpoint
+from chipload.simulation.kept_pass import KeptPasses
 from chipload.simulation.steps import StepBlocks, steps_of
 from chipload.simulation.surface import collisions, difference, fine, in_stock
 
@@ -104,19 +106,26 @@ def test_a_holder_in_the_stock(depth, hits):
         assert found[0].depth_mm == pytest.approx(2.0, abs=0.1)
 
 
-def test_blocks_of_steps_find_what_all_steps_find():
-    """A program that cuts too deep, runs its holder into a fixture and the stock; two tools; cut into blocks of 5."""
+def two_tools():
+    """A program that cuts too deep, runs its holder into a fixture and the stock; two tools; the part, points of a
+    fixture and of the stock.
+    """
     holder = ((40.0, 40.0),)
     cutters = {1: replace(BALL, holder=holder), 2: Cutter(6.0, 2, 0.5, 20.0, 30.0, 6e5, holder=holder)}
     path = [[-6, 2, 4], [-6, 2, -1], [16, 2, -1], [16, 6, -25], [-6, 6, -25], [-6, 4, -33], [16, 4, -33]]
     moves = [rapid(path[0], 800, 1, "way"), *(plunge(p, 10.0, 800.0, 1 + k // 4, "cut") for k, p in enumerate(path))]
     lines = [replace(m, line=np.full(1, k)) for k, m in enumerate(moves)]
-    program = Program.join(lines)
-    whole, blocks = steps_of(program, 2.0, 0.001), StepBlocks(program, 2.0, 0.001, size=5)
     part, fixture = box([0, 0, -40], [10, 8, 0]), fine(box([4, 12, -10], [8, 20, 0]), 0.5, "fixture")[0]
     grid = np.stack(np.meshgrid(*(np.arange(a, b, 2.0) for a, b in ((-30, 30), (-30, 30), (-40, 1)))), -1).reshape(
         -1, 3
     )
+    return Program.join(lines), cutters, part, fixture, grid
+
+
+def test_blocks_of_steps_find_what_all_steps_find():
+    """In blocks of 5 steps."""
+    program, cutters, part, fixture, grid = two_tools()
+    whole, blocks = steps_of(program, 2.0, 0.001), StepBlocks(program, 2.0, 0.001, size=5)
     one, two = (difference(s, cutters, part, everywhere, 1.0, 1.0, 1e-2) for s in (whole, blocks))
     for name in ("distance", "step", "deepest"):
         assert np.array_equal(getattr(one, name), getattr(two, name)), name
@@ -130,3 +139,79 @@ def test_blocks_of_steps_find_what_all_steps_find():
     assert len(sunk[0]) > 1
     for c in (*touched[0], *sunk[0]):
         assert (int(whole.line[c.step]), whole.p1[c.step].tolist()) == (c.line, list(c.at))
+
+
+class Stopped(Exception):
+    """The run is stopped."""
+
+
+def stopping(after):
+    """Progress that stops the pass where so many steps are done."""
+
+    def tell(done):
+        if done >= after:
+            raise Stopped
+
+    return tell
+
+
+def test_passes_that_were_stopped_go_on_and_find_the_same(tmp_path):
+    """Stopped twice, each pass takes the steps that it had not taken and finds what it finds without a stop."""
+    program, cutters, part, fixture, grid = two_tools()
+    blocks = StepBlocks(program, 2.0, 0.001, size=5)
+    solids = {"fixture": fixture, "part": part.vertices}
+    passes = {
+        "part": lambda **more: difference(blocks, cutters, part, everywhere, 1.0, 1.0, 1e-2, **more),
+        "collisions": lambda **more: collisions(blocks, cutters, solids, 0.01, **more),
+        "stock": lambda **more: in_stock(blocks, cutters, grid, 0.05, **more),
+    }
+    told = []
+    for name, go in passes.items():
+        alone, taken = go(), []
+        for after in (20, 40):
+            with Checkpoint(tmp_path / "u", 0.0, notice=told.append) as kept, pytest.raises(Stopped):
+                go(kept=KeptPasses(kept, "key"), progress=stopping(after))
+            assert kept.what_is_kept() == f"{after} steps of a pass are kept"
+        with Checkpoint(tmp_path / "u", 0.0, notice=told.append) as kept:
+            found = go(kept=KeptPasses(kept, "key"), progress=taken.append)
+        assert taken[0] == 40
+        # what was finished is not gone through again, what is of another input is
+        taken.clear()
+        with Checkpoint(tmp_path / "u", 0.0, notice=told.append) as kept:
+            again = go(kept=KeptPasses(kept, "key"), progress=taken.append)
+            assert taken == []
+            other = go(kept=KeptPasses(kept, "other"), progress=taken.append)
+        assert taken[0] == 0
+        for each in (found, again, other):
+            if name == "part":
+                for column in ("distance", "step", "deepest", "over"):
+                    assert np.array_equal(getattr(each, column), getattr(alone, column)), column
+            else:
+                assert each == alone
+    assert told[:2] == [f"the pass 'part' continues after step {k}, kept in {tmp_path / 'u'}" for k in (20, 40)]
+    assert [t.split("'")[1] for t in told] == ["part"] * 3 + ["collisions"] * 3 + ["stock"] * 3
+
+
+def test_a_pass_that_cannot_be_read_begins_again_and_is_set_aside(tmp_path):
+    program, cutters, part, _, _ = two_tools()
+    blocks = StepBlocks(program, 2.0, 0.001, size=5)
+    told, taken = [], []
+    with Checkpoint(tmp_path / "u", 0.0) as kept:
+        alone = difference(blocks, cutters, part, everywhere, 1.0, 1.0, 1e-2, kept=KeptPasses(kept, "key"))
+    file = tmp_path / "u" / "pass-part.npz"
+    file.write_bytes(file.read_bytes()[:-100])
+    with Checkpoint(tmp_path / "u", 0.0, notice=told.append) as kept:
+        found = difference(
+            blocks, cutters, part, everywhere, 1.0, 1.0, 1e-2, taken.append, KeptPasses(kept, "key")
+        )  # fmt: skip
+    assert taken[0] == 0
+    assert np.array_equal(found.distance, alone.distance)
+    assert told == [
+        f"begins again: pass-part.npz cannot be read: what was kept is set aside in {tmp_path / 'u.damaged-1'}"
+    ]
+    assert [p.name for p in (tmp_path / "u.damaged-1").iterdir()] == ["pass-part.npz"]
+    # a run that is to begin again does not read it
+    taken.clear()
+    with Checkpoint(tmp_path / "u", 0.0, fresh=True) as kept:
+        difference(blocks, cutters, part, everywhere, 1.0, 1.0, 1e-2, taken.append, KeptPasses(kept, "key"))
+    assert taken[0] == 0

@@ -76,10 +76,10 @@ def run(
                         done.result, done.presentation, out, lambda part, what: progress(0.8 + 0.2 * part, what)
                     )
             except (KeyboardInterrupt, Cancelled):
-                if not kept.safe:
+                if not kept.what_is_kept():
                     raise
                 raise Cancelled(
-                    f"{kept.safe} steps are kept in {kept.folder.name}: the same command continues from there, with "
+                    f"{kept.what_is_kept()} in {kept.folder.name}: the same command continues from there, with "
                     "--fresh it begins again"
                 ) from None
             kept.discard()

@@ -100,6 +100,8 @@ EVEN, IDLE = 3, 2
 MISSED, UNLIKE, PARTS = 3, 0.1, 16
 #: rows of columns that are read at once
 ROWS = 65_536
+#: columns of the energy balance
+BALANCED = ("tool", "rapid", "chip_volume_mm3", "engaged_volume_mm3", "cutting_work_j")
 
 
 def energy_balance(columns: Columns, ktc: float) -> dict[int, float]:
@@ -118,7 +120,7 @@ def energy_balance(columns: Columns, ktc: float) -> dict[int, float]:
     0.05
     """
     totals: dict[int, Floats] = {}
-    for part in in_rows(columns, ROWS):
+    for part in in_rows(columns, ROWS, BALANCED):
         lost = np.where(part["rapid"], 0.0, part["chip_volume_mm3"])
         engaged, work = part["engaged_volume_mm3"], 1000.0 * part["cutting_work_j"]
         has = engaged > 0.0

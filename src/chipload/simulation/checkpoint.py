@@ -3,7 +3,7 @@
 Notation: a piece is the columns of steps that follow one another, in one Parquet file; the state is all that goes on
 from one step to the next, after the last step of the last piece, in some files. ``last.json`` names the pieces and the
 state that belong together and is replaced at one moment: whatever else lies there is of a piece that was not finished,
-and is written again.
+and is written again. Passes beside the removal keep one file each (:mod:`chipload.simulation.kept_pass`).
 
 The key stands for all that the result depends on. What was kept under another key is of another run: it is thrown away.
 What cannot be read is set aside in a folder beside it, never removed.
@@ -38,6 +38,8 @@ if sys.platform != "win32":
 EVERY_S = 10.0
 KIND = "chipload unfinished simulation 1"
 LAST, LOCK = "last.json", "lock"
+#: files of passes over the steps begin so: they have keys of their own
+PASS = "pass-"
 #: columns that are kept in memory after they were read
 KEPT = 12
 
@@ -93,20 +95,21 @@ class Stored(Mapping[str, NDArray[Any]]):
     def __len__(self) -> int:
         return len(self.names)
 
-    def chunks(self) -> Iterator[dict[str, NDArray[Any]]]:
-        """All columns, chunk after chunk."""
+    def chunks(self, names: Sequence[str] | None = None) -> Iterator[dict[str, NDArray[Any]]]:
+        """Columns, chunk after chunk; None: all."""
         for (file, count), held in zip(self.files, self.held, strict=True):
-            yield _read(file, self.names, count, held)
+            yield _read(file, self.names if names is None else names, count, held)
 
 
-def in_rows(columns: Arrays, size: int) -> Iterator[dict[str, NDArray[Any]]]:
-    """Columns, ``size`` rows at a time and the rest.
+def in_rows(columns: Arrays, size: int, names: Sequence[str] | None = None) -> Iterator[dict[str, NDArray[Any]]]:
+    """Columns, ``size`` rows at a time and the rest; ``names``: those that are asked for, None: all.
 
     >>> [some["x"].tolist() for some in in_rows({"x": np.arange(5)}, 2)]
     [[0, 1], [2, 3], [4]]
     """
     held: dict[str, NDArray[Any]] = {}
-    for piece in columns.chunks() if isinstance(columns, Stored) else (columns,):
+    whole = {} if isinstance(columns, Stored) else {name: columns[name] for name in names or columns}
+    for piece in columns.chunks(names) if isinstance(columns, Stored) else (whole,):
         held = {k: np.concatenate([held[k], v]) if held else v for k, v in piece.items()}
         count = len(next(iter(held.values())))
         for at in range(0, count - size + 1, size):
@@ -149,6 +152,7 @@ class Checkpoint:
             raise InputError(f"{folder}: every_s = {every_s:g}: must be at least 0 s")
         self.folder, self.every_s, self.fresh, self.notice = folder, every_s, fresh, notice
         self.key, self.parts, self.number, self.safe = "", list[StoredChunk](), 0, 0
+        self.passes = dict[str, int]()
         self._lock: int | None = None
         if folder.exists():
             require_ours(folder)
@@ -158,7 +162,7 @@ class Checkpoint:
         return self
 
     def __exit__(self, _kind: object, error: object, _trace: object) -> None:
-        if isinstance(error, InputError) and self.key:
+        if isinstance(error, InputError) and (self.key or (self.passes and not (self.folder / LAST).exists())):
             self.discard()
         self.close()
 
@@ -181,7 +185,7 @@ class Checkpoint:
                     return None
             if state is not None:
                 return state
-            if any(file.name != LOCK for file in self.folder.iterdir()):
+            if any(_of_run(file) for file in self.folder.iterdir()):
                 self.notice(f"begins again: {'it was asked to' if self.fresh else 'what was kept is of another input'}")
             self._clear()
         return None
@@ -200,19 +204,41 @@ class Checkpoint:
         self.parts, self.number, self.safe = parts, len(parts), sum(part.steps for part in parts)
         return {name: self.folder / part.file for name, part in state.items()}
 
-    def set_aside(self, what: str) -> None:
-        """Keep what cannot be read in a folder beside this one, and begin again; ``what`` is the file at fault."""
+    def kept_pass(self, name: str) -> Path | None:
+        """The file of a pass over the steps; None: nothing is kept of it."""
+        file = self.folder / f"{PASS}{name}.npz"
+        if self.fresh and name not in self.passes and self._lock is not None:
+            file.unlink(missing_ok=True)
+        return file if file.exists() else None
+
+    def keep_pass(self, name: str, data: bytes, steps: int) -> None:
+        """Write what a pass has found in so many steps."""
+        self._make()
+        write_whole(self.folder / f"{PASS}{name}.npz", data)
+        self.passes[name] = steps
+
+    def what_is_kept(self) -> str:
+        """What the run goes on from, as it is told to the user; empty: nothing."""
+        if self.safe:
+            return f"{self.safe} steps are kept"
+        return f"{max(self.passes.values())} steps of a pass are kept" if self.passes else ""
+
+    def set_aside(self, what: str, only: Path | None = None) -> None:
+        """Keep what cannot be read in a folder beside this one, and begin again; ``what`` is the file at fault,
+        ``only`` the file of a pass that is set aside alone.
+        """
         number = 1
         while (aside := self.folder.with_name(f"{self.folder.name}.damaged-{number}")).exists():
             number += 1
         try:
             aside.mkdir()
-            for file in list(self.folder.iterdir()):
-                if file.name != LOCK:
+            for file in list(self.folder.iterdir()) if only is None else [only]:
+                if only is not None or _of_run(file):
                     file.rename(aside / file.name)
         except OSError as err:
             raise cannot_write(aside, err) from None
-        self.parts, self.number, self.safe = [], 0, 0
+        if only is None:
+            self.parts, self.number, self.safe = [], 0, 0
         self.notice(f"begins again: {what} cannot be read: what was kept is set aside in {aside}")
 
     def add(self, columns: Arrays) -> None:
@@ -232,7 +258,8 @@ class Checkpoint:
         parts = {"parts": [asdict(p) for p in self.parts], "state": {name: asdict(p) for name, p in made.items()}}
         write_whole(self.folder / LAST, (json.dumps({"kind": KIND, "key": self.key, **parts}) + "\n").encode())
         for old in set(self.folder.glob("*.npz")) - {self.folder / part.file for part in made.values()}:
-            old.unlink()
+            if _of_run(old):
+                old.unlink()
         self.safe = sum(part.steps for part in self.parts)
 
     def again(self, why: str) -> None:
@@ -290,8 +317,13 @@ class Checkpoint:
 
     def _clear(self) -> None:
         for file in self.folder.iterdir():
-            if file.name != LOCK:
+            if _of_run(file):
                 file.unlink()
+
+
+def _of_run(file: Path) -> bool:
+    """Whether a file of the folder belongs to the state of the removal: it is no lock and of no pass."""
+    return file.name != LOCK and not file.name.startswith(PASS)
 
 
 def is_ours(folder: Path) -> bool:
@@ -372,5 +404,6 @@ def _hash(file: Path) -> str:
 
 def _read(file: Path, names: Sequence[str], count: int, held: frozenset[str]) -> dict[str, NDArray[Any]]:
     """Some columns of a file of ``count`` rows that holds the columns ``held``."""
-    table = pq.read_table(file, columns=[name for name in names if name in held], use_threads=False)
+    with pq.ParquetFile(file) as open_file:
+        table = open_file.read(columns=[name for name in names if name in held], use_threads=False)
     return {name: np.asarray(table.column(name).to_numpy()) if name in held else np.zeros(count) for name in names}

@@ -391,7 +391,7 @@ def _removed(
     """(n, 4) volume, pieces and layers of each chip, contact of the shank; what the teeth cut; the chip of most pieces
     so far.
     """
-    thickness, tolerance, best = stock.thickness, setting.resolution.tolerance, sums.piece
+    thickness, tolerance, best = stock.thickness.tolist(), setting.resolution.tolerance, sums.piece
     rank = _rank(best.chips) if best is not None else (0, 0.0)
     removed = np.zeros((len(steps), 4))
     cutting: list[tuple[int, Move, Section]] = []
@@ -413,20 +413,20 @@ def _removed(
             there = Section(*stock.edges(layers, low, high))
             tidied = stock.tidied
             taken = stock.remove_many([i for i, _ in met], [shape for _, shape in met], 0.5 * tolerance)
-            removed[k, 0] = tidied - stock.tidied
+            volume, most, lost = tidied - stock.tidied, 0, 0
             for i, pieces, area, whole in _chips(met, taken, tolerance):
-                removed[k, [0, 2]] += (area * thickness[i], 1.0)
-                removed[k, 1] = max(removed[k, 1], len(whole))
+                volume, lost, most = volume + area * thickness[i], lost + 1, max(most, len(whole))
                 if whole and rank < (len(whole), 1.0 / len(whole)) and _rank(whole) > rank:
                     rank = _rank(whole)
                     near = polygons(stock.section(i).union(MultiPolygon(pieces)).intersection(box(*low, *high)))
                     cutter, z = setting.cutters[int(steps.tool[k])], float(stock.heights[i])
                     best = ChipAreas(sums.steps + k, swept.move, cutter, z, MultiPolygon(near), tuple(whole))
-            if removed[k, 1] > 0.0:
+            removed[k, :3] = volume, most, lost
+            if most:
                 cutter = setting.cutters[int(steps.tool[k])]
                 removed[k, 3] = axial_overrun(stock, cutter, steps.p1[k], steps.a1[k], FILM * tolerance)
             # what is thinner than the tolerance can tell is no cut
-            if removed[k, 1] > 0.0 and not steps.rapid[k]:
+            if most and not steps.rapid[k]:
                 cutting.append((k, swept.move, there))
             if len(cutting) == TOGETHER:
                 waiting.append(beside.submit(engaged, cutting))
@@ -447,13 +447,13 @@ def _chips(
     """Of each layer that lost something: its number, the pieces, their area, those that are more than films."""
     flat = [p for pieces in taken for p in pieces]
     area = shapely.area(flat)
-    film = 2.0 * area <= FILM * tolerance * shapely.length(flat)
+    film = (2.0 * area <= FILM * tolerance * shapely.length(flat)).tolist()
     at = 0
     for (i, _), pieces in zip(met, taken, strict=True):
         if pieces:
             a, b = at, at + len(pieces)
-            whole = [p for p, thin in zip(pieces, film[a:b].tolist(), strict=True) if not thin]
-            yield i, pieces, float(area[a:b].sum()), whole
+            whole = [p for p, thin in zip(pieces, film[a:b], strict=True) if not thin]
+            yield i, pieces, float(area[a] if b - a == 1 else area[a:b].sum()), whole
             at = b
 
 

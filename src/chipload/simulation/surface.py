@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -20,11 +21,14 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.simulation.clearance.body import above_cutting, cutting_part
 from chipload.simulation.clearance.clearance import NEVER, LeastDistance
+from chipload.simulation.kept_pass import KeptPasses
 from chipload.simulation.steps import Steps, blocks_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+#: a pass that keeps nothing
+ALONE = KeptPasses()
 #: what lies so many tolerances over a point of the part is over it
 OVER = 4.0
 ABOVE = "shank or holder"
@@ -107,6 +111,7 @@ def difference(
     search_range: float,
     tolerance: float,
     progress: Callable[[int], None] = lambda done: None,
+    kept: KeptPasses = ALONE,
 ) -> Difference:
     """What the program leaves on the part; O(places of the tool x points around it).
 
@@ -116,13 +121,22 @@ def difference(
     in_stock : which points (p, 3) lay in the stock before the program
     spacing, search_range, tolerance : [mm], of the points; how far material is looked for; of the path
     progress : is told how many steps are done
+    kept : where the pass keeps what it has found, and goes on from
     """
     points, faces = fine(part, spacing, "part")
     normals = np.asarray(trimesh.Trimesh(points, faces, process=False).vertex_normals)
     over = in_stock(points + OVER * tolerance * normals)
     near = LeastDistance({n: cutting_part(c) for n, c in cutters.items()}, points, search_range, tolerance)
     deepest = [np.empty(0)]
-    for block in blocks_of(steps):
+
+    def restore(state: Mapping[str, NDArray[Any]]) -> None:
+        near.restore(state)
+        deepest[:] = [state["deepest"]]
+
+    def state() -> dict[str, NDArray[Any]]:
+        return {**near.state(), "deepest": np.concatenate(deepest)}
+
+    for block in kept.blocks("part", steps, (points, search_range, tolerance), state, restore):
         progress(near.done)
         deepest.append(near.take(block))
     return Difference(points, faces, near.distance, near.step, np.concatenate(deepest), search_range, over)
@@ -136,6 +150,7 @@ def collisions(
     *,
     above_only: frozenset[str] = frozenset(),
     progress: Callable[[int], None] = lambda done: None,
+    kept: KeptPasses = ALONE,
 ) -> tuple[Collision, ...]:
     """Where shank and holder, and the cutting part too, come into solids; one entry for each line, tool part and solid.
 
@@ -146,6 +161,7 @@ def collisions(
     tolerance : what is less deep [mm] is none
     above_only : names of solids that the cutting part may touch, as the part
     progress : is told how many steps are done
+    kept : where the pass keeps what it has found, and goes on from
     """
     held: list[tuple[str, str, LeastDistance, dict[int, Collision]]] = []
     for name, points in solids.items():
@@ -153,7 +169,26 @@ def collisions(
             if what == ABOVE or name not in above_only:
                 bodies = {n: body(c) for n, c in cutters.items()}
                 held.append((what, name, LeastDistance(bodies, points, tolerance, tolerance), {}))
-    for block in blocks_of(steps) if held else ():
+
+    def state() -> dict[str, NDArray[Any]]:
+        out = dict[str, NDArray[Any]]()
+        for i, (_, _, near, best) in enumerate(held):
+            numbers = np.array([(c.step, c.line) for c in best.values()], dtype=np.int64).reshape(-1, 2)
+            places = np.array([(c.depth_mm, *c.at) for c in best.values()], dtype=np.float64).reshape(-1, 4)
+            own = {**near.state(), "numbers": numbers, "places": places}
+            out |= {f"{k}_{i}": v for k, v in own.items()}
+        return out
+
+    def restore(found: Mapping[str, NDArray[Any]]) -> None:
+        for i, (what, name, near, best) in enumerate(held):
+            near.restore({k: found[f"{k}_{i}"] for k in near.state()})
+            for (step, line), (depth, *at) in zip(
+                found[f"numbers_{i}"].tolist(), found[f"places_{i}"].tolist(), strict=True
+            ):
+                best[line] = Collision(what, name, depth, step, line, (at[0], at[1], at[2]))
+
+    depends = (dict(solids), sorted(above_only), tolerance)
+    for block in kept.blocks("collisions", steps, depends, state, restore) if held else ():
         progress(held[0][2].done)
         for what, name, near, best in held:
             first = near.done
@@ -167,6 +202,7 @@ def in_stock(
     points: Floats,
     tolerance: float,
     progress: Callable[[int], None] = lambda done: None,
+    kept: KeptPasses = ALONE,
 ) -> tuple[Collision, ...]:
     """Where shank and holder come into what is still there of the stock.
 
@@ -178,6 +214,7 @@ def in_stock(
     steps : all, or block after block; gone through twice
     points : (p, 3) float [mm] of a grid in the stock
     progress : is told how many steps are done
+    kept : where the pass keeps what it has found, and goes on from
 
     A tool that is a body without chips takes the points away at a feed, and runs into them in rapids.
     """
@@ -186,7 +223,16 @@ def in_stock(
     hits = {ABOVE: LeastDistance({n: above_cutting(c) for n, c in cutters.items()}, points, tolerance, tolerance)}
     if bodies:
         hits["cutting part in a rapid"] = LeastDistance(parts, points, tolerance, tolerance)
-    for block in blocks_of(steps):
+    every = [cut, *hits.values()]
+
+    def state() -> dict[str, NDArray[Any]]:
+        return {f"{k}_{i}": v for i, near in enumerate(every) for k, v in near.state().items()}
+
+    def restore(found: Mapping[str, NDArray[Any]]) -> None:
+        for i, near in enumerate(every):
+            near.restore({k: found[f"{k}_{i}"] for k in near.state()})
+
+    for block in kept.blocks("stock", steps, (points, tolerance), state, restore):
         progress(cut.done)
         rapid = block.rapid & np.isin(block.tool, bodies)
         cut.take(block, ~rapid)

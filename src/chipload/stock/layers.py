@@ -10,7 +10,6 @@ Reference: [Chips2017] (the pile of layers).
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -396,17 +395,12 @@ class LayeredStock:
 
     def _take(self, turn: Ints, rows: Ints, given: Shapes, chips: list[list[Polygon]], tidy: float) -> None:
         """Remove the shapes numbered ``turn``, no two of one layer."""
-        xs, ys = self.xs.tolist(), self.ys.tolist()
-        which: list[tuple[int, int, int, int]] = []
-        for k, row, (x0, y0, x1, y1) in zip(
-            turn.tolist(), rows[turn].tolist(), shapely.bounds(given[turn]).reshape(-1, 4).tolist(), strict=True
-        ):
-            which += [(k, row, j, i) for j, i in itertools.product(span(ys, y0, y1), span(xs, x0, x1))]
+        k, row, j, i = self._met(turn, rows, given)
+        which = list(zip(k.tolist(), row.tolist(), j.tolist(), i.tolist(), strict=True))
         # layers that were cut alike so far share their tiles, and what is alike is cut once
         seen: dict[tuple[int, int], int] = {}
         before, shape, same = [], [], []
-        for k, row, j, i in which:
-            tile, cutting = self.tiles[row, j, i], given[k]
+        for tile, cutting in zip(self.tiles[row, j, i].tolist(), given[k].tolist(), strict=True):
             key = (id(tile), id(cutting))
             if key not in seen:
                 seen[key] = len(seen)
@@ -424,22 +418,36 @@ class LayeredStock:
         hit = [n for n, found in enumerate(pieces) if found]
         left = dict(zip(hit, areas_alone(shapely.difference(old[hit], new[hit])).tolist(), strict=True))
         cut = [(at, n) for at, n in zip(which, same, strict=True) if n in left]
-        for (_, row, j, i), n in cut:
-            self.tiles[row, j, i] = left[n]
-            self.cut[row] = True
-        if tidy > 0.0 and cut:
+        if cut:
             row, j, i = np.array([at[1:] for at, _ in cut], dtype=np.int64).T
-            self._tidy(row, j, i, tidy)
+            self.tiles[row, j, i] = [left[n] for _, n in cut]
+            self.cut[row] = True
+            if tidy > 0.0:
+                self._tidy(row, j, i, tidy)
         groups: dict[int, list[int]] = {}
-        for (k, *_), n in cut:
-            groups.setdefault(k, []).append(n)
+        for (at, *_), n in cut:
+            groups.setdefault(at, []).append(n)
         joined: dict[tuple[int, ...], list[Polygon]] = {}
-        for k, several in groups.items():
+        for at, several in groups.items():
             alike = tuple(several)
             if alike not in joined:
                 flat = [p for n in several for p in pieces[n]]
                 joined[alike] = flat if len(several) == 1 else polygons(shapely.union_all(flat))
-            chips[k] = list(joined[alike])
+            chips[at] = list(joined[alike])
+
+    def _met(self, turn: Ints, rows: Ints, given: Shapes) -> tuple[Ints, Ints, Ints, Ints]:
+        """Tiles under the boxes of the shapes numbered ``turn``: of each the shape, the layer, row and column."""
+        x0, y0, x1, y1 = shapely.bounds(given[turn]).reshape(-1, 4).T
+        i0, j0 = (np.maximum(np.searchsorted(b, low, "right") - 1, 0) for b, low in ((self.xs, x0), (self.ys, y0)))
+        i1, j1 = (
+            np.minimum(np.searchsorted(b, high, "left"), len(b) - 1) for b, high in ((self.xs, x1), (self.ys, y1))
+        )
+        some = (x1 > x0) & (y1 > y0)
+        wide, tall = (np.where(some, np.maximum(b - a, 0), 0) for a, b in ((i0, i1), (j0, j1)))
+        count = wide * tall
+        of = np.repeat(np.arange(len(turn)), count)
+        at = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
+        return turn[of], rows[turn][of], j0[of] + at // wide[of], i0[of] + at % wide[of]
 
     def _tidy(self, layer: Ints, j: Ints, i: Ints, tidy: float) -> None:
         """Leave vertices out of tiles that have twice as many as when they were last tidied."""

@@ -44,7 +44,8 @@ def areas_alone(shapes: Shapes) -> Shapes:
     [6]
     """
     out: Shapes = np.array(shapes, dtype=object)
-    for at in np.flatnonzero(~np.isin(shapely.get_type_id(out), (POLYGON, MULTIPOLYGON))).tolist():
+    kind = shapely.get_type_id(out)
+    for at in np.flatnonzero((kind != POLYGON) & (kind != MULTIPOLYGON)).tolist():
         out[at] = MultiPolygon(polygons(out[at]))
     return out
 

@@ -28,14 +28,16 @@ from chipload.jobs.simulation.workpiece_compliance import (
     workpiece_compliance,
 )
 from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.program.program import Program
 from chipload.program.read import ProgramReading, line_times, read_program, read_tools
 from chipload.program.setup import Setup
 from chipload.progress import Progress, silent
-from chipload.simulation.checkpoint import Checkpoint
+from chipload.simulation.checkpoint import Checkpoint, digest
 from chipload.simulation.chips import remove
 from chipload.simulation.chunks import remove_in_chunks
 from chipload.simulation.engagement_samples import EngagementRecorder
 from chipload.simulation.estimate import estimate
+from chipload.simulation.kept_pass import KeptPasses
 from chipload.simulation.loads import Cuts
 from chipload.simulation.steps import StepBlocks
 from chipload.simulation.surface import collisions, difference, in_stock
@@ -146,12 +148,13 @@ def simulated(
     def passing(share: float, what: str) -> Callable[[int], None]:
         return lambda done: progress(share + SHARE * done / bodies.steps, what)
 
+    kept = KeptPasses(checkpoint, passes_key(job, bodies.program) if checkpoint is not None else "")
     left, solids = None, dict(bodies.fixtures)
     table = job.table.part
     if part is not None and table is not None:
         left = difference(
             steps, job.cutters, part, before, table.spacing_mm, table.excess_range_mm, op.tolerance_mm,
-            passing(0.0, "distances to the part"),
+            passing(0.0, "distances to the part"), kept,
         )  # fmt: skip
         solids["part"] = left.points
     # form error costs as much as the chips, and says little where nothing is known to give way
@@ -195,11 +198,11 @@ def simulated(
         removal = with_columns(removal, stability_watch.columns)
     touched = collisions(
         steps, job.cutters, solids, op.tolerance_mm, above_only=frozenset(["part"]),
-        progress=passing(0.8 + SHARE, "collisions"),
+        progress=passing(0.8 + SHARE, "collisions"), kept=kept,
     )  # fmt: skip
     if points is not None:
         touched += in_stock(
-            steps, job.cutters, points, op.tolerance_mm, passing(0.8 + 2.0 * SHARE, "holders in the stock")
+            steps, job.cutters, points, op.tolerance_mm, passing(0.8 + 2.0 * SHARE, "holders in the stock"), kept
         )  # fmt: skip
     settings = {k: v for k, v in op.model_dump().items() if v is not None}
     compared_with = (*solids, *(["stock"] if points is not None else []))
@@ -208,6 +211,12 @@ def simulated(
         CollisionCheck(touched, compared_with, _no_holder(job), fixture_meshes(job)), left, gives.unknown,
         None if stability_watch is None else stability_of(job, stability_watch, machine), compliance, blank,
     )  # fmt: skip
+
+
+def passes_key(job: ProgramJob, program: Program) -> str:
+    """A hash of what every pass over the steps of a program depends on."""
+    op: SimulateTable = job.table.operation[0]
+    return digest(program, job.cutters, op.step_mm, op.tolerance_mm, versions(), sources())
 
 
 def compliance_of_workpiece(

@@ -15,6 +15,7 @@ import math
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -99,6 +100,15 @@ class LeastDistance:
                     self._lower(grid, steps, own[begin : begin + BLOCK], body, deepest)
         self.done += len(steps)
         return deepest
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """All that it keeps: ``distance``, ``step``, ``first`` (p,) and ``done`` (1,)."""
+        return {"distance": self.distance, "step": self.step, "first": self.first, "done": np.array([self.done])}
+
+    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Keep what :meth:`state` gave for the same points, in place of what it keeps."""
+        self.distance, self.step, self.first = (state[k].copy() for k in ("distance", "step", "first"))
+        self.done = int(state["done"][0])
 
     def _lower(self, grid: Grid, steps: Steps, own: Ints, body: Body, deepest: Floats) -> None:
         tips, axes, rows = _places(steps, own, body, self.tolerance)
