@@ -101,6 +101,10 @@ def _contradictions(table: ContourJobTable, cutters: Mapping[int, Cutter]) -> It
                 f"{at}.{key} = {depth:g}: must be at most the cutter's flute_length_mm = "
                 f"{cutter.flute_length:g}: take several depths or a longer cutter"
             )
+    if len(table.part.lines) % 2:
+        yield f"part.lines = {list(table.part.lines)}: must be a first and a last line for each height"
+    if table.part.lines and table.part.labels:
+        yield "part.lines and part.labels: stated twice: state one of them"
     if not table.limits.stated:
         names = ", ".join(ContourLimitsTable.model_fields)
         yield f"limits: none is stated, so nothing would be checked: state at least one of {names}"

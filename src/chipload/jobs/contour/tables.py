@@ -12,6 +12,7 @@ from chipload.jobs.tables import (
     ChecksTable,
     Count,
     Limits,
+    LineNumber,
     NotNegative,
     Number,
     Positive,
@@ -43,9 +44,16 @@ class PartTable(Table):
     stock_layers: tuple[Text, ...] = Field(
         (), description="layers of a drawing that hold the outline of the stock of a pocket; none: material everywhere"
     )
-    lines: tuple[Count, Count] | None = Field(
-        None,
-        description="first and last line of a program that make the wall; none: all that cuts below the stock's top",
+    lines: tuple[LineNumber, ...] = Field(
+        (),
+        description="first and last line of a program that make the wall, of each height in turn, from above; none: "
+        "all that cuts below the stock's top",
+    )
+    labels: tuple[Text, ...] = Field(
+        (),
+        max_length=2,
+        description="in place of lines: a text of the program (block number, comment) behind which the wall begins, at "
+        "each height anew, and one before which it ends; none: where the cut ends",
     )
     face_z_mm: Number | None = Field(None, description="height of the planar face of a STEP file")
 
