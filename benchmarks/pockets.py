@@ -311,7 +311,8 @@ def main() -> None:
     here = Path(__file__).resolve().parents[2] / "shared" / "data"
     data = Path(os.environ.get("CHIPLOAD_DATA", here)) / "cad" / "dxf_hsm_nibbler"
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="*", help=f"of {', '.join(POCKETS)}; all where none is given")
+    parser.add_argument("names", nargs="*", help=f"of {', '.join(POCKETS)}, or DXF files; all where none is given")
+    parser.add_argument("--radius", type=float, default=4.0, help="of the cutter where a file is given [mm]")
     parser.add_argument("--data", type=Path, default=data, help="folder with the drawings")
     parser.add_argument("--json", type=Path, help="write the results here too")
     parser.add_argument("--spacing", type=float, default=0.3, help="between two places that are asked, / R")
@@ -322,7 +323,7 @@ def main() -> None:
     parser.add_argument("--tolerance", type=float, default=0.1, help="of Adaptive, 0.1 being its own default")
     parser.add_argument("--timeout", type=float, default=120.0, help="of one run of FreeCAD [s]")
     asked = parser.parse_args()
-    unknown = [name for name in asked.names if name not in POCKETS]
+    unknown = [name for name in asked.names if name not in POCKETS and not Path(name).is_file()]
     if unknown:
         parser.error(f"{', '.join(unknown)}: must be of {', '.join(POCKETS)}")
     if not asked.data.is_dir():
@@ -332,10 +333,11 @@ def main() -> None:
         print("without FreeCAD (freecadcmd): the columns of Adaptive are empty", file=sys.stderr)
     clear_region(Region.of([Contour.polyline([[0, 0], [9, 0], [9, 9], [0, 9]], closed=True)]), 2.0, 0.6)  # compile
     results = {}
-    for name in asked.names or POCKETS:
-        radius = POCKETS[name]
+    for drawn in asked.names or POCKETS:
+        name, radius = Path(drawn).stem, POCKETS.get(drawn, asked.radius)
         try:
-            drawing = read_dxf(asked.data / f"{name}.dxf", units_if_unstated="mm")
+            file = asked.data / f"{drawn}.dxf" if drawn in POCKETS else Path(drawn)
+            drawing = read_dxf(file, units_if_unstated="mm")
             region = Region.of([c for c in drawing.contours if c.closed])
             found = {"pocket": planned_path(region, radius)}
             if not asked.no_trochoidal:

@@ -21,6 +21,7 @@ from chipload.geometry.dxf import read_dxf
 from chipload.geometry.step import read_step_face
 from chipload.jobs.checks import default_checks
 from chipload.jobs.contour.advice import greatest_engagement
+from chipload.jobs.contour.earlier_stock import read_stock, standing_between
 from chipload.jobs.contour.finish_program import (
     FinishProgram,
     finish_contours,
@@ -43,6 +44,7 @@ from chipload.program.check import check_program
 from chipload.progress import Progress, silent
 from chipload.result import Provenance, Verdict
 from chipload.simulation.verify import verify_contour
+from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 #: what the simulation may find and still call a program proved
@@ -68,6 +70,7 @@ class Inputs:
     top: float
     finish: tuple[FinishProgram, ...]
     levels: tuple[tuple[Contour, ...], ...]
+    standing: LayeredStock | None
     machine: Machine
     material: Material
     findings: tuple[Finding, ...]
@@ -116,7 +119,9 @@ def read_inputs(job: ContourJob) -> Inputs:
                 f"{job.path.name}: {at}.speed_rpm = {rpm:g}: machine {machine.name} turns from "
                 f"{low:g} to {high:g} rpm: state a speed between them"
             )
-    return Inputs(contours, stock, top, finish, levels, machine, material, findings)
+    file = job.table.stock.file
+    standing = None if file is None else read_stock(job.path.parent / file)
+    return Inputs(contours, stock, top, finish, levels, standing, machine, material, findings)
 
 
 def _cuts(job: ContourJob, inputs: Inputs) -> list[tuple[OperationTable, Inputs]]:
@@ -311,6 +316,14 @@ def _larger(job: ContourJob, op: OperationTable, planned: Sequence[OperationResu
     return LargerCutter(job.cutters[before.cutter].radius, left_on_walls(before), left)
 
 
+def _standing(job: ContourJob, inputs: Inputs, op: OperationTable) -> tuple[Contour, ...] | None:
+    """What stands in the depth of a pocket before it begins; None where no file says so."""
+    if inputs.standing is None:
+        return None
+    floor = inputs.top - (op.axial_depth_mm if op.depth_mm is None else op.depth_mm)
+    return standing_between(inputs.standing, floor, inputs.top, str(job.table.stock.file))
+
+
 def _floor_finish(op: OperationTable) -> FloorFinish | None:
     own = op.floor_finish
     return None if own is None else FloorFinish(mm_s_from_mm_min(own.feed_mm_min), rad_s_from_rpm(own.speed_rpm))
@@ -348,12 +361,14 @@ def _setting(
             around=op.side == "outside",
             holes=op.holes_mm or (),
             larger=_larger(job, op, planned),
+            standing=_standing(job, inputs, op),
             floor_allowance=op.floor_allowance_mm or 0.0,
             floor_finish=_floor_finish(op),
             wall_finish=_wall_finish(op),
             tabs=None if op.tabs is None else Tabs(op.tabs.at_mm, op.tabs.width_mm, op.tabs.height_mm),
             strategies=tuple(op.strategies or ("pocket",)),
             use=op.use or (op.strategies or ("pocket",))[0],
+            entry=op.entry or "helix",
         )
     forward = op.kind == "forward"
     strategies: tuple[str, ...] = ("forward",) if forward else tuple(op.strategies or ())
@@ -476,5 +491,6 @@ def _stock_outline(layers: Sequence[str], drawing: Drawing) -> tuple[tuple[Conto
 def _provenance(job: ContourJob, inputs: Inputs) -> Provenance:
     files: dict[str, Path] = {"part": job.part_file}
     files |= {k: v for k, v in (("machine", job.machine), ("material", job.material)) if isinstance(v, Path)}
+    files |= {} if job.table.stock.file is None else {"stock": job.path.parent / job.table.stock.file}
     files |= {f"cutter {k}": job.path.parent / c.file for k, c in enumerate(job.table.cutter) if c.file is not None}
     return provenance_of(files, job.overrides, inputs.machine, (inputs.material,))

@@ -62,6 +62,11 @@ class StockTable(Table):
     """What it is made from."""
 
     top_mm: Number = Field(description="z of the top of the stock")
+    file: Text | None = Field(
+        None,
+        description="stock.npz of an earlier result: pockets cut what stands in it; none: material everywhere, or as "
+        "part.stock_layers, holes_mm and rest_of say",
+    )
 
 
 class FloorFinishTable(Table):
@@ -135,6 +140,9 @@ class OperationTable(Table):
         None,
         description="engagement that a pocket keeps, instead of radial_depth_mm; limit: the greatest within all limits",
     )
+    entry: Literal["helix", "ramp"] | None = Field(
+        None, description="into the solid: a helical bore, or a ramp to and fro along a straight line; none: helix"
+    )
     depth_mm: Positive | None = Field(
         None, description="of the pocket, cut in equal levels of at most axial_depth_mm; none: one level"
     )
@@ -200,6 +208,7 @@ MAY: Mapping[str, tuple[str, ...]] = {
         "floor_finish",
         "wall_finish",
         "tabs",
+        "entry",
         "link_feed_mm_min",
         "link_lift_mm",
     ),
