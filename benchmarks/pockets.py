@@ -1,11 +1,12 @@
 """The pocket planner and FreeCAD's Adaptive on real pockets: engagement, time at one force, path, lifts, area.
 
     python benchmarks/pockets.py [names ...] [--data FOLDER] [--json FILE] [--spacing 0.3] [--no-freecad]
+                                 [--no-trochoidal] [--pictures FOLDER]
 
-Radial depth R / 5, so that the engagement wanted is acos(0.8) = 36.87 deg. Both paths are asked by the same checker,
-which knows neither planner: the trail of the centre, and the rim point by point, every ``spacing`` R of the cutting
-moves. Bores are taken out first and are no cutting moves. FreeCAD runs in its own process (``freecadcmd``); without it
-its columns are empty.
+Radial depth R / 5, so that the engagement wanted is acos(0.8) = 36.87 deg. All paths (passes, trochoidal, Adaptive) are
+asked by the same checker, which knows no planner: the trail of the centre, and the rim point by point, every
+``spacing`` R of the cutting moves. Bores are taken out first and are no cutting moves. FreeCAD runs in its own process
+(``freecadcmd``); without it its columns are empty.
 
 Machining time is that of the program on the shipped machine `vmc`, by the clock of the product, at the same greatest
 force: the planner's feed is 0.05 mm a tooth, that of Adaptive as much lower as its greatest engagement asks for to keep
@@ -25,6 +26,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from pocket_pictures import picture
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_along
@@ -86,6 +88,8 @@ FEED_PER_TOOTH, CUTTING_SPEED, TEETH = 0.05, 200e3 / 60.0, 3
 MATERIAL, MACHINE = material_named("al7075-t6"), machine_named("vmc")
 #: kinds of a path here: a bore, cutting, along cleared space, raised
 BORE, CUTTING, LINKING, RAISED = 0, 1, 2, 3
+#: planners in the order of the columns
+PLANNERS = ("pocket", "trochoidal", "adaptive")
 #: a rim that goes this much beyond what was wanted counts as over it [deg]
 OVER_DEG = 1.0
 
@@ -118,10 +122,10 @@ with open(os.path.join(folder, "path.json"), "w") as f:
 """
 
 
-def planned_path(region, radius):
+def planned_path(region, radius, trochoidal=False):
     """Rows (n, 8) of the planner's path, segments and kind, and its seconds of processor time."""
     begun = time.process_time()
-    path = clear_region(region, radius, math.acos(1.0 - DEPTH))
+    path = clear_region(region, radius, math.acos(1.0 - DEPTH), trochoidal=trochoidal)
     seconds = time.process_time() - begun
     kind = np.select([path.kind == ENTRY, path.kind == CUT, path.kind == LIFT], [BORE, CUTTING, RAISED], LINKING)
     return np.column_stack([path.segments, kind]), seconds
@@ -256,9 +260,9 @@ def measured(rows, seconds, reachable, radius, spacing, workers):
 
 
 def table(results, wanted):
-    """Markdown: a row a pocket."""
+    """Markdown: a row a pocket; then the medians of the drawings that both planners clear."""
     out = [
-        f"engagement wanted {wanted:.2f} deg; columns planner / Adaptive",
+        f"engagement wanted {wanted:.2f} deg; columns passes / trochoidal / Adaptive",
         "",
         "| pocket | R [mm] | greatest [deg] | over by 1 deg [%] | machining at one force [s] | cutting [m] | links [m] "
         "| lifts | G-code [kB] | reached [%] | planning [s] |",
@@ -278,31 +282,48 @@ def table(results, wanted):
         if "refused" in r:
             out.append(f"| {name} | {r['radius_mm']:g} | refused: {r['refused']} |" + " |" * 8)
             continue
-        both = [r["pocket"], r.get("adaptive")]
+        both = [r.get(who) for who in PLANNERS]
         cells = [" / ".join(format(x[key] * k, how) if x else "-" for x in both) for key, k, how in columns]
         ratio = " / ".join(f"{x['seconds']:.1f}" if x else "-" for x in both)
         out.append(f"| {name} | {r['radius_mm']:g} | " + " | ".join(cells) + f" | {ratio} |")
-    pairs = [(r["pocket"], r["adaptive"]) for r in results.values() if "pocket" in r and r.get("adaptive")]
-    if pairs:
-        times = [a["time_s"] / b["time_s"] for a, b in pairs if math.isfinite(b["time_s"])]
-        out += ["", f"machining time over that of Adaptive: median {np.median(times):.3f} of {len(times)}"]
+    out.append("")
+    for who in PLANNERS[:2]:
+        pairs = [(r[who], r["adaptive"]) for r in results.values() if r.get(who) and r.get("adaptive")]
+        pairs = [(a, b) for a, b in pairs if math.isfinite(b["time_s"])]
+        if pairs:
+            out.append(f"{who} over Adaptive, median of {len(pairs)}: " + ", ".join(_medians(pairs)))
     return "\n".join(out)
+
+
+def _medians(pairs):
+    """The median ratio of each quantity, of those pairs in which it is not zero."""
+    names = {
+        "machining": "time_s", "cutting": "cut_mm", "links": "link_mm", "G-code": "gcode_bytes", "planning": "seconds"
+    }  # fmt: skip
+    for name, key in names.items():
+        ratios = [a[key] / b[key] for a, b in pairs if b[key] > 0.0]
+        yield f"{name} {np.median(ratios):.3f}"
+    slower = sum(a["time_s"] > b["time_s"] for a, b in pairs)
+    yield f"slower in {slower}"
 
 
 def main() -> None:
     here = Path(__file__).resolve().parents[2] / "shared" / "data"
     data = Path(os.environ.get("CHIPLOAD_DATA", here)) / "cad" / "dxf_hsm_nibbler"
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="*", help=f"of {', '.join(POCKETS)}; all where none is given")
+    parser.add_argument("names", nargs="*", help=f"of {', '.join(POCKETS)}, or DXF files; all where none is given")
+    parser.add_argument("--radius", type=float, default=4.0, help="of the cutter where a file is given [mm]")
     parser.add_argument("--data", type=Path, default=data, help="folder with the drawings")
     parser.add_argument("--json", type=Path, help="write the results here too")
     parser.add_argument("--spacing", type=float, default=0.3, help="between two places that are asked, / R")
     parser.add_argument("--workers", type=int, default=2, help="threads of the checker")
     parser.add_argument("--no-freecad", action="store_true", help="the planner alone")
+    parser.add_argument("--no-trochoidal", action="store_true", help="without the strategy trochoidal")
+    parser.add_argument("--pictures", type=Path, help="folder for a picture (SVG) of the paths of each drawing")
     parser.add_argument("--tolerance", type=float, default=0.1, help="of Adaptive, 0.1 being its own default")
     parser.add_argument("--timeout", type=float, default=120.0, help="of one run of FreeCAD [s]")
     asked = parser.parse_args()
-    unknown = [name for name in asked.names if name not in POCKETS]
+    unknown = [name for name in asked.names if name not in POCKETS and not Path(name).is_file()]
     if unknown:
         parser.error(f"{', '.join(unknown)}: must be of {', '.join(POCKETS)}")
     if not asked.data.is_dir():
@@ -312,12 +333,15 @@ def main() -> None:
         print("without FreeCAD (freecadcmd): the columns of Adaptive are empty", file=sys.stderr)
     clear_region(Region.of([Contour.polyline([[0, 0], [9, 0], [9, 9], [0, 9]], closed=True)]), 2.0, 0.6)  # compile
     results = {}
-    for name in asked.names or POCKETS:
-        radius = POCKETS[name]
+    for drawn in asked.names or POCKETS:
+        name, radius = Path(drawn).stem, POCKETS.get(drawn, asked.radius)
         try:
-            drawing = read_dxf(asked.data / f"{name}.dxf", units_if_unstated="mm")
+            file = asked.data / f"{drawn}.dxf" if drawn in POCKETS else Path(drawn)
+            drawing = read_dxf(file, units_if_unstated="mm")
             region = Region.of([c for c in drawing.contours if c.closed])
             found = {"pocket": planned_path(region, radius)}
+            if not asked.no_trochoidal:
+                found["trochoidal"] = planned_path(region, radius, trochoidal=True)
         except InputError as refused:
             print(f"{name}: refused: {refused}", file=sys.stderr, flush=True)
             results[name] = {"radius_mm": radius, "refused": str(refused)}
@@ -329,6 +353,10 @@ def main() -> None:
         for who, path in found.items():
             if path is not None:
                 results[name][who] = measured(*path, reachable, radius, asked.spacing, asked.workers)
+        if asked.pictures is not None:
+            asked.pictures.mkdir(parents=True, exist_ok=True)
+            panels = [(who, found[who][0], results[name][who]) for who in PLANNERS if found.get(who) is not None]
+            (asked.pictures / f"{name}.svg").write_text(picture(name, region, radius, panels))
         print(f"{name}: {json.dumps(results[name])}", file=sys.stderr, flush=True)
     wanted = math.degrees(math.acos(1.0 - DEPTH))
     print(table(results, wanted))

@@ -91,6 +91,15 @@ def test_region_turns_islands_and_subtracts_them():
     assert region.contains([[5.0, 2.0], [5.0, 3.0], [20.0, 2.0]]).tolist() == [False, True, False]
 
 
+def test_flatten_keeps_an_island_in_a_hole():
+    """Squares of 20, 10 and 4 mm one in the other, and one of 3 mm beside them: 400 - 100 + 16 + 9."""
+    squares = [
+        Contour.polyline([(x, x), (x + a, x), (x + a, x + a), (x, x + a)], closed=True)
+        for x, a in ((0.0, 20.0), (5.0, 10.0), (8.0, 4.0), (30.0, 3.0))
+    ]
+    assert Region.of(squares).flatten(1e-3).area == pytest.approx(325.0)
+
+
 def test_flatten_leaves_arcs_by_no_more_than_the_chord_error():
     p = Contour.circle((0.0, 0.0), 10.0).flatten(1e-3)
     sag = 10.0 - np.hypot(*(0.5 * (p[1:] + p[:-1])).T)

@@ -18,6 +18,7 @@ from chipload.program.program import RAPID
 from chipload.program.read import read_program
 from chipload.result import Verdict
 from chipload.simulation.centre_path import CentrePath, rim_engagement
+from finish_job import JOB
 
 #: a wall with an inside corner of 8 mm, finished by a cutter of 10 mm; a hole is drilled before, a chamfer cut after it
 PROGRAM = """(finish pass of another CAM)
@@ -97,44 +98,6 @@ SPINDL/OFF
 FINI
 """
 DIALECTS = {"finish.h": (CONVERSATIONAL, (12, 15), 8), "finish.apt": (CL_DATA, (22, 25), 16)}
-JOB = """
-[part]
-file = "{file}"
-lines = [{first}, {last}]
-[stock]
-top_mm = 0.0
-[machine]
-name = "{machine}"
-[material]
-name = "al7075-t6"
-[[cutter]]
-number = 1
-diameter_mm = 10.0
-flutes = 4
-helix_deg = 30.0
-flute_length_mm = 22.0
-overhang_mm = 35.0
-modulus_gpa = 580.0
-[[operation]]
-kind = "contour"
-cutter = 1
-side = "{side}"
-milling = "down"
-strategies = ["plain", "backward"]
-use = "backward"
-joint = "sharp"
-radial_depth_mm = 0.1
-semifinish_depth_mm = 0.5
-axial_depth_mm = 5.0
-feed_mm_min = 600.0
-speed_rpm = 3000.0
-tolerance_mm = 0.05
-step_mm = 0.1
-lead_mm = 3.0
-clearance_mm = 5.0
-[limits]
-engagement_deg = 13.0
-"""
 
 
 def job(folder: Path, text: str = PROGRAM, lines=WALL, side="left", machine="vmc", file="finish.ngc"):

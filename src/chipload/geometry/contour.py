@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -312,13 +313,18 @@ class Region:
         return total > 0
 
     def flatten(self, chord_mm: float) -> Any:
-        """The region as a shapely polygon whose chords leave the arcs by at most ``chord_mm``."""
+        """The region as a shapely polygon whose chords leave the arcs by at most ``chord_mm``.
+
+        The contours are laid from the greatest to the least, so that an island in a hole stands.
+        """
         import shapely
 
-        rings = [shapely.polygons(c.flatten(chord_mm)) for c in self.contours]
-        outer = [g for g, c in zip(rings, self.contours, strict=True) if c.area > 0.0]
-        holes = [g for g, c in zip(rings, self.contours, strict=True) if c.area <= 0.0]
-        return shapely.difference(shapely.union_all(outer), shapely.union_all(holes))
+        ordered = sorted(self.contours, key=lambda c: -abs(c.area))
+        out = shapely.Polygon()
+        for filled, alike in groupby(ordered, key=lambda c: c.area > 0.0):
+            rings = shapely.union_all([shapely.polygons(c.flatten(chord_mm)) for c in alike])
+            out = shapely.union(out, rings) if filled else shapely.difference(out, rings)
+        return out
 
 
 def winding(contour: Contour, points: Floats) -> NDArray[np.int64]:

@@ -53,6 +53,7 @@ Point = Annotated[tuple[Number, Number, Number], Field()]
 
 
 Count = Annotated[int, BeforeValidator(_only_count), Field(ge=1, le=1000)]
+LineNumber = Annotated[int, BeforeValidator(_only_count), Field(ge=1, le=10_000_000)]
 
 
 #: a face of a STEP file, by its number or by a point [mm] on it

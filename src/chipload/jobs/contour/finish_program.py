@@ -1,8 +1,9 @@
 """The finish path of a contour taken from an NC program, and the semi-finish passes written back into its text.
 
 The level lines and arcs of the stated lines of the program are the path of the cutter's centre in the finish pass; the
-wall lies R beside it, on the side that the milling says. Semi-finish passes are inserted into the text where the
-program was last at a safe height before these lines: after the calls of its tool, under its work offset. All other
+wall lies R beside it, on the side that the milling says. A program may finish a wall at several heights, from above:
+each is a level of its own, as deep as it lies below the one before. Semi-finish passes are inserted into the text where
+the program was last at a safe height before a level: after the calls of its tool, under its work offset. All other
 lines stay as they are. The new text is read again: every motion of the old one must come back, and the inserted ones
 must be those of the plan.
 """
@@ -11,7 +12,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour
+from chipload.geometry.distance import distance
 from chipload.geometry.offset import offset
 from chipload.jobs.contour.semifinish_text import inserted_lines, put_in
 from chipload.machine.machine import Machine
@@ -33,6 +35,8 @@ from chipload.simulation.centre_path import flat_motions
 
 #: motions are level and places are the same within this [mm]
 LEVEL_MM = 1e-6
+#: how far a level may come nearer than R to the wall of one above, the rounding of its text; places looked at [mm]
+NEAR_MM, APART_MM = 2e-3, 0.1
 #: modes in which the inserted lines would mean something else
 _MODES = re.compile(r"(?<![A-Za-z_])[gG]\s*0*(20|70|91|90\.1|41|42|41\.1|42\.1|51|68|16)(?![\d.])")
 #: the same in conversational text and in CL data
@@ -47,7 +51,7 @@ _COMMENT = re.compile(r"\([^)\n]*\)|;[^\n]*")
 
 @dataclass(frozen=True, eq=False)
 class FinishProgram:
-    """The finish pass in its program.
+    """The finish pass of one level in its program.
 
     Parameters
     ----------
@@ -57,6 +61,7 @@ class FinishProgram:
     program : its motions
     first, last : rows of the finish path
     safe : the last row before it at or above the top of the stock
+    top, floor : heights [mm] between which it finishes the wall
     """
 
     file: Path
@@ -66,6 +71,8 @@ class FinishProgram:
     first: int
     last: int
     safe: int
+    top: float
+    floor: float
 
 
 def is_program(path: Path) -> bool:
@@ -73,54 +80,105 @@ def is_program(path: Path) -> bool:
     return path.suffix.lower() in ENDINGS
 
 
-def read_finish(path: Path, machine: Machine, lines: Sequence[int] | None, top: float) -> FinishProgram:
-    """The finish path of a program.
+def read_finish(
+    path: Path, machine: Machine, lines: Sequence[int], labels: Sequence[str], top: float
+) -> tuple[FinishProgram, ...]:
+    """The levels of the finish path of a program, from above.
 
     Parameters
     ----------
-    lines : first and last line of the text that make the wall; None: all that cut below ``top`` [mm]
+    lines : first and last line of the text that make the wall, of one level after the other; none: all that cut below
+        ``top`` [mm]
+    labels : in place of lines, a text behind which the wall begins, and one before which it ends; with the first alone
+        it ends where the cut does
 
     Raises
     ------
     InputError
-        The program cannot be read, nothing cuts in these lines, they cut at several heights, or they do not follow one
-        another.
+        The program cannot be read, nothing cuts in these lines, levels do not lie one below the other, or the cut is
+        interrupted.
     """
-    reading = read_program(path, machine)
-    p = reading.program
+    p = read_program(path, machine).program
+    dialect = dialect_of(path, machine)
+    text = TEXTS.get(dialect, gcode_text)(path)
     z = p.p_work[:, 2]
     before = np.concatenate([z[:1], z[:-1]])
     cuts = np.isin(p.motion, (LINE, ARC_CW, ARC_CCW)) & (np.abs(z - before) <= LEVEL_MM) & (z < top - LEVEL_MM)
     cuts &= flat_lengths(p) > LEVEL_MM
-    if lines is not None:
-        cuts &= (p.line >= lines[0]) & (p.line <= lines[1])
-    rows = np.flatnonzero(cuts)
-    asked = "" if lines is None else f" in lines {lines[0]} to {lines[1]}"
-    if not len(rows):
-        raise InputError(f"part.file = {path.name}: no horizontal cut below the stock's top{asked}: state part.lines")
-    heights = np.unique(z[rows].round(6))
-    if len(heights) > 1:
-        raise InputError(
-            f"part.file = {path.name}: cuts at {len(heights)} heights{asked}, from {heights[0]:g} to {heights[-1]:g} "
-            "mm: state the lines of one of them as part.lines"
-        )
-    gap = np.flatnonzero(np.diff(rows) > 1)
-    if len(gap):
-        k = int(rows[gap[0]])
-        raise InputError(
-            f"part.file = {path.name}: the cut is interrupted after line {int(p.line[k])}: state the lines of one path "
-            "as part.lines"
-        )
-    high = np.flatnonzero(z[: rows[0]] >= top - LEVEL_MM)
-    if not len(high):
-        raise InputError(
-            f"part.file = {path.name}: the tool is never at the height of the stock's top before the cut: "
-            "check stock.top_mm"
-        )
-    dialect = dialect_of(path, machine)
-    return FinishProgram(
-        path, dialect, TEXTS.get(dialect, gcode_text)(path), p, int(rows[0]), int(rows[-1]), int(high[-1])
+    runs: list[NDArray[np.int64]] = []
+    if labels:
+        ranges = _labelled(path, text, labels)
+    else:
+        ranges = list(zip(lines[0::2], lines[1::2], strict=True)) or [(0, int(p.line.max(initial=0)))]
+    for first, last in ranges:
+        rows = np.flatnonzero(cuts & (p.line >= first) & (p.line <= last))
+        if not len(rows):
+            asked = f" in lines {first} to {last}" if lines or labels else ""
+            raise InputError(
+                f"part.file = {path.name}: no horizontal cut below the stock's top{asked}: state part.lines"
+            )
+        ends = np.flatnonzero((np.diff(rows) > 1) | (np.abs(np.diff(z[rows])) > LEVEL_MM)) + 1
+        found = np.split(rows, ends)
+        runs += found[:1] if len(labels) == 1 else found
+    return tuple(
+        FinishProgram(path, dialect, text, p, int(run[0]), int(run[-1]), safe, above, floor)
+        for run, (safe, above, floor) in zip(runs, _heights(path, p, runs, top), strict=True)
     )
+
+
+def _heights(path: Path, p: Program, runs: Sequence[NDArray[np.int64]], top: float) -> list[tuple[int, float, float]]:
+    """The last row at a safe height before each level, and the heights [mm] between which it cuts."""
+    z, above, out = p.p_work[:, 2], top, []
+    for k, run in enumerate(runs):
+        floor, line = float(z[run[0]]), int(p.line[run[0]])
+        if k and abs(floor - above) <= LEVEL_MM:
+            raise InputError(
+                f"part.file = {path.name}: the cut is interrupted after line {int(p.line[runs[k - 1][-1]])}: state the "
+                "lines of one path a level as part.lines"
+            )
+        if floor > above:
+            raise InputError(
+                f"part.file = {path.name}: line {line} cuts at {floor:g} mm, above the level before it at {above:g}: "
+                "state the lines of one path a level, from above, as part.lines"
+            )
+        high = np.flatnonzero(z[: run[0]] >= top - LEVEL_MM)
+        if not len(high):
+            raise InputError(
+                f"part.file = {path.name}: the tool is never at the height of the stock's top before the cut: "
+                "check stock.top_mm"
+            )
+        out.append((int(high[-1]), above, floor))
+        above = floor
+    return out
+
+
+def _labelled(path: Path, text: str, labels: Sequence[str]) -> list[tuple[int, int]]:
+    """First and last line between each pair of labels; a label is found as a whole word."""
+    lines = text.splitlines()
+    places = [
+        [
+            k
+            for k, line in enumerate(lines, start=1)
+            if re.search(rf"(?<!\w){re.escape(label)}(?!\w)", line, re.IGNORECASE)
+        ]
+        for label in labels
+    ]
+    for label, found in zip(labels, places, strict=True):
+        if not found:
+            raise InputError(f"part.labels: no line of {path.name} holds {label!r}: state a label that stands in it")
+    begins = [n for n in places[0] if n not in places[-1] or len(labels) == 1]
+    if len(labels) == 1:
+        return list(zip(begins, [*(k - 1 for k in begins[1:]), len(lines)], strict=True))
+    out = []
+    for k, first in enumerate(begins):
+        after = [n for n in places[1] if n > first and (k + 1 == len(begins) or n <= begins[k + 1])]
+        if not after:
+            raise InputError(
+                f"part.labels: no line of {path.name} behind line {first} holds {labels[1]!r}: state where the wall "
+                "ends"
+            )
+        out.append((first, after[0]))
+    return out
 
 
 def flat_lengths(p: Program) -> NDArray[Any]:
@@ -165,14 +223,45 @@ def finish_contours(finish: FinishProgram, cutter: Cutter, milling: str, side: s
     return walls
 
 
-def with_semifinish(finish: FinishProgram, planned: Program, machine: Machine) -> str:
-    """The text of the program with the semi-finish passes of a plan inserted.
+def require_reached(levels: Sequence[FinishProgram], walls: Sequence[Sequence[Contour]], cutter: Cutter) -> None:
+    """Refuse levels that cut into the wall of a level above.
+
+    Raises
+    ------
+    InputError
+        The path of a level comes nearer to such a wall than R.
+    """
+    for k, level in enumerate(levels):
+        path = Contour(flat_motions(level.program)[level.first : level.last + 1])
+        points = path.at(np.linspace(0.0, path.length, max(2, int(path.length / APART_MM))))[0]
+        for above, wall in zip(levels[:k], walls[:k], strict=True):
+            away = distance(np.vstack([c.segments for c in wall]), points)
+            at = int(away.argmin())
+            if away[at] < cutter.radius - NEAR_MM:
+                x, y = points[at].tolist()
+                raise InputError(
+                    f"part.file = {level.file.name}: at {level.floor:g} mm the cutter comes {away[at]:.4g} mm near to "
+                    f"the wall at {above.floor:g} mm, at ({x:.4g}, {y:.4g}): must be its radius, {cutter.radius:g}: "
+                    "state the lines of one wall as part.lines"
+                )
+
+
+def with_semifinish(levels: Sequence[FinishProgram], planned: Sequence[Program], machine: Machine) -> str:
+    """The text of the program with the semi-finish passes of the plan of each level inserted.
 
     Raises
     ------
     InputError
         The text states modes in which the inserted lines would mean something else, or it does not read back.
     """
+    text, program = levels[0].text, levels[0].program
+    for level, plan in reversed(list(zip(levels, planned, strict=True))):  # what stands above keeps its lines and rows
+        text, program = _with_level(replace(level, text=text, program=program), plan, machine)
+    return text
+
+
+def _with_level(finish: FinishProgram, planned: Program, machine: Machine) -> tuple[str, Program]:
+    """The text with the semi-finish passes of one level, and its motions."""
     found = MODES.get(finish.dialect, _MODES).search(_COMMENT.sub(" ", finish.text))
     if found is not None:
         raise InputError(f"{finish.file.name}: not written back: the text states {found[0]}")
@@ -182,8 +271,7 @@ def with_semifinish(finish: FinishProgram, planned: Program, machine: Machine) -
     ending = "\r\n" if "\r\n" in finish.text else "\n"
     new = inserted_lines(finish.dialect, planned, rows, p, k, machine.decimals)
     text = ending.join(put_in(finish.dialect, finish.text.split(ending), line, new))
-    _read_back(finish, text, planned, rows, line, len(new), machine)
-    return text
+    return text, _read_back(finish, text, planned, rows, line, len(new), machine)
 
 
 def _semifinish_rows(planned: Program) -> NDArray[Any]:
@@ -196,8 +284,8 @@ def _semifinish_rows(planned: Program) -> NDArray[Any]:
 
 def _read_back(
     finish: FinishProgram, text: str, planned: Program, rows: NDArray[np.int64], line: int, added: int, machine: Machine
-) -> None:
-    """Refuse a text whose old motions are not what they were, or whose new ones are not the plan's."""
+) -> Program:
+    """The motions of the new text; refused where old ones are not what they were, or new ones not the plan's."""
     again = read_program(finish.file, machine, text=text).program
     inserted = (again.line > line) & (again.line <= line + added)
     old = finish.program
@@ -211,6 +299,7 @@ def _read_back(
     wanted = wanted[wanted[:, 0] != RAPID]
     if len(cutting) < len(wanted) or np.abs(cutting[: len(wanted)] - wanted).max(initial=0.0) > coarse:
         raise InputError(f"{finish.file.name}: not written back: the inserted passes do not read as planned")
+    return again
 
 
 def _rows(p: Program) -> NDArray[Any]:

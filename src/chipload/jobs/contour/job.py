@@ -101,9 +101,27 @@ def _contradictions(table: ContourJobTable, cutters: Mapping[int, Cutter]) -> It
                 f"{at}.{key} = {depth:g}: must be at most the cutter's flute_length_mm = "
                 f"{cutter.flute_length:g}: take several depths or a longer cutter"
             )
+    if len(table.part.lines) % 2:
+        yield f"part.lines = {list(table.part.lines)}: must be a first and a last line for each height"
+    if table.part.lines and table.part.labels:
+        yield "part.lines and part.labels: stated twice: state one of them"
+    if table.stock.file is not None:
+        yield from _wrong_stock(table)
     if not table.limits.stated:
         names = ", ".join(ContourLimitsTable.model_fields)
         yield f"limits: none is stated, so nothing would be checked: state at least one of {names}"
+
+
+def _wrong_stock(table: ContourJobTable) -> Iterator[str]:
+    """What contradicts a stock that an earlier result left."""
+    if any(op.kind != "pocket" for op in table.operation):
+        yield "stock.file: only pockets begin in the stock of an earlier result: leave it out for the other kinds"
+    if table.part.stock_layers:
+        yield "stock.file and part.stock_layers: state one of them: the file holds the outline"
+    for k, op in enumerate(table.operation):
+        for key in ("holes_mm", "rest_of"):
+            if getattr(op, key) is not None:
+                yield f"operation.{k}.{key}: leave it out with stock.file, which holds what was cut before"
 
 
 def _wrong_pocket(at: str, k: int, table: ContourJobTable, cutters: Mapping[int, Cutter]) -> Iterator[str]:
@@ -114,6 +132,8 @@ def _wrong_pocket(at: str, k: int, table: ContourJobTable, cutters: Mapping[int,
         yield f"{at}.radial_depth_mm and {at}.engagement_deg: {state}: state one of them"
     if op.side in ("left", "right"):
         yield f"{at}.side = '{op.side}': must be inside or outside of a pocket"
+    if op.entry == "ramp" and "trochoidal" in (op.strategies or ()):
+        yield f"{at}.entry = 'ramp': circles begin at a bore: state helix, or leave trochoidal out of {at}.strategies"
     if op.rest_of is None:
         return
     if op.rest_of >= k or table.operation[op.rest_of].kind != "pocket":

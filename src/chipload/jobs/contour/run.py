@@ -21,11 +21,13 @@ from chipload.geometry.dxf import read_dxf
 from chipload.geometry.step import read_step_face
 from chipload.jobs.checks import default_checks
 from chipload.jobs.contour.advice import greatest_engagement
+from chipload.jobs.contour.earlier_stock import read_stock, standing_between
 from chipload.jobs.contour.finish_program import (
     FinishProgram,
     finish_contours,
     is_program,
     read_finish,
+    require_reached,
     with_semifinish,
 )
 from chipload.jobs.contour.job import ContourJob, left_on_walls
@@ -42,10 +44,13 @@ from chipload.program.check import check_program
 from chipload.progress import Progress, silent
 from chipload.result import Provenance, Verdict
 from chipload.simulation.verify import verify_contour
+from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 #: what the simulation may find and still call a program proved
 ENGAGEMENT_DEG, GOUGE_MM, CHORDS_MM = 0.05, 1e-4, 1e-3
+#: heights of a program are rounded to this [mm]
+ROUNDED_MM = 1e-6
 #: passes that descend or rise, whose engagement the simulation in the plane cannot compare; their path it does follow
 NOT_LEVEL = ("entry", "ramp")
 _NO_CONTOURS: tuple[Contour, ...] = ()
@@ -55,11 +60,17 @@ VERDICTS = {"proved": Verdict.HOLDS, "failed": Verdict.EXCEEDS, "unproven": Verd
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """What a job names, read: contours [mm], machine, material, and what the readers noticed."""
+    """What a job names, read: contours and top of the stock [mm], machine, material, and what the readers noticed.
+
+    Where the finish path is that of a program the contours are those of each of its levels.
+    """
 
     contours: tuple[Contour, ...]
     stock: tuple[Contour, ...]
-    finish: FinishProgram | None
+    top: float
+    finish: tuple[FinishProgram, ...]
+    levels: tuple[tuple[Contour, ...], ...]
+    standing: LayeredStock | None
     machine: Machine
     material: Material
     findings: tuple[Finding, ...]
@@ -78,15 +89,26 @@ def read_inputs(job: ContourJob) -> Inputs:
     for name in ("force_xy_n", "form_error_um"):
         if name in job.limits:
             need_directions(material, f"limits.{name}")
-    finish, stock, findings = None, _NO_CONTOURS, _NO_FINDINGS
+    stock, findings, top = _NO_CONTOURS, _NO_FINDINGS, job.table.stock.top_mm
+    finish: tuple[FinishProgram, ...] = ()
+    levels: tuple[tuple[Contour, ...], ...] = ()
     if is_program(job.part_file):
         if any(op.kind != "contour" for op in job.operations) or len(job.operations) != 1:
             raise InputError(
                 f"part.file = {job.table.part.file}: a program is the finish path of one operation contour"
             )
         op = job.operations[0]
-        finish = read_finish(job.part_file, machine, job.table.part.lines, job.table.stock.top_mm)
-        contours = finish_contours(finish, job.cutters[op.cutter], op.milling, op.side)
+        cutter, part = job.cutters[op.cutter], job.table.part
+        finish = read_finish(job.part_file, machine, part.lines, part.labels, top)
+        levels = tuple(finish_contours(level, cutter, op.milling, op.side) for level in finish)
+        require_reached(finish, levels, cutter)
+        deepest = max(level.top - level.floor for level in finish)
+        if abs(deepest - op.axial_depth_mm) > ROUNDED_MM:
+            raise InputError(
+                f"operation.axial_depth_mm = {op.axial_depth_mm:g}: {job.table.part.file} finishes the wall "
+                f"{deepest:g} mm deep at once: state axial_depth_mm = {deepest:g}, or check stock.top_mm"
+            )
+        contours = levels[0]
     else:
         contours, stock, findings = _read_part(job)
     for at, rpm in _speeds(job):
@@ -97,7 +119,27 @@ def read_inputs(job: ContourJob) -> Inputs:
                 f"{job.path.name}: {at}.speed_rpm = {rpm:g}: machine {machine.name} turns from "
                 f"{low:g} to {high:g} rpm: state a speed between them"
             )
-    return Inputs(contours, stock, finish, machine, material, findings)
+    file = job.table.stock.file
+    standing = None if file is None else read_stock(job.path.parent / file)
+    return Inputs(contours, stock, top, finish, levels, standing, machine, material, findings)
+
+
+def _cuts(job: ContourJob, inputs: Inputs) -> list[tuple[OperationTable, Inputs]]:
+    """The operations of a job in their order; that of a program once for each level, whose rapids are as high."""
+    if not inputs.finish:
+        return [(op, inputs) for op in job.operations]
+    (op,) = job.operations
+    return [
+        (
+            op.model_copy(
+                update={
+                    "axial_depth_mm": level.top - level.floor, "clearance_mm": op.clearance_mm + inputs.top - level.top
+                }
+            ),
+            replace(inputs, contours=contours, top=level.top),
+        )
+        for level, contours in zip(inputs.finish, inputs.levels, strict=True)
+    ]  # fmt: skip
 
 
 def _speeds(job: ContourJob) -> list[tuple[str, float]]:
@@ -124,13 +166,16 @@ def run(job: ContourJob, progress: Progress = silent) -> ContourResult:
     progress(0.0, "reading")
     inputs = read_inputs(job)
     operations: list[Operation] = []
-    for k, op in enumerate(job.operations):
-        share = 1.0 / len(job.operations)
+    cuts = _cuts(job, inputs)
+    for k, (op, own) in enumerate(cuts):
+        share = 1.0 / len(cuts)
 
         def part(done: float, what: str, start: float = k * share, share: float = share) -> None:
             progress(start + share * done, what)
 
-        operations.append(_operation(job, inputs, op, [done.result for done in operations], part))
+        operations.append(_operation(job, own, op, [done.result for done in operations], part))
+    if inputs.finish:
+        operations[0] = replace(operations[0], inserted=_inserted(inputs, operations))
     progress(1.0, "done")
     return ContourResult(
         title=title_of(job.path),
@@ -157,13 +202,13 @@ def check(job: ContourJob) -> tuple[list[str], bool]:
         f"machine {inputs.machine.name}, material {inputs.material.name}"
     ]
     beyond = list[str]()
-    for k, op in enumerate(job.operations):
-        op, _ = _resolved(job, inputs, op)
-        cutter, setting = job.cutters[op.cutter], _setting(job, inputs, op)
+    for k, (op, own) in enumerate(_cuts(job, inputs)):
+        op, _ = _resolved(job, own, op)
+        cutter, setting = job.cutters[op.cutter], _setting(job, own, op)
         if isinstance(setting, Clearing):
-            what = f"{check_pocket(inputs.contours, setting, cutter):.6g} mm2"
+            what = f"{check_pocket(own.contours, setting, cutter):.6g} mm2"
         else:
-            count = check_contour(inputs.contours, setting, cutter, inputs.material, inputs.machine)
+            count = check_contour(own.contours, setting, cutter, inputs.material, inputs.machine)
             what = f"{count} pass{'es' if count > 1 else ''}"
         lines.append(f"operation {k}: {op.kind}, cutter {op.cutter} of {cutter.diameter:g} mm, {what}")
         beyond += _above_limit(job, k, op, cutter)
@@ -203,24 +248,22 @@ def _operation(
         def part(done: float, what: str, start: float = start) -> None:
             progress(start + 0.5 * done / len(result.strategies), f"simulation: {what}")
 
-        verifications[name] = verify(strategy, op, cutter, job.table.stock.top_mm, part)
+        verifications[name] = verify(strategy, op, cutter, inputs.top, part)
         machine_findings[name] = tuple(
             replace(f, severity=Severity.EXCEEDS) for f in check_program(strategy.program, inputs.machine)
         )
     settings = {k: v for k, v in op.model_dump().items() if v is not None}
     checks = default_checks(job.table.checks, {cutter.number: cutter}, inputs.material, 0.5)
     return Operation(
-        result, settings, cutter, job.table.stock.top_mm, op.depth_mm or op.axial_depth_mm, verifications,
-        machine_findings, job.limits, checks, _inserted(inputs, result),
+        result, settings, cutter, inputs.top, op.depth_mm or op.axial_depth_mm, verifications,
+        machine_findings, job.limits, checks,
     )  # fmt: skip
 
 
-def _inserted(inputs: Inputs, result: OperationResult) -> tuple[str, str]:
-    """Name and text of the program that the finish path came from, with the semi-finish passes; "", "": none."""
-    finish = inputs.finish
-    if finish is None:
-        return "", ""
-    return finish.file.name, with_semifinish(finish, result.strategies[result.use].program, inputs.machine)
+def _inserted(inputs: Inputs, operations: Sequence[Operation]) -> tuple[str, str]:
+    """Name and text of the program that the finish path came from, with the semi-finish passes of all levels."""
+    planned = [op.result.strategies[op.result.use].program for op in operations]
+    return inputs.finish[0].file.name, with_semifinish(inputs.finish, planned, inputs.machine)
 
 
 def _plan(
@@ -273,6 +316,14 @@ def _larger(job: ContourJob, op: OperationTable, planned: Sequence[OperationResu
     return LargerCutter(job.cutters[before.cutter].radius, left_on_walls(before), left)
 
 
+def _standing(job: ContourJob, inputs: Inputs, op: OperationTable) -> tuple[Contour, ...] | None:
+    """What stands in the depth of a pocket before it begins; None where no file says so."""
+    if inputs.standing is None:
+        return None
+    floor = inputs.top - (op.axial_depth_mm if op.depth_mm is None else op.depth_mm)
+    return standing_between(inputs.standing, floor, inputs.top, str(job.table.stock.file))
+
+
 def _floor_finish(op: OperationTable) -> FloorFinish | None:
     own = op.floor_finish
     return None if own is None else FloorFinish(mm_s_from_mm_min(own.feed_mm_min), rad_s_from_rpm(own.speed_rpm))
@@ -298,7 +349,7 @@ def _setting(
             axial_depth=op.axial_depth_mm,
             feed=mm_s_from_mm_min(op.feed_mm_min),
             spindle_speed=rad_s_from_rpm(op.speed_rpm),
-            top=job.table.stock.top_mm,
+            top=inputs.top,
             clearance=op.clearance_mm,
             step=op.step_mm,
             allowance=op.allowance_mm or 0.0,
@@ -310,12 +361,14 @@ def _setting(
             around=op.side == "outside",
             holes=op.holes_mm or (),
             larger=_larger(job, op, planned),
+            standing=_standing(job, inputs, op),
             floor_allowance=op.floor_allowance_mm or 0.0,
             floor_finish=_floor_finish(op),
             wall_finish=_wall_finish(op),
             tabs=None if op.tabs is None else Tabs(op.tabs.at_mm, op.tabs.width_mm, op.tabs.height_mm),
             strategies=tuple(op.strategies or ("pocket",)),
             use=op.use or (op.strategies or ("pocket",))[0],
+            entry=op.entry or "helix",
         )
     forward = op.kind == "forward"
     strategies: tuple[str, ...] = ("forward",) if forward else tuple(op.strategies or ())
@@ -334,7 +387,7 @@ def _setting(
         tolerance=op.tolerance_mm or 0.0,
         step=op.step_mm,
         lead=op.lead_mm or 0.0,
-        top=job.table.stock.top_mm,
+        top=inputs.top,
         clearance=op.clearance_mm,
         rigid=rigid,
     )
@@ -438,5 +491,6 @@ def _stock_outline(layers: Sequence[str], drawing: Drawing) -> tuple[tuple[Conto
 def _provenance(job: ContourJob, inputs: Inputs) -> Provenance:
     files: dict[str, Path] = {"part": job.part_file}
     files |= {k: v for k, v in (("machine", job.machine), ("material", job.material)) if isinstance(v, Path)}
+    files |= {} if job.table.stock.file is None else {"stock": job.path.parent / job.table.stock.file}
     files |= {f"cutter {k}": job.path.parent / c.file for k, c in enumerate(job.table.cutter) if c.file is not None}
     return provenance_of(files, job.overrides, inputs.machine, (inputs.material,))

@@ -12,6 +12,7 @@ from chipload.jobs.tables import (
     ChecksTable,
     Count,
     Limits,
+    LineNumber,
     NotNegative,
     Number,
     Positive,
@@ -43,9 +44,16 @@ class PartTable(Table):
     stock_layers: tuple[Text, ...] = Field(
         (), description="layers of a drawing that hold the outline of the stock of a pocket; none: material everywhere"
     )
-    lines: tuple[Count, Count] | None = Field(
-        None,
-        description="first and last line of a program that make the wall; none: all that cuts below the stock's top",
+    lines: tuple[LineNumber, ...] = Field(
+        (),
+        description="first and last line of a program that make the wall, of each height in turn, from above; none: "
+        "all that cuts below the stock's top",
+    )
+    labels: tuple[Text, ...] = Field(
+        (),
+        max_length=2,
+        description="in place of lines: a text of the program (block number, comment) behind which the wall begins, at "
+        "each height anew, and one before which it ends; none: where the cut ends",
     )
     face_z_mm: Number | None = Field(None, description="height of the planar face of a STEP file")
 
@@ -54,6 +62,11 @@ class StockTable(Table):
     """What it is made from."""
 
     top_mm: Number = Field(description="z of the top of the stock")
+    file: Text | None = Field(
+        None,
+        description="stock.npz of an earlier result: pockets cut what stands in it; none: material everywhere, or as "
+        "part.stock_layers, holes_mm and rest_of say",
+    )
 
 
 class FloorFinishTable(Table):
@@ -129,6 +142,9 @@ class OperationTable(Table):
         None,
         description="engagement that a pocket keeps, instead of radial_depth_mm; limit: the greatest within all limits",
     )
+    entry: Literal["helix", "ramp"] | None = Field(
+        None, description="into the solid: a helical bore, or a ramp to and fro along a straight line; none: helix"
+    )
     depth_mm: Positive | None = Field(
         None, description="of the pocket, cut in equal levels of at most axial_depth_mm; none: one level"
     )
@@ -194,6 +210,7 @@ MAY: Mapping[str, tuple[str, ...]] = {
         "floor_finish",
         "wall_finish",
         "tabs",
+        "entry",
         "link_feed_mm_min",
         "link_lift_mm",
     ),

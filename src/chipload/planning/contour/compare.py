@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from chipload.cutting.force import forces_along
 from chipload.engagement.contact import PIECES
 from chipload.machine.machine import Machine
-from chipload.planning.contour.moves import speeds
+from chipload.planning.contour.moves import Speeds, speeds
 from chipload.planning.contour.sampled import SampledPass
 from chipload.planning.contour.schedule import constant_force, stepped, within_machine
 from chipload.planning.cost import CutConditions
@@ -56,30 +57,38 @@ def compared(
 
     None where no feed from ``LOW`` to ``HIGH`` times that of the job does it: the edge force knows no feed.
     """
-    force, time = force_and_time(finish[use], cut, feed, machine)
+    force, time = _force(finish[use], cut, machine, feed), _time(finish[use], cut, machine, feed)
     out: dict[str, dict[str, object]] = {}
     for name, run in finish.items():
-
-        def at(f0: float, run: FinishPasses = run) -> tuple[float, float]:
-            return force_and_time(run, cut, f0, machine)
-
-        as_strong = _greatest(lambda f, at=at: at(f)[0] <= force * (1.0 + 1e-9), feed)  # type: ignore[misc]
-        as_long = _greatest(lambda f, at=at: at(f)[1] >= time * (1.0 - 1e-9), feed)  # type: ignore[misc]
+        force_at, time_at = partial(_force, run, cut, machine), partial(_time, run, cut, machine)
+        as_strong = _greatest(force_at, -force * (1.0 + 1e-9), -1.0, feed)
+        as_long = feed if name == use else _greatest(time_at, time * (1.0 - 1e-9), 1.0, feed)
         out[name] = {
-            "at_equal_force": None if as_strong is None else _row(as_strong, at(as_strong)),
-            "at_equal_time": None if as_long is None else _row(as_long, at(as_long)),
+            "at_equal_force": None if as_strong is None else _row(as_strong, force_at(as_strong), time_at(as_strong)),
+            "at_equal_time": None if as_long is None else _row(as_long, force_at(as_long), time_at(as_long)),
         }
     return out
 
 
-def force_and_time(run: FinishPasses, cut: CutConditions, feed: float, machine: Machine) -> tuple[float, float]:
-    """Greatest force in the plane [N] where the wall is made, and the time of the finish passes [s], at f0 [mm/s]."""
-    force, time = 0.0, 0.0
-    for steps in run.passes:
-        programmed = programmed_feeds(steps, cut, feed, machine, run.wanted)
-        speed = speeds(steps, programmed, machine)
-        made = np.isin(steps.zone, ["finish", "closing"])
-        time += float(np.diff(speed.time, prepend=0.0)[made].sum())
+def _speeds(run: FinishPasses, cut: CutConditions, feed: float, machine: Machine) -> list[Speeds]:
+    """The speeds of each finish pass at f0 [mm/s]."""
+    return [
+        speeds(steps, programmed_feeds(steps, cut, feed, machine, run.wanted), machine) for steps in run.passes
+    ]  # fmt: skip
+
+
+def _time(run: FinishPasses, cut: CutConditions, machine: Machine, feed: float) -> float:
+    """Time of the finish passes [s] at f0 [mm/s]."""
+    return sum(
+        float(np.diff(speed.time, prepend=0.0)[np.isin(steps.zone, ["finish", "closing"])].sum())
+        for steps, speed in zip(run.passes, _speeds(run, cut, feed, machine), strict=True)
+    )
+
+
+def _force(run: FinishPasses, cut: CutConditions, machine: Machine, feed: float) -> float:
+    """Greatest force in the plane [N] where the wall is made, at f0 [mm/s]."""
+    force = 0.0
+    for steps, speed in zip(run.passes, _speeds(run, cut, feed, machine), strict=True):
         k = np.flatnonzero(steps.zone == "finish")
         if not len(k):
             continue
@@ -92,26 +101,28 @@ def force_and_time(run: FinishPasses, cut: CutConditions, feed: float, machine: 
             cut.material, cut.axial_depth, spindle_speed=cut.spindle_speed, count=np.clip(met.count[k], 0, PIECES),
         )  # fmt: skip
         force = max(force, float(loads["force_xy_n"].max()))
-    return force, time
+    return force
 
 
-def _greatest(holds: Callable[[float], bool], feed: float) -> float | None:
-    """The greatest f0 at which something holds that holds below it; None where it holds nowhere or everywhere."""
+def _greatest(value: Callable[[float], float], least: float, sign: float, feed: float) -> float | None:
+    """The greatest f0 at which ``sign`` times a value is at least ``least``, as it is below it; None where it is so
+    nowhere or everywhere.
+    """
     low, high = LOW * feed, HIGH * feed
-    if not holds(low) or holds(high):
+    if sign * value(low) < least or sign * value(high) >= least:
         return None
-    if holds(feed):
+    if sign * value(feed) >= least:
         low = feed
     else:
         high = feed
     while high - low > CLOSE * feed:
         middle = 0.5 * (low + high)
-        if holds(middle):
+        if sign * value(middle) >= least:
             low = middle
         else:
             high = middle
     return low
 
 
-def _row(feed: float, found: tuple[float, float]) -> dict[str, float]:
-    return {"feed_mm_min": mm_min_from_mm_s(1.0) * feed, "force_xy_n": found[0], "finish_time_s": found[1]}
+def _row(feed: float, force: float, time: float) -> dict[str, float]:
+    return {"feed_mm_min": mm_min_from_mm_s(1.0) * feed, "force_xy_n": force, "finish_time_s": time}

@@ -40,7 +40,7 @@ from chipload.planning.pocket.clearing_path import (
 )
 from chipload.planning.pocket.free_space import edge_places, places_along, take_free
 from chipload.planning.pocket.leftover import PocketRemainder
-from chipload.planning.pocket.reach import CHORD, Reach, centre_region, reach_of, widest_places
+from chipload.planning.pocket.reach import CHORD, Reach, centre_region, longest_line, reach_of, widest_places
 from chipload.planning.pocket.skeleton import skeleton_of
 from chipload.planning.pocket.starts import Starts
 from chipload.planning.pocket.trochoid import Trochoid
@@ -64,6 +64,10 @@ TURN_LEFT = math.radians(100.0)
 IDLE = 1.5
 #: radius / R of the axis of a bore, where there is room
 BORE = 0.9
+#: how to get into the solid
+Entry = Literal["helix", "ramp"]
+#: longest ramp / R to either side of its middle, and the shortest in all: where there is less room a bore is
+LONGEST, SHORTEST = 2.0, 0.2
 #: entries at most besides the first of each part, and the room / R that one needs
 ENTRIES, LEAST_ROOM = 50, 0.02
 #: so many passes within 2 R that take less than this part of R^2 each are given up
@@ -100,6 +104,7 @@ def clear_region(
     free: Sequence[Region] = (),
     earlier: EarlierPath | None = None,
     trochoidal: bool = False,
+    entry: Entry = "helix",
     progress: Progress = silent,
 ) -> ClearingPath:
     """Path that clears ``region`` with a cutter of ``radius`` [mm], never engaged by more than ``engagement`` [rad].
@@ -111,6 +116,7 @@ def clear_region(
     free : regions without material; passes begin at their edges, bores come only where these do not lead
     earlier : what the cutter has cut already; passes begin at its edge
     trochoidal : circles along the middle lines of the region first, passes for what they leave
+    entry : into the solid, by a helical bore or by a ramp along a straight line, to and fro; circles need a bore
 
     Raises
     ------
@@ -125,10 +131,10 @@ def clear_region(
                 mirrored_region(region), radius, engagement, milling="down", step=step, allowance=allowance,
                 free=[mirrored_region(r) for r in free],
                 earlier=None if earlier is None else mirrored_earlier(earlier),
-                trochoidal=trochoidal, progress=progress,
+                trochoidal=trochoidal, entry=entry, progress=progress,
             )
         )  # fmt: skip
-    run = _Run(centres, radius, engagement, step, free, progress)
+    run = _Run(centres, radius, engagement, step, free, progress, entry)
     if earlier is not None:
         run.take_earlier(earlier)
     if free or earlier is not None:
@@ -176,8 +182,10 @@ class _Run:
     """The state of one clearing: stock, path so far, places to go on from."""
 
     def __init__(
-        self, centres: Region, radius: float, limit: float, step: float, free: Sequence[Region], progress: Progress
-    ) -> None:
+        self, centres: Region, radius: float, limit: float, step: float, free: Sequence[Region], progress: Progress,
+        entry: Entry,
+    ) -> None:  # fmt: skip
+        self.entry = entry
         xmin, ymin, xmax, ymax = centres.bounds
         self.centres, self.radius, self.step = centres, radius, step
         self.most_engaged, self.limit = limit - BETWEEN, limit - MARGIN
@@ -211,7 +219,28 @@ class _Run:
 
     # -- moves ----------------------------------------------------------------------------------------------
     def enter(self, x: float, y: float, room: float) -> None:
-        """A helical bore at the widest place: its circle is as wide as there is room for, so that it leaves no core."""
+        """Into the solid at the widest place, by a ramp or by a bore."""
+        ends = longest_line(self.centres.flatten(1e-4 * self.radius), np.array([x, y]), LONGEST * self.radius)
+        if self.entry == "ramp" and np.hypot(*(ends[1] - ends[0])) > SHORTEST * self.radius:
+            self._ramp(ends)
+        else:
+            self._bore(x, y, room)
+
+    def _ramp(self, ends: Floats) -> None:
+        """A ramp to and fro along a straight line, to its floor and once more along it."""
+        line, (x, y) = ends[::-1], ends.mean(axis=0).tolist()
+        self.add(line[1:], LIFT)
+        self.add(line, ENTRY, math.pi)
+        self.stock.remove_segments(np.column_stack([ends[:1], ends[1:], np.zeros((1, 3))]))
+        long = float(np.hypot(*(ends[1] - ends[0])))
+        self.events.append(Event("pocket-entry", x, y, f"ramp of {long:.4g} mm to and fro: a full slot by its nature"))
+        n = max(2, math.ceil(long / self.step))
+        for p, q in (ends, line):
+            points = p + np.linspace(0.0, 1.0, n + 1)[:, None] * (q - p)
+            self.starts.add(points, np.full(n + 1, math.atan2(*(q - p)[::-1])))
+
+    def _bore(self, x: float, y: float, room: float) -> None:
+        """A helical bore: its circle is as wide as there is room for, so that it leaves no core."""
         R = self.radius
         rh = min(BORE * R, 0.98 * room)
         n = max(12, math.ceil(2.0 * math.pi * rh / self.step))

@@ -1,5 +1,5 @@
 """Space that is free of material before the cutter begins: outside of the stock, pre-drilled holes, what a larger
-cutter cleared.
+cutter cleared, what does not stand in the stock of an earlier result.
 
 Notation: R [mm] cutter radius. A free region is swept by the cutter itself: along its parallels at R, 2 R, 3 R ... from
 its boundary, which together reach every place of it that a disc of radius R can. A place that none can (an inner corner
@@ -28,6 +28,9 @@ BAND = 4.0
 CORNERS = 1e-6
 #: how far free space keeps off what an earlier cutter left, over R; chords of its edge [mm]
 KEPT, CHORD_MM = 1e-2, 1e-4
+#: material of an earlier result that is nowhere thicker than this [mm] is the rounding of its outlines; free space
+#: keeps this part of R off what is thicker, less than passes look for beside their path
+FILM_MM, KEPT_OFF_STOCK = 0.005, 2e-3
 
 
 def parallels(region: Region, radius: float) -> list[tuple[Contour, ...]]:
@@ -90,18 +93,34 @@ def cleared_by(region: Region, radius: float, allowance: float) -> Region:
     return offset_region(offset_region(region, radius + allowance), -radius)
 
 
-def without_leftover(region: Region, left: Sequence[Contour], radius: float) -> Region:
+def without_stock(region: Region, standing: Sequence[Contour], radius: float, allowance: float) -> Region:
+    """What of a region, ``allowance`` off its walls [mm], holds no material before, where a disc of R reaches it.
+
+    ``standing`` are closed contours of the material. The region is exact at the walls, where only films stand.
+    """
+    reach = cleared_by(region, radius, allowance)
+    if not standing or not reach.contours:
+        return reach
+    material = shapely.intersection(Region.of(standing).flatten(CHORD_MM), reach.flatten(CHORD_MM))
+    thick = shapely.buffer(shapely.buffer(material, -0.5 * FILM_MM), 0.5 * FILM_MM)
+    parts = [part for part in shapely.get_parts(thick) if isinstance(part, shapely.Polygon) and not part.is_empty]
+    rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
+    left = [Contour.polyline(np.asarray(ring.coords)[:-1], closed=True) for ring in rings]
+    return without_leftover(reach, left, radius, KEPT_OFF_STOCK)
+
+
+def without_leftover(region: Region, left: Sequence[Contour], radius: float, kept: float = KEPT) -> Region:
     """What of a free region a disc of R can be in without meeting what was ``left`` in it (closed contours).
 
-    The places of the disc's centre are a polygon, ``KEPT`` R clear of what was left; grown by R they make the region,
+    The places of the disc's centre are a polygon, ``kept`` R clear of what was left; grown by R they make the region,
     so that the disc reaches all of it.
     """
     if not left:
         return region
     centres = offset_region(region, radius).flatten(CHORD_MM)
-    around = shapely.buffer(Region.of(left).flatten(CHORD_MM), (1.0 + KEPT) * radius, quad_segs=64)
+    around = shapely.buffer(Region.of(left).flatten(CHORD_MM), (1.0 + kept) * radius, quad_segs=64)
     rest = shapely.simplify(shapely.difference(centres, around), 0.1 * CHORD_MM)
-    parts = [part for part in shapely.get_parts(rest) if part.area > (KEPT * radius) ** 2]
+    parts = [part for part in shapely.get_parts(rest) if part.area > (kept * radius) ** 2]
     rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
     if not rings:
         return Region(())

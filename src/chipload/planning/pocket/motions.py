@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -253,12 +254,39 @@ def bore_turns(radius: float, depth: float) -> int:
     return max(1, math.ceil(depth / (math.tau * radius * math.tan(HELIX))))
 
 
-def bore_pitch(motions: Motions, depth: float) -> float:
-    """Greatest depth [mm] that a turn of any bore goes down."""
+def ramp_legs(length: float, depth: float) -> int:
+    """Legs of a ramp to and fro ``depth`` [mm] deep along a line of ``length`` [mm]: an even number of them."""
+    return 2 * max(1, math.ceil(depth / (2.0 * length * math.tan(HELIX)) - 1e-9))
+
+
+def entry_depth(motions: Motions, depth: float) -> float:
+    """Greatest axial depth [mm] of any entry: what a turn of a bore goes down, or two legs of a ramp where it turns."""
     first = np.array([a + 1 for a, b in motions.runs if b > a and motions.kind[a + 1] == ENTRY])
     seg = motions.segments[first]
     radii = np.hypot(seg[:, 0] - seg[:, 4], seg[:, 1] - seg[:, 5])
-    return max(depth / bore_turns(r, depth) for r in radii.tolist())
+    straight = np.hypot(seg[:, 2] - seg[:, 0], seg[:, 3] - seg[:, 1])
+    return max(
+        depth / bore_turns(r, depth) if sweep else 2.0 * depth / ramp_legs(line, depth)
+        for r, line, sweep in zip(radii.tolist(), straight.tolist(), seg[:, 6].tolist(), strict=True)
+    )
+
+
+def _bore(at: Floats, seg: Floats, heights: tuple[float, float], feed: float, spindle: float, tool: int) -> Program:
+    """Turns around the centre of an arc ``seg`` (7,), from one height evenly down to the other."""
+    x, y, sweep = seg[4:7].tolist()
+    depth = heights[0] - heights[1]
+    pitch = depth / bore_turns(math.hypot(at[0] - x, at[1] - y), depth)
+    sense: Literal[1, -1] = 1 if sweep > 0.0 else -1
+    return helix(at, (x, y), heights, pitch, feed, spindle, tool, "entry", sense=sense, level=False)
+
+
+def _ramp(at: Floats, seg: Floats, heights: tuple[float, float], feed: float, spindle: float, tool: int) -> Program:
+    """Legs to and fro along a line ``seg`` (7,), from one height evenly down to the other, the last back to ``at``."""
+    legs = ramp_legs(float(np.hypot(*(seg[2:4] - at))), heights[0] - heights[1])
+    z = np.linspace(*heights, legs + 1)[1:]
+    to = np.where((np.arange(legs) % 2 == 0)[:, None], seg[2:4], at)
+    line = np.full(legs, LINE)
+    return rows(line, np.column_stack([to, z]), np.zeros((legs, 2)), np.full(legs, feed), spindle, tool, "entry")
 
 
 def programs_of(
@@ -273,13 +301,9 @@ def programs_of(
         at = motions.segments[a, 2:4]
         parts = [rapid([*at, h.safe], spindle, tool, "link")]
         if b > a and motions.kind[a + 1] == ENTRY:
-            xc, yc, sweep = seg[0, 4:7]
-            turns = bore_turns(math.hypot(at[0] - xc, at[1] - yc), depth)
             parts.append(plunge([*at, h.top], setting_feed, spindle, tool, "entry"))
-            parts.append(
-                helix(at, (float(xc), float(yc)), (h.top, h.floor), depth / turns, setting_feed, spindle, tool, "entry",
-                      sense=1 if sweep > 0.0 else -1, level=False)
-            )  # fmt: skip
+            descend = _ramp if seg[0, 6] == 0.0 else _bore
+            parts.append(descend(at, seg[0], (h.top, h.floor), setting_feed, spindle, tool))
         else:
             parts.append(plunge([*at, h.floor], motions.feed[a], spindle, tool, "entry"))
         for first, last, name in _stretches([zones[int(k)] for k in motions.kind[a + 1 : b + 1]]):

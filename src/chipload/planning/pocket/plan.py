@@ -28,8 +28,8 @@ from chipload.planning.pocket.motions import (
     ZONES,
     Motions,
     MotionSamples,
-    bore_pitch,
     clock,
+    entry_depth,
     motions_of,
     programs_of,
     replayed,
@@ -182,8 +182,8 @@ def _columns(
     place = (zone, length, own, samples.centre, samples.heading, 0.0, met, speed, makes_wall)
     cut = CutConditions(cutter, material, stage.depth, stage.spindle_speed, setting.milling, *setting.rigid)
     columns: Columns = {**cost(cut, *place), "engagement_max_deg": np.degrees(most)}
-    if (kind == ENTRY).any():  # a turn of a bore is as deep as its pitch
-        thin = cost(replace(cut, axial_depth=bore_pitch(motions, stage.depth)), *place)
+    if (kind == ENTRY).any():  # a turn of a bore is as deep as its pitch, a leg of a ramp as two
+        thin = cost(replace(cut, axial_depth=entry_depth(motions, stage.depth)), *place)
         columns = {k: np.where(kind == ENTRY, thin.get(k, v), v) for k, v in columns.items()}
     return columns, own
 

@@ -23,6 +23,8 @@ _kernels = LateModule("chipload.planning.pocket._kernels")
 
 Floats = NDArray[np.float64]
 
+#: directions of a ramp that are tried, and how much of the free length it takes
+DIRECTIONS, WITHIN = 36, 0.98
 #: chords leave the arcs of the centre region by at most this part of R, to its inside
 CHORD = 1e-5
 #: parts that the way between them begins at, one after the other
@@ -143,3 +145,23 @@ def shortest_order(points: Floats) -> list[int]:
         if length < best[0] - 1e-9:
             best = (length, order)
     return best[1]
+
+
+def longest_line(centres: shapely.Geometry, middle: Floats, half: float) -> Floats:
+    """Ends (2, 2) [mm] of the longest straight line through ``middle`` that stays in the region of the centre, at most
+    ``half`` to either side, of ``DIRECTIONS`` even directions.
+
+    >>> longest_line(shapely.box(0.0, 0.0, 9.0, 0.2), np.array([4.0, 0.1]), 3.0).round(6).tolist()
+    [[1.06, 0.1], [6.94, 0.1]]
+    """
+    best, longest = np.vstack([middle, middle]), -1.0
+    for angle in np.pi * np.arange(DIRECTIONS) / DIRECTIONS:
+        ahead = np.array([np.cos(angle), np.sin(angle)])
+        sides = []
+        for sign in (-1.0, 1.0):
+            inside = shapely.intersection(shapely.linestrings([middle, middle + sign * half * ahead]), centres)
+            parts = [part for part in shapely.get_parts(inside) if shapely.dwithin(part, shapely.points(middle), 1e-6)]
+            sides.append(sign * WITHIN * max((shapely.length(part) for part in parts), default=0.0))
+        if sides[1] - sides[0] > longest:
+            longest, best = sides[1] - sides[0], middle + np.array(sides)[:, None] * ahead
+    return best

@@ -15,8 +15,8 @@ from chipload.cutting.wall_error import Milling
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.geometry.offset import offset_region
-from chipload.planning.pocket.clearing import STEP
-from chipload.planning.pocket.free_space import cleared_by, hole, outside_of, without_leftover
+from chipload.planning.pocket.clearing import STEP, Entry
+from chipload.planning.pocket.free_space import cleared_by, hole, outside_of, without_leftover, without_stock
 from chipload.planning.pocket.motions import Heights
 from chipload.planning.pocket.tabs import Tabs
 
@@ -76,11 +76,13 @@ class Clearing:
     around : the contours are those of a part that stands in the stock, which is cleared around it
     holes : (x, y, diameter) of pre-drilled holes as deep as the pocket
     larger : what cleared the contours before; None: nothing did
+    standing : closed contours of the material as it stands over the whole depth; None: as the other keys say
     floor_allowance : left on the floor by the levels that clear
     floor_finish, wall_finish : passes that take the allowances; None: they stay
     tabs : what stays over the floor; None: nothing
     strategies : among `pocket` (passes alone), `trochoidal` (circles along the middle lines, then passes)
     use : the strategy whose program is released
+    entry : into the solid, `helix` or `ramp`
     """
 
     milling: Milling
@@ -100,12 +102,14 @@ class Clearing:
     around: bool = False
     holes: tuple[tuple[float, float, float], ...] = ()
     larger: LargerCutter | None = None
+    standing: tuple[Contour, ...] | None = None
     floor_allowance: float = 0.0
     floor_finish: FloorFinish | None = None
     wall_finish: WallFinish | None = None
     tabs: Tabs | None = None
     strategies: tuple[str, ...] = ("pocket",)
     use: str = "pocket"
+    entry: Entry = "helix"
 
     @property
     def bottom(self) -> float:
@@ -184,6 +188,8 @@ def laid_out(contours: Sequence[Contour], setting: Clearing, radius: float) -> A
         if not before.contours:
             raise InputError(f"operation.rest_of: the larger cutter, radius {setting.larger.radius:g} mm, fits nowhere")
         free.append(without_leftover(before, setting.larger.left, radius))
+    if setting.standing is not None:
+        free += [r for r in [without_stock(drawn, setting.standing, radius, setting.left_on_walls)] if r.contours]
     wanted = math.acos(1.0 - setting.radial_depth / radius)
     return Asked(region, tuple(free), wanted, min(max(setting.step, STEP * radius), 0.25 * radius))
 

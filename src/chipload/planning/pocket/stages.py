@@ -159,6 +159,7 @@ def _stages(
             free=asked.free,
             earlier=earlier,
             trochoidal=strategy == TROCHOIDAL and earlier is None,
+            entry=setting.entry,
             progress=lambda done, what: progress(share[0] + share[1] * done, what),
         )
 

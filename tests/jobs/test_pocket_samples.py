@@ -1,0 +1,34 @@
+"""Tooth engagement that is kept of a pocket in levels: the loads of its rows, at every level."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from chipload.jobs.contour.result import steps_of
+from chipload.jobs.contour.samples import samples_of
+from pocket_job import done, operation, written
+
+SMALL = [(0, 0), (16, 0), (16, 14), (0, 14)]
+
+
+def test_the_loads_of_each_level(tmp_path):
+    """Over the revolution that is kept, force and torque rise to what the history says of the row, which finds its
+    greatest values by another method; both levels are there, the finish passes with their own depth are not.
+    """
+    more = "radial_depth_mm = 1.2\ndepth_mm = 5.0\nallowance_mm = 0.2\nfloor_allowance_mm = 0.4\n"
+    more += "floor_finish = { feed_mm_min = 600.0, speed_rpm = 7960.0 }\n"
+    more += "wall_finish = { feed_mm_min = 600.0, speed_rpm = 7960.0 }\n"
+    _, outcome = done(written(tmp_path, {"0": [SMALL]}, operation(more)))
+    (op,) = outcome.operations
+    (found,) = samples_of(outcome).values()
+    rows = steps_of(op, op.result.strategies["pocket"])
+    assert set(rows["pass"]) >= {"floor", "wall", "entry"}
+    assert set(rows["pass"][found.row]) == {"pocket"}
+    heights, counts = np.unique(rows["z_mm"][found.row].round(9), return_counts=True)
+    assert heights.tolist() == [-4.6, -2.3]
+    assert counts.min() > 20
+    most = np.hypot(found.turn[:, :, 0], found.turn[:, :, 1]).max(axis=1)
+    assert most == pytest.approx(rows["force_xy_n"][found.row], rel=0.01, abs=0.5)
+    torque = np.abs(found.turn[:, :, 3]).max(axis=1)
+    assert torque == pytest.approx(rows["torque_nm"][found.row], rel=0.01, abs=0.002)
