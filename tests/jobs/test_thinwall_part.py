@@ -124,6 +124,28 @@ def test_stock_of_a_state(folder):
     assert wall_stock(read_wall(job(folder).job)).volume() == pytest.approx(whole + 12.0 * (3.6 + 2.0), rel=1e-3)
 
 
+def test_both_sides_of_a_wall(folder):
+    """They belong to one wall, are cut alternately, and give way alike: its thickness hardly changes."""
+    walls = WALLS.replace(
+        "foot_mm = 5.0\nallowance_mm = [0.3]",
+        "foot_mm = 5.0\nopposite = [6.0, 6.0, 15.0]\nallowance_mm = [0.3, 0.2]",
+        1,
+    )
+    inputs = read_wall(job(folder, walls=walls).job)
+    surfaces = [inputs.coarse(s) for s in inputs.body.side_numbers]
+    assert [s.wall for s in surfaces] == [0, 0, 1]
+    assert [s.allowance for s in surfaces] == [0.3, 0.2, 0.2]
+    assert np.allclose(surfaces[0].normals, [0.0, -1.0, 0.0])
+    assert np.allclose(surfaces[1].normals, [0.0, 1.0, 0.0])
+    bears = modelled(np.full(surfaces[0].points.shape[:2], 1e-4).ravel(), 0.05)
+    plan = constant(surfaces, lambda left, side: bears, inputs.depths.law, 0.15)
+    assert [p.side for p in plan.passes] == [0, 1, 0, 1, 2, 2]
+    part, none = inputs.body.part, [np.zeros(inputs.body.elastic.shape)] * 3
+    one, other = (part.compliance(none, k).reshape(part.shape)[:, 1:] for k in (0, 1))
+    # the way along u of the two faces may differ
+    assert min(np.abs(one / other - 1.0).max(), np.abs(one / other[::-1] - 1.0).max()) < 0.05
+
+
 @pytest.mark.parametrize("shank", [5.0, 6.0])
 def test_the_shank_beside_the_neighbour(folder, shank):
     """The cutter leans 50 deg over the first wall while it cuts the inner side of the second. In the link along its
