@@ -52,6 +52,17 @@ def test_fields_state_unit_range_and_choices() -> None:
     assert set(contour["operation.0.milling"].choices) == {"down", "up"}
 
 
+def test_a_key_that_takes_a_table_or_a_list_of_others(tmp_path) -> None:
+    text = (EXAMPLES / "plate" / "job.toml").read_text()
+    walls = '[part]\nfile = "part.step"\n\n[[wall]]\nface = 3\nfoot_mm = 5.0\nallowance_mm = [0.3]\n\n'
+    (tmp_path / "job.toml").write_text("# walls\n" + walls + text[text.index("[workpiece]") :])
+    fields = {f.path: f for f in job_fields(tmp_path / "job.toml")}
+    assert fields["wall.0.foot_mm"].value == 5.0
+    assert fields["wall.0.foot_mm"].meaning == "height above the lower edge of each side that keeps its stock"
+    assert fields["wall.0.fit_mm"].value is None
+    assert "wall.0.shape" not in fields
+
+
 def test_what_is_entered_is_checked_as_a_run_does() -> None:
     path = EXAMPLES / "chips" / "job.toml"
     fields = {f.path: f for f in job_fields(path)}

@@ -91,13 +91,19 @@ class ThinWall:
         pieces along u and v.
         """
         u, v = np.meshgrid(np.linspace(0.0, 1.0, counts[0] + 1), np.linspace(low, 1.0, counts[1] + 1), indexing="ij")
-        minus, plus = self.offset(u, v, stock)
-        n, m = u.shape
-        number = np.arange(n * m).reshape(n, m)
-        faces = [_quads(number)[:, ::-1], _quads(number + n * m)]
-        edges = (number[0, ::-1], number[-1], number[:, 0], number[::-1, -1])
-        faces += [_quads(np.stack([edge, edge + n * m], axis=1)) for edge in edges]
-        return trimesh.Trimesh(np.vstack([minus.reshape(-1, 3), plus.reshape(-1, 3)]), np.vstack(faces), process=False)
+        return closed_between(*self.offset(u, v, stock))
+
+
+def closed_between(minus: Floats, plus: Floats) -> trimesh.Trimesh:
+    """Closed triangles between two grids of points (n, m, 3); their first axis, their second one and the way from
+    ``minus`` to ``plus`` are right-handed.
+    """
+    n, m = minus.shape[:2]
+    number = np.arange(n * m).reshape(n, m)
+    faces = [_quads(number)[:, ::-1], _quads(number + n * m)]
+    edges = (number[0, ::-1], number[-1], number[:, 0], number[::-1, -1])
+    faces += [_quads(np.stack([edge, edge + n * m], axis=1)) for edge in edges]
+    return trimesh.Trimesh(np.vstack([minus.reshape(-1, 3), plus.reshape(-1, 3)]), np.vstack(faces), process=False)
 
 
 def _quads(number: Ints) -> Ints:

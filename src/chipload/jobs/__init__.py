@@ -69,7 +69,7 @@ CAPABILITIES = (
     Capability("feeds", "program", "FeedsJobTable", resumes=True, inner="feeds"),
     Capability("program", "program", "ProgramJobTable", resumes=True),
     Capability("impeller", "impeller", "ImpellerJobTable", resumes=True),
-    Capability("thinwall", "wall", "ThinWallJobTable"),
+    Capability("thinwall", "wall", "ThinWallJobTable", resumes=True),
     Capability("fit", "measurement", "FitJobTable"),
     Capability("contour", "part", "ContourJobTable"),
 )

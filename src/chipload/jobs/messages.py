@@ -9,7 +9,8 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Tag, ValidationError
+from pydantic.fields import FieldInfo
 
 from chipload.errors import InputError, InputErrors
 
@@ -142,12 +143,24 @@ def _meaning(loc: tuple[int | str, ...], root: type[BaseModel]) -> str:
 def _model_at(loc: Iterable[int | str], root: type[BaseModel]) -> type[BaseModel] | None:
     """The model of the table at a place in the file."""
     model: type[BaseModel] | None = root
+    field: FieldInfo | None = None
     for key in loc:
         if isinstance(key, int):
+            continue
+        if field is not None and (chosen := _tagged(field.annotation, key)) is not None:
+            model = chosen
             continue
         field = model.model_fields.get(key) if model is not None else None
         model = None if field is None else _model_in(field.annotation)
     return model
+
+
+def _tagged(annotation: Any, tag: str) -> type[BaseModel] | None:
+    """The table of a tag, where a key takes either of several kinds of tables."""
+    if any(isinstance(m, Tag) and m.tag == tag for m in getattr(annotation, "__metadata__", ())):
+        return _model_in(annotation)
+    found = (_tagged(a, tag) for a in typing.get_args(annotation))
+    return next((m for m in found if m is not None), None)
 
 
 def _model_in(annotation: Any) -> type[BaseModel] | None:

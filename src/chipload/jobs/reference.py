@@ -82,7 +82,8 @@ EXAMPLES = {
     "body_mm": "[[0.0, 0.0], [8.0, 6.0], [8.0, 20.0]]", "at_mm": "[40.0, 0.0, 8.0]",
     "high_mm": "[60.0, 40.0, 0.0]", "holder_mm": "[[20.0, 25.0], [30.0, 40.0]]",
     "pitch_deg": "[88.0, 92.0, 88.0, 92.0]", "layers": '["WALL"]',
-    "strategies": '["plain", "backward"]', "allowance_mm": "0.2", "wall.allowance_mm": "[0.3, 0.3]",
+    "strategies": '["plain", "backward"]', "allowance_mm": "0.2", "wall.allowance_mm": "[0.3, 0.3]", "wall.face": "3",
+    "opposite": "[10.0, 2.0, 15.0]", "places": "[8, 6]",
     "elements": "[8, 8]", "files": '["section_1.txt", "section_2.txt"]', "columns": '"X Y Z"', "span": "[0.1, 1.0]",
     "front": "3", "back": "[10.0, 0.0, 15.0]", "clamp": "5", "sections.blade": '["main_01.txt", "main_02.txt"]',
     "sections.splitter": '["splitter_01.txt"]', "hub": '"hub.txt"', "shroud": '"shroud.txt"',
@@ -120,18 +121,16 @@ def reference() -> str:
         if capability.inner:
             out += _variant(capability, next(c for c in CAPABILITIES if c.key == capability.key and not c.inner))
             continue
-        many = "tuple" in str(root.model_fields[capability.key].annotation)
-        out.append(f"Such a job has a table `{f'[[{capability.key}]]' if many else f'[{capability.key}]'}`.")
+        kinds = dict.fromkeys(many for _, many in tables_in(root.model_fields[capability.key].annotation))
+        heads = [f"`[[{capability.key}]]`" if many else f"`[{capability.key}]`" for many in kinds]
+        out.append(f"Such a job has a table {' or '.join(heads)}.")
         out.append(_summary(root) + "\n")
         if any(table_in(field.annotation) is None for field in root.model_fields.values()):
             out += ["\n### Keys before the first table\n", *_rows(root, "", tables=False)]
         for name, field in root.model_fields.items():
-            table = table_in(field.annotation)
-            if table is None:
-                continue
-            many = "tuple" in str(field.annotation)
-            heading = f"[[{name}]]" if many else f"[{name}]"
-            out += [f"\n### `{heading}`\n", _summary(table) + "\n", *_rows(table, name)]
+            for table, many in tables_in(field.annotation):
+                heading = f"[[{name}]]" if many else f"[{name}]"
+                out += [f"\n### `{heading}`\n", _summary(table) + "\n", *_rows(table, name)]
     return "\n".join(out) + "\n"
 
 
@@ -238,6 +237,14 @@ def _text_of(annotation: Any, bounds: list[str]) -> str:
             return f"list of {_text_of(args[0], bounds)}"
         return f"[{', '.join(_text_of(a, bounds) for a in args)}]"
     return getattr(annotation, "__name__", str(annotation))
+
+
+def tables_in(annotation: Any, many: bool = False) -> list[tuple[type[BaseModel], bool]]:
+    """The tables that a key may hold, and whether as a list: one, or either a table or a list of another."""
+    if isinstance(annotation, type) and not isinstance(annotation, types.GenericAlias):
+        return [(annotation, many)] if issubclass(annotation, BaseModel) else []
+    many = many or typing.get_origin(annotation) is tuple
+    return [found for a in typing.get_args(annotation) for found in tables_in(a, many)]
 
 
 def table_in(annotation: Any) -> type[BaseModel] | None:

@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from chipload.errors import InputError
 from chipload.files import read_regular
 from chipload.jobs import capability_of, load_job
-from chipload.jobs.reference import table_in, value_words
+from chipload.jobs.reference import tables_in, value_words
 from chipload.result.columns import unit_of
 from chipload.tables import parsed
 
@@ -30,6 +30,9 @@ UNITS = {
     "kg_m3": "kg/m\u00b3",
     "a": "A",
 }
+
+#: words of a schema for one of several kinds of values
+CHOICES = ("anyOf", "oneOf")
 
 Kind = Literal["number", "count", "word", "choice", "switch"]
 
@@ -119,14 +122,14 @@ def _fields(
         inner, value = properties.get(key), raw[key]
         if inner is None:
             continue
-        table = (
-            table_in(model.model_fields[key].annotation) if model is not None and key in model.model_fields else None
-        )
+        many = isinstance(value, list)
+        known = tables_in(model.model_fields[key].annotation) if model is not None and key in model.model_fields else []
+        table = next((t for t, several in known if several == many), known[0][0] if known else None)
         if isinstance(value, Mapping):
             yield from _fields(value, _table_schema(inner, defs), defs, table, f"{at}{key}.")
         elif isinstance(value, list) and value and all(isinstance(v, Mapping) for v in value):
             for k, one in enumerate(value):
-                yield from _fields(one, _table_schema(inner, defs), defs, table, f"{at}{key}.{k}.")
+                yield from _fields(one, _table_schema(inner, defs, many), defs, table, f"{at}{key}.{k}.")
 
 
 def _field(key: str, value: Any, schema: Mapping[str, Any], takes: str, at: str) -> FormField | None:
@@ -163,17 +166,15 @@ def _resolved(schema: Mapping[str, Any], defs: Mapping[str, Any]) -> Mapping[str
     if "$ref" in schema:
         own: Mapping[str, Any] = defs.get(str(schema["$ref"]).rsplit("/", 1)[-1], {})
         return {**own, **{k: v for k, v in schema.items() if k != "$ref"}}
-    if "anyOf" in schema:
-        return {**schema, "anyOf": [_resolved(one, defs) for one in schema["anyOf"]]}
-    return schema
+    chosen = {word: [_resolved(one, defs) for one in schema[word]] for word in CHOICES if word in schema}
+    return {**schema, **chosen}
 
 
-def _table_schema(schema: Mapping[str, Any], defs: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The schema of the table that a key holds, itself or in a list."""
-    options: list[Mapping[str, Any]] = [schema, *schema.get("anyOf", ())]
-    for one in options:
-        if "properties" in one:
-            return dict(one)
-        if one.get("type") == "array" and "items" in one:
-            return _table_schema(_resolved(one["items"], defs), defs)
-    return {}
+def _table_schema(schema: Mapping[str, Any], defs: Mapping[str, Any], many: bool = False) -> Mapping[str, Any]:
+    """The schema of the table that a key holds, itself or in a list; ``many``: the list, where it may be either."""
+    options: list[Mapping[str, Any]] = [schema, *(one for word in CHOICES for one in schema.get(word, ()))]
+    tables = [one for one in options if "properties" in one]
+    lists = [one for one in options if one.get("type") == "array" and "items" in one]
+    if lists and (many or not tables):
+        return _table_schema(_resolved(lists[0]["items"], defs), defs)
+    return dict(tables[0]) if tables else {}

@@ -1,6 +1,7 @@
 """Passes on walls: states against meshes of their own thickness, and the offset function on walls by formula."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -107,6 +108,23 @@ def test_sides_alternate_and_end_on_the_finish():
         assert_allclose(own[0].high, 0.5)
         assert_allclose(own[1].low, 0.0)
         assert_allclose(own[0].low, own[1].high)
+
+
+@pytest.mark.parametrize("kind", ["variable", "constant"])
+def test_walls_are_cut_one_after_another(kind):
+    """Two walls of two sides: the first one whole before the second, which has all of its stock until then; while the
+    second is cut the first one is finished."""
+    surfaces = [replace(line(0.5), wall=k // 2) for k in range(4)]
+    asked = []
+
+    def bears(left, side):
+        asked.append((side, [float(d.min()) for d in left]))
+        return modelled(np.full(left[side].size, 0.05 / 25.0), 0.05)
+
+    plan = variable(surfaces, bears, STRAIGHT, 1.0) if kind == "variable" else constant(surfaces, bears, STRAIGHT, 0.25)
+    assert [p.side for p in plan.passes] == [0, 1, 0, 1, 2, 3, 2, 3]
+    for side, left in asked:
+        assert_allclose(left[2:] if side < 2 else left[:2], 0.5 if side < 2 else 0.0)
 
 
 def test_constant_in_fewest_equal_passes():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import shapely
@@ -40,12 +40,12 @@ def clamp_errors(table: SimulationJobTable) -> Iterator[str]:
         for k, mode in enumerate(table.dynamics.mode):
             if mode.of == "workpiece":
                 yield f"dynamics.mode.{k}: of the workpiece: leave it out: workpiece.density_kg_m3 gives its modes"
-    yield from wrong_clamps(table.workpiece)
+    yield from wrong_clamps(table.workpiece.clamp)
 
 
-def wrong_clamps(table: WorkpieceTable) -> Iterator[str]:
+def wrong_clamps(clamps: Sequence[ClampTable]) -> Iterator[str]:
     """Clamps that state no place, or more than one."""
-    for k, clamp in enumerate(table.clamp):
+    for k, clamp in enumerate(clamps):
         key = f"workpiece.clamp.{k}"
         box = (clamp.low_mm is not None, clamp.high_mm is not None)
         point = (clamp.point_mm is not None, clamp.diameter_mm is not None)

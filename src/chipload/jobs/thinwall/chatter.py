@@ -94,7 +94,7 @@ class WallChatter:
         """
         key = (b"".join(np.asarray(D).tobytes() for D in left), side)
         if key not in self._depths:
-            limits, shape = self.inputs.depths.law.limits, self.inputs.body.wall.shape
+            limits, shape = self.inputs.depths.law.limits, self.inputs.body.elastic.shape
             allowance = self.inputs.body.allowance[self.inputs.body.side_numbers[side]]
             before = [np.array(D) for D in left]
             before[side] = np.minimum(before[side] + limits.greatest, allowance)
@@ -139,7 +139,7 @@ class WallChatter:
         full = [np.full(places.shape, self.inputs.body.allowance[s]) for s in self.inputs.body.side_numbers]
         before = list(left)
         before[p.side] = p.high
-        shape = self.inputs.body.wall.shape
+        shape = self.inputs.body.elastic.shape
         for cuts in removal.cuts:
             step = np.asarray(cuts.step)
             if not len(step):

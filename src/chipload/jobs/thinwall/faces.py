@@ -33,7 +33,7 @@ def wall_of_faces(job: ThinWallJob) -> ThinWall:
     InputError
         The file cannot be read, or the faces are not the sides of a wall.
     """
-    w = job.table.wall
+    w = job.wall
     model, fit = read_faces(job.section_files[0], "wall.file"), w.fit_mm or _FIT
     named: dict[str, FaceName] = {key: stated(getattr(w, key), f"wall.{key}") for key in ("front", "back", "clamp")}
     front, back = (model.face(named[key], f"wall.{key}") for key in ("front", "back"))

@@ -7,6 +7,7 @@ from functools import partial
 import trimesh
 
 from chipload.jobs.thinwall.outcome import USED, ThinWallResult
+from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.jobs.thinwall.result import failures_of
 from chipload.jobs.thinwall.scene import scene_bytes
 from chipload.jobs.thinwall.sections import sections_of
@@ -33,6 +34,13 @@ def _blanks(walled: ThinWallResult) -> dict[str, Blank]:
     return {name: Blank(mesh, cutters) for name in walled.variants} if mesh.is_watertight else {}
 
 
+def _frame(walled: ThinWallResult) -> str:
+    """What coordinates mean."""
+    if isinstance(walled.geometry.shape, PartShape):
+        return "coordinates are those of the part's model"
+    return "Z 0 is the clamp, X along the wall, its sides towards Y+ and Y-"
+
+
 def program_files(walled: ThinWallResult) -> dict[str, bytes]:
     """The program of each variant for the machine and as CL data; verified only the one in use, where it holds."""
     out: dict[str, bytes] = {}
@@ -46,7 +54,7 @@ def program_files(walled: ThinWallResult) -> dict[str, bytes]:
         said += [
             f"T{c.number}: D {c.diameter:g} mm, corner {c.corner_radius:g} mm, {c.flutes} flutes, overhang "
             f"{c.overhang:g} mm",
-            f"Z 0 is the clamp, X along the wall, its sides towards Y+ and Y-; machine {walled.planning.machine.name}",
+            f"{_frame(walled)}; machine {walled.planning.machine.name}",
             f"G43 H{c.number} must be the overhang of {c.overhang:g} mm: the rotary axes turn about it",
         ]
         text = write_commands(

@@ -23,6 +23,8 @@ from chipload.jobs.provenance import title_of
 from chipload.jobs.tables import stated
 from chipload.jobs.thinwall.faces import wall_of_faces
 from chipload.jobs.thinwall.job import ThinWallJob
+from chipload.jobs.thinwall.part_blank import PartBlank, part_blank
+from chipload.jobs.thinwall.part_shape import PartShape, part_of_faces
 from chipload.jobs.thinwall.tables import SHAPES
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.thinwall.blank import SIDES, FinishSurface, WallBlank
@@ -33,7 +35,7 @@ from chipload.planning.thinwall.passes import ThresholdOf
 from chipload.planning.thinwall.paths import PassMotion
 from chipload.planning.thinwall.plane_stock import CutterPose
 from chipload.planning.thinwall.table import read_cuts
-from chipload.planning.thinwall.threshold import Experiments, Threshold, calibrated
+from chipload.planning.thinwall.threshold import Experiments, Threshold, calibrated, modelled
 from chipload.structure.grid import from_map
 from chipload.structure.solid import SolidWorkpiece
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
@@ -48,24 +50,51 @@ GOUGE = 0.003
 
 @dataclass(frozen=True, eq=False)
 class WallBody:
-    """The wall and its stock, in mm.
+    """The wall and its stock, or a part with several, in mm.
 
     Attributes
     ----------
     shape : finished
-    allowance : on k- and k+
-    side_numbers : of the sides that have stock, 0 for k-, 1 for k+
-    foot : share of v that keeps its stock
-    wall : its finite elements
+    allowance : on k- and k+, or on each side of a part's walls
+    side_numbers : of the sides that have stock, 0 for k-, 1 for k+; of a part all of them
+    foot : share of v that keeps its stock; of a part 0
+    elastic : its finite elements, or the cells of the part
     places : u (n,) and v (m,) of them
     """
 
-    shape: ThinWall
-    allowance: tuple[float, float]
+    shape: ThinWall | PartShape
+    allowance: tuple[float, ...]
     side_numbers: tuple[int, ...]
     foot: float
-    wall: WallBlank
+    elastic: WallBlank | PartBlank
     places: tuple[Floats, Floats]
+
+    @property
+    def wall(self) -> WallBlank:
+        """The finite elements of one wall, where it is no part."""
+        assert isinstance(self.elastic, WallBlank)
+        return self.elastic
+
+    @property
+    def swept(self) -> ThinWall:
+        """The shape of one wall, where it is no part."""
+        assert isinstance(self.shape, ThinWall)
+        return self.shape
+
+    @property
+    def part(self) -> PartBlank | None:
+        """The part with walls; None: one wall."""
+        return self.elastic if isinstance(self.elastic, PartBlank) else None
+
+    def compliance(self, left: Sequence[Floats], number: int) -> Floats:
+        """C_nn of the places of a side while stock ``left`` is on all sides, (p,) [mm/N]."""
+        if isinstance(self.elastic, PartBlank):
+            return self.elastic.compliance(left, number)
+        return self.elastic.compliance(left, SIDES[number])
+
+    def wall_of(self, number: int) -> int:
+        """Number of the wall of a side."""
+        return self.shape.each[number].wall if isinstance(self.shape, PartShape) else 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,9 +145,9 @@ class WallInputs:
 
     @property
     def top(self) -> float:
-        """Height of the wall [mm]."""
-        minus, plus = self.body.shape.sides(np.linspace(0.0, 1.0, 65), 1.0)
-        return float(max(minus[:, 2].max(), plus[:, 2].max()))
+        """Height of the wall, or of the part with its stock [mm]."""
+        highest = max(float(p[:, 2].max()) for p in self.body.shape.sides(np.linspace(0.0, 1.0, 65), 1.0))
+        return highest if self.body.part is None else max(highest, float(self.stock_mesh().bounds[1][2]))
 
     @property
     def gouge_tolerance(self) -> float:
@@ -128,8 +157,15 @@ class WallInputs:
     @property
     def foot_height(self) -> float:
         """Highest point of the foot [mm]."""
-        minus, plus = self.body.shape.sides(np.linspace(0.0, 1.0, 65), self.body.foot)
-        return float(max(minus[:, 2].max(), plus[:, 2].max()))
+        return max(float(p[:, 2].max()) for p in self._lowest_rows())
+
+    @property
+    def lowest_row(self) -> float:
+        """Lowest point of the rows [mm]."""
+        return min(float(p[:, 2].min()) for p in self._lowest_rows())
+
+    def _lowest_rows(self) -> tuple[Floats, ...]:
+        return self.body.shape.sides(np.linspace(0.0, 1.0, 65), self.body.foot)
 
     def coarse(self, side: int) -> FinishSurface:
         """Finish surface at the places."""
@@ -160,16 +196,18 @@ class WallInputs:
     def _surface(self, side: int, u: Floats, v: Floats) -> FinishSurface:
         a, b = np.meshgrid(u, v, indexing="ij")
         return FinishSurface(
-            self.body.shape.sides(a, b)[side], self.body.shape.normals(a, b)[side], self.body.allowance[side]
+            self.body.shape.sides(a, b)[side],
+            self.body.shape.normals(a, b)[side],
+            self.body.allowance[side],
+            self.body.wall_of(side),
         )
 
     def threshold(self, deflection: float) -> ThresholdOf:
         """Thresholds of the sides with stock under a deflection that is allowed [mm]."""
 
-        def modelled(left: Sequence[Floats], side: int) -> Threshold:
-            return self.body.wall.threshold(
-                self.both(left), SIDES[self.body.side_numbers[side]], deflection, self.depths.factor
-            )
+        def limited(left: Sequence[Floats], side: int) -> Threshold:
+            C = self.body.compliance(self.both(left), self.body.side_numbers[side])
+            return modelled(C, deflection, self.depths.factor)
 
         def measured(left: Sequence[Floats], side: int) -> Threshold:
             u, v = np.meshgrid(*self.body.places, indexing="ij")
@@ -177,28 +215,32 @@ class WallInputs:
             table = stated(self.job.table.threshold, "threshold")
             return calibrated(stated(self.depths.experiments, "threshold"), place, table.deviations)
 
-        return modelled if self.depths.experiments is None else measured
+        return limited if self.depths.experiments is None else measured
 
     def finished_threshold(self) -> Threshold:
         """Thresholds of the first side with stock when the wall is finished."""
         return self.threshold(self.depths.deflection)(
-            [np.zeros(self.body.wall.shape) for _ in self.body.side_numbers], 0
+            [np.zeros(self.body.elastic.shape) for _ in self.body.side_numbers], 0
         )
 
     def both(self, left: Sequence[Floats]) -> list[Floats]:
-        """Stock on k- and k+ of stock on the sides that have any."""
-        out = [np.zeros(self.body.wall.shape), np.zeros(self.body.wall.shape)]
+        """Stock on all sides of stock on those that have any."""
+        out = [np.zeros(self.body.elastic.shape) for _ in self.body.allowance]
         for number, D in zip(self.body.side_numbers, left, strict=True):
             out[number] = D
         return out
 
     def stock_mesh(self) -> trimesh.Trimesh:
         """The workpiece before it is cut."""
-        return self.body.shape.mesh(FACETS, self.body.allowance)
+        shape = self.body.shape
+        if isinstance(shape, PartShape):
+            return shape.body(self.body.places, [np.full(self.body.elastic.shape, a) for a in self.body.allowance])
+        return shape.mesh(FACETS, _pair(self.body.allowance))
 
     def finished_mesh(self) -> trimesh.Trimesh:
-        """The finished wall, from the clamp up."""
-        return self.body.shape.mesh(FACETS, (0.0, 0.0))
+        """The finished wall, from the clamp up; or the finished part."""
+        shape = self.body.shape
+        return shape.part if isinstance(shape, PartShape) else shape.mesh(FACETS, (0.0, 0.0))
 
 
 def read_wall(job: ThinWallJob) -> WallInputs:
@@ -210,12 +252,10 @@ def read_wall(job: ThinWallJob) -> WallInputs:
         A file cannot be read, or values do not go together.
     """
     op, table = job.operation, job.table
-    shape = _shape(job)
     machine = machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
     material = material_named(job.material) if isinstance(job.material, str) else read_material(job.material)
     need_directions(material, "a thin wall")
     cutter = job.cutters[op.cutter]
-    wall, foot = _wall(job, shape)
     feed, spindle = mm_s_from_mm_min(op.feed_mm_min), rad_s_from_rpm(op.speed_rpm)
     step = _step_over(job, cutter) * (-1.0 if op.milling == "down" else 1.0)
     posture = CutterPose(
@@ -238,14 +278,7 @@ def read_wall(job: ThinWallJob) -> WallInputs:
     return WallInputs(
         job=job,
         title=title_of(job.path),
-        body=WallBody(
-            shape=shape,
-            allowance=table.wall.allowance_mm,
-            side_numbers=tuple(k for k, a in enumerate(table.wall.allowance_mm) if a > 0.0),
-            foot=foot,
-            wall=wall,
-            places=(np.linspace(0.0, 1.0, wall.shape[0]), np.linspace(foot, 1.0, wall.shape[1])),
-        ),
+        body=_part_body(job, abs(step)) if job.walls else _wall_body(job),
         cut=WallCut(
             cutter=cutter,
             material=material,
@@ -268,8 +301,35 @@ def read_wall(job: ThinWallJob) -> WallInputs:
     )
 
 
+def _pair(values: tuple[float, ...]) -> tuple[float, float]:
+    """Values of k- and k+."""
+    minus, plus = values
+    return minus, plus
+
+
+def _part_body(job: ThinWallJob, step_over: float) -> WallBody:
+    """A part with walls, in its clamps."""
+    part = part_blank(job, part_of_faces(job), step_over)
+    allowance = tuple(s.allowance for s in part.body.each)
+    return WallBody(part.body, allowance, tuple(range(len(allowance))), 0.0, part, part.places)
+
+
+def _wall_body(job: ThinWallJob) -> WallBody:
+    """One wall."""
+    shape = _shape(job)
+    wall, foot = _wall(job, shape)
+    return WallBody(
+        shape=shape,
+        allowance=job.wall.allowance_mm,
+        side_numbers=tuple(k for k, a in enumerate(job.wall.allowance_mm) if a > 0.0),
+        foot=foot,
+        elastic=wall,
+        places=(np.linspace(0.0, 1.0, wall.shape[0]), np.linspace(foot, 1.0, wall.shape[1])),
+    )
+
+
 def _shape(job: ThinWallJob) -> ThinWall:
-    w = job.table.wall
+    w = job.wall
     if w.shape == "plate":
         return plate(*(stated(getattr(w, key), f"wall.{key}") for key in SHAPES["plate"][0]))
     if w.shape == "blade":
@@ -291,7 +351,7 @@ def _shape(job: ThinWallJob) -> ThinWall:
 
 def _wall(job: ThinWallJob, shape: ThinWall) -> tuple[WallBlank, float]:
     """The wall in finite elements with all of its stock, and the share of v that is its foot."""
-    w, made = job.table.wall, job.table.workpiece
+    w, made = job.wall, job.table.workpiece
     _, height, _ = shape.size()
     foot = w.foot_mm / height
     if not foot < 0.8:

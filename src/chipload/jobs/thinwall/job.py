@@ -9,12 +9,15 @@ from typing import Any
 
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
+from chipload.jobs.simulation.clamped import wrong_clamps
 from chipload.jobs.sources import Limited, sources_and_cutters, unknown_cutter
 from chipload.jobs.thinwall.tables import (
     EVERY,
     SHAPES,
+    FaceWallTable,
     ThinWallJobTable,
     WallOperationTable,
+    WallTable,
 )
 
 
@@ -29,6 +32,7 @@ class ThinWallJob(Limited):
     cutters : by number
     machine, material : a shipped name or a file
     section_files : of the sections, or the STEP file; empty for other shapes
+    part_file : STEP file of a part with walls; None: the job has one wall of a shape
     threshold_file : experiments; None: the threshold is modelled
     overrides : the `--set` texts that were applied
     """
@@ -39,8 +43,20 @@ class ThinWallJob(Limited):
     machine: str | Path
     material: str | Path
     section_files: tuple[Path, ...]
+    part_file: Path | None
     threshold_file: Path | None
     overrides: tuple[str, ...]
+
+    @property
+    def walls(self) -> tuple[FaceWallTable, ...]:
+        """The walls of a part; none: the job has one wall of a shape."""
+        return self.table.wall if isinstance(self.table.wall, tuple) else ()
+
+    @property
+    def wall(self) -> WallTable:
+        """The wall of a shape."""
+        assert isinstance(self.table.wall, WallTable)
+        return self.table.wall
 
     @property
     def operation(self) -> WallOperationTable:
@@ -62,16 +78,25 @@ def load(path: Path, table: ThinWallJobTable, overrides: Sequence[str]) -> ThinW
     errors.texts += _contradictions(table, tools)
     errors.refuse()
     wall = table.wall
+    files: tuple[str, ...] = ()
+    if isinstance(wall, WallTable):
+        files = wall.files or (() if wall.file is None else (wall.file,))
     return ThinWallJob(
         path,
         table,
         tools,
         sources["machine"],
         sources["material"],
-        tuple(folder / f for f in wall.files or (() if wall.file is None else (wall.file,))),
+        tuple(folder / f for f in files),
+        None if table.part is None else folder / table.part.file,
         None if table.threshold is None else folder / table.threshold.file,
         tuple(overrides),
     )
+
+
+def resume_note(job: ThinWallJob) -> str:
+    """What is not kept while the job runs: nothing that takes long."""
+    return ""
 
 
 def missing(values: Mapping[str, Any]) -> list[str]:
@@ -87,21 +112,59 @@ def missing(values: Mapping[str, Any]) -> list[str]:
 def _contradictions(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Iterator[str]:
     """What values of the wall, the operation and its cutter contradict."""
     wall, op = table.wall, table.operation[0]
-    needs, may = SHAPES[wall.shape]
-    for key in type(wall).model_fields:
-        if getattr(wall, key) is not None and key not in (*EVERY, *needs, *may):
-            yield f"wall.{key}: not used by shape = {wall.shape}: leave it out"
+    if isinstance(wall, WallTable):
+        needs, may = SHAPES[wall.shape]
+        for key in type(wall).model_fields:
+            if getattr(wall, key) is not None and key not in (*EVERY, *needs, *may):
+                yield f"wall.{key}: not used by shape = {wall.shape}: leave it out"
+        yield from _of_parts_only(table)
+        feet, most = [("wall.foot_mm", wall.foot_mm)], max(wall.allowance_mm)
+    else:
+        yield from _part_contradictions(table, wall)
+        feet = [(f"wall.{k}.foot_mm", w.foot_mm) for k, w in enumerate(wall)]
+        most = max((a for w in wall for a in w.allowance_mm), default=0.0)
     yield from unknown_cutter("operation.0.cutter", op.cutter, tools)
     if (op.step_over_mm is None) == (op.scallop_um is None):
         said = "none is" if op.step_over_mm is None else "both are"
         yield f"operation.0: {said} stated: state either step_over_mm or scallop_um"
-    if op.cutter in tools and wall.foot_mm < tools[op.cutter].corner_radius:
+    for key, foot in feet:
+        if op.cutter in tools and foot < tools[op.cutter].corner_radius:
+            yield (
+                f"{key} = {foot:g}: must be at least the corner radius of cutter {op.cutter}, "
+                f"{tools[op.cutter].corner_radius:g}: the cutter reaches so far below its last row, towards the clamp"
+            )
+    if op.clearance_mm <= most:
         yield (
-            f"wall.foot_mm = {wall.foot_mm:g}: must be at least the corner radius of cutter {op.cutter}, "
-            f"{tools[op.cutter].corner_radius:g}: the cutter reaches so far below its last row, towards the clamp"
+            f"operation.0.clearance_mm = {op.clearance_mm:g}: must be above wall.allowance_mm = {most:g}: the cutter "
+            "goes back over stock"
         )
-    if op.clearance_mm <= max(wall.allowance_mm):
-        yield (
-            f"operation.0.clearance_mm = {op.clearance_mm:g}: must be above wall.allowance_mm = "
-            f"{max(wall.allowance_mm):g}: the cutter goes back over stock"
-        )
+
+
+def _of_parts_only(table: ThinWallJobTable) -> Iterator[str]:
+    """Keys that a wall of a shape does not use."""
+    if table.part is not None:
+        yield "part: not used by one [wall]: leave it out, or state walls of the part as [[wall]]"
+    for key in ("clamp", "order", "cell_mm"):
+        if getattr(table.workpiece, key):
+            yield f"workpiece.{key}: not used by one [wall], which is clamped at its foot: leave it out"
+
+
+def _part_contradictions(table: ThinWallJobTable, walls: Sequence[FaceWallTable]) -> Iterator[str]:
+    """What the walls of a part lack, and keys that they do not use."""
+    if not walls:
+        yield "wall: has no entry: state at least one [[wall]]"
+    if table.part is None:
+        yield "part: missing: state [part] with the file of the model whose faces [[wall]] names"
+    if not table.workpiece.clamp:
+        yield "workpiece.clamp: missing: state how the part is held, as [[workpiece.clamp]]"
+    yield from wrong_clamps(table.workpiece.clamp)
+    for key in ("threshold", "dynamics"):
+        if getattr(table, key) is not None:
+            yield f"{key}: for one [wall] of a shape only: leave it out"
+    for k, wall in enumerate(walls):
+        sides = 1 if wall.opposite is None else 2
+        if len(wall.allowance_mm) != sides:
+            yield (
+                f"wall.{k}.allowance_mm: {len(wall.allowance_mm)} stated for {sides} "
+                f"side{'s' if sides > 1 else ''}: state one for the face, and one for the opposite face if it is stated"
+            )

@@ -44,6 +44,7 @@ def mesh_error(inputs: WallInputs, used: Floats, side: int) -> Floats:
     side : index in the sides with stock
     """
     wall, (u, v) = inputs.body.wall, inputs.body.places
+    shape, (minus, plus) = inputs.body.swept, inputs.body.allowance
     i, j, _ = wall.solid.grid.counts
     up = np.concatenate([np.linspace(0.0, inputs.body.foot, wall.foot + 1)[:-1], v])
     assert len(up) == j + 1
@@ -51,9 +52,7 @@ def mesh_error(inputs: WallInputs, used: Floats, side: int) -> Floats:
     for times in (1, 2):
         along = np.linspace(0.0, 1.0, times * i + 1)
         rows = np.interp(np.linspace(0.0, j, times * j + 1), np.arange(j + 1), up)
-        solid = finished_wall(
-            inputs.body.shape, inputs.body.allowance, along, rows, times * wall.foot, times, wall.solid
-        )
+        solid = finished_wall(shape, (minus, plus), along, rows, times * wall.foot, times, wall.solid)
         a, b = np.meshgrid(u * times * i, np.interp(v, rows, np.arange(len(rows))), indexing="ij")
         b = np.maximum(b, times * wall.foot + ABOVE)
         spread.append(

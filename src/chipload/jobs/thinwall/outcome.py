@@ -18,10 +18,12 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding
 from chipload.geometry.thin_wall import ThinWall
 from chipload.jobs.checks import DefaultChecks
+from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.machine.machine import Machine
 from chipload.program.commands import Commands
 from chipload.program.program import Program
 from chipload.result import Provenance
+from chipload.simulation.surface import Collision
 
 Floats = NDArray[np.float64]
 #: share by which a simulated force may exceed its threshold
@@ -89,6 +91,7 @@ class Shape:
     at : (3,) float [mm], where the gouge is
     points : how many were looked at
     nearest : least distance of the cutter to the finished wall along the path [mm]; below 0: it gouges
+    collisions : of shank and holder with a part
     """
 
     gouge: float
@@ -96,6 +99,7 @@ class Shape:
     at: tuple[float, float, float]
     points: int
     nearest: float
+    collisions: tuple[Collision, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -219,12 +223,12 @@ class WallGeometry:
     Attributes
     ----------
     shape : finished
-    allowance : [mm] on k- and k+
-    stock, finished : (vertices (n, 3), faces (m, 3)) of the workpiece before, and of the finished wall
+    allowance : [mm] on k- and k+, or on each side of a part's walls
+    stock, finished : (vertices (n, 3), faces (m, 3)) of the workpiece before, and of the finished wall or part
     """
 
-    shape: ThinWall
-    allowance: tuple[float, float]
+    shape: ThinWall | PartShape
+    allowance: tuple[float, ...]
     stock: tuple[Floats, NDArray[np.int64]]
     finished: tuple[Floats, NDArray[np.int64]]
 

@@ -16,10 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
+from chipload.jobs.kept_parts import KeptRecords
 from chipload.jobs.thinwall.chatter import WallChatter, chatter_of
 from chipload.jobs.thinwall.inputs import WallInputs
 from chipload.jobs.thinwall.mesh_error import error_at, mesh_error
-from chipload.planning.thinwall.blank import SIDES, FinishSurface
+from chipload.jobs.thinwall.part_shape import PartShape
+from chipload.planning.thinwall.blank import FinishSurface
 from chipload.planning.thinwall.passes import ThresholdOf
 from chipload.planning.thinwall.threshold import Threshold, modelled
 from chipload.stock.layers import LayeredStock
@@ -42,7 +44,9 @@ def wall_stock(inputs: WallInputs) -> LayeredStock:
     """
     op, cutter = inputs.job.operation, inputs.cut.cutter
     stock = LayeredStock.of_mesh(inputs.stock_mesh(), COARSE * op.layer_mm, TILE * cutter.diameter)
-    low = inputs.foot_height - cutter.corner_radius
+    low = inputs.lowest_row - cutter.corner_radius if inputs.body.part else inputs.foot_height - cutter.corner_radius
+    if isinstance(inputs.body.shape, PartShape):
+        stock.refine_at(inputs.body.shape.levels())
     stock.refine(max(low, float(stock.bounds[0])), float(stock.bounds[-1]), op.layer_mm)
     return stock
 
@@ -56,6 +60,7 @@ class Places:
     u, v : (n,), (m,) float
     surfaces : finish surface of each side at them
     chatter : of the wall and the cutter; None: it is not calculated
+    keep : of the run; None: compliance is not kept
     """
 
     inputs: WallInputs
@@ -63,6 +68,7 @@ class Places:
     v: Floats
     surfaces: tuple[FinishSurface, ...]
     chatter: WallChatter | None = None
+    keep: KeptRecords | None = None
     _solved: dict[tuple[bytes, int], Floats] = field(default_factory=dict)
     _errors: dict[int, Floats] = field(default_factory=dict)
 
@@ -91,17 +97,24 @@ class Places:
         states = self.inputs.both(self.coarse(left))
         key = (b"".join(D.tobytes() for D in states), side)
         if key not in self._solved:
-            number = self.inputs.body.side_numbers[side]
-            self._solved[key] = self.inputs.body.wall.compliance(states, SIDES[number]).reshape(
-                self.inputs.body.wall.shape
+            body = self.inputs.body
+            number = body.side_numbers[side]
+            known = ("compliance", number, tuple(states))
+            C = (
+                self.keep(known, lambda: body.compliance(states, number))
+                if self.keep
+                else body.compliance(states, number)
             )
+            self._solved[key] = C.reshape(body.elastic.shape)
         return self._solved[key]
 
     def error(self, side: int) -> Floats:
         """Relative error of the compliance of a side by its mesh, at the elements' places of the finished wall."""
         if side not in self._errors:
-            none = [np.zeros(self.shape) for _ in self.surfaces]
-            self._errors[side] = mesh_error(self.inputs, self.compliance(none, side), side)
+            none, part = [np.zeros(self.shape) for _ in self.surfaces], self.inputs.body.part
+            self._errors[side] = (
+                mesh_error(self.inputs, self.compliance(none, side), side) if part is None else part.error(side)
+            )
         return self._errors[side]
 
     def threshold(self, deflection: float, factor: float, spare: bool = True) -> ThresholdOf:
@@ -128,16 +141,16 @@ class Places:
         return found if self.chatter is None or not spare else self.chatter.limited(self, found)
 
 
-def places_of(inputs: WallInputs) -> Places:
+def places_of(inputs: WallInputs, keep: KeptRecords | None = None) -> Places:
     """The places; as many rows as the side with most of them has."""
-    u = inputs.body.places[0]
+    u, shape = inputs.body.places[0], inputs.body.shape
     v = max((inputs.fine(s).v for s in inputs.body.side_numbers), key=len)
     a, b = np.meshgrid(u, v, indexing="ij")
     surfaces = tuple(
-        FinishSurface(inputs.body.shape.sides(a, b)[s], inputs.body.shape.normals(a, b)[s], inputs.body.allowance[s])
+        FinishSurface(shape.sides(a, b)[s], shape.normals(a, b)[s], inputs.body.allowance[s], inputs.body.wall_of(s))
         for s in inputs.body.side_numbers
     )
-    return Places(inputs, u, v, surfaces, chatter_of(inputs))
+    return Places(inputs, u, v, surfaces, chatter_of(inputs), keep)
 
 
 def between(places: tuple[Floats, Floats], values: Floats, u: Floats, v: Floats) -> Floats:

@@ -20,6 +20,7 @@ from chipload.jobs.checks import check_columns
 from chipload.jobs.thinwall.inputs import WallInputs
 from chipload.jobs.thinwall.load_error import SimulatedPass, load_error
 from chipload.jobs.thinwall.mesh_error import error_at
+from chipload.jobs.thinwall.neighbours import part_collisions
 from chipload.jobs.thinwall.outcome import Finish, Shape
 from chipload.jobs.thinwall.places import Places, between
 from chipload.planning.thinwall.blank import SIDES
@@ -134,13 +135,22 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
             finish[number] = _finish(inputs, removal, number, C, error, bars)
     whole = stacked(parts)  # a pass that cuts films alone has no bands
     find = partial(load_error, simulated, cutter, inputs.cut.material, fine)
-    return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(inputs, stock, legs), stress, find)
+    return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(places, stock, legs), stress, find)
 
 
 def _stress(inputs: WallInputs, left: Sequence[Floats], number: int, columns: Mapping[str, NDArray[Any]]) -> float:
     """Greatest equivalent stress [MPa] of the elements at the clamp by the contact point whose force bends them most:
-    its force times its height.
+    its force times its height. Of a part everywhere, by the greatest deflection and by the greatest force.
     """
+    if inputs.body.part is not None:
+        rows = {int(np.argmax(columns[name])) for name in ("deflection_workpiece_um", "force_normal_n")}
+        at = np.clip(np.column_stack([columns[name] for name in ("u", "v")]), 0.0, 1.0)
+        return max(
+            inputs.body.part.stress(
+                inputs.both(left), number, float(at[k, 0]), float(at[k, 1]), float(columns["force_normal_n"][k])
+            )
+            for k in rows
+        )
     k = int(np.argmax(columns["force_normal_n"] * columns["contact_z_mm"]))
     if not columns["force_normal_n"][k] > 0.0:
         return 0.0
@@ -256,8 +266,9 @@ def _finish(
     )
 
 
-def _shape(inputs: WallInputs, stock: LayeredStock, legs: Sequence[PassProgram]) -> Shape:
-    """Path and stock beside the finished wall."""
+def _shape(places: Places, stock: LayeredStock, legs: Sequence[PassProgram]) -> Shape:
+    """Path and stock beside the finished wall, shank and holder beside a part."""
+    inputs = places.inputs
     length, height, _ = inputs.body.shape.size()
     u, v = np.meshgrid(
         np.linspace(0.0, 1.0, round(length / CLOUD) + 1),
@@ -268,4 +279,5 @@ def _shape(inputs: WallInputs, stock: LayeredStock, legs: Sequence[PassProgram])
     gap = nearest(Program.join([leg.program for leg in legs]), inputs.cut.cutter, cloud)
     found = section_deviation(stock, inputs.finished_mesh(), inputs.foot_height + inputs.cut.cutter.corner_radius)
     at = found.at if found.gouge > -gap.distance else gap.at
-    return Shape(found.gouge, found.left, at, found.points, gap.distance)
+    touched = () if inputs.body.part is None else part_collisions(inputs, places.uncut, legs)
+    return Shape(found.gouge, found.left, at, found.points, gap.distance, touched)

@@ -12,6 +12,7 @@ from chipload.errors import Finding, Severity
 from chipload.jobs.checks import chip_findings, default_limits, unchecked_checks, with_peaks
 from chipload.jobs.thinwall.chatter import FIRST_STATE, chatter_limits, chatter_numbers
 from chipload.jobs.thinwall.outcome import OVER, USED, Finish, ThinWallResult, Variant, helps
+from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.report.programs import ENDINGS, program_name
 from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict, check_limit, in_memory, state_of
 from chipload.simulation.accuracy import energy_balance
@@ -52,13 +53,24 @@ def result_of(walled: ThinWallResult) -> Result:
         unchecked=(
             *unchecked_checks(walled.checks),
             *(f"limit {name}: not stated" for name in walled.unchecked),
-            "holder, clamp and machine: no collision check",
+            *_unchecked_bodies(walled),
             *(() if "dynamics" in walled.settings else ("chatter: not calculated",)),
             "tangential forces do not bend the wall; a bent wall is not cut less deep",
         ),
         provenance=walled.provenance,
         maps=tuple(_maps(walled)),
         note=_note(walled),
+    )
+
+
+def _unchecked_bodies(walled: ThinWallResult) -> tuple[str, ...]:
+    """What is not held against one another."""
+    if not isinstance(walled.geometry.shape, PartShape):
+        return ("holder, clamp and machine: no collision check",)
+    cutter = walled.planning.cutter
+    return (
+        *(() if cutter.holder else (f"holder of tool {cutter.number}: not stated",)),
+        "clamps and machine: no collision check",
     )
 
 
@@ -127,6 +139,9 @@ def findings_of(walled: ThinWallResult, one: Variant) -> tuple[Finding, ...]:
     rapids = int((one.columns["rapid"] & (one.columns["chip_areas"] > 0)).sum())
     if rapids:
         out.append(Finding("rapid-cuts", 0, f"{rapids} rapids go through material", Severity.EXCEEDS))
+    for c in one.shape.collisions:
+        text = f"{c.what} goes {c.depth_mm:.3g} mm into {c.into}"
+        out.append(Finding("collision", c.line, text, Severity.EXCEEDS, c.at, c.step))
     return (*out, *chip_findings(walled.checks, one.columns))
 
 
@@ -183,6 +198,7 @@ def _operation(walled: ThinWallResult, v: Variant) -> dict[str, Any]:
         "kind": "thinwall",
         "in_use": USED,
         "wall": walled.geometry.shape.name,
+        **_part_numbers(walled),
         "threshold_source": walled.planning.threshold_source,
         "threshold": walled.planning.threshold_text,
         "reserve": walled.planning.reserve,
@@ -204,6 +220,19 @@ def _operation(walled: ThinWallResult, v: Variant) -> dict[str, Any]:
         ],
         "settings": dict(walled.settings),
     }
+
+
+def _part_numbers(walled: ThinWallResult) -> dict[str, Any]:
+    """Of a part: its walls, and its cells."""
+    shape = walled.geometry.shape
+    if not isinstance(shape, PartShape):
+        return {}
+    sides = [
+        {"wall": s.wall, "face": int(s.name), "allowance_mm": s.allowance, "length_mm": s.size()[0],
+         "height_mm": s.size()[1]}
+        for s in shape.each
+    ]  # fmt: skip
+    return {"sides": sides, "thinnest_wall_mm": shape.thickness, "part": dict(walled.settings["part"])}
 
 
 def _variant(one: Variant, dynamics: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -16,11 +16,13 @@ from chipload.jobs.checks import default_checks
 from chipload.jobs.provenance import provenance_of, title_of
 from chipload.jobs.thinwall.inputs import WallInputs, read_wall
 from chipload.jobs.thinwall.job import ThinWallJob
+from chipload.jobs.thinwall.kept_proofs import kept_of
 from chipload.jobs.thinwall.outcome import (
     ThinWallResult,
     WallGeometry,
     WallPlanning,
 )
+from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.jobs.thinwall.places import places_of, wall_stock
 from chipload.jobs.thinwall.proof import resolution_of
 from chipload.jobs.thinwall.tries import Tried, compared_variants, constant_within, unlimited_plan, variable_within
@@ -30,6 +32,7 @@ from chipload.planning.thinwall.experiments import Proposal, propose_cuts
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
 from chipload.result import Provenance
+from chipload.simulation.checkpoint import Checkpoint
 from chipload.simulation.chips import counted
 from chipload.simulation.estimate import estimate
 
@@ -39,8 +42,12 @@ Floats = NDArray[np.float64]
 VARIANTS = 3
 
 
-def run(job: ThinWallJob, progress: Progress = silent) -> ThinWallResult:
+def run(job: ThinWallJob, progress: Progress = silent, checkpoint: Checkpoint | None = None) -> ThinWallResult:
     """Plan the three variants of a job, write their programs and simulate them.
+
+    Parameters
+    ----------
+    checkpoint : keeps the states that were solved and the plans that were simulated
 
     Raises
     ------
@@ -51,7 +58,9 @@ def run(job: ThinWallJob, progress: Progress = silent) -> ThinWallResult:
     """
     inputs = read_wall(job)
     _thick_enough(inputs)
-    tried = Tried(places_of(inputs), progress)
+    provenance = _provenance(job, inputs)
+    keep = kept_of(job, checkpoint, provenance)
+    tried = Tried(places_of(inputs, keep), progress, keep)
     free = tried.prove(unlimited_plan(tried.places), 0.25)
     constant, corrections = constant_within(tried, free)
     variable = variable_within(tried, corrections, constant)
@@ -66,6 +75,13 @@ def run(job: ThinWallJob, progress: Progress = silent) -> ThinWallResult:
         "yield_mpa": job.table.workpiece.yield_mpa,
         "simulated_tries": tried.variable,
     }
+    if inputs.body.part is not None:
+        grid = inputs.body.part.grid
+        settings["part"] = {
+            "cell_mm": float(grid.size.max()),
+            "order": grid.order,
+            "unknowns": inputs.body.part.unknowns,
+        }
     if job.table.dynamics is not None:
         settings["dynamics"] = job.table.dynamics.model_dump()
     cut = inputs.cut
@@ -92,7 +108,7 @@ def run(job: ThinWallJob, progress: Progress = silent) -> ThinWallResult:
         findings=_findings(inputs),
         settings=settings,
         checks=default_checks(job.table.checks, {cut.cutter.number: cut.cutter}, cut.material, 0.5),
-        provenance=_provenance(job, inputs),
+        provenance=provenance,
     )
 
 
@@ -124,13 +140,18 @@ def check(job: ThinWallJob) -> tuple[list[str], bool]:
     wall_stock(inputs)
     count = counted(program, {inputs.cut.cutter.number: inputs.cut.cutter}, resolution_of(inputs, legs))
     length, height, thickness = inputs.body.shape.size()
-    nodes = len(inputs.body.wall.solid.grid.nodes)
+    part = inputs.body.part
+    if part is None:
+        nodes = len(inputs.body.wall.solid.grid.nodes)
+        solved = f"{len(inputs.body.wall.solid.grid.elements)} elements, {nodes} nodes"
+    else:
+        solved = f"cells of {part.grid.size.max():.3g} mm, {part.unknowns} unknowns"
     bearing, law = inputs.finished_threshold(), inputs.depths.law
     lines = [
         *map(str, _findings(inputs)),
         f"{job.path.name}: {inputs.body.shape.name}: {length:.4g} mm long, {height:.4g} mm high, at least "
-        f"{thickness:.4g} mm thick; {len(inputs.body.wall.solid.grid.elements)} elements, {nodes} nodes",
-        f"threshold of the finished side {SIDES[inputs.body.side_numbers[0]]}, {bearing.source}: "
+        f"{thickness:.4g} mm thick; {solved}",
+        f"threshold of the finished side {_first_side(inputs)}, {bearing.source}: "
         f"{bearing.force.min():.4g} to {bearing.force.max():.4g} N; normal force {law.forces[0]:.4g} N at "
         f"{law.depths[0]:g} mm, {law.forces[-1]:.4g} N at {law.depths[-1]:g} mm",
         f"{VARIANTS} variants or more; the unconstrained one: {estimate(count, 0)}",
@@ -142,6 +163,12 @@ def check(job: ThinWallJob) -> tuple[list[str], bool]:
             f"force at the smallest depth, {law.forces[0]:.4g} N at {law.depths[0]:g} mm, is above their threshold"
         )
     return lines, not weak.any()
+
+
+def _first_side(inputs: WallInputs) -> str:
+    """The first side with stock."""
+    shape = inputs.body.shape
+    return f"face {shape.each[0].name}" if isinstance(shape, PartShape) else SIDES[inputs.body.side_numbers[0]]
 
 
 def propose(
@@ -158,6 +185,8 @@ def propose(
     InputError
         A file cannot be read, values do not go together, or a site bears not even the smallest depth.
     """
+    if job.walls:
+        raise InputError("wall: calibration cuts are proposed for one [wall] of a shape only")
     inputs = read_wall(job)
     inputs = replace(inputs, depths=replace(inputs.depths, experiments=None))
     u, v = np.meshgrid(*inputs.body.places, indexing="ij")
@@ -183,5 +212,6 @@ def _provenance(job: ThinWallJob, inputs: WallInputs) -> Provenance:
     named = {"machine": job.machine, "material": job.material, "threshold": job.threshold_file}
     files |= {k: v for k, v in named.items() if isinstance(v, Path)}
     files |= {f"section {k}": f for k, f in enumerate(job.section_files)}
+    files |= {} if job.part_file is None else {"part": job.part_file}
     files |= {f"cutter {k}": job.path.parent / c.file for k, c in enumerate(job.table.cutter) if c.file is not None}
     return provenance_of(files, job.overrides, inputs.cut.machine, (inputs.cut.material,))

@@ -8,8 +8,9 @@ import numpy as np
 import plotly.graph_objects as go
 
 from chipload.jobs.thinwall.outcome import OVER, USED, ThinWallResult, Variant, helps
+from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.jobs.thinwall.result import failures_of
-from chipload.jobs.thinwall.wall_figures import COLOURS, SIDE_NAMES, along, bars, maps, space
+from chipload.jobs.thinwall.wall_figures import COLOURS, along, bars, maps, space
 from chipload.report.page import state_cell
 from chipload.report.programs import program_name
 from chipload.report.sheet import figure, items, table, value_text
@@ -29,8 +30,9 @@ def sections_of(walled: ThinWallResult, figures: dict[str, go.Figure]) -> list[s
     length, height, thickness = geometry.shape.size()
     body = [
         f"<h2>Operation 0: {escape(geometry.shape.name)}</h2>",
-        f"<p>{length:.4g} mm long, {height:.4g} mm high, at least {thickness:.4g} mm thick when finished, clamped at "
-        f"z = 0; {geometry.allowance[0]:g} and {geometry.allowance[1]:g} mm of stock on its sides. Cutter {c.number}: "
+        f"<p>{length:.4g} mm long, {height:.4g} mm high, at least {thickness:.4g} mm thick when finished, "
+        f"{'in the clamps of the part' if isinstance(geometry.shape, PartShape) else 'clamped at z = 0'}; "
+        f"{' and '.join(f'{a:g}' for a in geometry.allowance)} mm of stock on its sides. Cutter {c.number}: "
         f"D {c.diameter:g} mm, corner {c.corner_radius:g} mm, {c.flutes} flutes; rows {planning.step_over:.4g} mm "
         f"apart, {planning.feed_per_tooth:.4g} mm a tooth.</p>",
         f'<p class="note">{escape(", ".join(f"{k} {value_text(v)}" for k, v in walled.settings.items()))}</p>',
@@ -154,7 +156,7 @@ def _thresholds(one: Variant) -> go.Figure:
         own = [(k, m) for k, m in enumerate(one.plan.maps) if m.side == side]
         for word, (k, m) in (("first", own[0]), ("last", own[-1])):
             chosen.append(m)
-            titles.append(f"{SIDE_NAMES[m.side].split(',')[0]}, {word} pass ({k + 1})")
+            titles.append(f"side {m.side + 1}, {word} pass ({k + 1})")
     return maps([m.threshold for m in chosen], [m.points for m in chosen], titles, "N", logarithmic=True)
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from chipload.cutter.table import CutterTable
+from chipload.jobs.simulation.tables import ClampTable
 from chipload.jobs.tables import (
     ChecksTable,
     Count,
@@ -100,14 +101,52 @@ class WallTable(Table):
     )
 
 
+class FacePartTable(Table):
+    """The finished part that the faces of walls belong to, in its setup: z up, the program has its coordinates."""
+
+    file: Text = Field(description="STEP file; `chipload check FILE` lists its faces")
+    chord_mm: Positive = Field(0.01, le=1.0, description="greatest deviation of facets from the part's faces")
+    places: tuple[Count, Count] = Field((8, 6), description="places along a face and up it at which the part is solved")
+    spacing_mm: Positive = Field(1.0, description="of the points of the stock that shank and holder are compared with")
+
+
+class FaceWallTable(Table):
+    """A wall of a part by one of its sides, or both; walls are cut in the order of the file."""
+
+    face: FaceName = Field(description="side that is cut, by number or point [mm] on it")
+    opposite: FaceName | None = Field(None, description="its other side, where that has stock too")
+    foot_mm: Positive = Field(description="height above the lower edge of each side that keeps its stock")
+    allowance_mm: tuple[Positive, ...] = Field(
+        min_length=1, max_length=2, description="stock on the face, and on the opposite one"
+    )
+    fit_mm: Positive = Field(0.001, le=0.1, description="greatest deviation of a fitted patch from its face")
+
+
+def _one_or_several(value: Any) -> str:
+    """Which of both kinds of tables a value is: tags are no keys, so that messages leave them out."""
+    return "several walls" if isinstance(value, list | tuple) else "one wall"
+
+
+#: ``[wall]``, clamped at its foot, or ``[[wall]]``, on a part in its clamps
+Walls = Annotated[
+    Annotated[WallTable, Tag("one wall")] | Annotated[tuple[FaceWallTable, ...], Tag("several walls")],
+    Discriminator(_one_or_several),
+]
+
+
 class WallWorkpieceTable(Table):
-    """Material of the wall."""
+    """Material of the wall, and the clamps of a part."""
 
     name: Text
     modulus_gpa: Gigapascal = Field(description="Young's modulus")
     poisson: NotNegative = Field(lt=0.5, description="Poisson's ratio")
     density_kg_m3: Density
     yield_mpa: Megapascal = Field(description="stress up to which the wall springs back")
+    clamp: tuple[ClampTable, ...] = Field(
+        (), description="of a part with [[wall]]: together they allow no rigid motion"
+    )
+    order: Literal[2, 3] | None = Field(None, description="of a part: order of the modes of a cell; none: 2")
+    cell_mm: Positive | None = Field(None, description="of a part: side of its cells; none: by the thinnest wall")
 
 
 class ThresholdTable(Table):
@@ -162,7 +201,8 @@ class ThinWallLimitsTable(Limits):
 class ThinWallJobTable(Table):
     """The whole file of a job that cuts a thin wall."""
 
-    wall: WallTable
+    wall: Walls
+    part: FacePartTable | None = Field(None, description="needed by [[wall]]")
     workpiece: WallWorkpieceTable
     machine: SourceTable
     material: SourceTable

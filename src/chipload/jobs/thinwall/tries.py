@@ -7,7 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.jobs.kept_parts import KeptRecords
 from chipload.jobs.thinwall.comparison import compensated, least_error
+from chipload.jobs.thinwall.kept_proofs import RECORDS, kept_proof
 from chipload.jobs.thinwall.outcome import OVER, Help, PassMap, Variant, VariantPlan
 from chipload.jobs.thinwall.places import Places
 from chipload.jobs.thinwall.proof import Proof, prove
@@ -43,8 +45,9 @@ CONSTANTS = 3
 class Tried:
     """Plans that are simulated one after another; how far that is, is told on the way."""
 
-    def __init__(self, places: Places, progress: Progress) -> None:
+    def __init__(self, places: Places, progress: Progress, keep: KeptRecords | None = None) -> None:
         self.places, self.progress = places, progress
+        self.keep = keep or KeptRecords(None, "", RECORDS)
         self.done = PLANNING
         self.variable = 0
         self.planned: dict[str, Planned] = {}
@@ -59,8 +62,12 @@ class Tried:
         legs = linked(self.places.inputs, planned.plan, self.places.grid)
         program = Program.join([leg.program for leg in legs])
         run = on_machine(self.places.inputs, program)
-        proof = prove(
-            self.places, planned.plan, legs, run.times, lambda p, w: self.progress(low + width * p, f"{name}: {w}")
+        proof = kept_proof(
+            self.keep,
+            planned.plan,
+            lambda: prove(
+                self.places, planned.plan, legs, run.times, lambda p, w: self.progress(low + width * p, f"{name}: {w}")
+            ),
         )
         self.done = low + width
         return _variant(self.places, planned, program, run, proof)

@@ -20,7 +20,6 @@ COLOURS = {"variable": "#0b7a75", "constant": "#3457a6", "unconstrained": "#c982
            "compensated": "#b3437d"}  # fmt: skip
 #: blue where material is left, red where it is cut away, white where neither
 BOTH = [[0.0, "#b3261e"], [0.5, "#ffffff"], [1.0, "#3457a6"]]
-SIDE_NAMES = ("side 1, towards +y", "side 2, towards -y")
 
 
 def lengths(points: Floats) -> tuple[Floats, Floats]:

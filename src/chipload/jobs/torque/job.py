@@ -136,7 +136,7 @@ def _wrong_workpiece(table: TorqueJobTable) -> Iterator[str]:
         if solid.layer_mm is not None:
             yield f"{key}.layer_mm: leave it out: simulation.layer_mm states it"
     if table.workpiece is not None:
-        yield from wrong_clamps(table.workpiece)
+        yield from wrong_clamps(table.workpiece.clamp)
         if table.workpiece.yield_mpa is None:
             yield "workpiece.yield_mpa: missing: state it (limits.strength_share needs it)"
         for key in ("density_kg_m3", "damping_ratio"):

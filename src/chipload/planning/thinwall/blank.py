@@ -41,11 +41,13 @@ class FinishSurface:
     points : (n, m, 3) float [mm], along i and j; j rises from the clamp to the free edge
     normals : (n, m, 3) float, unit vectors out of the wall
     allowance : [mm] of stock on it
+    wall : number of the wall that it belongs to
     """
 
     points: Floats
     normals: Floats
     allowance: float
+    wall: int = 0
 
     def __post_init__(self) -> None:
         shape = self.points.shape

@@ -2,7 +2,8 @@
 
 Notation: D_k [mm] stock that is left on a side before its pass k, D_0 = 0 the finish surface; d [mm] depth that a place
 bears; d~ its lower Lipschitz envelope of slope L; a allowance. Passes are numbered from the finish outwards, the order
-of planning; they are cut the other way round, the sides alternately: ... A_2 B_2 A_1 B_1.
+of planning; they are cut the other way round, the sides of a wall alternately: ... A_2 B_2 A_1 B_1. Of several walls
+the first one is cut first, whole.
 
     D_k = min(D_(k-1) + d~_k, a)      until D_k = a everywhere,
 
@@ -153,7 +154,7 @@ def variable(
 
     Parameters
     ----------
-    surfaces : one or two sides, A first
+    surfaces : one or two sides of each wall, A first, wall by wall
     threshold_of : threshold of a side in a state; the stock left is that of all sides, in their order
     law : depth of a threshold
     slope : L > 0 of the offset function
@@ -170,10 +171,12 @@ def variable(
     D = [np.zeros(s.points.shape[:2]) for s in surfaces]
     done: list[WallPass] = []
     infeasible: set[tuple[int, int, int]] = set()
-    for _ in range(most):
+    for _ in range(most * len({s.wall for s in surfaces})):
         open_sides = [s for s in reversed(range(count)) if (D[s] < surfaces[s].allowance - NOTHING).any()]
         if not open_sides:
             return Plan("variable", tuple(reversed(done)), tuple(sorted(infeasible)), c)
+        last = max(surfaces[s].wall for s in open_sides)
+        open_sides = [s for s in open_sides if surfaces[s].wall == last]
         for side in open_sides if order == "alternately" else open_sides[:1]:
             a = surfaces[side].allowance
             threshold = threshold_of(D, side)
@@ -233,7 +236,7 @@ def constant(
     number = [math.ceil(s.allowance / depth - 1e-9) for s in surfaces]
     turns = [(k, side) for side in reversed(range(len(surfaces))) for k in range(number[side])]
     if order == "alternately":
-        turns.sort(key=lambda turn: turn[0])
+        turns.sort(key=lambda turn: (-surfaces[turn[1]].wall, turn[0]))
     D, c = [np.zeros(s.points.shape[:2]) for s in surfaces], _ones(surfaces, corrections)
     done = []
     for k, side in turns:

@@ -96,7 +96,7 @@ def limited_to(
 
 def _better(surfaces: Sequence[FinishSurface], made: Callable[[Order], Plan], deflection: float) -> PlannedVariant:
     one = made("alternately")
-    if len(surfaces) == 1:
+    if len({s.wall for s in surfaces}) == len(surfaces):
         return PlannedVariant(one, deflection, "alternately", None)
     other = made("one after the other")
     if (len(other.passes), other.force_max) < (len(one.passes), one.force_max) and other.holds >= one.holds:

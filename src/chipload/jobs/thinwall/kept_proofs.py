@@ -1,0 +1,63 @@
+"""Simulated passes of a thin wall in the checkpoint of its run: a plan that was proved is not simulated again.
+
+A plan depends on the job and on the plans before it; its key is that of its passes. The error of its loads, which is
+asked for after the simulation, is a part of its own: where only that is missing, the plan is simulated once more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.jobs.kept_parts import KeptRecords
+from chipload.jobs.provenance import sources, versions
+from chipload.jobs.thinwall.job import ThinWallJob
+from chipload.jobs.thinwall.outcome import Finish, Shape
+from chipload.jobs.thinwall.proof import Proof
+from chipload.planning.thinwall.passes import Plan
+from chipload.result import Provenance
+from chipload.simulation.checkpoint import Checkpoint, digest
+from chipload.simulation.surface import Collision
+
+#: what a part may be made of beside arrays and plain values
+RECORDS = (Collision, Finish, Shape)
+
+
+def kept_of(job: ThinWallJob, checkpoint: Checkpoint | None, provenance: Provenance) -> KeptRecords:
+    """What is kept of a job."""
+    key = digest(job.table.model_dump_json(), provenance.inputs, versions(), sources())
+    return KeptRecords(checkpoint, key, RECORDS)
+
+
+def kept_proof(keep: KeptRecords, plan: Plan, prove: Callable[[], Proof]) -> Proof:
+    """The proof of a plan, kept or made; ``prove`` simulates it."""
+    passes = tuple((p.side, p.low, p.high, p.threshold.speed) for p in plan.passes)
+    key, made = (plan.name, passes, plan.corrections), list[Proof]()
+
+    def simulated() -> Proof:
+        if not made:
+            made.append(prove())
+        return made[0]
+
+    def tree() -> tuple[Any, ...]:
+        proof = simulated()
+        columns = {name: _plain(values) for name, values in proof.columns.items()}
+        return columns, proof.thresholds, proof.finish, proof.shape, proof.stress
+
+    columns, thresholds, finish, shape, stress = keep(("proof", *key), tree)
+    return Proof(
+        {name: values.astype(object) if values.dtype.kind == "U" else values for name, values in columns.items()},
+        thresholds,
+        finish,
+        shape,
+        stress,
+        lambda: keep(("error of the loads", *key), lambda: dict(simulated().find_load_error())),
+    )
+
+
+def _plain(values: NDArray[Any]) -> NDArray[Any]:
+    """A column as it is kept: texts of fixed length."""
+    return values.astype(np.str_) if values.dtype == object else np.asarray(values)

@@ -1,0 +1,154 @@
+"""A clamped part with stock on the sides of its walls, in finite cells: what its places bear in each state of removal.
+
+Notation: C_nn [mm/N] normal compliance of a place, of a force that is spread over a contact line along v; D [mm] stock
+left on a side, (n, m) at the places.
+
+The cells are those of a workpiece under any program (:mod:`chipload.structure.cells`): the whole part in its clamps
+gives way, floor and neighbours too. The error is the difference to cells of :data:`COARSER` times the side in the
+finished state, and :data:`FLOOR`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.jobs.simulation.clamped import clamped_volumes, clamps_of, elastic_of
+from chipload.jobs.simulation.tables import WorkpieceTable
+from chipload.jobs.simulation.workpiece_compliance import COARSER, FLOOR
+from chipload.jobs.tables import stated
+from chipload.jobs.thinwall.job import ThinWallJob
+from chipload.jobs.thinwall.part_shape import PartShape
+from chipload.stock.layers import LayeredStock
+from chipload.structure.cells.clamp import Clamp
+from chipload.structure.cells.grid import CellGrid, grid_over
+from chipload.structure.cells.stress import greatest_stress
+from chipload.structure.cells.thickness import cells_over
+from chipload.structure.cells.workpiece import CellWorkpiece, Elastic, cell_workpiece, line_means
+
+Floats = NDArray[np.float64]
+
+#: layers of the stock over the longest side of the part, by which cells are chosen, and in a cell
+LAYERS, PER_CELL = 60, 4
+#: length of the contact line over the step-over of the rows
+CONTACT = 0.5
+#: right-hand sides at once
+TOGETHER = 64
+
+
+@dataclass(frozen=True, eq=False)
+class PartBlank:
+    """The part in its clamps.
+
+    Attributes
+    ----------
+    body : the part and its sides
+    places : (n,) u, (m,) v, the same of each side
+    contact : [mm] length of the contact line
+    elastic, clamps, clamped : of the workpiece; [mm^3] what each clamp holds
+    grid, wide : its cells, and those that its error is found with
+    """
+
+    body: PartShape
+    places: tuple[Floats, Floats]
+    contact: float
+    elastic: Elastic
+    clamps: tuple[Clamp, ...]
+    clamped: Floats
+    grid: CellGrid
+    wide: CellGrid
+    _last: dict[str, tuple[bytes, CellWorkpiece]] = field(default_factory=dict)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Places along and up a side."""
+        return len(self.places[0]), len(self.places[1])
+
+    @property
+    def unknowns(self) -> int:
+        """Of the last state that was solved."""
+        return 3 * len(self._last["fine"][1].modes)
+
+    def state(self, left: Sequence[Floats], wide: bool = False) -> CellWorkpiece:
+        """The part with stock ``left`` on its sides, factored; ``wide``: in the wide cells."""
+        key, which = b"".join(np.ascontiguousarray(D).tobytes() for D in left), "wide" if wide else "fine"
+        if key != self._last.get(which, (b"", None))[0]:
+            grid = self.wide if wide else self.grid
+            stock = _layered(self.body, self.places, left, float(self.grid.size[2]) / PER_CELL)
+            self._last[which] = key, cell_workpiece(stock, grid, self.elastic, self.clamps, self.clamped)
+        return self._last[which][1]
+
+    def compliance(self, left: Sequence[Floats], side: int, wide: bool = False) -> Floats:
+        """C_nn of the places of a side while stock ``left`` is on all of them, (p,) [mm/N]."""
+        lines, normals = self._lines(left, side)
+        work = self.state(left, wide)
+        loads = line_means(work, lines).T.toarray()
+        out = np.empty(len(lines))
+        for at in range(0, len(lines), TOGETHER):
+            some = slice(at, at + TOGETHER)
+            right = (loads[:, None, some] * normals[some].T).reshape(-1, len(out[some]))
+            out[some] = (right * work.solve(right)).sum(axis=0)
+        return out
+
+    def error(self, side: int) -> Floats:
+        """(n, m) relative error of the compliance of a finished side by its cells."""
+        none = [np.zeros(self.shape) for _ in self.body.each]
+        fine, coarse = self.compliance(none, side), self.compliance(none, side, wide=True)
+        return np.asarray((np.abs(coarse / fine - 1.0) + FLOOR).reshape(self.shape))
+
+    def stress(self, left: Sequence[Floats], side: int, u: float, v: float, force: float) -> float:
+        """Greatest equivalent stress [MPa] under a normal force [N] at a place of a side."""
+        lines, normals = self._lines(left, side, (np.array([u]), np.array([v])))
+        away = float(self.grid.size.max())
+        return greatest_stress(self.state(left), self.elastic, lines[0], -force * normals[0], away).stress
+
+    def _lines(
+        self, left: Sequence[Floats], side: int, places: tuple[Floats, Floats] | None = None
+    ) -> tuple[Floats, Floats]:
+        """Contact lines (p, 2, 3) [mm] on what is left of a side, and the normals (p, 3) there."""
+        a, b = (x.ravel() for x in np.meshgrid(*(places or self.places), indexing="ij"))
+        one = self.body.each[side]
+        half = 0.5 * self.contact / (one.size()[1] * (1.0 - one.foot))
+        normals = self.body.normals(a, b)[side]
+        D = left[side].ravel() if places is None else np.zeros(1)
+        ends = [self.body.sides(a, np.clip(b + s * half, 0.0, 1.0))[side] + D[:, None] * normals for s in (-1.0, 1.0)]
+        return np.stack(ends, axis=1), normals
+
+
+def part_blank(job: ThinWallJob, body: PartShape, step_over: float) -> PartBlank:
+    """The part of a job in its clamps.
+
+    Parameters
+    ----------
+    step_over : [mm] of the rows, of which the contact line is the share :data:`CONTACT`
+
+    Raises
+    ------
+    InputError
+        A clamp holds nothing, a rigid motion is free, or the cells do not resolve the thinnest wall.
+    """
+    made = job.table.workpiece
+    n, m = stated(job.table.part, "part").places
+    places = np.linspace(0.0, 1.0, n), np.linspace(0.0, 1.0, m)
+    own = {name: getattr(made, name) for name in ("modulus_gpa", "poisson", "clamp", "density_kg_m3")}
+    table = WorkpieceTable.model_validate(own)
+    full = [np.full((n, m), s.allowance) for s in body.each]
+    layer = float(np.ptp(body.part.bounds, axis=0).max()) / LAYERS
+    first, last = (_layered(body, places, D, layer) for D in (full, [np.zeros((n, m)) for _ in full]))
+    grid, wall = cells_over(first, last, made.cell_mm, made.order or 2)
+    low, high = grid.origin, grid.origin + grid.size * grid.counts
+    wide = grid_over(low, high, COARSER * float(grid.size.max()), grid.order)
+    held = clamped_volumes(table, first)
+    body = replace(body, thickness=wall)
+    return PartBlank(body, places, CONTACT * step_over, elastic_of(table), clamps_of(table, first), held, grid, wide)
+
+
+def _layered(body: PartShape, places: tuple[Floats, Floats], left: Sequence[Floats], layer: float) -> LayeredStock:
+    """The part with its stock in layers, one tile each, that end at its level faces."""
+    mesh = body.body(places, left)
+    stock = LayeredStock.of_mesh(mesh, layer, 2.0 * float(np.ptp(mesh.bounds, axis=0).max()))
+    stock.refine_at(body.levels())
+    return stock
