@@ -180,3 +180,27 @@ def test_a_fillet_that_is_milled_but_not_stated(formula):
     assert refused(formula) == (
         "job.toml: surface.1.side = 'minus fillet': the impeller has no fillets: state impeller.fillet_mm"
     )
+
+
+def test_flank_passes_need_five_axes_links_and_a_side(formula):
+    stated = '[operation.flank]\nmachine = { name = "horizontal-b" }\nexcess_mm = 0.1\n\n'
+    text = formula.read_text()
+    formula.write_text(text.replace("[operation.paths]", stated + "[operation.paths]"))
+    assert refused(formula) == (
+        "operation.0.flank.machine: horizontal-b has 1 rotary axes that move in the cut: must have two"
+    )
+    finish = text[: text.index("[operation.rough]")]
+    formula.write_text(finish + stated.replace("horizontal-b", "cradle-ac"))
+    assert refused(formula) == "job.toml: operation.0.flank: takes its links from [operation.paths]: state that too"
+
+
+def test_feeds_by_force_need_an_allowance_and_an_overhang(formula):
+    stated = '[operation.forces]\nmaterial = { name = "al7075-t6" }\nflutes = 2\ndeflection_um = 20.0\n\n'
+    text = formula.read_text()
+    formula.write_text(text.replace("[operation.paths]", stated + "[operation.paths]"))
+    assert refused(formula).startswith("operation.0.forces.overhang_mm: missing: the catalogue states no reach of D ")
+    formula.write_text(text[: text.index("[operation.rough]")] + stated)
+    assert refused(formula) == (
+        "job.toml: operation.0.forces.allowance_mm: missing: there is no allowance of roughing: state what stands on "
+        "the surfaces"
+    )

@@ -220,3 +220,101 @@ def test_roughing_without_paths_is_refused(tmp_path):
     done = CliRunner().invoke(app, ["check", str(path)])
     assert done.exit_code == 2
     assert "takes its links from [operation.paths]" in " ".join(done.output.split())
+
+
+FORCES = """[operation.forces]
+material = { name = "al7075-t6" }
+flutes = 2
+overhang_mm = 70.0
+allowance_mm = 0.5
+deflection_um = 30.0
+
+[operation.paths]"""
+
+
+FLANK = """[operation.flank]
+machine = { name = "cradle-ac" }
+excess_mm = 0.05
+feed_mm_min = 300.0
+speed_rpm = 3000.0
+
+"""
+
+
+@pytest.fixture(scope="module")
+def more(tmp_path_factory):
+    """The same with feeds by force, and with flank passes."""
+    root = tmp_path_factory.mktemp("more")
+    path = job(root / "fed", feed_mm_min="400.0")
+    path.write_text(path.read_text().replace("[operation.paths]", FLANK + FORCES))
+    done = CliRunner().invoke(app, ["run", str(path), "--out", str(root / "out")])
+    assert done.exit_code == 0, done.output
+    return root / "out", json.loads((root / "out" / "summary.json").read_bytes())
+
+
+def test_a_side_is_milled_by_the_flank_in_one_pass_on_five_axes(more):
+    out, summary = more
+    (flank,) = summary["operations"][0]["flank"]
+    assert flank["surface"] == "blade plus"
+    assert flank["verdict"] == "holds"
+    (track,) = (t for t in summary["tracks"] if t["name"] == flank["program"])
+    assert not track["in_use"]
+    assert {x["name"]: x["state"] for x in track["limits"]} == {"gouge_mm": "holds", "excess_mm": "holds"}
+    # the text of the axes, brought back to tips and axes of the tool, against points of the true surfaces
+    machine = machine_named("cradle-ac")
+    position, rows = {"X": 0.0, "Y": 0.0, "Z": 0.0, "A": 0.0, "C": 0.0}, []
+    for line in (out / f"{flank['program']}.ngc").read_text().splitlines():
+        if line.startswith(("(", "M", "T", "G43")) or not re.search(r"[XYZAC]-?\d", line):
+            continue
+        position |= {letter: float(x) for letter, x in re.findall(r"([XYZAC])(-?[\d.]+)", line)}
+        rows.append(list(position.values()))
+    q = np.zeros((len(rows), 9))
+    q[:, [0, 1, 2]] = np.array(rows)[:, :3]
+    q[:, [3, 5]] = np.radians(np.array(rows)[:, 3:])
+    tip, axis = forward(machine, q)
+    share = np.linspace(0.0, 1.0, 9)[:-1, None, None]
+    tip, axis = (((1.0 - share) * x[:-1] + share * x[1:]).reshape(-1, 3) for x in (tip, axis))
+    axis /= np.linalg.norm(axis, axis=1)[:, None]
+    impeller = impeller_of(ImpellerShape())
+    u, v = (x.ravel() for x in np.meshgrid(np.linspace(0.30, 0.45, 41), np.linspace(0.50, 0.70, 21), indexing="ij"))
+    R, r = 0.5 * flank["diameter_mm"], flank["corner_radius_mm"]
+
+    def away(points):
+        """Distance of each point from the cutter in all its poses, its corner as that of a ball at its rim."""
+        y = points[:, None] - tip
+        h = (y * axis).sum(axis=2)
+        d = np.sqrt(np.maximum((y * y).sum(axis=2) - h * h, 0.0))
+        low = np.where(d > R - r, np.hypot(d - R + r, h - r), r - h) - r
+        return np.where(h >= r, d - R, low).min(axis=1)
+
+    own = away(impeller.blade.plus.at(u, v))
+    assert own.min() > -0.05
+    assert own.max() < 0.05
+    assert own.max() == pytest.approx(flank["excess_mm"], abs=0.01)
+    u, v = (x.ravel() for x in np.meshgrid(np.linspace(0.01, 0.99, 61), np.linspace(0.0, 0.99, 25), indexing="ij"))
+    for wall in (impeller.blade.plus, impeller.blade.minus, impeller.body(1).minus):
+        assert away(wall.at(u, v)).min() > -0.05
+    # one pass along the side, not many
+    assert flank["path_mm"] < 0.5 * summary["operations"][0]["finished"]["path_mm"]
+
+
+def test_feeds_by_force_make_the_stiff_cutter_the_fast_one(more):
+    out, summary = more
+    (op,) = summary["operations"]
+    ways = {way["name"]: way for way in op["ways"]}
+    slow, fast = ways["hand-picked"], ways["1 cutter"]
+    assert slow["cutters"][0]["diameter_mm"] < fast["cutters"][0]["diameter_mm"]
+    # at one feed the times of cutting would be as the paths
+    assert slow["cutting_min"] / slow["path_mm"] > 1.3 * fast["cutting_min"] / fast["path_mm"]
+    tracks = {track["name"]: track for track in summary["tracks"]}
+    for program in op["programs"]:
+        loads = program["loads"]
+        limits = {limit["name"]: limit for limit in tracks[program["program"]]["limits"]}
+        assert limits["deflection_cutter_um"]["worst"] == loads["deflection_cutter_um"] <= 30.0 / 1.1
+        assert limits["cutter_stress_mpa"]["worst"] == loads["cutter_stress_mpa"] < 1500.0
+    # what the text states: passes of the slender cutter below the greatest feed, its links above it
+    (picked,) = out.glob("way-hand-picked*.apt")
+    feeds = {float(f) for f in re.findall(r"FEDRAT/([0-9.]+)", picked.read_text())}
+    assert min(feeds) < 200.0
+    assert {f for f in feeds if f > 400.0} == {1200.0}
+    assert summary["unchecked"][0].startswith("chatter")

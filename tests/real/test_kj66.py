@@ -7,10 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from chipload.cutter.catalogue import read_catalogue
 from chipload.examples import copy_example
 from chipload.geometry.step_faces import read_faces
 from chipload.jobs import check_job, load_job, run_job
+from chipload.jobs.impeller.flank import checked_flanks
 from chipload.jobs.impeller.part import AGAINST_Z, read_part
+from chipload.jobs.impeller.paths import finish_settings
+from chipload.machine.machine import machine_named
+from chipload.planning.impeller.tables import index_table
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2].parent / "shared" / "data"))
 FILE = DATA / "cad" / "impeller_kj66" / "impeller.step"
@@ -125,3 +130,51 @@ def test_it_is_searched(tmp_path):
 def test_sides_that_are_changed_are_refused(tmp_path):
     with pytest.raises(Exception, match="must be less than half: plus faces a growing angle about the axis: change"):
         check_job(load_job(job(tmp_path, plus=1, minus=3)))
+
+
+FLANK = """
+[operation.flank]
+machine = { name = "cradle-ac" }
+excess_mm = 0.1
+most_passes = 4
+feed_mm_min = 300.0
+speed_rpm = 3000.0
+"""
+
+
+def test_its_bulging_side_is_milled_by_the_flank_in_passes(tmp_path):
+    """The axis of every row keeps the cutter's radius from the file's own face, by the CAD kernel."""
+    path = job(tmp_path)
+    thick = "{ diameter_mm = 6.0, corner_radius_mm = 1.0 }"
+    path.with_name("cutters.toml").write_text(f'name = "one"\nnote = "made up"\ncutter = [{thick}]\n')
+    text = path.read_text().replace("up = [0.2, 0.9]", "up = [0.3, 0.9]")
+    path.write_text(text + PATHS + FLANK)
+    loaded = load_job(path).job
+    machine, catalogue, impeller = machine_named("horizontal-b"), read_catalogue(loaded.catalogue), read_part(loaded)
+    op = loaded.operation
+    how = finish_settings(
+        impeller.impeller, machine, index_table(machine), catalogue, op, op.paths, 0.0, 0, 2
+    )  # fmt: skip
+    (one,) = checked_flanks(loaded, how, catalogue)
+    assert one.verified, one.fails
+    assert len(one.passes) == 3
+    face = read_faces(FILE).faces[2]
+    R = AGAINST_Z["-y"]
+    finish = np.array([name == "finish" for name in one.program.labels])[one.program.label]
+    for tip, axis in zip(one.program.p_work[finish][::3], one.program.axis[finish][::3], strict=True):
+        for height in (1.0, 2.0, 4.0, 8.0, 16.0):
+            assert face.distance(((tip + height * axis) @ R).tolist()) > 3.0 - 0.1
+    # points of the side, as it is in the file, against every pose and those between: what is left
+    side = impeller.impeller.blade.plus
+    u, v = (x.ravel() for x in np.meshgrid(np.linspace(0.1, 0.9, 33), np.linspace(0.3, 0.9, 17), indexing="ij"))
+    share = np.linspace(0.0, 1.0, 9)[:, None, None]
+    away = np.full(len(u), np.inf)
+    for path_of in one.passes:
+        tips, axes = ((1.0 - share) * x[:-1] + share * x[1:] for x in (path_of.tip, path_of.axis))
+        for tip, axis in zip(tips.reshape(-1, 3), axes.reshape(-1, 3), strict=True):
+            y = side.at(u, v) - tip
+            h = y @ axis / np.linalg.norm(axis)
+            d = np.sqrt(np.maximum((y * y).sum(axis=1) - h * h, 0.0)) - 3.0
+            away = np.minimum(away, np.where(h >= 1.0, d, np.inf))
+    assert away.max() < 0.1
+    assert away.min() > -0.1

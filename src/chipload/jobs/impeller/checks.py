@@ -7,8 +7,9 @@ from html import escape
 import numpy as np
 import plotly.graph_objects as go
 
+from chipload.jobs.impeller.flank_outcome import NoFlank
 from chipload.jobs.impeller.mesh import grid_faces
-from chipload.jobs.impeller.names import program_name, rough_names
+from chipload.jobs.impeller.names import flank_names, program_name, rough_names
 from chipload.jobs.impeller.outcome import Covered, ImpellerResult
 from chipload.jobs.impeller.partitions import COLOURS
 from chipload.jobs.impeller.roughing_check import rough_sections
@@ -85,12 +86,37 @@ def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
         table(head, rows, numbers=(2, 3, 4, 5, 6, 7, 8)),
         table(scallop, patches, numbers=(0, 2, 3, 4, 5, 6, 7, 8)),
         figure("paths", paths_figure(milled), figures),
+        *_flank_section(milled),
         "<h2>What all programs leave</h2>",
         f'<p class="note">Measured along rays on points of every surface, at most {spacing:g} mm apart, as far as its '
         "patches go: the least that any of the programs leaves. Where lines miss, rest passes or a neighbour may have "
         "milled; what is left higher than asked is red.</p>",
         table(["surface", "points", "asked [mm]", "most left [mm]", "area within [%]", ""], left, numbers=(1, 2, 3, 4)),
         *(figure(f"left{k}", left_figure(c), figures) for k, c in enumerate(milled.covered or ())),
+    ]
+
+
+def _flank_section(milled: ImpellerResult) -> list[str]:
+    """Flank passes on five axes; none where the job asks for none."""
+    if milled.flanks is None:
+        return []
+    rows = [
+        [
+            f"<code>{escape(name)}</code>", str(len(p.passes)), p.machine.name,
+            f"D {p.cutter.diameter:g} r {p.cutter.corner_radius:g}",
+            f"{p.length:.1f}", f"{p.seconds / 60.0:.2f}", f"{p.deviation:.4f}", f"{p.excess:.4f}",
+            f"{p.gouge.found:.4f} to {p.gouge.bound:.4f}",
+            '<span class="ok">verified</span>' if p.verified else '<span class="no">not verified</span>',
+        ]
+        for name, p in flank_names(milled)
+    ]  # fmt: skip
+    head = ["program", "passes", "machine", "cutter [mm]", "path [mm]", "time [min]", "deviation of the flank [mm]"]
+    head += ["most left [mm]", "deepest gouge [mm]", "check"]
+    return [
+        "<h2>Flank passes on five axes</h2>",
+        '<p class="note">Each side with the side of the cutter, of one channel, beside the programs above.</p>',
+        table(head, rows, numbers=(1, 4, 5, 6, 7, 8)) if rows else "",
+        *(f"<p>{escape(p.reason)}</p>" for p in milled.flanks if isinstance(p, NoFlank)),
     ]
 
 

@@ -16,7 +16,7 @@ from chipload.jobs.impeller.tables import (
     SurfaceTable,
 )
 from chipload.jobs.messages import Errors
-from chipload.jobs.sources import sources_of
+from chipload.jobs.sources import source, sources_of
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,8 @@ class ImpellerJob:
     path : the job file
     table : its values
     machine, catalogue : a shipped name or a file
+    material : likewise, of the force coefficients; None: forces are not asked for
+    flank_machine : likewise, of the flank passes; None: there are none
     files : what the part is read from, by what it is
     overrides : the `--set` texts that were applied
     """
@@ -38,6 +40,8 @@ class ImpellerJob:
     catalogue: str | Path
     files: dict[str, Path]
     overrides: tuple[str, ...]
+    material: str | Path | None = None
+    flank_machine: str | Path | None = None
 
     @property
     def operation(self) -> ImpellerOperationTable:
@@ -58,6 +62,17 @@ def load(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) -> Impel
     errors.texts += missing(table.model_dump(exclude_none=True))
     with errors.collect():
         sources = sources_of(table, folder, "machine", "catalogue")
+    forces = table.operation[0].forces
+    material: str | Path | None = None
+    if forces is not None:
+        with errors.collect():
+            material = source("operation.0.forces.material", forces.material, folder)
+    flank = table.operation[0].flank
+    flank_machine: str | Path | None = None
+    if flank is not None:
+        with errors.collect():
+            flank_machine = source("operation.0.flank.machine", flank.machine, folder)
+        errors.texts += _wrong_flank(table)
     for k, surface in enumerate(table.surface):
         errors.texts += _wrong_surface(f"surface.{k}", surface, part)
         if any((s.body, s.side) == (surface.body, surface.side) for s in table.surface[:k]):
@@ -69,7 +84,8 @@ def load(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) -> Impel
         errors.texts += _wrong_step(part.step)
     errors.refuse()
     return ImpellerJob(
-        path, table, sources["machine"], sources["catalogue"], _files(part, folder), tuple(overrides)
+        path, table, sources["machine"], sources["catalogue"], _files(part, folder), tuple(overrides), material,
+        flank_machine,
     )  # fmt: skip
 
 
@@ -106,10 +122,27 @@ def _wrong_paths(op: ImpellerOperationTable) -> Iterator[str]:
                 f"operation.0.paths.lead_mm = {paths.lead_mm:g}: must be at least the allowance of roughing, "
                 f"{stands:g} mm, which stands beside a pass"
             )
+    if op.forces is not None and op.forces.allowance_mm is None and not _allowance(op) > 0.0:
+        yield (
+            "operation.0.forces.allowance_mm: missing: there is no allowance of roughing: state what stands on the "
+            "surfaces"
+        )
     if rough is not None and paths is None:
         yield "operation.0.rough: takes its links from [operation.paths]: state that too"
     if rough is not None and (rough.diameter_mm is None) != (rough.corner_radius_mm is None):
         yield "operation.0.rough: state both diameter_mm and corner_radius_mm, or neither for the largest that fits"
+
+
+def _wrong_flank(table: ImpellerJobTable) -> Iterator[str]:
+    if table.operation[0].paths is None:
+        yield "operation.0.flank: takes its links from [operation.paths]: state that too"
+    if not any(s.side in ("plus", "minus") for s in table.surface):
+        yield "operation.0.flank: no [[surface]] is a side: list one with side plus or minus, or leave flank out"
+
+
+def _allowance(op: ImpellerOperationTable) -> float:
+    """What roughing leaves at most [mm]."""
+    return max(op.rough.blades_mm, op.rough.hub_mm) if op.rough is not None else 0.0
 
 
 def _wrong_sections(given: SectionsTable) -> Iterator[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
+from chipload.jobs.impeller.flank_outcome import CheckedFlank
 from chipload.jobs.impeller.outcome import Checked, CheckedPartition, ImpellerResult
 
 #: what the name of a text that goes through all channels ends with
@@ -30,6 +31,15 @@ def finish_names(milled: ImpellerResult) -> list[tuple[str, Checked]]:
             stem = stem_of(way)
             out += [(f"{stem}-{_finish_name(milled, k, p)}", p) for k, p in enumerate(way.programs, 1)]
     return out
+
+
+def flank_names(milled: ImpellerResult) -> list[tuple[str, CheckedFlank]]:
+    """File names of the flank passes without their endings."""
+    return [
+        (f"flank-{k}-{p.name.replace(' ', '-')}-D{p.cutter.diameter:g}r{p.cutter.corner_radius:g}", p)
+        for k, p in enumerate(milled.flanks or (), 1)
+        if isinstance(p, CheckedFlank)
+    ]
 
 
 def stem_of(way: CheckedPartition) -> str:

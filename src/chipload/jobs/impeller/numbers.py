@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.jobs.impeller.names import program_name
+from chipload.jobs.impeller.flank_outcome import flank_numbers
+from chipload.jobs.impeller.names import flank_names, program_name
 from chipload.jobs.impeller.outcome import Checked, ImpellerResult, Searched, unreached_text
 from chipload.planning.impeller.compare import Partition
 from chipload.planning.impeller.patch import Patch
 from chipload.planning.impeller.surfaces import BODIES
+from chipload.units import mm_min_from_mm_s
 
 
 def operation_numbers(milled: ImpellerResult) -> dict[str, Any]:
@@ -23,7 +25,7 @@ def operation_numbers(milled: ImpellerResult) -> dict[str, Any]:
         "kind": "impeller",
         "blades": milled.impeller.blades,
         "splitters": milled.impeller.blades if milled.impeller.splitter is not None else 0,
-        "outer_diameter_mm": milled.outer_diameter,
+        "outer_diameter_mm": milled.stated.outer_diameter,
         "catalogue": milled.catalogue.name,
         **_one(milled.surfaces[0], milled.one),
         **{key: sum(row[key] for row in rows) for key in ("cc_points", "check_points", "unreachable", "search_s")},
@@ -37,9 +39,10 @@ def operation_numbers(milled: ImpellerResult) -> dict[str, Any]:
         if milled.programs is None
         else [_program(program_name(milled, k), p) for k, p in enumerate(milled.programs, 1)],
         "roughing": None if milled.roughs is None else _roughing(milled),
+        "flank": None if milled.flanks is None else _flanks(milled),
         "finished": None if milled.covered is None else _finished(milled),
         "surfaces": rows,
-        "settings": {k: list(v) if isinstance(v, tuple) else v for k, v in milled.settings.items()},
+        "settings": {k: list(v) if isinstance(v, tuple) else v for k, v in milled.stated.settings.items()},
     }
 
 
@@ -114,6 +117,7 @@ def _program(name: str, p: Checked) -> dict[str, Any]:
         "rows": len(p.setting.program),
         "path_mm": p.setting.length,
         "time_min": p.seconds / 60.0,
+        "loads": _loads(p),
         "missed_mm": p.missed,
         "refused_lines": len(p.setting.linked.refused),
         "direct_links": p.setting.linked.direct,
@@ -155,6 +159,27 @@ def _program(name: str, p: Checked) -> dict[str, Any]:
             }
             for m, s in zip(p.setting.millings, p.scallops, strict=True)
         ],
+    }
+
+
+def _flanks(milled: ImpellerResult) -> list[dict[str, Any]]:
+    names = {id(p): name for name, p in flank_names(milled)}
+    return [flank_numbers(p, names.get(id(p), "")) for p in milled.flanks or ()]
+
+
+def _loads(p: Checked) -> dict[str, float] | None:
+    """Feeds of the passes and what they load the cutter with; None: forces are not asked for."""
+    loads = p.setting.loads
+    if loads is None or not len(loads.feed):
+        return None
+    return {
+        "feed_least_mm_min": mm_min_from_mm_s(float(loads.feed.min())),
+        "feed_mean_mm_min": mm_min_from_mm_s(float(loads.feed.mean())),
+        "feed_greatest_mm_min": mm_min_from_mm_s(float(loads.feed.max())),
+        "force_n": float(loads.force.max()),
+        "deflection_cutter_um": 1000.0 * float(loads.deflection.max()),
+        "cutter_stress_mpa": float(loads.stress.max()),
+        "places": len(loads.feed),
     }
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
+from chipload.jobs.impeller.flank_outcome import CheckedFlank, NoFlank
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.answer import Answer, Unreachable
@@ -180,8 +181,8 @@ class Checked:
 
     @property
     def verified(self) -> bool:
-        """No gouge, nothing beyond the machine, no scallop higher than asked."""
-        return self.gouge.bound <= self.allowed and not self.findings and all(s.holds for s in self.scallops)
+        """No gouge, nothing beyond the machine, no scallop higher than asked, no cutter overloaded."""
+        return not self.fails
 
     @property
     def missed(self) -> float:
@@ -205,6 +206,12 @@ class Checked:
             if not s.holds:
                 where = f"{BODIES[m.patch.body]} {m.patch.side}"
                 out.append(f"{self.name}, {where}: {s.greatest:.4f} mm are left between passes: asked {s.asked:g}")
+        loads = self.setting.loads
+        if loads is not None and len(loads.feed):
+            for what, values, most, unit in loads.columns:
+                worst = float(values.max()) * (1.0 + loads.error)
+                if worst > most:
+                    out.append(f"{self.name}: {what} up to {worst:.4g} {unit} at the least feed: {most:.4g} is allowed")
         return tuple(out)
 
 
@@ -332,24 +339,32 @@ class CheckedPartition:
 
 
 @dataclass(frozen=True, eq=False)
+class StatedJob:
+    """What the job states: its title, the keys of its operation, the outer diameter [mm]."""
+
+    title: str
+    settings: Mapping[str, Any]
+    outer_diameter: float
+
+
+@dataclass(frozen=True, eq=False)
 class ImpellerResult:
     """A whole run.
 
     Parameters
     ----------
-    title : name of the job
+    stated : what the job states
     impeller, catalogue, machine : what is milled, with what, where
     surfaces : in their order
     one : the largest cutter for all surfaces at one table angle, and the index of that; None: there is none
     partitions : the cutter picked by hand where one is stated, then one cutter, two, ...
     checked : each way with its programs, checked; None: the job asks for none
     roughs : roughing programs, before the others; None: the job asks for none
-    settings : keys of the operation, as stated
-    outer_diameter : as stated [mm]
     provenance : where the numbers come from
+    flanks : flank passes on five axes, beside the programs; None: the job asks for none
     """
 
-    title: str
+    stated: StatedJob
     impeller: Impeller
     catalogue: Catalogue
     machine: Machine
@@ -358,9 +373,13 @@ class ImpellerResult:
     partitions: tuple[Partition, ...]
     checked: tuple[CheckedPartition, ...] | None
     roughs: tuple[CheckedRough, ...] | None
-    settings: Mapping[str, Any]
-    outer_diameter: float
     provenance: Provenance
+    flanks: tuple[CheckedFlank | NoFlank, ...] | None = None
+
+    @property
+    def title(self) -> str:
+        """Name of the job."""
+        return self.stated.title
 
     @property
     def picked(self) -> Partition | None:

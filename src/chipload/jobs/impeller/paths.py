@@ -18,6 +18,7 @@ from chipload.jobs.impeller.tables import ImpellerOperationTable, PathsTable
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.coverage import between_lines
 from chipload.planning.impeller.covering.covering import Covering
+from chipload.planning.impeller.feeds import ForceTerms
 from chipload.planning.impeller.floor import patch_of
 from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.kept import Keep, anew
@@ -55,10 +56,12 @@ _FEW, _BETWEEN = 7, 14
 def finish_settings(
     impeller: Impeller, machine: Machine, table: IndexTable, catalogue: Catalogue, op: ImpellerOperationTable,
     paths: PathsTable, ahead: float, tools: int, workers: int, covering: Covering | None = None,
+    forces: ForceTerms | None = None,
 ) -> FinishSettings:  # fmt: skip
     """What the finishing programs of a job are planned with.
 
-    ``tools`` : how many tool numbers are taken; ``covering`` : of the walls between check points.
+    ``tools`` : how many tool numbers are taken; ``covering`` : of the walls between check points; ``forces`` : by which
+    passes are fed, None: all alike.
     """
     feed = mm_s_from_mm_min(op.feed_mm_min)
     motion = LineMotion(paths.chord_mm, feed, pallet_rate(machine), op.clearance_mm, scallop=op.scallop_mm)
@@ -74,7 +77,7 @@ def finish_settings(
     scene = replace(scene, covering=covering, known=scene.tree)
     return FinishSettings(
         impeller, catalogue, scene, PatchFinish(op.scallop_mm, motion, paths.overrun_mm), link,
-        rad_s_from_rpm(op.speed_rpm), table, ahead, workers, tools,
+        rad_s_from_rpm(op.speed_rpm), table, ahead, workers, tools, forces,
     )  # fmt: skip
 
 

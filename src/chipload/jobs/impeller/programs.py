@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.jobs.impeller.names import ALL, finish_names, rough_names
+from chipload.jobs.impeller.names import ALL, finish_names, flank_names, rough_names
 from chipload.jobs.impeller.outcome import Checked, ImpellerResult
 from chipload.jobs.impeller.proof import contact_points_bytes, proof_bytes
 from chipload.jobs.impeller.roughing_check import CheckedRough
@@ -34,6 +34,22 @@ def program_files(milled: ImpellerResult) -> dict[str, bytes]:
             out[f"{name}.{ENDINGS[milled.machine.dialect]}"] = text.encode("ascii")
         cl = write_apt(program, None, title=title, verified=checked.verified)
         out[f"{stem}.apt"] = cl.encode("ascii")
+    for stem, p in flank_names(milled):
+        size = f"D {p.cutter.diameter:g} r {p.cutter.corner_radius:g} mm"
+        title = f"{milled.title}, flank pass of {p.name}"
+        number = int(p.program.tool[0])
+        text = write_gcode(
+            p.program, p.machine, title=title, verified=p.verified, number=200 + number,
+            comments=[
+                *(f"not verified: {f}" for f in p.fails[:3]),
+                f"T{number}: {size}, tool length 0: positions of the tip",
+                f"five axes at once, deviation of the flank {p.deviation:.4f} mm",
+                f"one channel: the others with the part turned by {np.degrees(milled.impeller.pitch):.6f} deg each, "
+                f"{milled.impeller.blades} in all",
+            ],
+        )  # fmt: skip
+        out[f"{stem}.{ENDINGS[p.machine.dialect]}"] = text.encode("ascii")
+        out[f"{stem}.apt"] = write_apt(p.program, None, title=title, verified=p.verified).encode("ascii")
     return out
 
 

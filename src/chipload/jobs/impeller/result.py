@@ -8,7 +8,8 @@ from functools import partial
 import numpy as np
 
 from chipload.errors import Finding, Severity
-from chipload.jobs.impeller.names import ALL, finish_names, rough_names
+from chipload.jobs.impeller.flank_outcome import CheckedFlank, NoFlank
+from chipload.jobs.impeller.names import ALL, finish_names, flank_names, rough_names
 from chipload.jobs.impeller.numbers import operation_numbers
 from chipload.jobs.impeller.outcome import (
     Checked,
@@ -36,7 +37,7 @@ def result_of(milled: ImpellerResult) -> Result:
     return Result(
         capability="impeller",
         title=milled.title,
-        tracks=(_search(milled), *_roughing(milled), *_finishing(milled)),
+        tracks=(_search(milled), *_roughing(milled), *_finishing(milled), *_flanks(milled)),
         operations=(operation_numbers(milled),),
         findings=tuple(f for c in milled.covered or () for f in _left(c)),
         unchecked=_unchecked(milled),
@@ -106,7 +107,7 @@ def _finishing(milled: ImpellerResult) -> list[Track]:
     out, used = [], {id(p) for p in milled.programs or ()}
     for name, p in finish_names(milled):
         findings = tuple(Finding("machine", 0, text, Severity.EXCEEDS) for text in p.findings)
-        limits = (_gouge(name, p), *_scallops(name, p))
+        limits = (_gouge(name, p), *_scallops(name, p), *_loads(name, p))
         in_use = id(p) in used and not name.startswith("way-")
         out.append(
             _track(
@@ -121,6 +122,19 @@ def _finishing(milled: ImpellerResult) -> list[Track]:
                 in_use,
             )
         )
+    return out
+
+
+def _flanks(milled: ImpellerResult) -> list[Track]:
+    """Flank passes: beside the programs that are in use, on a machine of their own."""
+    out = []
+    for name, p in flank_names(milled):
+        state = state_of(p.excess, p.most)[0]
+        limits = (_gouge(name, p), LimitCheck("excess_mm", p.most, p.excess, state, name))
+        findings = tuple(Finding("machine", 0, text, Severity.EXCEEDS) for text in p.findings)
+        files = (f"{name}.{ENDINGS[p.machine.dialect]}", f"{name}.apt")
+        blocks = partial(motion_blocks, p.program, p.machine)
+        out.append(Track(name, TrackKind.PROGRAM, False, p.seconds, limits, findings, files, blocks=blocks))
     return out
 
 
@@ -141,7 +155,7 @@ def _track(
     return Track(name, TrackKind.PROGRAM, in_use, time_s, limits, findings, files, blocks=blocks)
 
 
-def _gouge(track: str, checked: Checked | CheckedRough) -> LimitCheck:
+def _gouge(track: str, checked: Checked | CheckedRough | CheckedFlank) -> LimitCheck:
     """The bound of the deepest gouge; its error is down to what was found."""
     gouge, limit = checked.gouge, checked.allowed
     if math.isinf(gouge.bound):
@@ -170,6 +184,24 @@ def _scallops(track: str, p: Checked) -> tuple[LimitCheck, ...]:
     return (LimitCheck("scallop_mm", s.asked, s.greatest, state, track),)
 
 
+def _loads(track: str, p: Checked) -> tuple[LimitCheck, ...]:
+    """The places of the passes with the greatest deflection and stress of the cutter."""
+    loads = p.setting.loads
+    if loads is None or not len(loads.feed):
+        return ()
+    out = []
+    for name, (_, values, limit, _) in zip(("deflection_cutter_um", "cutter_stress_mpa"), loads.columns, strict=True):
+        k = int(values.argmax())
+        x, y, z = loads.place[k].tolist()
+        state, why = state_of(float(values[k]), limit, loads.error)
+        out.append(
+            LimitCheck(
+                name, limit, float(values[k]), state, track, place=(x, y, z), resolution_error=loads.error, reason=why
+            )
+        )
+    return tuple(out)
+
+
 def _rough_findings(r: CheckedRough) -> tuple[Finding, ...]:
     texts = [*r.findings, *(f"{p}: touch_mm3 = {r.touch:g} is allowed" for p in r.taken.problems(r.touch))]
     if not r.rough.machined:
@@ -185,10 +217,14 @@ def _left(c: Covered) -> tuple[Finding, ...]:
 
 
 def _unchecked(milled: ImpellerResult) -> tuple[str, ...]:
+    fed = any(p.setting.loads is not None for p in milled.programs or ())
     out = [
-        "forces, torque, deflection and chatter: not calculated",
+        "chatter; forces of roughing; deflection of the blades: not calculated"
+        if fed
+        else "forces, torque, deflection and chatter: not calculated",
         "fixtures, pallet and linear axes: no collision check",
     ]
+    out += [p.reason for p in milled.flanks or () if isinstance(p, NoFlank)]
     if milled.programs is None:
         out.append("programs: the job states no [operation.paths]")
     return tuple(out)

@@ -7,6 +7,7 @@ import os
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,10 @@ from chipload.errors import InputError
 from chipload.jobs.impeller.channel_depth import reach_line
 from chipload.jobs.impeller.checkpoint import KeptParts
 from chipload.jobs.impeller.estimate import estimate
+from chipload.jobs.impeller.flank import checked_flanks, flank_machine
+from chipload.jobs.impeller.forces import cutter_feeds, force_terms
 from chipload.jobs.impeller.job import ImpellerJob
-from chipload.jobs.impeller.outcome import ImpellerResult, OneCutter, Searched, unreached_text
+from chipload.jobs.impeller.outcome import ImpellerResult, OneCutter, Searched, StatedJob, unreached_text
 from chipload.jobs.impeller.part import ImpellerPart, read_part
 from chipload.jobs.impeller.partition_programs import checked_partitions
 from chipload.jobs.impeller.paths import EDGE, finish_settings, walls_of
@@ -41,7 +44,6 @@ from chipload.progress import Progress, silent
 from chipload.progress import part_of as within
 from chipload.result import Provenance
 from chipload.simulation.checkpoint import Checkpoint, digest
-from chipload.units import mm_s_from_mm_min
 
 #: of the time of a run what search, division, roughing and finishing take, with paths and without
 _WITH_PATHS, _SEARCH_ALONE = (5.0, 10.0, 10.0, 75.0), (50.0, 50.0, 0.0, 0.0)
@@ -64,6 +66,9 @@ def run(job: ImpellerJob, progress: Progress = silent, checkpoint: Checkpoint | 
     _picked(job, catalogue)
     _rougher(job, catalogue)
     _checkable(job, impeller)
+    forces = force_terms(job, catalogue)
+    if job.flank_machine is not None:
+        flank_machine(job)
     op = job.operation
     provenance = _provenance(job, machine, catalogue, part)
     keep = KeptParts(checkpoint, digest(job.table.model_dump_json(), provenance.inputs, versions(), sources()))
@@ -82,11 +87,12 @@ def run(job: ImpellerJob, progress: Progress = silent, checkpoint: Checkpoint | 
     pairs = [(found.surface.scene, found.answer) for found in done]
     whole = keep(("one cutter",), lambda: one_cutter_of(pairs, op.clearance_mm, table.spans, WORKERS))
     one = None if whole is None else (catalogue.cutters[whole[0]], whole[1])
-    ways = _choices(job, done, catalogue, impeller, part_of(second, 0, 2), keep)
+    feeds = cutter_feeds(job, catalogue, forces)
+    ways = _choices(job, done, catalogue, impeller, feeds, part_of(second, 0, 2), keep)
     partitions = tuple(way.partition(WORKERS, part_of(second, 1, 2), keep) for way in ways)
+    stated = StatedJob(title_of(job.path), _settings(op), job.table.impeller.outer_diameter_mm)
     milled = ImpellerResult(
-        title_of(job.path), impeller, catalogue, machine, tuple(done), one, partitions, None, None, _settings(op),
-        job.table.impeller.outer_diameter_mm, provenance,
+        stated, impeller, catalogue, machine, tuple(done), one, partitions, None, None, provenance,
     )  # fmt: skip
     if op.paths is None or milled.used is None:
         return milled
@@ -97,11 +103,13 @@ def run(job: ImpellerJob, progress: Progress = silent, checkpoint: Checkpoint | 
             walls_of(impeller, _ahead(job)), _ahead(job), WORKERS, third, keep,
         )  # fmt: skip
     how = finish_settings(
-        impeller, machine, table, catalogue, op, op.paths, _ahead(job), len(roughs or ()), WORKERS, covering
+        impeller, machine, table, catalogue, op, op.paths, _ahead(job), len(roughs or ()), WORKERS, covering, forces
     )
     checked = checked_partitions(ways, partitions, how, machine, op.paths, last, keep)
     keep.write(at_once=True)
     chosen = {one.name: one.partition for one in checked}
+    flanks = checked_flanks(job, how, catalogue) if op.flank is not None else None
+    milled = replace(milled, flanks=flanks)
     return replace(milled, checked=checked, roughs=roughs, partitions=tuple(chosen.get(p.name, p) for p in partitions))
 
 
@@ -114,11 +122,18 @@ def _checkable(job: ImpellerJob, impeller: Impeller) -> None:
 
 def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue, part: ImpellerPart) -> Provenance:
     files = dict(job.files)
-    files |= {key: p for key, p in (("machine", job.machine), ("catalogue", job.catalogue)) if not isinstance(p, str)}
+    files |= {key: p for key, p in _named(job) if not isinstance(p, str)}
     own = provenance_of(files, job.overrides, machine)
     cutters = f"{catalogue.name}: {catalogue.note}" if catalogue.note else catalogue.name
     faces = {f"face {k}": line for k, line in enumerate(part.faces)}
     return replace(own, inputs={**own.inputs, "catalogue name": cutters, **faces})
+
+
+def _named(job: ImpellerJob) -> list[tuple[str, str | Path]]:
+    """Shipped names or files by what they are."""
+    named: list[tuple[str, str | Path]] = [("machine", job.machine), ("catalogue", job.catalogue)]
+    more = (("material", job.material), ("flank machine", job.flank_machine))
+    return [*named, *((key, path) for key, path in more if path is not None)]
 
 
 def check(job: ImpellerJob) -> tuple[list[str], bool]:
@@ -128,6 +143,9 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
     _picked(job, catalogue)
     _rougher(job, catalogue)
     _checkable(job, impeller)
+    force_terms(job, catalogue)
+    if job.flank_machine is not None:
+        flank_machine(job)
     lines = [f"impeller: {impeller.blades} blades{' and as many splitters' if impeller.splitter else ''}", *part.faces]
     table = _tables(machine, job.operation)
     angles = np.degrees(table.angle)
@@ -194,13 +212,12 @@ def _searched(
 
 
 def _choices(
-    job: ImpellerJob, done: Sequence[Searched], catalogue: Catalogue, impeller: Impeller, progress: Progress, keep: Keep
-) -> tuple[CutterChoice, ...]:
+    job: ImpellerJob, done: Sequence[Searched], catalogue: Catalogue, impeller: Impeller,
+    feeds: float | tuple[float, ...], progress: Progress, keep: Keep,
+) -> tuple[CutterChoice, ...]:  # fmt: skip
     """The cutter picked by hand where one is stated, then one cutter, two, ..."""
     op = job.operation
-    terms = Terms(
-        mm_s_from_mm_min(op.feed_mm_min), op.scallop_mm, op.cutter_change_s, op.table_change_s, impeller.blades
-    )
+    terms = Terms(feeds, op.scallop_mm, op.cutter_change_s, op.table_change_s, impeller.blades)
     picked = _picked(job, catalogue)
     index = None if picked is None else catalogue.cutters.index(picked)
     sides = [_side(x, x.answer) for x in done]

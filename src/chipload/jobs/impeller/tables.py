@@ -152,6 +152,35 @@ class RoughTable(Table):
     touch_mm3: NotNegative = Field(description="what a rapid, or parts above the cutting part, may take in one row")
 
 
+class ForcesTable(Table):
+    """Feeds of the finishing passes by the force of their chips, at most `feed_mm_min`."""
+
+    material: SourceTable = Field(description="force coefficients, in all directions")
+    flutes: Annotated[Count, Field(le=20)] = Field(description="of every cutter")
+    helix_deg: Annotated[Number, Field(ge=0.0, lt=80.0)] = Field(30.0, description="of every cutter")
+    modulus_gpa: Annotated[Number, Field(ge=10.0, le=1000.0)] = Field(580.0, description="of the cutters' material")
+    overhang_mm: Positive | None = Field(None, description="of cutters whose reach the catalogue does not state")
+    allowance_mm: Positive | None = Field(
+        None, description="that stands on the surfaces; none: the greater one of roughing"
+    )
+    deflection_um: Positive = Field(description="greatest deflection of a cutter at its contact")
+    safety_factor: Annotated[Number, Field(ge=1.0, le=100.0)] = Field(
+        2.0, description="strength of the cutters over the stress that is allowed"
+    )
+
+
+class FlankTable(Table):
+    """Flank passes (swarf milling) of the sides on a machine with five simultaneous axes, beside the other programs."""
+
+    machine: SourceTable = Field(description="with two rotary axes that move in the cut")
+    excess_mm: Positive = Field(le=1.0, description="most that a pass may leave on its side")
+    most_passes: Annotated[Count, Field(le=20)] = Field(
+        1, description="greatest number of passes up a side; the fewest that keep excess_mm and gouge_mm are taken"
+    )
+    feed_mm_min: Positive | None = Field(None, le=1e5, description="of the tip; none: that of the operation")
+    speed_rpm: Positive | None = Field(None, le=1e6, description="spindle speed; none: that of the operation")
+
+
 class ImpellerOperationTable(Table):
     """The search for the largest cutters of all surfaces."""
 
@@ -165,7 +194,7 @@ class ImpellerOperationTable(Table):
     table_deg: tuple[Number, ...] | None = Field(None, min_length=1, description="table angles; none: all")
     clearance_mm: NotNegative = Field(description="of neck, shank and holder")
     scallop_mm: Positive = Field(le=5.0, description="greatest height between two passes")
-    feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's tip")
+    feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's tip; the greatest one with `forces`")
     speed_rpm: Positive = Field(le=1e6, description="spindle speed")
     most_cutters: Annotated[Count, Field(le=6)] = Field(
         description="greatest number of different cutters; fewer are compared too"
@@ -174,6 +203,8 @@ class ImpellerOperationTable(Table):
     table_change_s: NotNegative = Field(description="time of setting the index table to another angle")
     paths: PathsTable | None = Field(None, description="none: the search and the patches alone, no programs")
     rough: RoughTable | None = Field(None, description="none: the programs finish only")
+    flank: FlankTable | None = Field(None, description="none: no flank passes")
+    forces: ForcesTable | None = Field(None, description="none: every pass has the same feed")
     hand_picked: PickedTable | None = Field(None, description="the cutter that is compared with")
 
 

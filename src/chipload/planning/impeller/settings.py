@@ -19,6 +19,7 @@ import numpy as np
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.geometry.bspline import BSplinePatch as Surface
 from chipload.planning.impeller.assignment import Changes
+from chipload.planning.impeller.feeds import ForceTerms, PassLoads, PassRows, pass_feeds
 from chipload.planning.impeller.floor import patch_of
 from chipload.planning.impeller.impeller import FILLET, Impeller
 from chipload.planning.impeller.kept import Keep, anew
@@ -42,7 +43,7 @@ from chipload.planning.impeller.scene import Floats, Scene
 from chipload.planning.impeller.surfaces import BODIES, ContactSampling, counts, hub_range
 from chipload.planning.impeller.tables import IndexTable
 from chipload.planning.impeller.track import ToolTrack
-from chipload.program.program import Program
+from chipload.program.program import LINE, Program
 from chipload.progress import Progress, silent
 
 #: number of each surface in the scene of the blade's plus side
@@ -85,6 +86,7 @@ class CutterSetting:
     rests : rest passes where other passes leave too much, after the patches
     linked : all moves; tracks that cannot be come to
     program : in the frame of the impeller, of one channel
+    loads : of its passes; None: forces are not asked for
     """
 
     cutter: CatalogueCutter
@@ -93,6 +95,7 @@ class CutterSetting:
     rests: tuple[RestPasses, ...]
     linked: Linked
     program: Program
+    loads: PassLoads | None = None
 
     @property
     def tracks(self) -> tuple[ToolTrack, ...]:
@@ -146,6 +149,7 @@ class FinishSettings:
     spindle : [rad/s]
     ahead : how far the hub goes on ahead of the blade's leading edge [mm]
     tools : tool numbers that are taken
+    forces : what feeds are found with; None: every pass has the feed of ``how``
     """
 
     impeller: Impeller
@@ -158,6 +162,7 @@ class FinishSettings:
     ahead: float = 0.0
     workers: int = 1
     tools: int = 0
+    forces: ForceTerms | None = None
 
     @property
     def spans(self) -> tuple[tuple[float, float], ...]:
@@ -289,7 +294,45 @@ def planned(
         lost_area[face.body, face.side] = float(cell[(over > h) & lost].sum())
     order = setting_order(list(settings), changes)
     numbered = tuple(settings[pair].numbered(job.tools + k) for k, pair in enumerate(order, 1))
-    return PlannedSettings(numbered, area, lost_area)
+    return PlannedSettings(settings_with_feeds(job, numbered), area, lost_area)
+
+
+def settings_with_feeds(job: FinishSettings, settings: tuple[CutterSetting, ...]) -> tuple[CutterSetting, ...]:
+    """The settings, in the order in which they are milled, with the feeds that forces allow."""
+    if job.forces is None:
+        return settings
+    most = job.how.motion.feed
+    passes = [_pass_rows(job, s) for s in settings]
+    cutters = [s.cutter for s in settings]
+    found = pass_feeds([(c, [p for _, p in rows]) for c, rows in zip(cutters, passes, strict=True)], job.forces, most)
+    out = []
+    for s, rows, (feeds, loads) in zip(settings, passes, found, strict=True):
+        allowed = np.full(len(s.tracks) + 1, most)
+        allowed[[number for number, _ in rows]] = feeds
+        program, to = s.program, s.linked.track
+        # the cutter stays down from the end of one pass to the beginning of the next
+        own = np.minimum(allowed[to], allowed[np.concatenate([to[:1], to[:-1]])])
+        in_cut = (program.motion == LINE) & (program.feed <= most * (1.0 + 1e-12)) & (to >= 0)
+        feed = np.where(in_cut, np.minimum(program.feed, own), program.feed)
+        out.append(replace(s, program=replace(program, feed=feed), loads=loads))
+    return tuple(out)
+
+
+def _pass_rows(job: FinishSettings, s: CutterSetting) -> list[tuple[int, PassRows]]:
+    """Number and rows of each track of a setting, in the order in which they are milled."""
+    owners = [(m.patch.body, m.patch.side, t) for m in s.millings for t in m.tracks.tracks]
+    owners += [(r.body, r.side, t) for r in s.rests for t in r.tracks]
+    cut = np.array([name == "finish" for name in s.program.labels])[s.program.label] & (s.linked.track >= 0)
+    numbers = s.linked.track[cut]
+    out = []
+    for number in dict.fromkeys(numbers.tolist()):
+        rows = np.flatnonzero(cut & (s.linked.track == number))
+        body, side, track = owners[number]
+        tip = s.program.p_work[rows]
+        at = np.array([int(((track.tip - p) ** 2).sum(axis=1).argmin()) for p in tip])
+        K = job.surface(body, side).curvature(*track.at[at].T)
+        out.append((number, PassRows(rows, tip, s.program.axis[rows], track.contact[at], track.normal[at], K)))
+    return out
 
 
 #: what the tracks of a patch, or of rest passes, leave on a surface: by the surface and the tracks, which it keeps

@@ -1,0 +1,138 @@
+"""The program of a flank pass: from above the part to the side, along it, and up again, on five simultaneous axes.
+
+Notation: p tip [mm], A axis, N normal of the side; H(A) the height along A above which no check point lies. The cutter
+comes down along A beside the end of the pass, a lift off the side, goes to the side at the feed of the cut, along it,
+and leaves it the same way. A row whose rotary axes would turn faster than they can is fed more slowly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.machine.machine import Machine
+from chipload.planning.impeller.clearance.clearance import between, clearance
+from chipload.planning.impeller.flank import FlankPass
+from chipload.planning.impeller.links import Link, Moves
+from chipload.planning.impeller.programs import program_of
+from chipload.planning.impeller.scene import Floats, Scene
+from chipload.program.motions import spans
+from chipload.program.program import LINE, RAPID, Program
+from chipload.program.to_axes import to_axes
+
+#: of the lift that are tried
+_LIFTS = (1.0, 0.5, 0.25)
+#: places of a lift that are looked at
+_SMALL = 12
+#: of the axis in one row above the part [rad]
+_TURN = math.radians(3.0)
+
+
+def lifted(path: FlankPass, end: int, scene: Scene, cutter: CatalogueCutter, how: Link, above: float) -> Floats | None:
+    """The tip beside an end (0, -1) of a pass, from which the way up along the axis is free; None: there is none.
+
+    ``above`` : clearance of neck, shank and holder [mm].
+    """
+    p, A, N = path.tip[end], path.axis[end], path.normal[end]
+    out = path.tip[end] - path.tip[1 if end == 0 else -2]
+    out = out / np.linalg.norm(out)
+    for size in _LIFTS:
+        for way in (N, N + A, N + out, out, A):
+            step = how.lift * size * way / np.linalg.norm(way)
+            tips = p + np.arange(1, _SMALL + 1)[:, None] / _SMALL * step
+            rise = np.linspace(0.0, max(top_of(scene, A, how) - float(tips[-1] @ A), 0.0), _SMALL)
+            up = tips[-1] + rise[:, None] * A
+            both = np.vstack([tips, up])
+            got, _ = clearance(scene, cutter, both, np.tile(A, (len(both), 1)), how.lift + 1.0, above)
+            if got.min() >= -how.touch and got[_SMALL - 1 :].min() > how.margin:
+                end_of_lift: Floats = p + step
+                return end_of_lift
+    return None
+
+
+def top_of(scene: Scene, axis: Floats, how: Link) -> float:
+    """The height along the axis at which the tip is above the part."""
+    return float((scene.check @ axis).max()) + how.above
+
+
+@dataclass(frozen=True, eq=False)
+class LinkedFlank:
+    """A flank pass with the tips (3,) [mm] beside its beginning and its end, of :func:`lifted`."""
+
+    path: FlankPass
+    begin: Floats
+    end: Floats
+
+    def back(self) -> LinkedFlank:
+        """The same from its end to its beginning."""
+        return LinkedFlank(self.path.back(), self.end, self.begin)
+
+
+def flank_program(
+    passes: Sequence[LinkedFlank], scene: Scene, how: Link, feed: float, spindle: float, tool: int, machine: Machine
+) -> Program:
+    """The program of passes in their order, every second one from its end, in the frame of the impeller.
+
+    Parameters
+    ----------
+    feed : of the tip [mm/s]
+    spindle : [rad/s]
+    """
+    parts: list[Moves] = []
+    last: tuple[Floats, Floats] | None = None
+    for k, one in enumerate(passes):
+        turned = one if k % 2 == 0 else one.back()
+        path, begin, end = turned.path, turned.begin, turned.end
+        A0, A1 = path.axis[0], path.axis[-1]
+        over = [_over(scene, p, A, how) for p, A in ((begin, A0), (end, A1))]
+        if last is not None:
+            parts.append(_round(scene, last, (over[0], A0), how))
+        parts += [
+            Moves.of(RAPID, over[0][None], A0[None], 0.0, "link"),
+            Moves.of(LINE, begin[None], A0[None], how.feed, "link"),
+            Moves.of(LINE, path.tip[:1], A0[None], feed, "lead"),
+            Moves.of(LINE, path.tip[1:], path.axis[1:], feed, "finish"),
+            Moves.of(LINE, end[None], A1[None], feed, "lead"),
+            Moves.of(LINE, over[1][None], A1[None], how.feed, "link"),
+        ]
+        last = (over[1], A1)
+    program = program_of(Moves.join(parts), spindle, tool)
+    share = rotary_share(program, machine)
+    return replace(program, feed=program.feed / np.maximum(share, 1.0))
+
+
+def _over(scene: Scene, tip: Floats, axis: Floats, how: Link) -> Floats:
+    """The tip moved up along the axis until it is above the part."""
+    out: Floats = tip + max(top_of(scene, axis, how) - float(tip @ axis), 0.0) * axis
+    return out
+
+
+def _round(scene: Scene, a: tuple[Floats, Floats], b: tuple[Floats, Floats], how: Link) -> Moves:
+    """Rapids above the part from one tip and axis to another: at every turn of the axis the tip is above the part."""
+    angle = float(np.arccos(np.clip(a[1] @ b[1], -1.0, 1.0)))
+    share = np.linspace(0.0, 1.0, max(int(np.ceil(angle / _TURN)), 1) + 1)[:-1]
+    axes = between(np.tile(a[1], (len(share), 1)), np.tile(b[1], (len(share), 1)), share)
+    tips = a[0] + share[:, None] * (b[0] - a[0])
+    # between two of them the part may turn up towards the tip by its size times half of the angle
+    size = float(np.linalg.norm(scene.check, axis=1).max())
+    more = 2.0 * size * _TURN
+    raised = np.array([_over(scene, p, A, how) + more * A for p, A in zip(tips, axes, strict=True)])
+    return Moves.of(RAPID, raised, axes, 0.0, "link")
+
+
+def rotary_share(program: Program, machine: Machine) -> Floats:
+    """(n,) rate of the fastest rotary axis in each row over its greatest; 0 for rapids."""
+    commands, _ = to_axes(replace(program, line=np.arange(len(program))), machine)
+    step = np.abs(np.diff(commands.position, axis=0, prepend=commands.position[:1]))
+    out = np.zeros(len(program))
+    length = spans(program)
+    cut = (program.motion == LINE) & (length > 0.0)
+    seconds = np.where(cut, length / np.where(cut, program.feed, 1.0), np.inf)
+    for axis in machine.chain.rotary:
+        turn = np.bincount(commands.line, step[:, axis.column], len(program))
+        out = np.maximum(out, np.where(cut, turn / axis.rate, 0.0) / np.where(cut, seconds, 1.0))
+    return out
