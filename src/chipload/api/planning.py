@@ -126,13 +126,14 @@ def plan_impeller(
 
 def plan_thin_wall(
     *,
-    wall: Values,
+    wall: Values | Tables,
     workpiece: Values,
     machine: Source,
     material: Source,
     cutter: Cutters,
     operation: Tables,
     limits: Values,
+    part: Source | None = None,
     threshold: Source | None = None,
     dynamics: Values | None = None,
     checks: Values | None = None,
@@ -145,13 +146,14 @@ def plan_thin_wall(
 
     Parameters
     ----------
-    wall, workpiece : keys of ``[wall]`` and ``[workpiece]``
+    wall, workpiece : keys of ``[wall]`` and ``[workpiece]``; of several walls of a part those of each ``[[wall]]``
+    part : finished part that several walls belong to: a STEP file, or keys of ``[part]``
     operation : keys of the ``[[operation]]``
     threshold : measured calibration cuts: a file, or keys of ``[threshold]``; None: the threshold is calculated
     dynamics : keys of ``[dynamics]``; None: chatter is not calculated
     """
     return run_tables(
-        "thinwall", folder, progress, wall=wall, workpiece=workpiece, machine=machine, material=material,
+        "thinwall", folder, progress, part=part, wall=wall, workpiece=workpiece, machine=machine, material=material,
         threshold=threshold, cutter=cutters_of(cutter), dynamics=dynamics, operation=operation, limits=limits,
         checks=checks,
     )  # fmt: skip
