@@ -26,6 +26,7 @@ from chipload.program.motions import lengths
 from chipload.program.program import RAPID
 from chipload.program.read import read_program
 from chipload.progress import silent
+from chipload.report.removal import read_removal
 from chipload.result import LimitCheck, Verdict
 from chipload.structure import beam
 from chipload.structure.shell import Shell, compliance, ritz
@@ -305,6 +306,25 @@ def test_the_error_is_the_force_of_the_moment(result, what):
             assert np.array(rows["form_error_um"])[own].max() == pytest.approx(controllers[x]["form_error_um_max"])
             ratio = np.array(rows["torque_nm"])[own] / np.array(rows["torque_allowable_nm"])[own]
             assert ratio.max() * what["torque_limit_nm"] == pytest.approx(controllers[x]["torque_nm_max"], rel=0.02)
+
+
+def test_the_stock_is_kept_over_the_path(result):
+    """A ring from 11.25 to 14.25 mm, its outer edge 0.45 mm off, 30 mm high; the upper 2 mm are cut to 12.75 mm."""
+    names = [t["name"] for t in json.loads((result / "summary.json").read_text())["tracks"]]
+    whole, cut = math.pi * 30.0 * (14.25**2 - 11.25**2), math.pi * 2.0 * (14.25**2 - 12.75**2)
+    for name in ("fuzzy_feedforward, 50 ms", "constant, 50 ms"):
+        mesh = read_removal(result / "removal.npz", names.index(name))
+        assert mesh is not None
+        assert mesh.volumes[0] == pytest.approx(whole, rel=0.02)
+        assert mesh.volumes[0] - mesh.volumes[-1] == pytest.approx(cut, rel=0.05)
+    assert read_removal(result / "removal.npz", names.index("pi")) is None
+
+
+def test_the_report_shows_the_surprises_on_the_unrolled_wall(result):
+    """At -90 degrees, which is 270, and at 180, in each of four planes."""
+    text = (result / "report.html").read_text()
+    assert "On the unrolled wall" in text
+    assert text.count('"x0":270.0') == text.count('"x0":180.0') == 4
 
 
 def test_the_program_leaves_the_wall(what):

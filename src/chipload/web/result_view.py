@@ -219,6 +219,7 @@ class ResultView:
     async def _tracked(self, result: PageResult, track: PageTrack) -> None:
         self.limits.open(result, track)
         self.tools.open(result, track)
+        self.scene.override.open(result, track)
         marks = self.scene.marks
         self.row = marks[0].row if marks else 0
         self.plots.open(result, track, self.row)
@@ -303,6 +304,7 @@ class ResultView:
         k = self.row
         self.plots.at(k)
         self.source.at(k)
+        self.scene.override.at(k)
         if self.table.value == "tools":
             self.tools.at(k)
         x, y, z = track.place[k].tolist()

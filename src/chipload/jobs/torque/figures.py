@@ -16,14 +16,17 @@ from chipload.jobs.torque.files import HAL, PATH, program_files
 from chipload.jobs.torque.numbers import operation_numbers
 from chipload.jobs.torque.outcome import (
     HELD,
+    PLAIN,
     ClampedWorkpiece,
     ControllerCase,
     ShellWall,
     SpindleEstimate,
     TorqueResult,
 )
+from chipload.jobs.torque.result import track_name
 from chipload.jobs.torque.scene import scene_bytes
-from chipload.report.presentation import Presentation
+from chipload.jobs.torque.unrolled_figure import unrolled
+from chipload.report.presentation import Blank, Presentation
 from chipload.report.sheet import figure, items, table
 
 SETS = ("NB", "NM", "NS", "Z", "PS", "PM", "PB")
@@ -31,7 +34,19 @@ SETS = ("NB", "NM", "NS", "Z", "PS", "PM", "PB")
 
 def presentation_of(outcome: TorqueResult) -> Presentation:
     """The presentation of a torque-controlled program."""
-    return Presentation(partial(_sections, outcome), partial(scene_bytes, outcome), partial(program_files, outcome))
+    return Presentation(
+        partial(_sections, outcome),
+        partial(scene_bytes, outcome),
+        partial(program_files, outcome),
+        partial(_blanks, outcome),
+    )
+
+
+def _blanks(outcome: TorqueResult) -> dict[str, Blank]:
+    """The real stock, of the controller in use and the one that it is compared with."""
+    if not outcome.control.cases:
+        return {}
+    return {track_name(outcome.control.cases[-1], name): outcome.blank for name in (HELD, PLAIN)}
 
 
 def _sections(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
@@ -101,8 +116,21 @@ def _limit(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
     return [
         *body,
         figure("allowable", drawn.allowable(outcome), figures),
+        *_unrolled(outcome, figures),
         "<h3>Deviations from the plan</h3>",
         items(surprises),
+    ]
+
+
+def _unrolled(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
+    """Only a tube or a cone has angles round it."""
+    if not isinstance(outcome.wall, ShellWall):
+        return []
+    return [
+        "<h3>On the unrolled wall</h3>",
+        '<p class="note">Each place of the path by its angle and height, all in one scale; dashed: the angle of a '
+        "surprise.</p>",
+        figure("unrolled", unrolled(outcome), figures),
     ]
 
 

@@ -29,6 +29,7 @@ from chipload.jobs.tables import ChecksTable
 from chipload.jobs.torque.step_checks import StepChecks
 from chipload.machine.machine import Machine
 from chipload.program.program import Program
+from chipload.report.presentation import Blank
 from chipload.result import Provenance
 from chipload.stock.layers import LayeredStock
 from chipload.structure.shell import Ovalisation, Shell
@@ -157,6 +158,7 @@ class TorqueInputs:
     unchecked : names of those that are not stated
     settings : the keys of the job but cutters and surprises
     surprises : a text each
+    surprise_angles : of those that have one, its angle round the wall [deg] and its kind
     checks, check_table : what is checked beside the stated limits, and its table
     """
 
@@ -168,6 +170,7 @@ class TorqueInputs:
     unchecked: tuple[str, ...]
     settings: Mapping[str, Any]
     surprises: tuple[str, ...]
+    surprise_angles: tuple[tuple[float, str], ...]
     checks: DefaultChecks
     check_table: ChecksTable
     provenance: Provenance
@@ -274,6 +277,7 @@ class TorqueResult:
     ----------
     wall : the thin wall, or the workpiece, that limits the torque
     step_checks : the steps for the checks beside the stated limits
+    blank : the stock as it really is before the program, with the cutters
     findings : of the simulations of the plan and of the truth
     resolution_error : relative error of loads by layers and steps, by column of the simulation of the truth
     energy_balance : work over the specific energy of the volume removed, less 1, by tool number: as planned, and real
@@ -284,6 +288,7 @@ class TorqueResult:
     allowable: AllowableTorque
     control: ControlComparison
     step_checks: StepChecks
+    blank: Blank
     findings: tuple[Finding, ...]
     resolution_error: Mapping[str, float]
     energy_balance: Mapping[str, Mapping[int, float]]

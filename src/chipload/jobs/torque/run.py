@@ -43,10 +43,13 @@ from chipload.jobs.torque.workpiece_limit import allowable_torque, clamped_workp
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.program import Program
 from chipload.progress import Progress, part_of, silent
+from chipload.report.presentation import Blank
 from chipload.result import Provenance
 from chipload.simulation.accuracy import energy_balance
 from chipload.simulation.chips import counted
 from chipload.simulation.estimate import estimate
+from chipload.stock.blank_mesh import blank_mesh
+from chipload.stock.layers import LayeredStock
 
 
 def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
@@ -94,10 +97,16 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
             ideal_time=shortest_time,
         ),
         step_checks=step_checks(own.real, own.loads, material, _fastest(cases)),
+        blank=Blank(blank_mesh(_real_stock(job, program)), job.cutters),
         findings=(*own.planned.removal.findings, *(own.real.removal.findings if own.real is not own.planned else ())),
         resolution_error=own.real.removal.resolution_error,
         energy_balance={name: energy_balance(cut.removal.columns, material.Ktc) for name, cut in both},
     )
+
+
+def _real_stock(job: TorqueJob, program: Program) -> LayeredStock:
+    """The stock as it really is, before the program."""
+    return real_stock_body(job, program) if job.workpiece is not None else real_shell_stock(job, program)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +131,7 @@ def _inputs(job: TorqueJob, program: Program, machine: Machine, material: Materi
         unchecked=ask.unstated,
         settings=job.table.model_dump(exclude_none=True, exclude={"cutter", "surprise"}),
         surprises=tuple(_text_of(x.model_dump(exclude_none=True)) for x in job.table.surprise),
+        surprise_angles=tuple((x.at_deg, x.kind) for x in job.table.surprise if x.at_deg is not None),
         checks=default_checks(job.table.checks, job.cutters, material, 0.5),
         check_table=job.table.checks,
         provenance=_provenance(job, machine, material),

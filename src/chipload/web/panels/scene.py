@@ -23,6 +23,7 @@ from chipload.web.asset_cache import AssetCache
 from chipload.web.checks import label_and_unit
 from chipload.web.comparison import Side, common_span, knots, matching_row
 from chipload.web.panels import RELEASE
+from chipload.web.panels.override import OverrideGauge
 from chipload.web.result import PageResult, PageTrack
 from chipload.web.scene import PageScene, bodies, colouring, page_scene, view_path
 
@@ -96,6 +97,7 @@ class ScenePanel:
                 ).classes("cl-share-slider")  # fmt: skip
                 self.share.on("change", js_handler=RELEASE)
                 self.share.set_visibility(False)
+            self.override = OverrideGauge()
             self.notice = ui.label("").classes("cl-over cl-notice")
         self.measures = False
 

@@ -1,0 +1,49 @@
+"""A stock in layers as one closed mesh whose parts overlap a little, so that no two of its faces lie in one plane."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+import trimesh
+
+from chipload.stock.layers import LayeredStock
+from chipload.stock.solid import prisms
+from chipload.stock.tile_grid import polygons
+
+#: prisms at most, where sections differ from layer to layer
+PRISMS = 64
+#: by how much a prism reaches into the next [mm]: far over what rays tell apart, far below what is seen
+OVERLAP_MM = 2e-3
+
+
+def blank_mesh(stock: LayeredStock) -> trimesh.Trimesh:
+    """The stock before a program as a closed mesh [mm], from which a removal mesh can begin.
+
+    Neighbouring layers of one section are one prism; of more than :data:`PRISMS` different ones as many are joined as
+    needed, with the section of the middle one.
+
+    Examples
+    --------
+    >>> from chipload.stock.rings import ring_stock
+    >>> tube = ring_stock(np.linspace(0.0, 2.0, 9), lambda z: 0 * z + 9.0, lambda z: 0 * z + 10.0)
+    >>> mesh = blank_mesh(tube)
+    >>> bool(mesh.is_watertight), bool(np.isclose(mesh.volume, tube.volume())), mesh.bounds[:, 2].tolist()
+    (True, True, [0.0, 2.0])
+    """
+    if not stock.cut.any():
+        return stock.body()
+    sections = [stock.section(k) for k in range(stock.layers)]
+    groups = [[0]]
+    for k in range(1, stock.layers):
+        if shapely.equals(sections[groups[-1][0]], sections[k]):
+            groups[-1].append(k)
+        else:
+            groups.append([k])
+    if len(groups) > PRISMS:
+        groups = [part.tolist() for part in np.array_split(np.arange(stock.layers), PRISMS) if len(part)]
+    out = []
+    for own in groups:
+        last = own[-1] == stock.layers - 1
+        ends = [stock.bounds[own[0]], stock.bounds[own[-1] + 1] + (0.0 if last else OVERLAP_MM)]
+        out.append(prisms([polygons(sections[own[len(own) // 2]])], np.array(ends)))
+    return trimesh.util.concatenate([part for part in out if len(part.faces)])
