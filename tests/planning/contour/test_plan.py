@@ -123,3 +123,16 @@ def test_no_entry_in_material():
             begins = np.flatnonzero(np.diff(result.history["s_mm"], prepend=-1.0) != 0.0)
             starts = [k for k in begins if k == 0 or result.history["feed_mm_min"][k] == 0.0]
             assert result.history["engagement_deg"][starts].max() == 0.0
+
+
+def test_what_a_cutter_leaves_in_a_corner_is_not_cleared():
+    """A square corner keeps (1 - pi/4) R^2; a round one that the cutter fits keeps nothing."""
+    mill, depth = replace(MILL, diameter=2.0), FINISHING.passes * FINISHING.radial_depth + FINISHING.semifinish_depth
+    square = Contour.polyline([[0, 28], [0, 0], [28, 0]])
+    left = (1.0 - math.pi / 4.0) * mill.radius**2
+    asked = depth * 2.0 * 28.0 - depth**2
+    for strategies in (("plain",), ("backward",)):
+        (found,) = plan([square], mill, strategies=strategies, use=strategies[0], tolerance=0.5).values()
+        assert found.summary["cleared_percent"] == pytest.approx(100.0 * (1.0 - left / asked), abs=0.05)
+    (fits,) = plan([CORNER], strategies=("plain",), use="plain").values()
+    assert fits.summary["cleared_percent"] == pytest.approx(100.0, abs=0.01)

@@ -42,6 +42,7 @@ from chipload.planning.contour.passes import (
 )
 from chipload.planning.contour.sampled import SampledPass, mirrored_pass, sampled, stations
 from chipload.planning.contour.schedule import LEAST_SHARE, straight_force
+from chipload.planning.contour.totals import cleared_percent, counts, elapsed
 from chipload.planning.cost import CutConditions, cost, stacked
 from chipload.planning.link_rows import row_ends, with_links
 from chipload.planning.result import Columns, Event, OperationResult, StrategyResult
@@ -214,15 +215,32 @@ def _prepared(
 
 def _rough(job: _Job) -> tuple[Contour, ...]:
     """The surface that roughing left: parallel to the walls at all that the passes take."""
-    away = job.setting.passes * job.setting.radial_depth + job.setting.semifinish_depth - job.radius
+    away = _depth(job) - job.radius
     return offset(job.finish, away) if away != 0.0 else job.finish
+
+
+def _depth(job: _Job) -> float:
+    """What all passes take on a straight wall [mm]."""
+    return job.setting.passes * job.setting.radial_depth + job.setting.semifinish_depth
 
 
 def _stock(job: _Job) -> Region:
     """What the first motion meets, in the work frame."""
     rough = _rough(job) if job.finish else job.walls.extended
-    behind = 0.5 * job.radius + (0.0 if job.finish else job.setting.passes * job.setting.radial_depth)
-    return Region(tuple(_back(c, job.flip) for c in rough_stock(job.walls, rough, behind).contours))
+    return Region(tuple(_back(c, job.flip) for c in rough_stock(job.walls, rough, _behind(job)).contours))
+
+
+def _behind(job: _Job) -> float:
+    """How far the stock that is looked at goes into the part [mm]."""
+    return 0.5 * job.radius + (0.0 if job.finish else job.setting.passes * job.setting.radial_depth)
+
+
+def _cleared(job: _Job, planar: list[ContourPass]) -> dict[str, float]:
+    """What the passes clear; nothing of those into the material, which make a wall of their own."""
+    if not job.finish:
+        return {}
+    stock, depth = rough_stock(job.walls, _rough(job), _behind(job)), _depth(job)
+    return {"cleared_percent": cleared_percent(stock, job.walls, _behind(job), depth, planar, job.radius)}
 
 
 def _passes(job: _Job, a: float | None) -> list[ContourPass]:
@@ -305,7 +323,7 @@ def _strategy(job: _Job, name: str, planar: list[ContourPass]) -> tuple[Strategy
         "finish path": tuple(r.path for r in runs if r.name != "semifinish"),
         "stock": tuple(Contour(c.segments) for r in runs if r.name != "semifinish" for c in _chains(r.stock.segments)),
     }
-    summary = {**_summary(job, name, history, on_wall), **_counts(runs, history)}
+    summary = {**_summary(job, name, history, on_wall), **counts(len(runs), history), **_cleared(job, planar)}
     finish = [steps for run, (steps, _) in zip(runs, clocks, strict=True) if run.name == "finish"]
     done = StrategyResult(name, program, history, summary, events, on_wall, drawn)
     return done, FinishPasses(tuple(finish), wanted if name == "feed" else None)
@@ -364,27 +382,10 @@ def _summary(job: _Job, name: str, history: Columns, on_wall: NDArray[np.bool_])
         "feed_mm_min": span("feed_mm_min"),
         "force_straight_n": straight_force(job.cut, math.radians(wanted), job.setting.feed),
         "time_s": float(history["t_s"][-1]),
-        "finish_time_s": float(_elapsed(history, finish)),
+        "finish_time_s": float(elapsed(history, finish)),
         "path_mm": float(history["s_mm"][-1]),
         "deviation_mm": job.deviation,
     }
-
-
-def _counts(runs: list[ContourPass], history: Columns) -> dict[str, object]:
-    """What the time [s] is spent on, passes in all, and how often the cutter goes up between them."""
-    link = history["pass"] == "link"
-    linked = float(_elapsed(history, link))
-    return {
-        "cutting_s": float(history["t_s"][-1]) - linked,
-        "link_s": linked,
-        "passes": len(runs),
-        "lifts": len(runs) - 1,
-    }
-
-
-def _elapsed(history: Columns, where: NDArray[np.bool_]) -> float:
-    """Time spent in the steps that end in a row ``where`` [s]."""
-    return float(np.diff(history["t_s"], prepend=0.0)[where].sum())
 
 
 def _events(job: _Job, runs: list[ContourPass], history: Columns, name: str) -> list[Event]:
