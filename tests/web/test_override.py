@@ -1,5 +1,6 @@
 """The override gauge of a controlled track: what it says is the history at the slider's step."""
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -33,6 +34,7 @@ def controlled(browser, served, folder):
     page.wait_for_selector(".cl-now")
     yield page
     page.close()
+    shutil.rmtree(folder / "controlled")
 
 
 def test_the_gauge_stands_at_the_row(controlled) -> None:

@@ -98,7 +98,8 @@ EXAMPLES = {
     "dynamics.file": '"modes.toml"', "frequency_hz": "812.0", "damping_ratio": "0.02", "stiffness_n_um": "8.0",
     "mass_kg": "0.3", "least_rpm": "5000.0", "most_rpm": "12000.0", "stability_margin": "1.2",
     "stable_probability": "0.95", "frequency_percent": "2.0", "fit_mm": "0.001", "reserve": "0.1",
-    "override_step": "0.01", "spacing_mm": "0.5", "stock_layers": '["STOCK"]', "part.lines": "[120, 180]", "part.labels": '["(WALL)", "(WALL END)"]',
+    "override_step": "0.01", "spacing_mm": "0.5", "stock_layers": '["STOCK"]', "part.lines": "[120, 180]",
+    "part.labels": '["(WALL)", "(WALL END)"]',
     "holes_mm": "[[20.0, 15.0, 8.0]]", "tabs.at_mm": "[[30.0, 17.0], [10.0, 17.0]]",
 }  # fmt: skip
 #: of a number by the unit at the end of its key, where none is stated above
@@ -183,7 +184,8 @@ def _example(name: str, key: str, field: FieldInfo) -> str:
         return f'"{default}"'
     words = _text_of(field.annotation, [])
     if words.startswith("`"):
-        return f'"{words.split("`")[1]}"'
+        first = words.split("`")[1]
+        return first if first.isdigit() else f'"{first}"'
     if words in ("number", "whole number"):
         return BY_UNIT.get(key.split("_")[-1], "1.0") if words == "number" else "3"
     return "true" if words == "true or false" else "[...]" if words.startswith("list") else '"..."'
