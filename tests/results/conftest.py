@@ -42,15 +42,20 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
         "workpiece.cell_mm=4.9",
     ),
     "trunnion": (),
-    "tube": (),
-    "cone": (),
-    "plate": ("operation.0.least_error=false",),
-    "blade": ("operation.0.least_error=false", "operation.0.layer_mm=0.5", "operation.0.step_mm=2.7"),
+    "tube": ("simulation.step_mm=2.0", "simulation.tolerance_mm=0.01"),
+    "cone": ("simulation.step_mm=2.0", "simulation.tolerance_mm=0.01"),
+    "plate": ("operation.0.least_error=false", "operation.0.scallop_um=45"),
+    "blade": (
+        "operation.0.least_error=false",
+        "operation.0.layer_mm=0.5",
+        "operation.0.step_mm=2.7",
+        "operation.0.scallop_um=68",
+    ),
     "impeller": (
         "operation.0.most_cutters=1",
         *(f"surface.{k}.{key}" for k in range(3) for key in ("along=[0.42, 0.58]", "points=[6, 5]")),
     ),
-    "hecc": ("operation.0.tolerance_mm=0.5", *(f"surface.{k}.points=[8, 4]" for k in range(6))),
+    "hecc": ("operation.0.tolerance_mm=0.5", *(f"surface.{k}.points=[6, 3]" for k in range(6))),
 }
 
 
