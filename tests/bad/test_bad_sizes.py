@@ -118,3 +118,21 @@ def test_a_stock_without_thickness(side: int) -> None:
 def test_room_for_a_stock_thinner_than_a_cell_of_its_index() -> None:
     index = MoveStock(np.zeros(3), np.array([1e-3, 1e-3, 9.0]), {1: cutter()})
     assert len(work_room(index.grid, index.cutters, 4, np.array([2.0]))[0]) < 1_000_000
+
+
+@pytest.mark.parametrize(
+    ("example", "key", "value", "limit"),
+    [
+        ("impeller", "impeller.outer_diameter_mm", "1e300", r"must be within 1e\+15"),
+        ("impeller", "impeller.outer_diameter_mm", "2e6", r"must be within 1e\+06 mm"),
+        ("impeller", "impeller.shape.wrap_deg", "-1e9", "must be at least -360"),
+        ("impeller", "impeller.shape.outlet_height_mm", "1e-9", r"must be at least 0\.1"),
+        ("pocket", "operation.0.allowance_mm", "1e300", r"must be within 1e\+15"),
+        ("contour", "stock.top_mm", "-1.1e6", r"must be within 1e\+06 mm"),
+        ("chips", "stock.high_mm", "[10.0, 2e6, 10.0]", r"must be within 1e\+06 mm"),
+    ],
+)
+def test_lengths_beyond_any_machine(tmp_path: Path, example: str, key: str, value: str, limit: str) -> None:
+    copy_example(example, tmp_path / "job")
+    with pytest.raises(InputError, match=f"{key} = .*: {limit}"):
+        load_job(tmp_path / "job" / "job.toml", [f"{key}={value}"])

@@ -127,6 +127,17 @@ def test_tracks_limits_and_history(tmp_path):
         assert means[f"force_{key}_n"] == pytest.approx(means[f"force_{key}_measured_n"], rel=0.01)
 
 
+def test_forces_without_coefficients_have_no_column(tmp_path):
+    """One feed does not tell edge from cutting force: what is not known is left out and is not a column of NaN."""
+    result = run_job(load_job(made(tmp_path, cuts=((900.0, "fit"), (900.5, "predict"))))).result
+    assert result.verdict is Verdict.UNPROVEN
+    for track in result.tracks:
+        assert [n for n in track.columns if n.startswith("force")] == [
+            f"force_{key}_measured_n" for key in ("feed", "across", "axis")
+        ]
+        assert all(np.isfinite(values).all() for values in track.columns.values())
+
+
 def test_what_the_mean_turn_leaves_is_the_noise(tmp_path):
     """A wave of 20 N twice a turn on the axis: beside the mean turn at their rotations, samples scatter by 0.05 N."""
     path = made(tmp_path)

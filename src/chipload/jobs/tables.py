@@ -9,11 +9,14 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator
 
 from chipload.errors import InputError
 
 Value = TypeVar("Value")
+
+#: [mm] greatest length, and greatest number of any other unit, of a job file
+FARTHEST_MM, GREATEST = 1e6, 1e15
 
 
 def _only_number(value: Any) -> Any:
@@ -21,6 +24,8 @@ def _only_number(value: Any) -> Any:
         raise ValueError("must be a number")
     if not math.isfinite(value):
         raise ValueError("must be a finite number")
+    if abs(value) > GREATEST:
+        raise ValueError(f"must be within {GREATEST:g}")
     return value
 
 
@@ -78,10 +83,25 @@ Text = Annotated[str, Field(min_length=1)]
 Unit = Literal["um", "mm", "cm", "m", "inch", "foot"]
 
 
+def _within(value: Any, most: float) -> bool:
+    """Whether a number, or each of a list of lists of them, is at most that large."""
+    if isinstance(value, list | tuple):
+        return all(_within(x, most) for x in value)
+    return not isinstance(value, int | float) or abs(value) <= most
+
+
 class Table(BaseModel):
     """A table of the file: unknown keys are refused, values do not change."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)
+
+    @field_validator("*")
+    @classmethod
+    def _near(cls, value: Any, info: ValidationInfo) -> Any:
+        """Refuse a length beyond any machine."""
+        if str(info.field_name).endswith("_mm") and not _within(value, FARTHEST_MM):
+            raise ValueError(f"must be within {FARTHEST_MM:g} mm")
+        return value
 
 
 def stated(value: Value | None, key: str) -> Value:

@@ -44,13 +44,17 @@ def result_of(done: FitResult) -> Result:
 
 
 def history(done: FitResult, c: Comparison) -> Columns:
-    """One turn of a measurement: measured and predicted forces on the cutter, a row a rotation."""
+    """One turn of a measurement: measured and predicted forces on the cutter, a row a rotation.
+
+    A channel whose coefficients are not identified has no column of predicted forces.
+    """
     theta = np.linspace(0.0, math.tau, TURN, endpoint=False)
     measured, model = c.measured(theta), predicted(done.fit, c.cut, theta)
     out: dict[str, NDArray[Any]] = {"t_s": theta / c.turns.speed, "rotation_deg": np.degrees(theta)}
     for k in np.flatnonzero(c.cut.measured):
         out[f"force_{CHANNELS[k]}_measured_n"] = measured[:, k]
-        out[f"force_{CHANNELS[k]}_n"] = model[:, k]
+        if np.isfinite(model[:, k]).all():
+            out[f"force_{CHANNELS[k]}_n"] = model[:, k]
     return out
 
 

@@ -26,13 +26,13 @@ Span = tuple[Share, Share]
 class ShapeTable(Table):
     """An impeller by formula, see ``planning/impeller/parametric.py``."""
 
-    channel_mm: Positive = Field(description="narrowest width of a channel, round the axis at the inlet")
-    hub_radius_mm: Positive = Field(description="of the hub at the inlet")
-    height_mm: Positive = Field(description="of the hub from outlet to inlet")
-    blade_height_mm: Positive = Field(description="at the inlet")
-    outlet_height_mm: Positive = Field(description="of the blades at the outlet")
-    wrap_deg: Number = Field(description="turn of a blade from inlet to outlet")
-    lean_deg: Number = Field(0.0, description="turn of a blade from hub to shroud")
+    channel_mm: Positive = Field(ge=0.1, description="narrowest width of a channel, round the axis at the inlet")
+    hub_radius_mm: Positive = Field(ge=0.1, description="of the hub at the inlet")
+    height_mm: Positive = Field(ge=0.1, description="of the hub from outlet to inlet")
+    blade_height_mm: Positive = Field(ge=0.1, description="at the inlet")
+    outlet_height_mm: Positive = Field(ge=0.1, description="of the blades at the outlet")
+    wrap_deg: Number = Field(ge=-360.0, le=360.0, description="turn of a blade from inlet to outlet")
+    lean_deg: Number = Field(0.0, ge=-180.0, le=180.0, description="turn of a blade from hub to shroud")
 
 
 class SectionsTable(Table):
