@@ -102,6 +102,7 @@ def test_accepted_guesses_stand_in_the_result(program: Path, tmp_path: Path) -> 
     assert not holds
     assert lines[0].startswith("guess: machine.name = ")
     assert "report:" in said
+    assert f" {len(notes)} guesses of the job accepted." in said.splitlines()[0]
 
 
 def test_a_first_look_is_never_better_than_unproven(program: Path, tmp_path: Path) -> None:
@@ -196,6 +197,32 @@ def test_comments_of_other_posts() -> None:
     assert siemens.stock[0] == ((-5.0, -5.0, -20.0), (100.0, 60.0, 0.0))
     # high-speed steel is a tool's
     assert read_header("(T1 HSS STEEL END MILL)").material is None
+
+
+def test_a_tool_that_is_called_by_name(tmp_path: Path) -> None:
+    """Its only number is a guess of the diameter; the tool of an earlier name keeps its own number."""
+    text = 'N1 G90 G54\nN2 T="FACE 40 Z5" D1\nN3 M6\nN4 S3000 M3\nN5 G0 X0 Y0 Z5\nN6 G1 Z-1 F200\nN7 X20\nN8 G0 Z5\n'
+    text += 'N9 T="EM8"\nN10 M6\nN11 S3000 M3\nN12 G1 Z-2 F200\nN13 X10\nN14 G0 Z9\nN15 M30\n'
+    (tmp_path / "a.mpf").write_text(text)
+    assert call("init", tmp_path / "a.mpf", tmp_path / "job")[0] == 0
+    text = (tmp_path / "job" / "job.toml").read_text()
+    face, mill = tomllib.loads(text)["cutter"]
+    assert [(c["number"], c["name"], c["diameter_mm"]) for c in (face, mill)] == [
+        (9001, "FACE 40 Z5", 10.0),
+        (9002, "EM8", 8.0),
+    ]
+    assert "# guess: the number in its name, EM8" in text
+
+
+def test_a_compensated_path_is_read_with_the_cutter_that_a_comment_states(tmp_path: Path) -> None:
+    """The stock is guessed round the path of the centre: right of the text's line by 4 mm, the radius."""
+    text = "(T1 D=8. CR=0. - flat end mill)\nG21 G90 G17\nT1 M6\nS4000 M3\nG0 X-20 Y0 Z5\nZ-2\nG42 D1 G1 X0 Y0 F300\n"
+    (tmp_path / "a.nc").write_text(text + "X40\nG40 G1 X60\nG0 Z5\nM30\n")
+    code, said, _ = call("init", tmp_path / "a.nc", tmp_path / "job")
+    assert code == 0
+    assert "nc-diameter-unknown" not in said
+    stock = tomllib.loads((tmp_path / "job" / "job.toml").read_text())["stock"]
+    assert (stock["low_mm"][1], stock["high_mm"][1]) == (-5.0, 1.0)
 
 
 def test_inches_become_millimetres(tmp_path: Path) -> None:

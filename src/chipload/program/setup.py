@@ -16,6 +16,8 @@ from dataclasses import dataclass, field
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 
+#: number from which tools that have only a name count
+FIRST_NAMED = 9001
 _HASH = re.compile(r"#?([0-9]{1,6})|#<([a-z_][^<>]*)>|(_[^<>]*)")
 _LETTER = {"sinumerik": "r", "heidenhain": "q"}
 _OFFSET = re.compile(r"G(5[4-9])(?:\.([123]))?(?:\s*P([0-9]{1,3}))?|G(5[0-9]{2})")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.errors import Finding, InputError
+from chipload.errors import Finding, InputError, Severity
 from chipload.result.columns import COLUMNS
 from chipload.result.display import result_html
 from chipload.result.limits import Columns, LimitCheck
@@ -158,10 +158,16 @@ class Result:
                 for track in self.in_use
                 if track.limits
             )
-            return f"Holds: {held}.{f' {self.note}' if self.note else ''}"
+            return " ".join(filter(None, (f"Holds: {held}.", self.note, self._accepted)))
         found = list(dict.fromkeys(texts[self.verdict])) or ["no limit was checked"]
         more = f"; and {len(found) - 1} more" if len(found) > 1 else ""
-        return f"{self.verdict.value.capitalize()}: {found[0]}{more}."
+        return " ".join(filter(None, (f"{self.verdict.value.capitalize()}: {found[0]}{more}.", self._accepted)))
+
+    @property
+    def _accepted(self) -> str:
+        """How many guesses of a drafted job were accepted, where that is all that is said of them."""
+        guesses = sum(f.code == "job-guess" and f.severity is Severity.NOTE for f in self.findings)
+        return f"{guesses} guess{'es' if guesses > 1 else ''} of the job accepted." if guesses else ""
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the message, and tables of limits, tracks and findings."""

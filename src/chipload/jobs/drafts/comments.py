@@ -17,6 +17,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.program.apt.cutters import Shape, read_cutters
 from chipload.program.reconcile import tool_comments
+from chipload.program.setup import FIRST_NAMED
 from chipload.units import MM_PER
 
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
@@ -33,6 +34,8 @@ _WORKPIECE = re.compile(r"WORKPIECE\s*\(([^)]*)\"BOX\"([^)]*)\)", re.IGNORECASE)
 _STOCK_SIZE = re.compile(rf"Stock\s+Size\s+X{_NUMBER}\s*Y{_NUMBER}\s*Z{_NUMBER}", re.IGNORECASE)
 #: a comment, and the tool that is defined behind it (Heidenhain)
 _TOOL_DEF = re.compile(r";([^\n]*)\n[^\n]*\bTOOL\s+(?:DEF|CALL)\s+(\d{1,8})\b", re.IGNORECASE)
+#: a tool called by its name: Sinumerik, Heidenhain
+_NAMED = re.compile(r'(?:\bT\d*\s*=\s*|\bTOOL\s+CALL\s+)"([^"\n]+)"', re.IGNORECASE)
 _MATERIALS = (
     (r"STAINLESS|\b304L?\b|\b316L?\b|1\.43\d\d|1\.44\d\d|INOX", "group-14-stainless"),
     (r"INCONEL|NIMONIC|HASTELLOY", "group-34-nickel"),
@@ -100,12 +103,16 @@ def _nc_cutters(text: str, mm: float) -> dict[int, Stated]:
         own = out.setdefault(int(defined[2]), {})
         for key, stated in _described(defined[1], mm).items():
             own.setdefault(key, stated)
+    for k, name in enumerate(dict.fromkeys(_NAMED.findall(text))):
+        own = out.setdefault(FIRST_NAMED + k, {})
+        for key, stated in _described(name, mm, f"the name of the tool ({name[:50]})").items():
+            own.setdefault(key, stated)
     return {n: {k: v for k, v in own.items() if v[0] != ""} for n, own in out.items()}
 
 
-def _described(name: str, mm: float) -> Stated:
+def _described(name: str, mm: float, where: str = "") -> Stated:
     """What the description of a tool states: ``14MM CRB 2FL 32 LOC FLUTE LEN 32.0 FLUTE EXT 60.0``."""
-    where = f"the comment ({' '.join(name.split())[:50]})"
+    where = where or f"the comment ({' '.join(name.split())[:50]})"
     out: Stated = {"name": (" ".join(name.split()), where)}
     if found := re.search(rf"{_NUMBER}\s*MM\b", name, re.IGNORECASE):
         out["diameter_mm"] = (float(found[1]), where)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -53,8 +54,13 @@ def _guesses(stated: Mapping[str, tuple[Any, str]], deepest: float) -> dict[str,
             out["overhang_mm"] = (length, "no file states it; the body and one diameter")
         return out
     if "diameter_mm" not in stated:
-        out["diameter_mm"] = (10.0, "no file states it")
-    d = float(stated.get("shank_diameter_mm", stated.get("diameter_mm", (10.0, "")))[0])
+        name = str(stated["name"][0]) if "name" in stated else ""
+        numbers = [float(n) for n in re.findall(r"[0-9]+(?:\.[0-9]+)?", name)]
+        if len(numbers) == 1 and 0.1 <= numbers[0] <= 100.0:
+            out["diameter_mm"] = (numbers[0], f"the number in its name, {name[:50]}")
+        else:
+            out["diameter_mm"] = (10.0, "no file states it")
+    d = float(stated.get("shank_diameter_mm", stated.get("diameter_mm", out.get("diameter_mm", (10.0, ""))))[0])
     out["flutes"] = (2 if d < 4.0 else 3, "no file states them; usual in aluminium")
     out["helix_deg"] = (30.0, "no file states it; usual of end mills")
     longest = float(stated["overhang_mm"][0]) if "overhang_mm" in stated else 3000.0

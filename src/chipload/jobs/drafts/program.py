@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from chipload.cutter.cutter import Cutter
+from chipload.cutter.table import cutter_from_table
 from chipload.errors import InputError, Severity
 from chipload.files import read_regular
 from chipload.jobs.drafts.comments import Box, Header, Stated, read_header
@@ -91,10 +93,12 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     """
     known = known or Known()
     chosen = _read(path, known)
-    program = chosen.reading.program
     apt = ENDINGS.get(path.suffix.lower()) == "apt" or chosen.dialect == "apt"
     text = known.text if known.text is not None else _text(path, apt)
     header = read_header(text, apt, unit_mm(text))
+    if any(f.code == "nc-diameter-unknown" for f in chosen.reading.findings):
+        chosen = _read(path, known, _cutters(chosen.reading.program, known, header))
+    program = chosen.reading.program
     block, stock_entries = _stock(program, known, header)
     cuts = _cutting(program)
     numbers = [int(n) for n in np.unique(program.tool[cuts])] if cuts.any() else [int(program.tool[-1])]
@@ -109,12 +113,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
             "stock", (*stock_entries, _layer(deepest, sizes)), note="the block that the program starts from [mm]"
         ),
         _material_table(header),
-        *(
-            cutter_table(
-                n, [known.cutters.get(n, {}), _of_table(known.tools, n), header.cutters.get(n, {})], deepest[n]
-            )
-            for n in numbers
-        ),
+        *(cutter_table(n, _stated(n, known, header), deepest[n]) for n in numbers),
         _operation_table(program, cuts, sizes),
         _limits_table(chosen.machine),
     ]
@@ -131,6 +130,22 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     )
 
 
+def _stated(number: int, known: Known, header: Header) -> list[Stated]:
+    """What is stated about a tool, the surest first."""
+    return [known.cutters.get(number, {}), _of_table(known.tools, number), header.cutters.get(number, {})]
+
+
+def _cutters(program: Program, known: Known, header: Header) -> dict[int, Cutter]:
+    """The tools of a program whose diameter is stated, for the compensation of its path."""
+    out: dict[int, Cutter] = {}
+    for n in (int(n) for n in np.unique(program.tool)):
+        sources = _stated(n, known, header)
+        if any("diameter_mm" in source for source in sources):
+            entries = cutter_table(n, sources).entries
+            out[n] = cutter_from_table({e.key: e.value for e in entries if e.value is not None})
+    return out
+
+
 def _text(path: Path, apt: bool) -> str:
     try:
         return apt_text(path) if apt else gcode_text(path)
@@ -138,8 +153,9 @@ def _text(path: Path, apt: bool) -> str:
         return read_regular(path, path.name, _LARGEST).decode("latin-1")
 
 
-def _read(path: Path, known: Known) -> _Chosen:
+def _read(path: Path, known: Known, cutters: Mapping[int, Cutter] | None = None) -> _Chosen:
     """The reading with the least that is left unproven, on the first machine that has the axes."""
+    setup = Setup(cutters=cutters or {})
     tools = read_tools(known.tools) if known.tools is not None else None
     ending = path.suffix.lower()
     size = len(known.text) if known.text is not None else path.stat().st_size if path.is_file() else 0
@@ -157,7 +173,7 @@ def _read(path: Path, known: Known) -> _Chosen:
                 try:
                     own = None if feed is None else mm_s_from_mm_min(feed)
                     reading = read_program(
-                        path, machine, dialect=dialect, tools=tools, feed=own, text=known.text, setup=Setup()
+                        path, machine, dialect=dialect, tools=tools, feed=own, text=known.text, setup=setup
                     )
                 except InputError as err:
                     refused.append(err)

@@ -30,6 +30,7 @@ from chipload.program.gcode.sinumerik_cycles import CYCLES, NORMAL, hole_blocks
 from chipload.program.gcode.sinumerik_flow import flow_step
 from chipload.program.gcode.state import AXES, LINEAR, ZERO, nine
 from chipload.program.gcode.words import LONGEST, Block
+from chipload.program.setup import FIRST_NAMED
 
 if TYPE_CHECKING:
     from chipload.program.gcode.flow import Flow
@@ -260,7 +261,7 @@ def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple
     if name in ("A3", "B3", "C3", "A2", "B2", "C2", "A4", "B4", "C4", "A5", "B5", "C5", "LEAD", "TILT"):
         raise NotReadError(f"{name}: tool directions as vectors or angles to the surface are not read: post with axes")
     if name == "T" and text.startswith('"'):
-        number = c.named_tools.setdefault(text, 9001 + len(c.named_tools))
+        number = c.named_tools.setdefault(text, FIRST_NAMED + len(c.named_tools))
         c.once("nc-tool-unknown", f"tool {text}: is not known here; it counts as T{number} without length")
         _put(block, "t", float(number))
         return

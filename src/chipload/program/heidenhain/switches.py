@@ -11,6 +11,7 @@ import re
 from chipload.errors import InputError
 from chipload.program.heidenhain import words
 from chipload.program.heidenhain.state import AXES, RADIUS_Q, ConversationalState
+from chipload.program.setup import FIRST_NAMED
 from chipload.units import MM_PER, rad_s_from_rpm
 
 TOOL_DIGITS = 9
@@ -19,8 +20,6 @@ KNOWN = (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 13, 14, 30, 89, 91, 92, 99, 128, 129, 136
 #: rotary axes by the shortest way, look-ahead, feeds on arcs and plunges, filters, handwheels, limits of axes
 SILENT = (90, 94, 101, 102, 103, 107, 108, 109, 110, 111, 114, 116, 117, 118, 120, 124, 126, 127, 134, 135, 138, 141,
           142, 143, 148, 149, 150, 200, 201, 202, 203, 204)  # fmt: skip
-#: number from which tools that are named count
-FIRST_NAMED = 9001
 _SHIFT = re.compile(r"^(I?)([XYZABC])\s*(.+)$")
 _CHANGE = re.compile(rf"\b(D[LR])\s*([-+]?)\s*({words.VALUE})")
 
