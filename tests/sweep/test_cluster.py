@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -11,40 +12,24 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
-import chipload.sweep.workers as workers_module
+import chipload.workers as workers_module
+from chipload.cli import app
+from chipload.jobs import FinishedJob, load_job, run_job
+from chipload.jobs.impeller.checkpoint import part_bytes
+from chipload.result.summary import summary_bytes
 from chipload.sweep.run import run_sweep
-from chipload.sweep.workers import WorkerDied, completed
+from chipload.workers import WorkerDied, Workers, completed
+from conftest import EXAMPLES
 from killed_tasks import always_killed
+from slot_job import slot_job
 
 pytest.importorskip("distributed", reason="no distributed: no sweep on a cluster")
 
-SLOT = "G21 G90 G94\nT1 M6\nS3000 M3\nG0 X-8 Y5 Z5\nG1 Z-2 F300\nX8\nG0 Z5\nM2\n"
-JOB = """[program]
-file = "slot.ngc"
-[machine]
-name = "vmc"
-[stock]
-low_mm = [0.0, 0.0, -6.0]
-high_mm = [20.0, 10.0, 0.0]
-[material]
-name = "al7075-t6"
-[[cutter]]
-number = 1
-diameter_mm = 6.0
-flutes = 2
-helix_deg = 30.0
-flute_length_mm = 18.0
-overhang_mm = 25.0
-modulus_gpa = 580.0
-[[operation]]
-kind = "simulate"
-step_mm = 2.0
-[limits]
-torque_nm = 5.0
-"""
 #: 12 small jobs
 OVER = ("limits.torque_nm=0.2,0.3,0.4,0.5,0.6,0.7", "operation.0.step_mm=2.0,1.5")
 
@@ -82,9 +67,7 @@ def tree(folder: Path) -> dict[str, bytes]:
 def test_a_worker_that_is_killed_in_the_middle_loses_nothing(cluster, tmp_path):
     """The bytes are those of one process, and the worker that is left did the rest."""
     address, workers = cluster
-    (tmp_path / "slot.ngc").write_text(SLOT)
-    job = tmp_path / "job.toml"
-    job.write_text(JOB)
+    job = slot_job(tmp_path / "job")
     ended: list[int] = []
 
     def progress(done: float, _: str) -> None:
@@ -115,3 +98,63 @@ def test_a_task_that_kills_as_many_workers_as_are_allowed_is_named(cluster):
     address, _ = cluster
     with pytest.raises(WorkerDied, match="task 1"):
         list(completed(always_killed, [(1,)], dask=address))
+
+
+#: a piece of each side of a blade
+SIDES = """[[surface]]
+body = "blade"
+side = "plus"
+along = [0.30, 0.36]
+up = [0.50, 0.60]
+points = [2, 2]
+
+[[surface]]
+body = "blade"
+side = "minus"
+along = [0.30, 0.36]
+up = [0.50, 0.60]
+points = [2, 2]
+
+"""
+
+
+@pytest.fixture(scope="module")
+def impeller(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The example with two small surfaces and without programs."""
+    text = (EXAMPLES / "impeller" / "job.toml").read_text()
+    text = text[: text.index("[[surface]]")] + SIDES + text[text.index("[[operation]]") :]
+    text = text[: text.index("[operation.rough]")]
+    text = re.sub(r"^(hand_picked|tolerance_mm|most_cutters).*\n", "", text, flags=re.MULTILINE)
+    text = text.replace("check_mm = 3.0\n", "check_mm = 4.0\ntable_deg = [55.0, 70.0]\nmost_cutters = 1\n")
+    file = tmp_path_factory.mktemp("impeller") / "job.toml"
+    file.write_text(text)
+    return file
+
+
+def numbers(done: FinishedJob) -> tuple[list[bytes], Any]:
+    """The answer of each surface as bytes, and the summary but for the time that the search took."""
+
+    def timeless(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {k: timeless(v) for k, v in value.items() if k != "search_s"}
+        return [timeless(v) for v in value] if isinstance(value, list) else value
+
+    return [part_bytes(s.answer) for s in done.outcome.surfaces], timeless(json.loads(summary_bytes(done.result, {})))
+
+
+def test_surfaces_of_an_impeller_are_searched_by_processes_and_on_a_cluster(impeller, cluster):
+    address, _ = cluster
+    alone = numbers(run_job(load_job(impeller)))
+    assert len(alone[0]) == 2
+    assert alone[0][0] != alone[0][1]
+    for where in (Workers(dask=address), Workers(2)):
+        assert numbers(run_job(load_job(impeller), workers=where)) == alone
+
+
+def test_a_job_without_such_parts_is_refused(tmp_path):
+    words = ["run", str(slot_job(tmp_path / "job")), "--out", str(tmp_path / "result"), "--workers"]
+    done = CliRunner().invoke(app, [*words, "2"])
+    assert done.exit_code == 2
+    assert "a program job has no parts that other processes can compute" in done.output
+    assert not (tmp_path / "result").exists()
+    assert "--workers = 0: must be from 1 to 1024" in CliRunner().invoke(app, [*words, "0"]).output

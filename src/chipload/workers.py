@@ -11,18 +11,54 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from typing import Any
 
 from chipload.errors import ChiploadError, InputError
 from chipload.lazy import require_extra
 
 Task = tuple[Any, ...]
+#: processes of one computer
+MOST_PROCESSES = 1024
 #: how often a task is begun again where its worker died
 RETRIES = 2
 #: how long a cluster may be without any worker [s]
 PATIENCE_S = 30.0
 #: how often the cluster is asked [s]
 POLL_S = 0.02
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Where tasks are done.
+
+    Parameters
+    ----------
+    processes : on this computer; 1: this one
+    dask : address of a Dask scheduler, as ``tcp://host:8786``; then ``processes`` has no meaning
+
+    Raises
+    ------
+    InputError
+        The number of processes is out of range.
+    """
+
+    processes: int = 1
+    dask: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that mean nothing."""
+        if not 1 <= self.processes <= MOST_PROCESSES:
+            raise InputError(f"--workers = {self.processes}: must be from 1 to {MOST_PROCESSES}")
+
+    @property
+    def alone(self) -> bool:
+        """Whether this process does all."""
+        return self.processes == 1 and self.dask is None
+
+    def completed(self, function: Callable[..., Any], tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
+        """As :func:`completed`."""
+        return completed(function, tasks, self.processes, self.dask)
 
 
 class WorkerDied(ChiploadError):
