@@ -1,4 +1,4 @@
-"""A sweep of many small jobs on one process, on two, on a Dask cluster, and with a worker killed: times, equal bytes.
+"""A sweep of many small jobs on one process, on two and on Dask, the last two also with a worker killed: equal bytes.
 
     python benchmarks/sweep.py [--jobs 200] [--write]
 
@@ -64,15 +64,14 @@ def tree(folder: Path) -> str:
 
 
 @contextmanager
-def one_killed(cases: Path, after: int) -> Iterator[None]:
-    """Kill one worker with SIGKILL as soon as ``after`` cases are done."""
+def one_killed(cases: Path, after: int, named: Callable[[], int]) -> Iterator[None]:
+    """Kill the worker whose process ``named`` gives with SIGKILL as soon as ``after`` cases are done."""
     done = threading.Event()
 
     def watch() -> None:
         while not done.wait(0.05):
-            workers = multiprocessing.active_children()
-            if workers and len(list(cases.glob("*.json"))) >= after:
-                os.kill(workers[0].pid or 0, signal.SIGKILL)
+            if len(list(cases.glob("*.json"))) >= after:
+                os.kill(named(), signal.SIGKILL)
                 return
 
     thread = threading.Thread(target=watch)
@@ -82,6 +81,11 @@ def one_killed(cases: Path, after: int) -> Iterator[None]:
     finally:
         done.set()
         thread.join()
+
+
+def own_process() -> int:
+    """The first of the processes that this one started."""
+    return next(child.pid for child in multiprocessing.active_children() if child.pid is not None)
 
 
 def measured(run: Callable[[], object], out: Path) -> tuple[float, str]:
@@ -122,11 +126,16 @@ def table(jobs: int) -> list[str]:
         spent.append(processor_time())
         of("two processes", workers=2)
         spent.append(processor_time())
-        with one_killed(folder / "two, one killed" / "cases", jobs // 2):
+        with one_killed(folder / "two, one killed" / "cases", jobs // 2, own_process):
             of("two, one killed", workers=2)
         spent.append(processor_time())
         with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
             of("Dask, two workers", dask=cluster.scheduler_address)
+        spent.append(processor_time())
+        with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+            first_worker = next(iter(cluster.workers.values()))
+            with one_killed(folder / "Dask, one killed" / "cases", jobs // 2, lambda: int(first_worker.pid)):
+                of("Dask, one killed", dask=cluster.scheduler_address)
         spent.append(processor_time())
     first = rows[0]
     return [

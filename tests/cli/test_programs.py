@@ -64,7 +64,7 @@ def test_a_program_that_fits(files: Path):
     # 30 + 30 at each straight, two half circles of radius 10, 6 down and 6 up
     length = 2 * 30 + 2 * np.pi * 10 + 6 + 6
     assert re.search(rf"a\.ngc: 8 motions on machine vmc, {length:.6g} mm", out)
-    assert out.splitlines()[-1] == "the limits hold"
+    assert out.splitlines()[-1] == "within the limits of machine vmc"
 
 
 def test_a_program_beyond_the_machine(files: Path):

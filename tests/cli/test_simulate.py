@@ -240,7 +240,7 @@ def test_a_rapid_through_material_is_said(job: Path, tmp_path: Path) -> None:
 def test_check_reads_the_stock_and_cuts_nothing(job: Path) -> None:
     code, out, _ = call("check", job)
     assert code == 0
-    assert out.splitlines()[-2] == "job.toml: read; the limits hold of machine vmc"
+    assert out.splitlines()[-2] == "job.toml: read; within the limits of machine vmc"
     assert out.splitlines()[-1].startswith("estimate: 28 steps")
     assert sorted(p.name for p in job.parent.iterdir()) == ["job.toml", "slot.ngc"]
 

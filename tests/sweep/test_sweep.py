@@ -24,9 +24,10 @@ from chipload.jobs import load_job
 from chipload.sweep.cases import Samples, cases_of
 from chipload.sweep.run import Combination, SweepResult, run_sweep
 from chipload.sweep.table import pareto
-from chipload.sweep.workers import WorkerDied, completed
+from chipload.workers import WorkerDied, completed
 from conftest import EXAMPLES
 from killed_tasks import always_killed, killed_once
+from slot_job import slot_job
 
 OVER = ("cutter.0.diameter_mm=8,10", "operation.0.feed_mm_min=600,900")
 
@@ -155,11 +156,10 @@ def test_a_refused_case_is_a_row(job, tmp_path):
     assert "cutter.0.flutes = -1" in done.records[1]["message"]
 
 
-def test_the_probability_is_that_of_the_normal_distribution(job, tmp_path):
+def test_the_probability_is_that_of_the_normal_distribution(tmp_path):
     """The torque is linear in the coefficients: the share below a limit follows from its mean and deviation."""
-    limit = 1.6
-    wide = ("limits.force_xy_n=9000", "limits.form_error_um=900", f"limits.torque_nm={limit}")
-    done = run_sweep(job, wide, tmp_path, samples=Samples(32))
+    limit = 0.38
+    done = run_sweep(slot_job(tmp_path / "job"), (f"limits.torque_nm={limit}",), tmp_path, samples=Samples(32))
     torque = np.array([record["limits"]["torque_nm"]["worst"] for record in done.records])
     (combination,) = done.combinations
     low, high = combination.interval

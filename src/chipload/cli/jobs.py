@@ -41,6 +41,13 @@ def run(
             "--coarse", help="larger steps, about a tenth of the time; the verdict is never better than unproven"
         ),
     ] = False,
+    workers: Annotated[
+        int, typer.Option("--workers", help="processes that search the surfaces of an impeller job; 1: this one")
+    ] = 1,
+    dask: Annotated[
+        str | None,
+        typer.Option("--dask", metavar="ADDRESS", help="address of a Dask scheduler, in place of --workers"),
+    ] = None,
     debug: Debug = False,
 ) -> None:
     """Run a job: plan or read its programs, simulate and check them; write the result folder.
@@ -58,7 +65,9 @@ def run(
             loaded = load_job(job, (*(sets or ()), *coarser(loaded)))
         from chipload.report.folder import check_target, checkpoint_folder, write_finished
         from chipload.simulation.checkpoint import Checkpoint
+        from chipload.workers import Workers
 
+        where = Workers(workers, dask)
         check_target(out)
         if not 0.0 <= keep_s < math.inf:
             raise InputError(f"--keep-s = {keep_s:g}: must be at least 0 s")
@@ -69,7 +78,7 @@ def run(
                 with bar() as progress:
                     done = run_job(
                         loaded, lambda part, what: progress(0.8 * part, what), kept,
-                        guesses=Severity.NOTE if accept else None,
+                        guesses=Severity.NOTE if accept else None, workers=where,
                     )  # fmt: skip
                     done = marked(done) if coarse else done
                     target = write_finished(

@@ -71,6 +71,6 @@ def check_program(
         f"{seconds.sum() / 60.0:.4g} min; {box} mm"
     )
     count = len(reading.violations)
-    holds = "the limits hold" if not gaps else f"unproven: {gaps[0]}"
-    show(f"{count} {'finding does' if count == 1 else 'findings do'} not hold" if count else holds)
+    state = f"unproven: {gaps[0]}" if gaps else f"within the limits of machine {on.name}"
+    show(f"{count} {'finding exceeds' if count == 1 else 'findings exceed'} the limits" if count else state)
     return EXCEEDED if reading.violations or gaps else 0

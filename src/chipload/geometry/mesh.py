@@ -98,7 +98,7 @@ def require_closed(mesh: trimesh.Trimesh, name: str) -> None:
     """
     count = open_edges(mesh)
     if count:
-        raise InputError(f"{name}: the mesh is not closed: {count} open edges: mend it in CAD and export it again")
+        raise InputError(f"{name}: the mesh is not closed: {count} open edges: repair it in CAD and export it again")
 
 
 def sections(mesh: trimesh.Trimesh, heights: Sequence[float] | Floats) -> list[MultiPolygon]:

@@ -27,6 +27,7 @@ from chipload.jobs.override import override
 from chipload.jobs.sources import cutter_errors, entries_of, source_errors
 from chipload.progress import Progress, silent
 from chipload.tables import LARGEST_FILE, parsed, require_sound
+from chipload.workers import Workers
 
 if TYPE_CHECKING:
     from chipload.report.presentation import Presentation
@@ -45,6 +46,7 @@ class Capability:
     table : name of the table of the whole file, in ``tables``
     resumes : whether a run that was stopped goes on from its checkpoint
     inner : the table of an operation that only its job files have; empty: ``key`` alone tells them
+    spreads : whether parts of a run can be computed by other processes
     """
 
     name: str
@@ -52,6 +54,7 @@ class Capability:
     table: str
     resumes: bool = False
     inner: str = ""
+    spreads: bool = False
 
     def module(self, part: str) -> ModuleType:
         """A file of its folder, imported when it is needed."""
@@ -68,7 +71,7 @@ CAPABILITIES = (
     Capability("torque", "torque_control", "TorqueJobTable"),
     Capability("feeds", "program", "FeedsJobTable", resumes=True, inner="feeds"),
     Capability("program", "program", "ProgramJobTable", resumes=True),
-    Capability("impeller", "impeller", "ImpellerJobTable", resumes=True),
+    Capability("impeller", "impeller", "ImpellerJobTable", resumes=True, spreads=True),
     Capability("thinwall", "wall", "ThinWallJobTable", resumes=True),
     Capability("fit", "measurement", "FitJobTable"),
     Capability("contour", "part", "ContourJobTable"),
@@ -228,6 +231,7 @@ def run_job(
     checkpoint: Checkpoint | None = None,
     *,
     guesses: Severity | None = None,
+    workers: Workers | None = None,
 ) -> FinishedJob:
     """Run a job; nothing is written.
 
@@ -236,19 +240,28 @@ def run_job(
     checkpoint : keeps what is finished, so that a stopped run goes on; used by the capabilities that can resume
     guesses : what a guess of a draft is in the result: a note where its user accepts it, UNPROVEN for a first look;
         None: a job with guesses is refused
+    workers : processes or a cluster that compute parts of the run; None: this process alone. What is found is the same
 
     Raises
     ------
     InputError
-        A file that it names cannot be used, or its values together; it has guesses that are not confirmed.
+        A file that it names cannot be used, or its values together; it has guesses that are not confirmed; it has no
+        parts that other processes can compute.
     Cancelled
         By ``progress``.
     """
     capability = loaded.capability
     if loaded.guesses and guesses is None:
         raise InputErrors(*loaded.guesses, unconfirmed(loaded))
-    kept = {"checkpoint": checkpoint} if capability.resumes else {}
-    outcome = capability.module("run").run(loaded.job, progress, **kept)
+    more: dict[str, Any] = {"checkpoint": checkpoint} if capability.resumes else {}
+    if workers is not None and not workers.alone:
+        if not capability.spreads:
+            raise InputError(
+                f"--workers, --dask: {_article(capability.name)} job has no parts that other processes can compute: "
+                "leave them out; chipload sweep runs many jobs at once"
+            )
+        more["workers"] = workers
+    outcome = capability.module("run").run(loaded.job, progress, **more)
     result: Result = capability.module("result").result_of(outcome)
     inputs = {"job": loaded.source, **result.provenance.inputs}
     accepted = tuple(Finding("job-guess", 0, f"guess: {text}", guesses or Severity.NOTE) for text in loaded.guesses)
@@ -261,9 +274,12 @@ def resume_note(loaded: LoadedJob) -> str:
     """What of a job is not kept while it runs, so that it begins again where it is stopped; empty: all is kept."""
     capability = loaded.capability
     if not capability.resumes:
-        article = "an" if capability.name[0] in "aeiou" else "a"
-        return f"{article} {capability.name} job does not resume: if it is stopped, it begins again"
+        return f"{_article(capability.name)} job does not resume: if it is stopped, it begins again"
     return str(capability.module("job").resume_note(loaded.job))
+
+
+def _article(name: str) -> str:
+    return f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
 
 
 def unconfirmed(loaded: LoadedJob) -> str:

@@ -69,6 +69,16 @@ class KeptRecords:
         self.write()
         return read_part(data, self.records)  # type: ignore[no-any-return]
 
+    def has(self, key: tuple[object, ...]) -> bool:
+        """Whether the part of this key is kept."""
+        return digest(*key) in self._parts
+
+    def add(self, key: tuple[object, ...], data: bytes) -> None:
+        """Keep a part that another process made, as the bytes of :func:`part_bytes`."""
+        name = digest(*key)
+        self._parts[name] = self._new[name] = data
+        self.write()
+
     def write(self, at_once: bool = False) -> None:
         """Write what is new, if it is time to, or ``at_once``."""
         kept = self.checkpoint

@@ -286,7 +286,7 @@ def _loaded(mesh: trimesh.Trimesh, caster: RayMeshIntersector, k: int, grid: Flo
         left = left[bad]
         if not len(left):
             return Rays(k, grid, ends, count)
-    raise InputError(f"stock: {len(left)} rays along {'xyz'[k]} enter the mesh more often than they leave it: mend it")
+    raise InputError(f"stock: {len(left)} rays along {'xyz'[k]} enter the mesh more often than they leave: repair it")
 
 
 def _runs(rows: Ints) -> tuple[Ints, Ints]:

@@ -250,7 +250,7 @@ class LayeredStock:
             self._layer(i)
         kind = shapely.get_type_id(given)
         if not (((kind == POLYGON) | (kind == MULTIPOLYGON)) & shapely.is_valid(given)).all():
-            raise InputError("stock: a shape to remove is no polygon or crosses itself: mend it first")
+            raise InputError("stock: a shape to remove is no polygon or crosses itself: repair it first")
         chips: list[list[Polygon]] = [[] for _ in rows]
         for turn in turns_of(rows):
             self._take(turn, rows, given, chips, tidy)

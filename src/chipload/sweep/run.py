@@ -17,8 +17,8 @@ from chipload.result import Verdict
 from chipload.sweep.case_run import REFUSED, Record, case_key, case_record, kept_record
 from chipload.sweep.cases import Case, Samples, cases_of
 from chipload.sweep.sampled import sample_files
-from chipload.sweep.workers import completed
 from chipload.tables import LARGEST_FILE, parsed
+from chipload.workers import Workers
 
 #: share of the samples in which a combination must hold
 CONFIDENCE = 0.95
@@ -156,8 +156,7 @@ def run_sweep(
     -----
     Work O(cases); the records do not depend on the number or the kind of the workers.
     """
-    if not 1 <= workers <= 1024:
-        raise InputError(f"--workers = {workers}: must be from 1 to 1024")
+    where = Workers(workers, dask)
     if not 0.0 < confidence <= 1.0:
         raise InputError(f"--confidence = {confidence:g}: must be above 0 and at most 1")
     job, out, samples = Path(job).absolute(), Path(out).absolute(), samples or Samples()
@@ -182,7 +181,7 @@ def run_sweep(
             tasks.append((str(job), overrides, str(folder), key))
             waiting.append(k)
     progress(len(records) / len(cases), f"{len(records)} of {len(cases)} cases")
-    for number, record in completed(case_record, tasks, workers, dask):
+    for number, record in where.completed(case_record, tasks):
         records[waiting[number]] = record
         progress(len(records) / len(cases), f"{len(records)} of {len(cases)} cases")
     return SweepResult(cases, tuple(records[k] for k in range(len(cases))), confidence)

@@ -56,7 +56,7 @@ def test_engagement_of_equal_circles(width):
 
 def test_a_slot_hardly_wider_than_the_cutter():
     """0.2 mm of room: passes give it up, circles clear it to the wall."""
-    region = slot(8.2)
+    region = slot(8.2, 24.0)
     path = clear_region(region, R, WANTED, trochoidal=True)
     assert path.cleared_share > 0.997
     assert path.engagement_max[path.kind == CUT].max() <= WANTED

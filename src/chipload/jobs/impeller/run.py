@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named, read_catalogue
 from chipload.errors import InputError
 from chipload.jobs.impeller.channel_depth import reach_line
-from chipload.jobs.impeller.checkpoint import KeptParts
+from chipload.jobs.impeller.checkpoint import KeptParts, part_bytes
 from chipload.jobs.impeller.estimate import estimate
 from chipload.jobs.impeller.flank import checked_flanks, flank_machine
 from chipload.jobs.impeller.forces import cutter_feeds, force_terms
@@ -44,6 +44,7 @@ from chipload.progress import Progress, silent
 from chipload.progress import part_of as within
 from chipload.result import Provenance
 from chipload.simulation.checkpoint import Checkpoint, digest
+from chipload.workers import Workers
 
 #: of the time of a run what search, division, roughing and finishing take, with paths and without
 _WITH_PATHS, _SEARCH_ALONE = (5.0, 10.0, 10.0, 75.0), (50.0, 50.0, 0.0, 0.0)
@@ -51,8 +52,14 @@ _WITH_PATHS, _SEARCH_ALONE = (5.0, 10.0, 10.0, 75.0), (50.0, 50.0, 0.0, 0.0)
 WORKERS = len(os.sched_getaffinity(0))
 
 
-def run(job: ImpellerJob, progress: Progress = silent, checkpoint: Checkpoint | None = None) -> ImpellerResult:
+def run(
+    job: ImpellerJob, progress: Progress = silent, checkpoint: Checkpoint | None = None, workers: Workers | None = None
+) -> ImpellerResult:
     """The largest cutters of every surface that the job names.
+
+    Parameters
+    ----------
+    workers : processes or a cluster that search the surfaces, each as a task; None: this process searches them
 
     Raises
     ------
@@ -79,6 +86,8 @@ def run(job: ImpellerJob, progress: Progress = silent, checkpoint: Checkpoint | 
     if checkpoint is not None:
         checkpoint.notice(_estimate(job, surfaces, catalogue))
     first, second, third, last = _stages(op, progress)
+    if workers is not None:
+        _search_apart(job, workers, keep, first)
     done = []
     for k, surface in enumerate(surfaces):
         found = _searched(job, k, surface, table, catalogue, part_of(first, k, len(surfaces)), keep)
@@ -111,6 +120,21 @@ def run(job: ImpellerJob, progress: Progress = silent, checkpoint: Checkpoint | 
     flanks = checked_flanks(job, how, catalogue) if op.flank is not None else None
     milled = replace(milled, flanks=flanks)
     return replace(milled, checked=checked, roughs=roughs, partitions=tuple(chosen.get(p.name, p) for p in partitions))
+
+
+def _search_apart(job: ImpellerJob, workers: Workers, keep: KeptParts, progress: Progress) -> None:
+    """Search the surfaces that are not kept, each as a task, and keep what is found."""
+    open_yet = [k for k in range(len(job.table.surface)) if not keep.has(("search", k))]
+    for number, (k, part) in enumerate(workers.completed(_found, [(job, k) for k in open_yet]), 1):
+        keep.add(("search", open_yet[k]), part)
+        progress(number / len(open_yet), f"search of {number} of {len(open_yet)} surfaces")
+
+
+def _found(job: ImpellerJob, k: int) -> bytes:
+    """The search of one surface as a kept part; this is what a worker executes."""
+    machine, catalogue, part = _machine(job), _catalogue(job), read_part(job)
+    surface = _surfaces(job, part.impeller, _covering(job, part.impeller, catalogue))[k]
+    return part_bytes(_search(job, surface, _tables(machine, job.operation), catalogue, silent))
 
 
 def _checkable(job: ImpellerJob, impeller: Impeller) -> None:
@@ -191,24 +215,26 @@ def _searched(
     keep: Keep,
 ) -> Searched:  # fmt: skip
     """The largest cutters of a surface."""
-    op, scene = job.operation, surface.scene
-
-    def found() -> tuple[Answer, tuple[int, int, tuple[NDArray[np.float64], ...]] | None, float]:
-        begin = time.perf_counter()
-        answer = largest_cutters(
-            scene, catalogue, table.angle, op.clearance_mm, pallets=table.spans, workers=WORKERS, progress=progress
-        )
-        answer = replace(answer, unreachable=with_fits(scene, answer, table.spans, WORKERS))
-        one = one_cutter(scene, answer, op.clearance_mm, table.spans, WORKERS)
-        return answer, one, time.perf_counter() - begin
-
-    answer, one, took = keep(("search", k), found)
+    op = job.operation
+    answer, one, took = keep(("search", k), lambda: _search(job, surface, table, catalogue, progress))
     best = None
     if one is not None:
         reached = np.flatnonzero(answer.cutter >= 0)
         best = OneCutter(catalogue.cutters[one[0]], one[1], reached, one[2])
     settings = _settings(op) | _settings(job.table.surface[k])
     return Searched(settings, surface, answer, table, best, op.clearance_mm, took)
+
+
+def _search(
+    job: ImpellerJob, surface: ContactSurface, table: IndexTable, catalogue: Catalogue, progress: Progress
+) -> tuple[Answer, tuple[int, int, tuple[NDArray[np.float64], ...]] | None, float]:
+    """Largest cutters of a surface, the one cutter that reaches most of it, and the time that this took [s]."""
+    begin, scene, clearance = time.perf_counter(), surface.scene, job.operation.clearance_mm
+    answer = largest_cutters(
+        scene, catalogue, table.angle, clearance, pallets=table.spans, workers=WORKERS, progress=progress
+    )
+    answer = replace(answer, unreachable=with_fits(scene, answer, table.spans, WORKERS))
+    return answer, one_cutter(scene, answer, clearance, table.spans, WORKERS), time.perf_counter() - begin
 
 
 def _choices(

@@ -101,7 +101,7 @@ def check_lines(job: ProgramJob, done: ProgramResult, passes: int) -> tuple[list
         needs = [estimate(passes * bodies.steps, len(done.reading.program))]
     found = [str(f) for f in (*done.reading.findings, *done.reading.violations)]
     count = len(done.reading.violations)
-    message = f"{count} finding{'s' if count > 1 else ''} exceed the limits" if count else "the limits hold"
+    message = f"{count} finding{'s exceed' if count > 1 else ' exceeds'} the limits" if count else "within the limits"
     holds = not count and worst_severity(done.reading.findings) < Severity.UNPROVEN
     return [*found, f"{job.path.name}: read; {message} of machine {done.machine.name}", *needs], holds
 

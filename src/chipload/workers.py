@@ -7,17 +7,58 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from typing import Any
 
 from chipload.errors import ChiploadError, InputError
 from chipload.lazy import require_extra
 
 Task = tuple[Any, ...]
+#: processes of one computer
+MOST_PROCESSES = 1024
 #: how often a task is begun again where its worker died
 RETRIES = 2
+#: how long a cluster may be without any worker [s]
+PATIENCE_S = 30.0
+#: how often the cluster is asked [s]
+POLL_S = 0.02
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Where tasks are done.
+
+    Parameters
+    ----------
+    processes : on this computer; 1: this one
+    dask : address of a Dask scheduler, as ``tcp://host:8786``; then ``processes`` has no meaning
+
+    Raises
+    ------
+    InputError
+        The number of processes is out of range.
+    """
+
+    processes: int = 1
+    dask: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that mean nothing."""
+        if not 1 <= self.processes <= MOST_PROCESSES:
+            raise InputError(f"--workers = {self.processes}: must be from 1 to {MOST_PROCESSES}")
+
+    @property
+    def alone(self) -> bool:
+        """Whether this process does all."""
+        return self.processes == 1 and self.dask is None
+
+    def completed(self, function: Callable[..., Any], tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
+        """As :func:`completed`."""
+        return completed(function, tasks, self.processes, self.dask)
 
 
 class WorkerDied(ChiploadError):
@@ -37,7 +78,7 @@ def completed(
     Raises
     ------
     WorkerDied
-        A task ended its worker :data:`RETRIES` + 1 times.
+        A task ended its worker :data:`RETRIES` + 1 times, or a cluster has no worker for :data:`PATIENCE_S`.
     InputError
         The cluster does not answer.
     """
@@ -102,11 +143,21 @@ def _on_cluster(function: Callable[..., Any], tasks: Sequence[Task], address: st
         numbers = {
             client.submit(function, *task, pure=False, retries=RETRIES): k for k, task in enumerate(tasks)
         }  # fmt: skip
-        for future in as_completed(numbers):
-            k = numbers[future]
-            try:
-                value = future.result()
-            except KilledWorker as err:
-                raise WorkerDied(f"task {k + 1}: {err}") from None
-            future.release()
-            yield k, value
+        ended = as_completed(numbers)
+        seen = time.monotonic()
+        while not ended.is_empty():
+            batch = ended.next_batch(block=False)
+            for future in batch:
+                k = numbers[future]
+                try:
+                    value = future.result()
+                except KilledWorker as err:
+                    raise WorkerDied(f"task {k + 1}: {err}") from None
+                future.release()
+                yield k, value
+            if batch or (time.monotonic() - seen > PATIENCE_S and client.nthreads()):
+                seen = time.monotonic()
+            elif time.monotonic() - seen > PATIENCE_S:
+                raise WorkerDied(f"--dask {address}: no worker is left: start workers; the same command continues")
+            else:
+                time.sleep(POLL_S)
