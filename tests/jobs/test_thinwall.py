@@ -259,7 +259,7 @@ def test_a_cutter_that_would_break_exceeds(done):
 
 def test_one_clock(finished, folder, done):
     """Time of a variant, end of its history, and its written program with the length of the cutter."""
-    tools = {1: done.planning.cutter}
+    tools = {1: done.planning.last.cutter}
     for track in finished.result.tracks:
         columns = track.columns
         assert track.time_s == pytest.approx(columns["t_s"][-1], rel=1e-3)

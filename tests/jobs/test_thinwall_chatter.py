@@ -67,12 +67,12 @@ def test_passes_are_no_deeper_than_chatter_allows_at_their_speed(finished):
 
 def test_the_program_has_the_speed_of_each_pass_and_the_feed_per_tooth_stays(finished):
     one = finished.outcome.variants["variable"]
-    program, cutter = one.program, finished.outcome.planning.cutter
+    program, cutter = one.program, finished.outcome.planning.last.cutter
     for k, m in enumerate(one.plan.maps):
         rows = (program.label == k) & (program.feed > 0.0)
         assert np.abs(program.spindle[rows]) == pytest.approx(np.full(rows.sum(), m.speed))
         ratio = program.feed[rows] / m.speed * math.tau / cutter.flutes
-        assert np.median(ratio) == pytest.approx(finished.outcome.planning.feed_per_tooth, rel=0.3)
+        assert np.median(ratio) == pytest.approx(finished.outcome.planning.last.feed_per_tooth, rel=0.3)
 
 
 def test_the_margin_of_the_simulated_passes_is_checked_and_shown(finished):

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import chipload.examples
 from chipload.errors import Cancelled, InputError
 from chipload.examples import copy_example
 from chipload.jobs import load_job, run_job
@@ -23,7 +24,6 @@ from chipload.simulation.checkpoint import Checkpoint
 from chipload.structure.grid import plate
 from chipload.structure.places import normals_of, on_cut, on_side
 from chipload.structure.solid import SolidWorkpiece, factorise, loads
-from step_files import written
 
 #: a floor of 6 mm with two walls of 3 mm, 12 and 10 mm high, 15 mm apart
 BOXES = (((0, 0, 0), (12, 27, 6)), ((0, 3, 6), (12, 6, 18)), ((0, 21, 6), (12, 24, 16)))
@@ -55,24 +55,18 @@ COARSE = (
 )
 
 
-def part(path: Path) -> None:
-    """The solid of BOXES as a STEP file."""
-    from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
-    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
-    from OCP.gp import gp_Pnt
-
-    whole = None
-    for low, high in BOXES:
-        box = BRepPrimAPI_MakeBox(gp_Pnt(*low), gp_Pnt(*high)).Shape()
-        whole = box if whole is None else BRepAlgoAPI_Fuse(whole, box).Shape()
-    written(path, whole)
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     made = copy_example("plate", tmp_path_factory.mktemp("part") / "job")
-    part(made / "part.step")
+    (made / "part.step").write_bytes((Path(chipload.examples.__file__).parent / "part" / "ribs.step").read_bytes())
     return made
+
+
+def test_the_part_of_the_example(folder):
+    """Boxes: a floor and two ribs."""
+    shape = read_wall(job(folder).job).body.part.body
+    assert shape.part.volume == pytest.approx(sum(np.prod(np.subtract(high, low)) for low, high in BOXES))
+    assert shape.part.bounds.tolist() == [[0.0, 0.0, 0.0], [12.0, 27.0, 18.0]]
 
 
 def job(folder: Path, *, walls: str = WALLS, clamp: str = CLAMP, change: tuple[str, ...] = ()):
@@ -170,8 +164,9 @@ def test_the_shank_beside_the_neighbour(folder, shank):
 
 
 @pytest.fixture(scope="module")
-def done(folder):
-    return run_job(job(folder))
+def done(tmp_path_factory):
+    """The shipped example, which has the walls and the values of :func:`job`."""
+    return run_job(load_job(copy_example("part", tmp_path_factory.mktemp("example") / "part") / "walls.toml"))
 
 
 def test_two_walls_in_one_job(done):

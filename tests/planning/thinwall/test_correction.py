@@ -49,7 +49,7 @@ def test_depths_are_those_of_the_corrected_force():
     assert plan.holds
     assert len(plan.passes) == 3
     assert plan.deflection_max == pytest.approx(0.05)
-    assert_allclose(plan.corrections[0], c)
+    assert_allclose(last.correction, c)
     assert least_first_depth([SURFACE], bears, STRAIGHT, [c]) == pytest.approx(0.2)
     even = constant([SURFACE], bears, STRAIGHT, 0.3, corrections=[c])
     assert not even.holds

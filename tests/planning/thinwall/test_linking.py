@@ -10,7 +10,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.geometry.thin_wall import plate
 from chipload.planning.thinwall.blank import FinishSurface
-from chipload.planning.thinwall.linking import FineSide, Margins, link_passes, refined
+from chipload.planning.thinwall.linking import FineSide, Margins, OperationMotion, link_passes, refined
 from chipload.planning.thinwall.passes import WallPass
 from chipload.planning.thinwall.paths import PassMotion
 from chipload.planning.thinwall.plane_stock import CutterPose
@@ -34,13 +34,18 @@ def two_passes() -> list[WallPass]:
     u = np.broadcast_to(PLACES[0][:, None], (5, 4))
     low = (0.1 + 0.2 * u, np.where(u > 0.5, 0.0, 0.5))
     threshold = modelled(np.full(20, 1e-3), 0.05)
-    return [WallPass(k, low[k], np.full((5, 4), 0.5), threshold, 0.0 * u, u > 2.0) for k in (0, 1)]
+    ones = np.ones((5, 4))
+    return [WallPass(k, low[k], 0.5 * ones, threshold, 0.0 * u, u > 2.0, ones) for k in (0, 1)]
+
+
+def over(each: list[FineSide], pass_motion: PassMotion) -> OperationMotion:
+    return OperationMotion(each, pass_motion, Margins(3.0, 26.0, 0.3))
 
 
 @pytest.mark.parametrize("step", [-0.9, 0.9])
 def test_ball_touches_what_the_pass_leaves(step):
     pass_motion = PassMotion(CutterPose(BALL, 0.05, step, 0.0, -math.copysign(TILT, step)), 10.0, 100.0, 300.0, 1.5)
-    legs = link_passes(two_passes(), sides(step), PLACES, pass_motion, Margins(3.0, 26.0, 0.3))
+    legs = link_passes(two_passes(), [over(sides(step), pass_motion)], PLACES)
     for k, leg in enumerate(legs):
         p, outwards = leg.program, (1.0, -1.0)[k]
         centre = p.p_work + 4.0 * p.axis
@@ -72,13 +77,13 @@ def test_ball_touches_what_the_pass_leaves(step):
 def test_only_half_is_cut():
     """The second pass finds stock where u is above 0.5 (and in the interval before, where its depth rises)."""
     pass_motion = PassMotion(CutterPose(BALL, 0.05, -0.9, 0.0, TILT), 10.0, 100.0, 300.0, 1.5)
-    leg = link_passes(two_passes()[1:2], sides(-0.9), PLACES, pass_motion, Margins(3.0, 26.0, 0.3))[0]
+    leg = link_passes(two_passes()[1:2], [over(sides(-0.9), pass_motion)], PLACES)[0]
     assert leg.place[leg.contact, 0].min() == pytest.approx(0.5)
 
 
 def test_feed_is_that_of_the_ball():
     pass_motion = PassMotion(CutterPose(BALL, 0.05, -0.9, 0.0, TILT), 10.0, 100.0, 300.0, 1.5)
-    for leg in link_passes(two_passes(), sides(-0.9), PLACES, pass_motion, Margins(3.0, 26.0, 0.3)):
+    for leg in link_passes(two_passes(), [over(sides(-0.9), pass_motion)], PLACES):
         p = leg.program
         centre = p.p_work + 4.0 * p.axis
         k = np.flatnonzero((p.motion[1:] == LINE) & (p.motion[:-1] == LINE)) + 1
@@ -103,4 +108,4 @@ def test_axis_below_the_horizontal_is_refused():
     with pytest.raises(
         InputError, match=r"stands -4\d\S* deg above the horizontal: lean it more towards the free edge"
     ):
-        link_passes(two_passes()[:1], sides(-0.9), PLACES, pass_motion, Margins(3.0, 26.0, 0.3))
+        link_passes(two_passes()[:1], [over(sides(-0.9), pass_motion)], PLACES)

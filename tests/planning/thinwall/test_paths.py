@@ -91,7 +91,7 @@ def test_only_stock_is_cut_and_timed():
     links = 24 * math.hypot(11.0, 12.0 / 24.0) + 25 * 2.0
     assert seconds(program, 100.0) == pytest.approx(25 * (11.0 + 2.0) / 10.0 + links / 100.0, rel=1e-9)
     threshold = modelled(np.full(low.size, 0.01), 0.1)
-    one = WallPass(0, low, high, threshold, low, low > 1.0)
+    one = WallPass(0, low, high, threshold, low, low > 1.0, np.ones_like(low))
     (again,) = pass_programs([one], [s], pass_motion)
     assert_allclose(again.p_work, program.p_work)
     assert again.labels == ("pass 1 side 1",)

@@ -21,9 +21,9 @@ from scipy.interpolate import RegularGridInterpolator
 
 from chipload.jobs.thinwall.outcome import Finish, Variant
 from chipload.jobs.thinwall.places import Places
-from chipload.planning.thinwall.passes import NOTHING, ThresholdOf, planned_pass
+from chipload.planning.thinwall.passes import NOTHING, planned_pass
 from chipload.planning.thinwall.threshold import Threshold
-from chipload.planning.thinwall.variants import PlannedVariant, limited_to
+from chipload.planning.thinwall.variants import DepthOperation, PlannedVariant, limited_to
 
 Floats = NDArray[np.float64]
 
@@ -35,8 +35,7 @@ MOVES = 2
 
 def least_error(
     places: Places,
-    limited: ThresholdOf,
-    corrections: tuple[Floats, ...],
+    operations: Sequence[DepthOperation],
     seconds: float,
     time_of: Callable[[PlannedVariant], float],
     prove: Callable[[PlannedVariant], Variant],
@@ -45,13 +44,14 @@ def least_error(
 
     Parameters
     ----------
-    limited : thresholds of the other passes
-    corrections : of the law's forces
+    operations : with the thresholds of the other passes
     seconds : that it may take
     time_of : time of a plan [s]
     prove : writes and simulates one
     """
     inputs = places.inputs
+
+    limited = operations[-1].threshold_of
 
     def planned(share: float) -> PlannedVariant:
         def threshold_of(left: Sequence[Floats], side: int) -> Threshold:
@@ -59,9 +59,8 @@ def least_error(
             last = float(left[side].max()) <= NOTHING
             return replace(found, force=share * found.force, factor=share * found.factor) if last else found
 
-        return limited_to(
-            places.surfaces, threshold_of, inputs.depths.law, inputs.depths.slope, inputs.depths.deflection, corrections
-        )
+        last = replace(operations[-1], threshold_of=threshold_of)
+        return limited_to(places.surfaces, [*operations[:-1], last], inputs.depths.deflection)
 
     best = planned(SHARES[0])
     for share in SHARES[1:]:
@@ -119,7 +118,9 @@ def _moved(places: Places, planned: PlannedVariant, shift: Sequence[Floats]) -> 
     """The plan with the last pass of each side moved."""
     plan, law = planned.plan, places.inputs.depths.law
     passes = [
-        planned_pass(p.side, p.low - shift[p.side], p.high, p.threshold, law, plan.corrections[p.side])
+        replace(
+            planned_pass(p.side, p.low - shift[p.side], p.high, p.threshold, law, p.correction), operation=p.operation
+        )
         if float(p.low.max()) <= NOTHING
         else p
         for p in plan.passes

@@ -30,8 +30,7 @@ def presentation_of(walled: ThinWallResult) -> Presentation:
 def _blanks(walled: ThinWallResult) -> dict[str, Blank]:
     """The workpiece before, the same for every variant."""
     mesh = trimesh.Trimesh(*walled.geometry.stock, process=True)
-    cutters = {walled.planning.cutter.number: walled.planning.cutter}
-    return {name: Blank(mesh, cutters) for name in walled.variants} if mesh.is_watertight else {}
+    return {name: Blank(mesh, walled.planning.cutters) for name in walled.variants} if mesh.is_watertight else {}
 
 
 def _frame(walled: ThinWallResult) -> str:
@@ -44,7 +43,7 @@ def _frame(walled: ThinWallResult) -> str:
 def program_files(walled: ThinWallResult) -> dict[str, bytes]:
     """The program of each variant for the machine and as CL data; verified only the one in use, where it holds."""
     out: dict[str, bytes] = {}
-    c = walled.planning.cutter
+    cutters = walled.planning.cutters
     for k, (name, one) in enumerate(walled.variants.items()):
         bad = failures_of(walled, one)
         released = name == USED and not bad
@@ -53,14 +52,18 @@ def program_files(walled: ThinWallResult) -> dict[str, bytes]:
         said += [f"does not hold: {bad[0]}"] if bad else []
         said += [
             f"T{c.number}: D {c.diameter:g} mm, corner {c.corner_radius:g} mm, {c.flutes} flutes, overhang "
-            f"{c.overhang:g} mm",
-            f"{_frame(walled)}; machine {walled.planning.machine.name}",
-            f"G43 H{c.number} must be the overhang of {c.overhang:g} mm: the rotary axes turn about it",
+            f"{c.overhang:g} mm"
+            for c in cutters.values()
+        ]
+        said += [f"{_frame(walled)}; machine {walled.planning.machine.name}"]
+        said += [
+            f"G43 H{c.number} must be the overhang of {c.overhang:g} mm: the rotary axes turn about it"
+            for c in cutters.values()
         ]
         text = write_commands(
             one.commands, walled.planning.machine, title=title, verified=released, comments=said, number=100 + k
         )
         stem = program_name(0, name)
         out[f"{stem}.{ENDINGS[walled.planning.machine.dialect]}"] = text.encode("ascii")
-        out[f"{stem}.apt"] = write_apt(one.program, {c.number: c}, title=title, verified=released).encode("ascii")
+        out[f"{stem}.apt"] = write_apt(one.program, cutters, title=title, verified=released).encode("ascii")
     return out

@@ -1,7 +1,6 @@
-"""What a thin wall's job comes to: its shape with stock, finite elements, cutter, force law and thresholds.
+"""What a thin wall's job comes to: its shape with stock, finite elements, operations and thresholds.
 
-Notation: u, v parameters of a side; i, j elements along the wall and up it; delta [mm] deflection that is allowed, r
-the reserve: the planner uses the share 1 - r of a threshold.
+Notation: u, v parameters of a side; i, j elements along the wall and up it; delta [mm] deflection that is allowed.
 """
 
 from __future__ import annotations
@@ -14,8 +13,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from chipload.cutter.cutter import Cutter
-from chipload.cutting.material import Material, material_named, need_directions, read_material
+from chipload.cutting.material import material_named, need_directions, read_material
 from chipload.errors import Finding, InputError
 from chipload.geometry.sections import checked, loft, read_sections
 from chipload.geometry.thin_wall import ThinWall, blade, plate, through_sections
@@ -26,19 +24,15 @@ from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.part_blank import PartBlank, part_blank
 from chipload.jobs.thinwall.part_shape import PartShape, part_of_faces
 from chipload.jobs.thinwall.tables import SHAPES
-from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.jobs.thinwall.wall_operation import DepthRules, WallCut, WallOperation, wall_operation
+from chipload.machine.machine import machine_named, read_machine
 from chipload.planning.thinwall.blank import SIDES, FinishSurface, WallBlank
-from chipload.planning.thinwall.depth import DepthRange, Measure
-from chipload.planning.thinwall.force_table import ForceTable, law_on_stock
 from chipload.planning.thinwall.linking import FineSide
 from chipload.planning.thinwall.passes import ThresholdOf
-from chipload.planning.thinwall.paths import PassMotion
-from chipload.planning.thinwall.plane_stock import CutterPose
 from chipload.planning.thinwall.table import read_cuts
 from chipload.planning.thinwall.threshold import Experiments, Threshold, calibrated, modelled
 from chipload.structure.grid import from_map
 from chipload.structure.solid import SolidWorkpiece
-from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 Floats = NDArray[np.float64]
 
@@ -98,50 +92,35 @@ class WallBody:
 
 
 @dataclass(frozen=True, eq=False)
-class WallCut:
-    """How the wall is cut, in mm, s, rad, N; rows leave cusps of ``scallop``, ``measure`` of the force counts."""
-
-    cutter: Cutter
-    material: Material
-    machine: Machine
-    posture: CutterPose
-    pass_motion: PassMotion
-    step_over: float
-    scallop: float
-    measure: Measure
-
-
-@dataclass(frozen=True, eq=False)
-class DepthRules:
-    """From what the depths of cut follow.
+class WallInputs:
+    """Everything that planning and proof need.
 
     Attributes
     ----------
-    law, even_law : F_n of depths on stock with the slope, and on even stock, both with cusps
-    slope : greatest change of depth along the surface
-    deflection : that is allowed [mm]
-    factor : of the thresholds, at most 1
-    experiments : None: thresholds are modelled
+    operations : in the order of cutting
+    findings : while it was read
     """
-
-    law: ForceTable
-    even_law: ForceTable
-    slope: float
-    deflection: float
-    factor: float
-    experiments: Experiments | None
-
-
-@dataclass(frozen=True, eq=False)
-class WallInputs:
-    """Everything that planning and proof need; ``findings``: while it was read."""
 
     job: ThinWallJob
     title: str
     body: WallBody
-    cut: WallCut
-    depths: DepthRules
+    operations: tuple[WallOperation, ...]
     findings: tuple[Finding, ...]
+
+    @property
+    def cut(self) -> WallCut:
+        """How the last operation cuts, which makes the finished surface."""
+        return self.operations[-1].cut
+
+    @property
+    def depths(self) -> DepthRules:
+        """From what the depths of the last operation follow."""
+        return self.operations[-1].depths
+
+    @property
+    def corner_radius(self) -> float:
+        """Greatest corner radius of the cutters [mm]."""
+        return max(o.cut.cutter.corner_radius for o in self.operations)
 
     @property
     def top(self) -> float:
@@ -171,19 +150,20 @@ class WallInputs:
         """Finish surface at the places."""
         return self._surface(side, *self.body.places)
 
-    def fine(self, side: int) -> FineSide:
-        """Finish surface at contact points: a step apart along the wall, a row apart up it."""
+    def fine(self, side: int, operation: int = -1) -> FineSide:
+        """Finish surface at the contact points of an operation: a step apart along the wall, a row apart up it."""
+        own = self.operations[operation]
         u, v = np.linspace(0.0, 1.0, 65), np.linspace(self.body.foot, 1.0, 33)
         p = self._surface(side, u, v).points
         along = np.linalg.norm(np.diff(p, axis=0), axis=2).sum(axis=0).max()
         up = np.linalg.norm(np.diff(p, axis=1), axis=2).sum(axis=1).max()
-        n = max(math.ceil(along / self.job.operation.step_mm), self._chords(side), 2) + 1
-        m = math.ceil(up / abs(self.cut.step_over)) + 1
+        n = max(math.ceil(along / own.table.step_mm), self._chords(side, own.table.chord_mm), 2) + 1
+        m = math.ceil(up / abs(own.cut.step_over)) + 1
         u, v = np.linspace(0.0, 1.0, n), np.linspace(self.body.foot, 1.0, m)
         return FineSide(self._surface(side, u, v), u, v)
 
-    def _chords(self, side: int) -> int:
-        """Straight chords along a row that stay within the chord's tolerance: the sag of one falls as its square."""
+    def _chords(self, side: int, chord: float) -> int:
+        """Straight chords along a row that sag by at most ``chord`` [mm]: the sag of one falls as its square."""
         u, v = np.meshgrid(np.linspace(0.0, 1.0, 65), np.linspace(self.body.foot, 1.0, 17), indexing="ij")
         p = self.body.shape.sides(u, v)[side]
         a, b = p[:-1], p[1:]
@@ -191,7 +171,7 @@ class WallInputs:
         along = (b - a) / np.linalg.norm(b - a, axis=-1, keepdims=True)
         off = middle - a - ((middle - a) * along).sum(axis=-1, keepdims=True) * along
         sag = float(np.linalg.norm(off, axis=-1).max())
-        return math.ceil(64 * math.sqrt(sag / self.job.operation.chord_mm))
+        return math.ceil(64 * math.sqrt(sag / chord))
 
     def _surface(self, side: int, u: Floats, v: Floats) -> FinishSurface:
         a, b = np.meshgrid(u, v, indexing="ij")
@@ -251,52 +231,21 @@ def read_wall(job: ThinWallJob) -> WallInputs:
     InputError
         A file cannot be read, or values do not go together.
     """
-    op, table = job.operation, job.table
+    table = job.table
     machine = machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
     material = material_named(job.material) if isinstance(job.material, str) else read_material(job.material)
     need_directions(material, "a thin wall")
-    cutter = job.cutters[op.cutter]
-    feed, spindle = mm_s_from_mm_min(op.feed_mm_min), rad_s_from_rpm(op.speed_rpm)
-    step = _step_over(job, cutter) * (-1.0 if op.milling == "down" else 1.0)
-    posture = CutterPose(
-        cutter,
-        feed * math.tau / (spindle * cutter.flutes),
-        step,
-        math.radians(op.lead_deg),
-        -math.copysign(math.radians(op.lean_deg), step),
-    )
-    scallop = step * step / (8.0 * cutter.corner_radius)
-    limits = DepthRange(op.depth_min_mm, op.depth_max_mm)
-    law, even = (
-        law_on_stock(posture, material, limits, slope=slope, scallop=scallop, measure="greatest")
-        for slope in (op.slope, 0.0)
-    )
     experiments: Experiments | None = None
     findings: tuple[Finding, ...] = ()
     if job.threshold_file is not None:
         experiments, findings = read_cuts(job.threshold_file, table.limits.deflection_workpiece_um / 1000.0)
+    operations = tuple(wall_operation(job, k, machine, material, experiments) for k in range(len(table.operation)))
+    step_over = min(abs(o.cut.step_over) for o in operations)
     return WallInputs(
         job=job,
         title=title_of(job.path),
-        body=_part_body(job, abs(step)) if job.walls else _wall_body(job),
-        cut=WallCut(
-            cutter=cutter,
-            material=material,
-            machine=machine,
-            posture=posture,
-            pass_motion=PassMotion(posture, feed, machine.rapid, spindle, op.clearance_mm),
-            step_over=step,
-            scallop=scallop,
-            measure="greatest",
-        ),
-        depths=DepthRules(
-            law=law,
-            even_law=even,
-            slope=op.slope,
-            deflection=table.limits.deflection_workpiece_um / 1000.0,
-            factor=1.0 - op.reserve,
-            experiments=experiments,
-        ),
+        body=_part_body(job, step_over) if job.walls else _wall_body(job),
+        operations=operations,
         findings=findings,
     )
 
@@ -374,19 +323,3 @@ def _wall(job: ThinWallJob, shape: ThinWall) -> tuple[WallBlank, float]:
     grid = from_map(np.linspace(0.0, 1.0, i + 1).tolist(), v.tolist(), [0.0, 1.0], place)
     solid = SolidWorkpiece(grid, 1000.0 * made.modulus_gpa, made.poisson, 1e-12 * made.density_kg_m3, grid.side("j-"))
     return WallBlank(solid, w.allowance_mm, 1, rows), foot
-
-
-def _step_over(job: ThinWallJob, cutter: Cutter) -> float:
-    """Step-over [mm], stated or from the height h of what two rows leave: 2 sqrt(2 r h - h^2) of a ball on a plane."""
-    op = job.operation
-    if op.step_over_mm is not None:
-        return op.step_over_mm
-    r, h = cutter.corner_radius, stated(op.scallop_um, "operation.0.scallop_um") / 1000.0
-    if not math.isclose(2.0 * r, cutter.diameter):
-        raise InputError(
-            "operation.0.scallop_um: applies to ball-nose cutters only: state step_over_mm for cutter "
-            f"{cutter.number} with corner_radius_mm = {r:g}"
-        )
-    if not h < 0.5 * r:
-        raise InputError(f"operation.0.scallop_um = {op.scallop_um:g}: must be below {500.0 * r:g}, half the radius")
-    return 2.0 * math.sqrt(2.0 * r * h - h * h)

@@ -60,8 +60,8 @@ class ThinWallJob(Limited):
 
     @property
     def operation(self) -> WallOperationTable:
-        """The operation."""
-        return self.table.operation[0]
+        """The last operation, which makes the finished surface."""
+        return self.table.operation[-1]
 
 
 def load(path: Path, table: ThinWallJobTable, overrides: Sequence[str]) -> ThinWallJob:
@@ -111,22 +111,32 @@ def missing(values: Mapping[str, Any]) -> list[str]:
 
 def _contradictions(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Iterator[str]:
     """What values of the wall, the operation and its cutter contradict."""
-    wall, op = table.wall, table.operation[0]
+    wall = table.wall
     if isinstance(wall, WallTable):
         needs, may = SHAPES[wall.shape]
         for key in type(wall).model_fields:
             if getattr(wall, key) is not None and key not in (*EVERY, *needs, *may):
                 yield f"wall.{key}: not used by shape = {wall.shape}: leave it out"
         yield from _of_parts_only(table)
-        feet, most = [("wall.foot_mm", wall.foot_mm)], max(wall.allowance_mm)
+        feet, stock = [("wall.foot_mm", wall.foot_mm)], [a for a in wall.allowance_mm if a > 0.0]
     else:
         yield from _part_contradictions(table, wall)
         feet = [(f"wall.{k}.foot_mm", w.foot_mm) for k, w in enumerate(wall)]
-        most = max((a for w in wall for a in w.allowance_mm), default=0.0)
-    yield from unknown_cutter("operation.0.cutter", op.cutter, tools)
+        stock = [a for w in wall for a in w.allowance_mm]
+    for k, op in enumerate(table.operation):
+        yield from _of_operation(op, k, tools, feet, max(stock, default=0.0))
+    yield from _of_several(table, min(stock, default=0.0))
+
+
+def _of_operation(
+    op: WallOperationTable, number: int, tools: Mapping[int, Cutter], feet: Sequence[tuple[str, float]], most: float
+) -> Iterator[str]:
+    """What an operation contradicts: its cutter, the feet of the walls and the greatest stock."""
+    where = f"operation.{number}"
+    yield from unknown_cutter(f"{where}.cutter", op.cutter, tools)
     if (op.step_over_mm is None) == (op.scallop_um is None):
         said = "none is" if op.step_over_mm is None else "both are"
-        yield f"operation.0: {said} stated: state either step_over_mm or scallop_um"
+        yield f"{where}: {said} stated: state either step_over_mm or scallop_um"
     for key, foot in feet:
         if op.cutter in tools and foot < tools[op.cutter].corner_radius:
             yield (
@@ -135,9 +145,35 @@ def _contradictions(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Ite
             )
     if op.clearance_mm <= most:
         yield (
-            f"operation.0.clearance_mm = {op.clearance_mm:g}: must be above wall.allowance_mm = {most:g}: the cutter "
+            f"{where}.clearance_mm = {op.clearance_mm:g}: must be above wall.allowance_mm = {most:g}: the cutter "
             "goes back over stock"
         )
+
+
+def _of_several(table: ThinWallJobTable, least: float) -> Iterator[str]:
+    """What operations that follow one another contradict: the stock that they leave, and keys of the last one.
+
+    ``least`` is the least stock of a side before the first one [mm].
+    """
+    found = least
+    for k, op in enumerate(table.operation):
+        where, last = f"operation.{k}", k == len(table.operation) - 1
+        if last and op.leave_mm > 0.0:
+            yield f"{where}.leave_mm = {op.leave_mm:g}: the last operation finishes: leave it out"
+        elif not last and not 0.0 < op.leave_mm < found:
+            yield (
+                f"{where}.leave_mm = {op.leave_mm:g}: must be above 0 and below {found:g}, the stock that the "
+                "operation finds: it is what the next one cuts"
+            )
+        if not last:
+            for key in ("least_error", "compensate_um"):
+                if getattr(op, key):
+                    yield f"{where}.{key}: belongs to the last operation, which makes the form error: move it there"
+            found = op.leave_mm
+    if len(table.operation) > 1:
+        for key in ("threshold", "dynamics"):
+            if getattr(table, key) is not None:
+                yield f"{key}: for one operation only: leave it out, or plan each operation in a job of its own"
 
 
 def _of_parts_only(table: ThinWallJobTable) -> Iterator[str]:

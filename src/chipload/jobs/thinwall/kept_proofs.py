@@ -34,8 +34,8 @@ def kept_of(job: ThinWallJob, checkpoint: Checkpoint | None, provenance: Provena
 
 def kept_proof(keep: KeptRecords, plan: Plan, prove: Callable[[], Proof]) -> Proof:
     """The proof of a plan, kept or made; ``prove`` simulates it."""
-    passes = tuple((p.side, p.low, p.high, p.threshold.speed) for p in plan.passes)
-    key, made = (plan.name, passes, plan.corrections), list[Proof]()
+    passes = tuple((p.operation, p.side, p.low, p.high, p.threshold.speed, p.correction) for p in plan.passes)
+    key, made = (plan.name, passes), list[Proof]()
 
     def simulated() -> Proof:
         if not made:

@@ -28,22 +28,21 @@ from chipload.stock.layers import LayeredStock
 
 @dataclass(frozen=True, eq=False)
 class SimulatedPass:
-    """A pass: its path, the stock before it, and the columns of its removal."""
+    """A pass: its path, the stock before it, the columns of its removal, its cutter and the resolution."""
 
     program: Program
     before: LayeredStock
     columns: Mapping[str, NDArray[Any]]
+    cutter: Cutter
+    resolution: Resolution
 
 
-def load_error(
-    passes: Sequence[SimulatedPass], cutter: Cutter, material: Material, resolution: Resolution
-) -> dict[str, float]:
+def load_error(passes: Sequence[SimulatedPass], material: Material) -> dict[str, float]:
     """Relative error of the worst value of each column of loads over all passes.
 
     Parameters
     ----------
     passes : in the order of cutting
-    resolution : that they were simulated with
 
     Returns
     -------
@@ -52,11 +51,11 @@ def load_error(
     """
     if any(p.columns["chip_volume_mm3"].any() and not p.columns["chip_areas"].any() for p in passes):
         return dict.fromkeys(COMPARABLE, math.inf)
-    setting = setting_of({cutter.number: cutter}, material, resolution, "slerp", None, 1)
     worst = {name: np.array([float(p.columns[name].max(initial=0.0)) for p in passes]) for name in COMPARABLE}
     out = dict.fromkeys(COMPARABLE, 0.0)
     for k in sorted({int(values.argmax()) for values in worst.values()}):
         p = passes[k]
+        setting = setting_of({p.cutter.number: p.cutter}, material, p.resolution, "slerp", None, 1)
         found = resolution_error_of(p.program, p.before, p.columns, setting, COMPARABLE)
         for name in COMPARABLE:
             whole = float(worst[name].max())

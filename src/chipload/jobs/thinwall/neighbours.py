@@ -30,7 +30,7 @@ def part_collisions(inputs: WallInputs, uncut: LayeredStock, legs: Sequence[Pass
         The points of part or stock would be too many.
     """
     op, table = inputs.job.operation, stated(inputs.job.table.part, "part")
-    cutters = {inputs.cut.cutter.number: inputs.cut.cutter}
+    cutters = {o.cut.cutter.number: o.cut.cutter for o in inputs.operations}
     steps = steps_of(Program.join([leg.program for leg in legs]), op.step_mm, op.tolerance_mm)
     solids = {"part": fine(inputs.finished_mesh(), table.spacing_mm, "part")[0]}
     touched = collisions(steps, cutters, solids, op.tolerance_mm, above_only=frozenset(["part"]))

@@ -45,6 +45,7 @@ class PassMap:
     threshold : (n, m) float [N], limit over compliance, or calibrated
     stable : (n, m) float [mm], depth that chatter allows; None: it is not calculated
     speed : of the spindle [rad/s]; None: that of the operation
+    operation : number of the operation
     """
 
     side: int
@@ -55,6 +56,7 @@ class PassMap:
     threshold: Floats
     stable: Floats | None = None
     speed: float | None = None
+    operation: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,25 +236,50 @@ class WallGeometry:
 
 
 @dataclass(frozen=True, eq=False)
-class WallPlanning:
-    """What the plans were made from.
+class PlannedOperation:
+    """An operation that was planned.
 
     Attributes
     ----------
-    cutter, machine : of the operation
-    threshold_source, threshold_text : ``modelled`` or ``calibrated``, and a sentence
+    cutter : its own
+    leave : [mm] stock that it leaves on every side
     reserve : share by which the planner kept below the thresholds
     step_over : [mm]
     feed_per_tooth : [mm]
     """
 
     cutter: Cutter
-    machine: Machine
-    threshold_source: str
-    threshold_text: str
+    leave: float
     reserve: float
     step_over: float
     feed_per_tooth: float
+
+
+@dataclass(frozen=True, eq=False)
+class WallPlanning:
+    """What the plans were made from.
+
+    Attributes
+    ----------
+    operations : in the order of cutting
+    machine : of all
+    threshold_source, threshold_text : ``modelled`` or ``calibrated``, and a sentence
+    """
+
+    operations: tuple[PlannedOperation, ...]
+    machine: Machine
+    threshold_source: str
+    threshold_text: str
+
+    @property
+    def last(self) -> PlannedOperation:
+        """The operation that makes the finished surface."""
+        return self.operations[-1]
+
+    @property
+    def cutters(self) -> dict[int, Cutter]:
+        """By number."""
+        return {one.cutter.number: one.cutter for one in self.operations}
 
 
 @dataclass(frozen=True, eq=False)

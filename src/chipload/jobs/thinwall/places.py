@@ -42,12 +42,13 @@ def wall_stock(inputs: WallInputs) -> LayeredStock:
     InputError
         There are too many layers.
     """
-    op, cutter = inputs.job.operation, inputs.cut.cutter
-    stock = LayeredStock.of_mesh(inputs.stock_mesh(), COARSE * op.layer_mm, TILE * cutter.diameter)
-    low = inputs.lowest_row - cutter.corner_radius if inputs.body.part else inputs.foot_height - cutter.corner_radius
+    layer = min(o.table.layer_mm for o in inputs.operations)
+    diameter = max(o.cut.cutter.diameter for o in inputs.operations)
+    stock = LayeredStock.of_mesh(inputs.stock_mesh(), COARSE * layer, TILE * diameter)
+    low = (inputs.lowest_row if inputs.body.part else inputs.foot_height) - inputs.corner_radius
     if isinstance(inputs.body.shape, PartShape):
         stock.refine_at(inputs.body.shape.levels())
-    stock.refine(max(low, float(stock.bounds[0])), float(stock.bounds[-1]), op.layer_mm)
+    stock.refine(max(low, float(stock.bounds[0])), float(stock.bounds[-1]), layer)
     return stock
 
 
@@ -141,10 +142,15 @@ class Places:
         return found if self.chatter is None or not spare else self.chatter.limited(self, found)
 
 
+def rows_up(inputs: WallInputs, operation: int) -> Floats:
+    """Parameters v of the rows of an operation, on the side with most of them."""
+    return max((inputs.fine(s, operation).v for s in inputs.body.side_numbers), key=len)
+
+
 def places_of(inputs: WallInputs, keep: KeptRecords | None = None) -> Places:
-    """The places; as many rows as the side with most of them has."""
+    """The places; as many rows as the operation and the side with most of them have."""
     u, shape = inputs.body.places[0], inputs.body.shape
-    v = max((inputs.fine(s).v for s in inputs.body.side_numbers), key=len)
+    v = max((rows_up(inputs, k) for k in range(len(inputs.operations))), key=len)
     a, b = np.meshgrid(u, v, indexing="ij")
     surfaces = tuple(
         FinishSurface(shape.sides(a, b)[s], shape.normals(a, b)[s], inputs.body.allowance[s], inputs.body.wall_of(s))

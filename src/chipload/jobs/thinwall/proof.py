@@ -72,11 +72,12 @@ class Proof:
     find_load_error: Callable[[], Mapping[str, float]]
 
 
-def resolution_of(inputs: WallInputs, legs: Sequence[PassProgram]) -> Resolution:
-    """How fine the simulation looks: a row of the passes is a step."""
-    op = inputs.job.operation
+def resolution_of(inputs: WallInputs, legs: Sequence[PassProgram], operation: int = -1) -> Resolution:
+    """How fine the simulation of an operation looks: a row of the passes is a step."""
+    own = inputs.operations[operation]
+    op = own.table
     longest = max(float(np.linalg.norm(np.diff(leg.program.p_work, axis=0), axis=1).max()) for leg in legs)
-    return Resolution(max(longest, op.step_mm), op.tolerance_mm, op.corner_slices, 0.5 * inputs.cut.cutter.radius)
+    return Resolution(max(longest, op.step_mm), op.tolerance_mm, op.corner_slices, 0.5 * own.cut.cutter.radius)
 
 
 def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats, progress: Progress) -> Proof:
@@ -87,10 +88,9 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
     times : (n,) float [s], time of each row of all passes, one after another, on the machine
     """
     inputs = places.inputs
-    cutter = inputs.cut.cutter
-    stock, fine = places.uncut.copied(), resolution_of(inputs, legs)
-    bars = {cutter.number: tool_bars(cutter)}
-    law = inputs.depths.even_law if plan.name in EVEN else inputs.depths.law
+    stock = places.uncut.copied()
+    fine = [resolution_of(inputs, legs, k) for k in range(len(inputs.operations))]
+    bars = {o.cut.cutter.number: tool_bars(o.cut.cutter) for o in inputs.operations}
     left = [np.full(places.shape, inputs.body.allowance[s]) for s in inputs.body.side_numbers]
     parts: list[dict[str, NDArray[Any]]] = []
     simulated: list[SimulatedPass] = []
@@ -100,19 +100,20 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
     last = {p.side: k for k, p in enumerate(plan.passes)}
     ends = np.cumsum([len(leg.program) for leg in legs])
     for k, (p, leg, own) in enumerate(zip(plan.passes, legs, np.split(times, ends[:-1]), strict=True)):
-        before = stock.copied()
+        before, own_operation = stock.copied(), inputs.operations[p.operation]
+        cutter, rules = own_operation.cut.cutter, own_operation.depths
         removal = remove(
             leg.program,
             stock,
             {cutter.number: cutter},
             inputs.cut.material,
-            fine,
+            fine[p.operation],
             keep=True,
             accuracy=False,
             times=own,
             progress=lambda part, what, k=k: progress((k + part) / len(legs), f"pass {k + 1} of {len(legs)}"),  # type: ignore[misc]
         )
-        simulated.append(SimulatedPass(leg.program, before, removal.columns))
+        simulated.append(SimulatedPass(leg.program, before, removal.columns, cutter, fine[p.operation]))
         left[p.side] = p.low
         number = inputs.body.side_numbers[p.side]
         C = places.compliance(left, p.side)
@@ -121,7 +122,8 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
         error = places.error(p.side)
         columns = _columns(places, removal, leg, C, F_th, error, bars)
         u, v = np.clip(columns["u"], 0.0, 1.0), np.clip(columns["v"], inputs.body.foot, 1.0)
-        share = RegularGridInterpolator(places.grid, plan.corrections[p.side])(np.column_stack([u, v]))
+        share = RegularGridInterpolator(places.grid, p.correction)(np.column_stack([u, v]))
+        law = rules.even_law if plan.name in EVEN else rules.law
         columns["force_normal_planned_n"] = share * law.force(columns["depth_mm"])
         columns["t_s"] = columns["t_s"] + time
         columns["s_mm"] = columns["s_mm"] + way
@@ -134,7 +136,7 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
         if k == last[p.side]:
             finish[number] = _finish(inputs, removal, number, C, error, bars)
     whole = stacked(parts)  # a pass that cuts films alone has no bands
-    find = partial(load_error, simulated, cutter, inputs.cut.material, fine)
+    find = partial(load_error, simulated, inputs.cut.material)
     return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(places, stock, legs), stress, find)
 
 
@@ -231,6 +233,7 @@ def _columns(
     ratio[at] = found["force_normal_n"][at] / threshold
     columns["force_over_allowable"] = ratio
     columns["side"] = np.full(n, leg.side)
+    columns["operation"] = np.full(n, leg.operation)
     return columns
 
 
@@ -276,8 +279,12 @@ def _shape(places: Places, stock: LayeredStock, legs: Sequence[PassProgram]) -> 
         indexing="ij",
     )
     cloud = np.concatenate([p.reshape(-1, 3) for p in inputs.body.shape.sides(u, v)])
-    gap = nearest(Program.join([leg.program for leg in legs]), inputs.cut.cutter, cloud)
-    found = section_deviation(stock, inputs.finished_mesh(), inputs.foot_height + inputs.cut.cutter.corner_radius)
+    gaps = [
+        nearest(Program.join([leg.program for leg in legs if leg.operation == k]), o.cut.cutter, cloud)
+        for k, o in enumerate(inputs.operations)
+    ]
+    gap = min(gaps, key=lambda one: one.distance)
+    found = section_deviation(stock, inputs.finished_mesh(), inputs.foot_height + inputs.corner_radius)
     at = found.at if found.gouge > -gap.distance else gap.at
     touched = () if inputs.body.part is None else part_collisions(inputs, places.uncut, legs)
     return Shape(found.gouge, found.left, at, found.points, gap.distance, touched)

@@ -23,7 +23,7 @@ Place = tuple[float, float, float] | None
 #: contact points over their allowable force that are listed, the worst first
 LISTED = 100
 #: columns of the plan that the history does not keep
-DROPPED = ("u", "v", "side", "label", "compliance_error", FIRST_STATE)
+DROPPED = ("u", "v", "side", "operation", "label", "compliance_error", FIRST_STATE)
 #: in place of a specific energy [MPa]: some step of a wall always has engaged edge
 ENGAGED = 1.0
 #: limits that are proportional to the compliance of the wall
@@ -67,9 +67,9 @@ def _unchecked_bodies(walled: ThinWallResult) -> tuple[str, ...]:
     """What is not held against one another."""
     if not isinstance(walled.geometry.shape, PartShape):
         return ("holder, clamp and machine: no collision check",)
-    cutter = walled.planning.cutter
+    cutters = walled.planning.cutters
     return (
-        *(() if cutter.holder else (f"holder of tool {cutter.number}: not stated",)),
+        *(f"holder of tool {number}: not stated" for number, cutter in cutters.items() if not cutter.holder),
         "clamps and machine: no collision check",
     )
 
@@ -201,9 +201,10 @@ def _operation(walled: ThinWallResult, v: Variant) -> dict[str, Any]:
         **_part_numbers(walled),
         "threshold_source": walled.planning.threshold_source,
         "threshold": walled.planning.threshold_text,
-        "reserve": walled.planning.reserve,
-        "step_over_mm": walled.planning.step_over,
-        "feed_per_tooth_mm": walled.planning.feed_per_tooth,
+        "reserve": walled.planning.last.reserve,
+        "step_over_mm": walled.planning.last.step_over,
+        "feed_per_tooth_mm": walled.planning.last.feed_per_tooth,
+        "operations": [_cut_by(walled, v, number) for number in range(len(walled.planning.operations))],
         "time_constant_over_variable": c.seconds / v.seconds,
         "variants": {name: _variant(one, walled.settings.get("dynamics")) for name, one in walled.variants.items()},
         "infeasible": [
@@ -219,6 +220,24 @@ def _operation(walled: ThinWallResult, v: Variant) -> dict[str, Any]:
             for h in v.plan.infeasible
         ],
         "settings": dict(walled.settings),
+    }
+
+
+def _cut_by(walled: ThinWallResult, one: Variant, number: int) -> dict[str, Any]:
+    """What an operation does in a variant."""
+    own, c = walled.planning.operations[number], one.columns
+    rows = c["operation"] == number
+    depth = [m.depth for m in one.plan.maps if m.operation == number]
+    return {
+        "cutter": own.cutter.number,
+        "leave_mm": own.leave,
+        "step_over_mm": own.step_over,
+        "feed_per_tooth_mm": own.feed_per_tooth,
+        "passes": len(depth),
+        "depth_mm_max": max(float(d.max()) for d in depth),
+        "chip_volume_mm3": float(c["chip_volume_mm3"][rows].sum()),
+        "force_normal_n_max": float(c["force_normal_n"][rows].max(initial=0.0)),
+        "deflection_workpiece_um_max": float(c["deflection_workpiece_um"][rows].max(initial=0.0)),
     }
 
 

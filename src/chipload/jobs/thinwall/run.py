@@ -18,6 +18,7 @@ from chipload.jobs.thinwall.inputs import WallInputs, read_wall
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.kept_proofs import kept_of
 from chipload.jobs.thinwall.outcome import (
+    PlannedOperation,
     ThinWallResult,
     WallGeometry,
     WallPlanning,
@@ -26,6 +27,7 @@ from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.jobs.thinwall.places import places_of, wall_stock
 from chipload.jobs.thinwall.proof import resolution_of
 from chipload.jobs.thinwall.tries import Tried, compared_variants, constant_within, unlimited_plan, variable_within
+from chipload.jobs.thinwall.wall_operation import WallOperation
 from chipload.jobs.thinwall.wall_program import linked, on_machine
 from chipload.planning.thinwall.blank import SIDES
 from chipload.planning.thinwall.experiments import Proposal, propose_cuts
@@ -75,6 +77,10 @@ def run(job: ThinWallJob, progress: Progress = silent, checkpoint: Checkpoint | 
         "yield_mpa": job.table.workpiece.yield_mpa,
         "simulated_tries": tried.variable,
     }
+    if len(job.table.operation) > 1:
+        settings["operations"] = [
+            {k: v for k, v in one.model_dump().items() if v is not None} for one in job.table.operation
+        ]
     if inputs.body.part is not None:
         grid = inputs.body.part.grid
         settings["part"] = {
@@ -84,7 +90,7 @@ def run(job: ThinWallJob, progress: Progress = silent, checkpoint: Checkpoint | 
         }
     if job.table.dynamics is not None:
         settings["dynamics"] = job.table.dynamics.model_dump()
-    cut = inputs.cut
+    cutters = {o.cut.cutter.number: o.cut.cutter for o in inputs.operations}
     return ThinWallResult(
         title=title_of(job.path),
         geometry=WallGeometry(
@@ -94,27 +100,31 @@ def run(job: ThinWallJob, progress: Progress = silent, checkpoint: Checkpoint | 
             finished=(np.asarray(finished.vertices), np.asarray(finished.faces)),
         ),
         planning=WallPlanning(
-            cutter=cut.cutter,
-            machine=cut.machine,
+            operations=tuple(_planned_operation(o) for o in inputs.operations),
+            machine=inputs.cut.machine,
             threshold_source=text.source,
             threshold_text=text.text,
-            reserve=job.operation.reserve,
-            step_over=abs(cut.step_over),
-            feed_per_tooth=cut.posture.feed_per_tooth,
         ),
         limits=job.limits,
         unchecked=job.unchecked,
         variants=made,
         findings=_findings(inputs),
         settings=settings,
-        checks=default_checks(job.table.checks, {cut.cutter.number: cut.cutter}, cut.material, 0.5),
+        checks=default_checks(job.table.checks, cutters, inputs.cut.material, 0.5),
         provenance=provenance,
     )
 
 
+def _planned_operation(one: WallOperation) -> PlannedOperation:
+    """An operation in the result."""
+    cut = one.cut
+    return PlannedOperation(cut.cutter, one.leave, one.table.reserve, abs(cut.step_over), cut.posture.feed_per_tooth)
+
+
 def _thick_enough(inputs: WallInputs) -> None:
     """Refuse a finished wall that is thinner than what is cut off it at once."""
-    thickness, deepest = inputs.body.shape.size()[2], min(inputs.depths.law.limits.greatest, max(inputs.body.allowance))
+    greatest = max(o.depths.law.limits.greatest for o in inputs.operations)
+    thickness, deepest = inputs.body.shape.size()[2], min(greatest, max(inputs.body.allowance))
     if not thickness >= deepest:
         raise InputError(
             f"wall: {thickness:.4g} mm thick where it is thinnest, thinner than a cut of {deepest:g} mm: state less "
@@ -138,7 +148,10 @@ def check(job: ThinWallJob) -> tuple[list[str], bool]:
     program = Program.join([leg.program for leg in legs])
     on_machine(inputs, program)
     wall_stock(inputs)
-    count = counted(program, {inputs.cut.cutter.number: inputs.cut.cutter}, resolution_of(inputs, legs))
+    count = 0
+    for k, o in enumerate(inputs.operations):
+        own = Program.join([leg.program for leg in legs if leg.operation == k])
+        count += counted(own, {o.cut.cutter.number: o.cut.cutter}, resolution_of(inputs, legs, k))
     length, height, thickness = inputs.body.shape.size()
     part = inputs.body.part
     if part is None:
@@ -188,7 +201,10 @@ def propose(
     if job.walls:
         raise InputError("wall: calibration cuts are proposed for one [wall] of a shape only")
     inputs = read_wall(job)
-    inputs = replace(inputs, depths=replace(inputs.depths, experiments=None))
+    if len(inputs.operations) > 1:
+        raise InputError("operation: calibration cuts are proposed for one operation: state the one to calibrate alone")
+    own = inputs.operations[0]
+    inputs = replace(inputs, operations=(replace(own, depths=replace(own.depths, experiments=None)),))
     u, v = np.meshgrid(*inputs.body.places, indexing="ij")
     points = inputs.coarse(inputs.body.side_numbers[0]).points.reshape(-1, 3)
     places = np.column_stack([u.ravel(), v.ravel()])
@@ -201,9 +217,12 @@ def propose(
 
 def _findings(inputs: WallInputs) -> tuple[Finding, ...]:
     """What asks more of the coefficients than they were measured for, and what the experiments' reader noticed."""
-    speed = inputs.cut.pass_motion.spindle * inputs.cut.cutter.radius * math.sin(inputs.cut.posture.beta)
-    asked = beyond(inputs.cut.material, inputs.cut.posture.feed_per_tooth, speed)
-    beyond_range = (Finding("chip-beyond-coefficients", 0, text, Severity.UNPROVEN) for text in asked)
+    asked: list[str] = []
+    for one in inputs.operations:
+        cut = one.cut
+        speed = cut.pass_motion.spindle * cut.cutter.radius * math.sin(cut.posture.beta)
+        asked += beyond(cut.material, cut.posture.feed_per_tooth, speed)
+    beyond_range = (Finding("chip-beyond-coefficients", 0, text, Severity.UNPROVEN) for text in dict.fromkeys(asked))
     return (*beyond_range, *inputs.findings)
 
 

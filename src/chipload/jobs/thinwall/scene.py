@@ -63,8 +63,8 @@ def _path(one: Variant, deepest: float) -> Any:
 def _tool(walled: ThinWallResult) -> Any:
     """The cutter at the first contact point of the variant in use."""
     program = walled.variants[USED].program
-    c = walled.planning.cutter
     k = int(np.flatnonzero(program.feed > 0.0)[0])
+    c = walled.planning.cutters[int(program.tool[k])]
     z = np.linspace(0.0, c.flute_length, 33)
     outline = np.column_stack([c.radius_at(z), z])
     outline = np.vstack([[0.0, 0.0], outline[outline[:, 0] > 0.0], [c.radius, c.overhang], [0.0, c.overhang]])

@@ -22,19 +22,28 @@ LISTED = 40
 MAPS = 12
 
 
+def _cutting(walled: ThinWallResult, number: int) -> str:
+    """An operation in a sentence."""
+    own = walled.planning.operations[number]
+    c = own.cutter
+    leaves = f"; {own.leave:g} mm stay for the next cutter" if own.leave else ""
+    return (
+        f"Cutter {c.number}: D {c.diameter:g} mm, corner {c.corner_radius:g} mm, {c.flutes} flutes; rows "
+        f"{own.step_over:.4g} mm apart, {own.feed_per_tooth:.4g} mm a tooth{leaves}."
+    )
+
+
 def sections_of(walled: ThinWallResult, figures: dict[str, go.Figure]) -> list[str]:
     """The sections of the report; figures are put among ``figures``."""
     used = walled.variants[USED]
-    c = walled.planning.cutter
     geometry, planning = walled.geometry, walled.planning
     length, height, thickness = geometry.shape.size()
     body = [
         f"<h2>Operation 0: {escape(geometry.shape.name)}</h2>",
         f"<p>{length:.4g} mm long, {height:.4g} mm high, at least {thickness:.4g} mm thick when finished, "
         f"{'in the clamps of the part' if isinstance(geometry.shape, PartShape) else 'clamped at z = 0'}; "
-        f"{' and '.join(f'{a:g}' for a in geometry.allowance)} mm of stock on its sides. Cutter {c.number}: "
-        f"D {c.diameter:g} mm, corner {c.corner_radius:g} mm, {c.flutes} flutes; rows {planning.step_over:.4g} mm "
-        f"apart, {planning.feed_per_tooth:.4g} mm a tooth.</p>",
+        f"{' and '.join(f'{a:g}' for a in geometry.allowance)} mm of stock on its sides. "
+        f"{' '.join(_cutting(walled, k) for k in range(len(planning.operations)))}</p>",
         f'<p class="note">{escape(", ".join(f"{k} {value_text(v)}" for k, v in walled.settings.items()))}</p>',
         "<h3>Variants</h3>",
         '<p class="note">Variable: the greatest depth that each place allows. Constant: one depth everywhere '
@@ -45,8 +54,8 @@ def sections_of(walled: ThinWallResult, figures: dict[str, go.Figure]) -> list[s
         figure("bars", _bars(walled), figures),
         "<h3>Allowable normal force</h3>",
         f"<p>{escape(planning.threshold_text[:1].upper() + planning.threshold_text[1:])}. The planner keeps "
-        f"{100.0 * planning.reserve:g} % below it; its force is corrected, place by place, by what the simulation of "
-        f"the plan before found: the simulated force is {_agreement(used)} of the planned one.</p>",
+        f"{100.0 * planning.last.reserve:g} % below it; its force is corrected, place by place, by what the simulation "
+        f"of the plan before found: the simulated force is {_agreement(used)} of the planned one.</p>",
         figure("threshold", _thresholds(used), figures),
         "<h3>Depth of each pass</h3>",
         f'<p class="note">Variable, in the order of cutting; sides {escape(used.plan.order)}.'

@@ -170,6 +170,9 @@ class WallOperationTable(Table):
     scallop_um: Positive | None = Field(None, ge=0.01, description="scallop height between rows; or step_over_mm")
     depth_min_mm: Positive
     depth_max_mm: Positive
+    leave_mm: NotNegative = Field(
+        0.0, description="stock on every side for the operation after this one; 0 in the last one, which finishes"
+    )
     slope: Positive = Field(le=1.0, description="greatest change of depth per length along the surface")
     reserve: NotNegative = Field(
         lt=1.0, description="share by which the planner keeps below the threshold for what its force model leaves out"
@@ -209,6 +212,8 @@ class ThinWallJobTable(Table):
     threshold: ThresholdTable | None = None
     cutter: tuple[CutterTable, ...] = Field(min_length=1)
     dynamics: WallDynamicsTable | None = Field(None, description="vibration; none: chatter is not calculated")
-    operation: tuple[WallOperationTable, ...] = Field(min_length=1, max_length=1)
+    operation: tuple[WallOperationTable, ...] = Field(
+        min_length=1, max_length=4, description="in the order of cutting; more than one: semi-finishing, then finishing"
+    )
     limits: ThinWallLimitsTable
     checks: ChecksTable = Field(default_factory=ChecksTable.model_construct)

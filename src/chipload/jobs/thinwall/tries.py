@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,19 +12,21 @@ from chipload.jobs.kept_parts import KeptRecords
 from chipload.jobs.thinwall.comparison import compensated, least_error
 from chipload.jobs.thinwall.kept_proofs import RECORDS, kept_proof
 from chipload.jobs.thinwall.outcome import OVER, Help, PassMap, Variant, VariantPlan
-from chipload.jobs.thinwall.places import Places
+from chipload.jobs.thinwall.places import Places, rows_up
 from chipload.jobs.thinwall.proof import Proof, prove
+from chipload.jobs.thinwall.wall_operation import DepthRules
 from chipload.jobs.thinwall.wall_program import OnMachine, linked, on_machine
 from chipload.planning.thinwall.correction import found
 from chipload.planning.thinwall.depth import largest_depths, normal_force
-from chipload.planning.thinwall.force_table import ForceTable
-from chipload.planning.thinwall.passes import Plan, ThresholdOf
+from chipload.planning.thinwall.passes import Plan, ThresholdOf, WallPass
+from chipload.planning.thinwall.variants import DepthOperation, even, limited_to, unlimited
 from chipload.planning.thinwall.variants import PlannedVariant as Planned
-from chipload.planning.thinwall.variants import even, limited_to, unlimited
 from chipload.program.program import Program
 from chipload.progress import Progress
 
 Floats = NDArray[np.float64]
+#: of the forces of each operation, side by side, (n, m) at the places
+Corrections = tuple[tuple[Floats, ...], ...]
 
 #: share of the work that reading and planning is, for the progress
 PLANNING = 0.05
@@ -51,7 +54,7 @@ class Tried:
         self.done = PLANNING
         self.variable = 0
         self.planned: dict[str, Planned] = {}
-        self.corrections: tuple[Floats, ...] = ()
+        self.corrections: Corrections = ()
         self.share = 1.0
 
     def prove(self, planned: Planned, share: float) -> Variant:
@@ -75,15 +78,29 @@ class Tried:
 
 def unlimited_plan(places: Places) -> Planned:
     """Passes of the greatest depth, whatever the wall allows."""
-    inputs = places.inputs
-    return unlimited(
-        places.surfaces, places.threshold(inputs.depths.deflection, inputs.depths.factor), inputs.depths.even_law
-    )
+    operations = [
+        DepthOperation(places.threshold(o.depths.deflection, o.depths.factor), o.depths.even_law, o.leave)
+        for o in places.inputs.operations
+    ]
+    return unlimited(places.surfaces, operations)
 
 
-def _thresholds(places: Places, share: float) -> ThresholdOf:
+def _depth_operations(places: Places, share: float, corrections: Corrections, even_stock: bool) -> list[DepthOperation]:
+    """The operations with thresholds that allow a share of the deflection limit, and the law of even stock or not."""
+    return [
+        DepthOperation(
+            _thresholds(places, o.depths, share),
+            o.depths.even_law if even_stock else o.depths.law,
+            o.leave,
+            o.depths.slope,
+            c,
+        )
+        for o, c in zip(places.inputs.operations, corrections, strict=True)
+    ]
+
+
+def _thresholds(places: Places, depths: DepthRules, share: float) -> ThresholdOf:
     """Thresholds that allow a share of the deflection limit, or of measured forces."""
-    depths = places.inputs.depths
     if depths.experiments is None:
         return places.threshold(share * depths.deflection, depths.factor)
     return places.threshold(depths.deflection, share * depths.factor)
@@ -110,35 +127,34 @@ def _over(one: Variant, modelled: bool, assumed: float) -> tuple[float, bool]:
     return over, over <= most
 
 
-def constant_within(tried: Tried, free: Variant) -> tuple[Variant, tuple[Floats, ...]]:
+def constant_within(tried: Tried, free: Variant) -> tuple[Variant, Corrections]:
     """The constant depth that the simulation of the greatest one lets expect, corrected until it holds; and the
     corrections of the force in even stock that the greatest one gave.
     """
     places = tried.places
-    inputs, law = places.inputs, places.inputs.depths.even_law
+    inputs = places.inputs
     modelled = inputs.depths.experiments is None
     assumed, share = _room(free)
-    at_most = _measured(places, free, law, tuple(np.ones(places.shape) for _ in places.surfaces))
+    ones = tuple(np.ones(places.shape) for _ in places.surfaces)
+    at_most = _measured(places, free, tuple(ones for _ in inputs.operations), even_stock=True)
     corrections = at_most
     for turn in range(CONSTANTS):
         held = share * inputs.depths.deflection if modelled else inputs.depths.deflection
-        planned = even(places.surfaces, _thresholds(places, share), law, held, corrections)
+        planned = even(places.surfaces, _depth_operations(places, share, corrections, True), held)
         constant = tried.prove(planned, 0.4)
         if turn == CONSTANTS - 1 or _smallest(places, planned) or _over(constant, modelled, assumed)[1]:
             break
-        measured = _measured(places, constant, law, corrections)
-        corrections = tuple(np.maximum(c, m) for c, m in zip(corrections, measured, strict=True))
+        corrections = _greater(corrections, _measured(places, constant, corrections, even_stock=True))
     return constant, at_most
 
 
 def _smallest(places: Places, planned: Planned) -> bool:
     """Whether the passes are as thin as they may be."""
-    return max(float(p.depth.max()) for p in planned.plan.passes) <= places.inputs.depths.law.limits.smallest * (
-        1.0 + 1e-9
-    )
+    laws = [o.depths.law for o in places.inputs.operations]
+    return all(float(p.depth.max()) <= laws[p.operation].limits.smallest * (1.0 + 1e-9) for p in planned.plan.passes)
 
 
-def variable_within(tried: Tried, corrections: tuple[Floats, ...], like: Variant) -> Variant:
+def variable_within(tried: Tried, corrections: Corrections, like: Variant) -> Variant:
     """Variable depths within the limit: planned, simulated, corrected by what was found. Of the plans that hold the
     fastest one; where none does, the one that exceeds least.
 
@@ -155,10 +171,7 @@ def variable_within(tried: Tried, corrections: tuple[Floats, ...], like: Variant
     assumed, share = _room(like)
     raised = False
     for turn in range(TRIES):
-        planned = limited_to(
-            places.surfaces, _thresholds(places, share), inputs.depths.law, inputs.depths.slope, share * held,
-            corrections,
-        )  # fmt: skip
+        planned = limited_to(places.surfaces, _depth_operations(places, share, corrections, False), share * held)
         if best is not None and not raised and program_seconds(places, planned) > FASTER * best.seconds:
             break
         one = tried.prove(planned, 0.4)
@@ -170,9 +183,9 @@ def variable_within(tried: Tried, corrections: tuple[Floats, ...], like: Variant
         used = best is not None and (not modelled or best.over_with_error(modelled) >= USED_SHARE)
         if best is not None and turn >= ROUNDS - 1 and (used or turn >= RAISES):
             break
-        measured = _measured(places, one, inputs.depths.law, corrections)
+        measured = _measured(places, one, corrections, even_stock=False)
         if not good:
-            measured = tuple(np.maximum(c, m) for c, m in zip(corrections, measured, strict=True))
+            measured = _greater(corrections, measured)
             share *= HOLD / over if turn >= ROUNDS - 1 and math.isfinite(over) else 1.0
         # what is left of the limit is used
         raised = good and not used and over > 0.0
@@ -189,7 +202,7 @@ def compared_variants(tried: Tried, variable: Variant, constant: Variant) -> dic
     places, op, out = tried.places, tried.places.inputs.job.operation, {}
     if op.least_error:
         out["least_error"] = least_error(
-            places, _thresholds(places, tried.share), tried.corrections, constant.seconds,
+            places, _depth_operations(places, tried.share, tried.corrections, False), constant.seconds,
             lambda planned: program_seconds(places, planned), lambda planned: tried.prove(planned, 0.4),
         )  # fmt: skip
     if op.compensate_um is not None:
@@ -209,15 +222,33 @@ def program_seconds(places: Places, planned: Planned) -> float:
     return float(on_machine(places.inputs, Program.join([leg.program for leg in legs])).times.sum())
 
 
-def _measured(places: Places, one: Variant, law: ForceTable, before: tuple[Floats, ...]) -> tuple[Floats, ...]:
-    """Corrections of the law by what a variant was found to do; where it did nothing, those before."""
-    c = one.columns
-    cut = (c["force_normal_n"] > 0.0) & (c["depth_mm"] >= law.limits.smallest * (1.0 - 1e-9))
-    out = []
-    for side, old in enumerate(before):
-        k = np.flatnonzero(cut & (c["side"] == side))
-        new = found(places.grid, c["u"][k], c["v"][k], c["force_normal_n"][k] / law.force(c["depth_mm"][k]))
-        out.append(np.where(np.isnan(new), old, new))
+def _greater(one: Corrections, other: Corrections) -> Corrections:
+    """The greater of two corrections at each place."""
+    return tuple(tuple(map(np.maximum, a, b)) for a, b in zip(one, other, strict=True))
+
+
+def _measured(places: Places, one: Variant, before: Corrections, *, even_stock: bool) -> Corrections:
+    """Corrections of the laws by what a variant was found to do; where it did nothing, those before.
+
+    The places of an operation are its own rows; those of the places are between them in proportion.
+    """
+    c, out = one.columns, []
+    for number, (operation, own) in enumerate(zip(places.inputs.operations, before, strict=True)):
+        law = operation.depths.even_law if even_stock else operation.depths.law
+        cut = (c["force_normal_n"] > 0.0) & (c["depth_mm"] >= law.limits.smallest * (1.0 - 1e-9))
+        cut &= c["operation"] == number
+        v = rows_up(places.inputs, number)
+        each = []
+        for side, old in enumerate(own):
+            k = np.flatnonzero(cut & (c["side"] == side))
+            ratio = c["force_normal_n"][k] / law.force(c["depth_mm"][k])
+            new = found((places.u, v), c["u"][k], c["v"][k], ratio)
+            if len(v) != len(places.v):
+                known = np.stack([np.interp(v, places.v, row) for row in old])
+                new = np.where(np.isnan(new), known, new)
+                new = np.stack([np.interp(places.v, v, row) for row in new])
+            each.append(np.where(np.isnan(new), old, new))
+        out.append(tuple(each))
     return tuple(out)
 
 
@@ -232,6 +263,7 @@ def _variant(places: Places, planned: Planned, program: Program, run: OnMachine,
             threshold,
             None if p.threshold.depth is None else p.threshold.depth.reshape(p.depth.shape),
             p.threshold.speed,
+            p.operation,
         )
         for p, threshold in zip(plan.passes, proof.thresholds, strict=True)
     )
@@ -260,31 +292,43 @@ def _variant(places: Places, planned: Planned, program: Program, run: OnMachine,
 
 def _infeasible(places: Places, plan: Plan, held: float) -> tuple[Help, ...]:
     """Places that bear not even the smallest depth in some pass under the limit itself, with what would help there."""
-    if not plan.infeasible:
-        return ()
+    out: list[Help] = []
+    for number in range(len(places.inputs.operations)):
+        out += _infeasible_in(places, [p for p in plan.passes if p.operation == number], plan.infeasible, held)
+    return tuple(out)
+
+
+def _infeasible_in(
+    places: Places, passes: Sequence[WallPass], infeasible: Sequence[tuple[int, int, int]], held: float
+) -> list[Help]:
+    """Those of one operation, by its passes."""
     inputs = places.inputs
+    own = inputs.operations[passes[0].operation]
     least: dict[tuple[int, int, int], float] = {}
-    for p in plan.passes:
+    correction: dict[tuple[int, int, int], float] = {}
+    law = own.depths.law
+    for p in passes:
         force = p.threshold.force.reshape(p.low.shape)
-        for side, i, j in plan.infeasible:
-            if side == p.side:
+        for side, i, j in infeasible:
+            if side == p.side and force[i, j] < p.correction[i, j] * law.forces[0]:
                 key = (side, i, j)
                 least[key] = min(least.get(key, math.inf), float(force[i, j]))
+                correction[key] = float(p.correction[i, j])
+    if not least:
+        return []
     keys = sorted(least)
-    limits = inputs.depths.law.limits
-    plane = float(
-        normal_force(inputs.cut.posture, inputs.cut.material, [limits.smallest], measure=inputs.cut.measure)[0]
-    )
-    share = plane / float(inputs.depths.law.forces[0])  # what helps is asked of plane stock
-    if inputs.depths.experiments is None:  # the plan may be held to less than the limit
-        least = {key: force * inputs.depths.deflection / held for key, force in least.items()}
-    shares = [share / float(plan.corrections[side][i, j]) for side, i, j in keys]
+    limits = law.limits
+    plane = float(normal_force(own.cut.posture, own.cut.material, [limits.smallest], measure=own.cut.measure)[0])
+    share = plane / float(law.forces[0])  # what helps is asked of plane stock
+    if own.depths.experiments is None:  # the plan may be held to less than the limit
+        least = {key: force * own.depths.deflection / held for key, force in least.items()}
+    shares = [share / correction[key] for key in keys]
     asked = largest_depths(
-        inputs.cut.posture,
-        inputs.cut.material,
+        own.cut.posture,
+        own.cut.material,
         [s * least[k] for s, k in zip(shares, keys, strict=True)],
         limits,
-        measure=inputs.cut.measure,
+        measure=own.cut.measure,
     )
     out = []
     for one in asked.infeasible:
@@ -292,4 +336,4 @@ def _infeasible(places: Places, plan: Plan, held: float) -> tuple[Help, ...]:
         x, y, z = places.surfaces[side].points[i, j].tolist()
         s = shares[one.place]
         out.append(Help(side, (x, y, z), one.threshold / s, one.force / s, one.feed_per_tooth, one.diameter))
-    return tuple(out)
+    return out

@@ -12,7 +12,7 @@ from chipload.errors import Finding, Severity
 from chipload.jobs.thinwall.inputs import WallInputs
 from chipload.machine.limits import limit_findings
 from chipload.machine.machine import Machine
-from chipload.planning.thinwall.linking import Margins, PassProgram, link_passes
+from chipload.planning.thinwall.linking import Margins, OperationMotion, PassProgram, link_passes
 from chipload.planning.thinwall.passes import Plan
 from chipload.program.check import check_program
 from chipload.program.commands import Commands
@@ -43,7 +43,7 @@ class OnMachine:
 def on_machine(inputs: WallInputs, program: Program) -> OnMachine:
     """What the axes do for a program."""
     machine: Machine = inputs.cut.machine
-    lengths = {inputs.cut.cutter.number: inputs.cut.cutter.overhang}
+    lengths = {o.cut.cutter.number: o.cut.cutter.overhang for o in inputs.operations}
     commands, _ = to_axes(program, machine, tool_lengths=lengths)
     axes = axes_of(commands, machine)
     broken = [*check_program(program, machine), *limit_findings(machine, axes, commands.line, placed=False)]
@@ -53,10 +53,16 @@ def on_machine(inputs: WallInputs, program: Program) -> OnMachine:
 
 def linked(inputs: WallInputs, plan: Plan, places: tuple[Floats, Floats] | None = None) -> tuple[PassProgram, ...]:
     """The way of a plan at these places, u and v; None: those of the elements."""
-    sides = [inputs.fine(s) for s in inputs.body.side_numbers]
-    cutter = inputs.cut.cutter
+    motions = [_motion(inputs, k) for k in range(len(inputs.operations))]
+    return link_passes(plan.passes, motions, places or inputs.body.places)
+
+
+def _motion(inputs: WallInputs, number: int) -> OperationMotion:
+    """How an operation goes over the sides."""
+    cut = inputs.operations[number].cut
     allowance = max(inputs.body.allowance)
-    reach = math.sqrt(2.0 * cutter.corner_radius * allowance)
-    sag = SAG * (inputs.cut.pass_motion.clearance - allowance)
-    margins = Margins(BEYOND + reach, inputs.top + SAFE * cutter.radius, sag)
-    return link_passes(plan.passes, sides, places or inputs.body.places, inputs.cut.pass_motion, margins)
+    reach = math.sqrt(2.0 * cut.cutter.corner_radius * allowance)
+    margins = Margins(
+        BEYOND + reach, inputs.top + SAFE * cut.cutter.radius, SAG * (cut.pass_motion.clearance - allowance)
+    )
+    return OperationMotion([inputs.fine(s, number) for s in inputs.body.side_numbers], cut.pass_motion, margins)

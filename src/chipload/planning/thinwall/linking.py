@@ -62,6 +62,7 @@ class PassProgram:
     points, normals : (k, 3) float [mm], q and n of those rows; 0 elsewhere
     place : (k, 2) float, u and v
     depth : (k,) float [mm], planned; 0 beyond the edges
+    operation : number of the operation
     """
 
     program: Program
@@ -71,6 +72,23 @@ class PassProgram:
     normals: Floats
     place: Floats
     depth: Floats
+    operation: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class OperationMotion:
+    """How an operation goes over the sides.
+
+    Attributes
+    ----------
+    sides : each finely, rows of its cutter apart
+    pass_motion : cutter, feed and clearance
+    margins : of its links
+    """
+
+    sides: Sequence[FineSide]
+    pass_motion: PassMotion
+    margins: Margins
 
 
 @dataclass(frozen=True)
@@ -112,16 +130,13 @@ def beyond_edges(rows: Rows, distance: float) -> Rows:
 
 
 def link_passes(
-    passes: Sequence[WallPass],
-    sides: Sequence[FineSide],
-    places: tuple[Floats, Floats],
-    pass_motion: PassMotion,
-    margins: Margins,
+    passes: Sequence[WallPass], operations: Sequence[OperationMotion], places: tuple[Floats, Floats]
 ) -> tuple[PassProgram, ...]:
     """A leg a pass, in order.
 
     Parameters
     ----------
+    operations : in the order of their numbers
     places : (n,), (m,) parameters u and v of the places that the passes have their depths at
 
     Raises
@@ -132,9 +147,12 @@ def link_passes(
     out: list[PassProgram] = []
     line = 1
     for number, p in enumerate(passes):
-        leg = _pass_program(p, sides[p.side], places, pass_motion, margins, f"pass {number + 1} side {p.side + 1}")
+        own = operations[p.operation]
+        label = f"pass {number + 1} side {p.side + 1}"
+        leg = _pass_program(p, own.sides[p.side], places, own.pass_motion, own.margins, label)
         count = len(leg.program)
-        out.append(replace(leg, program=replace(leg.program, line=np.arange(line, line + count))))
+        program = replace(leg.program, line=np.arange(line, line + count))
+        out.append(replace(leg, program=program, operation=p.operation))
         line += count
     return tuple(out)
 

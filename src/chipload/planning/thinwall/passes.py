@@ -14,6 +14,10 @@ already: the softest state in which the pass is cut. The other side still has wh
 
 Constant depths: the least d of the first passes, in the fewest equal passes; unlimited: what the cutter takes.
 
+Operations with cutters of their own follow one another: each but the last leaves even stock on every side, which the
+next one takes. Each is planned by its own law, from the stock that it leaves to the stock that it finds. All walls are
+cut by one operation before the next one comes.
+
 The force that a place is planned with is c F_n(d): c of a side, 1 where nothing is known, is what a simulation of an
 earlier plan found there over what the law says of the same depth.
 
@@ -24,7 +28,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -40,6 +44,9 @@ from chipload.progress import Progress, silent
 Floats = NDArray[np.float64]
 #: what the places of a side bear, ``(left on each side, side) -> threshold``
 ThresholdOf = Callable[[Sequence[Floats], int], Threshold]
+
+#: plan of an operation, ``(number, surfaces with the stock that it finds, stock that it leaves) -> plan``
+PlanOf = Callable[[int, Sequence[FinishSurface], float], "Plan"]
 
 #: in which order the sides are cut
 Order = Literal["alternately", "one after the other"]
@@ -59,6 +66,8 @@ class WallPass:
     threshold : what the places bear in the state after it
     force : (n, m) float [N], c F_n of its depth; 0 where nothing is cut
     exceeds : (n, m) bool, where that is above the threshold, or the pass is deeper than chatter allows
+    correction : (n, m) float, c that it was planned with
+    operation : number of the operation that cuts it
     """
 
     side: int
@@ -67,6 +76,8 @@ class WallPass:
     threshold: Threshold
     force: Floats
     exceeds: NDArray[np.bool_]
+    correction: Floats
+    operation: int = 0
 
     @property
     def depth(self) -> Floats:
@@ -89,13 +100,11 @@ class Plan:
     name : ``variable``, ``constant`` or ``unconstrained``
     passes : in order
     infeasible : (side, i, j) of places that bear not even the smallest depth in some pass
-    corrections : c of each side, (n, m) float, that it was planned with
     """
 
     name: str
     passes: tuple[WallPass, ...]
     infeasible: tuple[tuple[int, int, int], ...] = ()
-    corrections: tuple[Floats, ...] = ()
 
     @property
     def holds(self) -> bool:
@@ -130,7 +139,34 @@ def planned_pass(side: int, low: Floats, high: Floats, threshold: Threshold, law
     depth = high - low
     force = np.where(depth > NOTHING, c * law.force(np.maximum(depth, NOTHING)), 0.0)
     exceeds = force > threshold.force.reshape(low.shape) * (1.0 + 1e-9)
-    return WallPass(side, low, high, threshold, force, exceeds | (depth > threshold.within(depth) + NOTHING))
+    return WallPass(side, low, high, threshold, force, exceeds | (depth > threshold.within(depth) + NOTHING), c)
+
+
+def in_operations(surfaces: Sequence[FinishSurface], leaves: Sequence[float], planned: PlanOf) -> Plan:
+    """The passes of operations that follow one another.
+
+    Parameters
+    ----------
+    leaves : [mm] stock that each operation leaves on every side, in the order of cutting, falling to 0
+    planned : plan of an operation by its number, of surfaces whose allowance is the stock that it finds, down to the
+        stock that it leaves
+
+    Raises
+    ------
+    InputError
+        An operation leaves no less than it finds.
+    """
+    out: list[Plan] = []
+    for k, low in enumerate(leaves):
+        found = [s.allowance if k == 0 else leaves[k - 1] for s in surfaces]
+        if not low < min(found):
+            raise InputError(
+                f"operation.{k}: leaves {low:g} mm of stock, finds {min(found):g} mm: must leave less than it finds"
+            )
+        plan = planned(k, [replace(s, allowance=a) for s, a in zip(surfaces, found, strict=True)], low)
+        out.append(replace(plan, passes=tuple(replace(p, operation=k) for p in plan.passes)))
+    weak = sorted({place for plan in out for place in plan.infeasible})
+    return Plan(out[0].name, tuple(p for plan in out for p in plan.passes), tuple(weak))
 
 
 def _no_sliver(low: Floats, high: Floats, allowance: float, smallest: float) -> Floats:
@@ -147,6 +183,7 @@ def variable(
     *,
     order: Order = "alternately",
     corrections: Sequence[Floats] | None = None,
+    leave: float = 0.0,
     most: int = 200,
     progress: Progress = silent,
 ) -> Plan:
@@ -160,6 +197,7 @@ def variable(
     slope : L > 0 of the offset function
     order : of the sides; one after the other: the first one whole while the second has all of its stock
     corrections : c of each side, (n, m) float above 0; None: 1
+    leave : [mm] stock that stays on every side
     most : passes on a side before it is given up
 
     Raises
@@ -168,13 +206,13 @@ def variable(
         The allowance is not covered in ``most`` passes.
     """
     count, c = len(surfaces), _ones(surfaces, corrections)
-    D = [np.zeros(s.points.shape[:2]) for s in surfaces]
+    D = [np.full(s.points.shape[:2], leave) for s in surfaces]
     done: list[WallPass] = []
     infeasible: set[tuple[int, int, int]] = set()
     for _ in range(most * len({s.wall for s in surfaces})):
         open_sides = [s for s in reversed(range(count)) if (D[s] < surfaces[s].allowance - NOTHING).any()]
         if not open_sides:
-            return Plan("variable", tuple(reversed(done)), tuple(sorted(infeasible)), c)
+            return Plan("variable", tuple(reversed(done)), tuple(sorted(infeasible)))
         last = max(surfaces[s].wall for s in open_sides)
         open_sides = [s for s in open_sides if surfaces[s].wall == last]
         for side in open_sides if order == "alternately" else open_sides[:1]:
@@ -204,9 +242,12 @@ def least_first_depth(
     threshold_of: ThresholdOf,
     law: ForceTable,
     corrections: Sequence[Floats] | None = None,
+    leave: float = 0.0,
 ) -> float:
-    """Least depth [mm] that all places of all sides bear in the last passes; 0: one bears none."""
-    D = [np.zeros(s.points.shape[:2]) for s in surfaces]
+    """Least depth [mm] that all places of all sides bear in the last passes, which ``leave`` stock [mm]; 0: one bears
+    none.
+    """
+    D = [np.full(s.points.shape[:2], leave) for s in surfaces]
     c = _ones(surfaces, corrections)
     found = [threshold_of(D, side) for side in range(len(surfaces))]
     return min(float(t.within(law.depth(t.force / c[k].ravel())).min()) for k, t in enumerate(found))
@@ -220,8 +261,9 @@ def constant(
     name: str = "constant",
     order: Order = "alternately",
     corrections: Sequence[Floats] | None = None,
+    leave: float = 0.0,
 ) -> Plan:
-    """Equal passes of at most ``depth``, the fewest; ``corrections`` as of :func:`variable`.
+    """Equal passes of at most ``depth``, the fewest; ``corrections`` and ``leave`` as of :func:`variable`.
 
     Raises
     ------
@@ -233,14 +275,14 @@ def constant(
             f"passes: constant depth_mm = {depth:g}: must be above 0; a place of the wall allows no cut at all: allow "
             "more deflection, less feed or a smaller step-over"
         )
-    number = [math.ceil(s.allowance / depth - 1e-9) for s in surfaces]
+    number = [math.ceil((s.allowance - leave) / depth - 1e-9) for s in surfaces]
     turns = [(k, side) for side in reversed(range(len(surfaces))) for k in range(number[side])]
     if order == "alternately":
         turns.sort(key=lambda turn: (-surfaces[turn[1]].wall, turn[0]))
-    D, c = [np.zeros(s.points.shape[:2]) for s in surfaces], _ones(surfaces, corrections)
+    D, c = [np.full(s.points.shape[:2], leave) for s in surfaces], _ones(surfaces, corrections)
     done = []
     for k, side in turns:
-        high = np.full_like(D[side], surfaces[side].allowance * (k + 1) / number[side])
+        high = np.full_like(D[side], leave + (surfaces[side].allowance - leave) * (k + 1) / number[side])
         done.append(planned_pass(side, D[side], high, threshold_of(D, side), law, c[side]))
         D[side] = high
-    return Plan(name, tuple(reversed(done)), (), c)
+    return Plan(name, tuple(reversed(done)))

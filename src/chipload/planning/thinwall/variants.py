@@ -21,11 +21,40 @@ from numpy.typing import NDArray
 
 from chipload.planning.thinwall.blank import FinishSurface
 from chipload.planning.thinwall.force_table import ForceTable
-from chipload.planning.thinwall.passes import Order, Plan, ThresholdOf, constant, least_first_depth, variable
+from chipload.planning.thinwall.passes import (
+    Order,
+    Plan,
+    PlanOf,
+    ThresholdOf,
+    constant,
+    in_operations,
+    least_first_depth,
+    variable,
+)
 
 Corrections = Sequence[NDArray[np.float64]] | None
 
 NAMES = ("variable", "constant", "unconstrained")
+
+
+@dataclass(frozen=True, eq=False)
+class DepthOperation:
+    """An operation with a cutter of its own, and what it may do.
+
+    Attributes
+    ----------
+    threshold_of : thresholds of the places
+    law : force of its cutter
+    leave : [mm] stock that it leaves on every side
+    slope : greatest change of its depth along the surface
+    corrections : of the law's forces, side by side
+    """
+
+    threshold_of: ThresholdOf
+    law: ForceTable
+    leave: float = 0.0
+    slope: float = 1.0
+    corrections: Corrections = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,59 +75,72 @@ class PlannedVariant:
     passes_otherwise: int | None
 
 
-def unlimited(surfaces: Sequence[FinishSurface], threshold_of: ThresholdOf, law: ForceTable) -> PlannedVariant:
-    """Passes of the greatest depth of the law, whatever the wall bears."""
-    deepest = law.limits.greatest
-    return _better(
-        surfaces, lambda order: constant(surfaces, threshold_of, law, deepest, "unconstrained", order), math.inf
-    )
+def unlimited(surfaces: Sequence[FinishSurface], operations: Sequence[DepthOperation]) -> PlannedVariant:
+    """Passes of the greatest depth of the law of each operation, whatever the wall bears."""
+
+    def of_order(order: Order) -> PlanOf:
+        def planned(k: int, found: Sequence[FinishSurface], leave: float) -> Plan:
+            one = operations[k]
+            deepest = one.law.limits.greatest
+            return constant(found, one.threshold_of, one.law, deepest, "unconstrained", order, leave=leave)
+
+        return planned
+
+    return _better(surfaces, operations, of_order, math.inf)
 
 
-def even(
-    surfaces: Sequence[FinishSurface],
-    threshold_of: ThresholdOf,
-    law: ForceTable,
-    deflection: float,
-    corrections: Corrections = None,
-) -> PlannedVariant:
-    """Equal passes of the depth that every place bears in the last ones, at least the smallest of the law.
+def even(surfaces: Sequence[FinishSurface], operations: Sequence[DepthOperation], deflection: float) -> PlannedVariant:
+    """Equal passes of the depth that every place bears in the last ones of an operation, at least the smallest of its
+    law.
 
     Parameters
     ----------
-    surfaces : one or two sides
-    threshold_of : thresholds that allow ``deflection`` [mm]
-    law : of even stock
-    corrections : of its forces, side by side
+    surfaces : one or two sides of each wall
+    operations : with thresholds that allow ``deflection`` [mm] and the laws of even stock
     """
-    least = max(least_first_depth(surfaces, threshold_of, law, corrections), law.limits.smallest)
-    return _better(
-        surfaces,
-        lambda order: constant(surfaces, threshold_of, law, least, order=order, corrections=corrections),
-        deflection,
-    )
+
+    def of_order(order: Order) -> PlanOf:
+        def planned(k: int, found: Sequence[FinishSurface], leave: float) -> Plan:
+            one = operations[k]
+            least = least_first_depth(found, one.threshold_of, one.law, one.corrections, leave)
+            depth = max(least, one.law.limits.smallest)
+            return constant(
+                found, one.threshold_of, one.law, depth, order=order, corrections=one.corrections, leave=leave
+            )
+
+        return planned
+
+    return _better(surfaces, operations, of_order, deflection)
 
 
 def limited_to(
-    surfaces: Sequence[FinishSurface],
-    threshold_of: ThresholdOf,
-    law: ForceTable,
-    slope: float,
-    deflection: float,
-    corrections: Corrections = None,
+    surfaces: Sequence[FinishSurface], operations: Sequence[DepthOperation], deflection: float
 ) -> PlannedVariant:
-    """Variable depths under thresholds that allow ``deflection`` [mm]; ``corrections`` of the law's forces."""
-    return _better(
-        surfaces,
-        lambda order: variable(surfaces, threshold_of, law, slope, order=order, corrections=corrections),
-        deflection,
-    )
+    """Variable depths under thresholds that allow ``deflection`` [mm]."""
+
+    def of_order(order: Order) -> PlanOf:
+        def planned(k: int, found: Sequence[FinishSurface], leave: float) -> Plan:
+            one = operations[k]
+            return variable(
+                found, one.threshold_of, one.law, one.slope, order=order, corrections=one.corrections, leave=leave
+            )
+
+        return planned
+
+    return _better(surfaces, operations, of_order, deflection)
 
 
-def _better(surfaces: Sequence[FinishSurface], made: Callable[[Order], Plan], deflection: float) -> PlannedVariant:
-    one = made("alternately")
+def _better(
+    surfaces: Sequence[FinishSurface],
+    operations: Sequence[DepthOperation],
+    of_order: Callable[[Order], PlanOf],
+    deflection: float,
+) -> PlannedVariant:
+    leaves = [one.leave for one in operations]
+    one = in_operations(surfaces, leaves, of_order("alternately"))
     if len({s.wall for s in surfaces}) == len(surfaces):
         return PlannedVariant(one, deflection, "alternately", None)
-    other = made("one after the other")
+    other = in_operations(surfaces, leaves, of_order("one after the other"))
     if (len(other.passes), other.force_max) < (len(one.passes), one.force_max) and other.holds >= one.holds:
         return PlannedVariant(other, deflection, "one after the other", len(one.passes))
     return PlannedVariant(one, deflection, "alternately", len(other.passes))
