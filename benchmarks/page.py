@@ -65,7 +65,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         result, blanks = made(steps)
         start = time.process_time()
-        mesh = removal_meshes(result, blanks)[0]
+        mesh = removal_meshes(result, blanks).meshes[0]
         print(f"stock at all rows: {time.process_time() - start:.1f} s processor time, {len(mesh.corners)} quads, "
               f"{len(mesh.rows)} frames, cells of {mesh.cell.max():.2g} mm")  # fmt: skip
         scene = trimesh.Scene([trimesh.creation.box()]).export(file_type="glb", extension_webp=False)

@@ -7,8 +7,10 @@ import pyarrow.parquet as pq
 import pytest
 import trimesh
 
+from chipload.web.result import open_result
+from chipload.web.scene import bodies, page_scene
 from cli.test_simulate import call, states, summary_of
-from mill import MILL, block_job
+from mill import MILL, block_job, simulation
 
 SLOT = "G21 G90 G17 G94\nT1 M6\nS3000 M3\nG0 X-10 Y0 Z5\nG0 Z-2.1\nG1 X25 F600\nG0 Z5\nM2\n"
 JOB = block_job(
@@ -118,3 +120,43 @@ def test_a_limit_of_a_part_that_is_not_stated(job: Path, tmp_path: Path) -> None
     code, _, err = call("run", job, "--out", tmp_path / "r")
     assert code == 2
     assert "job.toml: limits.gouge_mm: needs the part that should come out: state [part] or leave it out" in err
+
+
+TABLE = """[machine_table]
+low_mm = [-40.0, -60.0, -35.0]
+high_mm = [90.0, 60.0, -5.0]
+spacing_mm = 2.0
+"""
+
+
+def test_the_table_of_the_machine_is_held_against_the_tool_and_shown(tmp_path: Path) -> None:
+    # a slot through a block of 5 mm that goes on 0.8 mm into the table under it
+    (tmp_path / "slot.ngc").write_text(SLOT.replace("Z-2.1", "Z-5.8"))
+    rest = TABLE + simulation("force_n = 3000.0\n")
+    job, out = tmp_path / "job.toml", tmp_path / "r"
+    job.write_text(block_job("slot.ngc", "[0.0, -15.0, -5.0]", "[50.0, 15.0, 0.0]", rest))
+    code, said, _ = call("run", job, "--out", out)
+    assert code == 3
+    assert "cutting part goes 0.8 mm into machine table" in said
+    op = summary_of(out)["operations"][0]
+    assert op["compared_with"] == ["machine table"]
+    assert max(one["depth_mm"] for one in op["collisions"]) == pytest.approx(0.8, abs=1e-3)
+    assert {(one["what"], one["into"]) for one in op["collisions"]} == {("cutting part", "machine table")}
+    shown = open_result(tmp_path, "r")
+    solids, _ = bodies(shown)
+    plate = next(b for b in solids if b.name == "machine table")
+    assert plate.kind == "fixture"
+    assert (plate.low.tolist(), plate.high.tolist()) == ([-40.0, -60.0, -35.0], [90.0, 60.0, -5.0])
+    # a click on the finding turns these red
+    marks = page_scene(shown, shown.tracks[0], (solids, ""), "force_n").marks
+    assert marks[0].bodies == ("cutting part", "machine table")
+    assert marks[0].depth_mm == pytest.approx(0.8, abs=1e-3)
+
+
+def test_a_table_that_is_upside_down_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "slot.ngc").write_text(SLOT)
+    rest = TABLE.replace("-35.0]", "-5.0]") + simulation("force_n = 3000.0\n")
+    (tmp_path / "job.toml").write_text(block_job("slot.ngc", "[0.0, -15.0, -5.0]", "[50.0, 15.0, 0.0]", rest))
+    code, _, wrong = call("check", tmp_path / "job.toml")
+    assert code == 2
+    assert "machine_table.low_mm: Z = -5: must be below high_mm, Z = -5" in wrong

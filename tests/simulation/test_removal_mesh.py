@@ -43,6 +43,13 @@ def test_a_slot_and_what_is_left_of_it_at_half() -> None:
     assert mesh.frame_of(140) == len(mesh.rows)
 
 
+def test_paths_before_have_cut_the_first_frame() -> None:
+    mesh = removal_mesh(BOX, path(slot(12.0)), {1: FLAT, 2: FLAT}, [path(slot(17.0), tool=2), path(slot(15.0))])
+    assert mesh.volumes[0] == pytest.approx(48000.0 - 60.0 * 10.0 * 5.0, rel=0.002)
+    assert mesh.volumes[-1] == pytest.approx(48000.0 - 60.0 * 10.0 * 8.0, rel=0.002)
+    assert mesh.rows.max() == 140
+
+
 def test_a_ball_that_leans_and_one_that_plunges() -> None:
     plunge = removal_mesh(BOX, path([(30.0, 20.0, z) for z in np.linspace(25.0, 10.0, 20)]), {1: BALL})
     taken = 2.0 / 3.0 * math.pi * 125.0 + math.pi * 25.0 * 5.0

@@ -103,3 +103,28 @@ def _empty() -> bytes:
     import trimesh
 
     return trimesh.Scene([trimesh.creation.box()]).export(file_type="glb", extension_webp=False)
+
+
+def test_a_stock_that_cannot_be_drawn_is_told_with_its_reason(tmp_path) -> None:
+    from chipload.report.removal import REMOVAL, read_cutter_parts, read_removal, removal_bytes
+    from chipload.web.result import open_result
+    from chipload.web.scene import bodies, page_scene
+
+    # its bottom is open
+    open_box = STOCK.copy()
+    open_box.update_faces(open_box.face_normals[:, 2] > -0.5)
+    blanks = {"program": Blank(open_box, {1: MILL})}
+    result = square_result("cut")
+    stocks = removal_meshes(result, blanks)
+    assert not stocks.meshes
+    assert "the mesh is not closed" in stocks.refused[0]
+    folder = make_cut_result(tmp_path / "r")
+    (folder / REMOVAL).write_bytes(removal_bytes(result, stocks, blanks))
+    assert read_removal(folder / REMOVAL, 0) is None
+    # the cutter is kept without its stock
+    assert [kind for kind, _ in read_cutter_parts(folder / REMOVAL, 0)[1]] == ["flutes", "shank", "holder"]
+    shown = open_result(tmp_path, "r")
+    notice = page_scene(shown, shown.tracks[0], bodies(shown), "force_n").notice
+    assert f"The stock is not drawn: {stocks.refused[0]}." in notice
+    glb = (folder / "scene.glb").read_bytes()
+    assert "The stock is not drawn: stock: " in view_section(result, glb, stocks, blanks)[1]

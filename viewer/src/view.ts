@@ -351,7 +351,7 @@ export class View {
     const seen = (name: Layer) => !this.hidden.has(name);
     if (!this.path) return;
     // a map stands in the place of part and stock
-    for (const s of this.solids) s.group.visible = seen(s.body.name) && (!this.shownMap || s.body.kind === "fixture");
+    for (const s of this.solids) s.group.visible = seen(s.body.name) && (!this.shownMap || s.body.kind === "fixture" || (s.body.kind === "body" && !s.body.colours && !s.body.legend));
     if (this.stock) this.stock.group.visible = seen("stock") && !this.shownMap;
     this.path.group.visible = seen("path");
     this.marks.visible = seen("marks");

@@ -22,6 +22,7 @@ SIMULATION: Mapping[str, tuple[float, float]] = {
     "stock.chord_mm": (5.0, 1.0),
     "part.spacing_mm": (3.0, 1e3),
     "fixture.spacing_mm": (3.0, 1e3),
+    "machine_table.spacing_mm": (3.0, 1e3),
 }
 #: the same by capability
 FACTORS: Mapping[str, Mapping[str, tuple[float, float]]] = {

@@ -23,6 +23,8 @@ TRIANGLES, HALVINGS = 400_000, 12
 OWN = ("path", "rapids", "cutter")
 #: kinds of bodies by how their names begin
 KINDS = ("stock", "part", "fixture", "wall")
+#: a fixture by another name
+MACHINE_TABLE = "machine table"
 #: a colour in a legend, and characters of its texts at most
 COLOUR, LONGEST = re.compile("#[0-9a-f]{6}"), 80
 PLAIN = (168, 176, 186, 255)
@@ -131,7 +133,7 @@ def _body(name: str, mesh: trimesh.Trimesh, most: int) -> SceneBody:
     if triangles > most:
         vertices, faces, painted, moved = fewer_triangles(vertices, faces, painted, most)
     plain = _plain(name)
-    kind = next((k for k in KINDS if plain.startswith(k)), "body")
+    kind = "fixture" if plain == MACHINE_TABLE else next((k for k in KINDS if plain.startswith(k)), "body")
     return SceneBody(name, kind, vertices, faces, painted, triangles, moved, _legend(mesh.metadata))
 
 

@@ -112,10 +112,10 @@ def write_result(result: Result, presentation: Presentation, out: str | Path, pr
         rows.update(write_history(result, file))
 
     scene, blanks, samples = cache(presentation.scene), presentation.blanks(), presentation.samples()
-    meshes = cache(lambda: removal_meshes(result, blanks))
+    stocks = cache(lambda: removal_meshes(result, blanks))
 
     def view() -> list[str]:
-        return view_section(result, scene(), meshes(), blanks, samples)
+        return view_section(result, scene(), stocks(), blanks, samples)
 
     makers: Makers = [
         (HISTORY, lambda: history),
@@ -124,7 +124,7 @@ def write_result(result: Result, presentation: Presentation, out: str | Path, pr
         ("report.html", lambda: page_bytes(result, presentation, view())),
     ]
     if blanks:
-        makers.append((REMOVAL, lambda: removal_bytes(result, meshes(), blanks)))
+        makers.append((REMOVAL, lambda: removal_bytes(result, stocks(), blanks)))
     if samples:
         makers.append((ENGAGEMENT, lambda: engagement_bytes(result, samples)))
     if result.maps:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import IO
 
+import numpy as np
 import plotly.graph_objects as go
 import trimesh
+from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.simulation.engagement_samples import EngagementSamples
@@ -18,10 +20,20 @@ Content = bytes | Callable[[IO[bytes]], None]
 
 @dataclass(frozen=True, eq=False)
 class Blank:
-    """What a track begins with: the closed ``mesh`` [mm] of its stock, and its ``cutters`` by tool number."""
+    """What a track begins with, and is cut with.
 
-    mesh: trimesh.Trimesh
+    Parameters
+    ----------
+    mesh : closed, of its stock [mm]; None: it is not known, the cutters are shown alone
+    cutters : by tool number
+    shapes : kind and profile (m, 2) [mm] of the parts of cutters that have more than :class:`Cutter` knows, as a neck
+    before : tracks that have cut the same stock before this one, in their order
+    """
+
+    mesh: trimesh.Trimesh | None
     cutters: Mapping[int, Cutter]
+    shapes: Mapping[int, Sequence[tuple[str, NDArray[np.float64]]]] = field(default_factory=dict)
+    before: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.report.presentation import Blank
 from chipload.report.view import parts_of
@@ -21,28 +22,62 @@ Floats = NDArray[np.float64]
 
 #: the file
 REMOVAL = "removal.npz"
-#: arrays of a track in it
+#: why the stock of a track is not in it; arrays of a track
+REFUSED = "refused"
 ARRAYS = ("low", "high", "corners", "seen", "rows", "volumes", "cell")
 #: columns that it is made from
 PLACE, AXIS = ("x_mm", "y_mm", "z_mm"), ("axis_x", "axis_y", "axis_z")
 #: tracks of a result whose stock is kept, those in use first
-TRACKS = 6
+TRACKS = 8
 
 
-def removal_meshes(result: Result, blanks: Mapping[str, Blank]) -> dict[int, RemovalMesh]:
-    """The stock over the rows of tracks that have a blank, by the number of the track.
+@dataclass(frozen=True, eq=False)
+class ShownStocks:
+    """The stock over the rows of tracks, by their number; of those ``refused`` why it is not shown."""
 
-    A blank that rays do not enter as often as they leave it has none: a result is not lost for its picture.
+    meshes: Mapping[int, RemovalMesh]
+    refused: Mapping[int, str]
+
+
+def removal_meshes(result: Result, blanks: Mapping[str, Blank]) -> ShownStocks:
+    """The stock over the rows of tracks that have a blank.
+
+    A blank that is not closed, or that rays do not enter as often as they leave it, is refused: a result is not lost
+    for its picture.
     """
     order = sorted(range(len(result.tracks)), key=lambda k: not result.tracks[k].in_use)
-    out = {}
-    for k in [k for k in order if result.tracks[k].name in blanks][:TRACKS]:
+    known = [k for k in order if (own := blanks.get(result.tracks[k].name)) is not None and own.mesh is not None]
+    out: dict[int, RemovalMesh] = {}
+    refused = dict.fromkeys(known[TRACKS:], f"the stock of {TRACKS} tracks is kept, those in use first")
+    for k in known[:TRACKS]:
         blank = blanks[result.tracks[k].name]
         path = tool_path(result.tracks[k], blank)
-        if path is not None:
-            with contextlib.suppress(InputError):
-                out[k] = removal_mesh(blank.mesh, path, {n: c for n, c in blank.cutters.items() if not c.body})
-    return out
+        if path is None or blank.mesh is None:
+            continue
+        before, cutters = _before(result, blanks, blank)
+        cutters |= dict(blank.cutters)
+        try:
+            out[k] = removal_mesh(blank.mesh, path, {n: c for n, c in cutters.items() if not c.body}, before)
+        except InputError as err:
+            refused[k] = str(err)
+    return ShownStocks(out, refused)
+
+
+def _before(result: Result, blanks: Mapping[str, Blank], blank: Blank) -> tuple[list[ToolPoses], dict[int, Cutter]]:
+    """The paths that have cut a stock before, with their cutters."""
+    paths: list[ToolPoses] = []
+    cutters: dict[int, Cutter] = {}
+    for track in (t for name in blank.before for t in result.tracks if t.name == name):
+        own = tool_path(track, blanks[track.name])
+        if own is not None:
+            paths.append(own)
+            cutters |= dict(blanks[track.name].cutters)
+    return paths, cutters
+
+
+def shapes_of(blank: Blank) -> dict[int, Sequence[tuple[str, Floats]]]:
+    """The parts of the cutters of a track as they are drawn."""
+    return {n: parts_of(c) for n, c in blank.cutters.items()} | dict(blank.shapes)
 
 
 def tool_path(track: Track, blank: Blank) -> ToolPoses | None:
@@ -75,14 +110,19 @@ def breaks(place: Floats, s: NDArray[Any] | None) -> NDArray[np.bool_]:
     return np.asarray(apart & (np.arange(len(place)) > 0))
 
 
-def removal_bytes(result: Result, meshes: Mapping[int, RemovalMesh], blanks: Mapping[str, Blank]) -> bytes:
-    """The file: the stock of each track, and the parts of its cutters."""
+def removal_bytes(result: Result, stocks: ShownStocks, blanks: Mapping[str, Blank]) -> bytes:
+    """The file: the stock of each track or why there is none, and the parts of its cutters."""
     sink = io.BytesIO()
     arrays: dict[str, NDArray[Any]] = {}
-    for k, mesh in meshes.items():
-        arrays |= {f"{k}-{name}": getattr(mesh, name) for name in ARRAYS}
-        for number, cutter in blanks[result.tracks[k].name].cutters.items():
-            for n, (kind, profile) in enumerate(parts_of(cutter)):
+    for k, track in enumerate(result.tracks):
+        if track.name not in blanks:
+            continue
+        if k in stocks.meshes:
+            arrays |= {f"{k}-{name}": getattr(stocks.meshes[k], name) for name in ARRAYS}
+        elif k in stocks.refused:
+            arrays[f"{k}-{REFUSED}"] = np.array(stocks.refused[k])
+        for number, parts in shapes_of(blanks[track.name]).items():
+            for n, (kind, profile) in enumerate(parts):
                 arrays[f"{k}-cutter-{number}-{n}-{kind}"] = profile
     np.savez_compressed(sink, **arrays)  # type: ignore[arg-type]
     return sink.getvalue()
@@ -106,6 +146,22 @@ def read_cutter_parts(path: Path, track: int) -> dict[int, list[tuple[str, Float
     except (OSError, ValueError, KeyError, EOFError) as err:
         raise InputError(f"{path.name}: cannot be read: {err}: run the job again") from None
     return {number: [(kind, p) for _, kind, p in sorted(parts, key=lambda x: x[0])] for number, parts in out.items()}
+
+
+def read_refused(path: Path, track: int) -> str:
+    """Why the stock of a track is not in the file; empty: it is, or the track has none.
+
+    Raises
+    ------
+    InputError
+        It cannot be read.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as held:
+            name = f"{track}-{REFUSED}"
+            return str(held[name]) if name in held.files else ""
+    except (OSError, ValueError, KeyError, EOFError) as err:
+        raise InputError(f"{path.name}: cannot be read: {err}: run the job again") from None
 
 
 def read_removal(path: Path, track: int) -> RemovalMesh | None:

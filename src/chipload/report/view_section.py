@@ -19,9 +19,9 @@ from chipload.report.marks import marks_of
 from chipload.report.operating import COLUMNS as OPERATING
 from chipload.report.operating import operating_points
 from chipload.report.presentation import Blank
-from chipload.report.removal import AXIS, PLACE, breaks
+from chipload.report.removal import AXIS, PLACE, ShownStocks, breaks, shapes_of
 from chipload.report.shown_maps import shown_maps
-from chipload.report.view import Colouring, ViewPath, ViewScene, parts_of, pointer_parts, scene_document
+from chipload.report.view import Colouring, ViewPath, ViewScene, pointer_parts, scene_document
 from chipload.result import LimitCheck, Result, Track
 from chipload.simulation.engagement_samples import EngagementSamples
 from chipload.simulation.removal_mesh import RemovalMesh
@@ -39,7 +39,7 @@ VIEW, DATA = "view3d", "view3d-data"
 def view_section(
     result: Result,
     scene_glb: bytes,
-    meshes: Mapping[int, RemovalMesh],
+    stocks: ShownStocks,
     blanks: Mapping[str, Blank],
     samples: Mapping[str, EngagementSamples] = MappingProxyType({}),
 ) -> list[str]:
@@ -49,13 +49,13 @@ def view_section(
         return []
     k, track, columns = found
     path = _path(columns)
-    removal = meshes.get(k)
+    removal = stocks.meshes.get(k)
     bodies = scene_bodies(scene_glb, TRIANGLES) if scene_glb.startswith(GLTF) else ()
     if removal is not None:
         bodies = tuple(b for b in bodies if b.kind != "stock")
     blank = blanks.get(track.name)
     size = max(0.25 * float(np.linalg.norm(np.ptp(path.place, axis=0))), 1.0)
-    parts = {n: parts_of(c) for n, c in blank.cutters.items()} if blank is not None else {}
+    parts = shapes_of(blank) if blank is not None else {}
     parts = {0: next(iter(parts.values()))} if len(parts) == 1 else {0: pointer_parts(size), **parts}
 
     def row(item: LimitCheck | Finding) -> int | None:
@@ -71,6 +71,8 @@ def view_section(
     notes = [bodies_note(bodies)]
     if removal is not None:
         notes.append(f"The stock is drawn in cells of {float(removal.cell.max()):.2g} mm.")
+    elif k in stocks.refused:
+        notes.append(f"The stock is not drawn: {stocks.refused[k]}.")
     if len(path.t) > POINTS:
         notes.append(f"The path is drawn by some {POINTS} of its {len(path.t)} steps.")
     said = f"{escape(track.name)}. Drag turns, the wheel zooms, the right button shifts. {escape(' '.join(notes))}"

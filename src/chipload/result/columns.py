@@ -150,6 +150,11 @@ _ROWS = (
     ("excess_mm", "mm", "excess", "most material over the part where the cutter came near it"),
     ("scallop_mm", "mm", "scallop height", "height of the material left between two passes"),
     ("clearance_mm", "mm", "clearance", "least distance of shank and holder to anything they must not touch"),
+    ("tool_clearance_mm", "mm", "tool clearance", "least distance of the whole tool from points of the walls, but for "
+     "the wall that a pass mills; 20: 20 or more"),
+    ("table_deg", "deg", "table angle", "between the axis of the pallet and the tool axis"),
+    ("pallet_deg", "deg", "pallet angle", "direction of the tool axis about the axis of the pallet"),
+    ("largest_diameter_mm", "mm", "largest diameter", "of the largest cutter that reaches a contact point"),
     ("unreached_points", "", "unreached contact points", "contact points that no cutter of the catalogue reaches"),
     ("uncertified_points", "", "uncertified contact points", "contact points whose largest cutter is not certified"),
     ("time_s", "s", "program time", "time of the program on the machine"),

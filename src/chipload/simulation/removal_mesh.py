@@ -9,7 +9,7 @@ knows the tip, the axis and the cutter of each row, nothing of chips. Its cells 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,13 +83,16 @@ class ToolPoses:
     apart: NDArray[np.bool_]
 
 
-def removal_mesh(blank: trimesh.Trimesh, path: ToolPoses, cutters: Mapping[int, Cutter]) -> RemovalMesh:
+def removal_mesh(
+    blank: trimesh.Trimesh, path: ToolPoses, cutters: Mapping[int, Cutter], before: Sequence[ToolPoses] = ()
+) -> RemovalMesh:
     """Run the tool along the rows through the blank.
 
     Parameters
     ----------
     blank : closed mesh [mm]
     cutters : by tool number; rows of other numbers take nothing
+    before : paths that have cut the blank before; frame 0 is what they leave
 
     Examples
     --------
@@ -100,21 +103,23 @@ def removal_mesh(blank: trimesh.Trimesh, path: ToolPoses, cutters: Mapping[int, 
     >>> [round(float(v), -2) for v in mesh.volumes[[0, -1]]]  # a slot 10 wide and 4 deep
     [4000.0, 3200.0]
     """
-    known = np.isin(path.tool, list(cutters))
-    radius = min((cutters[int(n)].radius for n in np.unique(path.tool[known])), default=1.0)
-    instants = _instants(path, cutters, known)
+    every = [*before, path]
+    used = np.unique(np.concatenate([p.tool for p in every]))
+    radius = min((cutters[int(n)].radius for n in used if int(n) in cutters), default=1.0)
+    each = [_instants(p, cutters, np.isin(p.tool, list(cutters))) for p in every]
+    instants = each[-1]
     low, high = (np.asarray(b, dtype=np.float64) for b in blank.bounds)
-    pitch = _pitch(high - low, radius, sum(len(i) for i in instants))
+    pitch = _pitch(high - low, radius, sum(len(i) for own in each for i in own))
     stock = TriDexel.of_mesh(blank, pitch)
+    for earlier, runs in zip(before, each, strict=False):
+        for places in runs:
+            _removed(stock, earlier, places, cutters, pitch)
     net = SurfaceNet(stock)
     rows, volumes = list[int](), [_volume(net)]
     ends = _frames(instants, path)
     for run, frame in zip(_runs(instants, ends), range(1, len(ends) + 1), strict=True):
         for places in run:
-            number = int(path.tool[places[-1]])
-            cutter = cutters[number]
-            tip, axis = _between(path, places, APART * cutter.radius)
-            stock.remove_poses(tip, axis, cutter.apt, tol=0.02 * pitch)
+            tip, axis, cutter = _removed(stock, path, places, cutters, pitch)
             reach = cutter.flute_length * axis
             size = float(cutter.profile(0.1)[:, 0].max())
             net.update(
@@ -124,6 +129,16 @@ def removal_mesh(blank: trimesh.Trimesh, path: ToolPoses, cutters: Mapping[int, 
         volumes.append(_volume(net))
     corners, seen = merged_quads(net.corners, net.seen)
     return RemovalMesh(net.low, net.high, corners, seen, np.array(rows, np.int64), np.array(volumes), net.pitch)
+
+
+def _removed(
+    stock: TriDexel, path: ToolPoses, places: Ints, cutters: Mapping[int, Cutter], pitch: float
+) -> tuple[Floats, Floats, Cutter]:
+    """Take away what a run of rows cuts; its tips, axes and cutter."""
+    cutter = cutters[int(path.tool[places[-1]])]
+    tip, axis = _between(path, places, APART * cutter.radius)
+    stock.remove_poses(tip, axis, cutter.apt, tol=0.02 * pitch)
+    return tip, axis, cutter
 
 
 def _volume(net: SurfaceNet) -> float:

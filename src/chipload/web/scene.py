@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from chipload.report.engagement import ENGAGEMENT, read_engagement
 from chipload.report.marks import marks_of
 from chipload.report.operating import COLUMNS as OPERATING
 from chipload.report.operating import OperatingPoints, operating_points
-from chipload.report.removal import REMOVAL, read_removal
+from chipload.report.removal import REMOVAL, read_refused, read_removal
 from chipload.report.shown_maps import ShownMap, shown_maps
 from chipload.report.view import Colouring, ViewMark, ViewPath, ViewScene, scene_document
 from chipload.result import LimitCheck
@@ -31,7 +32,7 @@ LARGEST = 400_000_000
 @dataclass(frozen=True, eq=False)
 class PageScene:
     """What is shown of a track: the document, the names of its bodies, the stock at every row, places, a notice,
-    whether it shows what the teeth cut, surface maps to choose from.
+    whether it shows what the teeth cut, surface maps to choose from, bodies that others cover, hidden at first.
     """
 
     document: bytes
@@ -41,6 +42,7 @@ class PageScene:
     notice: str
     engaged: bool = False
     maps: tuple[ShownMap, ...] = ()
+    covered: tuple[str, ...] = ()
 
 
 def bodies(result: PageResult) -> tuple[tuple[SceneBody, ...], str]:
@@ -58,6 +60,18 @@ def bodies(result: PageResult) -> tuple[tuple[SceneBody, ...], str]:
     return out, bodies_note(out) if out else "The scene of this result holds no body: only the path is shown."
 
 
+def covered_bodies(solids: Sequence[SceneBody]) -> tuple[str, ...]:
+    """Painted surfaces behind others of the same surface, by the number that their names begin with."""
+    out, seen = [], set()
+    for body in solids:
+        number = body.name.partition("-")[0]
+        if body.kind == "body" and body.legend is not None and number.isdigit():
+            if number in seen:
+                out.append(body.name)
+            seen.add(number)
+    return tuple(out)
+
+
 def stock_of(result: PageResult, track: PageTrack) -> RemovalMesh | None:
     """The stock of a track at its rows; None: the result does not hold it."""
     try:
@@ -67,6 +81,15 @@ def stock_of(result: PageResult, track: PageTrack) -> RemovalMesh | None:
     if found is not None and len(found.rows) and int(found.rows[-1]) >= len(track):
         return None
     return found
+
+
+def refused_stock(result: PageResult, track: PageTrack) -> str:
+    """A sentence why the stock of a track is not shown; empty: it is, or the result has none."""
+    try:
+        why = read_refused(result.file(REMOVAL), result.result.tracks.index(track.own))
+    except (InputError, ValueError):
+        return ""
+    return f"The stock is not drawn: {why}." if why else ""
 
 
 def samples_of(result: PageResult, track: PageTrack) -> EngagementSamples | None:
@@ -113,6 +136,8 @@ def page_scene(
         notice += f" The stock is drawn in cells of {cell:.2g} mm, in {len(removal.rows)} frames."
     elif any(b.kind == "stock" for b in solids):
         notice += " The stock does not change with the slider: this result holds one state of it."
+    if removal is None:
+        notice = f"{notice} {refused_stock(result, track)}".strip()
     size = 0.25 * float(np.linalg.norm(np.ptp(track.place, axis=0)))
     parts, unknown = cutters_of(result, track, max(size, 1.0))
 
@@ -130,7 +155,9 @@ def page_scene(
     )  # fmt: skip
     names = tuple(b.name for b in solids) + (("stock",) if removal is not None else ())
     notice = " ".join([notice, unknown]).strip()
-    return PageScene(scene_document(scene), names, removal, marks, notice, samples is not None, maps)
+    return PageScene(
+        scene_document(scene), names, removal, marks, notice, samples is not None, maps, covered_bodies(solids)
+    )
 
 
 def colouring(

@@ -8,6 +8,7 @@ from html import escape
 import numpy as np
 import plotly.graph_objects as go
 
+from chipload.jobs.impeller.blanks import blanks_of
 from chipload.jobs.impeller.checks import program_sections
 from chipload.jobs.impeller.outcome import ImpellerResult, Searched, for_all, largest, uncertified_text, unreached_text
 from chipload.jobs.impeller.partitions import divided_sections
@@ -25,7 +26,10 @@ LISTED = 40
 
 def presentation_of(milled: ImpellerResult) -> Presentation:
     """The presentation of an impeller."""
-    return Presentation(partial(_sections, milled), partial(scene_bytes, milled), partial(program_files, milled))
+    return Presentation(
+        partial(_sections, milled), partial(scene_bytes, milled), partial(program_files, milled),
+        partial(blanks_of, milled),
+    )  # fmt: skip
 
 
 def _sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> list[str]:

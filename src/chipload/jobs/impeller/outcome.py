@@ -340,11 +340,14 @@ class CheckedPartition:
 
 @dataclass(frozen=True, eq=False)
 class StatedJob:
-    """What the job states: its title, the keys of its operation, the outer diameter [mm]."""
+    """What the job states: its title, the keys of its operation, the outer diameter [mm], how far the hub goes on
+    ahead of the blade's leading edge [mm].
+    """
 
     title: str
     settings: Mapping[str, Any]
     outer_diameter: float
+    ahead: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

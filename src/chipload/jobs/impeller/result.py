@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from functools import partial
+from collections.abc import Callable, Sequence
+from functools import cache, partial
 
 import numpy as np
 
+from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import Finding, Severity
 from chipload.jobs.impeller.flank_outcome import CheckedFlank, NoFlank
+from chipload.jobs.impeller.maps import maps_of
 from chipload.jobs.impeller.names import ALL, finish_names, flank_names, rough_names
 from chipload.jobs.impeller.numbers import operation_numbers
 from chipload.jobs.impeller.outcome import (
@@ -22,26 +25,33 @@ from chipload.jobs.impeller.outcome import (
     unmilled,
     unreached_text,
 )
+from chipload.jobs.impeller.paths import walls_of
 from chipload.jobs.impeller.roughing_check import CheckedRough
+from chipload.jobs.impeller.tool_clearance import clearance_blocks
 from chipload.program.program import Program
 from chipload.report.programs import ENDINGS
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, state_of
 from chipload.result.motions import motion_blocks
+from chipload.simulation.channel.channel import SurfacePoints
 
 #: name of the track of the search, which has no program
 SEARCH = "search"
+#: walls of the channels as points, made when they are first asked for
+Walls = Callable[[], Sequence[SurfacePoints]]
 
 
 def result_of(milled: ImpellerResult) -> Result:
     """The result of an impeller: the search, roughing programs, finishing programs."""
+    walls = cache(lambda: walls_of(milled.impeller, milled.stated.ahead))
     return Result(
         capability="impeller",
         title=milled.title,
-        tracks=(_search(milled), *_roughing(milled), *_finishing(milled), *_flanks(milled)),
+        tracks=(_search(milled), *_roughing(milled, walls), *_finishing(milled, walls), *_flanks(milled)),
         operations=(operation_numbers(milled),),
         findings=tuple(f for c in milled.covered or () for f in _left(c)),
         unchecked=_unchecked(milled),
         provenance=milled.provenance,
+        maps=maps_of(milled),
         note=f"{for_all(milled)[:1].upper()}{for_all(milled)[1:]}, {certified_text(milled)}.",
     )
 
@@ -86,7 +96,7 @@ def _surface_findings(op: Searched) -> tuple[Finding, ...]:
     return tuple(out)
 
 
-def _roughing(milled: ImpellerResult) -> list[Track]:
+def _roughing(milled: ImpellerResult, walls: Walls) -> list[Track]:
     names = rough_names(milled)
     return [
         _track(
@@ -98,12 +108,14 @@ def _roughing(milled: ImpellerResult) -> list[Track]:
             _rough_findings(r),
             not r.rough.machined,
             r.repeat is not None,
+            r.rough.cutter,
+            walls,
         )
         for name, r in zip(names, milled.roughs or (), strict=True)
     ]
 
 
-def _finishing(milled: ImpellerResult) -> list[Track]:
+def _finishing(milled: ImpellerResult, walls: Walls) -> list[Track]:
     out, used = [], {id(p) for p in milled.programs or ()}
     for name, p in finish_names(milled):
         findings = tuple(Finding("machine", 0, text, Severity.EXCEEDS) for text in p.findings)
@@ -119,6 +131,8 @@ def _finishing(milled: ImpellerResult) -> list[Track]:
                 findings,
                 not p.setting.machined,
                 p.repeat is not None,
+                p.setting.cutter,
+                walls,
                 in_use,
             )
         )
@@ -147,11 +161,13 @@ def _track(
     findings: tuple[Finding, ...],
     empty: bool,
     repeats: bool,
+    cutter: CatalogueCutter,
+    walls: Walls,
     in_use: bool = True,
 ) -> Track:
     ending = ENDINGS[milled.machine.dialect]
     files = () if empty else (f"{name}.{ending}", f"{name}.apt", *((f"{name}{ALL}.{ending}",) if repeats else ()))
-    blocks = partial(motion_blocks, program, milled.machine)
+    blocks = clearance_blocks(program, milled.machine, cutter, walls)
     return Track(name, TrackKind.PROGRAM, in_use, time_s, limits, findings, files, blocks=blocks)
 
 

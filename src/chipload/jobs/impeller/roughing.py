@@ -76,9 +76,11 @@ def checked_roughing(
     )  # fmt: skip
     out: list[CheckedRough] = []
     stock: dict[int, TriDexel] = {}
+    blanks: dict[int, trimesh.Trimesh] = {}
     for k, plan in enumerate(plans):
         if plan.index not in stock:
-            stock[plan.index] = TriDexel.of_mesh(blank_of(impeller, plan.index, how, ahead), rough.grid_mm)
+            blanks[plan.index] = blank_of(impeller, plan.index, how, ahead)
+            stock[plan.index] = TriDexel.of_mesh(blanks[plan.index], rough.grid_mm)
         safe, taken, left = without_touch(plan, stock[plan.index], rough.grid_mm, rough.touch_mm3)
         first = not any(r.rough.index == plan.index for r in out)
         # a further table angle that takes nothing that is left is no program
@@ -87,7 +89,8 @@ def checked_roughing(
             numbered = safe.numbered(len(out) + 1)
             out.append(
                 _checked(
-                    machine, numbered, taken, rough.touch_mm3, paths, walls, workers, table, impeller.blades, keep
+                    machine, numbered, taken, rough.touch_mm3, paths, walls, workers, table, impeller.blades,
+                    blanks[plan.index], keep,
                 )
             )  # fmt: skip
         progress(0.6 + 0.4 * (k + 1) / len(plans), f"check of {k + 1} roughing programs")
@@ -114,7 +117,7 @@ def without_touch(
 def _checked(
     machine: Machine, plan: RoughingSetting, taken: ChannelRemoval, touch: float, paths: PathsTable, walls:
     Sequence[SurfacePoints],
-    workers: int, table: IndexTable, blades: int, keep: Keep,
+    workers: int, table: IndexTable, blades: int, blank: trimesh.Trimesh, keep: Keep,
 ) -> CheckedRough:  # fmt: skip
     program = plan.program
     allowed = paths.gouge_mm
@@ -137,7 +140,7 @@ def _checked(
     return CheckedRough(
         plan, gouge, allowed, (stands[0], stands[1]), taken, touch,
         tuple(said), seconds, between_channels(program, machine, blades),
-        channel_repeat(program, machine, table, blades),
+        channel_repeat(program, machine, table, blades), blank,
     )  # fmt: skip
 
 

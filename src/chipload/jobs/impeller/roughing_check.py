@@ -8,6 +8,7 @@ from html import escape
 from typing import Any
 
 import numpy as np
+import trimesh
 
 from chipload.planning.impeller.rough_settings import RoughingSetting
 from chipload.program.gcode.writer import Repeat
@@ -33,6 +34,7 @@ class CheckedRough:
     seconds : time of one channel [s]
     between : from the end of one channel to the beginning of the next [s]
     repeat : how the text goes through all channels; None: it is of one channel
+    blank : what its channel begins with, before any program
     """
 
     rough: RoughingSetting
@@ -45,6 +47,7 @@ class CheckedRough:
     seconds: float
     between: float
     repeat: Repeat | None
+    blank: trimesh.Trimesh
 
     @property
     def name(self) -> str:

@@ -99,7 +99,7 @@ def run(
     feeds = cutter_feeds(job, catalogue, forces)
     ways = _choices(job, done, catalogue, impeller, feeds, part_of(second, 0, 2), keep)
     partitions = tuple(way.partition(WORKERS, part_of(second, 1, 2), keep) for way in ways)
-    stated = StatedJob(title_of(job.path), _settings(op), job.table.impeller.outer_diameter_mm)
+    stated = StatedJob(title_of(job.path), _settings(op), job.table.impeller.outer_diameter_mm, _ahead(job))
     milled = ImpellerResult(
         stated, impeller, catalogue, machine, tuple(done), one, partitions, None, None, provenance,
     )  # fmt: skip

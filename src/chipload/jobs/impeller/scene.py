@@ -15,7 +15,7 @@ from chipload.jobs.impeller.mesh import OFF, body_meshes, surface_mesh
 from chipload.jobs.impeller.outcome import ImpellerResult, Searched
 from chipload.jobs.impeller.partitions import patch_grid, shade_of
 from chipload.planning.impeller.compare import Partition
-from chipload.report.scene import engagement_colours, engagement_legend
+from chipload.report.scene import engagement_colours, engagement_legend, legend
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -38,7 +38,12 @@ def scene_bytes(milled: ImpellerResult) -> bytes:
         _add(scene, f"{k}-largest", points, faces, colours, says)
         if milled.used is not None:
             _add(
-                scene, f"{k}-patches", points + OFF * op.surface.scene.normal, faces, _patches(milled, milled.used, op)
+                scene,
+                f"{k}-patches",
+                points + OFF * op.surface.scene.normal,
+                faces,
+                _patches(milled, milled.used, op),
+                _patch_legend(milled, milled.used, op),
             )
     for k, p in enumerate(milled.programs or (), 1):
         n = len(p.setting.program)
@@ -58,6 +63,19 @@ def _patches(milled: ImpellerResult, way: Partition, op: Searched) -> NDArray[np
     for n, p in enumerate(way.divided.patches if way.divided is not None else ()):
         out[grid == n, :3] = shade_of(way, p)
     return out
+
+
+def _patch_legend(milled: ImpellerResult, way: Partition, op: Searched) -> dict[str, Any]:
+    """Cutter and table angle of each patch of a surface."""
+    numbers = [int(n) for n in np.unique(patch_grid(milled, way, op)) if n >= 0]
+    patches = way.divided.patches if way.divided is not None else ()
+    cutters = op.answer.catalogue.cutters
+    words = {
+        f"D {cutters[p.cutter].diameter:g} r {cutters[p.cutter].corner_radius:g} mm at "
+        f"{np.degrees(p.table):.6g} deg": shade_of(way, p)
+        for p in (patches[n] for n in numbers)
+    }
+    return legend("patches of cutter and table angle", [], list(words.items()))
 
 
 def _add(

@@ -90,7 +90,17 @@ def program_job(
     else:
         errors.texts += [
             f'{key}: not used where a program is only read: add an [[operation]] with kind = "simulate" or leave it out'
-            for key in ("stock", "part", "fixture", "material", "cutter", "stiffness", "dynamics", "workpiece")
+            for key in (
+                "stock",
+                "part",
+                "fixture",
+                "machine_table",
+                "material",
+                "cutter",
+                "stiffness",
+                "dynamics",
+                "workpiece",
+            )
             if getattr(table, key)
         ]
     errors.refuse()
@@ -126,6 +136,10 @@ def _contradictions(table: SimulationJobTable) -> Iterator[str]:
         if saved and stock.layer_mm is not None:
             yield "stock.layer_mm: leave it out: the layers of an earlier result stay"
     yield from clamp_errors(table)
+    plate = table.machine_table
+    for axis, low, high in zip("XYZ", plate.low_mm, plate.high_mm, strict=True) if plate is not None else ():
+        if not low < high:
+            yield f"machine_table.low_mm: {axis} = {low:g}: must be below high_mm, {axis} = {high:g}"
     for key in ("form_error_um", "gouge_mm", "excess_mm"):
         if table.part is None and getattr(table.limits, key) is not None:
             yield f"limits.{key}: needs the part that should come out: state [part] or leave it out"

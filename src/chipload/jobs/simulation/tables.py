@@ -84,6 +84,14 @@ class FixtureTable(Table):
     spacing_mm: Positive = Field(description="longest side of the triangles whose corners are compared")
 
 
+class MachineTableTable(Table):
+    """The table or pallet under the work, a block that moves with it; no part of a tool may touch it."""
+
+    low_mm: Point = Field(description="lower corner, in the coordinates of the work")
+    high_mm: Point = Field(description="upper corner; its height is that of the face of the table")
+    spacing_mm: Positive = Field(5.0, description="longest side of the triangles whose corners are compared")
+
+
 class SimulateTable(Table):
     """Run the program through the stock: chips, forces, torque, power."""
 
@@ -219,6 +227,7 @@ class SimulationJobTable(Table):
     stock: SolidTable | None = None
     part: TargetTable | None = None
     fixture: tuple[FixtureTable, ...] = ()
+    machine_table: MachineTableTable | None = None
     material: SourceTable | None = None
     cutter: tuple[CutterTable, ...] = ()
     stiffness: StiffnessTable | None = None

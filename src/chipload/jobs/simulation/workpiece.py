@@ -20,6 +20,8 @@ from chipload.program.program import RAPID, Program
 from chipload.simulation.surface import MOST_POINTS, fine
 from chipload.stock.layers import LayeredStock
 
+#: name of the table among the fixtures
+MACHINE_TABLE = "machine table"
 #: side of a tile of the stock in diameters of the largest cutter
 TILE = 4.0
 #: layers where no thickness is stated: thickest and thinnest in smallest diameters, and most of them
@@ -38,14 +40,15 @@ def part_body(job: ProgramJob) -> trimesh.Trimesh | None:
 
 def fixture_points(job: ProgramJob) -> dict[str, NDArray[np.float64]]:
     """Points of the fixtures by name."""
-    spacing = [table.spacing_mm for table in job.table.fixture]
-    return {
-        name: fine(mesh, spacing[k], f"fixture.{k}")[0] for k, (name, mesh) in enumerate(fixture_meshes(job).items())
-    }
+    keys = [(table.spacing_mm, f"fixture.{k}") for k, table in enumerate(job.table.fixture)]
+    if job.table.machine_table is not None:
+        keys.append((job.table.machine_table.spacing_mm, "machine_table"))
+    meshes = fixture_meshes(job).items()
+    return {name: fine(mesh, spacing, key)[0] for (name, mesh), (spacing, key) in zip(meshes, keys, strict=True)}
 
 
 def fixture_meshes(job: ProgramJob) -> dict[str, trimesh.Trimesh]:
-    """The fixtures by name."""
+    """The fixtures by name, and the table of the machine after them."""
     out = {}
     for k, table in enumerate(job.table.fixture):
         path, key = job.path.parent / table.file, f"fixture.{k}.file"
@@ -53,6 +56,9 @@ def fixture_meshes(job: ProgramJob) -> dict[str, trimesh.Trimesh]:
         if mesh is None:
             mesh = read_mesh(path, unit=table.units, chord_mm=table.chord_mm, key=key)
         out[f"fixture {k}"] = mesh
+    table = job.table.machine_table
+    if table is not None:
+        out[MACHINE_TABLE] = trimesh.creation.box(bounds=[table.low_mm, table.high_mm])
     return out
 
 

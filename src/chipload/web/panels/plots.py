@@ -17,7 +17,16 @@ from chipload.web.result import PageResult, PageTrack, TextColumn
 #: a click on a plot gives the abscissa of the nearest point
 CLICK = "(e) => { if (e.points && e.points.length) emit(e.points[0].x) }"
 #: columns that are drawn first, where the history has them; how many at a time
-FIRST = ("engagement_deg", "force_n", "force_xy_n", "torque_nm", "deflection_um", "form_error_um", "feed_mm_min")
+FIRST = (
+    "engagement_deg",
+    "force_n",
+    "force_xy_n",
+    "torque_nm",
+    "deflection_um",
+    "form_error_um",
+    "tool_clearance_mm",
+    "feed_mm_min",
+)
 MOST, AT_FIRST = 4, 2
 
 

@@ -262,7 +262,9 @@ class ScenePanel:
         more = [GLASS] if scene.bodies else []
         if scene.removal is not None:
             more.append(DRAPE)
-        self.seen = {n: self.seen.get(n, True) for n in names} | {n: self.seen.get(n, False) for n in more}
+        self.seen = {n: self.seen.get(n, n not in scene.covered) for n in names} | {
+            n: self.seen.get(n, False) for n in more
+        }
         self.boxes.clear()
         with self.boxes:
             for name, on in self.seen.items():
