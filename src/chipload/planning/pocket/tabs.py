@@ -18,7 +18,7 @@ from chipload.geometry.contour import Contour, Region
 
 Floats = NDArray[np.float64]
 
-#: spacing of places on a wall of which the nearest is taken [mm]
+#: spacing of places on a wall among which the nearest is looked for [mm]
 SPACING_MM = 0.01
 #: chords of the region about the tabs leave its arcs by at most so much [mm], away from the part
 CHORD_MM = 1e-4
@@ -80,9 +80,12 @@ def _nearest(region: Region, place: tuple[float, float]) -> tuple[Floats, Floats
     best = (math.inf, np.zeros(2), np.zeros(2))
     for contour in region.contours:
         s = np.linspace(0.0, contour.length, max(16, math.ceil(contour.length / SPACING_MM)))
-        points, tangents, _ = contour.at(s)
-        far = np.hypot(*(points - np.asarray(place)).T)
-        k = int(far.argmin())
+        # the nearest place of many, then between its neighbours twice: to 1e-6 mm
+        for _ in range(3):
+            points, tangents, _ = contour.at(s)
+            far = np.hypot(*(points - np.asarray(place)).T)
+            k = int(far.argmin())
+            s = np.linspace(s[max(k - 1, 0)], s[min(k + 1, len(s) - 1)], 201)
         if far[k] < best[0]:
             best = (float(far[k]), points[k], np.array([-tangents[k, 1], tangents[k, 0]]))
     return best[1], best[2]
