@@ -56,9 +56,9 @@ def fixture_meshes(job: ProgramJob) -> dict[str, trimesh.Trimesh]:
         if mesh is None:
             mesh = read_mesh(path, unit=table.units, chord_mm=table.chord_mm, key=key)
         out[f"fixture {k}"] = mesh
-    table = job.table.machine_table
-    if table is not None:
-        out[MACHINE_TABLE] = trimesh.creation.box(bounds=[table.low_mm, table.high_mm])
+    plate = job.table.machine_table
+    if plate is not None:
+        out[MACHINE_TABLE] = trimesh.creation.box(bounds=[plate.low_mm, plate.high_mm])
     return out
 
 
