@@ -41,7 +41,20 @@ FIGURES: dict[str, tuple[tuple[str, int, int], ...]] = {
 VIEW = "chiploadViewer.of(document.querySelector('.cl-stage').id)"
 DRAWN = f"{VIEW}.frames > 0 && document.querySelectorAll('.cl-figure .trace').length > 0"
 #: pictures of the page: the example that each shows, and the track that it is compared with; none: none
-PAGES = {"page": ("bracket", ""), "page_compare": ("feeds", "original")}
+PAGES = {"page": ("bracket", ""), "page_compare": ("feeds", "original"), "page_impeller": ("impeller", "")}
+#: keys that shorten an example for its picture: a part of each surface, one cutter
+SHORTER = {
+    "page_impeller": (
+        "operation.0.most_cutters=1",
+        *(f"surface.{k}.{key}" for k in range(3) for key in ("along=[0.42, 0.58]", "points=[6, 5]")),
+    )
+}
+#: what the 3D view of a picture does: where it stands, from where it is looked at, from how far
+POSED = {
+    "page_impeller": f"{{ const v = {VIEW}, c = v.camera.position; "
+    "v.lookFrom(c.clone().set(0.85, -0.45, 0.75).normalize()); c.lerp(v.path.tip(v.place, c.clone()), 0.35);"
+    "v.controls.update(); v.dirty = true; }"
+}
 #: moves figures into a sheet of their own, above the page
 SHEET = """(wanted) => {
     const sheet = document.createElement('div');
@@ -94,6 +107,11 @@ def photograph_page(chromium: Browser, folder: Path, name: str) -> None:
         page.wait_for_selector(".cv-ramp")
         page.wait_for_selector(".cl-now")
         other = PAGES[name][1]
+        if name in POSED:
+            page.locator(".cl-slider").click(
+                position={"x": 0.8 * page.locator(".cl-slider").bounding_box()["width"], "y": 8}
+            )
+            page.wait_for_function(f"{VIEW}.row > 100")
         if other:
             choose(page, "compare with", other)
             page.wait_for_selector(".cl-compared", state="visible")
@@ -104,6 +122,10 @@ def photograph_page(chromium: Browser, folder: Path, name: str) -> None:
                 position={"x": 0.9 * page.locator(".cl-slider").bounding_box()["width"], "y": 8}
             )
         page.wait_for_function(DRAWN, timeout=120_000)
+        if name in POSED:
+            page.evaluate(POSED[name])
+            page.wait_for_function(f"!{VIEW}.dirty")
+            page.wait_for_timeout(2000)
         page.screenshot(path=DOCS / f"{name}.png")
         page.close()
     finally:
@@ -130,6 +152,7 @@ def main() -> int:
                 PAGES[name][0] if name in PAGES else name, Path(folder) / name / PAGES.get(name, (name, ""))[0]
             )
             words = [sys.executable, "-m", "chipload", "run", str(job / "job.toml"), "--out", str(job / "result")]
+            words += [word for key in SHORTER.get(name, ()) for word in ("--set", key)]
             code = subprocess.run(words, check=False).returncode
             if code not in (0, 3):
                 return code

@@ -146,6 +146,20 @@ def test_chips_are_bodies_with_the_volume_of_the_slot(result: Path, exported: Pa
     np.testing.assert_array_equal(found["force_n"][first], expected)
 
 
+def test_chips_of_gltf_are_closed_and_carry_their_numbers(exported: Path) -> None:
+    scene = trimesh.load(exported / "chips-program.glb")
+    table = read_vtk(exported / "chips-program.vtu")
+    chip, first = np.unique(table["chip"], return_index=True)
+    assert sorted(scene.graph.nodes_geometry) == sorted(f"chip-{k}" for k in chip)
+    volume = 0.0
+    for number, k in zip(chip, first, strict=True):
+        body = scene.geometry[f"chip-{number}"]
+        volume += body.volume
+        for name in ("force_n", "chip_volume_mm3", "row", "line"):
+            assert body.metadata[name] == pytest.approx(float(table[name][k]))
+    assert volume == pytest.approx(240.0, rel=0.02)
+
+
 def test_a_field_of_finite_elements_keeps_its_vectors(result: Path, tmp_path: Path) -> None:
     """The cells of a displaced surface map come back from maps.npz and from the file of VTK as they stood."""
     from chipload.report.export import _map

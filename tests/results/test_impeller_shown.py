@@ -109,6 +109,9 @@ def test_the_page_shows_them(shown, browser) -> None:
         page.wait_for_selector(".cl-now")
         first = shown.result.tracks[shown.used[0]]
         assert page.inner_text(".cl-space .cv-title").startswith("tool clearance [mm]")
+        # the patches of all surfaces have one legend
+        titles = page.locator(".cl-space .cv-title").all_inner_texts()
+        assert titles.count("patch: cutter, table angle") == 1
         volumes = []
         rows = len(first.columns["t_s"])
         for row in (0, rows // 2, rows - 1):
@@ -126,7 +129,10 @@ def test_the_page_shows_them(shown, browser) -> None:
         assert sorted(seen) == ["blades", "hub"], seen
         # the next program follows in the timeline
         page.locator(".cl-tabs").get_by_text("tools", exact=True).click()
-        page.wait_for_function("n => document.querySelectorAll('.cl-time').length == n", arg=len(shown.used))
+        page.wait_for_selector(".cl-time span")
+        listed = page.locator(".cl-time span").all_inner_texts()
+        for k, line in zip(shown.used, listed, strict=False):
+            assert line.startswith(f"{shown.result.tracks[k].name}, T")
     finally:
         page.close()
         served.end()

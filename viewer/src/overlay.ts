@@ -8,7 +8,8 @@ const STYLE = `
 .cv canvas { display: block; width: 100%; height: 100%; outline-offset: -2px; }
 .cv-bar, .cv-scale, .cv-tip, .cv-note { position: absolute; background: rgba(255,255,255,.86); border-radius: 4px;
   padding: 4px 8px; pointer-events: none; }
-.cv-bar { left: 6px; bottom: 6px; min-width: 190px; font-size: 11.5px; }
+.cv-bar { left: 6px; bottom: 6px; max-width: calc(100% - 210px); font-size: 11.5px; display: flex; flex-wrap: wrap; gap: 2px 16px; }
+.cv-bar > div { min-width: 150px; }
 .cv-title { font-weight: 600; }
 .cv-ramp { height: 10px; border-radius: 2px; margin: 4px 0 1px; position: relative; }
 .cv-ramp i { position: absolute; top: -3px; bottom: -3px; width: 0; border-left: 2.5px solid #c81e1e; }
@@ -40,7 +41,7 @@ const STYLE = `
 .cv-cut-plots { display: contents; }
 .cv-plot { width: 100%; max-height: 240px; background: #fff; border: 1px solid #edf0f3; }
 .cv-print { display: block; } }
-@media (max-width: 600px) { .cv-bar { min-width: 120px; max-width: 46%; } .cv-scale { display: none; }
+@media (max-width: 600px) { .cv-bar { max-width: 46%; } .cv-bar > div { min-width: 120px; } .cv-scale { display: none; }
   .cv-note { top: auto; bottom: 84px; left: 4px; transform: none; max-width: 68%; } }
 `;
 
@@ -48,9 +49,22 @@ export function number(x: number): string {
   return Number.isFinite(x) ? String(Number(x.toPrecision(4))) : "not known";
 }
 
+/** Legends that mean the same as one, with the words of all of them. */
+export function joined(legends: MapLegend[]): MapLegend[] {
+  const out: MapLegend[] = [];
+  for (const one of legends) {
+    const same = out.find((m) => m.title === one.title && JSON.stringify(m.stops) === JSON.stringify(one.stops));
+    if (!same) { out.push({ ...one, words: [...one.words] }); continue; }
+    same.words.push(...one.words.filter(([word]) => !same.words.some(([w]) => w === word)));
+  }
+  return out;
+}
+
 export class Overlay {
   readonly root: HTMLElement;
   private readonly bar = this.part("cv-bar");
+  /** of the bar, what belongs to one scale */
+  private group = this.bar;
   private readonly scale = this.part("cv-scale");
   private readonly tip = this.part("cv-tip");
   private readonly note = this.part("cv-note");
@@ -73,15 +87,16 @@ export class Overlay {
   legend(header: Header, c: Colouring | null, maps: MapLegend[]): void {
     this.bar.replaceChildren();
     this.bar.style.display = c || maps.length ? "" : "none";
-    if (c) this.column(header, c);
-    for (const m of maps) this.map(m);
+    const group = () => { this.group = document.createElement("div"); this.bar.append(this.group); };
+    if (c) { group(); this.column(header, c); }
+    for (const m of joined(maps)) { group(); this.map(m); }
   }
 
   private add(cls: string, text = ""): HTMLElement {
     const e = document.createElement("div");
     e.className = cls;
     e.textContent = text;
-    this.bar.append(e);
+    this.group.append(e);
     return e;
   }
 

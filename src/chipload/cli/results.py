@@ -59,6 +59,7 @@ def export(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="a new or empty folder for the files")],
     csv: Annotated[bool, typer.Option("--csv", help="history.csv: a row for each step, units in the names")] = False,
     vtk: Annotated[bool, typer.Option("--vtk", help="paths .vtp; chips, maps, stock .vtu; stock .stl")] = False,
+    glb: Annotated[bool, typer.Option("--glb", help="chips .glb, a body for each chip, with its numbers")] = False,
     sheet: Annotated[bool, typer.Option("--sheet", help="setup.html; with chipload[export] setup.pdf")] = False,
     load_monitor: Annotated[
         str | None,
@@ -74,12 +75,12 @@ def export(
     ] = None,
     debug: Debug = False,
 ) -> None:
-    """Write a result as CSV, VTK and a setup sheet for the machine; without an option, these three."""
+    """Write a result as CSV, VTK, GLB and a setup sheet for the machine; without an option, these four."""
 
     def work() -> int:
         from chipload.report.export import KINDS, export_result
 
-        asked = [kind for kind, wanted in zip(KINDS, (csv, vtk, sheet), strict=True) if wanted]
+        asked = [kind for kind, wanted in zip(KINDS, (csv, vtk, glb, sheet), strict=True) if wanted]
         kinds = asked if asked or load_monitor is not None else KINDS
         for name in export_result(result, out, kinds, load_monitor, spindle):
             show(f"written: {out / name}")

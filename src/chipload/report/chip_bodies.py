@@ -9,8 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
+from chipload.report.scene import engagement_colours, engagement_legend
+from chipload.result import COLUMNS
 from chipload.result.limits import Columns
 from chipload.simulation.removal_mesh import RemovalMesh
 from chipload.stock.surface_net import STEPS
@@ -20,6 +23,8 @@ Ints = NDArray[np.int64]
 
 #: columns whose greatest value in the rows of a chip is taken, where the history has them
 GREATEST = ("chip_max_mm", "force_n", "torque_nm", "power_w", "deflection_um", "cutter_stress_mpa")
+#: columns that colour a chip, the first that a history has
+COLOURED = ("force_n", "chip_max_mm", "torque_nm")
 #: a column whose sum is taken
 SUM = "chip_volume_mm3"
 
@@ -70,6 +75,30 @@ def chip_bodies(mesh: RemovalMesh, columns: Columns) -> ChipBodies:
     of_frames = _of_frames(mesh.rows, columns)
     values = {name: value[chip - 1] for name, value in of_frames.items()}
     return ChipBodies(points, at.reshape(-1, 4).astype(np.int64), chip, values)
+
+
+def chips_scene(chips: ChipBodies) -> bytes:
+    """Scene of glTF (GLB): a body for each chip, `chip-12`, coloured by its force, or thickness, with its numbers as
+    extras; lengths are mm, Z is up.
+    """
+    scene = trimesh.Scene()
+    numbers, first = np.unique(chips.chip, return_index=True)
+    shade = next((name for name in COLOURED if name in chips.values), None)
+    values = np.nan_to_num(chips.values[shade][first].astype(np.float64)) if shade is not None else np.zeros(len(first))
+    most = float(values.max(initial=0.0))
+    colours = engagement_colours(values, most)
+    for number, k, colour in zip(numbers.tolist(), first.tolist(), colours, strict=True):
+        used, at = np.unique(chips.faces[chips.chip == number], return_inverse=True)
+        quads = at.reshape(-1, 4)
+        triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+        body = trimesh.Trimesh(chips.points[used], triangles, process=False)
+        body.visual.vertex_colors = np.tile(colour, (len(used), 1))
+        body.metadata |= {name: float(value[k]) for name, value in chips.values.items() if np.isfinite(value[k])}
+        if shade is not None:
+            body.metadata["legend"] = engagement_legend(COLUMNS[shade].title, most)
+        scene.add_geometry(body, node_name=f"chip-{number}", geom_name=f"chip-{number}")
+    glb: bytes = scene.export(file_type="glb", extension_webp=False)
+    return glb
 
 
 def _of_frames(rows: Ints, columns: Columns) -> dict[str, NDArray[np.generic]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 
 from chipload.errors import InputError
 from chipload.files import cannot_write, fresh_folder
-from chipload.report.chip_bodies import chip_bodies
+from chipload.report.chip_bodies import chip_bodies, chips_scene
 from chipload.report.load_monitor import MONITORS, UNPUBLISHED, afc_table, load_csv, sections_of
 from chipload.report.presentation import Content
 from chipload.report.removal import REMOVAL, read_removal
@@ -29,7 +29,7 @@ from chipload.simulation.removal_mesh import RemovalMesh
 from chipload.stock.layers import LayeredStock
 
 #: what can be asked for
-KINDS = ("csv", "vtk", "sheet")
+KINDS = ("csv", "vtk", "glb", "sheet")
 #: rows of a history that are written at once
 ROWS = 65_536
 
@@ -41,8 +41,8 @@ def export_result(
 
     ``csv``: history.csv, a row a step, units in the names of the columns. ``vtk``: the path of each track with all its
     numbers (.vtp), its undeformed chips (.vtu), surface maps with displacements by finite elements (.vtu), the stock
-    that is left (.vtu and .stl). ``sheet``: setup.html, one page, and as
-    setup.pdf where ``chipload[export]`` is installed.
+    that is left (.vtu and .stl). ``glb``: the undeformed chips of each track, a body a chip. ``sheet``: setup.html, one
+    page, and as setup.pdf where ``chipload[export]`` is installed.
     ``monitor``: reference loads for a load monitor, ``csv`` or ``heidenhain``; ``spindle``: the file that tells the
     motor's power.
 
@@ -63,6 +63,11 @@ def export_result(
         files["history.csv"] = lambda: lambda file: _csv(folder / HISTORY, file)
     if "vtk" in kinds:
         files |= _vtk(result, folder)
+    if "glb" in kinds:
+        files |= {
+            f"chips-{_safe(name)}.glb": partial(_chips_scene, removed, blocks)
+            for name, removed, blocks in _removals(result, folder)
+        }
     if "sheet" in kinds:
         files["setup.html"] = lambda: setup_sheet(result)
         if find_spec("fpdf") is not None:
@@ -112,14 +117,12 @@ def _csv(history: Path, file: IO[bytes]) -> None:
 
 def _vtk(result: Result, folder: Path) -> dict[str, Callable[[], Content]]:
     files: dict[str, Callable[[], Content]] = {}
-    removal = folder / REMOVAL
-    for k, track in enumerate(result.tracks):
+    for track in result.tracks:
         blocks = list(track.blocks())
         if blocks and all(key in blocks[0] for key in ("x_mm", "y_mm", "z_mm")):
             files[f"path-{_safe(track.name)}.vtp"] = lambda blocks=blocks: _path(blocks)  # type: ignore[misc]
-        removed = read_removal(removal, k) if blocks and removal.is_file() else None
-        if removed is not None and len(removed.rows):
-            files[f"chips-{_safe(track.name)}.vtu"] = partial(_chips, removed, blocks)
+    for name, removed, rows in _removals(result, folder):
+        files[f"chips-{_safe(name)}.vtu"] = partial(_chips, removed, rows)
     for k, one in enumerate(result.maps):
         files[f"map-{k}-{_safe(one.name)}.vtu"] = lambda one=one: _map(one)  # type: ignore[misc]
     stock = folder / "stock.npz"
@@ -136,6 +139,16 @@ def _vtk(result: Result, folder: Path) -> dict[str, Callable[[], Content]]:
     return files
 
 
+def _removals(result: Result, folder: Path) -> Iterator[tuple[str, RemovalMesh, Sequence[Mapping[str, Any]]]]:
+    """Name, stock and history of the tracks whose stock the result holds."""
+    path = folder / REMOVAL
+    for k, track in enumerate(result.tracks if path.is_file() else ()):
+        blocks = list(track.blocks())
+        removed = read_removal(path, k) if blocks else None
+        if removed is not None and len(removed.rows):
+            yield track.name, removed, blocks
+
+
 def _columns(blocks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """All numbers of a history."""
     names = [n for n, v in blocks[0].items() if np.asarray(v).dtype.kind in "fiub"]
@@ -145,6 +158,10 @@ def _columns(blocks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 def _chips(mesh: RemovalMesh, blocks: Sequence[Mapping[str, Any]]) -> bytes:
     chips = chip_bodies(mesh, _columns(blocks))
     return faces_file(chips.points, chips.faces, of_faces={"chip": chips.chip, **chips.values})
+
+
+def _chips_scene(mesh: RemovalMesh, blocks: Sequence[Mapping[str, Any]]) -> bytes:
+    return chips_scene(chip_bodies(mesh, _columns(blocks)))
 
 
 def _map(one: SurfaceMap) -> bytes:

@@ -75,7 +75,7 @@ def _patch_legend(milled: ImpellerResult, way: Partition, op: Searched) -> dict[
         f"{np.degrees(p.table):.6g} deg": shade_of(way, p)
         for p in (patches[n] for n in numbers)
     }
-    return legend("patches of cutter and table angle", [], list(words.items()))
+    return legend("patch: cutter, table angle", [], list(words.items()))
 
 
 def _add(
