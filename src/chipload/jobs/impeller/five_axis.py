@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -45,7 +46,7 @@ _COLUMNS = (
 )  # fmt: skip
 
 
-def five_axis_machine(source: str | object | None, key: str) -> Machine:
+def five_axis_machine(source: str | Path | None, key: str) -> Machine:
     """A machine by its shipped name or file, with two rotary axes that move in the cut.
 
     Raises
