@@ -194,6 +194,30 @@ def test_flank_passes_need_five_axes_links_and_a_side(formula):
     assert refused(formula) == "job.toml: operation.0.flank: takes its links from [operation.paths]: state that too"
 
 
+def test_point_milling_needs_five_axes_and_links(formula):
+    stated = '[operation.point_milling]\nmachine = { name = "horizontal-b" }\n\n'
+    text = formula.read_text()
+    formula.write_text(text.replace("[operation.paths]", stated + "[operation.paths]"))
+    assert refused(formula) == (
+        "operation.0.point_milling.machine: horizontal-b has 1 rotary axes that move in the cut: must have two"
+    )
+    finish = text[: text.index("[operation.rough]")]
+    formula.write_text(finish + stated.replace("horizontal-b", "cradle-ac"))
+    assert refused(formula) == (
+        "job.toml: operation.0.point_milling: takes its links from [operation.paths]: state that too"
+    )
+
+
+def test_a_barrel_cutter_is_refused(formula):
+    row = "{ diameter_mm = 12.0, corner_radius_mm = 2.0, barrel_radius_mm = 85.0 }"
+    formula.with_name("cutters.toml").write_text(f'name = "own"\ncutter = [{row}]\n')
+    changed(formula, 'name = "wu2019"', 'file = "cutters.toml"')
+    assert refused(formula).endswith(
+        "cutter 1: barrel_radius_mm = 85.0: barrel cutters are not planned with: state flat, bull-nose or ball cutters "
+        "by diameter_mm and corner_radius_mm"
+    )
+
+
 def test_feeds_by_force_need_an_allowance_and_an_overhang(formula):
     stated = '[operation.forces]\nmaterial = { name = "al7075-t6" }\nflutes = 2\ndeflection_um = 20.0\n\n'
     text = formula.read_text()

@@ -238,12 +238,17 @@ excess_mm = 0.05
 feed_mm_min = 300.0
 speed_rpm = 3000.0
 
+[operation.point_milling]
+machine = { name = "cradle-ac" }
+feed_mm_min = 300.0
+speed_rpm = 3000.0
+
 """
 
 
 @pytest.fixture(scope="module")
 def more(tmp_path_factory):
-    """The same with feeds by force, and with flank passes."""
+    """The same with feeds by force, with flank passes and with point milling on five axes."""
     root = tmp_path_factory.mktemp("more")
     path = job(root / "fed", feed_mm_min="400.0")
     path.write_text(path.read_text().replace("[operation.paths]", FLANK + FORCES))
@@ -260,24 +265,58 @@ def test_a_side_is_milled_by_the_flank_in_one_pass_on_five_axes(more):
     (track,) = (t for t in summary["tracks"] if t["name"] == flank["program"])
     assert not track["in_use"]
     assert {x["name"]: x["state"] for x in track["limits"]} == {"gouge_mm": "holds", "excess_mm": "holds"}
-    # the text of the axes, brought back to tips and axes of the tool, against points of the true surfaces
+    own, away = by_the_text(out, flank)
+    assert own.min() > -0.05
+    assert own.max() < 0.05
+    assert own.max() == pytest.approx(flank["excess_mm"], abs=0.01)
+    assert away > -0.05
+    # one pass along the side, not many
+    assert flank["path_mm"] < 0.5 * summary["operations"][0]["finished"]["path_mm"]
+
+
+def test_a_side_is_milled_by_points_with_a_moving_axis(more):
+    out, summary = more
+    (points,) = summary["operations"][0]["point_milling"]
+    assert (points["surface"], points["verdict"]) == ("blade plus", "holds")
+    (track,) = (t for t in summary["tracks"] if t["name"] == points["program"])
+    assert not track["in_use"]
+    assert {x["name"]: x["state"] for x in track["limits"]} == {"gouge_mm": "holds", "scallop_mm": "holds"}
+    own, away = by_the_text(out, points)
+    assert min(own.min(), away) > -0.05
+    assert own.max() <= 0.1
+    # the densest points that are looked at here are 0.3 mm apart
+    assert own.max() == pytest.approx(points["scallop_greatest_mm"], abs=0.015)
+    assert points["time_all_channels_min"] == pytest.approx(11 * points["time_min"])
+    # the loop over all channels is the same rows, the table turned on each time
+    assert points["all_channels"] == "loop"
+    text = (out / f"{points['program']}-all.ngc").read_text()
+    assert "o100 repeat [11]" in text
+    assert "G52 C[#<turn> * -360 / 11]" in text
+
+
+def by_the_text(out, program):
+    """Distances of points of the side, and the least of the channel's walls, from the cutter along a text of axes.
+
+    The text is read by a few regular expressions and brought back to tips and axes by the machine's chain.
+    """
     machine = machine_named("cradle-ac")
     position, rows = {"X": 0.0, "Y": 0.0, "Z": 0.0, "A": 0.0, "C": 0.0}, []
-    for line in (out / f"{flank['program']}.ngc").read_text().splitlines():
+    for line in (out / f"{program['program']}.ngc").read_text().splitlines():
         if line.startswith(("(", "M", "T", "G43")) or not re.search(r"[XYZAC]-?\d", line):
             continue
         position |= {letter: float(x) for letter, x in re.findall(r"([XYZAC])(-?[\d.]+)", line)}
         rows.append(list(position.values()))
     q = np.zeros((len(rows), 9))
-    q[:, [0, 1, 2]] = np.array(rows)[:, :3]
+    # the text counts from the work offset, 77.5 mm above the origin of the axes
+    q[:, [0, 1, 2]] = np.array(rows)[:, :3] + machine.chain.work_zero
     q[:, [3, 5]] = np.radians(np.array(rows)[:, 3:])
-    tip, axis = forward(machine, q)
+    # the first row, before which Z is nowhere
+    tip, axis = (x[1:] for x in forward(machine, q))
     share = np.linspace(0.0, 1.0, 9)[:-1, None, None]
     tip, axis = (((1.0 - share) * x[:-1] + share * x[1:]).reshape(-1, 3) for x in (tip, axis))
     axis /= np.linalg.norm(axis, axis=1)[:, None]
     impeller = impeller_of(ImpellerShape())
-    u, v = (x.ravel() for x in np.meshgrid(np.linspace(0.30, 0.45, 41), np.linspace(0.50, 0.70, 21), indexing="ij"))
-    R, r = 0.5 * flank["diameter_mm"], flank["corner_radius_mm"]
+    R, r = 0.5 * program["diameter_mm"], program["corner_radius_mm"]
 
     def away(points):
         """Distance of each point from the cutter in all its poses, its corner as that of a ball at its rim."""
@@ -287,15 +326,11 @@ def test_a_side_is_milled_by_the_flank_in_one_pass_on_five_axes(more):
         low = np.where(d > R - r, np.hypot(d - R + r, h - r), r - h) - r
         return np.where(h >= r, d - R, low).min(axis=1)
 
+    u, v = (x.ravel() for x in np.meshgrid(np.linspace(0.30, 0.45, 41), np.linspace(0.50, 0.70, 21), indexing="ij"))
     own = away(impeller.blade.plus.at(u, v))
-    assert own.min() > -0.05
-    assert own.max() < 0.05
-    assert own.max() == pytest.approx(flank["excess_mm"], abs=0.01)
     u, v = (x.ravel() for x in np.meshgrid(np.linspace(0.01, 0.99, 61), np.linspace(0.0, 0.99, 25), indexing="ij"))
-    for wall in (impeller.blade.plus, impeller.blade.minus, impeller.body(1).minus):
-        assert away(wall.at(u, v)).min() > -0.05
-    # one pass along the side, not many
-    assert flank["path_mm"] < 0.5 * summary["operations"][0]["finished"]["path_mm"]
+    walls = (impeller.blade.plus, impeller.blade.minus, impeller.body(1).minus)
+    return own, min(away(wall.at(u, v)).min() for wall in walls)
 
 
 def test_feeds_by_force_make_the_stiff_cutter_the_fast_one(more):

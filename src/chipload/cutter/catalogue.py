@@ -196,6 +196,12 @@ def _from_table(labelled: Labelled) -> Catalogue:
 def _cutter(k: int, row: Any) -> CatalogueCutter:
     if not isinstance(row, dict):
         raise InputError(f"cutter {k}: must be a table")
+    barrel = next((key for key in row if key in _BARREL or row[key] == "barrel"), None)
+    if barrel is not None:
+        raise InputError(
+            f"cutter {k}: {barrel} = {row[barrel]!r}: barrel cutters are not planned with: state flat, bull-nose or "
+            "ball cutters by diameter_mm and corner_radius_mm"
+        )
     try:
         given = _Cutter.model_validate(row).model_dump()
     except ValidationError as err:
@@ -213,3 +219,5 @@ def _cutter(k: int, row: Any) -> CatalogueCutter:
 
 
 _WANTED = {"name": "text"}
+#: keys by which shops and tool libraries state the large radius of a barrel cutter
+_BARREL = ("barrel_radius_mm", "profile_radius_mm", "side_radius_mm")

@@ -11,8 +11,14 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.bspline import through
 from chipload.machine.machine import machine_named
+from chipload.planning.impeller.five_axis_program import (
+    LinkedPath,
+    five_axis_program,
+    lifted,
+    outline_of,
+    rotary_share,
+)
 from chipload.planning.impeller.flank import flank_pass
-from chipload.planning.impeller.flank_program import LinkedFlank, flank_program, lifted, rotary_share
 from chipload.planning.impeller.links import Link
 from chipload.planning.impeller.scene import Scene
 from chipload.program.program import LINE, RAPID
@@ -110,14 +116,17 @@ def test_rotary_axes_keep_their_rates_and_the_cutter_stays_above_between_passes(
     at, n = np.vstack([at, 0.5 * at]), 2 * len(at)
     scene = Scene(at[:1], np.eye(3)[:1], np.zeros((1, 3, 3)), np.zeros(1), at, np.zeros(n), 1.0)
     how = Link(lift=2.0, margin=0.2, touch=0.05, near=5.0, feed=20.0, above=5.0)
+    outline = outline_of(scene, 3)
     passes = []
     for up in ((0.0, 0.5), (0.5, 1.0)):
         path = flank_pass(side, (0.1, 0.9), up, CUTTER, 0.01)
-        ends = [lifted(path, k, scene, CUTTER, how, 0.0) for k in (0, -1)]
+        ends = [lifted(path, k, scene, outline, CUTTER, how, 0.0) for k in (0, -1)]
         assert ends[0] is not None
         assert ends[1] is not None
-        passes.append(LinkedFlank(path, *ends))
-    slow, fast = (flank_program(passes, scene, how, feed, 100.0, 1, machine) for feed in (5.0, 1000.0))
+        passes.append(LinkedPath(path, *ends))
+    slow, fast = (
+        five_axis_program(passes, outline, how, feed, 100.0, 1, machine, math.tau / 3) for feed in (5.0, 1000.0)
+    )
     assert rotary_share(slow, machine).max() < 1.0
     assert rotary_share(fast, machine).max() == pytest.approx(1.0)
     assert (fast.feed[fast.motion == LINE] < 999.0).any()

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from html import escape
 
 import numpy as np
 import plotly.graph_objects as go
 
-from chipload.jobs.impeller.flank_outcome import NoFlank
+from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, CheckedPoints, NoFiveAxisPath
 from chipload.jobs.impeller.mesh import grid_faces
-from chipload.jobs.impeller.names import flank_names, program_name, rough_names
+from chipload.jobs.impeller.names import flank_names, points_names, program_name, rough_names
 from chipload.jobs.impeller.outcome import Covered, ImpellerResult
 from chipload.jobs.impeller.partitions import COLOURS
 from chipload.jobs.impeller.roughing_check import rough_sections
@@ -87,6 +88,7 @@ def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
         table(scallop, patches, numbers=(0, 2, 3, 4, 5, 6, 7, 8)),
         figure("paths", paths_figure(milled), figures),
         *_flank_section(milled),
+        *_points_section(milled),
         "<h2>What all programs leave</h2>",
         f'<p class="note">Measured along rays on points of every surface, at most {spacing:g} mm apart, as far as its '
         "patches go: the least that any of the programs leaves. Where lines miss, rest passes or a neighbour may have "
@@ -101,22 +103,53 @@ def _flank_section(milled: ImpellerResult) -> list[str]:
     if milled.flanks is None:
         return []
     rows = [
-        [
-            f"<code>{escape(name)}</code>", str(len(p.passes)), p.machine.name,
-            f"D {p.cutter.diameter:g} r {p.cutter.corner_radius:g}",
-            f"{p.length:.1f}", f"{p.seconds / 60.0:.2f}", f"{p.deviation:.4f}", f"{p.excess:.4f}",
-            f"{p.gouge.found:.4f} to {p.gouge.bound:.4f}",
-            '<span class="ok">verified</span>' if p.verified else '<span class="no">not verified</span>',
-        ]
+        [f"<code>{escape(name)}</code>", str(len(p.passes)), *_five_axis_cells(p), f"{p.deviation:.4f}"]
         for name, p in flank_names(milled)
-    ]  # fmt: skip
-    head = ["program", "passes", "machine", "cutter [mm]", "path [mm]", "time [min]", "deviation of the flank [mm]"]
-    head += ["most left [mm]", "deepest gouge [mm]", "check"]
+    ]
+    head = ["program", "passes", *_FIVE_AXIS, "deviation of the flank [mm]"]
     return [
         "<h2>Flank passes on five axes</h2>",
-        '<p class="note">Each side with the side of the cutter, of one channel, beside the programs above.</p>',
-        table(head, rows, numbers=(1, 4, 5, 6, 7, 8)) if rows else "",
-        *(f"<p>{escape(p.reason)}</p>" for p in milled.flanks if isinstance(p, NoFlank)),
+        '<p class="note">Each side with the side of the cutter, beside the programs above; path and time of one '
+        "channel.</p>",
+        table(head, rows, numbers=(1, 4, 5, 6, 7, 9)) if rows else "",
+        *(f"<p>{escape(p.reason)}</p>" for p in milled.flanks if isinstance(p, NoFiveAxisPath)),
+    ]
+
+
+def _points_section(milled: ImpellerResult) -> list[str]:
+    """Point milling on five axes; none where the job asks for none."""
+    if milled.points is None:
+        return []
+    rows = [
+        [
+            f"<code>{escape(name)}</code>", str(p.path.lines), *_five_axis_cells(p),
+            "" if p.scallop is None else f"{100.0 * p.scallop / p.most:.0f}", f"{math.degrees(p.path.turn):.2f}",
+        ]
+        for name, p in points_names(milled)
+    ]  # fmt: skip
+    head = ["program", "lines", *_FIVE_AXIS, "mean scallop of asked [%]", "greatest turn of the axis [deg/mm]"]
+    return [
+        "<h2>Point milling on five axes</h2>",
+        '<p class="note">Each surface in one path with a smooth axis, beside the programs above; path and time of one '
+        "channel.</p>",
+        table(head, rows, numbers=(1, 4, 5, 6, 7, 9, 10)) if rows else "",
+        *(f"<p>{escape(p.reason)}</p>" for p in milled.points if isinstance(p, NoFiveAxisPath)),
+    ]
+
+
+#: columns of every program on five axes, after its name and its passes
+_FIVE_AXIS = ("machine", "cutter [mm]", "path [mm]", "time [min]", "most left [mm]", "deepest gouge [mm]", "check")
+
+
+def _five_axis_cells(p: CheckedFlank | CheckedPoints) -> list[str]:
+    return [
+        p.machine.name,
+        f"D {p.cutter.diameter:g} r {p.cutter.corner_radius:g}",
+        f"{p.length:.1f}",
+        f"{p.seconds / 60.0:.2f}",
+        f"{p.excess:.4f}",
+        f"{p.gouge.found:.4f} to {p.gouge.bound:.4f}",
+        '<span class="ok">verified</span>' if p.verified else '<span class="no">not verified</span>',
     ]
 
 

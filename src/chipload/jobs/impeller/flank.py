@@ -15,39 +15,29 @@ from numpy.typing import NDArray
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
-from chipload.jobs.impeller.flank_outcome import CheckedFlank, NoFlank
+from chipload.jobs.impeller.five_axis import all_channels, five_axis_machine, program_check
+from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, NoFiveAxisPath
 from chipload.jobs.impeller.job import ImpellerJob
-from chipload.jobs.impeller.paths import EDGE, walls_of
-from chipload.jobs.impeller.ray_depth import ray_depth
 from chipload.jobs.impeller.tables import FlankTable, PathsTable, SurfaceTable
-from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.machine.machine import Machine
 from chipload.planning.impeller.clearance.clearance import clearance
+from chipload.planning.impeller.five_axis_program import LinkedPath, five_axis_program, lifted, outline_of
 from chipload.planning.impeller.flank import FlankPass, flank_pass, offset_pass
-from chipload.planning.impeller.flank_program import LinkedFlank, flank_program, lifted
-from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.settings import FinishSettings
 from chipload.planning.impeller.surfaces import BODIES
-from chipload.program.check import check_program
-from chipload.program.program import Program
-from chipload.program.read import times_on
-from chipload.program.to_axes import to_axes
 from chipload.progress import Progress, silent
-from chipload.simulation.channel.channel import left_on, wall
-from chipload.simulation.channel.gouges import deepest_gouge
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 Floats = NDArray[np.float64]
 
-#: of the gouge that is allowed: what the plan may use, how near the check finds its depth
-_SHARE, _RESOLUTION = 0.8, 0.2
+#: of the gouge that is allowed: what the plan may use
+_SHARE = 0.8
 #: a cutter that comes deeper into a wall beside the two offset points than this over the gouge is not looked at [mm]
 _ROUGHLY = 0.5
 #: how often a pass is made longer so that it reaches its ends at all heights
 _LONGER = 3
 #: nor one whose axis through these points deviates by more than so many times what is allowed
 _MOST = 4.0
-#: distance of the points of a side on which what is left is measured, height of their rays [mm]
-_SPACING, _HEIGHT = 0.6, 1.0
 #: kinds of surfaces that have rulings
 SIDES = ("plus", "minus")
 
@@ -60,59 +50,63 @@ def flank_machine(job: ImpellerJob) -> Machine:
     InputError
         It cannot be read, or has not two rotary axes that move in the cut.
     """
-    source = job.flank_machine
-    if source is None:
-        raise InputError("operation.0.flank: missing")
-    machine = machine_named(source) if isinstance(source, str) else read_machine(source)
-    free = sum(not axis.indexed for axis in machine.chain.rotary)
-    if free < 2:
-        raise InputError(
-            f"operation.0.flank.machine: {machine.name} has {free} rotary axes that move in the cut: must have two"
-        )
-    return machine
+    return five_axis_machine(job.flank_machine, "operation.0.flank")
 
 
 def checked_flanks(
     job: ImpellerJob, how: FinishSettings, catalogue: Catalogue, progress: Progress = silent
-) -> tuple[CheckedFlank | NoFlank, ...]:
+) -> tuple[CheckedFlank | NoFiveAxisPath, ...]:
     """A flank pass for each side that the job names."""
     op, impeller = job.operation, how.impeller
-    stated, paths = op.flank, op.paths
-    if stated is None or paths is None:
+    table, paths = op.flank, op.paths
+    if table is None or paths is None:
         return ()
     machine = flank_machine(job)
     sides = [s for s in job.table.surface if s.side in SIDES]
-    out: list[CheckedFlank | NoFlank] = []
+    outline = outline_of(how.scene, impeller.blades)
+    out: list[CheckedFlank | NoFiveAxisPath] = []
     for k, side in enumerate(sides):
-        found = _planned(how, side, catalogue, stated, paths)
-        if isinstance(found, NoFlank):
+        found = _planned(how, side, catalogue, table, paths, outline)
+        if isinstance(found, NoFiveAxisPath):
             out.append(found)
         else:
-            feed = mm_s_from_mm_min(stated.feed_mm_min if stated.feed_mm_min is not None else op.feed_mm_min)
-            spindle = rad_s_from_rpm(stated.speed_rpm if stated.speed_rpm is not None else op.speed_rpm)
+            feed = mm_s_from_mm_min(table.feed_mm_min if table.feed_mm_min is not None else op.feed_mm_min)
+            spindle = rad_s_from_rpm(table.speed_rpm if table.speed_rpm is not None else op.speed_rpm)
             cutter, passes = found
-            program = flank_program(passes, how.scene, how.link, feed, spindle, k + 1, machine)
-            own = tuple(one.path for one in passes)
-            out.append(_checked(impeller, side, machine, cutter, own, program, stated, paths, how))
+            program = five_axis_program(
+                passes, outline, how.link, feed, spindle, k + 1, machine, impeller.pitch
+            )  # fmt: skip
+            got = program_check(how, side, machine, cutter, program, paths)
+            own = tuple(one.path for one in passes if isinstance(one.path, FlankPass))
+            out.append(CheckedFlank(
+                f"{side.body} {side.side}", machine, cutter, program, got.gouge, got.left, paths.gouge_mm,
+                table.excess_mm, got.findings, got.seconds, impeller.blades,
+                all_channels(program, machine, impeller.blades), own,
+            ))  # fmt: skip
         progress((k + 1) / len(sides), f"flank passes of {k + 1} sides")
     return tuple(out)
 
 
 def _planned(
-    how: FinishSettings, side: SurfaceTable, catalogue: Catalogue, stated: FlankTable, paths: PathsTable
-) -> tuple[CatalogueCutter, list[LinkedFlank]] | NoFlank:
+    how: FinishSettings,
+    side: SurfaceTable,
+    catalogue: Catalogue,
+    table: FlankTable,
+    paths: PathsTable,
+    outline: Floats,
+) -> tuple[CatalogueCutter, list[LinkedPath]] | NoFiveAxisPath:
     """The fewest passes up the side, with the largest cutter that is clear in them and keeps the deviation."""
     surface = how.surface(BODIES.index(side.body), side.side)
     least = math.inf
     met: set[CatalogueCutter] = set()
     cutters = sorted(catalogue.cutters, key=lambda c: (-c.diameter, c.corner_radius))
-    for count in range(1, stated.most_passes + 1):
+    for count in range(1, table.most_passes + 1):
         edges = np.linspace(*side.up, count + 1).tolist()
         bands = [(a, b) for a, b in itertools.pairwise(edges)]
         for cutter in cutters:
             found = []
             for band in bands:
-                one, deviation = _pass(how, surface, side.along, band, cutter, stated, paths)
+                one, deviation = _pass(how, surface, side.along, band, cutter, table, paths, outline)
                 if one is None:
                     if deviation is None:
                         met.add(cutter)
@@ -125,21 +119,21 @@ def _planned(
     why = f"{len(met)} meet a wall or are too short"
     if math.isfinite(least):
         why += f", the others deviate by {least:.4f} mm and more"
-    return NoFlank(
+    return NoFiveAxisPath(
         f"{side.body} {side.side}",
-        f"{side.body} {side.side}: no flank passes: of {len(cutters)} cutters {why} with up to {stated.most_passes} "
+        f"{side.body} {side.side}: no flank passes: of {len(cutters)} cutters {why} with up to {table.most_passes} "
         "passes: mill it by points, raise most_passes, excess_mm or gouge_mm, or add thinner or longer cutters",
     )
 
 
 def _pass(
     how: FinishSettings, surface: BSplinePatch, wanted: tuple[float, float], band: tuple[float, float],
-    cutter: CatalogueCutter, stated: FlankTable, paths: PathsTable,
-) -> tuple[LinkedFlank | None, float | None]:  # fmt: skip
+    cutter: CatalogueCutter, table: FlankTable, paths: PathsTable, outline: Floats,
+) -> tuple[LinkedPath | None, float | None]:  # fmt: skip
     """The pass of a cutter on a band of a side; None and its deviation, None where it meets a wall or is too short."""
     scene, above = how.scene, how.how.motion.clearance
     deep = _SHARE * paths.gouge_mm
-    limit = max(stated.excess_mm, deep)
+    limit = max(table.excess_mm, deep)
     along = _overrun(surface.at(np.linspace(*wanted, 65), 0.5 * sum(band)), wanted, paths.overrun_mm)
     tips, axes, rough = offset_pass(surface, along, band, cutter)
     if rough > _MOST * limit:
@@ -160,13 +154,13 @@ def _pass(
             path = flank_pass(surface, along, band, cutter, paths.chord_mm)
     except InputError:
         return None, None
-    if path.left.max() > stated.excess_mm or -path.gouge.min() > deep:
+    if path.left.max() > table.excess_mm or -path.gouge.min() > deep:
         return None, path.deviation
     got, _ = clearance(scene, cutter, path.tip, path.axis, 1.0, above)
-    begin, end = (lifted(path, k, scene, cutter, how.link, above) for k in (0, -1))
+    begin, end = (lifted(path, k, scene, outline, cutter, how.link, above) for k in (0, -1))
     if got.min() < -deep or begin is None or end is None:
         return None, None
-    return LinkedFlank(path, begin, end), path.deviation
+    return LinkedPath(path, begin, end), path.deviation
 
 
 def _overrun(line: Floats, along: tuple[float, float], mm: float) -> tuple[float, float]:
@@ -174,29 +168,3 @@ def _overrun(line: Floats, along: tuple[float, float], mm: float) -> tuple[float
     length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
     more = mm * (along[1] - along[0]) / length
     return max(along[0] - more, 0.0), min(along[1] + more, 1.0)
-
-
-def _checked(
-    impeller: Impeller, side: SurfaceTable, machine: Machine, cutter: CatalogueCutter, passes: tuple[FlankPass, ...],
-    program: Program, stated: FlankTable, paths: PathsTable, how: FinishSettings,
-) -> CheckedFlank:  # fmt: skip
-    surface = how.surface(BODIES.index(side.body), side.side)
-    grid = []
-    for (low, high), other, first in ((side.along, side.up, True), (side.up, side.along, False)):
-        t, q = np.linspace(low, high, 41), np.linspace(*other, 5)
-        lines = [surface.at(t, x) if first else surface.at(np.full(41, x), t) for x in q]
-        size = max(float(np.linalg.norm(np.diff(x, axis=0), axis=1).sum()) for x in lines)
-        grid.append(np.linspace(low, high, max(math.ceil(size / _SPACING), 2) + 1))
-    depth = ray_depth(impeller, EDGE, paths.gouge_mm)
-    (left,) = left_on([wall(f"{side.body} {side.side}", surface, *grid)], program, cutter, _HEIGHT, depth,
-                      workers=how.workers)  # fmt: skip
-    gouge = deepest_gouge(
-        walls_of(impeller, how.ahead), program, cutter, depth, _RESOLUTION * paths.gouge_mm, paths.gouge_mm,
-        workers=how.workers,
-    )  # fmt: skip
-    _, beyond = to_axes(program, machine)
-    texts = tuple(f.text for f in (*beyond, *check_program(program, machine)))
-    return CheckedFlank(
-        f"{side.body} {side.side}", machine, cutter, passes, program, gouge, left, paths.gouge_mm, stated.excess_mm,
-        texts, float(times_on(program, machine).sum()),
-    )  # fmt: skip

@@ -29,7 +29,7 @@ class ImpellerJob:
     table : its values
     machine, catalogue : a shipped name or a file
     material : likewise, of the force coefficients; None: forces are not asked for
-    flank_machine : likewise, of the flank passes; None: there are none
+    flank_machine, point_machine : likewise, of flank passes and of point milling on five axes; None: there is none
     files : what the part is read from, by what it is
     overrides : the `--set` texts that were applied
     """
@@ -42,6 +42,7 @@ class ImpellerJob:
     overrides: tuple[str, ...]
     material: str | Path | None = None
     flank_machine: str | Path | None = None
+    point_machine: str | Path | None = None
 
     @property
     def operation(self) -> ImpellerOperationTable:
@@ -73,6 +74,13 @@ def load(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) -> Impel
         with errors.collect():
             flank_machine = source("operation.0.flank.machine", flank.machine, folder)
         errors.texts += _wrong_flank(table)
+    points = table.operation[0].point_milling
+    point_machine: str | Path | None = None
+    if points is not None:
+        with errors.collect():
+            point_machine = source("operation.0.point_milling.machine", points.machine, folder)
+        if table.operation[0].paths is None:
+            errors.add("operation.0.point_milling: takes its links from [operation.paths]: state that too")
     for k, surface in enumerate(table.surface):
         errors.texts += _wrong_surface(f"surface.{k}", surface, part)
         if any((s.body, s.side) == (surface.body, surface.side) for s in table.surface[:k]):
@@ -85,7 +93,7 @@ def load(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) -> Impel
     errors.refuse()
     return ImpellerJob(
         path, table, sources["machine"], sources["catalogue"], _files(part, folder), tuple(overrides), material,
-        flank_machine,
+        flank_machine, point_machine,
     )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.jobs.impeller.flank_outcome import CheckedFlank
+from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, CheckedPoints, FiveAxisProgram
 from chipload.jobs.impeller.outcome import Checked, CheckedPartition, ImpellerResult
 
 #: what the name of a text that goes through all channels ends with
@@ -36,10 +36,21 @@ def finish_names(milled: ImpellerResult) -> list[tuple[str, Checked]]:
 def flank_names(milled: ImpellerResult) -> list[tuple[str, CheckedFlank]]:
     """File names of the flank passes without their endings."""
     return [
-        (f"flank-{k}-{p.name.replace(' ', '-')}-D{p.cutter.diameter:g}r{p.cutter.corner_radius:g}", p)
-        for k, p in enumerate(milled.flanks or (), 1)
-        if isinstance(p, CheckedFlank)
+        (_five_axis_name("flank", k, p), p) for k, p in enumerate(milled.flanks or (), 1) if isinstance(p, CheckedFlank)
     ]
+
+
+def points_names(milled: ImpellerResult) -> list[tuple[str, CheckedPoints]]:
+    """File names of the point milling on five axes without their endings."""
+    return [
+        (_five_axis_name("points", k, p), p)
+        for k, p in enumerate(milled.points or (), 1)
+        if isinstance(p, CheckedPoints)
+    ]
+
+
+def _five_axis_name(kind: str, k: int, p: FiveAxisProgram) -> str:
+    return f"{kind}-{k}-{p.name.replace(' ', '-')}-D{p.cutter.diameter:g}r{p.cutter.corner_radius:g}"
 
 
 def stem_of(way: CheckedPartition) -> str:

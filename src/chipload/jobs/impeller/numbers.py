@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.jobs.impeller.flank_outcome import flank_numbers
-from chipload.jobs.impeller.names import flank_names, program_name
+from chipload.jobs.impeller.five_axis_outcome import flank_numbers, points_numbers
+from chipload.jobs.impeller.names import flank_names, points_names, program_name
 from chipload.jobs.impeller.outcome import Checked, ImpellerResult, Searched, unreached_text
 from chipload.planning.impeller.compare import Partition
 from chipload.planning.impeller.patch import Patch
@@ -40,6 +40,7 @@ def operation_numbers(milled: ImpellerResult) -> dict[str, Any]:
         else [_program(program_name(milled, k), p) for k, p in enumerate(milled.programs, 1)],
         "roughing": None if milled.roughs is None else _roughing(milled),
         "flank": None if milled.flanks is None else _flanks(milled),
+        "point_milling": None if milled.points is None else _points(milled),
         "finished": None if milled.covered is None else _finished(milled),
         "surfaces": rows,
         "settings": {k: list(v) if isinstance(v, tuple) else v for k, v in milled.stated.settings.items()},
@@ -165,6 +166,11 @@ def _program(name: str, p: Checked) -> dict[str, Any]:
 def _flanks(milled: ImpellerResult) -> list[dict[str, Any]]:
     names = {id(p): name for name, p in flank_names(milled)}
     return [flank_numbers(p, names.get(id(p), "")) for p in milled.flanks or ()]
+
+
+def _points(milled: ImpellerResult) -> list[dict[str, Any]]:
+    names = {id(p): name for name, p in points_names(milled)}
+    return [points_numbers(p, names.get(id(p), "")) for p in milled.points or ()]
 
 
 def _loads(p: Checked) -> dict[str, float] | None:

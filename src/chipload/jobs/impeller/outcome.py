@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
-from chipload.jobs.impeller.flank_outcome import CheckedFlank, NoFlank
+from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, CheckedPoints, NoFiveAxisPath
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.answer import Answer, Unreachable
@@ -364,7 +364,7 @@ class ImpellerResult:
     checked : each way with its programs, checked; None: the job asks for none
     roughs : roughing programs, before the others; None: the job asks for none
     provenance : where the numbers come from
-    flanks : flank passes on five axes, beside the programs; None: the job asks for none
+    flanks, points : flank passes and point milling on five axes, beside the programs; None: the job asks for none
     """
 
     stated: StatedJob
@@ -377,12 +377,18 @@ class ImpellerResult:
     checked: tuple[CheckedPartition, ...] | None
     roughs: tuple[CheckedRough, ...] | None
     provenance: Provenance
-    flanks: tuple[CheckedFlank | NoFlank, ...] | None = None
+    flanks: tuple[CheckedFlank | NoFiveAxisPath, ...] | None = None
+    points: tuple[CheckedPoints | NoFiveAxisPath, ...] | None = None
 
     @property
     def title(self) -> str:
         """Name of the job."""
         return self.stated.title
+
+    @property
+    def not_on_five_axes(self) -> tuple[str, ...]:
+        """Why surfaces are not milled on five axes though the job asks for it."""
+        return tuple(p.reason for p in (*(self.flanks or ()), *(self.points or ())) if isinstance(p, NoFiveAxisPath))
 
     @property
     def picked(self) -> Partition | None:

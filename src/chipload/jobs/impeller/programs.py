@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.jobs.impeller.names import ALL, finish_names, flank_names, rough_names
+from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, CheckedPoints
+from chipload.jobs.impeller.names import ALL, finish_names, flank_names, points_names, rough_names
 from chipload.jobs.impeller.outcome import Checked, ImpellerResult
 from chipload.jobs.impeller.proof import contact_points_bytes, proof_bytes
 from chipload.jobs.impeller.roughing_check import CheckedRough
@@ -34,22 +35,42 @@ def program_files(milled: ImpellerResult) -> dict[str, bytes]:
             out[f"{name}.{ENDINGS[milled.machine.dialect]}"] = text.encode("ascii")
         cl = write_apt(program, None, title=title, verified=checked.verified)
         out[f"{stem}.apt"] = cl.encode("ascii")
-    for stem, p in flank_names(milled):
-        size = f"D {p.cutter.diameter:g} r {p.cutter.corner_radius:g} mm"
-        title = f"{milled.title}, flank pass of {p.name}"
-        number = int(p.program.tool[0])
+    for first, named in ((200, flank_names(milled)), (300, points_names(milled))):
+        for stem, p in named:
+            out |= _five_axis_files(milled, stem, p, first)
+    return out
+
+
+def _five_axis_files(
+    milled: ImpellerResult, stem: str, p: CheckedFlank | CheckedPoints, first: int
+) -> dict[str, bytes]:
+    """The texts of a program on five axes: one channel, all channels, APT."""
+    number, n = int(p.program.tool[0]), milled.impeller.blades
+    if isinstance(p, CheckedFlank):
+        what, of = f"deviation of the flank {p.deviation:.4f} mm", "flank pass"
+    else:
+        what, of = f"{p.path.lines} lines, scallop at most {p.excess:.4f} mm", "point milling"
+    title = f"{milled.title}, {of} of {p.name}"
+    head = [
+        *(f"not verified: {f}" for f in p.fails[:3]),
+        f"T{number}: D {p.cutter.diameter:g} r {p.cutter.corner_radius:g} mm, tool length 0: positions of the tip",
+        f"five axes at once, {what}",
+    ]
+    turn = f"{np.degrees(milled.impeller.pitch):.6f} deg each"
+    one = f"one channel: the others with the part turned by {turn}, {n} in all"
+    texts: list[tuple[str, Program, Repeat | None, str]] = [("", p.program, None, one)]
+    if not isinstance(p.every, str):
+        repeat = p.every.repeat
+        by = "row by row" if repeat is None else f"axis {repeat.letter} turned on by {turn}"
+        texts.append((ALL, p.every.program, repeat, f"all {n} channels: {by}"))
+    ending, out = ENDINGS[p.machine.dialect], {}
+    for more, program, repeat, line in texts:
         text = write_gcode(
-            p.program, p.machine, title=title, verified=p.verified, number=200 + number,
-            comments=[
-                *(f"not verified: {f}" for f in p.fails[:3]),
-                f"T{number}: {size}, tool length 0: positions of the tip",
-                f"five axes at once, deviation of the flank {p.deviation:.4f} mm",
-                f"one channel: the others with the part turned by {np.degrees(milled.impeller.pitch):.6f} deg each, "
-                f"{milled.impeller.blades} in all",
-            ],
+            program, p.machine, title=title, verified=p.verified, number=first + number, comments=[*head, line],
+            repeat=repeat,
         )  # fmt: skip
-        out[f"{stem}.{ENDINGS[p.machine.dialect]}"] = text.encode("ascii")
-        out[f"{stem}.apt"] = write_apt(p.program, None, title=title, verified=p.verified).encode("ascii")
+        out[f"{stem}{more}.{ending}"] = text.encode("ascii")
+    out[f"{stem}.apt"] = write_apt(p.program, None, title=title, verified=p.verified).encode("ascii")
     return out
 
 

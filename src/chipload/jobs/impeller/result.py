@@ -10,9 +10,9 @@ import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import Finding, Severity
-from chipload.jobs.impeller.flank_outcome import CheckedFlank, NoFlank
+from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, CheckedPoints, FiveAxisProgram
 from chipload.jobs.impeller.maps import maps_of
-from chipload.jobs.impeller.names import ALL, finish_names, flank_names, rough_names
+from chipload.jobs.impeller.names import ALL, finish_names, flank_names, points_names, rough_names
 from chipload.jobs.impeller.numbers import operation_numbers
 from chipload.jobs.impeller.outcome import (
     Checked,
@@ -46,7 +46,7 @@ def result_of(milled: ImpellerResult) -> Result:
     return Result(
         capability="impeller",
         title=milled.title,
-        tracks=(_search(milled), *_roughing(milled, walls), *_finishing(milled, walls), *_flanks(milled)),
+        tracks=(_search(milled), *_roughing(milled, walls), *_finishing(milled, walls), *_five_axis(milled)),
         operations=(operation_numbers(milled),),
         findings=tuple(f for c in milled.covered or () for f in _left(c)),
         unchecked=_unchecked(milled),
@@ -139,14 +139,17 @@ def _finishing(milled: ImpellerResult, walls: Walls) -> list[Track]:
     return out
 
 
-def _flanks(milled: ImpellerResult) -> list[Track]:
-    """Flank passes: beside the programs that are in use, on a machine of their own."""
+def _five_axis(milled: ImpellerResult) -> list[Track]:
+    """Flank passes and point milling: beside the programs that are in use, on machines of their own."""
     out = []
-    for name, p in flank_names(milled):
+    named: list[tuple[str, CheckedFlank | CheckedPoints]] = [*flank_names(milled), *points_names(milled)]
+    for name, p in named:
         state = state_of(p.excess, p.most)[0]
-        limits = (_gouge(name, p), LimitCheck("excess_mm", p.most, p.excess, state, name))
+        limits = (_gouge(name, p), LimitCheck(p.limit, p.most, p.excess, state, name))
         findings = tuple(Finding("machine", 0, text, Severity.EXCEEDS) for text in p.findings)
-        files = (f"{name}.{ENDINGS[p.machine.dialect]}", f"{name}.apt")
+        ending = ENDINGS[p.machine.dialect]
+        every = () if isinstance(p.every, str) else (f"{name}{ALL}.{ending}",)
+        files = (f"{name}.{ending}", f"{name}.apt", *every)
         blocks = partial(motion_blocks, p.program, p.machine)
         out.append(Track(name, TrackKind.PROGRAM, False, p.seconds, limits, findings, files, blocks=blocks))
     return out
@@ -171,7 +174,7 @@ def _track(
     return Track(name, TrackKind.PROGRAM, in_use, time_s, limits, findings, files, blocks=blocks)
 
 
-def _gouge(track: str, checked: Checked | CheckedRough | CheckedFlank) -> LimitCheck:
+def _gouge(track: str, checked: Checked | CheckedRough | FiveAxisProgram) -> LimitCheck:
     """The bound of the deepest gouge; its error is down to what was found."""
     gouge, limit = checked.gouge, checked.allowed
     if math.isinf(gouge.bound):
@@ -240,7 +243,7 @@ def _unchecked(milled: ImpellerResult) -> tuple[str, ...]:
         else "forces, torque, deflection and chatter: not calculated",
         "fixtures, pallet and linear axes: no collision check",
     ]
-    out += [p.reason for p in milled.flanks or () if isinstance(p, NoFlank)]
+    out += milled.not_on_five_axes
     if milled.programs is None:
         out.append("programs: the job states no [operation.paths]")
     return tuple(out)

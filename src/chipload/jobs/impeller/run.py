@@ -25,6 +25,7 @@ from chipload.jobs.impeller.outcome import ImpellerResult, OneCutter, Searched, 
 from chipload.jobs.impeller.part import ImpellerPart, read_part
 from chipload.jobs.impeller.partition_programs import checked_partitions
 from chipload.jobs.impeller.paths import EDGE, finish_settings, walls_of
+from chipload.jobs.impeller.point_milling import checked_points, point_machine
 from chipload.jobs.impeller.ray_depth import ray_depth
 from chipload.jobs.impeller.roughing import checked_roughing
 from chipload.jobs.impeller.tables import ImpellerOperationTable
@@ -74,8 +75,7 @@ def run(
     _rougher(job, catalogue)
     _checkable(job, impeller)
     forces = force_terms(job, catalogue)
-    if job.flank_machine is not None:
-        flank_machine(job)
+    _five_axis_machines(job)
     op = job.operation
     provenance = _provenance(job, machine, catalogue, part)
     keep = KeptParts(checkpoint, digest(job.table.model_dump_json(), provenance.inputs, versions(), sources()))
@@ -118,7 +118,8 @@ def run(
     keep.write(at_once=True)
     chosen = {one.name: one.partition for one in checked}
     flanks = checked_flanks(job, how, catalogue) if op.flank is not None else None
-    milled = replace(milled, flanks=flanks)
+    points = checked_points(job, how, catalogue) if op.point_milling is not None else None
+    milled = replace(milled, flanks=flanks, points=points)
     return replace(milled, checked=checked, roughs=roughs, partitions=tuple(chosen.get(p.name, p) for p in partitions))
 
 
@@ -135,6 +136,14 @@ def _found(job: ImpellerJob, k: int) -> bytes:
     machine, catalogue, part = _machine(job), _catalogue(job), read_part(job)
     surface = _surfaces(job, part.impeller, _covering(job, part.impeller, catalogue))[k]
     return part_bytes(_search(job, surface, _tables(machine, job.operation), catalogue, silent))
+
+
+def _five_axis_machines(job: ImpellerJob) -> None:
+    """Refuse machines that have not two rotary axes which move in the cut."""
+    if job.flank_machine is not None:
+        flank_machine(job)
+    if job.point_machine is not None:
+        point_machine(job)
 
 
 def _checkable(job: ImpellerJob, impeller: Impeller) -> None:
@@ -156,7 +165,11 @@ def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue, part: 
 def _named(job: ImpellerJob) -> list[tuple[str, str | Path]]:
     """Shipped names or files by what they are."""
     named: list[tuple[str, str | Path]] = [("machine", job.machine), ("catalogue", job.catalogue)]
-    more = (("material", job.material), ("flank machine", job.flank_machine))
+    more = (
+        ("material", job.material),
+        ("flank machine", job.flank_machine),
+        ("point-milling machine", job.point_machine),
+    )
     return [*named, *((key, path) for key, path in more if path is not None)]
 
 
@@ -168,8 +181,7 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
     _rougher(job, catalogue)
     _checkable(job, impeller)
     force_terms(job, catalogue)
-    if job.flank_machine is not None:
-        flank_machine(job)
+    _five_axis_machines(job)
     lines = [f"impeller: {impeller.blades} blades{' and as many splitters' if impeller.splitter else ''}", *part.faces]
     table = _tables(machine, job.operation)
     angles = np.degrees(table.angle)

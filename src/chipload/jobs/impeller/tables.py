@@ -181,6 +181,17 @@ class FlankTable(Table):
     speed_rpm: Positive | None = Field(None, le=1e6, description="spindle speed; none: that of the operation")
 
 
+class PointMillingTable(Table):
+    """Point milling of the surfaces on a machine with five simultaneous axes, beside the other programs."""
+
+    machine: SourceTable = Field(description="with two rotary axes that move in the cut")
+    lean_deg: Annotated[Number, Field(ge=0.5, le=80.0)] = Field(
+        10.0, description="least angle of the cutter's axis from the normal of the surface"
+    )
+    feed_mm_min: Positive | None = Field(None, le=1e5, description="of the tip; none: that of the operation")
+    speed_rpm: Positive | None = Field(None, le=1e6, description="spindle speed; none: that of the operation")
+
+
 class ImpellerOperationTable(Table):
     """The search for the largest cutters of all surfaces."""
 
@@ -204,6 +215,7 @@ class ImpellerOperationTable(Table):
     paths: PathsTable | None = Field(None, description="none: the search and the patches alone, no programs")
     rough: RoughTable | None = Field(None, description="none: the programs finish only")
     flank: FlankTable | None = Field(None, description="none: no flank passes")
+    point_milling: PointMillingTable | None = Field(None, description="none: no point milling on five axes")
     forces: ForcesTable | None = Field(None, description="none: every pass has the same feed")
     hand_picked: PickedTable | None = Field(None, description="the cutter that is compared with")
 

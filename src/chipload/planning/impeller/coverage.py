@@ -5,14 +5,28 @@ Notation: a track runs along p, lines follow each other across q; at a place p i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
 from chipload.planning.impeller.scene import Floats
-from chipload.planning.impeller.track import ToolTrack
 
 
-def between_lines(tracks: tuple[ToolTrack, ...], along: str, at: Floats) -> NDArray[np.bool_]:
+class LinePlaces(Protocol):
+    """A piece of a line: its places (n, 2), u and v, and its number."""
+
+    @property
+    def at(self) -> Floats:
+        """Places."""
+
+    @property
+    def line(self) -> int:
+        """Number."""
+
+
+def between_lines(tracks: Sequence[LinePlaces], along: str, at: Floats) -> NDArray[np.bool_]:
     """Whether points (n, 2), u and v, lie between two lines that follow each other, both of which are milled there.
 
     Parameters

@@ -1,8 +1,12 @@
-"""The program of a flank pass: from above the part to the side, along it, and up again, on five simultaneous axes.
+"""The program of passes on five simultaneous axes: from above the part to the surface, along it, and up again.
 
-Notation: p tip [mm], A axis, N normal of the side; H(A) the height along A above which no check point lies. The cutter
-comes down along A beside the end of the pass, a lift off the side, goes to the side at the feed of the cut, along it,
-and leaves it the same way. A row whose rotary axes would turn faster than they can is fed more slowly.
+Notation: p tip [mm], A axis, N normal of the surface; H(A) the height along A above which no point of the impeller
+lies: of its outline, the corners of the convex body round all channels. The cutter comes down along A beside the end of
+the pass, a lift off the surface, goes to it at the feed of the cut, along it, and leaves it the same way. A row whose
+rotary axes would turn faster than they can is fed more slowly.
+
+At its end the cutter goes on above the part to where it begins in the next channel. So a program that is carried out
+again and again, the part turned on by a pitch each time, has no other ways than those of its rows.
 """
 
 from __future__ import annotations
@@ -10,13 +14,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol, Self
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.clearance.clearance import between, clearance
-from chipload.planning.impeller.flank import FlankPass
 from chipload.planning.impeller.links import Link, Moves
 from chipload.planning.impeller.programs import program_of
 from chipload.planning.impeller.scene import Floats, Scene
@@ -32,7 +37,46 @@ _SMALL = 12
 _TURN = math.radians(3.0)
 
 
-def lifted(path: FlankPass, end: int, scene: Scene, cutter: CatalogueCutter, how: Link, above: float) -> Floats | None:
+class AxisPath(Protocol):
+    """A pass: tips and axes, and the normal of the surface at each."""
+
+    @property
+    def tip(self) -> Floats:
+        """(n, 3) [mm]."""
+
+    @property
+    def axis(self) -> Floats:
+        """(n, 3) unit."""
+
+    @property
+    def normal(self) -> Floats:
+        """(n, 3) unit."""
+
+    def back(self) -> Self:
+        """The same from its end to its beginning."""
+
+
+def outline_of(scene: Scene, blades: int) -> Floats:
+    """Corners (k, 3) [mm] of the convex body round the check points of all channels.
+
+    >>> one = np.array([[2.0, 0, 0], [2.0, 0, 1.0], [1.0, 0, 0], [1.5, 0.1, 0.5]])
+    >>> none = np.zeros((1, 3))
+    >>> scene = Scene(none, none + [1, 0, 0], np.zeros((1, 3, 3)), np.zeros(1), one, np.zeros(4), 0.0)
+    >>> len(outline_of(scene, 4))
+    8
+    """
+    points = scene.check[ConvexHull(scene.check).vertices]
+    a = math.tau * np.arange(blades) / blades
+    c, s = np.cos(a)[:, None], np.sin(a)[:, None]
+    x, y, z = points.T
+    turned = np.stack([c * x - s * y, s * x + c * y, np.broadcast_to(z, (blades, len(z)))], axis=-1).reshape(-1, 3)
+    out: Floats = turned[ConvexHull(turned).vertices]
+    return out
+
+
+def lifted(
+    path: AxisPath, end: int, scene: Scene, outline: Floats, cutter: CatalogueCutter, how: Link, above: float
+) -> Floats | None:
     """The tip beside an end (0, -1) of a pass, from which the way up along the axis is free; None: there is none.
 
     ``above`` : clearance of neck, shank and holder [mm].
@@ -44,7 +88,7 @@ def lifted(path: FlankPass, end: int, scene: Scene, cutter: CatalogueCutter, how
         for way in (N, N + A, N + out, out, A):
             step = how.lift * size * way / np.linalg.norm(way)
             tips = p + np.arange(1, _SMALL + 1)[:, None] / _SMALL * step
-            rise = np.linspace(0.0, max(top_of(scene, A, how) - float(tips[-1] @ A), 0.0), _SMALL)
+            rise = np.linspace(0.0, max(top_of(outline, A, how) - float(tips[-1] @ A), 0.0), _SMALL)
             up = tips[-1] + rise[:, None] * A
             both = np.vstack([tips, up])
             got, _ = clearance(scene, cutter, both, np.tile(A, (len(both), 1)), how.lift + 1.0, above)
@@ -54,43 +98,46 @@ def lifted(path: FlankPass, end: int, scene: Scene, cutter: CatalogueCutter, how
     return None
 
 
-def top_of(scene: Scene, axis: Floats, how: Link) -> float:
+def top_of(outline: Floats, axis: Floats, how: Link) -> float:
     """The height along the axis at which the tip is above the part."""
-    return float((scene.check @ axis).max()) + how.above
+    return float((outline @ axis).max()) + how.above
 
 
 @dataclass(frozen=True, eq=False)
-class LinkedFlank:
-    """A flank pass with the tips (3,) [mm] beside its beginning and its end, of :func:`lifted`."""
+class LinkedPath:
+    """A pass with the tips (3,) [mm] beside its beginning and its end, of :func:`lifted`."""
 
-    path: FlankPass
+    path: AxisPath
     begin: Floats
     end: Floats
 
-    def back(self) -> LinkedFlank:
+    def back(self) -> LinkedPath:
         """The same from its end to its beginning."""
-        return LinkedFlank(self.path.back(), self.end, self.begin)
+        return LinkedPath(self.path.back(), self.end, self.begin)
 
 
-def flank_program(
-    passes: Sequence[LinkedFlank], scene: Scene, how: Link, feed: float, spindle: float, tool: int, machine: Machine
-) -> Program:
+def five_axis_program(
+    passes: Sequence[LinkedPath], outline: Floats, how: Link, feed: float, spindle: float, tool: int, machine: Machine,
+    pitch: float,
+) -> Program:  # fmt: skip
     """The program of passes in their order, every second one from its end, in the frame of the impeller.
 
     Parameters
     ----------
     feed : of the tip [mm/s]
     spindle : [rad/s]
+    pitch : from channel to channel [rad]
     """
     parts: list[Moves] = []
+    first: tuple[Floats, Floats] | None = None
     last: tuple[Floats, Floats] | None = None
     for k, one in enumerate(passes):
         turned = one if k % 2 == 0 else one.back()
         path, begin, end = turned.path, turned.begin, turned.end
         A0, A1 = path.axis[0], path.axis[-1]
-        over = [_over(scene, p, A, how) for p, A in ((begin, A0), (end, A1))]
+        over = [_over(outline, p, A, how) for p, A in ((begin, A0), (end, A1))]
         if last is not None:
-            parts.append(_round(scene, last, (over[0], A0), how))
+            parts.append(_round(outline, last, (over[0], A0), how))
         parts += [
             Moves.of(RAPID, over[0][None], A0[None], 0.0, "link"),
             Moves.of(LINE, begin[None], A0[None], how.feed, "link"),
@@ -99,28 +146,34 @@ def flank_program(
             Moves.of(LINE, end[None], A1[None], feed, "lead"),
             Moves.of(LINE, over[1][None], A1[None], how.feed, "link"),
         ]
-        last = (over[1], A1)
+        first, last = first or (over[0], A0), (over[1], A1)
+    if first is not None and last is not None:
+        c, s = math.cos(pitch), math.sin(pitch)
+        R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        onward = R @ first[0], R @ first[1]
+        parts.append(_round(outline, last, onward, how))
+        parts.append(Moves.of(RAPID, onward[0][None], onward[1][None], 0.0, "link"))
     program = program_of(Moves.join(parts), spindle, tool)
     share = rotary_share(program, machine)
     return replace(program, feed=program.feed / np.maximum(share, 1.0))
 
 
-def _over(scene: Scene, tip: Floats, axis: Floats, how: Link) -> Floats:
+def _over(outline: Floats, tip: Floats, axis: Floats, how: Link) -> Floats:
     """The tip moved up along the axis until it is above the part."""
-    out: Floats = tip + max(top_of(scene, axis, how) - float(tip @ axis), 0.0) * axis
+    out: Floats = tip + max(top_of(outline, axis, how) - float(tip @ axis), 0.0) * axis
     return out
 
 
-def _round(scene: Scene, a: tuple[Floats, Floats], b: tuple[Floats, Floats], how: Link) -> Moves:
+def _round(outline: Floats, a: tuple[Floats, Floats], b: tuple[Floats, Floats], how: Link) -> Moves:
     """Rapids above the part from one tip and axis to another: at every turn of the axis the tip is above the part."""
     angle = float(np.arccos(np.clip(a[1] @ b[1], -1.0, 1.0)))
     share = np.linspace(0.0, 1.0, max(int(np.ceil(angle / _TURN)), 1) + 1)[:-1]
     axes = between(np.tile(a[1], (len(share), 1)), np.tile(b[1], (len(share), 1)), share)
     tips = a[0] + share[:, None] * (b[0] - a[0])
     # between two of them the part may turn up towards the tip by its size times half of the angle
-    size = float(np.linalg.norm(scene.check, axis=1).max())
+    size = float(np.linalg.norm(outline, axis=1).max())
     more = 2.0 * size * _TURN
-    raised = np.array([_over(scene, p, A, how) + more * A for p, A in zip(tips, axes, strict=True)])
+    raised = np.array([_over(outline, p, A, how) + more * A for p, A in zip(tips, axes, strict=True)])
     return Moves.of(RAPID, raised, axes, 0.0, "link")
 
 

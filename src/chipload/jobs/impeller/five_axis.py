@@ -1,0 +1,148 @@
+"""What flank passes and point milling on five axes share: the machine, the check of a program, all channels.
+
+Notation: q position of the axis that turns the part about the impeller's z, theta = sense q; pitch = 2 pi / blades.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.errors import InputError
+from chipload.jobs.impeller.channels import turned
+from chipload.jobs.impeller.five_axis_outcome import AllChannels
+from chipload.jobs.impeller.paths import EDGE, walls_of
+from chipload.jobs.impeller.ray_depth import ray_depth
+from chipload.jobs.impeller.tables import PathsTable, SurfaceTable
+from chipload.machine.kinematics import forward
+from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.planning.impeller.settings import FinishSettings
+from chipload.planning.impeller.surfaces import BODIES
+from chipload.program.check import check_program
+from chipload.program.gcode.writer import Repeat
+from chipload.program.program import Program
+from chipload.program.read import times_on
+from chipload.program.to_axes import to_axes
+from chipload.simulation.channel.channel import Remainder, SurfacePoints, left_on, wall
+from chipload.simulation.channel.gouges import Gouge, deepest_gouge
+
+Floats = NDArray[np.float64]
+
+#: how near the check finds the depth of a gouge, of what is allowed
+_RESOLUTION = 0.2
+#: distance of the points of a surface on which what is left is measured, height of their rays [mm]
+_SPACING, _HEIGHT = 0.6, 1.0
+#: by which axis positions may differ at the end of a channel and at the beginning of the next [mm, rad]
+_SAME = 1e-6
+#: of a program, a row each
+_COLUMNS = (
+    "motion", "p_work", "axis", "centre", "normal", "turns", "feed", "spindle", "tool", "line", "label", "path_mode",
+)  # fmt: skip
+
+
+def five_axis_machine(source: str | Path | None, key: str) -> Machine:
+    """A machine by its shipped name or file, with two rotary axes that move in the cut.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or has not two such axes.
+    """
+    if source is None:
+        raise InputError(f"{key}.machine: missing: state one with two rotary axes that move in the cut")
+    machine = machine_named(source) if isinstance(source, str) else read_machine(source)
+    free = sum(not axis.indexed for axis in machine.chain.rotary)
+    if free < 2:
+        raise InputError(f"{key}.machine: {machine.name} has {free} rotary axes that move in the cut: must have two")
+    return machine
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramCheck:
+    """What the check finds of a program: gouge, what is left, what the machine does not give, time [s]."""
+
+    gouge: Gouge
+    left: Remainder
+    findings: tuple[str, ...]
+    seconds: float
+
+
+def program_check(
+    how: FinishSettings, side: SurfaceTable, machine: Machine, cutter: CatalogueCutter, program: Program,
+    paths: PathsTable, points: SurfacePoints | None = None,
+) -> ProgramCheck:  # fmt: skip
+    """The check of a program of a surface, as of every program; ``points`` of the surface, None: evenly over it."""
+    at = surface_points(how, side) if points is None else points
+    depth = ray_depth(how.impeller, EDGE, paths.gouge_mm)
+    (left,) = left_on([at], program, cutter, _HEIGHT, depth, workers=how.workers)
+    gouge = deepest_gouge(
+        walls_of(how.impeller, how.ahead), program, cutter, depth, _RESOLUTION * paths.gouge_mm, paths.gouge_mm,
+        workers=how.workers,
+    )  # fmt: skip
+    _, beyond = to_axes(program, machine)
+    texts = tuple(f.text for f in (*beyond, *check_program(program, machine)))
+    return ProgramCheck(gouge, left, texts, float(times_on(program, machine).sum()))
+
+
+def surface_points(how: FinishSettings, side: SurfaceTable, apart: float = _SPACING) -> SurfacePoints:
+    """Points of the part of a surface that a job names, at most ``apart`` [mm] from one another."""
+    surface = how.surface(BODIES.index(side.body), side.side)
+    grid = []
+    for (low, high), other, first in ((side.along, side.up, True), (side.up, side.along, False)):
+        t, q = np.linspace(low, high, 41), np.linspace(*other, 5)
+        lines = [surface.at(t, x) if first else surface.at(np.full(41, x), t) for x in q]
+        size = max(float(np.linalg.norm(np.diff(x, axis=0), axis=1).sum()) for x in lines)
+        grid.append(np.linspace(low, high, max(math.ceil(size / apart), 2) + 1))
+    return wall(f"{side.body} {side.side}", surface, *grid)
+
+
+def part_axis(machine: Machine) -> tuple[str, int] | None:
+    """Letter and sense of the axis that turns the part about the work's z, whatever the others do; None: there is none.
+
+    >>> part_axis(machine_named("cradle-ac")), part_axis(machine_named("xyzbcw-bridge"))
+    (('C', -1), None)
+    """
+    for axis in machine.chain.rotary:
+        if axis.indexed or axis.head:
+            continue
+        q = np.zeros((2, 9))
+        for k, other in enumerate(machine.chain.axes):
+            q[:, other.column] = 0.3 + 0.2 * k if other.rotary else 10.0 + 7.0 * k
+        q[:, axis.column] = 0.0, 1.0
+        p, T = forward(machine, q)
+        for sense in (1, -1):
+            c, s = math.cos(sense), math.sin(sense)
+            R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+            if max(np.abs(R @ p[0] - p[1]).max(), np.abs(R @ T[0] - T[1]).max()) < _SAME:
+                return axis.letter, sense
+    return None
+
+
+def all_channels(program: Program, machine: Machine, blades: int) -> AllChannels | str:
+    """The program of one channel for all of them: in a loop, else row by row; a text where neither can be.
+
+    The program ends above the beginning of the next channel, so that there are no other ways than those of its rows.
+    """
+    commands, _ = to_axes(program, machine)
+    q, about = commands.position, part_axis(machine)
+    if about is not None:
+        axis = machine.chain.axis(about[0])
+        on = np.zeros(q.shape[1])
+        on[axis.column] = about[1] * math.tau / blades
+        last = (blades - 1) * on[axis.column]
+        own = q[:, axis.column]
+        inside = own.min() + min(last, 0.0) >= axis.low and own.max() + max(last, 0.0) <= axis.high
+        if inside and np.abs(q[-1] - q[0] - on).max() < _SAME:
+            return AllChannels(Repeat(about[0], blades, 360.0 * about[1]), program)
+    every = [turned(program, math.tau * k / blades) for k in range(blades)]
+    columns: dict[str, Any] = {name: np.concatenate([getattr(one, name) for one in every]) for name in _COLUMNS}
+    whole = replace(program, **columns)
+    _, beyond = to_axes(whole, machine)
+    texts = [f.text for f in (*beyond, *check_program(whole, machine))]
+    return f"no program of all channels: {texts[0]}" if texts else AllChannels(None, whole)

@@ -1,0 +1,201 @@
+"""What flank passes and point milling on five axes come to: program, what the check finds, or why there is none."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.machine.machine import Machine
+from chipload.planning.impeller.flank import FlankPass
+from chipload.planning.impeller.point_milling import PointPath
+from chipload.program.gcode.writer import Repeat
+from chipload.program.program import Program
+from chipload.simulation.channel.channel import Remainder
+from chipload.simulation.channel.gouges import Gouge
+
+
+@dataclass(frozen=True)
+class AllChannels:
+    """One program for all channels.
+
+    Parameters
+    ----------
+    repeat : a loop that offsets the axis that turns the part; None: every channel has its rows
+    program : rows of one channel with ``repeat``, of all without
+    """
+
+    repeat: Repeat | None
+    program: Program
+
+
+@dataclass(frozen=True, eq=False)
+class FiveAxisProgram:
+    """The program of a surface with what the check finds.
+
+    Parameters
+    ----------
+    name : `blade plus`
+    machine, cutter : what it is written for
+    program : of one channel, to above the beginning of the next
+    gouge, left : as of every program
+    allowed, most : gouge, and what may be left [mm]
+    findings : what the program asks of the machine that it does not give
+    seconds : of one channel
+    channels : how many there are
+    every : of all channels; a text why there is none
+    """
+
+    name: str
+    machine: Machine
+    cutter: CatalogueCutter
+    program: Program
+    gouge: Gouge
+    left: Remainder
+    allowed: float
+    most: float
+    findings: tuple[str, ...]
+    seconds: float
+    channels: int
+    every: AllChannels | str
+
+    #: key of the limit on what is left
+    limit = "excess_mm"
+
+    @property
+    def excess(self) -> float:
+        """The most that is left on the surface [mm]."""
+        return float(self.left.rest.max())
+
+    @property
+    def fails(self) -> tuple[str, ...]:
+        """What does not hold."""
+        out = [f"{self.name}: {f}" for f in self.findings]
+        if self.gouge.bound > self.allowed:
+            out.append(f"{self.name}: {self.gouge.message}: gouge_mm = {self.allowed:g} is allowed")
+        if self.excess > self.most:
+            out.append(f"{self.name}: {self.excess:.4f} mm are left: {self.limit} = {self.most:g} is allowed")
+        return tuple(out)
+
+    @property
+    def verified(self) -> bool:
+        """No gouge, nothing beyond the machine, no more left than is allowed."""
+        return not self.fails
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedFlank(FiveAxisProgram):
+    """The flank passes of a side; ``passes`` of one channel."""
+
+    passes: tuple[FlankPass, ...]
+
+    @property
+    def deviation(self) -> float:
+        """The greatest of all passes [mm]."""
+        return max(p.deviation for p in self.passes)
+
+    @property
+    def length(self) -> float:
+        """Of the path in the cut [mm]."""
+        return math.fsum(p.length for p in self.passes)
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedPoints(FiveAxisProgram):
+    """Point milling of a surface.
+
+    Parameters
+    ----------
+    path : of one channel
+    along : `u` or `v`, which its lines run along
+    slowed : share of the rows in the cut that are fed more slowly, for a rotary axis
+    scallop : mean height between its lines [mm]; None: there are no two
+    """
+
+    path: PointPath
+    along: str
+    slowed: float
+    scallop: float | None
+
+    limit = "scallop_mm"
+
+    @property
+    def length(self) -> float:
+        """Of the path in the cut [mm]."""
+        return self.path.length
+
+
+@dataclass(frozen=True)
+class NoFiveAxisPath:
+    """A surface that no cutter of the catalogue mills so, and why."""
+
+    name: str
+    reason: str
+
+
+def flank_numbers(one: CheckedFlank | NoFiveAxisPath, file: str) -> dict[str, Any]:
+    """Flank passes of one channel in summary.json; ``file`` the name of its program."""
+    if isinstance(one, NoFiveAxisPath):
+        return _none(one)
+    return {
+        **_head(one, file),
+        "passes": len(one.passes),
+        "path_mm": one.length,
+        **_times(one),
+        "deviation_mm": one.deviation,
+        "above_least_mm": max(p.unimproved for p in one.passes),
+        "excess_mm": one.excess,
+        **_found(one),
+    }
+
+
+def points_numbers(one: CheckedPoints | NoFiveAxisPath, file: str) -> dict[str, Any]:
+    """Point milling of one channel in summary.json; ``file`` the name of its program."""
+    if isinstance(one, NoFiveAxisPath):
+        return _none(one)
+    return {
+        **_head(one, file),
+        "lines": one.path.lines,
+        "lines_along": one.along,
+        "path_mm": one.length,
+        **_times(one),
+        "axis_turn_deg_mm": math.degrees(one.path.turn),
+        "slowed_share": one.slowed,
+        "scallop_greatest_mm": one.excess,
+        "scallop_mean_share": None if one.scallop is None else one.scallop / one.most,
+        **_found(one),
+    }
+
+
+def _none(one: NoFiveAxisPath) -> dict[str, Any]:
+    return {"surface": one.name, "program": None, "verdict": None, "reason": one.reason}
+
+
+def _head(one: FiveAxisProgram, file: str) -> dict[str, Any]:
+    return {
+        "surface": one.name,
+        "diameter_mm": one.cutter.diameter,
+        "corner_radius_mm": one.cutter.corner_radius,
+        "machine": one.machine.name,
+        "program": file,
+        "rows": len(one.program),
+    }
+
+
+def _times(one: FiveAxisProgram) -> dict[str, Any]:
+    return {
+        "time_min": one.seconds / 60.0,
+        "channels": one.channels,
+        "time_all_channels_min": one.channels * one.seconds / 60.0,
+        "all_channels": one.every if isinstance(one.every, str) else ("loop" if one.every.repeat else "expanded"),
+    }
+
+
+def _found(one: FiveAxisProgram) -> dict[str, Any]:
+    return {
+        "gouge_mm": one.gouge.found,
+        "gouge_bound_mm": one.gouge.bound if math.isfinite(one.gouge.bound) else None,
+        "verdict": "holds" if one.verified else "exceeds",
+        "reason": None,
+    }

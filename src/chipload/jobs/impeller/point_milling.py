@@ -1,0 +1,174 @@
+"""Point milling of the surfaces of an impeller on five simultaneous axes: planned, written, checked.
+
+It stands beside the programs of the index table: the same surfaces, each in one path with a smooth axis, with the
+cutter of the catalogue whose path is the shortest of those that reach all of it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.catalogue import Catalogue, CatalogueCutter
+from chipload.errors import InputError
+from chipload.geometry.bspline import BSplinePatch
+from chipload.jobs.impeller.five_axis import all_channels, five_axis_machine, program_check, surface_points
+from chipload.jobs.impeller.five_axis_outcome import CheckedPoints, NoFiveAxisPath
+from chipload.jobs.impeller.job import ImpellerJob
+from chipload.jobs.impeller.tables import PathsTable, PointMillingTable, SurfaceTable
+from chipload.machine.machine import Machine
+from chipload.planning.impeller.axis_field import AxisField, AxisLimits, clear_field, directions
+from chipload.planning.impeller.coverage import between_lines
+from chipload.planning.impeller.five_axis_program import (
+    LinkedPath,
+    five_axis_program,
+    lifted,
+    outline_of,
+    rotary_share,
+)
+from chipload.planning.impeller.lines import stretched
+from chipload.planning.impeller.point_milling import PointPath, point_path
+from chipload.planning.impeller.settings import FinishSettings
+from chipload.planning.impeller.surfaces import BODIES
+from chipload.program.program import Program
+from chipload.progress import Progress, silent
+from chipload.simulation.channel.channel import Remainder, scallop_numbers
+from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
+
+#: of the gouge that is allowed, what the plan uses at the check points
+_SHARE = 0.2
+#: cutters of each corner radius whose paths are laid out where they go
+_PATHS = 2
+#: distance of the points on which scallops are measured [mm]
+_FINE = 0.25
+
+
+class _PlannedPoints(NamedTuple):
+    cutter: CatalogueCutter
+    along: str
+    path: LinkedPath
+    points: PointPath
+
+
+def point_machine(job: ImpellerJob) -> Machine:
+    """The machine of the point milling.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or has not two rotary axes that move in the cut.
+    """
+    return five_axis_machine(job.point_machine, "operation.0.point_milling")
+
+
+def checked_points(
+    job: ImpellerJob, how: FinishSettings, catalogue: Catalogue, progress: Progress = silent
+) -> tuple[CheckedPoints | NoFiveAxisPath, ...]:
+    """Point milling of each surface that the job names."""
+    op, impeller = job.operation, how.impeller
+    table, paths = op.point_milling, op.paths
+    if table is None or paths is None:
+        return ()
+    machine = point_machine(job)
+    outline, reachable = outline_of(how.scene, impeller.blades), directions(machine)
+    feed = mm_s_from_mm_min(table.feed_mm_min if table.feed_mm_min is not None else op.feed_mm_min)
+    spindle = rad_s_from_rpm(table.speed_rpm if table.speed_rpm is not None else op.speed_rpm)
+    limits = AxisLimits(math.radians(table.lean_deg), _SHARE * paths.gouge_mm, op.clearance_mm, op.scallop_mm)
+    out: list[CheckedPoints | NoFiveAxisPath] = []
+    for k, side in enumerate(job.table.surface):
+        found = _planned(how, side, catalogue, table, paths, limits, reachable, outline)
+        if isinstance(found, NoFiveAxisPath):
+            out.append(found)
+        else:
+            program = five_axis_program(
+                [found.path], outline, how.link, feed, spindle, k + 1, machine, impeller.pitch
+            )  # fmt: skip
+            got = program_check(how, side, machine, found.cutter, program, paths, surface_points(how, side, _FINE))
+            out.append(CheckedPoints(
+                f"{side.body} {side.side}", machine, found.cutter, program, got.gouge, got.left, paths.gouge_mm,
+                op.scallop_mm, got.findings, got.seconds, impeller.blades,
+                all_channels(program, machine, impeller.blades), found.points, found.along,
+                _slowed(program, machine, feed), _scallop(found, got.left),
+            ))  # fmt: skip
+        progress((k + 1) / len(job.table.surface), f"point milling of {k + 1} surfaces")
+    return tuple(out)
+
+
+def _planned(
+    how: FinishSettings, side: SurfaceTable, catalogue: Catalogue, table: PointMillingTable, paths: PathsTable,
+    limits: AxisLimits, reachable: tuple[NDArray[np.float64], NDArray[np.bool_]], outline: NDArray[np.float64],
+) -> _PlannedPoints | NoFiveAxisPath:  # fmt: skip
+    """The shortest path of all cutters that reach the whole surface."""
+    name = f"{side.body} {side.side}"
+    surface = how.surface(BODIES.index(side.body), side.side)
+    u, v = side.along, side.up
+    box = tuple(
+        (float(x[0]), float(x[-1]))
+        for x in (
+            stretched(surface, "u", u, v, 2, paths.overrun_mm), stretched(surface, "v", v, u, 2, paths.overrun_mm)
+        )
+    )  # fmt: skip
+    best: _PlannedPoints | None = None
+    why: list[str] = []
+    for corner in catalogue.families:
+        laid = 0
+        for cutter in reversed(catalogue.family(corner)):
+            field = clear_field(surface, (box[0], box[1]), how.scene, cutter, reachable, limits)
+            if isinstance(field, str):
+                why.append(f"D {cutter.diameter:g} r {corner:g}: {field}")
+                continue
+            found = _path(how, surface, (u, v), field, cutter, limits, paths, outline)
+            if isinstance(found, str):
+                why.append(f"D {cutter.diameter:g} r {corner:g}: {found}")
+            elif best is None or found.points.length < best.points.length:
+                best = found
+            laid += 1
+            if laid >= _PATHS:
+                break
+    if best is not None:
+        return best
+    return NoFiveAxisPath(
+        name,
+        f"{name}: no point milling: none of {len(catalogue.cutters)} cutters reaches all of it with one smooth axis: "
+        f"{why[-1]}: state a smaller part of it, a lean_deg below {table.lean_deg:g}, or add smaller or longer cutters",
+    )
+
+
+def _path(
+    how: FinishSettings, surface: BSplinePatch, box: tuple[tuple[float, float], tuple[float, float]], field: AxisField,
+    cutter: CatalogueCutter, limits: AxisLimits, paths: PathsTable, outline: NDArray[np.float64],
+) -> _PlannedPoints | str:  # fmt: skip
+    """The shorter one of lines along u and along v; or why there is none."""
+    best: _PlannedPoints | None = None
+    why = "there is no way off the surface at the ends of its path"
+    for along in sorted("uv", key=lambda x: field.path(surface, x)):
+        try:
+            points = point_path(surface, along, box, field, cutter, limits.scallop, paths.chord_mm)
+        except InputError as err:
+            why = str(err)
+            continue
+        if best is not None and points.length >= best.points.length:
+            continue
+        begin, end = (
+            lifted(points, k, how.scene, outline, cutter, how.link, limits.above) for k in (0, -1)
+        )  # fmt: skip
+        if begin is not None and end is not None:
+            best = _PlannedPoints(cutter, along, LinkedPath(points, begin, end), points)
+    return why if best is None else best
+
+
+def _slowed(program: Program, machine: Machine, feed: float) -> float:
+    """Share of the rows in the cut in which a rotary axis is at its greatest rate."""
+    cut = np.array([label == "finish" for label in program.labels])[program.label]
+    return float((rotary_share(program, machine)[cut] > 1.0 - 1e-6).mean())
+
+
+def _scallop(found: _PlannedPoints, left: Remainder) -> float | None:
+    """Mean height [mm] of the scallops between two lines; None: there are none."""
+    w = left.wall
+    within = between_lines(found.points.each_line, found.along, np.column_stack([w.u, w.v]))
+    crests = left.scallops("v" if found.along == "u" else "u", within)
+    return scallop_numbers(crests, 1.0)["mean_mm"] if len(crests) else None
