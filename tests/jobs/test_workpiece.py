@@ -86,6 +86,36 @@ def changed(job_file: Path, old: str, new: str) -> Path:
     return job_file
 
 
+#: strip of 50 x 16 mm, 3 mm high, held at both ends, made 2.5 mm thin by a flat end from above
+FLOOR = ("""[stock]
+low_mm = [0.0, -8.0, -3.0]
+high_mm = [50.0, 8.0, 0.0]
+layer_mm = 0.5
+""", """order = 3
+cell_mm = 2.5
+[[workpiece.clamp]]
+low_mm = [0.0, -8.0, -3.0]
+high_mm = [5.0, 8.0, -0.5]
+[[workpiece.clamp]]
+low_mm = [45.0, -8.0, -3.0]
+high_mm = [50.0, 8.0, -0.5]
+""")  # fmt: skip
+
+
+def test_a_floor_gives_way_along_the_axis(job_file):
+    """A flat end over a thin floor: the axial force on a beam that is held at both ends, F L^3 / (192 E I)."""
+    path = changed(job_file, '[stock]\nfile = "wall.stl"\nunits = "mm"\nlayer_mm = 2.0\n', FLOOR[0])
+    path = changed(path, '[[workpiece.clamp]]\nface = "z-"\n', FLOOR[1])
+    path = changed(path, "diameter_mm = 10.0", "diameter_mm = 20.0")
+    (path.parent / "wall.nc").write_text(
+        "%\nG21 G90 G17 G54\nT1 M6\nS6000 M3\nG0 X-16. Y0. Z10.\nG0 Z-0.5\nG1 X66. F600.\nG0 Z10.\nM30\n%\n"
+    )
+    c = run(loaded(path)).simulated.removal.columns
+    middle = np.abs(c["x_mm"] - 24.0) < 2.5
+    beam = 40.0**3 / (192.0 * 70e3 * 16.0 * 2.5**3 / 12.0)
+    assert 1e-3 * c["deflection_workpiece_um"][middle] / -c["force_z_min_n"][middle] == pytest.approx(beam, rel=0.1)
+
+
 def test_a_wall_gives_way_as_a_plate(job_file):
     done = run(loaded(job_file))
     simulation = done.simulated

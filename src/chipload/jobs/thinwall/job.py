@@ -134,6 +134,11 @@ def _of_operation(
     """What an operation contradicts: its cutter, the feet of the walls and the greatest stock."""
     where = f"operation.{number}"
     yield from unknown_cutter(f"{where}.cutter", op.cutter, tools)
+    if op.cutter in tools and tools[op.cutter].body:
+        yield (
+            f"{where}.cutter = {op.cutter}: is a body (barrel, tap), whose chips are not simulated: state a "
+            "ball nose or a bull nose"
+        )
     if (op.step_over_mm is None) == (op.scallop_um is None):
         said = "none is" if op.step_over_mm is None else "both are"
         yield f"{where}: {said} stated: state either step_over_mm or scallop_um"

@@ -196,8 +196,8 @@ def _standing(patch: BSplinePatch, key: str, face: Face) -> BSplinePatch:
     if flat > STEEPEST:
         raise InputError(
             f"{key}: face {face.number} lies rather than stands: its normal is {np.degrees(np.arcsin(flat)):.3g} deg "
-            f"off the horizontal, at most {np.degrees(np.arcsin(STEEPEST)):g}: floors are not planned, state the side "
-            "of a wall, z up"
+            f"off the horizontal, at most {np.degrees(np.arcsin(STEEPEST)):g}: floors are not planned: state the "
+            "side of a wall, z up; for a floor, simulate its program with [workpiece] and [operation.feeds]"
         )
     ways = [q for p in (patch, patch.swapped()) for q in (p, p.reversed(False, True))]
     patch = max(ways, key=lambda q: float((q.at(FEW, 1.0) - q.at(FEW, 0.0))[:, 2].mean()))
