@@ -63,6 +63,7 @@ def optimise_feeds(
     limits: Values,
     part: Source | None = None,
     fixture: Tables = (),
+    machine_table: Values | None = None,
     stiffness: Values | None = None,
     workpiece: Values | None = None,
     dynamics: Values | None = None,
@@ -79,14 +80,15 @@ def optimise_feeds(
     program : the program's file, or keys of ``[program]``
     operation : keys of the ``[[operation]]`` of kind ``simulate``, with its table ``feeds``
     limits : keys of ``[limits]``; at least one of a load
-    part, fixture, stiffness, workpiece, dynamics : keys of the table of this name; None: it is left out
+    part, fixture, machine_table, stiffness, workpiece, dynamics : keys of the table of this name; None: it is left out
     """
     for k, op in enumerate(tables_of("operation", operation)):
         if op.get("feeds") is None:
             raise InputError(f"operation.{k}.feeds: missing: state the range of the new feeds; without it use simulate")
     return run_tables(
         "feeds", folder, progress, ("simulate",), program=program, stock=stock, machine=machine, material=material,
-        cutter=cutters_of(cutter), operation=operation, limits=limits, part=part, fixture=fixture, stiffness=stiffness,
+        cutter=cutters_of(cutter), operation=operation, limits=limits, part=part, fixture=fixture,
+        machine_table=machine_table, stiffness=stiffness,
         workpiece=workpiece, dynamics=dynamics, checks=checks,
     )  # fmt: skip
 
