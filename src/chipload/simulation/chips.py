@@ -11,22 +11,17 @@ and :mod:`chipload.engagement.immersion.immersion` for the one in force.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
-from shapely import MultiPolygon, Polygon, box
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import Slices, slices
 from chipload.cutting.band import deviations, mean_basis
 from chipload.cutting.material import Material
-from chipload.engagement.chips.move import Move
-from chipload.engagement.immersion.immersion import Section
 from chipload.engagement.moves.stock import Engaged
 from chipload.engagement.tooth_engagement import with_runout
 from chipload.errors import Finding, InputError
@@ -34,32 +29,37 @@ from chipload.program.motions import lengths
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
 from chipload.simulation.accuracy import COMPARED, energy_balance, layers_again, moves_again, resolution_error
+from chipload.simulation.layer_removal import removed_by_layers
 from chipload.simulation.loads import (
     LOADS,
     Cuts,
-    StepEngagement,
     bands_of_steps,
-    engagement_of_step,
     engagement_of_steps,
     joined,
     loads_of_steps,
     over_turn,
 )
 from chipload.simulation.moves import Engine, HandOver, MoveRun, leans, moved, run_by_moves, with_contact
-from chipload.simulation.removal import ChipAreas, Columns, Removal, Resolution, RunningSums, RunSettings, Watch
-from chipload.simulation.shank import axial_overrun
+from chipload.simulation.removal import (
+    ChipAreas,
+    Columns,
+    Removal,
+    Resolution,
+    RunningSums,
+    RunSettings,
+    TakenByLayers,
+    Watch,
+)
 from chipload.simulation.steps import BLOCK, ROWS, StepBlocks, Steps, steps_in_blocks
-from chipload.simulation.swept_area import TOGETHER, Interpolation, swept_ahead
+from chipload.simulation.strips import strips_for
+from chipload.simulation.swept_area import Interpolation
 from chipload.stock.layers import LayeredStock
-from chipload.stock.tile_grid import polygons
 from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
 
 #: most steps of a simulation
 MOST_STEPS = 50_000_000
-#: a piece of a chip narrower than so many tolerances is a film left by chords, no piece
-FILM = 4.0
 #: blocks of steps that go together by moves
 MOVES = 8
 
@@ -77,6 +77,7 @@ def remove(
     times: Floats | None = None,
     accuracy: bool = True,
     workers: int = 2,
+    processes: int = 1,
     engine: Engine = "layers",
     progress: Progress = silent,
 ) -> Removal:
@@ -96,7 +97,9 @@ def remove(
     times : (n,) float [s], time of each row of the program on the machine (:mod:`chipload.program.time`), for ``t_s``
         and ``duration_s``; None: at the commanded feed, rapids take none
     accuracy : find ``energy_balance`` and ``resolution_error``, which costs some steps once more
-    workers : threads that find areas ahead of the removal; the result does not depend on it
+    workers : threads that find areas ahead of the removal
+    processes : of layers, each with a strip of the stock (:mod:`chipload.simulation.strips`); the result does not
+        depend on threads and processes
     engine : ``layers`` or ``moves``; ``auto``: by moves what goes by moves, see :mod:`chipload.simulation.moves`, and
         else the whole program by layers, with a finding ``handed-over``
 
@@ -125,7 +128,7 @@ def remove(
     O(n l m): n steps, l layers under the cutter, m edges of the stock around it; m does not grow with n.
     """
     count = counted(program, cutters, resolution)
-    setting = setting_of(cutters, material, resolution, interpolation, watch, workers)
+    setting = setting_of(cutters, material, resolution, interpolation, watch, workers, processes)
     setting, handed = with_engine(engine, setting, program, stock)
     before = stock.copied() if accuracy else None
     while True:
@@ -134,15 +137,19 @@ def remove(
             program, resolution.step_mm, resolution.tolerance, size=block_of(setting), times=times
         )  # fmt: skip
         try:
-            for steps, contact in with_contact(blocks, setting.moves, setting.workers):
-                progress(sums.steps / count, "removing")
-                sums, some, cuts = remove_block(steps, stock, sums, setting, contact)
-                columns.append(some)
-                for bite in cuts if keep else ():
-                    kept.setdefault(bite.tool, []).append(bite)
+            with strips_for(program, stock, setting, block_of(setting)) as strips:
+                for steps, contact in with_contact(blocks, setting.moves, setting.workers):
+                    progress(sums.steps / count, "removing")
+                    found = None if strips is None else strips.next(steps, sums.piece)
+                    sums, some, cuts = remove_block(steps, stock, sums, setting, contact, found)
+                    columns.append(some)
+                    for bite in cuts if keep else ():
+                        kept.setdefault(bite.tool, []).append(bite)
+                if strips is not None:
+                    strips.finish()
             break
-        except HandOver as found:
-            setting, handed = by_layers(engine, setting, found)
+        except HandOver as why:
+            setting, handed = by_layers(engine, setting, why)
     progress(1.0, "removed")
     cut = tuple(joined(kept[number]) for number in sorted(kept))
     if setting.moves is not None:
@@ -230,10 +237,11 @@ def setting_of(
     interpolation: Interpolation,
     watch: Watch | None,
     workers: int,
+    processes: int = 1,
 ) -> RunSettings:
     """What a run keeps to."""
     profiles = {n: profile_of(c, resolution) for n, c in cutters.items()}
-    return RunSettings(cutters, profiles, material, resolution, interpolation, watch, workers)
+    return RunSettings(cutters, profiles, material, resolution, interpolation, watch, workers, None, processes)
 
 
 def profile_of(cutter: Cutter, resolution: Resolution) -> Slices:
@@ -287,14 +295,20 @@ def counted(program: Program, cutters: Mapping[int, Cutter], resolution: Resolut
 
 
 def remove_block(
-    steps: Steps, stock: LayeredStock, sums: RunningSums, setting: RunSettings, contact: Engaged | None = None
+    steps: Steps,
+    stock: LayeredStock,
+    sums: RunningSums,
+    setting: RunSettings,
+    contact: Engaged | None = None,
+    found: TakenByLayers | None = None,
 ) -> tuple[RunningSums, dict[str, NDArray[Any]], list[Cuts]]:
     """Take what some steps cut from the stock: the sums after them, their columns, what the teeth cut in them;
-    ``contact``: what they engage by moves, where that is known.
+    ``contact``: what they engage by moves, ``found``: what they take by layers, where that is known.
     """
     if setting.moves is not None:
         return _moved_block(steps, setting.moves, sums, setting, contact)
-    removed, bites, piece = _removed(steps, stock, sums, setting)
+    taken = removed_by_layers(steps, stock, sums.steps, setting, sums.piece) if found is None else found
+    removed, bites, piece = taken.removed, taken.engagement, taken.piece
     loads, basis, cut = np.zeros((len(steps), len(LOADS))), sums.basis, list[Cuts]()
     watched: dict[str, Floats] = {}
     for number in sorted({int(steps.tool[c.step]) for c in bites}):
@@ -383,78 +397,6 @@ def stacked(blocks: Sequence[Columns]) -> dict[str, NDArray[Any]]:
         name: np.concatenate([b[name] if name in b else np.zeros(n) for b, n in zip(blocks, count, strict=True)])
         for name in dict.fromkeys(name for b in blocks for name in b)
     }
-
-
-def _removed(
-    steps: Steps, stock: LayeredStock, sums: RunningSums, setting: RunSettings
-) -> tuple[Floats, list[StepEngagement], ChipAreas | None]:
-    """(n, 4) volume, pieces and layers of each chip, contact of the shank; what the teeth cut; the chip of most pieces
-    so far.
-    """
-    thickness, tolerance, best = stock.thickness.tolist(), setting.resolution.tolerance, sums.piece
-    rank = _rank(best.chips) if best is not None else (0, 0.0)
-    removed = np.zeros((len(steps), 4))
-    cutting: list[tuple[int, Move, Section]] = []
-    waiting: list[Future[list[StepEngagement]]] = []
-
-    def engaged(those: list[tuple[int, Move, Section]]) -> list[StepEngagement]:
-        tools = [int(steps.tool[k]) for k, _, _ in those]
-        return [
-            engagement_of_step(steps, k, move, setting.cutters[n], setting.profiles[n], there, tolerance)
-            for n, (k, move, there) in zip(tools, those, strict=True)
-        ]
-
-    ahead = swept_ahead(steps, stock, setting.cutters, setting.interpolation, tolerance, setting.workers)
-    with ThreadPoolExecutor(1) as beside:
-        for k, swept in ahead:
-            met, low, high = swept.met, swept.low[:2], swept.high[:2]
-            # a point below the lowest section of the box is held against the section below it
-            layers = range(max(swept.layers.start - 1, 0), min(swept.layers.stop + 1, stock.layers))
-            there = Section(*stock.edges(layers, low, high))
-            tidied = stock.tidied
-            taken = stock.remove_many([i for i, _ in met], [shape for _, shape in met], 0.5 * tolerance)
-            volume, most, lost = tidied - stock.tidied, 0, 0
-            for i, pieces, area, whole in _chips(met, taken, tolerance):
-                volume, lost, most = volume + area * thickness[i], lost + 1, max(most, len(whole))
-                if whole and rank < (len(whole), 1.0 / len(whole)) and _rank(whole) > rank:
-                    rank = _rank(whole)
-                    near = polygons(stock.section(i).union(MultiPolygon(pieces)).intersection(box(*low, *high)))
-                    cutter, z = setting.cutters[int(steps.tool[k])], float(stock.heights[i])
-                    best = ChipAreas(sums.steps + k, swept.move, cutter, z, MultiPolygon(near), tuple(whole))
-            removed[k, :3] = volume, most, lost
-            if most:
-                cutter = setting.cutters[int(steps.tool[k])]
-                removed[k, 3] = axial_overrun(stock, cutter, steps.p1[k], steps.a1[k], FILM * tolerance)
-            # what is thinner than the tolerance can tell is no cut
-            if most and not steps.rapid[k]:
-                cutting.append((k, swept.move, there))
-            if len(cutting) == TOGETHER:
-                waiting.append(beside.submit(engaged, cutting))
-                cutting = []
-        waiting.append(beside.submit(engaged, cutting))
-        return removed, [bite for several in waiting for bite in several.result()], best
-
-
-def _rank(whole: Sequence[Polygon]) -> tuple[int, float]:
-    """By how many pieces a chip stands out, and by how alike they are."""
-    areas = [p.area for p in whole]
-    return len(areas), min(areas) / sum(areas) if areas else 0.0
-
-
-def _chips(
-    met: list[tuple[int, Polygon | MultiPolygon]], taken: list[list[Polygon]], tolerance: float
-) -> Iterator[tuple[int, list[Polygon], float, list[Polygon]]]:
-    """Of each layer that lost something: its number, the pieces, their area, those that are more than films."""
-    flat = [p for pieces in taken for p in pieces]
-    area = shapely.area(flat)
-    film = (2.0 * area <= FILM * tolerance * shapely.length(flat)).tolist()
-    at = 0
-    for (i, _), pieces in zip(met, taken, strict=True):
-        if pieces:
-            a, b = at, at + len(pieces)
-            whole = [p for p, thin in zip(pieces, film[a:b], strict=True) if not thin]
-            yield i, pieces, float(area[a] if b - a == 1 else area[a:b].sum()), whole
-            at = b
 
 
 def _columns(steps: Steps, removed: Floats, loads: Floats, sums: RunningSums) -> dict[str, NDArray[Any]]:

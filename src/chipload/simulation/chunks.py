@@ -40,6 +40,7 @@ from chipload.simulation.chips import (
 from chipload.simulation.moves import Engine, HandOver, with_contact
 from chipload.simulation.removal import ChipAreas, Columns, Removal, Resolution, RunningSums, RunSettings, Watch
 from chipload.simulation.steps import BLOCK, steps_in_blocks
+from chipload.simulation.strips import strips_for
 from chipload.simulation.swept_area import Interpolation
 from chipload.stock.layers import LayeredStock
 from chipload.stock.shapes import read_shapes, shape_bytes
@@ -82,6 +83,7 @@ def remove_in_chunks(
     times: Floats | None = None,
     also: Any = (),
     workers: int = 2,
+    processes: int = 1,
     engine: Engine = "layers",
     progress: Progress = silent,
 ) -> Removal:
@@ -91,7 +93,7 @@ def remove_in_chunks(
     ----------
     unfinished : the folder of the run; it holds the columns of the result, and stays until it is discarded
     keeps : of ``watch``, what it keeps beside its columns, by names of files
-    times, engine : as of :func:`chipload.simulation.chips.remove`
+    times, processes, engine : as of :func:`chipload.simulation.chips.remove`
     also : values of any kind on which the result depends beside the arguments: versions, what ``watch`` uses
 
     Returns
@@ -105,7 +107,7 @@ def remove_in_chunks(
         As :func:`chipload.simulation.chips.remove`, and where the folder cannot be used.
     """
     count = counted(program, cutters, resolution)
-    setting = setting_of(cutters, material, resolution, interpolation, watch, workers)
+    setting = setting_of(cutters, material, resolution, interpolation, watch, workers, processes)
     shape = (stock.bounds, stock.xs, stock.ys, stock.cut, stock.room, stock.tidied, stock.tiles)
     part = None if stock.part is None else (np.asarray(stock.part.vertices), np.asarray(stock.part.faces))
     depends = (program, cutters, material, resolution, shape, part, interpolation, watch is not None, BLOCK, times)
@@ -173,20 +175,27 @@ def _removed(
     blocks = steps_in_blocks(
         program, resolution.step_mm, resolution.tolerance, size=block_of(setting), first=done, times=times
     )
-    for steps, contact in with_contact(blocks, setting.moves, setting.workers):
-        progress(sums.steps / count, "removing")
-        sums, some, _ = remove_block(steps, stock, sums, setting, contact)
-        columns.append(some)
-        waiting += len(steps)
-        now = time.monotonic()
-        due = now - since >= max(unfinished.every_s, cost / SHARE)
-        if due or unfinished.every_s == 0.0 or waiting >= MOST:
-            unfinished.add(stacked(columns))
-            columns, waiting = [], 0
-        if due or unfinished.every_s == 0.0:
-            unfinished.commit(state())
-            since = time.monotonic()
-            cost = since - now
+    with strips_for(program, stock, setting, block_of(setting), done, sums.piece) as strips:
+        for steps, contact in with_contact(blocks, setting.moves, setting.workers):
+            progress(sums.steps / count, "removing")
+            found = None if strips is None else strips.next(steps, sums.piece)
+            sums, some, _ = remove_block(steps, stock, sums, setting, contact, found)
+            columns.append(some)
+            waiting += len(steps)
+            now = time.monotonic()
+            due = unfinished.every_s == 0.0 or now - since >= max(unfinished.every_s, cost / SHARE)
+            if due and strips is not None and not strips.complete:
+                strips.ask()
+                due = False
+            if due or waiting >= MOST:
+                unfinished.add(stacked(columns))
+                columns, waiting = [], 0
+            if due:
+                unfinished.commit(state())
+                since = time.monotonic()
+                cost = since - now
+        if strips is not None:
+            strips.finish()
     if unfinished.parts:
         if columns:
             unfinished.add(stacked(columns))

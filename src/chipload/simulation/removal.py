@@ -17,7 +17,7 @@ from chipload.cutting.material import Material
 from chipload.engagement.chips.move import Move
 from chipload.errors import Finding
 from chipload.simulation.engagement_samples import EngagementSamples
-from chipload.simulation.loads import Cuts
+from chipload.simulation.loads import Cuts, StepEngagement
 from chipload.simulation.moves import MoveRun
 from chipload.simulation.swept_area import Interpolation
 
@@ -86,6 +86,24 @@ class ChipAreas:
 
 
 @dataclass(frozen=True, eq=False)
+class TakenByLayers:
+    """What some steps took from the layers.
+
+    Parameters
+    ----------
+    removed : (n, 4) volume [mm^3], pieces and layers of each chip, contact of the shank [mm]
+    gained : (n,) volume that the stock gained by edges that were made simpler [mm^3]
+    engagement : of the teeth, step by step, of those that cut
+    piece : the chip with most pieces so far
+    """
+
+    removed: Floats
+    gained: Floats
+    engagement: list[StepEngagement]
+    piece: ChipAreas | None
+
+
+@dataclass(frozen=True, eq=False)
 class Removal:
     """What a program removed.
 
@@ -138,7 +156,7 @@ class Removal:
 @dataclass(frozen=True, eq=False)
 class RunSettings:
     """What a run keeps to, step after step: see :func:`remove`; ``profiles`` are slices of the cutters;
-    ``moves`` the run by moves, None where it goes by layers.
+    ``moves`` the run by moves, None where it goes by layers; ``workers`` threads, ``processes`` strips of the layers.
     """
 
     cutters: Mapping[int, Cutter]
@@ -149,6 +167,7 @@ class RunSettings:
     watch: Watch | None
     workers: int
     moves: MoveRun | None = None
+    processes: int = 1
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,6 +29,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Interpolation = Literal["slerp", "lerp"]
 
+#: x0, y0, x1, y1 [mm]
+Plan = tuple[float, float, float, float]
 #: a step, the layers in its box, which of them still have material in its way
 Met = tuple[Move, range, NDArray[np.bool_]]
 #: steps whose areas are found in one go
@@ -53,15 +55,21 @@ def swept_ahead(
     interpolation: Interpolation,
     tolerance: float,
     workers: int,
+    plan: Plan | None = None,
 ) -> Iterator[tuple[int, Swept]]:
     """Those steps that meet a layer, in their order; found in threads that run ahead of the caller.
+
+    Parameters
+    ----------
+    plan : corners of the plan of the whole stock [mm], where ``stock`` is a strip of it: the steps near it are found
+        together, so that each area has the same numbers in a strip as in the whole
 
     Raises
     ------
     InputError
         Beside or in the stock the axis lies, or looks down.
     """
-    low, high, near = _near_stock(steps, stock, cutters)
+    low, high, near = near_stock(steps, plan_of(stock) if plan is None else plan, cutters)
     before = stock.tiles.copy()
 
     def swept(part: range) -> list[tuple[int, Swept]]:
@@ -102,19 +110,22 @@ def require_upright(
     lies = np.minimum(steps.a0[:, 2], steps.a1[:, 2]) < 2.0 * LEAST_AXIS_Z
     if not lies.any():
         return
-    low, high, near = _near_stock(steps, stock, cutters)
+    low, high, near = near_stock(steps, plan_of(stock), cutters)
     for k in np.flatnonzero(lies & near).tolist():
         if stock.layers_between(low[k, 2], high[k, 2]):
             _move(steps, k, interpolation)
 
 
-def _near_stock(
-    steps: Steps, stock: LayeredStock, cutters: Mapping[int, Cutter]
-) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Boxes of the steps, and which of them come over, into or under the stock."""
+def plan_of(stock: LayeredStock) -> Plan:
+    """x0, y0, x1, y1 of a stock [mm]."""
+    return float(stock.xs[0]), float(stock.ys[0]), float(stock.xs[-1]), float(stock.ys[-1])
+
+
+def near_stock(steps: Steps, plan: Plan, cutters: Mapping[int, Cutter]) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Boxes of the steps, and which of them come over, into or under the plan of the stock."""
     low, high = boxes(steps, cutters)
-    near = (high[:, 0] >= stock.xs[0]) & (low[:, 0] <= stock.xs[-1])
-    near &= (high[:, 1] >= stock.ys[0]) & (low[:, 1] <= stock.ys[-1])
+    near = (high[:, 0] >= plan[0]) & (low[:, 0] <= plan[2])
+    near &= (high[:, 1] >= plan[1]) & (low[:, 1] <= plan[3])
     near &= ~np.isin(steps.tool, [n for n, c in cutters.items() if c.body])
     return low, high, near
 

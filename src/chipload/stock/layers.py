@@ -174,10 +174,14 @@ class LayeredStock:
         last = int(np.searchsorted(self.bounds, z1, "left"))
         return range(max(first, 0), max(min(last, self.layers), first, 0))
 
-    def section(self, layer: int) -> MultiPolygon:
-        """What is left of a layer, its tiles joined."""
-        parts = polygons(shapely.union_all(self.tiles[self._layer(layer)].ravel()))
-        return MultiPolygon(parts)
+    def section(self, layer: int, low: ArrayLike | None = None, high: ArrayLike | None = None) -> MultiPolygon:
+        """What is left of a layer, its tiles joined; with ``low`` and ``high`` (2,) [mm] those under a rectangle."""
+        tiles = self.tiles[self._layer(layer)]
+        if low is not None and high is not None:
+            (x0, y0), (x1, y1) = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+            i, j = span(self.xs.tolist(), x0, x1), span(self.ys.tolist(), y0, y1)
+            tiles = tiles[j.start : j.stop, i.start : i.stop]
+        return MultiPolygon(polygons(shapely.union_all(tiles.ravel())))
 
     def area(self, layer: int) -> float:
         """Area that is left of a layer [mm^2]."""

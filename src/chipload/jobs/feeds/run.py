@@ -103,7 +103,7 @@ def _new_feeds(
     # as it is: what its loads are, and how well they are known
     before = remove(
         program, stock, job.cutters, material, fine, interpolation=op.interpolation, times=times, watch=bends,
-        engine=op.engine, progress=part_of(progress, 0.0, 0.5),
+        engine=op.engine, processes=op.workers, progress=part_of(progress, 0.0, 0.5),
     )  # fmt: skip
     before = with_columns(before, (*watched(gives), *CHECK_COLUMNS))
     more = bends if limits.keys() & {"deflection_um", "deflection_workpiece_um"} else None
@@ -118,7 +118,7 @@ def _new_feeds(
     allowed = remove(
         program, stock_body(job, reading.program), job.cutters, material, fine, interpolation=op.interpolation,
         times=times, watch=watching(steps, asked, job.cutters, material, machine, before.columns), accuracy=False,
-        engine=op.engine, progress=part_of(progress, 0.5, 1.0),
+        engine=op.engine, processes=op.workers, progress=part_of(progress, 0.5, 1.0),
     )  # fmt: skip
     return with_new_feeds(
         *own, reading, steps, before, allowed.columns, asked, job.cutters, machine,

@@ -87,7 +87,7 @@ def new_speeds(
 
     before = remove(
         program, stock, job.cutters, material, resolution_of(job, reading.program), interpolation=op.interpolation,
-        times=times, watch=watch, accuracy=False, engine=op.engine, progress=progress,
+        times=times, watch=watch, accuracy=False, engine=op.engine, processes=op.workers, progress=progress,
     )  # fmt: skip
     before = with_columns(before, (*watched(gives), *CHECK_COLUMNS, *stability.columns))
     found = stability_of(job, stability, machine)

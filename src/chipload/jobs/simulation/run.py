@@ -178,14 +178,14 @@ def simulated(
     if checkpoint is None:
         removal = remove(
             program, stock, job.cutters, material, fine, interpolation=op.interpolation, watch=watch, times=times,
-            engine=op.engine, progress=removing,
+            engine=op.engine, processes=op.workers, progress=removing,
         )  # fmt: skip
     else:
         formed = None if made is None else (made.points, made.faces, made.distance, made.step)
         removal = remove_in_chunks(
             program, stock, job.cutters, material, fine, checkpoint, interpolation=op.interpolation, watch=watch,
             keeps={"engagement": recorder} | ({} if stability_watch is None else {"watch": stability_watch}),
-            times=times, engine=op.engine, progress=removing,
+            times=times, engine=op.engine, processes=op.workers, progress=removing,
             also=(
                 versions(), sources(), repr((stiffness, job.table.workpiece)), repr(job.table.checks), formed,
                 None if stability_watch is None else stability_watch.dynamics,
@@ -204,7 +204,8 @@ def simulated(
         touched += in_stock(
             steps, job.cutters, points, op.tolerance_mm, passing(0.8 + 2.0 * SHARE, "holders in the stock"), kept
         )  # fmt: skip
-    settings = {k: v for k, v in op.model_dump().items() if v is not None}
+    # the result does not depend on how many processes found it
+    settings = {k: v for k, v in op.model_dump().items() if v is not None and k != "workers"}
     compared_with = (*solids, *(["stock"] if points is not None else []))
     return SimulationResult(
         removal, stock, machine, job.table.limits, settings, bodies.checks,
