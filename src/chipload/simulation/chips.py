@@ -11,7 +11,7 @@ and :mod:`chipload.engagement.immersion.immersion` for the one in force.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -132,21 +132,14 @@ def remove(
     setting, handed = with_engine(engine, setting, program, stock)
     before = stock.copied() if accuracy else None
     while True:
-        sums, kept, columns = RunningSums(stock.volume(), handed=handed), dict[int, list[Cuts]](), list[Columns]()
-        blocks = steps_in_blocks(
-            program, resolution.step_mm, resolution.tolerance, size=block_of(setting), times=times
-        )  # fmt: skip
+        begun = sums = RunningSums(stock.volume(), handed=handed)
+        kept, columns = dict[int, list[Cuts]](), list[Columns]()
         try:
-            with strips_for(program, stock, setting, block_of(setting)) as strips:
-                for steps, contact in with_contact(blocks, setting.moves, setting.workers):
-                    progress(sums.steps / count, "removing")
-                    found = None if strips is None else strips.next(steps, sums.piece)
-                    sums, some, cuts = remove_block(steps, stock, sums, setting, contact, found)
-                    columns.append(some)
-                    for bite in cuts if keep else ():
-                        kept.setdefault(bite.tool, []).append(bite)
-                if strips is not None:
-                    strips.finish()
+            for sums, some, cuts in _blocks_removed(program, stock, begun, setting, times):
+                progress(sums.steps / count, "removing")
+                columns.append(some)
+                for bite in cuts if keep else ():
+                    kept.setdefault(bite.tool, []).append(bite)
             break
         except HandOver as why:
             setting, handed = by_layers(engine, setting, why)
@@ -155,6 +148,21 @@ def remove(
     if setting.moves is not None:
         setting.moves.finish(stock, setting.workers)
     return with_accuracy(removal_of(program, stock, material, sums, stacked(columns), cut), program, before, setting)
+
+
+def _blocks_removed(
+    program: Program, stock: LayeredStock, sums: RunningSums, setting: RunSettings, times: Floats | None
+) -> Iterator[tuple[RunningSums, Columns, list[Cuts]]]:
+    """What :func:`remove_block` gives of one block of steps after another."""
+    fine, size = setting.resolution, block_of(setting)
+    blocks = steps_in_blocks(program, fine.step_mm, fine.tolerance, size=size, times=times)
+    with strips_for(program, stock, setting, size) as strips:
+        for steps, contact in with_contact(blocks, setting.moves, setting.workers):
+            found = None if strips is None else strips.next(steps, sums.piece)
+            sums, some, cuts = remove_block(steps, stock, sums, setting, contact, found)
+            yield sums, some, cuts
+        if strips is not None:
+            strips.finish()
 
 
 def block_of(setting: RunSettings) -> int:

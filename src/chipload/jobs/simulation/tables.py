@@ -103,10 +103,8 @@ class SimulateTable(Table):
         "auto",
         description="auto: moves, or layers if the axis leans or moves cannot do it; moves: exact; layers: polygons",
     )
-    workers: Count = Field(
-        1,
-        le=64,
-        description="processes that share the stock in strips, of layers alone; the result does not depend on them",
+    workers: Annotated[Count, Field(le=64)] = Field(
+        1, description="processes that share the stock in strips, of layers alone; the result does not depend on them"
     )
     corner_slices: Count | None = Field(
         None,
