@@ -97,7 +97,7 @@ def simulate(
     tolerance_mm : how far the edges of chips, and moves with a rotary axis, may leave what they are
     dialect, feed_mm_min : of the program's file, as in ``[program]``
     settings : further keys of the operation: ``interpolation``, ``engine``, ``corner_slices``, ``flank_mm``,
-        ``stock_points_mm``, ``confidence``
+        ``stock_points_mm``, ``confidence``, ``workers``
 
     Raises
     ------
