@@ -37,7 +37,8 @@ OVER = ("limits.torque_nm=0.2,0.3,0.4,0.5,0.6,0.7", "operation.0.step_mm=2.0,1.5
 @pytest.fixture
 def cluster(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
     """Address of a scheduler, and its two workers: no process restarts one that ends. Its parameter: environment."""
-    environment = os.environ | getattr(request, "param", {})
+    # the tasks of a test are modules beside it
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)} | getattr(request, "param", {})
     file = tmp_path / "scheduler.json"
     words = [sys.executable, "-m", "dask"]
     named = ["--scheduler-file", str(file)]
@@ -52,7 +53,7 @@ def cluster(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[tuple[st
             stack.callback(process.kill)
             return process
 
-        begun("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
+        begun("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--dashboard-address", "127.0.0.1:0")
         begin = time.monotonic()
         while not file.exists() and time.monotonic() - begin < 120.0:
             time.sleep(0.05)

@@ -130,7 +130,7 @@ def test_a_pool_and_a_cluster_give_the_same_bytes(alone, job, tmp_path):
     assert own == tree(tmp_path / "pool")
     from distributed import LocalCluster
 
-    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0") as cluster:
         run_sweep(job, OVER, tmp_path / "dask", dask=cluster.scheduler_address)
     assert own == tree(tmp_path / "dask")
 

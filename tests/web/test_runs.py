@@ -67,15 +67,20 @@ def test_a_job_is_refused_run_shown_and_stopped(window, folder) -> None:
     page.wait_for_selector(".cl-now")
     assert page.inner_text(".cl-file") == "0-backward.ngc"
     wait(lambda: not workers(job))
-    # half way
-    page = window("")
-    start(page, "contour/job.toml", "contour/again")
-    page.wait_for_function("document.querySelector('.cl-run-text').textContent.includes('%')")
-    page.get_by_text("Stop", exact=True).click()
-    page.wait_for_function(
-        "document.querySelector('.cl-run-text').textContent.includes('stopped, nothing was written')"
-    )
-    wait(lambda: not workers(job))
+    # half way, with steps so short that it cannot have ended
+    text = job.read_text()
+    job.write_text(text.replace("step_mm = 0.5", "step_mm = 0.005"))
+    try:
+        page = window("")
+        start(page, "contour/job.toml", "contour/again")
+        page.wait_for_function("document.querySelector('.cl-run-text').textContent.includes('%')")
+        page.get_by_text("Stop", exact=True).click()
+        page.wait_for_function(
+            "document.querySelector('.cl-run-text').textContent.includes('stopped, nothing was written')"
+        )
+        wait(lambda: not workers(job))
+    finally:
+        job.write_text(text)
     assert not (folder / "contour" / "again").exists()
     assert not list((folder / "contour").glob(".chipload-*"))
 
