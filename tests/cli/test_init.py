@@ -102,7 +102,7 @@ def test_accepted_guesses_stand_in_the_result(program: Path, tmp_path: Path) -> 
     assert not holds
     assert lines[0].startswith("guess: machine.name = ")
     assert "report:" in said
-    assert f" {len(notes)} guesses of the job accepted." in said.splitlines()[0]
+    assert f" {len(notes)} guesses of the job were accepted." in said.splitlines()[0]
 
 
 def test_a_first_look_is_never_better_than_unproven(program: Path, tmp_path: Path) -> None:
@@ -201,7 +201,8 @@ def test_comments_of_other_posts() -> None:
 
 def test_a_tool_that_is_called_by_name(tmp_path: Path) -> None:
     """Its only number is a guess of the diameter; the tool of an earlier name keeps its own number."""
-    text = 'N1 G90 G54\nN2 T="FACE 40 Z5" D1\nN3 M6\nN4 S3000 M3\nN5 G0 X0 Y0 Z5\nN6 G1 Z-1 F200\nN7 X20\nN8 G0 Z5\n'
+    text = '; T="EM8" after T="FACE 40 Z5"\nN1 G90 G54\nN2 T="FACE 40 Z5" D1\nN3 M6\nN4 S3000 M3\n'
+    text += "N5 G0 X0 Y0 Z5\nN6 G1 Z-1 F200\nN7 X20\nN8 G0 Z5\n"
     text += 'N9 T="EM8"\nN10 M6\nN11 S3000 M3\nN12 G1 Z-2 F200\nN13 X10\nN14 G0 Z9\nN15 M30\n'
     (tmp_path / "a.mpf").write_text(text)
     assert call("init", tmp_path / "a.mpf", tmp_path / "job")[0] == 0

@@ -23,7 +23,7 @@ TRIANGLES, HALVINGS = 400_000, 12
 OWN = ("path", "rapids", "cutter")
 #: kinds of bodies by how their names begin
 KINDS = ("stock", "part", "fixture", "wall")
-#: a fixture by another name
+#: name of the table of the machine, a fixture too
 MACHINE_TABLE = "machine table"
 #: a colour in a legend, and characters of its texts at most
 COLOUR, LONGEST = re.compile("#[0-9a-f]{6}"), 80

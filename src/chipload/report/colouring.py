@@ -20,7 +20,7 @@ Bools = NDArray[np.bool_]
 POINTS = 16_000
 #: colours of words, one after another
 WORDS = ("#3457a6", "#c9821a", "#0b7a75", "#8a4fa3", "#7a8a2e", "#b0567a", "#4d8fb8", "#6b5b4b", "#94a0ae", "#2f6f3e")
-#: columns that a path is coloured by first, where the history has them
+#: columns that a path is coloured by, and that are drawn, first, where the history has them
 FIRST = (
     "engagement_deg",
     "force_n",

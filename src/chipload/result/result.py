@@ -167,7 +167,8 @@ class Result:
     def _accepted(self) -> str:
         """How many guesses of a drafted job were accepted, where that is all that is said of them."""
         guesses = sum(f.code == "job-guess" and f.severity is Severity.NOTE for f in self.findings)
-        return f"{guesses} guess{'es' if guesses > 1 else ''} of the job accepted." if guesses else ""
+        many = f"{guesses} guesses of the job were" if guesses > 1 else "1 guess of the job was"
+        return f"{many} accepted." if guesses else ""
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the message, and tables of limits, tracks and findings."""

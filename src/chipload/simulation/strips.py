@@ -16,6 +16,7 @@ from __future__ import annotations
 import itertools
 import pickle
 import queue
+import signal
 import subprocess
 import sys
 import threading
@@ -43,7 +44,7 @@ Ints = NDArray[np.int64]
 
 #: blocks of steps that a strip may be ahead of the caller
 AHEAD = 8
-#: of a step that is only removed, over one whose chip and tooth engagement are found too: its time
+#: of a step that is only removed, over one whose chip and tooth engagement are found too: its time, an estimate
 HALO = 0.8
 #: strips are used where the longest is expected to take at most this share of the time of one process
 GAIN = 0.85
@@ -208,7 +209,8 @@ class Strips:
             borders = (stock.xs, stock.ys)[strip.axis]
             task = _Task(strip, borders, plan_of(stock), part_of(stock, strip), program, own, size, first, piece)
             process = subprocess.Popen(
-                [sys.executable, "-c", "from chipload.simulation.strips import serve; serve()"],
+                # -P: nothing is imported from the folder that the command is given in
+                [sys.executable, "-P", "-c", "from chipload.simulation.strips import serve; serve()"],
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             )  # fmt: skip
             found: queue.Queue[Any] = queue.Queue()
@@ -317,7 +319,8 @@ def _read(process: subprocess.Popen[bytes], found: queue.Queue[Any]) -> None:
     try:
         while process.stdout is not None:
             found.put(pickle.load(process.stdout))
-    except (EOFError, OSError, ValueError, pickle.UnpicklingError):
+    except Exception:
+        # whatever it is, the caller waits for an answer
         found.put(
             ChiploadError("simulation: a process of a strip of the stock ended: free memory, or state workers = 1")
         )
@@ -334,11 +337,13 @@ def serve() -> None:
     """The process of a strip: reads its task from the standard input, then a message for each block of steps (whether
     its tiles are asked for after it), None for the tiles at the end; writes what it finds to the standard output.
     """
+    # Ctrl-C is for the caller, which ends this process
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     given, out = sys.stdin.buffer, sys.stdout.buffer
     sys.stdout = sys.stderr
     try:
         _serve(pickle.load(given), given, out)
-    except EOFError:
+    except (EOFError, BrokenPipeError):
         # the caller has ended
         return
     except Exception as error:

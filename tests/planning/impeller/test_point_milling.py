@@ -202,9 +202,6 @@ def test_a_machine_that_does_not_turn_the_part_gets_every_row(milled):
     _, at = milled
     bridge = machine_named("xyzbcw-bridge")
     every = all_channels(at(5.0, bridge), bridge, 5)
-    if isinstance(every, str):
-        assert every.startswith("no program of all channels: ")
-        return
     assert every.repeat is None
     n = len(at(5.0, bridge))
     tips = every.program.p_work.reshape(5, n, 3)

@@ -103,7 +103,7 @@ def _nc_cutters(text: str, mm: float) -> dict[int, Stated]:
         own = out.setdefault(int(defined[2]), {})
         for key, stated in _described(defined[1], mm).items():
             own.setdefault(key, stated)
-    for k, name in enumerate(dict.fromkeys(_NAMED.findall(text))):
+    for k, name in enumerate(dict.fromkeys(_NAMED.findall(re.sub(r";[^\n]*", "", text)))):
         own = out.setdefault(FIRST_NAMED + k, {})
         for key, stated in _described(name, mm, f"the name of the tool ({name[:50]})").items():
             own.setdefault(key, stated)

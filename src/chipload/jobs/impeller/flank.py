@@ -19,7 +19,6 @@ from chipload.jobs.impeller.five_axis import all_channels, five_axis_machine, pr
 from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, NoFiveAxisPath
 from chipload.jobs.impeller.job import ImpellerJob
 from chipload.jobs.impeller.tables import FlankTable, PathsTable, SurfaceTable
-from chipload.machine.machine import Machine
 from chipload.planning.impeller.clearance.clearance import clearance
 from chipload.planning.impeller.five_axis_program import LinkedPath, five_axis_program, lifted, outline_of
 from chipload.planning.impeller.flank import FlankPass, flank_pass, offset_pass
@@ -42,17 +41,6 @@ _MOST = 4.0
 SIDES = ("plus", "minus")
 
 
-def flank_machine(job: ImpellerJob) -> Machine:
-    """The machine of the flank passes.
-
-    Raises
-    ------
-    InputError
-        It cannot be read, or has not two rotary axes that move in the cut.
-    """
-    return five_axis_machine(job.flank_machine, "operation.0.flank")
-
-
 def checked_flanks(
     job: ImpellerJob, how: FinishSettings, catalogue: Catalogue, progress: Progress = silent
 ) -> tuple[CheckedFlank | NoFiveAxisPath, ...]:
@@ -61,7 +49,7 @@ def checked_flanks(
     table, paths = op.flank, op.paths
     if table is None or paths is None:
         return ()
-    machine = flank_machine(job)
+    machine = five_axis_machine(job.flank_machine, "operation.0.flank")
     sides = [s for s in job.table.surface if s.side in SIDES]
     outline = outline_of(how.scene, impeller.blades)
     out: list[CheckedFlank | NoFiveAxisPath] = []

@@ -53,17 +53,6 @@ class _PlannedPoints(NamedTuple):
     points: PointPath
 
 
-def point_machine(job: ImpellerJob) -> Machine:
-    """The machine of the point milling.
-
-    Raises
-    ------
-    InputError
-        It cannot be read, or has not two rotary axes that move in the cut.
-    """
-    return five_axis_machine(job.point_machine, "operation.0.point_milling")
-
-
 def checked_points(
     job: ImpellerJob, how: FinishSettings, catalogue: Catalogue, progress: Progress = silent
 ) -> tuple[CheckedPoints | NoFiveAxisPath, ...]:
@@ -72,7 +61,7 @@ def checked_points(
     table, paths = op.point_milling, op.paths
     if table is None or paths is None:
         return ()
-    machine = point_machine(job)
+    machine = five_axis_machine(job.point_machine, "operation.0.point_milling")
     outline, reachable = outline_of(how.scene, impeller.blades), directions(machine)
     feed = mm_s_from_mm_min(table.feed_mm_min if table.feed_mm_min is not None else op.feed_mm_min)
     spindle = rad_s_from_rpm(table.speed_rpm if table.speed_rpm is not None else op.speed_rpm)

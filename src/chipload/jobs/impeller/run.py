@@ -18,14 +18,15 @@ from chipload.errors import InputError
 from chipload.jobs.impeller.channel_depth import reach_line
 from chipload.jobs.impeller.checkpoint import KeptParts, part_bytes
 from chipload.jobs.impeller.estimate import estimate
-from chipload.jobs.impeller.flank import checked_flanks, flank_machine
+from chipload.jobs.impeller.five_axis import five_axis_machine
+from chipload.jobs.impeller.flank import checked_flanks
 from chipload.jobs.impeller.forces import cutter_feeds, force_terms
 from chipload.jobs.impeller.job import ImpellerJob
 from chipload.jobs.impeller.outcome import ImpellerResult, OneCutter, Searched, StatedJob, unreached_text
 from chipload.jobs.impeller.part import ImpellerPart, read_part
 from chipload.jobs.impeller.partition_programs import checked_partitions
 from chipload.jobs.impeller.paths import EDGE, finish_settings, walls_of
-from chipload.jobs.impeller.point_milling import checked_points, point_machine
+from chipload.jobs.impeller.point_milling import checked_points
 from chipload.jobs.impeller.ray_depth import ray_depth
 from chipload.jobs.impeller.roughing import checked_roughing
 from chipload.jobs.impeller.tables import ImpellerOperationTable
@@ -140,10 +141,9 @@ def _found(job: ImpellerJob, k: int) -> bytes:
 
 def _five_axis_machines(job: ImpellerJob) -> None:
     """Refuse machines that have not two rotary axes which move in the cut."""
-    if job.flank_machine is not None:
-        flank_machine(job)
-    if job.point_machine is not None:
-        point_machine(job)
+    for key, source in (("flank", job.flank_machine), ("point_milling", job.point_machine)):
+        if source is not None:
+            five_axis_machine(source, f"operation.0.{key}")
 
 
 def _checkable(job: ImpellerJob, impeller: Impeller) -> None:

@@ -135,6 +135,9 @@ def _contradictions(table: SimulationJobTable) -> Iterator[str]:
         saved = stock.file is not None and stock.file.lower().endswith(".npz")
         if saved and stock.layer_mm is not None:
             yield "stock.layer_mm: leave it out: the layers of an earlier result stay"
+    for k, op in enumerate(table.operation):
+        if op.workers > 1 and op.engine == "moves":
+            yield f"operation.{k}.workers = {op.workers}: shares layers only: state engine = 'layers' or leave it out"
     yield from clamp_errors(table)
     plate = table.machine_table
     for axis, low, high in zip("XYZ", plate.low_mm, plate.high_mm, strict=True) if plate is not None else ():

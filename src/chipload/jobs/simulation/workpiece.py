@@ -17,11 +17,10 @@ from chipload.jobs.simulation.job import ProgramJob
 from chipload.jobs.tables import stated
 from chipload.program.motions import lengths
 from chipload.program.program import RAPID, Program
+from chipload.report.bodies import MACHINE_TABLE
 from chipload.simulation.surface import MOST_POINTS, fine
 from chipload.stock.layers import LayeredStock
 
-#: name of the table among the fixtures
-MACHINE_TABLE = "machine table"
 #: side of a tile of the stock in diameters of the largest cutter
 TILE = 4.0
 #: layers where no thickness is stated: thickest and thinnest in smallest diameters, and most of them

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
+from chipload.report.colouring import FIRST
 from chipload.web.checks import Bound, label_and_unit
 from chipload.web.comparison import Side
 from chipload.web.panels import RELEASE
@@ -16,17 +17,7 @@ from chipload.web.result import PageResult, PageTrack, TextColumn
 
 #: a click on a plot gives the abscissa of the nearest point
 CLICK = "(e) => { if (e.points && e.points.length) emit(e.points[0].x) }"
-#: columns that are drawn first, where the history has them; how many at a time
-FIRST = (
-    "engagement_deg",
-    "force_n",
-    "force_xy_n",
-    "torque_nm",
-    "deflection_um",
-    "form_error_um",
-    "tool_clearance_mm",
-    "feed_mm_min",
-)
+#: columns that are drawn at a time, and at first
 MOST, AT_FIRST = 4, 2
 
 
