@@ -24,34 +24,13 @@ from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
 from chipload.sweep.run import run_sweep
+from slot_job import slot_job
 
 PAGE = Path(__file__).parents[1] / "docs" / "sweep.md"
 BEGIN, END = "<!-- benchmarks/sweep.py -->", "<!-- end -->"
-PROGRAM = "G21 G90 G94\nT1 M6\nS3000 M3\nG0 X-8 Y5 Z5\nG1 Z-2 F300\nX28\nG0 Z5\nM2\n"
-JOB = """[program]
-file = "slot.ngc"
-[machine]
-name = "vmc"
-[stock]
-low_mm = [0.0, 0.0, -6.0]
-high_mm = [20.0, 10.0, 0.0]
-[material]
-name = "al7075-t6"
-[[cutter]]
-number = 1
-diameter_mm = 6.0
-flutes = 2
-helix_deg = 30.0
-flute_length_mm = 18.0
-overhang_mm = 25.0
-modulus_gpa = 580.0
-[[operation]]
-kind = "simulate"
-step_mm = 0.5
-[limits]
-torque_nm = 5.0
-"""
 
 
 def tree(folder: Path) -> str:
@@ -110,9 +89,7 @@ def table(jobs: int) -> list[str]:
     spent = [processor_time()]
     with tempfile.TemporaryDirectory(prefix="chipload-sweep-") as above:
         folder = Path(above)
-        (folder / "slot.ngc").write_text(PROGRAM)
-        job = folder / "job.toml"
-        job.write_text(JOB)
+        job = slot_job(folder, step=0.5, end=28.0)
         steps = ",".join(f"{0.4 + 0.02 * k:.2f}" for k in range(10))
         limits = ",".join(f"{0.2 + 0.05 * k:.2f}" for k in range(-(-jobs // 10)))
         over = (f"operation.0.step_mm={steps}", f"limits.torque_nm={limits}")

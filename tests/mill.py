@@ -9,31 +9,6 @@ flute_length_mm = 20.0
 overhang_mm = 30.0
 modulus_gpa = 580.0
 """
-#: a slot of 6 mm through a block of 20 x 10 x 6 mm; STEP stands for the longest step [mm]
-SLOT_JOB = """
-[program]
-file = "slot.ngc"
-[machine]
-name = "vmc"
-[stock]
-low_mm = [0.0, 0.0, -6.0]
-high_mm = [20.0, 10.0, 0.0]
-[material]
-name = "al7075-t6"
-[[cutter]]
-number = 1
-diameter_mm = 6.0
-flutes = 2
-helix_deg = 30.0
-flute_length_mm = 18.0
-overhang_mm = 25.0
-modulus_gpa = 580.0
-[[operation]]
-kind = "simulate"
-step_mm = STEP
-[limits]
-torque_nm = 5.0
-"""
 
 
 def block_job(file: str, low: str, high: str, rest: str, keys: str = "") -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import re
 from collections import Counter
+from functools import cache
 from pathlib import Path
 from typing import get_args
 
@@ -42,7 +43,8 @@ def bad(name: str) -> bool:
     return not FORBIDDEN.keys().isdisjoint(words(name))
 
 
-def names_of_source() -> set[str]:
+@cache
+def names_of_source() -> frozenset[str]:
     """``kind module:name`` of every file, class, field of a class and function."""
     out = set()
     for path in sorted(SOURCE.rglob("*.py")):
@@ -59,7 +61,7 @@ def names_of_source() -> set[str]:
                     x.target.id for x in node.body if isinstance(x, ast.AnnAssign) and isinstance(x.target, ast.Name)
                 ]
                 out |= {f"field {module}:{node.name}.{name}" for name in fields}
-    return out
+    return frozenset(out)
 
 
 def job_keys() -> set[str]:
@@ -81,10 +83,11 @@ def job_keys() -> set[str]:
     return out
 
 
-def private() -> set[str]:
+@cache
+def private() -> frozenset[str]:
     """Names that hold a forbidden word."""
     names = names_of_source() | job_keys() | {f"column result:{name}" for name in COLUMNS}
-    return {name for name in names if bad(re.split(r"[:.]", name)[-1])}
+    return frozenset(name for name in names if bad(re.split(r"[:.]", name)[-1]))
 
 
 #: standard terms that hold a forbidden word, and whose they are; the list only becomes shorter

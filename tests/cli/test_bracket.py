@@ -5,15 +5,9 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
-from typer.testing import CliRunner
 
 from chipload import examples
-from chipload.cli import app
-
-
-def call(*words):
-    done = CliRunner().invoke(app, [str(w) for w in words])
-    return done.exit_code, done.stdout, done.stderr
+from command import call
 
 
 @pytest.fixture

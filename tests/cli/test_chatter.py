@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from chipload import examples
-from cli.test_cli import call
+from command import call
 
 
 def test_the_example_chatters_as_posted_and_holds_at_the_new_speed(tmp_path: Path) -> None:

@@ -12,15 +12,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from chipload import examples, jobs
-from chipload.cli import app
 from chipload.jobs import Capability, FinishedJob, LoadedJob
 from chipload.jobs.contour.outcome import ContourResult
 from chipload.progress import Progress
 from chipload.result import Verdict
 from chipload.simulation.checkpoint import Checkpoint
+from command import call
 
 Maker = Callable[..., ContourResult]
 #: what a run says before it begins
@@ -32,11 +31,6 @@ def finished(capability: Capability, made: ContourResult) -> FinishedJob:
     """What a run gives of an outcome that is made."""
     result, figures = capability.module("result"), capability.module("figures")
     return FinishedJob(result.result_of(made), figures.presentation_of(made), made)
-
-
-def call(*words: object) -> tuple[int, str, str]:
-    done = CliRunner().invoke(app, [str(w) for w in words])
-    return done.exit_code, done.stdout, done.stderr
 
 
 @pytest.fixture

@@ -5,18 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from chipload import examples
-from chipload.cli import app
 from chipload.jobs import load_job
 from chipload.jobs.thinwall.inputs import read_wall
 from chipload.planning.thinwall.table import read_cuts
-
-
-def call(*words):
-    done = CliRunner().invoke(app, [str(w) for w in words])
-    return done.exit_code, done.stdout, done.stderr
+from command import call
 
 
 @pytest.fixture

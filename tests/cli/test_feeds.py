@@ -8,7 +8,7 @@ import pytest
 
 from chipload import examples
 from chipload.result import load_result
-from cli.test_simulate import call
+from command import call
 from mill import MILL
 from rs274 import MISSING, canonical, rs274_installed
 

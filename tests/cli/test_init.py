@@ -9,13 +9,12 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from chipload.cli import app
 from chipload.jobs import check_job, load_job, run_job
 from chipload.jobs.confirm import guesses_of, take_confirm
 from chipload.jobs.drafts.comments import read_header
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, write_draft
+from command import call
 
 FUSION = """%
 (T3 D=8. CR=0. - ZMIN=-2. - flat end mill)
@@ -34,11 +33,6 @@ M5
 M2
 %
 """
-
-
-def call(*words: object) -> tuple[int, str, str]:
-    done = CliRunner().invoke(app, [str(w) for w in words])
-    return done.exit_code, done.stdout, done.stderr
 
 
 @pytest.fixture

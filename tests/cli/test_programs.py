@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from typer.testing import CliRunner
 
-from chipload.cli import app
+from command import call
 
 TEXT = """G21 G90 G17 G94
 T3 M6
@@ -42,11 +41,6 @@ GOTO/20,0,5,0,0.17364817766693033,0.984807753012208
 GOTO/20,10,5,0.17364817766693033,0,0.984807753012208
 FINI
 """
-
-
-def call(*words):
-    done = CliRunner().invoke(app, [str(w) for w in words])
-    return done.exit_code, done.stdout, done.stderr
 
 
 @pytest.fixture

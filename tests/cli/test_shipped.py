@@ -8,20 +8,12 @@ import json
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from chipload.cli import app
 from chipload.jobs import load_job
 from chipload.jobs.coarse import coarser
 from chipload.tables import shipped_names
-from mill import SLOT_JOB
-
-JOB = SLOT_JOB.replace("STEP", "0.5")
-
-
-def call(*words: object) -> tuple[int, str, str]:
-    done = CliRunner().invoke(app, [str(w) for w in words])
-    return done.exit_code, done.stdout, done.stderr
+from command import call
+from slot_job import slot_job, slot_text
 
 
 def rows_of(command: str) -> tuple[list[str], dict[str, dict[str, str]]]:
@@ -91,9 +83,13 @@ def test_a_template_is_read_back(kind: str, said: str, tmp_path: Path) -> None:
 
 def test_a_template_in_a_job(tmp_path: Path) -> None:
     call("init", "--material", "--machine", "--fixture", tmp_path)
-    (tmp_path / "slot.ngc").write_text("G21 G90 G94\nT1 M6\nS3000 M3\nG0 X-8 Y5 Z5\nG1 Z-2 F300\nX28\nG0 Z5\nM2\n")
+    slot_job(tmp_path, step=0.5, end=28.0)
     fixture = '[[fixture]]\nfile = "fixture.stl"\nunits = "mm"\nspacing_mm = 2.0\n'
-    text = JOB.replace('name = "vmc"', 'file = "machine.toml"').replace('name = "al7075-t6"', 'file = "material.toml"')
+    text = (
+        slot_text(0.5)
+        .replace('name = "vmc"', 'file = "machine.toml"')
+        .replace('name = "al7075-t6"', 'file = "material.toml"')
+    )
     (tmp_path / "job.toml").write_text(text + fixture)
     code, said, err = call("check", tmp_path / "job.toml")
     assert code == 0, said + err
@@ -106,8 +102,7 @@ def test_what_init_refuses(tmp_path: Path) -> None:
 
 def test_a_coarse_run_says_so(tmp_path: Path) -> None:
     """The same slot with coarser steps: unproven, the torque within a tenth, the overrides in the provenance."""
-    (tmp_path / "slot.ngc").write_text("G21 G90 G94\nT1 M6\nS3000 M3\nG0 X-8 Y5 Z5\nG1 Z-2 F300\nX28\nG0 Z5\nM2\n")
-    (tmp_path / "job.toml").write_text(JOB)
+    slot_job(tmp_path, step=0.5, end=28.0)
     job = tmp_path / "job.toml"
     asked = coarser(load_job(job))
     assert asked == (

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from typer.testing import CliRunner
 
 from chipload import examples
-from chipload.cli import app
 from chipload.cutting.material import material_named
 from chipload.stock.layers import LayeredStock
+from command import call
 from mill import block_job, simulation
 
 SLOT = """G21 G90 G17 G94
@@ -27,11 +26,6 @@ G0 Z5
 M2
 """
 JOB = block_job("slot.ngc", "[0.0, -15.0, -5.0]", "[50.0, 15.0, 0.0]", simulation("force_n = 1000.0\n"))
-
-
-def call(*words):
-    done = CliRunner().invoke(app, [str(w) for w in words])
-    return done.exit_code, done.stdout, done.stderr
 
 
 def summary_of(folder: Path) -> dict[str, Any]:

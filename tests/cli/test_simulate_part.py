@@ -9,7 +9,8 @@ import trimesh
 
 from chipload.web.result import open_result
 from chipload.web.scene import bodies, page_scene
-from cli.test_simulate import call, states, summary_of
+from cli.test_simulate import states, summary_of
+from command import call
 from mill import MILL, block_job, simulation
 
 SLOT = "G21 G90 G17 G94\nT1 M6\nS3000 M3\nG0 X-10 Y0 Z5\nG0 Z-2.1\nG1 X25 F600\nG0 Z5\nM2\n"

@@ -6,19 +6,13 @@ import re
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from chipload import examples
-from chipload.cli import app
 from chipload.control.spindle_file import IDENTIFIED
 from chipload.jobs import load_job
 from chipload.jobs.torque.spindle import estimate_range, spindle_of
+from command import call
 from spindle_logs import KT, spindle_log
-
-
-def call(*words):
-    done = CliRunner().invoke(app, [str(w) for w in words])
-    return done.exit_code, done.stdout, done.stderr
 
 
 @pytest.fixture(scope="module")

@@ -6,18 +6,12 @@ import math
 import tomllib
 
 import pytest
-from typer.testing import CliRunner
 
-from chipload.cli import app
 from chipload.control.identification import aliased, bandwidth
 from chipload.control.spindle_file import read_spindle
 from chipload.errors import InputError
+from command import call
 from spindle_logs import DT, EFFICIENCY, IDLE, INERTIA, KT, LAG, NOISE, STEP, spindle_log
-
-
-def call(*words):
-    done = CliRunner().invoke(app, [str(w) for w in words])
-    return done.exit_code, done.stdout, done.stderr
 
 
 @pytest.fixture(scope="module")

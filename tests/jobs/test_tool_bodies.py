@@ -9,10 +9,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import trimesh
-from typer.testing import CliRunner
 
-from chipload.cli import app
-from mill import SLOT_JOB
+from command import call
+from slot_job import slot_text
 
 #: tool 1 mills a slot 2 mm deep at Y5, tool 2 comes down in it: X10 at a feed, then X4 in a rapid
 PROGRAM = (
@@ -20,12 +19,7 @@ PROGRAM = (
     "T2 M6\nS500 M3\nG0 X10 Y5 Z5\nG1 Z-4 F100\nG1 Z5\nG0 X4\nG0 Z-4\nG0 Z5\nM5\nM2\n"
 )
 TAP = '[[cutter]]\nnumber = 2\nname = "M6 tap"\nbody_mm = [[2.5, 0.0], [2.5, 15.0]]\noverhang_mm = 30.0\n'
-JOB = SLOT_JOB.replace("STEP", "3.0").replace("[[operation]]", TAP + "[[operation]]")
-
-
-def call(*words: object) -> tuple[int, str, str]:
-    done = CliRunner().invoke(app, [str(w) for w in words])
-    return done.exit_code, done.stdout, done.stderr
+JOB = slot_text(3.0).replace("[[operation]]", TAP + "[[operation]]")
 
 
 @pytest.fixture(scope="module")

@@ -10,10 +10,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import trimesh
-from typer.testing import CliRunner
 
 import chipload.examples
-from chipload.cli import app
 from chipload.cutting.material import material_named
 from chipload.errors import InputError
 from chipload.jobs import load_job
@@ -22,6 +20,7 @@ from chipload.jobs.torque.cut import cut, shell_stock
 from chipload.jobs.torque.run import opened
 from chipload.jobs.torque.workpiece_cut import limit_on_workpiece, responses_of, workpiece_cut
 from chipload.structure import beam
+from command import call
 from torque_job import OVERRIDE_AND_LOOP, SPINDLE
 
 CUTTER = """
@@ -86,11 +85,6 @@ M2
 """
 HELICAL = ("--set", "cutter.0.helix_deg=30", "--set", "limits.form_error_um=140")
 MATERIAL = material_named("al6082-t6")
-
-
-def call(*words):
-    done = CliRunner().invoke(app, [str(w) for w in words])
-    return done.exit_code, done.stdout, done.stderr
 
 
 @pytest.fixture(scope="module")

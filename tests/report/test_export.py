@@ -16,9 +16,7 @@ import pyarrow.parquet as pq
 import pypdf
 import pytest
 import trimesh
-from typer.testing import CliRunner
 
-from chipload.cli import app
 from chipload.errors import InputError
 from chipload.report.pdf import SheetLine, one_page
 from chipload.report.removal import read_removal
@@ -27,15 +25,8 @@ from chipload.report.vtk import faces_file, polyline
 from chipload.result import Result, SurfaceMap
 from chipload.result.load import load_result
 from chipload.stock.layers import LayeredStock
-from mill import SLOT_JOB
-
-PROGRAM = "G21 G90 G94\nT1 M6\nS3000 M3\nG0 X-8 Y5 Z5\nG1 Z-2 F300\nX28\nG0 Z5\nM5\nM2\n"
-JOB = SLOT_JOB.replace("STEP", "3.0")
-
-
-def call(*words: object) -> tuple[int, str, str]:
-    done = CliRunner().invoke(app, [str(w) for w in words])
-    return done.exit_code, done.stdout, done.stderr
+from command import call
+from slot_job import slot_job
 
 
 def read_vtk(path: Path) -> dict[str, np.ndarray]:
@@ -56,8 +47,7 @@ def read_vtk(path: Path) -> dict[str, np.ndarray]:
 @pytest.fixture(scope="module")
 def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("slot")
-    (folder / "slot.ngc").write_text(PROGRAM)
-    (folder / "job.toml").write_text(JOB)
+    slot_job(folder, step=3.0, end=28.0)
     code, _, said = call("run", folder / "job.toml", "--out", folder / "result")
     assert code in (0, 3), said
     return folder / "result"

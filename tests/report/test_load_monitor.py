@@ -16,7 +16,7 @@ from chipload.cli import app
 from chipload.errors import InputError
 from chipload.report.load_monitor import afc_table, load_csv, sections_of
 from chipload.result import LimitCheck, Provenance, Result, Track, Verdict
-from mill import SLOT_JOB
+from slot_job import slot_job
 
 #: 3000 and 6000 rpm
 SLOW, FAST = 3000.0 * math.tau / 60.0, 6000.0 * math.tau / 60.0
@@ -120,8 +120,7 @@ def test_what_is_not_known_is_refused_or_empty(file: Path) -> None:
 
 def test_the_command(tmp_path: Path, file: Path) -> None:
     """Of a slot, whose greatest power is that of its summary; the power is torque times speed."""
-    (tmp_path / "slot.ngc").write_text("G21 G90 G94\nT1 M6\nS3000 M3\nG0 X-8 Y5 Z5\nG1 Z-2 F300\nX28\nG0 Z5\nM5\nM2\n")
-    (tmp_path / "job.toml").write_text(SLOT_JOB.replace("STEP", "3.0"))
+    slot_job(tmp_path, step=3.0, end=28.0)
 
     def call(*words: object) -> tuple[int, str]:
         done = CliRunner().invoke(app, [str(word) for word in words])

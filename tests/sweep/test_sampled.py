@@ -18,31 +18,14 @@ from chipload.jobs.simulation.dynamics_tables import DynamicsTable, ModeTable
 from chipload.sweep.cases import Samples
 from chipload.sweep.run import run_sweep
 from chipload.sweep.sampled import modes_texts
+from slot_job import slot_job
 
 TABLE = DynamicsTable(frequency_percent=2.0, damping_percent=10.0, stiffness_percent=5.0)
 MODES = [
     ModeTable(tool=3, frequency_hz=812.0, damping_ratio=0.021, stiffness_n_um=6.9, direction="x"),
     ModeTable(of="workpiece", frequency_hz=1450.0, damping_ratio=0.01, mass_kg=0.3, direction=(0.6, 0.8)),
 ]
-SLOT = "G21 G90 G94\nT1 M6\nS3000 M3\nG0 X-8 Y5 Z5\nG1 Z-2 F300\nX8\nG0 Z5\nM2\n"
-JOB = """[program]
-file = "slot.ngc"
-[machine]
-name = "vmc"
-[stock]
-low_mm = [0.0, 0.0, -6.0]
-high_mm = [20.0, 10.0, 0.0]
-[material]
-file = "known.toml"
-[[cutter]]
-number = 1
-diameter_mm = 6.0
-flutes = 2
-helix_deg = 30.0
-flute_length_mm = 18.0
-overhang_mm = 25.0
-modulus_gpa = 580.0
-[dynamics]
+DYNAMICS = """[dynamics]
 frequency_percent = 0.0
 damping_percent = 0.0
 stiffness_percent = 20.0
@@ -51,11 +34,6 @@ frequency_hz = 900.0
 damping_ratio = 0.03
 stiffness_n_um = 1.5
 direction = "y"
-[[operation]]
-kind = "simulate"
-step_mm = 2.0
-[limits]
-stability_margin = 0.5
 """
 
 
@@ -90,11 +68,12 @@ def test_the_files_are_files_of_modes(tmp_path):
 
 @pytest.fixture
 def job(tmp_path) -> Path:
-    (tmp_path / "slot.ngc").write_text(SLOT)
+    path = slot_job(tmp_path)
     known = replace(material_named("al7075-t6"), spread=1e-6)
     (tmp_path / "known.toml").write_text(material_text(known))
-    (tmp_path / "job.toml").write_text(JOB)
-    return tmp_path / "job.toml"
+    text = path.read_text().replace('name = "al7075-t6"', 'file = "known.toml"')
+    path.write_text(DYNAMICS + text.replace("torque_nm = 5.0", "stability_margin = 0.5"))
+    return path
 
 
 def test_cases_run_with_their_modes(job, tmp_path):
@@ -111,6 +90,6 @@ def test_cases_run_with_their_modes(job, tmp_path):
 
 
 def test_a_limit_of_the_probability_is_refused(job, tmp_path):
-    job.write_text(JOB + "stable_probability = 0.9\n")
+    job.write_text(job.read_text() + "stable_probability = 0.9\n")
     with pytest.raises(InputError, match=r"state limits\.stability_margin in place of limits\.stable_probability"):
         run_sweep(job, [], tmp_path / "out", samples=Samples(2))

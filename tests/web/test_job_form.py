@@ -10,6 +10,7 @@ from chipload.errors import InputError
 from chipload.jobs import load_job
 from chipload.result import load_result
 from chipload.web.job_form import job_errors, job_fields, override_of
+from slot_job import slot_job
 from square import make_result
 
 EXAMPLES = Path(__file__).parents[2] / "src" / "chipload" / "examples"
@@ -81,10 +82,8 @@ def test_what_is_entered_is_checked_as_a_run_does() -> None:
 
 def test_a_changed_value_is_run_and_compared_with_the_last_result(browser, served, folder) -> None:
     work = folder / "form"
-    shutil.copytree(EXAMPLES / "chips", work)
-    job = work / "job.toml"
-    text = job.read_text().replace("step_mm = 0.5", "step_mm = 4.0").replace("layer_mm = 0.5", "layer_mm = 2.0")
-    job.write_text(text)
+    job = slot_job(work)
+    text = job.read_text()
     make_result(work / "result")
     page = browser.new_page(viewport={"width": 1280, "height": 720})
     page.set_default_timeout(400_000)

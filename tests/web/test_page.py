@@ -95,15 +95,12 @@ def test_a_plot_and_a_line_move_the_slider(square) -> None:
 
 def test_keys(square) -> None:
     page = square
-    row = 0
-    for key, moved in (
+    for key, row in (
         ("ArrowRight", 1), ("ArrowRight", 2), ("ArrowLeft", 1), ("Shift+ArrowRight", 21), ("End", ROWS - 1),
         ("ArrowRight", ROWS - 1), ("ArrowUp", 100), ("ArrowDown", 150), ("Home", 0), ("ArrowLeft", 0),
     ):  # fmt: skip
         page.keyboard.press(key)
-        row = moved
-        settle(page, row)
-    stands_at(page, row)
+        stands_at(page, row)
     play_slowly(page)
     stands_at(page, stop(page))
     # a closed list that the pointer left with the focus takes no key
@@ -112,11 +109,13 @@ def test_keys(square) -> None:
     settle(page, 0)
     page.evaluate("document.querySelector('[role=combobox][aria-label=\"path coloured by\"]').focus()")
     page.keyboard.press("ArrowDown")
-    settle(page, 50)
+    stands_at(page, 50)
+    help_text = page.get_by_text("one step back or on")
+    assert not help_text.is_visible()
     page.keyboard.press("?")
-    page.get_by_text("one step back or on").wait_for(state="visible")
+    help_text.wait_for(state="visible")
     page.keyboard.press("Escape")
-    page.get_by_text("one step back or on").wait_for(state="hidden")
+    help_text.wait_for(state="hidden")
 
 
 def test_the_frame_does_not_scroll_and_nothing_lies_outside(square) -> None:
