@@ -364,7 +364,8 @@ def _compare(
                 at = rows[use]
                 planned = columns["engagement_deg"][at]
                 off = np.abs(_degrees(level.centre_path, kk[at], ww[at], COARSE_DEG, workers) - planned)
-                again = np.flatnonzero(off > tolerance)
+                # a row that agrees on one side of a joint needs no closer look on the other
+                again = np.flatnonzero((off > tolerance) & (best[use] > tolerance))
                 if len(again):
                     j = at[again]
                     off[again] = _difference(level.centre_path, kk[j], ww[j], planned[again], tolerance, workers)
