@@ -157,5 +157,6 @@ def test_a_job_without_such_parts_is_refused(tmp_path):
     done = CliRunner().invoke(app, [*words, "2"])
     assert done.exit_code == 2
     assert "a program job has no parts that other processes can compute" in done.output
+    assert "a simulation by layers has operation.0.workers" in done.output
     assert not (tmp_path / "result").exists()
     assert "--workers = 0: must be from 1 to 1024" in CliRunner().invoke(app, [*words, "0"]).output

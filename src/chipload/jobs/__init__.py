@@ -258,7 +258,7 @@ def run_job(
         if not capability.spreads:
             raise InputError(
                 f"--workers, --dask: {_article(capability.name)} job has no parts that other processes can compute: "
-                "leave them out; chipload sweep runs many jobs at once"
+                "leave them out; a simulation by layers has operation.0.workers, chipload sweep runs many jobs"
             )
         more["workers"] = workers
     outcome = capability.module("run").run(loaded.job, progress, **more)
