@@ -25,6 +25,10 @@ from chipload.units import rpm_from_rad_s
 DIAMETERS = (20.0, 16.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5)
 #: share of the area that the guessed cutter must reach
 REACH = 0.97
+#: no channel may be narrower than ROOM cutters: each pass takes very little there, and long ones are not possible.
+#: What the cutter reaches and one ROOM times as wide does not is a channel above CHANNEL diameters squared, else a
+#: corner: in one of an angle t it is (ROOM^2 - 1) (cot(t / 2) - (pi - t) / 2) / 4, which is 0.12 at 60 deg
+ROOM, CHANNEL = 1.3, 0.12
 #: radial depth over the diameter, axial depth over the diameter, feed per tooth over the diameter
 RADIAL, AXIAL, FEED = 0.15, 0.5, 0.005
 #: material left on the wall of a pocket over the diameter
@@ -144,7 +148,7 @@ def _of_layer(drawing: Drawing, layer: str) -> list[Contour]:
 
 
 def _cutter_for(contours: Sequence[Contour]) -> tuple[float, float]:
-    """Diameter [mm] of the largest cutter that reaches nearly all of the area, and the area [mm^2]."""
+    """Diameter [mm] of the largest cutter that reaches nearly all, with room in its channels, and the area [mm^2]."""
     area: Any = shapely.Polygon()
     for c in contours:
         points = c.at(np.linspace(0.0, c.length, POINTS, endpoint=False))[0]
@@ -153,10 +157,17 @@ def _cutter_for(contours: Sequence[Contour]) -> tuple[float, float]:
     if not whole > 0.0:
         raise InputError("the contours enclose no area")
     for d in DIAMETERS:
-        opened = area.buffer(-0.5 * d).buffer(0.5 * d)
+        opened = _opened(area, d)
         if float(opened.area) >= REACH * whole:
-            return d, whole
+            tight = shapely.get_parts(opened.difference(_opened(area, ROOM * d)))
+            if max((float(piece.area) for piece in tight), default=0.0) <= CHANNEL * d * d:
+                return d, whole
     return DIAMETERS[-1], whole
+
+
+def _opened(area: Any, d: float) -> Any:
+    """What a cutter of diameter d [mm] reaches of an area."""
+    return area.buffer(-0.5 * d).buffer(0.5 * d)
 
 
 def _machine(name: str | None) -> Machine:
@@ -210,7 +221,11 @@ def _rest(machine: Machine, named: str | None, d: float, axial: float, kind: str
     if machine.torque is not None:
         limits.append(Entry("torque_nm", machine.torque / 1000.0, f"of the spindle of {machine.name}"))
     limits.append(Entry("force_xy_n", note="across the axis", example="500.0"))
-    why = f"the largest that reaches {100.0 * REACH:g} % of the area" if kind == "pocket" else "a common size"
+    why = (
+        f"the largest that reaches {100.0 * REACH:g} % of the area, with room in every channel"
+        if kind == "pocket"
+        else "a common size"
+    )
     cutter = cutter_table(1, [])
     sized = tuple(
         Entry("diameter_mm", d, why, True) if e.key == "diameter_mm"
