@@ -8,6 +8,7 @@ import pytest
 from chipload.errors import Cancelled, InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.program.program import ARC_CCW, LINE, RAPID, Program
+from chipload.simulation import verify as verify_module
 from chipload.simulation.material import material_left_of
 from chipload.simulation.verify import MATCH_MM, verify_contour
 
@@ -215,7 +216,7 @@ def test_refused():
         verify(plan(), rows)
 
 
-def test_a_row_at_a_kink_is_held_against_both_headings():
+def test_a_row_at_a_kink_is_held_against_both_headings(monkeypatch):
     """Two slots at right angles: leaving the corner the rim is engaged over 90 deg, arriving over 180."""
     p = program([(RAPID, 0, 0, SAFE, 0, 0), (LINE, 0, 0, Z, 0, 0), (LINE, 30, 0, Z, 0, 0), (LINE, 30, 30, Z, 0, 0)])
 
@@ -228,12 +229,20 @@ def test_a_row_at_a_kink_is_held_against_both_headings():
             "pass": np.full(3, "pocket", dtype=object),
         }
 
+    looked = []
+    closely = verify_module._difference
+    monkeypatch.setattr(verify_module, "_difference", lambda *args: looked.append(len(args[1])) or closely(*args))
+
     def check(angle):
+        looked.clear()
         return verify(p, row(angle), stock=None, wall=[], engagement_tolerance_deg=0.01)
 
     assert check(180.0).verdict == "proved"
+    assert looked == []  # it agrees on the first side
     assert check(90.0).verdict == "proved"
+    assert looked == [1]
     assert check(135.0).engagement_difference_deg == pytest.approx(45.0, abs=0.01)
+    assert looked == [1, 1]
 
 
 def film_planned_as(angle, thickness):
