@@ -25,10 +25,9 @@ from chipload.units import rpm_from_rad_s
 DIAMETERS = (20.0, 16.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5)
 #: share of the area that the guessed cutter must reach
 REACH = 0.97
-#: no channel may be narrower than ROOM cutters: each pass takes very little there, and long ones are not possible.
-#: What the cutter reaches and one ROOM times as wide does not is a channel above CHANNEL diameters squared, else a
-#: corner: in one of an angle t it is (ROOM^2 - 1) (cot(t / 2) - (pi - t) / 2) / 4, which is 0.12 at 60 deg
-ROOM, CHANNEL = 1.3, 0.12
+#: a channel is narrow below ROOM cutters: each pass takes very little there, and long ones are not possible; it is one
+#: if it holds more than CHANNEL diameters squared, which a corner of 15 deg does not, or joins parts of the area
+ROOM, CHANNEL = 1.3, 1.0
 #: radial depth over the diameter, axial depth over the diameter, feed per tooth over the diameter
 RADIAL, AXIAL, FEED = 0.15, 0.5, 0.005
 #: material left on the wall of a pocket over the diameter
@@ -156,18 +155,23 @@ def _cutter_for(contours: Sequence[Contour]) -> tuple[float, float]:
     whole = float(area.area)
     if not whole > 0.0:
         raise InputError("the contours enclose no area")
-    for d in DIAMETERS:
-        opened = _opened(area, d)
-        if float(opened.area) >= REACH * whole:
-            tight = shapely.get_parts(opened.difference(_opened(area, ROOM * d)))
-            if max((float(piece.area) for piece in tight), default=0.0) <= CHANNEL * d * d:
-                return d, whole
-    return DIAMETERS[-1], whole
+    able = [d for d in DIAMETERS if float(_opened(area, d).area) >= REACH * whole] or [DIAMETERS[-1]]
+    return next((d for d in able if not _narrow(area, d)), able[0]), whole
 
 
 def _opened(area: Any, d: float) -> Any:
     """What a cutter of diameter d [mm] reaches of an area."""
     return area.buffer(-0.5 * d).buffer(0.5 * d)
+
+
+def _narrow(area: Any, d: float) -> bool:
+    """Whether an area has channels in which a cutter of diameter d [mm] has no room."""
+    wide = ROOM * d
+    lost = shapely.get_parts(_opened(area, d).difference(_opened(area, wide)))
+    if max((float(piece.area) for piece in lost), default=0.0) > CHANNEL * d * d:
+        return True
+    centres, apart = area.buffer(-0.5 * d), area.buffer(-0.5 * wide)
+    return len(shapely.get_parts(apart)) > len(shapely.get_parts(centres))
 
 
 def _machine(name: str | None) -> Machine:
