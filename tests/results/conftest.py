@@ -26,7 +26,8 @@ from chipload.jobs import LoadedJob, load_job
 from chipload.result import Result, Summary, load_result, read_summary
 
 EXAMPLES = Path(chipload.examples.__file__).parent
-#: what makes a slow example shorter: coarser steps and layers, less of a surface; its kind, limits and files stay
+#: what makes a slow example shorter: coarser steps and layers, less of a surface, a smaller wall; its kind, limits and
+#: files stay
 SHORTER: Mapping[str, tuple[str, ...]] = {
     "contour": ("operation.0.step_mm=0.2",),
     "pocket": ("operation.0.step_mm=0.6",),
@@ -50,6 +51,12 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
         "operation.0.layer_mm=0.5",
         "operation.0.step_mm=2.7",
         "operation.0.scallop_um=68",
+        "wall.chord_root_mm=11",
+        "wall.chord_tip_mm=10",
+        "wall.height_mm=10",
+        "wall.thickness_root_mm=2.4",
+        "wall.thickness_tip_mm=1.8",
+        "wall.elements=[9,8]",
     ),
     "impeller": (
         "operation.0.most_cutters=1",
