@@ -45,7 +45,15 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
     "trunnion": (),
     "tube": ("simulation.step_mm=2.0", "simulation.tolerance_mm=0.01"),
     "cone": ("simulation.step_mm=2.0", "simulation.tolerance_mm=0.01"),
-    "plate": ("operation.0.least_error=false", "operation.0.scallop_um=45"),
+    "plate": (
+        "operation.0.least_error=false",
+        "operation.0.scallop_um=45",
+        "wall.length_mm=12",
+        "wall.height_mm=12",
+        "wall.thickness_mm=1.8",
+        "wall.foot_mm=4",
+        "wall.elements=[6,6]",
+    ),
     "blade": (
         "operation.0.least_error=false",
         "operation.0.layer_mm=0.5",
