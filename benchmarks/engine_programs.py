@@ -143,7 +143,7 @@ def of_examples(folder: Path, rows: int) -> Iterator[Case]:
             continue
         program = read_program(rough[0], machine_named("vmc" if name != "impeller" else "horizontal-b")).program
         cutters = cutters_of(rough[0].read_text()) or cutter_named(rough[0].name)
-        yield _in_block(name, head(program, rows), cutters)
+        yield in_block(name, head(program, rows), cutters)
 
 
 def cutters_of(text: str) -> dict[int, Cutter]:
@@ -161,7 +161,7 @@ def cutter_named(name: str) -> dict[int, Cutter]:
     return {1: Cutter(float(found[1]), 3, math.radians(30.0), 60.0, 80.0, 6e5, float(found[2]))}
 
 
-def _in_block(name: str, program: Program, cutters: dict[int, Cutter]) -> Case:
+def in_block(name: str, program: Program, cutters: dict[int, Cutter]) -> Case:
     """A program in the block round its way at a feed, turned so that the mean of its axes stands along z."""
     up = program.axis.mean(axis=0) / np.linalg.norm(program.axis.mean(axis=0))
     first = np.eye(3)[0] if np.allclose(up, UP) else np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])

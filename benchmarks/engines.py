@@ -1,6 +1,7 @@
 """The engines: steps a second, error against a converged setting and against one another, beside another simulator.
 
-    python benchmarks/engines.py [--moves 20000] [--job 1000000] [--real 1500] [--planned FOLDER] [--check] [--write]
+    python benchmarks/engines.py [--moves 20000] [--job 1000000] [--real 1500] [--planned FOLDER] [--others] [--fresh]
+                                 [--check] [--write]
 
 Programs: finishing by a ball nose over a wave (``benchmarks/simulation.py``), roughing by a flat mill in levels of
 2 mm, rows 3 mm apart, moves of 1 mm, and those of ``benchmarks/engine_programs.py``: bear and cameo of CAMotics, the
@@ -11,8 +12,10 @@ are those of a move's volume and loads against slices eight times as many, perce
 than a fifth of the median; of the programs of others, what layers differ by from moves, step by step.
 ``--job`` adds the finishing program as a job of the command line: reading, stress, deflection, report and all; goals
 are those of 10^6 moves by their number. ``--real`` takes so many rows of each other program, 0 leaves them out.
-The table has goal, value and share of the goal; ``--check`` exits 1 where one is missed by more than 20 %, ``--write``
-puts the tables into docs/design/engines.md.
+``--others`` adds pockets beside Adaptive, the feeds example and strips in two processes, ``--fresh`` a clone up to its
+first verdict (``benchmarks/engine_goals.py``). The table has goal, value and share of the goal, and says which goals
+are missed and which were not measured; ``--check`` exits 1 where one is missed by more than 20 %, ``--write`` puts the
+tables into docs/design/engines.md.
 """
 
 from __future__ import annotations
@@ -30,6 +33,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+from engine_goals import goals
 from engine_programs import Case, head, made, of_examples, of_others
 from numpy.typing import NDArray
 from simulators import freecad
@@ -167,9 +171,15 @@ def p_of(some: Floats, known: Floats) -> list[float]:
 
 
 def row(work: str, goal: float, found: float, unit: str, least: bool) -> tuple[str, bool]:
-    """A row of the table, and whether the goal is missed by more than 20 %; ``least``: the goal is the least value."""
+    """A row of the table, and whether the goal is missed by more than 20 %; ``least``: the goal is the least value;
+    where ``found`` is nan it was not measured.
+    """
+    if math.isnan(found):
+        return f"| {work} | {goal:,.4g} {unit} | not measured | | |", False
     share = found / goal if least else goal / found
-    return f"| {work} | {goal:,.4g} {unit} | {found:,.4g} {unit} | {share:.2f} |", share < (0.8 if least else 1.0 / 1.2)
+    missed = "" if share >= 1.0 else "missed"
+    cells = f"| {work} | {goal:,.4g} {unit} | {found:,.4g} {unit} | {share:.2f} | {missed} |"
+    return cells, share < (0.8 if least else 1.0 / 1.2)
 
 
 def tabled(title: str, head: str, rows: list[str]) -> str:
@@ -209,6 +219,8 @@ def main() -> None:
     parser.add_argument("--job", type=int, default=0, help="moves of a job by the command line, as 1000000")
     parser.add_argument("--real", type=int, default=1500, help="rows of each program of others; 0: none")
     parser.add_argument("--planned", type=Path, help="folder of the planned examples; none: they are left out")
+    parser.add_argument("--others", action="store_true", help="pockets beside Adaptive, the feeds example, strips")
+    parser.add_argument("--fresh", action="store_true", help="a clone up to its first verdict")
     parser.add_argument("--check", action="store_true")
     parser.add_argument("--write", action="store_true", help="put the tables into docs/design/engines.md")
     args = parser.parse_args()
@@ -238,14 +250,14 @@ def main() -> None:
     peer = beside_pathsim(args.moves) if args.real else None
     if peer is not None:
         table.append(row("finishing with loads over PathSim without", PEER, peer[0], "times", False))
-    if args.job:
-        seconds, used = command_line(args.job)
-        share = args.job / 1e6
-        table.append(row(f"job of {args.job} moves by the command line", MILLION_S * share, seconds, "s", False))
-        table.append(row("its memory", MILLION_MB, used, "MB", False))
+    seconds, used = command_line(args.job) if args.job else (math.nan, math.nan)
+    moves = args.job or 1_000_000
+    table.append(row(f"job of {moves} moves by the command line", MILLION_S * moves / 1e6, seconds, "s", False))
+    table.append(row("its memory", MILLION_MB, used, "MB", False))
+    table += [row(*goal) for goal in goals(args.others, args.fresh)]
     p = "p50 [%] | p95 [%] | p99 [%] |"
     parts = [
-        tabled("", "| work | goal | measured | share of the goal |", [line for line, _ in table]),
+        tabled("", "| work | goal | measured | share of the goal | |", [line for line, _ in table]),
         tabled("Moves a second of the moves engine:", "| program | contact | with loads | with their error |", alone),
         tabled("Error of a move against slices eight times as many:", f"| program | column | {p}", errors),
         tabled("Steps a second of other programs:", "| program | cutter | rows | moves | layers |", rates),

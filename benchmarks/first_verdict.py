@@ -22,8 +22,10 @@ VERDICT = re.compile(r"^(Holds|Exceeds|Unproven): ")
 KEPT = ("HOME", "LANG", "PATH", "PIP_INDEX_URL", "PIP_EXTRA_INDEX_URL", "PIP_CONFIG_FILE", "SSL_CERT_FILE", "TERM")
 
 
-def main() -> None:
-    """Print a row for each event."""
+def events() -> list[tuple[str, float]]:
+    """What happens from the clone on, and after how many seconds; the first is the end of the installation, the last
+    that of `make demo`.
+    """
     path = os.pathsep.join(p for p in os.environ["PATH"].split(os.pathsep) if not p.startswith(str(ROOT)))
     env = {name: os.environ[name] for name in KEPT if name in os.environ} | {"PATH": path}
     with tempfile.TemporaryDirectory() as folder:
@@ -37,13 +39,17 @@ def main() -> None:
                 if VERDICT.match(line):
                     verdicts.append((line.strip()[:60], time.time() - begun))
         ready = (Path(folder) / ".venv" / ".run").stat().st_mtime - begun
-        rows = [
+        return [
             ("packages installed", ready),
             *verdicts,
             (f"make demo ends with {demo.returncode}", time.time() - begun),
         ]
+
+
+def main() -> None:
+    """Print a row for each event."""
     print("| event | seconds |\n|---|---:|")
-    for name, seconds in rows:
+    for name, seconds in events():
         print(f"| {name} | {seconds:.0f} |")
 
 

@@ -33,24 +33,28 @@ def wave(count: int) -> Program:
     return Program.join([first, rows([LINE] * len(points), points, (0.0, 0.0), 20.0, 300.0, 1, "cut")])
 
 
+def shared(lines: int, processes: int) -> tuple[float, float, bool]:
+    """Clock times [s] in one process and in several, and whether what is left has the same bits."""
+    metal, times, left = material_named("al7075-t6"), list[float](), list[float]()
+    for some, each in ((4, 1), (lines, 1), (lines, processes)):
+        # the first compiles
+        stock = LayeredStock.block((0.0, 0.0, -6.0), (120.0, 2.0 * some, 0.0), 0.3, 15.0)
+        begun = time.perf_counter()
+        remove(wave(some), stock, {1: BALL}, metal, FINE, processes=each, accuracy=False)
+        times.append(time.perf_counter() - begun)
+        left.append(stock.volume())
+    return times[1], times[2], left[1] == left[2]
+
+
 def main() -> None:
     """Print the clock times and their ratio."""
     ask = argparse.ArgumentParser(description=__doc__)
     ask.add_argument("--processes", type=int, default=2)
     ask.add_argument("--rows", type=int, default=120)
     given = ask.parse_args()
-    metal, times, left = material_named("al7075-t6"), list[float](), list[float]()
-    for lines, processes in ((4, 1), (given.rows, 1), (given.rows, given.processes)):
-        # the first compiles
-        stock = LayeredStock.block((0.0, 0.0, -6.0), (120.0, 2.0 * lines, 0.0), 0.3, 15.0)
-        begun = time.perf_counter()
-        remove(wave(lines), stock, {1: BALL}, metal, FINE, processes=processes, accuracy=False)
-        times.append(time.perf_counter() - begun)
-        left.append(stock.volume())
-    print(
-        f"one process {times[1]:.1f} s, {given.processes} processes {times[2]:.1f} s: {times[1] / times[2]:.2f} times"
-    )
-    print(f"volume that is left: {'the same bits' if left[1] == left[2] else 'different'}")
+    one, several, alike = shared(given.rows, given.processes)
+    print(f"one process {one:.1f} s, {given.processes} processes {several:.1f} s: {one / several:.2f} times")
+    print(f"volume that is left: {'the same bits' if alike else 'different'}")
 
 
 if __name__ == "__main__":

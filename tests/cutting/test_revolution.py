@@ -89,3 +89,31 @@ def test_a_size_effect_takes_the_other_way() -> None:
         loads_over_turn(bites, cutter, law, 0.05, left)[0][:, 9],
         loads_over_turn(bites, cutter, STEEL, 0.05, left)[0][:, 9],
     )
+
+
+@pytest.mark.parametrize("runout", [0.0, 0.01])
+def test_entries_that_cut_alike_have_the_loads_of_the_first(runout: float) -> None:
+    """Each of 30 entries five times: as it is, with chips 5e-9 and 1e-6 thicker, turned by 1e-6 rad, with no normal."""
+    cutter = Cutter(10.0, 3, 0.5, 20.0, 30.0, 6e5, runout=(runout, 0.4))
+    plain = some_engagement(7, 0.5, 3)
+    n, size = len(plain), np.diff(plain.start)
+    row = np.concatenate([np.tile(np.arange(plain.start[i], plain.start[i + 1]), 5) for i in range(n)])
+    which = np.concatenate([np.repeat(np.arange(5), k) for k in size])
+    rows = plain.rows[row]
+    rows[which == 1, 4:] *= 1.0 + 5e-9
+    rows[which == 2, 4:] *= 1.0 + 1e-6
+    rows[which >= 3, :2] += 1e-6
+    start, frames = np.concatenate([[0], np.cumsum(np.repeat(size, 5))]), np.repeat(plain.frames, 5, axis=0)
+    five = ToothEngagement(start, rows, plain.tooth[row], plain.slice[row], plain.slices, frames)
+    left = np.repeat(np.random.default_rng(5).normal(size=(n, 3)), 5, axis=0)
+    left[4::5] = 0.0
+    bites = with_runout(five, cutter)
+    found = loads_over_turn(bites, cutter, STEEL, math.radians(3.0), left)[0]
+    known = _one_by_one(bites, cutter, STEEL, rotations(cutter, math.radians(3.0)), left)[:, :15]
+    np.testing.assert_allclose(found, known, rtol=1e-6, atol=1e-6)
+    each = found.reshape(n, 5, 15)[size > 0]
+    np.testing.assert_array_equal(each[:, 1, 9], each[:, 0, 9])
+    assert (each[:, 2, 9] > each[:, 0, 9]).mean() > 0.95
+    assert (each[:, 3, 9] != each[:, 2, 9]).mean() > 0.95
+    assert each[:, 3, 14].max() > 0.0
+    assert each[:, 4, 14].max() == 0.0

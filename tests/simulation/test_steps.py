@@ -10,7 +10,7 @@ import pytest
 from chipload.errors import InputError
 from chipload.program.build import dwell, plunge, rapid, rows
 from chipload.program.program import ARC_CCW, DWELL, LINE, Program
-from chipload.simulation.steps import steps_in_blocks, steps_of
+from chipload.simulation.steps import number_of_steps, steps_in_blocks, steps_of
 
 
 def five_axis(p: list[list[float]], a: list[list[float]], feed: float = 10.0, motion: int = LINE) -> Program:
@@ -82,3 +82,21 @@ def test_times_of_rows_are_shared_by_their_steps():
     assert np.concatenate([s.duration for s in some]).tolist() == steps.duration.tolist()
     with pytest.raises(InputError, match=r"steps: times \(3,\): must be \(4,\)"):
         steps_of(program, 5.0, 0.01, times=times[1:])
+
+
+@pytest.mark.parametrize("size", [7, 4096])
+def test_the_number_of_steps_is_that_of_the_steps_that_are_made(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lines, arcs, a dwell, a rapid and turns of the axis, in blocks of rows that end anywhere."""
+    monkeypatch.setattr("chipload.simulation.steps.ROWS", size)
+    random = np.random.default_rng(4)
+    arc = rows([ARC_CCW], [[-5.0, 0.0, 0.0]], (0.0, 0.0), 5.0, 0.0, 1, "cut")
+    program = Program.join(
+        [
+            rapid([5.0, 0.0, 0.0], 0.0, 1, "link"),
+            arc,
+            dwell([-5.0, 0.0, 0.0], 2.0, 0.0, 1, "wait"),
+            five_axis(random.uniform(-9.0, 9.0, (40, 3)).tolist(), random.uniform(0.2, 1.0, (40, 3)).tolist()),
+        ]
+    )
+    for step in (0.05, 0.7, 30.0):
+        assert number_of_steps(program, step, 0.01) == len(steps_of(program, step, 0.01)) > 40

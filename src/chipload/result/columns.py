@@ -82,7 +82,7 @@ _ROWS = (
     ("chip_volume_mm3", "mm\u00b3", "chip volume", "volume that the step removes"),
     ("engaged_volume_mm3", "mm\u00b3", "engaged volume", "volume that the engaged edge sweeps in the step"),
     ("cutting_work_j", "J", "cutting work", "work of the torque without the edge coefficients"),
-    ("chip_areas", "", "chip areas", "greatest number of separate areas of the chip on one layer"),
+    ("chip_areas", "", "chip areas", "separate areas of the chip: on one layer, or by moves of the edge"),
     ("chip_layers", "", "chip layers", "layers of the stock that lose material"),
     ("flute_fill", "", "chip space", "loose chip volume of a tooth over the volume of its flute"),
     # loads

@@ -34,7 +34,7 @@ halves, for what exceeds the worst: where the contact is exact, a load that diff
 where the cutter enters, is no error of the resolution unless it is greater than any that was found. FLOOR is that of
 :data:`MOVES_FLOOR`, no less than what 99 of 100 moves of the benchmark are off by (docs/design/engines.md), for of all
 steps a few are computed once more; where all cutters have a straight flank and a flat bottom, on which slices are
-exact, it is that of the layers.
+exact, it is that of the layers. Where an axis leans it is :data:`LEANING_MOVES_FLOOR` for any cutter.
 
 Deflection and form error go with the force: they have its error.
 """
@@ -89,6 +89,11 @@ FLOOR, LEANING_FLOOR = 0.01, 0.02
 MOVES_FLOOR = {
     "force_n": 0.03, "torque_nm": 0.03, "torque_mean_nm": 0.01, "power_w": 0.01, "chip_max_mm": 0.03,
     "force_normal_n": 0.03,
+}  # fmt: skip
+#: the same where an axis leans, for any cutter
+LEANING_MOVES_FLOOR = {
+    "force_n": 0.05, "torque_nm": 0.05, "torque_mean_nm": 0.02, "power_w": 0.02, "chip_max_mm": 0.05,
+    "force_normal_n": 0.05,
 }  # fmt: skip
 MORE = 4
 #: layers of the finer stock: the lowest in diameters, each so many times as thick as the one below it
@@ -218,7 +223,11 @@ def resolution_error(
     films, least = _films(columns), FLOOR if all(w.upright for w in windows.values()) else LEANING_FLOOR
     for name in names:
         if worst[name] > 0.0 and films < 1.0:
-            floor = least if setting.moves is None or straight else MOVES_FLOOR[name]
+            floor = least
+            if setting.moves is not None and not setting.moves.upright:
+                floor = LEANING_MOVES_FLOOR[name]
+            elif setting.moves is not None and not straight:
+                floor = MOVES_FLOOR[name]
             found[name] = lost[name] / worst[name] + floor + films / (1.0 - films)
         elif lost[name] > 0.0 or films > 0.0:
             found[name] = math.inf

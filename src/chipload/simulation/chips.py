@@ -39,7 +39,7 @@ from chipload.simulation.loads import (
     loads_of_steps,
     over_turn,
 )
-from chipload.simulation.moves import Engine, HandOver, MoveRun, leans, moved, run_by_moves, with_contact
+from chipload.simulation.moves import Engine, HandOver, MoveRun, moved, run_by_moves, with_contact
 from chipload.simulation.removal import (
     ChipAreas,
     Columns,
@@ -50,7 +50,7 @@ from chipload.simulation.removal import (
     TakenByLayers,
     Watch,
 )
-from chipload.simulation.steps import BLOCK, ROWS, StepBlocks, Steps, steps_in_blocks
+from chipload.simulation.steps import BLOCK, StepBlocks, Steps, moving_rows, number_of_steps, steps_in_blocks
 from chipload.simulation.strips import strips_for
 from chipload.simulation.swept_area import Interpolation
 from chipload.stock.layers import LayeredStock
@@ -128,6 +128,7 @@ def remove(
     O(n l m): n steps, l layers under the cutter, m edges of the stock around it; m does not grow with n.
     """
     count = counted(program, cutters, resolution)
+    progress(0.0, "removing")
     setting = setting_of(cutters, material, resolution, interpolation, watch, workers, processes)
     setting, handed = with_engine(engine, setting, program, stock)
     before = stock.copied() if accuracy else None
@@ -166,8 +167,8 @@ def _blocks_removed(
 
 
 def block_of(setting: RunSettings) -> int:
-    """Steps that are simulated together: by moves some more, of which each costs less."""
-    return BLOCK if setting.moves is None else MOVES * BLOCK
+    """Steps that are simulated together: by moves of an upright axis some more, of which each costs less."""
+    return MOVES * BLOCK if setting.moves is not None and setting.moves.upright else BLOCK
 
 
 def with_engine(
@@ -183,10 +184,6 @@ def with_engine(
     if engine == "layers":
         return setting, None
     fine = setting.resolution
-    leaning = leans(program)
-    if engine == "auto" and leaning.any():
-        line = int(program.line[int(np.argmax(leaning))])
-        return by_layers(engine, setting, HandOver(line, 'the axis leans; engine = "moves" simulates it by moves'))
     bodies = np.isin(program.tool, [n for n, c in setting.cutters.items() if c.body])
     try:
         if bodies.any():
@@ -289,14 +286,13 @@ def counted(program: Program, cutters: Mapping[int, Cutter], resolution: Resolut
         One has none, there is no step, or there are too many.
     """
     require_steps(program, resolution.step_mm)
-    count = 0
-    for steps in steps_in_blocks(program, resolution.step_mm, resolution.tolerance, size=ROWS):
-        count += len(steps)
-        for number in np.unique(steps.tool).tolist():
-            if number not in cutters:
-                line = int(steps.line[np.flatnonzero(steps.tool == number)[0]])
-                known = ", ".join(str(n) for n in sorted(cutters))
-                raise InputError(f"line {line}: tool {number}: no [[cutter]] has this number: state one beside {known}")
+    moving = np.flatnonzero(moving_rows(program))
+    for number, row in zip(*np.unique(program.tool[moving], return_index=True), strict=True):
+        if number not in cutters:
+            known = ", ".join(str(n) for n in sorted(cutters))
+            line = int(program.line[moving[row]])
+            raise InputError(f"line {line}: tool {number}: no [[cutter]] has this number: state one beside {known}")
+    count = number_of_steps(program, resolution.step_mm, resolution.tolerance)
     if count == 0:
         raise InputError("program: no motion: nothing to simulate")
     return count

@@ -107,6 +107,7 @@ def remove_in_chunks(
         As :func:`chipload.simulation.chips.remove`, and where the folder cannot be used.
     """
     count = counted(program, cutters, resolution)
+    progress(0.0, "removing")
     setting = setting_of(cutters, material, resolution, interpolation, watch, workers, processes)
     shape = (stock.bounds, stock.xs, stock.ys, stock.cut, stock.room, stock.tidied, stock.tiles)
     part = None if stock.part is None else (np.asarray(stock.part.vertices), np.asarray(stock.part.faces))

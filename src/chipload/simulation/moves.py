@@ -102,6 +102,11 @@ class MoveRun:
     flank_mm: Mapping[int, float]
     tolerance: float
 
+    @property
+    def upright(self) -> bool:
+        """Whether the axis stands upright all along."""
+        return isinstance(self.stock, MoveStock)
+
     def skip(self, program: Program, step_mm: float, count: int) -> None:
         """Make the first ``count`` steps of a program without looking at them: a run that goes on."""
         for steps in steps_in_blocks(program, step_mm, self.tolerance, size=ROWS):

@@ -20,9 +20,10 @@ from chipload.engagement.chips.covered import covered_polygons
 from chipload.engagement.chips.move import LEAST_AXIS_Z, Move
 from chipload.engagement.chips.section import cutter_numbers
 from chipload.errors import InputError
+from chipload.program.program import Program
 from chipload.simulation.flute_end import Tiles, in_air, met
 from chipload.simulation.reach import reached
-from chipload.simulation.steps import Steps
+from chipload.simulation.steps import StepBlocks, Steps
 from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]
@@ -98,22 +99,29 @@ def swept_ahead(
 
 
 def require_upright(
-    steps: Steps, stock: LayeredStock, cutters: Mapping[int, Cutter], interpolation: Interpolation
+    program: Program,
+    step_mm: float,
+    chord_mm: float,
+    stock: LayeredStock,
+    cutters: Mapping[int, Cutter],
+    interpolation: Interpolation,
 ) -> None:
-    """Refuse steps whose axis lies, or looks down, beside or in the stock.
+    """Refuse a program whose axis lies, or looks down, beside or in the stock; O(rows) where none lies.
 
     Raises
     ------
     InputError
         As :func:`swept_ahead`.
     """
-    lies = np.minimum(steps.a0[:, 2], steps.a1[:, 2]) < 2.0 * LEAST_AXIS_Z
-    if not lies.any():
+    # between two axes above the horizon none is lower than both
+    if not len(program) or float(program.axis[:, 2].min()) >= 2.0 * LEAST_AXIS_Z:
         return
-    low, high, near = near_stock(steps, plan_of(stock), cutters)
-    for k in np.flatnonzero(lies & near).tolist():
-        if stock.layers_between(low[k, 2], high[k, 2]):
-            _move(steps, k, interpolation)
+    for steps in StepBlocks(program, step_mm, chord_mm):
+        lies = np.minimum(steps.a0[:, 2], steps.a1[:, 2]) < 2.0 * LEAST_AXIS_Z
+        low, high, near = near_stock(steps, plan_of(stock), cutters)
+        for k in np.flatnonzero(lies & near).tolist():
+            if stock.layers_between(low[k, 2], high[k, 2]):
+                _move(steps, k, interpolation)
 
 
 def plan_of(stock: LayeredStock) -> Plan:

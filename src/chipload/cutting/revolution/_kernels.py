@@ -16,6 +16,9 @@ from numba import njit, types
 TAU = 2.0 * math.pi
 #: an edge that lags by less than this over a bite counts as one that does not [rad]
 STRAIGHT = 1e-5
+#: entries whose angles [rad] and places [mm] differ by no more than this, and whose chips by no more than this share,
+#: have the same loads: those of the first of them
+SAME = 1e-8
 
 _F2 = types.float64[:, ::1]
 _RI = types.Array(types.int64, 1, "C", readonly=True)
@@ -127,6 +130,32 @@ def add_part(acc, m0, k0, k1, m1, at, step, back, table, first, last, p, q, w, a
         acc[3, m] += over * arm * (at_ * d - bt * dC + ct * dS)
 
 
+@njit(cache=True, nogil=True)
+def same(i, j, start, rows, tooth, piece, slices, frame, left):
+    """Whether two entries cut alike, as the steps along a straight row do."""
+    count = start[i + 1] - start[i]
+    if start[j + 1] - start[j] != count:
+        return False
+    for d in range(3):
+        if abs(left[i, d] - left[j, d]) > SAME:
+            return False
+        for e in range(3):
+            if abs(frame[i, d, e] - frame[j, d, e]) > SAME:
+                return False
+    for n in range(count):
+        r = start[i] + n
+        q = start[j] + n
+        if tooth[r] != tooth[q]:
+            return False
+        thick = SAME * (abs(rows[q, 4]) + abs(rows[q, 5]) + abs(rows[q, 6]))
+        for d in range(7):
+            if abs(rows[r, d] - rows[q, d]) > (SAME if d < 4 else thick):
+                return False
+            if abs(slices[piece[r], d] - slices[piece[q], d]) > SAME:
+                return False
+    return True
+
+
 @njit(
     types.void(
         _RI, _RF[1], _RI, _RI, _RF[1], _RF[1], _RF[2], types.int64, types.int64, types.boolean, _RF[0], _RF[1], _F2
@@ -146,7 +175,12 @@ def over_turn(start, rows, tooth, piece, slices, table, frame, teeth, count, ali
     # where all teeth are alike each is the one before a pitch later, and a period of the pitch takes all in
     parts = teeth if alike else 1
     step = TAU / parts / count
+    known = -1
     for i in range(len(start) - 1):
+        if known >= 0 and same(i, known, start, rows, tooth, piece, slices, frame, left):
+            out[i] = out[known]
+            continue
+        known = i
         acc[:] = 0.0
         chip = 0.0
         for r in range(start[i], start[i + 1]):

@@ -24,7 +24,6 @@ from chipload.program.program import RAPID, Program
 from chipload.program.read import ProgramReading, times_of
 from chipload.simulation.chips import counted, require_steps
 from chipload.simulation.removal import Resolution
-from chipload.simulation.steps import StepBlocks
 from chipload.simulation.surface import require_points
 from chipload.simulation.swept_area import require_upright
 from chipload.stock.layers import LayeredStock
@@ -80,8 +79,7 @@ def bodies_of(
     program, times = timed(reading, job, machine)
     fine = resolution_of(job, program)
     count = counted(program, job.cutters, fine)
-    for steps in StepBlocks(program, op.step_mm, op.tolerance_mm):
-        require_upright(steps, stock, job.cutters, op.interpolation)
+    require_upright(program, op.step_mm, op.tolerance_mm, stock, job.cutters, op.interpolation)
     points = stock_points(stock, op.stock_points_mm) if op.stock_points_mm is not None else None
     part = part_body(job)
     if part is not None and job.table.part is not None:

@@ -101,7 +101,7 @@ class SimulateTable(Table):
     interpolation: Literal["slerp", "lerp"] = Field("slerp", description="how the axis turns within a step")
     engine: Literal["auto", "moves", "layers"] = Field(
         "auto",
-        description="auto: moves, or layers if the axis leans or moves cannot do it; moves: exact; layers: polygons",
+        description="auto: moves, or layers if moves cannot do it; moves: exact; layers: polygons",
     )
     workers: Annotated[Count, Field(le=64)] = Field(
         1, description="processes that share the stock in strips, of layers alone; the result does not depend on them"

@@ -52,9 +52,14 @@ from chipload.engagement.bricks.places._kernels import (
 )
 from chipload.engagement.moves._kernels import FLUTE, RHO1, TA, TB, Z2
 from chipload.engagement.moves.borrowed._kernels import borrowed
-from chipload.engagement.moves.front._kernels import APART, JUMP, STEADY, parts_of, turns
+from chipload.engagement.moves.front._kernels import APART, JUMP, STEADY, turns
 
 __all__ = ["APART", "BRICKS", "SLICES", "run"]
+
+#: an area of less than this share of the engaged surface is a film, as moves that turn leave along a rim
+FILM = 1e-3
+#: slices whose ends are no farther apart than this follow one another [mm]
+BESIDE = 1e-9
 
 
 @njit(cache=True, nogil=True)
@@ -181,10 +186,46 @@ def engaged(at, c, nodes, flank, index, work, slices, rows, owner, row_at, out):
         out[8] = 1.0
     total = row - row_at[0]
     if total > 0:
-        out[1] = parts_of(rows[row_at[0] :], owner, row_at[0], total, np.empty(total, np.int64))
+        out[1] = areas_of(rows, owner, slices, row_at[0], total, np.empty(total, np.int64), np.empty(total))
     row_at[0] = row
     row_at[1] = have
     return True
+
+
+@njit(cache=True, nogil=True)
+def areas_of(rows, owner, slices, first, count, room, area):
+    """Number of separate areas that are engaged, films apart: spans of slices that follow one another along the profile
+    and overlap, whole turns apart, belong together.
+    """
+    whole = 0.0
+    for i in range(count):
+        k = owner[first + i]
+        room[i] = i
+        area[i] = (rows[first + i, 1] - rows[first + i, 0]) * slices[k, 2] * (slices[k, 1] - slices[k, 0])
+        whole += area[i]
+        for j in range(i - 1, -1, -1):
+            before = owner[first + j]
+            if k - before > 1:
+                break
+            if k == before or abs(slices[k, 0] - slices[before, 1]) > BESIDE:
+                continue
+            turned = TAU * math.floor((rows[first + j, 1] - rows[first + i, 0]) / TAU)
+            if rows[first + j, 0] < rows[first + i, 1] + turned:
+                a = i
+                while room[a] != a:
+                    a = room[a]
+                b = j
+                while room[b] != b:
+                    b = room[b]
+                if a != b:
+                    # the surface of both is that of the earlier one
+                    room[max(a, b)] = min(a, b)
+                    area[min(a, b)] += area[max(a, b)]
+    areas = 0
+    for i in range(count):
+        if room[i] == i and area[i] >= FILM * whole:
+            areas += 1
+    return areas
 
 
 @njit(cache=True, nogil=True)
