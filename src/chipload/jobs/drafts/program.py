@@ -11,7 +11,7 @@ import numpy as np
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.table import cutter_from_table
-from chipload.errors import InputError, Severity
+from chipload.errors import InputError, Severity, grouped
 from chipload.files import read_regular
 from chipload.jobs.drafts.comments import Box, Header, Stated, read_header
 from chipload.jobs.drafts.cutters import cutter_table
@@ -121,7 +121,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     rest = [f for f in chosen.reading.findings if f not in found and not f.code.endswith(PLAIN)]
     # a speed is guessed where the spindle rests
     asked = [f for f in chosen.reading.violations if f.code != "machine-spindle-off"]
-    notes = [str(f) for f in (*found, *asked, *rest)][:LISTED]
+    notes = [text for _, text in grouped((*found, *asked, *rest))][:LISTED]
     origin = known.origin or path.name
     return Draft(
         f"Simulate {origin}: chips, forces, torque and collisions of the program in its stock.",
