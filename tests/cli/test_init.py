@@ -263,6 +263,17 @@ def test_a_camotics_project(tmp_path: Path) -> None:
     assert "guess: stock" not in said
 
 
+def test_a_camotics_project_whose_script_has_no_nc_text(tmp_path: Path) -> None:
+    tool = {"units": "metric", "shape": "cylindrical", "length": 20, "diameter": 6}
+    (tmp_path / "sign.camotics").write_text(json.dumps({"tools": {"1": tool}, "files": ["letters.tpl"]}))
+    code, _, err = call("init", tmp_path / "sign.camotics", tmp_path / "job")
+    assert code == 2
+    assert "export the NC text of letters.tpl from CAMotics, as sign.nc beside the project" in " ".join(err.split())
+    (tmp_path / "sign.camotics").write_text(json.dumps({"tools": {"1": tool}, "files": ["letters.nc"]}))
+    _, _, err = call("init", tmp_path / "sign.camotics", tmp_path / "job")
+    assert err.rstrip().endswith("(letters.nc): put it beside the project")
+
+
 def prop(name: str, kind: str, inner: str) -> str:
     return f'<Property name="{name}" type="{kind}">{inner}</Property>'
 
