@@ -222,7 +222,7 @@ def _rigid(check: LimitCheck) -> LimitCheck:
     """A deflection beyond the rigid model makes loads unknown; it is no limit that is exceeded."""
     if check.state is not Verdict.EXCEEDS:
         return check
-    reason = "the cutter bends so far that its chips change, which no load here knows: shorten its overhang or cut less"
+    reason = "the cutter bends further than the rigid model covers, so its loads are not known: shorten it or cut less"
     return replace(check, state=Verdict.UNPROVEN, reason=reason)
 
 
