@@ -16,6 +16,7 @@ import math
 import os
 import re
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -119,6 +120,7 @@ def run(folder: Path, limit_s: float) -> tuple[str, str, float]:
     code, out, err, seconds = timed(
         ["run", str(folder / "job" / "job.toml"), "--accept", "--out", str(folder / "result")], limit_s
     )
+    folder.mkdir(parents=True, exist_ok=True)
     spent.write_text(f"{earlier + seconds:.1f}")
     if code is None or code < 0:
         why = f"stopped after {limit_s:g} s by the clock" if code is None else f"ended by {signal.Signals(-code).name}"
@@ -162,6 +164,8 @@ def main(arguments: list[str] | None = None) -> None:
         if not (Path(data) / name).exists():
             print(f"{name}: is not in {data}")
             continue
+        if chosen.again:  # drafts too may have become others
+            shutil.rmtree(folder_of(chosen.kept, name), ignore_errors=True)
         most, why = drafted(Path(data) / name, folder_of(chosen.kept, name))
         if why:
             write({name: row(name, FILES[name], REFUSED, why, None)})

@@ -122,3 +122,10 @@ def test_the_shortest_is_run_first_and_a_verdict_is_kept(tool, tmp_path, monkeyp
     tool.main([*names, *kept])
     assert len(ran) == 3
     assert tool.rows_of(tool.PAGE.read_text())[names[2]].endswith("| exceeds | y | 20 |")
+    old = tool.folder_of(tmp_path / "kept", names[0]) / "job" / "job.toml"
+    old.parent.mkdir(exist_ok=True)
+    old.touch()
+    codes.append(3)
+    tool.main([names[0], "--again", *kept])
+    assert (len(ran), old.exists()) == (4, False)
+    assert tool.rows_of(tool.PAGE.read_text())[names[0]].endswith("| exceeds | y | 10 |")
