@@ -131,8 +131,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as above:
             out = run(case, Path(above) / Path(case.file).stem)
         edits = "; ".join(f"`{k} = {v}`: {why}" for k, v, why in case.edits) or "none"
-        told = str(out["verdict"]) + (f": {out['message']}" if "message" in out else "")
-        told = told.replace("|", "/")
+        told = str(out.get("message", out["verdict"])).replace("|", "/")
         seconds = f"{out['seconds']:.0f}" if "seconds" in out else ""
         name = Path(case.file).name
         rows[name] = f"| {name} | {case.kind} | {out.get('guesses', '')} | {edits} | {told} | {seconds} |"

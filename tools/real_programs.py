@@ -5,8 +5,8 @@
 ``chipload init`` drafts a job of each file of :data:`FILES`; ``chipload check`` estimates its run; ``chipload run
 --accept`` runs it, the shortest first, in a process of its own. What a file does not state is guessed, and the guesses
 are accepted. A file that takes longer than the limit, or that is refused, is recorded as such; a simulation that was
-stopped goes on from its checkpoint the next time. Files that have a verdict on the page are not run again unless
-``--again`` asks for it. Times are processor times of a file, all its parts together.
+stopped, or that the system ended, goes on from its checkpoint the next time. Files that have a verdict on the page are
+not run again unless ``--again`` asks for it. Times are processor times of a file, all its parts together.
 """
 
 from __future__ import annotations
@@ -16,15 +16,19 @@ import math
 import os
 import re
 import resource
+import shutil
 import signal
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
 #: where jobs, checkpoints and processor times are kept between two calls
 KEPT = Path(__file__).parents[1] / ".real"
 #: [s] of a unit of an estimate
 UNITS_S = {"s": 1.0, "min": 60.0, "h": 3600.0}
+#: characters of a reason
+LONGEST_REASON = 240
 PAGE = Path(__file__).parents[1] / "docs" / "real_programs.md"
 #: files below CHIPLOAD_DATA, and what they are
 FILES = {
@@ -49,7 +53,7 @@ FILES = {
     "machines_tools/better_tool_library/Shape/slittingsaw.fcstd": "FreeCAD document",
 }
 #: what stands for a verdict where there is none
-NOT_RUN, TOO_LONG, REFUSED = "not run", "longer than {:g} s", "refused"
+NOT_RUN, STOPPED, REFUSED, FAILED = "not run", "not finished", "refused", "failed"
 HEAD = """# Real programs, run whole
 
 Files of other people, each drafted by `chipload init FILE DIR` and run from its beginning to its end by
@@ -58,8 +62,7 @@ that a verdict rests on guesses: a gouge or a rapid through stock may be that of
 files that have no verdict yet, the shortest first by the estimate of `chipload check`, and writes this page; a file
 that was stopped goes on where it was. Times are processor times, the compiling of kernels included where a run was the
 first. A row with *{not_run}* waits for the next `make real`; the longest that its run may take by the estimate stands
-beside it. The row of `octagon.dxf` is still that of `chipload simulate`, whose guesses leave a result unproven;
-`--again` of the tool renews it.
+beside it.
 
 | file | kind | verdict | first reason | time [s] |
 |---|---|---|---|---:|
@@ -74,7 +77,8 @@ def rows_of(page: str) -> dict[str, str]:
 def row(name: str, kind: str, verdict: str, reason: str, seconds: float | None) -> str:
     """A row of the table; bars would end a cell."""
     time = "" if seconds is None else f"{seconds:.0f}"
-    return f"| `{name}` | {kind} | {verdict} | {reason.replace('|', '/')[:160]} | {time} |"
+    told = textwrap.shorten(reason.replace("|", "/"), LONGEST_REASON, placeholder=" ...")
+    return f"| `{name}` | {kind} | {verdict} | {told} | {time} |"
 
 
 def timed(words: list[str], limit_s: float | None = None) -> tuple[int | None, str, str, float]:
@@ -116,19 +120,27 @@ def run(folder: Path, limit_s: float) -> tuple[str, str, float]:
     code, out, err, seconds = timed(
         ["run", str(folder / "job" / "job.toml"), "--accept", "--out", str(folder / "result")], limit_s
     )
+    folder.mkdir(parents=True, exist_ok=True)
     spent.write_text(f"{earlier + seconds:.1f}")
-    if code is None:
-        return TOO_LONG.format(limit_s), err.strip().splitlines()[-1][:160] if err.strip() else "", earlier + seconds
+    if code is None or code < 0:
+        why = f"stopped after {limit_s:g} s by the clock" if code is None else f"ended by {signal.Signals(-code).name}"
+        return STOPPED, f"{why}{share(err)}; goes on in the next run", earlier + seconds
     return *read(code, out, err), earlier + seconds
 
 
+def share(err: str) -> str:
+    """How far a run came, by the last line of its progress; empty: it tells none."""
+    found = re.findall(r"(\d+) %", err)
+    return f" at {found[-1]} %" if found else ""
+
+
 def read(code: int, out: str, err: str) -> tuple[str, str]:
-    """Verdict and first reason from the exit code and the two texts of a run."""
+    """Verdict and first reason from the exit code and the two texts of a run that ended."""
     for line in out.splitlines():
         if found := re.match(r"(Holds|Unproven|Exceeds): (.*)", line):
             return found[1].lower(), found[2].strip()
     reasons = [line.removeprefix("chipload: ") for line in err.splitlines() if line.strip()]
-    return (REFUSED if code == 2 else f"exit code {code}"), reasons[-1] if reasons else ""
+    return (REFUSED if code == 2 else FAILED), reasons[-1] if reasons else f"exit code {code}"
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -152,6 +164,8 @@ def main(arguments: list[str] | None = None) -> None:
         if not (Path(data) / name).exists():
             print(f"{name}: is not in {data}")
             continue
+        if chosen.again:  # drafts too may have become others
+            shutil.rmtree(folder_of(chosen.kept, name), ignore_errors=True)
         most, why = drafted(Path(data) / name, folder_of(chosen.kept, name))
         if why:
             write({name: row(name, FILES[name], REFUSED, why, None)})

@@ -90,6 +90,30 @@ class Finding:
         return f"line {self.line}: {self.text} ({self.code})" if self.line else f"{self.text} ({self.code})"
 
 
+#: lines of a file that are named where the same finding is made in many
+LINES_NAMED = 3
+
+
+def grouped(findings: Iterable[Finding]) -> list[tuple[Finding, str]]:
+    """Findings with the same code, text and severity as one: the first of them, and the text with the lines of all.
+
+    >>> [text for _, text in grouped([Finding("a", n, "one") for n in (2, 5, 7, 8)] + [Finding("b", 4, "two")])]
+    ['lines 2, 5, 7 and 1 more: one (a)', 'line 4: two (b)']
+    """
+    groups: dict[tuple[str, str, Severity], list[Finding]] = {}
+    for finding in findings:
+        groups.setdefault((finding.code, finding.text, finding.severity), []).append(finding)
+    out = []
+    for (code, text, _), each in groups.items():
+        lines = list(dict.fromkeys(f.line for f in each))
+        if len(lines) == 1:
+            out.append((each[0], str(each[0])))
+            continue
+        named, more = ", ".join(map(str, lines[:LINES_NAMED])), len(lines) - LINES_NAMED
+        out.append((each[0], f"lines {named}{f' and {more} more' if more > 0 else ''}: {text} ({code})"))
+    return out
+
+
 def worst_severity(findings: Iterable[Finding]) -> Severity:
     """Greatest severity of the findings; ``NOTE`` without any.
 

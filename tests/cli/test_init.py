@@ -220,6 +220,19 @@ def test_a_compensated_path_is_read_with_the_cutter_that_a_comment_states(tmp_pa
     assert (stock["low_mm"][1], stock["high_mm"][1]) == (-5.0, 1.0)
 
 
+def test_cl_data_that_are_named_as_a_text(tmp_path: Path) -> None:
+    """No NC dialect reads them, CL data do: five axes, no spindle, no feed."""
+    text = "GOTO/-30.5,18.5,30.7,-0.6,0,0.8\nGOTO/-30.4,18.7,30.7,-0.6,0,0.8\nGOTO/-20.4,18.7,30.7,0,0,1\n"
+    (tmp_path / "path.txt").write_text(text)
+    assert call("init", tmp_path / "path.txt", tmp_path / "job")[0] == 0
+    job = tomllib.loads((tmp_path / "job" / "job.toml").read_text())
+    assert job["program"]["dialect"] == "apt"
+    assert job["machine"]["name"] == "xyzbc-trunnion"
+    (tmp_path / "words.txt").write_text("no program\n")
+    code, _, err = call("init", tmp_path / "words.txt", tmp_path / "no")
+    assert (code, "words.txt: line 1: " in err) == (2, True)
+
+
 def test_inches_become_millimetres(tmp_path: Path) -> None:
     path = tmp_path / "inch.nc"
     path.write_text("(T1 D=0.5 CR=0.)\nG20 G90\nT1 M6\nS3000 M3\nG0 X0 Y0 Z1\nG1 Z-0.1 F10\nX1\nG0 Z1\nM2\n")
@@ -242,6 +255,17 @@ def test_a_camotics_project(tmp_path: Path) -> None:
     assert (cutter["diameter_mm"], cutter["corner_radius_mm"], cutter["flute_length_mm"]) == (6.35, 3.175, 25.4)
     assert (job["stock"]["low_mm"], job["stock"]["high_mm"]) == ([-20.0, 0.0, -8.0], [40.0, 20.0, 0.0])
     assert "guess: stock" not in said
+
+
+def test_a_camotics_project_whose_script_has_no_nc_text(tmp_path: Path) -> None:
+    tool = {"units": "metric", "shape": "cylindrical", "length": 20, "diameter": 6}
+    (tmp_path / "sign.camotics").write_text(json.dumps({"tools": {"1": tool}, "files": ["letters.tpl"]}))
+    code, _, err = call("init", tmp_path / "sign.camotics", tmp_path / "job")
+    assert code == 2
+    assert "export the NC text of letters.tpl from CAMotics, as sign.nc beside the project" in " ".join(err.split())
+    (tmp_path / "sign.camotics").write_text(json.dumps({"tools": {"1": tool}, "files": ["letters.nc"]}))
+    _, _, err = call("init", tmp_path / "sign.camotics", tmp_path / "job")
+    assert err.rstrip().endswith("(letters.nc): put it beside the project")
 
 
 def prop(name: str, kind: str, inner: str) -> str:

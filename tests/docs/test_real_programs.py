@@ -28,11 +28,32 @@ def tool():
         (3, "a title\nguess: x\nUnproven: no stock.\nworst values: -\n", "", ("unproven", "no stock.")),
         (3, "Exceeds: line 3: a rapid\n", "chipload: 20 %\n", ("exceeds", "line 3: a rapid")),
         (2, "", "chipload: 20 %\nchipload: part: no contour\n", ("refused", "part: no contour")),
-        (1, "", "Traceback\nValueError: x\n", ("exit code 1", "ValueError: x")),
+        (1, "", "Traceback\nValueError: x\n", ("failed", "ValueError: x")),
+        (1, "", "", ("failed", "exit code 1")),
     ],
 )
 def test_a_run_is_read(tool, code, out, err, found):
     assert tool.read(code, out, err) == found
+
+
+@pytest.mark.parametrize(
+    ("code", "err", "reason"),
+    [
+        (None, "chipload: 12 %, about 9 min left: removing\nchipload: stopped: 7 steps are kept\n",
+         "stopped after 60 s by the clock at 12 %; goes on in the next run"),
+        (-9, "chipload: 13 %, about 127 min left: removing\n", "ended by SIGKILL at 13 %; goes on in the next run"),
+        (-15, "", "ended by SIGTERM; goes on in the next run"),
+    ],
+)  # fmt: skip
+def test_a_run_that_did_not_end_says_how_far_it_came(tool, tmp_path, monkeypatch, code, err, reason):
+    monkeypatch.setattr(tool, "timed", lambda words, limit_s: (code, "", err, 4.0))
+    assert tool.run(tmp_path, 60.0) == ("not finished", reason, 4.0)
+
+
+def test_a_long_reason_ends_at_a_word(tool):
+    cell = tool.row("a", "k", "exceeds", "word " * 100, 1.0).split("|")[4].strip()
+    assert cell.endswith("word ...")
+    assert len(cell) <= tool.LONGEST_REASON
 
 
 def test_rows_of_other_files_stay(tool, tmp_path, monkeypatch):
@@ -96,8 +117,15 @@ def test_the_shortest_is_run_first_and_a_verdict_is_kept(tool, tmp_path, monkeyp
     tool.main([*names[1:], *kept])
     assert ran == [tool.folder_of(tmp_path, name).name for name in (names[2], names[1])]
     rows = tool.rows_of(tool.PAGE.read_text())
-    assert "longer than 900 s" in rows[names[2]]
+    assert "stopped after 900 s by the clock" in rows[names[2]]
     assert rows[names[0]].endswith("| exceeds | x | 5 |")
     tool.main([*names, *kept])
     assert len(ran) == 3
     assert tool.rows_of(tool.PAGE.read_text())[names[2]].endswith("| exceeds | y | 20 |")
+    old = tool.folder_of(tmp_path / "kept", names[0]) / "job" / "job.toml"
+    old.parent.mkdir(exist_ok=True)
+    old.touch()
+    codes.append(3)
+    tool.main([names[0], "--again", *kept])
+    assert (len(ran), old.exists()) == (4, False)
+    assert tool.rows_of(tool.PAGE.read_text())[names[0]].endswith("| exceeds | y | 10 |")

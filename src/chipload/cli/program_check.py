@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chipload.cli.inputs import feed_of, machine_of
-from chipload.errors import InputError, Severity
+from chipload.errors import InputError, Severity, grouped
 from chipload.terminal import EXCEEDED, bar, show
 
 if TYPE_CHECKING:
@@ -20,13 +20,13 @@ GENERIC = ("vmc", "xyzbc-trunnion", "xyzac-trunnion", "xyzbc-head-table")
 
 
 def finding_lines(reading: ProgramReading) -> list[str]:
-    """What was found in a program, a line each: first what leaves it unproven, then by line of the program."""
+    """What was found in a program: first what leaves it unproven, then by line; the same in many lines is told once."""
     gaps = [f for f in reading.findings if f.severity >= Severity.UNPROVEN]
     broken = set(map(id, reading.violations))
     rest = sorted((*(f for f in reading.findings if f not in gaps), *reading.violations), key=lambda f: f.line)
     return [
-        *(f"{f} [unproven]" for f in gaps),
-        *(f"{f}{' [does not hold]' if id(f) in broken else ''}" for f in rest),
+        *(f"{text} [unproven]" for _, text in grouped(gaps)),
+        *(f"{text}{' [does not hold]' if id(f) in broken else ''}" for f, text in grouped(rest)),
     ]
 
 

@@ -21,7 +21,7 @@ from chipload.cli.app import (
 )
 from chipload.cli.inputs import feed_of, machine_of, setup_of
 from chipload.cli.program_check import TOLERANCE_MM, check_program
-from chipload.errors import InputError, Severity, worst_severity
+from chipload.errors import InputError, Severity, grouped, worst_severity
 from chipload.terminal import EXCEEDED, bar, guarded, show
 
 #: findings of a machine that break nothing
@@ -117,8 +117,8 @@ def convert(
                 tool_lengths=lengths, tcp=tcp, tolerance=tolerance_mm,
             )  # fmt: skip
             write_whole(target, text.encode("ascii"))
-        for f in (*reading.findings, *findings):
-            show(str(f))
+        for _, found in grouped((*reading.findings, *findings)):
+            show(found)
         show(f"written: {target}: {len(text.splitlines())} lines for machine {there.name}, not verified")
         exceeded = any(f.code.startswith("machine-") and f.code not in HARMLESS for f in findings)
         return EXCEEDED if exceeded or worst_severity(reading.findings) >= Severity.UNPROVEN else 0

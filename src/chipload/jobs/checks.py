@@ -236,9 +236,8 @@ def _rigid(check: LimitCheck) -> LimitCheck:
     """A deflection beyond the rigid model makes loads unknown; it is no limit that is exceeded."""
     if check.state is not Verdict.EXCEEDS:
         return check
-    return replace(
-        check, state=Verdict.UNPROVEN, reason="the deflection changes the chip: the rigid model is not valid"
-    )
+    reason = "the cutter bends further than the rigid model covers, so its loads are not known: shorten it or cut less"
+    return replace(check, state=Verdict.UNPROVEN, reason=reason)
 
 
 def _spindle(machine: Machine, columns: Columns, track: str, errors: Mapping[str, float]) -> list[LimitCheck]:

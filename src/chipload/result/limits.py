@@ -99,6 +99,8 @@ class LimitCheck:
         'force 812 N exceeds 500 N in line 12'
         >>> LimitCheck("force_n", 500.0, 412.0, Verdict.HOLDS).text
         'force 412 of 500 N'
+        >>> LimitCheck("torque_nm", 3.0, 2.9, Verdict.UNPROVEN, line=7, reason="coarse").text
+        'torque 2.9 of 3 N m in line 7, unproven: coarse'
         """
         unit = f" {self.column.unit}" if self.column.unit else ""
         least = self.column.least
@@ -109,7 +111,7 @@ class LimitCheck:
             beyond = "is below" if least else "exceeds"
             return f"{self.column.label} {self.worst:.4g}{unit} {beyond} {self.limit:g}{unit} {self.where}".rstrip()
         text = f"{self.column.label} {self.worst:.4g} of {'at least ' if least else ''}{self.limit:g}{unit}"
-        return text if self.state is Verdict.HOLDS else f"{text}, unproven: {self.reason}"
+        return text if self.state is Verdict.HOLDS else f"{text} {self.where}".rstrip() + f", unproven: {self.reason}"
 
 
 def state_of(

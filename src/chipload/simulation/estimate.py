@@ -16,15 +16,15 @@ BASE, MOTION, STEP = 350e6, 1.6e3, 0.5e3
 QUICK, SLOW, START = 1.6e-3, 17e-3, 4.0
 
 
-def estimate(steps: int, motions: int) -> str:
-    """Steps, memory and processor time of a simulation, in a sentence.
+def estimate(steps: int, motions: int, quick: float = QUICK, slow: float = SLOW) -> str:
+    """Steps, memory and processor time of a simulation, in a sentence; ``quick`` and ``slow`` are times of a step [s].
 
     >>> estimate(200_000, 100_000)
     'estimate: 200000 steps, 610 MB of memory, 5 to 57 min; a first answer: run --coarse'
     >>> estimate(28, 8)
     'estimate: 28 steps, 350 MB of memory, 4 to 4 s'
     """
-    low, high = START + QUICK * steps, START + SLOW * steps
+    low, high = START + quick * steps, START + slow * steps
     unit, name = (60.0, "min") if high > 300.0 else (1.0, "s")
     hint = "; a first answer: run --coarse" if high > 300.0 else ""
     memory = (BASE + MOTION * motions + STEP * steps) / 1e6

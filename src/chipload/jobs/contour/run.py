@@ -22,6 +22,7 @@ from chipload.geometry.step import read_step_face
 from chipload.jobs.checks import default_checks
 from chipload.jobs.contour.advice import greatest_engagement
 from chipload.jobs.contour.earlier_stock import read_stock, standing_between
+from chipload.jobs.contour.estimate import clearing_estimate
 from chipload.jobs.contour.finish_program import (
     FinishProgram,
     finish_contours,
@@ -201,12 +202,13 @@ def check(job: ContourJob) -> tuple[list[str], bool]:
         f"{job.path.name}: valid: {closed} closed and {len(inputs.contours) - closed} open contours, "
         f"machine {inputs.machine.name}, material {inputs.material.name}"
     ]
-    beyond = list[str]()
+    beyond, cleared = list[str](), list[tuple[float, Clearing, float]]()
     for k, (op, own) in enumerate(_cuts(job, inputs)):
         op, _ = _resolved(job, own, op)
         cutter, setting = job.cutters[op.cutter], _setting(job, own, op)
         if isinstance(setting, Clearing):
-            what = f"{check_pocket(own.contours, setting, cutter):.6g} mm2"
+            cleared.append((check_pocket(own.contours, setting, cutter), setting, cutter.radius))
+            what = f"{cleared[-1][0]:.6g} mm2"
         else:
             count = check_contour(own.contours, setting, cutter, inputs.material, inputs.machine)
             what = f"{count} pass{'es' if count > 1 else ''}"
@@ -216,7 +218,7 @@ def check(job: ContourJob) -> tuple[list[str], bool]:
     lines += [f"finding: {text}" for text in (*job.findings, *inputs.findings)]
     if job.unchecked:
         lines.append(f"not checked, no limit stated: {', '.join(job.unchecked)}")
-    return lines, not beyond
+    return [*lines, *clearing_estimate(cleared)], not beyond
 
 
 def _above_limit(job: ContourJob, k: int, op: OperationTable, cutter: Cutter) -> list[str]:

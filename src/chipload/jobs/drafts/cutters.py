@@ -71,6 +71,7 @@ def _guesses(stated: Mapping[str, tuple[Any, str]], deepest: float) -> dict[str,
         reason = "2.5 times the diameter" if flute <= 2.5 * d else "as deep as the program cuts, and 1 mm"
         out["flute_length_mm"] = (flute, f"no file states it; {reason}")
     if "overhang_mm" not in stated:
-        out["overhang_mm"] = (round(flute + max(d, 5.0), 3), "no file states it; flutes and one diameter")
+        above = "one diameter" if d >= 5.0 else "5 mm"
+        out["overhang_mm"] = (round(flute + max(d, 5.0), 3), f"no file states it; flutes and {above}")
     out["modulus_gpa"] = (580.0, "no file states it; carbide; high-speed steel has 210")
     return out

@@ -44,7 +44,7 @@ class Entry:
         """The line of the job file."""
         if self.value is None:
             text = f"# {self.key} = {self.example}"
-            return f"{text:{COMMENT_COLUMN}}# {self.note}" if self.note else text
+            return f"{text:{COMMENT_COLUMN}} # {self.note}" if self.note else text
         text = f"{self.key} = {toml(self.value)}"
         if not self.note:
             return text

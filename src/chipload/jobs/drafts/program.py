@@ -11,7 +11,7 @@ import numpy as np
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.table import cutter_from_table
-from chipload.errors import InputError, Severity
+from chipload.errors import InputError, Severity, grouped
 from chipload.files import read_regular
 from chipload.jobs.drafts.comments import Box, Header, Stated, read_header
 from chipload.jobs.drafts.cutters import cutter_table
@@ -121,7 +121,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     rest = [f for f in chosen.reading.findings if f not in found and not f.code.endswith(PLAIN)]
     # a speed is guessed where the spindle rests
     asked = [f for f in chosen.reading.violations if f.code != "machine-spindle-off"]
-    notes = [str(f) for f in (*found, *asked, *rest)][:LISTED]
+    notes = [text for _, text in grouped((*found, *asked, *rest))][:LISTED]
     origin = known.origin or path.name
     return Draft(
         f"Simulate {origin}: chips, forces, torque and collisions of the program in its stock.",
@@ -155,40 +155,50 @@ def _text(path: Path, apt: bool) -> str:
 
 def _read(path: Path, known: Known, cutters: Mapping[int, Cutter] | None = None) -> _Chosen:
     """The reading with the least that is left unproven, on the first machine that has the axes."""
-    setup = Setup(cutters=cutters or {})
-    tools = read_tools(known.tools) if known.tools is not None else None
     ending = path.suffix.lower()
     size = len(known.text) if known.text is not None else path.stat().st_size if path.is_file() else 0
-    dialects: tuple[str | None, ...] = (None,)
+    groups: tuple[tuple[str | None, ...], ...] = ((None,),)
     if ENDINGS.get(ending, "") is None and size <= LONG:
-        dialects = (None, "fanuc", "sinumerik")
+        # CL data and conversational programs are named .txt too
+        groups = ((None, "fanuc", "sinumerik"), ("heidenhain", "apt"))
     elif ending not in ENDINGS:
-        dialects = ("linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt")
+        groups = (("linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"),)
+    setup = Setup(cutters=cutters or {})
     refused: list[InputError] = []
     for name in MACHINES if known.machine is None else (known.machine,):
         machine = read_machine(name) if name.lower().endswith(".toml") else machine_named(name)
-        best: tuple[int, _Chosen] | None = None
-        for dialect in dialects:
-            for feed in (None, FEED_MM_MIN):
-                try:
-                    own = None if feed is None else mm_s_from_mm_min(feed)
-                    reading = read_program(
-                        path, machine, dialect=dialect, tools=tools, feed=own, text=known.text, setup=setup
-                    )
-                except InputError as err:
-                    refused.append(err)
-                    if "feed" not in str(err):
-                        break
-                    continue
-                gaps = sum(f.severity >= Severity.UNPROVEN for f in reading.findings)
-                if best is None or gaps < best[0]:
-                    best = (gaps, _Chosen(machine, dialect, feed, reading))
-                break
-            if best is not None and best[0] == 0:
-                break
-        if best is not None:
-            return best[1]
+        for dialects in groups:
+            chosen = _best(path, known, machine, dialects, setup, refused)
+            if chosen is not None:
+                return chosen
     raise refused[0]
+
+
+def _best(
+    path: Path, known: Known, machine: Machine, dialects: Sequence[str | None], setup: Setup, refused: list[InputError]
+) -> _Chosen | None:
+    """The reading with the fewest gaps by one of the dialects; ``refused`` takes why others do not read it."""
+    tools = read_tools(known.tools) if known.tools is not None else None
+    best: tuple[int, _Chosen] | None = None
+    for dialect in dialects:
+        for feed in (None, FEED_MM_MIN):
+            try:
+                own = None if feed is None else mm_s_from_mm_min(feed)
+                reading = read_program(
+                    path, machine, dialect=dialect, tools=tools, feed=own, text=known.text, setup=setup
+                )
+            except InputError as err:
+                refused.append(err)
+                if "feed" not in str(err):
+                    break
+                continue
+            gaps = sum(f.severity >= Severity.UNPROVEN for f in reading.findings)
+            if best is None or gaps < best[0]:
+                best = (gaps, _Chosen(machine, dialect, feed, reading))
+            break
+        if best is not None and best[0] == 0:
+            break
+    return None if best is None else best[1]
 
 
 def _cutting(program: Program) -> np.ndarray:

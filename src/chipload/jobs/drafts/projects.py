@@ -49,9 +49,15 @@ def _program(project: dict[str, Any], file: Path) -> Path:
             path = (file.parent / name).with_suffix(ending)
             if is_file(path):
                 return path
+    scripts = [name for name in names if name.lower().endswith(".tpl")]
+    remedy = (
+        f"export the NC text of {scripts[0]} from CAMotics, as {file.stem}.nc beside the project"
+        if scripts
+        else "put it beside the project"
+    )
     raise InputError(
         f"{file.name}: none of its files is an NC text that is there ({', '.join(names)[:200] or 'it names none'}): "
-        "put it beside the project"
+        f"{remedy}"
     )
 
 

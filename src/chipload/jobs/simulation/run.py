@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutting.material import Material
-from chipload.errors import Severity, worst_severity
+from chipload.errors import Severity, grouped, worst_severity
 from chipload.jobs.checks import CHECK_COLUMNS, with_checks
 from chipload.jobs.provenance import provenance_of, sources, title_of, versions
 from chipload.jobs.simulation.form_error import forming
@@ -99,7 +99,7 @@ def check_lines(job: ProgramJob, done: ProgramResult, passes: int) -> tuple[list
         stock, material = stock_body(job, done.reading.program), material_of(job)
         bodies = bodies_of(job, done.reading, stock, done.machine, material)
         needs = [estimate(passes * bodies.steps, len(done.reading.program))]
-    found = [str(f) for f in (*done.reading.findings, *done.reading.violations)]
+    found = [text for _, text in grouped((*done.reading.findings, *done.reading.violations))]
     count = len(done.reading.violations)
     message = f"{count} finding{'s exceed' if count > 1 else ' exceeds'} the limits" if count else "within the limits"
     holds = not count and worst_severity(done.reading.findings) < Severity.UNPROVEN

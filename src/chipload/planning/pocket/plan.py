@@ -38,7 +38,7 @@ from chipload.planning.pocket.motions import (
 )
 from chipload.planning.pocket.reach import CHORD
 from chipload.planning.pocket.request import Asked, Clearing, laid_out, material_before
-from chipload.planning.pocket.stages import FLOOR, PocketStage, require_finish, sections_of, stages_of
+from chipload.planning.pocket.stages import FLOOR, TROCHOIDAL, PocketStage, require_finish, sections_of, stages_of
 from chipload.planning.pocket.totals import summary_of
 from chipload.planning.result import Columns, Event, OperationResult, StrategyResult
 from chipload.program.program import Program
@@ -52,6 +52,8 @@ ABOVE_DEG = 0.01
 WALL_STEP_MM, EDGE_MM = 0.05, 1e-3
 #: share of the reachable area that must be cleared
 CLEARED = 0.995
+#: what clears channels that are hardly wider than the cutter
+CIRCLES = f'strategies = ["pocket", "{TROCHOIDAL}"], or '
 
 
 def plan_pocket(
@@ -78,7 +80,7 @@ def plan_pocket(
         def part(done: float, what: str, start: int = k) -> None:
             progress((start + done) / len(setting.strategies), what)
 
-        results[name] = _strategy(name, asked, setting, cutter, material, machine, part)
+        results[name] = _strategy(name, asked, setting, cutter, material, machine, limits, part)
     progress(1.0, "pocket")
     return OperationResult("pocket", setting.use, results)
 
@@ -90,6 +92,7 @@ def _strategy(
     cutter: Cutter,
     material: Material,
     machine: Machine,
+    limits: Mapping[str, float],
     progress: Progress,
 ) -> StrategyResult:
     """One strategy with its program and what it costs."""
@@ -99,6 +102,7 @@ def _strategy(
     history, program, whole, motions = _history(stages, setting, cutter, material, machine)
     on_front = np.isin(history["pass"], [stage.name for stage in stages])
     reaches = [_reach(section.asked, setting, radius) for section in sections]
+    areas, most = [_in_stock(reach, setting) for reach in reaches], limits.get("engagement_deg", 0.0)
     return StrategyResult(
         name,
         program,
@@ -106,7 +110,7 @@ def _strategy(
         summary_of(stages, history, len(program), whole),
         (
             *(event for stage in _planned(stages) for event in stage.path.events),
-            *_failures(stages, history, on_front, [_in_stock(reach, setting) for reach in reaches]),
+            *misses(name, stages, history, on_front, areas, most),
         ),
         np.append(on_front, False),
         {
@@ -251,11 +255,17 @@ def _chains(motions: Motions) -> tuple[Contour, ...]:
     return tuple(out)
 
 
-def _failures(
-    stages: Sequence[PocketStage], history: Columns, on_front: NDArray[np.bool_], areas: Sequence[float]
+def misses(
+    strategy: str,
+    stages: Sequence[PocketStage],
+    history: Columns,
+    on_front: NDArray[np.bool_],
+    areas: Sequence[float],
+    limit_deg: float,
 ) -> list[Event]:
-    """What the stages must keep by themselves: the engagement that was asked for, and each section cleared, in parts of
-    its area [mm^2] that a cutter can reach, whether an earlier one did or not.
+    """Where a strategy misses the engagement that was asked for, or leaves parts of the areas [mm^2] within its reach.
+
+    An engagement within the limit that the job states is no failure.
     """
     out = []
     wanted = stages[0].asked.engagement
@@ -263,7 +273,8 @@ def _failures(
     k = int(np.argmax(most))
     if most[k] > math.degrees(wanted) + ABOVE_DEG:
         text = f"engagement {most[k]:.4f} deg, wanted at most {math.degrees(wanted):.4f} deg"
-        out.append(Event("pocket-engagement", float(history["x_mm"][k]), float(history["y_mm"][k]), text, failure=True))
+        at = float(history["x_mm"][k]), float(history["y_mm"][k])
+        out.append(Event("pocket-engagement", *at, text, failure=bool(most[k] > limit_deg)))
     for stage in _planned(stages):
         path, within = stage.path, areas[stage.section]
         if not stage.makes_wall or path.leftover_mm2 <= (1.0 - CLEARED) * within:
@@ -271,7 +282,7 @@ def _failures(
         x, y = path.leftover[0].start if path.leftover else (float(path.x[-1]), float(path.y[-1]))
         text = (
             f"only {1.0 - path.leftover_mm2 / within:.2%} of what the cutter can reach is cleared, "
-            f"{path.leftover_mm2:.4g} mm2 left"
+            f"{path.leftover_mm2:.4g} mm2 left: state {'' if strategy == TROCHOIDAL else CIRCLES}a smaller cutter"
         )
         out.append(Event("pocket-uncleared", float(x), float(y), text, failure=True))
     return out

@@ -132,14 +132,28 @@ class Flow:
             return True
         if stripped == "%":
             if not self._opened:
-                said = "%: ends a text that begins with %, and this one does not"
-                if self.dialect.strict:
-                    raise InputError(f"{said}: remove it")
-                self.c.refused("nc-percent", f"{said}: the text ends here: remove it")
+                self._lone_percent()
             self.i.finish()
             return False
         self._check_length(raw)
         return self._block(raw)
+
+    def _lone_percent(self) -> None:
+        """A % that ends a text without one at its beginning.
+
+        LinuxCNC 2.9 carries out all motions before it and stops with an error; what stands behind it is lost.
+        """
+        said = "%: ends a text that begins with %, and this one does not"
+        lost = any(text.strip() for text in self.source.lines[self.line + 1 :])
+        remedy = "remove it" if lost else "write M2 in its place"
+        if self.dialect.strict:
+            raise InputError(f"{said}: {remedy}")
+        if lost:
+            self.c.refused("nc-percent", f"{said}: the lines after it are left out: {remedy}")
+        else:
+            self.c.findings.add(
+                "nc-percent", self.c.line, f"{said}: the motions end here, the spindle goes on: {remedy}"
+            )
 
     def _check_length(self, raw: str) -> None:
         if self.c.dialect == "linuxcnc" and len(raw.rstrip("\r")) > LONGEST_LINE:

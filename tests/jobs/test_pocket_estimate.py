@@ -1,0 +1,25 @@
+"""`chipload check` says how many steps a pocket takes; the plan takes about as many."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pocket_job import SQUARE, checked, done, operation, written
+
+
+def test_steps_of_a_pocket_before_and_after_it_is_planned(tmp_path: Path) -> None:
+    """30 x 24 mm in passes of 1.5 mm, steps of 0.4 mm become 0.06 R: 720 / 1.5 / 0.24 = 2000; two levels, one path."""
+    more = 'radial_depth_mm = 1.5\ndepth_mm = 8.0\nstrategies = ["pocket"]\n'
+    path = written(tmp_path, {"0": [SQUARE]}, operation(more))
+    lines, _ = checked(path)
+    # 4 s, and 1.2 to 8 ms a step
+    assert lines[-1] == "estimate: 2000 steps, 351 MB of memory, 6 to 20 s"
+    (strategy,), _ = done(path)
+    # the bore that the cutter enters by spares passes, corners ask for more
+    assert 0.6 < len(next(iter(strategy.history.values()))) / (2 * 2000) < 1.8
+
+
+def test_each_strategy_of_each_pocket_counts(tmp_path: Path) -> None:
+    one = operation('radial_depth_mm = 1.5\nstrategies = ["pocket", "trochoidal"]\nuse = "pocket"\n')
+    lines, _ = checked(written(tmp_path, {"0": [SQUARE]}, one))
+    assert lines[-1].startswith("estimate: 4000 steps")
