@@ -15,6 +15,7 @@ from chipload import examples
 from chipload.cutting.material import material_named
 from chipload.errors import Cancelled
 from chipload.jobs import load_job, run_job
+from chipload.simulation.checkpoint import Checkpoint
 from chipload.stock.layers import LayeredStock
 from command import call
 from mill import block_job, simulation
@@ -260,8 +261,11 @@ def test_the_first_progress_comes_before_a_step_is_made(job: Path, monkeypatch: 
         raise Cancelled("seen")
 
     monkeypatch.setattr("chipload.simulation.steps._cut", made)
+    loaded = load_job(job, ["operation.0.step_mm=0.00005"])
     with pytest.raises(Cancelled):
-        run_job(load_job(job, ["operation.0.step_mm=0.00005"]), stop)
+        run_job(loaded, stop)
+    with pytest.raises(Cancelled), Checkpoint(job.parent / "run") as kept:
+        run_job(loaded, stop, kept)
 
 
 def test_workers_share_layers_only(job: Path) -> None:

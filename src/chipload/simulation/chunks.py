@@ -107,7 +107,6 @@ def remove_in_chunks(
         As :func:`chipload.simulation.chips.remove`, and where the folder cannot be used.
     """
     count = counted(program, cutters, resolution)
-    progress(0.0, "removing")
     setting = setting_of(cutters, material, resolution, interpolation, watch, workers, processes)
     shape = (stock.bounds, stock.xs, stock.ys, stock.cut, stock.room, stock.tidied, stock.tiles)
     part = None if stock.part is None else (np.asarray(stock.part.vertices), np.asarray(stock.part.faces))
@@ -127,8 +126,9 @@ def remove_in_chunks(
             for state_of in keeps.values():
                 state_of.clear()
             kept = None
+    sums = sums if kept is None else found_sums
+    progress(sums.steps / count, "removing")
     if kept is not None:
-        sums = found_sums
         if state is not None:
             stock.restore(state)
             setting = replace(setting, moves=None)
