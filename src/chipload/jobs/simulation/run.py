@@ -36,9 +36,10 @@ from chipload.simulation.checkpoint import Checkpoint, digest
 from chipload.simulation.chips import remove
 from chipload.simulation.chunks import remove_in_chunks
 from chipload.simulation.engagement_samples import EngagementRecorder
-from chipload.simulation.estimate import estimate
+from chipload.simulation.estimate import LEANING, QUICK, SLOW, UPRIGHT, estimate
 from chipload.simulation.kept_pass import KeptPasses
 from chipload.simulation.loads import Cuts
+from chipload.simulation.moves import leans
 from chipload.simulation.steps import StepBlocks
 from chipload.simulation.surface import collisions, difference, in_stock
 from chipload.stock.layers import LayeredStock
@@ -98,12 +99,20 @@ def check_lines(job: ProgramJob, done: ProgramResult, passes: int) -> tuple[list
     if job.simulates:
         stock, material = stock_body(job, done.reading.program), material_of(job)
         bodies = bodies_of(job, done.reading, stock, done.machine, material)
-        needs = [estimate(passes * bodies.steps, len(done.reading.program))]
+        needs = [estimate(passes * bodies.steps, len(done.reading.program), *_step_times(job, bodies.program, stock))]
     found = [text for _, text in grouped((*done.reading.findings, *done.reading.violations))]
     count = len(done.reading.violations)
     message = f"{count} finding{'s exceed' if count > 1 else ' exceeds'} the limits" if count else "within the limits"
     holds = not count and worst_severity(done.reading.findings) < Severity.UNPROVEN
     return [*found, f"{job.path.name}: read; {message} of machine {done.machine.name}", *needs], holds
+
+
+def _step_times(job: ProgramJob, program: Program, stock: LayeredStock) -> tuple[float, float]:
+    """Processor time of a step [s], least and greatest, by the engine that will simulate most of a program."""
+    bodies = any(c.body and n in program.tool for n, c in job.cutters.items())
+    if job.table.operation[0].engine == "layers" or stock.cut.any() or bodies:
+        return QUICK, SLOW
+    return LEANING if leans(program).any() else UPRIGHT
 
 
 def text_to_change(
