@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.report.bodies import SceneBody
+from chipload.report.bodies import MACHINE_TABLE, SceneBody
 from chipload.report.operating import OperatingPoints
 from chipload.report.shown_maps import ShownMap
 from chipload.result.style import SCALE
@@ -206,14 +206,17 @@ def _document(header: Mapping[str, Any], out: Buffers) -> bytes:
 
 
 def _box(scene: ViewScene) -> tuple[Floats, Floats]:
-    """The box that a view shows: the bodies, and the path as far as it does not leave them by more than a share."""
+    """The box that a view shows: the bodies; path and table of the machine as far as they leave them by a share."""
     path, removal = scene.path.place, scene.removal
-    boxes = [(b.low, b.high) for b in scene.bodies] + ([(removal.low, removal.high)] if removal is not None else [])
+    boxes = [(b.low, b.high) for b in scene.bodies if b.name != MACHINE_TABLE]
+    boxes += [(removal.low, removal.high)] if removal is not None else []
     first, last = path.min(axis=0), path.max(axis=0)
     if not boxes:
         return first, last
     low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
     room = AROUND * float(np.linalg.norm(high - low))
+    tables = [b for b in scene.bodies if b.name == MACHINE_TABLE]
+    first, last = np.min([first, *(b.low for b in tables)], axis=0), np.max([last, *(b.high for b in tables)], axis=0)
     return np.minimum(low, np.maximum(first, low - room)), np.maximum(high, np.minimum(last, high + room))
 
 
