@@ -42,12 +42,12 @@ export async function paint(id: string, url: string): Promise<void> {
   view.colour(doc, doc.header.colouring);
 }
 
-/** Fill an element with the view of a document that is held as text, and its controls. */
-export async function report(id: string, text: string): Promise<void> {
+/** Fill an element with the view of documents that are held as text, by the names of their tracks, and its controls. */
+export async function report(id: string, texts: [string, string][]): Promise<void> {
   const host = document.getElementById(id)!;
   try {
     const { panel } = await import("./panel");
-    const view = await panel(host, text);
+    const view = await panel(host, texts);
     views.set(id, view);
   } catch (e) {
     host.textContent = `The 3D view cannot be shown: ${e instanceof Error ? e.message : e}`;
