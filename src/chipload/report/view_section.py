@@ -114,7 +114,7 @@ def _scene(
 
 def _shown(result: Result) -> list[tuple[int, Track, dict[str, NDArray[Any]]]]:
     """Number, track and columns of the tracks in use that have a place; where none has, of the first that has."""
-    out = []
+    out: list[tuple[int, Track, dict[str, NDArray[Any]]]] = []
     for k, track in sorted(enumerate(result.tracks), key=lambda item: not item[1].in_use):
         if out and not track.in_use:
             break
