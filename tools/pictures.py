@@ -126,6 +126,9 @@ def photograph_page(chromium: Browser, folder: Path, name: str) -> None:
                 position={"x": 0.9 * page.locator(".cl-slider").bounding_box()["width"], "y": 8}
             )
         page.wait_for_function(DRAWN, timeout=120_000)
+        if other:
+            page.wait_for_timeout(3000)
+            page.wait_for_function(f"{VIEW}.row > 100 && !{VIEW}.dirty && !{SECOND}.dirty")
         if name in POSED:
             page.evaluate(POSED[name])
             page.wait_for_function(f"!{VIEW}.dirty")

@@ -31,9 +31,11 @@ export async function open(id: string, url: string, keep = false): Promise<void>
 
 /** Show the document of an address beside a view that leads it. */
 export async function beside(id: string, url: string, leader: string, against: Abscissa, here: number[], there: number[]): Promise<void> {
-  const view = of(id);
+  const view = of(id), first = of(leader), leads = first.leads;
   view.load(await fetched(url), view.paired);
-  of(leader).lead(view, against, here, there);
+  // what was asked for while the document came counts
+  if (first.leads === leads) first.lead(view, against, here, there);
+  else first.leadsAgain();
 }
 
 /** Colour the path of a view by the document of an address. */

@@ -32,6 +32,7 @@ export class View {
   solids: Solid[] = [];
   row = -1;
   frames = 0;
+  leads = 0;
   private readonly renderer: THREE.WebGLRenderer;
   private readonly scene = new THREE.Scene();
   /** all that belongs to the work; it turns where the tool stands upright */
@@ -295,11 +296,15 @@ export class View {
   /** Lead another view: `here` and `there` are rising lengths of path [mm] that belong together, or times alike. */
   lead(other: View, against: Abscissa, here: number[], there: number[]): void {
     this.alone();
+    this.leads++;
     this.pair = { other, against, here, there };
     other.pair = { other: this, against, here: [], there: [] };
     this.follow();
     if (this.path) this.stand(this.place, this.row);
   }
+
+  /** Lead as before: the other view has another path. */
+  leadsAgain(): void { const p = this.pair; if (p) this.lead(p.other, p.against, p.here, p.there); }
 
   get paired(): boolean { return this.pair !== null; }
 
