@@ -1,6 +1,8 @@
 """Make the pictures of the documentation anew: each example is run as it is shipped, and its report photographed.
 
-    python tools/pictures.py [NAME ...]     all, or those of docs/NAME.png
+    python tools/pictures.py [NAME ...] [--results FOLDER]     all, or those of docs/NAME.png
+
+With ``--results`` the examples are not run: FOLDER holds the result of each as EXAMPLE/result.
 
 Needs Chromium and playwright, and as long as the examples take. Look at what changed before it is committed.
 """
@@ -15,6 +17,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from chipload.examples import copy_example
@@ -39,6 +42,7 @@ FIGURES: dict[str, tuple[tuple[str, int, int], ...]] = {
 }
 #: the 3D view of the page, and that it and the plots are drawn
 VIEW = "chiploadViewer.of(document.querySelector('.cl-stage').id)"
+SECOND = "chiploadViewer.of(document.querySelector('.cl-second').id)"
 DRAWN = f"{VIEW}.frames > 0 && document.querySelectorAll('.cl-figure .trace').length > 0"
 #: pictures of the page: the example that each shows, and the track that it is compared with; none: none
 PAGES = {"page": ("bracket", ""), "page_compare": ("feeds", "original"), "page_impeller": ("impeller", "")}
@@ -116,12 +120,15 @@ def photograph_page(chromium: Browser, folder: Path, name: str) -> None:
             choose(page, "compare with", other)
             page.wait_for_selector(".cl-compared", state="visible")
             page.locator(".cl-plots").get_by_text("path", exact=True).last.click()
-            page.wait_for_function(f"{VIEW}.paired")
+            page.wait_for_function(f"{VIEW}.paired && {SECOND}.frames > 0")
             # near the end of the path
             page.locator(".cl-slider").click(
                 position={"x": 0.9 * page.locator(".cl-slider").bounding_box()["width"], "y": 8}
             )
         page.wait_for_function(DRAWN, timeout=120_000)
+        if other:
+            page.wait_for_timeout(3000)
+            page.wait_for_function(f"{VIEW}.row > 100 && !{VIEW}.dirty && !{SECOND}.dirty")
         if name in POSED:
             page.evaluate(POSED[name])
             page.wait_for_function(f"!{VIEW}.dirty")
@@ -133,11 +140,26 @@ def photograph_page(chromium: Browser, folder: Path, name: str) -> None:
         server.wait(30)
 
 
+def fewer_colours(path: Path) -> None:
+    """Store a picture with at most 256 colours: half the size and less."""
+    with Image.open(path) as picture:
+        picture.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
+
+
+def run(job: Path, name: str) -> int:
+    """Run the job of a folder as its picture wants it; the exit code."""
+    words = [sys.executable, "-m", "chipload", "run", str(job / "job.toml"), "--out", str(job / "result")]
+    words += [word for key in SHORTER.get(name, ()) for word in ("--set", key)]
+    return subprocess.run(words, check=False).returncode
+
+
 def main() -> int:
     """Run the examples and make their pictures."""
     parser = argparse.ArgumentParser(description="Make the pictures of the documentation anew.")
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join((*PAGES, *FIGURES))}")
-    names = parser.parse_args().names or [*PAGES, *FIGURES]
+    parser.add_argument("--results", type=Path, metavar="FOLDER", help="with results of the examples")
+    given = parser.parse_args()
+    names = given.names or [*PAGES, *FIGURES]
     unknown = set(names) - {*PAGES, *FIGURES}
     if unknown:
         parser.error(f"{', '.join(sorted(unknown))}: must be of {', '.join((*PAGES, *FIGURES))}")
@@ -148,18 +170,15 @@ def main() -> int:
         )
         page = chromium.new_page(viewport={"width": 860, "height": 1266})
         for name in names:
-            job = copy_example(
-                PAGES[name][0] if name in PAGES else name, Path(folder) / name / PAGES.get(name, (name, ""))[0]
-            )
-            words = [sys.executable, "-m", "chipload", "run", str(job / "job.toml"), "--out", str(job / "result")]
-            words += [word for key in SHORTER.get(name, ()) for word in ("--set", key)]
-            code = subprocess.run(words, check=False).returncode
-            if code not in (0, 3):
+            example = PAGES.get(name, (name, ""))[0]
+            job = given.results / example if given.results else copy_example(example, Path(folder) / name / example)
+            if not given.results and (code := run(job, name)) not in (0, 3):
                 return code
             if name in PAGES:
                 photograph_page(chromium, job, name)
             else:
                 photograph(page, job / "result" / "report.html", name)
+            fewer_colours(DOCS / f"{name}.png")
             print(f"docs/{name}.png", flush=True)
         chromium.close()
     return 0

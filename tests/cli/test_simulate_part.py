@@ -1,5 +1,7 @@
 """A program held against the part, fixtures and its own stock, by the command line."""
 
+import json
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -152,6 +154,28 @@ def test_the_table_of_the_machine_is_held_against_the_tool_and_shown(tmp_path: P
     marks = page_scene(shown, shown.tracks[0], (solids, ""), "force_n").marks
     assert marks[0].bodies == ("cutting part", "machine table")
     assert marks[0].depth_mm == pytest.approx(0.8, abs=1e-3)
+
+
+@pytest.mark.parametrize(("own", "low"), [("", [-300.0, -200.0, -90.0]), (TABLE, [-40.0, -60.0, -35.0])])
+def test_the_machine_file_states_the_table_unless_the_job_does(tmp_path: Path, own: str, low: list[float]) -> None:
+    (tmp_path / "slot.ngc").write_text(SLOT.replace("Z-2.1", "Z-5.8"))
+    machine = resources.files("chipload").joinpath("data", "machines", "vmc.toml").read_text()
+    (tmp_path / "mine.toml").write_text(f"{machine}[table]\nlow_mm = [-300, -200, -90]\nhigh_mm = [300, 200, -5.2]\n")
+    text = block_job("slot.ngc", "[0.0, -15.0, -5.0]", "[50.0, 15.0, 0.0]", own + simulation("force_n = 3000.0\n"))
+    (tmp_path / "job.toml").write_text(text.replace('name = "vmc"', 'file = "mine.toml"'))
+    assert call("run", tmp_path / "job.toml", "--out", tmp_path / "r")[0] == 3
+    op = summary_of(tmp_path / "r")["operations"][0]
+    assert op["compared_with"] == ["machine table"]
+    # the face lies on Z = -5.2 by the machine, on -5 by the job
+    assert max(one["depth_mm"] for one in op["collisions"]) == pytest.approx(0.8 if own else 0.6, abs=1e-3)
+    shown = open_result(tmp_path, "r")
+    solids, _ = bodies(shown)
+    plate = next(b for b in solids if b.name == "machine table")
+    assert plate.low.tolist() == low
+    # a wide table does not move the first view away from the work: 50 x 30 x 5 mm and its path
+    document = page_scene(shown, shown.tracks[0], (solids, ""), "force_n").document
+    box = json.loads(document[8 : 8 + int.from_bytes(document[4:8], "little")])
+    assert np.ptp([box["low"][:2], box["high"][:2]], axis=0).max() < 100.0
 
 
 def test_a_table_that_is_upside_down_is_refused(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from chipload.errors import InputError
 from chipload.machine.machine import machine_named, machine_names, read_machine
+from chipload.machine.table import MachineTable
 
 VMC = (resources.files("chipload") / "data" / "machines" / "vmc.toml").read_text()
 
@@ -118,3 +119,29 @@ def test_curves_that_are_refused(tmp_path, curve, message):
         read_machine(path)
     assert "torque_curve" in str(caught.value)
     assert message in str(caught.value)
+
+
+def test_the_table_of_a_machine(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(VMC + "[table]\nlow_mm = [-350.0, -200.0, -150.0]\nhigh_mm = [350, 200, -100]\nspacing_mm = 4\n")
+    assert read_machine(path).table == MachineTable((-350.0, -200.0, -150.0), (350.0, 200.0, -100.0), 4.0)
+    assert machine_named("vmc").table is None
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("low_mm = [0, 0, 0]", "table.high_mm is missing"),
+        ("low_mm = [0, 0, 0]\nhigh_mm = [9, 9]", "table.high_mm = [9, 9]: must be three numbers"),
+        ("low_mm = [0, 9, 0]\nhigh_mm = [9, 9, 9]", "machine.table.low_mm: Y = 9: must be below high_mm, Y = 9"),
+        ("low_mm = [0, 0, 0]\nhigh_mm = [9, 9, inf]", "machine.table.high_mm: Z = inf: must be a finite number"),
+        ("low_mm = [0, 0, 0]\nhigh_mm = [9, 9, 9]\nspacing_mm = 0", "machine.table.spacing_mm = 0: must be above 0"),
+        ("low_mm = [0, 0, 0]\nhigh = [9, 9, 9]", "unknown key table.high: the nearest known one is table.high_mm"),
+    ],
+)
+def test_a_table_of_a_machine_that_is_refused(tmp_path, table, message):
+    path = tmp_path / "mine.toml"
+    path.write_text(f"{VMC}[table]\n{table}\n")
+    with pytest.raises(InputError) as refused:
+        read_machine(path)
+    assert message in str(refused.value)

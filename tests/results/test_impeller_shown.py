@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,6 +83,13 @@ def test_each_program_begins_with_the_stock_that_those_before_it_leave(shown) ->
         ((_, parts),) = read_cutter_parts(shown.folder / REMOVAL, k).items()
         assert parts[0][0] == "flutes"
         assert 2.0 * parts[0][1][:, 0].max() == pytest.approx(cutter_of(shown.result.tracks[k])[0].diameter)
+
+
+def test_the_report_holds_every_program_in_use_and_stays_small(shown) -> None:
+    report = (shown.folder / "report.html").read_text()
+    assert len(report.encode()) < 6_000_000
+    names = re.findall(r'class="view3d-data" data-name="([^"]+)"', report)
+    assert names == [shown.result.tracks[k].name for k in shown.used]
 
 
 def test_maps_hold_the_numbers_of_the_summary(shown) -> None:

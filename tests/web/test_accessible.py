@@ -33,6 +33,24 @@ def test_nothing_lies_beside_a_narrow_window(cut) -> None:
     cut.set_viewport_size({"width": 1280, "height": 720})
 
 
+def test_nothing_covers_the_middle_of_the_scene(cut) -> None:
+    cut.evaluate(f"{VIEW}.show(0)")
+    for width, height in ((420, 800), (1280, 720), (1920, 1080)):
+        cut.set_viewport_size({"width": width, "height": height})
+        cut.wait_for_function("w => document.documentElement.scrollWidth == w", arg=width)
+        scene = cut.locator(".cl-stage canvas").bounding_box()
+        assert scene["width"] * scene["height"] > 0.13 * width * height
+        low, high = (
+            [scene[x] + share * scene[w] for x, w in (("x", "width"), ("y", "height"))] for share in (0.25, 0.75)
+        )
+        for part in (".cv-bar", ".cv-note", ".cv-scale", ".cl-controls", ".cl-buttons", ".cl-notice", ".cl-section"):
+            if cut.locator(part).first.is_visible():
+                box = cut.locator(part).first.bounding_box()
+                beside = box["x"] >= high[0] or box["x"] + box["width"] <= low[0]
+                assert beside or box["y"] >= high[1] or box["y"] + box["height"] <= low[1], (width, part)
+    cut.set_viewport_size({"width": 1280, "height": 720})
+
+
 def test_the_window_says_what_it_shows_and_every_control_has_a_name(cut) -> None:
     assert cut.title() == "exceeds: cut - chipload"
     assert cut.evaluate("document.documentElement.lang") == "en"

@@ -97,7 +97,7 @@ def test_the_sector_lies_ahead_of_the_cutter_and_can_be_hidden(cut, pixels) -> N
         f"""() => {{ const v = {VIEW}, q = v.camera.position.clone().set(24.8, 0, 0).project(v.camera);
         return [(1 - q.y) / 2, (q.x + 1) / 2]; }}"""
     )
-    width = cut.evaluate(f"{VIEW}.host.clientWidth")
+    width = cut.evaluate(f"{VIEW}.overlay.stage.clientWidth")
     # the cutter goes along +x, to the right as seen from above
     assert (shown[:, 1] > tip[1] * width - 4).mean() > 0.98
     cut.evaluate(f"{VIEW}.layer('engagement', false)")
@@ -138,7 +138,7 @@ def test_a_map_shows_its_limit_as_a_line_and_bends(cut, pixels) -> None:
     assert len(red) > 40
     across, width = cut.evaluate(
         f"""() => {{ const v = {VIEW}, q = v.camera.position.clone().set(30, 20, 0).project(v.camera);
-        return [(q.x + 1) / 2, v.host.clientWidth]; }}"""
+        return [(q.x + 1) / 2, v.overlay.stage.clientWidth]; }}"""
     )
     assert np.median(red[:, 1]) == pytest.approx(across * rgb.shape[1], abs=3.0)
     assert width > 100

@@ -55,7 +55,7 @@ def test_the_gauge_stands_at_the_row(controlled) -> None:
 def test_no_control_covers_the_scene_of_a_narrow_window(controlled) -> None:
     stage = controlled.locator(".cl-stage").bounding_box()
     assert stage["height"] > 250
-    for part in (".cl-over-left", ".cl-over-right"):
+    for part in (".cl-controls", ".cl-buttons"):
         box = controlled.locator(part).bounding_box()
         assert box["y"] + box["height"] <= stage["y"] + 0.5
         assert box["x"] + box["width"] <= 420

@@ -133,13 +133,13 @@ def test_the_frame_does_not_scroll_and_nothing_lies_outside(square) -> None:
 
 def scene_pixels(page, pixels):
     drawn(page)
-    box = page.locator(".cl-stage").bounding_box()
-    # the middle, which nothing is laid over: the notice stands above it, the scale below
+    box = page.locator(".cl-stage canvas").bounding_box()
+    # the middle, which nothing is laid over
     clip = {
-        "x": box["x"] + 0.3 * box["width"],
-        "y": box["y"] + 60,
-        "width": 0.5 * box["width"],
-        "height": box["height"] - 130,
+        "x": box["x"] + 0.2 * box["width"],
+        "y": box["y"] + 40,
+        "width": 0.6 * box["width"],
+        "height": box["height"] - 80,
     }
     return pixels(page.screenshot(clip=clip))
 

@@ -9,6 +9,7 @@ import pytest
 from chipload.report.page import page_bytes
 from chipload.report.presentation import Blank, Presentation
 from chipload.report.removal import removal_meshes
+from chipload.report.view import Buffers, _removal
 from chipload.report.view_section import view_section
 from square import MILL, ROWS, STOCK, VOLUMES, make_cut_result, square_result
 
@@ -97,6 +98,69 @@ def test_a_long_report_stays_small() -> None:
     report = page_bytes(result, Presentation(lambda _: [], _empty), view)
     assert len(report) < 6_000_000 - 2_000_000  # figures bring plotly, 2 MB
     assert base64.b64decode(view[3].split(">")[1].split("<")[0])
+
+
+def two_programs():
+    """The square that is cut, and as a second program in use the first half of it."""
+    one = square_result("cut")
+    (own,) = one.tracks
+    table = {name: column[: ROWS // 2] for name, column in own.columns.items()}
+    half = replace(own, name="half", limits=(), findings=(), blocks=lambda: iter([table]))
+    result = replace(one, tracks=(own, half))
+    blanks = {name: Blank(STOCK, {1: MILL}) for name in ("program", "half")}
+    return result, blanks, removal_meshes(result, blanks)
+
+
+def test_each_program_in_use_can_be_chosen(browser, tmp_path) -> None:
+    result, blanks, stocks = two_programs()
+    glb = (make_cut_result(tmp_path / "r") / "scene.glb").read_bytes()
+    view = view_section(result, glb, stocks, blanks)
+    path = tmp_path / "report.html"
+    path.write_bytes(page_bytes(result, Presentation(lambda _: [], lambda: glb), view))
+    page = browser.new_page()
+    page.goto(path.as_uri())
+    page.wait_for_selector(".view3d canvas")
+    chosen = page.get_by_label("program")
+    assert chosen.locator("option").all_inner_texts() == ["program", "half"]
+    bodies = page.evaluate(f"{VIEW}.state().bodies")
+    for name, rows, volume in (("half", ROWS // 2, VOLUMES[1]), ("program", ROWS, VOLUMES[2])):
+        chosen.select_option(name)
+        page.wait_for_function(f"n => {VIEW}.path.count == n", arg=rows)
+        page.evaluate(f"{VIEW}.go({rows - 1})")
+        state = page.evaluate(f"{VIEW}.state()")
+        assert state["stock"]["volume"] == pytest.approx(volume, rel=0.01)
+        assert state["bodies"] == bodies
+        assert len(bodies) == 1
+        slider = page.locator("input[type=range]")
+        assert float(slider.get_attribute("max")) == pytest.approx(float(result.tracks[0].columns["t_s"][rows - 1]))
+    page.close()
+
+
+def test_a_program_that_makes_the_report_too_large_is_named(monkeypatch) -> None:
+    from chipload.report import view_section as module
+
+    result, blanks, stocks = two_programs()
+    monkeypatch.setattr(module, "LARGEST", 10_000)
+    view = view_section(result, _empty(), stocks, blanks)
+    assert "Not in this file, to keep it small: half." in view[1]
+    assert len(view) == 4
+
+
+def test_the_stock_is_rounded_by_less_than_its_cells_and_not_at_all_on_the_page() -> None:
+    _, _, stocks = two_programs()
+    mesh = stocks.meshes[0]
+    for cells in (0.0, 0.0625):
+        out = Buffers()
+        packed = _removal(mesh, out, cells)
+        kinds = {"u2": "<u2", "u4": "<u4"}
+        vertices, quads = (
+            np.cumsum(np.frombuffer(out.data, kinds[b["t"]], b["n"], b["at"]).reshape(n, -1), axis=1, dtype=kind).T
+            for b, n, kind in ((packed["vertices"], 3, np.uint16), (packed["quads"], 4, np.uint32))
+        )
+        found = np.minimum(vertices[quads] * np.array(packed["step"]), 65535)
+        off = np.abs(found - mesh.corners).max(axis=(0, 1)) * (mesh.high - mesh.low) / 65535
+        assert (max(packed["step"]) > 1.0) == (cells > 0.0)
+        assert (off <= 0.5 * cells * mesh.cell + 1e-3 * (cells > 0.0)).all()
 
 
 def _empty() -> bytes:

@@ -140,7 +140,7 @@ def test_a_length_is_measured_on_the_stock(cut) -> None:
     page.wait_for_function("document.querySelector('.cv-note').textContent == 'click two places'")
     # two corners of the box, by the places that the view itself projects them to
     places = page.evaluate(
-        f"""() => {{ const v = {VIEW}, b = v.host.getBoundingClientRect();
+        f"""() => {{ const v = {VIEW}, b = v.overlay.stage.getBoundingClientRect();
         return [[-9, -9, 0], [49, -9, 0]].map(p => {{
           const q = v.camera.position.clone().set(...p).project(v.camera);
           return [b.x + (q.x + 1) * b.width / 2, b.y + (1 - q.y) * b.height / 2]; }}); }}"""
@@ -158,7 +158,7 @@ def test_values_under_the_pointer_and_a_saved_picture(cut) -> None:
     page = cut
     page.evaluate(f"{VIEW}.look('top'); {VIEW}.picture()")
     x, y = page.evaluate(
-        f"""() => {{ const v = {VIEW}, b = v.host.getBoundingClientRect();
+        f"""() => {{ const v = {VIEW}, b = v.overlay.stage.getBoundingClientRect();
         const q = v.camera.position.clone().set(24, 40, -2).project(v.camera);
         return [b.x + (q.x + 1) * b.width / 2, b.y + (1 - q.y) * b.height / 2]; }}"""
     )

@@ -15,7 +15,7 @@ export interface Body {
   colours?: Buffer;
   legend?: MapLegend;
 }
-export interface Removal { low: Triple; high: Triple; corners: Buffer; seen: Buffer; rows: Buffer }
+export interface Removal { low: Triple; high: Triple; step: Triple; vertices: Buffer; quads: Buffer; seen: Buffer; rows: Buffer }
 export interface Path {
   count: number;
   rows: Buffer;

@@ -31,9 +31,11 @@ export async function open(id: string, url: string, keep = false): Promise<void>
 
 /** Show the document of an address beside a view that leads it. */
 export async function beside(id: string, url: string, leader: string, against: Abscissa, here: number[], there: number[]): Promise<void> {
-  const view = of(id);
+  const view = of(id), first = of(leader), leads = first.leads;
   view.load(await fetched(url), view.paired);
-  of(leader).lead(view, against, here, there);
+  // what was asked for while the document came counts
+  if (first.leads === leads) first.lead(view, against, here, there);
+  else first.leadsAgain();
 }
 
 /** Colour the path of a view by the document of an address. */
@@ -42,12 +44,12 @@ export async function paint(id: string, url: string): Promise<void> {
   view.colour(doc, doc.header.colouring);
 }
 
-/** Fill an element with the view of a document that is held as text, and its controls. */
-export async function report(id: string, text: string): Promise<void> {
+/** Fill an element with the view of documents that are held as text, by the names of their tracks, and its controls. */
+export async function report(id: string, texts: [string, string][]): Promise<void> {
   const host = document.getElementById(id)!;
   try {
     const { panel } = await import("./panel");
-    const view = await panel(host, text);
+    const view = await panel(host, texts);
     views.set(id, view);
   } catch (e) {
     host.textContent = `The 3D view cannot be shown: ${e instanceof Error ? e.message : e}`;

@@ -3,23 +3,26 @@
 import { Colouring, Header, MapLegend } from "./document";
 
 const STYLE = `
-.cv { position: relative; width: 100%; height: 100%; overflow: hidden; touch-action: none;
+.cv { width: 100%; height: 100%; overflow: hidden; display: flex; flex-direction: column;
   font: 12px/1.35 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; color: #1f2933; }
-.cv canvas { display: block; width: 100%; height: 100%; outline-offset: -2px; }
-.cv-bar, .cv-scale, .cv-tip, .cv-note { position: absolute; background: rgba(255,255,255,.86); border-radius: 4px;
-  padding: 4px 8px; pointer-events: none; }
-.cv-bar { left: 6px; bottom: 6px; max-width: calc(100% - 210px); font-size: 11.5px; display: flex; flex-wrap: wrap; gap: 2px 16px; }
-.cv-bar > div { min-width: 150px; }
+.cv-stage { position: relative; flex: 1; min-height: 0; touch-action: none; }
+.cv-stage canvas { position: absolute; inset: 0; display: block; width: 100%; height: 100%; outline-offset: -2px; }
+.cv-scale, .cv-tip, .cv-note { position: absolute; background: rgba(255,255,255,.86); border-radius: 4px; padding: 4px 8px;
+  pointer-events: none; }
+.cv-bar { flex: none; display: flex; flex-wrap: wrap; gap: 2px 20px; padding: 3px 8px 4px; max-height: 40%; overflow-y: auto;
+  background: #fff; border-top: 1px solid #e3e7ec; font-size: 11.5px; }
+.cv-bar > div { flex: 1 1 190px; max-width: 380px; min-width: 0; }
+.cv-head, .cv-ends, .cv-map-ends { display: flex; flex-wrap: wrap; gap: 0 10px; align-items: center; }
+.cv-ends, .cv-map-ends { flex-wrap: nowrap; gap: 6px; font-variant-numeric: tabular-nums; }
 .cv-title { font-weight: 600; }
-.cv-ramp { height: 10px; border-radius: 2px; margin: 4px 0 1px; position: relative; }
-.cv-ramp i { position: absolute; top: -3px; bottom: -3px; width: 0; border-left: 2.5px solid #c81e1e; }
-.cv-ends, .cv-map-ends { display: flex; justify-content: space-between; font-variant-numeric: tabular-nums; }
+.cv-ramp { flex: 1; height: 12px; border-radius: 2px; position: relative; text-align: center; font-size: 10px; line-height: 12px; }
+.cv-ramp i { position: absolute; top: -2px; bottom: -2px; width: 0; border-left: 2.5px solid #c81e1e; }
 .cv-red { color: #b01818; font-weight: 600; }
 .cv-dot { display: inline-block; width: 10px; height: 10px; border-radius: 5px; margin-right: 6px; }
-.cv-scale { right: 104px; bottom: 8px; padding: 2px 6px; text-align: center; font-size: 11px; }
+.cv-scale { right: 100px; bottom: 6px; padding: 2px 6px; text-align: center; font-size: 11px; }
 .cv-scale div { border: 1.5px solid #1f2933; border-top: 0; height: 5px; }
 .cv-tip { display: none; white-space: pre; font-size: 11.5px; font-variant-numeric: tabular-nums; z-index: 3; }
-.cv-note { left: 50%; top: 46px; transform: translateX(-50%); color: #b01818; font-weight: 600; max-width: 70%; }
+.cv-note { left: 6px; top: 6px; color: #b01818; font-weight: 600; max-width: 70%; }
 .cv-note:empty { display: none; }
 .cv-box { height: 520px; border: 1px solid #d9dde2; }
 .cv-controls { display: flex; flex-wrap: wrap; gap: 4px 12px; align-items: center; padding: 4px 0; font-size: 13px; }
@@ -33,16 +36,8 @@ const STYLE = `
 .cv-cut-plots { display: contents; }
 .cv-plot { width: 100%; max-height: 240px; background: #fff; border: 1px solid #edf0f3; }
 .cv-print { display: none; width: 100%; }
-@media print { .cv-box, .cv-controls { display: none; } .cv-cut { font: 12px/1.35 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; color: #1f2933; }
-.cv-cut-said { padding: 4px 2px; font-variant-numeric: tabular-nums; }
-.cv-cut-body { display: grid; grid-template-columns: repeat(auto-fit, minmax(210px, 1fr)); gap: 6px; }
-.cv-chip { min-height: 200px; border: 1px solid #d9dde2; position: relative; touch-action: none; }
-.cv-chip canvas { position: absolute; inset: 0; width: 100%; height: 100%; display: block; }
-.cv-cut-plots { display: contents; }
-.cv-plot { width: 100%; max-height: 240px; background: #fff; border: 1px solid #edf0f3; }
-.cv-print { display: block; } }
-@media (max-width: 600px) { .cv-bar { max-width: 46%; } .cv-bar > div { min-width: 120px; } .cv-scale { display: none; }
-  .cv-note { top: auto; bottom: 84px; left: 4px; transform: none; max-width: 68%; } }
+@media print { .cv-box, .cv-controls { display: none; } .cv-print { display: block; } }
+@media (max-width: 600px) { .cv-scale { display: none; } .cv-note { max-width: calc(100% - 110px); } }
 `;
 
 export function number(x: number): string {
@@ -62,6 +57,8 @@ export function joined(legends: MapLegend[]): MapLegend[] {
 
 export class Overlay {
   readonly root: HTMLElement;
+  /** where the scene is drawn; the scales stand below it and cover nothing */
+  readonly stage: HTMLElement;
   private readonly bar = this.part("cv-bar");
   /** of the bar, what belongs to one scale */
   private group = this.bar;
@@ -78,7 +75,9 @@ export class Overlay {
     }
     this.root = document.createElement("div");
     this.root.className = "cv";
-    this.root.append(this.bar, this.scale, this.tip, this.note);
+    this.stage = this.part("cv-stage");
+    this.stage.append(this.scale, this.tip, this.note);
+    this.root.append(this.stage, this.bar);
     this.note.setAttribute("role", "status");
     host.append(this.root);
   }
@@ -92,53 +91,50 @@ export class Overlay {
     for (const m of joined(maps)) { group(); this.map(m); }
   }
 
-  private add(cls: string, text = ""): HTMLElement {
+  private add(cls: string, text = "", to = this.group): HTMLElement {
     const e = document.createElement("div");
     e.className = cls;
     e.textContent = text;
-    this.group.append(e);
+    to.append(e);
     return e;
   }
 
-  private word(word: string, colour: string): void {
-    const row = this.add(""), dot = document.createElement("span");
-    dot.className = "cv-dot";
-    dot.style.background = colour;
-    row.append(dot, word);
+  /** A title, beside it words with their colours. */
+  private head(title: string, words: [string, string][] = []): HTMLElement {
+    const head = this.add("cv-head");
+    this.add("cv-title", title, head);
+    for (const [word, colour] of words) {
+      const row = this.add("", "", head), dot = document.createElement("span");
+      dot.className = "cv-dot";
+      dot.style.background = colour;
+      row.append(dot, word);
+    }
+    return head;
+  }
+
+  /** Colours [share, colour] between the values at their ends, of the path or `-map`. */
+  private ramp(low: number, high: number, stops: [number, string][], of = "", middle = ""): HTMLElement {
+    const ends = this.add(`cv${of}-ends`);
+    this.add("", number(low), ends);
+    const ramp = this.add(`cv-ramp cv${of}`, middle, ends);
+    ramp.style.background = `linear-gradient(to right, ${stops.map(([s, x]) => `${x} ${100 * s}%`).join(", ")})`;
+    this.add("", number(high), ends);
+    return ramp;
   }
 
   /** What the colours of a body mean. */
   private map(m: MapLegend): void {
-    this.add("cv-title", m.title);
-    const n = m.stops.length, low = m.stops[0]?.[0] ?? 0, span = (m.stops[n - 1]?.[0] ?? 1) - low || 1;
-    if (n > 1) {
-      const ramp = this.add("cv-ramp cv-map");
-      ramp.style.background = `linear-gradient(to right, ${m.stops.map(([v, x]) => `${x} ${100 * (v - low) / span}%`).join(", ")})`;
-      const ends = this.add("cv-map-ends");
-      for (const [v] of n === 3 ? m.stops : [m.stops[0], m.stops[n - 1]]) {
-        const e = document.createElement("span");
-        e.textContent = number(v);
-        ends.append(e);
-      }
-    }
-    for (const [word, colour] of m.words) this.word(word, colour);
+    this.head(m.title, m.words);
+    const n = m.stops.length;
+    if (n < 2) return;
+    const low = m.stops[0][0], high = m.stops[n - 1][0], span = high - low || 1;
+    this.ramp(low, high, m.stops.map(([v, x]) => [(v - low) / span, x]), "-map", n === 3 ? number(m.stops[1][0]) : "");
   }
 
   private column(header: Header, c: Colouring): void {
-    const add = (cls: string, text = "") => this.add(cls, text);
-    add("cv-title", c.unit ? `${c.label} [${c.unit}]` : c.label);
-    if (c.words.length) {
-      for (const [word, colour] of c.words.slice(0, 12)) this.word(word, colour);
-      return;
-    }
-    const ramp = add("cv-ramp");
-    ramp.style.background = `linear-gradient(to right, ${header.scale.map(([s, x]) => `${x} ${100 * s}%`).join(", ")})`;
-    const ends = add("cv-ends");
-    for (const x of [c.low, c.high]) {
-      const e = document.createElement("span");
-      e.textContent = number(x);
-      ends.append(e);
-    }
+    const head = this.head(c.unit ? `${c.label} [${c.unit}]` : c.label, c.words.slice(0, 12));
+    if (c.words.length) return;
+    const ramp = this.ramp(c.low, c.high, header.scale);
     if (c.limit === null) return;
     const share = c.high > c.low ? (c.limit - c.low) / (c.high - c.low) : 2;
     if (share >= 0 && share <= 1) {
@@ -148,7 +144,7 @@ export class Overlay {
     }
     const worse = c.least ? c.low < c.limit : c.high > c.limit;
     const text = worse ? `red and thick: ${c.least ? "below" : "above"} ${number(c.limit)}` : `limit ${number(c.limit)}`;
-    add(worse ? "cv-red" : "", text);
+    this.add(worse ? "cv-red" : "", text, head);
   }
 
   /** A bar of a round length: mm per pixel is that at the middle of what is looked at. */
@@ -164,9 +160,9 @@ export class Overlay {
   values(text: string, x = 0, y = 0): void {
     this.tip.style.display = text ? "block" : "none";
     this.tip.textContent = text;
-    const left = x + 14 + 220 > this.root.clientWidth ? Math.max(0, x - 200) : x + 14;
+    const left = x + 14 + 220 > this.stage.clientWidth ? Math.max(0, x - 200) : x + 14;
     this.tip.style.left = `${left}px`;
-    this.tip.style.top = `${Math.max(0, Math.min(y + 12, this.root.clientHeight - 90))}px`;
+    this.tip.style.top = `${Math.max(0, Math.min(y + 12, this.stage.clientHeight - 90))}px`;
   }
 
   message(text: string): void {

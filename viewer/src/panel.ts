@@ -1,9 +1,10 @@
 /** The 3D view with its own controls, as a report holds it: no server moves it. */
 
 import { CutPanel } from "./cut";
-import { Colouring, Header, unpacked } from "./document";
+import { Document, unpacked } from "./document";
 import { View, Why } from "./view";
 
+type Told = { row: number; why: Why };
 const WHOLE = 30, SIDES = ["iso", "top", "front", "side"];
 
 function made<K extends keyof HTMLElementTagNameMap>(tag: K, text = "", label = ""): HTMLElementTagNameMap[K] {
@@ -13,16 +14,69 @@ function made<K extends keyof HTMLElementTagNameMap>(tag: K, text = "", label = 
   return e;
 }
 
-/** Fill an element with the view of a document that is held as text, and with its controls. */
-export async function panel(host: HTMLElement, text: string): Promise<View> {
-  const doc = await unpacked(text), bar = made("div"), box = made("div"), foot = made("div");
-  bar.className = "cv-controls";
-  foot.className = "cv-controls";
+function row(): HTMLDivElement {
+  const e = made("div");
+  e.className = "cv-controls";
+  return e;
+}
+
+/** Fill an element with the view of documents that are held as text, by the names of their tracks, and with controls. */
+export async function panel(host: HTMLElement, texts: [string, string][]): Promise<View> {
+  const first = await unpacked(texts[0][1]), bar = row(), box = made("div"), foot = row(), cut = made("div");
   box.className = "cv-box";
-  host.replaceChildren(bar, box, foot);
-  const view = new View(box), header: Header = doc.header;
-  view.load(doc);
-  const columns: Colouring[] = header.columns ?? [];
+  cut.id = `${host.id}-cut`;
+  host.replaceChildren(bar, box, foot, cut);
+  const view = new View(box);
+  view.load(first);
+  for (const name of covered(view)) view.layer(name, false);
+  let panelled = false, told = (_: Told) => {};
+  box.addEventListener("viewrow", (e) => told((e as CustomEvent<Told>).detail));
+  const show = (doc: Document) => {
+    choices(view, doc, first, bar, tracks);
+    const { marks, engagement } = doc.header;
+    if (marks.length) view.show(0, false);
+    else view.go(view.path.count - 1);
+    told = player(view, foot);
+    cut.style.display = engagement ? "" : "none";
+    if (engagement && !panelled) { panelled = true; new CutPanel(cut, view); }
+  };
+  const tracks = made("select", "", "program");
+  texts.forEach(([name], k) => tracks.append(new Option(name, String(k))));
+  tracks.style.display = texts.length > 1 ? "" : "none";
+  tracks.onchange = async () => {
+    view.play(0);
+    const doc = tracks.value === "0" ? first : await unpacked(texts[Number(tracks.value)][1]);
+    view.load(doc, true, first);
+    show(doc);
+  };
+  show(first);
+  // what a printer gets
+  const image = made("img");
+  image.alt = "the 3D view";
+  image.className = "cv-print";
+  const photograph = () => { image.src = view.picture(); };
+  host.append(image);
+  requestAnimationFrame(photograph);
+  addEventListener("beforeprint", photograph);
+  return view;
+}
+
+/** Painted surfaces behind others of the same surface, by the number that their names begin with. */
+function covered(view: View): string[] {
+  const numbers = new Set<string>();
+  return view.solids.map((s) => s.body).filter((b) => {
+    const number = /^(\d+)-/.exec(b.name)?.[1];
+    if (b.kind !== "body" || !b.legend || !number) return false;
+    const behind = numbers.has(number);
+    numbers.add(number);
+    return behind;
+  }).map((b) => b.name);
+}
+
+/** What is shown, from where, in which colours. */
+function choices(view: View, doc: Document, shared: Document, bar: HTMLElement, tracks: HTMLElement): void {
+  const { header } = doc, columns = header.columns ?? [], maps = shared.header.maps ?? [];
+  bar.replaceChildren(tracks);
   const choose = made("select", "", "column that colours the path");
   columns.forEach((c, k) => choose.append(new Option(c.unit ? `${c.label} [${c.unit}]` : c.label, String(k))));
   choose.onchange = () => view.colour(doc, columns[Number(choose.value)]);
@@ -40,21 +94,25 @@ export async function panel(host: HTMLElement, text: string): Promise<View> {
     label.append(c, " ", name);
     bar.append(label);
   };
-  const names = [...header.bodies.map((b) => b.name), ...(view.stock ? ["stock"] : []), "path", "cutter",
+  const names = [...view.solids.map((s) => s.body.name), ...(view.stock ? ["stock"] : []), "path", "cutter",
     ...(header.engagement ? ["engagement"] : [])];
-  for (const name of names) check(name, true, (on) => view.layer(name, on));
+  for (const name of names) check(name, view.shows(name), (on) => view.layer(name, on));
   check("see through", false, (on) => view.glass(on));
+  if (header.path.axes) check("tool upright", false, (on) => view.stands(on));
   if (view.stock) check("values on stock", false, (on) => view.drape(on));
-  if (header.maps?.length) {
-    const maps = made("select", "", "surface map"), bent = made("input", "", "how far the map is bent");
-    maps.append(new Option("no map", ""), ...header.maps.map((m) => new Option(`map: ${m.name}, ${m.label}`, m.name)));
-    Object.assign(bent, { type: "range", min: "0", max: "1", step: "any", value: "0" });
-    bent.style.flex = "0 1 120px";
-    const show = () => { view.map(maps.value, Number(bent.value)); bent.style.display = header.maps!.find((m) => m.name === maps.value)?.moved ? "" : "none"; };
-    maps.onchange = bent.oninput = show;
-    bar.append(maps, bent);
-    show();
-  }
+  if (!maps.length) return;
+  const chosen = made("select", "", "surface map"), bent = made("input", "", "how far the map is bent");
+  chosen.append(new Option("no map", ""), ...maps.map((m) => new Option(`map: ${m.name}, ${m.label}`, m.name)));
+  Object.assign(bent, { type: "range", min: "0", max: "1", step: "any", value: "0" });
+  bent.style.flex = "0 1 120px";
+  const show = () => { view.map(chosen.value, Number(bent.value)); bent.style.display = maps.find((m) => m.name === chosen.value)?.moved ? "" : "none"; };
+  chosen.onchange = bent.oninput = show;
+  bar.append(chosen, bent);
+  show();
+}
+
+/** Play, and the slider of time; what follows the row of the view. */
+function player(view: View, foot: HTMLElement): (told: Told) => void {
   const play = made("button", "play"), slider = made("input", "", "time"), where = made("span");
   slider.type = "range";
   const t = view.path.t, first = t[0] ?? 0, last = t[t.length - 1] ?? 1;
@@ -68,36 +126,16 @@ export async function panel(host: HTMLElement, text: string): Promise<View> {
     play.textContent = view.playing ? "pause" : "play";
   };
   slider.oninput = () => { view.play(0); view.abscissa(Number(slider.value)); said(); };
-  const toggle = () => {
+  play.onclick = () => {
     if (!view.playing && view.row >= view.path.count - 1) view.go(0);
     view.play(view.playing ? 0 : Math.max(last - first, 1e-3) / WHOLE);
     said();
   };
-  play.onclick = toggle;
-  box.addEventListener("viewrow", (e) => {
-    const { row, why } = (e as CustomEvent<{ row: number; why: Why }>).detail;
+  const stand = () => { slider.value = String(t[view.path.place(view.row)]); said(); };
+  foot.replaceChildren(play, slider, where);
+  stand();
+  return ({ row, why }) => {
     if (why === "clicked") { view.play(0); view.go(row); }
-    slider.value = String(t[view.path.place(view.row)]);
-    said();
-  });
-  foot.append(play, slider, where);
-  if (header.marks.length) view.show(0, false);
-  else view.go(view.path.count - 1);
-  slider.value = String(t[view.path.place(view.row)]);
-  said();
-  if (header.engagement) {
-    const cut = made("div");
-    cut.id = `${host.id}-cut`;
-    host.append(cut);
-    new CutPanel(cut, view);
-  }
-  // what a printer gets
-  const image = made("img");
-  image.alt = "the 3D view";
-  image.className = "cv-print";
-  const photograph = () => { image.src = view.picture(); };
-  host.append(image);
-  requestAnimationFrame(photograph);
-  addEventListener("beforeprint", photograph);
-  return view;
+    stand();
+  };
 }

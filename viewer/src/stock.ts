@@ -5,6 +5,21 @@ import { Document, Removal, Rgb } from "./document";
 
 const RAW = new THREE.Color(0xb98a4e), CUT = new THREE.Color(0xc3cad3), CAP = new THREE.Color(0x8d6a3b);
 
+/** Corners (q, 4, 3) from vertices and quads, which are held column by column as differences from the row before. */
+function unrolled(doc: Document, removal: Removal): Uint16Array {
+  const vertices = doc.u2(removal.vertices), quads = doc.u4(removal.quads), n = vertices.length / 3, m = quads.length / 4;
+  const place = new Uint16Array(vertices.length), out = new Uint16Array(12 * m);
+  for (let c = 0; c < 3; c++) for (let k = 0, sum = 0; k < n; k++) {
+    sum = (sum + vertices[c * n + k]) & 0xffff;
+    place[3 * k + c] = Math.min(sum * removal.step[c], 65535);
+  }
+  for (let c = 0; c < 4; c++) for (let k = 0, at = 0; k < m; k++) {
+    at = (at + quads[c * m + k]) >>> 0;
+    for (let i = 0; i < 3; i++) out[12 * k + 3 * c + i] = place[3 * at + i];
+  }
+  return out;
+}
+
 export class Stock {
   readonly mesh: THREE.Mesh;
   readonly group = new THREE.Group();
@@ -18,7 +33,7 @@ export class Stock {
   };
 
   constructor(doc: Document, removal: Removal) {
-    const corners = doc.u2(removal.corners);
+    const corners = unrolled(doc, removal);
     this.seen = doc.u2(removal.seen);
     this.rows = doc.u4(removal.rows);
     this.low = new THREE.Vector3(...removal.low);

@@ -3,13 +3,16 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { HIT, Solid, Tool } from "./bodies";
+import { frame, uprighting } from "./camera";
 import { SIZE, ViewCube } from "./cube";
 import { Colouring, Document, Header, Mark, Rgb } from "./document";
 import { EngagedCutter } from "./engaged";
 import { Teeth } from "./engagement";
+import { Measure } from "./measure";
 import { Overlay, number } from "./overlay";
 import { Abscissa, Pair, between } from "./pair";
 import { ToolPath, coloured } from "./path";
+import { recorded, saved } from "./save";
 import { Stock } from "./stock";
 import { MapBody } from "./surface";
 
@@ -29,21 +32,26 @@ export class View {
   solids: Solid[] = [];
   row = -1;
   frames = 0;
+  leads = 0;
   private readonly renderer: THREE.WebGLRenderer;
   private readonly scene = new THREE.Scene();
+  /** all that belongs to the work; it turns where the tool stands upright */
+  private readonly work = new THREE.Group();
   private readonly camera = new THREE.PerspectiveCamera(FOV, 1, 0.1, 1000);
   private readonly controls: OrbitControls;
   private readonly cube = new ViewCube();
   private tools = new Map<number, Tool>();
   private readonly marks = new THREE.Group();
-  private readonly measure = new THREE.Group();
+  private readonly measure = new Measure();
   private readonly engaged = new EngagedCutter();
   /** told where the view stands */
   readonly stood = new Set<() => void>();
   private colouring: Colouring | null = null;
-  private picks: THREE.Vector3[] | null = null;
   private hidden = new Set<Layer>();
+  /** the section as it lies in the view, and in the work */
   private plane: THREE.Plane | null = null;
+  private uncut: THREE.Plane | null = null;
+  private upright = false;
   private dirty = true;
   private draped = false;
   private shades: Rgb[] | null = null;
@@ -68,10 +76,10 @@ export class View {
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", "3D view");
     canvas.tabIndex = -1;
-    this.overlay.root.prepend(canvas);
+    this.overlay.stage.prepend(canvas);
     this.scene.background = new THREE.Color(BACKGROUND);
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8d99a8, 1.5), this.camera, this.marks, this.measure,
-      this.engaged.group);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8d99a8, 1.5), this.camera, this.work);
+    this.work.add(this.marks, this.measure.group, this.engaged.group);
     const lamp = new THREE.DirectionalLight(0xffffff, 1.7);
     lamp.position.set(0.4, 0.7, 1);
     this.camera.add(lamp);
@@ -86,7 +94,7 @@ export class View {
     canvas.addEventListener("click", (e) => {
       if (Math.hypot(e.clientX - down[0], e.clientY - down[1]) < 5) this.click(e);
     });
-    new ResizeObserver(() => { this.dirty = true; }).observe(host);
+    new ResizeObserver(() => { this.dirty = true; }).observe(this.overlay.stage);
     const loop = (now: number) => {
       if (!host.isConnected) { this.renderer.dispose(); return; }
       this.advance(now);
@@ -96,23 +104,23 @@ export class View {
     requestAnimationFrame(loop);
   }
 
-  /** Show a document; `keep` leaves the camera where it is. */
-  load(doc: Document, keep = false): void {
+  /** Show a document; `keep` leaves the camera where it is; bodies and maps may be those of another document. */
+  load(doc: Document, keep = false, bodies = doc): void {
     const h = (this.header = doc.header);
-    this.doc = doc;
+    this.doc = bodies;
     this.map("");
-    for (const s of this.solids) this.scene.remove(s.group);
-    if (this.stock) this.scene.remove(this.stock.group);
-    if (this.path) this.scene.remove(this.path.group);
-    for (const t of this.tools.values()) this.scene.remove(t.group);
-    this.solids = h.bodies.map((b) => new Solid(doc, b));
+    for (const s of this.solids) this.work.remove(s.group);
+    if (this.stock) this.work.remove(this.stock.group);
+    if (this.path) this.work.remove(this.path.group);
+    for (const t of this.tools.values()) this.work.remove(t.group);
+    this.solids = bodies.header.bodies.filter((b) => b.kind !== "stock" || !h.removal).map((b) => new Solid(bodies, b));
     this.stock = h.removal ? new Stock(doc, h.removal) : null;
     this.path = new ToolPath(doc, h.path);
     this.engaged.load(doc, h);
     this.speeds = h.stability ? { rpm: doc.f4(h.stability.rpm), margin: doc.f4(h.stability.margin) } : null;
     this.tools = new Map(Object.entries(h.cutters).map(([n, parts]) => [Number(n), new Tool(parts)]));
-    this.scene.add(...this.solids.map((s) => s.group), this.path.group, ...[...this.tools.values()].map((t) => t.group));
-    if (this.stock) this.scene.add(this.stock.group);
+    this.work.add(...this.solids.map((s) => s.group), this.path.group, ...[...this.tools.values()].map((t) => t.group));
+    if (this.stock) this.work.add(this.stock.group);
     this.marks.clear();
     const size = this.size();
     for (const m of h.marks) {
@@ -148,16 +156,16 @@ export class View {
 
   /** Show a surface map in the place of part and stock, bent by a share of the greatest factor; "": none. The factor. */
   map(name: string, share = 0): number {
-    const found = this.header?.maps?.find((m) => m.name === name);
+    const found = this.doc?.header.maps?.find((m) => m.name === name);
     if (this.shownMap && this.shownMap.map !== found) {
-      this.scene.remove(this.shownMap.group);
+      this.work.remove(this.shownMap.group);
       this.shownMap.dispose();
       this.shownMap = null;
     }
     if (found && !this.shownMap) {
       this.shownMap = new MapBody(this.doc, found, this.header);
       this.shownMap.clip(this.plane ? [this.plane] : []);
-      this.scene.add(this.shownMap.group);
+      this.work.add(this.shownMap.group);
     }
     this.shownMap?.bend(share * this.shownMap.most);
     this.layers();
@@ -201,6 +209,8 @@ export class View {
 
   get playing(): boolean { return this.rate > 0; }
 
+  shows(name: Layer): boolean { return !this.hidden.has(name); }
+
   layer(name: Layer, on: boolean): void {
     if (on) this.hidden.delete(name); else this.hidden.add(name);
     this.layers();
@@ -222,12 +232,14 @@ export class View {
     if (!this.header) return;
     const k = "xyz".indexOf(axis), { low, high } = this.header;
     this.plane = null;
+    this.uncut = null;
     if (axis && k >= 0) {
       const normal = new THREE.Vector3().setComponent(k, -1);
       // from the side that the camera looks from in the first view
       if (k === 1) normal.negate();
       const at = low[k] + share * (high[k] - low[k]);
-      this.plane = new THREE.Plane(normal, k === 1 ? -at : at);
+      this.uncut = new THREE.Plane(normal, k === 1 ? -at : at);
+      this.plane = this.uncut.clone().applyMatrix4(this.work.matrixWorld);
     }
     const planes = this.plane ? [this.plane] : [];
     for (const s of this.solids) s.clip(planes);
@@ -251,7 +263,7 @@ export class View {
     this.go(mark.row);
     this.touch(mark);
     if (!near) return;
-    const to = new THREE.Vector3(...mark.at), away = this.camera.position.clone().sub(this.controls.target).normalize();
+    const to = this.work.localToWorld(new THREE.Vector3(...mark.at)), away = this.camera.position.clone().sub(this.controls.target).normalize();
     this.controls.target.copy(to);
     this.camera.position.copy(to).addScaledVector(away, 0.75 * this.size());
     this.controls.update();
@@ -260,9 +272,8 @@ export class View {
 
   /** Measure between clicks, or stop. */
   measuring(on: boolean): void {
-    this.picks = on ? [] : null;
-    this.measure.clear();
-    this.overlay.message(on ? "click two places" : "");
+    this.measure.begin(on);
+    this.overlay.message(this.measure.wanted);
     this.dirty = true;
   }
 
@@ -272,33 +283,28 @@ export class View {
     return this.renderer.domElement.toDataURL("image/png");
   }
 
-  save(name: string, url = this.picture()): void {
-    const a = document.createElement("a");
-    a.href = url;
-    a.download = name;
-    a.click();
-  }
+  save(name: string): void { saved(this.picture(), name); }
 
   /** Record what is shown as WebM until called again; false where the browser cannot. */
   record(): boolean {
     if (this.recorder) { this.recorder.stop(); this.recorder = null; return false; }
-    if (!("MediaRecorder" in window)) { this.overlay.message("this browser records no video: save pictures"); return false; }
-    const parts: Blob[] = [];
-    this.recorder = new MediaRecorder(this.renderer.domElement.captureStream(30), { mimeType: "video/webm" });
-    this.recorder.ondataavailable = (e) => { parts.push(e.data); };
-    this.recorder.onstop = () => this.save("chipload.webm", URL.createObjectURL(new Blob(parts, { type: "video/webm" })));
-    this.recorder.start();
-    return true;
+    this.recorder = recorded(this.renderer.domElement, "chipload.webm");
+    if (!this.recorder) this.overlay.message("this browser records no video: save pictures");
+    return this.recorder !== null;
   }
 
   /** Lead another view: `here` and `there` are rising lengths of path [mm] that belong together, or times alike. */
   lead(other: View, against: Abscissa, here: number[], there: number[]): void {
     this.alone();
+    this.leads++;
     this.pair = { other, against, here, there };
     other.pair = { other: this, against, here: [], there: [] };
     this.follow();
     if (this.path) this.stand(this.place, this.row);
   }
+
+  /** Lead as before: the other view has another path. */
+  leadsAgain(): void { const p = this.pair; if (p) this.lead(p.other, p.against, p.here, p.there); }
 
   get paired(): boolean { return this.pair !== null; }
 
@@ -325,27 +331,31 @@ export class View {
   }
 
   private lookFrom(away: THREE.Vector3): void {
-    const low = new THREE.Vector3(...this.header.low), high = new THREE.Vector3(...this.header.high);
-    const middle = low.clone().add(high).multiplyScalar(0.5);
-    const up = Math.abs(away.z) > 0.999 ? new THREE.Vector3(0, Math.sign(away.z), 0) : new THREE.Vector3(0, 0, 1);
-    const right = new THREE.Vector3().crossVectors(up, away).normalize(), top = new THREE.Vector3().crossVectors(away, right);
-    const half = Math.tan(THREE.MathUtils.degToRad(FOV / 2)), aspect = Math.max(this.aspect(), 0.2);
-    let far = 0;
-    for (let n = 0; n < 8; n++) {
-      const p = new THREE.Vector3(n & 1 ? high.x : low.x, n & 2 ? high.y : low.y, n & 4 ? high.z : low.z).sub(middle);
-      far = Math.max(far, p.dot(away) + Math.max(Math.abs(p.dot(top)) / half, Math.abs(p.dot(right)) / (half * aspect)));
-    }
+    const box = new THREE.Box3(new THREE.Vector3(...this.header.low), new THREE.Vector3(...this.header.high));
     const size = this.size();
     this.camera.near = size * 2e-3;
     this.camera.far = size * 40;
-    this.controls.target.copy(middle);
-    this.camera.position.copy(middle).addScaledVector(away, 1.06 * far);
-    if (Math.abs(away.z) > 0.999) this.camera.position.y -= 1e-3 * far;
+    this.controls.target.copy(frame(this.camera, box, this.work.matrixWorld, away, Math.max(this.aspect(), 0.2)));
     this.controls.update();
     this.dirty = true;
   }
 
-  private aspect(): number { return this.host.clientWidth / Math.max(this.host.clientHeight, 1); }
+  /** Turn the work so that the tool's axis stands upright, as on a machine whose tables carry the work; or leave it. */
+  stands(upright: boolean): void {
+    this.upright = upright;
+    this.stand(this.place, this.row);
+    this.section(this.cut.axis, this.cut.share);
+  }
+
+  private turn(place: number): void {
+    const axis = this.path.axis(place, new THREE.Vector3());
+    this.work.quaternion.identity();
+    if (this.upright) this.work.quaternion.copy(uprighting(axis));
+    this.work.updateMatrixWorld(true);
+    if (this.plane && this.uncut) this.plane.copy(this.uncut).applyMatrix4(this.work.matrixWorld);
+  }
+
+  private aspect(): number { return this.overlay.stage.clientWidth / Math.max(this.overlay.stage.clientHeight, 1); }
 
   private layers(): void {
     const seen = (name: Layer) => !this.hidden.has(name);
@@ -371,6 +381,7 @@ export class View {
       this.path.tip(place, own.group.position);
       own.group.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), this.path.axis(place, new THREE.Vector3()));
     }
+    this.turn(place);
     this.stock?.at(now);
     this.engaged.stand(now, this.path.tip(place, new THREE.Vector3()), !this.hidden.has("engagement"));
     this.dirty = true;
@@ -390,7 +401,7 @@ export class View {
   private touch(mark: Mark | null): void {
     for (const s of this.solids) s.hit(mark !== null && mark.bodies.includes(s.body.name));
     for (const t of this.tools.values()) t.hit(mark && mark.kind === "collision" ? mark.bodies[0] : "");
-    this.overlay.message(mark ? mark.text : this.picks ? "click two places" : "");
+    this.overlay.message(mark ? mark.text : this.measure.wanted);
     this.dirty = true;
   }
 
@@ -422,7 +433,7 @@ export class View {
   }
 
   private draw(): void {
-    const w = this.host.clientWidth, h = this.host.clientHeight;
+    const w = this.overlay.stage.clientWidth, h = this.overlay.stage.clientHeight;
     if (w < 2 || h < 2 || !this.header) return;
     this.dirty = false;
     this.frames++;
@@ -442,11 +453,11 @@ export class View {
 
   /** Drawn point of the path within some pixels of the pointer, the nearest to the camera. */
   private near(x: number, y: number): number {
-    const w = this.host.clientWidth, h = this.host.clientHeight, v = new THREE.Vector3();
+    const w = this.overlay.stage.clientWidth, h = this.overlay.stage.clientHeight, v = new THREE.Vector3();
     let best = -1, closest = NEAR * NEAR;
     const p = this.path.drawn;
     for (let k = 0; k < p.length / 3; k++) {
-      v.set(p[3 * k], p[3 * k + 1], p[3 * k + 2]).project(this.camera);
+      v.set(p[3 * k], p[3 * k + 1], p[3 * k + 2]).applyMatrix4(this.work.matrixWorld).project(this.camera);
       if (v.z > 1) continue;
       const far = ((v.x + 1) * w / 2 - x) ** 2 + ((1 - v.y) * h / 2 - y) ** 2;
       if (far < closest) { closest = far; best = k; }
@@ -456,7 +467,7 @@ export class View {
 
   private hover(e: PointerEvent): void {
     if (e.buttons || !this.header || this.hidden.has("path")) { this.overlay.values(""); return; }
-    const box = this.host.getBoundingClientRect(), x = e.clientX - box.left, y = e.clientY - box.top;
+    const box = this.overlay.stage.getBoundingClientRect(), x = e.clientX - box.left, y = e.clientY - box.top;
     const k = this.near(x, y);
     if (k < 0) { this.overlay.values(""); return; }
     const row = this.path.drawnRows[k], d = this.path.place(row), p = this.path.drawn, c = this.colouring, v = this.path.values;
@@ -467,38 +478,27 @@ export class View {
   }
 
   private click(e: MouseEvent): void {
-    const box = this.host.getBoundingClientRect(), x = e.clientX - box.left, y = e.clientY - box.top;
+    const box = this.overlay.stage.getBoundingClientRect(), x = e.clientX - box.left, y = e.clientY - box.top;
     const fromRight = box.width - 4 - x, fromBottom = box.height - 4 - y;
     if (fromRight > 0 && fromRight < SIZE && fromBottom > 0 && fromBottom < SIZE) {
       const side = this.cube.side(1 - (2 * fromRight) / SIZE, (2 * fromBottom) / SIZE - 1);
       if (side) { this.lookFrom(side); this.follow(); return; }
     }
-    if (this.picks) { this.pick(x, y); return; }
+    if (this.measure.on) { this.pick(x, y); return; }
     const k = this.hidden.has("path") ? -1 : this.near(x, y);
     if (k >= 0) this.tellRow(this.path.drawnRows[k], "clicked");
   }
 
   private pick(x: number, y: number): void {
     const ray = new THREE.Raycaster();
-    ray.setFromCamera(new THREE.Vector2(2 * x / this.host.clientWidth - 1, 1 - 2 * y / this.host.clientHeight), this.camera);
+    ray.setFromCamera(new THREE.Vector2(2 * x / this.overlay.stage.clientWidth - 1, 1 - 2 * y / this.overlay.stage.clientHeight), this.camera);
     const meshes = this.solids.filter((s) => s.group.visible).map((s) => s.mesh as THREE.Object3D);
     if (this.stock?.group.visible) meshes.push(this.stock.mesh);
     const hit = ray.intersectObjects(meshes, false).find((i) =>
       (i.object !== this.stock?.mesh || this.stock.shows(i.faceIndex!)) && (!this.plane || this.plane.distanceToPoint(i.point) >= 0));
-    if (!hit || !this.picks) return;
-    if (this.picks.length === 2) { this.picks.length = 0; this.measure.clear(); }
-    this.picks.push(hit.point);
-    const ball = new THREE.Mesh(new THREE.SphereGeometry(this.size() * 0.005, 12, 8), new THREE.MeshBasicMaterial({ color: 0x1b4fd0, depthTest: false }));
-    ball.position.copy(hit.point);
-    ball.renderOrder = 9;
-    this.measure.add(ball);
-    if (this.picks.length === 2) {
-      const [a, b] = this.picks, d = b.clone().sub(a);
-      const line = new THREE.Line(new THREE.BufferGeometry().setFromPoints([a, b]), new THREE.LineBasicMaterial({ color: 0x1b4fd0, depthTest: false }));
-      line.renderOrder = 9;
-      this.measure.add(line);
-      this.overlay.message(`${number(d.length())} mm   dX ${number(d.x)}  dY ${number(d.y)}  dZ ${number(d.z)}`);
-    }
+    if (!hit) return;
+    const said = this.measure.add(this.work.worldToLocal(hit.point), this.size() * 0.005);
+    if (said) this.overlay.message(said);
     this.dirty = true;
   }
 }

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
 from chipload.machine.chain import Chain
-from chipload.machine.schema import Row, chain_from_table, checked
+from chipload.machine.schema import Row, chain_from_table, checked, vector
+from chipload.machine.table import MachineTable
 from chipload.machine.trajectory import TrajectoryPlanner
 from chipload.tables import read_table, shipped_names, shipped_table
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm, rpm_from_rad_s
@@ -46,6 +47,7 @@ class Machine:
     note : where its numbers come from and which are assumed
     jerk : greatest jerk along the path [mm/s^3], > 0; None: not known. A feed schedule keeps it; the clock has none
     planner : settings of LinuxCNC's trajectory planner; None: another controller, judged by its corner tolerance
+    table : the block under the work; None: not known
     tcp_words : blocks that begin and end tool centre point control, ``{tool}`` for the tool's number; None: it has none
 
     Raises
@@ -70,6 +72,7 @@ class Machine:
     torque_curve: tuple[tuple[float, float], ...] = ()
     planner: TrajectoryPlanner | None = None
     jerk: float | None = None
+    table: MachineTable | None = None
 
     def __post_init__(self) -> None:
         def need(ok: bool, key: str, value: object, limit: str) -> None:
@@ -169,6 +172,7 @@ def _from_table(label: str, table: Row) -> Machine:
             tcp_words=_tcp_words(top),
             planner=_planner(label, top),
             jerk=float(top["jerk_mm_s3"]) if "jerk_mm_s3" in top else None,
+            table=_machine_table(label, top),
         )
     except InputError as err:
         text = str(err)
@@ -187,6 +191,15 @@ def _planner(label: str, top: Row) -> TrajectoryPlanner | None:
     if "override_max" in given:
         values["override"] = float(given["override_max"])
     return TrajectoryPlanner(cycle=1e-3 * given["cycle_ms"], **values)
+
+
+def _machine_table(label: str, top: Row) -> MachineTable | None:
+    """The block of `[table]`."""
+    if "table" not in top:
+        return None
+    given = checked(label, top["table"], "table")
+    spacing = {"spacing": float(given["spacing_mm"])} if "spacing_mm" in given else {}
+    return MachineTable(vector(given["low_mm"]), vector(given["high_mm"]), **spacing)
 
 
 def _tcp_words(top: Row) -> tuple[str, str] | None:
@@ -218,6 +231,10 @@ def read_machine(path: str | Path) -> Machine:
     In ``[spindle]``: ``min_rpm``, ``max_rpm``, optional ``power_w``, ``torque_nm``, ``torque_curve`` (pairs of rpm and
     N m), ``direction`` (from the tip to the spindle; else +Z), and ``nose_mm`` or ``gauge_mm``: the nose is so far from
     the pivot of the head's last rotary axis. In ``[work]``, which may be left out: ``zero_mm``, ``x_axis``, ``z_axis``.
+
+    In ``[table]``, which may be left out: ``low_mm`` and ``high_mm``, corners of the block under the work in the
+    coordinates of the work, optional ``spacing_mm``. A job that simulates a program compares its tools with that block,
+    unless it states a ``[machine_table]`` of its own.
 
     Raises
     ------

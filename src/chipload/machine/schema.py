@@ -48,6 +48,7 @@ _PLANNER = {
     "kink_ratio?": _NUMBER,
     "override_max?": _NUMBER,
 }
+_TABLE = {"low_mm": _VECTOR, "high_mm": _VECTOR, "spacing_mm?": _NUMBER}
 _WORK = {"zero_mm?": _VECTOR, "x_axis?": _VECTOR, "z_axis?": _VECTOR}
 _LINEAR = {
     "min_mm": _NUMBER,
@@ -71,8 +72,10 @@ _ROTARY = {
     "indexed?": _FLAG,
     "step_deg?": _NUMBER,
 }
+#: keys of the tables that are no axes
+_KEYS = {"spindle": _SPINDLE, "work": _WORK, "table": _TABLE, "trajectory_planner": _PLANNER}
 #: tables in the file's top: "?" may be left out
-_TABLES = ("axis", "spindle", "work?", "trajectory_planner?")
+_TABLES = ("axis", "spindle", "work?", "table?", "trajectory_planner?")
 
 
 def _is(kind: str, value: object) -> bool:
@@ -104,8 +107,8 @@ def checked(label: str, data: Row, where: str, letters: str = "XYZ") -> Row:
         keys, tables = _MACHINE, _TABLES
     elif where == "axis":
         keys, tables = {}, tuple(letters.lower())
-    elif where in ("spindle", "work", "trajectory_planner"):
-        keys = {"spindle": _SPINDLE, "work": _WORK, "trajectory_planner": _PLANNER}[where]
+    elif where in _KEYS:
+        keys = _KEYS[where]
     else:
         keys = _ROTARY if where[-1] in "abc" else _LINEAR
     known = [key.rstrip("?") for key in (*keys, *tables)]

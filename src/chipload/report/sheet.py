@@ -122,7 +122,8 @@ def _shown_view(view: tuple[str, str, str] | None) -> str:
     if view is None:
         return ""
     place, data, script = view
-    call = f'chiploadViewer.report("{place}", document.getElementById("{data}").textContent)'
+    texts = f'[...document.querySelectorAll(".{data}")].map((e) => [e.dataset.name, e.textContent])'
+    call = f'chiploadViewer.report("{place}", {texts})'
     return _library("viewer", script) + f'<script>library("viewer").then(() => {call});</script>\n'
 
 

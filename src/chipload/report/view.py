@@ -17,12 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.report.bodies import SceneBody
+from chipload.report.bodies import MACHINE_TABLE, SceneBody
 from chipload.report.operating import OperatingPoints
 from chipload.report.shown_maps import ShownMap
 from chipload.result.style import SCALE
 from chipload.simulation.engagement_samples import EngagementSamples
 from chipload.simulation.removal_mesh import RemovalMesh
+from chipload.stock.surface_net import STEPS
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -131,8 +132,12 @@ class Buffers:
         return out
 
 
-def scene_document(scene: ViewScene, kept: int = KEPT) -> bytes:
-    """The document of a scene, with ``kept`` rows of the path at most."""
+def scene_document(scene: ViewScene, kept: int = KEPT, shared: bool = False, cells: float = 0.0) -> bytes:
+    """The document of a scene, with ``kept`` rows of the path at most.
+
+    ``shared``: without bodies and maps, which are those of another document that is shown with it; ``cells``: the
+    stock is rounded to so much of the distance of its rays.
+    """
     out = Buffers()
     path, removal = scene.path, scene.removal
     low, high = _box(scene)
@@ -141,8 +146,8 @@ def scene_document(scene: ViewScene, kept: int = KEPT) -> bytes:
         "low": low.tolist(),
         "high": high.tolist(),
         "scale": SCALE,
-        "bodies": [_body(body, out) for body in scene.bodies],
-        "removal": None if removal is None else _removal(removal, out),
+        "bodies": [] if shared else [_body(body, out) for body in scene.bodies],
+        "removal": None if removal is None else _removal(removal, out, cells),
         "path": _path(path, out, kept),
         "cutters": {
             str(n): [{"kind": kind, "profile": np.round(p, 6).tolist()} for kind, p in parts]
@@ -154,7 +159,7 @@ def scene_document(scene: ViewScene, kept: int = KEPT) -> bytes:
         ],
         "colouring": None if scene.colouring is None else _colouring(scene.colouring, path, out),
         "columns": [_colouring(c, path, out) for c in scene.columns],
-        "maps": [_map(one, out) for one in scene.maps],
+        "maps": [] if shared else [_map(one, out) for one in scene.maps],
         "stability": None if scene.operating is None else _operating(scene.operating, len(path.t), kept, out),
         "engagement": None if scene.samples is None else _engagement(scene.samples, scene.bounds, out),
     }
@@ -206,14 +211,17 @@ def _document(header: Mapping[str, Any], out: Buffers) -> bytes:
 
 
 def _box(scene: ViewScene) -> tuple[Floats, Floats]:
-    """The box that a view shows: the bodies, and the path as far as it does not leave them by more than a share."""
+    """The box that a view shows: the bodies; path and table of the machine as far as they leave them by a share."""
     path, removal = scene.path.place, scene.removal
-    boxes = [(b.low, b.high) for b in scene.bodies] + ([(removal.low, removal.high)] if removal is not None else [])
+    boxes = [(b.low, b.high) for b in scene.bodies if b.name != MACHINE_TABLE]
+    boxes += [(removal.low, removal.high)] if removal is not None else []
     first, last = path.min(axis=0), path.max(axis=0)
     if not boxes:
         return first, last
     low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
     room = AROUND * float(np.linalg.norm(high - low))
+    tables = [b for b in scene.bodies if b.name == MACHINE_TABLE]
+    first, last = np.min([first, *(b.low for b in tables)], axis=0), np.max([last, *(b.high for b in tables)], axis=0)
     return np.minimum(low, np.maximum(first, low - room)), np.maximum(high, np.minimum(last, high + room))
 
 
@@ -232,14 +240,31 @@ def _body(body: SceneBody, out: Buffers) -> dict[str, Any]:
     }
 
 
-def _removal(removal: RemovalMesh, out: Buffers) -> dict[str, Any]:
+def _removal(removal: RemovalMesh, out: Buffers, cells: float) -> dict[str, Any]:
+    """Corners as vertices in steps and as vertices of quads, each as the difference from the one before."""
+    size = removal.high - removal.low
+    step = np.maximum(np.round(cells * removal.cell * STEPS / np.where(size > 0.0, size, 1.0)), 1.0)
+    corners = np.round(removal.corners.reshape(-1, 3) / step).astype(np.int64)
+    _, first, at = np.unique(corners @ [1, 1 << 16, 1 << 32], return_index=True, return_inverse=True)
+    # in the order in which the quads come to them
+    order = np.argsort(first)
+    number = np.empty_like(order)
+    number[order] = np.arange(len(order))
+    vertices, quads = corners[first[order]], number[at.ravel()].reshape(-1, 4)
     return {
         "low": removal.low.tolist(),
         "high": removal.high.tolist(),
-        "corners": out.put(removal.corners, "u2"),
+        "step": step.tolist(),
+        "vertices": out.put(_differences(vertices) % (1 << 16), "u2"),
+        "quads": out.put(_differences(quads) % (1 << 32), "u4"),
         "seen": out.put(removal.seen, "u2"),
         "rows": out.put(removal.rows, "u4"),
     }
+
+
+def _differences(rows: Ints) -> Ints:
+    """Column by column the difference from the row before: they pack well."""
+    return np.ascontiguousarray(np.diff(rows, axis=0, prepend=0).T)
 
 
 def _path(path: ViewPath, out: Buffers, kept: int) -> dict[str, Any]:

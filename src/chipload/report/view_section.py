@@ -1,10 +1,10 @@
-"""The 3D view of report.html: bodies, stock at every row, path, cutter of the track in use, in the file itself."""
+"""The 3D view of report.html: bodies, stock at every row, path, cutter of the tracks in use, in the file itself."""
 
 from __future__ import annotations
 
 import base64
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from types import MappingProxyType
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding
-from chipload.report.bodies import bodies_note, scene_bodies
+from chipload.report.bodies import SceneBody, bodies_note, scene_bodies
 from chipload.report.colouring import FIRST, bounds_of, colouring_of, lowest_limit
 from chipload.report.marks import marks_of
 from chipload.report.operating import COLUMNS as OPERATING
@@ -32,8 +32,12 @@ KEPT, POINTS, COLUMNS_SHOWN, TRIANGLES = 12_000, 6_000, 3, 60_000
 SAMPLES = 200
 #: how a file of glTF begins; another scene holds no body
 GLTF = b"glTF"
-#: element of the view, and of its document
+#: element of the view, and class of its documents, one a track
 VIEW, DATA = "view3d", "view3d-data"
+#: how far the stock is rounded, of the distance of its rays
+ROUNDED = 0.0625
+#: characters of all documents: what lies beyond is left out, but the first
+LARGEST = 3_000_000
 
 
 def view_section(
@@ -43,17 +47,56 @@ def view_section(
     blanks: Mapping[str, Blank],
     samples: Mapping[str, EngagementSamples] = MappingProxyType({}),
 ) -> list[str]:
-    """HTML of the view of the first track in use that has a place; empty: there is none."""
-    found = _first(result)
-    if found is None:
+    """HTML of the view of the tracks in use that have a place, else of the first one; empty: there is none."""
+    shown = _shown(result)
+    if not shown:
         return []
-    k, track, columns = found
-    path = _path(columns)
-    removal = stocks.meshes.get(k)
     bodies = scene_bodies(scene_glb, TRIANGLES) if scene_glb.startswith(GLTF) else ()
+    documents: dict[str, str] = {}
+    notes, left, length = [bodies_note(bodies)], [], 0
+    for k, track, columns in shown:
+        own = _scene(result, track, columns, bodies, stocks.meshes.get(k), blanks, samples)
+        data = base64.b64encode(zlib.compress(scene_document(own, KEPT, bool(documents), ROUNDED), 9)).decode()
+        if documents and length + len(data) > LARGEST:
+            left.append(track.name)
+            continue
+        length += len(data)
+        documents[track.name] = data
+        of = f"{track.name}: " if len(shown) > 1 else ""
+        if own.removal is not None:
+            notes.append(f"{of}The stock is drawn in cells of {float(own.removal.cell.max()):.2g} mm.")
+        elif k in stocks.refused:
+            notes.append(f"{of}The stock is not drawn: {stocks.refused[k]}.")
+        if len(own.path.t) > POINTS:
+            notes.append(f"{of}The path is drawn by some {POINTS} of its {len(own.path.t)} steps.")
+    if left:
+        notes.append(f"Not in this file, to keep it small: {', '.join(left)}.")
+    names, note = ", ".join(documents), " ".join(filter(None, notes))
+    said = f"{escape(names)}. Drag turns, the wheel zooms, the right button shifts. {escape(note)}"
+    return [
+        "<h2>In space</h2>",
+        f'<p class="note">{said}</p>',
+        f'<div id="{VIEW}" class="view3d"><p class="note">The view needs a browser with scripts and WebGL.</p></div>',
+        *(
+            f'<script class="{DATA}" data-name="{escape(name)}" type="text/plain">{data}</script>'
+            for name, data in documents.items()
+        ),
+    ]
+
+
+def _scene(
+    result: Result,
+    track: Track,
+    columns: Mapping[str, NDArray[Any]],
+    bodies: Sequence[SceneBody],
+    removal: RemovalMesh | None,
+    blanks: Mapping[str, Blank],
+    samples: Mapping[str, EngagementSamples],
+) -> ViewScene:
+    """What is shown of a track."""
+    path, blank = _path(columns), blanks.get(track.name)
     if removal is not None:
         bodies = tuple(b for b in bodies if b.kind != "stock")
-    blank = blanks.get(track.name)
     size = max(0.25 * float(np.linalg.norm(np.ptp(path.place, axis=0))), 1.0)
     parts = shapes_of(blank) if blank is not None else {}
     parts = {0: next(iter(parts.values()))} if len(parts) == 1 else {0: pointer_parts(size), **parts}
@@ -62,35 +105,23 @@ def view_section(
         return item.row if item.row is not None and item.row < len(path.t) else None
 
     colours, own = _colours(track, columns, path, removal), samples.get(track.name)
-    scene = ViewScene(
+    return ViewScene(
         result.title, bodies, removal, path, parts, marks_of(result, track, row, path.place),
         colours[0] if colours else None, colours, None if own is None else own.at_most(SAMPLES), bounds_of(track),
         operating_points(result, track, columns), shown_maps(result, track, bounds_of(track)),
     )  # fmt: skip
-    data = base64.b64encode(zlib.compress(scene_document(scene, KEPT), 9)).decode()
-    notes = [bodies_note(bodies)]
-    if removal is not None:
-        notes.append(f"The stock is drawn in cells of {float(removal.cell.max()):.2g} mm.")
-    elif k in stocks.refused:
-        notes.append(f"The stock is not drawn: {stocks.refused[k]}.")
-    if len(path.t) > POINTS:
-        notes.append(f"The path is drawn by some {POINTS} of its {len(path.t)} steps.")
-    said = f"{escape(track.name)}. Drag turns, the wheel zooms, the right button shifts. {escape(' '.join(notes))}"
-    return [
-        "<h2>In space</h2>",
-        f'<p class="note">{said}</p>',
-        f'<div id="{VIEW}" class="view3d"><p class="note">The view needs a browser with scripts and WebGL.</p></div>',
-        f'<script id="{DATA}" type="text/plain">{data}</script>',
-    ]
 
 
-def _first(result: Result) -> tuple[int, Track, dict[str, NDArray[Any]]] | None:
-    """Number, track and columns of the first track that has a place, those in use before the others."""
+def _shown(result: Result) -> list[tuple[int, Track, dict[str, NDArray[Any]]]]:
+    """Number, track and columns of the tracks in use that have a place; where none has, of the first that has."""
+    out: list[tuple[int, Track, dict[str, NDArray[Any]]]] = []
     for k, track in sorted(enumerate(result.tracks), key=lambda item: not item[1].in_use):
+        if out and not track.in_use:
+            break
         columns = _columns(track)
         if len(columns.get(PLACE[0], ())):
-            return k, track, columns
-    return None
+            out.append((k, track, columns))
+    return out
 
 
 def _columns(track: Track) -> dict[str, NDArray[Any]]:

@@ -117,11 +117,12 @@ def removal_mesh(
     net = SurfaceNet(stock)
     rows, volumes = list[int](), [_volume(net)]
     ends = _frames(instants, path)
+    sizes = {id(c): float(c.profile(0.1)[:, 0].max()) for c in cutters.values()}
     for run, frame in zip(_runs(instants, ends), range(1, len(ends) + 1), strict=True):
         for places in run:
             tip, axis, cutter = _removed(stock, path, places, cutters, pitch)
             reach = cutter.flute_length * axis
-            size = float(cutter.profile(0.1)[:, 0].max())
+            size = sizes[id(cutter)]
             net.update(
                 np.minimum(tip, tip + reach).min(axis=0) - size, np.maximum(tip, tip + reach).max(axis=0) + size, frame
             )

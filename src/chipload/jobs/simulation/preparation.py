@@ -84,7 +84,7 @@ def bodies_of(
     part = part_body(job)
     if part is not None and job.table.part is not None:
         require_points(part, job.table.part.spacing_mm, "part")
-    return Bodies(program, times, fine, points, part, fixture_points(job), stiffness, checks, count)
+    return Bodies(program, times, fine, points, part, fixture_points(job, machine), stiffness, checks, count)
 
 
 def material_of(job: ProgramJob) -> Material:

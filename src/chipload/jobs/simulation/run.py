@@ -218,7 +218,7 @@ def simulated(
     compared_with = (*solids, *(["stock"] if points is not None else []))
     return SimulationResult(
         removal, stock, machine, job.table.limits, settings, bodies.checks,
-        CollisionCheck(touched, compared_with, _no_holder(job), fixture_meshes(job)), left, gives.unknown,
+        CollisionCheck(touched, compared_with, _no_holder(job), fixture_meshes(job, machine)), left, gives.unknown,
         None if stability_watch is None else stability_of(job, stability_watch, machine), compliance, blank,
     )  # fmt: skip
 

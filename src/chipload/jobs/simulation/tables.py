@@ -85,7 +85,9 @@ class FixtureTable(Table):
 
 
 class MachineTableTable(Table):
-    """The table or pallet under the work, a block that moves with it; no part of a tool may touch it."""
+    """The table or pallet under the work, in the place of that of the machine file; it moves with the work, and no part
+    of a tool may touch it.
+    """
 
     low_mm: Point = Field(description="lower corner, in the coordinates of the work")
     high_mm: Point = Field(description="upper corner; its height is that of the face of the table")

@@ -15,6 +15,8 @@ from chipload.errors import InputError
 from chipload.geometry.mesh import read_mesh
 from chipload.jobs.simulation.job import ProgramJob
 from chipload.jobs.tables import stated
+from chipload.machine.machine import Machine
+from chipload.machine.table import MachineTable
 from chipload.program.motions import lengths
 from chipload.program.program import RAPID, Program
 from chipload.report.bodies import MACHINE_TABLE
@@ -37,16 +39,22 @@ def part_body(job: ProgramJob) -> trimesh.Trimesh | None:
     return read_mesh(job.path.parent / table.file, unit=table.units, chord_mm=table.chord_mm, key="part.file")
 
 
-def fixture_points(job: ProgramJob) -> dict[str, NDArray[np.float64]]:
+def machine_table_of(job: ProgramJob, machine: Machine) -> MachineTable | None:
+    """The table of the machine: as the job states it, else as the file of the machine does; None: neither does."""
+    block = job.table.machine_table
+    return machine.table if block is None else MachineTable(block.low_mm, block.high_mm, block.spacing_mm)
+
+
+def fixture_points(job: ProgramJob, machine: Machine) -> dict[str, NDArray[np.float64]]:
     """Points of the fixtures by name."""
     keys = [(table.spacing_mm, f"fixture.{k}") for k, table in enumerate(job.table.fixture)]
-    if job.table.machine_table is not None:
-        keys.append((job.table.machine_table.spacing_mm, "machine_table"))
-    meshes = fixture_meshes(job).items()
+    if (block := machine_table_of(job, machine)) is not None:
+        keys.append((block.spacing, "machine_table" if job.table.machine_table is not None else "machine.table"))
+    meshes = fixture_meshes(job, machine).items()
     return {name: fine(mesh, spacing, key)[0] for (name, mesh), (spacing, key) in zip(meshes, keys, strict=True)}
 
 
-def fixture_meshes(job: ProgramJob) -> dict[str, trimesh.Trimesh]:
+def fixture_meshes(job: ProgramJob, machine: Machine) -> dict[str, trimesh.Trimesh]:
     """The fixtures by name, and the table of the machine after them."""
     out = {}
     for k, table in enumerate(job.table.fixture):
@@ -55,8 +63,8 @@ def fixture_meshes(job: ProgramJob) -> dict[str, trimesh.Trimesh]:
         if mesh is None:
             mesh = read_mesh(path, unit=table.units, chord_mm=table.chord_mm, key=key)
         out[f"fixture {k}"] = mesh
-    if (block := job.table.machine_table) is not None:
-        out[MACHINE_TABLE] = trimesh.creation.box(bounds=[block.low_mm, block.high_mm])
+    if (block := machine_table_of(job, machine)) is not None:
+        out[MACHINE_TABLE] = trimesh.creation.box(bounds=[block.low, block.high])
     return out
 
 

@@ -30,7 +30,7 @@ from chipload.web.scene import PageScene, bodies, colouring, page_scene, view_pa
 #: names of views and what is said of them
 VIEWS = {"iso": "from a corner", "top": "from above", "front": "from the front", "side": "from the side"}
 #: boxes that are no bodies
-GLASS, DRAPE = "see through", "values on stock"
+GLASS, DRAPE, UPRIGHT = "see through", "values on stock", "tool upright"
 #: the engaged sector and surface of the cutter
 ENGAGED = "engagement"
 #: planes that cut the picture away
@@ -66,7 +66,7 @@ class ScenePanel:
             self.second.on("viewrow", self._moved_second, js_handler="(e) => emit(e.detail)")
             self.second.set_visibility(False)
             self.titles = [ui.label("").classes(f"cl-over cl-side cl-side-{k}") for k in range(2)]
-            with ui.element("div").classes("cl-over cl-over-left"):
+            with ui.element("div").classes("cl-controls"):
                 self.column = ui.select({}, label="path coloured by", on_change=lambda: self._recoloured()).props(
                     "dense options-dense outlined hide-bottom-space"
                 ).classes("cl-colour").mark("colour")  # fmt: skip
@@ -81,24 +81,24 @@ class ScenePanel:
                 self.bent.on("change", js_handler=RELEASE)
                 self.factor = ui.label("").classes("cl-note").mark("factor")
                 self.boxes = ui.element("div").classes("cl-layers")
-            with ui.element("div").classes("cl-over cl-over-right"):
+                self.notice = ui.label("").classes("cl-notice")
+            with ui.element("div").classes("cl-buttons"):
                 for name, meaning in VIEWS.items():
                     self._button(name, f"look {meaning}", partial(self.view_from, name))
                 self._button("measure", "measure between two places", self._measure).mark("measure")
                 self._button("picture", "save the picture (PNG)", lambda: self._call("save('chipload.png')"))
                 self._button("video", "record a video (WebM) until pressed again", lambda: self._call("record()"))
-            with ui.element("div").classes("cl-over cl-section"):
-                self.axis = ui.select(SECTIONS, value="", on_change=self._section).props(
-                    'dense options-dense borderless aria-label="section plane"'
-                ).classes("cl-axis").mark("section")  # fmt: skip
-                self.axis.on("popup-hide", js_handler=RELEASE)
-                self.share = ui.slider(min=0.0, max=1.0, step=0.005, value=0.5, on_change=self._section).props(
-                    'dense aria-label="place of the section"'
-                ).classes("cl-share-slider")  # fmt: skip
-                self.share.on("change", js_handler=RELEASE)
-                self.share.set_visibility(False)
+                with ui.element("div").classes("cl-section"):
+                    self.axis = ui.select(SECTIONS, value="", on_change=self._section).props(
+                        'dense options-dense borderless aria-label="section plane"'
+                    ).classes("cl-axis").mark("section")  # fmt: skip
+                    self.axis.on("popup-hide", js_handler=RELEASE)
+                    self.share = ui.slider(min=0.0, max=1.0, step=0.005, value=0.5, on_change=self._section).props(
+                        'dense aria-label="place of the section"'
+                    ).classes("cl-share-slider")  # fmt: skip
+                    self.share.on("change", js_handler=RELEASE)
+                    self.share.set_visibility(False)
             self.override = OverrideGauge()
-            self.notice = ui.label("").classes("cl-over cl-notice")
         self.measures = False
 
     @property
@@ -260,6 +260,8 @@ class ScenePanel:
         if scene.marks:
             names.append("marks")
         more = [GLASS] if scene.bodies else []
+        if self.track is not None and (self.track.axis[:, 2] < 1.0 - 1e-9).any():
+            more.append(UPRIGHT)
         if scene.removal is not None:
             more.append(DRAPE)
         self.seen = {n: self.seen.get(n, n not in scene.covered) for n in names} | {
@@ -279,7 +281,7 @@ class ScenePanel:
 
     def _layer(self, name: str, on: bool) -> str:
         """JavaScript that shows or hides a thing in every view."""
-        value, special = json.dumps(on), {GLASS: "glass", DRAPE: "drape"}.get(name)
+        value, special = json.dumps(on), {GLASS: "glass", DRAPE: "drape", UPRIGHT: "stands"}.get(name)
         what = f"{special}({value})" if special else f"layer({json.dumps(name)}, {value})"
         views = [self.view_id, *([f"c{self.second.id}"] if self.sides else [])]
         return "".join(f"chiploadViewer.of('{view}').{what};" for view in views)
