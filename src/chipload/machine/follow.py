@@ -5,9 +5,9 @@ of :func:`~chipload.machine.kinematics.inverse` with whole turns added to each f
 step, the greatest |change| of a free angle. The path through the states with the least sum of D is found by dynamic
 programming; a row outside a limit costs more than every motion, so that limits are broken where there is no other way
 alone, those of linear axes, which another work offset may keep, before those of rotary ones. An indexed axis that moves
-where it must stand costs more still. An axis whose range is more than ``FEW`` turns has too many states: its turns are left out of the search and
-added afterwards, so that it goes the short way, and turns back (greedily as late as possible: the fewest times) where
-it meets its limit.
+where it must stand costs more still. An axis whose range is more than ``FEW`` turns has too many states: its turns are
+left out of the search and added afterwards, so that it goes the short way, and turns back (greedily as late as
+possible: the fewest times) where it meets its limit.
 
 At a pole the angle of the first free axis is arbitrary: it stays as it was.
 """

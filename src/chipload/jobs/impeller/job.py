@@ -81,6 +81,12 @@ def load(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) -> Impel
             point_machine = source("operation.0.point_milling.machine", points.machine, folder)
         if table.operation[0].paths is None:
             errors.add("operation.0.point_milling: takes its links from [operation.paths]: state that too")
+    if forces is not None and (flank is not None or points is not None):
+        other = "flank" if flank is not None else "point_milling"
+        errors.add(
+            f"operation.0.forces: finds no feeds of operation.0.{other}, only of the index table: leave forces out and "
+            f"state operation.0.{other}.feed_mm_min, or leave {other} out"
+        )
     for k, surface in enumerate(table.surface):
         errors.texts += _wrong_surface(f"surface.{k}", surface, part)
         if any((s.body, s.side) == (surface.body, surface.side) for s in table.surface[:k]):
