@@ -171,7 +171,7 @@ def _shortest(
         change = np.abs(np.where(loose, wrapped(b - a), b - a))
         return np.asarray(change.max(axis=-1) + _TIE * change.sum(axis=-1))
 
-    def held(a: Floats, b: Floats) -> Floats:
+    def indexed_turn(a: Floats, b: Floats) -> Floats:
         change = np.abs(wrapped(b - a))
         return np.asarray((np.where(change > _STILL, change, 0.0) * indexed).sum(axis=-1))
 
@@ -185,7 +185,9 @@ def _shortest(
         high = min(low + rows, n)
         steps = moved(states[low - 1 : high - 1, :, None], states[low:high, None, :])
         if stands.any() and indexed.any():
-            steps += stands[low:high, None, None] * held(states[low - 1 : high - 1, :, None], states[low:high, None, :])
+            steps += stands[low:high, None, None] * indexed_turn(
+                states[low - 1 : high - 1, :, None], states[low:high, None, :]
+            )
         for i in range(low, high):
             total = cost[:, None] + steps[i - low]
             came[i] = total.argmin(axis=0)

@@ -41,6 +41,7 @@ _INSIDE = 0.9
 _LESS = 0.6  # least share of a step that is tried where a line came out too high
 _USED = 0.9  # of what is aimed at, the mean scallop that is enough
 _STILL = 5e-3  # share by which a step may still change
+_SPLIT = math.radians(45.0)  # from station to station: further the pallet does not turn in one piece of a line
 #: tangent of the angle by which a line may run askew to the parameter lines; least share of a step that it keeps there
 _SKEW, _HELD = 0.6, 0.4
 
@@ -291,10 +292,11 @@ class _Stepper:
 
 
 def _blended(pallet: Floats, at: Floats) -> Floats:
-    """Pallet angles between stations; nan next to a station that has none."""
+    """Pallet angles between stations; nan next to a station that has none, and where a line is split."""
     i = np.minimum(at.astype(np.int64), len(pallet) - 2)
     w = at - i
     turn = pallet[i + 1] - pallet[i]
     turn = turn - math.tau * np.round(turn / math.tau)
     out: Floats = pallet[i] + w * turn
+    out = np.where(np.abs(turn) > _SPLIT, np.nan, out)
     return np.where(w == 0.0, pallet[i], np.where(w == 1.0, pallet[i + 1], out))
