@@ -238,8 +238,8 @@ def test_forces_are_not_ignored_on_five_axes(formula, other):
     text = formula.read_text()
     formula.write_text(text.replace("[operation.paths]", stated + "[operation.paths]"))
     assert refused(formula) == (
-        f"job.toml: operation.0.forces: finds no feeds of operation.0.{other}, only of the index table: leave forces "
-        f"out and state operation.0.{other}.feed_mm_min, or leave {other} out"
+        f"job.toml: operation.0.{other}.feed_mm_min: missing: operation.0.forces finds the feeds of the index table "
+        "alone, none on five axes: state it"
     )
 
 
