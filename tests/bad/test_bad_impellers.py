@@ -218,6 +218,31 @@ def test_a_barrel_cutter_is_refused(formula):
     )
 
 
+def test_a_tapered_cutter_is_refused(formula):
+    row = "{ diameter_mm = 6.0, corner_radius_mm = 2.0, taper_deg = 3.0 }"
+    formula.with_name("cutters.toml").write_text(f'name = "own"\ncutter = [{row}]\n')
+    changed(formula, 'name = "wu2019"', 'file = "cutters.toml"')
+    assert refused(formula).endswith(
+        "cutter 1: taper_deg = 3.0: tapered cutters are not planned with: state the straight one that fits into it by "
+        "diameter_mm and corner_radius_mm, and its thicker part by shank_diameter_mm"
+    )
+
+
+@pytest.mark.parametrize("other", ["flank", "point_milling"])
+def test_forces_are_not_ignored_on_five_axes(formula, other):
+    stated = (
+        '[operation.forces]\nmaterial = { name = "al7075-t6" }\nflutes = 2\noverhang_mm = 70.0\n'
+        f'deflection_um = 20.0\n\n[operation.{other}]\nmachine = {{ name = "cradle-ac" }}\n'
+    )
+    stated += "excess_mm = 0.1\n\n" if other == "flank" else "\n"
+    text = formula.read_text()
+    formula.write_text(text.replace("[operation.paths]", stated + "[operation.paths]"))
+    assert refused(formula) == (
+        f"job.toml: operation.0.{other}.feed_mm_min: missing: operation.0.forces finds the feeds of the index table "
+        "alone, none on five axes: state it"
+    )
+
+
 def test_feeds_by_force_need_an_allowance_and_an_overhang(formula):
     stated = '[operation.forces]\nmaterial = { name = "al7075-t6" }\nflutes = 2\ndeflection_um = 20.0\n\n'
     text = formula.read_text()

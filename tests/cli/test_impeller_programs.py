@@ -351,5 +351,6 @@ def test_feeds_by_force_make_the_stiff_cutter_the_fast_one(more):
     (picked,) = out.glob("way-hand-picked*.apt")
     feeds = {float(f) for f in re.findall(r"FEDRAT/([0-9.]+)", picked.read_text())}
     assert min(feeds) < 200.0
-    assert {f for f in feeds if f > 400.0} == {1200.0}
+    # links, some as fast as the pallet turns
+    assert 1100.0 < min(f for f in feeds if f > 400.0) <= max(feeds) == 1200.0
     assert summary["unchecked"][0].startswith("chatter")

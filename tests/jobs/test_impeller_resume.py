@@ -12,7 +12,9 @@ import pytest
 from chipload import examples
 from chipload.errors import Cancelled
 from chipload.jobs import load_job, run_job
+from chipload.jobs.impeller import paths, point_milling
 from chipload.jobs.impeller.checkpoint import KeptParts, part_bytes, read_part
+from chipload.jobs.impeller.five_axis_outcome import CheckedPoints
 from chipload.planning.impeller.lines import Tracks, UnreachedSpan
 from chipload.planning.impeller.links import Moves
 from chipload.planning.impeller.track import ToolTrack
@@ -94,6 +96,30 @@ def test_parts_are_made_once_and_read_again(tmp_path: Path) -> None:
         # another job, or other sources: nothing of it counts
         assert KeptParts(checkpoint, "another key")(("square", 2), lambda: make(2)) == 4
     assert made == [2, 3, 4, 2]
+
+
+def test_point_milling_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = job(tmp_path / "job")
+    path.write_text(
+        path.read_text() + '\n[operation.point_milling]\nmachine = { name = "cradle-ac" }\nfeed_mm_min = 300.0\n'
+    )
+    loaded = load_job(path)
+    with Checkpoint(tmp_path / "kept", 0.0) as checkpoint:
+        (first,) = run_job(loaded, checkpoint=checkpoint).outcome.points
+
+    def again(*_: object) -> None:
+        raise AssertionError("planned or checked again")
+
+    monkeypatch.setattr(point_milling, "_planned", again)
+    monkeypatch.setattr(paths, "left_on", again)
+    monkeypatch.setattr(paths, "deepest_gouge", again)
+    with Checkpoint(tmp_path / "kept", 0.0) as checkpoint:
+        (last,) = run_job(loaded, checkpoint=checkpoint).outcome.points
+    assert isinstance(last, CheckedPoints)
+    for name in ("motion", "p_work", "axis", "feed"):
+        assert getattr(first.program, name).tobytes() == getattr(last.program, name).tobytes()
+    assert (first.gouge, first.length, first.scallop) == (last.gouge, last.length, last.scallop)
+    assert first.left.rest.tobytes() == last.left.rest.tobytes()
 
 
 def test_a_run_that_was_stopped_goes_on(tmp_path: Path) -> None:

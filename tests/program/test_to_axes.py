@@ -153,6 +153,27 @@ def test_an_axis_that_is_not_there(letter, text):
         to_work(commands, machine_named("vmc"))
 
 
+@pytest.mark.parametrize(("far", "code"), [(500.0, "machine-offset"), (1400.0, "machine-limit")])
+@pytest.mark.parametrize("other", [False, True])
+def test_an_index_table_is_not_turned_over_to_stay_within_the_travels(far, code, other):
+    """A part beyond the travels is a finding; its second solution, A and B the other way, is no way out of a cut."""
+    machine = machine_named("horizontal-b")
+    if other:
+        # both solutions are within the limits of A
+        chain = machine.chain
+        wide = [replace(a, low=-math.pi / 2, high=math.pi / 2) if a.letter == "A" else a for a in chain.axes]
+        machine = replace(machine, chain=replace(chain, axes=tuple(wide)))
+    a = math.radians(55.0)
+    axes = [[math.sin(a) * math.cos(b), math.sin(a) * math.sin(b), math.cos(a)] for b in np.linspace(0.0, 3.0, 40)]
+    points = far * np.array([[x, y, 0.0] for x, y, _ in axes])
+    points[:8] *= -0.5
+    commands, findings = to_axes(program(points, axes), machine)
+    tilt = np.degrees(commands.machine()[:, 3])
+    assert np.ptp(tilt) < 1e-9
+    assert abs(tilt[0]) == pytest.approx(35.0)
+    assert {f.code for f in findings} == {code}
+
+
 def test_an_index_table_stands_in_a_cut():
     machine = machine_named("horizontal-b")
     axes = [

@@ -202,6 +202,12 @@ def _cutter(k: int, row: Any) -> CatalogueCutter:
             f"cutter {k}: {barrel} = {row[barrel]!r}: barrel cutters are not planned with: state flat, bull-nose or "
             "ball cutters by diameter_mm and corner_radius_mm"
         )
+    taper = next((key for key in row if key in _TAPER or row[key] == "tapered"), None)
+    if taper is not None:
+        raise InputError(
+            f"cutter {k}: {taper} = {row[taper]!r}: tapered cutters are not planned with: state the straight one "
+            "that fits into it by diameter_mm and corner_radius_mm, and its thicker part by shank_diameter_mm"
+        )
     try:
         given = _Cutter.model_validate(row).model_dump()
     except ValidationError as err:
@@ -221,3 +227,5 @@ def _cutter(k: int, row: Any) -> CatalogueCutter:
 _WANTED = {"name": "text"}
 #: keys by which shops and tool libraries state the large radius of a barrel cutter
 _BARREL = ("barrel_radius_mm", "profile_radius_mm", "side_radius_mm")
+#: likewise the angle of a tapered one
+_TAPER = ("taper_deg", "taper_angle_deg", "half_angle_deg", "taper")

@@ -4,9 +4,10 @@ Notation: free axes are the rotary ones that are solved for, m <= 2 of them; a s
 of :func:`~chipload.machine.kinematics.inverse` with whole turns added to each free angle. D [rad] rotary motion of a
 step, the greatest |change| of a free angle. The path through the states with the least sum of D is found by dynamic
 programming; a row outside a limit costs more than every motion, so that limits are broken where there is no other way
-alone. An axis whose range is more than ``FEW`` turns has too many states: its turns are left out of the search and
-added afterwards, so that it goes the short way, and turns back (greedily as late as possible: the fewest times) where
-it meets its limit.
+alone, those of linear axes, which another work offset may keep, before those of rotary ones. An indexed axis that moves
+where it must stand costs more still. An axis whose range is more than ``FEW`` turns has too many states: its turns are
+left out of the search and added afterwards, so that it goes the short way, and turns back (greedily as late as
+possible: the fewest times) where it meets its limit.
 
 At a pole the angle of the first free axis is arbitrary: it stays as it was.
 """
@@ -37,7 +38,10 @@ REACH = 1e-6
 #: a free angle that goes this many times as far as the tool's axis turns, and further than SWING [rad], is reported
 GAIN, SWING = 10.0, math.radians(30.0)
 
-_OUTSIDE = 1e6  # [rad] what a row outside a limit costs
+#: [rad] what a row outside a limit of a linear axis costs, of a rotary one, what a radian costs that an index table
+#: moves where it must stand
+_OUTSIDE, _TURNED_OUT, _SET = 1e6, 1e9, 1e12
+_STILL = 1e-6  # [rad] by which an axis that stands may seem to move
 _TIE = 1e-6  # weight of the sum of all free motions, beside the greatest
 _CHUNK = 1 << 18  # steps that are held at once
 _AHEAD = 4096  # rows that the choice of a wide axis's turns looks ahead
@@ -54,6 +58,7 @@ def follow(
     free: str | None = None,
     pole_tolerance: float = 1e-9,
     line: ArrayLike | None = None,
+    stand: ArrayLike | None = None,
 ) -> tuple[Floats, tuple[Finding, ...]]:
     """Axis positions for every row of a path: the least rotary motion within the limits; O(n S^2) for S states a row.
 
@@ -65,6 +70,7 @@ def follow(
         Where the axes stand before row 0; axes that are not solved for stay there. None: these at 0, the others free.
     tool_length, work_zero, free, pole_tolerance : as in ``inverse``
     line : (n,) int, line of each row in its source; None: 0
+    stand : (n,) bool, rows to which indexed axes must not move, as cuts; None: there are none
 
     Returns
     -------
@@ -99,7 +105,7 @@ def follow(
     if found.free:
         found = _kept(machine, found, singular, begin, tip, tool_length, work_zero)
         wide = [not one.high - one.low <= FEW * math.tau + SLACK for one in found.free]
-        values, branch = _shortest(machine, found, wide, begin)
+        values, branch = _shortest(machine, found, wide, begin, stand)
         for k, one in enumerate(found.free):
             if wide[k]:
                 values[:, k] = _wound(one, values[:, k], None if begin is None else float(begin[one.column]))
@@ -137,7 +143,9 @@ def _kept(
     return replace(found, axes=axes)
 
 
-def _shortest(machine: Machine, found: Solutions, wide: list[bool], begin: Floats | None) -> tuple[Floats, Ints]:
+def _shortest(
+    machine: Machine, found: Solutions, wide: list[bool], begin: Floats | None, stand: ArrayLike | None
+) -> tuple[Floats, Ints]:
     """Values (n, m) of the free angles, those of wide axes less whole turns, and the solution (n,) that they are of."""
     angles = found.axes[:, :, [one.column for one in found.free]]
     n, k, m = angles.shape
@@ -154,20 +162,18 @@ def _shortest(machine: Machine, found: Solutions, wide: list[bool], begin: Float
         states = wound
     each = states.shape[2]
     states = states.reshape(n, k * each, m)
-    penalty = np.zeros(states.shape[:2])
-    for i, one in enumerate(found.free):
-        if not wide[i]:
-            penalty += beyond(one, states[..., i])
-    others = [one for one in machine.chain.axes if one not in found.free]
-    for one in others:
-        penalty += np.repeat(beyond(one, found.axes[:, :, one.column]), each, axis=1)
-    penalty = np.where(penalty > SLACK, _OUTSIDE + penalty, 0.0)
-    loose = np.array(wide)
+    penalty = _outside(machine, found, states, wide)
+    loose, indexed = np.array(wide), np.array([one.indexed for one in found.free])
+    stands = np.zeros(n) if stand is None else np.where(np.asarray(stand, dtype=np.bool_), _SET, 0.0)
     count = k * each
 
     def moved(a: Floats, b: Floats) -> Floats:
         change = np.abs(np.where(loose, wrapped(b - a), b - a))
         return np.asarray(change.max(axis=-1) + _TIE * change.sum(axis=-1))
+
+    def indexed_turn(a: Floats, b: Floats) -> Floats:
+        change = np.abs(wrapped(b - a))
+        return np.asarray((np.where(change > _STILL, change, 0.0) * indexed).sum(axis=-1))
 
     if begin is None:
         cost = penalty[0] + _TIE * moved(np.zeros(m), states[0])
@@ -178,6 +184,10 @@ def _shortest(machine: Machine, found: Solutions, wide: list[bool], begin: Float
     for low in range(1, n, rows):
         high = min(low + rows, n)
         steps = moved(states[low - 1 : high - 1, :, None], states[low:high, None, :])
+        if stands.any() and indexed.any():
+            steps += stands[low:high, None, None] * indexed_turn(
+                states[low - 1 : high - 1, :, None], states[low:high, None, :]
+            )
         for i in range(low, high):
             total = cost[:, None] + steps[i - low]
             came[i] = total.argmin(axis=0)
@@ -188,6 +198,20 @@ def _shortest(machine: Machine, found: Solutions, wide: list[bool], begin: Float
     for i in range(n - 1, 0, -1):
         chosen[i - 1] = came[i, chosen[i]]
     return states[np.arange(n), chosen], chosen // each
+
+
+def _outside(machine: Machine, found: Solutions, states: Floats, wide: list[bool]) -> Floats:
+    """(n, states) what being outside the limits costs [rad]."""
+    turned, away = np.zeros(states.shape[:2]), np.zeros(states.shape[:2])
+    for i, one in enumerate(found.free):
+        if not wide[i]:
+            turned += beyond(one, states[..., i])
+    each = states.shape[1] // found.axes.shape[1]
+    for one in machine.chain.axes:
+        if one not in found.free:
+            out = turned if one.rotary else away
+            out += np.repeat(beyond(one, found.axes[:, :, one.column]), each, axis=1)
+    return np.where(turned > SLACK, _TURNED_OUT + turned, 0.0) + np.where(away > SLACK, _OUTSIDE + away, 0.0)
 
 
 def _wound(axis: Axis, q: Floats, begin: float | None) -> Floats:

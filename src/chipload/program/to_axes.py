@@ -181,7 +181,7 @@ def _piece(
     program: Program, machine: Machine, length: float, free: str, tcp: bool, start: Floats | None, tolerance: float
 ) -> tuple[Program, Floats, tuple[Finding, ...]]:
     """Rows of one tool and their axes: arcs that the machine sees askew as chords, turning rows in pieces."""
-    q, findings = follow(machine, program.p_work, program.axis, start, length, None, free, line=program.line)
+    q, findings = _followed(program, machine, start, length, free)
     missed = next((f for f in findings if f.code == "machine-reach"), None)
     if missed is not None:
         raise InputError(f"program {missed.text}: choose a machine that reaches it")
@@ -191,7 +191,7 @@ def _piece(
     program = _plane_arcs(program, odd, tolerance)
     indexed = any(axis.indexed for axis in machine.chain.rotary)
     if tcp or indexed:
-        q, findings = follow(machine, program.p_work, program.axis, start, length, None, free, line=program.line)
+        q, findings = _followed(program, machine, start, length, free)
         return (program, q, findings) if tcp else (*_swung(program, machine, q, length, tolerance), findings)
     pieces, findings = linearise(
         machine, program.p_work, program.axis, tolerance, ANGLE_TOLERANCE, start, length, None, free
@@ -200,6 +200,16 @@ def _piece(
     inner = (pieces.part < 1.0)[:, None]
     out = replace(out, p_work=np.where(inner, pieces.tip, out.p_work), axis=np.where(inner, pieces.axis, out.axis))
     return out, pieces.axes, findings
+
+
+def _followed(
+    program: Program, machine: Machine, start: Floats | None, length: float, free: str
+) -> tuple[Floats, tuple[Finding, ...]]:
+    """Axes of the rows; index tables stand but in rapids, wherever another solution would take them."""
+    stand = program.motion != WORK_RAPID
+    return follow(
+        machine, program.p_work, program.axis, start, length, None, free, line=program.line, stand=stand
+    )  # fmt: skip
 
 
 def _swung(program: Program, machine: Machine, q: Floats, length: float, tolerance: float) -> tuple[Program, Floats]:

@@ -6,9 +6,13 @@ from typing import Any
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.jobs import kept_parts
+from chipload.jobs.impeller.five_axis_outcome import NoFiveAxisPath
+from chipload.jobs.impeller.point_milling import PlannedPoints
 from chipload.planning.impeller.answer import Answer, Unreachable
+from chipload.planning.impeller.five_axis_program import LinkedPath
 from chipload.planning.impeller.lines import Tracks, UnreachedSpan
 from chipload.planning.impeller.links import Linked, Moves
+from chipload.planning.impeller.point_milling import PointPath
 from chipload.planning.impeller.ranges.ranges import Ranges
 from chipload.planning.impeller.rest_machining import RestPasses
 from chipload.planning.impeller.search import SearchLimits
@@ -18,8 +22,8 @@ from chipload.simulation.checkpoint import Checkpoint
 
 #: what a part may be made of beside arrays and plain values
 RECORDS = (
-    Answer, Catalogue, CatalogueCutter, Gouge, Linked, Moves, Ranges, RestPasses, SearchLimits, ToolTrack, Tracks,
-    Unreachable, UnreachedSpan,
+    Answer, Catalogue, CatalogueCutter, Gouge, Linked, LinkedPath, Moves, NoFiveAxisPath, PlannedPoints, PointPath,
+    Ranges, RestPasses, SearchLimits, ToolTrack, Tracks, Unreachable, UnreachedSpan,
 )  # fmt: skip
 
 

@@ -17,11 +17,12 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.jobs.impeller.channels import turned
 from chipload.jobs.impeller.five_axis_outcome import AllChannels
-from chipload.jobs.impeller.paths import EDGE, walls_of
+from chipload.jobs.impeller.paths import EDGE, gouge_by, left_by, walls_of
 from chipload.jobs.impeller.ray_depth import ray_depth
 from chipload.jobs.impeller.tables import PathsTable, SurfaceTable
 from chipload.machine.kinematics import forward
 from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.settings import FinishSettings
 from chipload.planning.impeller.surfaces import BODIES
 from chipload.program.check import check_program
@@ -29,15 +30,13 @@ from chipload.program.gcode.writer import Repeat
 from chipload.program.program import Program
 from chipload.program.read import times_on
 from chipload.program.to_axes import to_axes
-from chipload.simulation.channel.channel import Remainder, SurfacePoints, left_on, wall
-from chipload.simulation.channel.gouges import Gouge, deepest_gouge
+from chipload.simulation.channel.channel import Remainder, SurfacePoints, wall
+from chipload.simulation.channel.gouges import Gouge
 
 Floats = NDArray[np.float64]
 
-#: how near the check finds the depth of a gouge, of what is allowed
-_RESOLUTION = 0.2
-#: distance of the points of a surface on which what is left is measured, height of their rays [mm]
-_SPACING, _HEIGHT = 0.6, 1.0
+#: distance of the points of a surface on which what is left is measured [mm]
+_SPACING = 0.6
 #: by which axis positions may differ at the end of a channel and at the beginning of the next [mm, rad]
 _SAME = 1e-6
 #: of a program, a row each
@@ -75,16 +74,13 @@ class ProgramCheck:
 
 def program_check(
     how: FinishSettings, side: SurfaceTable, machine: Machine, cutter: CatalogueCutter, program: Program,
-    paths: PathsTable, points: SurfacePoints | None = None,
+    paths: PathsTable, points: SurfacePoints | None = None, keep: Keep = anew,
 ) -> ProgramCheck:  # fmt: skip
     """The check of a program of a surface, as of every program; ``points`` of the surface, None: evenly over it."""
     at = surface_points(how, side) if points is None else points
     depth = ray_depth(how.impeller, EDGE, paths.gouge_mm)
-    (left,) = left_on([at], program, cutter, _HEIGHT, depth, workers=how.workers)
-    gouge = deepest_gouge(
-        walls_of(how.impeller, how.ahead), program, cutter, depth, _RESOLUTION * paths.gouge_mm, paths.gouge_mm,
-        workers=how.workers,
-    )  # fmt: skip
+    left = left_by(how, [at], program, cutter, depth, keep)[0]
+    gouge = gouge_by(how, walls_of(how.impeller, how.ahead), program, cutter, depth, paths.gouge_mm, keep)
     _, beyond = to_axes(program, machine)
     texts = tuple(f.text for f in (*beyond, *check_program(program, machine)))
     return ProgramCheck(gouge, left, texts, float(times_on(program, machine).sum()))

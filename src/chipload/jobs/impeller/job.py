@@ -18,6 +18,12 @@ from chipload.jobs.impeller.tables import (
 from chipload.jobs.messages import Errors
 from chipload.jobs.sources import source, sources_of
 
+#: of flank passes and point milling, whose feeds forces do not find
+_NO_FORCES = (
+    "operation.0.{}.feed_mm_min: missing: operation.0.forces finds the feeds of the index table alone, none on five "
+    "axes: state it"
+)
+
 
 @dataclass(frozen=True)
 class ImpellerJob:
@@ -81,6 +87,10 @@ def load(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) -> Impel
             point_machine = source("operation.0.point_milling.machine", points.machine, folder)
         if table.operation[0].paths is None:
             errors.add("operation.0.point_milling: takes its links from [operation.paths]: state that too")
+    if forces is not None and flank is not None and flank.feed_mm_min is None:
+        errors.add(_NO_FORCES.format("flank"))
+    if forces is not None and points is not None and points.feed_mm_min is None:
+        errors.add(_NO_FORCES.format("point_milling"))
     for k, surface in enumerate(table.surface):
         errors.texts += _wrong_surface(f"surface.{k}", surface, part)
         if any((s.body, s.side) == (surface.body, surface.side) for s in table.surface[:k]):

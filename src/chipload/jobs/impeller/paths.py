@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.cutter.catalogue import Catalogue
+from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.jobs.impeller.channels import between_channels, channel_repeat
 from chipload.jobs.impeller.outcome import Checked, Covered, Scallop
 from chipload.jobs.impeller.ray_depth import ray_depth
@@ -26,7 +26,7 @@ from chipload.planning.impeller.lines import LineMotion
 from chipload.planning.impeller.links import Link
 from chipload.planning.impeller.paths import PatchFinish
 from chipload.planning.impeller.programs import pallet_rate, too_fast
-from chipload.planning.impeller.settings import CutterSetting, FinishSettings, Milling, PlannedSettings, channel_scene
+from chipload.planning.impeller.settings import FinishSettings, Milling, PlannedSettings, channel_scene
 from chipload.planning.impeller.surfaces import BODIES, ContactSampling
 from chipload.planning.impeller.tables import IndexTable
 from chipload.program.check import check_program
@@ -93,7 +93,7 @@ def checked_programs(
     coarse = walls_of(impeller, job.ahead)
     walls = [*dense, *whole]
     depth = ray_depth(impeller, EDGE, paths.gouge_mm)
-    found = [_left(job, walls, setting, depth, keep) for setting in settings]
+    found = [left_by(job, walls, s.program, s.cutter, depth, keep) for s in settings]
     # what is left is what no program takes
     rest = [replace(same[0], rest=np.min([x.rest for x in same], axis=0)) for same in zip(*found, strict=True)]
     crests = iter(rest)
@@ -103,7 +103,7 @@ def checked_programs(
         scallops = tuple(_scallop(m, next(crests), asked) for m in setting.millings)
         _, findings = to_axes(program, machine)
         said = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
-        gouge = _gouge(job, coarse, setting, depth, paths.gouge_mm, keep)
+        gouge = gouge_by(job, coarse, program, setting.cutter, depth, paths.gouge_mm, keep)
         rows = times_on(program, machine)
         seconds, cutting = float(rows.sum()), float(rows[in_cut(program)].sum())
         between = between_channels(program, machine, impeller.blades)
@@ -116,42 +116,36 @@ def checked_programs(
     return tuple(out), covered
 
 
-def _moves_key(setting: CutterSetting) -> tuple[object, ...]:
+def _moves_key(program: Program, cutter: CatalogueCutter) -> tuple[object, ...]:
     """What the checks of a program depend on beside the walls."""
-    program = setting.program
-    return (setting.cutter, program.motion, program.p_work, program.axis)
+    return (cutter, program.motion, program.p_work, program.axis)
 
 
-def _left(
-    job: FinishSettings, walls: Sequence[SurfacePoints], setting: CutterSetting, depth: float, keep: Keep
-) -> tuple[Remainder, ...]:
+def left_by(
+    job: FinishSettings, walls: Sequence[SurfacePoints], program: Program, cutter: CatalogueCutter, depth: float,
+    keep: Keep = anew,
+) -> tuple[Remainder, ...]:  # fmt: skip
     """What a program leaves on each wall."""
 
     def columns() -> list[list[NDArray[Any]]]:
-        found = left_on(walls, setting.program, setting.cutter, _HEIGHT, depth, workers=job.workers)
+        found = left_on(walls, program, cutter, _HEIGHT, depth, workers=job.workers)
         return [[x.rest, x.gouge, x.row, x.part] for x in found]
 
-    got = keep(("left", *_moves_key(setting), [w.points for w in walls]), columns)
+    got = keep(("left", *_moves_key(program, cutter), [w.points for w in walls]), columns)
     return tuple(
         Remainder(w, rest, gouge, row, part, _HEIGHT, depth)
         for w, (rest, gouge, row, part) in zip(walls, got, strict=True)
     )
 
 
-def _gouge(
-    job: FinishSettings,
-    walls: Sequence[SurfacePoints],
-    setting: CutterSetting,
-    depth: float,
-    allowed: float,
-    keep: Keep,
-) -> Gouge:
+def gouge_by(
+    job: FinishSettings, walls: Sequence[SurfacePoints], program: Program, cutter: CatalogueCutter, depth: float,
+    allowed: float, keep: Keep = anew,
+) -> Gouge:  # fmt: skip
     """The deepest gouge of a program."""
     return keep(
-        ("gouge", *_moves_key(setting)),
-        lambda: deepest_gouge(
-            walls, setting.program, setting.cutter, depth, _RESOLUTION * allowed, allowed, workers=job.workers
-        ),
+        ("gouge", *_moves_key(program, cutter)),
+        lambda: deepest_gouge(walls, program, cutter, depth, _RESOLUTION * allowed, allowed, workers=job.workers),
     )
 
 

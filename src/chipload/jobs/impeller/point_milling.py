@@ -7,7 +7,8 @@ cutter of the catalogue whose path is the shortest of those that reach all of it
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ from chipload.planning.impeller.five_axis_program import (
     outline_of,
     rotary_share,
 )
+from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.lines import stretched
 from chipload.planning.impeller.point_milling import PointPath, point_path
 from chipload.planning.impeller.settings import FinishSettings
@@ -46,7 +48,10 @@ _PATHS = 2
 _FINE = 0.25
 
 
-class _PlannedPoints(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class PlannedPoints:
+    """The path of a surface: the cutter, `u` or `v` along which its lines run, with its lifts, without."""
+
     cutter: CatalogueCutter
     along: str
     path: LinkedPath
@@ -54,7 +59,7 @@ class _PlannedPoints(NamedTuple):
 
 
 def checked_points(
-    job: ImpellerJob, how: FinishSettings, catalogue: Catalogue, progress: Progress = silent
+    job: ImpellerJob, how: FinishSettings, catalogue: Catalogue, progress: Progress = silent, keep: Keep = anew
 ) -> tuple[CheckedPoints | NoFiveAxisPath, ...]:
     """Point milling of each surface that the job names."""
     op, impeller = job.operation, how.impeller
@@ -68,14 +73,19 @@ def checked_points(
     limits = AxisLimits(math.radians(table.lean_deg), _SHARE * paths.gouge_mm, op.clearance_mm, op.scallop_mm)
     out: list[CheckedPoints | NoFiveAxisPath] = []
     for k, side in enumerate(job.table.surface):
-        found = _planned(how, side, catalogue, table, paths, limits, reachable, outline)
+        found = keep(
+            ("point milling", k),
+            partial(_planned, how, side, catalogue, table, paths, limits, reachable, outline),
+        )
         if isinstance(found, NoFiveAxisPath):
             out.append(found)
         else:
             program = five_axis_program(
                 [found.path], outline, how.link, feed, spindle, k + 1, machine, impeller.pitch
             )  # fmt: skip
-            got = program_check(how, side, machine, found.cutter, program, paths, surface_points(how, side, _FINE))
+            got = program_check(
+                how, side, machine, found.cutter, program, paths, surface_points(how, side, _FINE), keep
+            )
             out.append(CheckedPoints(
                 f"{side.body} {side.side}", machine, found.cutter, program, got.gouge, got.left, paths.gouge_mm,
                 op.scallop_mm, got.findings, got.seconds, impeller.blades,
@@ -89,7 +99,7 @@ def checked_points(
 def _planned(
     how: FinishSettings, side: SurfaceTable, catalogue: Catalogue, table: PointMillingTable, paths: PathsTable,
     limits: AxisLimits, reachable: tuple[NDArray[np.float64], NDArray[np.bool_]], outline: NDArray[np.float64],
-) -> _PlannedPoints | NoFiveAxisPath:  # fmt: skip
+) -> PlannedPoints | NoFiveAxisPath:  # fmt: skip
     """The shortest path of all cutters that reach the whole surface."""
     name = f"{side.body} {side.side}"
     surface = how.surface(BODIES.index(side.body), side.side)
@@ -100,7 +110,7 @@ def _planned(
             stretched(surface, "u", u, v, 2, paths.overrun_mm), stretched(surface, "v", v, u, 2, paths.overrun_mm)
         )
     )  # fmt: skip
-    best: _PlannedPoints | None = None
+    best: PlannedPoints | None = None
     why: list[str] = []
     for corner in catalogue.families:
         laid = 0
@@ -129,9 +139,9 @@ def _planned(
 def _path(
     how: FinishSettings, surface: BSplinePatch, box: tuple[tuple[float, float], tuple[float, float]], field: AxisField,
     cutter: CatalogueCutter, limits: AxisLimits, paths: PathsTable, outline: NDArray[np.float64],
-) -> _PlannedPoints | str:  # fmt: skip
+) -> PlannedPoints | str:  # fmt: skip
     """The shorter one of lines along u and along v; or why there is none."""
-    best: _PlannedPoints | None = None
+    best: PlannedPoints | None = None
     why = "there is no way off the surface at the ends of its path"
     for along in sorted("uv", key=lambda x: field.path(surface, x)):
         try:
@@ -145,7 +155,7 @@ def _path(
             lifted(points, k, how.scene, outline, cutter, how.link, limits.above) for k in (0, -1)
         )  # fmt: skip
         if begin is not None and end is not None:
-            best = _PlannedPoints(cutter, along, LinkedPath(points, begin, end), points)
+            best = PlannedPoints(cutter, along, LinkedPath(points, begin, end), points)
     return why if best is None else best
 
 
@@ -155,7 +165,7 @@ def _slowed(program: Program, machine: Machine, feed: float) -> float:
     return float((rotary_share(program, machine)[cut] > 1.0 - 1e-6).mean())
 
 
-def _scallop(found: _PlannedPoints, left: Remainder) -> float | None:
+def _scallop(found: PlannedPoints, left: Remainder) -> float | None:
     """Mean height [mm] of the scallops between two lines; None: there are none."""
     w = left.wall
     within = between_lines(found.points.each_line, found.along, np.column_stack([w.u, w.v]))

@@ -116,10 +116,10 @@ def run(
         impeller, machine, table, catalogue, op, op.paths, _ahead(job), len(roughs or ()), WORKERS, covering, forces
     )
     checked = checked_partitions(ways, partitions, how, machine, op.paths, last, keep)
-    keep.write(at_once=True)
     chosen = {one.name: one.partition for one in checked}
     flanks = checked_flanks(job, how, catalogue) if op.flank is not None else None
-    points = checked_points(job, how, catalogue) if op.point_milling is not None else None
+    points = checked_points(job, how, catalogue, keep=keep) if op.point_milling is not None else None
+    keep.write(at_once=True)
     milled = replace(milled, flanks=flanks, points=points)
     return replace(milled, checked=checked, roughs=roughs, partitions=tuple(chosen.get(p.name, p) for p in partitions))
 

@@ -177,7 +177,9 @@ class FlankTable(Table):
     most_passes: Annotated[Count, Field(le=20)] = Field(
         1, description="greatest number of passes up a side; the fewest that keep excess_mm and gouge_mm are taken"
     )
-    feed_mm_min: Positive | None = Field(None, le=1e5, description="of the tip; none: that of the operation")
+    feed_mm_min: Positive | None = Field(
+        None, le=1e5, description="of the tip; none: that of the operation, if it has no `forces`"
+    )
     speed_rpm: Positive | None = Field(None, le=1e6, description="spindle speed; none: that of the operation")
 
 
@@ -188,7 +190,9 @@ class PointMillingTable(Table):
     lean_deg: Annotated[Number, Field(ge=0.5, le=80.0)] = Field(
         10.0, description="least angle of the cutter's axis from the normal of the surface"
     )
-    feed_mm_min: Positive | None = Field(None, le=1e5, description="of the tip; none: that of the operation")
+    feed_mm_min: Positive | None = Field(
+        None, le=1e5, description="of the tip; none: that of the operation, if it has no `forces`"
+    )
     speed_rpm: Positive | None = Field(None, le=1e6, description="spindle speed; none: that of the operation")
 
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.ndimage import gaussian_filter1d, minimum_filter1d
+from scipy.ndimage import binary_dilation, gaussian_filter1d, minimum_filter1d
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
@@ -32,14 +32,18 @@ from chipload.planning.impeller.scene import Floats, Scene
 from chipload.planning.impeller.track import ToolTrack, posed
 from chipload.progress import Progress, silent
 
-_MENDS, _ROUNDS = 4, 12
-#: distance of the places at which a scallop is looked for [mm], and while a step is sought
-_FINE, _COARSE = 0.5, 1.5
+_MENDS, _ROUNDS = 6, 12
+#: distance of the places at which a scallop is looked for [mm]: with 1.5 a D 12 came out a third too high
+_FINE = 0.5
 _LINES = 5000
 #: of how far a pass stays below the scallop, how far from the border the outermost lines lie
 _INSIDE = 0.9
+_LESS = 0.6  # least share of a step that is tried where a line came out too high
 _USED = 0.9  # of what is aimed at, the mean scallop that is enough
 _STILL = 5e-3  # share by which a step may still change
+_SPLIT = math.radians(45.0)  # from station to station: further the pallet does not turn in one piece of a line
+#: tangent of the angle by which a line may run askew to the parameter lines; least share of a step that it keeps there
+_SKEW, _HELD = 0.6, 0.4
 
 
 @dataclass(frozen=True)
@@ -57,7 +61,7 @@ class PatchFinish:
     scallop: float
     motion: LineMotion
     overrun: float = 0.0
-    aim: float = 0.9
+    aim: float = 0.95
 
     def __post_init__(self) -> None:
         if not (0.0 < self.scallop < math.inf and 0.0 < self.aim <= 1.0):
@@ -109,14 +113,12 @@ def finishing(
         tracks += new
         missed += gone
         progress(float(np.clip((line.q.min() - Q[0]) / (Q[1] - Q[0]), 0.0, 1.0)), f"{number_of + 1} lines")
-        open_ = line.q < Q[1]
-        if not open_[need].any() or step.reaches(line, Q[1]):
+        open_ = use & ~step.done(line, Q[1])
+        if not open_[need].any():
             return Tracks(tuple(tracks), tuple(missed), number_of + 1)
         line = step.next(line, Q[1])
-        # where the line before has reached the border there is nothing left
-        use = (
-            open_ | np.roll(open_, 1) & (np.arange(len(p)) > 0) | np.roll(open_, -1) & (np.arange(len(p)) < len(p) - 1)
-        )
+        # where the pass of the line before has reached the border there is nothing left
+        use = binary_dilation(open_)
     raise InputError(f"finish.scallop = {how.scallop:g} mm: more than {_LINES} lines: raise it")
 
 
@@ -151,11 +153,15 @@ class _Stepper:
             w = np.where(known, np.minimum(w, behind), w)
         return line
 
-    def reaches(self, line: Line, border: float) -> bool:
-        """Whether the pass of a line stays below the scallop to the border, all along: no further line is needed."""
+    def done(self, line: Line, border: float) -> Flags:
+        """(n,) stations at which the pass of a line stays below the scallop to the border."""
         ahead, _ = self._reach(line)
-        w = _INSIDE * ahead[self.need]
-        return bool(np.isfinite(w).all() and (line.q + self._dq(line, _INSIDE * ahead))[self.need].min() >= border)
+        w = np.where(np.isfinite(ahead), _INSIDE * ahead, 0.0)
+        # beyond the patch lines go on as at its ends
+        inner = np.flatnonzero(self.need)
+        near = inner[np.abs(inner - np.arange(len(w))[:, None]).argmin(axis=1)]
+        out: Flags = (line.q + self._dq(line, w) >= border)[near]
+        return out
 
     def next(self, line: Line, end: float) -> Line:
         """The next line towards ``end``, so that the scallop between is as high as asked.
@@ -164,35 +170,38 @@ class _Stepper:
         """
         ahead, behind = self._reach(line)
         w = self._even(ahead + behind)
-        B, out = line.pallet, line
+        B, most = line.pallet, self.scallop * (0.5 + 0.5 * self.aim)
+        less = np.ones(len(w))
         best: tuple[float, Line] | None = None
         for _ in range(_MENDS):
             w = self._step(line, w, B)
-            out = self.lines.line(self._moved(line, w, end), B)
+            out = self.lines.line(self._moved(line, less * w, end), B)
             scallop = self._scallop(line, out.q, out.pallet)
-            if not np.isfinite(out.pallet).any():
+            # what is used of the scallop where the line is not at the border; below 0: by how much it is too high
+            inner = scallop[np.isfinite(scallop) & (out.q < end)]
+            share = float(inner.mean() / self.scallop) if len(inner) else 1.0
+            over = float(np.nanmax(scallop, initial=0.0)) / most
+            score = share if over <= 1.0 else 1.0 - over
+            if best is None or score > best[0]:
+                best = score, out
+            if not np.isfinite(out.pallet).any() or (over <= 1.0 and share > _USED * self.aim):
                 break
+            if over > 1.0:
+                # the new line has other angles than the step was laid out for
+                there = np.sqrt(most / np.where(scallop > most, scallop, most))
+                less *= np.clip(minimum_filter1d(there, 3), _LESS, 1.0)
             B = out.pallet
-            if (scallop > self.scallop * (0.5 + 0.5 * self.aim)).any():
-                continue
-            # what is used of the scallop where the line is not at the border
-            inner = np.isfinite(scallop) & (out.q < end)
-            share = float(scallop[inner].mean() / self.scallop) if inner.any() else 1.0
-            if best is None or share > best[0]:
-                best = share, out
-            if share > _USED * self.aim:
-                break
-        return out if best is None else best[1]
+        return line if best is None else best[1]
 
     def _moved(self, line: Line, w: Floats, end: float) -> Floats:
-        out: Floats = np.minimum(line.q + self._dq(line, w), end)
+        out: Floats = np.minimum(self._straight(line, line.q + self._dq(line, w)), end)
         return out
 
     def _step(self, line: Line, w: Floats, pallet: Floats) -> Floats:
         """The step at which the scallop is as high as aimed, if the next line is milled at these pallet angles."""
         aim = self.aim * self.scallop
         for _ in range(_ROUNDS):
-            scallop = self._scallop(line, self._moved(line, w, 1.0), pallet, _COARSE)
+            scallop = self._scallop(line, self._moved(line, w, 1.0), pallet)
             ratio = np.clip(np.sqrt(aim / np.clip(scallop, 0.1 * aim, None)), 0.6, 1.3)
             if not np.isfinite(ratio).any() or (np.nanmin(ratio) > 0.99 and np.nanmax(ratio) < 1.03):
                 break
@@ -206,14 +215,11 @@ class _Stepper:
                 break
         return w
 
-    def _scallop(self, line: Line, q: Floats, pallet: Floats, fine: float = _FINE) -> Floats:
-        """(n,) scallop between a line and one at q, the highest near each station; nan: one of them is not milled.
-
-        ``fine`` : distance of the places along the line at which it is looked for [mm]
-        """
+    def _scallop(self, line: Line, q: Floats, pallet: Floats) -> Floats:
+        """(n,) scallop between a line and one at q, the highest near each station; nan: one of them is not milled."""
         n = len(q)
         length = float(np.linalg.norm(np.diff(line.S, axis=0), axis=1).mean())
-        sub = 2 * max(1, math.ceil(0.5 * length / fine))
+        sub = 2 * max(1, math.ceil(0.5 * length / _FINE))
         at = np.arange((n - 1) * sub + 1) / sub
         p, q0, q1 = (np.interp(at, np.arange(n), x) for x in (self.lines.p, line.q, q))
         B0, B1 = (_blended(x, at) for x in (line.pallet, pallet))
@@ -265,7 +271,17 @@ class _Stepper:
             r, h = self.lines.cutter.corner_radius, self.scallop
             return np.full(len(w), 2.0 * math.sqrt(2.0 * max(r, h) * h))
         near = known[np.abs(known[None] - np.arange(len(w))[:, None]).argmin(axis=1)]
-        out: Floats = np.minimum(gaussian_filter1d(minimum_filter1d(w[near], 3), 1.0, mode="nearest"), w[near])
+        out: Floats = np.minimum(gaussian_filter1d(w[near], 1.0, mode="nearest"), w[near])
+        return out
+
+    def _straight(self, line: Line, q: Floats) -> Floats:
+        """Places (n,) of the line after ``line``, held back where it would run askew to the parameter lines."""
+        ahead = np.maximum(np.abs(self._across(line, line.q)), 1e-12)
+        size = np.linalg.norm(np.diff(line.S, axis=0), axis=1)
+        far = np.concatenate([[0.0], np.cumsum(_SKEW * size / np.minimum(ahead[1:], ahead[:-1]))])
+        soft = np.minimum(gaussian_filter1d(q, 1.0, mode="nearest"), q)
+        held = (soft[None] + np.abs(far[:, None] - far[None])).min(axis=1)
+        out: Floats = np.maximum(held, line.q + _HELD * (q - line.q))
         return out
 
     def _dq(self, line: Line, w: Floats) -> Floats:
@@ -276,10 +292,11 @@ class _Stepper:
 
 
 def _blended(pallet: Floats, at: Floats) -> Floats:
-    """Pallet angles between stations; nan next to a station that has none."""
+    """Pallet angles between stations; nan next to a station that has none, and where a line is split."""
     i = np.minimum(at.astype(np.int64), len(pallet) - 2)
     w = at - i
     turn = pallet[i + 1] - pallet[i]
     turn = turn - math.tau * np.round(turn / math.tau)
     out: Floats = pallet[i] + w * turn
+    out = np.where(np.abs(turn) > _SPLIT, np.nan, out)
     return np.where(w == 0.0, pallet[i], np.where(w == 1.0, pallet[i + 1], out))

@@ -52,7 +52,7 @@ NUMBERS |= {(body, f"{side} fillet"): FILLET + n for (body, side), n in NUMBERS.
 _FLOOR = 2
 #: rest passes take what is left above this share of the scallop: above what is left between two lines, and below
 #: what is asked, for the count is of points
-_AIM = 0.96
+_AIM = 0.985
 #: so many settings are brought into the best order; more of them on and on to the nearest
 _EXACT = 7
 
